@@ -1,0 +1,3 @@
+//! The PC side of the motion kernel.
+
+pub mod record;

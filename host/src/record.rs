@@ -1,0 +1,109 @@
+//! What a run leaves behind: one row per tick, and the plan it was run from.
+//!
+//! Filled by the simulation, read by the summary, the trace file and the report.
+
+/// Axes of the machine.
+pub const AXES: usize = 3;
+
+/// A whole run.
+#[derive(Clone, Debug, Default)]
+pub struct RunRecord {
+    /// Program name as the user gave it.
+    pub program: String,
+    /// Machine name from the machine file.
+    pub machine: String,
+    /// Control tick \[s\].
+    pub tick_s: f64,
+    /// Axis names, in order.
+    pub axis_names: [String; AXES],
+    /// Blocks of the plan, in path order over the whole program.
+    pub blocks: Vec<BlockRecord>,
+    /// Every tick, in order.
+    pub ticks: Vec<TickRecord>,
+    /// Duration of the plan, dwells included \[s\].
+    pub planned_time_s: f64,
+    /// Faults, in order.
+    pub faults: Vec<FaultRecord>,
+    /// What was accepted and not acted on, and other remarks for the reader.
+    pub notices: Vec<String>,
+}
+
+/// One block of the plan.
+#[derive(Clone, Debug)]
+pub struct BlockRecord {
+    /// G-code line, from 1.
+    pub line: u32,
+    /// "line", "arc" or "helix".
+    pub kind: &'static str,
+    /// Where the block starts, from the program's start along the path \[mm\].
+    pub start_mm: f64,
+    /// Path length \[mm\].
+    pub length_mm: f64,
+    /// Ceiling of the feed \[mm/s\].
+    pub cap_mm_s: f64,
+    /// What set the ceiling.
+    pub cap_reason: &'static str,
+    /// Feed at the start \[mm/s\].
+    pub enter_mm_s: f64,
+    /// Highest feed inside \[mm/s\].
+    pub peak_mm_s: f64,
+    /// Feed at the end \[mm/s\].
+    pub exit_mm_s: f64,
+    /// Duration \[s\].
+    pub time_s: f64,
+}
+
+/// One tick: set values along the path, and every axis.
+#[derive(Clone, Copy, Debug)]
+pub struct TickRecord {
+    /// Tick number from 0.
+    pub tick: u64,
+    /// Path position from the program's start \[mm\].
+    pub s_mm: f64,
+    /// Feed \[mm/s\].
+    pub v_mm_s: f64,
+    /// Acceleration along the path \[mm/s²\].
+    pub a_mm_s2: f64,
+    /// Jerk along the path \[mm/s³\].
+    pub j_mm_s3: f64,
+    /// Snap along the path \[mm/s⁴\].
+    pub snap_mm_s4: f64,
+    /// Executor state: "idle", "moving", "dwell", "stopped", "fault".
+    pub state: &'static str,
+    /// G-code line of the path piece.
+    pub line: u32,
+    /// Per axis.
+    pub axes: [AxisTick; AXES],
+}
+
+/// One axis in one tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct AxisTick {
+    /// Set position \[mm\].
+    pub set_mm: f64,
+    /// Set velocity \[mm/s\].
+    pub vel_mm_s: f64,
+    /// Set acceleration \[mm/s²\].
+    pub acc_mm_s2: f64,
+    /// Set jerk \[mm/s³\].
+    pub jerk_mm_s3: f64,
+    /// Actual position from the encoder \[mm\].
+    pub act_mm: f64,
+    /// Following error, set − actual \[µm\].
+    pub err_um: f64,
+    /// Output voltage \[V\].
+    pub out_v: f64,
+}
+
+/// A fault as recorded.
+#[derive(Clone, Debug)]
+pub struct FaultRecord {
+    /// Tick in which it was latched.
+    pub tick: u64,
+    /// Name of the axis, if it concerns one.
+    pub axis: Option<String>,
+    /// Stable name of the fault.
+    pub fault: String,
+    /// Figures.
+    pub detail: String,
+}

@@ -1,0 +1,116 @@
+//! Quantities whose mix-up would break a machine, as types.
+//!
+//! Everything else is a plain number with its unit in its name. Used by every room; holds no logic
+//! beyond the conversions between these types.
+
+use fixed::types::I32F32;
+
+use crate::num::Real;
+
+/// A position or a length in mm, in steps of 2⁻³² mm (0.23 pm), from −2³¹ to 2³¹ mm.
+///
+/// Path positions and axis positions are kept in this type because a float degrades with distance:
+/// in f32 the fourth decimal is lost at 1.7 m. Subtract first, convert the difference afterwards.
+///
+/// All arithmetic wraps. Inputs are bounded to ±10⁶ mm when they are accepted
+/// ([`Position::LIMIT_MM`]), so wrapping can't be reached by accepted work.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Position(I32F32);
+
+impl Position {
+    /// The origin.
+    pub const ZERO: Self = Self(I32F32::ZERO);
+    /// The largest coordinate and stretch length that the kernel accepts \[mm\]: one kilometre.
+    pub const LIMIT_MM: f64 = 1.0e6;
+
+    /// Steps of 2⁻³² mm.
+    #[must_use]
+    pub const fn from_bits(bits: i64) -> Self {
+        Self(I32F32::from_bits(bits))
+    }
+
+    /// Steps of 2⁻³² mm.
+    #[must_use]
+    pub const fn to_bits(self) -> i64 {
+        self.0.to_bits()
+    }
+
+    /// The nearest step to `mm`; `None` if `mm` is not finite or beyond ±[`Self::LIMIT_MM`].
+    /// Background only.
+    #[must_use]
+    pub fn from_mm(mm: f64) -> Option<Self> {
+        if libm::fabs(mm) <= Self::LIMIT_MM { I32F32::checked_from_num(mm).map(Self) } else { None }
+    }
+
+    /// The value in mm, rounded to f64 (exact up to 2 m). For records and reports, not for the tick.
+    #[must_use]
+    pub fn to_mm(self) -> f64 {
+        self.0.to_num()
+    }
+
+    /// A short local offset in mm as a step count. Offsets beyond ±2³¹ mm saturate.
+    #[must_use]
+    pub fn from_offset<R: Real>(offset_mm: R) -> Self {
+        Self::from_bits(offset_mm.to_q32())
+    }
+
+    /// The value as a local offset in mm; exact to the resolution of `R`.
+    #[must_use]
+    pub fn to_offset<R: Real>(self) -> R {
+        R::from_q32(self.to_bits())
+    }
+}
+
+impl core::ops::Add for Position {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self(self.0.wrapping_add(other.0))
+    }
+}
+
+impl core::ops::Sub for Position {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self(self.0.wrapping_sub(other.0))
+    }
+}
+
+impl core::ops::Neg for Position {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self(self.0.wrapping_neg())
+    }
+}
+
+/// An encoder position in counts since power-up, extended to 64 bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Counts(pub i64);
+
+/// A two's-complement code of a 16-bit ±10 V converter: −32768 is −10 V, 0 is 0 V, 32767 is one
+/// step below +10 V. The only door between volts and the converter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DacCode(pub i16);
+
+impl DacCode {
+    /// 0 V.
+    pub const ZERO: Self = Self(0);
+    /// The converter's full scale \[V\].
+    pub const FULL_SCALE_V: f64 = 10.0;
+    /// Codes per volt.
+    pub const PER_VOLT: f64 = 32768.0 / Self::FULL_SCALE_V;
+
+    /// The code nearest to `output_v`, halves away from zero; saturates at the ends of the range.
+    /// A value that is not a number gives 0 V.
+    #[must_use]
+    pub fn from_volts<R: Real>(output_v: R) -> Self {
+        Self((output_v * R::from_f64(Self::PER_VOLT)).round_to_i16())
+    }
+
+    /// The voltage of this code \[V\].
+    #[must_use]
+    pub fn to_volts(self) -> f64 {
+        f64::from(self.0) / Self::PER_VOLT
+    }
+}
