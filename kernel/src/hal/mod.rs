@@ -5,8 +5,10 @@
 //! only round if both its axes were read at the same time. A board implements these traits in the
 //! tick's interrupt, so each call must have a bounded duration.
 
+mod ad5754;
 mod extend;
 
+pub use ad5754::{Ad5754Error, Ad5754Frame, Ad5754Output, POWER_UP_TIME_US};
 pub use extend::{CountExtender, TimerWidth};
 
 use crate::units::{Counts, DacCode};

@@ -10,6 +10,7 @@ macro_rules! float {
         impl Real for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
+            const EPSILON: f64 = $float::EPSILON as f64;
             const SERIES_TERMS: usize = $terms;
             const PIECE_MM_MAX: f64 = $piece;
 

@@ -33,6 +33,8 @@ pub trait Real:
     const ZERO: Self;
     /// 1.
     const ONE: Self;
+    /// Distance from 1 to the next larger value.
+    const EPSILON: f64;
     /// Terms of the power series of the law's shapes near an edge that this type can resolve
     /// (see [`crate::law`]).
     const SERIES_TERMS: usize;

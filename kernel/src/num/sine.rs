@@ -52,7 +52,7 @@ macro_rules! sin_cos {
             for &term in SINE[..$sine_terms].iter().rev() {
                 sine = sine * square + term as $float;
             }
-            sine = sine * x;
+            sine *= x;
             let mut cosine: $float = 0.0;
             for &term in COSINE[..$cosine_terms].iter().rev() {
                 cosine = cosine * square + term as $float;

@@ -1,0 +1,198 @@
+//! The regulator of S4 (1).
+//!
+//! ```text
+//! U = kp·ε + kd·Δε + ki·Σε + F_V(V) + F_a(a) + F_J(J)
+//! ```
+//!
+//! ε is the following error; V, a, J are the commanded velocity, acceleration and jerk of this tick.
+//! P, PI, PD, PID and open loop are choices of the gains. Gains are given in units of time, so they
+//! keep their meaning when the tick changes; [`Regulator::new`] turns them into per-tick factors.
+//!
+//! **Anti-windup**: while the output is at its limit, the sum takes no error that would drive the
+//! output farther out.
+
+use super::scale::ScaleError;
+use crate::num::Real;
+use crate::path::Setpoint;
+
+/// Feedback gains, output \[mm/s\] per following error.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gains {
+    /// Proportional \[1/s\].
+    pub kp_per_s: f64,
+    /// Integral \[1/s²\]: ki of S4 (1) is this times the tick.
+    pub ki_per_s2: f64,
+    /// Derivative \[1\]: kd of S4 (1) is this divided by the tick.
+    pub kd: f64,
+}
+
+/// Feedforward gains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Feedforward {
+    /// Of velocity \[1\]; 1 for a drive whose gain is known.
+    pub velocity: f64,
+    /// Of acceleration \[s\].
+    pub accel_s: f64,
+    /// Of jerk \[s²\].
+    pub jerk_s2: f64,
+}
+
+/// The regulator's configuration, per tick. Immutable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Regulator<R> {
+    kp: R,
+    ki: R,
+    kd: R,
+    velocity: R,
+    accel: R,
+    jerk: R,
+}
+
+/// What the regulator remembers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RegulatorState<R> {
+    /// Σε \[mm\].
+    sum_mm: R,
+    /// ε of the tick before \[mm\]; none in the first tick, so that it has no derivative kick.
+    last_error_mm: Option<R>,
+}
+
+/// The regulator's output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command<R> {
+    /// Velocity command \[mm/s\].
+    pub velocity_mm_s: R,
+    /// It was cut at a limit.
+    pub saturated: bool,
+}
+
+impl<R: Real> Regulator<R> {
+    /// The regulator for a control tick of `tick_s`.
+    ///
+    /// # Errors
+    /// A gain or the tick is not finite, kp, ki or kd is negative, or the tick is not positive.
+    pub fn new(gains: Gains, feedforward: Feedforward, tick_s: f64) -> Result<Self, ScaleError> {
+        for (quantity, value, least) in [
+            ("kp [1/s]", gains.kp_per_s, 0.0),
+            ("ki [1/s²]", gains.ki_per_s2, 0.0),
+            ("kd [1]", gains.kd, 0.0),
+            ("velocity feedforward [1]", feedforward.velocity, f64::MIN),
+            ("acceleration feedforward [s]", feedforward.accel_s, f64::MIN),
+            ("jerk feedforward [s²]", feedforward.jerk_s2, f64::MIN),
+            ("tick [s]", tick_s, f64::MIN_POSITIVE),
+        ] {
+            if !(value >= least && value.is_finite()) {
+                return Err(ScaleError { quantity, value, expected: "a finite number, not below 0 for a gain" });
+            }
+        }
+        Ok(Self {
+            kp: R::from_f64(gains.kp_per_s),
+            ki: R::from_f64(gains.ki_per_s2 * tick_s),
+            kd: R::from_f64(gains.kd / tick_s),
+            velocity: R::from_f64(feedforward.velocity),
+            accel: R::from_f64(feedforward.accel_s),
+            jerk: R::from_f64(feedforward.jerk_s2),
+        })
+    }
+
+    /// One tick: the velocity command, cut at `limits` \[mm/s\].
+    #[inline]
+    pub fn tick(
+        &self,
+        state: &mut RegulatorState<R>,
+        error_mm: R,
+        setpoint: &Setpoint<R>,
+        limits: (R, R),
+    ) -> Command<R> {
+        let change_mm = state.last_error_mm.map_or(R::ZERO, |last| error_mm - last);
+        state.last_error_mm = Some(error_mm);
+        let feedforward = self.velocity * setpoint.velocity_mm_s
+            + self.accel * setpoint.accel_mm_s2
+            + self.jerk * setpoint.jerk_mm_s3;
+        let sum_mm = state.sum_mm + error_mm;
+        let wanted = feedforward + self.kp * error_mm + self.kd * change_mm + self.ki * sum_mm;
+        let (least, greatest) = limits;
+        let velocity_mm_s = wanted.min(greatest).max(least);
+        let winding_up = (wanted > greatest && error_mm > R::ZERO) || (wanted < least && error_mm < R::ZERO);
+        if !winding_up {
+            state.sum_mm = sum_mm;
+        }
+        Command { velocity_mm_s, saturated: wanted > greatest || wanted < least }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TICK_S: f64 = 0.0005;
+    const WIDE: (f64, f64) = (-1e9, 1e9);
+    const NO_FEEDFORWARD: Feedforward = Feedforward { velocity: 0.0, accel_s: 0.0, jerk_s2: 0.0 };
+
+    fn regulator(gains: Gains, feedforward: Feedforward) -> Regulator<f64> {
+        Regulator::new(gains, feedforward, TICK_S).expect("valid")
+    }
+
+    /// S4 (1) written out, on a random sequence of errors and set-points.
+    #[test]
+    fn is_the_papers_equation() {
+        let gains = Gains { kp_per_s: 230.0, ki_per_s2: 900.0, kd: 0.003 };
+        let feedforward = Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.2e-5 };
+        let regulator = regulator(gains, feedforward);
+        let mut state = RegulatorState::default();
+        let (mut random, mut errors) = (7_u64, Vec::new());
+        for _ in 0..1000 {
+            let mut unit = || {
+                random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (random >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+            };
+            let setpoint = Setpoint {
+                velocity_mm_s: 300.0 * unit(),
+                accel_mm_s2: 5e3 * unit(),
+                jerk_mm_s3: 5e4 * unit(),
+                ..Setpoint::default()
+            };
+            errors.push(0.01 * unit());
+            let error = errors[errors.len() - 1];
+            let found = regulator.tick(&mut state, error, &setpoint, WIDE);
+            let change = if errors.len() > 1 { error - errors[errors.len() - 2] } else { 0.0 };
+            let expected = gains.kp_per_s * error
+                + gains.kd / TICK_S * change
+                + gains.ki_per_s2 * TICK_S * errors.iter().sum::<f64>()
+                + setpoint.velocity_mm_s
+                + 1.675e-3 * setpoint.accel_mm_s2
+                + 2.2e-5 * setpoint.jerk_mm_s3;
+            assert!((found.velocity_mm_s - expected).abs() < 1e-9);
+            assert!(!found.saturated);
+        }
+    }
+
+    #[test]
+    fn gains_of_zero_open_the_loop() {
+        let open = regulator(Gains::default(), Feedforward { velocity: 1.0, ..NO_FEEDFORWARD });
+        let setpoint = Setpoint { velocity_mm_s: 120.0, ..Setpoint::default() };
+        let command = open.tick(&mut RegulatorState::default(), 55.0, &setpoint, WIDE);
+        assert!((command.velocity_mm_s - 120.0).abs() < 1e-12);
+    }
+
+    /// After a long saturation the output must come back as soon as the error changes sign.
+    #[test]
+    fn the_sum_does_not_wind_up() {
+        let regulator = regulator(Gains { kp_per_s: 10.0, ki_per_s2: 1e4, kd: 0.0 }, NO_FEEDFORWARD);
+        let mut state = RegulatorState::default();
+        let still = Setpoint::default();
+        for _ in 0..100_000 {
+            let command = regulator.tick(&mut state, 5.0, &still, (-40.0, 30.0));
+            assert!(command.saturated && (command.velocity_mm_s - 30.0).abs() < 1e-12);
+        }
+        let back = regulator.tick(&mut state, -1.0, &still, (-40.0, 30.0));
+        assert!(back.velocity_mm_s < 0.0, "{}", back.velocity_mm_s);
+    }
+
+    #[test]
+    fn refuses_gains_that_are_not_numbers() {
+        let gains = Gains { kp_per_s: f64::NAN, ..Gains::default() };
+        assert!(Regulator::<f32>::new(gains, NO_FEEDFORWARD, TICK_S).is_err());
+        assert!(Regulator::<f32>::new(Gains::default(), NO_FEEDFORWARD, 0.0).is_err());
+    }
+}

@@ -1,0 +1,181 @@
+//! Units of an axis: encoder counts ↔ mm, velocity command ↔ volts ↔ converter code.
+//!
+//! The only place where these meet. Configuration, made in the background from f64 figures.
+
+use crate::num::Real;
+use crate::units::{Counts, DacCode, Position};
+
+/// A scale that can't be used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ScaleError {
+    /// The quantity, with its unit.
+    pub quantity: &'static str,
+    /// What was given.
+    pub value: f64,
+    /// What is expected.
+    pub expected: &'static str,
+}
+
+impl core::fmt::Display for ScaleError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} {}: expected {}", self.quantity, self.value, self.expected)
+    }
+}
+
+impl core::error::Error for ScaleError {}
+
+/// Length per encoder count, with 64 fractional bits: over 2³¹ counts it is off by less than half a
+/// position step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EncoderScale {
+    /// mm per count in 2⁻⁶⁴ mm, split into 32-bit halves.
+    step_high: i64,
+    step_low: i64,
+    reversed: bool,
+}
+
+impl EncoderScale {
+    /// `mm_per_count` mm a count, positive counts in positive direction; negative for an encoder that
+    /// counts the other way.
+    ///
+    /// # Errors
+    /// |mm_per_count| is not from 10⁻⁸ to 1 mm, exclusive.
+    pub fn new(mm_per_count: f64) -> Result<Self, ScaleError> {
+        let size = libm::fabs(mm_per_count);
+        if !(size > 1.0e-8 && size < 1.0) {
+            return Err(ScaleError {
+                quantity: "encoder resolution [mm/count]",
+                value: mm_per_count,
+                expected: "a magnitude between 1e-8 and 1",
+            });
+        }
+        let scaled = size * 4_294_967_296.0;
+        let step_high = scaled as i64;
+        let step_low = ((scaled - step_high as f64) * 4_294_967_296.0) as i64;
+        Ok(Self { step_high, step_low, reversed: mm_per_count < 0.0 })
+    }
+
+    /// The position of `counts`. In the tick: four 32×32-bit products.
+    #[inline]
+    #[must_use]
+    pub fn position(&self, counts: Counts) -> Position {
+        let counts = if self.reversed { counts.0.wrapping_neg() } else { counts.0 };
+        // counts·step_low/2³², halves of the counts apart.
+        let low = (counts >> 32)
+            .wrapping_mul(self.step_low)
+            .wrapping_add((((counts & 0xFFFF_FFFF) as u64).wrapping_mul(self.step_low as u64) >> 32) as i64);
+        Position::from_bits(counts.wrapping_mul(self.step_high).wrapping_add(low))
+    }
+
+    /// Millimetres per count, with its sign.
+    #[must_use]
+    pub fn mm_per_count(&self) -> f64 {
+        let size = (self.step_high as f64 + self.step_low as f64 / 4_294_967_296.0) / 4_294_967_296.0;
+        if self.reversed { -size } else { size }
+    }
+}
+
+/// Velocity command to volts: gain, offset trim, limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutputScale<R> {
+    volts_per_mm_s: R,
+    offset_v: R,
+    /// The velocity commands at which the output reaches −limit and +limit \[mm/s\].
+    limits: (R, R),
+}
+
+impl<R: Real> OutputScale<R> {
+    /// `mm_s_at_10_v` is the axis velocity at +10 V (negative if +10 V moves in negative direction);
+    /// `offset_v` is added to every output so that a command of 0 holds the drive still;
+    /// `limit_v` bounds the output.
+    ///
+    /// # Errors
+    /// The gain is 0 or not finite, the limit is not in (0, 10\] V, or the trim is not below the limit.
+    pub fn new(mm_s_at_10_v: f64, offset_v: f64, limit_v: f64) -> Result<Self, ScaleError> {
+        let full = DacCode::FULL_SCALE_V;
+        if !(limit_v > 0.0 && limit_v <= full) {
+            return Err(ScaleError {
+                quantity: "output limit [V]",
+                value: limit_v,
+                expected: "more than 0 and at most 10",
+            });
+        }
+        if !(libm::fabs(offset_v) < limit_v) {
+            return Err(ScaleError {
+                quantity: "output offset [V]",
+                value: offset_v,
+                expected: "a magnitude below the output limit",
+            });
+        }
+        let volts_per_mm_s = full / mm_s_at_10_v;
+        if !(mm_s_at_10_v.is_finite() && volts_per_mm_s.is_finite()) {
+            return Err(ScaleError {
+                quantity: "velocity at 10 V [mm/s]",
+                value: mm_s_at_10_v,
+                expected: "a finite number other than 0",
+            });
+        }
+        let (a, b) = ((-limit_v - offset_v) / volts_per_mm_s, (limit_v - offset_v) / volts_per_mm_s);
+        Ok(Self {
+            volts_per_mm_s: R::from_f64(volts_per_mm_s),
+            offset_v: R::from_f64(offset_v),
+            limits: if a < b { (R::from_f64(a), R::from_f64(b)) } else { (R::from_f64(b), R::from_f64(a)) },
+        })
+    }
+
+    /// Least and greatest velocity command the output can express \[mm/s\].
+    pub fn limits(&self) -> (R, R) {
+        self.limits
+    }
+
+    /// The code for a velocity command \[mm/s\] within the limits.
+    #[inline]
+    pub fn code(&self, velocity_mm_s: R) -> DacCode {
+        DacCode::from_volts(velocity_mm_s * self.volts_per_mm_s + self.offset_v)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_to_position_is_exact_to_a_step_over_the_whole_range() {
+        for mm_per_count in [1e-4, 5e-4, -1e-3, 1.0 / 4096.0, 1.27e-6] {
+            let scale = EncoderScale::new(mm_per_count).expect("valid");
+            let mut counts = 1_i64;
+            while counts < 1 << 31 {
+                for counts in [counts, -counts, counts * 3 / 2] {
+                    let found = scale.position(Counts(counts)).to_bits();
+                    // Exact: the f64 resolution as a fraction of 2⁶⁴, the product in 128 bits.
+                    let step = (mm_per_count * 2.0_f64.powi(64)) as i128;
+                    let exact = (i128::from(counts) * step) >> 32;
+                    assert!((i128::from(found) - exact).abs() <= 1, "{mm_per_count} {counts}");
+                }
+                counts *= 2;
+            }
+        }
+    }
+
+    #[test]
+    fn eighty_million_counts_are_eight_metres() {
+        let scale = EncoderScale::new(1e-4).expect("valid");
+        let error_mm = scale.position(Counts(80_000_000)).to_mm() - 8000.0;
+        assert!(error_mm.abs() < 1e-9, "{error_mm:e}");
+    }
+
+    #[test]
+    fn output_reaches_its_limits_and_trims() {
+        let output = OutputScale::<f32>::new(1000.0 / 3.0, 0.5, 10.0).expect("valid");
+        assert_eq!(output.code(0.0), DacCode(1638));
+        assert_eq!(output.code(output.limits().1), DacCode(i16::MAX));
+        assert_eq!(output.code(output.limits().0), DacCode(i16::MIN));
+        let reversed = OutputScale::<f32>::new(-100.0, 0.0, 5.0).expect("valid");
+        assert_eq!(reversed.code(50.0), DacCode(-16384));
+        assert!(OutputScale::<f32>::new(0.0, 0.0, 10.0).is_err());
+        assert!(OutputScale::<f32>::new(f64::INFINITY, 0.0, 10.0).is_err());
+        assert!(OutputScale::<f32>::new(100.0, 10.0, 10.0).is_err());
+        assert!(OutputScale::<f32>::new(100.0, 0.0, 10.1).is_err());
+    }
+}

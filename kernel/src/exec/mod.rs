@@ -1,0 +1,230 @@
+//! The tick's first half: from the two streams to set-points.
+//!
+//! Consumes feed segments and pieces; produces the motion along the path and a [`Setpoint`] for every
+//! axis, each tick. Everything ends at its exact time inside a tick: what is left of the tick is
+//! spent on what follows, so a program's duration is its plan's to the tick. Every stretch ends
+//! exactly at its end point, at rest.
+//!
+//! Bound: [`STEPS_PER_TICK_MAX`] phase changes, [`PIECES_PER_TICK_MAX`](crate::path::PIECES_PER_TICK_MAX)
+//! pieces; no solver, no division. Fails by [`ExecFault`] only.
+
+mod motion;
+
+use crate::law::{PathMotion, Ticks};
+use crate::num::Real;
+use crate::path::walk::WalkError;
+use crate::path::{Setpoint, Walker};
+use crate::queue::{FeedItem, Intake};
+use crate::units::Position;
+use motion::Moving;
+
+/// How many segments or dwells may end within one tick. Denser ones are rejected when they are
+/// offered to the queue.
+pub const SEGMENTS_PER_TICK_MAX: usize = 8;
+
+/// Greatest number of steps of the executor within one tick: three phases and an end of stretch for
+/// each segment that ends, and for the one that begins.
+pub const STEPS_PER_TICK_MAX: usize = 4 * (SEGMENTS_PER_TICK_MAX + 1) + 1;
+
+/// What the executor is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ExecState {
+    /// At rest, nothing to do.
+    Idle,
+    /// Moving along the path.
+    Moving,
+    /// At rest for a programmed time.
+    Dwell,
+    /// At rest until told to resume.
+    Stopped,
+}
+
+/// Why the executor can't go on. Latched by the kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ExecFault {
+    /// The next feed segment was needed and had not arrived.
+    FeedStarved,
+    /// The next piece of path was needed and had not arrived.
+    PathStarved,
+    /// More pieces ended within one tick than the bound.
+    TooManyPieces,
+    /// More segments ended within one tick than the bound.
+    TooManySegments,
+}
+
+/// The result of one tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Executed<R, const AXES: usize> {
+    /// What the executor is doing at the end of the tick.
+    pub state: ExecState,
+    /// The motion along the path; `s` counts from the stretch's start, 0 at rest between stretches.
+    pub motion: PathMotion<R>,
+    /// Stretches finished since the start.
+    pub stretches: u32,
+    /// Program line of the current piece; 0 at rest.
+    pub line: u32,
+    /// Set-points of all axes.
+    pub setpoints: [Setpoint<R>; AXES],
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Activity<R> {
+    /// Between stretches.
+    Rest,
+    Dwell {
+        left: Ticks,
+    },
+    Stopped,
+    /// Inside a stretch.
+    Moving(Moving<R>),
+    /// Inside a stretch, the next segment not yet taken.
+    Between {
+        s: Position,
+        v_mm_s: R,
+    },
+}
+
+/// Executes the streams, tick by tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Executor<R: Real, const AXES: usize> {
+    activity: Activity<R>,
+    walker: Walker<R, AXES>,
+    stretches: u32,
+}
+
+impl<R: Real, const AXES: usize> Executor<R, AXES> {
+    /// At rest at `position`.
+    #[must_use]
+    pub fn new(position: [Position; AXES]) -> Self {
+        Self { activity: Activity::Rest, walker: Walker::new(position), stretches: 0 }
+    }
+
+    /// The outcome of a tick at rest here.
+    pub(crate) fn resting(&self) -> Executed<R, AXES> {
+        let motion = PathMotion::default();
+        Executed {
+            state: self.state(),
+            motion,
+            stretches: self.stretches,
+            line: self.walker.program_line(),
+            setpoints: self.walker.setpoints(&motion),
+        }
+    }
+
+    /// Ends a program stop. Without effect in any other state.
+    pub fn resume(&mut self) {
+        if matches!(self.activity, Activity::Stopped) {
+            self.activity = Activity::Rest;
+        }
+    }
+
+    /// One control tick.
+    ///
+    /// # Errors
+    /// The streams ran dry inside a stretch, or held more than the tick's bound. The executor's state
+    /// is then of no further use; the kernel latches the fault.
+    pub fn tick(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<Executed<R, AXES>, ExecFault> {
+        self.advance(intake)?;
+        let motion = match &self.activity {
+            Activity::Moving(moving) => moving.at(),
+            Activity::Between { s, v_mm_s } => {
+                PathMotion { s: *s, v_mm_s: *v_mm_s, ..PathMotion::default() }
+            }
+            Activity::Rest | Activity::Dwell { .. } | Activity::Stopped => PathMotion::default(),
+        };
+        if matches!(self.activity, Activity::Moving(_) | Activity::Between { .. }) {
+            self.walker.seek(motion.s, intake).map_err(walk_fault)?;
+        }
+        Ok(Executed {
+            state: self.state(),
+            motion,
+            stretches: self.stretches,
+            line: self.walker.program_line(),
+            setpoints: self.walker.setpoints(&motion),
+        })
+    }
+
+    fn state(&self) -> ExecState {
+        match self.activity {
+            Activity::Rest => ExecState::Idle,
+            Activity::Dwell { .. } => ExecState::Dwell,
+            Activity::Stopped => ExecState::Stopped,
+            Activity::Moving(_) | Activity::Between { .. } => ExecState::Moving,
+        }
+    }
+
+    /// Spends one tick's time on what is queued.
+    #[inline]
+    fn advance(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), ExecFault> {
+        let mut left = Ticks::ONE;
+        for _ in 0..STEPS_PER_TICK_MAX {
+            match &mut self.activity {
+                Activity::Moving(moving) => {
+                    let Some(after) = moving.spend(left) else { return Ok(()) };
+                    left = after;
+                    if !moving.next_phase() {
+                        self.activity = moving.ended();
+                    }
+                }
+                Activity::Dwell { left: dwell } => {
+                    if let Some(still) = dwell.minus(left)
+                        && still > Ticks::ZERO
+                    {
+                        *dwell = still;
+                        return Ok(());
+                    }
+                    left = left.minus(*dwell).unwrap_or(Ticks::ZERO);
+                    self.activity = Activity::Rest;
+                }
+                Activity::Stopped => return Ok(()),
+                Activity::Rest => match intake.peek_feed() {
+                    None => return Ok(()),
+                    Some(FeedItem::Segment(_)) if !intake.may_start() => return Ok(()),
+                    Some(FeedItem::Segment(_)) => {
+                        self.activity = Activity::Between { s: Position::ZERO, v_mm_s: R::ZERO };
+                    }
+                    Some(&FeedItem::Dwell(left)) => {
+                        intake.take_feed();
+                        self.activity = Activity::Dwell { left };
+                    }
+                    Some(FeedItem::ProgramStop) => {
+                        intake.take_feed();
+                        self.activity = Activity::Stopped;
+                    }
+                    Some(FeedItem::EndOfStretch) => self.end_stretch(intake)?,
+                },
+                Activity::Between { s, v_mm_s } => match intake.peek_feed() {
+                    Some(&FeedItem::Segment(segment)) => {
+                        intake.take_feed();
+                        self.activity = Activity::Moving(Moving::new(segment, *s));
+                    }
+                    Some(FeedItem::EndOfStretch) => self.end_stretch(intake)?,
+                    // The next item is not needed yet, or there is time to wait for it at rest.
+                    None if left == Ticks::ZERO || *v_mm_s <= R::ZERO => return Ok(()),
+                    // The feeder lets no dwell or stop into a stretch.
+                    None | Some(FeedItem::Dwell(_) | FeedItem::ProgramStop) => {
+                        return Err(ExecFault::FeedStarved);
+                    }
+                },
+            }
+        }
+        Err(ExecFault::TooManySegments)
+    }
+
+    fn end_stretch(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), ExecFault> {
+        intake.take_feed();
+        self.walker.finish(intake).map_err(walk_fault)?;
+        self.stretches = self.stretches.wrapping_add(1);
+        self.activity = Activity::Rest;
+        Ok(())
+    }
+}
+
+fn walk_fault(error: WalkError) -> ExecFault {
+    match error {
+        WalkError::Starved => ExecFault::PathStarved,
+        WalkError::TooManyPieces => ExecFault::TooManyPieces,
+    }
+}

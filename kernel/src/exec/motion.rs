@@ -1,0 +1,66 @@
+//! A feed segment under way: which phase, and how far into it.
+
+use super::Activity;
+use crate::law::{FeedSegment, PathMotion, Phase, Ticks};
+use crate::num::Real;
+use crate::units::Position;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moving<R> {
+    segment: FeedSegment<R>,
+    /// Path position of the segment's start.
+    start: Position,
+    phase: Phase,
+    /// Time spent in the phase.
+    elapsed: Ticks,
+    /// The same, normalised, in 2⁻⁶⁴.
+    fraction: u64,
+}
+
+impl<R: Real> Moving<R> {
+    pub(super) fn new(segment: FeedSegment<R>, start: Position) -> Self {
+        Self { segment, start, phase: Phase::Rise, elapsed: Ticks::ZERO, fraction: 0 }
+    }
+
+    /// Spends `time` ≤ 1 tick in the phase. If the phase ends by then: what is left of the time.
+    #[inline]
+    pub(super) fn spend(&mut self, time: Ticks) -> Option<Ticks> {
+        let elapsed = self.elapsed.plus(time);
+        let over = elapsed.minus(self.segment.phase_duration(self.phase));
+        if over.is_none() {
+            // A phase that is already under way is given whole ticks only.
+            self.fraction = if self.elapsed > Ticks::ZERO {
+                self.fraction.wrapping_add(self.segment.fraction_step(self.phase))
+            } else {
+                self.segment.fraction_at(self.phase, time)
+            };
+            self.elapsed = elapsed;
+        }
+        over
+    }
+
+    /// Goes on to the next phase; false if that was the last one.
+    #[inline]
+    pub(super) fn next_phase(&mut self) -> bool {
+        self.phase = match self.phase {
+            Phase::Rise => Phase::Hold,
+            Phase::Hold => Phase::Fall,
+            Phase::Fall => return false,
+        };
+        self.elapsed = Ticks::ZERO;
+        self.fraction = 0;
+        true
+    }
+
+    /// What follows the segment's end.
+    pub(super) fn ended(&self) -> Activity<R> {
+        Activity::Between { s: self.start + self.segment.length(), v_mm_s: self.segment.as_ramp().to_mm_s }
+    }
+
+    /// The motion now; `s` counts from the stretch's start.
+    #[inline]
+    pub(super) fn at(&self) -> PathMotion<R> {
+        let motion = self.segment.at(self.phase, self.fraction);
+        PathMotion { s: self.start + motion.s, ..motion }
+    }
+}

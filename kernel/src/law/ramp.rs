@@ -1,0 +1,156 @@
+//! One change of feed: its peak jerk, its times, and the state at any time inside it.
+//!
+//! Background: the planner chooses ramps with it and reports evaluate it. The tick evaluates the
+//! same shapes through [`FeedSegment`](super::FeedSegment), which has nothing left to divide.
+
+use super::limits::Law;
+use super::shape::Shape;
+use crate::num::Root;
+
+/// A ramp between two feeds (S1, section 1). A braking ramp is the accelerating one mirrored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ramp<R> {
+    /// F₀ \[mm/s\], ≥ 0.
+    pub from_mm_s: R,
+    /// F \[mm/s\], ≥ 0.
+    pub to_mm_s: R,
+    /// J_p \[mm/s³\], ≥ 0; 0 if the feeds are equal.
+    pub peak_jerk_mm_s3: R,
+    /// t₁, the end of the rising phase \[s\].
+    pub t1_s: R,
+    /// t₂, the end of the phase of constant acceleration \[s\], ≥ t₁.
+    pub t2_s: R,
+    /// What fixed J_p and t₁.
+    pub limited_by: LimitedBy,
+}
+
+/// The limit that fixed a ramp's peak jerk and rise time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum LimitedBy {
+    /// Acceleration: there is a phase of constant acceleration.
+    Acceleration,
+    /// Jerk: the peak jerk is the jerk limit, the acceleration limit is not reached.
+    Jerk,
+    /// Snap: the change of feed is too small for the jerk limit.
+    Snap,
+}
+
+impl LimitedBy {
+    /// The limit's name, as the command line prints it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Acceleration => "acceleration",
+            Self::Jerk => "jerk",
+            Self::Snap => "snap",
+        }
+    }
+}
+
+/// The motion along the path at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FeedState<R> {
+    /// Length since the start of the ramp \[mm\].
+    pub s_mm: R,
+    /// Feed \[mm/s\].
+    pub v_mm_s: R,
+    /// Acceleration \[mm/s²\].
+    pub a_mm_s2: R,
+    /// Jerk \[mm/s³\].
+    pub j_mm_s3: R,
+    /// Snap \[mm/s⁴\].
+    pub snap_mm_s4: R,
+}
+
+impl<R: Root> Ramp<R> {
+    /// The fastest ramp of the law between two feeds ≥ 0: S1 (13), (22), (23). Equal feeds give a
+    /// ramp of no duration.
+    #[must_use]
+    pub fn new(law: &Law<R>, from_mm_s: R, to_mm_s: R) -> Self {
+        let change = (to_mm_s - from_mm_s).abs();
+        let (t1_s, t2_s) = law.times_s(change);
+        let (peak_jerk_mm_s3, limited_by) = if change <= law.snap_limited_to_mm_s {
+            let jerk = if t1_s > R::ZERO { (change + change) / (t1_s * t1_s) } else { R::ZERO };
+            (jerk.min(law.jerk_mm_s3), LimitedBy::Snap)
+        } else if change < law.accel_limited_from_mm_s {
+            (law.jerk_mm_s3, LimitedBy::Jerk)
+        } else {
+            (law.jerk_mm_s3, LimitedBy::Acceleration)
+        };
+        Self { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by }
+    }
+
+    /// t_p \[s\]: (14).
+    pub fn duration_s(&self) -> R {
+        self.t1_s + self.t2_s
+    }
+
+    /// S(t_p) \[mm\]: (12).
+    pub fn length_mm(&self) -> R {
+        R::from_f64(0.5) * (self.from_mm_s + self.to_mm_s) * self.duration_s()
+    }
+
+    /// J_p with the sign of the change of feed.
+    pub(super) fn signed_jerk_mm_s3(&self) -> R {
+        if self.to_mm_s < self.from_mm_s { -self.peak_jerk_mm_s3 } else { self.peak_jerk_mm_s3 }
+    }
+
+    /// The motion at `t_s` after the ramp's start: (1)–(6). Before the start it is the start's,
+    /// after the end the end's, continued at constant feed.
+    #[must_use]
+    pub fn at(&self, t_s: R) -> FeedState<R> {
+        let rest = |s_mm, v_mm_s| FeedState {
+            s_mm,
+            v_mm_s,
+            a_mm_s2: R::ZERO,
+            j_mm_s3: R::ZERO,
+            snap_mm_s4: R::ZERO,
+        };
+        let remaining_s = self.duration_s() - t_s;
+        if t_s <= R::ZERO {
+            return rest(self.from_mm_s * t_s, self.from_mm_s);
+        }
+        if remaining_s <= R::ZERO {
+            return rest(self.length_mm() - self.to_mm_s * remaining_s, self.to_mm_s);
+        }
+        let (rise_s, jerk) = (self.t1_s, self.signed_jerk_mm_s3());
+        let accel_scale = jerk * rise_s;
+        let speed_scale = accel_scale * rise_s;
+        let length_scale = speed_scale * rise_s;
+        let snap_scale = R::from_f64(core::f64::consts::PI) * jerk / rise_s;
+        if t_s < rise_s {
+            let shape = Shape::at(t_s / rise_s);
+            FeedState {
+                s_mm: self.from_mm_s * t_s + length_scale * shape.length,
+                v_mm_s: self.from_mm_s + speed_scale * shape.speed,
+                a_mm_s2: accel_scale * shape.accel,
+                j_mm_s3: jerk * shape.jerk,
+                snap_mm_s4: snap_scale * shape.snap,
+            }
+        } else if remaining_s < rise_s {
+            // The rising phase run backwards from the end.
+            let shape = Shape::at(remaining_s / rise_s);
+            FeedState {
+                s_mm: self.length_mm() - (self.to_mm_s * remaining_s - length_scale * shape.length),
+                v_mm_s: self.to_mm_s - speed_scale * shape.speed,
+                a_mm_s2: accel_scale * shape.accel,
+                j_mm_s3: -(jerk * shape.jerk),
+                snap_mm_s4: snap_scale * shape.snap,
+            }
+        } else {
+            let end = Shape::at(R::ONE);
+            let held_s = t_s - rise_s;
+            let accel = accel_scale * end.accel;
+            let v_start = self.from_mm_s + speed_scale * end.speed;
+            let s_start = self.from_mm_s * rise_s + length_scale * end.length;
+            FeedState {
+                s_mm: s_start + held_s * (v_start + R::from_f64(0.5) * accel * held_s),
+                v_mm_s: v_start + accel * held_s,
+                a_mm_s2: accel,
+                j_mm_s3: R::ZERO,
+                snap_mm_s4: R::ZERO,
+            }
+        }
+    }
+}

@@ -1,0 +1,401 @@
+//! A ramp or a cruise made ready for the tick.
+//!
+//! Consumes a [`Ramp`] of any number type and the control tick; produces a [`FeedSegment`]: the feed
+//! stream's item. All divisions and roots happen here, in the background, in f64. What is left to the
+//! tick is one [`Shape`] and a handful of products.
+//!
+//! **Time** is counted in ticks with 32 fractional bits and divided by nothing: a phase keeps the
+//! part of itself that passes in one tick, with 64 fractional bits, and adds it up.
+//!
+//! **Position** has two parts. What grows with the feed (F₀·t) is 32.32 fixed point times a fraction,
+//! good to length·2⁻³² (1.9 nm over 8 m) whatever the number type. What the ramp adds or takes away
+//! is a `Real`: at most the change of feed times its duration.
+
+use super::ramp::Ramp;
+use super::shape::Shape;
+use crate::num::{Real, Root};
+use crate::units::Position;
+
+/// A duration in control ticks, in steps of 2⁻³² tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Ticks(u64);
+
+impl Ticks {
+    /// No time.
+    pub const ZERO: Self = Self(0);
+    /// One control tick.
+    pub const ONE: Self = Self(1 << 32);
+    /// The longest duration a segment or a dwell may have \[ticks\]: 2³¹, twelve days at 0.5 ms.
+    pub const LIMIT: f64 = 2_147_483_648.0;
+
+    /// The duration `seconds` at `tick_s` seconds a tick; `None` unless it is from 0 to
+    /// [`Self::LIMIT`].
+    #[must_use]
+    pub fn from_seconds(seconds: f64, tick_s: f64) -> Option<Self> {
+        let ticks = seconds / tick_s;
+        (0.0..=Self::LIMIT).contains(&ticks).then_some(Self((ticks * 4_294_967_296.0 + 0.5) as u64))
+    }
+
+    /// The duration in ticks.
+    #[must_use]
+    pub fn to_f64(self) -> f64 {
+        self.0 as f64 / 4_294_967_296.0
+    }
+
+    /// Sum; wraps beyond 2³² ticks.
+    #[must_use]
+    pub const fn plus(self, other: Self) -> Self {
+        Self(self.0.wrapping_add(other.0))
+    }
+
+    /// What is left of `self` after `other`, or `None` if `other` is longer.
+    #[must_use]
+    pub const fn minus(self, other: Self) -> Option<Self> {
+        match self.0.checked_sub(other.0) {
+            Some(left) => Some(Self(left)),
+            None => None,
+        }
+    }
+}
+
+/// The parts of a segment, in order. A cruise has only a hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Phase {
+    /// 0 … t₁: acceleration builds up.
+    Rise,
+    /// t₁ … t₂: constant acceleration, or cruise.
+    Hold,
+    /// t₂ … t_p: acceleration falls back to 0.
+    Fall,
+}
+
+/// The motion along the path in one tick; the position is counted from the stretch's start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PathMotion<R> {
+    /// Path position.
+    pub s: Position,
+    /// Feed \[mm/s\].
+    pub v_mm_s: R,
+    /// Acceleration along the path \[mm/s²\].
+    pub a_mm_s2: R,
+    /// Jerk along the path \[mm/s³\].
+    pub j_mm_s3: R,
+    /// Snap along the path \[mm/s⁴\].
+    pub snap_mm_s4: R,
+}
+
+/// Why a segment can't be made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SegmentError {
+    /// A quantity is not finite or below zero, or is beyond the kernel's range.
+    OutOfRange {
+        /// Which one, with its unit.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The ramp's own length differs from the length of path it is to cover.
+    LengthMismatch {
+        /// (F₀+F)/2·t_p \[mm\].
+        ramp_mm: f64,
+        /// The length of path \[mm\].
+        path_mm: f64,
+    },
+}
+
+impl core::fmt::Display for SegmentError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::OutOfRange { quantity, value } => write!(f, "{quantity} {value} is out of range"),
+            Self::LengthMismatch { ramp_mm, path_mm } => {
+                write!(f, "a ramp of {ramp_mm} mm over {path_mm} mm of path")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SegmentError {}
+
+/// How a phase turns ticks into its normalised time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Clock {
+    duration: Ticks,
+    /// The part of the phase that passes in one tick, in 2⁻⁶⁴; for a phase shorter than a tick,
+    /// the part that passes in 2⁻³² tick.
+    step: u64,
+}
+
+impl Clock {
+    fn new(duration: Ticks) -> Self {
+        let step = match duration.0 {
+            0 => 0,
+            bits if bits > Ticks::ONE.0 => ((1_u128 << 96) / u128::from(bits)) as u64,
+            bits => u64::MAX / bits,
+        };
+        Self { duration, step }
+    }
+
+    /// The normalised time `elapsed` ≤ 1 tick after the phase's start.
+    #[inline]
+    fn at(&self, elapsed: Ticks) -> u64 {
+        if self.duration > Ticks::ONE {
+            multiply_q32(self.step, elapsed.0)
+        } else {
+            self.step.wrapping_mul(elapsed.0)
+        }
+    }
+}
+
+/// a·b/2³² for b ≤ 2³².
+#[inline]
+const fn multiply_q32(a: u64, b: u64) -> u64 {
+    (a >> 32).wrapping_mul(b).wrapping_add(((a & 0xFFFF_FFFF).wrapping_mul(b)) >> 32)
+}
+
+/// `length`·`fraction`, from the top 32 bits of the fraction: two 32×32-bit products.
+#[inline]
+#[allow(clippy::cast_possible_wrap)]
+const fn portion(length: i64, fraction: u64) -> i64 {
+    let fraction = fraction >> 32;
+    let high = (length >> 32).wrapping_mul(fraction as i64);
+    let low = ((length & 0xFFFF_FFFF) as u64).wrapping_mul(fraction) >> 32;
+    high.wrapping_add(low as i64)
+}
+
+/// An item of the feed stream: a ramp or a cruise over a length of path. Immutable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeedSegment<R> {
+    length: Position,
+    ramp: Ramp<R>,
+    rise: Clock,
+    hold: Clock,
+    /// F₀·t₁ and F·t₁, in position steps.
+    rise_bits: i64,
+    fall_bits: i64,
+    /// S(t₁), V(t₁)·(t₂−t₁) and A(t₁)·(t₂−t₁)²/2, in position steps.
+    hold_start_bits: i64,
+    hold_linear_bits: i64,
+    hold_square_bits: i64,
+    hold_v_mm_s: R,
+    hold_a_mm_s2: R,
+    hold_gain_mm_s: R,
+    /// ±Jp times 1, t₁, t₁², t₁³ and π/t₁: the scales of [`Shape`].
+    jerk_mm_s3: R,
+    accel_mm_s2: R,
+    speed_mm_s: R,
+    length_mm: R,
+    snap_mm_s4: R,
+}
+
+/// How far a ramp's own length may be from the path it covers \[mm\]: rounding of both ends to
+/// position steps, and of the ramp's figures in f64 at a kilometre.
+const LENGTH_TOLERANCE_MM: f64 = 1.0e-8;
+
+impl<R: Real> FeedSegment<R> {
+    /// A ramp over `length` of path, which must be its own length to 10⁻⁸ mm (rounding).
+    ///
+    /// # Errors
+    /// A figure is not finite, negative or too large, or the lengths differ.
+    pub fn ramp<P: Root>(ramp: &Ramp<P>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
+        let ramp = to_f64(ramp);
+        let path_mm = length.to_mm();
+        let ramp_mm = ramp.length_mm();
+        // In a narrower planning type the ramp's figures carry that type's rounding.
+        let rounding = 16.0 * P::EPSILON * ramp_mm;
+        if !(libm::fabs(ramp_mm - path_mm) <= LENGTH_TOLERANCE_MM + rounding) {
+            return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
+        }
+        Self::new(&ramp, length, tick_s)
+    }
+
+    /// A cruise at `feed_mm_s` > 0 over `length` of path.
+    ///
+    /// # Errors
+    /// A figure is not finite, the feed is not positive, or the duration is too long.
+    pub fn cruise(feed_mm_s: f64, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
+        let duration_s = length.to_mm() / feed_mm_s;
+        let ramp = Ramp {
+            from_mm_s: feed_mm_s,
+            to_mm_s: feed_mm_s,
+            peak_jerk_mm_s3: 0.0,
+            t1_s: 0.0,
+            t2_s: duration_s,
+            limited_by: super::LimitedBy::Snap,
+        };
+        Self::new(&ramp, length, tick_s)
+    }
+
+    fn new(ramp: &Ramp<f64>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
+        let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by } = *ramp;
+        for (quantity, value) in [
+            ("entry feed [mm/s]", from_mm_s),
+            ("exit feed [mm/s]", to_mm_s),
+            ("peak jerk [mm/s³]", peak_jerk_mm_s3),
+            ("length [mm]", length.to_mm()),
+            ("t1 [s]", t1_s),
+            ("t2 − t1 [s]", t2_s - t1_s),
+            ("tick [s]", tick_s),
+        ] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(SegmentError::OutOfRange { quantity, value });
+            }
+        }
+        let ticks = |quantity, value| {
+            Ticks::from_seconds(value, tick_s).ok_or(SegmentError::OutOfRange { quantity, value })
+        };
+        let rise_ticks = ticks("t1 [s]", t1_s)?;
+        let hold_s = t2_s - t1_s;
+        let hold_ticks = ticks("t2 − t1 [s]", hold_s)?;
+        let bits = |quantity, mm: f64| {
+            Position::from_mm(mm)
+                .map(Position::to_bits)
+                .ok_or(SegmentError::OutOfRange { quantity, value: mm })
+        };
+        let jerk = ramp.signed_jerk_mm_s3();
+        let (accel, speed, length_scale) = (jerk * t1_s, jerk * t1_s * t1_s, jerk * t1_s * t1_s * t1_s);
+        let end = Shape::at(1.0);
+        let (hold_a, hold_v) = (accel * end.accel, from_mm_s + speed * end.speed);
+        // A scale that a narrow type can't hold must be refused here, not become infinite in a tick.
+        let real = |quantity, value: f64| {
+            let narrow = R::from_f64(value);
+            if narrow.is_finite() { Ok(narrow) } else { Err(SegmentError::OutOfRange { quantity, value }) }
+        };
+        let snap = if t1_s > 0.0 { core::f64::consts::PI * jerk / t1_s } else { 0.0 };
+        Ok(Self {
+            length,
+            ramp: Ramp {
+                from_mm_s: real("entry feed [mm/s]", from_mm_s)?,
+                to_mm_s: real("exit feed [mm/s]", to_mm_s)?,
+                peak_jerk_mm_s3: real("peak jerk [mm/s³]", peak_jerk_mm_s3)?,
+                t1_s: real("t1 [s]", t1_s)?,
+                t2_s: real("t2 [s]", t2_s)?,
+                limited_by,
+            },
+            rise: Clock::new(rise_ticks),
+            hold: Clock::new(hold_ticks),
+            rise_bits: bits("entry feed · t1 [mm]", from_mm_s * t1_s)?,
+            fall_bits: bits("exit feed · t1 [mm]", to_mm_s * t1_s)?,
+            hold_start_bits: bits("length of the rise [mm]", from_mm_s * t1_s + length_scale * end.length)?,
+            hold_linear_bits: bits("feed · hold time [mm]", hold_v * hold_s)?,
+            hold_square_bits: bits("length gained in the hold [mm]", 0.5 * hold_a * hold_s * hold_s)?,
+            hold_v_mm_s: real("feed at t1 [mm/s]", hold_v)?,
+            hold_a_mm_s2: real("acceleration at t1 [mm/s²]", hold_a)?,
+            hold_gain_mm_s: real("feed gained in the hold [mm/s]", hold_a * hold_s)?,
+            jerk_mm_s3: real("peak jerk [mm/s³]", jerk)?,
+            accel_mm_s2: real("jerk · t1 [mm/s²]", accel)?,
+            speed_mm_s: real("jerk · t1² [mm/s]", speed)?,
+            length_mm: real("jerk · t1³ [mm]", length_scale)?,
+            snap_mm_s4: real("peak snap [mm/s⁴]", snap)?,
+        })
+    }
+
+    /// The length of path it covers.
+    pub fn length(&self) -> Position {
+        self.length
+    }
+
+    /// The ramp it was made from; a cruise has equal feeds and t₁ = 0.
+    pub fn as_ramp(&self) -> &Ramp<R> {
+        &self.ramp
+    }
+
+    /// Greatest |acceleration| inside \[mm/s²\].
+    pub fn peak_accel_mm_s2(&self) -> R {
+        self.hold_a_mm_s2.abs()
+    }
+
+    /// Greatest |snap| inside \[mm/s⁴\].
+    pub fn peak_snap_mm_s4(&self) -> R {
+        self.snap_mm_s4.abs()
+    }
+
+    /// The whole duration.
+    pub fn duration(&self) -> Ticks {
+        self.rise.duration.plus(self.hold.duration).plus(self.rise.duration)
+    }
+
+    /// The duration of a phase; phases that a segment does not have last no time.
+    #[inline]
+    pub fn phase_duration(&self, phase: Phase) -> Ticks {
+        self.clock(phase).duration
+    }
+
+    /// Normalised time in `phase`, `elapsed` ≤ 1 tick after the phase's start, in 2⁻⁶⁴.
+    #[inline]
+    pub fn fraction_at(&self, phase: Phase, elapsed: Ticks) -> u64 {
+        self.clock(phase).at(elapsed)
+    }
+
+    /// What one tick adds to the normalised time of `phase`. Only for phases longer than a tick.
+    #[inline]
+    pub fn fraction_step(&self, phase: Phase) -> u64 {
+        self.clock(phase).step
+    }
+
+    #[inline]
+    fn clock(&self, phase: Phase) -> &Clock {
+        match phase {
+            Phase::Rise | Phase::Fall => &self.rise,
+            Phase::Hold => &self.hold,
+        }
+    }
+
+    /// The motion at a normalised time of a phase; `s` counts from the segment's start. In the tick.
+    #[inline]
+    pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
+        match phase {
+            Phase::Rise => {
+                let shape = Shape::at(R::from_fraction(fraction));
+                PathMotion {
+                    s: Position::from_bits(portion(self.rise_bits, fraction))
+                        + Position::from_offset(self.length_mm * shape.length),
+                    v_mm_s: self.ramp.from_mm_s + self.speed_mm_s * shape.speed,
+                    a_mm_s2: self.accel_mm_s2 * shape.accel,
+                    j_mm_s3: self.jerk_mm_s3 * shape.jerk,
+                    snap_mm_s4: self.snap_mm_s4 * shape.snap,
+                }
+            }
+            Phase::Hold => {
+                let square = portion(portion(self.hold_square_bits, fraction), fraction);
+                let s = self
+                    .hold_start_bits
+                    .wrapping_add(portion(self.hold_linear_bits, fraction))
+                    .wrapping_add(square);
+                PathMotion {
+                    s: Position::from_bits(s),
+                    v_mm_s: self.hold_v_mm_s + self.hold_gain_mm_s * R::from_fraction(fraction),
+                    a_mm_s2: self.hold_a_mm_s2,
+                    j_mm_s3: R::ZERO,
+                    snap_mm_s4: R::ZERO,
+                }
+            }
+            // The rising phase run backwards from the end.
+            Phase::Fall => {
+                let left = !fraction;
+                let shape = Shape::at(R::from_fraction(left));
+                PathMotion {
+                    s: self.length - Position::from_bits(portion(self.fall_bits, left))
+                        + Position::from_offset(self.length_mm * shape.length),
+                    v_mm_s: self.ramp.to_mm_s - self.speed_mm_s * shape.speed,
+                    a_mm_s2: self.accel_mm_s2 * shape.accel,
+                    j_mm_s3: -(self.jerk_mm_s3 * shape.jerk),
+                    snap_mm_s4: self.snap_mm_s4 * shape.snap,
+                }
+            }
+        }
+    }
+}
+
+fn to_f64<P: Root>(ramp: &Ramp<P>) -> Ramp<f64> {
+    Ramp {
+        from_mm_s: ramp.from_mm_s.to_f64(),
+        to_mm_s: ramp.to_mm_s.to_f64(),
+        peak_jerk_mm_s3: ramp.peak_jerk_mm_s3.to_f64(),
+        t1_s: ramp.t1_s.to_f64(),
+        t2_s: ramp.t2_s.to_f64(),
+        limited_by: ramp.limited_by,
+    }
+}

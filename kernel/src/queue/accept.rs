@@ -1,0 +1,254 @@
+//! What may follow what in the streams.
+//!
+//! Every check costs the producer a few operations and spares the tick from ever meeting an item it
+//! could not execute. Each method returns the state after the item, so that an item that finds its
+//! queue full leaves no trace.
+
+use crate::exec::SEGMENTS_PER_TICK_MAX;
+use crate::law::{FeedSegment, Limits, Ticks};
+use crate::num::Real;
+use crate::path::Piece;
+use crate::units::Position;
+
+/// What the streams are held to. Immutable; the machine's configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathRules {
+    /// Limits along the path.
+    pub limits: Limits<f64>,
+    /// Greatest feed \[mm/s\].
+    pub feed_mm_s: f64,
+    /// Greatest angle between the tangents of neighbouring pieces of one stretch \[rad\].
+    pub joint_angle_rad: f64,
+    /// Greatest gap between the end of a piece and the start of the next \[mm\].
+    pub joint_gap_mm: f64,
+}
+
+/// Why an item may not enter. Each names the quantity and its value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Rejection {
+    /// A piece does not start where its predecessor ends.
+    Gap {
+        /// The axis, from 0.
+        axis: usize,
+        /// The gap \[mm\].
+        gap_mm: f64,
+    },
+    /// A piece does not go on in the direction in which its predecessor ends.
+    Corner {
+        /// The angle between the tangents \[rad\].
+        angle_rad: f64,
+    },
+    /// A segment does not start at the feed at which its predecessor ends.
+    FeedStep {
+        /// The predecessor's \[mm/s\].
+        from_mm_s: f64,
+        /// The segment's \[mm/s\].
+        to_mm_s: f64,
+    },
+    /// A segment exceeds a limit.
+    Limit {
+        /// Which one, with its unit.
+        quantity: &'static str,
+        /// The segment's value.
+        value: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// More segments or dwells than the executor handles would end within one tick.
+    Dense {
+        /// How long this segment and its predecessors, as many as the executor handles in a tick,
+        /// take together \[ticks\]; at least 1 is needed.
+        ticks: f64,
+    },
+    /// A stretch would end before it is at rest.
+    Moving {
+        /// The feed \[mm/s\].
+        feed_mm_s: f64,
+    },
+    /// The two streams have measured different lengths of the same stretch.
+    Lengths {
+        /// The pieces' \[mm\].
+        path_mm: f64,
+        /// The segments' \[mm\].
+        feed_mm: f64,
+    },
+    /// A stretch without any length.
+    Empty,
+    /// Dwells and stops belong between stretches.
+    InsideStretch,
+    /// The stretch is longer, or a position farther out, than the kernel's range.
+    Range {
+        /// The length or coordinate \[mm\].
+        mm: f64,
+    },
+}
+
+impl core::fmt::Display for Rejection {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Gap { axis, gap_mm } => write!(f, "gap of {gap_mm} mm to the predecessor on axis {axis}"),
+            Self::Corner { angle_rad } => write!(f, "corner of {angle_rad} rad inside a stretch"),
+            Self::FeedStep { from_mm_s, to_mm_s } => {
+                write!(f, "feed steps from {from_mm_s} to {to_mm_s} mm/s")
+            }
+            Self::Limit { quantity, value, limit } => write!(f, "{quantity} {value} exceeds {limit}"),
+            Self::Dense { ticks } => {
+                write!(f, "{SEGMENTS_PER_TICK_MAX} segments in {ticks} ticks: expected at least 1")
+            }
+            Self::Moving { feed_mm_s } => write!(f, "stretch ends at {feed_mm_s} mm/s: expected rest"),
+            Self::Lengths { path_mm, feed_mm } => {
+                write!(f, "{path_mm} mm of path, {feed_mm} mm of feed: expected equal lengths")
+            }
+            Self::Empty => write!(f, "a stretch without any length"),
+            Self::InsideStretch => write!(f, "dwell or stop inside a stretch"),
+            Self::Range { mm } => write!(f, "{mm} mm: expected at most ±{} mm", Position::LIMIT_MM),
+        }
+    }
+}
+
+impl core::error::Error for Rejection {}
+
+/// Where the streams stand.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Acceptance<R: Real, const AXES: usize> {
+    rules: PathRules,
+    position: [Position; AXES],
+    /// Of the last piece of this stretch.
+    tangent: Option<[R; AXES]>,
+    path_length: Position,
+    feed_length: Position,
+    feed_mm_s: R,
+    /// Durations of the latest segments, the newest first.
+    recent: [Ticks; SEGMENTS_PER_TICK_MAX],
+}
+
+impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
+    pub(super) fn new(rules: PathRules, position: [Position; AXES]) -> Self {
+        Self {
+            rules,
+            position,
+            tangent: None,
+            path_length: Position::ZERO,
+            feed_length: Position::ZERO,
+            feed_mm_s: R::ZERO,
+            recent: [Ticks::ONE; SEGMENTS_PER_TICK_MAX],
+        }
+    }
+
+    pub(super) fn piece(&self, piece: &Piece<R, AXES>) -> Result<Self, Rejection> {
+        self.continuous(&piece.start())?;
+        if let Some(before) = self.tangent {
+            let after = piece.tangent_at(R::ZERO);
+            let square: f64 = before
+                .iter()
+                .zip(&after)
+                .map(|(b, a)| {
+                    let difference = a.to_f64() - b.to_f64();
+                    difference * difference
+                })
+                .sum();
+            // The chord between unit vectors is below the angle by a part in 24·angle².
+            let angle_rad = libm::sqrt(square);
+            let rounding = 4.0 * R::EPSILON;
+            if !(angle_rad <= self.rules.joint_angle_rad + rounding) {
+                return Err(Rejection::Corner { angle_rad });
+            }
+        }
+        let end = piece.end();
+        for position in &end {
+            within_range(*position)?;
+        }
+        let path_length = self.path_length + piece.length();
+        within_range(path_length)?;
+        Ok(Self {
+            position: end,
+            tangent: Some(piece.tangent_at(piece.length().to_offset())),
+            path_length,
+            ..*self
+        })
+    }
+
+    pub(super) fn segment(&self, segment: &FeedSegment<R>) -> Result<Self, Rejection> {
+        let ramp = segment.as_ramp();
+        let step = (ramp.from_mm_s - self.feed_mm_s).abs();
+        if !(step <= R::from_f64(4.0 * R::EPSILON) * self.feed_mm_s) {
+            return Err(Rejection::FeedStep {
+                from_mm_s: self.feed_mm_s.to_f64(),
+                to_mm_s: ramp.from_mm_s.to_f64(),
+            });
+        }
+        let limits = &self.rules.limits;
+        for (quantity, value, limit) in [
+            ("feed [mm/s]", ramp.from_mm_s.max(ramp.to_mm_s), self.rules.feed_mm_s),
+            ("acceleration [mm/s²]", segment.peak_accel_mm_s2(), limits.accel_mm_s2),
+            ("jerk [mm/s³]", ramp.peak_jerk_mm_s3, limits.jerk_mm_s3),
+            ("snap [mm/s⁴]", segment.peak_snap_mm_s4(), limits.snap_mm_s4),
+        ] {
+            let value = value.to_f64();
+            if !(value <= limit * (1.0 + 8.0 * R::EPSILON)) {
+                return Err(Rejection::Limit { quantity, value, limit });
+            }
+        }
+        let recent = self.not_too_dense(segment.duration())?;
+        let feed_length = self.feed_length + segment.length();
+        within_range(feed_length)?;
+        Ok(Self { feed_mm_s: ramp.to_mm_s, feed_length, recent, ..*self })
+    }
+
+    pub(super) fn end_of_stretch(&self, position: [Position; AXES]) -> Result<Self, Rejection> {
+        self.continuous(&position)?;
+        if self.feed_mm_s > R::ZERO {
+            return Err(Rejection::Moving { feed_mm_s: self.feed_mm_s.to_f64() });
+        }
+        if self.path_length == Position::ZERO {
+            return Err(Rejection::Empty);
+        }
+        if self.path_length != self.feed_length {
+            return Err(Rejection::Lengths {
+                path_mm: self.path_length.to_mm(),
+                feed_mm: self.feed_length.to_mm(),
+            });
+        }
+        Ok(Self { recent: self.recent, ..Self::new(self.rules, position) })
+    }
+
+    pub(super) fn dwell(&self, duration: Ticks) -> Result<Self, Rejection> {
+        self.at_rest()?;
+        Ok(Self { recent: self.not_too_dense(duration)?, ..*self })
+    }
+
+    pub(super) fn at_rest(&self) -> Result<(), Rejection> {
+        if self.tangent.is_some() || self.feed_length > Position::ZERO {
+            return Err(Rejection::InsideStretch);
+        }
+        Ok(())
+    }
+
+    /// The latest durations with `newest` among them, if the executor can keep up with them.
+    fn not_too_dense(&self, newest: Ticks) -> Result<[Ticks; SEGMENTS_PER_TICK_MAX], Rejection> {
+        let mut recent = self.recent;
+        recent.rotate_right(1);
+        recent[0] = newest;
+        let together = recent.iter().fold(Ticks::ZERO, |sum, duration| sum.plus(*duration));
+        if together < Ticks::ONE {
+            return Err(Rejection::Dense { ticks: together.to_f64() });
+        }
+        Ok(recent)
+    }
+
+    fn continuous(&self, start: &[Position; AXES]) -> Result<(), Rejection> {
+        for (axis, (here, start)) in self.position.iter().zip(start).enumerate() {
+            let gap_mm = (*start - *here).to_mm();
+            if !(libm::fabs(gap_mm) <= self.rules.joint_gap_mm) {
+                return Err(Rejection::Gap { axis, gap_mm });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn within_range(position: Position) -> Result<(), Rejection> {
+    let mm = position.to_mm();
+    if libm::fabs(mm) <= Position::LIMIT_MM { Ok(()) } else { Err(Rejection::Range { mm }) }
+}

@@ -1,0 +1,218 @@
+//! The two bounded streams between background and tick: geometry, and feed over the same length.
+//!
+//! Consumes [`Piece`]s and [`FeedSegment`]s from the planner; hands them to the executor. Single
+//! producer, single consumer, lock-free. The producer's end, [`Feeder`], checks every item against
+//! its predecessor before it enters, so the tick never meets an item that can't be executed; a full
+//! queue returns the item. The consumer's end, [`Intake`], only takes.
+//!
+//! A *stretch* is the motion from one full stop to the next. Both streams mark its end with an item
+//! of their own; [`Feeder::end_stretch`] enters the two together and only if both streams have
+//! measured the same length.
+
+mod accept;
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use crate::law::{FeedSegment, Ticks};
+use crate::num::Real;
+use crate::path::Piece;
+use crate::units::Position;
+
+pub use accept::{PathRules, Rejection};
+
+/// An item of the path stream.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PathItem<R, const AXES: usize> {
+    /// Geometry.
+    Piece(Piece<R, AXES>),
+    /// The stretch ends exactly here.
+    EndOfStretch([Position; AXES]),
+}
+
+/// An item of the feed stream.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FeedItem<R> {
+    /// A ramp or a cruise.
+    Segment(FeedSegment<R>),
+    /// Rest for a time, between stretches.
+    Dwell(Ticks),
+    /// Rest until told to resume, between stretches.
+    ProgramStop,
+    /// The stretch ends, at rest.
+    EndOfStretch,
+}
+
+/// An item that did not enter its queue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Refused<T> {
+    /// The queue is full; here is the item back. Offer it again later.
+    Full(T),
+    /// The item must not enter; the stream is as it was before.
+    Invalid(Rejection),
+}
+
+/// Storage of both streams: `PIECES` and `SEGMENTS` items.
+#[derive(Debug)]
+pub struct Streams<R, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> {
+    path: Queue<PathItem<R, AXES>, PIECES>,
+    feed: Queue<FeedItem<R>, SEGMENTS>,
+    /// Ends of stretch entered so far. Written by the feeder only.
+    stretches: AtomicU32,
+}
+
+impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
+    Streams<R, AXES, PIECES, SEGMENTS>
+{
+    /// Empty streams.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { path: Queue::new(), feed: Queue::new(), stretches: AtomicU32::new(0) }
+    }
+
+    /// The two ends, for a machine that stands at `position`.
+    pub fn split(
+        &mut self,
+        rules: PathRules,
+        position: [Position; AXES],
+    ) -> (Feeder<'_, R, AXES>, Intake<'_, R, AXES>) {
+        let (path_in, path_out) = self.path.split();
+        let (feed_in, feed_out) = self.feed.split();
+        let stretches: &AtomicU32 = &self.stretches;
+        (
+            Feeder {
+                path: path_in,
+                feed: feed_in,
+                stretches,
+                accept: accept::Acceptance::new(rules, position),
+            },
+            Intake { path: path_out, feed: feed_out, stretches, finished: stretches.load(Ordering::Relaxed) },
+        )
+    }
+}
+
+impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> Default
+    for Streams<R, AXES, PIECES, SEGMENTS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The background's end of the streams.
+pub struct Feeder<'a, R: Real, const AXES: usize> {
+    path: Producer<'a, PathItem<R, AXES>>,
+    feed: Producer<'a, FeedItem<R>>,
+    stretches: &'a AtomicU32,
+    accept: accept::Acceptance<R, AXES>,
+}
+
+impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
+    /// Enters a piece of path.
+    ///
+    /// # Errors
+    /// The queue is full, or the piece does not continue its predecessor.
+    pub fn piece(&mut self, piece: Piece<R, AXES>) -> Result<(), Refused<Piece<R, AXES>>> {
+        let next = self.accept.piece(&piece).map_err(Refused::Invalid)?;
+        self.path.enqueue(PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
+        self.accept = next;
+        Ok(())
+    }
+
+    /// Enters a feed segment.
+    ///
+    /// # Errors
+    /// The queue is full, or the segment does not continue its predecessor or exceeds a limit.
+    pub fn segment(&mut self, segment: FeedSegment<R>) -> Result<(), Refused<FeedSegment<R>>> {
+        let next = self.accept.segment(&segment).map_err(Refused::Invalid)?;
+        self.feed.enqueue(FeedItem::Segment(segment)).map_err(|_| Refused::Full(segment))?;
+        self.accept = next;
+        Ok(())
+    }
+
+    /// Ends the stretch exactly at `position`, in both streams.
+    ///
+    /// # Errors
+    /// A queue is full, the streams have measured different lengths, the feed is not 0, or the path
+    /// does not end there.
+    pub fn end_stretch(&mut self, position: [Position; AXES]) -> Result<(), Refused<[Position; AXES]>> {
+        let next = self.accept.end_of_stretch(position).map_err(Refused::Invalid)?;
+        if !(self.path.ready() && self.feed.ready()) {
+            return Err(Refused::Full(position));
+        }
+        // Room was there and only this end fills the queues: neither can fail.
+        let path = self.path.enqueue(PathItem::EndOfStretch(position));
+        let feed = self.feed.enqueue(FeedItem::EndOfStretch);
+        debug_assert!(path.is_ok() && feed.is_ok());
+        self.accept = next;
+        self.stretches.store(self.stretches.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
+        Ok(())
+    }
+
+    /// Rests for `duration` between stretches.
+    ///
+    /// # Errors
+    /// The queue is full, or a stretch is under way.
+    pub fn dwell(&mut self, duration: Ticks) -> Result<(), Refused<Ticks>> {
+        let next = self.accept.dwell(duration).map_err(Refused::Invalid)?;
+        self.feed.enqueue(FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))?;
+        self.accept = next;
+        Ok(())
+    }
+
+    /// Rests until told to resume, between stretches.
+    ///
+    /// # Errors
+    /// The queue is full, or a stretch is under way.
+    pub fn program_stop(&mut self) -> Result<(), Refused<()>> {
+        self.accept.at_rest().map_err(Refused::Invalid)?;
+        self.feed.enqueue(FeedItem::ProgramStop).map_err(|_| Refused::Full(()))
+    }
+}
+
+/// The tick's end of the streams.
+pub struct Intake<'a, R: Real, const AXES: usize> {
+    path: Consumer<'a, PathItem<R, AXES>>,
+    feed: Consumer<'a, FeedItem<R>>,
+    stretches: &'a AtomicU32,
+    finished: u32,
+}
+
+impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
+    /// The next item of the feed stream, left where it is.
+    #[inline]
+    pub(crate) fn peek_feed(&self) -> Option<&FeedItem<R>> {
+        self.feed.peek()
+    }
+
+    /// Takes the next item of the feed stream.
+    #[inline]
+    pub(crate) fn take_feed(&mut self) -> Option<FeedItem<R>> {
+        self.feed.dequeue()
+    }
+
+    /// Whether the stretch ends with the next item of the path stream.
+    #[inline]
+    pub(crate) fn at_end_of_path(&self) -> bool {
+        matches!(self.path.peek(), Some(PathItem::EndOfStretch(_)))
+    }
+
+    /// Takes the next item of the path stream.
+    #[inline]
+    pub(crate) fn take_path(&mut self) -> Option<PathItem<R, AXES>> {
+        let item = self.path.dequeue();
+        if matches!(item, Some(PathItem::EndOfStretch(_))) {
+            self.finished = self.finished.wrapping_add(1);
+        }
+        item
+    }
+
+    /// Whether a stretch may begin: its end is queued, or a queue is full and can't hold more of it.
+    #[inline]
+    pub(crate) fn may_start(&self) -> bool {
+        self.stretches.load(Ordering::Acquire) != self.finished
+            || self.feed.len() == self.feed.capacity()
+            || self.path.len() == self.path.capacity()
+    }
+}
