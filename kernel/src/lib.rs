@@ -8,6 +8,7 @@ pub mod kernel;
 pub mod law;
 pub mod num;
 pub mod path;
+pub mod plan;
 pub mod queue;
 pub mod trace;
 pub mod units;

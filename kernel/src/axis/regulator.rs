@@ -82,7 +82,11 @@ impl<R: Real> Regulator<R> {
             ("tick [s]", tick_s, f64::MIN_POSITIVE),
         ] {
             if !(value >= least && value.is_finite()) {
-                return Err(ScaleError { quantity, value, expected: "a finite number, not below 0 for a gain" });
+                return Err(ScaleError {
+                    quantity,
+                    value,
+                    expected: "a finite number, not below 0 for a gain",
+                });
             }
         }
         Ok(Self {

@@ -129,9 +129,7 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         self.advance(intake)?;
         let motion = match &self.activity {
             Activity::Moving(moving) => moving.at(),
-            Activity::Between { s, v_mm_s } => {
-                PathMotion { s: *s, v_mm_s: *v_mm_s, ..PathMotion::default() }
-            }
+            Activity::Between { s, v_mm_s } => PathMotion { s: *s, v_mm_s: *v_mm_s, ..PathMotion::default() },
             Activity::Rest | Activity::Dwell { .. } | Activity::Stopped => PathMotion::default(),
         };
         if matches!(self.activity, Activity::Moving(_) | Activity::Between { .. }) {

@@ -141,11 +141,8 @@ mod tests {
         for i in 0..=200_000_u32 {
             let x = 10.0_f64.powf(f64::from(i) / 200_000.0 * 6.0 - 6.0) as f32;
             let (narrow, wide) = (Shape::at(x), Shape::at(f64::from(x)));
-            let pairs = [
-                (narrow.accel, wide.accel),
-                (narrow.speed, wide.speed),
-                (narrow.length, wide.length),
-            ];
+            let pairs =
+                [(narrow.accel, wide.accel), (narrow.speed, wide.speed), (narrow.length, wide.length)];
             for (worst, (narrow, wide)) in worst.iter_mut().zip(pairs) {
                 *worst = worst.max(((f64::from(narrow) - wide) / wide).abs());
             }

@@ -1,0 +1,95 @@
+//! One simulated axis: a voltage in, an encoder count out.
+//!
+//! Consumes the DAC's voltage and the drive enable, once a tick; produces the encoder's count and, for
+//! tests and records, what no encoder shows: true position, velocity and torque.
+
+use motion_kernel::units::Counts;
+
+use crate::drive::{DriveModel, DriveState};
+use crate::drive_parameters::{DriveParameters, REFERENCE_X, REFERENCE_Y, REFERENCE_Z};
+use crate::encoder::{EncoderParameters, REFERENCE_ENCODER, SimEncoder};
+use crate::parameter::{ParameterError, finite};
+
+/// Velocity of the reference axes per volt \[mm/s/V\]: 20 m/min at 10 V (S4).
+pub const REFERENCE_MM_S_PER_VOLT: f64 = 20_000.0 / 60.0 / 10.0;
+
+/// An axis. Immutable once given to a [`SimAxis`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisParameters {
+    /// Drive and mechanics.
+    pub drive: DriveParameters,
+    /// Position feedback.
+    pub encoder: EncoderParameters,
+    /// Velocity that the drive makes of one volt \[mm/s/V\]; negative if it is wired the other way round,
+    /// not 0.
+    pub mm_s_per_volt: f64,
+    /// True position at the start \[mm\]; the axis is at rest there.
+    pub start_position_mm: f64,
+}
+
+impl AxisParameters {
+    /// The X axis of S4.
+    pub const REFERENCE_X: Self = Self::reference(REFERENCE_X);
+    /// The Y axis of S4.
+    pub const REFERENCE_Y: Self = Self::reference(REFERENCE_Y);
+    /// A Z axis like X.
+    pub const REFERENCE_Z: Self = Self::reference(REFERENCE_Z);
+
+    const fn reference(drive: DriveParameters) -> Self {
+        Self {
+            drive,
+            encoder: REFERENCE_ENCODER,
+            mm_s_per_volt: REFERENCE_MM_S_PER_VOLT,
+            start_position_mm: 0.0,
+        }
+    }
+}
+
+/// An axis in motion. `LINE` as in [`DriveState`].
+#[derive(Clone, Debug)]
+pub struct SimAxis<const LINE: usize> {
+    model: DriveModel,
+    state: DriveState<LINE>,
+    encoder: SimEncoder,
+    mm_s_per_volt: f64,
+}
+
+impl<const LINE: usize> SimAxis<LINE> {
+    /// An axis at rest, for ticks of `tick_s` in `substeps` parts.
+    ///
+    /// # Errors
+    /// The first parameter that cannot be simulated.
+    pub fn new(parameters: AxisParameters, tick_s: f64, substeps: u32) -> Result<Self, ParameterError> {
+        let AxisParameters { drive, encoder, mm_s_per_volt, start_position_mm } = parameters;
+        finite("mm_s_per_volt", mm_s_per_volt)?;
+        if mm_s_per_volt == 0.0 {
+            return Err(ParameterError::OutOfRange { quantity: "mm_s_per_volt", value: mm_s_per_volt });
+        }
+        finite("start_position_mm", start_position_mm)?;
+        let model = DriveModel::new(drive, tick_s, substeps)?;
+        Ok(Self {
+            model,
+            state: DriveState::at_rest(&model, start_position_mm)?,
+            encoder: SimEncoder::new(encoder, start_position_mm)?,
+            mm_s_per_volt,
+        })
+    }
+
+    /// Advances by one tick with `output_v` held at the drive's input. A disabled drive takes the command 0
+    /// instead: it brakes and holds, as a drive with a stop ramp and holding torque does; it does not coast.
+    pub fn advance(&mut self, output_v: f64, is_enabled: bool) {
+        let command_mm_s = if is_enabled { output_v * self.mm_s_per_volt } else { 0.0 };
+        self.model.tick(&mut self.state, command_mm_s);
+    }
+
+    /// Reads the encoder.
+    pub fn latch(&mut self) -> Counts {
+        self.encoder.latch(self.state.position_mm())
+    }
+
+    /// The drive's state: true position, velocity, torque.
+    #[must_use]
+    pub fn drive(&self) -> &DriveState<LINE> {
+        &self.state
+    }
+}

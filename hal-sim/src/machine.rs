@@ -1,0 +1,207 @@
+//! A machine of simulated axes behind one DAC chip, as the kernel's hardware.
+//!
+//! Consumes the chip's voltages and the drive enable; produces encoder counts, all axes at once. One
+//! [`SimMachine::advance`] is one control tick; its cost is constant: axes × sub-steps.
+//!
+//! Everything goes through a shared reference, as on a board where the same machine hangs on several
+//! peripherals: `&machine` is the kernel's encoder and its drive enable, `machine.chip()` is the SPI device of
+//! its DAC driver, and the simulation advances the machine between two ticks. It is meant for one thread.
+
+use core::cell::{Cell, RefCell};
+use core::convert::Infallible;
+
+use motion_kernel::hal::{DriveEnable, Encoder};
+use motion_kernel::units::Counts;
+
+use crate::axis::{AxisParameters, SimAxis};
+use crate::dac_chip::{Ad5754Chip, CHANNELS};
+use crate::parameter::{ParameterError, positive};
+
+/// Control tick of the reference machine \[s\] (S4).
+pub const REFERENCE_TICK_S: f64 = 0.0005;
+
+/// Sub-steps of the reference machine's tick.
+pub const REFERENCE_SUBSTEPS: u32 = 20;
+
+/// Cells for the dead time that suffice for the reference machine's 1.42 ms in steps of 25 µs.
+pub const REFERENCE_LINE: usize = 64;
+
+/// A machine. Immutable once given to a [`SimMachine`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MachineParameters<const AXES: usize> {
+    /// The axes, on the DAC's channels from A upwards.
+    pub axes: [AxisParameters; AXES],
+    /// Control tick \[s\], > 0.
+    pub tick_s: f64,
+    /// Simulation steps per tick, from 1 to [`SUBSTEPS_MAX`](crate::SUBSTEPS_MAX).
+    pub substeps: u32,
+}
+
+impl<const AXES: usize> MachineParameters<AXES> {
+    /// `axes` at the reference tick of 0.5 ms in 20 sub-steps.
+    #[must_use]
+    pub const fn at_reference_tick(axes: [AxisParameters; AXES]) -> Self {
+        Self { axes, tick_s: REFERENCE_TICK_S, substeps: REFERENCE_SUBSTEPS }
+    }
+}
+
+/// An axis of a machine cannot be simulated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MachineError {
+    /// The axis, from 0.
+    pub axis: usize,
+    /// What is wrong with it, or with the tick.
+    pub cause: ParameterError,
+}
+
+impl core::fmt::Display for MachineError {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(formatter, "axis {}: {}", self.axis, self.cause)
+    }
+}
+
+impl core::error::Error for MachineError {}
+
+/// What only a simulation knows of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisTruth {
+    /// Position \[mm\].
+    pub position_mm: f64,
+    /// Velocity \[mm/s\].
+    pub velocity_mm_s: f64,
+    /// Torque, as the acceleration it gives the unloaded axis \[mm/s²\].
+    pub torque_mm_s2: f64,
+    /// Displacement of the bed under the axis \[mm\].
+    pub bed_mm: f64,
+}
+
+/// One to four simulated axes and their DAC. More than four axes do not compile:
+///
+/// ```compile_fail,E0080
+/// use hal_sim::{AxisParameters, MachineParameters, SimMachine};
+/// let parameters = MachineParameters::at_reference_tick([AxisParameters::REFERENCE_X; 5]);
+/// let _ = SimMachine::<5>::new(&parameters);
+/// ```
+#[derive(Debug)]
+pub struct SimMachine<const AXES: usize, const LINE: usize = REFERENCE_LINE> {
+    chip: Ad5754Chip,
+    axes: RefCell<[SimAxis<LINE>; AXES]>,
+    is_enabled: Cell<bool>,
+    tick_ns: u64,
+    ticks: Cell<u64>,
+}
+
+impl<const AXES: usize, const LINE: usize> SimMachine<AXES, LINE> {
+    const AXES_FIT: () = assert!(AXES >= 1 && AXES <= CHANNELS, "the DAC has four channels");
+
+    /// A machine at rest, drives disabled, its chip just powered on.
+    ///
+    /// # Errors
+    /// The first axis that cannot be simulated and why.
+    pub fn new(parameters: &MachineParameters<AXES>) -> Result<Self, MachineError> {
+        let () = Self::AXES_FIT;
+        let &MachineParameters { axes, tick_s, substeps } = parameters;
+        positive("tick_s", tick_s).map_err(|cause| MachineError { axis: 0, cause })?;
+        let build = |axis: usize| {
+            SimAxis::<LINE>::new(axes[axis], tick_s, substeps).map_err(|cause| MachineError { axis, cause })
+        };
+        // Without allocation an array is filled by a fallible function only over something already there.
+        let first = build(0)?;
+        let mut built: [SimAxis<LINE>; AXES] = core::array::from_fn(|_| first.clone());
+        for (axis, place) in built.iter_mut().enumerate().skip(1) {
+            *place = build(axis)?;
+        }
+        Ok(Self {
+            chip: Ad5754Chip::new(),
+            axes: RefCell::new(built),
+            is_enabled: Cell::new(false),
+            tick_ns: (tick_s * 1e9) as u64,
+            ticks: Cell::new(0),
+        })
+    }
+
+    /// The DAC chip: the SPI device of the velocity output's driver.
+    #[must_use]
+    pub fn chip(&self) -> &Ad5754Chip {
+        &self.chip
+    }
+
+    /// One control tick: the chip's present voltages act on the drives until the next call.
+    pub fn advance(&self) {
+        let volts = self.chip.volts();
+        for (axis, output_v) in self.axes.borrow_mut().iter_mut().zip(volts) {
+            axis.advance(output_v, self.is_enabled.get());
+        }
+        self.chip.elapse_ns(self.tick_ns);
+        self.ticks.set(self.ticks.get() + 1);
+    }
+
+    /// Ticks since the start.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.ticks.get()
+    }
+
+    /// Whether the drives are enabled.
+    #[must_use]
+    pub fn is_enabled(&self) -> bool {
+        self.is_enabled.get()
+    }
+
+    /// What no encoder shows, for tests and records.
+    #[must_use]
+    pub fn truth(&self) -> [AxisTruth; AXES] {
+        let axes = self.axes.borrow();
+        core::array::from_fn(|axis| {
+            let drive = axes[axis].drive();
+            AxisTruth {
+                position_mm: drive.position_mm(),
+                velocity_mm_s: drive.velocity_mm_s(),
+                torque_mm_s2: drive.torque_mm_s2(),
+                bed_mm: drive.bed_mm(),
+            }
+        })
+    }
+}
+
+impl<const AXES: usize, const LINE: usize> Encoder<AXES> for &SimMachine<AXES, LINE> {
+    type Error = Infallible;
+
+    fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
+        let mut axes = self.axes.borrow_mut();
+        Ok(core::array::from_fn(|axis| axes[axis].latch()))
+    }
+}
+
+impl<const AXES: usize, const LINE: usize> DriveEnable<AXES> for &SimMachine<AXES, LINE> {
+    type Error = Infallible;
+
+    fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
+        self.is_enabled.set(enabled);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{DriveParameters, REFERENCE_Y};
+
+    #[test]
+    fn a_refusal_names_the_axis() {
+        let slow = DriveParameters { dead_time_s: 0.002, ..REFERENCE_Y };
+        let axes =
+            [AxisParameters::REFERENCE_X, AxisParameters { drive: slow, ..AxisParameters::REFERENCE_Y }];
+        let refusal = SimMachine::<2>::new(&MachineParameters::at_reference_tick(axes)).unwrap_err();
+        let cause = ParameterError::LineTooShort { cells_needed: 82, capacity: REFERENCE_LINE };
+        assert_eq!(refusal, MachineError { axis: 1, cause });
+    }
+
+    #[test]
+    fn axes_keep_their_own_parameters() {
+        let apart = |start_position_mm| AxisParameters { start_position_mm, ..AxisParameters::REFERENCE_X };
+        let axes = [apart(1.0), apart(2.0), apart(3.0)];
+        let machine = SimMachine::<3>::new(&MachineParameters::at_reference_tick(axes)).unwrap();
+        assert_eq!((&machine).latch(), Ok([Counts(10_000), Counts(20_000), Counts(30_000)]));
+    }
+}

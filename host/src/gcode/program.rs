@@ -1,0 +1,226 @@
+//! What a program asks for, in the order it asks.
+
+use super::decimal::Length;
+use std::fmt;
+
+/// A program, read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Program {
+    /// What is to be done, in order. Moves of no length are not listed.
+    pub steps: Vec<Step>,
+    /// What was accepted and not acted on, at most one per kind, in the order of their first lines.
+    pub notices: Vec<Notice>,
+}
+
+/// One thing to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Line of the program that asks for it, from 1.
+    pub line: u32,
+    /// What to do.
+    pub kind: StepKind,
+}
+
+/// What a step does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StepKind {
+    /// G0 or G1.
+    Line(LineMove),
+    /// G2 or G3.
+    Arc(ArcMove),
+    /// G4: stand still.
+    Dwell {
+        /// How long \[s\], 0 or more.
+        seconds: f64,
+    },
+    /// M0 or M1: stop until the operator goes on.
+    Stop,
+    /// M2, M30 or a closing `%`: nothing follows.
+    End,
+}
+
+/// A straight move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineMove {
+    /// Start, X Y Z.
+    pub from: [Length; 3],
+    /// End, X Y Z; differs from the start.
+    pub to: [Length; 3],
+    /// Feed along the line.
+    pub feed: Feed,
+    /// How its end is passed.
+    pub mode: PathMode,
+}
+
+/// An arc, or a helix if start and end differ along the plane's normal.
+///
+/// Where the radii differ (within the tolerance of [`RADIUS_MISMATCH_RATIO`](super::RADIUS_MISMATCH_RATIO)), the
+/// curve from the exact start to the exact end is a spiral: the radius, like the height, goes linearly with the
+/// angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArcMove {
+    /// Start, X Y Z.
+    pub from: [Length; 3],
+    /// End, X Y Z.
+    pub to: [Length; 3],
+    /// Plane of the arc.
+    pub plane: Plane,
+    /// Centre \[mm\]: coordinates along the plane's first and second axis, in that order (ZX: Z, then X).
+    pub centre_mm: [f64; 2],
+    /// Distance of the start from the centre in the plane \[mm\], greater than 0.
+    pub start_radius_mm: f64,
+    /// Distance of the end from the centre in the plane \[mm\], greater than 0.
+    pub end_radius_mm: f64,
+    /// Angle run through \[rad\], in ±(0, 2π]: counter-clockwise positive, seen from the positive end of the plane's
+    /// normal; a full circle is ±2π.
+    pub sweep_rad: f64,
+    /// Feed along the path, the height of a helix included.
+    pub feed: Feed,
+    /// How its end is passed.
+    pub mode: PathMode,
+}
+
+/// Speed of a move along its path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Feed {
+    /// G0: as fast as the machine may.
+    Rapid,
+    /// Programmed feed \[mm/min\], positive.
+    MmPerMin(f64),
+}
+
+/// What may happen to the path at a corner.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PathMode {
+    /// G61, and before either is programmed: the path is kept.
+    #[default]
+    ExactPath,
+    /// G64: corners may be rounded.
+    Blend {
+        /// Greatest distance from the programmed path \[mm\], 0 or more; the machine's choice if absent.
+        tolerance_mm: Option<f64>,
+    },
+}
+
+/// Plane of arcs, named by its first and second axis; with the normal as third they are right-handed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Plane {
+    /// G17: X, Y, normal Z; offsets I, J.
+    #[default]
+    Xy,
+    /// G18: Z, X, normal Y; offsets K, I. In the usual drawing with X to the right and Z up, Y points away from the
+    /// reader, so that a clockwise arc looks counter-clockwise.
+    Zx,
+    /// G19: Y, Z, normal X; offsets J, K.
+    Yz,
+}
+
+impl Plane {
+    /// Indices in X Y Z of the first axis, the second axis and the normal.
+    #[must_use]
+    pub const fn axes(self) -> [usize; 3] {
+        match self {
+            Self::Xy => [0, 1, 2],
+            Self::Zx => [2, 0, 1],
+            Self::Yz => [1, 2, 0],
+        }
+    }
+
+    /// Letters of the offsets, for messages.
+    pub(super) const fn offset_letters(self) -> &'static str {
+        match self {
+            Self::Xy => "I and J",
+            Self::Zx => "I and K",
+            Self::Yz => "J and K",
+        }
+    }
+}
+
+impl fmt::Display for Plane {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Xy => "XY",
+            Self::Zx => "ZX",
+            Self::Yz => "YZ",
+        })
+    }
+}
+
+/// Something accepted that the reader of the program should know of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Notice {
+    /// What.
+    pub kind: NoticeKind,
+    /// Line where it occurs first, from 1.
+    pub first_line: u32,
+    /// In how many lines it occurs.
+    pub count: u32,
+}
+
+/// Kinds of notices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NoticeKind {
+    /// M3, M4, M5.
+    Spindle,
+    /// S.
+    SpindleSpeed,
+    /// M6.
+    ToolChange,
+    /// M7, M8, M9.
+    Coolant,
+    /// G64.
+    Blending,
+    /// Q of G64.
+    Simplification,
+    /// F in a line that switches the units: controllers differ in which unit they take it.
+    FeedInNewUnits,
+    /// R a rounding error smaller than half the chord.
+    RadiusEnlarged,
+    /// Text after the end.
+    TextAfterEnd,
+    /// No M2, M30 or closing `%`.
+    NoProgramEnd,
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let text = match self.kind {
+            NoticeKind::Spindle => "M3, M4, M5 are not acted on: there is no spindle",
+            NoticeKind::SpindleSpeed => "S is not acted on: there is no spindle",
+            NoticeKind::ToolChange => "M6 is not acted on: there is no tool changer",
+            NoticeKind::Coolant => "M7, M8, M9 are not acted on: there is no coolant",
+            NoticeKind::Blending => "G64 is not acted on: blends do not exist yet, corners are exact stops",
+            NoticeKind::Simplification => "Q of G64 is not acted on: every programmed point is kept",
+            NoticeKind::FeedInNewUnits => "F in a line that switches the units is taken in the new unit",
+            NoticeKind::RadiusEnlarged => {
+                "R falls short of half the chord by a rounding error: half circle made"
+            }
+            NoticeKind::TextAfterEnd => "text after the end of the program is not read",
+            NoticeKind::NoProgramEnd => "no M2, M30 or % at the end: is the file complete?",
+        };
+        write!(f, "line {}: {text}", self.first_line)?;
+        if self.count > 1 { write!(f, " ({} lines)", self.count) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes_are_right_handed() {
+        for plane in [Plane::Xy, Plane::Zx, Plane::Yz] {
+            let [first, second, normal] = plane.axes();
+            assert_eq!([(first + 1) % 3, (first + 2) % 3], [second, normal], "{plane}");
+        }
+    }
+
+    #[test]
+    fn notices_count_their_lines() {
+        let mut notice = Notice { kind: NoticeKind::SpindleSpeed, first_line: 4, count: 1 };
+        assert_eq!(notice.to_string(), "line 4: S is not acted on: there is no spindle");
+        notice.count = 9;
+        assert_eq!(notice.to_string(), "line 4: S is not acted on: there is no spindle (9 lines)");
+    }
+}

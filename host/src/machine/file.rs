@@ -1,0 +1,270 @@
+//! The layout of a machine file, and the rules that join several of its keys.
+
+use hal_sim::{BedMode, DriveParameters, EncoderNoise, TimerBits};
+use motion_kernel::axis::{Feedforward, Gains};
+use serde::Deserialize;
+use serde::de::{Deserializer, Error as _};
+use toml::Spanned;
+
+use super::error::{MachineError, quote};
+use super::range::{
+    DeadTime, FeedforwardGain, FollowingError, Gain, Inertia, JointAngle, Limit, OutputLimit, OutputOffset,
+    Positive, Resolution, Tick, Velocity, Within,
+};
+use super::settings::{AxisSettings, Machine, PathSettings};
+
+/// Longest axis name: it heads seven columns of a trace.
+const NAME_CHARACTERS_MAX: usize = 8;
+/// Seconds per minute: feeds in mm/min exist in this file only.
+const S_PER_MIN: f64 = 60.0;
+
+pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineError> {
+    let file: MachineFile =
+        toml::from_str(text).map_err(|error| MachineError::from_reader(source_name, text, &error))?;
+    let refuse = |at: std::ops::Range<usize>, expected: String| {
+        let problem = format!("found {}, expected {expected}", quote(text, &at));
+        MachineError::new(source_name, text, &at, problem)
+    };
+    let axes = file
+        .axis
+        .map(|axis| (axis.name.span(), axis.feed_mm_s.span(), axis.output.offset_v.span(), axis.settings()));
+    for (index, (name_at, feed_at, offset_at, axis)) in axes.iter().enumerate() {
+        if axes.iter().take(index).any(|(_, _, _, other)| other.name == axis.name) {
+            return Err(refuse(name_at.clone(), "a name that no other axis has".to_owned()));
+        }
+        if axis.output_offset_v.abs() >= axis.output_limit_v {
+            let limit_v = axis.output_limit_v;
+            return Err(refuse(offset_at.clone(), format!("a magnitude below limit_v = {limit_v}")));
+        }
+        let reachable_mm_s = axis.reachable_mm_s();
+        if axis.feed_mm_s > reachable_mm_s {
+            let expected = format!("at most {reachable_mm_s:.6}, the velocity at the output's limit");
+            return Err(refuse(feed_at.clone(), expected));
+        }
+    }
+    Ok(Machine {
+        name: file.name,
+        tick_s: file.tick_s.0,
+        path: file.path.settings(),
+        axes: axes.map(|(_, _, _, axis)| axis),
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MachineFile {
+    name: String,
+    tick_s: Within<Tick>,
+    path: PathTable,
+    #[serde(deserialize_with = "three_axes")]
+    axis: [AxisTable; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PathTable {
+    feed_mm_s: Within<Limit>,
+    accel_mm_s2: Within<Limit>,
+    jerk_mm_s3: Within<Limit>,
+    snap_mm_s4: Within<Limit>,
+    joint_angle_deg: Within<JointAngle>,
+    accel_step_mm_s2: Within<Limit>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxisTable {
+    name: Spanned<AxisName>,
+    feed_mm_s: Spanned<Within<Limit>>,
+    accel_mm_s2: Within<Limit>,
+    jerk_mm_s3: Within<Limit>,
+    snap_mm_s4: Within<Limit>,
+    following_error_limit_mm: Within<FollowingError>,
+    encoder: EncoderTable,
+    output: OutputTable,
+    regulator: RegulatorTable,
+    drive: DriveTable,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EncoderTable {
+    mm_per_count: Within<Resolution>,
+    #[serde(default)]
+    timer_bits: Timer,
+    #[serde(default)]
+    noise_counts: NoiseCounts,
+    #[serde(default = "first_seed")]
+    noise_seed: u64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OutputTable {
+    mm_min_at_10_v: Within<Velocity>,
+    offset_v: Spanned<Within<OutputOffset>>,
+    limit_v: Within<OutputLimit>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RegulatorTable {
+    kp_per_s: Within<Gain>,
+    ki_per_s2: Within<Gain>,
+    kd: Within<Gain>,
+    feedforward_velocity: Within<FeedforwardGain>,
+    feedforward_accel_s: Within<FeedforwardGain>,
+    feedforward_jerk_s2: Within<FeedforwardGain>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DriveTable {
+    velocity_gain_per_s: Within<Positive>,
+    integral_time_s: Within<Positive>,
+    current_lag_s: Within<Gain>,
+    dead_time_s: Within<DeadTime>,
+    command_filter_s: Within<Gain>,
+    accel_limit_mm_s2: Within<Positive>,
+    load_inertia_ratio: Within<Inertia>,
+    coulomb_friction_mm_s2: Within<Gain>,
+    viscous_friction_per_s: Within<Gain>,
+    bed: Option<BedTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BedTable {
+    frequency_hz: Within<Positive>,
+    damping_ratio: Within<Gain>,
+    mass_ratio: Within<Positive>,
+}
+
+impl PathTable {
+    fn settings(&self) -> PathSettings {
+        PathSettings {
+            feed_mm_s: self.feed_mm_s.0,
+            accel_mm_s2: self.accel_mm_s2.0,
+            jerk_mm_s3: self.jerk_mm_s3.0,
+            snap_mm_s4: self.snap_mm_s4.0,
+            joint_angle_rad: self.joint_angle_deg.0.to_radians(),
+            accel_step_mm_s2: self.accel_step_mm_s2.0,
+        }
+    }
+}
+
+impl AxisTable {
+    fn settings(self) -> AxisSettings {
+        let noise = match self.encoder.noise_counts.0 {
+            0 => None,
+            amplitude_counts => Some(EncoderNoise { amplitude_counts, seed: self.encoder.noise_seed }),
+        };
+        AxisSettings {
+            name: self.name.into_inner().0,
+            feed_mm_s: self.feed_mm_s.into_inner().0,
+            accel_mm_s2: self.accel_mm_s2.0,
+            jerk_mm_s3: self.jerk_mm_s3.0,
+            snap_mm_s4: self.snap_mm_s4.0,
+            following_error_limit_mm: self.following_error_limit_mm.0,
+            mm_per_count: self.encoder.mm_per_count.0,
+            timer: self.encoder.timer_bits.0,
+            noise,
+            mm_s_at_10_v: self.output.mm_min_at_10_v.0 / S_PER_MIN,
+            output_offset_v: self.output.offset_v.into_inner().0,
+            output_limit_v: self.output.limit_v.0,
+            gains: Gains {
+                kp_per_s: self.regulator.kp_per_s.0,
+                ki_per_s2: self.regulator.ki_per_s2.0,
+                kd: self.regulator.kd.0,
+            },
+            feedforward: Feedforward {
+                velocity: self.regulator.feedforward_velocity.0,
+                accel_s: self.regulator.feedforward_accel_s.0,
+                jerk_s2: self.regulator.feedforward_jerk_s2.0,
+            },
+            drive: self.drive.parameters(),
+        }
+    }
+}
+
+impl DriveTable {
+    fn parameters(&self) -> DriveParameters {
+        DriveParameters {
+            velocity_gain_per_s: self.velocity_gain_per_s.0,
+            integral_time_s: self.integral_time_s.0,
+            current_lag_s: self.current_lag_s.0,
+            dead_time_s: self.dead_time_s.0,
+            command_filter_s: self.command_filter_s.0,
+            accel_limit_mm_s2: self.accel_limit_mm_s2.0,
+            load_inertia_ratio: self.load_inertia_ratio.0,
+            coulomb_friction_mm_s2: self.coulomb_friction_mm_s2.0,
+            viscous_friction_per_s: self.viscous_friction_per_s.0,
+            bed: self.bed.as_ref().map(|bed| BedMode {
+                frequency_hz: bed.frequency_hz.0,
+                damping_ratio: bed.damping_ratio.0,
+                mass_ratio: bed.mass_ratio.0,
+            }),
+        }
+    }
+}
+
+fn three_axes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[AxisTable; 3], D::Error> {
+    let axes = Vec::<AxisTable>::deserialize(deserializer)?;
+    axes.try_into().map_err(|axes: Vec<AxisTable>| {
+        D::Error::custom(format!("{} [[axis]] tables, expected exactly 3", axes.len()))
+    })
+}
+
+/// A name that can head a column.
+struct AxisName(String);
+
+impl<'de> Deserialize<'de> for AxisName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let fits = (1..=NAME_CHARACTERS_MAX).contains(&name.len());
+        if fits && name.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
+            Ok(Self(name))
+        } else {
+            let expected = format!("1 to {NAME_CHARACTERS_MAX} letters and digits");
+            Err(D::Error::custom(format!("name {name:?}, expected {expected}")))
+        }
+    }
+}
+
+/// The width of a counter register.
+struct Timer(TimerBits);
+
+impl Default for Timer {
+    fn default() -> Self {
+        Self(TimerBits::ThirtyTwo)
+    }
+}
+
+impl<'de> Deserialize<'de> for Timer {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match i64::deserialize(deserializer)? {
+            16 => Ok(Self(TimerBits::Sixteen)),
+            32 => Ok(Self(TimerBits::ThirtyTwo)),
+            bits => Err(D::Error::custom(format!("timer_bits = {bits}, expected 16 or 32"))),
+        }
+    }
+}
+
+/// Amplitude of an encoder's noise.
+#[derive(Default)]
+struct NoiseCounts(u16);
+
+impl<'de> Deserialize<'de> for NoiseCounts {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        const MAX: u16 = 1000;
+        let counts = i64::deserialize(deserializer)?;
+        match u16::try_from(counts) {
+            Ok(counts) if counts <= MAX => Ok(Self(counts)),
+            _ => Err(D::Error::custom(format!("noise_counts = {counts}, expected from 0 to {MAX}"))),
+        }
+    }
+}
+
+fn first_seed() -> u64 {
+    1
+}

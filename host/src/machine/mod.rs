@@ -1,0 +1,37 @@
+//! The machine: what it may do, how its axes are wired and regulated, and what its drives are like.
+//!
+//! **Consumes** a TOML file (or nothing: [`Machine::reference`]). **Produces** a [`Machine`] from which every
+//! stage takes its own configuration: planning its limits, the kernel its rules and axes, the simulation its
+//! drives. **Runs** in the background, once. **Fails** with a [`MachineError`] that names file, line, column,
+//! what was found and what was expected; nothing is clamped or filled in silently.
+//!
+//! - [`settings`]: the values, and what the stages make of them;
+//! - [`error`]: refusals and their places;
+//! - `file`: the layout of the file and the rules that join several keys;
+//! - `range`: numbers that carry their range, so that a wrong one is refused where it stands.
+//!
+//! ```
+//! use motion_host::machine::{Machine, REFERENCE_TOML};
+//!
+//! let machine = Machine::from_toml("reference.toml", REFERENCE_TOML)?;
+//! assert_eq!(machine, Machine::reference());
+//!
+//! let fast = REFERENCE_TOML.replacen("tick_s = 0.0005", "tick_s = 0.0", 1);
+//! let refused = Machine::from_toml("fast.toml", &fast).unwrap_err();
+//! assert!(refused.to_string().contains("found tick_s = 0.0, expected a number from 0.00002 to 0.02"));
+//! # Ok::<(), motion_host::machine::MachineError>(())
+//! ```
+
+pub mod error;
+pub mod settings;
+
+mod file;
+mod range;
+#[cfg(test)]
+mod tests;
+
+pub use error::{AxisError, MachineError};
+pub use settings::{AxisSettings, DEAD_TIME_CELLS, Machine, PathSettings};
+
+/// The reference machine's file, with every key explained.
+pub const REFERENCE_TOML: &str = include_str!("reference.toml");

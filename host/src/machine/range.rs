@@ -1,0 +1,79 @@
+//! Numbers that carry their range in their type.
+//!
+//! The check runs while the file is being read, so the reader knows line and column of a wrong value.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::Deserialize;
+use serde::de::{Deserializer, Error, Unexpected, Visitor};
+
+/// A range of finite numbers. None of them contains what is not a number.
+pub(super) trait Range {
+    /// "a number …", as errors say it.
+    const EXPECTED: &'static str;
+    /// Whether `value` is allowed.
+    fn contains(value: f64) -> bool;
+}
+
+/// A number within `R`.
+pub(super) struct Within<R>(pub(super) f64, PhantomData<R>);
+
+macro_rules! ranges {
+    ($($name:ident: $expected:literal, $contains:expr;)*) => {$(
+        pub(super) struct $name;
+        impl Range for $name {
+            const EXPECTED: &'static str = $expected;
+            fn contains(value: f64) -> bool {
+                let contains: fn(f64) -> bool = $contains;
+                contains(value)
+            }
+        }
+    )*};
+}
+
+// Upper ends are far beyond any machine: they keep products of several values finite in f32, too.
+ranges! {
+    Tick: "a number from 0.00002 to 0.02", |value| (0.00002..=0.02).contains(&value);
+    Limit: "a number from 0.001 to 1e12", |value| (0.001..=1e12).contains(&value);
+    JointAngle: "a number from 0 to 30", |value| (0.0..=30.0).contains(&value);
+    FollowingError: "a number from 0.0001 to 1000", |value| (0.0001..=1000.0).contains(&value);
+    Resolution: "a number above 1e-8 and below 1", |value| value > 1e-8 && value < 1.0;
+    Velocity: "a number other than 0 within ±1e9", |value| value.abs() >= 1e-3 && value.abs() <= 1e9;
+    OutputLimit: "a number above 0, at most 10", |value| value > 0.0 && value <= 10.0;
+    OutputOffset: "a number above -10 and below 10", |value| value.abs() < 10.0;
+    Gain: "a number from 0 to 1e9", |value| (0.0..=1e9).contains(&value);
+    FeedforwardGain: "a number from -1000 to 1000", |value| value.abs() <= 1000.0;
+    Positive: "a number above 0, at most 1e9", |value| value > 0.0 && value <= 1e9;
+    DeadTime: "a number from 0 to 0.01", |value| (0.0..=0.01).contains(&value);
+    Inertia: "a number above -1, at most 1000", |value| value > -1.0 && value <= 1000.0;
+}
+
+impl<'de, R: Range> Deserialize<'de> for Within<R> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Number<R>(PhantomData<R>);
+
+        impl<R: Range> Visitor<'_> for Number<R> {
+            type Value = f64;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str(R::EXPECTED)
+            }
+
+            fn visit_f64<E: Error>(self, value: f64) -> Result<f64, E> {
+                if R::contains(value) {
+                    Ok(value)
+                } else {
+                    Err(E::invalid_value(Unexpected::Float(value), &self))
+                }
+            }
+
+            // 5 is as good as 5.0. Integers of a range's size are exact.
+            fn visit_i64<E: Error>(self, value: i64) -> Result<f64, E> {
+                self.visit_f64(value as f64)
+            }
+        }
+
+        deserializer.deserialize_f64(Number(PhantomData::<R>)).map(|value| Self(value, PhantomData))
+    }
+}

@@ -1,0 +1,235 @@
+//! The machine's values, and what each stage makes of them.
+
+use hal_sim::{
+    AxisParameters, DriveParameters, EncoderNoise, EncoderParameters, MachineParameters, REFERENCE_TICK_S,
+    REFERENCE_X, REFERENCE_Y, REFERENCE_Z, SUBSTEPS_MAX, TimerBits,
+};
+use motion_kernel::axis::{AxisConfig, EncoderScale, Feedforward, Gains, OutputScale, Regulator};
+use motion_kernel::law::Limits;
+use motion_kernel::num::Real;
+use motion_kernel::plan::{AxisLimits, MachineLimits};
+use motion_kernel::queue::PathRules;
+use motion_kernel::units::DacCode;
+
+use super::error::{AxisError, MachineError};
+use super::file;
+
+/// Greatest gap between two pieces \[mm\]: a fifth of a count of 0.1 µm is left for rounding of pieces.
+const JOINT_GAP_MM: f64 = 5e-6;
+
+/// The simulation's step \[s\]; a tick is divided into as many as come closest to it, so a step is at least 3/4 of it.
+const SUBSTEP_S: f64 = 25e-6;
+
+/// Cells of a simulated axis's dead time: for the longest dead time that a file may give, in the shortest steps.
+pub const DEAD_TIME_CELLS: usize = 640;
+
+/// A machine of three axes. Made by [`Machine::from_toml`] or [`Machine::reference`]; whoever changes a value
+/// afterwards is held to the ranges by the stages that take it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    /// Shown in reports.
+    pub name: String,
+    /// Control tick \[s\], 0.00002 to 0.02.
+    pub tick_s: f64,
+    /// What holds along the path.
+    pub path: PathSettings,
+    /// The axes X, Y, Z of G-code, under their own names.
+    pub axes: [AxisSettings; 3],
+}
+
+/// Limits along the path, and rules for its joints. The four limits are from 0.001 to 10¹².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathSettings {
+    /// Greatest feed \[mm/s\].
+    pub feed_mm_s: f64,
+    /// Greatest acceleration, as a vector \[mm/s²\].
+    pub accel_mm_s2: f64,
+    /// Greatest jerk, as a vector \[mm/s³\].
+    pub jerk_mm_s3: f64,
+    /// Greatest snap \[mm/s⁴\].
+    pub snap_mm_s4: f64,
+    /// Greatest change of direction at a joint that is driven through \[rad\]; 0 to 30° (in the file in degrees).
+    pub joint_angle_rad: f64,
+    /// Greatest jump of acceleration at a joint \[mm/s²\]; from 0.001 to 10¹².
+    pub accel_step_mm_s2: f64,
+}
+
+/// One axis. Limits are from 0.001 to 10¹².
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisSettings {
+    /// Letters and digits, at most 8.
+    pub name: String,
+    /// Greatest velocity \[mm/s\].
+    pub feed_mm_s: f64,
+    /// Greatest acceleration \[mm/s²\].
+    pub accel_mm_s2: f64,
+    /// Greatest jerk \[mm/s³\].
+    pub jerk_mm_s3: f64,
+    /// Greatest snap \[mm/s⁴\].
+    pub snap_mm_s4: f64,
+    /// Following error at which the axis faults \[mm\], 0.0001 to 1000.
+    pub following_error_limit_mm: f64,
+    /// Travel per encoder count \[mm\], between 10⁻⁸ and 1.
+    pub mm_per_count: f64,
+    /// Width of the encoder's counter register.
+    pub timer: TimerBits,
+    /// Reading noise of the simulated encoder, if any.
+    pub noise: Option<EncoderNoise>,
+    /// Velocity at +10 V \[mm/s\], not 0; negative if +10 V moves the axis backwards. In the file in mm/min.
+    pub mm_s_at_10_v: f64,
+    /// Added to every output \[V\]; its magnitude is below the limit.
+    pub output_offset_v: f64,
+    /// Greatest output in either direction \[V\], above 0, at most 10.
+    pub output_limit_v: f64,
+    /// Feedback gains, 0 or more.
+    pub gains: Gains,
+    /// Feedforward gains, within ±1000.
+    pub feedforward: Feedforward,
+    /// The simulated drive and its mechanics.
+    pub drive: DriveParameters,
+}
+
+impl Machine {
+    /// The reference machine: S4's axes X and Y, a Z like X, S1's limits. The same as
+    /// [`REFERENCE_TOML`](super::REFERENCE_TOML).
+    #[must_use]
+    pub fn reference() -> Self {
+        Self {
+            name: "reference".to_owned(),
+            tick_s: REFERENCE_TICK_S,
+            path: PathSettings {
+                feed_mm_s: 300.0,
+                accel_mm_s2: 500.0,
+                jerk_mm_s3: 5e3,
+                snap_mm_s4: 4e5,
+                joint_angle_rad: 0.5_f64.to_radians(),
+                accel_step_mm_s2: 500.0,
+            },
+            axes: [
+                AxisSettings::reference("X", REFERENCE_X),
+                AxisSettings::reference("Y", REFERENCE_Y),
+                AxisSettings::reference("Z", REFERENCE_Z),
+            ],
+        }
+    }
+
+    /// Reads a machine file; `source_name` appears in errors only.
+    ///
+    /// # Errors
+    /// The text is not TOML, a key is missing or unknown, or a value is out of its range.
+    pub fn from_toml(source_name: &str, text: &str) -> Result<Self, MachineError> {
+        file::read(source_name, text)
+    }
+
+    /// The limits that planning keeps.
+    #[must_use]
+    pub fn limits(&self) -> MachineLimits<f64, 3> {
+        let path = &self.path;
+        MachineLimits {
+            path: AxisLimits { feed_mm_s: path.feed_mm_s, limits: path.limits() },
+            axes: self.axes.each_ref().map(|axis| AxisLimits {
+                feed_mm_s: axis.feed_mm_s,
+                limits: Limits {
+                    accel_mm_s2: axis.accel_mm_s2,
+                    jerk_mm_s3: axis.jerk_mm_s3,
+                    snap_mm_s4: axis.snap_mm_s4,
+                },
+            }),
+        }
+    }
+
+    /// What the kernel's queues hold the streams to.
+    #[must_use]
+    pub fn rules(&self) -> PathRules {
+        PathRules {
+            limits: self.path.limits(),
+            feed_mm_s: self.path.feed_mm_s,
+            joint_angle_rad: self.path.joint_angle_rad,
+            joint_gap_mm: JOINT_GAP_MM,
+        }
+    }
+
+    /// The kernel's axes.
+    ///
+    /// # Errors
+    /// The first axis with a value that the kernel can't use.
+    pub fn axis_configs<R: Real>(&self) -> Result<[AxisConfig<R>; 3], AxisError> {
+        let [x, y, z] = &self.axes;
+        Ok([x.config(self.tick_s)?, y.config(self.tick_s)?, z.config(self.tick_s)?])
+    }
+
+    /// The simulated machine: the same drives, encoders and scales, at rest at the origin. Its dead times
+    /// fit [`DEAD_TIME_CELLS`].
+    #[must_use]
+    pub fn simulated(&self) -> MachineParameters<3> {
+        let substeps = (self.tick_s / SUBSTEP_S).round() as u32;
+        MachineParameters {
+            axes: self.axes.each_ref().map(AxisSettings::simulated),
+            tick_s: self.tick_s,
+            substeps: substeps.clamp(1, SUBSTEPS_MAX),
+        }
+    }
+}
+
+impl PathSettings {
+    /// Acceleration, jerk and snap along the path.
+    #[must_use]
+    pub fn limits(&self) -> Limits<f64> {
+        Limits { accel_mm_s2: self.accel_mm_s2, jerk_mm_s3: self.jerk_mm_s3, snap_mm_s4: self.snap_mm_s4 }
+    }
+}
+
+impl AxisSettings {
+    fn reference(name: &str, drive: DriveParameters) -> Self {
+        Self {
+            name: name.to_owned(),
+            feed_mm_s: 300.0,
+            accel_mm_s2: 500.0,
+            jerk_mm_s3: 5e3,
+            snap_mm_s4: 4e5,
+            following_error_limit_mm: 1.0,
+            mm_per_count: 1e-4,
+            timer: TimerBits::ThirtyTwo,
+            noise: None,
+            mm_s_at_10_v: 20_000.0 / 60.0,
+            output_offset_v: 0.0,
+            output_limit_v: 10.0,
+            gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
+            // The measured machine ran 0.35 of the drive's own J, 6.376715·10⁻⁵ s².
+            feedforward: Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.231_850_25e-5 },
+            drive,
+        }
+    }
+
+    /// The velocity that the output can command in either direction \[mm/s\].
+    #[must_use]
+    pub fn reachable_mm_s(&self) -> f64 {
+        let volts = self.output_limit_v - self.output_offset_v.abs();
+        self.mm_s_at_10_v.abs() * volts / DacCode::FULL_SCALE_V
+    }
+
+    fn config<R: Real>(&self, tick_s: f64) -> Result<AxisConfig<R>, AxisError> {
+        let refused = |source| AxisError { axis: self.name.clone(), source };
+        Ok(AxisConfig {
+            encoder: EncoderScale::new(self.mm_per_count).map_err(refused)?,
+            output: OutputScale::new(self.mm_s_at_10_v, self.output_offset_v, self.output_limit_v)
+                .map_err(refused)?,
+            regulator: Regulator::new(self.gains, self.feedforward, tick_s).map_err(refused)?,
+            following_error_limit_mm: R::from_f64(self.following_error_limit_mm),
+        })
+    }
+
+    fn simulated(&self) -> AxisParameters {
+        AxisParameters {
+            drive: self.drive,
+            encoder: EncoderParameters {
+                resolution_mm: self.mm_per_count,
+                offset_counts: 0,
+                timer: self.timer,
+                noise: self.noise,
+            },
+            mm_s_per_volt: self.mm_s_at_10_v / DacCode::FULL_SCALE_V,
+            start_position_mm: 0.0,
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Programs and block lists to feed plans.
+//!
+//! Consumes G-code steps or a BLOCKS.json; produces a [`Plan`]: every block with its ceiling and the
+//! reason for it, the feed over the path, and what the kernel needs to execute it. Plans whole
+//! stretches, from one full stop to the next, in f64.
+//!
+//! - [`program`]: steps to stretches: where motion must stop, what each joint allows;
+//! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
+//! - [`profile`]: feed and time at any path position of a planned stretch;
+//! - [`blocks`]: BLOCKS.json;
+//! - [`executable`]: a plan in the kernel's terms, checked against the tick's bounds;
+//! - [`error`]: what is refused, with file and line.
+
+pub mod blocks;
+pub mod error;
+pub mod executable;
+pub mod profile;
+pub mod program;
+pub mod stretch;
+
+pub use blocks::plan_blocks;
+pub use error::{PlanningError, Problem};
+pub use executable::{Executable, ExecutableItem};
+pub use program::plan_program;
+pub use stretch::Stretch;
+
+use crate::record::BlockRecord;
+
+/// Whether neighbours with equal ceilings are planned as one block.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// Equal neighbours are merged: a ramp may span them.
+    #[default]
+    Merged,
+    /// One pair of ramps per block, as S3 plans.
+    PerBlock,
+}
+
+/// The feed over a length of path: a ramp, or a cruise with equal feeds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeedRecord {
+    /// Where it starts, from the program's start \[mm\].
+    pub start_mm: f64,
+    /// Length \[mm\].
+    pub length_mm: f64,
+    /// Feed at the start \[mm/s\].
+    pub from_mm_s: f64,
+    /// Feed at the end \[mm/s\].
+    pub to_mm_s: f64,
+    /// Peak jerk \[mm/s³\]; 0 for a cruise.
+    pub peak_jerk_mm_s3: f64,
+    /// t₁ of S1 \[s\]; 0 for a cruise.
+    pub t1_s: f64,
+    /// t₂ of S1 \[s\].
+    pub t2_s: f64,
+    /// Duration \[s\].
+    pub time_s: f64,
+}
+
+/// A planned program.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Name of the program or block list.
+    pub source: String,
+    /// Blocks, in path order.
+    pub blocks: Vec<BlockRecord>,
+    /// Feed, in path order.
+    pub feed: Vec<FeedRecord>,
+    /// Duration, dwells included, stops not \[s\].
+    pub time_s: f64,
+    /// Path length \[mm\].
+    pub length_mm: f64,
+    /// What to execute, in order. Empty for a block list, which has no geometry.
+    pub items: Vec<Item>,
+    /// What was accepted and not acted on.
+    pub notices: Vec<String>,
+    /// The control tick it was planned for \[s\].
+    pub tick_s: f64,
+}
+
+/// One thing to execute.
+#[derive(Clone, Debug)]
+pub enum Item {
+    /// Motion from one full stop to the next.
+    Stretch(Stretch),
+    /// Rest.
+    Dwell {
+        /// Program line.
+        line: u32,
+        /// Duration \[s\].
+        seconds: f64,
+    },
+    /// Program stop.
+    Stop {
+        /// Program line.
+        line: u32,
+    },
+}

@@ -1,0 +1,108 @@
+//! Steps of a program to stretches: where the motion must stop, and what each joint allows.
+
+use motion_kernel::plan::{Ceiling, Joint, joint};
+
+use super::error::{PlanningError, Problem};
+use super::executable::Executable;
+use super::stretch::{Stretch, StretchBlock};
+use super::{Item, Mode, Plan};
+use crate::gcode::{Feed, Program, StepKind};
+use crate::machine::Machine;
+use crate::toolpath::{Element, angle, norm, subtract};
+
+/// Plans a whole program for a machine.
+///
+/// # Errors
+/// A move can't be executed by the kernel, or the plan would exceed what a tick can do; the error
+/// names the line.
+pub fn plan_program(
+    source_name: &str,
+    program: &Program,
+    machine: &Machine,
+    mode: Mode,
+) -> Result<Plan, PlanningError> {
+    let at = |line: u32| {
+        move |problem: Problem| PlanningError { source_name: source_name.to_owned(), line, problem }
+    };
+    let mut plan = Plan {
+        source: source_name.to_owned(),
+        blocks: Vec::new(),
+        feed: Vec::new(),
+        time_s: 0.0,
+        length_mm: 0.0,
+        items: Vec::new(),
+        notices: program.notices.iter().map(ToString::to_string).collect(),
+        tick_s: machine.tick_s,
+    };
+    let mut open: Vec<StretchBlock> = Vec::new();
+    for step in &program.steps {
+        let (element, feed) = match &step.kind {
+            StepKind::Line(line) => (Element::line(line), line.feed),
+            StepKind::Arc(arc) => (Element::arc(arc), arc.feed),
+            StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => {
+                close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
+                match step.kind {
+                    // A dwell of no time changes nothing but the stop it makes.
+                    StepKind::Dwell { seconds } if seconds > 0.0 => {
+                        plan.time_s += seconds;
+                        plan.items.push(Item::Dwell { line: step.line, seconds });
+                    }
+                    StepKind::Stop => plan.items.push(Item::Stop { line: step.line }),
+                    _ => {}
+                }
+                continue;
+            }
+        };
+        let block = block(&element, step.line, feed, machine).map_err(at(step.line))?;
+        if let Some(last) = open.last_mut() {
+            last.joint_mm_s = joint_feed(&last.element, &element, machine);
+            if last.joint_mm_s <= 0.0 {
+                close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
+            }
+        }
+        open.push(block);
+    }
+    close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
+    // What the tick can't do is to be refused here, not on the machine.
+    Executable::<f32>::new(&plan)?;
+    Ok(plan)
+}
+
+fn block(element: &Element, line: u32, feed: Feed, machine: &Machine) -> Result<StretchBlock, Problem> {
+    let feed_mm_s = match feed {
+        Feed::Rapid => f64::INFINITY,
+        Feed::MmPerMin(feed) => feed / 60.0,
+    };
+    let ceiling = Ceiling::new(
+        &machine.limits(),
+        feed_mm_s,
+        &element.tangent_max(),
+        &element.curved(),
+        &element.bend(),
+    )?;
+    Ok(StretchBlock { line, element: *element, ceiling, joint_mm_s: 0.0 })
+}
+
+/// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.
+fn joint_feed(before: &Element, after: &Element, machine: &Machine) -> f64 {
+    let ([_, end], [start, _]) = (before.ends(), after.ends());
+    let steps = Joint {
+        angle_rad: angle(end.tangent, start.tangent),
+        curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)),
+    };
+    joint(&steps, machine.path.joint_angle_rad, machine.path.accel_step_mm_s2, machine.tick_s)
+}
+
+/// Plans the open stretch and appends it.
+fn close(open: &mut Vec<StretchBlock>, plan: &mut Plan, mode: Mode) -> Result<(), (u32, Problem)> {
+    if open.is_empty() {
+        return Ok(());
+    }
+    let stretch = Stretch::new(std::mem::take(open), plan.length_mm, mode, plan.tick_s)?;
+    plan.blocks.extend(stretch.block_records());
+    plan.feed.extend(stretch.feed_records());
+    plan.time_s += stretch.profile.time_s();
+    plan.length_mm += stretch.length_mm();
+    plan.items.push(Item::Stretch(stretch));
+    Ok(())
+}

@@ -1,0 +1,313 @@
+//! The report of a run: one HTML file for the engineer who wants to see what the machine did.
+//!
+//! Consumes a [`RunRecord`], produces a page that needs nothing else: no script, no font, no picture from elsewhere.
+//! It opens on a desk, on a phone and in ten years, and prints on paper. Time and memory grow with the number of
+//! ticks; the size of the page does not: plots keep the extremes of every column, tables end after a number of rows
+//! and say what they left out. Fails only if the output cannot be written.
+
+mod decimate;
+mod format;
+mod palette;
+mod plots;
+mod summary;
+mod tables;
+
+use std::io::{self, Write};
+
+use self::format::{counted, duration, escape, figure};
+use self::palette::Ink;
+use self::plots::path::View;
+use self::plots::{Caption, feed, path, time};
+use self::summary::{Outcome, Summary};
+use crate::record::{AXES, FaultRecord, RunRecord};
+
+/// Faults named in the sentence at the top; the table below it has the others.
+const FAULTS_IN_SENTENCE: usize = 3;
+
+/// Notices shown.
+const NOTICES_MAX: usize = 100;
+
+/// Writes the report of `record` as one self-contained HTML file.
+///
+/// An empty record, a run of one tick and values that are not finite all make a valid page that says so.
+///
+/// # Errors
+///
+/// Whatever `out` reports. Drawing itself happens in memory.
+pub fn write_html(record: &RunRecord, out: &mut impl Write) -> io::Result<()> {
+    let summary = Summary::of(record);
+    let names = axis_names(record);
+    head(record, out)?;
+    header(record, &summary, &names, out)?;
+    if !record.ticks.is_empty() {
+        path_section(record, &summary, &names, out)?;
+        feed_section(record, &summary, out)?;
+        time_section(record, &summary, out)?;
+        axes_section(record, &summary, &names, out)?;
+    }
+    if !record.blocks.is_empty() {
+        writeln!(out, "<section><h2>Blocks</h2>\n{}</section>", tables::blocks(record))?;
+    }
+    writeln!(out, "</main></body></html>")
+}
+
+/// Names to call the axes by; one without a name gets its number.
+fn axis_names(record: &RunRecord) -> [String; AXES] {
+    std::array::from_fn(|axis| match record.axis_names[axis].trim() {
+        "" => format!("axis {}", axis + 1),
+        name => name.to_string(),
+    })
+}
+
+fn head(record: &RunRecord, out: &mut impl Write) -> io::Result<()> {
+    let program = program_name(record);
+    writeln!(
+        out,
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
+         <title>{} – motion report</title>\n<style>\n{}{}</style></head>\n<body><main>",
+        escape(program),
+        include_str!("style.css"),
+        palette::style_sheet(),
+    )
+}
+
+fn program_name(record: &RunRecord) -> &str {
+    if record.program.is_empty() { "unnamed program" } else { &record.program }
+}
+
+fn header(
+    record: &RunRecord,
+    summary: &Summary,
+    names: &[String; AXES],
+    out: &mut impl Write,
+) -> io::Result<()> {
+    writeln!(out, "<header><h1>{}</h1>", escape(program_name(record)))?;
+    if !record.machine.is_empty() {
+        writeln!(out, "<p class=\"machine\">Machine: {}</p>", escape(&record.machine))?;
+    }
+    let class = match summary.outcome {
+        Outcome::Empty => "empty",
+        Outcome::Done => "done",
+        Outcome::Unfinished => "unfinished",
+        Outcome::Faulted => "faulted",
+    };
+    writeln!(out, "<p class=\"result {class}\">{}</p></header>", result(record, summary))?;
+    writeln!(out, "{}", tables::faults(record))?;
+    notices(record, summary, out)?;
+    writeln!(out, "<h2>Key figures</h2>\n{}", tables::key_figures(record, summary))?;
+    writeln!(out, "{}", tables::axes(summary, names))
+}
+
+/// How the run ended, in one sentence.
+fn result(record: &RunRecord, summary: &Summary) -> String {
+    let blocks = counted(record.blocks.len(), "block", "blocks");
+    let length = figure(summary.path_length_mm, 6);
+    let time = duration(summary.executed_time_s);
+    match summary.outcome {
+        Outcome::Empty => "<strong>Nothing was run:</strong> the record holds no tick.".to_string(),
+        Outcome::Done => format!("<strong>Done without a fault:</strong> {blocks}, {length} mm in {time}."),
+        Outcome::Unfinished => format!(
+            "<strong>Not finished:</strong> the run ended without a fault after {time}, {} of {length} mm along the path.",
+            figure(summary.path_done_mm, 6)
+        ),
+        Outcome::Faulted => {
+            let named: Vec<_> = record
+                .faults
+                .iter()
+                .take(FAULTS_IN_SENTENCE)
+                .map(|fault| name_fault(fault, record.tick_s))
+                .collect();
+            let others = match record.faults.len().saturating_sub(FAULTS_IN_SENTENCE) {
+                0 => String::new(),
+                others => format!(", and {}", counted(others, "other", "others")),
+            };
+            format!(
+                "<strong>Ended in {}:</strong> {}{others}, {} of {length} mm along the path.",
+                if record.faults.len() == 1 { "a fault" } else { "faults" },
+                named.join("; "),
+                figure(summary.path_done_mm, 6),
+            )
+        }
+    }
+}
+
+fn name_fault(fault: &FaultRecord, tick_s: f64) -> String {
+    let axis = fault.axis.as_deref().map_or(String::new(), |axis| format!(" on axis {}", escape(axis)));
+    let detail =
+        if fault.detail.is_empty() { String::new() } else { format!(" ({})", escape(&fault.detail)) };
+    format!("{}{axis} at {:.4} s{detail}", escape(&fault.fault), fault.tick as f64 * tick_s)
+}
+
+fn notices(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+    if record.notices.is_empty() && summary.not_finite == 0 {
+        return Ok(());
+    }
+    writeln!(out, "<h2>Notices</h2>\n<ul class=\"notices\">")?;
+    for notice in record.notices.iter().take(NOTICES_MAX) {
+        writeln!(out, "<li>{}</li>", escape(notice))?;
+    }
+    if record.notices.len() > NOTICES_MAX {
+        writeln!(out, "<li>{} more left out.</li>", record.notices.len() - NOTICES_MAX)?;
+    }
+    if summary.not_finite > 0 {
+        let values = counted(summary.not_finite as usize, "value", "values");
+        writeln!(out, "<li>{values} in the record not finite, and therefore not drawn.</li>")?;
+    }
+    writeln!(out, "</ul>")
+}
+
+/// A figure with its legend and its caption.
+fn figure_html(
+    drawing: &str,
+    legend: &[(Ink, String)],
+    caption: &str,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    writeln!(out, "<figure>\n{drawing}")?;
+    if !legend.is_empty() {
+        writeln!(out, "<ul class=\"legend\">")?;
+        for (ink, word) in legend {
+            let line = "<path d=\"M0 24H136\" fill=\"none\" stroke-width=\"12\"";
+            writeln!(
+                out,
+                "<li><svg viewBox=\"0 0 136 48\" aria-hidden=\"true\">{line} stroke=\"{}\"/></svg>{}</li>",
+                ink.hex(),
+                escape(word)
+            )?;
+        }
+        writeln!(out, "</ul>")?;
+    }
+    if !caption.is_empty() {
+        writeln!(out, "<figcaption>{caption}</figcaption>")?;
+    }
+    writeln!(out, "</figure>")
+}
+
+fn path_section(
+    record: &RunRecord,
+    summary: &Summary,
+    names: &[String; AXES],
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let mut views = vec![View { right: 0, up: 1 }];
+    if summary.axes[2].moved() {
+        views.push(View { right: 0, up: 2 });
+    }
+    writeln!(out, "<section><h2>Path</h2>")?;
+    let classes = path::classes(summary.feed_mm_s);
+    let legend: Vec<_> = palette::CLASSES
+        .into_iter()
+        .zip(&classes)
+        .map(|(ink, (from, to))| (ink, format!("{}–{}", figure(*from, 3), figure(*to, 3))))
+        .collect();
+    let count = views.len();
+    for (number, view) in views.iter().enumerate() {
+        let title = format!("Path, {} and {}", names[view.right], names[view.up]);
+        let description = path::describe(summary, names, view);
+        let caption = Caption { id: &format!("path{number}"), title: &title, description: &description };
+        let drawing = path::draw(record, summary, names, view, &caption)?;
+        let last = number + 1 == count;
+        let words = if last {
+            "Set path, coloured by feed in mm/s. Ring: start; square: end; cross: first fault."
+        } else {
+            ""
+        };
+        figure_html(&drawing, if last { &legend } else { &[] }, words, out)?;
+    }
+    writeln!(out, "</section>")
+}
+
+fn feed_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+    let faults_mm: Vec<f64> = record
+        .faults
+        .iter()
+        .filter_map(|fault| {
+            let index = record.ticks.partition_point(|tick| tick.tick < fault.tick);
+            record.ticks.get(index).map(|tick| tick.s_mm)
+        })
+        .collect();
+    let reasons = feed::reasons(&record.blocks);
+    let description = format!(
+        "Feed over {} mm of path, at most {} mm/s, under ceilings set by: {}.",
+        figure(summary.path_length_mm, 6),
+        figure(summary.feed_mm_s.magnitude(), 4),
+        if reasons.is_empty() { "nothing".to_string() } else { reasons.join(", ") }
+    );
+    let caption =
+        Caption { id: "feed", title: "Feed over path length and its ceilings", description: &description };
+    let mut legend = vec![(palette::FEED, "feed".to_string())];
+    legend.extend(
+        reasons.iter().map(|reason| (palette::ceiling(reason, &reasons), format!("ceiling: {reason}"))),
+    );
+    legend.extend(fault_key(record));
+    let (top_mm_s, beyond) = feed::top(record, summary);
+    let mut words = String::new();
+    if beyond {
+        let top = figure(top_mm_s, 4);
+        words +=
+            &format!("Ceilings above {top} mm/s are drawn there; the table of blocks has their values. ");
+    }
+    if feed::is_crowded(record, summary) {
+        words += "Where many blocks share a column, a band spans their ceilings; its lower edge is the lowest of them.";
+    }
+    writeln!(out, "<section><h2>Feed along the path</h2>")?;
+    figure_html(&feed::draw(record, summary, &faults_mm, &caption)?, &legend, &words, out)?;
+    writeln!(out, "</section>")
+}
+
+fn time_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+    let description = format!(
+        "Four curves over {}: feed up to {} mm/s, acceleration up to {} mm/s², jerk up to {} mm/s³, snap up to {} mm/s⁴.",
+        duration(summary.executed_time_s),
+        figure(summary.feed_mm_s.magnitude(), 4),
+        figure(summary.accel_mm_s2.magnitude(), 4),
+        figure(summary.jerk_mm_s3.magnitude(), 4),
+        figure(summary.snap_mm_s4.magnitude(), 4),
+    );
+    let caption = Caption {
+        id: "time",
+        title: "Feed, acceleration, jerk and snap over time",
+        description: &description,
+    };
+    writeln!(out, "<section><h2>Motion along the path over time</h2>")?;
+    figure_html(&time::along_path(record, summary, &caption)?, &fault_key(record), "", out)?;
+    writeln!(out, "</section>")
+}
+
+fn axes_section(
+    record: &RunRecord,
+    summary: &Summary,
+    names: &[String; AXES],
+    out: &mut impl Write,
+) -> io::Result<()> {
+    writeln!(out, "<section><h2>Axes over time</h2>")?;
+    for (axis, (name, figures)) in names.iter().zip(&summary.axes).enumerate() {
+        let still = !figures.moved() && figures.err_um.magnitude() <= 0.0 && figures.out_v.magnitude() <= 0.0;
+        if still {
+            writeln!(out, "<h3>{0}</h3><p>{0} stood still without error or output.</p>", escape(name))?;
+            continue;
+        }
+        let title = format!("Following error and output of {name}");
+        let description = format!(
+            "Following error at most {} µm, {} µm rms; output at most {} V.",
+            figure(figures.err_um.magnitude(), 3),
+            figure(figures.err_um_rms, 3),
+            figure(figures.out_v.magnitude(), 3),
+        );
+        let caption = Caption { id: &format!("axis{axis}"), title: &title, description: &description };
+        let drawing = time::of_axis(record, summary, axis, &caption)?;
+        writeln!(out, "<div class=\"axis\"><h3>{}</h3>", escape(name))?;
+        figure_html(&drawing, &fault_key(record), "", out)?;
+        writeln!(out, "</div>")?;
+    }
+    writeln!(out, "</section>")
+}
+
+/// Legend of the fault lines, where there are any.
+fn fault_key(record: &RunRecord) -> Vec<(Ink, String)> {
+    if record.faults.is_empty() { Vec::new() } else { vec![(palette::FAULT, "fault latched".to_string())] }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,170 @@
+//! One colour per idea, on light and on dark paper.
+//!
+//! The plots are drawn in the light colours; the style sheet generated here replaces them by their dark partners.
+//! A drawn colour is therefore also a name and must be unique. Lines keep a contrast of at least 3:1 to the paper,
+//! text of at least 4.5:1, and where several lines share a plot they also differ in their dashes.
+
+use plotters::style::RGBColor;
+
+/// A colour on light and on dark paper, and the dashes of a line drawn in it (empty: solid).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ink {
+    light: u32,
+    dark: u32,
+    dash: &'static str,
+}
+
+const fn solid(light: u32, dark: u32) -> Ink {
+    Ink { light, dark, dash: "" }
+}
+
+const fn dashed(light: u32, dark: u32, dash: &'static str) -> Ink {
+    Ink { light, dark, dash }
+}
+
+impl Ink {
+    /// The colour to draw with.
+    pub(super) fn rgb(self) -> RGBColor {
+        let [_, r, g, b] = self.light.to_be_bytes();
+        RGBColor(r, g, b)
+    }
+
+    /// The same as the drawing library writes it, `#RRGGBB`.
+    pub(super) fn hex(self) -> String {
+        format!("#{:06X}", self.light)
+    }
+}
+
+/// Numbers and words in a plot.
+pub(super) const TEXT: Ink = solid(0x1C2530, 0xE4E9EF);
+/// Axes and tick marks.
+pub(super) const AXIS: Ink = solid(0x6B7684, 0x8C98A6);
+/// Grid.
+pub(super) const GRID: Ink = solid(0xE1E5EA, 0x2C343E);
+/// Where blocks meet, and zero.
+pub(super) const RULE: Ink = solid(0xBCC4CD, 0x47525F);
+/// Faults.
+pub(super) const FAULT: Ink = dashed(0xC4162A, 0xFF6B6B, "20 12");
+/// Feed.
+pub(super) const FEED: Ink = solid(0x1F66B0, 0x6BB1F5);
+/// Acceleration, and ceilings set by it.
+pub(super) const ACCELERATION: Ink = solid(0x0B7A5F, 0x3CCBA4);
+/// Jerk, and ceilings set by it.
+pub(super) const JERK: Ink = solid(0x8740B5, 0xC596EE);
+/// Snap, and ceilings set by it.
+pub(super) const SNAP: Ink = solid(0xB05200, 0xF2A154);
+/// Following error.
+pub(super) const ERROR: Ink = solid(0xA8235E, 0xF588B4);
+/// Output voltage.
+pub(super) const VOLTS: Ink = solid(0x4E6A00, 0xB2CE4B);
+
+/// Ceilings: programmed, acceleration, jerk, snap, then others in the order in which they appear.
+const CEILINGS: [Ink; 8] = [
+    dashed(0x4A5563, 0xB4BECA, ""),
+    dashed(0x0C7B60, 0x3DCCA5, "32 12"),
+    dashed(0x8841B6, 0xC697EF, "14 10"),
+    dashed(0xB15301, 0xF3A255, "32 10 8 10"),
+    dashed(0xA9245F, 0xF689B5, "16 8"),
+    dashed(0x7A5C00, 0xD9B84A, "48 12"),
+    dashed(0x0A7285, 0x4CC4DA, "20 8 8 8 8 8"),
+    dashed(0x39509E, 0x9DB1F7, "12 20"),
+];
+
+/// Ink of a ceiling. `known` are the reasons of this run in the order of their appearance; from the ninth on they
+/// share the last ink.
+pub(super) fn ceiling(reason: &str, known: &[&str]) -> Ink {
+    const OWN: [&str; 4] = ["programmed", "acceleration", "jerk", "snap"];
+    if let Some(index) = OWN.iter().position(|own| *own == reason) {
+        return CEILINGS[index];
+    }
+    let others = known.iter().filter(|other| !OWN.contains(other));
+    let index = OWN.len() + others.take_while(|other| **other != reason).count();
+    CEILINGS[index.min(CEILINGS.len() - 1)]
+}
+
+/// Classes of feed along the path, slow to fast: brightness rises with the feed, so that the order survives a
+/// grey-scale printer.
+pub(super) const CLASSES: [Ink; 6] = [
+    solid(0x14086B, 0x8C5FE0),
+    solid(0x5A0FA0, 0xC24BC4),
+    solid(0x9A1D96, 0xE8628F),
+    solid(0xC43F74, 0xF78F5E),
+    solid(0xDA5A4C, 0xFBBD4A),
+    solid(0xE07A1F, 0xF3F26E),
+];
+
+/// Rules that put every ink on dark paper, and its dashes on every line drawn in it.
+pub(super) fn style_sheet() -> String {
+    let single = [TEXT, AXIS, GRID, RULE, FAULT, FEED, ACCELERATION, JERK, SNAP, ERROR, VOLTS];
+    let inks = || single.iter().chain(&CEILINGS).chain(&CLASSES);
+    let mut dashes = String::new();
+    let mut dark = String::new();
+    for ink in inks() {
+        let hex = ink.hex();
+        if !ink.dash.is_empty() {
+            dashes.push_str(&format!("svg [stroke=\"{hex}\"]{{stroke-dasharray:{}}}\n", ink.dash));
+        }
+        dark.push_str(&format!("svg [stroke=\"{hex}\"]{{stroke:#{:06X}}}", ink.dark));
+        dark.push_str(&format!("svg [fill=\"{hex}\"]{{fill:#{:06X}}}\n", ink.dark));
+    }
+    format!("{dashes}@media screen and (prefers-color-scheme:dark){{\n{dark}}}\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn luminance(colour: u32) -> f64 {
+        let [_, r, g, b] = colour.to_be_bytes();
+        let linear = |c: u8| {
+            let c = f64::from(c) / 255.0;
+            if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        };
+        0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b)
+    }
+
+    fn contrast(a: u32, b: u32) -> f64 {
+        let (a, b) = (luminance(a), luminance(b));
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    const LIGHT_PAPER: u32 = 0xFFFFFF;
+    const DARK_PAPER: u32 = 0x151A20;
+
+    #[test]
+    fn every_line_stands_out_from_its_paper() {
+        let lines = [AXIS, FAULT, FEED, ACCELERATION, JERK, SNAP, ERROR, VOLTS];
+        for ink in lines.iter().chain(&CEILINGS).chain(&CLASSES) {
+            let hex = ink.hex();
+            assert!(contrast(ink.light, LIGHT_PAPER) >= 3.0, "{hex} {}", contrast(ink.light, LIGHT_PAPER));
+            assert!(contrast(ink.dark, DARK_PAPER) >= 3.0, "{hex} {}", contrast(ink.dark, DARK_PAPER));
+        }
+        assert!(contrast(TEXT.light, LIGHT_PAPER) >= 7.0 && contrast(TEXT.dark, DARK_PAPER) >= 7.0);
+    }
+
+    #[test]
+    fn feed_classes_grow_brighter() {
+        for pair in CLASSES.windows(2) {
+            assert!(luminance(pair[0].light) < luminance(pair[1].light));
+            assert!(luminance(pair[0].dark) < luminance(pair[1].dark));
+        }
+    }
+
+    #[test]
+    fn a_colour_names_one_ink() {
+        let single = [TEXT, AXIS, GRID, RULE, FAULT, FEED, ACCELERATION, JERK, SNAP, ERROR, VOLTS];
+        let mut seen: Vec<u32> =
+            single.iter().chain(&CEILINGS).chain(&CLASSES).map(|ink| ink.light).collect();
+        let number = seen.len();
+        seen.sort_unstable();
+        seen.dedup();
+        assert_eq!(seen.len(), number);
+    }
+
+    #[test]
+    fn unknown_reasons_get_inks_of_their_own() {
+        let known = ["programmed", "axis velocity", "corner"];
+        let inks = known.map(|reason| ceiling(reason, &known).light);
+        assert_eq!(inks, [CEILINGS[0].light, CEILINGS[4].light, CEILINGS[5].light]);
+    }
+}

@@ -1,0 +1,266 @@
+//! Feed over path length, under its ceilings.
+
+use std::io;
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::{
+    Area, Caption, Drawn, NARROW, Panel, Sheet, UNITS_PER_PX, curve, ends_over, fault_marks, on_both_sheets,
+};
+use crate::record::{BlockRecord, RunRecord};
+use crate::report::decimate;
+use crate::report::format::scale_mark;
+use crate::report::palette;
+use crate::report::summary::Summary;
+
+/// A ceiling may lie far above any feed (a rapid over a short way). The axis ends at this many times the highest
+/// feed, and a higher ceiling is drawn there.
+const CEILING_TO_FEED_MAX: f64 = 1.6;
+
+/// Line width of the ceilings: wide enough to show on both sides of a feed that runs along them.
+const CEILING_STROKE: u32 = 18;
+
+/// A level piece of the ceiling, or, where many blocks share a column, the range they cover.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Step<'a> {
+    from_mm: f64,
+    to_mm: f64,
+    low_mm_s: f64,
+    high_mm_s: f64,
+    reason: &'a str,
+}
+
+impl Step<'_> {
+    /// Whether it stands for several ceilings.
+    fn is_range(&self) -> bool {
+        self.high_mm_s > self.low_mm_s
+    }
+}
+
+/// Whether blocks are so many that columns of the plot show a range of ceilings.
+pub(in crate::report) fn is_crowded(record: &RunRecord, summary: &Summary) -> bool {
+    let (top_mm_s, _) = top(record, summary);
+    steps(&record.blocks, top_mm_s, summary.path_length_mm, NARROW.columns).iter().any(Step::is_range)
+}
+
+/// Reasons of the ceilings in the order of their appearance.
+pub(in crate::report) fn reasons(blocks: &[BlockRecord]) -> Vec<&'static str> {
+    let mut known = Vec::new();
+    for block in blocks {
+        if !known.contains(&block.cap_reason) {
+            known.push(block.cap_reason);
+        }
+    }
+    known
+}
+
+/// Top of the feed axis \[mm/s\], and whether a ceiling lies above it.
+pub(in crate::report) fn top(record: &RunRecord, summary: &Summary) -> (f64, bool) {
+    let feed = summary.feed_mm_s.magnitude();
+    let ceilings = record.blocks.iter().map(|block| block.cap_mm_s);
+    let ceiling = ceilings.filter(|cap| cap.is_finite()).fold(0.0, f64::max);
+    let limit = if feed > 0.0 { CEILING_TO_FEED_MAX * feed } else { f64::INFINITY };
+    let beyond = record.blocks.iter().any(|block| block.cap_mm_s > limit);
+    let highest = feed.max(ceiling.min(limit));
+    (if highest > 0.0 { highest } else { 1.0 }, beyond)
+}
+
+/// The ceilings as steps, at most about two for each of `columns`. A column with many blocks shows their range in
+/// the ink of the lowest, the one that holds the feed down.
+fn steps<'a>(blocks: &'a [BlockRecord], top_mm_s: f64, length_mm: f64, columns: usize) -> Vec<Step<'a>> {
+    let column_mm = length_mm / columns.max(1) as f64;
+    let mut steps: Vec<Step<'a>> = Vec::new();
+    for block in blocks.iter().filter(|block| !block.cap_mm_s.is_nan() && block.length_mm.is_finite()) {
+        let cap = block.cap_mm_s.min(top_mm_s);
+        let to_mm = block.start_mm + block.length_mm;
+        match steps.last_mut() {
+            Some(last)
+                if last.reason == block.cap_reason
+                    && last.low_mm_s.total_cmp(&cap).is_eq()
+                    && last.high_mm_s.total_cmp(&cap).is_eq() =>
+            {
+                last.to_mm = to_mm;
+            }
+            Some(last) if to_mm - last.from_mm < column_mm => {
+                if cap < last.low_mm_s {
+                    last.reason = block.cap_reason;
+                }
+                last.low_mm_s = last.low_mm_s.min(cap);
+                last.high_mm_s = last.high_mm_s.max(cap);
+                last.to_mm = to_mm;
+            }
+            _ => steps.push(Step {
+                from_mm: block.start_mm,
+                to_mm,
+                low_mm_s: cap,
+                high_mm_s: cap,
+                reason: block.cap_reason,
+            }),
+        }
+    }
+    // Neighbours that came out alike are one.
+    steps.dedup_by(|next, step| {
+        let alike = (step.reason, step.low_mm_s.to_bits(), step.high_mm_s.to_bits())
+            == (next.reason, next.low_mm_s.to_bits(), next.high_mm_s.to_bits());
+        if alike {
+            step.to_mm = next.to_mm;
+        }
+        alike
+    });
+    steps
+}
+
+/// Stretches of one G-code line: line, from, to. A line may be several blocks (its blends, its pieces).
+fn lines(blocks: &[BlockRecord]) -> Vec<(u32, f64, f64)> {
+    let mut lines: Vec<(u32, f64, f64)> = Vec::new();
+    for block in blocks.iter().filter(|block| block.start_mm.is_finite() && block.length_mm.is_finite()) {
+        let to = block.start_mm + block.length_mm;
+        match lines.last_mut() {
+            Some(last) if last.0 == block.line => last.2 = to,
+            _ => lines.push((block.line, block.start_mm, to)),
+        }
+    }
+    lines
+}
+
+/// Draws feed and ceilings. `faults_mm` is where on the path a fault was latched.
+pub(in crate::report) fn draw(
+    record: &RunRecord,
+    summary: &Summary,
+    faults_mm: &[f64],
+    caption: &Caption<'_>,
+) -> io::Result<String> {
+    let height = |sheet: &Sheet| sheet.panel_height * 2 + sheet.axis_height();
+    on_both_sheets(caption, height, |area, sheet| draw_on(area, sheet, record, summary, faults_mm))
+}
+
+fn draw_on(
+    area: &Area<'_>,
+    sheet: &Sheet,
+    record: &RunRecord,
+    summary: &Summary,
+    faults_mm: &[f64],
+) -> Drawn {
+    let (top_mm_s, _) = top(record, summary);
+    let length_mm = summary.path_length_mm.max(summary.path_done_mm);
+    let panel = Panel {
+        title: "Feed [mm/s]",
+        x: ends_over(0.0, length_mm),
+        // Room above the highest ceiling for the line numbers.
+        y: (0.0, 1.14 * top_mm_s),
+        x_name: Some("path length [mm]"),
+        right: sheet.left,
+    };
+    let mut chart = panel.draw(area, sheet)?;
+    let axes_width = f64::from(sheet.width - sheet.left - panel.right);
+    let units_per_mm = axes_width / (panel.x.1 - panel.x.0);
+
+    for (line, from, to) in lines(&record.blocks) {
+        let word = format!("N{line}");
+        if (to - from) * units_per_mm > sheet.width_of(&word) + 16.0 {
+            let rule = palette::RULE.rgb().stroke_width(3);
+            for x in [from, to] {
+                chart.draw_series([PathElement::new([(x, 0.0), (x, panel.y.1)], rule)])?;
+            }
+            let style = sheet.letters(palette::TEXT, HPos::Center, VPos::Center);
+            chart.draw_series([Text::new(word, (from.midpoint(to), 1.09 * top_mm_s), style)])?;
+        }
+    }
+
+    let known = reasons(&record.blocks);
+    for step in steps(&record.blocks, top_mm_s, length_mm, sheet.columns) {
+        let ink = palette::ceiling(step.reason, &known).rgb();
+        if step.is_range() {
+            let corners = [(step.from_mm, step.low_mm_s), (step.to_mm, step.high_mm_s)];
+            chart.draw_series([Rectangle::new(corners, ink.mix(0.25).filled())])?;
+        }
+        let level = [(step.from_mm, step.low_mm_s), (step.to_mm, step.low_mm_s)];
+        chart.draw_series([PathElement::new(level, ink.stroke_width(CEILING_STROKE))])?;
+    }
+
+    let feed = record.ticks.iter().map(|tick| (tick.s_mm, tick.v_mm_s));
+    curve(&mut chart, decimate::by_column(feed, panel.x, sheet.columns), palette::FEED, sheet.stroke)?;
+    // Below the line numbers.
+    fault_marks(&mut chart, faults_mm, panel.x, (0.0, 1.04 * top_mm_s))?;
+    per_minute(area, sheet, &panel)
+}
+
+/// The same axis once more on the right, in the unit of the program.
+fn per_minute(area: &Area<'_>, sheet: &Sheet, panel: &Panel<'_>) -> Drawn {
+    let (width, height) = area.dim_in_pixel();
+    let (upper, lower) = (sheet.title_height() as i32, (height - sheet.axis_height()) as i32);
+    let x = (width - panel.right) as i32;
+    let top = panel.y.1 * 60.0;
+    let step = round_step(top / sheet.marks.1 as f64);
+    let letters = |h| sheet.letters(palette::TEXT, h, VPos::Center);
+    let axis = palette::AXIS.rgb().stroke_width(4);
+    area.draw(&PathElement::new([(x, upper), (x, lower)], axis))?;
+    for mark in 0..=(top / step) as i32 {
+        let value = f64::from(mark) * step;
+        let y = lower - (value / top * f64::from(lower - upper)).round() as i32;
+        area.draw(&PathElement::new([(x, y), (x + 16, y)], axis))?;
+        area.draw(&Text::new(scale_mark(value, top), (x + 28, y), letters(HPos::Left)))?;
+    }
+    let title = sheet.letters(palette::TEXT, HPos::Right, VPos::Top);
+    area.draw(&Text::new("[mm/min]", ((width - UNITS_PER_PX) as i32, 4), title))
+}
+
+/// The next of 1, 2, 5, 10, … from `least` on.
+fn round_step(least: f64) -> f64 {
+    let decade = 10f64.powf(least.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|part| part * decade).find(|step| *step >= least).unwrap_or(least)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(
+        line: u32,
+        start_mm: f64,
+        length_mm: f64,
+        cap_mm_s: f64,
+        cap_reason: &'static str,
+    ) -> BlockRecord {
+        BlockRecord {
+            line,
+            kind: "line",
+            start_mm,
+            length_mm,
+            cap_mm_s,
+            cap_reason,
+            enter_mm_s: 0.0,
+            peak_mm_s: 0.0,
+            exit_mm_s: 0.0,
+            time_s: 1.0,
+        }
+    }
+
+    #[test]
+    fn equal_ceilings_join_and_crowded_ones_show_their_range() {
+        let wide = [block(1, 0.0, 10.0, 50.0, "programmed"), block(2, 10.0, 10.0, 50.0, "programmed")];
+        assert_eq!(steps(&wide, 100.0, 20.0, 100).len(), 1);
+        let crowd: Vec<_> = (0..10_000u32)
+            .map(|i| {
+                block(
+                    i,
+                    f64::from(i) * 0.01,
+                    0.01,
+                    if i == 777 { 3.0 } else { 50.0 + f64::from(i % 7) },
+                    "jerk",
+                )
+            })
+            .collect();
+        let steps = steps(&crowd, 100.0, 100.0, 200);
+        assert!(steps.len() <= 401, "{}", steps.len());
+        assert!(steps.iter().any(|step| (step.low_mm_s - 3.0).abs() < 1e-12 && step.high_mm_s > 55.0));
+    }
+
+    #[test]
+    fn marks_fall_on_round_feeds() {
+        for (least, step) in [(980.0, 1000.0), (1.1, 2.0), (0.03, 0.05), (6.0, 10.0)] {
+            assert!((round_step(least) - step).abs() < 1e-9, "{least}");
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! What all plots share: the sheet they are drawn on, the panel with its axes, and the wrapping for the page.
+//!
+//! Every plot is drawn twice, for a wide and for a narrow page, because a picture scaled down to a phone takes its
+//! letters along. The style sheet shows one of the two. The drawing library places things on whole units only, so a
+//! sheet has [`UNITS_PER_PX`] of them to a pixel, and a smooth curve stays smooth.
+
+pub(super) mod feed;
+pub(super) mod path;
+pub(super) mod time;
+
+use std::io;
+
+use plotters::chart::ChartContext;
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::format::{escape, scale_mark};
+use super::palette::{self, Ink};
+use super::summary::Span;
+
+/// Drawing units to a pixel of the page.
+pub(super) const UNITS_PER_PX: u32 = 4;
+
+/// Fault marks in one plot; more than these would hide the curve they are to explain.
+const FAULT_MARKS_MAX: usize = 20;
+
+/// A part of the picture.
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// A pair of axes in it.
+pub(super) type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+/// Drawing into memory fails only if the drawing library rejects something.
+pub(super) type Drawn<T = ()> = Result<T, DrawingAreaErrorKind<io::Error>>;
+
+/// Paper of one width. All lengths in drawing units.
+#[derive(Debug)]
+pub(super) struct Sheet {
+    /// Class of the drawing in the style sheet.
+    pub(super) class: &'static str,
+    /// Width.
+    pub(super) width: u32,
+    /// Height of the letters as the drawing library counts it, 1.24 times the font size.
+    pub(super) text: u32,
+    /// Room left of the axes for the numbers.
+    pub(super) left: u32,
+    /// Room right of the axes.
+    pub(super) right: u32,
+    /// Columns a curve is reduced to.
+    pub(super) columns: usize,
+    /// About how many marks the axes get, along and upwards.
+    pub(super) marks: (usize, usize),
+    /// Height of one panel in a stack, without the axis below it.
+    pub(super) panel_height: u32,
+    /// Line width of curves.
+    pub(super) stroke: u32,
+}
+
+/// For a screen or a printed page.
+const WIDE: Sheet = Sheet {
+    class: "wide",
+    width: 960 * UNITS_PER_PX,
+    text: 62,
+    left: 70 * UNITS_PER_PX,
+    right: 24 * UNITS_PER_PX,
+    columns: 900,
+    marks: (12, 5),
+    panel_height: 150 * UNITS_PER_PX,
+    stroke: 7,
+};
+
+/// For a phone.
+const NARROW: Sheet = Sheet {
+    class: "narrow",
+    width: 358 * UNITS_PER_PX,
+    text: 58,
+    left: 66 * UNITS_PER_PX,
+    right: 16 * UNITS_PER_PX,
+    columns: 300,
+    marks: (5, 5),
+    panel_height: 120 * UNITS_PER_PX,
+    stroke: 7,
+};
+
+impl Sheet {
+    /// Letters in `ink`, held at `anchor`.
+    pub(super) fn letters(&self, ink: Ink, h: HPos, v: VPos) -> TextStyle<'static> {
+        let mut style = TextStyle::from(("sans-serif", self.text).into_font()).pos(Pos::new(h, v));
+        style.color = ink.rgb().to_backend_color();
+        style
+    }
+
+    /// Room a title takes above its panel.
+    pub(super) fn title_height(&self) -> u32 {
+        self.text * 3 / 2
+    }
+
+    /// Room the marks and the name of the axis take below a panel.
+    pub(super) fn axis_height(&self) -> u32 {
+        self.text * 5 / 2
+    }
+
+    /// Width of `text` in drawing units, on the safe side: letters are at most 0.62 of the font size on average.
+    pub(super) fn width_of(&self, text: &str) -> f64 {
+        text.chars().count() as f64 * f64::from(self.text) / 1.24 * 0.62
+    }
+}
+
+/// What a drawing is called and what it shows, for those who cannot see it.
+pub(super) struct Caption<'a> {
+    /// Unique on the page.
+    pub(super) id: &'a str,
+    /// Short name.
+    pub(super) title: &'a str,
+    /// One or two sentences with the figures a reader would take from the picture.
+    pub(super) description: &'a str,
+}
+
+/// Draws for both widths; `height` may depend on the sheet.
+pub(super) fn on_both_sheets(
+    caption: &Caption<'_>,
+    height: impl Fn(&Sheet) -> u32,
+    draw: impl Fn(&Area<'_>, &Sheet) -> Drawn,
+) -> io::Result<String> {
+    let mut page = String::new();
+    for sheet in [&WIDE, &NARROW] {
+        let size = (sheet.width, height(sheet));
+        let mut svg = String::new();
+        {
+            let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+            draw(&area, sheet).and_then(|()| area.present()).map_err(io::Error::other)?;
+        }
+        // The library's own opening tag fixes the size in pixels and names nothing.
+        let drawing = svg.split_once('>').map_or("", |(_, rest)| rest);
+        let (id, class) = (caption.id, sheet.class);
+        page.push_str(&format!(
+            "<svg class=\"{class}\" viewBox=\"0 0 {} {}\" role=\"img\" aria-labelledby=\"{id}-{class}-t {id}-{class}-d\" \
+             xmlns=\"http://www.w3.org/2000/svg\"><title id=\"{id}-{class}-t\">{}</title>\
+             <desc id=\"{id}-{class}-d\">{}</desc>{drawing}",
+            size.0,
+            size.1,
+            escape(caption.title),
+            escape(caption.description),
+        ));
+    }
+    Ok(page)
+}
+
+/// A pair of axes to be drawn.
+pub(super) struct Panel<'a> {
+    /// Quantity and unit, above the axes.
+    pub(super) title: &'a str,
+    /// Ends of the horizontal axis.
+    pub(super) x: (f64, f64),
+    /// Ends of the vertical axis.
+    pub(super) y: (f64, f64),
+    /// Name and unit of the horizontal axis; without one it has neither marks nor name.
+    pub(super) x_name: Option<&'a str>,
+    /// Room on the right.
+    pub(super) right: u32,
+}
+
+impl Panel<'_> {
+    /// Draws title, grid and axes. A panel without a horizontal axis leaves a gap below, so that the lowest number
+    /// keeps clear of the next title.
+    pub(super) fn draw<'a>(&self, area: &Area<'a>, sheet: &Sheet) -> Drawn<Chart<'a>> {
+        let title = sheet.letters(palette::TEXT, HPos::Left, VPos::Top);
+        area.draw(&Text::new(self.title.to_string(), (sheet.left as i32, 4), title))?;
+        let mut chart = ChartBuilder::on(area)
+            .margin_top(sheet.title_height())
+            .margin_right(self.right)
+            .margin_bottom(if self.x_name.is_some() { 0 } else { sheet.text / 2 })
+            .y_label_area_size(sheet.left)
+            .x_label_area_size(if self.x_name.is_some() { sheet.axis_height() } else { 0 })
+            .build_cartesian_2d(self.x.0..self.x.1, self.y.0..self.y.1)?;
+        let (x_span, y_span) = (self.x.1 - self.x.0, self.y.1 - self.y.0);
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(palette::GRID.rgb().stroke_width(4))
+            .axis_style(palette::AXIS.rgb().stroke_width(4))
+            .set_all_tick_mark_size(16)
+            .x_labels(sheet.marks.0)
+            .y_labels(sheet.marks.1)
+            .x_label_formatter(&|x| scale_mark(*x, x_span))
+            .y_label_formatter(&|y| scale_mark(*y, y_span))
+            .x_desc(self.x_name.unwrap_or(""))
+            .label_style(sheet.letters(palette::TEXT, HPos::Center, VPos::Center))
+            .axis_desc_style(sheet.letters(palette::TEXT, HPos::Center, VPos::Center))
+            .draw()?;
+        if self.y.0 < 0.0 && self.y.1 > 0.0 {
+            chart.draw_series([PathElement::new(
+                [(self.x.0, 0.0), (self.x.1, 0.0)],
+                palette::RULE.rgb().stroke_width(4),
+            )])?;
+        }
+        Ok(chart)
+    }
+}
+
+/// A curve through `points`, or a dot if there is only one.
+pub(super) fn curve(chart: &mut Chart<'_>, points: Vec<(f64, f64)>, ink: Ink, stroke: u32) -> Drawn {
+    if let [only] = points[..] {
+        chart.draw_series([Circle::new(only, 8, ink.rgb().filled())])?;
+    } else if !points.is_empty() {
+        chart.draw_series([PathElement::new(points, ink.rgb().stroke_width(stroke))])?;
+    }
+    Ok(())
+}
+
+/// An upright dashed line, as high as `y`, at each place within `x` where a fault was latched.
+pub(super) fn fault_marks(chart: &mut Chart<'_>, at: &[f64], x: (f64, f64), y: (f64, f64)) -> Drawn {
+    let inside = at.iter().filter(|at| (x.0..=x.1).contains(*at)).take(FAULT_MARKS_MAX);
+    let style = palette::FAULT.rgb().stroke_width(6);
+    chart.draw_series(inside.map(|&x| PathElement::new([(x, y.0), (x, y.1)], style)))?;
+    Ok(())
+}
+
+/// Ends of an axis that shows all of `span`, and zero, with a little air. Never empty.
+pub(super) fn ends_with_zero(span: Span) -> (f64, f64) {
+    if span.magnitude() < f64::MIN_POSITIVE {
+        return (-1.0, 1.0);
+    }
+    let (low, high) = (span.low.min(0.0), span.high.max(0.0));
+    let air = 0.06 * (high - low);
+    (if low < 0.0 { low - air } else { 0.0 }, if high > 0.0 { high + air } else { 0.0 })
+}
+
+/// Ends of an axis over `from..to`. Never empty.
+pub(super) fn ends_over(from: f64, to: f64) -> (f64, f64) {
+    if to > from { (from, to) } else { (from - 0.5, from + 0.5) }
+}

@@ -1,0 +1,174 @@
+//! The figures of a run, from one pass over its ticks.
+
+use crate::record::{AXES, RunRecord, TickRecord};
+
+/// A path counts as finished when less than this is left of it \[mm\]. Far above rounding, far below any tolerance.
+const FINISHED_WITHIN_MM: f64 = 1e-3;
+
+/// An axis counts as moved when its set position spans more than this \[mm\].
+const MOVED_BEYOND_MM: f64 = 1e-6;
+
+/// How the run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// Nothing ran.
+    Empty,
+    /// The whole path was run, without a fault.
+    Done,
+    /// No fault, but the path was not run to its end.
+    Unfinished,
+    /// At least one fault was latched.
+    Faulted,
+}
+
+/// Smallest and largest of the finite values seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    /// Smallest value.
+    pub(super) low: f64,
+    /// Largest value.
+    pub(super) high: f64,
+}
+
+impl Default for Span {
+    fn default() -> Self {
+        Self { low: f64::INFINITY, high: f64::NEG_INFINITY }
+    }
+}
+
+impl Span {
+    /// Takes a value in, if it is finite.
+    pub(super) fn add(&mut self, value: f64) {
+        if value.is_finite() {
+            self.low = self.low.min(value);
+            self.high = self.high.max(value);
+        }
+    }
+
+    /// Largest magnitude, 0 if nothing was seen.
+    pub(super) fn magnitude(self) -> f64 {
+        if self.is_empty() { 0.0 } else { self.low.abs().max(self.high.abs()) }
+    }
+
+    /// Largest minus smallest, 0 if nothing was seen.
+    pub(super) fn width(self) -> f64 {
+        if self.is_empty() { 0.0 } else { self.high - self.low }
+    }
+
+    /// Whether no finite value was seen.
+    pub(super) fn is_empty(self) -> bool {
+        self.low > self.high
+    }
+}
+
+/// Figures of one axis.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct AxisSummary {
+    /// Set position \[mm\].
+    pub(super) set_mm: Span,
+    /// Set velocity \[mm/s\].
+    pub(super) vel_mm_s: Span,
+    /// Following error \[µm\].
+    pub(super) err_um: Span,
+    /// Root mean square of the following error \[µm\].
+    pub(super) err_um_rms: f64,
+    /// Output \[V\].
+    pub(super) out_v: Span,
+}
+
+impl AxisSummary {
+    /// Whether the program moved the axis.
+    pub(super) fn moved(&self) -> bool {
+        self.set_mm.width() > MOVED_BEYOND_MM
+    }
+}
+
+/// Figures of the whole run.
+#[derive(Clone, Debug)]
+pub(super) struct Summary {
+    /// How it ended.
+    pub(super) outcome: Outcome,
+    /// First and last instant \[s\].
+    pub(super) time_s: (f64, f64),
+    /// Ticks times their length \[s\].
+    pub(super) executed_time_s: f64,
+    /// Length of the planned path \[mm\].
+    pub(super) path_length_mm: f64,
+    /// How far along it the run came \[mm\].
+    pub(super) path_done_mm: f64,
+    /// Feed \[mm/s\].
+    pub(super) feed_mm_s: Span,
+    /// Acceleration along the path \[mm/s²\].
+    pub(super) accel_mm_s2: Span,
+    /// Jerk along the path \[mm/s³\].
+    pub(super) jerk_mm_s3: Span,
+    /// Snap along the path \[mm/s⁴\].
+    pub(super) snap_mm_s4: Span,
+    /// Per axis.
+    pub(super) axes: [AxisSummary; AXES],
+    /// Values in the record that are not finite and can therefore not be shown.
+    pub(super) not_finite: u64,
+}
+
+impl Summary {
+    /// Reads a record once.
+    pub(super) fn of(record: &RunRecord) -> Self {
+        let mut path = [Span::default(); 4];
+        let mut axes = [AxisSummary::default(); AXES];
+        let mut squares = [(0.0, 0u64); AXES];
+        let mut done_mm = Span::default();
+        let mut not_finite = 0;
+        for tick in &record.ticks {
+            done_mm.add(tick.s_mm);
+            for (span, value) in path.iter_mut().zip(along_path(tick)) {
+                span.add(value);
+                not_finite += u64::from(!value.is_finite());
+            }
+            for ((axis, square), value) in axes.iter_mut().zip(&mut squares).zip(&tick.axes) {
+                axis.set_mm.add(value.set_mm);
+                axis.vel_mm_s.add(value.vel_mm_s);
+                axis.err_um.add(value.err_um);
+                axis.out_v.add(value.out_v);
+                if value.err_um.is_finite() {
+                    *square = (square.0 + value.err_um * value.err_um, square.1 + 1);
+                }
+                let shown = [value.set_mm, value.err_um, value.out_v];
+                not_finite += shown.iter().filter(|v| !v.is_finite()).count() as u64;
+            }
+        }
+        for (axis, (sum, number)) in axes.iter_mut().zip(squares) {
+            axis.err_um_rms = if number > 0 { (sum / number as f64).sqrt() } else { 0.0 };
+        }
+        let path_length_mm = record.blocks.iter().map(|block| block.length_mm).sum();
+        let path_done_mm = if done_mm.is_empty() { 0.0 } else { done_mm.high };
+        let outcome = if !record.faults.is_empty() {
+            Outcome::Faulted
+        } else if record.ticks.is_empty() {
+            Outcome::Empty
+        } else if path_done_mm < path_length_mm - FINISHED_WITHIN_MM {
+            Outcome::Unfinished
+        } else {
+            Outcome::Done
+        };
+        let instant = |tick: Option<&TickRecord>| tick.map_or(0.0, |tick| tick.tick as f64 * record.tick_s);
+        let [feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4] = path;
+        Self {
+            outcome,
+            time_s: (instant(record.ticks.first()), instant(record.ticks.last())),
+            executed_time_s: record.ticks.len() as f64 * record.tick_s,
+            path_length_mm,
+            path_done_mm,
+            feed_mm_s,
+            accel_mm_s2,
+            jerk_mm_s3,
+            snap_mm_s4,
+            axes,
+            not_finite,
+        }
+    }
+}
+
+/// Feed and its three derivatives.
+fn along_path(tick: &TickRecord) -> [f64; 4] {
+    [tick.v_mm_s, tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4]
+}

@@ -1,0 +1,180 @@
+//! The tables: key figures, axes, faults, blocks.
+
+use std::fmt::Write as _;
+
+use super::format::{count, counted, duration, escape, figure, fixed};
+use super::summary::Summary;
+use crate::record::{AXES, RunRecord};
+
+/// Rows of a table on the page; the rest is in the trace file.
+pub(super) const ROWS_MAX: usize = 200;
+
+/// What did not fit into a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct LeftOut {
+    /// How many rows the table would have.
+    pub(super) total: usize,
+    /// How many of them are not shown.
+    pub(super) rows: usize,
+}
+
+impl LeftOut {
+    /// `None` if `total` rows fit.
+    fn of(total: usize) -> Option<Self> {
+        (total > ROWS_MAX).then(|| Self { total, rows: total - ROWS_MAX })
+    }
+
+    fn remark(self) -> String {
+        let total = count(self.total as u64);
+        format!("<p class=\"remark\">{} of {total} rows left out.</p>\n", count(self.rows as u64))
+    }
+}
+
+/// A table that scrolls by itself where the page is too narrow for it.
+fn wrapped(name: &str, head: &[&str], body: &str) -> String {
+    let mut table = format!(
+        "<div class=\"scroll\" role=\"region\" aria-label=\"{name}\" tabindex=\"0\"><table>\
+         <caption class=\"unseen\">{name}</caption><thead><tr>"
+    );
+    for cell in head {
+        // Columns of words are marked with a star and aligned to the left like their cells.
+        let (cell, class) = cell.strip_prefix('*').map_or((*cell, ""), |word| (word, " class=\"word\""));
+        // The unit goes below the word, so that columns stay narrow.
+        let (word, unit) = cell.split_once(" [").unwrap_or((cell, ""));
+        let unit = unit.trim_end_matches(']');
+        if unit.is_empty() {
+            let _ = write!(table, "<th scope=\"col\"{class}>{word}</th>");
+        } else {
+            let _ = write!(table, "<th scope=\"col\"{class}>{word} <span class=\"unit\">{unit}</span></th>");
+        }
+    }
+    let _ = writeln!(table, "</tr></thead><tbody>\n{body}</tbody></table></div>");
+    table
+}
+
+/// Figures of the whole run, as terms and values.
+pub(super) fn key_figures(record: &RunRecord, summary: &Summary) -> String {
+    let feed = summary.feed_mm_s.magnitude();
+    let path = if summary.path_done_mm < summary.path_length_mm - 1e-3 {
+        format!("{} of {} mm", figure(summary.path_done_mm, 6), figure(summary.path_length_mm, 6))
+    } else {
+        format!("{} mm", figure(summary.path_length_mm, 6))
+    };
+    let rows = [
+        ("Path length", path),
+        ("Planned time", duration(record.planned_time_s)),
+        ("Executed time", duration(summary.executed_time_s)),
+        ("Ticks", format!("{} of {} ms", count(record.ticks.len() as u64), figure(record.tick_s * 1e3, 4))),
+        ("Blocks", count(record.blocks.len() as u64)),
+        ("Highest feed", format!("{} mm/s<small>{} mm/min</small>", figure(feed, 4), figure(feed * 60.0, 4))),
+        ("Highest acceleration", format!("{} mm/s²", figure(summary.accel_mm_s2.magnitude(), 4))),
+        ("Highest jerk", format!("{} mm/s³", figure(summary.jerk_mm_s3.magnitude(), 4))),
+        ("Highest snap", format!("{} mm/s⁴", figure(summary.snap_mm_s4.magnitude(), 4))),
+    ];
+    let mut list = String::from("<dl class=\"figures\">\n");
+    for (term, value) in rows {
+        let _ = writeln!(list, "<div><dt>{term}</dt><dd>{value}</dd></div>");
+    }
+    list.push_str("</dl>\n");
+    list
+}
+
+/// A row per axis.
+pub(super) fn axes(summary: &Summary, names: &[String; AXES]) -> String {
+    let mut body = String::new();
+    for (axis, name) in summary.axes.iter().zip(names) {
+        let _ = writeln!(
+            body,
+            "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            escape(name),
+            fixed(axis.err_um.magnitude(), 2),
+            fixed(axis.err_um_rms, 2),
+            fixed(axis.out_v.magnitude(), 3),
+            fixed(axis.vel_mm_s.magnitude(), 2),
+            fixed(axis.set_mm.low, 4),
+            fixed(axis.set_mm.high, 4),
+        );
+    }
+    let head = [
+        "*Axis",
+        "Error max [µm]",
+        "Error rms [µm]",
+        "Output max [V]",
+        "Speed max [mm/s]",
+        "Lowest [mm]",
+        "Highest [mm]",
+    ];
+    format!(
+        "<p>Error is the following error, set minus actual position.</p>\n{}",
+        wrapped("Axes", &head, &body)
+    )
+}
+
+/// A row per fault; nothing if there was none.
+pub(super) fn faults(record: &RunRecord) -> String {
+    if record.faults.is_empty() {
+        return String::new();
+    }
+    let mut body = String::new();
+    for fault in record.faults.iter().take(ROWS_MAX) {
+        let _ = writeln!(
+            body,
+            "<tr><td>{}</td><td>{:.4}</td><td class=\"word\">{}</td><td class=\"word\">{}</td><td class=\"word long\">{}</td></tr>",
+            fault.tick,
+            fault.tick as f64 * record.tick_s,
+            fault.axis.as_deref().map_or("–".to_string(), escape),
+            escape(&fault.fault),
+            escape(&fault.detail),
+        );
+    }
+    let left_out = LeftOut::of(record.faults.len()).map_or(String::new(), LeftOut::remark);
+    let mut table = String::from("<h2>Faults</h2>\n");
+    table.push_str(&wrapped("Faults", &["Tick", "Time [s]", "*Axis", "*Fault", "*Detail"], &body));
+    table + &left_out
+}
+
+/// A row per block.
+pub(super) fn blocks(record: &RunRecord) -> String {
+    let mut body = String::new();
+    for block in record.blocks.iter().take(ROWS_MAX) {
+        let _ = writeln!(
+            body,
+            "<tr><th scope=\"row\">N{}</th><td class=\"word\">{}</td><td>{}</td><td>{}</td><td class=\"word\">{}</td>\
+             <td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            block.line,
+            escape(block.kind),
+            fixed(block.length_mm, 3),
+            fixed(block.cap_mm_s, 2),
+            escape(block.cap_reason),
+            fixed(block.enter_mm_s, 2),
+            fixed(block.peak_mm_s, 2),
+            fixed(block.exit_mm_s, 2),
+            fixed(block.time_s * 1e3, 2),
+        );
+    }
+    let head = [
+        "*Line",
+        "*Kind",
+        "Length [mm]",
+        "Ceiling [mm/s]",
+        "*Set by",
+        "Enter [mm/s]",
+        "Peak [mm/s]",
+        "Exit [mm/s]",
+        "Time [ms]",
+    ];
+    let table = wrapped("Blocks", &head, &body);
+    let left_out = LeftOut::of(record.blocks.len()).map_or(String::new(), LeftOut::remark);
+    format!("<p>{} in path order.</p>\n{table}{left_out}", counted(record.blocks.len(), "block", "blocks"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_does_not_fit_is_left_out() {
+        assert_eq!(LeftOut::of(ROWS_MAX), None);
+        assert_eq!(LeftOut::of(ROWS_MAX + 5), Some(LeftOut { total: ROWS_MAX + 5, rows: 5 }));
+    }
+}

@@ -1,0 +1,275 @@
+//! The page as a whole, on made-up runs.
+
+use super::*;
+use crate::record::{AxisTick, BlockRecord, TickRecord};
+
+/// Ramps and cruises of the sample: duration \[s\], feed at both ends \[mm/s\]. A ramp is a raised cosine in
+/// acceleration.
+const FEED: [(f64, f64, f64); 10] = [
+    (0.365_148, 0.0, 83.3333),
+    (0.224_945, 83.3333, 83.3333),
+    (0.253_755, 83.3333, 43.0887),
+    (0.121_516, 43.0887, 43.0887),
+    (0.210_227, 43.0887, 70.7107),
+    (0.031_909, 70.7107, 70.7107),
+    (0.210_227, 70.7107, 43.0887),
+    (0.121_516, 43.0887, 43.0887),
+    (0.217_671, 43.0887, 72.7017),
+    (0.341_061, 72.7017, 0.0),
+];
+
+/// Blocks of the sample: line, kind, length \[mm\], curvature \[1/mm\], ceiling \[mm/s\] and its reason, feed at
+/// entry, peak and exit \[mm/s\], duration \[s\].
+type SampleBlock = (u32, &'static str, f64, f64, f64, &'static str, [f64; 3], f64);
+const BLOCKS: [SampleBlock; 5] = [
+    (10, "line", 50.0, 0.0, 83.3333, "programmed", [0.0, 83.3333, 43.0887], 0.843_848),
+    (20, "arc", 5.235_988, -0.25, 43.0887, "jerk", [43.0887, 43.0887, 43.0887], 0.121_516),
+    (30, "arc", 26.179_939, 0.1, 70.7107, "acceleration", [43.0887, 70.7107, 43.0887], 0.452_363),
+    (40, "arc", 5.235_988, -0.25, 43.0887, "jerk", [43.0887, 43.0887, 43.0887], 0.121_516),
+    (50, "line", 25.0, 0.0, 83.3333, "programmed", [43.0887, 72.7017, 0.0], 0.558_732),
+];
+
+/// Feed and its derivatives at a time.
+fn feed_at(mut time_s: f64) -> [f64; 4] {
+    use std::f64::consts::TAU;
+    for (length_s, from, to) in FEED {
+        if time_s <= length_s {
+            let (x, rise, turn) = (time_s / length_s, to - from, TAU / length_s);
+            let (sine, cosine) = (TAU * x).sin_cos();
+            let a = rise / length_s;
+            return [
+                from + rise * (x - sine / TAU),
+                a * (1.0 - cosine),
+                a * turn * sine,
+                a * turn * turn * cosine,
+            ];
+        }
+        time_s -= length_s;
+    }
+    [0.0; 4]
+}
+
+/// The five-block path in ticks of `tick_s`, Z dipping if `with_z`.
+fn sample(tick_s: f64, with_z: bool) -> RunRecord {
+    let mut record = RunRecord {
+        program: "flange.ngc".to_string(),
+        machine: "reference machine".to_string(),
+        tick_s,
+        axis_names: ["X", "Y", "Z"].map(String::from),
+        planned_time_s: FEED.iter().map(|ramp| ramp.0).sum(),
+        ..RunRecord::default()
+    };
+    let mut start_mm = 0.0;
+    for (line, kind, length_mm, _, cap_mm_s, cap_reason, [enter_mm_s, peak_mm_s, exit_mm_s], time_s) in BLOCKS
+    {
+        record.blocks.push(BlockRecord {
+            line,
+            kind,
+            start_mm,
+            length_mm,
+            cap_mm_s,
+            cap_reason,
+            enter_mm_s,
+            peak_mm_s,
+            exit_mm_s,
+            time_s,
+        });
+        start_mm += length_mm;
+    }
+    let ticks = (record.planned_time_s / tick_s).ceil() as u64 + 1;
+    let (mut s, mut heading, mut x, mut y) = (0.0f64, 0.0f64, 0.0, 0.0);
+    let mut seed = 1u32;
+    for tick in 0..ticks {
+        let [v, a, j, snap] = feed_at(tick as f64 * tick_s);
+        let index = record.blocks.iter().rposition(|block| s >= block.start_mm).unwrap_or(0);
+        let mut axes = [AxisTick::default(); AXES];
+        let z = if with_z { -4.0 * (s / start_mm * std::f64::consts::PI).sin() } else { 0.0 };
+        for (axis, (set, along)) in axes.iter_mut().zip([(x, heading.cos()), (y, heading.sin()), (z, 0.0)]) {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let noise = f64::from(seed >> 8) / f64::from(1u32 << 24) - 0.5;
+            axis.set_mm = set;
+            axis.vel_mm_s = v * along;
+            axis.err_um = 0.004 * a * along + 0.6 * noise;
+            axis.act_mm = set - axis.err_um * 1e-3;
+            axis.out_v = v * along / 10.0 + 0.01 * noise;
+        }
+        let state = if tick + 1 == ticks { "idle" } else { "moving" };
+        record.ticks.push(TickRecord {
+            tick,
+            s_mm: if tick + 1 == ticks { start_mm } else { s.min(start_mm) },
+            v_mm_s: v,
+            a_mm_s2: a,
+            j_mm_s3: j,
+            snap_mm_s4: snap,
+            state,
+            line: record.blocks[index].line,
+            axes,
+        });
+        let step = v * tick_s;
+        heading += BLOCKS[index].3 * step;
+        (x, y, s) = (x + heading.cos() * step, y + heading.sin() * step, s + step);
+    }
+    record
+}
+
+fn page(record: &RunRecord) -> String {
+    let mut out = Vec::new();
+    write_html(record, &mut out).expect("writing to memory");
+    let page = String::from_utf8(out).expect("UTF-8");
+    assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
+    for forbidden in ["NaN", "inf\"", ",inf", "<script", "http-equiv", "src=", "href="] {
+        assert!(!page.contains(forbidden), "{forbidden}");
+    }
+    assert_eq!(page.matches("<svg").count(), page.matches("</svg>").count());
+    page
+}
+
+#[test]
+fn a_whole_run_makes_every_section() {
+    let page = page(&sample(1e-3, true));
+    for part in
+        ["Done without a fault", "5 blocks, 111.652 mm", "5000 mm/min", "Path, X and Y", "Path, X and Z"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    for part in ["ceiling: jerk", "N30", "Snap [mm/s⁴]", "Following error [µm]", "id=\"axis2-wide-t\""] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(!page.contains("left out"));
+}
+
+#[test]
+fn empty_and_one_tick_records_make_a_page() {
+    assert!(page(&RunRecord::default()).contains("Nothing was run"));
+    let mut one = sample(1e-3, false);
+    one.ticks.truncate(1);
+    assert!(page(&one).contains("Not finished"));
+    one.blocks.clear();
+    assert!(page(&one).contains("Done without a fault"));
+}
+
+#[test]
+fn text_from_the_program_cannot_become_markup() {
+    let mut record = sample(1e-2, false);
+    let hostile = "<script>alert('x')</script>&\"";
+    record.program = hostile.to_string();
+    record.machine = hostile.to_string();
+    record.notices = vec![hostile.to_string()];
+    record.axis_names = [hostile, "", "Z"].map(String::from);
+    record.faults.push(FaultRecord {
+        tick: 20,
+        axis: Some(hostile.to_string()),
+        fault: hostile.to_string(),
+        detail: hostile.to_string(),
+    });
+    let page = page(&record);
+    assert!(page.contains("&lt;script&gt;") && page.contains("axis 2"));
+}
+
+#[test]
+fn faults_are_named_first_and_marked_in_the_plots() {
+    let mut record = sample(1e-3, false);
+    record.ticks.truncate(900);
+    record.faults.push(FaultRecord {
+        tick: 850,
+        axis: Some("Y".to_string()),
+        fault: "following-error".to_string(),
+        detail: "512.3 µm, limit 500 µm".to_string(),
+    });
+    let page = page(&record);
+    assert!(
+        page.contains("<strong>Ended in a fault:</strong> following-error on axis Y at 0.8500 s (512.3 µm")
+    );
+    assert!(page.contains("limit 500 µm") && page.contains("fault latched"));
+    let mark = format!("stroke=\"{}\"", palette::FAULT.hex());
+    assert!(page.matches(&mark).count() > 2 * (1 + 4 + 2));
+}
+
+#[test]
+fn values_that_are_not_finite_are_reported_and_not_drawn() {
+    let mut record = sample(1e-3, false);
+    record.ticks[100].v_mm_s = f64::NAN;
+    record.ticks[200].axes[0].err_um = f64::INFINITY;
+    record.ticks[300].axes[1].set_mm = f64::NEG_INFINITY;
+    record.ticks[400].s_mm = f64::NAN;
+    record.blocks[2].cap_mm_s = f64::INFINITY;
+    assert!(page(&record).contains("3 values in the record not finite"));
+    for tick in &mut record.ticks {
+        tick.v_mm_s = f64::NAN;
+        tick.axes =
+            [AxisTick { set_mm: f64::NAN, err_um: f64::NAN, out_v: f64::NAN, ..AxisTick::default() }; AXES];
+    }
+    page(&record);
+}
+
+/// The sample cut into `number` blocks of one length, so that many share a column of the plot.
+fn chopped(mut record: RunRecord, number: u32) -> RunRecord {
+    let length_mm = record.blocks.iter().map(|block| block.length_mm).sum::<f64>() / f64::from(number);
+    let pattern = std::mem::take(&mut record.blocks);
+    let block = |(line, block): (u32, &BlockRecord)| BlockRecord {
+        line,
+        start_mm: f64::from(line) * length_mm,
+        length_mm,
+        ..block.clone()
+    };
+    record.blocks = (0..number).zip(pattern.iter().cycle()).map(block).collect();
+    record
+}
+
+#[test]
+fn the_largest_run_stays_small_and_keeps_its_peak() {
+    let mut record = chopped(sample(2.05e-6, true), 20_000);
+    assert!(record.ticks.len() > 1_000_000);
+    // The worst case for the size: nothing is smooth, neither in time nor on the path.
+    let mut seed = 7u32;
+    let mut noise = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(seed >> 8) / f64::from(1u32 << 24) - 0.5
+    };
+    for tick in &mut record.ticks {
+        tick.v_mm_s = 40.0 + 80.0 * noise();
+        (tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4) = (500.0 * noise(), 5e3 * noise(), 4e5 * noise());
+        for axis in &mut tick.axes {
+            axis.set_mm = 100.0 * noise();
+            axis.err_um = 10.0 * noise();
+            axis.out_v = 20.0 * noise();
+        }
+    }
+    record.ticks[777_777].axes[0].err_um = 40.0;
+    let page = page(&record);
+    assert!(page.len() < 1_500_000, "{} bytes", page.len());
+    assert!(page.contains("19\u{202f}800 of 20\u{202f}000 rows left out"));
+    // The lone peak is the highest point of its curve and lies just below the top of its axes.
+    let plot = page.split("id=\"axis0-wide-t\"").nth(1).and_then(|rest| rest.split("</svg>").next());
+    let stroke = format!("stroke=\"{}\"", palette::ERROR.hex());
+    let curve = plot.and_then(|plot| plot.split("<polyline").find(|line| line.contains(&stroke)));
+    let points =
+        curve.and_then(|curve| curve.split("points=\"").nth(1)).and_then(|rest| rest.split('"').next());
+    let heights = points.unwrap_or("").split_whitespace().filter_map(|point| point.split_once(','));
+    let mut heights: Vec<i32> = heights.filter_map(|(_, y)| y.parse().ok()).collect();
+    heights.sort_unstable();
+    assert!(heights.len() > 1000 && heights[0] < 150 && heights[1] > 300, "{:?}", &heights[..2]);
+}
+
+/// For looking at the page while working on it: `cargo test -p motion-host report -- --ignored`.
+#[test]
+#[ignore = "writes sample pages into the folder for temporary files"]
+fn sample_pages() {
+    let mut faulted = sample(2.5e-4, false);
+    faulted.notices =
+        vec!["N15: M3 S12000 accepted, not acted on".to_string(), "N5: G64 read as exact path".to_string()];
+    faulted.ticks.truncate(5000);
+    faulted.faults.push(FaultRecord {
+        tick: 4990,
+        axis: Some("Y".to_string()),
+        fault: "following-error".to_string(),
+        detail: "512.3 µm, limit 500 µm".to_string(),
+    });
+    let dense = chopped(sample(1e-4, false), 3_000);
+    for (name, record) in
+        [("report", sample(2.5e-4, true)), ("report-faulted", faulted), ("report-dense", dense)]
+    {
+        let path = std::env::temp_dir().join(name).with_extension("html");
+        std::fs::write(path, page(&record)).expect("temporary file");
+    }
+}

@@ -1,0 +1,23 @@
+//! A plan executed by the kernel on the simulated machine, tick by tick.
+//!
+//! Consumes a [`Plan`](crate::planning::Plan) and a [`Machine`](crate::machine::Machine); produces one
+//! [`TickRecord`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter and
+//! the encoder's count extension are the ones a board runs; only the drive is a model.
+//!
+//! - [`rig`]: the simulated machine as the kernel's hardware;
+//! - [`supply`]: keeps the two streams filled, as the background of a board does;
+//! - [`run`](mod@run): the ticks;
+//! - [`summary`]: maxima, following and contour error.
+
+pub mod rig;
+pub mod run;
+pub mod summary;
+pub mod supply;
+
+pub use run::{Number, RunError, run, run_with};
+pub use summary::{AxisSummary, RunSummary};
+
+use crate::record::TickRecord;
+
+/// Called with every tick.
+pub type Observer<'a> = dyn FnMut(&TickRecord) + 'a;

@@ -1,0 +1,51 @@
+//! The simulated machine as the kernel's hardware: encoders and enable from hal-sim, the velocity
+//! outputs through the converter's adapter and real SPI frames.
+
+use core::convert::Infallible;
+
+use hal_sim::{Ad5754Chip, ChipError, SimMachine};
+use motion_kernel::hal::{Ad5754Error, Ad5754Output, DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::units::{Counts, DacCode};
+
+use crate::record::AXES;
+
+/// The machine and the adapter that talks to its converter.
+pub struct Rig<'a> {
+    machine: &'a SimMachine<AXES>,
+    outputs: Ad5754Output<&'a Ad5754Chip, AXES>,
+}
+
+impl<'a> Rig<'a> {
+    /// Sets up the converter.
+    ///
+    /// # Errors
+    /// The converter does not take its configuration.
+    pub fn new(machine: &'a SimMachine<AXES>) -> Result<Self, Ad5754Error<ChipError>> {
+        let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())?;
+        Ok(Self { machine, outputs })
+    }
+}
+
+impl Encoder<AXES> for Rig<'_> {
+    type Error = Infallible;
+
+    fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
+        self.machine.latch()
+    }
+}
+
+impl VelocityChannel<AXES> for Rig<'_> {
+    type Error = Ad5754Error<ChipError>;
+
+    fn write(&mut self, codes: &[DacCode; AXES]) -> Result<(), Self::Error> {
+        self.outputs.write(codes)
+    }
+}
+
+impl DriveEnable<AXES> for Rig<'_> {
+    type Error = Infallible;
+
+    fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
+        self.machine.set_enabled(enabled)
+    }
+}

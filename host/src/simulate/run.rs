@@ -1,0 +1,209 @@
+//! The ticks of a run.
+
+use hal_sim::SimMachine;
+use motion_kernel::exec::ExecState;
+use motion_kernel::hal::Encoder;
+use motion_kernel::kernel::{Fault, FaultKind, Kernel};
+use motion_kernel::num::Real;
+use motion_kernel::queue::{Rejection, Streams};
+use motion_kernel::trace::Trace;
+use motion_kernel::units::Position;
+
+use super::Observer;
+use super::rig::Rig;
+use super::summary::{Collector, RunSummary};
+use super::supply::Supply;
+use crate::machine::{AxisError, Machine};
+use crate::planning::{Executable, ExecutableItem, Plan, PlanningError};
+use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
+
+/// Capacities of the two streams, as a board has them.
+const PIECES: usize = 64;
+const SEGMENTS: usize = 64;
+/// How long the machine is given to settle before its end position is read \[s\].
+const SETTLE_S: f64 = 0.2;
+
+/// The number type of the kernel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Number {
+    /// As on a board with a single-precision FPU.
+    #[default]
+    F32,
+    /// The reference.
+    F64,
+}
+
+/// Why a run could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The plan can't be executed.
+    #[error(transparent)]
+    Planning(#[from] PlanningError),
+    /// The machine's parameters can't be used.
+    #[error(transparent)]
+    Machine(#[from] AxisError),
+    /// The simulated machine can't be built.
+    #[error("simulated machine: {0}")]
+    Simulation(String),
+    /// The kernel refused what the planner made.
+    #[error("the kernel rejects the plan: {0}")]
+    Rejected(Rejection),
+}
+
+/// Runs `plan` in f32, as a board would.
+///
+/// # Errors
+/// The plan or the machine can't be executed. Faults of the run itself are in the summary.
+pub fn run(plan: &Plan, machine: &Machine, observe: &mut Observer<'_>) -> Result<RunSummary, RunError> {
+    run_with(Number::F32, plan, machine, observe)
+}
+
+/// Runs `plan` with the given number type.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(
+    number: Number,
+    plan: &Plan,
+    machine: &Machine,
+    observe: &mut Observer<'_>,
+) -> Result<RunSummary, RunError> {
+    match number {
+        Number::F32 => run_in::<f32>(plan, machine, observe),
+        Number::F64 => run_in::<f64>(plan, machine, observe),
+    }
+}
+
+fn run_in<R: Real>(
+    plan: &Plan,
+    machine: &Machine,
+    observe: &mut Observer<'_>,
+) -> Result<RunSummary, RunError> {
+    let executable = Executable::<R>::new(plan)?;
+    let starts: Vec<f64> = executable
+        .items
+        .iter()
+        .filter_map(|item| match item {
+            ExecutableItem::Stretch { start_mm, .. } => Some(*start_mm),
+            ExecutableItem::Dwell(_) | ExecutableItem::Stop => None,
+        })
+        .collect();
+    let simulated = SimMachine::<AXES>::new(&machine.simulated())
+        .map_err(|error| RunError::Simulation(error.to_string()))?;
+    let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
+    let Ok(counts) = rig.latch();
+    let start = [Position::ZERO; AXES];
+    let mut kernel = Kernel::<R, AXES>::new(machine.axis_configs()?, start, counts);
+    let mut streams = Streams::<R, AXES, PIECES, SEGMENTS>::new();
+    let (mut feeder, mut intake) = streams.split(machine.rules(), start);
+    let mut supply = Supply::new(&executable);
+
+    let mut summary = RunSummary {
+        tick_s: machine.tick_s,
+        planned_time_s: plan.time_s,
+        path_length_mm: plan.length_mm,
+        notices: plan.notices.clone(),
+        ..RunSummary::default()
+    };
+    let mut collector = Collector::default();
+    let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
+    loop {
+        supply.fill(&mut feeder).map_err(RunError::Rejected)?;
+        let trace = kernel.tick(&mut intake, &mut rig);
+        simulated.advance();
+        let state = trace.executed.state;
+        // What is idle after the last item is no longer part of the program, but for the tick in which
+        // it ended.
+        let ended = supply.is_empty() && state == ExecState::Idle;
+        let start_mm = starts.get(trace.executed.stretches as usize).copied().unwrap_or(plan.length_mm);
+        let record = tick_record(&trace, start_mm);
+        collector.add(&record);
+        observe(&record);
+        if let Some(fault) = trace.fault {
+            summary.faults.push(fault_record(&fault, machine));
+            break;
+        }
+        if ended {
+            break;
+        }
+        if state == ExecState::Stopped {
+            stops += 1;
+            stopped_ticks += 1;
+            kernel.resume();
+        }
+    }
+    collector.fill(&mut summary);
+    summary.time_s = (summary.ticks - stopped_ticks) as f64 * machine.tick_s;
+    if stops > 0 {
+        summary.notices.push(format!("{stops} program stops: resumed at once"));
+    }
+    let mut last = None;
+    for _ in 0..(SETTLE_S / machine.tick_s) as u64 {
+        last = Some(kernel.tick(&mut intake, &mut rig));
+        simulated.advance();
+    }
+    for (index, (axis, settings)) in summary.axes.iter_mut().zip(&machine.axes).enumerate() {
+        axis.name.clone_from(&settings.name);
+        if let Some(trace) = &last {
+            let error_mm = trace.axes[index].following_error_mm.to_f64();
+            axis.end_error_counts = (error_mm / settings.mm_per_count.abs()).round() as i64;
+        }
+    }
+    Ok(summary)
+}
+
+fn tick_record<R: Real>(trace: &Trace<R, AXES>, start_mm: f64) -> TickRecord {
+    let executed = &trace.executed;
+    let motion = &executed.motion;
+    let axes = core::array::from_fn(|index| {
+        let (setpoint, output) = (&executed.setpoints[index], &trace.axes[index]);
+        AxisTick {
+            set_mm: setpoint.position.to_mm(),
+            vel_mm_s: setpoint.velocity_mm_s.to_f64(),
+            acc_mm_s2: setpoint.accel_mm_s2.to_f64(),
+            jerk_mm_s3: setpoint.jerk_mm_s3.to_f64(),
+            act_mm: output.actual.to_mm(),
+            err_um: output.following_error_mm.to_f64() * 1e3,
+            out_v: output.code.to_volts(),
+        }
+    });
+    TickRecord {
+        tick: trace.tick,
+        s_mm: start_mm + motion.s.to_mm(),
+        v_mm_s: motion.v_mm_s.to_f64(),
+        a_mm_s2: motion.a_mm_s2.to_f64(),
+        j_mm_s3: motion.j_mm_s3.to_f64(),
+        snap_mm_s4: motion.snap_mm_s4.to_f64(),
+        state: state_name(trace),
+        line: executed.line,
+        axes,
+    }
+}
+
+fn state_name<R: Real>(trace: &Trace<R, AXES>) -> &'static str {
+    if trace.fault.is_some() {
+        return "fault";
+    }
+    match trace.executed.state {
+        ExecState::Idle => "idle",
+        ExecState::Moving => "moving",
+        ExecState::Dwell => "dwell",
+        ExecState::Stopped => "stopped",
+    }
+}
+
+fn fault_record<R: Real>(fault: &Fault<R>, machine: &Machine) -> FaultRecord {
+    let (axis, name, detail) = match fault.kind {
+        FaultKind::Executor(fault) => (None, "executor", format!("{fault:?}")),
+        FaultKind::FollowingError { axis, error_mm } => {
+            let settings = &machine.axes[axis];
+            let detail =
+                format!("{:.3} mm, limit {} mm", error_mm.to_f64(), settings.following_error_limit_mm);
+            (Some(settings.name.clone()), "following error", detail)
+        }
+        FaultKind::Encoder => (None, "encoder", "the encoders could not be read".to_owned()),
+        FaultKind::Output => (None, "output", "the converter could not be written".to_owned()),
+        FaultKind::Enable => (None, "enable", "the drives could not be switched".to_owned()),
+    };
+    FaultRecord { tick: fault.tick, axis, fault: name.to_owned(), detail }
+}

@@ -1,0 +1,103 @@
+//! Figures of a run, collected tick by tick.
+
+use crate::record::{AXES, FaultRecord, TickRecord};
+
+/// The figures of a run.
+#[derive(Clone, Debug, Default)]
+pub struct RunSummary {
+    /// Ticks from the first motion to the end of the program.
+    pub ticks: u64,
+    /// Control tick \[s\].
+    pub tick_s: f64,
+    /// Duration of the plan, dwells included, stops not \[s\].
+    pub planned_time_s: f64,
+    /// Executed duration, dwells included, stops not \[s\].
+    pub time_s: f64,
+    /// Path length \[mm\].
+    pub path_length_mm: f64,
+    /// Greatest feed \[mm/s\].
+    pub max_feed_mm_s: f64,
+    /// Greatest |acceleration| along the path \[mm/s²\].
+    pub max_accel_mm_s2: f64,
+    /// Greatest |jerk| along the path \[mm/s³\].
+    pub max_jerk_mm_s3: f64,
+    /// Greatest |snap| along the path \[mm/s⁴\].
+    pub max_snap_mm_s4: f64,
+    /// Per axis.
+    pub axes: [AxisSummary; AXES],
+    /// Greatest distance of the actual position from the programmed path \[µm\].
+    pub contour_error_um_max: f64,
+    /// Faults, in order.
+    pub faults: Vec<FaultRecord>,
+    /// What was accepted and not acted on, and how the run was made.
+    pub notices: Vec<String>,
+}
+
+/// The figures of one axis.
+#[derive(Clone, Debug, Default)]
+pub struct AxisSummary {
+    /// Name.
+    pub name: String,
+    /// Greatest |following error| \[µm\].
+    pub following_error_um_max: f64,
+    /// Root of the mean square of the following error \[µm\].
+    pub following_error_um_rms: f64,
+    /// Set − actual position after settling \[counts\].
+    pub end_error_counts: i64,
+    /// Greatest |output| \[V\].
+    pub output_v_max: f64,
+}
+
+/// Collects ticks into figures.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Collector {
+    max: [f64; 4],
+    error_um_max: [f64; AXES],
+    error_um_square_sum: [f64; AXES],
+    output_v_max: [f64; AXES],
+    contour_um_max: f64,
+    direction: Option<[f64; AXES]>,
+    ticks: u64,
+}
+
+impl Collector {
+    pub(super) fn add(&mut self, tick: &TickRecord) {
+        self.ticks += 1;
+        let along = [tick.v_mm_s, tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4];
+        for (max, value) in self.max.iter_mut().zip(along) {
+            *max = max.max(value.abs());
+        }
+        for (index, axis) in tick.axes.iter().enumerate() {
+            self.error_um_max[index] = self.error_um_max[index].max(axis.err_um.abs());
+            self.error_um_square_sum[index] += axis.err_um * axis.err_um;
+            self.output_v_max[index] = self.output_v_max[index].max(axis.out_v.abs());
+        }
+        self.contour_um_max = self.contour_um_max.max(self.contour_um(tick));
+    }
+
+    /// The part of the following error across the path. The path is taken as straight over the error's
+    /// length, which at 20 µm on a radius of 1 mm hides 0.2 µm. At rest the last direction counts.
+    fn contour_um(&mut self, tick: &TickRecord) -> f64 {
+        let velocity = tick.axes.map(|axis| axis.vel_mm_s);
+        let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
+        if speed > 1e-6 {
+            self.direction = Some(velocity.map(|v| v / speed));
+        }
+        let error = tick.axes.map(|axis| axis.err_um);
+        let direction = self.direction.unwrap_or_default();
+        let along: f64 = error.iter().zip(direction).map(|(e, d)| e * d).sum();
+        error.iter().zip(direction).map(|(e, d)| (e - along * d) * (e - along * d)).sum::<f64>().sqrt()
+    }
+
+    pub(super) fn fill(&self, summary: &mut RunSummary) {
+        summary.ticks = self.ticks;
+        [summary.max_feed_mm_s, summary.max_accel_mm_s2, summary.max_jerk_mm_s3, summary.max_snap_mm_s4] =
+            self.max;
+        summary.contour_error_um_max = self.contour_um_max;
+        for (index, axis) in summary.axes.iter_mut().enumerate() {
+            axis.following_error_um_max = self.error_um_max[index];
+            axis.following_error_um_rms = (self.error_um_square_sum[index] / self.ticks.max(1) as f64).sqrt();
+            axis.output_v_max = self.output_v_max[index];
+        }
+    }
+}

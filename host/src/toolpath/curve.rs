@@ -1,0 +1,177 @@
+//! Derivatives of a curve: by its parameter, and by arc length.
+
+use super::{Vector, add, cross, dot, norm, scale, subtract};
+
+/// A smooth curve with a parameter.
+pub trait Curve {
+    /// The point at `u` minus the point at `origin` \[mm\], without the cancellation of computing both.
+    fn offset(&self, origin: f64, u: f64) -> Vector;
+
+    /// First to third derivative by the parameter at `u`.
+    fn derivatives(&self, u: f64) -> [Vector; 3];
+
+    /// Arc length from `a` to `b` \[mm\], `b` ≥ `a`. The default integrates |r'| by 16 Gauss points, which
+    /// resolves a turn of up to an eighth of a circle to the last place.
+    fn length(&self, a: f64, b: f64) -> f64 {
+        let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+        let speed = |u| norm(self.derivatives(u)[0]);
+        let sum: f64 =
+            GAUSS_16.iter().map(|(x, w)| w * (speed(middle - half * x) + speed(middle + half * x))).sum();
+        half * sum
+    }
+}
+
+/// First to third derivative by arc length, from those by a parameter.
+///
+/// With σ = |r'|: t = r'/σ, κn = (r'' − t·(t·r''))/σ², and the third from the derivative of that.
+#[must_use]
+pub fn by_arc_length([d1, d2, d3]: [Vector; 3]) -> [Vector; 3] {
+    let speed = norm(d1);
+    let tangent = scale(d1, 1.0 / speed);
+    // s' = σ, s'' = t·r'', s''' = t·r''' + |r''⊥|²/σ
+    let s2 = dot(tangent, d2);
+    let across = subtract(d2, scale(tangent, s2));
+    let s3 = dot(tangent, d3) + dot(across, across) / speed;
+    // r'' = x''σ² + x's'',  r''' = x'''σ³ + 3x''σs'' + x's'''
+    let second = scale(across, 1.0 / (speed * speed));
+    let third = scale(
+        subtract(subtract(d3, scale(second, 3.0 * speed * s2)), scale(tangent, s3)),
+        1.0 / (speed * speed * speed),
+    );
+    [tangent, second, third]
+}
+
+/// Positive abscissae and weights of the 16-point Gauss–Legendre rule.
+const GAUSS_16: [(f64, f64); 8] = [
+    (0.095_012_509_837_637_44, 0.189_450_610_455_068_5),
+    (0.281_603_550_779_258_9, 0.182_603_415_044_923_6),
+    (0.458_016_777_657_227_4, 0.169_156_519_395_002_54),
+    (0.617_876_244_402_643_7, 0.149_595_988_816_576_73),
+    (0.755_404_408_355_003, 0.124_628_971_255_533_87),
+    (0.865_631_202_387_831_7, 0.095_158_511_682_492_78),
+    (0.944_575_023_073_232_6, 0.062_253_523_938_647_89),
+    (0.989_400_934_991_649_9, 0.027_152_459_411_754_095),
+];
+
+/// An arc, helix or spiral: the angle is the parameter, radius and height go linearly with it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spiral {
+    /// Unit vector from the centre to the start, in the plane.
+    pub outward: Vector,
+    /// Unit vector a quarter turn on, in the direction of travel.
+    pub onward: Vector,
+    /// Unit normal of the plane.
+    pub normal: Vector,
+    /// Radius at the start \[mm\], > 0.
+    pub radius_mm: f64,
+    /// Change of the radius \[mm/rad\].
+    pub radius_per_rad: f64,
+    /// Change of the height along the normal \[mm/rad\].
+    pub height_per_rad: f64,
+}
+
+impl Spiral {
+    /// Direction from the centre at `angle`, and a quarter turn on.
+    fn frame(&self, angle: f64) -> (Vector, Vector) {
+        let (sine, cosine) = angle.sin_cos();
+        (
+            add(scale(self.outward, cosine), scale(self.onward, sine)),
+            subtract(scale(self.onward, cosine), scale(self.outward, sine)),
+        )
+    }
+}
+
+impl Curve for Spiral {
+    fn offset(&self, origin: f64, angle: f64) -> Vector {
+        let turn = angle - origin;
+        let (outward, onward) = self.frame(origin);
+        let (here, _) = self.frame(angle);
+        let radius = self.radius_mm + self.radius_per_rad * origin;
+        let half = (0.5 * turn).sin();
+        // radius·(e(angle) − e(origin)) without cancellation, and what the radius grew by.
+        let round = add(scale(onward, radius * turn.sin()), scale(outward, -2.0 * radius * half * half));
+        let grown = scale(here, self.radius_per_rad * turn);
+        add(add(round, grown), scale(self.normal, self.height_per_rad * turn))
+    }
+
+    fn derivatives(&self, angle: f64) -> [Vector; 3] {
+        let (outward, onward) = self.frame(angle);
+        let (radius, rate) = (self.radius_mm + self.radius_per_rad * angle, self.radius_per_rad);
+        [
+            add(add(scale(onward, radius), scale(outward, rate)), scale(self.normal, self.height_per_rad)),
+            subtract(scale(onward, 2.0 * rate), scale(outward, radius)),
+            subtract(scale(onward, -radius), scale(outward, 3.0 * rate)),
+        ]
+    }
+}
+
+/// The curve of a helper for the plane's third direction.
+#[must_use]
+pub(crate) fn right_handed(first: Vector, second: Vector) -> Vector {
+    cross(first, second)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spiral() -> Spiral {
+        Spiral {
+            outward: [0.6, 0.8, 0.0],
+            onward: [-0.8, 0.6, 0.0],
+            normal: [0.0, 0.0, 1.0],
+            radius_mm: 7.0,
+            radius_per_rad: 0.3,
+            height_per_rad: -1.1,
+        }
+    }
+
+    /// Each derivative against the central difference of the one before.
+    #[test]
+    fn derivatives_by_the_angle() {
+        let (curve, h) = (spiral(), 1e-5);
+        for angle in [0.0, 0.7, 3.0, 6.2] {
+            let exact = curve.derivatives(angle);
+            let (before, after) = (curve.derivatives(angle - h), curve.derivatives(angle + h));
+            let chord = subtract(curve.offset(0.3, angle + h), curve.offset(0.3, angle - h));
+            let found = [
+                scale(chord, 0.5 / h),
+                scale(subtract(after[0], before[0]), 0.5 / h),
+                scale(subtract(after[1], before[1]), 0.5 / h),
+            ];
+            for (exact, found) in exact.iter().zip(found) {
+                assert!(norm(subtract(*exact, found)) < 1e-8, "{exact:?} {found:?}");
+            }
+        }
+    }
+
+    /// The same by arc length, the parameter moved by what makes the length grow by h.
+    #[test]
+    fn derivatives_by_arc_length() {
+        let (curve, h) = (spiral(), 1e-4);
+        for angle in [0.1, 2.0, 5.0] {
+            let exact = by_arc_length(curve.derivatives(angle));
+            let at = |length: f64| {
+                let mut u = angle;
+                for _ in 0..50 {
+                    let gone = if u >= angle { curve.length(angle, u) } else { -curve.length(u, angle) };
+                    u -= (gone - length) / norm(curve.derivatives(u)[0]);
+                }
+                by_arc_length(curve.derivatives(u))
+            };
+            let (before, after) = (at(-h), at(h));
+            for order in 0..2 {
+                let found = scale(subtract(after[order], before[order]), 0.5 / h);
+                assert!(norm(subtract(exact[order + 1], found)) < 1e-8, "{order} {exact:?} {found:?}");
+            }
+            assert!((norm(exact[0]) - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_circles_length_is_exact() {
+        let circle = Spiral { radius_per_rad: 0.0, height_per_rad: 0.0, ..spiral() };
+        let quarter = circle.length(0.2, 0.2 + core::f64::consts::FRAC_PI_4);
+        assert!((quarter - 7.0 * core::f64::consts::FRAC_PI_4).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,166 @@
+//! Blocks of path with one geometry: lines, and arcs with all that goes by that name in G-code.
+
+use motion_kernel::plan::Bend;
+
+use super::curve::{Curve, Spiral, by_arc_length, right_handed};
+use super::{Vector, add, norm, scale, subtract};
+use crate::gcode::{ArcMove, LineMove};
+
+/// A block's geometry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Element {
+    /// A straight line.
+    Line {
+        /// Start \[mm\].
+        from: Vector,
+        /// End \[mm\].
+        to: Vector,
+    },
+    /// An arc, helix or spiral.
+    Arc {
+        /// Start \[mm\].
+        from: Vector,
+        /// End \[mm\].
+        to: Vector,
+        /// Its shape, the angle counted from the start.
+        shape: Spiral,
+        /// The angle run through \[rad\], > 0.
+        sweep_rad: f64,
+        /// Indices of the plane's axes.
+        plane: [usize; 2],
+    },
+}
+
+/// Tangent and curvature vector at an end of an element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct End {
+    /// Unit tangent.
+    pub tangent: Vector,
+    /// κN \[1/mm\].
+    pub curvature: Vector,
+}
+
+impl Element {
+    /// The line of a move.
+    #[must_use]
+    pub fn line(step: &LineMove) -> Self {
+        Self::Line { from: step.from.map(|c| c.to_mm()), to: step.to.map(|c| c.to_mm()) }
+    }
+
+    /// The arc of a move.
+    #[must_use]
+    pub fn arc(step: &ArcMove) -> Self {
+        let (from, to) = (step.from.map(|c| c.to_mm()), step.to.map(|c| c.to_mm()));
+        let [first, second, normal] = step.plane.axes();
+        let axis = |index: usize| {
+            let mut unit = [0.0; 3];
+            unit[index] = 1.0;
+            unit
+        };
+        let radius_mm = step.start_radius_mm;
+        let (x, y) =
+            ((from[first] - step.centre_mm[0]) / radius_mm, (from[second] - step.centre_mm[1]) / radius_mm);
+        let outward = add(scale(axis(first), x), scale(axis(second), y));
+        let turn = right_handed(axis(normal), outward);
+        let sweep_rad = step.sweep_rad.abs();
+        let shape = Spiral {
+            outward,
+            onward: if step.sweep_rad < 0.0 { scale(turn, -1.0) } else { turn },
+            normal: axis(normal),
+            radius_mm,
+            radius_per_rad: (step.end_radius_mm - radius_mm) / sweep_rad,
+            height_per_rad: (to[normal] - from[normal]) / sweep_rad,
+        };
+        Self::Arc { from, to, shape, sweep_rad, plane: [first, second] }
+    }
+
+    /// "line", "arc" or "helix".
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Line { .. } => "line",
+            Self::Arc { shape, .. } if shape.height_per_rad == 0.0 => "arc",
+            Self::Arc { .. } => "helix",
+        }
+    }
+
+    /// Where it starts and ends \[mm\].
+    #[must_use]
+    pub fn ends_mm(&self) -> (Vector, Vector) {
+        match *self {
+            Self::Line { from, to } | Self::Arc { from, to, .. } => (from, to),
+        }
+    }
+
+    /// Arc length \[mm\].
+    #[must_use]
+    pub fn length_mm(&self) -> f64 {
+        match self {
+            Self::Line { from, to } => norm(subtract(*to, *from)),
+            Self::Arc { shape, sweep_rad, .. } => {
+                // In eighths of a circle, which the quadrature resolves.
+                let parts = (sweep_rad / core::f64::consts::FRAC_PI_4).ceil().max(1.0);
+                let at = |part: f64| sweep_rad * part / parts;
+                (0..parts as u32).map(|part| shape.length(at(f64::from(part)), at(f64::from(part + 1)))).sum()
+            }
+        }
+    }
+
+    /// Tangent and curvature at the start and at the end.
+    #[must_use]
+    pub fn ends(&self) -> [End; 2] {
+        match self {
+            Self::Line { from, to } => {
+                let tangent = scale(subtract(*to, *from), 1.0 / self.length_mm());
+                [End { tangent, curvature: [0.0; 3] }; 2]
+            }
+            Self::Arc { shape, sweep_rad, .. } => [0.0, *sweep_rad].map(|angle| {
+                let [tangent, curvature, _] = by_arc_length(shape.derivatives(angle));
+                End { tangent, curvature }
+            }),
+        }
+    }
+
+    /// How it bends, at its tightest.
+    #[must_use]
+    pub fn bend(&self) -> Bend<f64> {
+        match self {
+            Self::Line { .. } => Bend::default(),
+            Self::Arc { shape, sweep_rad, .. } => {
+                let radius = shape.radius_mm.min(shape.radius_mm + shape.radius_per_rad * sweep_rad);
+                Bend::circle(radius, self.planar())
+            }
+        }
+    }
+
+    /// Greatest |component| of the tangent on each axis.
+    #[must_use]
+    pub fn tangent_max(&self) -> Vector {
+        match self {
+            Self::Line { .. } => self.ends()[0].tangent.map(f64::abs),
+            Self::Arc { plane, .. } => {
+                let planar = self.planar();
+                // Conservative for arcs that never run along one of their axes.
+                let axial = (1.0 - planar * planar).max(0.0).sqrt();
+                core::array::from_fn(|axis| if plane.contains(&axis) { planar } else { axial })
+            }
+        }
+    }
+
+    /// Which axes take part in the bend.
+    #[must_use]
+    pub fn curved(&self) -> [bool; 3] {
+        match self {
+            Self::Line { .. } => [false; 3],
+            Self::Arc { plane, .. } => core::array::from_fn(|axis| plane.contains(&axis)),
+        }
+    }
+
+    /// The part of the length that lies in the plane of the arc.
+    fn planar(&self) -> f64 {
+        match self {
+            Self::Line { .. } => 1.0,
+            Self::Arc { shape, .. } => shape.radius_mm / shape.radius_mm.hypot(shape.height_per_rad),
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! Geometry of the programmed path: from moves to pieces of arc length.
+//!
+//! Consumes lines and arcs as the G-code reader gives them; produces [`Piece`](motion_kernel::path::Piece)s
+//! and what planning needs to know of each block's geometry. Background, f64.
+//!
+//! - [`element`]: lines, arcs, helices and spirals: length, tangents, curvature, bend;
+//! - [`curve`]: derivatives of a curve by its parameter and by arc length;
+//! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
+//! - [`compile`]: elements to pieces over exact path positions.
+
+pub mod compile;
+pub mod curve;
+pub mod element;
+pub mod septic;
+
+pub use compile::{CompileError, compile};
+pub use element::Element;
+
+/// A point or a vector, X Y Z \[mm\].
+pub type Vector = [f64; 3];
+
+pub(crate) fn add(a: Vector, b: Vector) -> Vector {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+pub(crate) fn subtract(a: Vector, b: Vector) -> Vector {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn scale(a: Vector, factor: f64) -> Vector {
+    a.map(|component| component * factor)
+}
+
+pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(crate) fn norm(a: Vector) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// The angle between two directions \[rad\], precise for small ones too.
+pub(crate) fn angle(a: Vector, b: Vector) -> f64 {
+    norm(cross(a, b)).atan2(dot(a, b))
+}

@@ -1,0 +1,279 @@
+//! Stage 1: the ceiling of one block, from the machine's limits and the block's geometry.
+//!
+//! On a curve every axis accelerates even at constant feed. With κ = |r''|, κ' = |r'''| and
+//! κ'' = |r''''| by arc length, the vectors' tangential and normal parts are
+//!
+//! ```text
+//! acceleration   a                       κ·v²
+//! jerk           j − κ'·v³               3κ·v·a
+//! snap           s − 6κ'·v²·a            κ''·v⁴ − 3κ·a² − 4κ·v·j
+//! ```
+//!
+//! At v = √(A/κ) nothing is left to change the feed with, so the budget has to be **shared**: a curve
+//! may be driven at [`CURVE_FEED_SHARE`] of the feed that would use it up, and ramps on it get limits
+//! for which the sums above stay within the machine's even at that feed. All the terms grow with v,
+//! a, j, so they stay within it everywhere below.
+
+use crate::law::{Law, LimitError, Limits};
+use crate::num::Root;
+
+/// Part of a curve's greatest feed that blocks are planned with. 0.8 costs a fifth of the feed on a
+/// long arc and leaves three quarters of the acceleration, and a third of the jerk, for ramps at its
+/// very top.
+pub const CURVE_FEED_SHARE: f64 = 0.8;
+/// Part of the jerk limit that ramps may use across the path, 3κ·v·a.
+const NORMAL_JERK_SHARE: f64 = 0.55;
+/// Parts of the snap limit that ramps may use: 3κ·a² and 4κ·v·j across, 6κ'·v²·a along the path.
+const NORMAL_SNAP_SHARES: (f64, f64) = (0.1, 0.3);
+const TANGENTIAL_SNAP_SHARE: f64 = 0.2;
+
+/// The limits of one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisLimits<R> {
+    /// Greatest velocity \[mm/s\].
+    pub feed_mm_s: R,
+    /// Greatest acceleration, jerk and snap.
+    pub limits: Limits<R>,
+}
+
+/// The limits of the machine: along the path, and of each axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MachineLimits<R, const AXES: usize> {
+    /// Of the path: feed, and the magnitudes of acceleration, jerk and snap as vectors.
+    pub path: AxisLimits<R>,
+    /// Of each axis.
+    pub axes: [AxisLimits<R>; AXES],
+}
+
+/// How a block bends.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bend<R> {
+    /// κ, greatest |r''| \[1/mm\]; 0 for a line. R⁻¹ for an arc.
+    pub curvature_per_mm: R,
+    /// κ', greatest |r'''| \[1/mm²\]. R⁻² for an arc.
+    pub third_per_mm2: R,
+    /// κ'', greatest |r''''| \[1/mm³\]. R⁻³ for an arc.
+    pub fourth_per_mm3: R,
+}
+
+impl<R: Root> Bend<R> {
+    /// A circle of `radius_mm` > 0, driven with `planar` (0 … 1] of the path's length in its plane:
+    /// 1 for an arc, less for a helix.
+    #[must_use]
+    pub fn circle(radius_mm: R, planar: R) -> Self {
+        let turn = planar / radius_mm;
+        Self {
+            curvature_per_mm: planar * turn,
+            third_per_mm2: planar * turn * turn,
+            fourth_per_mm3: planar * turn * turn * turn,
+        }
+    }
+}
+
+/// What keeps a block's feed where it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Reason {
+    /// The program's feed.
+    Programmed,
+    /// The machine's greatest feed along the path.
+    PathFeed,
+    /// The greatest velocity of an axis.
+    AxisFeed,
+    /// Acceleration across the path: κ·v².
+    Acceleration,
+    /// Jerk along the path: κ'·v³.
+    Jerk,
+    /// Snap across the path: κ''·v⁴.
+    Snap,
+    /// The block is too short to reach its ceiling and brake to its exit feed.
+    Braking,
+    /// The block is too short to accelerate to its ceiling.
+    Accelerating,
+}
+
+impl Reason {
+    /// The reason in one or two words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Programmed => "programmed",
+            Self::PathFeed => "path feed",
+            Self::AxisFeed => "axis feed",
+            Self::Acceleration => "acceleration",
+            Self::Jerk => "jerk",
+            Self::Snap => "snap",
+            Self::Braking => "braking",
+            Self::Accelerating => "accelerating",
+        }
+    }
+}
+
+/// A block's ceiling and the law its ramps follow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ceiling<R> {
+    /// Greatest feed \[mm/s\].
+    pub feed_mm_s: R,
+    /// What set it.
+    pub reason: Reason,
+    /// What is left for changing the feed.
+    pub law: Law<R>,
+}
+
+impl<R: Root> Ceiling<R> {
+    /// The ceiling of a block.
+    ///
+    /// `feed_mm_s` is the programmed feed, infinite for a rapid. `tangent` holds the greatest
+    /// |component| of the unit tangent on each axis, `curved` whether the axis takes part in the bend.
+    ///
+    /// # Errors
+    /// A limit of the machine is not positive and finite.
+    pub fn new<const AXES: usize>(
+        machine: &MachineLimits<R, AXES>,
+        feed_mm_s: R,
+        tangent: &[R; AXES],
+        curved: &[bool; AXES],
+        bend: &Bend<R>,
+    ) -> Result<Self, LimitError> {
+        let path = &machine.path;
+        // Along the path, and across it in the plane of the bend.
+        let (mut along, mut across) = (path.limits, path.limits);
+        let (mut feed, mut reason) = (feed_mm_s, Reason::Programmed);
+        let mut lower = |candidate: R, why: Reason| {
+            if candidate < feed {
+                (feed, reason) = (candidate, why);
+            }
+        };
+        lower(path.feed_mm_s, Reason::PathFeed);
+        for ((axis, &component), &curved) in machine.axes.iter().zip(tangent).zip(curved) {
+            if curved {
+                across = least(&across, &axis.limits, R::ONE);
+            }
+            if component > R::ZERO {
+                lower(axis.feed_mm_s / component, Reason::AxisFeed);
+                along = least(&along, &axis.limits, component);
+            }
+        }
+        let kappa = bend.curvature_per_mm;
+        if kappa <= R::ZERO {
+            return Ok(Self { feed_mm_s: feed, reason, law: Law::new(along)? });
+        }
+        let along = least(&along, &across, R::ONE);
+        let (accel, jerk, snap) = (across.accel_mm_s2, across.jerk_mm_s3, across.snap_mm_s4);
+        let share = R::from_f64(CURVE_FEED_SHARE);
+        lower(share * (accel / kappa).sqrt(), Reason::Acceleration);
+        lower(share * (jerk / bend.third_per_mm2).cbrt(), Reason::Jerk);
+        lower(share * (snap / bend.fourth_per_mm3).sqrt().sqrt(), Reason::Snap);
+
+        // The ramps' budget at the ceiling itself, where it is smallest.
+        let v = feed;
+        let constant = R::from_f64;
+        let normal_accel = kappa * v * v;
+        let along_jerk = bend.third_per_mm2 * v * v * v;
+        let ramp_accel = (accel * accel - normal_accel * normal_accel)
+            .sqrt()
+            .min(constant(NORMAL_JERK_SHARE / 3.0) * jerk / (kappa * v))
+            .min((constant(NORMAL_SNAP_SHARES.0 / 3.0) * snap / kappa).sqrt())
+            .min(constant(TANGENTIAL_SNAP_SHARE / 6.0) * snap / (bend.third_per_mm2 * v * v))
+            .min(along.accel_mm_s2);
+        let normal_jerk = constant(3.0) * kappa * v * ramp_accel;
+        let ramp_jerk = ((jerk * jerk - normal_jerk * normal_jerk).sqrt() - along_jerk)
+            .min(constant(NORMAL_SNAP_SHARES.1 / 4.0) * snap / (kappa * v))
+            .min(along.jerk_mm_s3);
+        let normal_snap = bend.fourth_per_mm3 * v * v * v * v
+            + kappa * (constant(3.0) * ramp_accel * ramp_accel + constant(4.0) * v * ramp_jerk);
+        let along_snap = constant(6.0) * bend.third_per_mm2 * v * v * ramp_accel;
+        let ramp_snap = ((snap * snap - normal_snap * normal_snap).sqrt() - along_snap).min(along.snap_mm_s4);
+        let law = Law::new(Limits { accel_mm_s2: ramp_accel, jerk_mm_s3: ramp_jerk, snap_mm_s4: ramp_snap })?;
+        Ok(Self { feed_mm_s: feed, reason, law })
+    }
+}
+
+/// The smaller limits of `a` and of `b` divided by `component`.
+fn least<R: Root>(a: &Limits<R>, b: &Limits<R>, component: R) -> Limits<R> {
+    Limits {
+        accel_mm_s2: a.accel_mm_s2.min(b.accel_mm_s2 / component),
+        jerk_mm_s3: a.jerk_mm_s3.min(b.jerk_mm_s3 / component),
+        snap_mm_s4: a.snap_mm_s4.min(b.snap_mm_s4 / component),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn machine() -> MachineLimits<f64, 3> {
+        let all = AxisLimits {
+            feed_mm_s: 300.0,
+            limits: Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 },
+        };
+        MachineLimits { path: all, axes: [all; 3] }
+    }
+
+    /// Worst vectors over every state a ramp on the arc can be in, radii from 1 µm to 100 m.
+    #[test]
+    fn shared_budget_keeps_the_vectors_within_the_limits() {
+        let machine = machine();
+        let limits = machine.path.limits;
+        for exponent in -12..=20 {
+            let radius = 10.0_f64.powf(f64::from(exponent) / 4.0);
+            let bend = Bend::circle(radius, 1.0);
+            let ceiling =
+                Ceiling::new(&machine, f64::INFINITY, &[1.0, 1.0, 0.0], &[true, true, false], &bend)
+                    .expect("limits");
+            let ramp = ceiling.law.limits();
+            let mut worst = [0.0_f64; 3];
+            for i in 0..=20 {
+                let v = ceiling.feed_mm_s * f64::from(i) / 20.0;
+                for a in [-1.0, -0.5, 0.0, 0.5, 1.0].map(|a| a * ramp.accel_mm_s2) {
+                    let accel = a.hypot(v * v / radius);
+                    worst[0] = worst[0].max(accel / limits.accel_mm_s2);
+                    for j in [-1.0, 0.0, 1.0].map(|j| j * ramp.jerk_mm_s3) {
+                        let jerk = (j - v.powi(3) / radius.powi(2)).hypot(3.0 * v * a / radius);
+                        worst[1] = worst[1].max(jerk / limits.jerk_mm_s3);
+                        for s in [-1.0, 1.0].map(|s| s * ramp.snap_mm_s4) {
+                            let snap = (s - 6.0 * v * v * a / radius.powi(2)).hypot(
+                                v.powi(4) / radius.powi(3) - 3.0 * a * a / radius - 4.0 * v * j / radius,
+                            );
+                            worst[2] = worst[2].max(snap / limits.snap_mm_s4);
+                        }
+                    }
+                }
+            }
+            assert!(worst.iter().all(|&w| w <= 1.0 + 1e-12), "R {radius}: {worst:?}");
+            // And the budget is used: something comes close.
+            assert!(worst.iter().any(|&w| w > 0.75), "R {radius}: {worst:?}");
+        }
+    }
+
+    #[test]
+    fn reasons_of_the_stringers_arcs() {
+        let of = |radius, feed| {
+            let bend = Bend::circle(radius, 1.0);
+            Ceiling::new(&machine(), feed, &[1.0, 1.0, 0.0], &[true, true, false], &bend)
+                .expect("limits")
+                .reason
+        };
+        assert_eq!(of(4.0, 5000.0 / 60.0), Reason::Jerk);
+        assert_eq!(of(10.0, 5000.0 / 60.0), Reason::Acceleration);
+        assert_eq!(of(1000.0, 5000.0 / 60.0), Reason::Programmed);
+        assert_eq!(of(1e5, f64::INFINITY), Reason::PathFeed);
+        assert_eq!(of(1e-4, 10.0), Reason::Snap);
+    }
+
+    /// A line along one axis and a diagonal: axis limits divided by the direction's components.
+    #[test]
+    fn axes_limit_lines() {
+        let mut machine = machine();
+        machine.axes[2].feed_mm_s = 30.0;
+        machine.axes[2].limits.jerk_mm_s3 = 1000.0;
+        let line = |direction: [f64; 3]| {
+            Ceiling::new(&machine, 200.0, &direction, &[false; 3], &Bend::default()).expect("limits")
+        };
+        let along = line([1.0, 0.0, 0.0]);
+        assert_eq!((along.feed_mm_s, along.reason), (200.0, Reason::Programmed));
+        let plunge = line([0.0, 0.6, 0.8]);
+        assert_eq!((plunge.feed_mm_s, plunge.reason), (37.5, Reason::AxisFeed));
+        assert_eq!(plunge.law.limits().jerk_mm_s3, 1250.0);
+    }
+}

@@ -1,0 +1,58 @@
+//! What a joint between two blocks allows.
+//!
+//! A joint is passed without stopping if its tangents agree to a stated angle; otherwise the machine
+//! stops exactly on the corner. Passing it at feed v, two things step from one tick to the next: the
+//! velocity by the angle, v·φ, which is an acceleration of v·φ/τ for one tick, and the acceleration by
+//! the jump of curvature, v²·|Δ(κN)|. No limit on jerk per tick can be honest there (it grows as 1/τ),
+//! so their sum is held to an **acceleration-step limit** of its own:
+//!
+//! ```text
+//! v·φ/τ + v²·|Δ(κN)| ≤ step
+//! ```
+
+use crate::num::Root;
+
+/// The steps at a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint<R> {
+    /// φ, the angle between the tangents \[rad\].
+    pub angle_rad: R,
+    /// |Δ(κN)|, the jump of the curvature vector \[1/mm\].
+    pub curvature_step_per_mm: R,
+}
+
+/// The greatest feed through a joint \[mm/s\]: 0 if the angle exceeds `angle_max_rad`, infinite if
+/// nothing steps. `accel_step_mm_s2` is the acceleration-step limit, `tick_s` the control tick τ.
+pub fn joint<R: Root>(joint: &Joint<R>, angle_max_rad: R, accel_step_mm_s2: R, tick_s: R) -> R {
+    if joint.angle_rad > angle_max_rad {
+        return R::ZERO;
+    }
+    // The root of Δκ·v² + (φ/τ)·v = step, in the form that has no cancellation.
+    let kink = joint.angle_rad / tick_s;
+    let bend = joint.curvature_step_per_mm;
+    let two_step = accel_step_mm_s2 + accel_step_mm_s2;
+    two_step / (kink + (kink * kink + (bend + bend) * two_step).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sum_of_the_steps_is_the_limit() {
+        let (step, tick) = (500.0, 0.0005);
+        for angle_rad in [0.0, 1e-6, 1e-3] {
+            for curvature_step_per_mm in [0.0, 1e-3, 0.25, 100.0] {
+                let v = joint(&Joint { angle_rad, curvature_step_per_mm }, 0.01, step, tick);
+                if angle_rad == 0.0 && curvature_step_per_mm == 0.0 {
+                    assert_eq!(v, f64::INFINITY);
+                } else {
+                    let sum = v * angle_rad / tick + v * v * curvature_step_per_mm;
+                    assert!((sum - step).abs() < 1e-9 * step, "{angle_rad} {curvature_step_per_mm} {v}");
+                }
+            }
+        }
+        let corner = Joint { angle_rad: 0.02, curvature_step_per_mm: 0.0 };
+        assert_eq!(joint(&corner, 0.01, step, tick), 0.0);
+    }
+}

@@ -1,0 +1,259 @@
+//! Stages 1 and 2: a feed for every joint of a stretch.
+//!
+//! Forward, each block's exit is what its ceiling, the next one's, their joint and the length allow;
+//! backward from the stop, each block's entry is what one can brake from ("block 9" of S3). Then each
+//! block gets the peak its length allows ("block 12").
+//!
+//! One pass each way, constant work a block. The result is feasible, and Pareto-maximal: no feasible
+//! plan has every joint feed at least as high and one higher. It is *not* always the fastest, because
+//! a ramp's length is not monotone in its lower feed.
+
+use super::ceiling::Reason;
+use crate::law::{Law, peak, reach};
+use crate::num::Root;
+
+/// A block as the look-ahead sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Block<R> {
+    /// Length \[mm\], ≥ 0.
+    pub length_mm: R,
+    /// Ceiling of the feed \[mm/s\], ≥ 0.
+    pub cap_mm_s: R,
+    /// Greatest feed through the joint at its end \[mm/s\], ≥ 0; infinite for none.
+    pub joint_mm_s: R,
+    /// The law its ramps follow.
+    pub law: Law<R>,
+}
+
+/// The planned feeds of a block.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BlockPlan<R> {
+    /// At its start \[mm/s\].
+    pub enter_mm_s: R,
+    /// Greatest inside; it cruises there if there is length left \[mm/s\].
+    pub peak_mm_s: R,
+    /// At its end \[mm/s\].
+    pub exit_mm_s: R,
+}
+
+impl<R: Root> BlockPlan<R> {
+    /// What limits a block whose ceiling was set for `ceiling`: that, or its length.
+    pub fn reason(&self, block: &Block<R>, ceiling: Reason) -> Reason {
+        let reached = self.peak_mm_s >= block.cap_mm_s * (R::ONE - R::from_f64(1.0e-9));
+        match (reached, self.peak_mm_s > self.exit_mm_s) {
+            (true, _) => ceiling,
+            (false, true) => Reason::Braking,
+            (false, false) => Reason::Accelerating,
+        }
+    }
+}
+
+/// Why there is no plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum PlanError {
+    /// A figure of a block is not a number or is negative.
+    Block {
+        /// The block, from 0.
+        block: usize,
+        /// Which figure, with its unit.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The start or end feed is negative or above the ceiling of its block.
+    EndFeed {
+        /// "start feed" or "end feed".
+        quantity: &'static str,
+        /// Its value \[mm/s\].
+        feed_mm_s: f64,
+        /// The greatest possible \[mm/s\].
+        greatest_mm_s: f64,
+    },
+    /// The stretch is too short to brake from its start feed.
+    TooShortToBrake {
+        /// The start feed \[mm/s\].
+        start_mm_s: f64,
+        /// The greatest from which one can brake \[mm/s\].
+        greatest_mm_s: f64,
+    },
+    /// The stretch is too short to accelerate to its end feed.
+    TooShortToAccelerate {
+        /// The end feed \[mm/s\].
+        end_mm_s: f64,
+        /// The greatest that can be reached \[mm/s\].
+        greatest_mm_s: f64,
+    },
+    /// The output has another number of blocks than the input.
+    Output {
+        /// Blocks.
+        blocks: usize,
+        /// Room for plans.
+        plans: usize,
+    },
+}
+
+impl core::fmt::Display for PlanError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Block { block, quantity, value } => {
+                write!(f, "block {block}: {quantity} {value}: expected a number not below 0")
+            }
+            Self::EndFeed { quantity, feed_mm_s, greatest_mm_s } => {
+                write!(f, "{quantity} {feed_mm_s} mm/s: expected from 0 to {greatest_mm_s} mm/s")
+            }
+            Self::TooShortToBrake { start_mm_s, greatest_mm_s } => {
+                write!(f, "too short to brake from {start_mm_s} mm/s: at most {greatest_mm_s} mm/s")
+            }
+            Self::TooShortToAccelerate { end_mm_s, greatest_mm_s } => {
+                write!(f, "too short to reach {end_mm_s} mm/s: at most {greatest_mm_s} mm/s")
+            }
+            Self::Output { blocks, plans } => write!(f, "{blocks} blocks, room for {plans} plans"),
+        }
+    }
+}
+
+impl core::error::Error for PlanError {}
+
+/// Plans a stretch from `start_mm_s` to `end_mm_s` into `plans`, one for each block. The joint at the
+/// end of the last block is not looked at.
+///
+/// # Errors
+/// A figure is out of range, or the stretch is too short for its start or end feed.
+pub fn plan<R: Root>(
+    blocks: &[Block<R>],
+    start_mm_s: R,
+    end_mm_s: R,
+    plans: &mut [BlockPlan<R>],
+) -> Result<(), PlanError> {
+    if blocks.len() != plans.len() {
+        return Err(PlanError::Output { blocks: blocks.len(), plans: plans.len() });
+    }
+    check(blocks, start_mm_s, end_mm_s)?;
+    forward(blocks, start_mm_s, end_mm_s, plans)?;
+    backward(blocks, start_mm_s, plans)?;
+    for (block, plan) in blocks.iter().zip(plans) {
+        let highest = peak(&block.law, plan.enter_mm_s, plan.exit_mm_s, block.length_mm);
+        // The joints' feeds are below the ceiling already.
+        plan.peak_mm_s = highest.min(block.cap_mm_s);
+    }
+    Ok(())
+}
+
+fn check<R: Root>(blocks: &[Block<R>], start: R, end: R) -> Result<(), PlanError> {
+    for (index, block) in blocks.iter().enumerate() {
+        let length = block.length_mm;
+        let finite = length.is_finite();
+        for (quantity, value, good) in [
+            ("length [mm]", length, finite && length >= R::ZERO),
+            ("ceiling [mm/s]", block.cap_mm_s, block.cap_mm_s.is_finite() && block.cap_mm_s > R::ZERO),
+            ("joint feed [mm/s]", block.joint_mm_s, block.joint_mm_s >= R::ZERO),
+        ] {
+            if !good {
+                return Err(PlanError::Block { block: index, quantity, value: value.to_f64() });
+            }
+        }
+    }
+    for (quantity, feed, block) in [("start feed", start, blocks.first()), ("end feed", end, blocks.last())] {
+        let greatest = block.map_or(R::ZERO, |block| block.cap_mm_s);
+        if !(feed >= R::ZERO && feed <= greatest) {
+            return Err(PlanError::EndFeed {
+                quantity,
+                feed_mm_s: feed.to_f64(),
+                greatest_mm_s: greatest.to_f64(),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn forward<R: Root>(
+    blocks: &[Block<R>],
+    start: R,
+    end: R,
+    plans: &mut [BlockPlan<R>],
+) -> Result<(), PlanError> {
+    let mut feed = start;
+    let mut rest = blocks;
+    for plan in plans {
+        let [block, after @ ..] = rest else { break };
+        let allowed = match after.first() {
+            Some(next) => block.cap_mm_s.min(block.joint_mm_s).min(next.cap_mm_s),
+            None => end,
+        };
+        let exit = if allowed > feed {
+            let reached = allowed.min(reach(&block.law, feed, block.length_mm));
+            if after.is_empty() && !close(reached, end) {
+                return Err(PlanError::TooShortToAccelerate {
+                    end_mm_s: end.to_f64(),
+                    greatest_mm_s: reached.to_f64(),
+                });
+            }
+            reached
+        } else {
+            allowed
+        };
+        *plan = BlockPlan { enter_mm_s: feed, peak_mm_s: feed, exit_mm_s: exit };
+        feed = exit;
+        rest = after;
+    }
+    Ok(())
+}
+
+fn backward<R: Root>(blocks: &[Block<R>], start: R, plans: &mut [BlockPlan<R>]) -> Result<(), PlanError> {
+    let mut exit = match plans.last() {
+        Some(last) => last.exit_mm_s,
+        None => return Ok(()),
+    };
+    for (block, plan) in blocks.iter().zip(plans.iter_mut()).rev() {
+        plan.exit_mm_s = exit;
+        if plan.enter_mm_s > exit && block.law.ramp_length_mm(exit, plan.enter_mm_s) > block.length_mm {
+            // Never above what the forward stage allowed, whatever the rounding.
+            plan.enter_mm_s = plan.enter_mm_s.min(reach(&block.law, exit, block.length_mm));
+        }
+        exit = plan.enter_mm_s;
+    }
+    if let Some(first) = plans.first_mut() {
+        if !close(first.enter_mm_s, start) {
+            return Err(PlanError::TooShortToBrake {
+                start_mm_s: start.to_f64(),
+                greatest_mm_s: first.enter_mm_s.to_f64(),
+            });
+        }
+        first.enter_mm_s = start;
+    }
+    Ok(())
+}
+
+/// Equal but for rounding.
+fn close<R: Root>(reached: R, wanted: R) -> bool {
+    reached >= wanted * (R::ONE - R::from_f64(16.0 * R::EPSILON))
+}
+
+/// Merges neighbours that look like one block: same ceiling, same law, and a joint that does not
+/// slow them. The merged blocks are at the front of the slice; returns how many they are.
+#[must_use]
+pub fn merge_equal<R: Root>(blocks: &mut [Block<R>]) -> usize {
+    let mut merged: usize = 0;
+    for index in 0..blocks.len() {
+        let Some(&next) = blocks.get(index) else { break };
+        let last = merged.checked_sub(1).and_then(|last| blocks.get_mut(last));
+        match last {
+            Some(last)
+                if last.cap_mm_s == next.cap_mm_s
+                    && last.law == next.law
+                    && last.joint_mm_s >= next.cap_mm_s =>
+            {
+                last.length_mm = last.length_mm + next.length_mm;
+                last.joint_mm_s = next.joint_mm_s;
+            }
+            _ => {
+                if let Some(place) = blocks.get_mut(merged) {
+                    *place = next;
+                }
+                merged += 1;
+            }
+        }
+    }
+    merged
+}

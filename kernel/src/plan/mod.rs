@@ -1,0 +1,21 @@
+//! The feed plan (S3): how fast each block may be, and how to get there.
+//!
+//! Consumes blocks of path; produces feed segments. Works on slices, allocates nothing, runs in the
+//! background, on the host for a whole stretch or on the board for what is queued. Unchanged input
+//! gives the same bits.
+//!
+//! - [`ceiling`]: stage 1, the feed that a block's geometry and the machine allow, with the reason,
+//!   and how much acceleration, jerk and snap are left for changing the feed on a curve;
+//! - [`joint`]: what a joint between two blocks allows;
+//! - [`lookahead`]: stages 1 and 2 over the stretch: what can be reached, and from what one can brake;
+//! - [`feed`]: the planned blocks as feed segments over exact path positions.
+
+pub mod ceiling;
+pub mod feed;
+pub mod joint;
+pub mod lookahead;
+
+pub use ceiling::{AxisLimits, Bend, Ceiling, MachineLimits, Reason};
+pub use feed::segments;
+pub use joint::{Joint, joint};
+pub use lookahead::{Block, BlockPlan, PlanError, merge_equal, plan};
