@@ -1,9 +1,23 @@
-//! The PC side of the motion kernel.
+//! The PC side of the motion kernel: from G-code to motion on a simulated machine.
+//!
+//! Modules in the order the data travels:
+//!
+//! ```text
+//!   machine    TOML ─► Machine                    limits, axes, drives
+//!   gcode      text ─► Program                    exact decimals, modal state
+//!   toolpath   moves ─► Element ─► Piece          arc length, septic polynomials
+//!   planning   Program ─► Plan                    ceilings with reasons, feed over path
+//!   simulate   Plan ─► ticks                      the kernel against hal-sim
+//!   record     TickRecord, RunRecord              what a run leaves behind
+//!   report     RunRecord ─► HTML                  one file, pictures inside
+//!   cli        the `motion` command
+//! ```
 
-pub mod gcode;
 pub mod machine;
+pub mod cli;
+pub mod gcode;
+pub mod toolpath;
 pub mod planning;
+pub mod simulate;
 pub mod record;
 pub mod report;
-pub mod simulate;
-pub mod toolpath;

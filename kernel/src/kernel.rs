@@ -8,43 +8,13 @@
 //! 0 V, the drives are disabled, and both stay so until [`Kernel::clear_fault`].
 
 use crate::axis::{AxisConfig, AxisOutput, AxisState};
-use crate::exec::{ExecFault, Executed, Executor};
+use crate::exec::{Executed, Executor};
+use crate::fault::{Fault, FaultKind};
 use crate::hal::{DriveEnable, Encoder, VelocityChannel};
 use crate::num::Real;
 use crate::queue::Intake;
 use crate::trace::Trace;
 use crate::units::{Counts, DacCode, Position};
-
-/// What went wrong, where and when.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Fault<R> {
-    /// The tick in which it was found.
-    pub tick: u64,
-    /// What.
-    pub kind: FaultKind<R>,
-}
-
-/// The kinds of fault.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum FaultKind<R> {
-    /// The executor could not go on.
-    Executor(ExecFault),
-    /// The following error of an axis is beyond its limit.
-    FollowingError {
-        /// The axis, from 0.
-        axis: usize,
-        /// Set-point − actual \[mm\].
-        error_mm: R,
-    },
-    /// The encoders could not be read.
-    Encoder,
-    /// The converter could not be written.
-    Output,
-    /// The drives could not be enabled or disabled.
-    Enable,
-}
 
 /// The real-time motion kernel of a machine with `AXES` axes.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 use crate::axis::AxisOutput;
 use crate::exec::Executed;
-use crate::kernel::Fault;
+use crate::fault::Fault;
 
 /// One tick of the whole kernel.
 #[derive(Clone, Copy, Debug)]

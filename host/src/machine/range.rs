@@ -32,19 +32,19 @@ macro_rules! ranges {
     )*};
 }
 
-// Upper ends are far beyond any machine: they keep products of several values finite in f32, too.
+// Ends are far beyond any machine: they keep quotients and products of several values finite in f32, too.
 ranges! {
     Tick: "a number from 0.00002 to 0.02", |value| (0.00002..=0.02).contains(&value);
     Limit: "a number from 0.001 to 1e12", |value| (0.001..=1e12).contains(&value);
     JointAngle: "a number from 0 to 30", |value| (0.0..=30.0).contains(&value);
     FollowingError: "a number from 0.0001 to 1000", |value| (0.0001..=1000.0).contains(&value);
     Resolution: "a number above 1e-8 and below 1", |value| value > 1e-8 && value < 1.0;
-    Velocity: "a number other than 0 within ±1e9", |value| value.abs() >= 1e-3 && value.abs() <= 1e9;
+    Velocity: "a number of magnitude 0.001 to 1e9", |value| (0.001..=1e9).contains(&value.abs());
     OutputLimit: "a number above 0, at most 10", |value| value > 0.0 && value <= 10.0;
     OutputOffset: "a number above -10 and below 10", |value| value.abs() < 10.0;
     Gain: "a number from 0 to 1e9", |value| (0.0..=1e9).contains(&value);
     FeedforwardGain: "a number from -1000 to 1000", |value| value.abs() <= 1000.0;
-    Positive: "a number above 0, at most 1e9", |value| value > 0.0 && value <= 1e9;
+    Positive: "a number from 1e-6 to 1e9", |value| (1e-6..=1e9).contains(&value);
     DeadTime: "a number from 0 to 0.01", |value| (0.0..=0.01).contains(&value);
     Inertia: "a number above -1, at most 1000", |value| value > -1.0 && value <= 1000.0;
 }

@@ -1,12 +1,12 @@
-//! BLOCKS.json: a bare list of lengths and feeds, planned like a stretch.
+//! A block list, BLOCKS.json: a bare list of lengths and feeds, planned like a stretch.
 
 use motion_kernel::law::{Law, Limits};
 use motion_kernel::plan::{Block, Reason};
 use serde::Deserialize;
 
 use super::error::{PlanningError, Problem};
+use super::lookahead::lookahead;
 use super::profile::FeedProfile;
-use super::stretch::lookahead;
 use super::{Mode, Plan};
 use crate::record::BlockRecord;
 

@@ -3,10 +3,11 @@
 //! Consumes a [`Plan`]; produces the items of the two streams for a number type. A program that is
 //! denser than the executor's bounds is refused here, with its line, before anything moves.
 
-use motion_kernel::exec::SEGMENTS_PER_TICK_MAX;
+use motion_kernel::exec::PIECES_PER_TICK_MAX;
 use motion_kernel::law::{FeedSegment, Ticks};
 use motion_kernel::num::Real;
-use motion_kernel::path::{PIECES_PER_TICK_MAX, Piece};
+use motion_kernel::path::Piece;
+use motion_kernel::queue::SEGMENTS_PER_TICK_MAX;
 use motion_kernel::units::Position;
 
 use super::error::{PlanningError, Problem};

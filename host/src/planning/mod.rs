@@ -6,14 +6,16 @@
 //!
 //! - [`program`]: steps to stretches: where motion must stop, what each joint allows;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
+//! - `lookahead`: the kernel's look-ahead, merged or per block;
 //! - [`profile`]: feed and time at any path position of a planned stretch;
-//! - [`blocks`]: BLOCKS.json;
+//! - [`blocks`]: bare block lists, BLOCKS.json;
 //! - [`executable`]: a plan in the kernel's terms, checked against the tick's bounds;
 //! - [`error`]: what is refused, with file and line.
 
 pub mod blocks;
 pub mod error;
 pub mod executable;
+mod lookahead;
 pub mod profile;
 pub mod program;
 pub mod stretch;

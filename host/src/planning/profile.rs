@@ -5,7 +5,7 @@ use motion_kernel::plan::BlockPlan;
 
 use super::FeedRecord;
 use super::error::Problem;
-use super::stretch::Planned;
+use super::lookahead::Planned;
 
 /// Positions closer than this are the same: segments start and end on position steps, blocks do not.
 const ROUNDING_MM: f64 = 1.0e-9;

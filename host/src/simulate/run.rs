@@ -2,8 +2,9 @@
 
 use hal_sim::SimMachine;
 use motion_kernel::exec::ExecState;
+use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::hal::Encoder;
-use motion_kernel::kernel::{Fault, FaultKind, Kernel};
+use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Real;
 use motion_kernel::queue::{Rejection, Streams};
 use motion_kernel::trace::Trace;

@@ -5,22 +5,21 @@
 //! spent on what follows, so a program's duration is its plan's to the tick. Every stretch ends
 //! exactly at its end point, at rest.
 //!
-//! Bound: [`STEPS_PER_TICK_MAX`] phase changes, [`PIECES_PER_TICK_MAX`](crate::path::PIECES_PER_TICK_MAX)
+//! Bound: [`STEPS_PER_TICK_MAX`] phase changes, [`PIECES_PER_TICK_MAX`]
 //! pieces; no solver, no division. Fails by [`ExecFault`] only.
 
 mod motion;
+mod walk;
 
 use crate::law::{PathMotion, Ticks};
 use crate::num::Real;
-use crate::path::walk::WalkError;
-use crate::path::{Setpoint, Walker};
-use crate::queue::{FeedItem, Intake};
+use crate::path::Setpoint;
+use crate::queue::{FeedItem, Intake, SEGMENTS_PER_TICK_MAX};
 use crate::units::Position;
 use motion::Moving;
+use walk::{WalkError, Walker};
 
-/// How many segments or dwells may end within one tick. Denser ones are rejected when they are
-/// offered to the queue.
-pub const SEGMENTS_PER_TICK_MAX: usize = 8;
+pub use walk::PIECES_PER_TICK_MAX;
 
 /// Greatest number of steps of the executor within one tick: three phases and an end of stretch for
 /// each segment that ends, and for the one that begins.

@@ -45,6 +45,18 @@ pub enum Geometry<R, const AXES: usize> {
     },
 }
 
+impl<R: Real, const AXES: usize> Geometry<R, AXES> {
+    /// The first axis with a coefficient that is not finite.
+    fn not_finite(&self) -> Option<usize> {
+        match self {
+            Self::Line { direction } => direction.iter().position(|c| !c.is_finite()),
+            Self::Septic { coefficients, .. } => {
+                coefficients.iter().position(|axis| axis.iter().any(|c| !c.is_finite()))
+            }
+        }
+    }
+}
+
 /// An item of the path stream. Immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece<R, const AXES: usize> {
@@ -141,11 +153,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
             return Err(PieceError::Length { length_mm: length.to_mm(), longest_mm });
         }
         let piece = Self { line, length, start, geometry };
-        let finite = |axis: usize| match &piece.geometry {
-            Geometry::Line { direction } => direction[axis].is_finite(),
-            Geometry::Septic { coefficients, .. } => coefficients[axis].iter().all(|c| c.is_finite()),
-        };
-        if let Some(axis) = (0..AXES).find(|&axis| !finite(axis)) {
+        if let Some(axis) = piece.geometry.not_finite() {
             return Err(PieceError::NotFinite { axis });
         }
         for tangent in [piece.tangent_at(R::ZERO), piece.tangent_at(length.to_offset())] {

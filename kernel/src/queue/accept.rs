@@ -4,11 +4,13 @@
 //! could not execute. Each method returns the state after the item, so that an item that finds its
 //! queue full leaves no trace.
 
-use crate::exec::SEGMENTS_PER_TICK_MAX;
 use crate::law::{FeedSegment, Limits, Ticks};
 use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
+
+/// How many segments or dwells may end within one tick. Denser ones are rejected when they are offered.
+pub const SEGMENTS_PER_TICK_MAX: usize = 8;
 
 /// What the streams are held to. Immutable; the machine's configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -20,7 +20,7 @@ use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
 
-pub use accept::{PathRules, Rejection};
+pub use accept::{PathRules, Rejection, SEGMENTS_PER_TICK_MAX};
 
 /// An item of the path stream.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,9 +3,9 @@
 //! Consumes the path stream, up to [`PIECES_PER_TICK_MAX`] pieces a tick; produces the set-points at
 //! a path position. In the tick.
 
-use super::piece::{Piece, Setpoint};
 use crate::law::PathMotion;
 use crate::num::Real;
+use crate::path::{Piece, Setpoint};
 use crate::queue::{Intake, PathItem};
 use crate::units::Position;
 
@@ -15,7 +15,7 @@ pub const PIECES_PER_TICK_MAX: usize = 16;
 
 /// Why the walk can't go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum WalkError {
+pub(super) enum WalkError {
     /// The next piece has not arrived.
     Starved,
     /// More than [`PIECES_PER_TICK_MAX`] pieces ended.
@@ -24,7 +24,7 @@ pub(crate) enum WalkError {
 
 /// Where on the path the machine is.
 #[derive(Clone, Copy, Debug)]
-pub struct Walker<R: Real, const AXES: usize> {
+pub(super) struct Walker<R: Real, const AXES: usize> {
     piece: Option<Piece<R, AXES>>,
     /// Path position of the piece's start, from the stretch's start.
     piece_start: Position,
@@ -33,18 +33,18 @@ pub struct Walker<R: Real, const AXES: usize> {
 }
 
 impl<R: Real, const AXES: usize> Walker<R, AXES> {
-    pub(crate) fn new(rest: [Position; AXES]) -> Self {
+    pub(super) fn new(rest: [Position; AXES]) -> Self {
         Self { piece: None, piece_start: Position::ZERO, rest }
     }
 
     /// Program line of the current piece; 0 at rest.
-    pub(crate) fn program_line(&self) -> u32 {
+    pub(super) fn program_line(&self) -> u32 {
         self.piece.as_ref().map_or(0, Piece::program_line)
     }
 
     /// Goes forward to the piece that contains path position `s`.
     #[inline]
-    pub(crate) fn seek(&mut self, s: Position, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
+    pub(super) fn seek(&mut self, s: Position, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
         for _ in 0..=PIECES_PER_TICK_MAX {
             if let Some(piece) = &self.piece {
                 // At the very end of the path a rounding step beyond it is still its end.
@@ -64,7 +64,7 @@ impl<R: Real, const AXES: usize> Walker<R, AXES> {
 
     /// Ends the stretch: what is left of its pieces is passed, and the machine rests at its end.
     #[inline]
-    pub(crate) fn finish(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
+    pub(super) fn finish(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
         for _ in 0..=PIECES_PER_TICK_MAX {
             match intake.take_path() {
                 Some(PathItem::EndOfStretch(end)) => {
@@ -80,7 +80,7 @@ impl<R: Real, const AXES: usize> Walker<R, AXES> {
 
     /// The set-points at path position `motion.s` of the current piece, or at rest.
     #[inline]
-    pub(crate) fn setpoints(&self, motion: &PathMotion<R>) -> [Setpoint<R>; AXES] {
+    pub(super) fn setpoints(&self, motion: &PathMotion<R>) -> [Setpoint<R>; AXES] {
         match &self.piece {
             Some(piece) => {
                 let local = (motion.s - self.piece_start).max(Position::ZERO).min(piece.length());

@@ -1,0 +1,91 @@
+//! Errors of the command line and their exit statuses.
+
+use std::io;
+use std::process::ExitCode;
+
+use thiserror::Error;
+
+use crate::gcode::GcodeError;
+use crate::machine::MachineError;
+use crate::planning::PlanningError;
+use crate::simulate::RunError;
+
+/// How a command that ran to its end ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything is as it should be.
+    Done,
+    /// The run ended in a fault, or a check failed.
+    Failed,
+}
+
+impl Outcome {
+    /// 0 or 1.
+    #[must_use]
+    pub fn exit_code(self) -> ExitCode {
+        match self {
+            Self::Done => ExitCode::SUCCESS,
+            Self::Failed => ExitCode::FAILURE,
+        }
+    }
+}
+
+/// Why a command could not do its work. Displays as one line.
+#[derive(Debug, Error)]
+pub enum CliError {
+    /// A file can't be read.
+    #[error("{path}: found {source}, expected a readable file")]
+    Read {
+        /// As the user gave it.
+        path: String,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// A file can't be written.
+    #[error("{path}: found {source}, expected a file that can be written")]
+    Write {
+        /// As the user gave it.
+        path: String,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// Standard output can't be written.
+    #[error("standard output: found {0}")]
+    Output(#[source] io::Error),
+    /// The program is not G-code.
+    #[error(transparent)]
+    Gcode(#[from] GcodeError),
+    /// The machine file is refused.
+    #[error(transparent)]
+    Machine(#[from] MachineError),
+    /// There is no plan.
+    #[error(transparent)]
+    Planning(#[from] PlanningError),
+    /// The run can't be made.
+    #[error("{program}: {source}")]
+    Run {
+        /// The program.
+        program: String,
+        /// Why.
+        source: RunError,
+    },
+    /// Arguments that are right one by one and don't fit together.
+    #[error("found {found}, expected {expected}")]
+    Arguments {
+        /// What they amount to.
+        found: String,
+        /// What would fit.
+        expected: &'static str,
+    },
+}
+
+impl CliError {
+    /// 2, but for output that failed and for a plan that the kernel refuses: these are not the user's input.
+    #[must_use]
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Output(_) | Self::Run { source: RunError::Rejected(_), .. } => ExitCode::FAILURE,
+            _ => ExitCode::from(2),
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! The command line: what users and scripts rely on.
+//!
+//! Consumes arguments, files and standard input; produces text for people, `--json` for scripts, CSV for tables.
+//! Exit status 0: done; 1: the run ended in a fault, or a check failed; 2: wrong input. An error is one line on standard
+//! error that names file, line and column, what was found and what was expected.
+//!
+//! - [`profile`]: one ramp of the feed law, in figures;
+//! - [`plan`]: the feed plan of a program or a block list;
+//! - [`run`]: a program through plan, kernel and simulated machine;
+//! - [`machine`]: the reference machine's file;
+//! - [`demo`]: what `motion` alone does;
+//! - [`error`]: errors and exit statuses;
+//! - `input`, `table`, `trace`, `progress`: what the commands share.
+
+pub mod demo;
+pub mod error;
+pub mod machine;
+pub mod plan;
+pub mod profile;
+pub mod run;
+
+mod input;
+mod progress;
+mod table;
+mod trace;
+
+use std::io::{self, BufWriter, Write};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use self::error::{CliError, Outcome};
+
+const EXAMPLES: &str = "\
+Examples:
+  motion                                         the built-in demonstration; writes stringer.html
+  motion run part.ngc --report part.html         run a program, look at what the axes did
+  motion plan part.ngc                           what limits the feed, block by block
+  motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
+  motion machine > mine.toml                     a machine file to start from
+
+Exit status: 0 done, 1 the run ended in a fault or a check failed, 2 wrong input.";
+
+/// G-code to motion: plans the feed, runs the real-time kernel, and shows what simulated ±10 V axes make of it.
+///
+/// Without a command, plans and runs a built-in program on the built-in machine and writes a report.
+#[derive(Debug, Parser)]
+#[command(name = "motion", version, after_help = EXAMPLES)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Run(run::RunArguments),
+    Plan(plan::PlanArguments),
+    Profile(profile::ProfileArguments),
+    Machine(machine::MachineArguments),
+}
+
+/// The whole program: arguments to exit status.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let mut out = BufWriter::new(io::stdout().lock());
+    let done = execute(&cli, &mut out);
+    match done.and_then(|outcome| out.flush().map(|()| outcome).map_err(CliError::Output)) {
+        Ok(outcome) => outcome.exit_code(),
+        // Whoever reads us has seen enough (`motion plan part.ngc | head`).
+        Err(CliError::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(error) => {
+            // What was printed before the error belongs before it.
+            let _ = out.flush();
+            eprintln!("motion: {error}");
+            error.exit_code()
+        }
+    }
+}
+
+fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    match &cli.command {
+        None => demo::demonstrate(out),
+        Some(Command::Run(arguments)) => run::run(arguments, out),
+        Some(Command::Plan(arguments)) => plan::plan(arguments, out),
+        Some(Command::Profile(arguments)) => profile::profile(arguments, out),
+        Some(Command::Machine(_)) => machine::print(out),
+    }
+}
+
+/// Writes `value` as indented JSON with a line end.
+fn write_json(value: &impl serde::Serialize, out: &mut dyn Write) -> Result<(), CliError> {
+    serde_json::to_writer_pretty(&mut *out, value).map_err(|error| CliError::Output(error.into()))?;
+    writeln!(out).map_err(CliError::Output)
+}
+
+/// The cause of a failed write, with its kind: a closed pipe must stay one.
+fn csv_failure(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(cause) => cause,
+        other => io::Error::other(format!("{other:?}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        super::Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,180 @@
+//! `motion plan`: what limits the feed, block by block.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::table::{self, Align};
+use super::{input, write_json};
+use crate::gcode;
+use crate::planning::{FeedRecord, Mode, Plan, plan_blocks, plan_program};
+use crate::record::BlockRecord;
+
+const EXAMPLES: &str = "\
+Examples:
+  motion plan part.ngc                           a table: ceiling, its reason, feeds and time of every block
+  motion plan part.ngc --machine mine.toml       for a machine of your own
+  motion plan part.ngc --per-block               one pair of ramps per block
+  motion plan blocks.json --json                 lengths and feeds without geometry
+  generate-part | motion plan -                  G-code from standard input
+
+A block list holds its own limits:
+  {\"limits\": {\"accel_mm_s2\": 500, \"jerk_mm_s3\": 5000, \"snap_mm_s4\": 400000},
+   \"start_feed_mm_s\": 0, \"end_feed_mm_s\": 0,
+   \"blocks\": [{\"length_mm\": 50, \"feed_mm_s\": 80}, {\"length_mm\": 25, \"feed_mm_s\": 40}]}";
+
+/// Plan the feed of a program or of a block list, without running it.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct PlanArguments {
+    /// G-code (`-`: standard input), or a block list if the name ends in .json.
+    #[arg(value_name = "PROGRAM|BLOCKS.json")]
+    program: PathBuf,
+    /// Machine file (`motion machine` prints one); without it, the reference machine.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    /// One pair of ramps per block; without it, ramps may span blocks with equal ceilings.
+    #[arg(long)]
+    per_block: bool,
+    /// Print JSON: time_s, blocks, feed.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct PlanJson<'plan> {
+    time_s: f64,
+    length_mm: f64,
+    blocks: Vec<BlockJson>,
+    feed: Vec<FeedJson>,
+    notices: &'plan [String],
+}
+
+#[derive(Serialize)]
+struct BlockJson {
+    line: u32,
+    kind: &'static str,
+    start_mm: f64,
+    length_mm: f64,
+    cap_mm_s: f64,
+    cap_reason: &'static str,
+    enter_mm_s: f64,
+    peak_mm_s: f64,
+    exit_mm_s: f64,
+    time_s: f64,
+}
+
+#[derive(Serialize)]
+struct FeedJson {
+    start_mm: f64,
+    length_mm: f64,
+    from_mm_s: f64,
+    to_mm_s: f64,
+    peak_jerk_mm_s3: f64,
+    t1_s: f64,
+    t2_s: f64,
+    time_s: f64,
+}
+
+/// Plans and prints.
+///
+/// # Errors
+/// The program, block list or machine file is refused, there is no plan, or `out` can't be written.
+pub fn plan(arguments: &PlanArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let machine = input::machine(arguments.machine.as_ref())?;
+    let source = input::read(&arguments.program)?;
+    let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Merged };
+    let is_block_list =
+        arguments.program.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    let mut plan = if is_block_list {
+        plan_blocks(&source.name, &source.text, mode)?
+    } else {
+        let program = gcode::read(&source.name, &source.text)?;
+        plan_program(&source.name, &program, &machine, mode)?
+    };
+    if is_block_list && arguments.machine.is_some() {
+        plan.notices.push("a block list has its own limits: --machine is not acted on".to_owned());
+    }
+    if arguments.json {
+        write_json(&json(&plan), out)?;
+    } else {
+        write_plan(&plan, out).map_err(CliError::Output)?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn json(plan: &Plan) -> PlanJson<'_> {
+    let block = |block: &BlockRecord| BlockJson {
+        line: block.line,
+        kind: block.kind,
+        start_mm: block.start_mm,
+        length_mm: block.length_mm,
+        cap_mm_s: block.cap_mm_s,
+        cap_reason: block.cap_reason,
+        enter_mm_s: block.enter_mm_s,
+        peak_mm_s: block.peak_mm_s,
+        exit_mm_s: block.exit_mm_s,
+        time_s: block.time_s,
+    };
+    let feed = |feed: &FeedRecord| FeedJson {
+        start_mm: feed.start_mm,
+        length_mm: feed.length_mm,
+        from_mm_s: feed.from_mm_s,
+        to_mm_s: feed.to_mm_s,
+        peak_jerk_mm_s3: feed.peak_jerk_mm_s3,
+        t1_s: feed.t1_s,
+        t2_s: feed.t2_s,
+        time_s: feed.time_s,
+    };
+    PlanJson {
+        time_s: plan.time_s,
+        length_mm: plan.length_mm,
+        blocks: plan.blocks.iter().map(block).collect(),
+        feed: plan.feed.iter().map(feed).collect(),
+        notices: &plan.notices,
+    }
+}
+
+/// The plan as people read it.
+pub(super) fn write_plan(plan: &Plan, out: &mut dyn Write) -> io::Result<()> {
+    let columns = [
+        ("block", "", Align::Right),
+        ("line", "", Align::Right),
+        ("kind", "", Align::Left),
+        ("length", "mm", Align::Right),
+        ("ceiling", "mm/s", Align::Right),
+        ("limited by", "", Align::Left),
+        ("enter", "mm/s", Align::Right),
+        ("peak", "mm/s", Align::Right),
+        ("exit", "mm/s", Align::Right),
+        ("peak", "mm/min", Align::Right),
+        ("time", "s", Align::Right),
+    ];
+    let row = |(index, block): (usize, &BlockRecord)| {
+        [
+            (index + 1).to_string(),
+            if block.line == 0 { "–".to_owned() } else { block.line.to_string() },
+            block.kind.to_owned(),
+            format!("{:.4}", block.length_mm),
+            format!("{:.3}", block.cap_mm_s),
+            block.cap_reason.to_owned(),
+            format!("{:.3}", block.enter_mm_s),
+            format!("{:.3}", block.peak_mm_s),
+            format!("{:.3}", block.exit_mm_s),
+            format!("{:.1}", block.peak_mm_s * 60.0),
+            format!("{:.6}", block.time_s),
+        ]
+    };
+    let rows: Vec<[String; 11]> = plan.blocks.iter().enumerate().map(row).collect();
+    table::write(&columns, &rows, out)?;
+    let (blocks, parts) = (plan.blocks.len(), plan.feed.len());
+    writeln!(
+        out,
+        "\n  {blocks} blocks, {:.4} mm, {parts} ramps and cruises, {:.6} s",
+        plan.length_mm, plan.time_s
+    )?;
+    plan.notices.iter().try_for_each(|notice| writeln!(out, "  note: {notice}"))
+}

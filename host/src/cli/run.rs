@@ -1,0 +1,254 @@
+//! `motion run`: a program through plan, kernel and simulated machine.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::input::{self, Output};
+use super::progress::Progress;
+use super::table::{self, Align};
+use super::trace::TraceWriter;
+use super::write_json;
+use crate::gcode;
+use crate::machine::Machine;
+use crate::planning::{Mode, Plan, plan_program};
+use crate::record::{FaultRecord, RunRecord, TickRecord};
+use crate::report;
+use crate::simulate::{self, AxisSummary, RunSummary};
+
+const EXAMPLES: &str = "\
+Examples:
+  motion run part.ngc                                run on the reference machine, print a summary
+  motion run part.ngc --report part.html             and a page with the pictures of the run
+  motion run part.ngc --machine mine.toml --trace part.csv
+                                                     every tick of every axis, for a spreadsheet
+  generate-part | motion run - --json                for a script
+
+Exit status 1: the run ended in a fault; the summary, the trace and the report are written all the same.";
+
+/// Run a program: plan it, execute it tick by tick with the real-time kernel, on simulated axes.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct RunArguments {
+    /// G-code; `-` is standard input.
+    #[arg(value_name = "PROGRAM")]
+    program: PathBuf,
+    /// Machine file (`motion machine` prints one); without it, the reference machine.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    /// Write every tick as a row of CSV; an existing file is replaced.
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+    /// Write a self-contained HTML page about the run; an existing file is replaced.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Print JSON: ticks, times, maxima along the path, errors of the axes, faults.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Plans, runs and prints.
+///
+/// # Errors
+/// The program or the machine file is refused, there is no plan, or a file can't be written.
+pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let machine = input::machine(arguments.machine.as_ref())?;
+    let source = input::read(&arguments.program)?;
+    let program = gcode::read(&source.name, &source.text)?;
+    let plan = plan_program(&source.name, &program, &machine, Mode::Merged)?;
+    // Opened before the run: a wrong path should not cost the user a long one.
+    let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
+    let report = arguments.report.as_deref().map(Output::create).transpose()?;
+    let summary = execute(&plan, &machine, trace, report)?;
+    if arguments.json {
+        write_json(&json(&summary), out)?;
+    } else {
+        write_summary(&summary, out).map_err(CliError::Output)?;
+        for (what, path) in [("trace", &arguments.trace), ("report", &arguments.report)] {
+            if let Some(path) = path {
+                writeln!(out, "  {what} written to {}", path.display()).map_err(CliError::Output)?;
+            }
+        }
+    }
+    Ok(if summary.faults.is_empty() { Outcome::Done } else { Outcome::Failed })
+}
+
+/// Runs a plan; writes the trace as it goes and the report afterwards.
+pub(super) fn execute(
+    plan: &Plan,
+    machine: &Machine,
+    trace: Option<Output>,
+    report: Option<Output>,
+) -> Result<RunSummary, CliError> {
+    let unwritten = |path: &str| {
+        let path = path.to_owned();
+        move |source| CliError::Write { path, source }
+    };
+    let trace_name = trace.as_ref().map_or_else(String::new, |output| output.name.clone());
+    let mut trace = match trace {
+        Some(output) => Some(TraceWriter::new(output.file, machine).map_err(unwritten(&trace_name))?),
+        None => None,
+    };
+    // Only a report needs all the ticks at once.
+    let mut ticks: Vec<TickRecord> = Vec::new();
+    let mut progress = Progress::new((plan.time_s / machine.tick_s) as u64);
+    let ran = simulate::run(plan, machine, &mut |tick| {
+        if let Some(trace) = &mut trace {
+            trace.add(tick);
+        }
+        if report.is_some() {
+            ticks.push(*tick);
+        }
+        progress.tick();
+    });
+    progress.finish();
+    if let Some(trace) = trace {
+        trace.finish().map_err(unwritten(&trace_name))?;
+    }
+    let summary = ran.map_err(|source| CliError::Run { program: plan.source.clone(), source })?;
+    if let Some(mut output) = report {
+        let record = record(plan, machine, &summary, ticks);
+        report::write_html(&record, &mut output.file)
+            .and_then(|()| output.file.flush())
+            .map_err(unwritten(&output.name))?;
+    }
+    Ok(summary)
+}
+
+fn record(plan: &Plan, machine: &Machine, summary: &RunSummary, ticks: Vec<TickRecord>) -> RunRecord {
+    RunRecord {
+        program: plan.source.clone(),
+        machine: machine.name.clone(),
+        tick_s: machine.tick_s,
+        axis_names: machine.axes.each_ref().map(|axis| axis.name.clone()),
+        blocks: plan.blocks.clone(),
+        ticks,
+        planned_time_s: plan.time_s,
+        faults: summary.faults.clone(),
+        notices: summary.notices.clone(),
+    }
+}
+
+#[derive(Serialize)]
+struct RunJson<'run> {
+    ticks: u64,
+    tick_s: f64,
+    planned_time_s: f64,
+    time_s: f64,
+    path_length_mm: f64,
+    max: MaxJson,
+    axes: Vec<AxisJson<'run>>,
+    contour_error_um_max: f64,
+    faults: Vec<FaultJson<'run>>,
+    notices: &'run [String],
+}
+
+#[derive(Serialize)]
+struct MaxJson {
+    feed_mm_s: f64,
+    accel_mm_s2: f64,
+    jerk_mm_s3: f64,
+    snap_mm_s4: f64,
+}
+
+#[derive(Serialize)]
+struct AxisJson<'run> {
+    name: &'run str,
+    following_error_um_max: f64,
+    following_error_um_rms: f64,
+    end_error_counts: i64,
+    output_v_max: f64,
+}
+
+#[derive(Serialize)]
+struct FaultJson<'run> {
+    tick: u64,
+    axis: Option<&'run str>,
+    fault: &'run str,
+    detail: &'run str,
+}
+
+fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
+    let axis = |axis: &'run AxisSummary| AxisJson {
+        name: &axis.name,
+        following_error_um_max: axis.following_error_um_max,
+        following_error_um_rms: axis.following_error_um_rms,
+        end_error_counts: axis.end_error_counts,
+        output_v_max: axis.output_v_max,
+    };
+    let fault = |fault: &'run FaultRecord| FaultJson {
+        tick: fault.tick,
+        axis: fault.axis.as_deref(),
+        fault: &fault.fault,
+        detail: &fault.detail,
+    };
+    RunJson {
+        ticks: summary.ticks,
+        tick_s: summary.tick_s,
+        planned_time_s: summary.planned_time_s,
+        time_s: summary.time_s,
+        path_length_mm: summary.path_length_mm,
+        max: MaxJson {
+            feed_mm_s: summary.max_feed_mm_s,
+            accel_mm_s2: summary.max_accel_mm_s2,
+            jerk_mm_s3: summary.max_jerk_mm_s3,
+            snap_mm_s4: summary.max_snap_mm_s4,
+        },
+        axes: summary.axes.iter().map(axis).collect(),
+        contour_error_um_max: summary.contour_error_um_max,
+        faults: summary.faults.iter().map(fault).collect(),
+        notices: &summary.notices,
+    }
+}
+
+/// The run as people read it.
+pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Result<()> {
+    let RunSummary { ticks, tick_s, planned_time_s, time_s, path_length_mm, .. } = summary;
+    let tick_ms = tick_s * 1e3;
+    writeln!(
+        out,
+        "  {path_length_mm:.4} mm in {time_s:.4} s (planned {planned_time_s:.6} s), {ticks} ticks of {tick_ms} ms"
+    )?;
+    writeln!(
+        out,
+        "  along the path at most: feed {:.3} mm/s ({:.1} mm/min), acceleration {:.2} mm/s², jerk {:.1} mm/s³, snap {:.0} mm/s⁴",
+        summary.max_feed_mm_s,
+        summary.max_feed_mm_s * 60.0,
+        summary.max_accel_mm_s2,
+        summary.max_jerk_mm_s3,
+        summary.max_snap_mm_s4,
+    )?;
+    writeln!(out, "  contour error at most {:.2} µm\n", summary.contour_error_um_max)?;
+    let columns = [
+        ("axis", "", Align::Left),
+        ("following error max", "µm", Align::Right),
+        ("rms", "µm", Align::Right),
+        ("at the end", "counts", Align::Right),
+        ("output max", "V", Align::Right),
+    ];
+    let rows: Vec<[String; 5]> = summary
+        .axes
+        .iter()
+        .map(|axis| {
+            [
+                axis.name.clone(),
+                format!("{:.2}", axis.following_error_um_max),
+                format!("{:.2}", axis.following_error_um_rms),
+                axis.end_error_counts.to_string(),
+                format!("{:.3}", axis.output_v_max),
+            ]
+        })
+        .collect();
+    table::write(&columns, &rows, out)?;
+    if !(summary.faults.is_empty() && summary.notices.is_empty()) {
+        writeln!(out)?;
+    }
+    for FaultRecord { tick, axis, fault, detail } in &summary.faults {
+        let axis = axis.as_ref().map_or_else(String::new, |name| format!(" of axis {name}"));
+        writeln!(out, "  FAULT in tick {tick} ({:.4} s): {fault}{axis}: {detail}", *tick as f64 * tick_s)?;
+    }
+    summary.notices.iter().try_for_each(|notice| writeln!(out, "  note: {notice}"))
+}

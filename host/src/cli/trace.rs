@@ -1,0 +1,126 @@
+//! The trace file: one row per tick, written as the run goes.
+
+use std::io::{self, Write};
+
+use super::csv_failure;
+use crate::machine::Machine;
+use crate::record::TickRecord;
+
+/// Columns of the path, then seven of each axis.
+const PATH_COLUMNS: [&str; 8] = ["tick", "t_s", "s_mm", "v_mm_s", "a_mm_s2", "j_mm_s3", "state", "line"];
+const AXIS_COLUMNS: [&str; 7] =
+    ["set_mm", "vel_mm_s", "acc_mm_s2", "jerk_mm_s3", "act_mm", "err_um", "out_v"];
+
+// Decimals. A position step is 2⁻³² mm = 2.3·10⁻¹⁰ mm, a step of the converter 0.3 mV.
+const TIME: usize = 9;
+const POSITION: usize = 10;
+const VELOCITY: usize = 9;
+const CHANGE: usize = 6;
+const ERROR: usize = 6;
+const VOLTS: usize = 6;
+
+/// A trace being written.
+pub(super) struct TraceWriter<W: Write> {
+    csv: csv::Writer<W>,
+    tick_s: f64,
+    /// The text of one field, kept for its memory.
+    field: Vec<u8>,
+    /// The first failure; nothing is written after it.
+    failure: Option<io::Error>,
+}
+
+impl<W: Write> TraceWriter<W> {
+    /// Writes the header.
+    pub(super) fn new(out: W, machine: &Machine) -> io::Result<Self> {
+        let mut csv = csv::Writer::from_writer(out);
+        for column in PATH_COLUMNS {
+            csv.write_field(column).map_err(csv_failure)?;
+        }
+        for axis in &machine.axes {
+            for column in AXIS_COLUMNS {
+                csv.write_field(format!("{}_{column}", axis.name)).map_err(csv_failure)?;
+            }
+        }
+        csv.write_record(None::<&[u8]>).map_err(csv_failure)?;
+        Ok(Self { csv, tick_s: machine.tick_s, field: Vec::new(), failure: None })
+    }
+
+    /// Adds a row. A failure is kept for [`Self::finish`]: a run is not stopped for it.
+    pub(super) fn add(&mut self, tick: &TickRecord) {
+        if self.failure.is_none() {
+            self.failure = self.row(tick).err();
+        }
+    }
+
+    /// Writes out what is still in memory.
+    pub(super) fn finish(mut self) -> io::Result<()> {
+        match self.failure.take() {
+            Some(failure) => Err(failure),
+            None => self.csv.flush(),
+        }
+    }
+
+    fn row(&mut self, tick: &TickRecord) -> io::Result<()> {
+        self.text(format_args!("{}", tick.tick))?;
+        self.number(tick.tick as f64 * self.tick_s, TIME)?;
+        self.number(tick.s_mm, POSITION)?;
+        self.number(tick.v_mm_s, VELOCITY)?;
+        self.number(tick.a_mm_s2, CHANGE)?;
+        self.number(tick.j_mm_s3, CHANGE)?;
+        self.text(format_args!("{}", tick.state))?;
+        self.text(format_args!("{}", tick.line))?;
+        for axis in &tick.axes {
+            self.number(axis.set_mm, POSITION)?;
+            self.number(axis.vel_mm_s, VELOCITY)?;
+            self.number(axis.acc_mm_s2, CHANGE)?;
+            self.number(axis.jerk_mm_s3, CHANGE)?;
+            self.number(axis.act_mm, POSITION)?;
+            self.number(axis.err_um, ERROR)?;
+            self.number(axis.out_v, VOLTS)?;
+        }
+        self.csv.write_record(None::<&[u8]>).map_err(csv_failure)
+    }
+
+    fn number(&mut self, value: f64, decimals: usize) -> io::Result<()> {
+        self.text(format_args!("{value:.decimals$}"))
+    }
+
+    fn text(&mut self, text: std::fmt::Arguments<'_>) -> io::Result<()> {
+        self.field.clear();
+        self.field.write_fmt(text)?;
+        self.csv.write_field(&self.field).map_err(csv_failure)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{AXES, AxisTick};
+
+    #[test]
+    fn header_and_row() {
+        let mut text = Vec::new();
+        let mut trace = TraceWriter::new(&mut text, &Machine::reference()).expect("memory");
+        let axis = AxisTick { set_mm: 7_999.999_999_999_8, act_mm: -0.1, ..AxisTick::default() };
+        trace.add(&TickRecord {
+            tick: 3,
+            s_mm: 1.0 / 3.0,
+            v_mm_s: 2.0,
+            a_mm_s2: -1.5,
+            j_mm_s3: 0.0,
+            snap_mm_s4: 0.0,
+            state: "moving",
+            line: 12,
+            axes: [axis; AXES],
+        });
+        trace.finish().expect("memory");
+        let text = String::from_utf8(text).expect("UTF-8");
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].starts_with("tick,t_s,s_mm,v_mm_s,a_mm_s2,j_mm_s3,state,line,X_set_mm,X_vel_mm_s,"));
+        assert!(lines[0].ends_with("Z_acc_mm_s2,Z_jerk_mm_s3,Z_act_mm,Z_err_um,Z_out_v"));
+        assert!(lines[1].starts_with(
+            "3,0.001500000,0.3333333333,2.000000000,-1.500000,0.000000,moving,12,7999.9999999998,"
+        ));
+        assert_eq!(lines.iter().map(|line| line.split(',').count()).collect::<Vec<_>>(), [29, 29]);
+    }
+}

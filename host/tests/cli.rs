@@ -1,0 +1,392 @@
+//! The command line as users and scripts rely on it: exit statuses, keys, headers, errors.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+/// A directory of a test's own, removed afterwards.
+struct Desk(PathBuf);
+
+impl Desk {
+    fn new(name: &str) -> Self {
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("cli-{name}"));
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).expect("a directory");
+        Self(path)
+    }
+
+    fn put(&self, name: &str, text: &str) {
+        fs::write(self.0.join(name), text).expect("a file");
+    }
+
+    fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.0.join(name)).expect("a file")
+    }
+
+    /// Runs `motion` in this directory.
+    fn motion(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_motion"));
+        command.args(arguments).current_dir(&self.0).output().expect("motion starts")
+    }
+
+    /// Runs `motion`, which must succeed and say nothing on standard error.
+    fn stdout(&self, arguments: &[&str]) -> String {
+        let output = self.motion(arguments);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!((output.status.code(), error.as_ref()), (Some(0), ""), "{arguments:?}");
+        String::from_utf8(output.stdout).expect("UTF-8")
+    }
+
+    fn json(&self, arguments: &[&str]) -> Value {
+        serde_json::from_str(&self.stdout(arguments)).expect("JSON")
+    }
+
+    /// Runs `motion`, which must refuse its input in one line; that line without `motion: `.
+    fn refusal(&self, arguments: &[&str]) -> String {
+        let output = self.motion(arguments);
+        let error = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{arguments:?}: {error}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+        error.trim_end().strip_prefix("motion: ").expect("its name first").to_owned()
+    }
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    let mut keys: Vec<&str> = value.as_object().expect("an object").keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    keys
+}
+
+fn assert_has(value: &Value, expected: &[&str]) {
+    let found = keys(value);
+    for key in expected {
+        assert!(found.contains(key), "{key} is not among {found:?}");
+    }
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+const LIMITS: [&str; 6] = ["--accel", "500", "--jerk", "5000", "--snap", "400000"];
+const STRINGER: &str = include_str!("../src/cli/stringer.ngc");
+
+fn profile<'a>(from: &'a str, to: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    [&["profile", "--from", from, "--to", to][..], &LIMITS, more].concat()
+}
+
+#[test]
+fn profile_json() {
+    let desk = Desk::new("profile-json");
+    let ramp = desk.json(&profile("0", "200", &["--json"]));
+    assert_has(&ramp, &["peak_jerk_mm_s3", "t1_s", "t2_s", "tp_s", "length_mm", "limited_by", "at"]);
+    assert_eq!(ramp["limited_by"], "acceleration");
+    assert!((number(&ramp["tp_s"]) - 0.6).abs() < 1e-12);
+    assert!((number(&ramp["length_mm"]) - 60.0).abs() < 1e-9);
+    let at = ramp["at"].as_array().expect("a list");
+    assert_eq!(at.len(), 4);
+    for row in at {
+        assert_eq!(keys(row), ["a_mm_s2", "j_mm_s3", "s_mm", "snap_mm_s4", "t_s", "v_mm_s"]);
+    }
+    assert!((number(&at[0]["snap_mm_s4"]) - 78_539.816).abs() < 1e-2);
+    assert!((number(&at[0]["t_s"]) - 0.05).abs() < 1e-12);
+    assert_eq!(desk.json(&profile("19", "100", &["--json"]))["limited_by"], "jerk");
+    assert_eq!(desk.json(&profile("18", "20", &["--json"]))["limited_by"], "snap");
+    let none = desk.json(&profile("50", "50", &["--json"]));
+    assert!(number(&none["tp_s"]).abs() <= 0.0 && number(&none["length_mm"]).abs() <= 0.0);
+}
+
+#[test]
+fn profile_csv_and_table() {
+    let desk = Desk::new("profile-csv");
+    let csv = desk.stdout(&profile("0", "200", &["--csv", "--tick", "0.001"]));
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(lines[0], "t_s,s_mm,v_mm_s,a_mm_s2,j_mm_s3,snap_mm_s4");
+    assert_eq!(lines.len(), 602);
+    assert!(lines[1].starts_with("0.0,0.0,0.0,"), "{}", lines[1]);
+    assert!(lines[601].starts_with("0.6"), "{}", lines[601]);
+    let table = desk.stdout(&profile("0", "200", &[]));
+    for word in ["t1/4", "tp", "mm/s³", "acceleration", "12000.0 mm/min", "78539.82", "22.826727"] {
+        assert!(table.contains(word), "{word} is not in\n{table}");
+    }
+}
+
+#[test]
+fn profile_names_a_wrong_argument() {
+    let desk = Desk::new("profile-wrong");
+    for (name, value) in [
+        ("--from", "-1"),
+        ("--from", "nan"),
+        ("--to", "inf"),
+        ("--accel", "0"),
+        ("--jerk", "-5"),
+        ("--snap", "x"),
+        ("--tick", "0"),
+    ] {
+        let mut arguments = profile("0", "200", &["--tick", "0.001"]);
+        let place = arguments.iter().position(|argument| *argument == name).expect("an argument") + 1;
+        arguments[place] = value;
+        let output = desk.motion(&arguments);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{name} {value}");
+        assert!(error.contains(name) && error.contains(&format!("found {value}, expected")), "{error}");
+    }
+    assert_eq!(desk.motion(&["profile", "--from", "0"]).status.code(), Some(2));
+    assert_eq!(desk.motion(&profile("0", "1", &["--json", "--csv"])).status.code(), Some(2));
+    assert_eq!(desk.motion(&["dance"]).status.code(), Some(2));
+    assert_eq!(desk.motion(&["--help"]).status.code(), Some(0));
+    let refusal = desk.refusal(&profile("0", "200", &["--csv", "--tick", "1e-12"]));
+    assert!(refusal.contains("expected at most 1e8 ticks"), "{refusal}");
+    let refusal = desk.refusal(&[
+        "profile", "--from", "0", "--to", "1e300", "--accel", "1e-300", "--jerk", "1", "--snap", "1",
+    ]);
+    assert!(refusal.contains("found ") && refusal.contains(", expected "), "{refusal}");
+}
+
+#[test]
+fn machine_prints_its_file() {
+    let desk = Desk::new("machine");
+    let file = desk.stdout(&["machine"]);
+    assert_eq!(file, include_str!("../src/machine/reference.toml"));
+    desk.put("mine.toml", &file);
+    desk.put("part.ngc", STRINGER);
+    let with = desk.stdout(&["plan", "part.ngc", "--machine", "mine.toml", "--json"]);
+    assert_eq!(with, desk.stdout(&["plan", "part.ngc", "--json"]));
+}
+
+#[test]
+fn plan_of_the_stringer() {
+    let desk = Desk::new("plan");
+    desk.put("part.ngc", STRINGER);
+    let plan = desk.json(&["plan", "part.ngc", "--json"]);
+    assert_has(&plan, &["time_s", "blocks", "feed"]);
+    let blocks = plan["blocks"].as_array().expect("a list");
+    for block in blocks {
+        assert_has(
+            block,
+            &[
+                "line",
+                "kind",
+                "length_mm",
+                "cap_mm_s",
+                "cap_reason",
+                "enter_mm_s",
+                "peak_mm_s",
+                "exit_mm_s",
+                "time_s",
+            ],
+        );
+    }
+    let of = |key: &str| blocks.iter().map(|block| block[key].clone()).collect::<Vec<Value>>();
+    assert_eq!(of("line"), [4, 5, 6, 7, 8]);
+    assert_eq!(of("kind"), ["line", "arc", "arc", "arc", "line"]);
+    // S3's result. The paper does not say what limits N1.
+    assert_eq!(of("cap_reason")[1..], ["jerk", "acceleration", "jerk", "braking"]);
+    let feed = plan["feed"].as_array().expect("a list");
+    let (mut start_mm, mut time_s) = (0.0, 0.0);
+    for part in feed {
+        assert_has(
+            part,
+            &["start_mm", "length_mm", "from_mm_s", "to_mm_s", "peak_jerk_mm_s3", "t1_s", "t2_s", "time_s"],
+        );
+        assert!((number(&part["start_mm"]) - start_mm).abs() < 1e-6);
+        start_mm += number(&part["length_mm"]);
+        time_s += number(&part["time_s"]);
+    }
+    assert!((time_s - number(&plan["time_s"])).abs() < 1e-9);
+    let table = desk.stdout(&["plan", "part.ngc", "--per-block"]);
+    for word in ["limited by", "mm/min", "acceleration", "5 blocks"] {
+        assert!(table.contains(word), "{word} is not in\n{table}");
+    }
+}
+
+const BLOCKS: &str = r#"{
+  "limits": {"accel_mm_s2": 500, "jerk_mm_s3": 5000, "snap_mm_s4": 400000},
+  "start_feed_mm_s": 0,
+  "end_feed_mm_s": 0,
+  "blocks": [
+    {"length_mm": 50, "feed_mm_s": 80},
+    {"length_mm": 25, "feed_mm_s": 40}
+  ]
+}"#;
+
+#[test]
+fn plan_of_a_block_list() {
+    let desk = Desk::new("blocks");
+    desk.put("list.json", BLOCKS);
+    for more in [&["--per-block"][..], &[]] {
+        let plan = desk.json(&[&["plan", "list.json", "--json"], more].concat());
+        let blocks = plan["blocks"].as_array().expect("a list");
+        assert_eq!(blocks.len(), 2);
+        assert!(blocks.iter().all(|block| block["line"] == 0));
+        assert!(number(&blocks[1]["exit_mm_s"]).abs() <= 0.0);
+    }
+    desk.put("extra.json", &BLOCKS.replace("\"feed_mm_s\": 40", "\"speed_mm_s\": 40"));
+    let refusal = desk.refusal(&["plan", "extra.json"]);
+    assert!(refusal.starts_with("extra.json:7") && refusal.contains("speed_mm_s"), "{refusal}");
+    desk.put("negative.json", &BLOCKS.replace("\"length_mm\": 25", "\"length_mm\": -25"));
+    let refusal = desk.refusal(&["plan", "negative.json"]);
+    assert!(refusal.starts_with("negative.json:7") && refusal.contains("found -25, expected"), "{refusal}");
+    desk.put("torn.json", &BLOCKS[..100]);
+    assert!(desk.refusal(&["plan", "torn.json"]).starts_with("torn.json:"));
+}
+
+#[test]
+fn run_of_the_stringer() {
+    let desk = Desk::new("run");
+    desk.put("part.ngc", STRINGER);
+    let run = desk.json(&["run", "part.ngc", "--json", "--trace", "part.csv", "--report", "part.html"]);
+    assert_has(
+        &run,
+        &[
+            "ticks",
+            "tick_s",
+            "planned_time_s",
+            "time_s",
+            "path_length_mm",
+            "max",
+            "axes",
+            "contour_error_um_max",
+            "faults",
+        ],
+    );
+    assert_eq!(keys(&run["max"]), ["accel_mm_s2", "feed_mm_s", "jerk_mm_s3", "snap_mm_s4"]);
+    for axis in run["axes"].as_array().expect("a list") {
+        assert_has(
+            axis,
+            &["name", "following_error_um_max", "following_error_um_rms", "end_error_counts", "output_v_max"],
+        );
+    }
+    assert_eq!(run["faults"], Value::Array(Vec::new()));
+    assert!((number(&run["time_s"]) - number(&run["planned_time_s"])).abs() < 2.0 * number(&run["tick_s"]));
+
+    let trace = desk.read("part.csv");
+    let mut rows = trace.lines();
+    let mut header = "tick,t_s,s_mm,v_mm_s,a_mm_s2,j_mm_s3,state,line".to_owned();
+    for name in ["X", "Y", "Z"] {
+        for column in ["set_mm", "vel_mm_s", "acc_mm_s2", "jerk_mm_s3", "act_mm", "err_um", "out_v"] {
+            header += &format!(",{name}_{column}");
+        }
+    }
+    assert_eq!(rows.next(), Some(header.as_str()));
+    assert_eq!(rows.clone().count() as u64, run["ticks"].as_u64().expect("a count"));
+    for row in rows {
+        let fields: Vec<&str> = row.split(',').collect();
+        assert_eq!(fields.len(), 29);
+        for position in [fields[2], fields[8], fields[12], fields[15], fields[19]] {
+            let (_, decimals) = position.split_once('.').expect("decimals");
+            assert!(decimals.len() >= 9, "{position}");
+        }
+    }
+    assert!(desk.read("part.html").contains("<svg"));
+
+    let summary = desk.stdout(&["run", "part.ngc"]);
+    for word in ["following error", "contour error", "planned", "mm/min"] {
+        assert!(summary.contains(word), "{word} is not in\n{summary}");
+    }
+}
+
+#[test]
+fn a_program_from_standard_input() {
+    let desk = Desk::new("stdin");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_motion"))
+        .args(["run", "-", "--json"])
+        .current_dir(&desk.0)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("motion starts");
+    child.stdin.take().expect("a pipe").write_all(b"G1 X5 F600\nM2\n").expect("written");
+    let output = child.wait_with_output().expect("motion ends");
+    assert_eq!(output.status.code(), Some(0));
+    let run: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert!((number(&run["path_length_mm"]) - 5.0).abs() < 1e-9);
+}
+
+/// `motion … | head`: no complaint about a reader that has seen enough.
+#[test]
+fn a_closed_pipe_is_not_an_error() {
+    let desk = Desk::new("pipe");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_motion"))
+        .args(profile("0", "200", &["--csv", "--tick", "1e-6"]))
+        .current_dir(&desk.0)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("motion starts");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("motion ends");
+    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+}
+
+/// An axis that may follow with an error of 0.1 µm only can't.
+#[test]
+fn a_fault_is_status_1() {
+    let desk = Desk::new("fault");
+    desk.put("part.ngc", STRINGER);
+    let file = desk.stdout(&["machine"]);
+    desk.put(
+        "strict.toml",
+        &file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.0001"),
+    );
+    let output = desk.motion(&["run", "part.ngc", "--machine", "strict.toml", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let run: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let faults = run["faults"].as_array().expect("a list");
+    assert_eq!(keys(&faults[0]), ["axis", "detail", "fault", "tick"]);
+    assert_eq!(faults[0]["axis"], "X");
+    let output = desk.motion(&["run", "part.ngc", "--machine", "strict.toml"]);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("FAULT in tick"));
+}
+
+#[test]
+fn wrong_input_is_status_2_and_named() {
+    let desk = Desk::new("wrong");
+    desk.put("part.ngc", STRINGER);
+    desk.put("unknown.ngc", "G21\nG1 X10 F100\n G33 Z1\n");
+    desk.put("fast.toml", &desk.stdout(&["machine"]).replace("tick_s = 0.0005", "tick_s = 5"));
+    desk.put("note.toml", "not a machine\n");
+    for command in ["run", "plan"] {
+        let refusal = desk.refusal(&[command, "missing.ngc"]);
+        assert!(refusal.starts_with("missing.ngc: found ") && refusal.contains(", expected"), "{refusal}");
+        let refusal = desk.refusal(&[command, "unknown.ngc"]);
+        assert!(
+            refusal.starts_with("unknown.ngc:3:2: found G33") && refusal.contains(", expected"),
+            "{refusal}"
+        );
+        let refusal = desk.refusal(&[command, "part.ngc", "--machine", "missing.toml"]);
+        assert!(refusal.starts_with("missing.toml: found "), "{refusal}");
+        let refusal = desk.refusal(&[command, "part.ngc", "--machine", "fast.toml"]);
+        assert!(
+            refusal.starts_with("fast.toml:14:10: found tick_s = 5, expected a number from"),
+            "{refusal}"
+        );
+        let refusal = desk.refusal(&[command, "part.ngc", "--machine", "note.toml"]);
+        assert!(refusal.starts_with("note.toml:1:") && refusal.contains("expected"), "{refusal}");
+    }
+    for option in ["--trace", "--report"] {
+        let refusal = desk.refusal(&["run", "part.ngc", option, "no/such/place"]);
+        assert!(refusal.starts_with("no/such/place: found "), "{refusal}");
+    }
+}
+
+#[test]
+fn alone_it_demonstrates() {
+    let desk = Desk::new("demonstration");
+    let said = desk.stdout(&[]);
+    for word in ["stringer.html", "N3 G2", "limited by", "jerk", "acceleration", "braking", "following error"]
+    {
+        assert!(said.contains(word), "{word} is not in\n{said}");
+    }
+    assert!(desk.read("stringer.html").contains("<svg"));
+}
