@@ -14,8 +14,14 @@ pub struct RunRecord {
     pub machine: String,
     /// Control tick \[s\].
     pub tick_s: f64,
+    /// Limits along the path.
+    pub limits: PathLimits,
     /// Axis names, in order.
     pub axis_names: [String; AXES],
+    /// Following error at which each axis faults \[µm\]; 0 if not known.
+    pub following_error_limit_um: [f64; AXES],
+    /// Set − actual position of each axis after settling \[counts\].
+    pub end_error_counts: [i64; AXES],
     /// Blocks of the plan, in path order over the whole program.
     pub blocks: Vec<BlockRecord>,
     /// Every tick, in order.
@@ -26,6 +32,17 @@ pub struct RunRecord {
     pub faults: Vec<FaultRecord>,
     /// What was accepted and not acted on, and other remarks for the reader.
     pub notices: Vec<String>,
+}
+
+/// What the machine allows along the path. A limit of 0 is not known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PathLimits {
+    /// Greatest acceleration \[mm/s²\].
+    pub accel_mm_s2: f64,
+    /// Greatest jerk \[mm/s³\].
+    pub jerk_mm_s3: f64,
+    /// Greatest snap \[mm/s⁴\].
+    pub snap_mm_s4: f64,
 }
 
 /// One block of the plan.
@@ -41,7 +58,8 @@ pub struct BlockRecord {
     pub length_mm: f64,
     /// Ceiling of the feed \[mm/s\].
     pub cap_mm_s: f64,
-    /// What set the ceiling.
+    /// What holds the feed down: what set the ceiling, or "accelerating" or "braking" where the block is too short
+    /// for the feed to reach it.
     pub cap_reason: &'static str,
     /// Feed at the start \[mm/s\].
     pub enter_mm_s: f64,
@@ -72,6 +90,8 @@ pub struct TickRecord {
     pub state: &'static str,
     /// G-code line of the path piece.
     pub line: u32,
+    /// Contour error, the part of the following error across the path, 0 or more \[µm\].
+    pub contour_um: f64,
     /// Per axis.
     pub axes: [AxisTick; AXES],
 }

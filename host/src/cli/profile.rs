@@ -46,7 +46,7 @@ pub struct ProfileArguments {
     /// Snap limit [mm/s⁴], above 0.
     #[arg(long, value_name = "DJ", value_parser = positive, allow_negative_numbers = true)]
     snap: f64,
-    /// Time between two rows of --csv [s], above 0.
+    /// Time between two rows of --csv, in seconds, above 0.
     #[arg(long, value_name = "S", default_value = "0.0005", value_parser = positive, allow_negative_numbers = true)]
     tick: f64,
     /// Print JSON: peak_jerk_mm_s3, t1_s, t2_s, tp_s, length_mm, limited_by, and `at` t1/4, t1, t2, tp.

@@ -15,7 +15,7 @@ use super::write_json;
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
-use crate::record::{FaultRecord, RunRecord, TickRecord};
+use crate::record::{FaultRecord, PathLimits, RunRecord, TickRecord};
 use crate::report;
 use crate::simulate::{self, AxisSummary, RunSummary};
 
@@ -123,7 +123,14 @@ fn record(plan: &Plan, machine: &Machine, summary: &RunSummary, ticks: Vec<TickR
         program: plan.source.clone(),
         machine: machine.name.clone(),
         tick_s: machine.tick_s,
+        limits: PathLimits {
+            accel_mm_s2: machine.path.accel_mm_s2,
+            jerk_mm_s3: machine.path.jerk_mm_s3,
+            snap_mm_s4: machine.path.snap_mm_s4,
+        },
         axis_names: machine.axes.each_ref().map(|axis| axis.name.clone()),
+        following_error_limit_um: machine.axes.each_ref().map(|axis| axis.following_error_limit_mm * 1e3),
+        end_error_counts: summary.axes.each_ref().map(|axis| axis.end_error_counts),
         blocks: plan.blocks.clone(),
         ticks,
         planned_time_s: plan.time_s,

@@ -111,6 +111,7 @@ mod tests {
             snap_mm_s4: 0.0,
             state: "moving",
             line: 12,
+            contour_um: 0.0,
             axes: [axis; AXES],
         });
         trace.finish().expect("memory");

@@ -1,10 +1,10 @@
 //! A block list, BLOCKS.json: a bare list of lengths and feeds, planned like a stretch.
 
 use motion_kernel::law::{Law, Limits};
-use motion_kernel::plan::{Block, Reason};
+use motion_kernel::plan::{Block, PlanError, Reason};
 use serde::Deserialize;
 
-use super::error::{PlanningError, Problem};
+use super::error::{Place, PlanningError, Problem};
 use super::lookahead::lookahead;
 use super::profile::FeedProfile;
 use super::{Mode, Plan};
@@ -73,18 +73,26 @@ impl TryFrom<f64> for NotNegative {
 /// # Errors
 /// The text is not a block list, or the list can't be planned from its start feed to its end feed.
 pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, PlanningError> {
-    let fail =
-        |line: u32, problem: Problem| PlanningError { source_name: source_name.to_owned(), line, problem };
+    let fail = |place: Place, problem: Problem| PlanningError {
+        source_name: source_name.to_owned(),
+        place,
+        problem,
+    };
     let list: BlockList = serde_json::from_slice(text).map_err(|error| {
-        let line = u32::try_from(error.line()).unwrap_or(u32::MAX);
-        fail(line, Problem::Json(error.to_string()))
+        let number = |at: usize| u32::try_from(at).unwrap_or(u32::MAX);
+        let place = Place { line: number(error.line()), column: Some(number(error.column())) };
+        // The reader's own text ends with the place, which stands in front here.
+        let text = error.to_string();
+        let what = text.split(" at line ").next().unwrap_or(&text);
+        let found = if what.starts_with("found") { "" } else { "found " };
+        fail(place, Problem::Json(format!("{found}{what}")))
     })?;
     let law = Law::new(Limits {
         accel_mm_s2: list.limits.accel_mm_s2.0,
         jerk_mm_s3: list.limits.jerk_mm_s3.0,
         snap_mm_s4: list.limits.snap_mm_s4.0,
     })
-    .map_err(|error| fail(0, error.into()))?;
+    .map_err(|error| fail(line_of(text, "limits"), error.into()))?;
     let blocks: Vec<Block<f64>> = list
         .blocks
         .iter()
@@ -103,8 +111,9 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
         })
         .collect();
     let planned = lookahead(blocks.clone(), &ends_mm, list.start_feed_mm_s.0, list.end_feed_mm_s.0, mode)
-        .map_err(|problem| fail(0, problem))?;
-    let profile = FeedProfile::new(&planned, TICK_S).map_err(|problem| fail(0, problem))?;
+        .map_err(|problem| fail(line_of(text, key(&problem)), problem))?;
+    let profile =
+        FeedProfile::new(&planned, TICK_S).map_err(|problem| fail(line_of(text, "blocks"), problem))?;
     let mut start_mm = 0.0;
     let mut records = Vec::with_capacity(blocks.len());
     for (block, &end_mm) in blocks.iter().zip(&ends_mm) {
@@ -133,4 +142,23 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
         notices: Vec::new(),
         tick_s: TICK_S,
     })
+}
+
+/// The key a problem of the look-ahead is about.
+fn key(problem: &Problem) -> &'static str {
+    match problem {
+        Problem::Plan(
+            PlanError::EndFeed { quantity: "end feed", .. } | PlanError::TooShortToAccelerate { .. },
+        ) => "end_feed_mm_s",
+        Problem::Plan(PlanError::EndFeed { .. } | PlanError::TooShortToBrake { .. }) => "start_feed_mm_s",
+        _ => "blocks",
+    }
+}
+
+/// The line in which `key` stands first.
+fn line_of(text: &[u8], key: &str) -> Place {
+    let quoted = format!("\"{key}\"");
+    let at = text.windows(quoted.len()).position(|window| window == quoted.as_bytes()).unwrap_or(0);
+    let breaks = text[..at].iter().filter(|&&byte| byte == b'\n').count();
+    Place::from(u32::try_from(breaks + 1).unwrap_or(u32::MAX))
 }

@@ -5,14 +5,36 @@ use motion_kernel::plan::PlanError;
 
 use crate::toolpath::CompileError;
 
+/// A place in a file, counted from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Line.
+    pub line: u32,
+    /// Column, where the problem has one.
+    pub column: Option<u32>,
+}
+
+impl From<u32> for Place {
+    fn from(line: u32) -> Self {
+        Self { line, column: None }
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.line)?;
+        self.column.map_or(Ok(()), |column| write!(f, ":{column}"))
+    }
+}
+
 /// A program or block list that can't be planned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{source_name}:{line}: {problem}")]
+#[error("{source_name}:{place}: {problem}")]
 pub struct PlanningError {
     /// File name.
     pub source_name: String,
-    /// Line, from 1; for a block list the block, from 0.
-    pub line: u32,
+    /// Where.
+    pub place: Place,
     /// What is wrong.
     pub problem: Problem,
 }

@@ -49,8 +49,11 @@ impl<R: Real> Executable<R> {
     /// A move can't be made into pieces, or more pieces or segments than the tick's bound fall into
     /// one tick.
     pub fn new(plan: &Plan) -> Result<Self, PlanningError> {
-        let fail =
-            |line: u32, problem: Problem| PlanningError { source_name: plan.source.clone(), line, problem };
+        let fail = |line: u32, problem: Problem| PlanningError {
+            source_name: plan.source.clone(),
+            place: line.into(),
+            problem,
+        };
         let mut pace = Pace::default();
         let mut items = Vec::with_capacity(plan.items.len());
         for item in &plan.items {

@@ -21,7 +21,7 @@ pub mod program;
 pub mod stretch;
 
 pub use blocks::plan_blocks;
-pub use error::{PlanningError, Problem};
+pub use error::{Place, PlanningError, Problem};
 pub use executable::{Executable, ExecutableItem};
 pub use program::plan_program;
 pub use stretch::Stretch;

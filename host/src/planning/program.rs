@@ -22,7 +22,11 @@ pub fn plan_program(
     mode: Mode,
 ) -> Result<Plan, PlanningError> {
     let at = |line: u32| {
-        move |problem: Problem| PlanningError { source_name: source_name.to_owned(), line, problem }
+        move |problem: Problem| PlanningError {
+            source_name: source_name.to_owned(),
+            place: line.into(),
+            problem,
+        }
     };
     let mut plan = Plan {
         source: source_name.to_owned(),

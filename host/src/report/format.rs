@@ -67,6 +67,22 @@ pub(super) fn counted(number: usize, one: &str, many: &str) -> String {
     format!("{} {}", count(number as u64), if number == 1 { one } else { many })
 }
 
+/// `value` as a part of `limit`, in percent; `None` if there is no limit. Never rounds an excess away that a reader
+/// should see.
+pub(super) fn share(value: f64, limit: f64) -> Option<String> {
+    let percent = 100.0 * value / limit;
+    if !(limit > 0.0 && percent.is_finite()) {
+        return None;
+    }
+    let text = match percent {
+        p if p < 10.0 => figure(p, 2),
+        // An excess below this is single precision's, not the motion's.
+        p if p <= 100.05 => trimmed(p, 0),
+        p => figure(p, 4),
+    };
+    Some(format!("{text} %"))
+}
+
 /// A duration: milliseconds below a second, minutes and hours from two minutes on.
 pub(super) fn duration(time_s: f64) -> String {
     if !time_s.is_finite() || time_s < 0.0 {
@@ -172,6 +188,13 @@ mod tests {
         assert_eq!(scale_mark(0.30000000000000004, 1.0), "0.3");
         assert_eq!(scale_mark(-1e-17, 1.0), "0");
         assert_eq!(scale_mark(20_000.0, 1e5), "20\u{202f}000");
+    }
+
+    #[test]
+    fn shares_show_an_excess_and_need_a_limit() {
+        let of = |value, limit| share(value, limit).unwrap_or_default();
+        assert_eq!([of(456.4, 500.0), of(5000.1, 5000.0), of(502.0, 500.0)], ["91 %", "100 %", "100.4 %"]);
+        assert_eq!([of(0.59, 100.0), of(1.0, 0.0), of(f64::NAN, 1.0)], ["0.59 %", "", ""]);
     }
 
     #[test]

@@ -14,15 +14,21 @@ mod tables;
 
 use std::io::{self, Write};
 
-use self::format::{counted, duration, escape, figure};
+use self::format::{counted, duration, escape, figure, share};
 use self::palette::Ink;
 use self::plots::path::View;
-use self::plots::{Caption, feed, path, time};
-use self::summary::{Outcome, Summary};
+use self::plots::{Caption, contour, feed, path, time};
+use self::summary::{Outcome, Span, Summary};
 use crate::record::{AXES, FaultRecord, RunRecord};
 
 /// Faults named in the sentence at the top; the table below it has the others.
 const FAULTS_IN_SENTENCE: usize = 3;
+
+/// Full stops that a plot of the feed can tell apart, even if they are not evenly spread.
+const STOPS_TOLD_APART: usize = 60;
+
+/// Below a plot with line numbers.
+const LINE_NUMBERS: &str = "Numbers along the top, where there is room for them, are lines of the program. ";
 
 /// Notices shown.
 const NOTICES_MAX: usize = 100;
@@ -42,6 +48,7 @@ pub fn write_html(record: &RunRecord, out: &mut impl Write) -> io::Result<()> {
     if !record.ticks.is_empty() {
         path_section(record, &summary, &names, out)?;
         feed_section(record, &summary, out)?;
+        contour_section(record, &summary, out)?;
         time_section(record, &summary, out)?;
         axes_section(record, &summary, &names, out)?;
     }
@@ -66,7 +73,7 @@ fn head(record: &RunRecord, out: &mut impl Write) -> io::Result<()> {
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
          <title>{} – motion report</title>\n<style>\n{}{}</style></head>\n<body><main>",
-        escape(program),
+        escape(file_name(program)),
         include_str!("style.css"),
         palette::style_sheet(),
     )
@@ -76,13 +83,22 @@ fn program_name(record: &RunRecord) -> &str {
     if record.program.is_empty() { "unnamed program" } else { &record.program }
 }
 
+/// The last part of a path, which is what a reader looks for.
+fn file_name(program: &str) -> &str {
+    program.rsplit(['/', '\\']).next().filter(|name| !name.is_empty()).unwrap_or(program)
+}
+
 fn header(
     record: &RunRecord,
     summary: &Summary,
     names: &[String; AXES],
     out: &mut impl Write,
 ) -> io::Result<()> {
-    writeln!(out, "<header><h1>{}</h1>", escape(program_name(record)))?;
+    let program = program_name(record);
+    writeln!(out, "<header><h1>{}</h1>", escape(file_name(program)))?;
+    if file_name(program) != program {
+        writeln!(out, "<p class=\"machine\">Program: {}</p>", escape(program))?;
+    }
     if !record.machine.is_empty() {
         writeln!(out, "<p class=\"machine\">Machine: {}</p>", escape(&record.machine))?;
     }
@@ -96,7 +112,7 @@ fn header(
     writeln!(out, "{}", tables::faults(record))?;
     notices(record, summary, out)?;
     writeln!(out, "<h2>Key figures</h2>\n{}", tables::key_figures(record, summary))?;
-    writeln!(out, "{}", tables::axes(summary, names))
+    writeln!(out, "{}", tables::axes(record, summary, names))
 }
 
 /// How the run ended, in one sentence.
@@ -184,16 +200,26 @@ fn figure_html(
     writeln!(out, "</figure>")
 }
 
+/// The planes in which there is something to see: of two axes that moved theirs, of three the first with each of
+/// the others, and the third plane if the tool moved within it (G19), which the other two show as a line.
+fn views(summary: &Summary) -> Vec<View> {
+    let view = |right, up| View { right, up };
+    match [0, 1, 2].map(|axis: usize| summary.axes[axis].moved()) {
+        [true, true, true] if summary.moved_beside_first => vec![view(0, 1), view(0, 2), view(1, 2)],
+        [true, true, true] => vec![view(0, 1), view(0, 2)],
+        [false, true, true] => vec![view(1, 2)],
+        [_, false, true] => vec![view(0, 2)],
+        [_, _, false] => vec![view(0, 1)],
+    }
+}
+
 fn path_section(
     record: &RunRecord,
     summary: &Summary,
     names: &[String; AXES],
     out: &mut impl Write,
 ) -> io::Result<()> {
-    let mut views = vec![View { right: 0, up: 1 }];
-    if summary.axes[2].moved() {
-        views.push(View { right: 0, up: 2 });
-    }
+    let views = views(summary);
     writeln!(out, "<section><h2>Path</h2>")?;
     let classes = path::classes(summary.feed_mm_s);
     let legend: Vec<_> = palette::CLASSES
@@ -218,18 +244,20 @@ fn path_section(
     writeln!(out, "</section>")
 }
 
+/// Where on the path faults were latched.
+fn faults_mm(record: &RunRecord) -> Vec<f64> {
+    let place = |fault: &FaultRecord| {
+        let index = record.ticks.partition_point(|tick| tick.tick < fault.tick);
+        record.ticks.get(index).map(|tick| tick.s_mm)
+    };
+    record.faults.iter().filter_map(place).collect()
+}
+
 fn feed_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
-    let faults_mm: Vec<f64> = record
-        .faults
-        .iter()
-        .filter_map(|fault| {
-            let index = record.ticks.partition_point(|tick| tick.tick < fault.tick);
-            record.ticks.get(index).map(|tick| tick.s_mm)
-        })
-        .collect();
-    let reasons = feed::reasons(&record.blocks);
+    let (top_mm_s, beyond) = feed::top(record, summary);
+    let reasons = feed::reasons(&record.blocks, top_mm_s);
     let description = format!(
-        "Feed over {} mm of path, at most {} mm/s, under ceilings set by: {}.",
+        "Feed over {} mm of path, at most {} mm/s, under ceilings: {}.",
         figure(summary.path_length_mm, 6),
         figure(summary.feed_mm_s.magnitude(), 4),
         if reasons.is_empty() { "nothing".to_string() } else { reasons.join(", ") }
@@ -241,19 +269,76 @@ fn feed_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> 
         reasons.iter().map(|reason| (palette::ceiling(reason, &reasons), format!("ceiling: {reason}"))),
     );
     legend.extend(fault_key(record));
-    let (top_mm_s, beyond) = feed::top(record, summary);
     let mut words = String::new();
+    if feed::has_line_numbers(record, summary) {
+        words += LINE_NUMBERS;
+    }
+    if reasons.contains(&palette::NOT_REACHED) {
+        words += "A ceiling is not reached where a block is too short to accelerate to it and brake again. ";
+    }
     if beyond {
         let top = figure(top_mm_s, 4);
-        words +=
-            &format!("Ceilings above {top} mm/s are drawn there; the table of blocks has their values. ");
+        words += &format!(
+            "Ceilings above {top} mm/s are out of reach and not drawn; the table of blocks has them. "
+        );
+    }
+    if tables::full_stops(record) > STOPS_TOLD_APART {
+        words += "Where the curve fills an area, the feed falls to 0 and rises again more often than the picture resolves. ";
     }
     if feed::is_crowded(record, summary) {
         words += "Where many blocks share a column, a band spans their ceilings; its lower edge is the lowest of them.";
     }
     writeln!(out, "<section><h2>Feed along the path</h2>")?;
-    figure_html(&feed::draw(record, summary, &faults_mm, &caption)?, &legend, &words, out)?;
+    figure_html(&feed::draw(record, summary, &faults_mm(record), &caption)?, &legend, &words, out)?;
     writeln!(out, "</section>")
+}
+
+fn contour_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+    if summary.contour_um.is_empty() {
+        return Ok(());
+    }
+    let description = format!(
+        "Contour error over {} mm of path, at most {} µm.",
+        figure(summary.path_length_mm, 6),
+        figure(summary.contour_um.magnitude(), 3),
+    );
+    let caption =
+        Caption { id: "contour", title: "Contour error over path length", description: &description };
+    let mut words = "The part of the following error across the path. ".to_string();
+    if feed::has_line_numbers(record, summary) {
+        words += LINE_NUMBERS;
+    }
+    writeln!(out, "<section><h2>Contour error along the path</h2>")?;
+    let drawing = contour::draw(record, summary, &faults_mm(record), &caption)?;
+    figure_html(&drawing, &fault_key(record), &words, out)?;
+    writeln!(out, "</section>")
+}
+
+/// What the remarks below a plot over time have to say about limits that it does not show.
+fn limits_beyond<'a>(limits: impl Iterator<Item = (&'a str, Span, f64, &'a str)>) -> String {
+    let mut words = String::new();
+    for (quantity, span, limit, unit) in
+        limits.filter(|(_, span, limit, _)| !time::shows_limit(*span, *limit))
+    {
+        if let Some(share) = share(span.magnitude(), limit) {
+            let limit = figure(limit, 4);
+            words += &format!(
+                "The {quantity} stays within {share} of its limit, {limit} {unit}, which is not drawn. "
+            );
+        }
+    }
+    words
+}
+
+/// What shaded stretches of a plot over time are; nothing if there are none.
+fn rests_key(summary: &Summary) -> &'static str {
+    let has = |state| summary.rests.iter().any(|rest| rest.state == state);
+    match (has("dwell"), has("stopped")) {
+        (true, true) => "Shaded: dwells and program stops.",
+        (true, false) => "Shaded: dwells.",
+        (false, true) => "Shaded: program stops.",
+        (false, false) => "",
+    }
 }
 
 fn time_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
@@ -270,8 +355,19 @@ fn time_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> 
         title: "Feed, acceleration, jerk and snap over time",
         description: &description,
     };
+    let limits = [
+        ("acceleration", summary.accel_mm_s2, record.limits.accel_mm_s2, "mm/s²"),
+        ("jerk", summary.jerk_mm_s3, record.limits.jerk_mm_s3, "mm/s³"),
+        ("snap", summary.snap_mm_s4, record.limits.snap_mm_s4, "mm/s⁴"),
+    ];
+    let mut legend = Vec::new();
+    if limits.iter().any(|(_, span, limit, _)| time::shows_limit(*span, *limit)) {
+        legend.push((palette::LIMIT, "limit".to_string()));
+    }
+    legend.extend(fault_key(record));
+    let words = limits_beyond(limits.into_iter()) + rests_key(summary);
     writeln!(out, "<section><h2>Motion along the path over time</h2>")?;
-    figure_html(&time::along_path(record, summary, &caption)?, &fault_key(record), "", out)?;
+    figure_html(&time::along_path(record, summary, &caption)?, &legend, &words, out)?;
     writeln!(out, "</section>")
 }
 
@@ -283,9 +379,16 @@ fn axes_section(
 ) -> io::Result<()> {
     writeln!(out, "<section><h2>Axes over time</h2>")?;
     for (axis, (name, figures)) in names.iter().zip(&summary.axes).enumerate() {
-        let still = !figures.moved() && figures.err_um.magnitude() <= 0.0 && figures.out_v.magnitude() <= 0.0;
-        if still {
-            writeln!(out, "<h3>{0}</h3><p>{0} stood still without error or output.</p>", escape(name))?;
+        // An axis that failed is of interest even if it was to stand still.
+        let failed = record.faults.iter().any(|fault| fault.axis.as_ref() == Some(&record.axis_names[axis]));
+        if !figures.moved() && !failed {
+            writeln!(
+                out,
+                "<p>{} was not moved: following error at most {} µm, output at most {} V.</p>",
+                escape(name),
+                figure(figures.err_um.magnitude(), 3),
+                figure(figures.out_v.magnitude(), 3),
+            )?;
             continue;
         }
         let title = format!("Following error and output of {name}");
@@ -297,8 +400,15 @@ fn axes_section(
         );
         let caption = Caption { id: &format!("axis{axis}"), title: &title, description: &description };
         let drawing = time::of_axis(record, summary, axis, &caption)?;
+        let limit_um = record.following_error_limit_um[axis];
+        let mut legend = Vec::new();
+        if time::shows_limit(figures.err_um, limit_um) {
+            legend.push((palette::LIMIT, "limit".to_string()));
+        }
+        legend.extend(fault_key(record));
+        let beyond = limits_beyond([("following error", figures.err_um, limit_um, "µm")].into_iter());
         writeln!(out, "<div class=\"axis\"><h3>{}</h3>", escape(name))?;
-        figure_html(&drawing, &fault_key(record), "", out)?;
+        figure_html(&drawing, &legend, &(beyond + rests_key(summary)), out)?;
         writeln!(out, "</div>")?;
     }
     writeln!(out, "</section>")

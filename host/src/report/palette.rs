@@ -43,6 +43,10 @@ pub(super) const AXIS: Ink = solid(0x6B7684, 0x8C98A6);
 pub(super) const GRID: Ink = solid(0xE1E5EA, 0x2C343E);
 /// Where blocks meet, and zero.
 pub(super) const RULE: Ink = solid(0xBCC4CD, 0x47525F);
+/// Where the program lets the machine stand.
+pub(super) const REST: Ink = solid(0xF7EBCB, 0x38301C);
+/// What the machine allows.
+pub(super) const LIMIT: Ink = dashed(0x59636F, 0x9AA6B3, "16 12");
 /// Faults.
 pub(super) const FAULT: Ink = dashed(0xC4162A, 0xFF6B6B, "20 12");
 /// Feed.
@@ -55,6 +59,8 @@ pub(super) const JERK: Ink = solid(0x8740B5, 0xC596EE);
 pub(super) const SNAP: Ink = solid(0xB05200, 0xF2A154);
 /// Following error.
 pub(super) const ERROR: Ink = solid(0xA8235E, 0xF588B4);
+/// Contour error.
+pub(super) const CONTOUR: Ink = solid(0x0F6E78, 0x4FC3CF);
 /// Output voltage.
 pub(super) const VOLTS: Ink = solid(0x4E6A00, 0xB2CE4B);
 
@@ -70,14 +76,23 @@ const CEILINGS: [Ink; 8] = [
     dashed(0x39509E, 0x9DB1F7, "12 20"),
 ];
 
+/// What a ceiling is called that the feed does not reach.
+pub(super) const NOT_REACHED: &str = "not reached";
+
+/// Its ink: it holds nothing back and stays behind the others.
+const UNREACHED: Ink = dashed(0x6F7A88, 0x8F9BA9, "6 14");
+
 /// Ink of a ceiling. `known` are the reasons of this run in the order of their appearance; from the ninth on they
 /// share the last ink.
 pub(super) fn ceiling(reason: &str, known: &[&str]) -> Ink {
+    if reason == NOT_REACHED {
+        return UNREACHED;
+    }
     const OWN: [&str; 4] = ["programmed", "acceleration", "jerk", "snap"];
     if let Some(index) = OWN.iter().position(|own| *own == reason) {
         return CEILINGS[index];
     }
-    let others = known.iter().filter(|other| !OWN.contains(other));
+    let others = known.iter().filter(|other| !OWN.contains(other) && **other != NOT_REACHED);
     let index = OWN.len() + others.take_while(|other| **other != reason).count();
     CEILINGS[index.min(CEILINGS.len() - 1)]
 }
@@ -93,10 +108,28 @@ pub(super) const CLASSES: [Ink; 6] = [
     solid(0xE07A1F, 0xF3F26E),
 ];
 
+/// Inks that stand alone.
+const SINGLE: [Ink; 15] = [
+    TEXT,
+    AXIS,
+    GRID,
+    RULE,
+    REST,
+    LIMIT,
+    FAULT,
+    FEED,
+    ACCELERATION,
+    JERK,
+    SNAP,
+    ERROR,
+    CONTOUR,
+    VOLTS,
+    UNREACHED,
+];
+
 /// Rules that put every ink on dark paper, and its dashes on every line drawn in it.
 pub(super) fn style_sheet() -> String {
-    let single = [TEXT, AXIS, GRID, RULE, FAULT, FEED, ACCELERATION, JERK, SNAP, ERROR, VOLTS];
-    let inks = || single.iter().chain(&CEILINGS).chain(&CLASSES);
+    let inks = || SINGLE.iter().chain(&CEILINGS).chain(&CLASSES);
     let mut dashes = String::new();
     let mut dark = String::new();
     for ink in inks() {
@@ -133,7 +166,7 @@ mod tests {
 
     #[test]
     fn every_line_stands_out_from_its_paper() {
-        let lines = [AXIS, FAULT, FEED, ACCELERATION, JERK, SNAP, ERROR, VOLTS];
+        let lines = [AXIS, LIMIT, FAULT, FEED, ACCELERATION, JERK, SNAP, ERROR, CONTOUR, VOLTS, UNREACHED];
         for ink in lines.iter().chain(&CEILINGS).chain(&CLASSES) {
             let hex = ink.hex();
             assert!(contrast(ink.light, LIGHT_PAPER) >= 3.0, "{hex} {}", contrast(ink.light, LIGHT_PAPER));
@@ -152,9 +185,8 @@ mod tests {
 
     #[test]
     fn a_colour_names_one_ink() {
-        let single = [TEXT, AXIS, GRID, RULE, FAULT, FEED, ACCELERATION, JERK, SNAP, ERROR, VOLTS];
         let mut seen: Vec<u32> =
-            single.iter().chain(&CEILINGS).chain(&CLASSES).map(|ink| ink.light).collect();
+            SINGLE.iter().chain(&CEILINGS).chain(&CLASSES).map(|ink| ink.light).collect();
         let number = seen.len();
         seen.sort_unstable();
         seen.dedup();

@@ -8,6 +8,9 @@ const FINISHED_WITHIN_MM: f64 = 1e-3;
 /// An axis counts as moved when its set position spans more than this \[mm\].
 const MOVED_BEYOND_MM: f64 = 1e-6;
 
+/// An axis stands still beside the others when it moves at less than this part of the feed.
+const STILL_PART: f64 = 1e-3;
+
 /// How the run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
@@ -61,6 +64,17 @@ impl Span {
     }
 }
 
+/// A stretch of time in which the program lets the machine stand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Rest {
+    /// "dwell" or "stopped".
+    pub(super) state: &'static str,
+    /// Begin \[s\].
+    pub(super) from_s: f64,
+    /// End \[s\].
+    pub(super) to_s: f64,
+}
+
 /// Figures of one axis.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AxisSummary {
@@ -104,8 +118,14 @@ pub(super) struct Summary {
     pub(super) jerk_mm_s3: Span,
     /// Snap along the path \[mm/s⁴\].
     pub(super) snap_mm_s4: Span,
+    /// Contour error \[µm\].
+    pub(super) contour_um: Span,
+    /// Dwells and program stops, in order.
+    pub(super) rests: Vec<Rest>,
     /// Per axis.
     pub(super) axes: [AxisSummary; AXES],
+    /// Whether at some time the second and the third axis moved together without the first.
+    pub(super) moved_beside_first: bool,
     /// Values in the record that are not finite and can therefore not be shown.
     pub(super) not_finite: u64,
 }
@@ -117,9 +137,15 @@ impl Summary {
         let mut axes = [AxisSummary::default(); AXES];
         let mut squares = [(0.0, 0u64); AXES];
         let mut done_mm = Span::default();
+        let mut contour_um = Span::default();
+        let mut moved_beside_first = false;
         let mut not_finite = 0;
         for tick in &record.ticks {
             done_mm.add(tick.s_mm);
+            contour_um.add(tick.contour_um);
+            not_finite += u64::from(!tick.contour_um.is_finite());
+            let still = |axis: usize| tick.axes[axis].vel_mm_s.abs() <= STILL_PART * tick.v_mm_s.abs();
+            moved_beside_first |= still(0) && !still(1) && !still(2);
             for (span, value) in path.iter_mut().zip(along_path(tick)) {
                 span.add(value);
                 not_finite += u64::from(!value.is_finite());
@@ -162,10 +188,27 @@ impl Summary {
             accel_mm_s2,
             jerk_mm_s3,
             snap_mm_s4,
+            contour_um,
+            rests: rests(record),
             axes,
+            moved_beside_first,
             not_finite,
         }
     }
+}
+
+/// Dwells and program stops: ticks that follow each other in one of these states.
+fn rests(record: &RunRecord) -> Vec<Rest> {
+    let mut rests = Vec::new();
+    for ticks in record.ticks.chunk_by(|a, b| a.state == b.state) {
+        let [first, ..] = ticks else { continue };
+        if ["dwell", "stopped"].contains(&first.state) {
+            let from_s = first.tick as f64 * record.tick_s;
+            let to_s = from_s + ticks.len() as f64 * record.tick_s;
+            rests.push(Rest { state: first.state, from_s, to_s });
+        }
+    }
+    rests
 }
 
 /// Feed and its three derivatives.

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::format::{count, counted, duration, escape, figure, fixed};
-use super::summary::Summary;
+use super::format::{count, counted, duration, escape, figure, fixed, share};
+use super::summary::{Span, Summary};
 use crate::record::{AXES, RunRecord};
 
 /// Rows of a table on the page; the rest is in the trace file.
@@ -52,6 +52,11 @@ fn wrapped(name: &str, head: &[&str], body: &str) -> String {
     table
 }
 
+/// Blocks at whose end the machine stands.
+pub(super) fn full_stops(record: &RunRecord) -> usize {
+    record.blocks.iter().filter(|block| block.exit_mm_s <= 0.0).count()
+}
+
 /// Figures of the whole run, as terms and values.
 pub(super) fn key_figures(record: &RunRecord, summary: &Summary) -> String {
     let feed = summary.feed_mm_s.magnitude();
@@ -60,17 +65,46 @@ pub(super) fn key_figures(record: &RunRecord, summary: &Summary) -> String {
     } else {
         format!("{} mm", figure(summary.path_length_mm, 6))
     };
-    let rows = [
+    // What a quantity came to, and how much of what is allowed that is.
+    let of_limit = |span: Span, limit: f64, unit: &str| {
+        let share = share(span.magnitude(), limit);
+        let share = share.map_or(String::new(), |share| format!("<small>{share} of the limit</small>"));
+        format!("{} {unit}{share}", figure(span.magnitude(), 4))
+    };
+    let limits = &record.limits;
+    let mut rows = vec![
         ("Path length", path),
-        ("Planned time", duration(record.planned_time_s)),
-        ("Executed time", duration(summary.executed_time_s)),
+        (
+            "Executed time",
+            format!(
+                "{}<small>planned {}</small>",
+                duration(summary.executed_time_s),
+                duration(record.planned_time_s)
+            ),
+        ),
         ("Ticks", format!("{} of {} ms", count(record.ticks.len() as u64), figure(record.tick_s * 1e3, 4))),
-        ("Blocks", count(record.blocks.len() as u64)),
+        (
+            "Blocks",
+            format!(
+                "{}<small>{}</small>",
+                count(record.blocks.len() as u64),
+                counted(full_stops(record), "full stop", "full stops")
+            ),
+        ),
         ("Highest feed", format!("{} mm/s<small>{} mm/min</small>", figure(feed, 4), figure(feed * 60.0, 4))),
-        ("Highest acceleration", format!("{} mm/s²", figure(summary.accel_mm_s2.magnitude(), 4))),
-        ("Highest jerk", format!("{} mm/s³", figure(summary.jerk_mm_s3.magnitude(), 4))),
-        ("Highest snap", format!("{} mm/s⁴", figure(summary.snap_mm_s4.magnitude(), 4))),
+        ("Highest acceleration", of_limit(summary.accel_mm_s2, limits.accel_mm_s2, "mm/s²")),
+        ("Highest jerk", of_limit(summary.jerk_mm_s3, limits.jerk_mm_s3, "mm/s³")),
+        ("Highest snap", of_limit(summary.snap_mm_s4, limits.snap_mm_s4, "mm/s⁴")),
     ];
+    if !summary.contour_um.is_empty() {
+        rows.push(("Highest contour error", format!("{} µm", figure(summary.contour_um.magnitude(), 3))));
+    }
+    let dwells = || summary.rests.iter().filter(|rest| rest.state == "dwell");
+    if dwells().next().is_some() {
+        let time_s = dwells().map(|rest| rest.to_s - rest.from_s).sum();
+        let number = counted(dwells().count(), "dwell", "dwells");
+        rows.push(("Dwells", format!("{}<small>{number}</small>", duration(time_s))));
+    }
     let mut list = String::from("<dl class=\"figures\">\n");
     for (term, value) in rows {
         let _ = writeln!(list, "<div><dt>{term}</dt><dd>{value}</dd></div>");
@@ -80,15 +114,16 @@ pub(super) fn key_figures(record: &RunRecord, summary: &Summary) -> String {
 }
 
 /// A row per axis.
-pub(super) fn axes(summary: &Summary, names: &[String; AXES]) -> String {
+pub(super) fn axes(record: &RunRecord, summary: &Summary, names: &[String; AXES]) -> String {
     let mut body = String::new();
-    for (axis, name) in summary.axes.iter().zip(names) {
+    for ((axis, name), end) in summary.axes.iter().zip(names).zip(record.end_error_counts) {
         let _ = writeln!(
             body,
-            "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             escape(name),
             fixed(axis.err_um.magnitude(), 2),
             fixed(axis.err_um_rms, 2),
+            fixed(end as f64, 0),
             fixed(axis.out_v.magnitude(), 3),
             fixed(axis.vel_mm_s.magnitude(), 2),
             fixed(axis.set_mm.low, 4),
@@ -99,13 +134,14 @@ pub(super) fn axes(summary: &Summary, names: &[String; AXES]) -> String {
         "*Axis",
         "Error max [µm]",
         "Error rms [µm]",
+        "End error [counts]",
         "Output max [V]",
         "Speed max [mm/s]",
         "Lowest [mm]",
         "Highest [mm]",
     ];
     format!(
-        "<p>Error is the following error, set minus actual position.</p>\n{}",
+        "<p>Error is the following error, set minus actual position; end error is what is left of it once the axes have settled.</p>\n{}",
         wrapped("Axes", &head, &body)
     )
 }
@@ -139,7 +175,7 @@ pub(super) fn blocks(record: &RunRecord) -> String {
     for block in record.blocks.iter().take(ROWS_MAX) {
         let _ = writeln!(
             body,
-            "<tr><th scope=\"row\">N{}</th><td class=\"word\">{}</td><td>{}</td><td>{}</td><td class=\"word\">{}</td>\
+            "<tr><th scope=\"row\">{}</th><td class=\"word\">{}</td><td>{}</td><td>{}</td><td class=\"word\">{}</td>\
              <td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             block.line,
             escape(block.kind),
@@ -157,7 +193,7 @@ pub(super) fn blocks(record: &RunRecord) -> String {
         "*Kind",
         "Length [mm]",
         "Ceiling [mm/s]",
-        "*Set by",
+        "*Limited by",
         "Enter [mm/s]",
         "Peak [mm/s]",
         "Exit [mm/s]",
@@ -165,7 +201,10 @@ pub(super) fn blocks(record: &RunRecord) -> String {
     ];
     let table = wrapped("Blocks", &head, &body);
     let left_out = LeftOut::of(record.blocks.len()).map_or(String::new(), LeftOut::remark);
-    format!("<p>{} in path order.</p>\n{table}{left_out}", counted(record.blocks.len(), "block", "blocks"))
+    format!(
+        "<p>{} in path order; line: the line of the program.</p>\n{table}{left_out}",
+        counted(record.blocks.len(), "block", "blocks")
+    )
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The page as a whole, on made-up runs.
 
 use super::*;
-use crate::record::{AxisTick, BlockRecord, TickRecord};
+use crate::record::{AxisTick, BlockRecord, PathLimits, TickRecord};
 
 /// Ramps and cruises of the sample: duration \[s\], feed at both ends \[mm/s\]. A ramp is a raised cosine in
 /// acceleration.
@@ -55,7 +55,10 @@ fn sample(tick_s: f64, with_z: bool) -> RunRecord {
         program: "flange.ngc".to_string(),
         machine: "reference machine".to_string(),
         tick_s,
+        limits: PathLimits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 },
         axis_names: ["X", "Y", "Z"].map(String::from),
+        following_error_limit_um: [1000.0; AXES],
+        end_error_counts: [0, -3, 1],
         planned_time_s: FEED.iter().map(|ramp| ramp.0).sum(),
         ..RunRecord::default()
     };
@@ -103,6 +106,7 @@ fn sample(tick_s: f64, with_z: bool) -> RunRecord {
             snap_mm_s4: snap,
             state,
             line: record.blocks[index].line,
+            contour_um: 0.5 * axes[1].err_um.abs(),
             axes,
         });
         let step = v * tick_s;
@@ -132,10 +136,97 @@ fn a_whole_run_makes_every_section() {
     {
         assert!(page.contains(part), "{part}");
     }
-    for part in ["ceiling: jerk", "N30", "Snap [mm/s⁴]", "Following error [µm]", "id=\"axis2-wide-t\""] {
+    for part in [
+        "ceiling: jerk",
+        ">30</th>",
+        "lines of the program",
+        "Snap [mm/s⁴]",
+        "Following error [µm]",
+        "id=\"axis2-wide-t\"",
+    ] {
         assert!(page.contains(part), "{part}");
     }
     assert!(!page.contains("left out"));
+    // The program's own block numbers may differ from its line numbers.
+    assert!(!page.contains("N30"));
+}
+
+#[test]
+fn limits_are_drawn_where_they_fit_and_named_where_not() {
+    let mut record = sample(1e-3, true);
+    let summary = Summary::of(&record);
+    let whole = page(&record);
+    assert!(whole.contains(&format!(
+        "{} mm/s²<small>{} of the limit</small>",
+        figure(summary.accel_mm_s2.magnitude(), 4),
+        share(summary.accel_mm_s2.magnitude(), 500.0).expect("a limit"),
+    )));
+    assert!(whole.contains("Acceleration [mm/s²], limit ±500") && whole.contains("<td>−3</td>"));
+    let limit_line = format!("stroke=\"{}\"", palette::LIMIT.hex());
+    let lines = |page: &str| {
+        let in_style = palette::style_sheet().matches(&limit_line).count();
+        page.matches(&limit_line).count() - in_style
+    };
+    // Both directions of three curves on two sheets, and the legend.
+    assert_eq!(lines(&whole), 2 * 3 * 2 + 1);
+    assert!(whole.contains("of its limit, 1000 µm, which is not drawn"));
+    record.limits.snap_mm_s4 = 4e7;
+    let flat = page(&record);
+    assert_eq!(lines(&flat), 2 * 2 * 2 + 1);
+    assert!(flat.contains("The snap stays within"));
+    record.limits = PathLimits::default();
+    let unlimited = page(&record);
+    assert!(lines(&unlimited) == 0 && !unlimited.contains("of the limit<"));
+}
+
+#[test]
+fn rests_are_shaded_and_timed() {
+    let mut record = sample(1e-3, false);
+    assert!(!page(&record).contains("Shaded"));
+    for tick in &mut record.ticks[500..750] {
+        tick.state = "dwell";
+    }
+    let dwelt = page(&record);
+    assert!(dwelt.contains("Shaded: dwells.") && dwelt.contains("250 ms<small>1 dwell</small>"));
+    // Four panels along the path, two for each of two axes, on two sheets.
+    let shade = format!("fill=\"{}\"", palette::REST.hex());
+    let in_style = palette::style_sheet().matches(&shade).count();
+    assert_eq!(dwelt.matches(&shade).count() - in_style, 2 * (4 + 2 + 2));
+    record.ticks[900].state = "stopped";
+    assert!(page(&record).contains("Shaded: dwells and program stops."));
+}
+
+#[test]
+fn contour_error_is_drawn_and_its_peak_named() {
+    let mut record = sample(1e-3, false);
+    record.ticks[300].contour_um = 12.5;
+    let page = page(&record);
+    assert!(page.contains("<dt>Highest contour error</dt><dd>12.5 µm</dd>"));
+    assert!(page.contains("id=\"contour-narrow-t\"") && page.contains("Contour error along the path"));
+}
+
+#[test]
+fn views_and_axis_plots_follow_what_moved() {
+    let planes = |record: &RunRecord| {
+        let views = views(&Summary::of(record));
+        views.iter().map(|view| (view.right, view.up)).collect::<Vec<_>>()
+    };
+    let mut record = sample(1e-2, true);
+    assert_eq!(planes(&record), [(0, 1), (0, 2)]);
+    (record.ticks[50].axes[0].vel_mm_s, record.ticks[50].axes[1].vel_mm_s) = (0.0, 30.0);
+    record.ticks[50].axes[2].vel_mm_s = 30.0;
+    assert_eq!(planes(&record), [(0, 1), (0, 2), (1, 2)]);
+    record.ticks.iter_mut().for_each(|tick| tick.axes[0].set_mm = 7.0);
+    assert_eq!(planes(&record), [(1, 2)]);
+    // Without a motion there is nothing to plot, unless the axis failed.
+    assert!(page(&record).contains("X was not moved") && !page(&record).contains("id=\"axis0-wide-t\""));
+    record.faults.push(FaultRecord {
+        tick: 20,
+        axis: Some("X".to_string()),
+        fault: "following error".to_string(),
+        detail: String::new(),
+    });
+    assert!(page(&record).contains("id=\"axis0-wide-t\""));
 }
 
 #[test]

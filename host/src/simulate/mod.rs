@@ -6,9 +6,11 @@
 //!
 //! - [`rig`]: the simulated machine as the kernel's hardware;
 //! - [`supply`]: keeps the two streams filled, as the background of a board does;
+//! - `contour`: how far the machine is beside its path;
 //! - [`run`](mod@run): the ticks;
 //! - [`summary`]: maxima, following and contour error.
 
+mod contour;
 pub mod rig;
 pub mod run;
 pub mod summary;

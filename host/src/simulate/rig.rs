@@ -7,11 +7,15 @@ use hal_sim::{Ad5754Chip, ChipError, SimMachine};
 use motion_kernel::hal::{Ad5754Error, Ad5754Output, DriveEnable, Encoder, VelocityChannel};
 use motion_kernel::units::{Counts, DacCode};
 
+use crate::machine::DEAD_TIME_CELLS;
 use crate::record::AXES;
+
+/// The simulated machine, with room for every dead time a machine file may ask for.
+pub type Simulated = SimMachine<AXES, DEAD_TIME_CELLS>;
 
 /// The machine and the adapter that talks to its converter.
 pub struct Rig<'a> {
-    machine: &'a SimMachine<AXES>,
+    machine: &'a Simulated,
     outputs: Ad5754Output<&'a Ad5754Chip, AXES>,
 }
 
@@ -20,7 +24,7 @@ impl<'a> Rig<'a> {
     ///
     /// # Errors
     /// The converter does not take its configuration.
-    pub fn new(machine: &'a SimMachine<AXES>) -> Result<Self, Ad5754Error<ChipError>> {
+    pub fn new(machine: &'a Simulated) -> Result<Self, Ad5754Error<ChipError>> {
         let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())?;
         Ok(Self { machine, outputs })
     }

@@ -1,6 +1,5 @@
 //! The ticks of a run.
 
-use hal_sim::SimMachine;
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::hal::Encoder;
@@ -11,7 +10,8 @@ use motion_kernel::trace::Trace;
 use motion_kernel::units::Position;
 
 use super::Observer;
-use super::rig::Rig;
+use super::contour::Contour;
+use super::rig::{Rig, Simulated};
 use super::summary::{Collector, RunSummary};
 use super::supply::Supply;
 use crate::machine::{AxisError, Machine};
@@ -89,8 +89,8 @@ fn run_in<R: Real>(
             ExecutableItem::Dwell(_) | ExecutableItem::Stop => None,
         })
         .collect();
-    let simulated = SimMachine::<AXES>::new(&machine.simulated())
-        .map_err(|error| RunError::Simulation(error.to_string()))?;
+    let simulated =
+        Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))?;
     let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
     let Ok(counts) = rig.latch();
     let start = [Position::ZERO; AXES];
@@ -107,6 +107,7 @@ fn run_in<R: Real>(
         ..RunSummary::default()
     };
     let mut collector = Collector::default();
+    let mut contour = Contour::default();
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     loop {
         supply.fill(&mut feeder).map_err(RunError::Rejected)?;
@@ -117,7 +118,7 @@ fn run_in<R: Real>(
         // it ended.
         let ended = supply.is_empty() && state == ExecState::Idle;
         let start_mm = starts.get(trace.executed.stretches as usize).copied().unwrap_or(plan.length_mm);
-        let record = tick_record(&trace, start_mm);
+        let record = tick_record(&trace, start_mm, &mut contour);
         collector.add(&record);
         observe(&record);
         if let Some(fault) = trace.fault {
@@ -136,7 +137,10 @@ fn run_in<R: Real>(
     collector.fill(&mut summary);
     summary.time_s = (summary.ticks - stopped_ticks) as f64 * machine.tick_s;
     if stops > 0 {
-        summary.notices.push(format!("{stops} program stops: resumed at once"));
+        summary.notices.push(match stops {
+            1 => "1 program stop: resumed at once".to_owned(),
+            _ => format!("{stops} program stops: resumed at once"),
+        });
     }
     let mut last = None;
     for _ in 0..(SETTLE_S / machine.tick_s) as u64 {
@@ -153,7 +157,7 @@ fn run_in<R: Real>(
     Ok(summary)
 }
 
-fn tick_record<R: Real>(trace: &Trace<R, AXES>, start_mm: f64) -> TickRecord {
+fn tick_record<R: Real>(trace: &Trace<R, AXES>, start_mm: f64, contour: &mut Contour) -> TickRecord {
     let executed = &trace.executed;
     let motion = &executed.motion;
     let axes = core::array::from_fn(|index| {
@@ -177,6 +181,7 @@ fn tick_record<R: Real>(trace: &Trace<R, AXES>, start_mm: f64) -> TickRecord {
         snap_mm_s4: motion.snap_mm_s4.to_f64(),
         state: state_name(trace),
         line: executed.line,
+        contour_um: contour.error_um(&axes),
         axes,
     }
 }

@@ -56,7 +56,6 @@ pub(super) struct Collector {
     error_um_square_sum: [f64; AXES],
     output_v_max: [f64; AXES],
     contour_um_max: f64,
-    direction: Option<[f64; AXES]>,
     ticks: u64,
 }
 
@@ -72,21 +71,7 @@ impl Collector {
             self.error_um_square_sum[index] += axis.err_um * axis.err_um;
             self.output_v_max[index] = self.output_v_max[index].max(axis.out_v.abs());
         }
-        self.contour_um_max = self.contour_um_max.max(self.contour_um(tick));
-    }
-
-    /// The part of the following error across the path. The path is taken as straight over the error's
-    /// length, which at 20 µm on a radius of 1 mm hides 0.2 µm. At rest the last direction counts.
-    fn contour_um(&mut self, tick: &TickRecord) -> f64 {
-        let velocity = tick.axes.map(|axis| axis.vel_mm_s);
-        let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-        if speed > 1e-6 {
-            self.direction = Some(velocity.map(|v| v / speed));
-        }
-        let error = tick.axes.map(|axis| axis.err_um);
-        let direction = self.direction.unwrap_or_default();
-        let along: f64 = error.iter().zip(direction).map(|(e, d)| e * d).sum();
-        error.iter().zip(direction).map(|(e, d)| (e - along * d) * (e - along * d)).sum::<f64>().sqrt()
+        self.contour_um_max = self.contour_um_max.max(tick.contour_um);
     }
 
     pub(super) fn fill(&self, summary: &mut RunSummary) {

@@ -6,7 +6,7 @@
 //! - [`element`]: lines, arcs, helices and spirals: length, tangents, curvature, bend;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
-//! - [`compile`]: elements to pieces over exact path positions.
+//! - [`mod@compile`]: elements to pieces over exact path positions.
 
 pub mod compile;
 pub mod curve;

@@ -1,8 +1,7 @@
 //! One axis: from its set-point and its encoder to a converter code.
 //!
-//! Consumes a [`Setpoint`](crate::path::Setpoint) and [`Counts`](crate::units::Counts); produces a
-//! [`DacCode`](crate::units::DacCode). In the tick, no loop, no failure: a fault is reported, not
-//! thrown.
+//! Consumes a [`Setpoint`] and [`Counts`]; produces a [`DacCode`]. In the tick, no loop, no failure: a
+//! fault is reported, not thrown.
 //!
 //! - [`scale`]: mm ↔ counts, mm/s ↔ volts;
 //! - [`regulator`]: S4 (1), P(ID) on the following error plus feedforward of velocity, acceleration

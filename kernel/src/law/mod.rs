@@ -5,7 +5,7 @@
 //! - [`limits`]: acceleration, jerk and snap limits, and what follows from them once;
 //! - [`shape`]: the law in normalised time, the same for every ramp, evaluated in the tick;
 //! - [`ramp`]: one change of feed: choice of peak jerk and times, S1 (22) and (23);
-//! - [`reach`]: the inverse problems, background only: highest feed reachable in a length, and
+//! - [`mod@reach`]: the inverse problems, background only: highest feed reachable in a length, and
 //!   highest peak between two feeds;
 //! - [`segment`]: a ramp or a cruise made ready for the tick: no division is left to do.
 //!

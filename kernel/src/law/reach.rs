@@ -29,18 +29,21 @@ fn change_within<R: Root>(law: &Law<R>, lower: R, length: R) -> R {
     }
     let half = R::from_f64(0.5);
     let (x1, x2) = (law.snap_limited_to_mm_s, law.accel_limited_from_mm_s);
-    let length_for = |change: R| (lower + half * change) * law.ramp_time_s(change);
-    if length <= length_for(x1) {
+    let law_limits = law.limits();
+    // t_p at x₁ is 2π·J'/DJ, at x₂ it is 4A/J': where one regime takes over, no root is left.
+    let time_x1 = R::from_f64(core::f64::consts::TAU) * law.jerk_mm_s3 / law_limits.snap_mm_s4;
+    let time_x2 = law.accel_time_s + law.accel_time_s;
+    if length <= (lower + half * x1) * time_x1 {
         // x = w³, t_p = 2c·w:  w⁴ + 2·F·w = L/c
         let w = root_of_power::<R, 4>(lower + lower, length / law.snap_time);
         w * w * w
-    } else if length < length_for(x2) {
+    } else if length < (lower + half * x2) * time_x2 {
         // x = w², t_p = 2·√(2/J')·w:  w³ + 2·F·w = L/√(2/J')
         let w = root_of_power::<R, 3>(lower + lower, length / law.jerk_time);
         w * w
     } else {
         // (F + x/2)(x/A + 2A/J') = L, solved for x without cancellation; a = A²/J'
-        let accel = law.limits().accel_mm_s2;
+        let accel = law_limits.accel_mm_s2;
         let a = half * x2;
         let al = accel * length;
         let difference = lower - a;
@@ -52,8 +55,14 @@ fn change_within<R: Root>(law: &Law<R>, lower: R, length: R) -> R {
 
 /// The positive root of wⁿ + p·w = q for n = 3 or 4, p ≥ 0, q > 0.
 fn root_of_power<R: Root, const N: usize>(p: R, q: R) -> R {
-    let power_root = if N == 3 { q.cbrt() } else { q.sqrt().sqrt() };
-    let mut w = if p * power_root > q { q / p } else { power_root };
+    // The lower of q/p and the root of q, both above the root sought; q/p < ⁿ√q iff qⁿ⁻¹ < pⁿ.
+    let (q_square, p_square) = (q * q, p * p);
+    let linear = if N == 3 { q_square < p_square * p } else { q_square * q < p_square * p_square };
+    let mut w = match (linear, N) {
+        (true, _) => q / p,
+        (false, 3) => q.cbrt(),
+        (false, _) => q.sqrt().sqrt(),
+    };
     for _ in 0..NEWTON_STEPS_MAX {
         let square = w * w;
         let (power, slope) = if N == 3 {
@@ -79,7 +88,9 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     let half = R::from_f64(0.5);
     let (higher, lower) = (from_mm_s.max(to_mm_s), from_mm_s.min(to_mm_s));
     let step = higher - lower;
-    if law.ramp_length_mm(lower, higher) >= length_mm {
+    // Room of no more than rounding is none: with the cube of it, the peak rises by less than that.
+    let rounding = R::ONE + R::from_f64(4.0 * R::EPSILON);
+    if law.ramp_length_mm(lower, higher) * rounding >= length_mm {
         return higher;
     }
     let above = change_within(law, higher, half * length_mm);
@@ -94,8 +105,15 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     for _ in 0..NEWTON_STEPS_MAX {
         let square = y * y;
         let change = square * y;
-        let (short, short_slope) = leg(law, higher, change, square);
-        let (long, long_slope) = leg(law, lower, change + step, square);
+        // While snap limits the shorter leg, y is the cube root that its time takes.
+        let short_time = if change <= law.snap_limited_to_mm_s {
+            law.snap_time * (y + y)
+        } else {
+            law.ramp_time_s(change)
+        };
+        let (short, short_slope) = leg(law, higher, change, short_time, square);
+        let long_time = law.ramp_time_s(change + step);
+        let (long, long_slope) = leg(law, lower, change + step, long_time, square);
         let slope = three * (short_slope + long_slope);
         let next = y - (short + long - length_mm) / slope;
         if !(next < y && next > R::ZERO) {
@@ -106,10 +124,10 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     higher + y * y * y
 }
 
-/// Length of the ramp from `lower` by `change`, and its derivative by the change times `square`.
-fn leg<R: Root>(law: &Law<R>, lower: R, change: R, square: R) -> (R, R) {
+/// Length of the ramp from `lower` by `change` in `time`, and its derivative by the change times
+/// `square`.
+fn leg<R: Root>(law: &Law<R>, lower: R, change: R, time: R, square: R) -> (R, R) {
     let half = R::from_f64(0.5);
-    let time = law.ramp_time_s(change);
     let mean = lower + half * change;
     // dT/dx is T/(3x), T/(2x) or 1/A.
     let time_slope = if change <= law.snap_limited_to_mm_s {

@@ -346,45 +346,39 @@ impl<R: Real> FeedSegment<R> {
     /// The motion at a normalised time of a phase; `s` counts from the segment's start. In the tick.
     #[inline]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
-        match phase {
-            Phase::Rise => {
-                let shape = Shape::at(R::from_fraction(fraction));
-                PathMotion {
-                    s: Position::from_bits(portion(self.rise_bits, fraction))
-                        + Position::from_offset(self.length_mm * shape.length),
-                    v_mm_s: self.ramp.from_mm_s + self.speed_mm_s * shape.speed,
-                    a_mm_s2: self.accel_mm_s2 * shape.accel,
-                    j_mm_s3: self.jerk_mm_s3 * shape.jerk,
-                    snap_mm_s4: self.snap_mm_s4 * shape.snap,
-                }
-            }
-            Phase::Hold => {
-                let square = portion(portion(self.hold_square_bits, fraction), fraction);
-                let s = self
-                    .hold_start_bits
-                    .wrapping_add(portion(self.hold_linear_bits, fraction))
-                    .wrapping_add(square);
-                PathMotion {
-                    s: Position::from_bits(s),
-                    v_mm_s: self.hold_v_mm_s + self.hold_gain_mm_s * R::from_fraction(fraction),
-                    a_mm_s2: self.hold_a_mm_s2,
-                    j_mm_s3: R::ZERO,
-                    snap_mm_s4: R::ZERO,
-                }
-            }
-            // The rising phase run backwards from the end.
-            Phase::Fall => {
-                let left = !fraction;
-                let shape = Shape::at(R::from_fraction(left));
-                PathMotion {
-                    s: self.length - Position::from_bits(portion(self.fall_bits, left))
-                        + Position::from_offset(self.length_mm * shape.length),
-                    v_mm_s: self.ramp.to_mm_s - self.speed_mm_s * shape.speed,
-                    a_mm_s2: self.accel_mm_s2 * shape.accel,
-                    j_mm_s3: -(self.jerk_mm_s3 * shape.jerk),
-                    snap_mm_s4: self.snap_mm_s4 * shape.snap,
-                }
-            }
+        if phase == Phase::Hold {
+            let square = portion(portion(self.hold_square_bits, fraction), fraction);
+            let s = self
+                .hold_start_bits
+                .wrapping_add(portion(self.hold_linear_bits, fraction))
+                .wrapping_add(square);
+            return PathMotion {
+                s: Position::from_bits(s),
+                v_mm_s: self.hold_v_mm_s + self.hold_gain_mm_s * R::from_fraction(fraction),
+                a_mm_s2: self.hold_a_mm_s2,
+                j_mm_s3: R::ZERO,
+                snap_mm_s4: R::ZERO,
+            };
+        }
+        // The fall is the rise run backwards from the end: the same shape, once, for both.
+        let falling = phase == Phase::Fall;
+        let fraction = if falling { !fraction } else { fraction };
+        let shape = Shape::at(R::from_fraction(fraction));
+        let (gained, jerk) = (self.speed_mm_s * shape.speed, self.jerk_mm_s3 * shape.jerk);
+        let offset = Position::from_offset(self.length_mm * shape.length);
+        let (s, v_mm_s, j_mm_s3) = if falling {
+            let even = Position::from_bits(portion(self.fall_bits, fraction));
+            (self.length - even, self.ramp.to_mm_s - gained, -jerk)
+        } else {
+            let even = Position::from_bits(portion(self.rise_bits, fraction));
+            (even, self.ramp.from_mm_s + gained, jerk)
+        };
+        PathMotion {
+            s: s + offset,
+            v_mm_s,
+            a_mm_s2: self.accel_mm_s2 * shape.accel,
+            j_mm_s3,
+            snap_mm_s4: self.snap_mm_s4 * shape.snap,
         }
     }
 }

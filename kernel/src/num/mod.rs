@@ -35,8 +35,8 @@ pub trait Real:
     const ONE: Self;
     /// Distance from 1 to the next larger value.
     const EPSILON: f64;
-    /// Terms of the power series of the law's shapes near an edge that this type can resolve
-    /// (see [`crate::law`]).
+    /// Terms of the power series of the law's shapes that this type resolves over half a phase, at
+    /// most 12 (see [`crate::law::shape`]).
     const SERIES_TERMS: usize;
     /// The longest piece of path whose local offset this type resolves to a small part of a
     /// 0.1 µm count \[mm\]. Longer lines are cut into several pieces.

@@ -133,9 +133,15 @@ pub fn plan<R: Root>(
     forward(blocks, start_mm_s, end_mm_s, plans)?;
     backward(blocks, start_mm_s, plans)?;
     for (block, plan) in blocks.iter().zip(plans) {
-        let highest = peak(&block.law, plan.enter_mm_s, plan.exit_mm_s, block.length_mm);
-        // The joints' feeds are below the ceiling already.
-        plan.peak_mm_s = highest.min(block.cap_mm_s);
+        // The joints' feeds are below the ceiling already. Most often there is room to reach it, or
+        // the block is passed at it: that is cheaper to see than to solve for.
+        let (enter, exit, cap) = (plan.enter_mm_s, plan.exit_mm_s, block.cap_mm_s);
+        let to_cap = block.law.ramp_length_mm(enter, cap) + block.law.ramp_length_mm(cap, exit);
+        plan.peak_mm_s = if to_cap <= block.length_mm {
+            cap
+        } else {
+            peak(&block.law, enter, exit, block.length_mm).min(cap)
+        };
     }
     Ok(())
 }

@@ -6,7 +6,7 @@
 //!
 //! - [`ceiling`]: stage 1, the feed that a block's geometry and the machine allow, with the reason,
 //!   and how much acceleration, jerk and snap are left for changing the feed on a curve;
-//! - [`joint`]: what a joint between two blocks allows;
+//! - [`mod@joint`]: what a joint between two blocks allows;
 //! - [`lookahead`]: stages 1 and 2 over the stretch: what can be reached, and from what one can brake;
 //! - [`feed`]: the planned blocks as feed segments over exact path positions.
 

@@ -146,23 +146,29 @@ fn table(rows: &[Row], times: &[(&'static str, Vec<f64>)]) -> bool {
     for row in rows {
         let ours = of(row.ours);
         let ours_ns = median(ours.iter().copied());
-        let (peer, peer_ns, ratio) = match row.peer {
-            Some(name) => {
-                let peer = of(name);
-                let ratio = median(ours.iter().zip(peer).map(|(ours, peer)| ours / peer));
-                (name, median(peer.iter().copied()), ratio)
+        let beside = row.peer.map(|name| {
+            let peer = of(name);
+            (
+                name,
+                median(peer.iter().copied()),
+                median(ours.iter().zip(peer).map(|(ours, peer)| ours / peer)),
+            )
+        });
+        let (required, good) = match (&row.required, beside) {
+            (Requirement::RatioMax(most), Some((_, _, ratio))) => {
+                (format!("ratio ≤ {most:.2}"), ratio <= *most)
             }
-            None => ("–", f64::NAN, f64::NAN),
+            (Requirement::NanosecondsMax(most), _) => (format!("≤ {most:.0} ns"), ours_ns <= *most),
+            (Requirement::None | Requirement::RatioMax(_), _) => (String::from("–"), true),
         };
-        let (required, good) = match row.required {
-            Requirement::None => (String::from("–"), true),
-            Requirement::RatioMax(most) => (format!("ratio ≤ {most:.2}"), ratio <= most),
-            Requirement::NanosecondsMax(most) => (format!("≤ {most:.0} ns"), ours_ns <= most),
+        kept &= good;
+        let (peer, peer_ns, ratio) = match beside {
+            Some((name, ns, ratio)) => (name, format!("{ns:.1}"), format!("{ratio:.2}")),
+            None => ("–", String::from("–"), String::from("–")),
         };
         let verdict = if good { "" } else { ", missed" };
-        kept &= good;
         println!(
-            "| {:<26} | {ours_ns:6.1} | {peer:<26} | {peer_ns:6.1} | {ratio:5.2} | {required}{verdict} |",
+            "| {:<26} | {ours_ns:6.1} | {peer:<26} | {peer_ns:>6} | {ratio:>5} | {required}{verdict} |",
             row.ours
         );
     }
@@ -188,8 +194,7 @@ fn contenders() -> Vec<Contender> {
     let mut all = Vec::new();
     let mut random = Random(1);
     let blocks: Vec<Motion> = (0..BLOCKS).map(|_| Motion::random(&mut random)).collect();
-    let at_random: Vec<(usize, f64)> =
-        (0..CALLS).map(|_| (random.below(BLOCKS), random.unit())).collect();
+    let at_random: Vec<(usize, f64)> = (0..CALLS).map(|_| (random.below(BLOCKS), random.unit())).collect();
     evaluations(&mut all, &blocks, &at_random);
     ticks::<f32>(&mut all, "tick f32, one axis");
     ticks::<f64>(&mut all, "tick f64, one axis");
@@ -553,8 +558,7 @@ fn plans(all: &mut Vec<Contender>, random: &mut Random) {
         law,
     };
     let mut caps = Random(4);
-    let blocks: Vec<Block<f64>> =
-        (0..BLOCKS_PLANNED).map(|_| block(caps.log(20.0, 500.0))).collect();
+    let blocks: Vec<Block<f64>> = (0..BLOCKS_PLANNED).map(|_| block(caps.log(20.0, 500.0))).collect();
     let mut plans = vec![BlockPlan::default(); BLOCKS_PLANNED];
     all.push(Contender {
         name: "plan, a block",

@@ -6,20 +6,24 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::{
-    Area, Caption, Drawn, NARROW, Panel, Sheet, UNITS_PER_PX, curve, ends_over, fault_marks, on_both_sheets,
+    Area, Caption, Chart, Drawn, NARROW, Panel, Sheet, UNITS_PER_PX, WIDE, curve, ends_over, fault_marks,
+    on_both_sheets,
 };
 use crate::record::{BlockRecord, RunRecord};
 use crate::report::decimate;
 use crate::report::format::scale_mark;
-use crate::report::palette;
+use crate::report::palette::{self, NOT_REACHED};
 use crate::report::summary::Summary;
 
 /// A ceiling may lie far above any feed (a rapid over a short way). The axis ends at this many times the highest
-/// feed, and a higher ceiling is drawn there.
-const CEILING_TO_FEED_MAX: f64 = 1.6;
+/// feed, planned or run; a higher ceiling holds nothing back and is left out.
+const CEILING_TO_FEED_MAX: f64 = 1.3;
 
 /// Line width of the ceilings: wide enough to show on both sides of a feed that runs along them.
 const CEILING_STROKE: u32 = 18;
+
+/// Line width of the ceilings that the feed does not reach.
+const UNREACHED_STROKE: u32 = 8;
 
 /// A level piece of the ceiling, or, where many blocks share a column, the range they cover.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,12 +48,21 @@ pub(in crate::report) fn is_crowded(record: &RunRecord, summary: &Summary) -> bo
     steps(&record.blocks, top_mm_s, summary.path_length_mm, NARROW.columns).iter().any(Step::is_range)
 }
 
-/// Reasons of the ceilings in the order of their appearance.
-pub(in crate::report) fn reasons(blocks: &[BlockRecord]) -> Vec<&'static str> {
+/// What set a block's ceiling. A block that is too short to reach it names what keeps the feed below instead; what
+/// set its ceiling is then not known, and does not matter.
+fn reason(block: &BlockRecord) -> &'static str {
+    match block.cap_reason {
+        "accelerating" | "braking" => NOT_REACHED,
+        reason => reason,
+    }
+}
+
+/// Reasons of the ceilings up to `top_mm_s`, in the order of their appearance.
+pub(in crate::report) fn reasons(blocks: &[BlockRecord], top_mm_s: f64) -> Vec<&'static str> {
     let mut known = Vec::new();
-    for block in blocks {
-        if !known.contains(&block.cap_reason) {
-            known.push(block.cap_reason);
+    for block in blocks.iter().filter(|block| block.cap_mm_s <= top_mm_s) {
+        if !known.contains(&reason(block)) {
+            known.push(reason(block));
         }
     }
     known
@@ -57,26 +70,28 @@ pub(in crate::report) fn reasons(blocks: &[BlockRecord]) -> Vec<&'static str> {
 
 /// Top of the feed axis \[mm/s\], and whether a ceiling lies above it.
 pub(in crate::report) fn top(record: &RunRecord, summary: &Summary) -> (f64, bool) {
-    let feed = summary.feed_mm_s.magnitude();
-    let ceilings = record.blocks.iter().map(|block| block.cap_mm_s);
-    let ceiling = ceilings.filter(|cap| cap.is_finite()).fold(0.0, f64::max);
+    let planned = record.blocks.iter().map(|block| block.peak_mm_s).filter(|peak| peak.is_finite());
+    let feed = planned.fold(summary.feed_mm_s.magnitude(), f64::max);
     let limit = if feed > 0.0 { CEILING_TO_FEED_MAX * feed } else { f64::INFINITY };
-    let beyond = record.blocks.iter().any(|block| block.cap_mm_s > limit);
-    let highest = feed.max(ceiling.min(limit));
+    let ceilings = || record.blocks.iter().map(|block| block.cap_mm_s);
+    let beyond = ceilings().any(|cap| cap > limit);
+    let highest = ceilings().filter(|cap| cap.is_finite() && *cap <= limit).fold(feed, f64::max);
     (if highest > 0.0 { highest } else { 1.0 }, beyond)
 }
 
-/// The ceilings as steps, at most about two for each of `columns`. A column with many blocks shows their range in
+/// The ceilings up to the top as steps, at most about two for each of `columns`. A column with many blocks shows their range in
 /// the ink of the lowest, the one that holds the feed down.
 fn steps<'a>(blocks: &'a [BlockRecord], top_mm_s: f64, length_mm: f64, columns: usize) -> Vec<Step<'a>> {
     let column_mm = length_mm / columns.max(1) as f64;
     let mut steps: Vec<Step<'a>> = Vec::new();
-    for block in blocks.iter().filter(|block| !block.cap_mm_s.is_nan() && block.length_mm.is_finite()) {
-        let cap = block.cap_mm_s.min(top_mm_s);
+    let shown = |block: &&BlockRecord| block.cap_mm_s <= top_mm_s && block.length_mm.is_finite();
+    for block in blocks.iter().filter(shown) {
+        let (cap, reason) = (block.cap_mm_s, reason(block));
         let to_mm = block.start_mm + block.length_mm;
         match steps.last_mut() {
             Some(last)
-                if last.reason == block.cap_reason
+                if last.reason == reason
+                    && block.start_mm - last.to_mm < column_mm
                     && last.low_mm_s.total_cmp(&cap).is_eq()
                     && last.high_mm_s.total_cmp(&cap).is_eq() =>
             {
@@ -84,31 +99,62 @@ fn steps<'a>(blocks: &'a [BlockRecord], top_mm_s: f64, length_mm: f64, columns: 
             }
             Some(last) if to_mm - last.from_mm < column_mm => {
                 if cap < last.low_mm_s {
-                    last.reason = block.cap_reason;
+                    last.reason = reason;
                 }
                 last.low_mm_s = last.low_mm_s.min(cap);
                 last.high_mm_s = last.high_mm_s.max(cap);
                 last.to_mm = to_mm;
             }
-            _ => steps.push(Step {
-                from_mm: block.start_mm,
-                to_mm,
-                low_mm_s: cap,
-                high_mm_s: cap,
-                reason: block.cap_reason,
-            }),
+            _ => steps.push(Step { from_mm: block.start_mm, to_mm, low_mm_s: cap, high_mm_s: cap, reason }),
         }
     }
     // Neighbours that came out alike are one.
     steps.dedup_by(|next, step| {
         let alike = (step.reason, step.low_mm_s.to_bits(), step.high_mm_s.to_bits())
-            == (next.reason, next.low_mm_s.to_bits(), next.high_mm_s.to_bits());
+            == (next.reason, next.low_mm_s.to_bits(), next.high_mm_s.to_bits())
+            && next.from_mm - step.to_mm < column_mm;
         if alike {
             step.to_mm = next.to_mm;
         }
         alike
     });
     steps
+}
+
+/// Whether there is room in a wide plot for the number of at least one line.
+pub(in crate::report) fn has_line_numbers(record: &RunRecord, summary: &Summary) -> bool {
+    !numbered(&WIDE, &record.blocks, length_shown(summary)).is_empty()
+}
+
+/// End of the path axis \[mm\].
+pub(super) fn length_shown(summary: &Summary) -> f64 {
+    summary.path_length_mm.max(summary.path_done_mm)
+}
+
+/// Lines of the program that are long enough for their number above the plot: number, from, to.
+fn numbered(sheet: &Sheet, blocks: &[BlockRecord], length_mm: f64) -> Vec<(String, f64, f64)> {
+    let units_per_mm = f64::from(sheet.width - 2 * sheet.left) / length_mm.max(f64::MIN_POSITIVE);
+    let stretches = lines(blocks).into_iter().map(|(line, from, to)| (line.to_string(), from, to));
+    stretches.filter(|(word, from, to)| (to - from) * units_per_mm > sheet.width_of(word) + 16.0).collect()
+}
+
+/// Where the lines of the program meet, with their numbers at the height `at`; `y_top` is the end of the axis.
+pub(super) fn line_numbers(
+    chart: &mut Chart<'_>,
+    sheet: &Sheet,
+    blocks: &[BlockRecord],
+    length_mm: f64,
+    (at, y_top): (f64, f64),
+) -> Drawn {
+    for (word, from, to) in numbered(sheet, blocks, length_mm) {
+        let rule = palette::RULE.rgb().stroke_width(3);
+        for x in [from, to] {
+            chart.draw_series([PathElement::new([(x, 0.0), (x, y_top)], rule)])?;
+        }
+        let style = sheet.letters(palette::TEXT, HPos::Center, VPos::Center);
+        chart.draw_series([Text::new(word, (from.midpoint(to), at), style)])?;
+    }
+    Ok(())
 }
 
 /// Stretches of one G-code line: line, from, to. A line may be several blocks (its blends, its pieces).
@@ -143,7 +189,7 @@ fn draw_on(
     faults_mm: &[f64],
 ) -> Drawn {
     let (top_mm_s, _) = top(record, summary);
-    let length_mm = summary.path_length_mm.max(summary.path_done_mm);
+    let length_mm = length_shown(summary);
     let panel = Panel {
         title: "Feed [mm/s]",
         x: ends_over(0.0, length_mm),
@@ -151,24 +197,12 @@ fn draw_on(
         y: (0.0, 1.14 * top_mm_s),
         x_name: Some("path length [mm]"),
         right: sheet.left,
+        shade: &[],
     };
     let mut chart = panel.draw(area, sheet)?;
-    let axes_width = f64::from(sheet.width - sheet.left - panel.right);
-    let units_per_mm = axes_width / (panel.x.1 - panel.x.0);
+    line_numbers(&mut chart, sheet, &record.blocks, length_mm, (1.09 * top_mm_s, panel.y.1))?;
 
-    for (line, from, to) in lines(&record.blocks) {
-        let word = format!("N{line}");
-        if (to - from) * units_per_mm > sheet.width_of(&word) + 16.0 {
-            let rule = palette::RULE.rgb().stroke_width(3);
-            for x in [from, to] {
-                chart.draw_series([PathElement::new([(x, 0.0), (x, panel.y.1)], rule)])?;
-            }
-            let style = sheet.letters(palette::TEXT, HPos::Center, VPos::Center);
-            chart.draw_series([Text::new(word, (from.midpoint(to), 1.09 * top_mm_s), style)])?;
-        }
-    }
-
-    let known = reasons(&record.blocks);
+    let known = reasons(&record.blocks, top_mm_s);
     for step in steps(&record.blocks, top_mm_s, length_mm, sheet.columns) {
         let ink = palette::ceiling(step.reason, &known).rgb();
         if step.is_range() {
@@ -176,7 +210,8 @@ fn draw_on(
             chart.draw_series([Rectangle::new(corners, ink.mix(0.25).filled())])?;
         }
         let level = [(step.from_mm, step.low_mm_s), (step.to_mm, step.low_mm_s)];
-        chart.draw_series([PathElement::new(level, ink.stroke_width(CEILING_STROKE))])?;
+        let stroke = if step.reason == NOT_REACHED { UNREACHED_STROKE } else { CEILING_STROKE };
+        chart.draw_series([PathElement::new(level, ink.stroke_width(stroke))])?;
     }
 
     let feed = record.ticks.iter().map(|tick| (tick.s_mm, tick.v_mm_s));
@@ -255,6 +290,27 @@ mod tests {
         let steps = steps(&crowd, 100.0, 100.0, 200);
         assert!(steps.len() <= 401, "{}", steps.len());
         assert!(steps.iter().any(|step| (step.low_mm_s - 3.0).abs() < 1e-12 && step.high_mm_s > 55.0));
+    }
+
+    #[test]
+    fn ceilings_out_of_reach_are_told_apart_and_left_out_when_far_above() {
+        let mut blocks = vec![
+            block(1, 0.0, 10.0, 50.0, "braking"),
+            block(2, 10.0, 10.0, 50.0, "accelerating"),
+            block(3, 20.0, 10.0, 40.0, "programmed"),
+            block(4, 30.0, 10.0, 300.0, "braking"),
+            block(5, 40.0, 10.0, 40.0, "programmed"),
+        ];
+        blocks[2].peak_mm_s = 40.0;
+        let record = RunRecord { blocks, ..RunRecord::default() };
+        let summary = Summary::of(&record);
+        let (top_mm_s, beyond) = top(&record, &summary);
+        assert!((top_mm_s - 50.0).abs() < 1e-12 && beyond);
+        assert_eq!(reasons(&record.blocks, top_mm_s), [NOT_REACHED, "programmed"]);
+        let drawn = steps(&record.blocks, top_mm_s, 50.0, 100);
+        let ends: Vec<_> = drawn.iter().map(|step| (step.reason, step.from_mm, step.to_mm)).collect();
+        // The programmed ceilings are alike, but the block between them has another.
+        assert_eq!(ends, [(NOT_REACHED, 0.0, 20.0), ("programmed", 20.0, 30.0), ("programmed", 40.0, 50.0)]);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! letters along. The style sheet shows one of the two. The drawing library places things on whole units only, so a
 //! sheet has [`UNITS_PER_PX`] of them to a pixel, and a smooth curve stays smooth.
 
+pub(super) mod contour;
 pub(super) mod feed;
 pub(super) mod path;
 pub(super) mod time;
@@ -158,6 +159,8 @@ pub(super) struct Panel<'a> {
     pub(super) x_name: Option<&'a str>,
     /// Room on the right.
     pub(super) right: u32,
+    /// Stretches of the horizontal axis to be shaded.
+    pub(super) shade: &'a [(f64, f64)],
 }
 
 impl Panel<'_> {
@@ -174,6 +177,10 @@ impl Panel<'_> {
             .x_label_area_size(if self.x_name.is_some() { sheet.axis_height() } else { 0 })
             .build_cartesian_2d(self.x.0..self.x.1, self.y.0..self.y.1)?;
         let (x_span, y_span) = (self.x.1 - self.x.0, self.y.1 - self.y.0);
+        // First, so that grid and curve lie on it.
+        chart.draw_series(self.shade.iter().map(|&(from, to)| {
+            Rectangle::new([(from, self.y.0), (to, self.y.1)], palette::REST.rgb().filled())
+        }))?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)

@@ -16,7 +16,7 @@ use crate::report::summary::{Span, Summary};
 const CORNERS_MAX: usize = 12_000;
 
 /// Tallest and lowest picture as a part of its width.
-const TALL: f64 = 0.62;
+const TALL: f64 = 0.52;
 const TALL_NARROW: f64 = 1.1;
 const LOW: f64 = 0.18;
 
@@ -104,6 +104,7 @@ pub(in crate::report) fn draw(
                 y: scale.y_mm,
                 x_name: Some(&format!("{} [mm]", names[view.right])),
                 right: sheet.right,
+                shade: &[],
             };
             let mut chart = panel.draw(area, sheet)?;
             let corners = || {
@@ -144,7 +145,9 @@ fn marks(
     fault: Option<(i32, i32)>,
 ) -> Drawn {
     let near = |a: (i32, i32), b: (i32, i32)| {
-        (a.0 - b.0).unsigned_abs() < 4 * sheet.text && (a.1 - b.1).unsigned_abs() < sheet.text * 3 / 2
+        // As long as the longest word and the gap before it.
+        f64::from((a.0 - b.0).abs()) < sheet.width_of("start") + 12.0
+            && (a.1 - b.1).unsigned_abs() < sheet.text * 3 / 2
     };
     let ink = palette::TEXT.rgb();
     let mut words: Vec<((i32, i32), String)> = Vec::new();

@@ -2,11 +2,15 @@
 
 use std::io;
 
+use plotters::element::PathElement;
+use plotters::style::Color as _;
+
 use super::{Caption, Panel, Sheet, curve, ends_over, ends_with_zero, fault_marks, on_both_sheets};
 use crate::record::{RunRecord, TickRecord};
 use crate::report::decimate;
+use crate::report::format::figure;
 use crate::report::palette::{self, Ink};
-use crate::report::summary::{Span, Summary};
+use crate::report::summary::{Rest, Span, Summary};
 
 /// Full scale of the output \[V\].
 const RAIL_V: f64 = 10.0;
@@ -18,8 +22,61 @@ const RAIL_SHOWN_FROM_V: f64 = 7.0;
 struct Curve<V: Fn(&TickRecord) -> f64> {
     title: &'static str,
     span: Span,
+    /// What the machine allows, in both directions; 0 if that is not known.
+    limit: f64,
     ink: Ink,
     value: V,
+}
+
+/// Below this part of its limit a curve would be flat in a picture that shows the limit.
+const LIMIT_SHOWN_FROM: f64 = 0.2;
+
+/// Whether the plot of a curve shows its limit.
+pub(in crate::report) fn shows_limit(span: Span, limit: f64) -> bool {
+    limit > 0.0 && limit.is_finite() && span.magnitude() >= LIMIT_SHOWN_FROM * limit
+}
+
+impl<V: Fn(&TickRecord) -> f64> Curve<V> {
+    /// The limits to be drawn: in the directions in which the curve goes.
+    fn limits(&self) -> impl Iterator<Item = f64> {
+        let shown = shows_limit(self.span, self.limit);
+        let up = (shown && self.span.high > 0.0).then_some(self.limit);
+        let down = (shown && self.span.low < 0.0).then_some(-self.limit);
+        up.into_iter().chain(down)
+    }
+
+    /// Quantity and unit, and the limit if it is drawn.
+    fn title(&self) -> String {
+        if shows_limit(self.span, self.limit) {
+            format!("{}, limit ±{}", self.title, figure(self.limit, 4))
+        } else {
+            self.title.to_string()
+        }
+    }
+
+    /// Ends of the vertical axis.
+    fn ends(&self) -> (f64, f64) {
+        let mut span = self.span;
+        self.limits().for_each(|limit| span.add(limit));
+        ends_with_zero(span)
+    }
+}
+
+/// Columns that a shaded stretch has at least, so that it is seen.
+const SHADE_COLUMNS: f64 = 3.0;
+
+/// The rests to shade, at most one for each of `columns`: motion too short to be seen between two of them is left out.
+fn shades(rests: &[Rest], x: (f64, f64), columns: usize) -> Vec<(f64, f64)> {
+    let column = (x.1 - x.0) / columns.max(1) as f64;
+    let mut shades: Vec<(f64, f64)> = Vec::new();
+    for rest in rests {
+        let to = rest.to_s.max(rest.from_s + SHADE_COLUMNS * column).min(x.1);
+        match shades.last_mut() {
+            Some(last) if rest.from_s - last.1 < column => last.1 = last.1.max(to),
+            _ => shades.push((rest.from_s, to)),
+        }
+    }
+    shades
 }
 
 /// Feed, acceleration, jerk and snap along the path.
@@ -29,12 +86,19 @@ pub(in crate::report) fn along_path(
     caption: &Caption<'_>,
 ) -> io::Result<String> {
     type Value = fn(&TickRecord) -> f64;
-    let curve = |title, span, ink, value: Value| Curve { title, span, ink, value };
+    let limits = &record.limits;
+    let curve = |title, span, limit, ink, value: Value| Curve { title, span, limit, ink, value };
     let curves = [
-        curve("Feed [mm/s]", summary.feed_mm_s, palette::FEED, |tick| tick.v_mm_s),
-        curve("Acceleration [mm/s²]", summary.accel_mm_s2, palette::ACCELERATION, |tick| tick.a_mm_s2),
-        curve("Jerk [mm/s³]", summary.jerk_mm_s3, palette::JERK, |tick| tick.j_mm_s3),
-        curve("Snap [mm/s⁴]", summary.snap_mm_s4, palette::SNAP, |tick| tick.snap_mm_s4),
+        curve("Feed [mm/s]", summary.feed_mm_s, 0.0, palette::FEED, |tick| tick.v_mm_s),
+        curve(
+            "Acceleration [mm/s²]",
+            summary.accel_mm_s2,
+            limits.accel_mm_s2,
+            palette::ACCELERATION,
+            |tick| tick.a_mm_s2,
+        ),
+        curve("Jerk [mm/s³]", summary.jerk_mm_s3, limits.jerk_mm_s3, palette::JERK, |tick| tick.j_mm_s3),
+        curve("Snap [mm/s⁴]", summary.snap_mm_s4, limits.snap_mm_s4, palette::SNAP, |tick| tick.snap_mm_s4),
     ];
     stack(record, summary, &curves, caption)
 }
@@ -59,10 +123,11 @@ pub(in crate::report) fn of_axis(
         Curve {
             title: "Following error [µm]",
             span: figures.err_um,
+            limit: record.following_error_limit_um[axis],
             ink: palette::ERROR,
             value: Box::new(error) as Value<'_>,
         },
-        Curve { title: "Output [V]", span: output, ink: palette::VOLTS, value: Box::new(volts) },
+        Curve { title: "Output [V]", span: output, limit: 0.0, ink: palette::VOLTS, value: Box::new(volts) },
     ];
     stack(record, summary, &curves, caption)
 }
@@ -84,13 +149,17 @@ fn stack<V: Fn(&TickRecord) -> f64>(
             // The lowest panel carries the time axis of all.
             let part = if last { &rest } else { &upper };
             let panel = Panel {
-                title: shown.title,
+                title: &shown.title(),
                 x,
-                y: ends_with_zero(shown.span),
+                y: shown.ends(),
                 x_name: last.then_some("time [s]"),
                 right: sheet.right,
+                shade: &shades(&summary.rests, x, sheet.columns),
             };
             let mut chart = panel.draw(part, sheet)?;
+            let style = palette::LIMIT.rgb().stroke_width(5);
+            let line = |limit| PathElement::new([(x.0, limit), (x.1, limit)], style);
+            chart.draw_series(shown.limits().map(line))?;
             let points =
                 record.ticks.iter().map(|tick| (tick.tick as f64 * record.tick_s, (shown.value)(tick)));
             curve(&mut chart, decimate::by_column(points, x, sheet.columns), shown.ink, sheet.stroke)?;
@@ -99,4 +168,39 @@ fn stack<V: Fn(&TickRecord) -> f64>(
         }
         Ok(())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_far_above_its_curve_does_not_flatten_it() {
+        let curve = |low, high| Curve {
+            title: "Jerk [mm/s³]",
+            span: Span { low, high },
+            limit: 5000.0,
+            ink: palette::JERK,
+            value: |tick: &TickRecord| tick.j_mm_s3,
+        };
+        assert_eq!(curve(-900.0, 999.0).limits().count(), 0);
+        assert_eq!(curve(-900.0, 999.0).title(), "Jerk [mm/s³]");
+        assert_eq!(curve(-900.0, 1500.0).title(), "Jerk [mm/s³], limit ±5000");
+        assert!(curve(-900.0, 1500.0).ends().0 < -5000.0);
+        assert_eq!(curve(0.0, 1500.0).limits().count(), 1);
+        assert_eq!(curve(f64::INFINITY, f64::NEG_INFINITY).limits().count(), 0);
+        assert!(!shows_limit(Span { low: -1.0, high: 1.0 }, 0.0));
+    }
+
+    #[test]
+    fn short_rests_are_seen_and_many_stay_few() {
+        let rest = |from_s, to_s| Rest { state: "dwell", from_s, to_s };
+        let two = shades(&[rest(1.0, 1.001), rest(3.0, 5.0)], (0.0, 10.0), 100);
+        assert!((two[0].1 - two[0].0 - 0.3).abs() < 1e-9, "{two:?}");
+        assert_eq!(two[1], (3.0, 5.0));
+        let many: Vec<_> = (0..10_000).map(|i| f64::from(i) * 1e-3).map(|at| rest(at, at + 1e-4)).collect();
+        let shades = shades(&many, (0.0, 10.0), 100);
+        assert!(shades.len() <= 100, "{}", shades.len());
+        assert!(shades.windows(2).all(|pair| pair[0].1 <= pair[1].0));
+    }
 }
