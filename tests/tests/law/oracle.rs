@@ -20,7 +20,7 @@ const NODES: usize = 6;
 const PANEL: f64 = 1.0 / 64.0;
 
 /// What the integration needs and no ramp changes.
-pub struct Quadrature {
+pub(crate) struct Quadrature {
     /// Nodes on \[0, 1\] and weights.
     nodes: [(Dd, Dd); NODES],
     /// (−1)^k π^(2k+1)/(2k+1)! and (−1)^k π^(2k)/(2k)!.
@@ -29,7 +29,7 @@ pub struct Quadrature {
 }
 
 impl Quadrature {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let nodes = std::array::from_fn(|i| {
             let guess = (std::f64::consts::PI * (i as f64 + 0.75) / (NODES as f64 + 0.5)).cos();
             let mut x = dd(guess);
@@ -90,29 +90,29 @@ impl Quadrature {
 
 /// The motion at one instant.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Motion {
-    pub s: Dd,
-    pub v: Dd,
-    pub a: Dd,
-    pub j: Dd,
-    pub snap: Dd,
+pub(crate) struct Motion {
+    pub(crate) s: Dd,
+    pub(crate) v: Dd,
+    pub(crate) a: Dd,
+    pub(crate) j: Dd,
+    pub(crate) snap: Dd,
 }
 
 /// A ramp as S1 defines it; `jerk` carries the sign of the change of feed.
-pub struct Exact<'a> {
+pub(crate) struct Exact<'a> {
     quadrature: &'a Quadrature,
     from: Dd,
     to: Dd,
-    pub jerk: Dd,
-    pub t1: Dd,
-    pub t2: Dd,
-    pub end: Dd,
+    pub(crate) jerk: Dd,
+    pub(crate) t1: Dd,
+    pub(crate) t2: Dd,
+    pub(crate) end: Dd,
     /// S(t_p) by integration.
-    pub length: Dd,
+    pub(crate) length: Dd,
 }
 
 /// (Jp, t₁, t₂) by (22), (23), (13); zero for no change.
-pub fn choose(limits: &Limits<f64>, change: Dd) -> (Dd, Dd, Dd) {
+pub(crate) fn choose(limits: &Limits<f64>, change: Dd) -> (Dd, Dd, Dd) {
     let (accel, jerk, snap) = (dd(limits.accel_mm_s2), dd(limits.jerk_mm_s3), dd(limits.snap_mm_s4));
     if change.hi <= 0.0 {
         return (Dd::ZERO, Dd::ZERO, Dd::ZERO);
@@ -126,13 +126,13 @@ pub fn choose(limits: &Limits<f64>, change: Dd) -> (Dd, Dd, Dd) {
 }
 
 /// Λ, the length of the ramp between two feeds: (12).
-pub fn length(limits: &Limits<f64>, from: Dd, to: Dd) -> Dd {
+pub(crate) fn length(limits: &Limits<f64>, from: Dd, to: Dd) -> Dd {
     let (_, t1, t2) = choose(limits, (to - from).abs());
     (from + to) * dd(0.5) * (t1 + t2)
 }
 
 impl<'a> Exact<'a> {
-    pub fn new(quadrature: &'a Quadrature, limits: &Limits<f64>, from: f64, to: f64) -> Self {
+    pub(crate) fn new(quadrature: &'a Quadrature, limits: &Limits<f64>, from: f64, to: f64) -> Self {
         let (from, to) = (dd(from), dd(to));
         let (peak, t1, t2) = choose(limits, (to - from).abs());
         let jerk = if to < from { -peak } else { peak };
@@ -198,7 +198,7 @@ impl<'a> Exact<'a> {
     /// The motion at each of `times_s`, which ascend. The falling phase is integrated backwards from
     /// the end, where the acceleration is 0 and the feed is the ramp's: near the end the small values
     /// keep their digits that way.
-    pub fn at_each(&self, times_s: &[f64]) -> Vec<Motion> {
+    pub(crate) fn at_each(&self, times_s: &[f64]) -> Vec<Motion> {
         let mut motions = vec![Motion::default(); times_s.len()];
         let (mut motion, mut reached) = (self.start(), Dd::ZERO);
         let held = self.pulse(&self.start(), self.t1, self.jerk);
