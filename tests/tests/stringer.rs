@@ -102,8 +102,9 @@ fn executed(machine: &Machine, number: Number) -> RunSummary {
 #[test]
 fn executes_without_a_fault_within_the_limits() {
     let machine = Machine::reference();
-    for (number, rounding) in [(Number::F64, 1e-9), (Number::F32, 1e-6)] {
+    for (number, rounding) in [(Number::F64, 1e-9), (Number::F32, 1e-6), (Number::Fixed, 1e-6)] {
         let summary = executed(&machine, number);
+        println!("{number:?} {summary:?}");
         for (quantity, value, limit) in [
             ("feed", summary.max_feed_mm_s, 5000.0 / 60.0),
             ("acceleration", summary.max_accel_mm_s2, machine.path.accel_mm_s2),

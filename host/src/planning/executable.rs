@@ -17,14 +17,14 @@ use crate::toolpath::{Vector, compile};
 
 /// What the two streams are fed with.
 #[derive(Clone, Debug)]
-pub struct Executable<R> {
+pub struct Executable<R: Real> {
     /// In order.
     pub items: Vec<ExecutableItem<R>>,
 }
 
 /// One thing to feed.
 #[derive(Clone, Debug)]
-pub enum ExecutableItem<R> {
+pub enum ExecutableItem<R: Real> {
     /// Motion from one full stop to the next.
     Stretch {
         /// Path position of its start, from the program's start \[mm\].

@@ -4,7 +4,7 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
-use motion_kernel::num::Real;
+use motion_kernel::num::{Fixed, Real};
 use motion_kernel::queue::{Rejection, Streams};
 use motion_kernel::trace::Trace;
 use motion_kernel::units::Position;
@@ -32,6 +32,8 @@ pub enum Number {
     F32,
     /// The reference.
     F64,
+    /// As on a board without an FPU.
+    Fixed,
 }
 
 /// Why a run could not be made.
@@ -72,6 +74,7 @@ pub fn run_with(
     match number {
         Number::F32 => run_in::<f32>(plan, machine, observe),
         Number::F64 => run_in::<f64>(plan, machine, observe),
+        Number::Fixed => run_in::<Fixed>(plan, machine, observe),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::planning::{Executable, ExecutableItem};
 use crate::record::AXES;
 
 /// Where the supply stands.
-pub struct Supply<'a, R> {
+pub struct Supply<'a, R: Real> {
     items: &'a [ExecutableItem<R>],
     piece: usize,
     segment: usize,

@@ -62,7 +62,7 @@ impl<R: Root> Law<R> {
     pub fn new(limits: Limits<R>) -> Result<Self, LimitError> {
         let Limits { accel_mm_s2: accel, jerk_mm_s3: jerk, snap_mm_s4: snap } = limits;
         for (quantity, value) in [("acceleration", accel), ("jerk", jerk), ("snap", snap)] {
-            if !(value > R::ZERO && value.is_finite()) {
+            if !(value > R::ZERO && value.to_f64().is_finite()) {
                 return Err(LimitError { quantity, value: value.to_f64() });
             }
         }

@@ -5,7 +5,7 @@
 
 use super::limits::Law;
 use super::shape::Shape;
-use crate::num::Root;
+use crate::num::{Root, Scalar};
 
 /// A ramp between two feeds (S1, section 1). A braking ramp is the accelerating one mirrored.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,30 +120,30 @@ impl<R: Root> Ramp<R> {
         let length_scale = speed_scale * rise_s;
         let snap_scale = R::from_f64(core::f64::consts::PI) * jerk / rise_s;
         if t_s < rise_s {
-            let shape = Shape::at(t_s / rise_s);
+            let shape = Shape::at((t_s / rise_s).to_unit());
             FeedState {
-                s_mm: self.from_mm_s * t_s + length_scale * shape.length,
-                v_mm_s: self.from_mm_s + speed_scale * shape.speed,
-                a_mm_s2: accel_scale * shape.accel,
-                j_mm_s3: jerk * shape.jerk,
-                snap_mm_s4: snap_scale * shape.snap,
+                s_mm: self.from_mm_s * t_s + length_scale.scaled(shape.length),
+                v_mm_s: self.from_mm_s + speed_scale.scaled(shape.speed),
+                a_mm_s2: accel_scale.scaled(shape.accel),
+                j_mm_s3: jerk.scaled(shape.jerk),
+                snap_mm_s4: snap_scale.scaled(shape.snap),
             }
         } else if remaining_s < rise_s {
             // The rising phase run backwards from the end.
-            let shape = Shape::at(remaining_s / rise_s);
+            let shape = Shape::at((remaining_s / rise_s).to_unit());
             FeedState {
-                s_mm: self.length_mm() - (self.to_mm_s * remaining_s - length_scale * shape.length),
-                v_mm_s: self.to_mm_s - speed_scale * shape.speed,
-                a_mm_s2: accel_scale * shape.accel,
-                j_mm_s3: -(jerk * shape.jerk),
-                snap_mm_s4: snap_scale * shape.snap,
+                s_mm: self.length_mm() - (self.to_mm_s * remaining_s - length_scale.scaled(shape.length)),
+                v_mm_s: self.to_mm_s - speed_scale.scaled(shape.speed),
+                a_mm_s2: accel_scale.scaled(shape.accel),
+                j_mm_s3: -(jerk.scaled(shape.jerk)),
+                snap_mm_s4: snap_scale.scaled(shape.snap),
             }
         } else {
-            let end = Shape::at(R::ONE);
+            let end = Shape::at(R::Unit::ONE);
             let held_s = t_s - rise_s;
-            let accel = accel_scale * end.accel;
-            let v_start = self.from_mm_s + speed_scale * end.speed;
-            let s_start = self.from_mm_s * rise_s + length_scale * end.length;
+            let accel = accel_scale.scaled(end.accel);
+            let v_start = self.from_mm_s + speed_scale.scaled(end.speed);
+            let s_start = self.from_mm_s * rise_s + length_scale.scaled(end.length);
             FeedState {
                 s_mm: s_start + held_s * (v_start + R::from_f64(0.5) * accel * held_s),
                 v_mm_s: v_start + accel * held_s,

@@ -13,7 +13,7 @@
 
 use super::ramp::Ramp;
 use super::shape::Shape;
-use crate::num::{Real, Root};
+use crate::num::{Real, Root, Unit};
 use crate::units::Position;
 
 /// A duration in control ticks, in steps of 2⁻³² tick.
@@ -204,7 +204,7 @@ impl<R: Real> FeedSegment<R> {
         let path_mm = length.to_mm();
         let ramp_mm = ramp.length_mm();
         // In a narrower planning type the ramp's figures carry that type's rounding.
-        let rounding = 16.0 * P::EPSILON * ramp_mm;
+        let rounding = 16.0 * P::EPSILON * (ramp_mm + ramp.from_mm_s + ramp.to_mm_s);
         if !(libm::fabs(ramp_mm - path_mm) <= LENGTH_TOLERANCE_MM + rounding) {
             return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
         }
@@ -258,10 +258,9 @@ impl<R: Real> FeedSegment<R> {
         let (accel, speed, length_scale) = (jerk * t1_s, jerk * t1_s * t1_s, jerk * t1_s * t1_s * t1_s);
         let end = Shape::at(1.0);
         let (hold_a, hold_v) = (accel * end.accel, from_mm_s + speed * end.speed);
-        // A scale that a narrow type can't hold must be refused here, not become infinite in a tick.
+        // A scale that a narrow type can't hold must be refused here, not overflow in a tick.
         let real = |quantity, value: f64| {
-            let narrow = R::from_f64(value);
-            if narrow.is_finite() { Ok(narrow) } else { Err(SegmentError::OutOfRange { quantity, value }) }
+            R::checked_from_f64(value).ok_or(SegmentError::OutOfRange { quantity, value })
         };
         let snap = if t1_s > 0.0 { core::f64::consts::PI * jerk / t1_s } else { 0.0 };
         Ok(Self {
@@ -354,7 +353,7 @@ impl<R: Real> FeedSegment<R> {
                 .wrapping_add(square);
             return PathMotion {
                 s: Position::from_bits(s),
-                v_mm_s: self.hold_v_mm_s + self.hold_gain_mm_s * R::from_fraction(fraction),
+                v_mm_s: self.hold_v_mm_s + self.hold_gain_mm_s.scaled(R::Unit::from_fraction(fraction)),
                 a_mm_s2: self.hold_a_mm_s2,
                 j_mm_s3: R::ZERO,
                 snap_mm_s4: R::ZERO,
@@ -363,9 +362,9 @@ impl<R: Real> FeedSegment<R> {
         // The fall is the rise run backwards from the end: the same shape, once, for both.
         let falling = phase == Phase::Fall;
         let fraction = if falling { !fraction } else { fraction };
-        let shape = Shape::at(R::from_fraction(fraction));
-        let (gained, jerk) = (self.speed_mm_s * shape.speed, self.jerk_mm_s3 * shape.jerk);
-        let offset = Position::from_offset(self.length_mm * shape.length);
+        let shape = Shape::at(R::Unit::from_fraction(fraction));
+        let (gained, jerk) = (self.speed_mm_s.scaled(shape.speed), self.jerk_mm_s3.scaled(shape.jerk));
+        let offset = Position::from_offset(self.length_mm.scaled(shape.length));
         let (s, v_mm_s, j_mm_s3) = if falling {
             let even = Position::from_bits(portion(self.fall_bits, fraction));
             (self.length - even, self.ramp.to_mm_s - gained, -jerk)
@@ -376,9 +375,9 @@ impl<R: Real> FeedSegment<R> {
         PathMotion {
             s: s + offset,
             v_mm_s,
-            a_mm_s2: self.accel_mm_s2 * shape.accel,
+            a_mm_s2: self.accel_mm_s2.scaled(shape.accel),
             j_mm_s3,
-            snap_mm_s4: self.snap_mm_s4 * shape.snap,
+            snap_mm_s4: self.snap_mm_s4.scaled(shape.snap),
         }
     }
 }

@@ -12,92 +12,99 @@
 //!
 //! The middle three are differences of nearly equal terms when x is small: with a sine in f32, the
 //! length has lost every digit at x = 0.005. So it goes the other way round: feed and length are
-//! power series, and what is left of them is the sine. With B the length and C the feed gained,
+//! power series, and what is left of them is the sine. With y = 2x, C = 4π² times the feed gained and
+//! B = 4π² times the length gained,
 //!
 //! ```text
-//! acceleration = π²x³/3 − 4π²·B     snap = 2πx − 4π·acceleration     jerk = π²x² − 4π²·C
+//! jerk = π²y²/4 − C     acceleration = π²y³/24 − B     snap = π·(y − 4·acceleration)
 //! ```
 //!
-//! where cancelling costs acceleration and jerk less than two bits, and snap keeps its absolute error.
-//! The series run up to x = 1/2; beyond, the shapes are those at 1 − x mirrored. The falling phase is the rising one run backwards
-//! from the ramp's end, so both ends of a ramp have the full relative precision.
+//! where cancelling costs jerk and acceleration less than two bits, and snap keeps its absolute error.
+//! The series run up to x = 1/2; beyond, the shapes are those at 1 − x mirrored. The falling phase is
+//! the rising one run backwards from the ramp's end, so both ends of a ramp have the full relative
+//! precision. All the coefficients and all that is computed stay below 4: fixed point of 32 bits
+//! will do.
 //!
 //! In the tick: two series of constant length side by side, a dozen multiplications more, no
 //! division, and no branch that depends on the time but the mirror, which is a choice of values.
 
-use crate::num::Real;
+use crate::num::Unit;
 
 /// The law's shapes at one normalised time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shape<R> {
+pub struct Shape<U> {
     /// 0 … 1 … 0.
-    pub jerk: R,
+    pub jerk: U,
     /// 0 … 1/2.
-    pub accel: R,
+    pub accel: U,
     /// 0 … 1/4.
-    pub speed: R,
+    pub speed: U,
     /// 0 … 1/12 − 1/(8π²).
-    pub length: R,
+    pub length: U,
     /// 0 … 1 … −1 … 0.
-    pub snap: R,
+    pub snap: U,
 }
 
-/// (−1)^(n+1)·(2π)^(2n+2)/((2n+2)!·8π²), n = 1 …: feed gained, over x⁴.
+/// (−1)^(n+1)·π^(2n+2)/(2·(2n+2)!), n = 1 …: C over y⁴.
 const SPEED: [f64; SERIES_TERMS_MAX] = [
-    0.822_467_033_424_113_218_24,
-    -1.082_323_233_711_138_191_5,
-    0.763_007_296_488_336_854_79,
-    -0.334_692_452_065_981_446_46,
-    0.100_099_457_512_781_808_53,
-    -0.021_713_012_009_116_672_539,
-    0.003_571_647_314_768_066_803,
-    -0.000_460_794_066_104_234_011_55,
-    0.000_047_872_159_398_086_408_91,
-    -0.000_004_090_729_654_415_627_033_8,
-    0.000_000_292_564_372_470_197_272_52,
-    -0.000_000_017_769_197_650_054_187_018,
+    2.029_356_063_208_384_109_1,
+    -0.667_631_384_427_294_747_94,
+    0.117_665_315_179_446_602_27,
+    -0.012_903_445_695_007_030_00,
+    0.000_964_787_154_701_961_523_95,
+    -0.000_052_319_052_462_422_853_559,
+    0.000_002_151_534_793_516_473_503_6,
+    -0.000_000_069_394_762_311_068_860_572,
+    0.000_000_001_802_365_398_731_250_466_9,
+    -0.000_000_000_038_503_535_653_006_766_899,
+    0.000_000_000_000_688_432_364_018_870_685_21,
+    -0.000_000_000_000_010_453_161_676_573_842_349,
 ];
-/// (−1)^(n+1)·(2π)^(2n+3)/((2n+3)!·16π³), n = 1 …: length gained, over x⁵.
+/// (−1)^(n+1)·π^(2n+2)/(2·(2n+3)!), n = 1 …: B over y⁵.
 const LENGTH: [f64; SERIES_TERMS_MAX] = [
-    0.164_493_406_684_822_643_65,
-    -0.154_617_604_815_876_884_5,
-    0.084_778_588_498_704_094_976,
-    -0.030_426_586_551_452_858_769,
-    0.007_699_958_270_213_985_271_8,
-    -0.001_447_534_133_941_111_502_6,
-    0.000_210_096_900_868_709_811_94,
-    -0.000_024_252_319_268_643_895_345,
-    0.000_002_279_626_638_004_114_71,
-    -0.000_000_177_857_811_061_549_001_47,
-    0.000_000_011_702_574_897_880_789_09,
-    -0.000_000_000_658_118_431_483_488_08,
+    0.202_935_606_320_838_410_91,
+    -0.047_687_956_030_521_053_42,
+    0.006_536_961_954_413_700_12,
+    -0.000_586_520_258_863_955_909_38,
+    0.000_037_107_198_257_767_750_921,
+    -0.000_001_743_968_415_414_095_118_6,
+    0.000_000_063_280_435_103_425_691_284,
+    -0.000_000_001_826_177_955_554_443_699_3,
+    0.000_000_000_042_913_461_874_553_582_546,
+    -0.000_000_000_000_837_033_383_761_016_671_72,
+    0.000_000_000_000_013_768_647_280_377_413_704,
+    -0.000_000_000_000_000_193_577_068_084_700_784_24,
 ];
 /// Terms that f64 resolves up to x = 1/2: the first one left out is below 7·10⁻¹⁷ of the sum's
 /// first.
 const SERIES_TERMS_MAX: usize = 12;
 
-impl<R: Real> Shape<R> {
+impl<U: Unit> Shape<U> {
     /// The shapes at `x` in \[0, 1\].
     #[inline]
     #[must_use]
-    pub fn at(x: R) -> Self {
+    pub fn at(x: U) -> Self {
         use core::f64::consts::PI;
-        let real = R::from_f64;
-        let half = real(0.5);
+        let unit = U::from_f64;
+        let half = unit(0.5);
         let mirrored = x > half;
         // Exact: 1 − x loses no digit for x above 1/2.
-        let left = R::ONE - x;
+        let left = U::ONE - x;
         let z = if mirrored { left } else { x };
-        let square = z * z;
-        let cube = square * z;
-        let length = series(&LENGTH, square) * (cube * square);
-        let speed = series(&SPEED, square) * (square * square);
-        let accel = cube * real(PI * PI / 3.0) - length * real(4.0 * PI * PI);
-        let snap = z * real(2.0 * PI) - accel * real(4.0 * PI);
-        let jerk = square * real(PI * PI) - speed * real(4.0 * PI * PI);
+        let y = z + z;
+        let square = y * y;
+        let cube = square * y;
+        let b = series(&LENGTH, square) * (cube * square);
+        let c = series(&SPEED, square) * (square * square);
+        let accel = cube * unit(PI * PI / 24.0) - b;
+        let jerk = square * unit(PI * PI / 4.0) - c;
+        let twice = accel + accel;
+        let snap = (y - (twice + twice)) * unit(PI);
+        let scale = unit(1.0 / (4.0 * PI * PI));
+        let (speed, length) = (c * scale, b * scale);
         if mirrored {
             // From x³ + z³ = 1 − 3xz and x² − z² = x − z.
-            let length_sum = real(1.0 / 12.0 - 1.0 / (8.0 * PI * PI)) - real(0.25) * (x * z);
+            let length_sum = unit(1.0 / 12.0 - 1.0 / (8.0 * PI * PI)) - unit(0.25) * (x * z);
             Self {
                 jerk,
                 accel: half - accel,
@@ -112,10 +119,10 @@ impl<R: Real> Shape<R> {
 }
 
 #[inline]
-fn series<R: Real>(coefficients: &[f64; SERIES_TERMS_MAX], square: R) -> R {
-    let mut sum = R::ZERO;
-    for &coefficient in coefficients.iter().take(R::SERIES_TERMS).rev() {
-        sum = sum * square + R::from_f64(coefficient);
+fn series<U: Unit>(coefficients: &[f64; SERIES_TERMS_MAX], square: U) -> U {
+    let mut sum = U::ZERO;
+    for &coefficient in coefficients.iter().take(U::SERIES_TERMS).rev() {
+        sum = sum * square + U::from_f64(coefficient);
     }
     sum
 }
@@ -123,6 +130,8 @@ fn series<R: Real>(coefficients: &[f64; SERIES_TERMS_MAX], square: R) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::num::Scalar;
+    use crate::num::sine::sin_cos_f64;
 
     /// The halves must meet, and end where S1 (7)–(9) say.
     #[test]
@@ -151,7 +160,7 @@ mod tests {
         let mut worst = [0.0_f64; 5];
         for i in 0..=1_000_000_u32 {
             let x = f64::from(i) / 1_000_000.0;
-            let (sine, cosine) = f64::sin_cos_half_turn(x.min(1.0 - x));
+            let (sine, cosine) = sin_cos_f64(f64::min(x, 1.0 - x));
             let double = 2.0 * sine * if x > 0.5 { -cosine } else { cosine };
             let shape = Shape::at(x);
             let pairs = [
@@ -184,5 +193,28 @@ mod tests {
         }
         println!("f32 relative error, acceleration, speed, length: {worst:?}");
         assert!(worst[0] < 5e-7 && worst[1] < 5e-7 && worst[2] < 2e-6, "{worst:?}");
+    }
+
+    /// Fixed point against f64 at the same argument: a few of its steps.
+    #[test]
+    fn fixed_point_is_good_to_a_few_steps() {
+        use fixed::types::I3F29;
+        let mut worst = [0.0_f64; 5];
+        for i in 0..=1_000_000_u64 {
+            let x = I3F29::from_fraction(i << 44);
+            let (narrow, wide) = (Shape::at(x), Shape::at(x.to_f64()));
+            let pairs = [
+                (narrow.jerk, wide.jerk),
+                (narrow.accel, wide.accel),
+                (narrow.speed, wide.speed),
+                (narrow.length, wide.length),
+                (narrow.snap, wide.snap),
+            ];
+            for (worst, (narrow, wide)) in worst.iter_mut().zip(pairs) {
+                *worst = worst.max((narrow.to_f64() - wide).abs() * 536_870_912.0);
+            }
+        }
+        println!("fixed point, steps of error: {worst:.2?}");
+        assert!(worst[..4].iter().all(|&steps| steps < 10.0) && worst[4] < 70.0, "{worst:?}");
     }
 }

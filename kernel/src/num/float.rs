@@ -1,18 +1,14 @@
-//! [`Real`] and [`Root`] of the two float types.
+//! The two float types.
 //!
 //! Roots come from `libm`: its square and cube roots are correctly rounded, and pure Rust.
 
-use super::sine;
-use super::{Real, Root};
+use super::{Real, Root, Scalar, Unit};
 
 macro_rules! float {
-    ($float:ident, $sine:path, $sqrt:path, $cbrt:path, terms: $terms:literal, piece_mm: $piece:literal, q32: $q32:path, fraction: |$f:ident| $fraction:expr) => {
-        impl Real for $float {
+    ($float:ident, $sqrt:path, $cbrt:path, terms: $terms:literal, piece_mm: $piece:literal, q32: $q32:path, fraction: |$f:ident| $fraction:expr) => {
+        impl Scalar for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
-            const EPSILON: f64 = $float::EPSILON as f64;
-            const SERIES_TERMS: usize = $terms;
-            const PIECE_MM_MAX: f64 = $piece;
 
             #[inline]
             #[allow(clippy::cast_possible_truncation)]
@@ -24,10 +20,35 @@ macro_rules! float {
             fn to_f64(self) -> f64 {
                 f64::from(self)
             }
+        }
+
+        impl Unit for $float {
+            const SERIES_TERMS: usize = $terms;
 
             #[inline]
             fn from_fraction($f: u64) -> Self {
                 $fraction
+            }
+        }
+
+        impl Real for $float {
+            type Unit = Self;
+            const EPSILON: f64 = $float::EPSILON as f64;
+            const PIECE_MM_MAX: f64 = $piece;
+
+            fn checked_from_f64(value: f64) -> Option<Self> {
+                let narrow = Self::from_f64(value);
+                narrow.is_finite().then_some(narrow)
+            }
+
+            #[inline]
+            fn scaled(self, by: Self) -> Self {
+                self * by
+            }
+
+            #[inline]
+            fn to_unit(self) -> Self {
+                self
             }
 
             #[inline]
@@ -43,16 +64,6 @@ macro_rules! float {
             #[inline]
             fn round_to_i16(self) -> i16 {
                 (if self < 0.0 { self - 0.5 } else { self + 0.5 }) as i16
-            }
-
-            #[inline]
-            fn is_finite(self) -> bool {
-                self.is_finite()
-            }
-
-            #[inline]
-            fn sin_cos_half_turn(x: Self) -> (Self, Self) {
-                $sine(x)
             }
         }
 
@@ -71,9 +82,9 @@ macro_rules! float {
 }
 
 // f32 keeps the top word only: one conversion instruction on a core with a single-precision FPU.
-float!(f32, sine::sin_cos_f32, libm::sqrtf, libm::cbrtf, terms: 7, piece_mm: 16.0, q32: f32_to_q32,
+float!(f32, libm::sqrtf, libm::cbrtf, terms: 7, piece_mm: 16.0, q32: f32_to_q32,
     fraction: |fraction| (fraction >> 32) as u32 as Self * (1.0 / 4_294_967_296.0));
-float!(f64, sine::sin_cos_f64, libm::sqrt, libm::cbrt, terms: 12, piece_mm: 1.0e6, q32: f64_to_q32,
+float!(f64, libm::sqrt, libm::cbrt, terms: 12, piece_mm: 1.0e6, q32: f64_to_q32,
     fraction: |fraction| (fraction >> 11) as Self * (1.0 / 9_007_199_254_740_992.0));
 
 /// The same bits on every core, by what the core has one instruction for.

@@ -1,23 +1,35 @@
-//! Numbers: what the kernel's arithmetic is generic over, and the sine of our own.
+//! Numbers: what the kernel's arithmetic is generic over.
 //!
-//! Two levels. [`Real`] is all the tick needs: add, subtract, multiply, compare, a sine, and exact
-//! conversions from and to the 32.32 fixed-point positions. [`Root`] adds what only planning needs
-//! (divide, roots); it never runs in the tick.
+//! Three levels, by what they are for:
+//!
+//! - [`Unit`]: normalised quantities of magnitude below 4, such as the time inside a phase, the law's
+//!   shapes, a direction. 32 bits suffice for them.
+//! - [`Real`]: quantities with a unit: offsets, velocities, accelerations, gains. A `Real` is scaled by
+//!   a `Unit`, and converts exactly from and to the 32.32 fixed-point positions. This is all the tick
+//!   needs.
+//! - [`Root`]: divide and take roots, for planning. Never in the tick.
+//!
+//! | `Real` | `Unit` | for |
+//! |---|---|---|
+//! | f32 | f32 | cores with a single-precision FPU |
+//! | f64 | f64 | the reference, on a PC |
+//! | [`Fixed`] | `I3F29` | cores without an FPU |
 //!
 //! Every operation is IEEE basic arithmetic or integer arithmetic, nothing is contracted to a fused
 //! multiply-add and no platform library is called, so the same input gives the same bits on every
 //! target.
 
+mod fixed_point;
 mod float;
-mod sine;
+pub mod sine;
+
+pub use fixed_point::Fixed;
 
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A number the tick can compute with.
-///
-/// Nothing here assumes a floating point: a fixed-point type can implement it.
-pub trait Real:
+/// What every number of the kernel can do.
+pub trait Scalar:
     Copy
     + Debug
     + Default
@@ -33,33 +45,12 @@ pub trait Real:
     const ZERO: Self;
     /// 1.
     const ONE: Self;
-    /// Distance from 1 to the next larger value.
-    const EPSILON: f64;
-    /// Terms of the power series of the law's shapes that this type resolves over half a phase, at
-    /// most 12 (see [`crate::law::shape`]).
-    const SERIES_TERMS: usize;
-    /// The longest piece of path whose local offset this type resolves to a small part of a
-    /// 0.1 µm count \[mm\]. Longer lines are cut into several pieces.
-    const PIECE_MM_MAX: f64;
 
-    /// The nearest value to `value`. For constants and configuration.
+    /// The nearest value to `value`, for constants and configuration. Fixed point saturates, and takes
+    /// what is not a number for 0; use [`Real::checked_from_f64`] for input.
     fn from_f64(value: f64) -> Self;
     /// The value, for records and background code.
     fn to_f64(self) -> f64;
-    /// A fraction of one in steps of 2⁻⁶⁴.
-    fn from_fraction(fraction: u64) -> Self;
-    /// A signed value in steps of 2⁻³².
-    fn from_q32(bits: i64) -> Self;
-    /// The value in steps of 2⁻³², truncated towards zero; saturates beyond ±2³¹, and is 0 if the
-    /// value is not a number.
-    fn to_q32(self) -> i64;
-    /// The nearest integer, halves away from zero; saturates, and is 0 if the value is not a number.
-    fn round_to_i16(self) -> i16;
-    /// False for infinities and what is not a number.
-    fn is_finite(self) -> bool;
-    /// (sin πx, cos πx) for `x` in \[0, 1/2\]; absolute error at most [`SINE_ERROR_F64`] in f64 and
-    /// [`SINE_ERROR_F32`] in f32.
-    fn sin_cos_half_turn(x: Self) -> (Self, Self);
 
     /// |x|.
     #[must_use]
@@ -78,12 +69,42 @@ pub trait Real:
     fn max(self, other: Self) -> Self {
         if other > self { other } else { self }
     }
+}
 
-    /// `self` limited to ±`bound`.
+/// A normalised quantity, |x| < 4.
+pub trait Unit: Scalar {
+    /// Terms of the power series of the law's shapes that this type resolves over half a phase, at
+    /// most 12 (see [`crate::law::shape`]).
+    const SERIES_TERMS: usize;
+
+    /// A fraction of one in steps of 2⁻⁶⁴.
+    fn from_fraction(fraction: u64) -> Self;
+}
+
+/// A quantity with a unit, that the tick can compute with.
+pub trait Real: Scalar {
+    /// The normalised quantities that scale it.
+    type Unit: Unit;
+    /// Distance from 1 to the next larger value.
+    const EPSILON: f64;
+    /// The longest piece of path whose local offset this type resolves to a small part of a
+    /// 0.1 µm count \[mm\]. Longer lines are cut into several pieces.
+    const PIECE_MM_MAX: f64;
+
+    /// The nearest value to `value`; `None` if it is not finite or beyond the type's range.
+    fn checked_from_f64(value: f64) -> Option<Self>;
+    /// This quantity times a normalised one.
     #[must_use]
-    fn clamp_abs(self, bound: Self) -> Self {
-        self.min(bound).max(-bound)
-    }
+    fn scaled(self, by: Self::Unit) -> Self;
+    /// A value below 4 in magnitude as a normalised one.
+    fn to_unit(self) -> Self::Unit;
+    /// A signed value in steps of 2⁻³².
+    fn from_q32(bits: i64) -> Self;
+    /// The value in steps of 2⁻³², truncated towards zero; saturates beyond ±2³¹, and is 0 if the
+    /// value is not a number.
+    fn to_q32(self) -> i64;
+    /// The nearest integer, halves away from zero; saturates, and is 0 if the value is not a number.
+    fn round_to_i16(self) -> i16;
 }
 
 /// What planning needs beyond [`Real`]. Background only.
@@ -95,5 +116,3 @@ pub trait Root: Real + Div<Output = Self> {
     #[must_use]
     fn cbrt(self) -> Self;
 }
-
-pub use sine::{SINE_ERROR_F32, SINE_ERROR_F64};

@@ -12,9 +12,9 @@
 //! What remains is rounding. `libm::sinf` computes in f64, which a single-precision FPU emulates at
 //! more than a thousand instructions; this needs about twenty multiplications.
 
-/// Largest absolute error of [`Real::sin_cos_half_turn`](super::Real::sin_cos_half_turn) in f32.
+/// Largest absolute error of [`sin_cos_f32`].
 pub const SINE_ERROR_F32: f64 = 1.2e-7;
-/// Largest absolute error of [`Real::sin_cos_half_turn`](super::Real::sin_cos_half_turn) in f64.
+/// Largest absolute error of [`sin_cos_f64`].
 pub const SINE_ERROR_F64: f64 = 2.3e-16;
 
 // (−1)^k π^(2k+1)/(2k+1)! and (−1)^k π^(2k)/(2k)!
@@ -44,7 +44,9 @@ macro_rules! sin_cos {
     ($name:ident, $float:ident, $sine_terms:literal, $cosine_terms:literal) => {
         #[inline]
         #[allow(clippy::cast_possible_truncation)]
-        pub(super) fn $name(x: $float) -> ($float, $float) {
+        /// (sin πx, cos πx) for `x` in \[0, 1/2\], in the type's own arithmetic.
+        #[must_use]
+        pub fn $name(x: $float) -> ($float, $float) {
             let beyond = x > 0.25;
             let x = if beyond { 0.5 - x } else { x };
             let square = x * x;

@@ -12,7 +12,7 @@
 //! ([`Real::PIECE_MM_MAX`]), so f32 offsets stay good to a hundredth of a 0.1 µm count.
 
 use crate::law::PathMotion;
-use crate::num::Real;
+use crate::num::{Real, Scalar};
 use crate::units::Position;
 
 /// What one axis is asked to do in one tick.
@@ -30,11 +30,11 @@ pub struct Setpoint<R> {
 
 /// The geometry of a piece, relative to its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Geometry<R, const AXES: usize> {
+pub enum Geometry<R: Real, const AXES: usize> {
     /// A straight line along a unit vector.
     Line {
         /// The unit vector, per axis.
-        direction: [R; AXES],
+        direction: [R::Unit; AXES],
     },
     /// Σ cₖ·uᵏ, k = 1 … 7, with u = s/length.
     Septic {
@@ -45,21 +45,9 @@ pub enum Geometry<R, const AXES: usize> {
     },
 }
 
-impl<R: Real, const AXES: usize> Geometry<R, AXES> {
-    /// The first axis with a coefficient that is not finite.
-    fn not_finite(&self) -> Option<usize> {
-        match self {
-            Self::Line { direction } => direction.iter().position(|c| !c.is_finite()),
-            Self::Septic { coefficients, .. } => {
-                coefficients.iter().position(|axis| axis.iter().any(|c| !c.is_finite()))
-            }
-        }
-    }
-}
-
 /// An item of the path stream. Immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece<R, const AXES: usize> {
+pub struct Piece<R: Real, const AXES: usize> {
     line: u32,
     length: Position,
     start: [Position; AXES],
@@ -70,7 +58,7 @@ pub struct Piece<R, const AXES: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PieceError {
-    /// A coefficient is not finite.
+    /// A coefficient is not finite, or beyond the number type's range.
     NotFinite {
         /// The axis, from 0.
         axis: usize,
@@ -120,7 +108,12 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         direction: [f64; AXES],
         length: Position,
     ) -> Result<Self, PieceError> {
-        Self::new(line, start, length, Geometry::Line { direction: direction.map(R::from_f64) })
+        if let Some(axis) = direction.iter().position(|d| !d.is_finite()) {
+            return Err(PieceError::NotFinite { axis });
+        }
+        // A component beyond 1 is refused with the tangent's magnitude; it must fit for that.
+        let direction = direction.map(|d| R::Unit::from_f64(d.clamp(-2.0, 2.0)));
+        Self::new(line, start, length, Geometry::Line { direction })
     }
 
     /// A polynomial piece of `length` from `start`; `coefficients` are c₁ … c₇ per axis \[mm\] over
@@ -135,11 +128,16 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         coefficients: [[f64; 7]; AXES],
         length: Position,
     ) -> Result<Self, PieceError> {
-        let geometry = Geometry::Septic {
-            coefficients: coefficients.map(|axis| axis.map(R::from_f64)),
-            per_mm: R::from_f64(1.0 / length.to_mm()),
-        };
-        Self::new(line, start, length, geometry)
+        let length_mm = length.to_mm();
+        let out_of_range = PieceError::Length { length_mm, longest_mm: R::PIECE_MM_MAX };
+        let per_mm = R::checked_from_f64(1.0 / length_mm).ok_or(out_of_range)?;
+        let mut real = [[R::ZERO; 7]; AXES];
+        for (axis, (real, coefficients)) in real.iter_mut().zip(&coefficients).enumerate() {
+            for (real, &c) in real.iter_mut().zip(coefficients) {
+                *real = R::checked_from_f64(c).ok_or(PieceError::NotFinite { axis })?;
+            }
+        }
+        Self::new(line, start, length, Geometry::Septic { coefficients: real, per_mm })
     }
 
     fn new(
@@ -153,9 +151,6 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
             return Err(PieceError::Length { length_mm: length.to_mm(), longest_mm });
         }
         let piece = Self { line, length, start, geometry };
-        if let Some(axis) = piece.geometry.not_finite() {
-            return Err(PieceError::NotFinite { axis });
-        }
         for tangent in [piece.tangent_at(R::ZERO), piece.tangent_at(length.to_offset())] {
             let square: f64 = tangent.iter().map(|t| t.to_f64() * t.to_f64()).sum();
             let magnitude = libm::sqrt(square);
@@ -203,26 +198,26 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
             Geometry::Line { direction } => {
                 for ((setpoint, &start), &d) in setpoints.iter_mut().zip(&self.start).zip(direction) {
                     *setpoint = Setpoint {
-                        position: start + Position::from_offset(d * s_mm),
-                        velocity_mm_s: d * v,
-                        accel_mm_s2: d * a,
-                        jerk_mm_s3: d * j,
+                        position: start + Position::from_offset(s_mm.scaled(d)),
+                        velocity_mm_s: v.scaled(d),
+                        accel_mm_s2: a.scaled(d),
+                        jerk_mm_s3: j.scaled(d),
                     };
                 }
             }
             Geometry::Septic { coefficients, per_mm } => {
-                let u = s_mm * *per_mm;
-                // In units of the piece's length, derivatives by u multiply powers of this.
-                let (v, a, j) = (v * *per_mm, a * *per_mm, j * *per_mm);
-                let square = v * v;
-                let (cube, mixed) = (square * v, R::from_f64(3.0) * v * a);
+                let u = (s_mm * *per_mm).to_unit();
+                // In units of the piece's length. Multiplied one by one, every intermediate result is
+                // of the size of what it is for, however short the piece.
+                let (w, a, j) = (v * *per_mm, a * *per_mm, j * *per_mm);
+                let three_a = a + a + a;
                 for ((setpoint, &start), c) in setpoints.iter_mut().zip(&self.start).zip(coefficients) {
                     let [p, p1, p2, p3] = derivatives(c, u);
                     *setpoint = Setpoint {
                         position: start + Position::from_offset(p),
-                        velocity_mm_s: p1 * v,
-                        accel_mm_s2: p2 * square + p1 * a,
-                        jerk_mm_s3: p3 * cube + p2 * mixed + p1 * j,
+                        velocity_mm_s: p1 * w,
+                        accel_mm_s2: p2 * w * w + p1 * a,
+                        jerk_mm_s3: (p3 * w * w + p2 * three_a) * w + p1 * j,
                     };
                 }
             }
@@ -233,21 +228,17 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
 
 /// Σ cₖ·uᵏ, k = 1 … 7, and its first three derivatives by u, by Horner's scheme on all four.
 #[inline]
-fn derivatives<R: Real>(c: &[R; 7], u: R) -> [R; 4] {
+fn derivatives<R: Real>(c: &[R; 7], u: R::Unit) -> [R; 4] {
     let (mut p, mut p1, mut p2, mut p3) = (R::ZERO, R::ZERO, R::ZERO, R::ZERO);
-    // p2 and p3 collect p''/2! and p'''/3!.
-    for &coefficient in c.iter().rev() {
-        p3 = p3 * u + p2;
-        p2 = p2 * u + p1;
-        p1 = p1 * u + p;
-        p = p * u + coefficient;
+    // p2 and p3 collect p''/2! and p'''/3!. The last round is for the constant term, which is 0.
+    for coefficient in c.iter().rev().copied().chain([R::ZERO]) {
+        p3 = p3.scaled(u) + p2;
+        p2 = p2.scaled(u) + p1;
+        p1 = p1.scaled(u) + p;
+        p = p.scaled(u) + coefficient;
     }
-    // The constant term is 0.
-    p3 = p3 * u + p2;
-    p2 = p2 * u + p1;
-    p1 = p1 * u + p;
-    p = p * u;
-    [p, p1, R::from_f64(2.0) * p2, R::from_f64(6.0) * p3]
+    let twice = p3 + p3;
+    [p, p1, p2 + p2, twice + twice + twice]
 }
 
 #[cfg(test)]

@@ -155,9 +155,10 @@ pub fn plan<R: Root>(
 fn check<R: Root>(blocks: &[Block<R>], start: R, end: R) -> Result<(), PlanError> {
     for (index, block) in blocks.iter().enumerate() {
         let length = block.length_mm;
+        let finite = |value: R| value.to_f64().is_finite();
         for (quantity, value, good) in [
             ("length [mm]", length, length >= R::ZERO && length <= R::from_f64(Position::LIMIT_MM)),
-            ("ceiling [mm/s]", block.cap_mm_s, block.cap_mm_s.is_finite() && block.cap_mm_s > R::ZERO),
+            ("ceiling [mm/s]", block.cap_mm_s, finite(block.cap_mm_s) && block.cap_mm_s > R::ZERO),
             ("joint feed [mm/s]", block.joint_mm_s, block.joint_mm_s >= R::ZERO),
         ] {
             if !good {

@@ -24,7 +24,7 @@ pub use accept::{PathRules, Rejection, SEGMENTS_PER_TICK_MAX};
 
 /// An item of the path stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PathItem<R, const AXES: usize> {
+pub enum PathItem<R: Real, const AXES: usize> {
     /// Geometry.
     Piece(Piece<R, AXES>),
     /// The stretch ends exactly here.
@@ -55,7 +55,7 @@ pub enum Refused<T> {
 
 /// Storage of both streams: `PIECES` and `SEGMENTS` items.
 #[derive(Debug)]
-pub struct Streams<R, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> {
+pub struct Streams<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> {
     path: Queue<PathItem<R, AXES>, PIECES>,
     feed: Queue<FeedItem<R>, SEGMENTS>,
     /// Ends of stretch entered so far. Written by the feeder only.
