@@ -3,7 +3,7 @@
 use crate::support::Random;
 use crate::{LIMITS, feeds, limits};
 use motion_kernel::law::{FeedSegment, FeedState, Law, Limits, PathMotion, Phase, Ramp, SegmentError, Ticks};
-use motion_kernel::num::{Real, Root};
+use motion_kernel::num::{Real, Root, Scalar};
 use motion_kernel::units::Position;
 
 /// Greatest errors of V, A, J and snap, in the number type's epsilon times the ramp's greatest value of
@@ -320,7 +320,7 @@ fn ramps_of_f32_make_segments() {
         let wide = limits(*random.pick(&LIMITS));
         let law = Law::new(crate::narrow::<f32>(&wide)).expect("positive");
         let (from, to) = feeds::<f32>(&mut random);
-        let ramp = Ramp::new(&law, <f32 as Real>::from_f64(from), <f32 as Real>::from_f64(to));
+        let ramp = Ramp::new(&law, <f32 as Scalar>::from_f64(from), <f32 as Scalar>::from_f64(to));
         let length = Position::from_mm(Root::sqrt(ramp.length_mm()).to_f64().powi(2)).expect("in range");
         let segment = FeedSegment::<f32>::ramp(&ramp, length, 5e-4).expect("a segment");
         ends_are_exact(&segment);
