@@ -4,8 +4,12 @@
 //! encoders ─► latch ─► executor ─► axis regulators ─► converter codes ─► outputs
 //! ```
 //!
+//! The kernel starts disabled and does nothing to the drives until [`Kernel::enable`]; then it holds the
+//! machine where it stands for the time that drives and brakes need, and only then executes the streams.
+//!
 //! A fault ends in one defined way: it is latched with the tick it was found in, every output goes to
-//! 0 V, the drives are disabled, and both stay so until [`Kernel::clear_fault`].
+//! the voltage of standing still (0 V plus trim), the drives are disabled, and both stay so until
+//! [`Kernel::clear_fault`].
 
 use crate::axis::{AxisConfig, AxisOutput, AxisState};
 use crate::exec::{Executed, Executor};
@@ -14,7 +18,18 @@ use crate::hal::{DriveEnable, Encoder, VelocityChannel};
 use crate::num::Real;
 use crate::queue::Intake;
 use crate::trace::Trace;
-use crate::units::{Counts, DacCode, Position};
+use crate::units::{Counts, Position};
+
+/// Whether the drives may move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Power {
+    Off,
+    /// Enabled and held still for so many more ticks.
+    Starting {
+        ticks_left: u32,
+    },
+    On,
+}
 
 /// The real-time motion kernel of a machine with `AXES` axes.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +38,9 @@ pub struct Kernel<R: Real, const AXES: usize> {
     executor: Executor<R, AXES>,
     axes: [AxisState<R>; AXES],
     tick: u64,
-    enabled: bool,
+    power: Power,
+    /// What the drives were last told; `None` before the first time and where that failed.
+    told: Option<bool>,
     last: Executed<R, AXES>,
     counts: [Counts; AXES],
     fault: Option<Fault<R>>,
@@ -44,11 +61,26 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             executor,
             axes,
             tick: 0,
-            enabled: false,
+            power: Power::Off,
+            told: None,
             last: executor.resting(),
             counts,
             fault: None,
         }
+    }
+
+    /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (what
+    /// brakes and relays need), then executes the streams. Without effect in a fault.
+    pub fn enable(&mut self, settle_ticks: u32) {
+        if self.fault.is_none() && self.power == Power::Off {
+            self.power = Power::Starting { ticks_left: settle_ticks };
+        }
+    }
+
+    /// Disables the drives with the next tick, wherever the machine is. The motion under way is lost:
+    /// go on with [`Kernel::stand_here`] and new streams.
+    pub fn disable(&mut self) {
+        self.power = Power::Off;
     }
 
     /// One control tick: reads the encoders, executes the streams, regulates every axis, writes the
@@ -61,38 +93,59 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             Ok(counts) => self.counts = counts,
             Err(_) => self.latch_fault(FaultKind::Encoder),
         }
-        if self.fault.is_none() {
+        self.execute(intake);
+        let axes = self.regulate();
+        if hal.write(&axes.map(|axis| axis.code)).is_err() {
+            self.latch_fault(FaultKind::Output);
+        }
+        // Repeated until the drives have taken it, above all when they are to be disabled.
+        let enable = self.power != Power::Off;
+        if self.told != Some(enable) {
+            self.told = hal.set_enabled(enable).is_ok().then_some(enable);
+            if self.told.is_none() {
+                self.latch_fault(FaultKind::Enable);
+            }
+        }
+        let trace = Trace { tick: self.tick, executed: self.last, axes, fault: self.fault };
+        self.tick = self.tick.wrapping_add(1);
+        trace
+    }
+
+    fn execute(&mut self, intake: &mut Intake<'_, R, AXES>) {
+        match &mut self.power {
+            Power::Off => {}
+            Power::Starting { ticks_left: 0 } => self.power = Power::On,
+            Power::Starting { ticks_left } => *ticks_left -= 1,
+            Power::On => {}
+        }
+        if self.power == Power::On {
             match self.executor.tick(intake) {
                 Ok(executed) => self.last = executed,
                 Err(fault) => self.latch_fault(FaultKind::Executor(fault)),
             }
         }
+    }
+
+    /// The outputs of all axes. Where the drives are off they stand still, and regulators and peaks
+    /// keep what they had.
+    fn regulate(&mut self) -> [AxisOutput<R>; AXES] {
         let mut outputs = [AxisOutput::default(); AXES];
-        let parts = self.axes.iter_mut().zip(&self.config).zip(&self.last.setpoints).zip(&self.counts);
-        for (output, (((axis, config), setpoint), &counts)) in outputs.iter_mut().zip(parts) {
-            *output = axis.tick(config, setpoint, counts);
-        }
-        if let Some((axis, output)) = outputs.iter().enumerate().find(|(_, output)| output.lost) {
-            self.latch_fault(FaultKind::FollowingError { axis, error_mm: output.following_error_mm });
-        }
-        if self.fault.is_some() {
-            for output in &mut outputs {
-                output.code = DacCode::ZERO;
+        if self.power != Power::Off {
+            let parts = self.axes.iter_mut().zip(&self.config).zip(&self.last.setpoints).zip(&self.counts);
+            for (output, (((axis, config), setpoint), &counts)) in outputs.iter_mut().zip(parts) {
+                *output = axis.tick(config, setpoint, counts);
+            }
+            if let Some((axis, output)) = outputs.iter().enumerate().find(|(_, output)| output.lost) {
+                self.latch_fault(FaultKind::FollowingError { axis, error_mm: output.following_error_mm });
             }
         }
-        if hal.write(&outputs.map(|output| output.code)).is_err() {
-            self.latch_fault(FaultKind::Output);
-        }
-        let enable = self.fault.is_none();
-        if enable != self.enabled {
-            match hal.set_enabled(enable) {
-                Ok(()) => self.enabled = enable,
-                Err(_) => self.latch_fault(FaultKind::Enable),
+        if self.power == Power::Off {
+            let parts = self.axes.iter().zip(&self.config).zip(&self.last.setpoints).zip(&self.counts);
+            for (output, (((axis, config), setpoint), &counts)) in outputs.iter_mut().zip(parts) {
+                *output = axis.stand_still(config, setpoint, counts);
             }
         }
-        let trace = Trace { tick: self.tick, executed: self.last, axes: outputs, fault: self.fault };
-        self.tick = self.tick.wrapping_add(1);
-        trace
+        outputs
     }
 
     /// Ends a program stop.
@@ -105,19 +158,28 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.fault
     }
 
-    /// Clears the fault and starts anew at rest at the actual position. What was queued must have
-    /// been dropped before: use new streams.
-    pub fn clear_fault(&mut self) {
+    /// Clears the fault and stands at the actual position, as [`Kernel::stand_here`], which it returns.
+    /// The drives stay disabled until [`Kernel::enable`].
+    pub fn clear_fault(&mut self) -> [Position; AXES] {
+        self.fault = None;
+        self.stand_here()
+    }
+
+    /// Gives up the motion that is under way or queued and takes the actual position for the set
+    /// position; the drives are disabled. Returns the position: split the streams anew for it, which
+    /// drops what is queued.
+    pub fn stand_here(&mut self) -> [Position; AXES] {
+        self.power = Power::Off;
         let mut position = [Position::ZERO; AXES];
         for (((position, axis), config), &counts) in
             position.iter_mut().zip(&mut self.axes).zip(&self.config).zip(&self.counts)
         {
-            *position = config.encoder.position(counts) + axis.offset;
+            *position = axis.position(config, counts);
             axis.regulator = crate::axis::RegulatorState::default();
         }
         self.executor = Executor::new(position);
         self.last = self.executor.resting();
-        self.fault = None;
+        position
     }
 
     /// The largest following error of every axis since the last call \[mm\].
@@ -129,8 +191,9 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         peaks
     }
 
-    /// The first fault stays.
+    /// The first fault stays, and the drives go off.
     fn latch_fault(&mut self, kind: FaultKind<R>) {
+        self.power = Power::Off;
         if self.fault.is_none() {
             self.fault = Some(Fault { tick: self.tick, kind });
         }

@@ -65,10 +65,34 @@ impl<R: Real> AxisState<R> {
         self.offset = position - config.encoder.position(counts);
     }
 
+    /// The actual position at the encoder's reading.
+    #[inline]
+    pub fn position(&self, config: &AxisConfig<R>, counts: Counts) -> Position {
+        config.encoder.position(counts) + self.offset
+    }
+
+    /// The output of an axis whose drive is off: the voltage at which it stands still.
+    #[inline]
+    pub fn stand_still(
+        &self,
+        config: &AxisConfig<R>,
+        setpoint: &Setpoint<R>,
+        counts: Counts,
+    ) -> AxisOutput<R> {
+        let actual = self.position(config, counts);
+        AxisOutput {
+            actual,
+            following_error_mm: (setpoint.position - actual).to_offset(),
+            code: config.output.code(R::ZERO),
+            saturated: false,
+            lost: false,
+        }
+    }
+
     /// One control tick.
     #[inline]
     pub fn tick(&mut self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, counts: Counts) -> AxisOutput<R> {
-        let actual = config.encoder.position(counts) + self.offset;
+        let actual = self.position(config, counts);
         // Subtracted in fixed point, converted afterwards.
         let following_error_mm: R = (setpoint.position - actual).to_offset();
         self.peak_following_error_mm = self.peak_following_error_mm.max(following_error_mm.abs());

@@ -51,8 +51,8 @@ pub struct Regulator<R> {
 /// What the regulator remembers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RegulatorState<R> {
-    /// Σε \[mm\].
-    sum_mm: R,
+    /// ki·Σε \[mm/s\]: in units of the output, so that a new ki does not move it.
+    integral_mm_s: R,
     /// ε of the tick before \[mm\]; none in the first tick, so that it has no derivative kick.
     last_error_mm: Option<R>,
 }
@@ -67,35 +67,37 @@ pub struct Command<R> {
 }
 
 impl<R: Real> Regulator<R> {
-    /// The regulator for a control tick of `tick_s`.
+    /// The regulator for a control tick of `tick_s` and following errors up to `error_limit_mm`, beyond
+    /// which the axis faults.
     ///
     /// # Errors
-    /// A gain or the tick is not finite, kp, ki or kd is negative, or the tick is not positive.
-    pub fn new(gains: Gains, feedforward: Feedforward, tick_s: f64) -> Result<Self, ScaleError> {
-        for (quantity, value, least) in [
-            ("kp [1/s]", gains.kp_per_s, 0.0),
-            ("ki [1/s²]", gains.ki_per_s2, 0.0),
-            ("kd [1]", gains.kd, 0.0),
-            ("velocity feedforward [1]", feedforward.velocity, f64::MIN),
-            ("acceleration feedforward [s]", feedforward.accel_s, f64::MIN),
-            ("jerk feedforward [s²]", feedforward.jerk_s2, f64::MIN),
-            ("tick [s]", tick_s, f64::MIN_POSITIVE),
-        ] {
-            if !(value >= least && value.is_finite()) {
-                return Err(ScaleError {
-                    quantity,
-                    value,
-                    expected: "a finite number, not below 0 for a gain",
-                });
-            }
+    /// A gain or the tick is not finite, kp, ki or kd is negative, the tick is not positive, or a gain
+    /// at the error limit is beyond the number type's range.
+    pub fn new(
+        gains: Gains,
+        feedforward: Feedforward,
+        tick_s: f64,
+        error_limit_mm: f64,
+    ) -> Result<Self, ScaleError> {
+        if !(tick_s > 0.0 && tick_s.is_finite()) {
+            return Err(ScaleError { quantity: "tick [s]", value: tick_s, expected: "a positive number" });
         }
+        let real = |quantity, value: f64, per_mm: f64, least: f64| {
+            // With room for the sum of all the terms.
+            let fits = R::checked_from_f64(8.0 * libm::fabs(value) * per_mm).is_some();
+            R::checked_from_f64(value).filter(|_| value >= least && fits).ok_or(ScaleError {
+                quantity,
+                value,
+                expected: "a number within the kernel's range, not below 0 for a gain",
+            })
+        };
         Ok(Self {
-            kp: R::from_f64(gains.kp_per_s),
-            ki: R::from_f64(gains.ki_per_s2 * tick_s),
-            kd: R::from_f64(gains.kd / tick_s),
-            velocity: R::from_f64(feedforward.velocity),
-            accel: R::from_f64(feedforward.accel_s),
-            jerk: R::from_f64(feedforward.jerk_s2),
+            kp: real("kp [1/s]", gains.kp_per_s, error_limit_mm, 0.0)?,
+            ki: real("ki [1/s²]", gains.ki_per_s2 * tick_s, error_limit_mm, 0.0)?,
+            kd: real("kd [1]", gains.kd / tick_s, 2.0 * error_limit_mm, 0.0)?,
+            velocity: real("velocity feedforward [1]", feedforward.velocity, 1.0, f64::MIN)?,
+            accel: real("acceleration feedforward [s]", feedforward.accel_s, 1.0, f64::MIN)?,
+            jerk: real("jerk feedforward [s²]", feedforward.jerk_s2, 1.0, f64::MIN)?,
         })
     }
 
@@ -113,13 +115,13 @@ impl<R: Real> Regulator<R> {
         let feedforward = self.velocity * setpoint.velocity_mm_s
             + self.accel * setpoint.accel_mm_s2
             + self.jerk * setpoint.jerk_mm_s3;
-        let sum_mm = state.sum_mm + error_mm;
-        let wanted = feedforward + self.kp * error_mm + self.kd * change_mm + self.ki * sum_mm;
+        let integral_mm_s = state.integral_mm_s + self.ki * error_mm;
+        let wanted = feedforward + self.kp * error_mm + self.kd * change_mm + integral_mm_s;
         let (least, greatest) = limits;
         let velocity_mm_s = wanted.min(greatest).max(least);
         let winding_up = (wanted > greatest && error_mm > R::ZERO) || (wanted < least && error_mm < R::ZERO);
         if !winding_up {
-            state.sum_mm = sum_mm;
+            state.integral_mm_s = integral_mm_s;
         }
         Command { velocity_mm_s, saturated: wanted > greatest || wanted < least }
     }
@@ -134,7 +136,7 @@ mod tests {
     const NO_FEEDFORWARD: Feedforward = Feedforward { velocity: 0.0, accel_s: 0.0, jerk_s2: 0.0 };
 
     fn regulator(gains: Gains, feedforward: Feedforward) -> Regulator<f64> {
-        Regulator::new(gains, feedforward, TICK_S).expect("valid")
+        Regulator::new(gains, feedforward, TICK_S, 1.0).expect("valid")
     }
 
     /// S4 (1) written out, on a random sequence of errors and set-points.
@@ -196,7 +198,11 @@ mod tests {
     #[test]
     fn refuses_gains_that_are_not_numbers() {
         let gains = Gains { kp_per_s: f64::NAN, ..Gains::default() };
-        assert!(Regulator::<f32>::new(gains, NO_FEEDFORWARD, TICK_S).is_err());
-        assert!(Regulator::<f32>::new(Gains::default(), NO_FEEDFORWARD, 0.0).is_err());
+        assert!(Regulator::<f32>::new(gains, NO_FEEDFORWARD, TICK_S, 1.0).is_err());
+        assert!(Regulator::<f32>::new(Gains::default(), NO_FEEDFORWARD, 0.0, 1.0).is_err());
+        // 8·10⁷·100 mm/s do not fit 32.32 bits.
+        let strong = Gains { kp_per_s: 1e7, ..Gains::default() };
+        assert!(Regulator::<crate::num::Fixed>::new(strong, NO_FEEDFORWARD, TICK_S, 220.0).is_err());
+        assert!(Regulator::<f32>::new(strong, NO_FEEDFORWARD, TICK_S, 220.0).is_ok());
     }
 }

@@ -21,9 +21,10 @@ use walk::{WalkError, Walker};
 
 pub use walk::PIECES_PER_TICK_MAX;
 
-/// Greatest number of steps of the executor within one tick: three phases and an end of stretch for
-/// each segment that ends, and for the one that begins.
-pub const STEPS_PER_TICK_MAX: usize = 4 * (SEGMENTS_PER_TICK_MAX + 1) + 1;
+/// Greatest number of steps of the executor within one tick. A segment takes one to be taken, three for
+/// its phases, and with a stretch of its own two more to end and to begin; so do the segments that end
+/// in the tick and the one that begins in it.
+pub const STEPS_PER_TICK_MAX: usize = 6 * (SEGMENTS_PER_TICK_MAX + 1) + 1;
 
 /// What the executor is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +52,8 @@ pub enum ExecFault {
     TooManyPieces,
     /// More segments ended within one tick than the bound.
     TooManySegments,
+    /// A stretch does not start where the machine stands.
+    NotHere,
 }
 
 /// The result of one tick.
@@ -125,6 +128,7 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     /// The streams ran dry inside a stretch, or held more than the tick's bound. The executor's state
     /// is then of no further use; the kernel latches the fault.
     pub fn tick(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<Executed<R, AXES>, ExecFault> {
+        self.walker.start_tick();
         self.advance(intake)?;
         let motion = match &self.activity {
             Activity::Moving(moving) => moving.at(),
@@ -223,5 +227,6 @@ fn walk_fault(error: WalkError) -> ExecFault {
     match error {
         WalkError::Starved => ExecFault::PathStarved,
         WalkError::TooManyPieces => ExecFault::TooManyPieces,
+        WalkError::NotHere => ExecFault::NotHere,
     }
 }

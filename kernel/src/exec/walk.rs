@@ -9,9 +9,13 @@ use crate::path::{Piece, Setpoint};
 use crate::queue::{Intake, PathItem};
 use crate::units::Position;
 
-/// How many pieces may end within one tick. At 20 m/min and 0.5 ms a tick that is pieces of 10 µm.
-/// Planning must refuse a denser program; the executor's fault is the last line of defence.
+/// How many pieces may end within one tick, whatever stretches they belong to. At 20 m/min and 0.5 ms
+/// a tick that is pieces of 10 µm. Planning must refuse a denser program; the executor's fault is the
+/// last line of defence.
 pub const PIECES_PER_TICK_MAX: usize = 16;
+
+/// How far a stretch may start from where the machine stands \[mm\]: rounding of f32 over a piece.
+const START_TOLERANCE: Position = Position::from_bits(1 << 16);
 
 /// Why the walk can't go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,6 +24,8 @@ pub(super) enum WalkError {
     Starved,
     /// More than [`PIECES_PER_TICK_MAX`] pieces ended.
     TooManyPieces,
+    /// The stretch starts elsewhere.
+    NotHere,
 }
 
 /// Where on the path the machine is.
@@ -30,16 +36,24 @@ pub(super) struct Walker<R: Real, const AXES: usize> {
     piece_start: Position,
     /// Where the machine rests between stretches.
     rest: [Position; AXES],
+    /// How many more pieces may end in this tick.
+    ends_left: usize,
 }
 
 impl<R: Real, const AXES: usize> Walker<R, AXES> {
     pub(super) fn new(rest: [Position; AXES]) -> Self {
-        Self { piece: None, piece_start: Position::ZERO, rest }
+        Self { piece: None, piece_start: Position::ZERO, rest, ends_left: PIECES_PER_TICK_MAX }
     }
 
     /// Program line of the current piece; 0 at rest.
     pub(super) fn program_line(&self) -> u32 {
         self.piece.as_ref().map_or(0, Piece::program_line)
+    }
+
+    /// A new tick: the bound starts anew.
+    #[inline]
+    pub(super) fn start_tick(&mut self) {
+        self.ends_left = PIECES_PER_TICK_MAX;
     }
 
     /// Goes forward to the piece that contains path position `s`.
@@ -52,10 +66,15 @@ impl<R: Real, const AXES: usize> Walker<R, AXES> {
                     return Ok(());
                 }
                 self.piece_start = self.piece_start + piece.length();
-                self.piece = None;
+                self.end_piece()?;
             }
             match intake.take_path() {
-                Some(PathItem::Piece(piece)) => self.piece = Some(piece),
+                Some(PathItem::Piece(piece)) => {
+                    if self.piece_start == Position::ZERO && !self.stands_at(&piece.start()) {
+                        return Err(WalkError::NotHere);
+                    }
+                    self.piece = Some(piece);
+                }
                 Some(PathItem::EndOfStretch(_)) | None => return Err(WalkError::Starved),
             }
         }
@@ -68,14 +87,30 @@ impl<R: Real, const AXES: usize> Walker<R, AXES> {
         for _ in 0..=PIECES_PER_TICK_MAX {
             match intake.take_path() {
                 Some(PathItem::EndOfStretch(end)) => {
-                    *self = Self::new(end);
+                    self.end_piece()?;
+                    (self.piece_start, self.rest) = (Position::ZERO, end);
                     return Ok(());
                 }
-                Some(PathItem::Piece(_)) => {}
+                Some(PathItem::Piece(_)) => self.end_piece()?,
                 None => return Err(WalkError::Starved),
             }
         }
         Err(WalkError::TooManyPieces)
+    }
+
+    #[inline]
+    fn end_piece(&mut self) -> Result<(), WalkError> {
+        self.piece = None;
+        self.ends_left = self.ends_left.checked_sub(1).ok_or(WalkError::TooManyPieces)?;
+        Ok(())
+    }
+
+    fn stands_at(&self, start: &[Position; AXES]) -> bool {
+        let tolerance = START_TOLERANCE;
+        self.rest.iter().zip(start).all(|(&rest, &start)| {
+            let gap = start - rest;
+            gap <= tolerance && -gap <= tolerance
+        })
     }
 
     /// The set-points at path position `motion.s` of the current piece, or at rest.

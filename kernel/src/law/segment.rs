@@ -7,9 +7,11 @@
 //! **Time** is counted in ticks with 32 fractional bits and divided by nothing: a phase keeps the
 //! part of itself that passes in one tick, with 64 fractional bits, and adds it up.
 //!
-//! **Position** has two parts. What grows with the feed (F₀·t) is 32.32 fixed point times a fraction,
-//! good to length·2⁻³² (1.9 nm over 8 m) whatever the number type. What the ramp adds or takes away
-//! is a `Real`: at most the change of feed times its duration.
+//! **Position** in a rise is F₀·t + Jp·t₁³·(x³/12 − x/(8π²) + sin 2πx/(16π³)) with x = t/t₁. All but the
+//! sine is fixed point times fractions, good to a few position steps and length·2⁻³² (1.9 nm over 8 m)
+//! whatever the number type; the sine's part, a five-hundredth of Jp·t₁³, is a `Real`.
+
+use core::f64::consts::PI;
 
 use super::ramp::Ramp;
 use super::shape::Shape;
@@ -43,10 +45,10 @@ impl Ticks {
         self.0 as f64 / 4_294_967_296.0
     }
 
-    /// Sum; wraps beyond 2³² ticks.
+    /// Sum; saturates at 2³² ticks.
     #[must_use]
     pub const fn plus(self, other: Self) -> Self {
-        Self(self.0.wrapping_add(other.0))
+        Self(self.0.saturating_add(other.0))
     }
 
     /// What is left of `self` after `other`, or `None` if `other` is longer.
@@ -172,9 +174,10 @@ pub struct FeedSegment<R> {
     ramp: Ramp<R>,
     rise: Clock,
     hold: Clock,
-    /// F₀·t₁ and F·t₁, in position steps.
+    /// F₀·t₁ and −F·t₁ less Jp·t₁³/(8π²), and Jp·t₁³/12, in position steps.
     rise_bits: i64,
     fall_bits: i64,
+    cube_bits: i64,
     /// S(t₁), V(t₁)·(t₂−t₁) and A(t₁)·(t₂−t₁)²/2, in position steps.
     hold_start_bits: i64,
     hold_linear_bits: i64,
@@ -182,11 +185,11 @@ pub struct FeedSegment<R> {
     hold_v_mm_s: R,
     hold_a_mm_s2: R,
     hold_gain_mm_s: R,
-    /// ±Jp times 1, t₁, t₁², t₁³ and π/t₁: the scales of [`Shape`].
+    /// ±Jp times 1, t₁, t₁², t₁³/(16π³) and π/t₁: the scales of [`Shape`].
     jerk_mm_s3: R,
     accel_mm_s2: R,
     speed_mm_s: R,
-    length_mm: R,
+    sine_mm: R,
     snap_mm_s4: R,
 }
 
@@ -262,7 +265,7 @@ impl<R: Real> FeedSegment<R> {
         let real = |quantity, value: f64| {
             R::checked_from_f64(value).ok_or(SegmentError::OutOfRange { quantity, value })
         };
-        let snap = if t1_s > 0.0 { core::f64::consts::PI * jerk / t1_s } else { 0.0 };
+        let snap = if t1_s > 0.0 { PI * jerk / t1_s } else { 0.0 };
         Ok(Self {
             length,
             ramp: Ramp {
@@ -275,8 +278,9 @@ impl<R: Real> FeedSegment<R> {
             },
             rise: Clock::new(rise_ticks),
             hold: Clock::new(hold_ticks),
-            rise_bits: bits("entry feed · t1 [mm]", from_mm_s * t1_s)?,
-            fall_bits: bits("exit feed · t1 [mm]", to_mm_s * t1_s)?,
+            rise_bits: bits("entry feed · t1 [mm]", from_mm_s * t1_s - length_scale / (8.0 * PI * PI))?,
+            fall_bits: bits("exit feed · t1 [mm]", -to_mm_s * t1_s - length_scale / (8.0 * PI * PI))?,
+            cube_bits: bits("jerk · t1³/12 [mm]", length_scale / 12.0)?,
             hold_start_bits: bits("length of the rise [mm]", from_mm_s * t1_s + length_scale * end.length)?,
             hold_linear_bits: bits("feed · hold time [mm]", hold_v * hold_s)?,
             hold_square_bits: bits("length gained in the hold [mm]", 0.5 * hold_a * hold_s * hold_s)?,
@@ -286,7 +290,7 @@ impl<R: Real> FeedSegment<R> {
             jerk_mm_s3: real("peak jerk [mm/s³]", jerk)?,
             accel_mm_s2: real("jerk · t1 [mm/s²]", accel)?,
             speed_mm_s: real("jerk · t1² [mm/s]", speed)?,
-            length_mm: real("jerk · t1³ [mm]", length_scale)?,
+            sine_mm: real("jerk · t1³ [mm]", length_scale / (16.0 * PI * PI * PI))?,
             snap_mm_s4: real("peak snap [mm/s⁴]", snap)?,
         })
     }
@@ -364,16 +368,17 @@ impl<R: Real> FeedSegment<R> {
         let fraction = if falling { !fraction } else { fraction };
         let shape = Shape::at(R::Unit::from_fraction(fraction));
         let (gained, jerk) = (self.speed_mm_s.scaled(shape.speed), self.jerk_mm_s3.scaled(shape.jerk));
-        let offset = Position::from_offset(self.length_mm.scaled(shape.length));
+        let cube = portion(portion(portion(self.cube_bits, fraction), fraction), fraction);
+        let bent = Position::from_bits(cube) + Position::from_offset(self.sine_mm.scaled(shape.snap));
         let (s, v_mm_s, j_mm_s3) = if falling {
             let even = Position::from_bits(portion(self.fall_bits, fraction));
-            (self.length - even, self.ramp.to_mm_s - gained, -jerk)
+            (self.length + even, self.ramp.to_mm_s - gained, -jerk)
         } else {
             let even = Position::from_bits(portion(self.rise_bits, fraction));
             (even, self.ramp.from_mm_s + gained, jerk)
         };
         PathMotion {
-            s: s + offset,
+            s: s + bent,
             v_mm_s,
             a_mm_s2: self.accel_mm_s2.scaled(shape.accel),
             j_mm_s3,

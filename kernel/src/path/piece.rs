@@ -12,7 +12,7 @@
 //! ([`Real::PIECE_MM_MAX`]), so f32 offsets stay good to a hundredth of a 0.1 µm count.
 
 use crate::law::PathMotion;
-use crate::num::{Real, Scalar};
+use crate::num::{Real, Scalar, Unit};
 use crate::units::Position;
 
 /// What one axis is asked to do in one tick.
@@ -36,12 +36,14 @@ pub enum Geometry<R: Real, const AXES: usize> {
         /// The unit vector, per axis.
         direction: [R::Unit; AXES],
     },
-    /// Σ cₖ·uᵏ, k = 1 … 7, with u = s/length.
+    /// length·Σ qₖ·uᵏ, k = 1 … 7, with u = s/length.
     Septic {
-        /// c₁ … c₇ of every axis \[mm\].
-        coefficients: [[R; 7]; AXES],
+        /// q₁ … q₇ of every axis: parts of the length, so that |Σ k·qₖ·uᵏ⁻¹| over the axes is 1.
+        coefficients: [[R::Unit; 7]; AXES],
         /// 1/length \[1/mm\].
         per_mm: R,
+        /// length \[mm\].
+        length_mm: R,
     },
 }
 
@@ -58,10 +60,17 @@ pub struct Piece<R: Real, const AXES: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PieceError {
-    /// A coefficient is not finite, or beyond the number type's range.
+    /// A direction is not finite.
     NotFinite {
         /// The axis, from 0.
         axis: usize,
+    },
+    /// A coefficient is not finite, or not below twice the length.
+    OutOfRange {
+        /// The axis, from 0.
+        axis: usize,
+        /// The coefficient \[mm\].
+        coefficient_mm: f64,
     },
     /// The length is not positive, or longer than the number type resolves.
     Length {
@@ -70,7 +79,7 @@ pub enum PieceError {
         /// The longest allowed \[mm\].
         longest_mm: f64,
     },
-    /// The derivative by arc length is not a unit vector at an end.
+    /// The derivative by arc length is not a unit vector.
     NotArcLength {
         /// Its magnitude.
         magnitude: f64,
@@ -80,7 +89,11 @@ pub enum PieceError {
 impl core::fmt::Display for PieceError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::NotFinite { axis } => write!(f, "a coefficient of axis {axis} is not finite"),
+            Self::NotFinite { axis } => write!(f, "a direction of axis {axis} that is not a number"),
+            Self::OutOfRange { axis, coefficient_mm } => write!(
+                f,
+                "coefficient {coefficient_mm} mm of axis {axis}: expected less than twice the length"
+            ),
             Self::Length { length_mm, longest_mm } => {
                 write!(f, "length {length_mm} mm: expected more than 0 and at most {longest_mm} mm")
             }
@@ -93,7 +106,9 @@ impl core::fmt::Display for PieceError {
 
 impl core::error::Error for PieceError {}
 
-/// How far the tangent's magnitude at an end of a piece may be from 1: a part in 10⁵ of the feed.
+/// In how many parts a piece is cut to check its tangent.
+const TANGENT_CHECKS: u8 = 13;
+/// How far the tangent's magnitude may be from 1: a part in 10⁵ of the feed.
 const TANGENT_TOLERANCE: f64 = 1.0e-5;
 
 impl<R: Real, const AXES: usize> Piece<R, AXES> {
@@ -131,13 +146,19 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         let length_mm = length.to_mm();
         let out_of_range = PieceError::Length { length_mm, longest_mm: R::PIECE_MM_MAX };
         let per_mm = R::checked_from_f64(1.0 / length_mm).ok_or(out_of_range)?;
-        let mut real = [[R::ZERO; 7]; AXES];
-        for (axis, (real, coefficients)) in real.iter_mut().zip(&coefficients).enumerate() {
-            for (real, &c) in real.iter_mut().zip(coefficients) {
-                *real = R::checked_from_f64(c).ok_or(PieceError::NotFinite { axis })?;
+        let mut unit = [[R::Unit::ZERO; 7]; AXES];
+        for (axis, (unit, coefficients)) in unit.iter_mut().zip(&coefficients).enumerate() {
+            for (unit, &c) in unit.iter_mut().zip(coefficients) {
+                let part = c / length_mm;
+                // Half the range of a unit, so that the derivatives' sums have room.
+                if !(libm::fabs(part) < 2.0) {
+                    return Err(PieceError::OutOfRange { axis, coefficient_mm: c });
+                }
+                *unit = R::Unit::from_f64(part);
             }
         }
-        Self::new(line, start, length, Geometry::Septic { coefficients: real, per_mm })
+        let geometry = Geometry::Septic { coefficients: unit, per_mm, length_mm: R::from_f64(length_mm) };
+        Self::new(line, start, length, geometry)
     }
 
     fn new(
@@ -151,7 +172,10 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
             return Err(PieceError::Length { length_mm: length.to_mm(), longest_mm });
         }
         let piece = Self { line, length, start, geometry };
-        for tangent in [piece.tangent_at(R::ZERO), piece.tangent_at(length.to_offset())] {
+        // |r'| is a polynomial of degree 12: at the ends and in between, so that none hides a bulge.
+        for part in 0..=TANGENT_CHECKS {
+            let s_mm = length.to_mm() * f64::from(part) / f64::from(TANGENT_CHECKS);
+            let tangent = piece.tangent_at(R::from_f64(s_mm));
             let square: f64 = tangent.iter().map(|t| t.to_f64() * t.to_f64()).sum();
             let magnitude = libm::sqrt(square);
             if !(libm::fabs(magnitude - 1.0) <= TANGENT_TOLERANCE) {
@@ -205,19 +229,20 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
                     };
                 }
             }
-            Geometry::Septic { coefficients, per_mm } => {
+            Geometry::Septic { coefficients, per_mm, length_mm } => {
                 let u = (s_mm * *per_mm).to_unit();
-                // In units of the piece's length. Multiplied one by one, every intermediate result is
-                // of the size of what it is for, however short the piece.
-                let (w, a, j) = (v * *per_mm, a * *per_mm, j * *per_mm);
+                // Multiplied one by one, every intermediate result is of the size of what it is for,
+                // however short the piece: κ·v, κ'·v².
+                let w = v * *per_mm;
                 let three_a = a + a + a;
-                for ((setpoint, &start), c) in setpoints.iter_mut().zip(&self.start).zip(coefficients) {
-                    let [p, p1, p2, p3] = derivatives(c, u);
+                for ((setpoint, &start), q) in setpoints.iter_mut().zip(&self.start).zip(coefficients) {
+                    let [q0, q1, q2, q3] = derivatives(q, u);
+                    let (bend, twist) = (w.scaled(q2), w.scaled(q3) * w);
                     *setpoint = Setpoint {
-                        position: start + Position::from_offset(p),
-                        velocity_mm_s: p1 * w,
-                        accel_mm_s2: p2 * w * w + p1 * a,
-                        jerk_mm_s3: (p3 * w * w + p2 * three_a) * w + p1 * j,
+                        position: start + Position::from_offset(length_mm.scaled(q0)),
+                        velocity_mm_s: v.scaled(q1),
+                        accel_mm_s2: bend * v + a.scaled(q1),
+                        jerk_mm_s3: twist * v + bend * three_a + j.scaled(q1),
                     };
                 }
             }
@@ -226,16 +251,16 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     }
 }
 
-/// Σ cₖ·uᵏ, k = 1 … 7, and its first three derivatives by u, by Horner's scheme on all four.
+/// Σ qₖ·uᵏ, k = 1 … 7, and its first three derivatives by u, by Horner's scheme on all four.
 #[inline]
-fn derivatives<R: Real>(c: &[R; 7], u: R::Unit) -> [R; 4] {
-    let (mut p, mut p1, mut p2, mut p3) = (R::ZERO, R::ZERO, R::ZERO, R::ZERO);
+fn derivatives<U: Unit>(q: &[U; 7], u: U) -> [U; 4] {
+    let (mut p, mut p1, mut p2, mut p3) = (U::ZERO, U::ZERO, U::ZERO, U::ZERO);
     // p2 and p3 collect p''/2! and p'''/3!. The last round is for the constant term, which is 0.
-    for coefficient in c.iter().rev().copied().chain([R::ZERO]) {
-        p3 = p3.scaled(u) + p2;
-        p2 = p2.scaled(u) + p1;
-        p1 = p1.scaled(u) + p;
-        p = p.scaled(u) + coefficient;
+    for coefficient in q.iter().rev().copied().chain([U::ZERO]) {
+        p3 = p3 * u + p2;
+        p2 = p2 * u + p1;
+        p1 = p1 * u + p;
+        p = p * u + coefficient;
     }
     let twice = p3 + p3;
     [p, p1, p2 + p2, twice + twice + twice]

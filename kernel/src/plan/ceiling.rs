@@ -10,17 +10,19 @@
 //! ```
 //!
 //! At v = √(A/κ) nothing is left to change the feed with, so the budget has to be **shared**: a curve
-//! may be driven at [`CURVE_FEED_SHARE`] of the feed that would use it up, and ramps on it get limits
+//! may be driven at a share of the feed that would use it up
+//! ([`MachineLimits::curve_feed_share`]), and ramps on it get limits
 //! for which the sums above stay within the machine's even at that feed. All the terms grow with v,
 //! a, j, so they stay within it everywhere below.
 
 use crate::law::{Law, LimitError, Limits};
 use crate::num::Root;
 
-/// Part of a curve's greatest feed that blocks are planned with. 0.8 costs a fifth of the feed on a
-/// long arc and leaves three quarters of the acceleration, and a third of the jerk, for ramps at its
-/// very top.
+/// A good value for [`MachineLimits::curve_feed_share`]: it costs a fifth of the feed on a long arc and
+/// leaves three quarters of the acceleration, and a third of the jerk, for ramps at its very top.
 pub const CURVE_FEED_SHARE: f64 = 0.8;
+/// The greatest share that leaves something of every limit for ramps.
+pub const CURVE_FEED_SHARE_MAX: f64 = 0.85;
 /// Part of the jerk limit that ramps may use across the path, 3κ·v·a.
 const NORMAL_JERK_SHARE: f64 = 0.55;
 /// Parts of the snap limit that ramps may use: 3κ·a² and 4κ·v·j across, 6κ'·v²·a along the path.
@@ -43,6 +45,9 @@ pub struct MachineLimits<R, const AXES: usize> {
     pub path: AxisLimits<R>,
     /// Of each axis.
     pub axes: [AxisLimits<R>; AXES],
+    /// Part of a curve's greatest feed that blocks are planned with, above 0 and at most
+    /// [`CURVE_FEED_SHARE_MAX`]; the rest of the limits is for changing the feed on the curve.
+    pub curve_feed_share: R,
 }
 
 /// How a block bends.
@@ -160,7 +165,7 @@ impl<R: Root> Ceiling<R> {
         }
         let along = least(&along, &across, R::ONE);
         let (accel, jerk, snap) = (across.accel_mm_s2, across.jerk_mm_s3, across.snap_mm_s4);
-        let share = R::from_f64(CURVE_FEED_SHARE);
+        let share = machine.curve_feed_share;
         lower(share * (accel / kappa).sqrt(), Reason::Acceleration);
         lower(share * (jerk / bend.third_per_mm2).cbrt(), Reason::Jerk);
         lower(share * (snap / bend.fourth_per_mm3).sqrt().sqrt(), Reason::Snap);
@@ -207,19 +212,24 @@ mod tests {
             feed_mm_s: 300.0,
             limits: Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 },
         };
-        MachineLimits { path: all, axes: [all; 3] }
+        MachineLimits { path: all, axes: [all; 3], curve_feed_share: CURVE_FEED_SHARE }
     }
 
     /// Worst vectors over every state a ramp on the arc can be in, radii from 1 µm to 100 m.
     #[test]
     fn shared_budget_keeps_the_vectors_within_the_limits() {
-        let machine = machine();
+        for share in [0.3, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX] {
+            vectors_stay_within(&MachineLimits { curve_feed_share: share, ..machine() });
+        }
+    }
+
+    fn vectors_stay_within(machine: &MachineLimits<f64, 3>) {
         let limits = machine.path.limits;
         for exponent in -12..=20 {
             let radius = 10.0_f64.powf(f64::from(exponent) / 4.0);
             let bend = Bend::circle(radius, 1.0);
             let ceiling =
-                Ceiling::new(&machine, f64::INFINITY, &[1.0, 1.0, 0.0], &[true, true, false], &bend)
+                Ceiling::new(machine, f64::INFINITY, &[1.0, 1.0, 0.0], &[true, true, false], &bend)
                     .expect("limits");
             let ramp = ceiling.law.limits();
             let mut worst = [0.0_f64; 3];

@@ -220,6 +220,11 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         Ok(Self { recent: self.not_too_dense(duration)?, ..*self })
     }
 
+    /// How the feed's length of this stretch compares with the path's.
+    pub(super) fn feed_ahead_of_path(&self) -> core::cmp::Ordering {
+        self.feed_length.cmp(&self.path_length)
+    }
+
     pub(super) fn at_rest(&self) -> Result<(), Rejection> {
         if self.tangent.is_some() || self.feed_length > Position::ZERO {
             return Err(Rejection::InsideStretch);

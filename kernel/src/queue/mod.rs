@@ -11,7 +11,7 @@
 
 mod accept;
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
@@ -53,13 +53,25 @@ pub enum Refused<T> {
     Invalid(Rejection),
 }
 
-/// Storage of both streams: `PIECES` and `SEGMENTS` items.
+/// Storage of both streams: `PIECES` and `SEGMENTS` items. With fewer than 17 pieces or 9 segments a
+/// program that uses the tick's bounds to the full can starve, because a queue is refilled between
+/// ticks only; with 64 and 64 the streams of a machine with three f32 axes take 17 KiB.
 #[derive(Debug)]
 pub struct Streams<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> {
     path: Queue<PathItem<R, AXES>, PIECES>,
     feed: Queue<FeedItem<R>, SEGMENTS>,
-    /// Ends of stretch entered so far. Written by the feeder only.
+    shared: Shared,
+}
+
+/// What the feeder tells the intake besides the items. Written by the feeder only.
+#[derive(Debug)]
+struct Shared {
+    /// Ends of stretch entered so far.
     stretches: AtomicU32,
+    /// In the stretch being entered, the feed covers at least as much path as the pieces.
+    feed_covers_path: AtomicBool,
+    /// And the pieces at least as much as the feed.
+    path_covers_feed: AtomicBool,
 }
 
 impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
@@ -68,27 +80,33 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
     /// Empty streams.
     #[must_use]
     pub const fn new() -> Self {
-        Self { path: Queue::new(), feed: Queue::new(), stretches: AtomicU32::new(0) }
+        Self {
+            path: Queue::new(),
+            feed: Queue::new(),
+            shared: Shared {
+                stretches: AtomicU32::new(0),
+                feed_covers_path: AtomicBool::new(true),
+                path_covers_feed: AtomicBool::new(true),
+            },
+        }
     }
 
-    /// The two ends, for a machine that stands at `position`.
+    /// The two ends, for a machine that stands at `position`. What was queued before is dropped.
     pub fn split(
         &mut self,
         rules: PathRules,
         position: [Position; AXES],
     ) -> (Feeder<'_, R, AXES>, Intake<'_, R, AXES>) {
+        while self.path.dequeue().is_some() {}
+        while self.feed.dequeue().is_some() {}
         let (path_in, path_out) = self.path.split();
         let (feed_in, feed_out) = self.feed.split();
-        let stretches: &AtomicU32 = &self.stretches;
-        (
-            Feeder {
-                path: path_in,
-                feed: feed_in,
-                stretches,
-                accept: accept::Acceptance::new(rules, position),
-            },
-            Intake { path: path_out, feed: feed_out, stretches, finished: stretches.load(Ordering::Relaxed) },
-        )
+        let shared: &Shared = &self.shared;
+        let mut feeder =
+            Feeder { path: path_in, feed: feed_in, shared, accept: accept::Acceptance::new(rules, position) };
+        feeder.publish();
+        let finished = shared.stretches.load(Ordering::Relaxed);
+        (feeder, Intake { path: path_out, feed: feed_out, shared, finished })
     }
 }
 
@@ -104,7 +122,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> Def
 pub struct Feeder<'a, R: Real, const AXES: usize> {
     path: Producer<'a, PathItem<R, AXES>>,
     feed: Producer<'a, FeedItem<R>>,
-    stretches: &'a AtomicU32,
+    shared: &'a Shared,
     accept: accept::Acceptance<R, AXES>,
 }
 
@@ -117,6 +135,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
         let next = self.accept.piece(&piece).map_err(Refused::Invalid)?;
         self.path.enqueue(PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
         self.accept = next;
+        self.publish();
         Ok(())
     }
 
@@ -128,6 +147,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
         let next = self.accept.segment(&segment).map_err(Refused::Invalid)?;
         self.feed.enqueue(FeedItem::Segment(segment)).map_err(|_| Refused::Full(segment))?;
         self.accept = next;
+        self.publish();
         Ok(())
     }
 
@@ -146,8 +166,17 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
         let feed = self.feed.enqueue(FeedItem::EndOfStretch);
         debug_assert!(path.is_ok() && feed.is_ok());
         self.accept = next;
-        self.stretches.store(self.stretches.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
+        self.publish();
+        let stretches = &self.shared.stretches;
+        stretches.store(stretches.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
         Ok(())
+    }
+
+    /// Tells the intake which stream is ahead.
+    fn publish(&mut self) {
+        let ahead = self.accept.feed_ahead_of_path();
+        self.shared.feed_covers_path.store(ahead.is_ge(), Ordering::Release);
+        self.shared.path_covers_feed.store(ahead.is_le(), Ordering::Release);
     }
 
     /// Rests for `duration` between stretches.
@@ -175,7 +204,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
 pub struct Intake<'a, R: Real, const AXES: usize> {
     path: Consumer<'a, PathItem<R, AXES>>,
     feed: Consumer<'a, FeedItem<R>>,
-    stretches: &'a AtomicU32,
+    shared: &'a Shared,
     finished: u32,
 }
 
@@ -208,11 +237,14 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         item
     }
 
-    /// Whether a stretch may begin: its end is queued, or a queue is full and can't hold more of it.
+    /// Whether a stretch may begin: its end is queued; or a queue is full, so that no more of it can be
+    /// had, and the other queue is full too or covers as much path.
     #[inline]
     pub(crate) fn may_start(&self) -> bool {
-        self.stretches.load(Ordering::Acquire) != self.finished
-            || self.feed.len() == self.feed.capacity()
-            || self.path.len() == self.path.capacity()
+        let feed_full = self.feed.len() == self.feed.capacity();
+        let path_full = self.path.len() == self.path.capacity();
+        self.shared.stretches.load(Ordering::Acquire) != self.finished
+            || (path_full && (feed_full || self.shared.feed_covers_path.load(Ordering::Acquire)))
+            || (feed_full && self.shared.path_covers_feed.load(Ordering::Acquire))
     }
 }
