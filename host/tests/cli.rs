@@ -380,6 +380,93 @@ fn wrong_input_is_status_2_and_named() {
     }
 }
 
+const TICKS: &str = "expected at most 1073741.824 s (2147483648 ticks)";
+const KILOMETRE: &str = "expected at most 1000000 mm between two full stops";
+
+/// Every refusal of a plan, to the letter: the line of the block concerned, what was found, what was expected.
+#[test]
+fn what_planning_refuses() {
+    let desk = Desk::new("planning");
+    for (program, refusal) in [
+        (
+            "G1 X1 F600\nG1 X1.001 F0.0000000001\nG1 X2 F600\nM2\n",
+            format!("2: found t2 − t1 = 599999958.6492777 s, {TICKS}"),
+        ),
+        ("G1 X1 F600\nG4 P1073742\nM2\n", format!("2: found a dwell of 1073742 s, {TICKS}")),
+        (
+            "G2 X0 Y0 I200000 F18000\nM2\n",
+            format!("1: found 1256637.0614359172 mm of path without a full stop, {KILOMETRE}"),
+        ),
+        (
+            "G0 X-1000000\nG0 X0\nG0 X1000000\nM2\n",
+            format!("3: found 2000000 mm of path without a full stop, {KILOMETRE}"),
+        ),
+        (
+            "G0 X999999\nG2 I2 F1000\nM2\n",
+            "2: found a path through X = 1000001 mm, expected coordinates within ±1000000 mm".to_owned(),
+        ),
+        (
+            "G1 X1 F600\nG1 X1.0000000001\nM2\n",
+            "2: found a piece of 1.00e-10 mm, expected at least 5e-10 mm: a short line is one piece, an \
+             arc has one every 45°"
+                .to_owned(),
+        ),
+    ] {
+        desk.put("part.ngc", program);
+        for mode in [&[][..], &["--per-block"]] {
+            let found = desk.refusal(&[&["plan", "part.ngc"], mode].concat());
+            assert_eq!(found, format!("part.ngc:{refusal}"), "{program}");
+        }
+    }
+}
+
+/// The same for a block list: line and column where it is not JSON of the right layout, else the line.
+#[test]
+fn what_a_block_list_refuses() {
+    const LIMITS: &str = r#""limits": {"accel_mm_s2": 500, "jerk_mm_s3": 5000, "snap_mm_s4": 400000},"#;
+    const SECOND: &str = r#"{"length_mm": 25, "feed_mm_s": 40}"#;
+    let desk = Desk::new("lists");
+    let refusal = |text: &str| {
+        desk.put("list.json", text);
+        let refusal = desk.refusal(&["plan", "list.json"]);
+        refusal.strip_prefix("list.json:").expect("its name").to_owned()
+    };
+    for (found, to, expected) in [
+        (LIMITS, "", "9:1: found no key `limits`, expected it in this object"),
+        (": 400000", ": 0", "2:69: found 0, expected a number above 0"),
+        (": 25", ": -25", "7:21: found -25, expected a number not below 0"),
+        (": 25", ": \"25\"", "7:22: found string \"25\", expected a number"),
+        (": 25,", ": 25;", "7:21: found ';', expected `,` or `}`"),
+        ("\"blocks\"", "blocks", "5:3: found 'b', expected a key in double quotes"),
+        (
+            "_mm_s\": 40",
+            "_mm\": 40",
+            "7:31: found unknown key `feed_mm`, expected `length_mm` or `feed_mm_s`",
+        ),
+        ("feed_mm_s\": 40", "length_mm\": 40", "7:33: found a second key `length_mm`, expected one"),
+        (
+            "end_feed_mm_s\": 0",
+            "end_feed_mm_s\": 41",
+            "4: found end feed 41 mm/s, expected from 0 to 40 mm/s",
+        ),
+        (": 40}", ": 1e-9}", &format!("7: found t2 − t1 = 2.5e10 s, {TICKS}")),
+        (": 25,", ": 999990,", &format!("7: found 1000040 mm of path without a full stop, {KILOMETRE}")),
+    ] {
+        assert!(BLOCKS.contains(found), "{found}");
+        assert_eq!(refusal(&BLOCKS.replacen(found, to, 1)), expected, "{to}");
+    }
+    let torn = BLOCKS.split(SECOND).next().expect("a beginning");
+    assert_eq!(refusal(torn), "7:4: found the end of the file, expected the rest of a value");
+
+    let short = BLOCKS.replace(": 50,", ": 0.5,").replace(": 25,", ": 0.5,");
+    let found = refusal(&short.replace("start_feed_mm_s\": 0", "start_feed_mm_s\": 80"));
+    assert!(found.starts_with("3: found start feed 80 mm/s, expected at most 9.83124"), "{found}");
+    assert!(found.ends_with(" mm/s: the path is too short to brake from more"), "{found}");
+    let found = refusal(&short.replace("end_feed_mm_s\": 0", "end_feed_mm_s\": 40"));
+    assert!(found.starts_with("4: found end feed 40 mm/s, expected at most 9.83124"), "{found}");
+    assert!(found.ends_with(" mm/s: the path is too short to reach more"), "{found}");
+}
+
 #[test]
 fn alone_it_demonstrates() {
     let desk = Desk::new("demonstration");

@@ -9,7 +9,7 @@
 //!
 //! A fault ends in one defined way: it is latched with the tick it was found in, every output goes to
 //! the voltage of standing still (0 V plus trim), the drives are disabled, and both stay so until
-//! [`Kernel::clear_fault`].
+//! [`Kernel::clear_fault`]. A fault that is found in writing the outputs shows in them from the next tick on.
 
 use crate::axis::{AxisConfig, AxisOutput, AxisState};
 use crate::exec::{Executed, Executor};

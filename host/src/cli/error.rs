@@ -50,7 +50,7 @@ pub enum CliError {
         source: io::Error,
     },
     /// Standard output can't be written.
-    #[error("standard output: found {0}")]
+    #[error("standard output: found {0}, expected a place that can be written")]
     Output(#[source] io::Error),
     /// The program is not G-code.
     #[error(transparent)]

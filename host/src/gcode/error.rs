@@ -130,7 +130,7 @@ pub enum Problem {
 }
 
 /// A byte as an error message shows it.
-pub(super) fn describe(byte: Option<u8>) -> String {
+pub(crate) fn describe(byte: Option<u8>) -> String {
     match byte {
         None => "the end of the line".to_owned(),
         Some(byte @ b' '..=b'~') => format!("'{}'", char::from(byte)),

@@ -70,6 +70,7 @@ mod program;
 
 pub use arc::{RADIUS_MISMATCH_MAX_MM, RADIUS_MISMATCH_MIN_MM, RADIUS_MISMATCH_RATIO};
 pub use decimal::{Decimal, Length};
+pub(crate) use error::describe;
 pub use error::{GcodeError, Problem};
 pub use program::{ArcMove, Feed, LineMove, Notice, NoticeKind, PathMode, Plane, Program, Step, StepKind};
 

@@ -1,5 +1,7 @@
 //! The layout of a machine file, and the rules that join several of its keys.
 
+use std::ops::Range;
+
 use hal_sim::{BedMode, DriveParameters, EncoderNoise, TimerBits};
 use motion_kernel::axis::{Feedforward, Gains};
 use serde::Deserialize;
@@ -8,8 +10,8 @@ use toml::Spanned;
 
 use super::error::{MachineError, quote};
 use super::range::{
-    DeadTime, FeedforwardGain, FollowingError, Gain, Inertia, JointAngle, Limit, OutputLimit, OutputOffset,
-    Positive, Resolution, Tick, Velocity, Within,
+    CurveShare, DeadTime, FeedforwardGain, FollowingError, Gain, Inertia, JointAngle, Limit, OutputLimit,
+    OutputOffset, Positive, Resolution, Tick, Velocity, Within,
 };
 use super::settings::{AxisSettings, Machine, PathSettings};
 
@@ -17,37 +19,53 @@ use super::settings::{AxisSettings, Machine, PathSettings};
 const NAME_CHARACTERS_MAX: usize = 8;
 /// Seconds per minute: feeds in mm/min exist in this file only.
 const S_PER_MIN: f64 = 60.0;
+/// An encoder's register tells a move from its complement only while the axis moves by less than half the
+/// register from one tick to the next. An axis may be faster than its feed, while it overshoots or catches up,
+/// and readings have noise: it is held to twice its feed.
+const TIMER_MARGIN: f64 = 2.0;
 
 pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineError> {
     let file: MachineFile =
         toml::from_str(text).map_err(|error| MachineError::from_reader(source_name, text, &error))?;
-    let refuse = |at: std::ops::Range<usize>, expected: String| {
+    let refuse = |at: Range<usize>, expected: String| {
         let problem = format!("found {}, expected {expected}", quote(text, &at));
         MachineError::new(source_name, text, &at, problem)
     };
-    let axes = file
-        .axis
-        .map(|axis| (axis.name.span(), axis.feed_mm_s.span(), axis.output.offset_v.span(), axis.settings()));
-    for (index, (name_at, feed_at, offset_at, axis)) in axes.iter().enumerate() {
-        if axes.iter().take(index).any(|(_, _, _, other)| other.name == axis.name) {
-            return Err(refuse(name_at.clone(), "a name that no other axis has".to_owned()));
+    let tick_s = file.tick_s.0;
+    let axes = file.axis.map(|axis| (axis.places(), axis.settings()));
+    for (index, (places, axis)) in axes.iter().enumerate() {
+        if axes.iter().take(index).any(|(_, other)| other.name == axis.name) {
+            return Err(refuse(places.name.clone(), "a name that no other axis has".to_owned()));
         }
         if axis.output_offset_v.abs() >= axis.output_limit_v {
             let limit_v = axis.output_limit_v;
-            return Err(refuse(offset_at.clone(), format!("a magnitude below limit_v = {limit_v}")));
+            return Err(refuse(places.offset_v.clone(), format!("a magnitude below limit_v = {limit_v}")));
         }
         let reachable_mm_s = axis.reachable_mm_s();
         if axis.feed_mm_s > reachable_mm_s {
             let expected = format!("at most {reachable_mm_s:.6}, the velocity at the output's limit");
-            return Err(refuse(feed_at.clone(), expected));
+            return Err(refuse(places.feed_mm_s.clone(), expected));
+        }
+        let bits = timer_bits(axis.timer);
+        let least_mm = TIMER_MARGIN * axis.feed_mm_s * tick_s / f64::from(1_u32 << (bits - 1));
+        if axis.mm_per_count <= least_mm {
+            let feed_mm_s = axis.feed_mm_s;
+            let expected = format!(
+                "above {least_mm:e}: at {TIMER_MARGIN} times feed_mm_s = {feed_mm_s} a tick must be less than \
+                 half the register of timer_bits = {bits}"
+            );
+            return Err(refuse(places.mm_per_count.clone(), expected));
         }
     }
-    Ok(Machine {
-        name: file.name,
-        tick_s: file.tick_s.0,
-        path: file.path.settings(),
-        axes: axes.map(|(_, _, _, axis)| axis),
-    })
+    Ok(Machine { name: file.name, tick_s, path: file.path.settings(), axes: axes.map(|(_, axis)| axis) })
+}
+
+/// Where an axis has the keys that rules of several keys are about.
+struct Places {
+    name: Range<usize>,
+    feed_mm_s: Range<usize>,
+    offset_v: Range<usize>,
+    mm_per_count: Range<usize>,
 }
 
 #[derive(Deserialize)]
@@ -69,6 +87,7 @@ struct PathTable {
     snap_mm_s4: Within<Limit>,
     joint_angle_deg: Within<JointAngle>,
     accel_step_mm_s2: Within<Limit>,
+    curve_feed_share: Within<CurveShare>,
 }
 
 #[derive(Deserialize)]
@@ -89,7 +108,7 @@ struct AxisTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EncoderTable {
-    mm_per_count: Within<Resolution>,
+    mm_per_count: Spanned<Within<Resolution>>,
     #[serde(default)]
     timer_bits: Timer,
     #[serde(default)]
@@ -149,11 +168,21 @@ impl PathTable {
             snap_mm_s4: self.snap_mm_s4.0,
             joint_angle_rad: self.joint_angle_deg.0.to_radians(),
             accel_step_mm_s2: self.accel_step_mm_s2.0,
+            curve_feed_share: self.curve_feed_share.0,
         }
     }
 }
 
 impl AxisTable {
+    fn places(&self) -> Places {
+        Places {
+            name: self.name.span(),
+            feed_mm_s: self.feed_mm_s.span(),
+            offset_v: self.output.offset_v.span(),
+            mm_per_count: self.encoder.mm_per_count.span(),
+        }
+    }
+
     fn settings(self) -> AxisSettings {
         let noise = match self.encoder.noise_counts.0 {
             0 => None,
@@ -166,7 +195,7 @@ impl AxisTable {
             jerk_mm_s3: self.jerk_mm_s3.0,
             snap_mm_s4: self.snap_mm_s4.0,
             following_error_limit_mm: self.following_error_limit_mm.0,
-            mm_per_count: self.encoder.mm_per_count.0,
+            mm_per_count: self.encoder.mm_per_count.into_inner().0,
             timer: self.encoder.timer_bits.0,
             noise,
             mm_s_at_10_v: self.output.mm_min_at_10_v.0 / S_PER_MIN,
@@ -233,6 +262,13 @@ impl<'de> Deserialize<'de> for AxisName {
 
 /// The width of a counter register.
 struct Timer(TimerBits);
+
+fn timer_bits(timer: TimerBits) -> u32 {
+    match timer {
+        TimerBits::Sixteen => 16,
+        TimerBits::ThirtyTwo => 32,
+    }
+}
 
 impl Default for Timer {
     fn default() -> Self {

@@ -5,6 +5,7 @@
 use std::fmt;
 use std::marker::PhantomData;
 
+use motion_kernel::plan::CURVE_FEED_SHARE_MAX;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
 
@@ -37,6 +38,7 @@ ranges! {
     Tick: "a number from 0.00002 to 0.02", |value| (0.00002..=0.02).contains(&value);
     Limit: "a number from 0.001 to 1e12", |value| (0.001..=1e12).contains(&value);
     JointAngle: "a number from 0 to 30", |value| (0.0..=30.0).contains(&value);
+    CurveShare: "a number from 0.1 to 0.85", |value| (0.1..=CURVE_FEED_SHARE_MAX).contains(&value);
     FollowingError: "a number from 0.0001 to 1000", |value| (0.0001..=1000.0).contains(&value);
     Resolution: "a number above 1e-8 and below 1", |value| value > 1e-8 && value < 1.0;
     Velocity: "a number of magnitude 0.001 to 1e9", |value| (0.001..=1e9).contains(&value.abs());

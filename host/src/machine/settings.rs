@@ -7,14 +7,17 @@ use hal_sim::{
 use motion_kernel::axis::{AxisConfig, EncoderScale, Feedforward, Gains, OutputScale, Regulator};
 use motion_kernel::law::Limits;
 use motion_kernel::num::Real;
-use motion_kernel::plan::{AxisLimits, MachineLimits};
+use motion_kernel::plan::{AxisLimits, CURVE_FEED_SHARE, MachineLimits};
 use motion_kernel::queue::PathRules;
 use motion_kernel::units::DacCode;
 
 use super::error::{AxisError, MachineError};
 use super::file;
 
-/// Greatest gap between two pieces \[mm\]: a fifth of a count of 0.1 µm is left for rounding of pieces.
+/// Pieces are rounded: their tangents agree with the planner's angle to this, and with a curve's feed.
+const JOINT_ANGLE_ROUNDING_RAD: f64 = 2.0e-6;
+
+/// Greatest gap between two pieces \[mm\]: pieces are rounded, to a twentieth of a count of 0.1 µm.
 const JOINT_GAP_MM: f64 = 5e-6;
 
 /// The simulation's step \[s\]; a tick is divided into as many as come closest to it, so a step is at least 3/4 of it.
@@ -52,6 +55,9 @@ pub struct PathSettings {
     pub joint_angle_rad: f64,
     /// Greatest jump of acceleration at a joint \[mm/s²\]; from 0.001 to 10¹².
     pub accel_step_mm_s2: f64,
+    /// Part of a curve's greatest feed that is planned with, 0.1 to 0.85; what it leaves of acceleration, jerk and
+    /// snap is for changing the feed on the curve.
+    pub curve_feed_share: f64,
 }
 
 /// One axis. Limits are from 0.001 to 10¹².
@@ -69,7 +75,8 @@ pub struct AxisSettings {
     pub snap_mm_s4: f64,
     /// Following error at which the axis faults \[mm\], 0.0001 to 1000.
     pub following_error_limit_mm: f64,
-    /// Travel per encoder count \[mm\], between 10⁻⁸ and 1.
+    /// Travel per encoder count \[mm\], between 10⁻⁸ and 1; so much that a tick at twice `feed_mm_s` is less than
+    /// half the register of `timer`.
     pub mm_per_count: f64,
     /// Width of the encoder's counter register.
     pub timer: TimerBits,
@@ -104,6 +111,7 @@ impl Machine {
                 snap_mm_s4: 4e5,
                 joint_angle_rad: 0.5_f64.to_radians(),
                 accel_step_mm_s2: 500.0,
+                curve_feed_share: CURVE_FEED_SHARE,
             },
             axes: [
                 AxisSettings::reference("X", REFERENCE_X),
@@ -126,6 +134,7 @@ impl Machine {
     pub fn limits(&self) -> MachineLimits<f64, 3> {
         let path = &self.path;
         MachineLimits {
+            curve_feed_share: path.curve_feed_share,
             path: AxisLimits { feed_mm_s: path.feed_mm_s, limits: path.limits() },
             axes: self.axes.each_ref().map(|axis| AxisLimits {
                 feed_mm_s: axis.feed_mm_s,
@@ -144,7 +153,7 @@ impl Machine {
         PathRules {
             limits: self.path.limits(),
             feed_mm_s: self.path.feed_mm_s,
-            joint_angle_rad: self.path.joint_angle_rad,
+            joint_angle_rad: self.path.joint_angle_rad + JOINT_ANGLE_ROUNDING_RAD,
             joint_gap_mm: JOINT_GAP_MM,
         }
     }
@@ -214,7 +223,8 @@ impl AxisSettings {
             encoder: EncoderScale::new(self.mm_per_count).map_err(refused)?,
             output: OutputScale::new(self.mm_s_at_10_v, self.output_offset_v, self.output_limit_v)
                 .map_err(refused)?,
-            regulator: Regulator::new(self.gains, self.feedforward, tick_s).map_err(refused)?,
+            regulator: Regulator::new(self.gains, self.feedforward, tick_s, self.following_error_limit_mm)
+                .map_err(refused)?,
             following_error_limit_mm: R::from_f64(self.following_error_limit_mm),
         })
     }

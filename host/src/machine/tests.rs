@@ -55,6 +55,7 @@ fn every_range_is_kept() {
         ("snap_mm_s4", LIMIT),
         ("joint_angle_deg", &["-0.5", "31"]),
         ("accel_step_mm_s2", LIMIT),
+        ("curve_feed_share", &["0", "0.86", "-0.5"]),
         ("following_error_limit_mm", &["0", "-1", "1001"]),
         ("mm_per_count", &["0", "-0.0001", "1", "1e-8"]),
         ("mm_min_at_10_v", &["0", "2e9"]),
@@ -123,6 +124,23 @@ fn keys_agree_with_each_other() {
         "offset_v = 2\nlimit_v = 1.5",
     );
     assert!(error.contains("found offset_v = 2, expected a magnitude below limit_v = 1.5"), "{error}");
+    // 2·300·0.0005/2¹⁵ = 9.1552734375e-6, to the last digit.
+    let narrow = |mm_per_count: &str| {
+        let encoder = format!("mm_per_count = {mm_per_count}\ntimer_bits = 16\n#");
+        REFERENCE_TOML.replacen("mm_per_count = 0.0001", &encoder, 1).replacen("timer_bits = 32", "", 1)
+    };
+    let row = REFERENCE_TOML.split("mm_per_count = ").next().expect("text before it").lines().count() + 1;
+    assert_eq!(
+        Machine::from_toml("n.toml", &narrow("2e-8")).unwrap_err().to_string(),
+        format!(
+            "n.toml:{row}:16: found mm_per_count = 2e-8, expected above 9.1552734375e-6: at 2 times feed_mm_s = 300 \
+             a tick must be less than half the register of timer_bits = 16"
+        )
+    );
+    assert!(Machine::from_toml("n.toml", &narrow("0.0000091552734375")).is_err());
+    assert!(Machine::from_toml("n.toml", &narrow("0.00000916")).is_ok());
+    let wide = REFERENCE_TOML.replacen("mm_per_count = 0.0001", "mm_per_count = 2e-8", 1);
+    assert!(Machine::from_toml("w.toml", &wide).is_ok());
     let two = REFERENCE_TOML.rsplit_once("[[axis]]").expect("axes").0;
     let error = Machine::from_toml("two.toml", two).unwrap_err().to_string();
     assert!(error.contains("found 2 [[axis]] tables, expected exactly 3"), "{error}");

@@ -8,13 +8,14 @@ use super::error::{Place, PlanningError, Problem};
 use super::lookahead::lookahead;
 use super::profile::FeedProfile;
 use super::{Mode, Plan};
+use crate::gcode;
 use crate::record::BlockRecord;
 
 /// The tick that durations are counted in where no machine says one \[s\].
 const TICK_S: f64 = 0.0005;
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with the keys of a block list")]
 struct BlockList {
     limits: JsonLimits,
     start_feed_mm_s: NotNegative,
@@ -23,7 +24,7 @@ struct BlockList {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with three limits")]
 struct JsonLimits {
     accel_mm_s2: Positive,
     jerk_mm_s3: Positive,
@@ -31,39 +32,28 @@ struct JsonLimits {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with length_mm and feed_mm_s")]
 struct JsonBlock {
     length_mm: NotNegative,
     feed_mm_s: Positive,
 }
 
+type Positive = Figure<false>;
+type NotNegative = Figure<true>;
+
 // Checked while reading, so that the error has a line and a column.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(try_from = "f64")]
-struct Positive(f64);
+struct Figure<const MAY_BE_ZERO: bool>(f64);
 
-impl TryFrom<f64> for Positive {
+impl<const MAY_BE_ZERO: bool> TryFrom<f64> for Figure<MAY_BE_ZERO> {
     type Error = String;
     fn try_from(value: f64) -> Result<Self, String> {
-        if value > 0.0 && value.is_finite() {
+        let least = if MAY_BE_ZERO { "not below" } else { "above" };
+        if value.is_finite() && (value > 0.0 || MAY_BE_ZERO && value == 0.0) {
             Ok(Self(value))
         } else {
-            Err(format!("found {value}, expected a number above 0"))
-        }
-    }
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(try_from = "f64")]
-struct NotNegative(f64);
-
-impl TryFrom<f64> for NotNegative {
-    type Error = String;
-    fn try_from(value: f64) -> Result<Self, String> {
-        if value >= 0.0 && value.is_finite() {
-            Ok(Self(value))
-        } else {
-            Err(format!("found {value}, expected a number not below 0"))
+            Err(format!("found {value}, expected a number {least} 0"))
         }
     }
 }
@@ -80,12 +70,10 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
     };
     let list: BlockList = serde_json::from_slice(text).map_err(|error| {
         let number = |at: usize| u32::try_from(at).unwrap_or(u32::MAX);
-        let place = Place { line: number(error.line()), column: Some(number(error.column())) };
-        // The reader's own text ends with the place, which stands in front here.
-        let text = error.to_string();
-        let what = text.split(" at line ").next().unwrap_or(&text);
-        let found = if what.starts_with("found") { "" } else { "found " };
-        fail(place, Problem::Json(format!("{found}{what}")))
+        // At the end of the text the reader is in column 0 of a line that has no text.
+        let column = Some(error.column()).filter(|&column| column > 0).map(number);
+        let place = Place { line: number(error.line()), column };
+        fail(place, Problem::Json(found_expected(&error, text)))
     })?;
     let law = Law::new(Limits {
         accel_mm_s2: list.limits.accel_mm_s2.0,
@@ -111,9 +99,12 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
         })
         .collect();
     let planned = lookahead(blocks.clone(), &ends_mm, list.start_feed_mm_s.0, list.end_feed_mm_s.0, mode)
-        .map_err(|problem| fail(line_of(text, key(&problem)), problem))?;
-    let profile =
-        FeedProfile::new(&planned, TICK_S).map_err(|problem| fail(line_of(text, "blocks"), problem))?;
+        .map_err(|(block, problem)| match key(&problem) {
+            Some(key) => fail(line_of(text, key), problem),
+            None => fail(line_of_block(text, block), problem),
+        })?;
+    let profile = FeedProfile::new(&planned, TICK_S)
+        .map_err(|(block, problem)| fail(line_of_block(text, block), problem))?;
     let mut start_mm = 0.0;
     let mut records = Vec::with_capacity(blocks.len());
     for (block, &end_mm) in blocks.iter().zip(&ends_mm) {
@@ -144,21 +135,72 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
     })
 }
 
-/// The key a problem of the look-ahead is about.
-fn key(problem: &Problem) -> &'static str {
+/// The JSON reader's refusal in the words of the project.
+fn found_expected(error: &serde_json::Error, text: &[u8]) -> String {
+    // Its own text ends with the place, which stands in front here.
+    let message = error.to_string();
+    let what = message.split(" at line ").next().unwrap_or(&message);
+    if what.starts_with("found ") {
+        return what.to_owned();
+    }
+    if let Some(wrong) = what.strip_prefix("invalid type: ").or(what.strip_prefix("invalid value: ")) {
+        return format!("found {}", wrong.replace("expected f64", "expected a number"));
+    }
+    if let Some(missing) = what.strip_prefix("missing field ") {
+        return format!("found no key {missing}, expected it in this object");
+    }
+    if let Some(unknown) = what.strip_prefix("unknown field ") {
+        return format!("found unknown key {unknown}");
+    }
+    if let Some(twice) = what.strip_prefix("duplicate field ") {
+        return format!("found a second key {twice}, expected one");
+    }
+    if let Some(whole) = what.strip_prefix("EOF while parsing ") {
+        return format!("found the end of the file, expected the rest of {whole}");
+    }
+    let expected = match what {
+        "key must be a string" => Some("expected a key in double quotes"),
+        _ => what.starts_with("expected ").then_some(what),
+    };
+    if let Some(expected) = expected {
+        let line = text.split(|&byte| byte == b'\n').nth(error.line().saturating_sub(1)).unwrap_or(&[]);
+        let byte = error.column().checked_sub(1).and_then(|column| line.get(column)).copied();
+        return format!("found {}, {expected}", gcode::describe(byte));
+    }
+    format!("found {what}, expected a block list as `motion plan --help` shows it")
+}
+
+/// The key a problem of the look-ahead is about, if it is not a block.
+fn key(problem: &Problem) -> Option<&'static str> {
     match problem {
         Problem::Plan(
             PlanError::EndFeed { quantity: "end feed", .. } | PlanError::TooShortToAccelerate { .. },
-        ) => "end_feed_mm_s",
-        Problem::Plan(PlanError::EndFeed { .. } | PlanError::TooShortToBrake { .. }) => "start_feed_mm_s",
-        _ => "blocks",
+        ) => Some("end_feed_mm_s"),
+        Problem::Plan(PlanError::EndFeed { .. } | PlanError::TooShortToBrake { .. }) => {
+            Some("start_feed_mm_s")
+        }
+        _ => None,
     }
 }
 
 /// The line in which `key` stands first.
 fn line_of(text: &[u8], key: &str) -> Place {
+    line_at(text, offset_of(text, key))
+}
+
+/// The line in which a block begins: blocks have no objects inside.
+fn line_of_block(text: &[u8], block: usize) -> Place {
+    let key = offset_of(text, "blocks");
+    let braces = text.iter().enumerate().skip(key).filter(|&(_, &byte)| byte == b'{');
+    line_at(text, braces.map(|(at, _)| at).nth(block).unwrap_or(key))
+}
+
+fn offset_of(text: &[u8], key: &str) -> usize {
     let quoted = format!("\"{key}\"");
-    let at = text.windows(quoted.len()).position(|window| window == quoted.as_bytes()).unwrap_or(0);
-    let breaks = text[..at].iter().filter(|&&byte| byte == b'\n').count();
+    text.windows(quoted.len()).position(|window| window == quoted.as_bytes()).unwrap_or(0)
+}
+
+fn line_at(text: &[u8], offset: usize) -> Place {
+    let breaks = text[..offset].iter().filter(|&&byte| byte == b'\n').count();
     Place::from(u32::try_from(breaks + 1).unwrap_or(u32::MAX))
 }

@@ -1,7 +1,8 @@
 //! What planning refuses.
 
-use motion_kernel::law::{LimitError, SegmentError};
+use motion_kernel::law::{LimitError, SegmentError, Ticks};
 use motion_kernel::plan::PlanError;
+use motion_kernel::units::Position;
 
 use crate::toolpath::CompileError;
 
@@ -39,25 +40,30 @@ pub struct PlanningError {
     pub problem: Problem,
 }
 
-/// What is wrong.
+/// What is wrong: what was found, and what was expected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Problem {
     /// The geometry has no executable form.
     #[error("found {0}")]
     Geometry(#[from] CompileError),
     /// A limit that results for the block is unusable.
-    #[error("found {0}")]
+    #[error("found {} limit {}, expected a positive finite number", .0.quantity, .0.value)]
     Limit(#[from] LimitError),
     /// The look-ahead has no plan.
-    #[error("found {0}")]
+    #[error("found {}", unplannable(.0))]
     Plan(#[from] PlanError),
-    /// A ramp is beyond the tick's range.
-    #[error("found {0}")]
-    Segment(#[from] SegmentError),
+    /// A ramp or a cruise is beyond the tick's range.
+    #[error("found {}", unmade(error, *tick_s))]
+    Segment {
+        /// Which figure.
+        error: SegmentError,
+        /// The tick \[s\].
+        tick_s: f64,
+    },
     /// More pieces than the tick handles.
     #[error(
         "found {pieces} pieces over {length_mm:.6} mm, which {feed_mm_s:.3} mm/s pass within one tick of \
-         {tick_s} s: expected at most {pieces} pieces a tick, so a feed of at most {feed_max_mm_s:.3} mm/s \
+         {tick_s} s, expected at most {pieces} pieces a tick, so a feed of at most {feed_max_mm_s:.3} mm/s \
          here or longer moves"
     )]
     DensePieces {
@@ -73,7 +79,7 @@ pub enum Problem {
         tick_s: f64,
     },
     /// More feed segments than the tick handles.
-    #[error("found {segments} feed segments and dwells within {ticks:.3} ticks: expected at least 1 tick")]
+    #[error("found {segments} feed segments and dwells within {ticks:.3} ticks, expected at least 1 tick")]
     DenseSegments {
         /// The bound.
         segments: usize,
@@ -81,14 +87,64 @@ pub enum Problem {
         ticks: f64,
     },
     /// A dwell that can't be executed.
-    #[error("found a dwell of {seconds} s: expected at most {longest_s} s")]
+    #[error("found a dwell of {seconds} s, expected {}", at_most_ticks(*tick_s))]
     Dwell {
         /// Its duration \[s\].
         seconds: f64,
-        /// The longest \[s\].
-        longest_s: f64,
+        /// The tick \[s\].
+        tick_s: f64,
     },
     /// The file is not a block list.
     #[error("{0}")]
     Json(String),
+}
+
+fn unplannable(error: &PlanError) -> String {
+    match error {
+        PlanError::Block { quantity, value, .. } => format!(
+            "{quantity} {value}, expected a length from 0 to {} mm, a ceiling above 0, a joint feed not below 0",
+            Position::LIMIT_MM
+        ),
+        PlanError::EndFeed { quantity, feed_mm_s, greatest_mm_s } => {
+            format!("{quantity} {feed_mm_s} mm/s, expected from 0 to {greatest_mm_s} mm/s")
+        }
+        PlanError::TooShortToBrake { start_mm_s, greatest_mm_s } => format!(
+            "start feed {start_mm_s} mm/s, expected at most {greatest_mm_s} mm/s: the path is too short to brake \
+             from more"
+        ),
+        PlanError::TooShortToAccelerate { end_mm_s, greatest_mm_s } => format!(
+            "end feed {end_mm_s} mm/s, expected at most {greatest_mm_s} mm/s: the path is too short to reach more"
+        ),
+        PlanError::Output { blocks, plans } => format!("room for {plans} plans, expected {blocks}"),
+    }
+}
+
+fn unmade(error: &SegmentError, tick_s: f64) -> String {
+    match *error {
+        // The kernel's quantities carry their units: "t1 [s]".
+        SegmentError::OutOfRange { quantity, value } => {
+            let (name, unit) = quantity.trim_end_matches(']').split_once(" [").unwrap_or((quantity, ""));
+            let expected = match unit {
+                "s" => at_most_ticks(tick_s),
+                "mm" => format!("from 0 to {} mm", Position::LIMIT_MM),
+                _ => {
+                    "a number that is not below 0 and within the range of the kernel's number type".to_owned()
+                }
+            };
+            // All digits of 1e160 help nobody.
+            if (1e-3..1e9).contains(&value) {
+                format!("{name} = {value} {unit}, expected {expected}")
+            } else {
+                format!("{name} = {value:e} {unit}, expected {expected}")
+            }
+        }
+        SegmentError::LengthMismatch { ramp_mm, path_mm } => {
+            format!("a ramp of {ramp_mm} mm, expected the length of its path, {path_mm} mm")
+        }
+    }
+}
+
+/// The longest duration of a dwell, or of a part of a move at constant feed or acceleration.
+fn at_most_ticks(tick_s: f64) -> String {
+    format!("at most {} s ({} ticks)", Ticks::LIMIT * tick_s, Ticks::LIMIT)
 }

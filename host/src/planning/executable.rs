@@ -3,17 +3,16 @@
 //! Consumes a [`Plan`]; produces the items of the two streams for a number type. A program that is
 //! denser than the executor's bounds is refused here, with its line, before anything moves.
 
-use motion_kernel::exec::PIECES_PER_TICK_MAX;
 use motion_kernel::law::{FeedSegment, Ticks};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
-use motion_kernel::queue::SEGMENTS_PER_TICK_MAX;
 use motion_kernel::units::Position;
 
+use super::density::{PiecePace, SegmentPace};
 use super::error::{PlanningError, Problem};
 use super::stretch::Stretch;
 use super::{Item, Plan};
-use crate::toolpath::{Vector, compile};
+use crate::toolpath::{compile, exact};
 
 /// What the two streams are fed with.
 #[derive(Clone, Debug)]
@@ -54,25 +53,19 @@ impl<R: Real> Executable<R> {
             place: line.into(),
             problem,
         };
-        let mut pace = Pace::default();
+        let (mut piece_pace, mut segment_pace) = (PiecePace::default(), SegmentPace::default());
         let mut items = Vec::with_capacity(plan.items.len());
         for item in &plan.items {
             items.push(match item {
                 Item::Stretch(stretch) => {
-                    let item = stretch_item(stretch, plan.tick_s).map_err(|(line, p)| fail(line, p))?;
-                    if let ExecutableItem::Stretch { segments, .. } = &item {
-                        let line = stretch.blocks.first().map_or(0, |block| block.line);
-                        for segment in segments {
-                            pace.next(segment.duration()).map_err(|p| fail(line, p))?;
-                        }
-                    }
-                    item
+                    stretch_item(stretch, plan.tick_s, &mut piece_pace, &mut segment_pace)
+                        .map_err(|(line, problem)| fail(line, problem))?
                 }
                 &Item::Dwell { line, seconds } => {
-                    let dwell = Ticks::from_seconds(seconds, plan.tick_s).ok_or_else(|| {
-                        fail(line, Problem::Dwell { seconds, longest_s: Ticks::LIMIT * plan.tick_s })
-                    })?;
-                    pace.next(dwell).map_err(|p| fail(line, p))?;
+                    let dwell = Ticks::from_seconds(seconds, plan.tick_s)
+                        .ok_or_else(|| fail(line, Problem::Dwell { seconds, tick_s: plan.tick_s }))?;
+                    piece_pace.dwell(seconds);
+                    segment_pace.next(dwell).map_err(|problem| fail(line, problem))?;
                     ExecutableItem::Dwell(dwell)
                 }
                 Item::Stop { .. } => ExecutableItem::Stop,
@@ -82,8 +75,12 @@ impl<R: Real> Executable<R> {
     }
 }
 
-fn stretch_item<R: Real>(stretch: &Stretch, tick_s: f64) -> Result<ExecutableItem<R>, (u32, Problem)> {
-    let first_line = stretch.blocks.first().map_or(0, |block| block.line);
+fn stretch_item<R: Real>(
+    stretch: &Stretch,
+    tick_s: f64,
+    piece_pace: &mut PiecePace,
+    segment_pace: &mut SegmentPace,
+) -> Result<ExecutableItem<R>, (u32, Problem)> {
     let (mut pieces, mut piece_blocks) = (Vec::new(), Vec::new());
     let (mut start_mm, mut end) = (0.0, [0.0; 3]);
     for (index, block) in stretch.blocks.iter().enumerate() {
@@ -92,72 +89,17 @@ fn stretch_item<R: Real>(stretch: &Stretch, tick_s: f64) -> Result<ExecutableIte
         piece_blocks.resize(pieces.len(), index);
         (_, end) = block.element.ends_mm();
     }
-    not_too_dense(stretch, &pieces, &piece_blocks, tick_s)?;
+    piece_pace.stretch(stretch, &pieces, &piece_blocks, tick_s)?;
     let mut segments = Vec::new();
     for planned in &stretch.planned {
-        segments.extend(planned.segments(tick_s).map_err(|problem| (first_line, problem))?);
+        let at_line = |(block, problem): (usize, Problem)| (stretch.blocks[block].line, problem);
+        for segment in planned.segments::<R>(tick_s).map_err(at_line)? {
+            let duration = segment.duration();
+            segment_pace.next(duration).map_err(|problem| at_line((planned.first, problem)))?;
+            segments.push(segment);
+        }
     }
-    let end = exact(end).map_err(|problem| (first_line, problem))?;
+    let last_line = stretch.blocks.last().map_or(0, |block| block.line);
+    let end = exact(end).map_err(|error| (last_line, error.into()))?;
     Ok(ExecutableItem::Stretch { start_mm: stretch.start_mm, pieces, segments, end })
-}
-
-fn exact(point: Vector) -> Result<[Position; 3], Problem> {
-    let mut exact = [Position::ZERO; 3];
-    for (exact, mm) in exact.iter_mut().zip(point) {
-        *exact = Position::from_mm(mm)
-            .ok_or(crate::toolpath::CompileError::OutOfRange { length_mm: 0.0, at_mm: point })?;
-    }
-    Ok(exact)
-}
-
-/// However the ticks fall, at most [`PIECES_PER_TICK_MAX`] pieces end within one: any so many in a row
-/// are at least as long as the way of one tick at their highest feed.
-fn not_too_dense<R: Real>(
-    stretch: &Stretch,
-    pieces: &[Piece<R, 3>],
-    piece_blocks: &[usize],
-    tick_s: f64,
-) -> Result<(), (u32, Problem)> {
-    for (window, blocks) in pieces.windows(PIECES_PER_TICK_MAX).zip(piece_blocks.windows(PIECES_PER_TICK_MAX))
-    {
-        let length_mm: f64 = window.iter().map(|piece| piece.length().to_mm()).sum();
-        let (first, last) = (blocks[0], blocks[PIECES_PER_TICK_MAX - 1]);
-        let cap = |block: usize| stretch.blocks[block].ceiling.feed_mm_s;
-        if (first..=last).all(|block| length_mm >= cap(block) * tick_s) {
-            continue;
-        }
-        // The ceilings alone do not tell: look at the planned feed.
-        let ends = stretch.ends_mm();
-        let from_mm = if first == 0 { 0.0 } else { ends[first - 1] };
-        let feed_mm_s = stretch.profile.over(from_mm, ends[last]).0.peak_mm_s;
-        if length_mm < feed_mm_s * tick_s {
-            let problem = Problem::DensePieces {
-                pieces: PIECES_PER_TICK_MAX,
-                length_mm,
-                feed_mm_s,
-                feed_max_mm_s: length_mm / tick_s,
-                tick_s,
-            };
-            return Err((stretch.blocks[last].line, problem));
-        }
-    }
-    Ok(())
-}
-
-/// The latest durations, as the queue looks at them.
-#[derive(Default)]
-struct Pace(std::collections::VecDeque<Ticks>);
-
-impl Pace {
-    fn next(&mut self, duration: Ticks) -> Result<(), Problem> {
-        self.0.push_back(duration);
-        if self.0.len() > SEGMENTS_PER_TICK_MAX {
-            self.0.pop_front();
-        }
-        let together = self.0.iter().fold(Ticks::ZERO, |sum, &one| sum.plus(one));
-        if self.0.len() == SEGMENTS_PER_TICK_MAX && together < Ticks::ONE {
-            return Err(Problem::DenseSegments { segments: SEGMENTS_PER_TICK_MAX, ticks: together.to_f64() });
-        }
-        Ok(())
-    }
 }

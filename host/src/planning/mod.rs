@@ -4,15 +4,21 @@
 //! reason for it, the feed over the path, and what the kernel needs to execute it. Plans whole
 //! stretches, from one full stop to the next, in f64.
 //!
+//! **Limits.** A dwell, and a part of a move at constant feed or acceleration, may last 2³¹ ticks: twelve days at
+//! 0.5 ms. Between two full stops there may be one kilometre of path (10⁶ mm), and every point of the path lies
+//! within one kilometre of the origin on each axis. What is beyond is refused, with the line of the block.
+//!
 //! - [`program`]: steps to stretches: where motion must stop, what each joint allows;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
 //! - `lookahead`: the kernel's look-ahead, merged or per block;
 //! - [`profile`]: feed and time at any path position of a planned stretch;
 //! - [`blocks`]: bare block lists, BLOCKS.json;
-//! - [`executable`]: a plan in the kernel's terms, checked against the tick's bounds;
+//! - [`executable`]: a plan in the kernel's terms;
+//! - `density`: whether that is too dense for a tick;
 //! - [`error`]: what is refused, with file and line.
 
 pub mod blocks;
+mod density;
 pub mod error;
 pub mod executable;
 mod lookahead;

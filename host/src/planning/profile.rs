@@ -28,7 +28,8 @@ struct Span {
 }
 
 impl FeedProfile {
-    pub(super) fn new(planned: &[Planned], tick_s: f64) -> Result<Self, Problem> {
+    /// An error comes with the index of the original block.
+    pub(super) fn new(planned: &[Planned], tick_s: f64) -> Result<Self, (usize, Problem)> {
         let (mut spans, mut time_s) = (Vec::with_capacity(planned.len() * 3), 0.0);
         for block in planned {
             let mut start_mm = block.start.to_mm();

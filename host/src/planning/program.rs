@@ -87,11 +87,15 @@ fn block(element: &Element, line: u32, feed: Feed, machine: &Machine) -> Result<
     Ok(StretchBlock { line, element: *element, ceiling, joint_mm_s: 0.0 })
 }
 
+/// Directions computed from coordinates that are exact to 10⁻¹⁰ mm agree to this where they are meant to.
+const TANGENT_ROUNDING_RAD: f64 = 1.0e-9;
+
 /// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.
 fn joint_feed(before: &Element, after: &Element, machine: &Machine) -> f64 {
     let ([_, end], [start, _]) = (before.ends(), after.ends());
+    let angle_rad = angle(end.tangent, start.tangent);
     let steps = Joint {
-        angle_rad: angle(end.tangent, start.tangent),
+        angle_rad: if angle_rad <= TANGENT_ROUNDING_RAD { 0.0 } else { angle_rad },
         curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)),
     };
     joint(&steps, machine.path.joint_angle_rad, machine.path.accel_step_mm_s2, machine.tick_s)

@@ -45,7 +45,6 @@ impl Stretch {
         mode: Mode,
         tick_s: f64,
     ) -> Result<Self, (u32, Problem)> {
-        let first_line = blocks.first().map_or(0, |block| block.line);
         let mut end_mm = 0.0;
         let mut ends_mm = Vec::with_capacity(blocks.len());
         let mut plan_blocks = Vec::with_capacity(blocks.len());
@@ -60,8 +59,9 @@ impl Stretch {
                 law: block.ceiling.law,
             });
         }
-        let planned = lookahead(plan_blocks, &ends_mm, 0.0, 0.0, mode).map_err(|p| (first_line, p))?;
-        let profile = FeedProfile::new(&planned, tick_s).map_err(|p| (first_line, p))?;
+        let at_line = |(block, problem): (usize, Problem)| (blocks[block].line, problem);
+        let planned = lookahead(plan_blocks, &ends_mm, 0.0, 0.0, mode).map_err(at_line)?;
+        let profile = FeedProfile::new(&planned, tick_s).map_err(at_line)?;
         Ok(Self { start_mm, blocks, ends_mm, planned, profile })
     }
 

@@ -98,6 +98,7 @@ fn run_in<R: Real>(
     let Ok(counts) = rig.latch();
     let start = [Position::ZERO; AXES];
     let mut kernel = Kernel::<R, AXES>::new(machine.axis_configs()?, start, counts);
+    kernel.enable(0);
     let mut streams = Streams::<R, AXES, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
     let mut supply = Supply::new(&executable);

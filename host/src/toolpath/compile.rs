@@ -14,30 +14,84 @@ use super::{Vector, add, scale, subtract};
 /// Widest piece of an arc \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off.
 const WIDEST_RAD: f64 = core::f64::consts::FRAC_PI_4;
 
-/// Why an element can't be made into pieces.
+/// The shortest piece that is sure to advance the path position, which goes in steps of 2⁻³² mm and is
+/// added up in f64 to a kilometre: two steps, rounded up \[mm\].
+const PIECE_MM_MIN: f64 = 5.0e-10;
+
+/// Why an element can't be made into pieces. Displays as "…, expected …".
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum CompileError {
-    /// It is too short or too far out for the path's positions.
-    #[error("a move of {length_mm} mm to ({}, {}, {}) mm: expected at least 1e-9 mm, within ±1e6 mm", at_mm[0], at_mm[1], at_mm[2])]
-    OutOfRange {
-        /// Its length \[mm\].
+    /// A piece of it does not advance the path position.
+    #[error(
+        "a piece of {length_mm:.2e} mm, expected at least {PIECE_MM_MIN:e} mm: a short line is one piece, an arc \
+         has one every 45°"
+    )]
+    TooShort {
+        /// The piece's length \[mm\].
         length_mm: f64,
-        /// Its end \[mm\].
-        at_mm: Vector,
+    },
+    /// It leaves the space that the kernel has positions for.
+    #[error(
+        "a path through {} = {mm} mm, expected coordinates within ±{} mm",
+        ["X", "Y", "Z"][*axis], Position::LIMIT_MM
+    )]
+    Coordinate {
+        /// The axis, from 0.
+        axis: usize,
+        /// The coordinate \[mm\].
+        mm: f64,
+    },
+    /// The stretch it ends is longer than path positions reach.
+    #[error(
+        "{length_mm} mm of path without a full stop, expected at most {} mm between two full stops",
+        Position::LIMIT_MM
+    )]
+    StretchTooLong {
+        /// From the stretch's start to the element's end \[mm\].
+        length_mm: f64,
     },
     /// It is not smooth.
     #[error(transparent)]
     Fit(#[from] FitError),
     /// The kernel would not take the piece.
-    #[error("a piece the kernel can't execute: {0}")]
+    #[error("a piece with {}", unfit(.0))]
     Piece(#[from] PieceError),
+}
+
+/// What is wrong with a piece, and what was expected.
+fn unfit(error: &PieceError) -> String {
+    match error {
+        PieceError::NotFinite { .. } => format!("{error}, expected a unit vector"),
+        _ => error.to_string(),
+    }
+}
+
+/// Where `mm` of a stretch lies on the path.
+///
+/// # Errors
+/// The stretch is too long.
+pub fn on_path(mm: f64) -> Result<Position, CompileError> {
+    Position::from_mm(mm).ok_or(CompileError::StretchTooLong { length_mm: mm })
+}
+
+/// `point` in the kernel's positions.
+///
+/// # Errors
+/// It lies too far out.
+pub fn exact(point: Vector) -> Result<[Position; 3], CompileError> {
+    let mut exact = [Position::ZERO; 3];
+    for (axis, (exact, mm)) in exact.iter_mut().zip(point).enumerate() {
+        *exact = Position::from_mm(mm).ok_or(CompileError::Coordinate { axis, mm })?;
+    }
+    Ok(exact)
 }
 
 /// Appends the pieces of `element`, which starts at `start_mm` of the stretch, to `pieces`; returns
 /// where it ends on the path. `line` is the program line.
 ///
 /// # Errors
-/// The element is out of range, not smooth, or makes a piece that the kernel refuses.
+/// The element is too short, too far out, ends too far along the stretch, is not smooth, or makes a piece that
+/// the kernel refuses.
 pub fn compile<R: Real>(
     element: &Element,
     line: u32,
@@ -47,18 +101,13 @@ pub fn compile<R: Real>(
     let length_mm = element.length_mm();
     let end_mm = start_mm + length_mm;
     let (from, to) = element.ends_mm();
-    let out_of_range = CompileError::OutOfRange { length_mm, at_mm: to };
-    let on_path = |mm: f64| Position::from_mm(mm).ok_or(out_of_range);
-    let point = |at: Vector| -> Result<[Position; 3], CompileError> {
-        Ok([on_path(at[0])?, on_path(at[1])?, on_path(at[2])?])
-    };
     let longest_mm = R::PIECE_MM_MAX * (1.0 - 1e-9);
     let mut here = on_path(start_mm)?;
-    let mut length_to = |mm: f64| -> Result<Position, CompileError> {
+    let mut length_to = |mm: f64, length_mm: f64| -> Result<Position, CompileError> {
         let next = on_path(mm)?;
         let length = next - here;
         here = next;
-        if length > Position::ZERO { Ok(length) } else { Err(out_of_range) }
+        if length > Position::ZERO { Ok(length) } else { Err(CompileError::TooShort { length_mm }) }
     };
     match element {
         Element::Line { .. } => {
@@ -66,8 +115,9 @@ pub fn compile<R: Real>(
             let parts = (length_mm / longest_mm).ceil().max(1.0) as u64;
             for part in 0..parts {
                 let (a, b) = (part as f64 / parts as f64, (part + 1) as f64 / parts as f64);
-                let start = point(add(from, scale(subtract(to, from), a)))?;
-                let length = length_to(if part + 1 == parts { end_mm } else { start_mm + length_mm * b })?;
+                let start = exact(add(from, scale(subtract(to, from), a)))?;
+                let part_end_mm = if part + 1 == parts { end_mm } else { start_mm + length_mm * b };
+                let length = length_to(part_end_mm, length_mm / parts as f64)?;
                 pieces.push(Piece::line(line, start, direction, length)?);
             }
         }
@@ -76,9 +126,10 @@ pub fn compile<R: Real>(
             let septics = fit(shape, 0.0, *sweep_rad, WIDEST_RAD, longest_mm)?;
             let (mut gone_mm, count) = (0.0, septics.len());
             for (index, septic) in septics.iter().enumerate() {
-                let start = point(add(from, shape.offset(0.0, septic.span.0)))?;
+                let start = exact(add(from, shape.offset(0.0, septic.span.0)))?;
                 gone_mm += septic.length_mm;
-                let length = length_to(if index + 1 == count { end_mm } else { start_mm + gone_mm })?;
+                let part_end_mm = if index + 1 == count { end_mm } else { start_mm + gone_mm };
+                let length = length_to(part_end_mm, septic.length_mm)?;
                 pieces.push(Piece::septic(line, start, septic.coefficients, length)?);
             }
         }

@@ -1,6 +1,6 @@
 //! Derivatives of a curve: by its parameter, and by arc length.
 
-use super::{Vector, add, cross, dot, norm, scale, subtract};
+use super::{Vector, add, dot, norm, scale, subtract};
 
 /// A smooth curve with a parameter.
 pub trait Curve {
@@ -73,7 +73,7 @@ pub struct Spiral {
 impl Spiral {
     /// Direction from the centre at `angle`, and a quarter turn on.
     fn frame(&self, angle: f64) -> (Vector, Vector) {
-        let (sine, cosine) = angle.sin_cos();
+        let (sine, cosine) = libm::sincos(angle);
         (
             add(scale(self.outward, cosine), scale(self.onward, sine)),
             subtract(scale(self.onward, cosine), scale(self.outward, sine)),
@@ -87,9 +87,9 @@ impl Curve for Spiral {
         let (outward, onward) = self.frame(origin);
         let (here, _) = self.frame(angle);
         let radius = self.radius_mm + self.radius_per_rad * origin;
-        let half = (0.5 * turn).sin();
+        let half = libm::sin(0.5 * turn);
         // radius·(e(angle) − e(origin)) without cancellation, and what the radius grew by.
-        let round = add(scale(onward, radius * turn.sin()), scale(outward, -2.0 * radius * half * half));
+        let round = add(scale(onward, radius * libm::sin(turn)), scale(outward, -2.0 * radius * half * half));
         let grown = scale(here, self.radius_per_rad * turn);
         add(add(round, grown), scale(self.normal, self.height_per_rad * turn))
     }
@@ -103,12 +103,6 @@ impl Curve for Spiral {
             subtract(scale(onward, -radius), scale(outward, 3.0 * rate)),
         ]
     }
-}
-
-/// The curve of a helper for the plane's third direction.
-#[must_use]
-pub(crate) fn right_handed(first: Vector, second: Vector) -> Vector {
-    cross(first, second)
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use motion_kernel::plan::Bend;
 
-use super::curve::{Curve, Spiral, by_arc_length, right_handed};
-use super::{Vector, add, norm, scale, subtract};
+use super::curve::{Curve, Spiral, by_arc_length};
+use super::{Vector, add, cross, norm, scale, subtract};
 use crate::gcode::{ArcMove, LineMove};
 
 /// A block's geometry.
@@ -61,7 +61,7 @@ impl Element {
         let (x, y) =
             ((from[first] - step.centre_mm[0]) / radius_mm, (from[second] - step.centre_mm[1]) / radius_mm);
         let outward = add(scale(axis(first), x), scale(axis(second), y));
-        let turn = right_handed(axis(normal), outward);
+        let turn = cross(axis(normal), outward);
         let sweep_rad = step.sweep_rad.abs();
         let shape = Spiral {
             outward,
@@ -160,7 +160,7 @@ impl Element {
     fn planar(&self) -> f64 {
         match self {
             Self::Line { .. } => 1.0,
-            Self::Arc { shape, .. } => shape.radius_mm / shape.radius_mm.hypot(shape.height_per_rad),
+            Self::Arc { shape, .. } => shape.radius_mm / libm::hypot(shape.radius_mm, shape.height_per_rad),
         }
     }
 }

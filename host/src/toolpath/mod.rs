@@ -1,7 +1,8 @@
 //! Geometry of the programmed path: from moves to pieces of arc length.
 //!
 //! Consumes lines and arcs as the G-code reader gives them; produces [`Piece`](motion_kernel::path::Piece)s
-//! and what planning needs to know of each block's geometry. Background, f64.
+//! and what planning needs to know of each block's geometry. Background, f64; angles by libm and roots by the
+//! standard library, so that every host computes the same bits.
 //!
 //! - [`element`]: lines, arcs, helices and spirals: length, tangents, curvature, bend;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
@@ -13,7 +14,7 @@ pub mod curve;
 pub mod element;
 pub mod septic;
 
-pub use compile::{CompileError, compile};
+pub use compile::{CompileError, compile, exact, on_path};
 pub use element::Element;
 
 /// A point or a vector, X Y Z \[mm\].
@@ -45,5 +46,5 @@ pub(crate) fn norm(a: Vector) -> f64 {
 
 /// The angle between two directions \[rad\], precise for small ones too.
 pub(crate) fn angle(a: Vector, b: Vector) -> f64 {
-    norm(cross(a, b)).atan2(dot(a, b))
+    libm::atan2(norm(cross(a, b)), dot(a, b))
 }

@@ -27,7 +27,11 @@ pub struct Septic {
 
 /// A curve that no reasonable number of pieces follows.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("the curve between parameters {} and {} is not smooth enough: {HALVINGS_MAX} halvings leave {error_mm} mm", span.0, span.1)]
+#[error(
+    "a curve that {HALVINGS_MAX} halvings miss by {error_mm:.2e} mm from {} to {} rad, expected at most \
+     {POSITION_TOLERANCE_MM:e} mm and a feed within a millionth",
+    span.0, span.1
+)]
 pub struct FitError {
     /// The span that failed.
     pub span: (f64, f64),

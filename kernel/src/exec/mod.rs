@@ -129,6 +129,7 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     /// is then of no further use; the kernel latches the fault.
     pub fn tick(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<Executed<R, AXES>, ExecFault> {
         self.walker.start_tick();
+        intake.start_tick();
         self.advance(intake)?;
         let motion = match &self.activity {
             Activity::Moving(moving) => moving.at(),

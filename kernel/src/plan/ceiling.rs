@@ -228,9 +228,8 @@ mod tests {
         for exponent in -12..=20 {
             let radius = 10.0_f64.powf(f64::from(exponent) / 4.0);
             let bend = Bend::circle(radius, 1.0);
-            let ceiling =
-                Ceiling::new(machine, f64::INFINITY, &[1.0, 1.0, 0.0], &[true, true, false], &bend)
-                    .expect("limits");
+            let ceiling = Ceiling::new(machine, f64::INFINITY, &[1.0, 1.0, 0.0], &[true, true, false], &bend)
+                .expect("limits");
             let ramp = ceiling.law.limits();
             let mut worst = [0.0_f64; 3];
             for i in 0..=20 {

@@ -53,7 +53,7 @@ pub enum Refused<T> {
     Invalid(Rejection),
 }
 
-/// Storage of both streams: `PIECES` and `SEGMENTS` items. With fewer than 17 pieces or 9 segments a
+/// Storage of both streams: `PIECES` − 1 and `SEGMENTS` − 1 items (one place tells full from empty). With fewer than 17 pieces or 9 segments a
 /// program that uses the tick's bounds to the full can starve, because a queue is refilled between
 /// ticks only; with 64 and 64 the streams of a machine with three f32 axes take 17 KiB.
 #[derive(Debug)]
@@ -106,7 +106,15 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             Feeder { path: path_in, feed: feed_in, shared, accept: accept::Acceptance::new(rules, position) };
         feeder.publish();
         let finished = shared.stretches.load(Ordering::Relaxed);
-        (feeder, Intake { path: path_out, feed: feed_out, shared, finished })
+        let intake = Intake {
+            path: path_out,
+            feed: feed_out,
+            shared,
+            finished,
+            taken_from_path: 0,
+            taken_from_feed: 0,
+        };
+        (feeder, intake)
     }
 }
 
@@ -206,9 +214,18 @@ pub struct Intake<'a, R: Real, const AXES: usize> {
     feed: Consumer<'a, FeedItem<R>>,
     shared: &'a Shared,
     finished: u32,
+    /// Items taken in this tick: the producer could not have filled their places yet.
+    taken_from_path: usize,
+    taken_from_feed: usize,
 }
 
 impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
+    /// A new tick: the producer has had its turn.
+    #[inline]
+    pub(crate) fn start_tick(&mut self) {
+        (self.taken_from_path, self.taken_from_feed) = (0, 0);
+    }
+
     /// The next item of the feed stream, left where it is.
     #[inline]
     pub(crate) fn peek_feed(&self) -> Option<&FeedItem<R>> {
@@ -218,6 +235,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// Takes the next item of the feed stream.
     #[inline]
     pub(crate) fn take_feed(&mut self) -> Option<FeedItem<R>> {
+        self.taken_from_feed += 1;
         self.feed.dequeue()
     }
 
@@ -230,6 +248,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// Takes the next item of the path stream.
     #[inline]
     pub(crate) fn take_path(&mut self) -> Option<PathItem<R, AXES>> {
+        self.taken_from_path += 1;
         let item = self.path.dequeue();
         if matches!(item, Some(PathItem::EndOfStretch(_))) {
             self.finished = self.finished.wrapping_add(1);
@@ -237,12 +256,12 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         item
     }
 
-    /// Whether a stretch may begin: its end is queued; or a queue is full, so that no more of it can be
-    /// had, and the other queue is full too or covers as much path.
+    /// Whether a stretch may begin: its end is queued; or a queue was full when the tick began, so that
+    /// no more of it can be had, and the other queue was full too or covers as much path.
     #[inline]
     pub(crate) fn may_start(&self) -> bool {
-        let feed_full = self.feed.len() == self.feed.capacity();
-        let path_full = self.path.len() == self.path.capacity();
+        let feed_full = self.feed.len() + self.taken_from_feed >= self.feed.capacity();
+        let path_full = self.path.len() + self.taken_from_path >= self.path.capacity();
         self.shared.stretches.load(Ordering::Acquire) != self.finished
             || (path_full && (feed_full || self.shared.feed_covers_path.load(Ordering::Acquire)))
             || (feed_full && self.shared.path_covers_feed.load(Ordering::Acquire))

@@ -1,0 +1,99 @@
+//! Whether a plan is too dense for a tick, seen over the whole program.
+//!
+//! However the ticks fall on it, at most [`PIECES_PER_TICK_MAX`] pieces and [`SEGMENTS_PER_TICK_MAX`]
+//! segments and dwells may end within one, whatever stretches they belong to.
+
+use std::collections::VecDeque;
+
+use motion_kernel::exec::PIECES_PER_TICK_MAX;
+use motion_kernel::law::Ticks;
+use motion_kernel::num::Real;
+use motion_kernel::path::Piece;
+use motion_kernel::queue::SEGMENTS_PER_TICK_MAX;
+
+use super::error::Problem;
+use super::stretch::Stretch;
+
+/// The times at which the latest short pieces end, and where on the path \[s, mm\].
+#[derive(Default)]
+pub(super) struct PiecePace {
+    ends: VecDeque<(f64, f64)>,
+    /// When the stretch begins \[s\], and where \[mm\].
+    start: (f64, f64),
+}
+
+impl PiecePace {
+    /// The pieces of the next stretch; `blocks` holds the index of each one's block. An error comes with
+    /// the program line.
+    pub(super) fn stretch<R: Real>(
+        &mut self,
+        stretch: &Stretch,
+        pieces: &[Piece<R, 3>],
+        blocks: &[usize],
+        tick_s: f64,
+    ) -> Result<(), (u32, Problem)> {
+        let (start_s, start_mm) = self.start;
+        let mut s_mm = 0.0;
+        for (piece, &block) in pieces.iter().zip(blocks) {
+            let length_mm = piece.length().to_mm();
+            s_mm += length_mm;
+            let block = &stretch.blocks[block];
+            if length_mm >= block.ceiling.feed_mm_s * tick_s {
+                // It takes a tick at least by itself: nothing before it can share one with what follows.
+                self.ends.clear();
+                continue;
+            }
+            let (_, time_s) = stretch.profile.at(s_mm);
+            self.ends.push_back((start_s + time_s, start_mm + s_mm));
+            self.check(tick_s).map_err(|problem| (block.line, problem))?;
+        }
+        self.start = (start_s + stretch.profile.time_s(), start_mm + s_mm);
+        Ok(())
+    }
+
+    /// The machine rests.
+    pub(super) fn dwell(&mut self, seconds: f64) {
+        self.start.0 += seconds;
+    }
+
+    /// One more than the bound must not end within less than a tick.
+    fn check(&mut self, tick_s: f64) -> Result<(), Problem> {
+        if self.ends.len() <= PIECES_PER_TICK_MAX {
+            return Ok(());
+        }
+        let (Some((first_s, first_mm)), Some(&(last_s, last_mm))) = (self.ends.pop_front(), self.ends.back())
+        else {
+            return Ok(());
+        };
+        let (time_s, length_mm) = (last_s - first_s, last_mm - first_mm);
+        if time_s >= tick_s {
+            return Ok(());
+        }
+        Err(Problem::DensePieces {
+            pieces: PIECES_PER_TICK_MAX,
+            length_mm,
+            feed_mm_s: length_mm / time_s,
+            feed_max_mm_s: length_mm / tick_s,
+            tick_s,
+        })
+    }
+}
+
+/// The latest durations, as the queue looks at them.
+#[derive(Default)]
+pub(super) struct SegmentPace(VecDeque<Ticks>);
+
+impl SegmentPace {
+    /// The next segment or dwell.
+    pub(super) fn next(&mut self, duration: Ticks) -> Result<(), Problem> {
+        self.0.push_back(duration);
+        if self.0.len() > SEGMENTS_PER_TICK_MAX {
+            self.0.pop_front();
+        }
+        let together = self.0.iter().fold(Ticks::ZERO, |sum, &one| sum.plus(one));
+        if self.0.len() == SEGMENTS_PER_TICK_MAX && together < Ticks::ONE {
+            return Err(Problem::DenseSegments { segments: SEGMENTS_PER_TICK_MAX, ticks: together.to_f64() });
+        }
+        Ok(())
+    }
+}

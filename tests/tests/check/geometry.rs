@@ -1,0 +1,153 @@
+//! The programmed path: moves as they stand in the text, in exact decimals, and their points by arc length.
+
+use std::f64::consts::PI;
+
+pub(crate) type Vector = [f64; 3];
+
+/// Units of 10⁻¹⁰ mm, the last decimal a program may have.
+pub(crate) const UNITS_PER_MM: f64 = 1e10;
+
+pub(crate) fn mm(units: i64) -> f64 {
+    units as f64 / UNITS_PER_MM
+}
+
+pub(crate) fn norm(v: Vector) -> f64 {
+    dot(v, v).sqrt()
+}
+
+pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn minus(a: Vector, b: Vector) -> Vector {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// The steps of 2⁻³² mm nearest to a number of units.
+pub(crate) fn position_bits(units: i64) -> i64 {
+    let scaled = i128::from(units) << 33;
+    ((scaled / 10_000_000_000 + scaled.signum()) / 2) as i64
+}
+
+/// A move of a program.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Move {
+    pub(crate) from: [i64; 3],
+    pub(crate) to: [i64; 3],
+    /// None for a line.
+    pub(crate) arc: Option<Arc>,
+    /// Programmed feed \[mm/min\]; infinite for a rapid.
+    pub(crate) feed_mm_min: f64,
+}
+
+/// What makes a move an arc or a helix.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arc {
+    /// First and second axis of the plane, and its normal; right-handed.
+    pub(crate) axes: [usize; 3],
+    /// Centre minus start, along the first and second axis.
+    pub(crate) offset: [i64; 2],
+    pub(crate) is_clockwise: bool,
+}
+
+/// A point of the path and its derivatives by arc length.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PathPoint {
+    pub(crate) at: Vector,
+    pub(crate) tangent: Vector,
+    pub(crate) second: Vector,
+    pub(crate) third: Vector,
+}
+
+/// A move made ready to be evaluated.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Element {
+    pub(crate) length_mm: f64,
+    from: Vector,
+    /// Radius, 0 for a line, and what it grows by until the end (the rounding of the programmed end).
+    pub(crate) radius_mm: f64,
+    grows_mm: f64,
+    sweep_rad: f64,
+    outward: Vector,
+    onward: Vector,
+    /// Of a line the direction, of an arc the rise.
+    axial: Vector,
+}
+
+impl Element {
+    pub(crate) fn new(step: &Move) -> Self {
+        let from = step.from.map(mm);
+        let whole: Vector = core::array::from_fn(|axis| mm(step.to[axis] - step.from[axis]));
+        let Some(arc) = step.arc else {
+            let length_mm = norm(whole);
+            return Self {
+                length_mm,
+                from,
+                radius_mm: 0.0,
+                grows_mm: 0.0,
+                sweep_rad: 0.0,
+                outward: [0.0; 3],
+                onward: [0.0; 3],
+                axial: whole.map(|c| c / length_mm),
+            };
+        };
+        let [first, second, normal] = arc.axes;
+        let start = arc.offset.map(|units| -units);
+        let end =
+            [start[0] + step.to[first] - step.from[first], start[1] + step.to[second] - step.from[second]];
+        let product = |a: i64, b: i64| i128::from(a) * i128::from(b);
+        let cross = product(start[0], end[1]) - product(start[1], end[0]);
+        let inner = product(start[0], end[0]) + product(start[1], end[1]);
+        let mut sweep_rad = (cross as f64).atan2(inner as f64);
+        if arc.is_clockwise {
+            sweep_rad = -sweep_rad;
+        }
+        if sweep_rad <= 0.0 {
+            sweep_rad += 2.0 * PI;
+        }
+        let radius_mm = mm(start[0]).hypot(mm(start[1]));
+        let mut outward = [0.0; 3];
+        (outward[first], outward[second]) = (mm(start[0]) / radius_mm, mm(start[1]) / radius_mm);
+        let turn = if arc.is_clockwise { -1.0 } else { 1.0 };
+        let mut onward = [0.0; 3];
+        (onward[first], onward[second]) = (-turn * outward[second], turn * outward[first]);
+        let length_mm = (radius_mm * sweep_rad).hypot(whole[normal]);
+        let mut axial = [0.0; 3];
+        axial[normal] = whole[normal] / length_mm;
+        let grows_mm = mm(end[0]).hypot(mm(end[1])) - radius_mm;
+        Self { length_mm, from, radius_mm, grows_mm, sweep_rad, outward, onward, axial }
+    }
+
+    /// `s_mm` from its start.
+    pub(crate) fn at(&self, s_mm: f64) -> PathPoint {
+        let still = [0.0; 3];
+        if self.radius_mm <= 0.0 {
+            let at = core::array::from_fn(|axis| self.from[axis] + self.axial[axis] * s_mm);
+            return PathPoint { at, tangent: self.axial, second: still, third: still };
+        }
+        let part = s_mm / self.length_mm;
+        let (sine, cosine) = (self.sweep_rad * part).sin_cos();
+        let half = (0.5 * self.sweep_rad * part).sin();
+        let turn = self.sweep_rad / self.length_mm;
+        let planar = self.radius_mm * turn;
+        let mut point = PathPoint { at: self.from, tangent: still, second: still, third: still };
+        for axis in 0..3 {
+            let (o, n) = (self.outward[axis], self.onward[axis]);
+            let (here, ahead) = (o * cosine + n * sine, n * cosine - o * sine);
+            point.at[axis] += self.radius_mm * (n * sine - 2.0 * o * half * half)
+                + here * self.grows_mm * part
+                + self.axial[axis] * s_mm;
+            point.tangent[axis] = planar * ahead + self.axial[axis];
+            point.second[axis] = -planar * turn * here;
+            point.third[axis] = -planar * turn * turn * ahead;
+        }
+        point
+    }
+}
+
+/// Angle between the directions at a joint \[rad\], and the step of the curvature vector \[1/mm\].
+pub(crate) fn joint(before: &Element, after: &Element) -> (f64, f64) {
+    let (end, start) = (before.at(before.length_mm), after.at(0.0));
+    let chord = norm(minus(end.tangent, start.tangent));
+    (2.0 * (0.5 * chord).min(1.0).asin(), norm(minus(end.second, start.second)))
+}

@@ -1,0 +1,154 @@
+//! The programmed path as a whole: stretches between full stops, found from the geometry alone.
+
+use super::geometry::{Element, PathPoint, joint, position_bits};
+use super::program::{Asked, Generated};
+use motion_host::machine::Machine;
+
+/// A move on its stretch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed {
+    pub(crate) element: Element,
+    /// From the stretch's start [mm].
+    pub(crate) start_mm: f64,
+    pub(crate) feed_mm_s: f64,
+    /// Index of the move, and so of the plan's block.
+    pub(crate) block: usize,
+    /// Angle [rad] and step of curvature [1/mm] at its start, if the motion does not stop there.
+    pub(crate) joint: Option<(f64, f64)>,
+}
+
+/// From full stop to full stop.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Stretch {
+    pub(crate) moves: Vec<Placed>,
+    pub(crate) length_mm: f64,
+    /// Exact end, in steps of 2⁻³² mm.
+    pub(crate) end_bits: [i64; 3],
+}
+
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Path {
+    pub(crate) stretches: Vec<Stretch>,
+    pub(crate) dwell_s: f64,
+    pub(crate) stops: u64,
+    /// A joint's angle is so close to the machine's that rounding decides whether it stops there.
+    pub(crate) is_ambiguous: bool,
+}
+
+impl Path {
+    pub(crate) fn new(program: &Generated, machine: &Machine) -> Self {
+        let mut path = Self::default();
+        let mut open = Stretch::default();
+        let mut block = 0;
+        for asked in &program.asked {
+            let step = match asked {
+                Asked::Move(step) => step,
+                Asked::Dwell(seconds) => {
+                    path.close(&mut open);
+                    path.dwell_s += seconds;
+                    continue;
+                }
+                Asked::Stop => {
+                    path.close(&mut open);
+                    path.stops += 1;
+                    continue;
+                }
+            };
+            let element = Element::new(step);
+            let mut passed = None;
+            if let Some(last) = open.moves.last() {
+                let (angle_rad, bend) = joint(&last.element, &element);
+                let limit_rad = machine.path.joint_angle_rad;
+                let is_close = (angle_rad - limit_rad).abs() <= 1e-6 * limit_rad + 1e-9;
+                path.is_ambiguous |= is_close;
+                if angle_rad > limit_rad {
+                    path.close(&mut open);
+                } else {
+                    passed = Some((angle_rad, bend));
+                }
+            }
+            open.moves.push(Placed {
+                element,
+                start_mm: open.length_mm,
+                feed_mm_s: step.feed_mm_min / 60.0,
+                block,
+                joint: passed,
+            });
+            open.length_mm += element.length_mm;
+            open.end_bits = step.to.map(position_bits);
+            block += 1;
+        }
+        path.close(&mut open);
+        path
+    }
+
+    fn close(&mut self, open: &mut Stretch) {
+        let end_bits = open.end_bits;
+        if !open.moves.is_empty() {
+            self.stretches.push(std::mem::take(open));
+            open.end_bits = end_bits;
+        }
+    }
+
+    pub(crate) fn length_mm(&self) -> f64 {
+        self.stretches.iter().map(|stretch| stretch.length_mm).sum()
+    }
+}
+
+/// Walks a path forward.
+#[derive(Clone, Debug)]
+pub(crate) struct Cursor<'a> {
+    path: &'a Path,
+    stretch: usize,
+    index: usize,
+    /// Length of the stretches before.
+    pub(crate) before_mm: f64,
+}
+
+impl<'a> Cursor<'a> {
+    pub(crate) fn new(path: &'a Path) -> Self {
+        Self { path, stretch: 0, index: 0, before_mm: 0.0 }
+    }
+
+    /// The move that contains `s_mm` of a stretch; none after the last stretch.
+    pub(crate) fn seek(&mut self, stretch: usize, s_mm: f64) -> Option<&'a Placed> {
+        while self.stretch < stretch {
+            self.before_mm += self.path.stretches.get(self.stretch)?.length_mm;
+            self.stretch += 1;
+            self.index = 0;
+        }
+        let moves = &self.path.stretches.get(stretch)?.moves;
+        while moves.get(self.index + 1).is_some_and(|next| next.start_mm <= s_mm) {
+            self.index += 1;
+        }
+        moves.get(self.index)
+    }
+
+    /// The move found last and what lies around it on the stretch.
+    pub(crate) fn neighbours(&self) -> &'a [Placed] {
+        let moves = self.path.stretches.get(self.stretch).map_or(&[][..], |stretch| &stretch.moves);
+        let from = self.index.saturating_sub(20).min(moves.len());
+        &moves[from..(self.index + 2).min(moves.len())]
+    }
+
+    /// The moves that contain `s_mm` but for rounding: the one found last, and at a joint others.
+    pub(crate) fn near(&self, s_mm: f64, rounding_mm: f64) -> impl Iterator<Item = &'a Placed> {
+        let holds = move |placed: &Placed, margin_mm: f64| {
+            let local_mm = s_mm - placed.start_mm;
+            local_mm >= -margin_mm && local_mm <= placed.element.length_mm + margin_mm
+        };
+        let around = self.neighbours();
+        let inside = around.iter().rev().take(2).position(|placed| holds(placed, -rounding_mm));
+        let around = match inside {
+            Some(from_end) => &around[around.len() - 1 - from_end..around.len() - from_end],
+            None => around,
+        };
+        around.iter().filter(move |placed| holds(placed, rounding_mm))
+    }
+}
+
+impl Placed {
+    pub(crate) fn at(&self, s_mm: f64) -> PathPoint {
+        self.element.at(s_mm - self.start_mm)
+    }
+}

@@ -1,0 +1,302 @@
+//! Faults of the kernel: typed, latched, the first one stays, outputs 0 V, drives disabled, and a defined
+//! way back.
+
+#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
+mod check;
+
+use check::bench::{LIMITS, RULES, line, mm, point, ramp, rest_to_rest};
+use hal_sim::{AxisParameters, MachineParameters, SimMachine};
+use motion_host::machine::Machine;
+use motion_host::simulate::rig::Rig;
+use motion_kernel::exec::{ExecFault, ExecState};
+use motion_kernel::fault::FaultKind;
+use motion_kernel::hal::{DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::kernel::Kernel;
+use motion_kernel::queue::{Feeder, Intake, Streams};
+use motion_kernel::units::{Counts, DacCode, Position};
+
+/// Axes that follow perfectly until told to fail.
+#[derive(Debug, Default)]
+struct Bench {
+    counts: [Counts; 2],
+    written: [DacCode; 2],
+    is_enabled: bool,
+    encoder_fails: bool,
+    output_fails: bool,
+    enable_fails: bool,
+}
+
+struct Failure;
+
+impl Encoder<2> for Bench {
+    type Error = Failure;
+    fn latch(&mut self) -> Result<[Counts; 2], Failure> {
+        if self.encoder_fails { Err(Failure) } else { Ok(self.counts) }
+    }
+}
+
+impl VelocityChannel<2> for Bench {
+    type Error = Failure;
+    fn write(&mut self, codes: &[DacCode; 2]) -> Result<(), Failure> {
+        if self.output_fails {
+            return Err(Failure);
+        }
+        self.written = *codes;
+        Ok(())
+    }
+}
+
+impl DriveEnable<2> for Bench {
+    type Error = Failure;
+    fn set_enabled(&mut self, is_enabled: bool) -> Result<(), Failure> {
+        if self.enable_fails {
+            return Err(Failure);
+        }
+        self.is_enabled = is_enabled;
+        Ok(())
+    }
+}
+
+const MM_PER_COUNT: f64 = 1e-4;
+
+/// Two axes of the reference machine, with another limit of the following error.
+fn kernel() -> Kernel<f32, 2> {
+    let mut machine = Machine::reference();
+    for axis in &mut machine.axes {
+        axis.following_error_limit_mm = 0.5;
+        axis.mm_per_count = MM_PER_COUNT;
+    }
+    let [x, y, _] = machine.axis_configs().expect("axes");
+    let mut kernel = Kernel::new([x, y], point([0.0, 0.0]), [Counts(0); 2]);
+    kernel.enable(0);
+    kernel
+}
+
+/// What is found when the codes are on their way already: they are 0 V from the next tick on.
+fn is_found_writing(kind: &FaultKind<f32>) -> bool {
+    matches!(kind, FaultKind::Output | FaultKind::Enable)
+}
+
+/// One tick of a bench that follows: its encoders read what was set.
+fn tick(
+    kernel: &mut Kernel<f32, 2>,
+    intake: &mut Intake<'_, f32, 2>,
+    bench: &mut Bench,
+) -> Option<FaultKind<f32>> {
+    let trace = kernel.tick(intake, bench);
+    if trace.fault.is_none() {
+        bench.counts = trace
+            .executed
+            .setpoints
+            .map(|axis| Counts((axis.position.to_mm() / MM_PER_COUNT).round() as i64));
+    } else if trace.fault.is_some_and(|fault| fault.tick < trace.tick || !is_found_writing(&fault.kind)) {
+        assert!(trace.axes.iter().all(|axis| axis.code == DacCode::ZERO), "{trace:?}");
+    }
+    assert_eq!(trace.fault.map(|fault| fault.kind), kernel.fault().map(|fault| fault.kind));
+    trace.fault.map(|fault| fault.kind)
+}
+
+/// 20 mm along X from `from_mm`, whole.
+fn offer(feeder: &mut Feeder<'_, f32, 2>, from_mm: f64) {
+    for part in [0.0, 10.0] {
+        feeder.piece(line([from_mm + part, 0.0], [1.0, 0.0], 10.0)).expect("a piece");
+    }
+    for segment in rest_to_rest(mm(20.0), 50.0) {
+        feeder.segment(segment).expect("a segment");
+    }
+    feeder.end_stretch(point([from_mm + 20.0, 0.0])).expect("its end");
+}
+
+/// Runs into a fault that `break_it` provokes at tick 100, and checks all that is promised about it.
+fn provoke(
+    break_it: impl Fn(&mut Bench),
+    repair: impl Fn(&mut Bench),
+    is_expected: impl Fn(&FaultKind<f32>) -> bool,
+) {
+    let (mut kernel, mut bench) = (kernel(), Bench::default());
+    let mut streams = Streams::<f32, 2, 8, 8>::new();
+    let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
+    offer(&mut feeder, 0.0);
+    for _ in 0..100 {
+        assert_eq!(tick(&mut kernel, &mut intake, &mut bench), None);
+    }
+    assert!(bench.is_enabled && bench.written[0] != DacCode::ZERO);
+    let mut fault = None;
+    for _ in 0..400 {
+        break_it(&mut bench);
+        fault = fault.or(tick(&mut kernel, &mut intake, &mut bench));
+    }
+    let fault = fault.expect("a fault");
+    assert!(is_expected(&fault), "{fault:?}");
+    let latched = kernel.fault().expect("latched");
+    // Repaired it stays, and another failure does not replace it.
+    repair(&mut bench);
+    assert_eq!(tick(&mut kernel, &mut intake, &mut bench), Some(fault));
+    bench.encoder_fails = true;
+    bench.output_fails = true;
+    tick(&mut kernel, &mut intake, &mut bench);
+    (bench.encoder_fails, bench.output_fails) = (false, false);
+    for _ in 0..10 {
+        assert_eq!(tick(&mut kernel, &mut intake, &mut bench), Some(fault));
+    }
+    assert_eq!(kernel.fault(), Some(latched));
+    assert!(!bench.is_enabled && bench.written == [DacCode::ZERO; 2], "{bench:?}");
+    // The way back: cleared, at rest where the axes are, with new streams.
+    let stands = kernel.clear_fault();
+    assert_eq!(kernel.fault(), None);
+    let here = bench.counts.map(|Counts(counts)| counts as f64 * MM_PER_COUNT);
+    for (found, here) in stands.iter().zip(here) {
+        assert!((found.to_mm() - here).abs() < 1e-9);
+    }
+    let mut streams = Streams::<f32, 2, 8, 8>::new();
+    let (mut feeder, mut intake) = streams.split(RULES, point(here));
+    offer(&mut feeder, here[0]);
+    // Not before it is asked to.
+    for _ in 0..3 {
+        let trace = kernel.tick(&mut intake, &mut bench);
+        assert!(trace.executed.state == ExecState::Idle && !bench.is_enabled);
+    }
+    kernel.enable(5);
+    for settling in 0..5 {
+        let trace = kernel.tick(&mut intake, &mut bench);
+        assert!(trace.executed.state == ExecState::Idle && bench.is_enabled, "{settling}");
+    }
+    for _ in 0..20_000 {
+        let trace = kernel.tick(&mut intake, &mut bench);
+        assert_eq!(trace.fault, None);
+        let set = trace.executed.setpoints.map(|axis| axis.position);
+        bench.counts = set.map(|position| Counts((position.to_mm() / MM_PER_COUNT).round() as i64));
+        if trace.executed.stretches == 1 && trace.executed.state == ExecState::Idle {
+            assert!(bench.is_enabled);
+            assert_eq!(set, [mm(here[0] + 20.0), mm(here[1])]);
+            return;
+        }
+    }
+    panic!("it did not move again");
+}
+
+#[test]
+fn following_error() {
+    let stuck = |bench: &mut Bench| bench.counts[0] = Counts(0);
+    provoke(
+        stuck,
+        |_| {},
+        |kind| matches!(*kind, FaultKind::FollowingError { axis: 0, error_mm } if error_mm > 0.5 && error_mm < 0.6),
+    );
+}
+
+#[test]
+fn encoder() {
+    provoke(|b| b.encoder_fails = true, |b| b.encoder_fails = false, |k| matches!(k, FaultKind::Encoder));
+}
+
+#[test]
+fn output() {
+    provoke(|b| b.output_fails = true, |b| b.output_fails = false, |k| matches!(k, FaultKind::Output));
+}
+
+/// The first tick can't enable the drives: no motion with them off.
+#[test]
+fn enable() {
+    let (mut kernel, mut bench) = (kernel(), Bench { enable_fails: true, ..Bench::default() });
+    let mut streams = Streams::<f32, 2, 8, 8>::new();
+    let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
+    offer(&mut feeder, 0.0);
+    tick(&mut kernel, &mut intake, &mut bench);
+    let before = kernel.fault();
+    assert!(matches!(before.map(|fault| fault.kind), Some(FaultKind::Enable)), "{before:?}");
+    bench.enable_fails = false;
+    tick(&mut kernel, &mut intake, &mut bench);
+    assert!(kernel.fault() == before && bench.written == [DacCode::ZERO; 2] && !bench.is_enabled);
+}
+
+/// Runs dry inside a stretch: as much as fits the queues, then nothing more.
+fn starve(is_path: bool) {
+    let (mut kernel, mut bench) = (kernel(), Bench::default());
+    let mut streams = Streams::<f32, 2, 8, 4>::new();
+    let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
+    // Both streams are full (one place stays empty), so the stretch may start; then the rest of the path
+    // is missing, or the fourth segment.
+    let (path_mm, top_mm_s) = if is_path { (10.0, 50.0) } else { (80.0, 30.0) };
+    let part_mm = path_mm / 7.0;
+    for part in 0..7 {
+        feeder.piece(line([f64::from(part) * part_mm, 0.0], [1.0, 0.0], part_mm)).expect("a piece");
+    }
+    for (from, to) in [(0.0, 0.5 * top_mm_s), (0.5 * top_mm_s, 0.8 * top_mm_s), (0.8 * top_mm_s, top_mm_s)] {
+        feeder.segment(ramp(LIMITS, from, to)).expect("a ramp");
+    }
+    let mut fault = None;
+    for _ in 0..10_000 {
+        let trace = kernel.tick(&mut intake, &mut bench);
+        if trace.fault.is_none() {
+            assert!(trace.executed.motion.v_mm_s <= top_mm_s as f32);
+            let set = trace.executed.setpoints.map(|axis| axis.position.to_mm());
+            assert!(!is_path || set[0] <= path_mm);
+            bench.counts = set.map(|at| Counts((at / MM_PER_COUNT).round() as i64));
+        } else {
+            assert!(trace.axes.iter().all(|axis| axis.code == DacCode::ZERO));
+        }
+        assert!(fault.is_none() || fault == trace.fault, "latched");
+        fault = trace.fault;
+    }
+    let expected = if is_path { ExecFault::PathStarved } else { ExecFault::FeedStarved };
+    assert_eq!(fault.map(|fault| fault.kind), Some(FaultKind::Executor(expected)));
+    assert!(!bench.is_enabled && bench.written == [DacCode::ZERO; 2]);
+}
+
+#[test]
+fn starvation_of_the_path() {
+    starve(true);
+}
+
+#[test]
+fn starvation_of_the_feed() {
+    starve(false);
+}
+
+/// The converter's bus fails in the middle of a move, on the simulated machine: when it is back, the first
+/// thing it gets is 0 V, although the axes do not stand where they were set.
+#[test]
+fn converter_bus() {
+    let reference = Machine::reference();
+    for frames in [0, 1, 2, 3, 401, 402, 403, 404] {
+        let axis = AxisParameters::REFERENCE_X;
+        let parameters = MachineParameters::at_reference_tick([axis; 3]);
+        let simulated = SimMachine::<3, _>::new(&parameters).expect("a machine");
+        let mut rig = Rig::new(&simulated).expect("a converter");
+        let Ok(counts) = rig.latch();
+        let start = [Position::ZERO; 3];
+        let mut kernel = Kernel::<f32, 3>::new(reference.axis_configs().expect("axes"), start, counts);
+        kernel.enable(0);
+        let mut streams = Streams::<f32, 3, 8, 8>::new();
+        let (mut feeder, mut intake) = streams.split(reference.rules(), start);
+        let piece = motion_kernel::path::Piece::line(1, start, [1.0, 0.0, 0.0], mm(10.0)).expect("a piece");
+        feeder.piece(piece).expect("room");
+        for segment in rest_to_rest(mm(10.0), 50.0) {
+            feeder.segment(segment).expect("room");
+        }
+        feeder.end_stretch([mm(10.0), mm(0.0), mm(0.0)]).expect("room");
+        // The frames of 100 ticks, then some.
+        for _ in 0..100 {
+            assert_eq!(kernel.tick(&mut intake, &mut rig).fault, None);
+            simulated.advance();
+        }
+        simulated.chip().fail_bus_after(Some(frames));
+        let mut ticks = 100;
+        while kernel.fault().is_none() {
+            kernel.tick(&mut intake, &mut rig);
+            simulated.advance();
+            ticks += 1;
+        }
+        let fault = kernel.fault().expect("a fault");
+        assert!(matches!(fault.kind, FaultKind::Output), "{fault:?}");
+        // Four frames a tick.
+        assert_eq!(fault.tick, 100 + frames / 4, "{frames} frames");
+        assert_eq!(ticks, fault.tick + 1);
+        assert!(!simulated.is_enabled());
+        simulated.chip().fail_bus_after(None);
+        kernel.tick(&mut intake, &mut rig);
+        assert_eq!(simulated.chip().volts()[..3], [0.0; 3]);
+        assert_eq!(kernel.fault(), Some(fault));
+    }
+}
