@@ -125,6 +125,12 @@ fn unmade(error: &SegmentError, tick_s: f64) -> String {
         SegmentError::OutOfRange { quantity, value } => {
             let (name, unit) = quantity.trim_end_matches(']').split_once(" [").unwrap_or((quantity, ""));
             let expected = match unit {
+                // The one length that depends on the number type, and that f32 alone can refuse here.
+                "mm" if name.starts_with("jerk") => format!(
+                    "at most {} mm, for positions good to a quarter of a 0.1 µm count in f32: \
+                     a higher jerk limit or a lower feed",
+                    <f32 as motion_kernel::num::Real>::RAMP_MM_MAX
+                ),
                 "s" => at_most_ticks(tick_s),
                 "mm" => format!("from 0 to {} mm", Position::LIMIT_MM),
                 _ => {

@@ -259,6 +259,12 @@ impl<R: Real> FeedSegment<R> {
         };
         let jerk = ramp.signed_jerk_mm_s3();
         let (accel, speed, length_scale) = (jerk * t1_s, jerk * t1_s * t1_s, jerk * t1_s * t1_s * t1_s);
+        if !(libm::fabs(length_scale) <= R::RAMP_MM_MAX) {
+            return Err(SegmentError::OutOfRange {
+                quantity: "jerk · t1³ [mm]",
+                value: libm::fabs(length_scale),
+            });
+        }
         let end = Shape::at(1.0);
         let (hold_a, hold_v) = (accel * end.accel, from_mm_s + speed * end.speed);
         // A scale that a narrow type can't hold must be refused here, not overflow in a tick.

@@ -125,6 +125,7 @@ impl Real for Fixed {
     type Unit = I3F29;
     const EPSILON: f64 = 1.0 / 4_294_967_296.0;
     const PIECE_MM_MAX: f64 = 16.0;
+    const RAMP_MM_MAX: f64 = 90.0e3;
 
     fn checked_from_f64(value: f64) -> Option<Self> {
         (libm::fabs(value) < 2_147_483_648.0).then(|| Self::from_f64(value))

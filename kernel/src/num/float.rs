@@ -5,7 +5,7 @@
 use super::{Real, Root, Scalar, Unit};
 
 macro_rules! float {
-    ($float:ident, $sqrt:path, $cbrt:path, terms: $terms:literal, piece_mm: $piece:literal, q32: $q32:path, fraction: |$f:ident| $fraction:expr) => {
+    ($float:ident, $sqrt:path, $cbrt:path, terms: $terms:literal, piece_mm: $piece:literal, ramp_mm: $ramp:literal, q32: $q32:path, fraction: |$f:ident| $fraction:expr) => {
         impl Scalar for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -35,6 +35,7 @@ macro_rules! float {
             type Unit = Self;
             const EPSILON: f64 = $float::EPSILON as f64;
             const PIECE_MM_MAX: f64 = $piece;
+            const RAMP_MM_MAX: f64 = $ramp;
 
             fn checked_from_f64(value: f64) -> Option<Self> {
                 let narrow = Self::from_f64(value);
@@ -82,9 +83,9 @@ macro_rules! float {
 }
 
 // f32 keeps the top word only: one conversion instruction on a core with a single-precision FPU.
-float!(f32, libm::sqrtf, libm::cbrtf, terms: 7, piece_mm: 16.0, q32: f32_to_q32,
+float!(f32, libm::sqrtf, libm::cbrtf, terms: 7, piece_mm: 16.0, ramp_mm: 16.0e3, q32: f32_to_q32,
     fraction: |fraction| (fraction >> 32) as u32 as Self * (1.0 / 4_294_967_296.0));
-float!(f64, libm::sqrt, libm::cbrt, terms: 12, piece_mm: 1.0e6, q32: f64_to_q32,
+float!(f64, libm::sqrt, libm::cbrt, terms: 12, piece_mm: 1.0e6, ramp_mm: 1.0e9, q32: f64_to_q32,
     fraction: |fraction| (fraction >> 11) as Self * (1.0 / 9_007_199_254_740_992.0));
 
 /// The same bits on every core, by what the core has one instruction for.

@@ -91,6 +91,11 @@ pub trait Real: Scalar {
     /// 0.1 µm count \[mm\]. Longer lines are cut into several pieces.
     const PIECE_MM_MAX: f64;
 
+    /// The greatest Jp·t₁³ of a ramp whose positions this type keeps within a quarter of a 0.1 µm count
+    /// \[mm\]: a five-hundredth of it is scaled by a sine of this type, good to six [`Self::EPSILON`] in a
+    /// float and 70 steps of 2⁻²⁹ in fixed point. Reached by limits so soft that a ramp takes a minute.
+    const RAMP_MM_MAX: f64;
+
     /// The nearest value to `value`; `None` if it is not finite or beyond the type's range.
     fn checked_from_f64(value: f64) -> Option<Self>;
     /// This quantity times a normalised one.

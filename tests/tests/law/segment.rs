@@ -9,10 +9,12 @@ use motion_kernel::units::Position;
 /// Greatest errors of V, A, J and snap, in the number type's epsilon times the ramp's greatest value of
 /// the quantity, beyond what the rounding of time explains. Measured: 1.6, 1.4, 3.9 and 6.5 (f32).
 const STATE_EPSILONS: [f64; 4] = [2.0, 4.0, 8.0, 12.0];
-/// Greatest error of the position: a part of the length, the number type's epsilon times Jp·t₁³, and some steps.
-/// The first is the fixed-point product's 2⁻³² (documented with the segment) twice, and the time step's 2⁻³³.
+/// Greatest error of the position: a part of the length and of Jp·t₁³, the number type's epsilon in the sine's
+/// part of Jp·t₁³, and some steps. The first is the fixed-point product's 2⁻³² (documented with the segment)
+/// twice, and the time step's 2⁻³³; the sine has snap's error and half an epsilon of time, 2π-fold.
 const LENGTH_PART: f64 = 2.5 / 4_294_967_296.0;
-const GAIN_EPSILONS: f64 = 1.0;
+const SINE_EPSILONS: f64 = (STATE_EPSILONS[3] + std::f64::consts::PI) / 496.1;
+const CUBE_PART: f64 = 1.0 / 4_294_967_296.0;
 const STEPS_MM: f64 = 6.0 / 4_294_967_296.0;
 
 const TICK: f64 = 4_294_967_296.0;
@@ -75,7 +77,7 @@ impl Worst {
             }
         }
         let bound = LENGTH_PART * length_mm
-            + GAIN_EPSILONS * R::EPSILON * jerk * t1_s.powi(3)
+            + (SINE_EPSILONS * R::EPSILON + CUBE_PART) * jerk * t1_s.powi(3)
             + STEPS_MM
             + exact.v_mm_s.max(0.0) * late_s
             + 4.0 * f64::EPSILON * length_mm;
@@ -269,6 +271,32 @@ fn long_and_slow() {
         walk(&mut random, &ramp, &segment, 1e-5, &mut worst);
     }
     worst.check();
+}
+
+/// Limits so soft that a ramp takes most of a minute and metres: f32 keeps the promised quarter of a 0.1 µm count.
+#[test]
+fn soft_limits_keep_their_counts_in_f32() {
+    // Softer still is refused by name.
+    let softer = Ramp::new(&Law::new(limits((50.0, 0.5, 100.0))).expect("positive"), 0.0, 300.0);
+    let length = Position::from_mm(softer.length_mm()).expect("in range");
+    let refused = FeedSegment::<f32>::ramp(&softer, length, 5e-4);
+    assert!(matches!(refused, Err(SegmentError::OutOfRange { quantity: "jerk · t1³ [mm]", .. })));
+    for (soft, to) in [((50.0, 2.0, 4e5), 300.0), ((50.0, 1.7, 100.0), 300.0), ((20.0, 1.0, 1.0), 200.0)] {
+        let ramp = Ramp::new(&Law::new(limits(soft)).expect("positive"), 0.0, to);
+        let length = Position::from_mm(ramp.length_mm()).expect("in range");
+        let narrow = FeedSegment::<f32>::ramp(&ramp, length, 5e-4).expect("a segment");
+        let wide = FeedSegment::<f64>::ramp(&ramp, length, 5e-4).expect("a segment");
+        let mut worst = 0.0_f64;
+        for part in 0..200_000_u64 {
+            let fraction = part * (u64::MAX / 200_000);
+            for phase in [Phase::Rise, Phase::Hold, Phase::Fall] {
+                let found = narrow.at(phase, fraction).s - wide.at(phase, fraction).s;
+                worst = worst.max(found.to_mm().abs());
+            }
+        }
+        println!("{soft:?}, {:.0} s: {:.4} counts", ramp.duration_s(), worst * 1e4);
+        assert!(worst < 2.5e-5, "{soft:?}: {worst:e} mm");
+    }
 }
 
 /// What does not fit is refused by name.
