@@ -94,11 +94,13 @@ const TANGENT_ROUNDING_RAD: f64 = 1.0e-9;
 fn joint_feed(before: &Element, after: &Element, machine: &Machine) -> f64 {
     let ([_, end], [start, _]) = (before.ends(), after.ends());
     let angle_rad = angle(end.tangent, start.tangent);
-    let steps = Joint {
-        angle_rad: if angle_rad <= TANGENT_ROUNDING_RAD { 0.0 } else { angle_rad },
-        curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)),
-    };
-    joint(&steps, machine.path.joint_angle_rad, machine.path.accel_step_mm_s2, machine.tick_s)
+    let steps = Joint { angle_rad, curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)) };
+    joint(
+        &steps,
+        machine.path.joint_angle_rad.max(TANGENT_ROUNDING_RAD),
+        machine.path.accel_step_mm_s2,
+        machine.tick_s,
+    )
 }
 
 /// Plans the open stretch and appends it.

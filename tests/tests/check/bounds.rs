@@ -64,21 +64,23 @@ pub(crate) fn position_mm<R: Number>() -> f64 {
 pub(crate) const AXIS_SHARES: [f64; 3] = [4e-6, 5e-6, 2e-5];
 
 /// What fixed point adds to that, in [`Number::STEP`]s. A septic's coefficients and what is made of them
-/// are parts of the piece's length, rounded to 2⁻²⁹ = 8 steps: k, k·(k − 1), … of those, summed over k, for
-/// the first, second and third derivative; v/L and the products are rounded to one step each. `bend` and
-/// `twist` are κ and κ', `piece_mm` is L. Twice that, because Horner's scheme rounds down in every round.
+/// are parts of the piece's length, in units of 2⁻²⁹ = 8 steps. Half a unit for each coefficient (k,
+/// k·(k − 1), … of them, summed over k) and one for each of Horner's products that is rounded down and
+/// carried on (8, 8 + 28, … of them, times 1, 2, 6) make 50, 240 and 1180 units of the first, second and third
+/// derivative; the products are rounded to one step each, and so is 1/L, of which v/L has v-fold the error.
+/// `bend` and `twist` are κ and κ', `piece_mm` is L.
 pub(crate) fn axis_steps([v, a, j]: [f64; 3], bend: f64, twist: f64, piece_mm: f64) -> [f64; 3] {
     if bend <= 0.0 {
         return [3.0; 3];
     }
     let w = v / piece_mm;
+    let w_steps = 1.0 + v;
     let (a, j) = (a.abs(), j.abs());
     [
-        3.0 + 8.0 * 28.0 * v,
-        3.0 + 8.0 * (28.0 * a + 112.0 * w * v) + v * (1.0 + bend * piece_mm),
-        3.0 + 8.0 * (28.0 * j + 336.0 * w * a + 420.0 * w * w * v)
-            + 3.0 * a * (1.0 + bend * piece_mm)
-            + v * (1.0 + w + 2.0 * twist * piece_mm * v),
+        6.0 + 8.0 * 50.0 * v,
+        6.0 + 8.0 * (50.0 * a + 240.0 * w * v) + 2.0 * v * (1.0 + bend * piece_mm * w_steps),
+        6.0 + 8.0 * (50.0 * j + 3.0 * 240.0 * w * a + 1180.0 * w * w * v)
+            + 6.0 * a * (1.0 + bend * piece_mm * w_steps)
+            + 2.0 * v * (1.0 + w + 2.0 * twist * piece_mm * v * w_steps),
     ]
-    .map(|steps| steps * 2.0)
 }
