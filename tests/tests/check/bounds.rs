@@ -68,19 +68,25 @@ pub(crate) const AXIS_SHARES: [f64; 3] = [4e-6, 5e-6, 2e-5];
 /// k·(k − 1), … of them, summed over k) and one for each of Horner's products that is rounded down and
 /// carried on (8, 8 + 28, … of them, times 1, 2, 6) make 50, 240 and 1180 units of the first, second and third
 /// derivative; the products are rounded to one step each, and so is 1/L, of which v/L has v-fold the error.
-/// `bend` and `twist` are κ and κ', `piece_mm` is L.
+/// The place in the piece is off by two units. √3 of
+/// that for the vector of three axes. `bend` and `twist` are κ and κ', `piece_mm` is L.
 pub(crate) fn axis_steps([v, a, j]: [f64; 3], bend: f64, twist: f64, piece_mm: f64) -> [f64; 3] {
     if bend <= 0.0 {
         return [3.0; 3];
     }
     let w = v / piece_mm;
     let w_steps = 1.0 + v;
+    let place = 2.0 * 8.0 * piece_mm;
     let (a, j) = (a.abs(), j.abs());
     [
-        6.0 + 8.0 * 50.0 * v,
-        6.0 + 8.0 * (50.0 * a + 240.0 * w * v) + 2.0 * v * (1.0 + bend * piece_mm * w_steps),
+        6.0 + 8.0 * 50.0 * v + place * bend * v,
+        6.0 + 8.0 * (50.0 * a + 240.0 * w * v)
+            + 2.0 * v * (1.0 + bend * piece_mm * w_steps)
+            + place * (twist * v * v + bend * a),
         6.0 + 8.0 * (50.0 * j + 3.0 * 240.0 * w * a + 1180.0 * w * w * v)
             + 6.0 * a * (1.0 + bend * piece_mm * w_steps)
-            + 2.0 * v * (1.0 + w + 2.0 * twist * piece_mm * v * w_steps),
+            + 2.0 * v * (1.0 + w + 2.0 * twist * piece_mm * v * w_steps)
+            + place * (bend * twist * v * v * v + 3.0 * twist * v * a + bend * j),
     ]
+    .map(|steps| 3.0_f64.sqrt() * steps)
 }
