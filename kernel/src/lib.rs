@@ -73,6 +73,7 @@
 //! }
 //! ```
 #![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
 // No panic path in what runs on a board; tests may.
 #![cfg_attr(
     not(test),
