@@ -293,6 +293,53 @@ fn a_tick_after_every_item_starves_nothing() {
     }
 }
 
+/// A full queue alone is no reason to start: the other one would run dry at once.
+#[test]
+fn a_stretch_waits_for_the_stream_that_is_behind() {
+    let rest = |intake: &mut motion_kernel::queue::Intake<'_, f32, 2>| {
+        let mut executor = Executor::new(point([0.0, 0.0]));
+        for _ in 0..1000 {
+            assert_eq!(executor.tick(intake).expect("nothing starves").state, ExecState::Idle);
+        }
+    };
+    // The feed stream is full, and there is no path.
+    let mut streams = Box::new(Streams::<f32, 2, 64, 3>::new());
+    let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
+    for segment in rest_to_rest(mm(10.0), 50.0) {
+        feeder.segment(segment).unwrap_or_default();
+    }
+    rest(&mut intake);
+    // The path stream is full, and the feed covers the beginning of it.
+    let mut streams = Box::new(Streams::<f32, 2, 4, 64>::new());
+    let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
+    for part in 0..3 {
+        feeder.piece(line([f64::from(part) * 10.0, 0.0], ALONG, 10.0)).expect("a piece");
+    }
+    feeder.segment(ramp(LIMITS, 0.0, 0.1)).expect("a ramp");
+    rest(&mut intake);
+}
+
+/// Pieces are counted over the whole program: stretches of a quarter of a tick, six short pieces each.
+#[test]
+fn pieces_of_several_stretches_in_one_tick_are_counted_together() {
+    let mut machine = Machine::reference();
+    machine.tick_s = 0.02;
+    let path = &mut machine.path;
+    (path.feed_mm_s, path.accel_mm_s2, path.jerk_mm_s3, path.snap_mm_s4) = (900.0, 1e9, 1e12, 1e12);
+    for axis in &mut machine.axes {
+        (axis.feed_mm_s, axis.accel_mm_s2, axis.jerk_mm_s3, axis.snap_mm_s4) = (900.0, 1e9, 1e12, 1e12);
+    }
+    let plan = |moves: usize| {
+        let side = |word: &str| format!("{word}{}\n", 0.9 / moves as f64).repeat(moves);
+        let text = format!("G91 G61 G1 F54000\n{}M2\n", (side("X") + &side("Y")).repeat(20));
+        let program = gcode::read("stairs.ngc", text.as_bytes()).expect("G-code");
+        plan_program("stairs.ngc", &program, &machine, Mode::Merged).map(|_| ()).map_err(|e| e.problem)
+    };
+    assert_eq!(plan(2), Ok(()));
+    let found = plan(6);
+    assert!(matches!(found, Err(Problem::DensePieces { pieces: PIECES_PER_TICK_MAX, .. })), "{found:?}");
+}
+
 /// What was queued before a split is gone, and a stretch that starts elsewhere than the machine stands is
 /// a fault, not a jump.
 #[test]
@@ -323,7 +370,9 @@ fn split_streams_are_empty_and_a_stretch_starts_where_the_machine_stands() {
 fn stretches_shorter_than_a_tick_stay_within_the_step_bound() {
     let limits = Limits { accel_mm_s2: 1e9, jerk_mm_s3: 1e12, snap_mm_s4: 1e15 };
     let rules = PathRules { limits, feed_mm_s: 1e5, ..RULES };
-    for length_mm in [1e-3, 2e-3, 5e-3, 0.01, 0.1] {
+    let mut most_in_a_tick = 0;
+    for part in 0..40 {
+        let length_mm = 2e-4 * 1.05_f64.powi(part);
         let mut streams = Box::new(Streams::<f32, 2, 256, 512>::new());
         let (mut feeder, mut intake) = streams.split(rules, point([0.0, 0.0]));
         let law = motion_kernel::law::Law::new(limits).expect("limits");
@@ -334,11 +383,11 @@ fn stretches_shorter_than_a_tick_stay_within_the_step_bound() {
         while stretches < 100 {
             let ramps = [(0.0, top), (top, 0.0)].map(|(a, b)| motion_kernel::law::Ramp::new(&law, a, b));
             let half = mm(ramps[0].length_mm());
-            let piece = motion_kernel::path::Piece::line(1, at, [1.0, 0.0], length).expect("a piece");
+            let piece = Piece::line(1, at, [1.0, 0.0], length).expect("a piece");
             feeder.piece(piece).expect("a piece");
             let mut entered = true;
             for (ramp, length) in ramps.iter().zip([half, length - half]) {
-                let segment = motion_kernel::law::FeedSegment::ramp(ramp, length, TICK_S).expect("a ramp");
+                let segment = FeedSegment::ramp(ramp, length, TICK_S).expect("a ramp");
                 entered &= feeder.segment(segment).is_ok();
             }
             if !entered {
@@ -349,8 +398,18 @@ fn stretches_shorter_than_a_tick_stay_within_the_step_bound() {
             stretches += 1;
         }
         let mut executor = Executor::new(point([0.0, 0.0]));
-        while executor.tick(&mut intake).expect("within the bound").state != ExecState::Idle {}
+        let mut before = 0;
+        loop {
+            let executed = executor.tick(&mut intake).expect("within the bound");
+            most_in_a_tick = most_in_a_tick.max(executed.stretches - before);
+            before = executed.stretches;
+            if executed.state == ExecState::Idle {
+                break;
+            }
+        }
     }
+    // Eight segments, two a stretch.
+    assert!(most_in_a_tick >= 4, "{most_in_a_tick}");
 }
 
 /// A line in pieces of `piece_mm`, passed at `pieces_per_tick`.
