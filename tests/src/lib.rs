@@ -1,1 +1,3 @@
-//! Tests.
+//! What the integration tests share across test programs.
+
+pub mod figures;
