@@ -56,7 +56,7 @@ pub struct Instruction {
     pub(super) row: Row,
     /// Bytes, 2 or 4.
     pub(super) width: u32,
-    /// Registers it writes.
+    /// Registers it writes. Of pairs and lists also those it stores: what stalls after it does not ask.
     pub(super) results: Registers,
     /// Registers it needs when it starts. The addend of an accumulate is not: it comes one cycle later
     /// (7.2.3).

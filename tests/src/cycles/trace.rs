@@ -218,7 +218,7 @@ pub enum TraceError {
     },
     /// The function was reached by something other than a call, so where it returns to is not known.
     NotCalled {
-        /// The address of what led to it.
+        /// The address of what led to it; 0 if the log starts there.
         from: u32,
     },
     /// Execution went elsewhere after an instruction that is no jump: an exception was taken.
