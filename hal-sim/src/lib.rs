@@ -23,6 +23,7 @@
 //!            Counts ─► back to the kernel
 //! ```
 //!
+//! [`closed_loop`] runs a compiled program on it, the same way on a PC and inside an emulated board.
 //! [`SimMachine`] holds one chip and up to four such axes and advances them one control tick at a time.
 //!
 //! # Example
@@ -69,6 +70,7 @@
 #![forbid(unsafe_code)]
 
 mod axis;
+pub mod closed_loop;
 mod dac_chip;
 mod dac_frame;
 mod dead_time;

@@ -12,7 +12,7 @@
 //! [`Kernel::clear_fault`]. A fault that is found in writing the outputs shows in them from the next tick on.
 
 use crate::axis::{AxisConfig, AxisOutput, AxisState};
-use crate::exec::{Executed, Executor};
+use crate::exec::Executor;
 use crate::fault::{Fault, FaultKind};
 use crate::hal::{DriveEnable, Encoder, VelocityChannel};
 use crate::num::Real;
@@ -41,9 +41,8 @@ pub struct Kernel<R: Real, const AXES: usize> {
     power: Power,
     /// What the drives were last told; `None` before the first time and where that failed.
     told: Option<bool>,
-    last: Executed<R, AXES>,
-    counts: [Counts; AXES],
-    fault: Option<Fault<R>>,
+    /// What the latest tick did; the next one goes on from it.
+    trace: Trace<R, AXES>,
 }
 
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {
@@ -56,23 +55,20 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             axis.set_position(config, counts, position);
         }
         let executor = Executor::new(position);
-        Self {
-            config,
-            executor,
-            axes,
+        let trace = Trace {
             tick: 0,
-            power: Power::Off,
-            told: None,
-            last: executor.resting(),
+            executed: executor.resting(),
             counts,
+            axes: [AxisOutput::default(); AXES],
             fault: None,
-        }
+        };
+        Self { config, executor, axes, tick: 0, power: Power::Off, told: None, trace }
     }
 
     /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (what
     /// brakes and relays need), then executes the streams. Without effect in a fault.
     pub fn enable(&mut self, settle_ticks: u32) {
-        if self.fault.is_none() && self.power == Power::Off {
+        if self.trace.fault.is_none() && self.power == Power::Off {
             self.power = Power::Starting { ticks_left: settle_ticks };
         }
     }
@@ -90,18 +86,19 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     }
 
     /// One control tick: reads the encoders, executes the streams, regulates every axis, writes the
-    /// outputs. Call it from the tick's interrupt and nowhere else.
-    pub fn tick<H>(&mut self, intake: &mut Intake<'_, R, AXES>, hal: &mut H) -> Trace<R, AXES>
+    /// outputs. Call it from the tick's interrupt and nowhere else. What it did stays readable until the next.
+    pub fn tick<H>(&mut self, intake: &mut Intake<'_, R, AXES>, hal: &mut H) -> &Trace<R, AXES>
     where
         H: Encoder<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
     {
         match hal.latch() {
-            Ok(counts) => self.counts = counts,
+            Ok(counts) => self.trace.counts = counts,
             Err(_) => self.latch_fault(FaultKind::Encoder),
         }
+        self.trace.tick = self.tick;
         self.execute(intake);
-        let axes = self.regulate();
-        if hal.write(&axes.map(|axis| axis.code)).is_err() {
+        self.regulate();
+        if hal.write(&self.trace.axes.each_ref().map(|axis| axis.code)).is_err() {
             self.latch_fault(FaultKind::Output);
         }
         // Repeated until the drives have taken it, above all when they are to be disabled.
@@ -112,12 +109,11 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
                 self.latch_fault(FaultKind::Enable);
             }
         }
-        let trace =
-            Trace { tick: self.tick, executed: self.last, counts: self.counts, axes, fault: self.fault };
         self.tick = self.tick.wrapping_add(1);
-        trace
+        &self.trace
     }
 
+    #[inline]
     fn execute(&mut self, intake: &mut Intake<'_, R, AXES>) {
         match &mut self.power {
             Power::Off => {}
@@ -126,33 +122,46 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             Power::On => {}
         }
         if self.power == Power::On {
-            match self.executor.tick(intake) {
-                Ok(executed) => self.last = executed,
-                Err(fault) => self.latch_fault(FaultKind::Executor(fault)),
+            if let Err(fault) = self.executor.tick_into(intake, &mut self.trace.executed) {
+                self.latch_fault(FaultKind::Executor(fault));
             }
         }
     }
 
     /// The outputs of all axes. Where the drives are off they stand still, and regulators and peaks
     /// keep what they had.
-    fn regulate(&mut self) -> [AxisOutput<R>; AXES] {
-        let mut outputs = [AxisOutput::default(); AXES];
+    #[inline]
+    fn regulate(&mut self) {
+        let Trace { executed, counts, axes: outputs, .. } = &mut self.trace;
+        let mut lost = None;
         if self.power != Power::Off {
-            let parts = self.axes.iter_mut().zip(&self.config).zip(&self.last.setpoints).zip(&self.counts);
-            for (output, (((axis, config), setpoint), &counts)) in outputs.iter_mut().zip(parts) {
+            let parts = self.axes.iter_mut().zip(&self.config).zip(&executed.setpoints).zip(&*counts);
+            for (index, (output, (((axis, config), setpoint), &counts))) in
+                outputs.iter_mut().zip(parts).enumerate()
+            {
                 *output = axis.tick(config, setpoint, counts);
+                if output.lost && lost.is_none() {
+                    lost = Some(FaultKind::FollowingError {
+                        axis: index,
+                        error_mm: output.following_error_mm,
+                    });
+                }
             }
-            if let Some((axis, output)) = outputs.iter().enumerate().find(|(_, output)| output.lost) {
-                self.latch_fault(FaultKind::FollowingError { axis, error_mm: output.following_error_mm });
-            }
+        }
+        if let Some(kind) = lost {
+            self.latch_fault(kind);
         }
         if self.power == Power::Off {
-            let parts = self.axes.iter().zip(&self.config).zip(&self.last.setpoints).zip(&self.counts);
-            for (output, (((axis, config), setpoint), &counts)) in outputs.iter_mut().zip(parts) {
-                *output = axis.stand_still(config, setpoint, counts);
-            }
+            self.stand_still();
         }
-        outputs
+    }
+
+    fn stand_still(&mut self) {
+        let Trace { executed, counts, axes: outputs, .. } = &mut self.trace;
+        let parts = self.axes.iter().zip(&self.config).zip(&executed.setpoints).zip(&*counts);
+        for (output, (((axis, config), setpoint), &counts)) in outputs.iter_mut().zip(parts) {
+            *output = axis.stand_still(config, setpoint, counts);
+        }
     }
 
     /// Ends a program stop.
@@ -162,13 +171,13 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
     /// The latched fault.
     pub fn fault(&self) -> Option<Fault<R>> {
-        self.fault
+        self.trace.fault
     }
 
     /// Clears the fault and stands at the actual position, as [`Kernel::stand_here`], which it returns.
     /// The drives stay disabled until [`Kernel::enable`].
     pub fn clear_fault(&mut self) -> [Position; AXES] {
-        self.fault = None;
+        self.trace.fault = None;
         self.stand_here()
     }
 
@@ -179,13 +188,13 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.power = Power::Off;
         let mut position = [Position::ZERO; AXES];
         for (((position, axis), config), &counts) in
-            position.iter_mut().zip(&mut self.axes).zip(&self.config).zip(&self.counts)
+            position.iter_mut().zip(&mut self.axes).zip(&self.config).zip(&self.trace.counts)
         {
             *position = axis.position(config, counts);
             axis.regulator = crate::axis::RegulatorState::default();
         }
         self.executor = Executor::new(position);
-        self.last = self.executor.resting();
+        self.trace.executed = self.executor.resting();
         position
     }
 
@@ -199,10 +208,11 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     }
 
     /// The first fault stays, and the drives go off.
+    #[cold]
     fn latch_fault(&mut self, kind: FaultKind<R>) {
         self.power = Power::Off;
-        if self.fault.is_none() {
-            self.fault = Some(Fault { tick: self.tick, kind });
+        if self.trace.fault.is_none() {
+            self.trace.fault = Some(Fault { tick: self.tick, kind });
         }
     }
 }

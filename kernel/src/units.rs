@@ -49,7 +49,7 @@ impl Position {
         self.0.to_num()
     }
 
-    /// A short local offset in mm as a step count. Offsets beyond ±2³¹ mm saturate.
+    /// A short local offset in mm as a step count, see [`Real::to_q32`].
     #[must_use]
     pub fn from_offset<R: Real>(offset_mm: R) -> Self {
         Self::from_bits(offset_mm.to_q32())

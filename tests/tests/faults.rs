@@ -83,7 +83,7 @@ fn tick(
     intake: &mut Intake<'_, f32, 2>,
     bench: &mut Bench,
 ) -> Option<FaultKind<f32>> {
-    let trace = kernel.tick(intake, bench);
+    let trace = *kernel.tick(intake, bench);
     if trace.fault.is_none() {
         bench.counts = trace
             .executed

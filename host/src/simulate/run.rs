@@ -117,7 +117,7 @@ fn run_in<R: Real>(
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     loop {
         supply.fill(&mut feeder).map_err(RunError::Rejected)?;
-        let trace = kernel.tick(&mut intake, &mut rig);
+        let trace = *kernel.tick(&mut intake, &mut rig);
         simulated.advance();
         let state = trace.executed.state;
         // What is idle after the last item is no longer part of the program, but for the tick in which
@@ -150,7 +150,7 @@ fn run_in<R: Real>(
     }
     let mut last = None;
     for _ in 0..(SETTLE_S / machine.tick_s) as u64 {
-        last = Some(kernel.tick(&mut intake, &mut rig));
+        last = Some(*kernel.tick(&mut intake, &mut rig));
         simulated.advance();
     }
     for (index, (axis, settings)) in summary.axes.iter_mut().zip(&machine.axes).enumerate() {

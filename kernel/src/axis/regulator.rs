@@ -120,12 +120,17 @@ impl<R: Real> Regulator<R> {
         let integral_mm_s = state.integral_mm_s + self.ki * error_mm;
         let wanted = feedforward + self.kp * error_mm + self.kd * change_mm + integral_mm_s;
         let (least, greatest) = limits;
-        let velocity_mm_s = wanted.min(greatest).max(least);
-        let winding_up = (wanted > greatest && error_mm > R::ZERO) || (wanted < least && error_mm < R::ZERO);
+        let (velocity_mm_s, saturated, winding_up) = if wanted > greatest {
+            (greatest, true, error_mm > R::ZERO)
+        } else if wanted < least {
+            (least, true, error_mm < R::ZERO)
+        } else {
+            (wanted, false, false)
+        };
         if !winding_up {
             state.integral_mm_s = integral_mm_s;
         }
-        Command { velocity_mm_s, saturated: wanted > greatest || wanted < least }
+        Command { velocity_mm_s, saturated }
     }
 }
 

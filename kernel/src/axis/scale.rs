@@ -29,9 +29,9 @@ impl core::error::Error for ScaleError {}
 /// position step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderScale {
-    /// mm per count in 2⁻⁶⁴ mm, split into 32-bit halves.
-    step_high: i64,
-    step_low: i64,
+    /// mm per count in 2⁻⁶⁴ mm, in halves.
+    step_high: u32,
+    step_low: u32,
     reversed: bool,
 }
 
@@ -51,8 +51,8 @@ impl EncoderScale {
             });
         }
         let scaled = size * 4_294_967_296.0;
-        let step_high = scaled as i64;
-        let step_low = ((scaled - step_high as f64) * 4_294_967_296.0) as i64;
+        let step_high = scaled as u32;
+        let step_low = ((scaled - f64::from(step_high)) * 4_294_967_296.0) as u32;
         Ok(Self { step_high, step_low, reversed: mm_per_count < 0.0 })
     }
 
@@ -60,27 +60,32 @@ impl EncoderScale {
     #[inline]
     #[must_use]
     pub fn position(&self, counts: Counts) -> Position {
-        let counts = if self.reversed { counts.0.wrapping_neg() } else { counts.0 };
-        // counts·step_low/2³², halves of the counts apart.
-        let low = (counts >> 32)
-            .wrapping_mul(self.step_low)
-            .wrapping_add((((counts & 0xFFFF_FFFF) as u64).wrapping_mul(self.step_low as u64) >> 32) as i64);
-        Position::from_bits(counts.wrapping_mul(self.step_high).wrapping_add(low))
+        // −1 turns the sign: −x is the complement of x, plus 1.
+        let sign = -i64::from(self.reversed);
+        let counts = (counts.0 ^ sign).wrapping_sub(sign);
+        // Halves times halves; what is beyond 64 bits is beyond the range.
+        let (counts_high, counts_low) = (counts >> 32, counts & 0xFFFF_FFFF);
+        let (step_high, step_low) = (i64::from(self.step_high), i64::from(self.step_low));
+        let lowest = ((counts_low as u64).wrapping_mul(step_low as u64) >> 32) as i64;
+        let middle = counts_low.wrapping_mul(step_high).wrapping_add(counts_high.wrapping_mul(step_low));
+        let highest = counts_high.wrapping_mul(step_high) << 32;
+        Position::from_bits(highest.wrapping_add(middle).wrapping_add(lowest))
     }
 
     /// Millimetres per count, with its sign.
     #[must_use]
     pub fn mm_per_count(&self) -> f64 {
-        let size = (self.step_high as f64 + self.step_low as f64 / 4_294_967_296.0) / 4_294_967_296.0;
+        let size =
+            (f64::from(self.step_high) + f64::from(self.step_low) / 4_294_967_296.0) / 4_294_967_296.0;
         if self.reversed { -size } else { size }
     }
 }
 
-/// Velocity command to volts: gain, offset trim, limit.
+/// Velocity command to converter code: gain, offset trim, limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutputScale<R> {
-    volts_per_mm_s: R,
-    offset_v: R,
+    codes_per_mm_s: R,
+    offset_codes: R,
     /// The velocity commands at which the output reaches −limit and +limit \[mm/s\].
     limits: (R, R),
 }
@@ -91,7 +96,8 @@ impl<R: Real> OutputScale<R> {
     /// `limit_v` bounds the output.
     ///
     /// # Errors
-    /// The gain is 0 or not finite, the limit is not in (0, 10\] V, or the trim is not below the limit.
+    /// The gain is 0, not finite or beyond the number type, the limit is not in (0, 10\] V, or the trim is not
+    /// below the limit.
     pub fn new(mm_s_at_10_v: f64, offset_v: f64, limit_v: f64) -> Result<Self, ScaleError> {
         let full = DacCode::FULL_SCALE_V;
         if !(limit_v > 0.0 && limit_v <= full) {
@@ -109,18 +115,19 @@ impl<R: Real> OutputScale<R> {
             });
         }
         let volts_per_mm_s = full / mm_s_at_10_v;
-        if !(mm_s_at_10_v.is_finite() && volts_per_mm_s.is_finite()) {
-            return Err(ScaleError {
+        let real = |value: f64| {
+            R::checked_from_f64(value).filter(|_| mm_s_at_10_v.is_finite()).ok_or(ScaleError {
                 quantity: "velocity at 10 V [mm/s]",
                 value: mm_s_at_10_v,
-                expected: "a finite number other than 0",
-            });
-        }
+                expected: "a number other than 0 within the kernel's range",
+            })
+        };
         let (a, b) = ((-limit_v - offset_v) / volts_per_mm_s, (limit_v - offset_v) / volts_per_mm_s);
+        let (least, greatest) = if a < b { (a, b) } else { (b, a) };
         Ok(Self {
-            volts_per_mm_s: R::from_f64(volts_per_mm_s),
-            offset_v: R::from_f64(offset_v),
-            limits: if a < b { (R::from_f64(a), R::from_f64(b)) } else { (R::from_f64(b), R::from_f64(a)) },
+            codes_per_mm_s: real(volts_per_mm_s * DacCode::PER_VOLT)?,
+            offset_codes: real(offset_v * DacCode::PER_VOLT)?,
+            limits: (real(least)?, real(greatest)?),
         })
     }
 
@@ -132,7 +139,7 @@ impl<R: Real> OutputScale<R> {
     /// The code for a velocity command \[mm/s\] within the limits.
     #[inline]
     pub fn code(&self, velocity_mm_s: R) -> DacCode {
-        DacCode::from_volts(velocity_mm_s * self.volts_per_mm_s + self.offset_v)
+        DacCode((velocity_mm_s * self.codes_per_mm_s + self.offset_codes).round_to_i16())
     }
 }
 

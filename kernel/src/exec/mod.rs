@@ -79,9 +79,9 @@ enum Activity<R> {
         left: Ticks,
     },
     Stopped,
-    /// Inside a stretch.
-    Moving(Moving<R>),
-    /// Inside a stretch, the next segment not yet taken.
+    /// Inside a stretch, in the segment at the head of the feed stream.
+    Moving(Moving),
+    /// Inside a stretch, between two segments.
     Between {
         s: Position,
         v_mm_s: R,
@@ -92,7 +92,7 @@ enum Activity<R> {
 #[derive(Clone, Copy, Debug)]
 pub struct Executor<R: Real, const AXES: usize> {
     activity: Activity<R>,
-    walker: Walker<R, AXES>,
+    walker: Walker<AXES>,
     stretches: u32,
 }
 
@@ -105,14 +105,15 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
 
     /// The outcome of a tick at rest here.
     pub(crate) fn resting(&self) -> Executed<R, AXES> {
-        let motion = PathMotion::default();
-        Executed {
+        let mut executed = Executed {
             state: self.state(),
-            motion,
+            motion: PathMotion::default(),
             stretches: self.stretches,
-            line: self.walker.program_line(),
-            setpoints: self.walker.setpoints(&motion),
-        }
+            line: 0,
+            setpoints: [Setpoint::default(); AXES],
+        };
+        self.walker.rest(&mut executed.setpoints);
+        executed
     }
 
     /// Ends a program stop. Without effect in any other state.
@@ -128,26 +129,42 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     /// The streams ran dry inside a stretch, or held more than the tick's bound. The executor's state
     /// is then of no further use; the kernel latches the fault.
     pub fn tick(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<Executed<R, AXES>, ExecFault> {
+        let mut executed = self.resting();
+        self.tick_into(intake, &mut executed)?;
+        Ok(executed)
+    }
+
+    /// [`Executor::tick`] into `executed`, whose set-points are those of the tick before.
+    #[inline]
+    pub(crate) fn tick_into(
+        &mut self,
+        intake: &mut Intake<'_, R, AXES>,
+        executed: &mut Executed<R, AXES>,
+    ) -> Result<(), ExecFault> {
         self.walker.start_tick();
         intake.start_tick();
         self.advance(intake)?;
-        let motion = match &self.activity {
-            Activity::Moving(moving) => moving.at(),
-            Activity::Between { s, v_mm_s } => PathMotion { s: *s, v_mm_s: *v_mm_s, ..PathMotion::default() },
-            Activity::Rest | Activity::Dwell { .. } | Activity::Stopped => PathMotion::default(),
+        let motion = match (&self.activity, intake.feed()) {
+            (Activity::Moving(moving), Some(FeedItem::Segment(segment))) => moving.at(segment),
+            (Activity::Between { s, v_mm_s }, _) => {
+                PathMotion { s: *s, v_mm_s: *v_mm_s, ..PathMotion::default() }
+            }
+            _ => PathMotion::default(),
         };
-        if matches!(self.activity, Activity::Moving(_) | Activity::Between { .. }) {
-            self.walker.seek(motion.s, intake).map_err(walk_fault)?;
+        if let Activity::Moving(_) | Activity::Between { .. } = self.activity {
+            executed.line =
+                self.walker.follow(&motion, intake, &mut executed.setpoints).map_err(walk_fault)?;
+        } else {
+            executed.line = 0;
+            self.walker.rest(&mut executed.setpoints);
         }
-        Ok(Executed {
-            state: self.state(),
-            motion,
-            stretches: self.stretches,
-            line: self.walker.program_line(),
-            setpoints: self.walker.setpoints(&motion),
-        })
+        executed.motion = motion;
+        executed.state = self.state();
+        executed.stretches = self.stretches;
+        Ok(())
     }
 
+    #[inline]
     fn state(&self) -> ExecState {
         match self.activity {
             Activity::Rest => ExecState::Idle,
@@ -162,15 +179,16 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     fn advance(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), ExecFault> {
         let mut left = Ticks::ONE;
         for _ in 0..STEPS_PER_TICK_MAX {
-            match &mut self.activity {
-                Activity::Moving(moving) => {
-                    let Some(after) = moving.spend(left) else { return Ok(()) };
+            match (&mut self.activity, intake.feed()) {
+                (Activity::Moving(moving), Some(FeedItem::Segment(segment))) => {
+                    let Some(after) = moving.spend(segment, left) else { return Ok(()) };
                     left = after;
                     if !moving.next_phase() {
-                        self.activity = moving.ended();
+                        self.activity = moving.ended(segment);
+                        intake.drop_feed();
                     }
                 }
-                Activity::Dwell { left: dwell } => {
+                (Activity::Dwell { left: dwell }, _) => {
                     if let Some(still) = dwell.minus(left)
                         && still > Ticks::ZERO
                     {
@@ -180,43 +198,40 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
                     left = left.minus(*dwell).unwrap_or(Ticks::ZERO);
                     self.activity = Activity::Rest;
                 }
-                Activity::Stopped => return Ok(()),
-                Activity::Rest => match intake.peek_feed() {
-                    None => return Ok(()),
-                    Some(FeedItem::Segment(_)) if !intake.may_start() => return Ok(()),
-                    Some(FeedItem::Segment(_)) => {
-                        self.activity = Activity::Between { s: Position::ZERO, v_mm_s: R::ZERO };
+                (Activity::Stopped, _) | (Activity::Rest, None) => return Ok(()),
+                (Activity::Rest, Some(FeedItem::Segment(_))) => {
+                    if !intake.may_start() {
+                        return Ok(());
                     }
-                    Some(&FeedItem::Dwell(left)) => {
-                        intake.take_feed();
-                        self.activity = Activity::Dwell { left };
-                    }
-                    Some(FeedItem::ProgramStop) => {
-                        intake.take_feed();
-                        self.activity = Activity::Stopped;
-                    }
-                    Some(FeedItem::EndOfStretch) => self.end_stretch(intake)?,
-                },
-                Activity::Between { s, v_mm_s } => match intake.peek_feed() {
-                    Some(&FeedItem::Segment(segment)) => {
-                        intake.take_feed();
-                        self.activity = Activity::Moving(Moving::new(segment, *s));
-                    }
-                    Some(FeedItem::EndOfStretch) => self.end_stretch(intake)?,
-                    // The next item is not needed yet, or there is time to wait for it at rest.
-                    None if left == Ticks::ZERO || *v_mm_s <= R::ZERO => return Ok(()),
-                    // The feeder lets no dwell or stop into a stretch.
-                    None | Some(FeedItem::Dwell(_) | FeedItem::ProgramStop) => {
-                        return Err(ExecFault::FeedStarved);
-                    }
-                },
+                    self.activity = Activity::Between { s: Position::ZERO, v_mm_s: R::ZERO };
+                }
+                (Activity::Rest, Some(&FeedItem::Dwell(left))) => {
+                    intake.drop_feed();
+                    self.activity = Activity::Dwell { left };
+                }
+                (Activity::Rest, Some(FeedItem::ProgramStop)) => {
+                    intake.drop_feed();
+                    self.activity = Activity::Stopped;
+                }
+                (Activity::Between { s, .. }, Some(FeedItem::Segment(_))) => {
+                    self.activity = Activity::Moving(Moving::new(*s));
+                }
+                (Activity::Rest | Activity::Between { .. }, Some(FeedItem::EndOfStretch)) => {
+                    self.end_stretch(intake)?;
+                }
+                // The next item is not needed yet, or there is time to wait for it at rest.
+                (Activity::Between { v_mm_s, .. }, None) if left == Ticks::ZERO || *v_mm_s <= R::ZERO => {
+                    return Ok(());
+                }
+                // The feeder lets no dwell or stop into a stretch, and a segment stays until it is done.
+                (Activity::Between { .. } | Activity::Moving(_), _) => return Err(ExecFault::FeedStarved),
             }
         }
         Err(ExecFault::TooManySegments)
     }
 
     fn end_stretch(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), ExecFault> {
-        intake.take_feed();
+        intake.drop_feed();
         self.walker.finish(intake).map_err(walk_fault)?;
         self.stretches = self.stretches.wrapping_add(1);
         self.activity = Activity::Rest;

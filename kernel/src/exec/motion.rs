@@ -1,4 +1,4 @@
-//! A feed segment under way: which phase, and how far into it.
+//! A feed segment under way: which phase, and how far into it. The segment itself stays in its queue.
 
 use super::Activity;
 use crate::law::{FeedSegment, PathMotion, Phase, Ticks};
@@ -6,8 +6,7 @@ use crate::num::Real;
 use crate::units::Position;
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Moving<R> {
-    segment: FeedSegment<R>,
+pub(super) struct Moving {
     /// Path position of the segment's start.
     start: Position,
     phase: Phase,
@@ -17,22 +16,22 @@ pub(super) struct Moving<R> {
     fraction: u64,
 }
 
-impl<R: Real> Moving<R> {
-    pub(super) fn new(segment: FeedSegment<R>, start: Position) -> Self {
-        Self { segment, start, phase: Phase::Rise, elapsed: Ticks::ZERO, fraction: 0 }
+impl Moving {
+    pub(super) fn new(start: Position) -> Self {
+        Self { start, phase: Phase::Rise, elapsed: Ticks::ZERO, fraction: 0 }
     }
 
     /// Spends `time` ≤ 1 tick in the phase. If the phase ends by then: what is left of the time.
     #[inline]
-    pub(super) fn spend(&mut self, time: Ticks) -> Option<Ticks> {
+    pub(super) fn spend<R: Real>(&mut self, segment: &FeedSegment<R>, time: Ticks) -> Option<Ticks> {
         let elapsed = self.elapsed.plus(time);
-        let over = elapsed.minus(self.segment.phase_duration(self.phase));
+        let over = elapsed.minus(segment.phase_duration(self.phase));
         if over.is_none() {
             // A phase that is already under way is given whole ticks only.
             self.fraction = if self.elapsed > Ticks::ZERO {
-                self.fraction.wrapping_add(self.segment.fraction_step(self.phase))
+                self.fraction.wrapping_add(segment.fraction_step(self.phase))
             } else {
-                self.segment.fraction_at(self.phase, time)
+                segment.fraction_at(self.phase, time)
             };
             self.elapsed = elapsed;
         }
@@ -53,14 +52,14 @@ impl<R: Real> Moving<R> {
     }
 
     /// What follows the segment's end.
-    pub(super) fn ended(&self) -> Activity<R> {
-        Activity::Between { s: self.start + self.segment.length(), v_mm_s: self.segment.as_ramp().to_mm_s }
+    pub(super) fn ended<R: Real>(&self, segment: &FeedSegment<R>) -> Activity<R> {
+        Activity::Between { s: self.start + segment.length(), v_mm_s: segment.as_ramp().to_mm_s }
     }
 
     /// The motion now; `s` counts from the stretch's start.
     #[inline]
-    pub(super) fn at(&self) -> PathMotion<R> {
-        let motion = self.segment.at(self.phase, self.fraction);
+    pub(super) fn at<R: Real>(&self, segment: &FeedSegment<R>) -> PathMotion<R> {
+        let motion = segment.at(self.phase, self.fraction);
         PathMotion { s: self.start + motion.s, ..motion }
     }
 }

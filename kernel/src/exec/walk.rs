@@ -5,7 +5,7 @@
 
 use crate::law::PathMotion;
 use crate::num::Real;
-use crate::path::{Piece, Setpoint};
+use crate::path::Setpoint;
 use crate::queue::{Intake, PathItem};
 use crate::units::Position;
 
@@ -28,10 +28,11 @@ pub(super) enum WalkError {
     NotHere,
 }
 
-/// Where on the path the machine is.
+/// Where on the path the machine is. The piece itself stays in its queue, at the head.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Walker<R: Real, const AXES: usize> {
-    piece: Option<Piece<R, AXES>>,
+pub(super) struct Walker<const AXES: usize> {
+    /// The head of the path stream is the piece under way.
+    is_on_piece: bool,
     /// Path position of the piece's start, from the stretch's start.
     piece_start: Position,
     /// Where the machine rests between stretches.
@@ -40,14 +41,9 @@ pub(super) struct Walker<R: Real, const AXES: usize> {
     ends_left: usize,
 }
 
-impl<R: Real, const AXES: usize> Walker<R, AXES> {
+impl<const AXES: usize> Walker<AXES> {
     pub(super) fn new(rest: [Position; AXES]) -> Self {
-        Self { piece: None, piece_start: Position::ZERO, rest, ends_left: PIECES_PER_TICK_MAX }
-    }
-
-    /// Program line of the current piece; 0 at rest.
-    pub(super) fn program_line(&self) -> u32 {
-        self.piece.as_ref().map_or(0, Piece::program_line)
+        Self { is_on_piece: false, piece_start: Position::ZERO, rest, ends_left: PIECES_PER_TICK_MAX }
     }
 
     /// A new tick: the bound starts anew.
@@ -56,42 +52,46 @@ impl<R: Real, const AXES: usize> Walker<R, AXES> {
         self.ends_left = PIECES_PER_TICK_MAX;
     }
 
-    /// Goes forward to the piece that contains path position `s`.
+    /// Goes forward to the piece that contains path position `s`: the set-points there, into `setpoints`, and
+    /// the piece's program line.
     #[inline]
-    pub(super) fn seek(&mut self, s: Position, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
+    pub(super) fn follow<R: Real>(
+        &mut self,
+        motion: &PathMotion<R>,
+        intake: &mut Intake<'_, R, AXES>,
+        setpoints: &mut [Setpoint<R>; AXES],
+    ) -> Result<u32, WalkError> {
         for _ in 0..=PIECES_PER_TICK_MAX {
-            if let Some(piece) = &self.piece {
-                // At the very end of the path a rounding step beyond it is still its end.
-                if s - self.piece_start <= piece.length() || intake.at_end_of_path() {
-                    return Ok(());
+            let Some(PathItem::Piece(piece)) = intake.path() else { return Err(WalkError::Starved) };
+            if !self.is_on_piece {
+                if self.piece_start == Position::ZERO && !self.stands_at(&piece.start()) {
+                    return Err(WalkError::NotHere);
                 }
-                self.piece_start = self.piece_start + piece.length();
-                self.end_piece()?;
+                self.is_on_piece = true;
             }
-            match intake.take_path() {
-                Some(PathItem::Piece(piece)) => {
-                    if self.piece_start == Position::ZERO && !self.stands_at(&piece.start()) {
-                        return Err(WalkError::NotHere);
-                    }
-                    self.piece = Some(piece);
-                }
-                Some(PathItem::EndOfStretch(_)) | None => return Err(WalkError::Starved),
+            let local = motion.s - self.piece_start;
+            if local <= piece.length() {
+                // A rounding step back over the joint is still its piece's start.
+                piece.set(local.max(Position::ZERO).to_offset(), motion, setpoints);
+                return Ok(piece.program_line());
             }
+            self.piece_start = self.piece_start + piece.length();
+            self.end_piece(intake)?;
         }
         Err(WalkError::TooManyPieces)
     }
 
     /// Ends the stretch: what is left of its pieces is passed, and the machine rests at its end.
     #[inline]
-    pub(super) fn finish(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
+    pub(super) fn finish<R: Real>(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
         for _ in 0..=PIECES_PER_TICK_MAX {
-            match intake.take_path() {
-                Some(PathItem::EndOfStretch(end)) => {
-                    self.end_piece()?;
+            match intake.path() {
+                Some(&PathItem::EndOfStretch(end)) => {
+                    intake.drop_path();
                     (self.piece_start, self.rest) = (Position::ZERO, end);
                     return Ok(());
                 }
-                Some(PathItem::Piece(_)) => self.end_piece()?,
+                Some(PathItem::Piece(_)) => self.end_piece(intake)?,
                 None => return Err(WalkError::Starved),
             }
         }
@@ -99,8 +99,9 @@ impl<R: Real, const AXES: usize> Walker<R, AXES> {
     }
 
     #[inline]
-    fn end_piece(&mut self) -> Result<(), WalkError> {
-        self.piece = None;
+    fn end_piece<R: Real>(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
+        intake.drop_path();
+        self.is_on_piece = false;
         self.ends_left = self.ends_left.checked_sub(1).ok_or(WalkError::TooManyPieces)?;
         Ok(())
     }
@@ -113,15 +114,11 @@ impl<R: Real, const AXES: usize> Walker<R, AXES> {
         })
     }
 
-    /// The set-points at path position `motion.s` of the current piece, or at rest.
+    /// The set-points between stretches.
     #[inline]
-    pub(super) fn setpoints(&self, motion: &PathMotion<R>) -> [Setpoint<R>; AXES] {
-        match &self.piece {
-            Some(piece) => {
-                let local = (motion.s - self.piece_start).max(Position::ZERO).min(piece.length());
-                piece.at(local.to_offset(), motion)
-            }
-            None => self.rest.map(|position| Setpoint { position, ..Setpoint::default() }),
+    pub(super) fn rest<R: Real>(&self, setpoints: &mut [Setpoint<R>; AXES]) {
+        for (setpoint, &position) in setpoints.iter_mut().zip(&self.rest) {
+            *setpoint = Setpoint { position, ..Setpoint::default() };
         }
     }
 }

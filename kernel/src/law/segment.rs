@@ -354,7 +354,8 @@ impl<R: Real> FeedSegment<R> {
         }
     }
 
-    /// The motion at a normalised time of a phase; `s` counts from the segment's start. In the tick.
+    /// The motion at a normalised time of a phase; `s` counts from the segment's start and is never beyond its
+    /// end. In the tick.
     #[inline]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
         if phase == Phase::Hold {
@@ -364,7 +365,7 @@ impl<R: Real> FeedSegment<R> {
                 .wrapping_add(portion(self.hold_linear_bits, fraction))
                 .wrapping_add(square);
             return PathMotion {
-                s: Position::from_bits(s),
+                s: Position::from_bits(s).min(self.length),
                 v_mm_s: self.hold_v_mm_s + self.hold_gain_mm_s.scaled(R::Unit::from_fraction(fraction)),
                 a_mm_s2: self.hold_a_mm_s2,
                 j_mm_s3: R::ZERO,
@@ -386,7 +387,7 @@ impl<R: Real> FeedSegment<R> {
             (even, self.ramp.from_mm_s + gained, jerk)
         };
         PathMotion {
-            s: s + bent,
+            s: (s + bent).min(self.length),
             v_mm_s,
             a_mm_s2: self.accel_mm_s2.scaled(shape.accel),
             j_mm_s3,

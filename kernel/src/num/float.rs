@@ -5,7 +5,7 @@
 use super::{Real, Root, Scalar, Unit};
 
 macro_rules! float {
-    ($float:ident, $sqrt:path, $cbrt:path, terms: $terms:literal, piece_mm: $piece:literal, ramp_mm: $ramp:literal, q32: $q32:path, fraction: |$f:ident| $fraction:expr) => {
+    ($float:ident, $sqrt:path, $cbrt:path, terms: $terms:literal, piece_mm: $piece:literal, ramp_mm: $ramp:literal, q32: $from_q32:path, $q32:path, fraction: |$f:ident| $fraction:expr) => {
         impl Scalar for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -23,6 +23,11 @@ macro_rules! float {
 
             fn to_bits64(self) -> u64 {
                 u64::from(self.to_bits())
+            }
+
+            #[inline]
+            fn abs(self) -> Self {
+                <$float>::abs(self)
             }
         }
 
@@ -58,7 +63,7 @@ macro_rules! float {
 
             #[inline]
             fn from_q32(bits: i64) -> Self {
-                bits as Self * (1.0 / 4_294_967_296.0)
+                $from_q32(bits)
             }
 
             #[inline]
@@ -68,7 +73,9 @@ macro_rules! float {
 
             #[inline]
             fn round_to_i16(self) -> i16 {
-                (if self < 0.0 { self - 0.5 } else { self + 0.5 }) as i16
+                // Two saturations, each of them one instruction where it matters.
+                let nearest = (self + (0.5 as Self).copysign(self)) as i32;
+                nearest.clamp(i16::MIN.into(), i16::MAX.into()) as i16
             }
         }
 
@@ -87,29 +94,35 @@ macro_rules! float {
 }
 
 // f32 keeps the top word only: one conversion instruction on a core with a single-precision FPU.
-float!(f32, libm::sqrtf, libm::cbrtf, terms: 7, piece_mm: 16.0, ramp_mm: 16.0e3, q32: f32_to_q32,
+float!(f32, libm::sqrtf, libm::cbrtf, terms: 7, piece_mm: 16.0, ramp_mm: 16.0e3, q32: f32_from_q32, f32_to_q32,
     fraction: |fraction| (fraction >> 32) as u32 as Self * (1.0 / 4_294_967_296.0));
-float!(f64, libm::sqrt, libm::cbrt, terms: 12, piece_mm: 1.0e6, ramp_mm: 1.0e9, q32: f64_to_q32,
+float!(f64, libm::sqrt, libm::cbrt, terms: 12, piece_mm: 1.0e6, ramp_mm: 1.0e9, q32: f64_from_q32, f64_to_q32,
     fraction: |fraction| (fraction >> 11) as Self * (1.0 / 9_007_199_254_740_992.0));
 
-/// The same bits on every core, by what the core has one instruction for.
+/// A 32-bit core converts i32 to f32 in one instruction and i64 in a subroutine of fifty, so every core goes by
+/// halves. The lower half is taken with its sign: a small value is all in it, and is rounded once; a larger one is
+/// off by 2⁻²⁶ mm before its own rounding.
 #[inline]
-fn f32_to_q32(x: f32) -> i64 {
-    if cfg!(target_pointer_width = "64") { (x * 4_294_967_296.0) as i64 } else { f32_to_q32_in_words(x) }
+#[allow(clippy::cast_possible_truncation)]
+fn f32_from_q32(bits: i64) -> f32 {
+    let lower = bits as i32;
+    let upper = (bits.wrapping_sub(i64::from(lower)) >> 32) as i32;
+    upper as f32 + lower as f32 * (1.0 / 4_294_967_296.0)
 }
 
-/// A 32-bit core converts f32 to i32 in one instruction and to i64 in a subroutine of sixty. Up to
-/// 2¹⁵ (32 m) two of the first do the same: every step is exact, and all parts have the sign of `x`.
 #[inline]
-fn f32_to_q32_in_words(x: f32) -> i64 {
-    let scaled = x * 65_536.0;
-    if scaled.abs() < 2_147_483_648.0 {
-        let upper = scaled as i32;
-        let lower = ((scaled - upper as f32) * 65_536.0) as i32;
-        (i64::from(upper) << 16).wrapping_add(i64::from(lower))
-    } else {
-        (scaled * 65_536.0) as i64
-    }
+fn f64_from_q32(bits: i64) -> f64 {
+    bits as f64 * (1.0 / 4_294_967_296.0)
+}
+
+/// The other way likewise, in whole millimetres and what is left: both conversions are one instruction on a 32-bit
+/// core, and both steps between them are exact. Truncated to steps of 2⁻³¹.
+#[inline]
+#[allow(clippy::cast_possible_truncation)]
+fn f32_to_q32(x: f32) -> i64 {
+    let upper = x as i32;
+    let lower = ((x - upper as f32) * 2_147_483_648.0) as i32;
+    (i64::from(upper) << 32).wrapping_add(i64::from(lower) << 1)
 }
 
 #[inline]
@@ -121,14 +134,31 @@ fn f64_to_q32(x: f64) -> i64 {
 mod tests {
     use super::*;
 
-    /// Every f32 whose bits are a multiple of an odd stride, so all exponents and both signs; the
-    /// ends of the two ranges; and what is no number.
+    /// Positions of all sizes and signs: rounded once below half a millimetre, within one last place above it.
     #[test]
-    fn f32_to_q32_in_words_is_the_plain_conversion() {
-        let ends = [0.0, -0.0, 32_768.0, 32_767.998, 2_147_483_648.0, f32::MAX, f32::INFINITY, f32::NAN];
-        let all = (0..=u32::MAX / 997).map(|i| f32::from_bits(i * 997));
-        for x in all.chain(ends).chain(ends.map(|x| -x)) {
-            assert_eq!(f32_to_q32_in_words(x), (x * 4_294_967_296.0) as i64, "{x:e}");
+    fn f32_from_q32_is_the_plain_conversion_to_a_last_place() {
+        let mut state = 1_u64;
+        for _ in 0..10_000_000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let bits = state.cast_signed() >> (state >> 7) % 63;
+            let (found, plain) = (f32_from_q32(bits), bits as f32 * (1.0 / 4_294_967_296.0));
+            if i32::try_from(bits).is_ok() {
+                assert_eq!(found.to_bits(), plain.to_bits(), "{bits}");
+            } else {
+                assert!((found - plain).abs() <= plain.abs() * f32::EPSILON, "{bits}: {found} {plain}");
+            }
         }
+    }
+
+    /// Every f32 whose bits are a multiple of an odd stride, so all exponents and both signs, as far as positions
+    /// go; the ends of the range; and what is no number.
+    #[test]
+    fn f32_to_q32_truncates_to_two_steps() {
+        let ends = [0.0, 1.0, 32_768.0, 32_767.998, 2_147_483_500.0];
+        let all = (0..=u32::MAX / 997).map(|i| f32::from_bits(i * 997));
+        for x in all.chain(ends).chain(ends.map(|x| -x)).filter(|x| x.abs() < 2_147_483_648.0) {
+            assert_eq!(f32_to_q32(x), (x * 2_147_483_648.0) as i64 * 2, "{x:e}");
+        }
+        assert_eq!(f32_to_q32(f32::NAN), 0);
     }
 }

@@ -108,8 +108,8 @@ pub trait Real: Scalar {
     fn to_unit(self) -> Self::Unit;
     /// A signed value in steps of 2⁻³².
     fn from_q32(bits: i64) -> Self;
-    /// The value in steps of 2⁻³², truncated towards zero; saturates beyond ±2³¹, and is 0 if the
-    /// value is not a number.
+    /// The value in steps of 2⁻³², truncated towards zero to a step or, in f32, two; 0 if it is not a number.
+    /// Beyond ±2³¹, where nothing that is accepted comes, the result is some number.
     fn to_q32(self) -> i64;
     /// The nearest integer, halves away from zero; saturates, and is 0 if the value is not a number.
     fn round_to_i16(self) -> i16;

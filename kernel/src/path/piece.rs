@@ -211,11 +211,17 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     }
 
     /// The set-points of all axes at `s_mm` from the piece's start, for the motion along the path.
-    /// In the tick: no division, no loop but those over axes and coefficients.
-    #[inline]
+    #[must_use]
     pub fn at(&self, s_mm: R, motion: &PathMotion<R>) -> [Setpoint<R>; AXES] {
-        let (v, a, j) = (motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3);
         let mut setpoints = [Setpoint::default(); AXES];
+        self.set(s_mm, motion, &mut setpoints);
+        setpoints
+    }
+
+    /// [`Piece::at`] into `setpoints`. In the tick: no division, no loop but those over axes and coefficients.
+    #[inline]
+    pub fn set(&self, s_mm: R, motion: &PathMotion<R>, setpoints: &mut [Setpoint<R>; AXES]) {
+        let (v, a, j) = (motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3);
         match &self.geometry {
             Geometry::Line { direction } => {
                 for ((setpoint, &start), &d) in setpoints.iter_mut().zip(&self.start).zip(direction) {
@@ -245,21 +251,27 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
                 }
             }
         }
-        setpoints
     }
 }
 
-/// Σ qₖ·uᵏ, k = 1 … 7, and its first three derivatives by u, by Horner's scheme on all four.
+/// Σ qₖ·uᵏ, k = 1 … 7, and its first three derivatives by u: Horner's scheme on all four at once, each as far as
+/// it has terms.
 #[inline]
-fn derivatives<U: Unit>(q: &[U; 7], u: U) -> [U; 4] {
-    let (mut p, mut p1, mut p2, mut p3) = (U::ZERO, U::ZERO, U::ZERO, U::ZERO);
-    // p2 and p3 collect p''/2! and p'''/3!. The last round is for the constant term, which is 0.
-    for coefficient in q.iter().rev().copied().chain([U::ZERO]) {
-        p3 = p3 * u + p2;
-        p2 = p2 * u + p1;
+fn derivatives<U: Unit>(&[q1, q2, q3, q4, q5, q6, q7]: &[U; 7], u: U) -> [U; 4] {
+    // The sum, its derivative, a half of its second and a sixth of its third.
+    let (mut p, mut p1, mut p2, mut p3) = (q7, q7, q7, q7);
+    for q in [q6, q5, q4, q3] {
+        p = p * u + q;
         p1 = p1 * u + p;
-        p = p * u + coefficient;
+        p2 = p2 * u + p1;
+        p3 = p3 * u + p2;
     }
+    p = p * u + q2;
+    p1 = p1 * u + p;
+    p2 = p2 * u + p1;
+    p = p * u + q1;
+    p1 = p1 * u + p;
+    p = p * u;
     let twice = p3 + p3;
     [p, p1, p2 + p2, twice + twice + twice]
 }

@@ -53,9 +53,10 @@ pub enum Refused<T> {
     Invalid(Rejection),
 }
 
-/// Storage of both streams: `PIECES` − 1 and `SEGMENTS` − 1 items (one place tells full from empty). With fewer than 17 pieces or 9 segments a
-/// program that uses the tick's bounds to the full can starve, because a queue is refilled between
-/// ticks only; with 64 and 64 the streams of a machine with three f32 axes take 17 KiB.
+/// Storage of both streams: `PIECES` − 1 and `SEGMENTS` − 1 items (one place tells full from empty). What is being
+/// executed stays where it is: nothing is copied in the tick. With fewer than 18 pieces or 10 segments a program
+/// that uses the tick's bounds to the full can starve, because a queue is refilled between ticks only; with 64 and
+/// 64 the streams of a machine with three f32 axes take 17 KiB.
 #[derive(Debug)]
 pub struct Streams<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> {
     path: Queue<PathItem<R, AXES>, PIECES>,
@@ -226,34 +227,32 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         (self.taken_from_path, self.taken_from_feed) = (0, 0);
     }
 
-    /// The next item of the feed stream, left where it is.
+    /// The first item of the feed stream: the one under way, or the next.
     #[inline]
-    pub(crate) fn peek_feed(&self) -> Option<&FeedItem<R>> {
+    pub(crate) fn feed(&self) -> Option<&FeedItem<R>> {
         self.feed.peek()
     }
 
-    /// Takes the next item of the feed stream.
+    /// The first item of the feed stream is done.
     #[inline]
-    pub(crate) fn take_feed(&mut self) -> Option<FeedItem<R>> {
+    pub(crate) fn drop_feed(&mut self) {
         self.taken_from_feed += 1;
-        self.feed.dequeue()
+        self.feed.dequeue();
     }
 
-    /// Whether the stretch ends with the next item of the path stream.
+    /// The first item of the path stream: the one under way, or the next.
     #[inline]
-    pub(crate) fn at_end_of_path(&self) -> bool {
-        matches!(self.path.peek(), Some(PathItem::EndOfStretch(_)))
+    pub(crate) fn path(&self) -> Option<&PathItem<R, AXES>> {
+        self.path.peek()
     }
 
-    /// Takes the next item of the path stream.
+    /// The first item of the path stream is done.
     #[inline]
-    pub(crate) fn take_path(&mut self) -> Option<PathItem<R, AXES>> {
+    pub(crate) fn drop_path(&mut self) {
         self.taken_from_path += 1;
-        let item = self.path.dequeue();
-        if matches!(item, Some(PathItem::EndOfStretch(_))) {
+        if matches!(self.path.dequeue(), Some(PathItem::EndOfStretch(_))) {
             self.finished = self.finished.wrapping_add(1);
         }
-        item
     }
 
     /// Whether a stretch may begin: its end is queued; or a queue was full when the tick began, so that

@@ -1,0 +1,152 @@
+//! Counts the instructions of every tick of every program of the bundle, and of the tick's stages; paints the
+//! stack below the tick; says how much memory kernel and streams take.
+//!
+//! One line a figure: what, and how many instructions (for `stack` and `ram`: bytes).
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+
+use cortex_m_rt::entry;
+use cortex_m_semihosting::hprintln;
+use hal_sim::SimMachine;
+use hal_sim::closed_loop::{InMemory, LOOP_AXES, close, reference_machine};
+use motion_kernel::axis::{AxisConfig, AxisOutput, AxisState};
+use motion_kernel::exec::ExecState;
+use motion_kernel::kernel::Kernel;
+use motion_kernel::law::{FeedSegment, PathMotion, Phase, Ticks};
+use motion_kernel::num::Scalar;
+use motion_kernel::path::{Piece, Setpoint};
+use motion_kernel::program::supply::Ready;
+use motion_kernel::program::{Header, ProgramError, Reader};
+use motion_kernel::queue::{Intake, Streams};
+use motion_kernel::trace::Trace;
+use motion_kernel::units::{Counts, Position};
+use qemu_boards::count::Counter;
+use qemu_boards::programs::programs;
+use qemu_boards::{LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail, stack};
+
+type Axis = AxisState<Number>;
+
+#[entry]
+fn main() -> ! {
+    let core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
+    let counter = Counter::new(core.SYST);
+    hprintln!("ram {}", size_of::<Kernel<Number, LOOP_AXES>>() + size_of::<Streams<Number, LOOP_AXES, PIECES, SEGMENTS>>());
+    for bytes in programs() {
+        let program = Reader::<LOOP_AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
+        hprintln!("program");
+        ticks(&counter, program);
+        stages(&counter, program);
+    }
+    exit(true)
+}
+
+/// The whole tick of the kernel. Outlined under this name, by which a trace of executed instructions is cut.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn budgeted_tick<'a>(
+    kernel: &'a mut Kernel<Number, LOOP_AXES>,
+    intake: &mut Intake<'_, Number, LOOP_AXES>,
+    memory: &mut InMemory,
+) -> &'a Trace<Number, LOOP_AXES> {
+    kernel.tick(intake, memory)
+}
+
+#[inline(never)]
+fn ticks(counter: &Counter, program: Reader<'_, LOOP_AXES>) {
+    let &Header { tick_s, axes: [x, ..], start, .. } = program.header();
+    let machine = SimMachine::<LOOP_AXES, LINE>::new(&reference_machine(program.header(), SUBSTEPS))
+        .unwrap_or_else(|error| fail(&error));
+    let mut streams = Streams::<Number, LOOP_AXES, PIECES, SEGMENTS>::new();
+    let (mut producer, mut closed_loop) =
+        close(program, &mut streams, &machine).unwrap_or_else(|error| fail(&error));
+    // A regulator of its own beside the kernel's, fed with the same.
+    let config = AxisConfig::<Number>::new(&x, tick_s).unwrap_or_else(|error| fail(&error));
+    let mut axis = Axis::default();
+    axis.set_position(&config, Counts::default(), start[0]);
+    let mut deepest = 0;
+    loop {
+        let is_all = producer.fill().unwrap_or_else(|error| fail(&error));
+        let mut spent = 0;
+        let trace = closed_loop.tick_by(|kernel, intake, memory| {
+            let top = stack::paint();
+            let (trace, instructions) = counter.count(|| budgeted_tick(kernel, intake, memory));
+            deepest = deepest.max(stack::depth(top));
+            spent = instructions;
+            *trace
+        });
+        hprintln!("tick {}", spent);
+        let (_, spent) =
+            counter.count(|| regulate(&mut axis, &config, &trace.executed.setpoints[0], trace.counts[0]));
+        hprintln!("regulator {}", spent);
+        if trace.fault.is_some() {
+            fail(&"a fault");
+        }
+        if is_all && trace.executed.state == ExecState::Idle {
+            break;
+        }
+    }
+    hprintln!("stack {}", deepest);
+}
+
+/// The stages by themselves, over all that the program contains.
+fn stages(counter: &Counter, program: Reader<'_, LOOP_AXES>) {
+    let &Header { tick_s, rules, .. } = program.header();
+    let limits = rules.limits;
+    let motion = PathMotion {
+        s: Position::ZERO,
+        v_mm_s: Number::from_f64(0.3 * rules.feed_mm_s),
+        a_mm_s2: Number::from_f64(-0.7 * limits.accel_mm_s2),
+        j_mm_s3: Number::from_f64(0.6 * limits.jerk_mm_s3),
+        snap_mm_s4: Number::from_f64(-0.5 * limits.snap_mm_s4),
+    };
+    for item in program {
+        let item = item.unwrap_or_else(|error| fail(&error));
+        match item.ready::<Number, ProgramError>(tick_s).unwrap_or_else(|error| fail(&error)) {
+            Ready::Segment(segment) => {
+                for phase in [Phase::Rise, Phase::Hold, Phase::Fall] {
+                    if segment.phase_duration(phase) > Ticks::ZERO {
+                        for eighth in 0..8 {
+                            let (_, spent) = counter.count(|| law(&segment, phase, (eighth << 61) + 12345));
+                            hprintln!("law {}", spent);
+                        }
+                    }
+                }
+            }
+            Ready::Piece(piece) => {
+                let length: Number = piece.length().to_offset();
+                for eighth in 0..8 {
+                    let s_mm = length * Number::from_f64(0.125 * f64::from(eighth));
+                    let (_, spent) = counter.count(|| path(&piece, s_mm, &motion));
+                    hprintln!("path {}", spent);
+                }
+            }
+            Ready::EndOfStretch(_) | Ready::Dwell(_) | Ready::Stop => {}
+        }
+    }
+}
+
+#[inline(never)]
+fn law(segment: &FeedSegment<Number>, phase: Phase, fraction: u64) -> PathMotion<Number> {
+    black_box(segment).at(black_box(phase), black_box(fraction))
+}
+
+#[inline(never)]
+fn path(
+    piece: &Piece<Number, LOOP_AXES>,
+    s_mm: Number,
+    motion: &PathMotion<Number>,
+) -> [Setpoint<Number>; LOOP_AXES] {
+    black_box(piece).at(black_box(s_mm), black_box(motion))
+}
+
+#[inline(never)]
+fn regulate(
+    axis: &mut Axis,
+    config: &AxisConfig<Number>,
+    setpoint: &Setpoint<Number>,
+    counts: Counts,
+) -> AxisOutput<Number> {
+    black_box(axis).tick(black_box(config), black_box(setpoint), black_box(counts))
+}

@@ -1,0 +1,100 @@
+//! Executes the first program of the bundle as a board does: the tick in an interrupt, the streams filled in
+//! the background, which the interrupt may stop anywhere. The digest is that of the stepped run.
+#![no_std]
+#![no_main]
+
+use core::cell::RefCell;
+
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m_rt::{entry, exception};
+use cortex_m_semihosting::hprintln;
+use critical_section::Mutex;
+use hal_sim::SimMachine;
+use hal_sim::closed_loop::{ClosedLoop, LOOP_AXES, close, reference_machine};
+use motion_kernel::exec::ExecState;
+use motion_kernel::program::Reader;
+use motion_kernel::queue::Streams;
+use motion_kernel::trace::Digest;
+use qemu_boards::programs::programs;
+use qemu_boards::{LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail};
+
+/// Timer steps between two ticks: several times what kernel and simulation take, so that there is time for the
+/// background.
+const TICK_STEPS: u32 = 8_000_000;
+
+/// What the interrupt owns.
+struct Foreground {
+    closed_loop: ClosedLoop<'static, Number, LINE>,
+    digest: Digest,
+    ticks: u32,
+    /// The state after the last tick, for the background.
+    is_idle: bool,
+    is_faulted: bool,
+}
+
+// Sound: the machine is behind a shared reference that only `closed_loop` keeps, so all of it moves into the
+// interrupt together.
+unsafe impl Send for Foreground {}
+
+static FOREGROUND: Mutex<RefCell<Option<Foreground>>> = Mutex::new(RefCell::new(None));
+
+#[entry]
+fn main() -> ! {
+    let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
+    let bytes = programs().next().unwrap_or_else(|| fail(&"a bundle without a program"));
+    let program = Reader::<LOOP_AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
+    let parameters = reference_machine(program.header(), SUBSTEPS);
+    let machine = cortex_m::singleton!(: SimMachine<LOOP_AXES, LINE> =
+        SimMachine::new(&parameters).unwrap_or_else(|error| fail(&error)))
+    .unwrap_or_else(|| fail(&"machine"));
+    let streams =
+        cortex_m::singleton!(: Streams<Number, LOOP_AXES, PIECES, SEGMENTS> = Streams::new())
+            .unwrap_or_else(|| fail(&"streams"));
+    let (mut producer, closed_loop) =
+        close(program, streams, machine).unwrap_or_else(|error| fail(&error));
+    let mut is_all = producer.fill().unwrap_or_else(|error| fail(&error));
+    let foreground = Foreground {
+        closed_loop,
+        digest: Digest::new(),
+        ticks: 0,
+        is_idle: false,
+        is_faulted: false,
+    };
+    critical_section::with(|cs| FOREGROUND.replace(cs, Some(foreground)));
+
+    core.SYST.set_clock_source(SystClkSource::Core);
+    core.SYST.set_reload(TICK_STEPS - 1);
+    core.SYST.clear_current();
+    core.SYST.enable_interrupt();
+    core.SYST.enable_counter();
+    loop {
+        if !is_all {
+            is_all = producer.fill().unwrap_or_else(|error| fail(&error));
+        }
+        cortex_m::asm::wfi();
+        let end = critical_section::with(|cs| {
+            let mut foreground = FOREGROUND.borrow_ref_mut(cs);
+            let foreground = foreground.as_mut()?;
+            let is_over = foreground.is_faulted || (is_all && foreground.is_idle);
+            is_over.then_some((foreground.ticks, foreground.digest, foreground.is_faulted))
+        });
+        if let Some((ticks, digest, is_faulted)) = end {
+            core.SYST.disable_interrupt();
+            hprintln!("{} ticks digest {:016x} fault {}", ticks, digest.value(), is_faulted);
+            exit(true)
+        }
+    }
+}
+
+#[exception]
+fn SysTick() {
+    critical_section::with(|cs| {
+        if let Some(foreground) = FOREGROUND.borrow_ref_mut(cs).as_mut() {
+            let trace = foreground.closed_loop.tick();
+            foreground.digest.add(&trace);
+            foreground.ticks += 1;
+            foreground.is_idle = trace.executed.state == ExecState::Idle;
+            foreground.is_faulted = trace.fault.is_some();
+        }
+    });
+}

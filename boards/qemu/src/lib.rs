@@ -1,0 +1,68 @@
+//! What the images for emulated boards share: the number type and the capacities by core, the programs they
+//! execute, counting of instructions, the way out.
+//!
+//! One ELF for each target serves every board with that core:
+//!
+//! | target | boards | number |
+//! |---|---|---|
+//! | thumbv7em-none-eabihf | mps2-an386 (M4F), mps2-an500 (M7) | f32 |
+//! | thumbv7m-none-eabi | mps2-an385 (M3) | fixed point, or f32 in software (feature `soft-float`) |
+//! | thumbv6m-none-eabi | microbit (M0) | fixed point |
+#![no_std]
+
+pub mod count;
+pub mod programs;
+pub mod stack;
+
+use core::panic::PanicInfo;
+
+use cortex_m_semihosting::{debug, hprintln};
+
+/// The kernel's number type on this core.
+#[cfg(any(target_abi = "eabihf", feature = "soft-float"))]
+pub type Number = f32;
+/// The kernel's number type on this core.
+#[cfg(not(any(target_abi = "eabihf", feature = "soft-float")))]
+pub type Number = motion_kernel::num::Fixed;
+
+/// Whether this is the core with 16 KiB of memory.
+#[cfg(not(target_has_atomic = "8"))]
+const IS_SMALL: bool = true;
+#[cfg(target_has_atomic = "8")]
+const IS_SMALL: bool = false;
+
+/// Capacity of the path stream.
+pub const PIECES: usize = if IS_SMALL { 18 } else { 64 };
+/// Capacity of the feed stream.
+pub const SEGMENTS: usize = if IS_SMALL { 10 } else { 64 };
+/// Cells for the dead time of a simulated axis.
+pub const LINE: usize = 16;
+/// Sub-steps of a simulated tick: the dead time of 1.42 ms fits the cells.
+pub const SUBSTEPS: u32 = 4;
+
+/// Ends the emulation with a status.
+pub fn exit(is_good: bool) -> ! {
+    debug::exit(if is_good { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+/// Says what is wrong and ends the emulation.
+pub fn fail(what: &dyn core::fmt::Debug) -> ! {
+    hprintln!("failed {:?}", what);
+    exit(false)
+}
+
+/// In one place, so that whatever can panic drags this symbol into its image.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn panic_is_linked(info: &PanicInfo<'_>) -> ! {
+    hprintln!("{}", info);
+    exit(false)
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    panic_is_linked(info)
+}
