@@ -28,7 +28,9 @@
 //! In the tick: two series of constant length side by side, a dozen multiplications more, no
 //! division, and no branch that depends on the time but the mirror, which is a choice of values.
 
-use crate::num::Unit;
+use fixed::types::I3F29;
+
+use crate::num::{Unit, table};
 
 /// The law's shapes at one normalised time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +81,27 @@ const LENGTH: [f64; SERIES_TERMS_MAX] = [
 /// first.
 const SERIES_TERMS_MAX: usize = 12;
 
+/// The coefficients of the series in a number's own type.
+pub trait Coefficients: Sized + 'static {
+    /// Of the feed gained: C over y⁴.
+    const SPEED: &'static [Self; SERIES_TERMS_MAX];
+    /// Of the length gained: B over y⁵.
+    const LENGTH: &'static [Self; SERIES_TERMS_MAX];
+}
+
+macro_rules! coefficients {
+    ($unit:ty, $table:path) => {
+        impl Coefficients for $unit {
+            const SPEED: &'static [Self; SERIES_TERMS_MAX] = &$table(&SPEED);
+            const LENGTH: &'static [Self; SERIES_TERMS_MAX] = &$table(&LENGTH);
+        }
+    };
+}
+
+coefficients!(f32, table::f32s);
+coefficients!(f64, table::f64s);
+coefficients!(I3F29, table::fixed_points);
+
 impl<U: Unit> Shape<U> {
     /// The shapes at `x` in \[0, 1\].
     #[inline]
@@ -94,8 +117,8 @@ impl<U: Unit> Shape<U> {
         let y = z + z;
         let square = y * y;
         let cube = square * y;
-        let b = series(&LENGTH, square) * (cube * square);
-        let c = series(&SPEED, square) * (square * square);
+        let b = series(U::LENGTH, square) * (cube * square);
+        let c = series(U::SPEED, square) * (square * square);
         let accel = cube * unit(PI * PI / 24.0) - b;
         let jerk = square * unit(PI * PI / 4.0) - c;
         let twice = accel + accel;
@@ -119,10 +142,10 @@ impl<U: Unit> Shape<U> {
 }
 
 #[inline]
-fn series<U: Unit>(coefficients: &[f64; SERIES_TERMS_MAX], square: U) -> U {
+fn series<U: Unit>(coefficients: &[U; SERIES_TERMS_MAX], square: U) -> U {
     let mut sum = U::ZERO;
     for &coefficient in coefficients.iter().take(U::SERIES_TERMS).rev() {
-        sum = sum * square + U::from_f64(coefficient);
+        sum = sum * square + coefficient;
     }
     sum
 }
