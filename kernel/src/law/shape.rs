@@ -27,8 +27,13 @@
 //!
 //! In the tick: two series of constant length side by side, a dozen multiplications more, no
 //! division, and no branch that depends on the time but the mirror, which is a choice of values.
+//!
+//! The closed forms are there too, [`Shape::closed`], with any sine of [`crate::num::sine`].
 
-use crate::num::Unit;
+use fixed::types::I3F29;
+
+use crate::num::sine::SineCosine;
+use crate::num::{Unit, table};
 
 /// The law's shapes at one normalised time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +84,27 @@ const LENGTH: [f64; SERIES_TERMS_MAX] = [
 /// first.
 const SERIES_TERMS_MAX: usize = 12;
 
+/// The coefficients of the series in a number's own type.
+pub trait Coefficients: Sized + 'static {
+    /// Of the feed gained: C over y⁴.
+    const SPEED: &'static [Self; SERIES_TERMS_MAX];
+    /// Of the length gained: B over y⁵.
+    const LENGTH: &'static [Self; SERIES_TERMS_MAX];
+}
+
+macro_rules! coefficients {
+    ($unit:ty, $table:path) => {
+        impl Coefficients for $unit {
+            const SPEED: &'static [Self; SERIES_TERMS_MAX] = &$table(&SPEED);
+            const LENGTH: &'static [Self; SERIES_TERMS_MAX] = &$table(&LENGTH);
+        }
+    };
+}
+
+coefficients!(f32, table::f32s);
+coefficients!(f64, table::f64s);
+coefficients!(I3F29, table::fixed_points);
+
 impl<U: Unit> Shape<U> {
     /// The shapes at `x` in \[0, 1\].
     #[inline]
@@ -94,8 +120,8 @@ impl<U: Unit> Shape<U> {
         let y = z + z;
         let square = y * y;
         let cube = square * y;
-        let b = series(&LENGTH, square) * (cube * square);
-        let c = series(&SPEED, square) * (square * square);
+        let b = series(U::LENGTH, square) * (cube * square);
+        let c = series(U::SPEED, square) * (square * square);
         let accel = cube * unit(PI * PI / 24.0) - b;
         let jerk = square * unit(PI * PI / 4.0) - c;
         let twice = accel + accel;
@@ -116,13 +142,38 @@ impl<U: Unit> Shape<U> {
             Self { jerk, accel, speed, length, snap }
         }
     }
+
+    /// The shapes at `x` in \[0, 1\] as S1 writes them, with the sine of `B`: `Shape::closed::<Own>(x)`.
+    ///
+    /// [`Shape::at`] is better at the ramp's ends; `tests/expected/functions.md` shows by how much. In
+    /// absolute error these are the better ones for jerk, acceleration and snap.
+    #[inline]
+    #[must_use]
+    pub fn closed<B: SineCosine<U>>(x: U) -> Self {
+        use core::f64::consts::PI;
+        let unit = U::from_f64;
+        let mirrored = x > unit(0.5);
+        let (sine, cosine) = B::sin_cos(if mirrored { U::ONE - x } else { x });
+        let square = sine * sine;
+        let product = sine * cosine;
+        let double = if mirrored { -(product + product) } else { product + product };
+        let x_square = x * x;
+        Self {
+            jerk: square,
+            accel: x * unit(0.5) - double * unit(1.0 / (4.0 * PI)),
+            speed: x_square * unit(0.25) - square * unit(1.0 / (4.0 * PI * PI)),
+            length: x * (x_square * unit(1.0 / 12.0) - unit(1.0 / (8.0 * PI * PI)))
+                + double * unit(1.0 / (16.0 * PI * PI * PI)),
+            snap: double,
+        }
+    }
 }
 
 #[inline]
-fn series<U: Unit>(coefficients: &[f64; SERIES_TERMS_MAX], square: U) -> U {
+fn series<U: Unit>(coefficients: &[U; SERIES_TERMS_MAX], square: U) -> U {
     let mut sum = U::ZERO;
     for &coefficient in coefficients.iter().take(U::SERIES_TERMS).rev() {
-        sum = sum * square + U::from_f64(coefficient);
+        sum = sum * square + coefficient;
     }
     sum
 }
@@ -131,7 +182,7 @@ fn series<U: Unit>(coefficients: &[f64; SERIES_TERMS_MAX], square: U) -> U {
 mod tests {
     use super::*;
     use crate::num::Scalar;
-    use crate::num::sine::sin_cos_f64;
+    use crate::num::sine::Own;
 
     /// The halves must meet, and end where S1 (7)–(9) say.
     #[test]
@@ -156,19 +207,16 @@ mod tests {
     /// f64 against the closed forms, which are good where they don't cancel.
     #[test]
     fn shapes_are_those_of_the_closed_forms() {
-        use core::f64::consts::PI;
         let mut worst = [0.0_f64; 5];
         for i in 0..=1_000_000_u32 {
             let x = f64::from(i) / 1_000_000.0;
-            let (sine, cosine) = sin_cos_f64(f64::min(x, 1.0 - x));
-            let double = 2.0 * sine * if x > 0.5 { -cosine } else { cosine };
-            let shape = Shape::at(x);
+            let (shape, closed) = (Shape::at(x), Shape::closed::<Own>(x));
             let pairs = [
-                (shape.jerk, sine * sine),
-                (shape.accel, x / 2.0 - double / (4.0 * PI)),
-                (shape.speed, x * x / 4.0 - sine * sine / (4.0 * PI * PI)),
-                (shape.length, x * x * x / 12.0 - x / (8.0 * PI * PI) + double / (16.0 * PI.powi(3))),
-                (shape.snap, double),
+                (shape.jerk, closed.jerk),
+                (shape.accel, closed.accel),
+                (shape.speed, closed.speed),
+                (shape.length, closed.length),
+                (shape.snap, closed.snap),
             ];
             for (worst, (series, closed)) in worst.iter_mut().zip(pairs) {
                 *worst = worst.max((series - closed).abs());
@@ -198,7 +246,6 @@ mod tests {
     /// Fixed point against f64 at the same argument: a few of its steps.
     #[test]
     fn fixed_point_is_good_to_a_few_steps() {
-        use fixed::types::I3F29;
         let mut worst = [0.0_f64; 5];
         for i in 0..=1_000_000_u64 {
             let x = I3F29::from_fraction(i << 44);

@@ -22,11 +22,14 @@
 mod fixed_point;
 mod float;
 pub mod sine;
+pub(crate) mod table;
 
 pub use fixed_point::Fixed;
 
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::law::shape::Coefficients;
 
 /// What every number of the kernel can do.
 pub trait Scalar:
@@ -75,7 +78,7 @@ pub trait Scalar:
 }
 
 /// A normalised quantity, |x| < 4.
-pub trait Unit: Scalar {
+pub trait Unit: Scalar + Coefficients {
     /// Terms of the power series of the law's shapes that this type resolves over half a phase, at
     /// most 12 (see [`crate::law::shape`]).
     const SERIES_TERMS: usize;
