@@ -20,61 +20,58 @@ use motion_kernel::units::{Counts, DacCode};
 
 use crate::axis::AxisParameters;
 use crate::dac_chip::{Ad5754Chip, ChipError};
-use crate::drive_parameters::{DriveParameters, REFERENCE_X, REFERENCE_Y, REFERENCE_Z};
+use crate::drive_parameters::{REFERENCE_X, REFERENCE_Y};
 use crate::encoder::{EncoderParameters, REFERENCE_ENCODER};
 use crate::machine::{MachineParameters, SimMachine};
 
-/// Axes of a closed loop.
-pub const LOOP_AXES: usize = 3;
-
-/// The reference drives behind a program's scales.
+/// The reference drives behind a program's scales: the first axis is S4's X, the second its Y, all others are like
+/// X.
 #[must_use]
-pub fn reference_machine(header: &Header<LOOP_AXES>, substeps: u32) -> MachineParameters<LOOP_AXES> {
-    let [x, y, z] = header.axes;
-    let axis = |drive: DriveParameters, figures: motion_kernel::axis::AxisFigures| AxisParameters {
-        drive,
-        encoder: EncoderParameters { resolution_mm: figures.mm_per_count, ..REFERENCE_ENCODER },
-        mm_s_per_volt: figures.mm_s_at_10_v / DacCode::FULL_SCALE_V,
-        start_position_mm: 0.0,
-    };
-    MachineParameters {
-        axes: [axis(REFERENCE_X, x), axis(REFERENCE_Y, y), axis(REFERENCE_Z, z)],
-        tick_s: header.tick_s,
-        substeps,
+pub fn reference_machine<const AXES: usize>(header: &Header<AXES>, substeps: u32) -> MachineParameters<AXES> {
+    let mut drives = [REFERENCE_X; AXES];
+    if let Some(second) = drives.get_mut(1) {
+        *second = REFERENCE_Y;
     }
+    let axes = core::array::from_fn(|axis| AxisParameters {
+        drive: drives[axis],
+        encoder: EncoderParameters { resolution_mm: header.axes[axis].mm_per_count, ..REFERENCE_ENCODER },
+        mm_s_per_volt: header.axes[axis].mm_s_at_10_v / DacCode::FULL_SCALE_V,
+        start_position_mm: 0.0,
+    });
+    MachineParameters { axes, tick_s: header.tick_s, substeps }
 }
 
 /// What a tick exchanges with its peripherals.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct InMemory {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InMemory<const AXES: usize> {
     /// As the encoders read when the tick began.
-    pub counts: [Counts; LOOP_AXES],
+    pub counts: [Counts; AXES],
     /// As the tick wrote.
-    pub codes: [DacCode; LOOP_AXES],
+    pub codes: [DacCode; AXES],
     /// As the tick told the drives, if it did.
     pub enabled: Option<bool>,
 }
 
-impl Encoder<LOOP_AXES> for InMemory {
+impl<const AXES: usize> Encoder<AXES> for InMemory<AXES> {
     type Error = Infallible;
 
     #[inline]
-    fn latch(&mut self) -> Result<[Counts; LOOP_AXES], Infallible> {
+    fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         Ok(self.counts)
     }
 }
 
-impl VelocityChannel<LOOP_AXES> for InMemory {
+impl<const AXES: usize> VelocityChannel<AXES> for InMemory<AXES> {
     type Error = Infallible;
 
     #[inline]
-    fn write(&mut self, codes: &[DacCode; LOOP_AXES]) -> Result<(), Infallible> {
+    fn write(&mut self, codes: &[DacCode; AXES]) -> Result<(), Infallible> {
         self.codes = *codes;
         Ok(())
     }
 }
 
-impl DriveEnable<LOOP_AXES> for InMemory {
+impl<const AXES: usize> DriveEnable<AXES> for InMemory<AXES> {
     type Error = Infallible;
 
     #[inline]
@@ -94,12 +91,12 @@ pub enum LoopError {
 }
 
 /// The background's part: keeps the streams full.
-pub struct Producer<'a, R: Real> {
-    feeder: Feeder<'a, R, LOOP_AXES>,
-    supply: Supply<R, LOOP_AXES, Reader<'a, LOOP_AXES>>,
+pub struct Producer<'a, R: Real, const AXES: usize> {
+    feeder: Feeder<'a, R, AXES>,
+    supply: Supply<R, AXES, Reader<'a, AXES>>,
 }
 
-impl<R: Real> Producer<'_, R> {
+impl<R: Real, const AXES: usize> Producer<'_, R, AXES> {
     /// Fills the streams; true if nothing is left to come.
     ///
     /// # Errors
@@ -110,50 +107,61 @@ impl<R: Real> Producer<'_, R> {
 }
 
 /// The interrupt's part.
-pub struct ClosedLoop<'a, R: Real, const LINE: usize> {
-    kernel: Kernel<R, LOOP_AXES>,
-    intake: Intake<'a, R, LOOP_AXES>,
-    machine: &'a SimMachine<LOOP_AXES, LINE>,
-    outputs: Ad5754Output<&'a Ad5754Chip, LOOP_AXES>,
-    memory: InMemory,
+pub struct ClosedLoop<'a, R: Real, const AXES: usize, const LINE: usize> {
+    kernel: Kernel<R, AXES>,
+    intake: Intake<'a, R, AXES>,
+    machine: &'a SimMachine<AXES, LINE>,
+    outputs: Ad5754Output<&'a Ad5754Chip, AXES>,
+    memory: InMemory<AXES>,
 }
+
+/// Both parts of a loop.
+pub type Closed<'a, R, const AXES: usize, const LINE: usize> =
+    (Producer<'a, R, AXES>, ClosedLoop<'a, R, AXES, LINE>);
 
 /// Closes the loop of a program over `machine`, drives enabled.
 ///
 /// # Errors
 /// The program's machine can't be regulated or simulated.
-pub fn close<'a, R: Real, const PIECES: usize, const SEGMENTS: usize, const LINE: usize>(
-    program: Reader<'a, LOOP_AXES>,
-    streams: &'a mut Streams<R, LOOP_AXES, PIECES, SEGMENTS>,
-    machine: &'a SimMachine<LOOP_AXES, LINE>,
-) -> Result<(Producer<'a, R>, ClosedLoop<'a, R, LINE>), LoopError> {
-    let &Header { tick_s, rules, axes: [x, y, z], start } = program.header();
-    let config = |figures| AxisConfig::new(&figures, tick_s).map_err(LoopError::Scale);
+pub fn close<
+    'a,
+    R: Real,
+    const AXES: usize,
+    const PIECES: usize,
+    const SEGMENTS: usize,
+    const LINE: usize,
+>(
+    program: Reader<'a, AXES>,
+    streams: &'a mut Streams<R, AXES, PIECES, SEGMENTS>,
+    machine: &'a SimMachine<AXES, LINE>,
+) -> Result<Closed<'a, R, AXES, LINE>, LoopError> {
+    let &Header { tick_s, rules, axes, start } = program.header();
+    let first = AxisConfig::new(&axes[0], tick_s).map_err(LoopError::Scale)?;
+    let mut configs = [first; AXES];
+    for (config, figures) in configs.iter_mut().zip(&axes) {
+        *config = AxisConfig::new(figures, tick_s).map_err(LoopError::Scale)?;
+    }
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
     let Ok(counts) = (&*machine).latch();
-    let mut kernel = Kernel::new([config(x)?, config(y)?, config(z)?], start, counts);
+    let mut kernel = Kernel::new(configs, start, counts);
     kernel.enable(0);
     let (feeder, intake) = streams.split(rules, start);
     let supply = Supply::new(program, tick_s);
-    let memory = InMemory::default();
+    let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
     Ok((Producer { feeder, supply }, ClosedLoop { kernel, intake, machine, outputs, memory }))
 }
 
-impl<R: Real, const LINE: usize> ClosedLoop<'_, R, LINE> {
+impl<R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'_, R, AXES, LINE> {
     /// One tick of the kernel and of the machine. A program stop is resumed at once.
-    pub fn tick(&mut self) -> Trace<R, LOOP_AXES> {
+    pub fn tick(&mut self) -> Trace<R, AXES> {
         self.tick_by(|kernel, intake, memory| *kernel.tick(intake, memory))
     }
 
     /// The same with the kernel's tick called by `tick`, to measure it.
     pub fn tick_by(
         &mut self,
-        tick: impl FnOnce(
-            &mut Kernel<R, LOOP_AXES>,
-            &mut Intake<'_, R, LOOP_AXES>,
-            &mut InMemory,
-        ) -> Trace<R, LOOP_AXES>,
-    ) -> Trace<R, LOOP_AXES> {
+        tick: impl FnOnce(&mut Kernel<R, AXES>, &mut Intake<'_, R, AXES>, &mut InMemory<AXES>) -> Trace<R, AXES>,
+    ) -> Trace<R, AXES> {
         let mut machine = self.machine;
         let Ok(counts) = machine.latch();
         self.memory.counts = counts;

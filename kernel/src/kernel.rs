@@ -37,7 +37,6 @@ pub struct Kernel<R: Real, const AXES: usize> {
     config: [AxisConfig<R>; AXES],
     executor: Executor<R, AXES>,
     axes: [AxisState<R>; AXES],
-    tick: u64,
     power: Power,
     /// What the drives were last told; `None` before the first time and where that failed.
     told: Option<bool>,
@@ -56,13 +55,14 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
         let executor = Executor::new(position);
         let trace = Trace {
-            tick: 0,
+            // The first tick is number 0.
+            tick: u64::MAX,
             executed: executor.resting(),
             counts,
             axes: [AxisOutput::default(); AXES],
             fault: None,
         };
-        Self { config, executor, axes, tick: 0, power: Power::Off, told: None, trace }
+        Self { config, executor, axes, power: Power::Off, told: None, trace }
     }
 
     /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (what
@@ -82,7 +82,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// Latches a fault that the board has found (an input, a missed tick), in the tick to come: its
     /// outputs already are those of a fault. Without effect if there is one.
     pub fn trip(&mut self, kind: FaultKind<R>) {
-        self.latch_fault(kind);
+        self.latch_fault_in(self.trace.tick.wrapping_add(1), kind);
     }
 
     /// One control tick: reads the encoders, executes the streams, regulates every axis, writes the
@@ -91,11 +91,11 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     where
         H: Encoder<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
     {
+        self.trace.tick = self.trace.tick.wrapping_add(1);
         match hal.latch() {
             Ok(counts) => self.trace.counts = counts,
             Err(_) => self.latch_fault(FaultKind::Encoder),
         }
-        self.trace.tick = self.tick;
         self.execute(intake);
         self.regulate();
         if hal.write(&self.trace.axes.each_ref().map(|axis| axis.code)).is_err() {
@@ -109,7 +109,6 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
                 self.latch_fault(FaultKind::Enable);
             }
         }
-        self.tick = self.tick.wrapping_add(1);
         &self.trace
     }
 
@@ -133,26 +132,28 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     #[inline]
     fn regulate(&mut self) {
         let Trace { executed, counts, axes: outputs, .. } = &mut self.trace;
-        let mut lost = None;
         if self.power != Power::Off {
+            let mut is_lost = false;
             let parts = self.axes.iter_mut().zip(&self.config).zip(&executed.setpoints).zip(&*counts);
-            for (index, (output, (((axis, config), setpoint), &counts))) in
-                outputs.iter_mut().zip(parts).enumerate()
-            {
-                *output = axis.tick(config, setpoint, counts);
-                if output.lost && lost.is_none() {
-                    lost = Some(FaultKind::FollowingError {
-                        axis: index,
-                        error_mm: output.following_error_mm,
-                    });
-                }
+            for (output, (((axis, config), setpoint), counts)) in outputs.iter_mut().zip(parts) {
+                axis.tick_into(config, setpoint, counts, output);
+                is_lost |= output.lost;
             }
-        }
-        if let Some(kind) = lost {
-            self.latch_fault(kind);
+            if is_lost {
+                self.lose();
+            }
         }
         if self.power == Power::Off {
             self.stand_still();
+        }
+    }
+
+    /// Latches the first axis that is beyond its limit.
+    #[cold]
+    fn lose(&mut self) {
+        let lost = self.trace.axes.iter().enumerate().find(|(_, output)| output.lost);
+        if let Some((axis, &AxisOutput { following_error_mm: error_mm, .. })) = lost {
+            self.latch_fault(FaultKind::FollowingError { axis, error_mm });
         }
     }
 
@@ -210,9 +211,13 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// The first fault stays, and the drives go off.
     #[cold]
     fn latch_fault(&mut self, kind: FaultKind<R>) {
+        self.latch_fault_in(self.trace.tick, kind);
+    }
+
+    fn latch_fault_in(&mut self, tick: u64, kind: FaultKind<R>) {
         self.power = Power::Off;
         if self.trace.fault.is_none() {
-            self.trace.fault = Some(Fault { tick: self.tick, kind });
+            self.trace.fault = Some(Fault { tick, kind });
         }
     }
 }

@@ -31,8 +31,11 @@ impl Counter {
         let _ = steps(|| ());
         let nothing = steps(|| ());
         let known = steps(|| {
-            // Nothing but instructions that do nothing.
-            unsafe { asm!(".rept 1000", "nop", ".endr", options(nomem, nostack)) }
+            // Sound: counts a register down, two instructions a turn.
+            unsafe {
+                asm!("2:", "subs {turns}, {turns}, #1", "bne 2b", turns = inout(reg) KNOWN / 2 => _,
+                    options(nomem, nostack))
+            }
         });
         Self { nothing, known: known - nothing }
     }

@@ -31,6 +31,8 @@ const IS_SMALL: bool = true;
 #[cfg(target_has_atomic = "8")]
 const IS_SMALL: bool = false;
 
+/// Axes of the machine.
+pub const AXES: usize = 3;
 /// Capacity of the path stream.
 pub const PIECES: usize = if IS_SMALL { 18 } else { 64 };
 /// Capacity of the feed stream.

@@ -134,21 +134,34 @@ impl<R: Real> AxisState<R> {
     }
 
     /// One control tick.
-    #[inline]
     pub fn tick(&mut self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, counts: Counts) -> AxisOutput<R> {
+        let mut output = AxisOutput::default();
+        self.tick_into(config, setpoint, &counts, &mut output);
+        output
+    }
+
+    /// [`AxisState::tick`] into `output`. Not inlined: three copies of it would fight for the registers.
+    #[inline(never)]
+    pub(crate) fn tick_into(
+        &mut self,
+        config: &AxisConfig<R>,
+        setpoint: &Setpoint<R>,
+        &counts: &Counts,
+        output: &mut AxisOutput<R>,
+    ) {
         let actual = self.position(config, counts);
         // Subtracted in fixed point, converted afterwards.
         let following_error_mm: R = (setpoint.position - actual).to_offset();
         self.peak_following_error_mm = self.peak_following_error_mm.max(following_error_mm.abs());
         let command =
             config.regulator.tick(&mut self.regulator, following_error_mm, setpoint, config.output.limits());
-        AxisOutput {
+        *output = AxisOutput {
             actual,
             following_error_mm,
             code: config.output.code(command.velocity_mm_s),
             saturated: command.saturated,
             // Written so that what is not a number counts as lost.
             lost: !(following_error_mm.abs() <= config.following_error_limit_mm),
-        }
+        };
     }
 }

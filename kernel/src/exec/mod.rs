@@ -143,22 +143,17 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     ) -> Result<(), ExecFault> {
         self.walker.start_tick();
         intake.start_tick();
-        self.advance(intake)?;
-        let motion = match (&self.activity, intake.feed()) {
-            (Activity::Moving(moving), Some(FeedItem::Segment(segment))) => moving.at(segment),
-            (Activity::Between { s, v_mm_s }, _) => {
-                PathMotion { s: *s, v_mm_s: *v_mm_s, ..PathMotion::default() }
+        match self.advance(intake)? {
+            Some(motion) => {
+                executed.motion = motion;
+                let Executed { motion, setpoints, .. } = executed;
+                executed.line = self.walker.follow(motion, intake, setpoints).map_err(walk_fault)?;
             }
-            _ => PathMotion::default(),
-        };
-        if let Activity::Moving(_) | Activity::Between { .. } = self.activity {
-            executed.line =
-                self.walker.follow(&motion, intake, &mut executed.setpoints).map_err(walk_fault)?;
-        } else {
-            executed.line = 0;
-            self.walker.rest(&mut executed.setpoints);
+            None => {
+                (executed.motion, executed.line) = (PathMotion::default(), 0);
+                self.walker.rest(&mut executed.setpoints);
+            }
         }
-        executed.motion = motion;
         executed.state = self.state();
         executed.stretches = self.stretches;
         Ok(())
@@ -174,16 +169,18 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         }
     }
 
-    /// Spends one tick's time on what is queued.
+    /// Spends one tick's time on what is queued: the motion at the tick's end, inside a stretch.
     #[inline]
-    fn advance(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), ExecFault> {
+    fn advance(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<Option<PathMotion<R>>, ExecFault> {
         let mut left = Ticks::ONE;
         for _ in 0..STEPS_PER_TICK_MAX {
             match (&mut self.activity, intake.feed()) {
                 (Activity::Moving(moving), Some(FeedItem::Segment(segment))) => {
-                    let Some(after) = moving.spend(segment, left) else { return Ok(()) };
+                    let Some(after) = moving.spend(segment, left) else {
+                        return Ok(Some(moving.at(segment)));
+                    };
                     left = after;
-                    if !moving.next_phase() {
+                    if !moving.next_phase(segment) {
                         self.activity = moving.ended(segment);
                         intake.drop_feed();
                     }
@@ -193,15 +190,15 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
                         && still > Ticks::ZERO
                     {
                         *dwell = still;
-                        return Ok(());
+                        return Ok(None);
                     }
                     left = left.minus(*dwell).unwrap_or(Ticks::ZERO);
                     self.activity = Activity::Rest;
                 }
-                (Activity::Stopped, _) | (Activity::Rest, None) => return Ok(()),
+                (Activity::Stopped, _) | (Activity::Rest, None) => return Ok(None),
                 (Activity::Rest, Some(FeedItem::Segment(_))) => {
                     if !intake.may_start() {
-                        return Ok(());
+                        return Ok(None);
                     }
                     self.activity = Activity::Between { s: Position::ZERO, v_mm_s: R::ZERO };
                 }
@@ -213,15 +210,15 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
                     intake.drop_feed();
                     self.activity = Activity::Stopped;
                 }
-                (Activity::Between { s, .. }, Some(FeedItem::Segment(_))) => {
-                    self.activity = Activity::Moving(Moving::new(*s));
+                (Activity::Between { s, .. }, Some(FeedItem::Segment(segment))) => {
+                    self.activity = Activity::Moving(Moving::new(segment, *s));
                 }
                 (Activity::Rest | Activity::Between { .. }, Some(FeedItem::EndOfStretch)) => {
                     self.end_stretch(intake)?;
                 }
                 // The next item is not needed yet, or there is time to wait for it at rest.
-                (Activity::Between { v_mm_s, .. }, None) if left == Ticks::ZERO || *v_mm_s <= R::ZERO => {
-                    return Ok(());
+                (Activity::Between { s, v_mm_s }, None) if left == Ticks::ZERO || *v_mm_s <= R::ZERO => {
+                    return Ok(Some(PathMotion { s: *s, v_mm_s: *v_mm_s, ..PathMotion::default() }));
                 }
                 // The feeder lets no dwell or stop into a stretch, and a segment stays until it is done.
                 (Activity::Between { .. } | Activity::Moving(_), _) => return Err(ExecFault::FeedStarved),

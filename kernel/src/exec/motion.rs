@@ -10,48 +10,51 @@ pub(super) struct Moving {
     /// Path position of the segment's start.
     start: Position,
     phase: Phase,
-    /// Time spent in the phase.
-    elapsed: Ticks,
-    /// The same, normalised, in 2⁻⁶⁴.
+    /// Time that the phase still takes.
+    left: Ticks,
+    /// How much of it has passed, in 2⁻⁶⁴; 0 only before it begins.
     fraction: u64,
 }
 
 impl Moving {
-    pub(super) fn new(start: Position) -> Self {
-        Self { start, phase: Phase::Rise, elapsed: Ticks::ZERO, fraction: 0 }
+    #[inline]
+    pub(super) fn new<R: Real>(segment: &FeedSegment<R>, start: Position) -> Self {
+        Self { start, phase: Phase::Rise, left: segment.phase_duration(Phase::Rise), fraction: 0 }
     }
 
     /// Spends `time` ≤ 1 tick in the phase. If the phase ends by then: what is left of the time.
     #[inline]
     pub(super) fn spend<R: Real>(&mut self, segment: &FeedSegment<R>, time: Ticks) -> Option<Ticks> {
-        let elapsed = self.elapsed.plus(time);
-        let over = elapsed.minus(segment.phase_duration(self.phase));
-        if over.is_none() {
+        let over = time.minus(self.left);
+        if let Some(left) = self.left.minus(time)
+            && over.is_none()
+        {
             // A phase that is already under way is given whole ticks only.
-            self.fraction = if self.elapsed > Ticks::ZERO {
+            self.fraction = if self.fraction > 0 {
                 self.fraction.wrapping_add(segment.fraction_step(self.phase))
             } else {
                 segment.fraction_at(self.phase, time)
             };
-            self.elapsed = elapsed;
+            self.left = left;
         }
         over
     }
 
     /// Goes on to the next phase; false if that was the last one.
     #[inline]
-    pub(super) fn next_phase(&mut self) -> bool {
+    pub(super) fn next_phase<R: Real>(&mut self, segment: &FeedSegment<R>) -> bool {
         self.phase = match self.phase {
             Phase::Rise => Phase::Hold,
             Phase::Hold => Phase::Fall,
             Phase::Fall => return false,
         };
-        self.elapsed = Ticks::ZERO;
+        self.left = segment.phase_duration(self.phase);
         self.fraction = 0;
         true
     }
 
     /// What follows the segment's end.
+    #[inline]
     pub(super) fn ended<R: Real>(&self, segment: &FeedSegment<R>) -> Activity<R> {
         Activity::Between { s: self.start + segment.length(), v_mm_s: segment.as_ramp().to_mm_s }
     }

@@ -159,14 +159,20 @@ const fn multiply_q32(a: u64, b: u64) -> u64 {
     (a >> 32).wrapping_mul(b).wrapping_add(((a & 0xFFFF_FFFF).wrapping_mul(b)) >> 32)
 }
 
-/// `length`·`fraction`, from the top 32 bits of the fraction: two 32×32-bit products.
+/// `length` times a fraction in 2⁻³²: two 32×32-bit products.
 #[inline]
 #[allow(clippy::cast_possible_wrap)]
-const fn portion(length: i64, fraction: u64) -> i64 {
-    let fraction = fraction >> 32;
+const fn portion(length: i64, fraction: u32) -> i64 {
     let high = (length >> 32).wrapping_mul(fraction as i64);
-    let low = ((length & 0xFFFF_FFFF) as u64).wrapping_mul(fraction) >> 32;
+    let low = ((length & 0xFFFF_FFFF) as u64).wrapping_mul(fraction as u64) >> 32;
     high.wrapping_add(low as i64)
+}
+
+/// The product of two fractions in 2⁻³².
+#[inline]
+#[allow(clippy::cast_possible_truncation)]
+const fn times(a: u32, b: u32) -> u32 {
+    ((a as u64).wrapping_mul(b as u64) >> 32) as u32
 }
 
 /// An item of the feed stream: a ramp or a cruise over a length of path. Immutable.
@@ -359,11 +365,11 @@ impl<R: Real> FeedSegment<R> {
     #[inline]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
         if phase == Phase::Hold {
-            let square = portion(portion(self.hold_square_bits, fraction), fraction);
+            let x = (fraction >> 32) as u32;
             let s = self
                 .hold_start_bits
-                .wrapping_add(portion(self.hold_linear_bits, fraction))
-                .wrapping_add(square);
+                .wrapping_add(portion(self.hold_linear_bits, x))
+                .wrapping_add(portion(self.hold_square_bits, times(x, x)));
             return PathMotion {
                 s: Position::from_bits(s).min(self.length),
                 v_mm_s: self.hold_v_mm_s + self.hold_gain_mm_s.scaled(R::Unit::from_fraction(fraction)),
@@ -377,13 +383,14 @@ impl<R: Real> FeedSegment<R> {
         let fraction = if falling { !fraction } else { fraction };
         let shape = Shape::at(R::Unit::from_fraction(fraction));
         let (gained, jerk) = (self.speed_mm_s.scaled(shape.speed), self.jerk_mm_s3.scaled(shape.jerk));
-        let cube = portion(portion(portion(self.cube_bits, fraction), fraction), fraction);
+        let x = (fraction >> 32) as u32;
+        let cube = portion(self.cube_bits, times(times(x, x), x));
         let bent = Position::from_bits(cube) + Position::from_offset(self.sine_mm.scaled(shape.snap));
         let (s, v_mm_s, j_mm_s3) = if falling {
-            let even = Position::from_bits(portion(self.fall_bits, fraction));
+            let even = Position::from_bits(portion(self.fall_bits, x));
             (self.length + even, self.ramp.to_mm_s - gained, -jerk)
         } else {
-            let even = Position::from_bits(portion(self.rise_bits, fraction));
+            let even = Position::from_bits(portion(self.rise_bits, x));
             (even, self.ramp.from_mm_s + gained, jerk)
         };
         PathMotion {

@@ -10,7 +10,7 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use hal_sim::SimMachine;
-use hal_sim::closed_loop::{InMemory, LOOP_AXES, close, reference_machine};
+use hal_sim::closed_loop::{InMemory, close, reference_machine};
 use motion_kernel::axis::{AxisConfig, AxisOutput, AxisState};
 use motion_kernel::exec::ExecState;
 use motion_kernel::kernel::Kernel;
@@ -24,20 +24,36 @@ use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, Position};
 use qemu_boards::count::Counter;
 use qemu_boards::programs::programs;
-use qemu_boards::{LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail, stack};
+use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail, stack};
 
 type Axis = AxisState<Number>;
+type Queues<const N: usize> = Streams<Number, N, PIECES, SEGMENTS>;
+/// The tick of a machine with `N` axes, called through something that is not inlined.
+type Tick<const N: usize> = for<'a> fn(
+    &'a mut Kernel<Number, N>,
+    &mut Intake<'_, Number, N>,
+    &mut InMemory<N>,
+) -> &'a Trace<Number, N>;
 
 #[entry]
 fn main() -> ! {
     let core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
     let counter = Counter::new(core.SYST);
-    hprintln!("ram {}", size_of::<Kernel<Number, LOOP_AXES>>() + size_of::<Streams<Number, LOOP_AXES, PIECES, SEGMENTS>>());
+    let kernel = size_of::<Kernel<Number, AXES>>();
+    hprintln!("ram {}", kernel + size_of::<Streams<Number, AXES, PIECES, SEGMENTS>>());
+    // Not on the stack, where the one that is measured needs the room.
+    let streams = cortex_m::singleton!(: Queues<AXES> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
+    let one = cortex_m::singleton!(: Queues<1> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     for bytes in programs() {
-        let program = Reader::<LOOP_AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
         hprintln!("program");
-        ticks(&counter, program);
-        stages(&counter, program);
+        match Reader::<AXES>::new(bytes) {
+            Ok(program) => measure(&counter, program, streams, budgeted_tick),
+            Err(ProgramError::Axes { found: 1, .. }) => {
+                let program = Reader::<1>::new(bytes).unwrap_or_else(|error| fail(&error));
+                measure(&counter, program, one, Kernel::tick);
+            }
+            Err(error) => fail(&error),
+        }
     }
     exit(true)
 }
@@ -46,23 +62,32 @@ fn main() -> ! {
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn budgeted_tick<'a>(
-    kernel: &'a mut Kernel<Number, LOOP_AXES>,
-    intake: &mut Intake<'_, Number, LOOP_AXES>,
-    memory: &mut InMemory,
-) -> &'a Trace<Number, LOOP_AXES> {
+    kernel: &'a mut Kernel<Number, AXES>,
+    intake: &mut Intake<'_, Number, AXES>,
+    memory: &mut InMemory<AXES>,
+) -> &'a Trace<Number, AXES> {
     kernel.tick(intake, memory)
 }
 
+fn measure<const N: usize>(
+    counter: &Counter,
+    program: Reader<'_, N>,
+    streams: &mut Queues<N>,
+    tick: Tick<N>,
+) {
+    ticks(counter, program, streams, tick);
+    stages(counter, program);
+}
+
 #[inline(never)]
-fn ticks(counter: &Counter, program: Reader<'_, LOOP_AXES>) {
-    let &Header { tick_s, axes: [x, ..], start, .. } = program.header();
-    let machine = SimMachine::<LOOP_AXES, LINE>::new(&reference_machine(program.header(), SUBSTEPS))
+fn ticks<const N: usize>(counter: &Counter, program: Reader<'_, N>, streams: &mut Queues<N>, tick: Tick<N>) {
+    let &Header { tick_s, axes, start, .. } = program.header();
+    let machine = SimMachine::<N, LINE>::new(&reference_machine(program.header(), SUBSTEPS))
         .unwrap_or_else(|error| fail(&error));
-    let mut streams = Streams::<Number, LOOP_AXES, PIECES, SEGMENTS>::new();
     let (mut producer, mut closed_loop) =
-        close(program, &mut streams, &machine).unwrap_or_else(|error| fail(&error));
+        close(program, streams, &machine).unwrap_or_else(|error| fail(&error));
     // A regulator of its own beside the kernel's, fed with the same.
-    let config = AxisConfig::<Number>::new(&x, tick_s).unwrap_or_else(|error| fail(&error));
+    let config = AxisConfig::<Number>::new(&axes[0], tick_s).unwrap_or_else(|error| fail(&error));
     let mut axis = Axis::default();
     axis.set_position(&config, Counts::default(), start[0]);
     let mut deepest = 0;
@@ -71,7 +96,7 @@ fn ticks(counter: &Counter, program: Reader<'_, LOOP_AXES>) {
         let mut spent = 0;
         let trace = closed_loop.tick_by(|kernel, intake, memory| {
             let top = stack::paint();
-            let (trace, instructions) = counter.count(|| budgeted_tick(kernel, intake, memory));
+            let (trace, instructions) = counter.count(|| black_box(tick)(kernel, intake, memory));
             deepest = deepest.max(stack::depth(top));
             spent = instructions;
             *trace
@@ -91,7 +116,7 @@ fn ticks(counter: &Counter, program: Reader<'_, LOOP_AXES>) {
 }
 
 /// The stages by themselves, over all that the program contains.
-fn stages(counter: &Counter, program: Reader<'_, LOOP_AXES>) {
+fn stages<const N: usize>(counter: &Counter, program: Reader<'_, N>) {
     let &Header { tick_s, rules, .. } = program.header();
     let limits = rules.limits;
     let motion = PathMotion {
@@ -101,6 +126,7 @@ fn stages(counter: &Counter, program: Reader<'_, LOOP_AXES>) {
         j_mm_s3: Number::from_f64(0.6 * limits.jerk_mm_s3),
         snap_mm_s4: Number::from_f64(-0.5 * limits.snap_mm_s4),
     };
+    let mut setpoints = [Setpoint::default(); N];
     for item in program {
         let item = item.unwrap_or_else(|error| fail(&error));
         match item.ready::<Number, ProgramError>(tick_s).unwrap_or_else(|error| fail(&error)) {
@@ -118,7 +144,7 @@ fn stages(counter: &Counter, program: Reader<'_, LOOP_AXES>) {
                 let length: Number = piece.length().to_offset();
                 for eighth in 0..8 {
                     let s_mm = length * Number::from_f64(0.125 * f64::from(eighth));
-                    let (_, spent) = counter.count(|| path(&piece, s_mm, &motion));
+                    let (_, spent) = counter.count(|| path(&piece, s_mm, &motion, &mut setpoints));
                     hprintln!("path {}", spent);
                 }
             }
@@ -129,16 +155,18 @@ fn stages(counter: &Counter, program: Reader<'_, LOOP_AXES>) {
 
 #[inline(never)]
 fn law(segment: &FeedSegment<Number>, phase: Phase, fraction: u64) -> PathMotion<Number> {
-    black_box(segment).at(black_box(phase), black_box(fraction))
+    segment.at(phase, fraction)
 }
 
 #[inline(never)]
-fn path(
-    piece: &Piece<Number, LOOP_AXES>,
+fn path<const N: usize>(
+    piece: &Piece<Number, N>,
     s_mm: Number,
     motion: &PathMotion<Number>,
-) -> [Setpoint<Number>; LOOP_AXES] {
-    black_box(piece).at(black_box(s_mm), black_box(motion))
+    setpoints: &mut [Setpoint<Number>; N],
+) {
+    piece.set(s_mm, motion, setpoints);
+    black_box(setpoints);
 }
 
 #[inline(never)]
@@ -148,5 +176,5 @@ fn regulate(
     setpoint: &Setpoint<Number>,
     counts: Counts,
 ) -> AxisOutput<Number> {
-    black_box(axis).tick(black_box(config), black_box(setpoint), black_box(counts))
+    axis.tick(config, setpoint, counts)
 }

@@ -6,13 +6,13 @@
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use hal_sim::SimMachine;
-use hal_sim::closed_loop::{LOOP_AXES, close, reference_machine};
+use hal_sim::closed_loop::{close, reference_machine};
 use motion_kernel::exec::ExecState;
 use motion_kernel::program::Reader;
 use motion_kernel::queue::Streams;
 use motion_kernel::trace::Digest;
 use qemu_boards::programs::programs;
-use qemu_boards::{LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail};
+use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail};
 
 #[entry]
 fn main() -> ! {
@@ -24,10 +24,10 @@ fn main() -> ! {
 
 #[inline(never)]
 fn run(bytes: &[u8]) {
-    let program = Reader::<LOOP_AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
-    let machine = SimMachine::<LOOP_AXES, LINE>::new(&reference_machine(program.header(), SUBSTEPS))
+    let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
+    let machine = SimMachine::<AXES, LINE>::new(&reference_machine(program.header(), SUBSTEPS))
         .unwrap_or_else(|error| fail(&error));
-    let mut streams = Streams::<Number, LOOP_AXES, PIECES, SEGMENTS>::new();
+    let mut streams = Streams::<Number, AXES, PIECES, SEGMENTS>::new();
     let (mut producer, mut closed_loop) =
         close(program, &mut streams, &machine).unwrap_or_else(|error| fail(&error));
     let (mut digest, mut ticks) = (Digest::new(), 0_u32);

@@ -10,13 +10,13 @@ use cortex_m_rt::{entry, exception};
 use cortex_m_semihosting::hprintln;
 use critical_section::Mutex;
 use hal_sim::SimMachine;
-use hal_sim::closed_loop::{ClosedLoop, LOOP_AXES, close, reference_machine};
+use hal_sim::closed_loop::{ClosedLoop, close, reference_machine};
 use motion_kernel::exec::ExecState;
 use motion_kernel::program::Reader;
 use motion_kernel::queue::Streams;
 use motion_kernel::trace::Digest;
 use qemu_boards::programs::programs;
-use qemu_boards::{LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail};
+use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail};
 
 /// Timer steps between two ticks: several times what kernel and simulation take, so that there is time for the
 /// background.
@@ -24,7 +24,7 @@ const TICK_STEPS: u32 = 8_000_000;
 
 /// What the interrupt owns.
 struct Foreground {
-    closed_loop: ClosedLoop<'static, Number, LINE>,
+    closed_loop: ClosedLoop<'static, Number, AXES, LINE>,
     digest: Digest,
     ticks: u32,
     /// The state after the last tick, for the background.
@@ -42,24 +42,17 @@ static FOREGROUND: Mutex<RefCell<Option<Foreground>>> = Mutex::new(RefCell::new(
 fn main() -> ! {
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
     let bytes = programs().next().unwrap_or_else(|| fail(&"a bundle without a program"));
-    let program = Reader::<LOOP_AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
+    let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
     let parameters = reference_machine(program.header(), SUBSTEPS);
-    let machine = cortex_m::singleton!(: SimMachine<LOOP_AXES, LINE> =
+    let machine = cortex_m::singleton!(: SimMachine<AXES, LINE> =
         SimMachine::new(&parameters).unwrap_or_else(|error| fail(&error)))
     .unwrap_or_else(|| fail(&"machine"));
-    let streams =
-        cortex_m::singleton!(: Streams<Number, LOOP_AXES, PIECES, SEGMENTS> = Streams::new())
-            .unwrap_or_else(|| fail(&"streams"));
-    let (mut producer, closed_loop) =
-        close(program, streams, machine).unwrap_or_else(|error| fail(&error));
+    let streams = cortex_m::singleton!(: Streams<Number, AXES, PIECES, SEGMENTS> = Streams::new())
+        .unwrap_or_else(|| fail(&"streams"));
+    let (mut producer, closed_loop) = close(program, streams, machine).unwrap_or_else(|error| fail(&error));
     let mut is_all = producer.fill().unwrap_or_else(|error| fail(&error));
-    let foreground = Foreground {
-        closed_loop,
-        digest: Digest::new(),
-        ticks: 0,
-        is_idle: false,
-        is_faulted: false,
-    };
+    let foreground =
+        Foreground { closed_loop, digest: Digest::new(), ticks: 0, is_idle: false, is_faulted: false };
     critical_section::with(|cs| FOREGROUND.replace(cs, Some(foreground)));
 
     core.SYST.set_clock_source(SystClkSource::Core);
