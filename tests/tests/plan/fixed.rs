@@ -285,6 +285,31 @@ fn ends_of_the_ranges() {
     assert!(worst <= LIMIT_PART, "{worst:e}");
 }
 
+/// Changes of feed around those where one limit takes over from another, step by step.
+#[test]
+fn where_regimes_meet() {
+    let mut random = Random::new(96);
+    let mut worst = -1.0_f64;
+    for case in 0..4000 {
+        let range = if case % 2 == 0 { Range::Machines } else { Range::Accepted };
+        let [accel, jerk, snap] = range.limits(&mut random);
+        let (law, _) = laws([accel, jerk, snap]);
+        let pi = std::f64::consts::PI;
+        let peak = jerk.min((2.0 * accel * snap / pi).sqrt());
+        for meeting in [(pi / snap).powi(2) * peak.powi(3) / 2.0, 2.0 * accel * accel / peak] {
+            let from = fixed(*random.pick(&[0.0, 1.0, 1e5]));
+            for steps in -40..=40 {
+                let change = fixed(meeting.min(1e6)).to_bits() + steps;
+                if change > 0 {
+                    worst = worst.max(excess(&law, from, from + Fixed::from_bits(change)));
+                }
+            }
+        }
+    }
+    println!("limits exceeded by {worst:.1e}");
+    assert!(worst <= LIMIT_PART, "{worst:e}");
+}
+
 #[test]
 fn beyond_the_ranges_is_refused() {
     let good = [500.0, 5e3, 4e5];
