@@ -334,6 +334,37 @@ mod tests {
         }
     }
 
+    /// What keeps a product whole: within half a step and a step of the exact value, whatever the sizes.
+    #[test]
+    fn whole_products_round_once_and_saturate() {
+        let mut state = 7;
+        let mut wide = || random(&mut state).cast_signed() >> (random(&mut state) % 64);
+        for _ in 0..200_000 {
+            let [a, b, c] = [wide(), wide(), wide()];
+            let [x, y, z] = [a, b, c].map(Fixed::from_bits);
+            let found = i128::from(x.times_per(y, z).to_bits());
+            let (product, per) = (i128::from(a) * i128::from(b), i128::from(c));
+            if found == i128::from(i64::MAX) || found == i128::from(i64::MIN) {
+                let is_beyond = per == 0 || product.abs() >= (per * found).abs() - per.abs() / 2;
+                assert!(is_beyond, "{a} {b} {c}");
+            } else {
+                assert!((product - found * per).abs() * 2 <= per.abs(), "{a} {b} {c}: {found}");
+            }
+            let (a, b) = (a.max(0), b.max(0));
+            let root = Fixed::from_bits(a).sqrt_product(Fixed::from_bits(b)).to_bits();
+            let (root, product) = (i128::from(root), i128::from(a) * i128::from(b));
+            assert!(root * root <= product && (root + 1) * (root + 1) > product, "{a} {b}");
+            let root = x.root_of_squares(y).to_bits();
+            let squares = x.to_bits().unsigned_abs() as u128;
+            let squares = squares * squares + (y.to_bits().unsigned_abs() as u128).pow(2);
+            let root = root.unsigned_abs() as u128;
+            assert!(root * root <= squares, "{x:?} {y:?}");
+            assert!(root == i64::MAX as u128 || (root + 1) * (root + 1) > squares, "{x:?} {y:?}");
+        }
+        assert_eq!(Fixed::ONE.times_per(Fixed::ONE, Fixed::ZERO).to_bits(), i64::MAX);
+        assert_eq!((-Fixed::ONE).times_per(Fixed::ONE, Fixed::ZERO).to_bits(), i64::MIN);
+    }
+
     #[test]
     fn conversions_saturate_and_round() {
         assert_eq!(Fixed::from_f64(1e30).to_bits(), i64::MAX);
