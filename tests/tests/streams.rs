@@ -215,10 +215,10 @@ const SHORT: &str =
     "G1 X5 F3000\nY5\nG2 X0 Y0 I-5 J0\nG4 P0.0123\nG1 X1\nY1\nX0\nY0\nG3 X0 Y0 I2 J1\nG1 Z3\nX30 Y20\nM2\n";
 
 #[test]
-fn a_capacity_of_one_is_enough() {
+fn a_capacity_of_two_is_enough() {
     let program = executable(SHORT);
     let all_at_once = execute::<512>(&program, |tick| tick == 0);
-    assert_eq!(execute::<2>(&program, |_| true).last(), all_at_once.last());
+    assert_eq!(execute::<3>(&program, |_| true).last(), all_at_once.last());
 }
 
 #[test]

@@ -5,10 +5,11 @@
 //! ever solved for. Newton's method on increasing convex functions, started above the root, falls
 //! monotonically: no bracket, no bisection, and a constant bound on the iterations.
 //!
-//! Background only; pure; generic, but plan in f64: one unit in the last place of an f32 feed is a
-//! ramp of 82 µm.
+//! Background only; pure; generic. In f32 one unit in the last place of a feed is a ramp of up to 82 µm: that
+//! is for tests. In fixed point the solution is as good as its times are long in steps of 0.23 ns.
 
 use super::limits::Law;
+use super::ramp::LimitedBy;
 use crate::num::Root;
 
 /// Newton steps after which a solve ends whatever it has. Ten reach the last places in f64, nine in
@@ -23,19 +24,31 @@ pub fn reach<R: Root>(law: &Law<R>, lower_mm_s: R, length_mm: R) -> R {
     fit(reached, lower_mm_s, |feed| law.ramp_length_mm(lower_mm_s, feed) <= length_mm)
 }
 
-/// Most steps down to a feed that fits.
-const FIT_STEPS_MAX: usize = 8;
+/// Most steps down to a feed that fits, each twice as long as the one before.
+const FIT_STEPS_MAX: usize = 48;
 
 /// `feed`, or the next lower one that fits, `least` if none does: an ulp of feed may be a long ramp.
 fn fit<R: Root>(feed: R, least: R, fits: impl Fn(R) -> bool) -> R {
-    let mut feed = feed;
-    for _ in 0..FIT_STEPS_MAX {
-        if feed <= least || fits(feed) {
-            return feed.max(least);
+    let (mut low, mut high, mut step) = (feed, feed, feed.spacing());
+    let mut steps = 0;
+    while low > least && !fits(low) {
+        if steps == FIT_STEPS_MAX {
+            return least;
         }
-        feed = feed * (R::ONE - R::from_f64(R::EPSILON));
+        (low, high, step) = (low - step, low, step + step);
+        steps += 1;
     }
-    least
+    low = low.max(least);
+    // The last step was as long as all before it together; it took as many to get there.
+    for _ in 1..steps {
+        let middle = low + R::from_f64(0.5) * (high - low);
+        if fits(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
 }
 
 /// The change of feed that [`reach`] adds; it keeps its digits where the sum would lose them.
@@ -43,52 +56,45 @@ fn change_within<R: Root>(law: &Law<R>, lower: R, length: R) -> R {
     if length <= R::ZERO {
         return R::ZERO;
     }
-    let half = R::from_f64(0.5);
-    let (x1, x2) = (law.snap_limited_to_mm_s, law.accel_limited_from_mm_s);
-    let law_limits = law.limits();
-    // t_p at x₁ is 2π·J'/DJ, at x₂ it is 4A/J': where one regime takes over, no root is left.
-    let time_x1 = R::from_f64(core::f64::consts::TAU) * law.jerk_mm_s3 / law_limits.snap_mm_s4;
-    let time_x2 = law.accel_time_s + law.accel_time_s;
-    if length <= (lower + half * x1) * time_x1 {
-        // x = w³, t_p = 2c·w:  w⁴ + 2·F·w = L/c
-        let w = root_of_power::<R, 4>(lower + lower, length / law.snap_time);
+    let double_lower = lower + lower;
+    let x2 = law.accel_limited_from_mm_s;
+    // The ramp by x₁ is (2F + x₁)·t₁ long with t₁ = πJ'/DJ, the one by x₂ with t₁ = 2A/J'.
+    if length / law.snap_time_s - double_lower <= law.snap_limited_to_mm_s {
+        // x = w³, t₁ = w/k with k = (DJ/2π)^⅓:  w·(x + 2F) = k·L
+        let w = root_of_power::<R, 4>(double_lower, law.snap_root, length);
         w * w * w
-    } else if length < (lower + half * x2) * time_x2 {
-        // x = w², t_p = 2·√(2/J')·w:  w³ + 2·F·w = L/√(2/J')
-        let w = root_of_power::<R, 3>(lower + lower, length / law.jerk_time);
+    } else if length / law.accel_time_s - double_lower < x2 {
+        // x = w², t₁ = w/k with k = √(J'/2):  w·(x + 2F) = k·L
+        let w = root_of_power::<R, 3>(double_lower, law.jerk_root, length);
         w * w
     } else {
-        // (F + x/2)(x/A + 2A/J') = L, solved for x without cancellation; a = A²/J'
-        let accel = law_limits.accel_mm_s2;
-        let a = half * x2;
-        let al = accel * length;
-        let difference = lower - a;
-        let root = (difference * difference + al + al).sqrt();
-        let four_a_lower = (a + a) * (lower + lower);
-        (al + al - four_a_lower) / (root + lower + a)
+        // (F + x/2)(x/A + 2A/J') = L, solved for x without cancellation; a = A²/J':
+        // x = (2AL − 4aF)/(√((F − a)² + 2AL) + F + a), no square taken by itself.
+        let accel = law.limits().accel_mm_s2;
+        let a = R::from_f64(0.5) * x2;
+        let all = (accel + accel).sqrt_product(length);
+        let taken = x2.sqrt_product(double_lower);
+        (all - taken).times_per(all + taken, (lower - a).root_of_squares(all) + lower + a)
     }
 }
 
-/// The positive root of wⁿ + p·w = q for n = 3 or 4, p ≥ 0, q > 0.
-fn root_of_power<R: Root, const N: usize>(p: R, q: R) -> R {
-    // The lower of q/p and the root of q, both above the root sought; q/p < ⁿ√q iff qⁿ⁻¹ < pⁿ.
-    let (q_square, p_square) = (q * q, p * p);
-    let linear = if N == 3 { q_square < p_square * p } else { q_square * q < p_square * p_square };
-    let mut w = match (linear, N) {
-        (true, _) => q / p,
-        (false, 3) => q.cbrt(),
-        (false, _) => q.sqrt().sqrt(),
+/// The positive root of w·(wⁿ⁻¹ + p) = k·L for n = 3 or 4, p ≥ 0, k > 0, L > 0.
+fn root_of_power<R: Root, const N: usize>(p: R, k: R, length: R) -> R {
+    let power = match N {
+        3 => length.cbrt() * k.cbrt(),
+        _ => length.sqrt_product(k).sqrt(),
     };
-    for _ in 0..NEWTON_STEPS_MAX {
-        let square = w * w;
-        let (power, slope) = if N == 3 {
-            (square * w, R::from_f64(3.0) * square)
-        } else {
-            (square * square, R::from_f64(4.0) * square * w)
-        };
-        let next = w - (power + p * w - q) / (slope + p);
-        // `>=` also ends on what is not a number.
-        if !(next < w && next > R::ZERO) {
+    // Both are above the root sought.
+    let mut w = if p > R::ZERO { length.times_per(k, p).min(power) } else { power };
+    let n = R::from_f64(N as f64);
+    for step in 0..NEWTON_STEPS_MAX {
+        let change = if N == 3 { w * w } else { w * w * w };
+        // Of the equation divided by w: both sides are feeds.
+        let residual = change + p - length.times_per(k, w);
+        let next = w - w.times_per(residual, n * change + p);
+        // The start may be below the root for its rounding; the first step lands above, the others fall.
+        // `>` and `<` also end on what is not a number.
+        if !(next > R::ZERO && (step == 0 || next < w)) {
             break;
         }
         w = next;
@@ -105,34 +111,37 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     let (higher, lower) = (from_mm_s.max(to_mm_s), from_mm_s.min(to_mm_s));
     let step = higher - lower;
     // Room of no more than rounding is none: with the cube of it, the peak rises by less than that.
-    let rounding = R::ONE + R::from_f64(4.0 * R::EPSILON);
-    if law.ramp_length_mm(lower, higher) * rounding >= length_mm {
+    let rounding = R::from_f64(4.0) * length_mm.spacing();
+    if length_mm - law.ramp_length_mm(lower, higher) <= rounding {
         return higher;
     }
     let above = change_within(law, higher, half * length_mm);
-    let fits = |feed: R| law.ramp_length_mm(lower, feed) + law.ramp_length_mm(higher, feed) <= length_mm;
+    // Subtracted, because the sum may be beyond fixed point.
+    let fits = |feed: R| law.ramp_length_mm(lower, feed) <= length_mm - law.ramp_length_mm(higher, feed);
     if step <= R::ZERO {
         return fit(higher + above, higher, fits);
     }
     // The peak is `higher` + y³. It lies between what either feed alone would reach in half the
     // length, and in y the total length is increasing and convex.
     let upper = above.max(change_within(law, lower, half * length_mm) - step);
-    let mut y = upper.cbrt();
-    let three = R::from_f64(3.0);
+    let mut y = upper.cbrt() + R::MARGIN;
+    let (two, three) = (R::from_f64(2.0), R::from_f64(3.0));
     for _ in 0..NEWTON_STEPS_MAX {
         let square = y * y;
-        let change = square * y;
+        let (change, by_y) = (square * y, three * square);
         // While snap limits the shorter leg, y is the cube root that its time takes.
         let short_time = if change <= law.snap_limited_to_mm_s {
-            law.snap_time * (y + y)
+            ((y + y) / law.snap_root, two / law.snap_root)
         } else {
-            law.ramp_time_s(change)
+            time(law, change, by_y)
         };
-        let (short, short_slope) = leg(law, higher, change, short_time, square);
-        let long_time = law.ramp_time_s(change + step);
-        let (long, long_slope) = leg(law, lower, change + step, long_time, square);
-        let slope = three * (short_slope + long_slope);
-        let next = y - (short + long - length_mm) / slope;
+        let (short, short_slope) = leg(higher, change, short_time, by_y);
+        let (long, long_slope) = leg(lower, change + step, time(law, change + step, by_y), by_y);
+        let (excess, slope) = (short + long - length_mm, short_slope + long_slope);
+        if !(excess > R::ZERO && slope > R::ZERO) {
+            break;
+        }
+        let next = y - excess / slope;
         if !(next < y && next > R::ZERO) {
             break;
         }
@@ -141,20 +150,24 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     fit(higher + y * y * y, higher, fits)
 }
 
-/// Length of the ramp from `lower` by `change` in `time`, and its derivative by the change times
-/// `square`.
-fn leg<R: Root>(law: &Law<R>, lower: R, change: R, time: R, square: R) -> (R, R) {
+/// Duration of the ramp by `change` > 0, and its derivative by y where the change's is `by_y`.
+fn time<R: Root>(law: &Law<R>, change: R, by_y: R) -> (R, R) {
+    let (rise, fall_start, limited_by) = law.times_s(change);
+    let time = rise + fall_start;
+    // dT/dx is T/(3x), T/(2x) or 1/A.
+    let slope = match limited_by {
+        LimitedBy::Snap => time.times_per(by_y, R::from_f64(3.0) * change),
+        LimitedBy::Jerk => time.times_per(by_y, change + change),
+        LimitedBy::Acceleration => by_y / law.limits().accel_mm_s2,
+    };
+    (time, slope)
+}
+
+/// Length of the ramp from `lower` by `change`, and its derivative by y, from those of its time.
+fn leg<R: Root>(lower: R, change: R, (time, time_slope): (R, R), by_y: R) -> (R, R) {
     let half = R::from_f64(0.5);
     let mean = lower + half * change;
-    // dT/dx is T/(3x), T/(2x) or 1/A.
-    let time_slope = if change <= law.snap_limited_to_mm_s {
-        time / (R::from_f64(3.0) * change)
-    } else if change < law.accel_limited_from_mm_s {
-        half * time / change
-    } else {
-        R::ONE / law.limits().accel_mm_s2
-    };
-    (mean * time, (half * time + mean * time_slope) * square)
+    (mean * time, half * time * by_y + mean * time_slope)
 }
 
 #[cfg(test)]

@@ -215,7 +215,8 @@ impl<R: Real> FeedSegment<R> {
         let path_mm = length.to_mm();
         let ramp_mm = ramp.length_mm();
         // In a narrower planning type the ramp's figures carry that type's rounding.
-        let rounding = 16.0 * P::EPSILON * (ramp_mm + ramp.from_mm_s + ramp.to_mm_s);
+        let size = P::from_f64(ramp_mm + ramp.from_mm_s + ramp.to_mm_s);
+        let rounding = 16.0 * size.spacing().to_f64();
         if !(libm::fabs(ramp_mm - path_mm) <= LENGTH_TOLERANCE_MM + rounding) {
             return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
         }
@@ -403,13 +404,12 @@ impl<R: Real> FeedSegment<R> {
     }
 }
 
+/// The ramp in f64. Its peak jerk is what takes one feed to the other in its times, 2·|F − F₀|/(t₁·t₂): that
+/// of `P` carries the rounding of `P`, which would be a step of the feed in the middle.
 fn to_f64<P: Root>(ramp: &Ramp<P>) -> Ramp<f64> {
-    Ramp {
-        from_mm_s: ramp.from_mm_s.to_f64(),
-        to_mm_s: ramp.to_mm_s.to_f64(),
-        peak_jerk_mm_s3: ramp.peak_jerk_mm_s3.to_f64(),
-        t1_s: ramp.t1_s.to_f64(),
-        t2_s: ramp.t2_s.to_f64(),
-        limited_by: ramp.limited_by,
-    }
+    let (from_mm_s, to_mm_s) = (ramp.from_mm_s.to_f64(), ramp.to_mm_s.to_f64());
+    let (t1_s, t2_s) = (ramp.t1_s.to_f64(), ramp.t2_s.to_f64());
+    let twice = 2.0 * libm::fabs(to_mm_s - from_mm_s);
+    let peak_jerk_mm_s3 = if t1_s > 0.0 { twice / t2_s / t1_s } else { ramp.peak_jerk_mm_s3.to_f64() };
+    Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by: ramp.limited_by }
 }

@@ -17,6 +17,38 @@
 //!
 //! Products are rounded down. Sums and products of accepted input can't overflow: items are checked
 //! for it when they are made ([`FeedSegment`](crate::law::FeedSegment), [`Piece`](crate::path::Piece)).
+//! They wrap if they do; in a build with debug assertions that is found.
+//!
+//! # Planning
+//!
+//! Plans ([`Law`](crate::law::Law), [`reach`](crate::law::reach()), [`plan`](crate::plan::plan()),
+//! [`Ceiling`](crate::plan::Ceiling), [`joint`](crate::plan::joint())) run in 32.32 too. What is accepted is bounded
+//! so that everything made of it fits; the bounds are [`Root::LIMITS`], [`Root::FEEDS_MM_S`], [`Root::LENGTH_MIN_MM`] and
+//! [`Position::LIMIT_MM`](crate::units::Position::LIMIT_MM). The step is 2⁻³² throughout, s below.
+//!
+//! | quantity | accepted or at most | why it fits, and what its step is worth |
+//! |---|---|---|
+//! | A, J, DJ: limits | 1 … 10⁹ | twice the greatest fits; s is 2.3·10⁻¹⁰ of the least |
+//! | v: ceilings, feeds | 10⁻³ … 10⁶ mm/s, or 0 | below, a ramp from rest is shorter than s |
+//! | L: lengths | 10⁻⁶ … 10⁶ mm, or 0 | s is a part of 2.3·10⁻⁴ of the shortest, and exactly a position step |
+//! | J' = min(J, √(A·DJ·2/π)) | 8·10⁸ | root of the whole product; rounded down |
+//! | πJ'/DJ, 2A/J' | 8·10⁴ s, 2·10⁹ s | quotients of whole products; the first from 13 s up, the second from 8·10⁻⁵ s up |
+//! | x₁ = π²J'³/(2DJ²) | A·πJ'/DJ, saturates | as (πJ'/DJ · J'/2)·πJ'/DJ, the first product ≤ A |
+//! | x₂ = 2A²/J' | saturates | beyond 2³¹ mm/s acceleration never fixes a ramp |
+//! | √(J'/2), (DJ/2π)^⅓ | 0.5 … 2.3·10⁴ | divisors of roots: the error of a time is at most 3 s |
+//! | times of ramps | 10⁸ s | from √x/√(J'/2), x^⅓/(DJ/2π)^⅓, x/A; up to 8 s (1.9 ns) too long, never too short |
+//! | length of a ramp | saturates | (F₀ + F)·t/2 of the whole product, to the nearest s; saturated is longer than any block |
+//! | sums of two such | – | never taken: a length less one of them is compared with the other |
+//! | Newton: k·L/w, x + 2F | saturates, 4·10⁷ mm/s | the equation divided by w, so that no w³ or w⁴ is taken |
+//! | √((F − a)² + 2AL) | 4·10⁷ mm/s | of whole squares, √(2AL) of a whole product |
+//! | κ, √κ', ∛κ'' and their inverses | 2·10⁹ per mm, 5·10⁸ mm | R⁻³ itself has no digits left at 1 m; up to 9 s too much |
+//! | κ·v, √κ'·v, ∛κ''·v | 1/s | multiplied by v, a, j one at a time, so that products end below a limit |
+//!
+//! What follows, and is tested: no ramp exceeds a limit of acceleration, jerk or snap by more than a part of 10⁻⁹ (its
+//! times are too long rather than too short; the rest is the rounding of constants), no ramp is longer than its block,
+//! no ceiling or joint is exceeded. Ceilings and joints keep their limits to 10⁻⁸. A stretch takes at most a part of
+//! 10⁻⁶ longer than planned in f64, plus the part that s is of its shortest block. Planned lengths are position steps, so that
+//! they add up exactly.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -66,6 +98,7 @@ impl Add for Fixed {
     type Output = Self;
     #[inline]
     fn add(self, other: Self) -> Self {
+        debug_assert!(self.0.checked_add(other.0).is_some(), "{self:?} + {other:?}");
         Self(self.0.wrapping_add(other.0))
     }
 }
@@ -74,6 +107,7 @@ impl Sub for Fixed {
     type Output = Self;
     #[inline]
     fn sub(self, other: Self) -> Self {
+        debug_assert!(self.0.checked_sub(other.0).is_some(), "{self:?} - {other:?}");
         Self(self.0.wrapping_sub(other.0))
     }
 }
@@ -90,6 +124,7 @@ impl Mul for Fixed {
     type Output = Self;
     #[inline]
     fn mul(self, other: Self) -> Self {
+        debug_assert!(self.0.checked_mul(other.0).is_some(), "{self:?} * {other:?}");
         Self::from_bits(multiply(self.to_bits(), other.to_bits()))
     }
 }
@@ -167,26 +202,58 @@ impl Real for Fixed {
 }
 
 impl Root for Fixed {
+    const LIMITS: (f64, f64) = (1.0, 1.0e9);
+    const FEEDS_MM_S: (f64, f64) = (1.0e-3, 1.0e6);
+    const LENGTH_MIN_MM: f64 = 1.0e-6;
+    const MARGIN: Self = Self::from_bits(8);
+
     /// Rounded down; 0 for what is below it.
     fn sqrt(self) -> Self {
-        let square = u128::from(self.to_bits().max(0).unsigned_abs()) << 32;
-        Self::from_bits(integer_root::<2>(square))
+        self.sqrt_product(Self::ONE)
     }
 
     /// Rounded towards zero.
     fn cbrt(self) -> Self {
-        let cube = u128::from(self.to_bits().unsigned_abs()) << 64;
-        let root = integer_root::<3>(cube);
+        let root = integer_root::<3>(u128::from(self.to_bits().unsigned_abs()) << 64);
         Self::from_bits(if self.to_bits() < 0 { -root } else { root })
+    }
+
+    fn times_per(self, by: Self, per: Self) -> Self {
+        let (product, per) =
+            (i128::from(self.to_bits()) * i128::from(by.to_bits()), i128::from(per.to_bits()));
+        if per == 0 {
+            return saturated(if product < 0 { i128::MIN } else { i128::MAX });
+        }
+        let half = if product < 0 { -(per.abs() / 2) } else { per.abs() / 2 };
+        saturated((product + half) / per)
+    }
+
+    fn sqrt_product(self, other: Self) -> Self {
+        let positive = |value: Self| u128::from(value.to_bits().max(0).unsigned_abs());
+        Self::from_bits(integer_root::<2>(positive(self) * positive(other)))
+    }
+
+    fn root_of_squares(self, other: Self) -> Self {
+        let square = |value: Self| u128::from(value.to_bits().unsigned_abs()).pow(2);
+        Self::from_bits(integer_root::<2>(square(self) + square(other)))
+    }
+
+    fn spacing(self) -> Self {
+        Self::from_bits(1)
     }
 }
 
-/// The greatest integer whose `N`-th power is at most `value`, bit by bit; `N` is 2 or 3 and `value`
-/// below 2¹²⁷, so the root is below 2⁶⁴⸍… and its powers fit.
+#[allow(clippy::cast_possible_truncation)]
+fn saturated(bits: i128) -> Fixed {
+    Fixed::from_bits(bits.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64)
+}
+
+/// The greatest integer whose `N`-th power is at most `value`, bit by bit; saturates. `N` is 2, or 3 with
+/// `value` below 2¹²⁷: no power that is tried outgrows 128 bits.
 fn integer_root<const N: u32>(value: u128) -> i64 {
     let mut root: u64 = 0;
-    // The highest bit the root can have: 48 of a square root of 2⁹⁵, 43 of a cube root of 2¹²⁷.
-    let mut bit: u64 = 1 << if N == 2 { 47 } else { 42 };
+    // The highest bit the root can have.
+    let mut bit: u64 = if value == 0 { 0 } else { 1 << (value.ilog2() / N) };
     while bit > 0 {
         let candidate = root | bit;
         let wide = u128::from(candidate);
@@ -196,7 +263,7 @@ fn integer_root<const N: u32>(value: u128) -> i64 {
         }
         bit >>= 1;
     }
-    root.cast_signed()
+    i64::try_from(root).unwrap_or(i64::MAX)
 }
 
 impl Scalar for I3F29 {
@@ -273,6 +340,37 @@ mod tests {
             assert!(root * root * root <= cube && (root + 1).pow(3) > cube, "{bits}");
             assert_eq!((-value).cbrt(), -value.cbrt());
         }
+    }
+
+    /// What keeps a product whole: within half a step and a step of the exact value, whatever the sizes.
+    #[test]
+    fn whole_products_round_once_and_saturate() {
+        let mut state = 7;
+        let mut wide = || random(&mut state).cast_signed() >> (random(&mut state) % 64);
+        for _ in 0..200_000 {
+            let [a, b, c] = [wide(), wide(), wide()];
+            let [x, y, z] = [a, b, c].map(Fixed::from_bits);
+            let found = i128::from(x.times_per(y, z).to_bits());
+            let (product, per) = (i128::from(a) * i128::from(b), i128::from(c));
+            if found == i128::from(i64::MAX) || found == i128::from(i64::MIN) {
+                let is_beyond = per == 0 || product.abs() >= (per * found).abs() - per.abs() / 2;
+                assert!(is_beyond, "{a} {b} {c}");
+            } else {
+                assert!((product - found * per).abs() * 2 <= per.abs(), "{a} {b} {c}: {found}");
+            }
+            let (a, b) = (a.max(0), b.max(0));
+            let root = Fixed::from_bits(a).sqrt_product(Fixed::from_bits(b)).to_bits();
+            let (root, product) = (i128::from(root), i128::from(a) * i128::from(b));
+            assert!(root * root <= product && (root + 1) * (root + 1) > product, "{a} {b}");
+            let root = x.root_of_squares(y).to_bits();
+            let squares = x.to_bits().unsigned_abs() as u128;
+            let squares = squares * squares + (y.to_bits().unsigned_abs() as u128).pow(2);
+            let root = root.unsigned_abs() as u128;
+            assert!(root * root <= squares, "{x:?} {y:?}");
+            assert!(root == i64::MAX as u128 || (root + 1) * (root + 1) > squares, "{x:?} {y:?}");
+        }
+        assert_eq!(Fixed::ONE.times_per(Fixed::ONE, Fixed::ZERO).to_bits(), i64::MAX);
+        assert_eq!((-Fixed::ONE).times_per(Fixed::ONE, Fixed::ZERO).to_bits(), i64::MIN);
     }
 
     #[test]

@@ -80,6 +80,11 @@ macro_rules! float {
         }
 
         impl Root for $float {
+            const LIMITS: (f64, f64) = (0.0, f64::INFINITY);
+            const FEEDS_MM_S: (f64, f64) = (0.0, f64::INFINITY);
+            const LENGTH_MIN_MM: f64 = 0.0;
+            const MARGIN: Self = 0.0;
+
             #[inline]
             fn sqrt(self) -> Self {
                 $sqrt(self)
@@ -88,6 +93,26 @@ macro_rules! float {
             #[inline]
             fn cbrt(self) -> Self {
                 $cbrt(self)
+            }
+
+            #[inline]
+            fn times_per(self, by: Self, per: Self) -> Self {
+                self * by / per
+            }
+
+            #[inline]
+            fn sqrt_product(self, other: Self) -> Self {
+                $sqrt(self * other)
+            }
+
+            #[inline]
+            fn root_of_squares(self, other: Self) -> Self {
+                $sqrt(self * self + other * other)
+            }
+
+            #[inline]
+            fn spacing(self) -> Self {
+                self.abs() * $float::EPSILON
             }
         }
     };

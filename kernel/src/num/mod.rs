@@ -119,11 +119,38 @@ pub trait Real: Scalar {
 }
 
 /// What planning needs beyond [`Real`]. Background only.
+///
+/// Plans multiply and divide figures whose products outgrow fixed point although the result does not:
+/// those that combine two steps keep the product between them whole.
 pub trait Root: Real + Div<Output = Self> {
+    /// Least and greatest limit of acceleration, jerk and snap that plans are made with
+    /// \[mm/s², mm/s³, mm/s⁴\]; see [`Law::new`](crate::law::Law::new).
+    const LIMITS: (f64, f64);
+    /// Least and greatest ceiling of a block \[mm/s\]. A feed below the least is a ramp from rest without a
+    /// length.
+    const FEEDS_MM_S: (f64, f64);
+    /// The shortest length of a block that has any \[mm\].
+    const LENGTH_MIN_MM: f64;
+    /// What is added to times and curvatures so that rounding never makes them too small; nothing in
+    /// floats, whose rounding is a part of the value.
+    const MARGIN: Self;
+
     /// Square root; `self` ≥ 0.
     #[must_use]
     fn sqrt(self) -> Self;
     /// Cube root.
     #[must_use]
     fn cbrt(self) -> Self;
+    /// self·by/per. Fixed point rounds the result alone, to the nearest, and saturates.
+    #[must_use]
+    fn times_per(self, by: Self, per: Self) -> Self;
+    /// √(self·other); both ≥ 0. Fixed point rounds the result alone, down.
+    #[must_use]
+    fn sqrt_product(self, other: Self) -> Self;
+    /// √(self² + other²). Fixed point rounds the result alone, down, and saturates.
+    #[must_use]
+    fn root_of_squares(self, other: Self) -> Self;
+    /// The distance of neighbouring values around this one, to a factor of two.
+    #[must_use]
+    fn spacing(self) -> Self;
 }

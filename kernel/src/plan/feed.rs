@@ -29,7 +29,8 @@ pub fn segments<R: Real, P: Root>(
     let top = start + rounded(&rise)?;
     let brake = end - rounded(&fall)?;
     // With no room to cruise the two ramps meet but for rounding: they are made to meet.
-    let meets = (brake - top).to_mm() <= GAP_MM + 16.0 * P::EPSILON * (end - start).to_mm();
+    let rounding_mm = block.length_mm.spacing().to_f64();
+    let meets = (brake - top).to_mm() <= GAP_MM + 16.0 * rounding_mm;
     let (top, brake) = match (meets, rise.duration_s() > P::ZERO, fall.duration_s() > P::ZERO) {
         (true, true, true) => (top, top),
         (true, true, false) => (end, end),

@@ -22,16 +22,20 @@ pub struct Joint<R> {
 }
 
 /// The greatest feed through a joint \[mm/s\]: 0 if the angle exceeds `angle_max_rad`, infinite if
-/// nothing steps. `accel_step_mm_s2` is the acceleration-step limit, `tick_s` the control tick τ.
+/// nothing steps (in fixed point the greatest value). `accel_step_mm_s2` is the acceleration-step limit, `tick_s` the control tick τ.
 pub fn joint<R: Root>(joint: &Joint<R>, angle_max_rad: R, accel_step_mm_s2: R, tick_s: R) -> R {
-    if joint.angle_rad > angle_max_rad {
+    let (kink, bend) = (joint.angle_rad / tick_s, joint.curvature_step_per_mm);
+    // What is beyond the range of fixed point stops, and no greater step is made use of.
+    let most = R::from_f64(R::LIMITS.1);
+    if joint.angle_rad > angle_max_rad || kink > most || bend > most {
         return R::ZERO;
     }
     // The root of Δκ·v² + (φ/τ)·v = step, in the form that has no cancellation.
-    let kink = joint.angle_rad / tick_s;
-    let bend = joint.curvature_step_per_mm;
-    let two_step = accel_step_mm_s2 + accel_step_mm_s2;
-    two_step / (kink + (kink * kink + (bend + bend) * two_step).sqrt())
+    let step = accel_step_mm_s2.min(most);
+    let two_step = step + step;
+    // Made larger, not smaller, by the rounding of fixed point.
+    let sum = kink + kink.root_of_squares((bend + bend).sqrt_product(two_step));
+    two_step / if sum > R::ZERO { sum + R::MARGIN } else { sum }
 }
 
 #[cfg(test)]

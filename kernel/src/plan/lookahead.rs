@@ -16,11 +16,12 @@ use crate::units::Position;
 /// A block as the look-ahead sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block<R> {
-    /// Length \[mm\], from 0 to [`Position::LIMIT_MM`].
+    /// Length \[mm\], from [`Root::LENGTH_MIN_MM`] to [`Position::LIMIT_MM`], or 0.
     pub length_mm: R,
-    /// Ceiling of the feed \[mm/s\], > 0.
+    /// Ceiling of the feed \[mm/s\], > 0 and within [`Root::FEEDS_MM_S`].
     pub cap_mm_s: R,
-    /// Greatest feed through the joint at its end \[mm/s\], ≥ 0; infinite for none.
+    /// Greatest feed through the joint at its end \[mm/s\], ≥ 0; infinite for none, in fixed point the
+    /// greatest value. Below the least of [`Root::FEEDS_MM_S`] it is a stop.
     pub joint_mm_s: R,
     /// The law its ramps follow.
     pub law: Law<R>,
@@ -53,7 +54,7 @@ impl<R: Root> BlockPlan<R> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PlanError {
-    /// A figure of a block is not a number or is negative.
+    /// A figure of a block is not a number, is negative, or is beyond the range of the number type.
     Block {
         /// The block, from 0.
         block: usize,
@@ -61,8 +62,11 @@ pub enum PlanError {
         quantity: &'static str,
         /// Its value.
         value: f64,
+        /// Least and greatest that is accepted, besides a length of 0.
+        range: (f64, f64),
     },
-    /// The start or end feed is negative or above the ceiling of its block.
+    /// The start or end feed is negative, above the ceiling of its block, or not 0 and below the least of
+    /// [`Root::FEEDS_MM_S`].
     EndFeed {
         /// "start feed" or "end feed".
         quantity: &'static str,
@@ -97,16 +101,19 @@ pub enum PlanError {
 impl core::fmt::Display for PlanError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Block { block, quantity, value } => {
+            Self::Block { block, quantity, value, range: (least, greatest) } => {
                 write!(
                     f,
-                    "block {block}: {quantity} {value}: expected a length from 0 to {} mm, a ceiling above 0, \
-                     a joint feed not below 0",
-                    Position::LIMIT_MM
+                    "block {block}: {quantity} {value}: expected a length of 0 or more, a ceiling above 0, \
+                     a joint feed not below 0; here from {least} to {greatest}"
                 )
             }
             Self::EndFeed { quantity, feed_mm_s, greatest_mm_s } => {
-                write!(f, "{quantity} {feed_mm_s} mm/s: expected from 0 to {greatest_mm_s} mm/s")
+                write!(
+                    f,
+                    "{quantity} {feed_mm_s} mm/s: expected from 0 to {greatest_mm_s} mm/s, and none too small \
+                     for the number type"
+                )
             }
             Self::TooShortToBrake { start_mm_s, greatest_mm_s } => {
                 write!(f, "too short to brake from {start_mm_s} mm/s: at most {greatest_mm_s} mm/s")
@@ -142,8 +149,9 @@ pub fn plan<R: Root>(
         // The joints' feeds are below the ceiling already. Most often there is room to reach it, or
         // the block is passed at it: that is cheaper to see than to solve for.
         let (enter, exit, cap) = (plan.enter_mm_s, plan.exit_mm_s, block.cap_mm_s);
-        let to_cap = block.law.ramp_length_mm(enter, cap) + block.law.ramp_length_mm(cap, exit);
-        plan.peak_mm_s = if to_cap <= block.length_mm {
+        // Subtracted, because the sum may be beyond fixed point.
+        let left = block.length_mm - block.law.ramp_length_mm(cap, exit);
+        plan.peak_mm_s = if block.law.ramp_length_mm(enter, cap) <= left {
             cap
         } else {
             peak(&block.law, enter, exit, block.length_mm).min(cap)
@@ -153,22 +161,26 @@ pub fn plan<R: Root>(
 }
 
 fn check<R: Root>(blocks: &[Block<R>], start: R, end: R) -> Result<(), PlanError> {
+    let (slowest, fastest) = R::FEEDS_MM_S;
     for (index, block) in blocks.iter().enumerate() {
-        let length = block.length_mm;
-        let finite = |value: R| value.to_f64().is_finite();
-        for (quantity, value, good) in [
-            ("length [mm]", length, length >= R::ZERO && length <= R::from_f64(Position::LIMIT_MM)),
-            ("ceiling [mm/s]", block.cap_mm_s, finite(block.cap_mm_s) && block.cap_mm_s > R::ZERO),
-            ("joint feed [mm/s]", block.joint_mm_s, block.joint_mm_s >= R::ZERO),
+        let (length, cap, joint) = (block.length_mm, block.cap_mm_s, block.joint_mm_s);
+        // A length of 0 is as good as one in its range, a ceiling of 0 is not.
+        for (quantity, value, least, greatest, good) in [
+            ("length [mm]", length, R::LENGTH_MIN_MM, Position::LIMIT_MM, length == R::ZERO),
+            ("ceiling [mm/s]", cap, slowest, fastest, false),
+            ("joint feed [mm/s]", joint, 0.0, f64::INFINITY, joint >= R::ZERO),
         ] {
-            if !good {
-                return Err(PlanError::Block { block: index, quantity, value: value.to_f64() });
+            let value = value.to_f64();
+            let within = value > 0.0 && value.is_finite() && value >= least && value <= greatest;
+            if !(good || within) {
+                return Err(PlanError::Block { block: index, quantity, value, range: (least, greatest) });
             }
         }
     }
     for (quantity, feed, block) in [("start feed", start, blocks.first()), ("end feed", end, blocks.last())] {
         let greatest = block.map_or(R::ZERO, |block| block.cap_mm_s);
-        if !(feed >= R::ZERO && feed <= greatest) {
+        let is_resolved = feed == R::ZERO || feed.to_f64() >= slowest;
+        if !(feed >= R::ZERO && feed <= greatest && is_resolved) {
             return Err(PlanError::EndFeed {
                 quantity,
                 feed_mm_s: feed.to_f64(),
@@ -190,6 +202,7 @@ fn forward<R: Root>(
     for plan in plans {
         let [block, after @ ..] = rest else { break };
         let allowed = match after.first() {
+            Some(_) if block.joint_mm_s.to_f64() < R::FEEDS_MM_S.0 => R::ZERO,
             Some(next) => block.cap_mm_s.min(block.joint_mm_s).min(next.cap_mm_s),
             None => end,
         };
@@ -241,6 +254,7 @@ fn backward<R: Root>(blocks: &[Block<R>], start: R, plans: &mut [BlockPlan<R>]) 
 #[must_use]
 pub fn merge_equal<R: Root>(blocks: &mut [Block<R>]) -> usize {
     let mut merged: usize = 0;
+    let longest = R::from_f64(Position::LIMIT_MM);
     for index in 0..blocks.len() {
         let Some(&next) = blocks.get(index) else { break };
         let last = merged.checked_sub(1).and_then(|last| blocks.get_mut(last));
@@ -248,7 +262,10 @@ pub fn merge_equal<R: Root>(blocks: &mut [Block<R>]) -> usize {
             Some(last)
                 if last.cap_mm_s == next.cap_mm_s
                     && last.law == next.law
-                    && last.joint_mm_s >= next.cap_mm_s =>
+                    && last.joint_mm_s >= next.cap_mm_s
+                    // Neither was checked yet, nor may the sum be refused for being one.
+                    && next.length_mm <= longest
+                    && last.length_mm <= longest - next.length_mm =>
             {
                 last.length_mm = last.length_mm + next.length_mm;
                 last.joint_mm_s = next.joint_mm_s;

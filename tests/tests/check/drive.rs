@@ -120,7 +120,7 @@ pub(crate) fn execute<R: Number>(
     Ok(totals)
 }
 
-fn is_beyond_fixed_point(problem: &Problem) -> bool {
+pub(crate) fn is_beyond_fixed_point(problem: &Problem) -> bool {
     matches!(
         problem,
         Problem::Segment { error: SegmentError::OutOfRange { .. }, .. }

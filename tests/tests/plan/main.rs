@@ -5,6 +5,7 @@
 
 mod cases;
 mod feasible;
+mod fixed;
 mod maximal;
 mod refusals;
 mod segments;

@@ -23,7 +23,7 @@ fn bad_figures_are_named() {
                 }
                 let before = format!("{blocks:?}");
                 match planned(&blocks, 0.0, 0.0) {
-                    Err(PlanError::Block { block, quantity: named, value }) => {
+                    Err(PlanError::Block { block, quantity: named, value, .. }) => {
                         assert_eq!((block, named, value.to_bits()), (place, quantity, bad.to_bits()));
                     }
                     other => panic!("{quantity} {bad} in block {place}: {other:?}"),

@@ -1,0 +1,293 @@
+//! How far fixed point and f32 are from f64: one plan, executed in all three side by side, every tick compared.
+//!
+//! The result is a committed table, `tests/expected/accuracy.md`; see `motion_tests::figures`.
+
+#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
+mod check;
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use check::drive::{PIECES, SEGMENTS, is_beyond_fixed_point};
+use check::random::Random;
+use check::totals::Totals;
+use check::{drive, machine, program};
+use motion_host::gcode;
+use motion_host::machine::Machine;
+use motion_host::planning::{Executable, Mode, Plan, plan_program};
+use motion_kernel::exec::{ExecState, Executed, Executor};
+use motion_kernel::num::{Fixed, Real};
+use motion_kernel::program::Supply;
+use motion_kernel::queue::Streams;
+use motion_kernel::units::Position;
+use motion_tests::figures::{Table, hold};
+
+const STRINGER: &str = include_str!("../../host/src/cli/stringer.ngc");
+const MM_PER_COUNT: f64 = 1e-4;
+/// Promised of fixed point: a quarter of a count.
+const COUNTS_MAX: f64 = 0.25;
+/// Random programs, by their seeds from 1; longer ones than this are not executed [ticks].
+const PROGRAMS: u64 = 1000;
+const TICKS_MAX: f64 = 150_000.0;
+/// So many of them have to be executed.
+const EXECUTED_MIN: u64 = 900;
+
+/// What an executor says of a tick, in f64: state, stretches, positions, then feed, acceleration, jerk and snap along
+/// the path, then velocity, acceleration and jerk of the axes.
+struct Tick {
+    state: ExecState,
+    stretches: u32,
+    positions: [Position; 3],
+    along: [f64; 4],
+    axes: [[f64; 3]; 3],
+}
+
+impl Tick {
+    fn new<R: Real>(executed: &Executed<R, 3>) -> Self {
+        let (motion, set) = (&executed.motion, &executed.setpoints);
+        Self {
+            state: executed.state,
+            stretches: executed.stretches,
+            positions: set.map(|axis| axis.position),
+            along: [motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(R::to_f64),
+            axes: set.map(|axis| [axis.velocity_mm_s, axis.accel_mm_s2, axis.jerk_mm_s3].map(R::to_f64)),
+        }
+    }
+}
+
+/// The greatest differences from f64, and the greatest excess of a limit.
+#[derive(Clone, Copy, Debug, Default)]
+struct Worst {
+    counts: f64,
+    /// Of an axis' velocity, acceleration and jerk, as parts of the axis' limits.
+    axes: [f64; 3],
+    /// Of feed, acceleration, jerk and snap along the path, as a part of the limit.
+    excess: f64,
+    ticks: u64,
+    programs: u64,
+}
+
+impl Worst {
+    fn tick(&mut self, machine: &Machine, found: &Tick, reference: &Tick) {
+        self.ticks += 1;
+        for (found, reference) in found.positions.iter().zip(&reference.positions) {
+            self.counts = self.counts.max((*found - *reference).to_mm().abs() / MM_PER_COUNT);
+        }
+        for ((found, reference), axis) in found.axes.iter().zip(&reference.axes).zip(&machine.axes) {
+            let limits = [axis.feed_mm_s, axis.accel_mm_s2, axis.jerk_mm_s3];
+            for k in 0..3 {
+                self.axes[k] = self.axes[k].max((found[k] - reference[k]).abs() / limits[k]);
+            }
+        }
+        let path = &machine.path;
+        let limits = [path.feed_mm_s, path.accel_mm_s2, path.jerk_mm_s3, path.snap_mm_s4];
+        for (value, limit) in found.along.iter().zip(limits) {
+            self.excess = self.excess.max(value.abs() / limit - 1.0);
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.counts = self.counts.max(other.counts);
+        for (axis, other) in self.axes.iter_mut().zip(other.axes) {
+            *axis = axis.max(other);
+        }
+        self.excess = self.excess.max(other.excess);
+        self.ticks += other.ticks;
+        self.programs += other.programs;
+    }
+}
+
+/// Executes all of a plan; every tick is handed to `see`.
+fn execute<R: Real>(
+    executable: &Executable,
+    machine: &Machine,
+    mut see: impl FnMut(Tick),
+) -> Result<(), String> {
+    let start = [Position::ZERO; 3];
+    let mut streams = Streams::<R, 3, PIECES, SEGMENTS>::new();
+    let (mut feeder, mut intake) = streams.split(machine.rules(), start);
+    let mut executor = Executor::<R, 3>::new(start);
+    let mut supply = Supply::new(executable.supplied(), executable.tick_s);
+    loop {
+        supply.fill(&mut feeder).map_err(|rejection| format!("rejected: {rejection}"))?;
+        let executed = executor.tick(&mut intake).map_err(|fault| format!("{fault:?}"))?;
+        see(Tick::new(&executed));
+        match executed.state {
+            ExecState::Idle if supply.is_empty() => return Ok(()),
+            ExecState::Stopped => executor.resume(),
+            _ => {}
+        }
+    }
+}
+
+/// A plan executed in `R` against what f64 made of it.
+fn against<R: Real>(plan: &Plan, machine: &Machine, reference: &[Tick]) -> Result<Option<Worst>, String> {
+    let executable = match Executable::new::<R>(plan) {
+        Ok(executable) => executable,
+        Err(error) if is_beyond_fixed_point(&error.problem) => return Ok(None),
+        Err(error) => return Err(error.to_string()),
+    };
+    let mut worst = Worst { programs: 1, ..Worst::default() };
+    let (mut tick, mut differs) = (0, None);
+    execute::<R>(&executable, machine, |found| {
+        let same =
+            reference.get(tick).filter(|tick| (tick.state, tick.stretches) == (found.state, found.stretches));
+        match same {
+            Some(reference) => worst.tick(machine, &found, reference),
+            None => differs = differs.or(Some(tick)),
+        }
+        tick += 1;
+    })?;
+    match differs {
+        None if tick == reference.len() => Ok(Some(worst)),
+        _ => Err(format!("{tick} ticks, {} in f64; first differs in {differs:?}", reference.len())),
+    }
+}
+
+/// A plan in f64, in fixed point and in f32; none where it is beyond the type.
+fn all(plan: &Plan, machine: &Machine) -> Result<[Option<Worst>; 3], String> {
+    let executable = Executable::new::<f64>(plan).map_err(|error| error.to_string())?;
+    let mut reference = Vec::new();
+    execute::<f64>(&executable, machine, |tick| reference.push(tick))?;
+    Ok([
+        against::<f64>(plan, machine, &reference).map_err(|error| format!("f64: {error}"))?,
+        against::<Fixed>(plan, machine, &reference).map_err(|error| format!("fixed: {error}"))?,
+        against::<f32>(plan, machine, &reference).map_err(|error| format!("f32: {error}"))?,
+    ])
+}
+
+fn reference_machine(text: &str) -> [Worst; 3] {
+    let machine = Machine::reference();
+    let program = gcode::read("accuracy.ngc", text.as_bytes()).expect("G-code");
+    let plan = plan_program("accuracy.ngc", &program, &machine, Mode::Merged).expect("a plan");
+    all(&plan, &machine).expect("executed").map(|worst| worst.expect("within the type's range"))
+}
+
+/// What became of the random programs.
+#[derive(Debug, Default)]
+struct Programs {
+    worst: [Worst; 3],
+    /// Not executed, by reason.
+    refused: BTreeMap<String, u64>,
+    failures: Vec<String>,
+}
+
+impl Programs {
+    fn one(&mut self, seed: u64) -> Result<(), String> {
+        let mut random = Random::new(seed);
+        let machine = machine::any(&mut random);
+        let fragments = 1 + random.below(24);
+        let program = program::generate(&mut random, fragments, machine.path.feed_mm_s);
+        let mode = if random.chance(0.5) { Mode::Merged } else { Mode::PerBlock };
+        let mut totals = Totals::default();
+        let plan = drive::plan(&program.text, &machine, mode, &mut totals)?;
+        for (reason, count) in totals.refused {
+            *self.refused.entry(reason).or_default() += count;
+        }
+        let Some(plan) = plan else { return Ok(()) };
+        if plan.time_s / machine.tick_s > TICKS_MAX {
+            *self.refused.entry(format!("longer than {TICKS_MAX} ticks")).or_default() += 1;
+            return Ok(());
+        }
+        for ((worst, found), number) in self.worst.iter_mut().zip(all(&plan, &machine)?).zip(NUMBERS) {
+            match found {
+                Some(found) => worst.add(&found),
+                None => *self.refused.entry(format!("beyond {number}")).or_default() += 1,
+            }
+        }
+        Ok(())
+    }
+}
+
+const NUMBERS: [&str; 3] = ["f64", "fixed point", "f32"];
+
+/// The random programs, on all cores.
+fn random_programs() -> Programs {
+    let next = AtomicU64::new(1);
+    let all = Mutex::new(Programs::default());
+    let workers = std::thread::available_parallelism().map_or(2, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                let mut done = Programs::default();
+                loop {
+                    let seed = next.fetch_add(1, Ordering::Relaxed);
+                    if seed > PROGRAMS {
+                        break;
+                    }
+                    if let Err(error) = done.one(seed) {
+                        done.failures.push(format!("seed {seed}: {error}"));
+                    }
+                }
+                let mut all = all.lock().expect("no worker panics");
+                for (all, done) in all.worst.iter_mut().zip(done.worst) {
+                    all.add(&done);
+                }
+                for (reason, count) in done.refused {
+                    *all.refused.entry(reason).or_default() += count;
+                }
+                all.failures.append(&mut done.failures);
+            });
+        }
+    });
+    all.into_inner().expect("no worker panics")
+}
+
+/// Two digits.
+fn part(value: f64) -> String {
+    if value <= 0.0 { "0".to_owned() } else { format!("{value:.1e}") }
+}
+
+fn rows(table: &mut Table, run: &str, worst: &[Worst; 3]) {
+    for (number, worst) in NUMBERS.iter().zip(worst) {
+        let mut cells = vec![run.to_owned(), (*number).to_owned()];
+        if *number == "f64" {
+            cells.extend(["–"; 4].map(str::to_owned));
+        } else {
+            cells.push(format!("{:.4}", worst.counts));
+            cells.extend(worst.axes.map(part));
+        }
+        cells.push(part(worst.excess));
+        table.row(&cells);
+    }
+}
+
+#[test]
+fn fixed_point_and_f32_against_f64() {
+    let programs = random_programs();
+    println!("random programs: {programs:?}");
+    assert!(programs.failures.is_empty(), "{:#?}", programs.failures);
+    let straight = reference_machine("G1 X8000 F18000\nM2\n");
+    let diagonal = reference_machine("G1 X5000 Y-4000 Z4795.8315233 F18000\nM2\n");
+    let stringer = reference_machine(STRINGER);
+    let executed = programs.worst.map(|worst| worst.programs);
+    let refused: String =
+        programs.refused.iter().map(|(reason, count)| format!(", {count} {reason}")).collect();
+    let run = format!("{PROGRAMS} random programs{refused}");
+
+    let mut table = Table::new(&[
+        "executed",
+        "number type",
+        "positions off f64 [counts of 0.1 µm]",
+        "velocity off f64 [parts of the axis' limit]",
+        "acceleration off f64 [parts]",
+        "jerk off f64 [parts]",
+        "path limits exceeded by [parts]",
+    ]);
+    for (run, worst) in [
+        ("8 m along X, 300 mm/s", &straight),
+        ("8 m diagonally, 300 mm/s", &diagonal),
+        ("stringer flange", &stringer),
+        (&run, &programs.worst),
+    ] {
+        rows(&mut table, run, worst);
+        assert_eq!(worst[0].counts, 0.0, "{run}: f64 differs from itself");
+        assert!(worst[1].counts <= COUNTS_MAX, "{run} in fixed point: {:?}", worst[1]);
+    }
+    println!("{}", table.to_markdown());
+    assert!(executed.iter().all(|&count| count >= EXECUTED_MIN), "{executed:?}");
+    if let Err(difference) = hold("accuracy", &table, 0.02) {
+        panic!("{difference}");
+    }
+}
