@@ -33,4 +33,11 @@ pub enum FaultKind<R> {
     Output,
     /// The drives could not be enabled or disabled.
     Enable,
+    /// The emergency stop is open. Reported by the board, see [`Kernel::trip`](crate::kernel::Kernel::trip).
+    EmergencyStop,
+    /// A drive reports a fault. Reported by the board.
+    Drive {
+        /// The axis, from 0.
+        axis: usize,
+    },
 }

@@ -83,6 +83,12 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.power = Power::Off;
     }
 
+    /// Latches a fault that the board has found (an input, a missed tick), in the tick to come: its
+    /// outputs already are those of a fault. Without effect if there is one.
+    pub fn trip(&mut self, kind: FaultKind<R>) {
+        self.latch_fault(kind);
+    }
+
     /// One control tick: reads the encoders, executes the streams, regulates every axis, writes the
     /// outputs. Call it from the tick's interrupt and nowhere else.
     pub fn tick<H>(&mut self, intake: &mut Intake<'_, R, AXES>, hal: &mut H) -> Trace<R, AXES>
@@ -106,7 +112,8 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
                 self.latch_fault(FaultKind::Enable);
             }
         }
-        let trace = Trace { tick: self.tick, executed: self.last, axes, fault: self.fault };
+        let trace =
+            Trace { tick: self.tick, executed: self.last, counts: self.counts, axes, fault: self.fault };
         self.tick = self.tick.wrapping_add(1);
         trace
     }

@@ -13,6 +13,7 @@
 //!   law     ramps; inverse problems              Ramp ─► FeedSegment ┐ two streams that measure
 //!   path    lines and septic pieces              Piece ──────────────┤ the same path length
 //!                                                                    │
+//!   program both as data; keeps the queues full  Item ─► Feeder       │
 //!   queue   bounded, checked on entry            Feeder ─► Intake ◄──┘
 //!   ─────── tick ──────────────────────────────────────────────────────
 //!   exec    feed law ─► s, v, a, j, snap         PathMotion
@@ -86,6 +87,7 @@ pub mod plan;
 pub mod law;
 pub mod path;
 pub mod queue;
+pub mod program;
 pub mod exec;
 pub mod axis;
 pub mod hal;

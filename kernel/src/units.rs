@@ -4,6 +4,7 @@
 //! beyond the conversions between these types.
 
 use fixed::types::I32F32;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::num::Real;
 
@@ -58,6 +59,19 @@ impl Position {
     #[must_use]
     pub fn to_offset<R: Real>(self) -> R {
         R::from_q32(self.to_bits())
+    }
+}
+
+/// As its steps of 2⁻³² mm.
+impl Serialize for Position {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.to_bits().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Position {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        i64::deserialize(deserializer).map(Self::from_bits)
     }
 }
 

@@ -1,3 +1,4 @@
 //! What the integration tests share across test programs.
 
+pub mod cycles;
 pub mod figures;

@@ -5,13 +5,16 @@ mod check;
 
 use check::bench::{LIMITS, RULES, TICK_S, cruise, line, mm, point, ramp, rest_to_rest};
 use check::random::Random;
+use std::convert::Infallible;
+
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Problem, plan_program};
-use motion_host::simulate::supply::Supply;
 use motion_kernel::exec::{ExecFault, ExecState, Executed, Executor, PIECES_PER_TICK_MAX};
 use motion_kernel::law::{FeedSegment, Limits, Ticks};
 use motion_kernel::path::{Piece, PieceError};
+use motion_kernel::program::Supply;
+use motion_kernel::program::supply::Ready;
 use motion_kernel::queue::{Feeder, PathRules, Refused, Rejection, SEGMENTS_PER_TICK_MAX, Streams};
 use motion_kernel::units::Position;
 
@@ -177,21 +180,21 @@ fn what_is_not_a_finite_positive_number_makes_no_item() {
 }
 
 /// G-code on the reference machine.
-fn executable(text: &str) -> Executable<f32> {
+fn executable(text: &str) -> Executable {
     let program = gcode::read("streams.ngc", text.as_bytes()).expect("G-code");
     let plan = plan_program("streams.ngc", &program, &Machine::reference(), Mode::Merged).expect("a plan");
-    Executable::new(&plan).expect("executable")
+    Executable::new::<f32>(&plan).expect("executable")
 }
 
 /// Set-points of all ticks, filling the streams of a capacity whenever `is_due` says so.
 fn execute<const CAPACITY: usize>(
-    executable: &Executable<f32>,
+    executable: &Executable,
     mut is_due: impl FnMut(usize) -> bool,
 ) -> Vec<[i64; 3]> {
     let start = [Position::ZERO; 3];
     let mut streams = Box::new(Streams::<f32, 3, CAPACITY, CAPACITY>::new());
     let (mut feeder, mut intake) = streams.split(Machine::reference().rules(), start);
-    let mut supply = Supply::new(executable);
+    let mut supply = Supply::new(executable.supplied(), executable.tick_s);
     let mut executor = Executor::<f32, 3>::new(start);
     let mut positions = Vec::new();
     loop {
@@ -262,9 +265,14 @@ fn a_long_stretch_after_another_loses_no_time() {
 #[test]
 fn a_tick_after_every_item_starves_nothing() {
     let program = executable("G1 X3000 F18000\nM2\n");
-    let motion_host::planning::ExecutableItem::Stretch { pieces, segments, .. } = &program.items[0] else {
-        panic!("a stretch")
-    };
+    let (mut pieces, mut segments) = (Vec::new(), Vec::new());
+    for item in &program.items {
+        match item.ready::<f32, Infallible>(program.tick_s).expect("f32 holds it") {
+            Ready::Piece(piece) => pieces.push(piece),
+            Ready::Segment(segment) => segments.push(segment),
+            _ => {}
+        }
+    }
     for pieces_first in [true, false] {
         let mut streams = Box::new(Streams::<f32, 3, 64, 2>::new());
         let start = [Position::ZERO; 3];
@@ -491,7 +499,7 @@ fn ten_thousand_lines_of_a_nanometre() {
         let program = gcode::read("nano.ngc", text.as_bytes()).expect("G-code");
         match plan_program("nano.ngc", &program, &Machine::reference(), Mode::Merged) {
             Ok(plan) => {
-                let positions = execute::<64>(&Executable::new(&plan).expect("executable"), |_| true);
+                let positions = execute::<64>(&Executable::new::<f32>(&plan).expect("executable"), |_| true);
                 let end = positions[positions.len() - 1][0];
                 assert!((end - mm(0.01).to_bits()).abs() <= 1, "{feed_mm_min} mm/min ends at {end}");
             }

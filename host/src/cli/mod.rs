@@ -7,11 +7,13 @@
 //! - [`profile`]: one ramp of the feed law, in figures;
 //! - [`plan`]: the feed plan of a program or a block list;
 //! - [`run`]: a program through plan, kernel and simulated machine;
+//! - [`compile`]: a program as bytes, for a board;
 //! - [`machine`]: the reference machine's file;
 //! - [`demo`]: what `motion` alone does;
 //! - [`error`]: errors and exit statuses;
 //! - `input`, `table`, `trace`, `progress`: what the commands share.
 
+pub mod compile;
 pub mod demo;
 pub mod error;
 pub mod machine;
@@ -37,6 +39,7 @@ Examples:
   motion run part.ngc --report part.html         run a program, look at what the axes did
   motion plan part.ngc                           what limits the feed, block by block
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
+  motion compile part.ngc -o part.bin            the plan as bytes, for a board
   motion machine > mine.toml                     a machine file to start from
 
 Exit status: 0 done, 1 the run ended in a fault or a check failed, 2 wrong input.";
@@ -56,6 +59,7 @@ enum Command {
     Run(run::RunArguments),
     Plan(plan::PlanArguments),
     Profile(profile::ProfileArguments),
+    Compile(compile::CompileArguments),
     Machine(machine::MachineArguments),
 }
 
@@ -84,6 +88,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Run(arguments)) => run::run(arguments, out),
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),
+        Some(Command::Compile(arguments)) => compile::compile(arguments, out),
         Some(Command::Machine(_)) => machine::print(out),
     }
 }

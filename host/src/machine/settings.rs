@@ -4,12 +4,13 @@ use hal_sim::{
     AxisParameters, DriveParameters, EncoderNoise, EncoderParameters, MachineParameters, REFERENCE_TICK_S,
     REFERENCE_X, REFERENCE_Y, REFERENCE_Z, SUBSTEPS_MAX, TimerBits,
 };
-use motion_kernel::axis::{AxisConfig, EncoderScale, Feedforward, Gains, OutputScale, Regulator};
+use motion_kernel::axis::{AxisConfig, AxisFigures, Feedforward, Gains};
 use motion_kernel::law::Limits;
 use motion_kernel::num::Real;
 use motion_kernel::plan::{AxisLimits, CURVE_FEED_SHARE, MachineLimits};
+use motion_kernel::program::Header;
 use motion_kernel::queue::PathRules;
-use motion_kernel::units::DacCode;
+use motion_kernel::units::{DacCode, Position};
 
 use super::error::{AxisError, MachineError};
 use super::file;
@@ -167,6 +168,18 @@ impl Machine {
         Ok([x.config(self.tick_s)?, y.config(self.tick_s)?, z.config(self.tick_s)?])
     }
 
+    /// What a compiled program carries: everything that the kernel has to know of the machine, which stands at
+    /// the origin when the program starts.
+    #[must_use]
+    pub fn header(&self) -> Header<3> {
+        Header {
+            tick_s: self.tick_s,
+            rules: self.rules(),
+            axes: self.axes.each_ref().map(AxisSettings::figures),
+            start: [Position::ZERO; 3],
+        }
+    }
+
     /// The simulated machine: the same drives, encoders and scales, at rest at the origin. Its dead times
     /// fit [`DEAD_TIME_CELLS`].
     #[must_use]
@@ -217,16 +230,23 @@ impl AxisSettings {
         self.mm_s_at_10_v.abs() * volts / DacCode::FULL_SCALE_V
     }
 
+    /// The axis in the kernel's terms.
+    #[must_use]
+    pub fn figures(&self) -> AxisFigures {
+        AxisFigures {
+            mm_per_count: self.mm_per_count,
+            mm_s_at_10_v: self.mm_s_at_10_v,
+            output_offset_v: self.output_offset_v,
+            output_limit_v: self.output_limit_v,
+            gains: self.gains,
+            feedforward: self.feedforward,
+            following_error_limit_mm: self.following_error_limit_mm,
+        }
+    }
+
     fn config<R: Real>(&self, tick_s: f64) -> Result<AxisConfig<R>, AxisError> {
-        let refused = |source| AxisError { axis: self.name.clone(), source };
-        Ok(AxisConfig {
-            encoder: EncoderScale::new(self.mm_per_count).map_err(refused)?,
-            output: OutputScale::new(self.mm_s_at_10_v, self.output_offset_v, self.output_limit_v)
-                .map_err(refused)?,
-            regulator: Regulator::new(self.gains, self.feedforward, tick_s, self.following_error_limit_mm)
-                .map_err(refused)?,
-            following_error_limit_mm: R::from_f64(self.following_error_limit_mm),
-        })
+        AxisConfig::new(&self.figures(), tick_s)
+            .map_err(|source| AxisError { axis: self.name.clone(), source })
     }
 
     fn simulated(&self) -> AxisParameters {

@@ -7,12 +7,11 @@ use std::collections::VecDeque;
 
 use motion_kernel::exec::PIECES_PER_TICK_MAX;
 use motion_kernel::law::Ticks;
-use motion_kernel::num::Real;
-use motion_kernel::path::Piece;
 use motion_kernel::queue::SEGMENTS_PER_TICK_MAX;
 
 use super::error::Problem;
 use super::stretch::Stretch;
+use crate::toolpath::Placed;
 
 /// The times at which the latest short pieces end, and where on the path \[s, mm\].
 #[derive(Default)]
@@ -25,17 +24,17 @@ pub(super) struct PiecePace {
 impl PiecePace {
     /// The pieces of the next stretch; `blocks` holds the index of each one's block. An error comes with
     /// the program line.
-    pub(super) fn stretch<R: Real>(
+    pub(super) fn stretch(
         &mut self,
         stretch: &Stretch,
-        pieces: &[Piece<R, 3>],
+        pieces: &[Placed],
         blocks: &[usize],
         tick_s: f64,
     ) -> Result<(), (u32, Problem)> {
         let (start_s, start_mm) = self.start;
         let mut s_mm = 0.0;
         for (piece, &block) in pieces.iter().zip(blocks) {
-            let length_mm = piece.length().to_mm();
+            let length_mm = piece.length.to_mm();
             s_mm += length_mm;
             let block = &stretch.blocks[block];
             if length_mm >= block.ceiling.feed_mm_s * tick_s {

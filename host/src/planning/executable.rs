@@ -1,53 +1,38 @@
-//! A plan in the kernel's terms, checked against the bounds of a tick.
+//! A plan in the kernel's terms, checked against the number type and against the bounds of a tick.
 //!
-//! Consumes a [`Plan`]; produces the items of the two streams for a number type. A program that is
-//! denser than the executor's bounds is refused here, with its line, before anything moves.
+//! Consumes a [`Plan`]; produces the items of the two streams. A program that is denser than the executor's
+//! bounds, or beyond the number type's range, is refused here, with its line, before anything moves.
+
+use core::convert::Infallible;
 
 use motion_kernel::law::{FeedSegment, Ticks};
 use motion_kernel::num::Real;
-use motion_kernel::path::Piece;
+use motion_kernel::program::{Item, write};
 use motion_kernel::units::Position;
 
 use super::density::{PiecePace, SegmentPace};
 use super::error::{PlanningError, Problem};
 use super::stretch::Stretch;
-use super::{Item, Plan};
-use crate::toolpath::{compile, exact};
+use super::{Item as PlanItem, Plan};
+use crate::machine::Machine;
+use crate::toolpath::{Placed, compile, exact};
 
 /// What the two streams are fed with.
 #[derive(Clone, Debug)]
-pub struct Executable<R: Real> {
+pub struct Executable {
     /// In order.
-    pub items: Vec<ExecutableItem<R>>,
+    pub items: Vec<Item<3>>,
+    /// The control tick they are for \[s\].
+    pub tick_s: f64,
 }
 
-/// One thing to feed.
-#[derive(Clone, Debug)]
-pub enum ExecutableItem<R: Real> {
-    /// Motion from one full stop to the next.
-    Stretch {
-        /// Path position of its start, from the program's start \[mm\].
-        start_mm: f64,
-        /// The path.
-        pieces: Vec<Piece<R, 3>>,
-        /// The feed over it.
-        segments: Vec<FeedSegment<R>>,
-        /// Exactly where it ends.
-        end: [Position; 3],
-    },
-    /// Rest.
-    Dwell(Ticks),
-    /// Program stop.
-    Stop,
-}
-
-impl<R: Real> Executable<R> {
-    /// The executable form of `plan`.
+impl Executable {
+    /// The executable form of `plan`, for kernels of the number type `R`.
     ///
     /// # Errors
-    /// A move can't be made into pieces, or more pieces or segments than the tick's bound fall into
-    /// one tick.
-    pub fn new(plan: &Plan) -> Result<Self, PlanningError> {
+    /// A move can't be made into pieces, a figure is beyond the number type, or more pieces or segments than
+    /// the tick's bound fall into one tick.
+    pub fn new<R: Real>(plan: &Plan) -> Result<Self, PlanningError> {
         let fail = |line: u32, problem: Problem| PlanningError {
             source_name: plan.source.clone(),
             place: line.into(),
@@ -56,50 +41,89 @@ impl<R: Real> Executable<R> {
         let (mut piece_pace, mut segment_pace) = (PiecePace::default(), SegmentPace::default());
         let mut items = Vec::with_capacity(plan.items.len());
         for item in &plan.items {
-            items.push(match item {
-                Item::Stretch(stretch) => {
-                    stretch_item(stretch, plan.tick_s, &mut piece_pace, &mut segment_pace)
-                        .map_err(|(line, problem)| fail(line, problem))?
+            match item {
+                PlanItem::Stretch(stretch) => {
+                    stretch_items::<R>(stretch, plan.tick_s, &mut piece_pace, &mut segment_pace, &mut items)
+                        .map_err(|(line, problem)| fail(line, problem))?;
                 }
-                &Item::Dwell { line, seconds } => {
+                &PlanItem::Dwell { line, seconds } => {
                     let dwell = Ticks::from_seconds(seconds, plan.tick_s)
                         .ok_or_else(|| fail(line, Problem::Dwell { seconds, tick_s: plan.tick_s }))?;
                     piece_pace.dwell(seconds);
                     segment_pace.next(dwell).map_err(|problem| fail(line, problem))?;
-                    ExecutableItem::Dwell(dwell)
+                    items.push(Item::Dwell(dwell));
                 }
-                Item::Stop { .. } => ExecutableItem::Stop,
-            });
+                PlanItem::Stop { .. } => items.push(Item::Stop),
+            }
         }
-        Ok(Self { items })
+        Ok(Self { items, tick_s: plan.tick_s })
+    }
+
+    /// The program with the machine it was planned for, as bytes for a board.
+    #[must_use]
+    pub fn to_bytes(&self, machine: &Machine) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        // Entries of three axes fit the format.
+        write(&machine.header(), &self.items, &mut bytes).expect("three axes");
+        bytes
+    }
+
+    /// The items, as the kernel's [`Supply`](motion_kernel::program::Supply) takes them.
+    pub fn supplied(&self) -> impl Iterator<Item = Result<Item<3>, Infallible>> + '_ {
+        self.items.iter().map(|&item| Ok(item))
     }
 }
 
-fn stretch_item<R: Real>(
+fn stretch_items<R: Real>(
     stretch: &Stretch,
     tick_s: f64,
     piece_pace: &mut PiecePace,
     segment_pace: &mut SegmentPace,
-) -> Result<ExecutableItem<R>, (u32, Problem)> {
+    items: &mut Vec<Item<3>>,
+) -> Result<(), (u32, Problem)> {
     let (mut pieces, mut piece_blocks) = (Vec::new(), Vec::new());
     let (mut start_mm, mut end) = (0.0, [0.0; 3]);
     for (index, block) in stretch.blocks.iter().enumerate() {
-        start_mm = compile(&block.element, block.line, start_mm, &mut pieces)
+        start_mm = compile::<R>(&block.element, block.line, start_mm, &mut pieces)
             .map_err(|error| (block.line, error.into()))?;
         piece_blocks.resize(pieces.len(), index);
         (_, end) = block.element.ends_mm();
     }
     piece_pace.stretch(stretch, &pieces, &piece_blocks, tick_s)?;
-    let mut segments = Vec::new();
+    let mut feed = Vec::new();
     for planned in &stretch.planned {
         let at_line = |(block, problem): (usize, Problem)| (stretch.blocks[block].line, problem);
-        for segment in planned.segments::<R>(tick_s).map_err(at_line)? {
-            let duration = segment.duration();
-            segment_pace.next(duration).map_err(|problem| at_line((planned.first, problem)))?;
-            segments.push(segment);
+        for segment in planned.segments::<f64>(tick_s).map_err(at_line)? {
+            let (ramp, length) = (*segment.as_ramp(), segment.length());
+            // What the number type cannot hold is refused here.
+            let segment = FeedSegment::<R>::ramp(&ramp, length, tick_s)
+                .map_err(|error| at_line((planned.first, Problem::Segment { error, tick_s })))?;
+            segment_pace.next(segment.duration()).map_err(|problem| at_line((planned.first, problem)))?;
+            feed.push(Placed { length, item: Item::Feed { ramp, length } });
         }
     }
+    in_order_of_start(&pieces, &feed, items);
     let last_line = stretch.blocks.last().map_or(0, |block| block.line);
     let end = exact(end).map_err(|error| (last_line, error.into()))?;
-    Ok(ExecutableItem::Stretch { start_mm: stretch.start_mm, pieces, segments, end })
+    items.push(Item::EndOfStretch(end));
+    Ok(())
+}
+
+/// Both streams as one, in the order of the path positions where the items start.
+fn in_order_of_start(pieces: &[Placed], feed: &[Placed], items: &mut Vec<Item<3>>) {
+    let (mut feed, mut feed_start) = (feed.iter(), Position::ZERO);
+    let mut next_feed = feed.next();
+    let mut piece_start = Position::ZERO;
+    for piece in pieces {
+        while let Some(segment) = next_feed
+            && feed_start < piece_start
+        {
+            items.push(segment.item);
+            feed_start = feed_start + segment.length;
+            next_feed = feed.next();
+        }
+        items.push(piece.item);
+        piece_start = piece_start + piece.length;
+    }
+    items.extend(next_feed.into_iter().chain(feed).map(|segment| segment.item));
 }

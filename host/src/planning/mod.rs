@@ -28,7 +28,7 @@ pub mod stretch;
 
 pub use blocks::plan_blocks;
 pub use error::{Place, PlanningError, Problem};
-pub use executable::{Executable, ExecutableItem};
+pub use executable::Executable;
 pub use program::plan_program;
 pub use stretch::Stretch;
 

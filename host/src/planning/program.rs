@@ -68,7 +68,7 @@ pub fn plan_program(
     }
     close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
     // What the tick can't do is to be refused here, not on the machine.
-    Executable::<f32>::new(&plan)?;
+    Executable::new::<f32>(&plan)?;
     Ok(plan)
 }
 

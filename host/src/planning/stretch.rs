@@ -71,12 +71,6 @@ impl Stretch {
         self.ends_mm.last().copied().unwrap_or(0.0)
     }
 
-    /// Path positions of the blocks' ends, from the stretch's start \[mm\].
-    #[must_use]
-    pub fn ends_mm(&self) -> &[f64] {
-        &self.ends_mm
-    }
-
     pub(super) fn block_records(&self) -> Vec<BlockRecord> {
         let mut start_mm = 0.0;
         let mut records = Vec::with_capacity(self.blocks.len());

@@ -5,7 +5,6 @@
 //! the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
 //! - [`rig`]: the simulated machine as the kernel's hardware;
-//! - [`supply`]: keeps the two streams filled, as the background of a board does;
 //! - `contour`: how far the machine is beside its path;
 //! - [`run`](mod@run): the ticks;
 //! - [`summary`]: maxima, following and contour error.
@@ -14,7 +13,6 @@ mod contour;
 pub mod rig;
 pub mod run;
 pub mod summary;
-pub mod supply;
 
 pub use run::{Number, RunError, run, run_with};
 pub use summary::{AxisSummary, RunSummary};

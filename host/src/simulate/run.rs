@@ -1,11 +1,14 @@
 //! The ticks of a run.
 
+use core::convert::Infallible;
+
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
-use motion_kernel::queue::{Rejection, Streams};
+use motion_kernel::program::{Supply, SupplyError};
+use motion_kernel::queue::Streams;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::Position;
 
@@ -13,9 +16,8 @@ use super::Observer;
 use super::contour::Contour;
 use super::rig::{Rig, Simulated};
 use super::summary::{Collector, RunSummary};
-use super::supply::Supply;
 use crate::machine::{AxisError, Machine};
-use crate::planning::{Executable, ExecutableItem, Plan, PlanningError};
+use crate::planning::{Executable, Item as PlanItem, Plan, PlanningError};
 use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
 
 /// Capacities of the two streams, as a board has them.
@@ -50,7 +52,7 @@ pub enum RunError {
     Simulation(String),
     /// The kernel refused what the planner made.
     #[error("the kernel rejects the plan: {0}")]
-    Rejected(Rejection),
+    Rejected(SupplyError<Infallible>),
 }
 
 /// Runs `plan` in f32, as a board would.
@@ -83,13 +85,13 @@ fn run_in<R: Real>(
     machine: &Machine,
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
-    let executable = Executable::<R>::new(plan)?;
-    let starts: Vec<f64> = executable
+    let executable = Executable::new::<R>(plan)?;
+    let starts: Vec<f64> = plan
         .items
         .iter()
         .filter_map(|item| match item {
-            ExecutableItem::Stretch { start_mm, .. } => Some(*start_mm),
-            ExecutableItem::Dwell(_) | ExecutableItem::Stop => None,
+            PlanItem::Stretch(stretch) => Some(stretch.start_mm),
+            PlanItem::Dwell { .. } | PlanItem::Stop { .. } => None,
         })
         .collect();
     let simulated =
@@ -101,7 +103,7 @@ fn run_in<R: Real>(
     kernel.enable(0);
     let mut streams = Streams::<R, AXES, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
-    let mut supply = Supply::new(&executable);
+    let mut supply = Supply::<R, AXES, _>::new(executable.supplied(), executable.tick_s);
 
     let mut summary = RunSummary {
         tick_s: machine.tick_s,
@@ -214,6 +216,10 @@ fn fault_record<R: Real>(fault: &Fault<R>, machine: &Machine) -> FaultRecord {
         FaultKind::Encoder => (None, "encoder", "the encoders could not be read".to_owned()),
         FaultKind::Output => (None, "output", "the converter could not be written".to_owned()),
         FaultKind::Enable => (None, "enable", "the drives could not be switched".to_owned()),
+        FaultKind::EmergencyStop => (None, "emergency stop", "the emergency stop is open".to_owned()),
+        FaultKind::Drive { axis } => {
+            (Some(machine.axes[axis].name.clone()), "drive", "the drive reports a fault".to_owned())
+        }
     };
     FaultRecord { tick: fault.tick, axis, fault: name.to_owned(), detail }
 }

@@ -5,6 +5,7 @@
 
 use motion_kernel::num::Real;
 use motion_kernel::path::{Piece, PieceError};
+use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
 use super::element::Element;
@@ -86,8 +87,17 @@ pub fn exact(point: Vector) -> Result<[Position; 3], CompileError> {
     Ok(exact)
 }
 
-/// Appends the pieces of `element`, which starts at `start_mm` of the stretch, to `pieces`; returns
-/// where it ends on the path. `line` is the program line.
+/// A piece of path with its length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed {
+    /// Its length.
+    pub length: Position,
+    /// The piece.
+    pub item: Item<3>,
+}
+
+/// Appends the pieces of `element`, which starts at `start_mm` of the stretch, to `pieces`, cut for the number
+/// type `R`; returns where it ends on the path. `line` is the program line.
 ///
 /// # Errors
 /// The element is too short, too far out, ends too far along the stretch, is not smooth, or makes a piece that
@@ -96,7 +106,7 @@ pub fn compile<R: Real>(
     element: &Element,
     line: u32,
     start_mm: f64,
-    pieces: &mut Vec<Piece<R, 3>>,
+    pieces: &mut Vec<Placed>,
 ) -> Result<f64, CompileError> {
     let length_mm = element.length_mm();
     let end_mm = start_mm + length_mm;
@@ -118,7 +128,9 @@ pub fn compile<R: Real>(
                 let start = exact(add(from, scale(subtract(to, from), a)))?;
                 let part_end_mm = if part + 1 == parts { end_mm } else { start_mm + length_mm * b };
                 let length = length_to(part_end_mm, length_mm / parts as f64)?;
-                pieces.push(Piece::line(line, start, direction, length)?);
+                // What the number type cannot hold is refused here.
+                Piece::<R, 3>::line(line, start, direction, length)?;
+                pieces.push(Placed { length, item: Item::Line { line, start, direction, length } });
             }
         }
         Element::Arc { shape, sweep_rad, .. } => {
@@ -130,7 +142,9 @@ pub fn compile<R: Real>(
                 gone_mm += septic.length_mm;
                 let part_end_mm = if index + 1 == count { end_mm } else { start_mm + gone_mm };
                 let length = length_to(part_end_mm, septic.length_mm)?;
-                pieces.push(Piece::septic(line, start, septic.coefficients, length)?);
+                let coefficients = septic.coefficients.map(|axis| axis.map(|mm| mm / septic.length_mm));
+                Piece::<R, 3>::septic(line, start, coefficients, length)?;
+                pieces.push(Placed { length, item: Item::Septic { line, start, coefficients, length } });
             }
         }
     }

@@ -14,7 +14,7 @@ pub mod curve;
 pub mod element;
 pub mod septic;
 
-pub use compile::{CompileError, compile, exact, on_path};
+pub use compile::{CompileError, Placed, compile, exact, on_path};
 pub use element::Element;
 
 /// A point or a vector, X Y Z \[mm\].

@@ -16,9 +16,30 @@ pub mod scale;
 pub use regulator::{Command, Feedforward, Gains, Regulator, RegulatorState};
 pub use scale::{EncoderScale, OutputScale, ScaleError};
 
+use serde::{Deserialize, Serialize};
+
 use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, DacCode, Position};
+
+/// An axis in figures of any number type: what a machine's file says of it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisFigures {
+    /// Travel per encoder count \[mm\], see [`EncoderScale::new`].
+    pub mm_per_count: f64,
+    /// Velocity at +10 V \[mm/s\], see [`OutputScale::new`].
+    pub mm_s_at_10_v: f64,
+    /// Added to every output \[V\].
+    pub output_offset_v: f64,
+    /// Greatest output in either direction \[V\].
+    pub output_limit_v: f64,
+    /// Feedback gains.
+    pub gains: Gains,
+    /// Feedforward gains.
+    pub feedforward: Feedforward,
+    /// Following error at which the axis faults \[mm\], > 0.
+    pub following_error_limit_mm: f64,
+}
 
 /// What is fixed about an axis while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +52,29 @@ pub struct AxisConfig<R> {
     pub regulator: Regulator<R>,
     /// Following error at which the axis faults \[mm\].
     pub following_error_limit_mm: R,
+}
+
+impl<R: Real> AxisConfig<R> {
+    /// The axis for a control tick of `tick_s`. Background.
+    ///
+    /// # Errors
+    /// The first figure that is out of its range or beyond the number type's.
+    pub fn new(figures: &AxisFigures, tick_s: f64) -> Result<Self, ScaleError> {
+        let &AxisFigures { mm_per_count, mm_s_at_10_v, output_offset_v, output_limit_v, .. } = figures;
+        let limit_mm = figures.following_error_limit_mm;
+        let following_error_limit_mm =
+            R::checked_from_f64(limit_mm).filter(|_| limit_mm > 0.0).ok_or(ScaleError {
+                quantity: "following error limit [mm]",
+                value: limit_mm,
+                expected: "a positive number within the kernel's range",
+            })?;
+        Ok(Self {
+            encoder: EncoderScale::new(mm_per_count)?,
+            output: OutputScale::new(mm_s_at_10_v, output_offset_v, output_limit_v)?,
+            regulator: Regulator::new(figures.gains, figures.feedforward, tick_s, limit_mm)?,
+            following_error_limit_mm,
+        })
+    }
 }
 
 /// What changes about an axis from tick to tick.

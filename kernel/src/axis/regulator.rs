@@ -11,12 +11,14 @@
 //! **Anti-windup**: while the output is at its limit, the sum takes no error that would drive the
 //! output farther out.
 
+use serde::{Deserialize, Serialize};
+
 use super::scale::ScaleError;
 use crate::num::Real;
 use crate::path::Setpoint;
 
 /// Feedback gains, output \[mm/s\] per following error.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gains {
     /// Proportional \[1/s\].
     pub kp_per_s: f64,
@@ -27,7 +29,7 @@ pub struct Gains {
 }
 
 /// Feedforward gains.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Feedforward {
     /// Of velocity \[1\]; 1 for a drive whose gain is known.
     pub velocity: f64,

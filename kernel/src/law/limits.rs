@@ -3,10 +3,12 @@
 //! Consumes the limits of a machine or of a block; produces a [`Law`] that [`Ramp`](super::Ramp)
 //! and [`reach`](super::reach()) share, so that roots are taken once per set of limits. Background.
 
+use serde::{Deserialize, Serialize};
+
 use crate::num::Root;
 
 /// Limits along the path.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits<R> {
     /// Greatest acceleration \[mm/s²\], > 0. A_max of S1.

@@ -3,12 +3,14 @@
 //! Background: the planner chooses ramps with it and reports evaluate it. The tick evaluates the
 //! same shapes through [`FeedSegment`](super::FeedSegment), which has nothing left to divide.
 
+use serde::{Deserialize, Serialize};
+
 use super::limits::Law;
 use super::shape::Shape;
 use crate::num::{Root, Scalar};
 
 /// A ramp between two feeds (S1, section 1). A braking ramp is the accelerating one mirrored.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ramp<R> {
     /// F₀ \[mm/s\], ≥ 0.
     pub from_mm_s: R,
@@ -25,7 +27,7 @@ pub struct Ramp<R> {
 }
 
 /// The limit that fixed a ramp's peak jerk and rise time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LimitedBy {
     /// Acceleration: there is a phase of constant acceleration.

@@ -13,13 +13,15 @@
 
 use core::f64::consts::PI;
 
+use serde::{Deserialize, Serialize};
+
 use super::ramp::Ramp;
 use super::shape::Shape;
 use crate::num::{Real, Root, Unit};
 use crate::units::Position;
 
 /// A duration in control ticks, in steps of 2⁻³² tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ticks(u64);
 

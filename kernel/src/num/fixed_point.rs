@@ -119,6 +119,10 @@ impl Scalar for Fixed {
     fn to_f64(self) -> f64 {
         self.0.to_num()
     }
+
+    fn to_bits64(self) -> u64 {
+        self.to_bits().cast_unsigned()
+    }
 }
 
 impl Real for Fixed {
@@ -207,6 +211,10 @@ impl Scalar for I3F29 {
 
     fn to_f64(self) -> f64 {
         self.to_num()
+    }
+
+    fn to_bits64(self) -> u64 {
+        u64::from(self.to_bits().cast_unsigned())
     }
 }
 

@@ -20,6 +20,10 @@ macro_rules! float {
             fn to_f64(self) -> f64 {
                 f64::from(self)
             }
+
+            fn to_bits64(self) -> u64 {
+                u64::from(self.to_bits())
+            }
         }
 
         impl Unit for $float {

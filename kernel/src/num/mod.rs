@@ -52,6 +52,9 @@ pub trait Scalar:
     /// The value, for records and background code.
     fn to_f64(self) -> f64;
 
+    /// Its bits, for digests: equal bits mean equal values of this type.
+    fn to_bits64(self) -> u64;
+
     /// |x|.
     #[must_use]
     fn abs(self) -> Self {

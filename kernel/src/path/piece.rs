@@ -65,12 +65,12 @@ pub enum PieceError {
         /// The axis, from 0.
         axis: usize,
     },
-    /// A coefficient is not finite, or not below twice the length.
+    /// A coefficient is not finite, or not below 2.
     OutOfRange {
         /// The axis, from 0.
         axis: usize,
-        /// The coefficient \[mm\].
-        coefficient_mm: f64,
+        /// The coefficient, as a part of the length.
+        coefficient: f64,
     },
     /// The length is not positive, or longer than the number type resolves.
     Length {
@@ -90,10 +90,9 @@ impl core::fmt::Display for PieceError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NotFinite { axis } => write!(f, "a direction of axis {axis} that is not a number"),
-            Self::OutOfRange { axis, coefficient_mm } => write!(
-                f,
-                "coefficient {coefficient_mm} mm of axis {axis}: expected less than twice the length"
-            ),
+            Self::OutOfRange { axis, coefficient } => {
+                write!(f, "coefficient {coefficient} of axis {axis}: expected a magnitude below 2")
+            }
             Self::Length { length_mm, longest_mm } => {
                 write!(f, "length {length_mm} mm: expected more than 0 and at most {longest_mm} mm")
             }
@@ -131,8 +130,8 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         Self::new(line, start, length, Geometry::Line { direction })
     }
 
-    /// A polynomial piece of `length` from `start`; `coefficients` are c₁ … c₇ per axis \[mm\] over
-    /// u = s/length.
+    /// A polynomial piece of `length` from `start`; `coefficients` are q₁ … q₇ per axis over
+    /// u = s/length, as parts of the length.
     ///
     /// # Errors
     /// A coefficient is not finite, the length is out of range, or a tangent at an end is not a unit
@@ -149,12 +148,11 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         let mut unit = [[R::Unit::ZERO; 7]; AXES];
         for (axis, (unit, coefficients)) in unit.iter_mut().zip(&coefficients).enumerate() {
             for (unit, &c) in unit.iter_mut().zip(coefficients) {
-                let part = c / length_mm;
                 // Half the range of a unit, so that the derivatives' sums have room.
-                if !(libm::fabs(part) < 2.0) {
-                    return Err(PieceError::OutOfRange { axis, coefficient_mm: c });
+                if !(libm::fabs(c) < 2.0) {
+                    return Err(PieceError::OutOfRange { axis, coefficient: c });
                 }
-                *unit = R::Unit::from_f64(part);
+                *unit = R::Unit::from_f64(c);
             }
         }
         let geometry = Geometry::Septic { coefficients: unit, per_mm, length_mm: R::from_f64(length_mm) };

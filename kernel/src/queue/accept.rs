@@ -4,6 +4,8 @@
 //! could not execute. Each method returns the state after the item, so that an item that finds its
 //! queue full leaves no trace.
 
+use serde::{Deserialize, Serialize};
+
 use crate::law::{FeedSegment, Limits, Ticks};
 use crate::num::Real;
 use crate::path::Piece;
@@ -13,7 +15,7 @@ use crate::units::Position;
 pub const SEGMENTS_PER_TICK_MAX: usize = 8;
 
 /// What the streams are held to. Immutable; the machine's configuration.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PathRules {
     /// Limits along the path.
     pub limits: Limits<f64>,

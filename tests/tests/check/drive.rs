@@ -3,11 +3,11 @@
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan, Problem, plan_program};
-use motion_host::simulate::supply::Supply;
 use motion_host::toolpath::CompileError;
 use motion_kernel::exec::{ExecState, Executor};
 use motion_kernel::law::SegmentError;
 use motion_kernel::path::PieceError;
+use motion_kernel::program::Supply;
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
 
@@ -66,7 +66,7 @@ pub(crate) fn execute<R: Number>(
         *totals.refused.entry("long, not executed".to_owned()).or_default() += 1;
         return Ok(totals);
     }
-    let executable = match Executable::<R>::new(&plan) {
+    let executable = match Executable::new::<R>(&plan) {
         Ok(executable) => executable,
         // Planning has tried f32. Fixed point ends at 2³¹, also for snap, and does not resolve the curves
         // of a fraction of a micrometre.
@@ -80,7 +80,7 @@ pub(crate) fn execute<R: Number>(
     let mut streams = Streams::<R, 3, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
     let mut executor = Executor::<R, 3>::new(start);
-    let mut supply = Supply::new(&executable);
+    let mut supply = Supply::new(executable.supplied(), executable.tick_s);
     let mut checker = Checker::new::<R>(machine, &plan, &path, seed);
     let (mut ticks, mut stops, mut stretches) = (0_u64, 0_u64, 0_usize);
     loop {

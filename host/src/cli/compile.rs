@@ -1,0 +1,86 @@
+//! `motion compile`: a planned program as bytes, for a board.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use motion_kernel::num::Fixed;
+
+use super::error::{CliError, Outcome};
+use super::input::{self, Output};
+use crate::gcode;
+use crate::planning::{Executable, Mode, plan_program};
+
+const EXAMPLES: &str = "\
+Examples:
+  motion compile part.ngc --machine mine.toml --output part.bin
+  motion compile part.ngc --number fixed --output part.bin    for a board without an FPU
+
+The file holds the machine's scales, gains and path limits, every piece of path and every ramp, and a checksum.
+Its format is documented with motion_kernel::program.";
+
+/// Plan a program and write it for a board, with the machine it is for.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct CompileArguments {
+    /// G-code (`-`: standard input).
+    program: PathBuf,
+    /// Where to write.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Machine file (`motion machine` prints one); without it, the reference machine.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    /// The number type of the board's kernel.
+    #[arg(long, value_enum, default_value_t = Number::F32)]
+    number: Number,
+    /// One pair of ramps per block; without it, ramps may span blocks with equal ceilings.
+    #[arg(long)]
+    per_block: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Number {
+    F32,
+    Fixed,
+}
+
+/// Plans, checks, writes.
+///
+/// # Errors
+/// The program or the machine file is refused, or a file can't be read or written.
+pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let machine = input::machine(arguments.machine.as_ref())?;
+    let source = input::read(&arguments.program)?;
+    let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Merged };
+    let program = gcode::read(&source.name, &source.text)?;
+    let plan = plan_program(&source.name, &program, &machine, mode)?;
+    let executable = match arguments.number {
+        Number::F32 => Executable::new::<f32>(&plan),
+        Number::Fixed => Executable::new::<Fixed>(&plan),
+    }?;
+    let bytes = executable.to_bytes(&machine);
+    write(&arguments.output, &bytes)?;
+    for notice in &plan.notices {
+        writeln!(out, "note: {notice}").map_err(CliError::Output)?;
+    }
+    writeln!(
+        out,
+        "{}: {} items, {} bytes; {:.3} mm in {:.3} s at {} ticks/s, on machine \"{}\"",
+        arguments.output.display(),
+        executable.items.len(),
+        bytes.len(),
+        plan.length_mm,
+        plan.time_s,
+        (1.0 / machine.tick_s).round(),
+        machine.name
+    )
+    .map_err(CliError::Output)?;
+    Ok(Outcome::Done)
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+    let mut output = Output::create(path)?;
+    let written = output.file.write_all(bytes).and_then(|()| output.file.flush());
+    written.map_err(|source| CliError::Write { path: output.name, source })
+}

@@ -1,0 +1,252 @@
+//! A program as bytes, with the machine it is for.
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 4 | `MOTN` |
+//! | 1 | version of this format, 1 |
+//! | 1 | number of axes |
+//! | … | [`Header`], then [`Item`]s to the end, each in the [postcard](https://postcard.jamesmunns.com) wire format |
+//! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
+//!
+//! A board checks the whole before anything moves. f64 figures are kept, so that the program runs in any
+//! number type, and gives the same bits wherever it is read.
+
+use core::marker::PhantomData;
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use serde::{Deserialize, Serialize};
+use serde_big_array::BigArray;
+
+use super::Item;
+use crate::axis::AxisFigures;
+use crate::queue::PathRules;
+use crate::units::Position;
+
+const MAGIC: [u8; 4] = *b"MOTN";
+const VERSION: u8 = 1;
+const PREFIX: usize = MAGIC.len() + 2;
+const CHECKSUM: usize = 4;
+/// No header and no item of eight axes is longer.
+const ENTRY_MAX: usize = 1024;
+
+/// What a program was planned for. A board executes it with this or not at all.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header<const AXES: usize> {
+    /// The control tick \[s\].
+    pub tick_s: f64,
+    /// What the streams are held to.
+    pub rules: PathRules,
+    /// The machine's axes.
+    #[serde(with = "BigArray")]
+    pub axes: [AxisFigures; AXES],
+    /// Where the machine stands when it starts.
+    #[serde(with = "BigArray")]
+    pub start: [Position; AXES],
+}
+
+/// Why bytes are not a program for this kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ProgramError {
+    /// It does not begin with `MOTN`, or is shorter than the shortest program.
+    NotAProgram,
+    /// It is of another version of the format.
+    Version {
+        /// Its version; 1 is expected.
+        found: u8,
+    },
+    /// It is for a machine with another number of axes.
+    Axes {
+        /// The program's.
+        found: u8,
+        /// The kernel's.
+        expected: usize,
+    },
+    /// It has been damaged.
+    Checksum {
+        /// Of the bytes as they are.
+        found: u32,
+        /// As written.
+        expected: u32,
+    },
+    /// Behind an intact checksum there is no header or item where one should be.
+    Malformed {
+        /// Bytes from the start of the program.
+        at: usize,
+    },
+}
+
+impl core::fmt::Display for ProgramError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NotAProgram => write!(f, "no compiled program: expected MOTN at its start"),
+            Self::Version { found } => write!(f, "format {found}, expected {VERSION}"),
+            Self::Axes { found, expected } => write!(f, "a program for {found} axes, expected {expected}"),
+            Self::Checksum { found, expected } => {
+                write!(f, "damaged: checksum {found:08x}, expected {expected:08x}")
+            }
+            Self::Malformed { at } => write!(f, "no header or item at byte {at}"),
+        }
+    }
+}
+
+impl core::error::Error for ProgramError {}
+
+/// Appends a program to `out`.
+///
+/// # Errors
+/// An entry is longer than the format's bound: more axes than eight.
+pub fn write<'a, const AXES: usize>(
+    header: &Header<AXES>,
+    items: impl IntoIterator<Item = &'a Item<AXES>>,
+    out: &mut impl Extend<u8>,
+) -> Result<(), postcard::Error> {
+    let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+    let mut digest = crc.digest();
+    let mut put = |bytes: &[u8]| {
+        digest.update(bytes);
+        out.extend(bytes.iter().copied());
+    };
+    let mut entry = [0; ENTRY_MAX];
+    put(&MAGIC);
+    put(&[VERSION, AXES as u8]);
+    put(postcard::to_slice(header, &mut entry)?);
+    for item in items {
+        put(postcard::to_slice(item, &mut entry)?);
+    }
+    let checksum = digest.finalize();
+    out.extend(checksum.to_le_bytes());
+    Ok(())
+}
+
+/// Reads a program's items in order, from bytes that stay where they are.
+#[derive(Clone, Copy, Debug)]
+pub struct Reader<'a, const AXES: usize> {
+    header: Header<AXES>,
+    /// Header and items.
+    body: &'a [u8],
+    left: &'a [u8],
+    items: PhantomData<Item<AXES>>,
+}
+
+impl<'a, const AXES: usize> Reader<'a, AXES> {
+    /// The program in `bytes`, which end with it.
+    ///
+    /// # Errors
+    /// Nothing but a whole, undamaged program for `AXES` axes is accepted.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, ProgramError> {
+        let (prefix, rest) = bytes.split_at_checked(PREFIX).ok_or(ProgramError::NotAProgram)?;
+        let body_length = rest.len().checked_sub(CHECKSUM).ok_or(ProgramError::NotAProgram)?;
+        let (body, checksum) = rest.split_at_checked(body_length).ok_or(ProgramError::NotAProgram)?;
+        let [m, o, t, n, version, axes] = *prefix else { return Err(ProgramError::NotAProgram) };
+        if [m, o, t, n] != MAGIC {
+            return Err(ProgramError::NotAProgram);
+        }
+        if version != VERSION {
+            return Err(ProgramError::Version { found: version });
+        }
+        if usize::from(axes) != AXES {
+            return Err(ProgramError::Axes { found: axes, expected: AXES });
+        }
+        let expected = checksum.iter().rev().fold(0, |sum, &byte| sum << 8 | u32::from(byte));
+        let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+        let mut digest = crc.digest();
+        digest.update(prefix);
+        digest.update(body);
+        let found = digest.finalize();
+        if found != expected {
+            return Err(ProgramError::Checksum { found, expected });
+        }
+        let (header, left) = postcard::take_from_bytes::<Header<AXES>>(body)
+            .map_err(|_| ProgramError::Malformed { at: PREFIX })?;
+        Ok(Self { header, body, left, items: PhantomData })
+    }
+
+    /// What the program was planned for.
+    pub fn header(&self) -> &Header<AXES> {
+        &self.header
+    }
+}
+
+impl<const AXES: usize> Iterator for Reader<'_, AXES> {
+    type Item = Result<Item<AXES>, ProgramError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.left.is_empty() {
+            return None;
+        }
+        let at = PREFIX + self.body.len() - self.left.len();
+        Some(match postcard::take_from_bytes(self.left) {
+            Ok((item, left)) => {
+                self.left = left;
+                Ok(item)
+            }
+            Err(_) => {
+                self.left = &[];
+                Err(ProgramError::Malformed { at })
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::{Feedforward, Gains};
+    use crate::law::{Limits, Ticks};
+
+    fn header() -> Header<2> {
+        let axis = AxisFigures {
+            mm_per_count: 1e-4,
+            mm_s_at_10_v: 1000.0 / 3.0,
+            output_offset_v: 0.0,
+            output_limit_v: 10.0,
+            gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
+            feedforward: Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.2e-5 },
+            following_error_limit_mm: 1.0,
+        };
+        let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+        Header {
+            tick_s: 0.0005,
+            rules: PathRules { limits, feed_mm_s: 300.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 },
+            axes: [axis; 2],
+            start: [Position::ZERO, Position::from_bits(-7)],
+        }
+    }
+
+    fn program() -> (Vec<Item<2>>, Vec<u8>) {
+        let at = [Position::from_bits(i64::MIN), Position::from_bits(i64::MAX)];
+        let items = vec![
+            Item::Line { line: 3, start: at, direction: [0.6, -0.8], length: Position::from_bits(1 << 40) },
+            Item::Septic { line: u32::MAX, start: at, coefficients: [[f64::MIN; 7]; 2], length: at[1] },
+            Item::EndOfStretch(at),
+            Item::Dwell(Ticks::ONE),
+            Item::Stop,
+        ];
+        let mut bytes = Vec::new();
+        write(&header(), &items, &mut bytes).expect("short entries");
+        (items, bytes)
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let (items, bytes) = program();
+        let reader = Reader::<2>::new(&bytes).expect("a program");
+        assert_eq!(*reader.header(), header());
+        assert_eq!(reader.collect::<Result<Vec<_>, _>>(), Ok(items));
+    }
+
+    /// Every single damaged byte, every shorter program, and every kind of stranger.
+    #[test]
+    fn anything_else_is_refused() {
+        let (_, bytes) = program();
+        for index in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[index] ^= 0x10;
+            assert!(Reader::<2>::new(&damaged).is_err(), "byte {index}");
+            assert!(Reader::<2>::new(&bytes[..index]).is_err(), "{index} bytes");
+        }
+        assert_eq!(Reader::<3>::new(&bytes).err(), Some(ProgramError::Axes { found: 2, expected: 3 }));
+        assert_eq!(Reader::<2>::new(b"G1 X10 F600\nM2\n").err(), Some(ProgramError::NotAProgram));
+    }
+}

@@ -1,0 +1,65 @@
+//! Planned motion as data: what a board has in flash, or is sent.
+//!
+//! Consumes what a planner made, for whatever number type; produces pieces and segments of the kernel's,
+//! into the two streams. Background.
+//!
+//! - [`Item`]: one item of a program, in f64 and position steps; made into the same bits on every target;
+//! - [`supply`]: keeps the two streams filled from items;
+//! - [`mod@bytes`]: a program as bytes, with the machine it is for.
+
+pub mod bytes;
+pub mod supply;
+
+pub use bytes::{Header, ProgramError, Reader, write};
+pub use supply::{Supply, SupplyError};
+
+use serde::{Deserialize, Serialize};
+use serde_big_array::BigArray;
+
+use crate::law::{Ramp, Ticks};
+use crate::units::Position;
+
+/// One thing for the streams. Within a stretch, pieces and ramps come in the order of the path positions
+/// where they start, so that whichever queue is full, the other one is as far.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Item<const AXES: usize> {
+    /// A straight piece of path, see [`Piece::line`](crate::path::Piece::line).
+    Line {
+        /// The program line it came from.
+        line: u32,
+        /// Where it starts.
+        #[serde(with = "BigArray")]
+        start: [Position; AXES],
+        /// A unit vector.
+        #[serde(with = "BigArray")]
+        direction: [f64; AXES],
+        /// Its length.
+        length: Position,
+    },
+    /// A curved piece of path, see [`Piece::septic`](crate::path::Piece::septic).
+    Septic {
+        /// The program line it came from.
+        line: u32,
+        /// Where it starts.
+        #[serde(with = "BigArray")]
+        start: [Position; AXES],
+        /// q₁ … q₇ of every axis, parts of the length.
+        #[serde(with = "BigArray")]
+        coefficients: [[f64; 7]; AXES],
+        /// Its length.
+        length: Position,
+    },
+    /// The feed over a length of path; a cruise is a ramp between equal feeds.
+    Feed {
+        /// The ramp.
+        ramp: Ramp<f64>,
+        /// The length.
+        length: Position,
+    },
+    /// The stretch ends here, at rest.
+    EndOfStretch(#[serde(with = "BigArray")] [Position; AXES]),
+    /// Rest, between stretches.
+    Dwell(Ticks),
+    /// Rest until told to resume, between stretches.
+    Stop,
+}

@@ -1,0 +1,137 @@
+//! Keeps the two streams filled.
+//!
+//! Consumes [`Item`]s; offers them to the [`Feeder`] until it says it is full, whenever it is called. Here
+//! an item becomes the kernel's number type, so that a board needs room for one item besides its queues.
+
+use super::Item;
+use crate::law::{FeedSegment, SegmentError, Ticks};
+use crate::num::Real;
+use crate::path::{Piece, PieceError};
+use crate::queue::{Feeder, Refused, Rejection};
+use crate::units::Position;
+
+/// Why an item can't be executed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum SupplyError<E> {
+    /// The item could not be had.
+    Source(E),
+    /// It is no piece of path in this number type.
+    Piece(PieceError),
+    /// It is no feed segment in this number type.
+    Segment(SegmentError),
+    /// It does not belong where it stands.
+    Rejected(Rejection),
+}
+
+impl<E: core::fmt::Display> core::fmt::Display for SupplyError<E> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Source(error) => error.fmt(f),
+            Self::Piece(error) => error.fmt(f),
+            Self::Segment(error) => error.fmt(f),
+            Self::Rejected(rejection) => rejection.fmt(f),
+        }
+    }
+}
+
+impl<E: core::fmt::Debug + core::fmt::Display> core::error::Error for SupplyError<E> {}
+
+/// An item in the kernel's number type.
+#[derive(Clone, Copy, Debug)]
+pub enum Ready<R: Real, const AXES: usize> {
+    /// Of the path stream.
+    Piece(Piece<R, AXES>),
+    /// Of the feed stream.
+    Segment(FeedSegment<R>),
+    /// Of both.
+    EndOfStretch([Position; AXES]),
+    /// Rest for a time.
+    Dwell(Ticks),
+    /// Rest until told to resume.
+    Stop,
+}
+
+impl<const AXES: usize> Item<AXES> {
+    /// The item in the number type `R`, for ticks of `tick_s`.
+    ///
+    /// # Errors
+    /// The number type does not hold it.
+    pub fn ready<R: Real, E>(&self, tick_s: f64) -> Result<Ready<R, AXES>, SupplyError<E>> {
+        Ok(match *self {
+            Self::Line { line, start, direction, length } => {
+                Ready::Piece(Piece::line(line, start, direction, length).map_err(SupplyError::Piece)?)
+            }
+            Self::Septic { line, start, coefficients, length } => {
+                Ready::Piece(Piece::septic(line, start, coefficients, length).map_err(SupplyError::Piece)?)
+            }
+            Self::Feed { ramp, length } => {
+                Ready::Segment(FeedSegment::ramp(&ramp, length, tick_s).map_err(SupplyError::Segment)?)
+            }
+            Self::EndOfStretch(end) => Ready::EndOfStretch(end),
+            Self::Dwell(duration) => Ready::Dwell(duration),
+            Self::Stop => Ready::Stop,
+        })
+    }
+}
+
+/// Where the supply stands.
+#[derive(Debug)]
+pub struct Supply<R: Real, const AXES: usize, I> {
+    items: I,
+    tick_s: f64,
+    /// Made ready, and not yet taken by the queues.
+    pending: Option<Ready<R, AXES>>,
+    is_at_end: bool,
+}
+
+impl<R: Real, const AXES: usize, E, I: Iterator<Item = Result<Item<AXES>, E>>> Supply<R, AXES, I> {
+    /// All of `items` still to do, for ticks of `tick_s`.
+    pub fn new(items: I, tick_s: f64) -> Self {
+        Self { items, tick_s, pending: None, is_at_end: false }
+    }
+
+    /// Whether everything has been offered and taken.
+    pub fn is_empty(&self) -> bool {
+        self.is_at_end && self.pending.is_none()
+    }
+
+    /// Fills the streams.
+    ///
+    /// # Errors
+    /// The next item can't be executed; what is queued before it is untouched.
+    pub fn fill(&mut self, feeder: &mut Feeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+        loop {
+            let ready = match self.pending.take() {
+                Some(ready) => ready,
+                None => match self.items.next() {
+                    Some(item) => item.map_err(SupplyError::Source)?.ready(self.tick_s)?,
+                    None => {
+                        self.is_at_end = true;
+                        return Ok(());
+                    }
+                },
+            };
+            let is_taken = match ready {
+                Ready::Piece(piece) => is_taken(feeder.piece(piece)),
+                Ready::Segment(segment) => is_taken(feeder.segment(segment)),
+                Ready::EndOfStretch(end) => is_taken(feeder.end_stretch(end)),
+                Ready::Dwell(duration) => is_taken(feeder.dwell(duration)),
+                Ready::Stop => is_taken(feeder.program_stop()),
+            };
+            if !is_taken.map_err(SupplyError::Rejected)? {
+                self.pending = Some(ready);
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// Whether the queue had room.
+fn is_taken<T>(answer: Result<(), Refused<T>>) -> Result<bool, Rejection> {
+    match answer {
+        Ok(()) => Ok(true),
+        Err(Refused::Full(_)) => Ok(false),
+        Err(Refused::Invalid(rejection)) => Err(rejection),
+    }
+}
