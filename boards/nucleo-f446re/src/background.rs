@@ -19,15 +19,13 @@ use motion_kernel::fault::Fault;
 use motion_kernel::queue::Feeder;
 use motion_kernel::units::Position;
 use nucleo_f446re::design_parameters::{BUTTON_TICKS, REPORT_TICKS, SETTLE_TICKS, SYSCLK_HZ};
-use nucleo_f446re::machine::{AXES, RULES};
-use nucleo_f446re::program::Program;
+use nucleo_f446re::machine::{AXES, Machine};
+use nucleo_f446re::program::{Run, RunError};
 use nucleo_f446re::tick_log::TickLog;
-use nucleo_f446re::travel::TravelError;
 use rtic::Mutex;
 use stm32f4xx_hal::gpio::{Input, PC13};
 
 use crate::control::{Control, Streams};
-use crate::drives::Stop;
 
 /// Ticks since the start; counted by the tick.
 pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
@@ -41,12 +39,12 @@ enum Phase {
     /// the machine may be found at another place than the program expects.
     Ready(&'static mut Streams),
     /// The program is entering the streams.
-    Feeding { feeder: Feeder<'static, f32, AXES>, program: Program },
+    Feeding { feeder: Feeder<'static, f32, AXES>, run: Run },
     /// The program has entered; `ticks_left` until the last of it can be told from never begun.
-    Finishing { feeder: Feeder<'static, f32, AXES>, here: [Position; AXES], ticks_left: u32 },
+    Finishing { feeder: Feeder<'static, f32, AXES>, ticks_left: u32 },
     /// The program is done, the machine is held at its end.
-    Done { feeder: Feeder<'static, f32, AXES>, here: [Position; AXES] },
-    /// Stopped: drives off until reset.
+    Done { feeder: Feeder<'static, f32, AXES> },
+    /// Drives off until reset.
     Stopped,
 }
 
@@ -54,8 +52,8 @@ enum Phase {
 #[derive(Clone, Copy)]
 struct Seen {
     state: ExecState,
+    position: [Position; AXES],
     fault: Option<Fault<f32>>,
-    stop: Option<Stop>,
     healthy: bool,
 }
 
@@ -63,6 +61,7 @@ struct Seen {
 pub(crate) fn run(
     mut control: impl Mutex<T = Control>,
     streams: &'static mut Streams,
+    machine: &Machine,
     button: &PC13<Input>,
 ) -> ! {
     let mut phase = Phase::Ready(streams);
@@ -76,13 +75,13 @@ pub(crate) fn run(
 
         let seen = control.lock(|control| Seen {
             state: control.state,
+            position: control.position,
             fault: control.kernel.fault(),
-            stop: control.stop,
             healthy: control.healthy,
         });
         let pressed = press.is_new(button.is_low());
         let before = core::mem::discriminant(&phase);
-        phase = turn(phase, seen, pressed, &mut control);
+        phase = turn(phase, seen, pressed, machine, &mut control);
         // A change of phase has had its line.
         if core::mem::discriminant(&phase) == before && !pressed {
             report.line(&mut control);
@@ -102,75 +101,90 @@ fn wait_for_tick() {
 }
 
 /// What follows from what the tick has left, and from the button. At most one line of log.
-fn turn(phase: Phase, seen: Seen, pressed: bool, control: &mut impl Mutex<T = Control>) -> Phase {
+fn turn(
+    phase: Phase,
+    seen: Seen,
+    pressed: bool,
+    machine: &Machine,
+    control: &mut impl Mutex<T = Control>,
+) -> Phase {
     match phase {
         Phase::Stopped => Phase::Stopped,
-        Phase::Ready(streams) if pressed => start(streams, seen.healthy, control),
+        Phase::Ready(streams) if pressed => start(streams, seen.healthy, machine, control),
         Phase::Ready(streams) => Phase::Ready(streams),
-        Phase::Feeding { .. } | Phase::Finishing { .. } | Phase::Done { .. }
-            if seen.fault.is_some() || seen.stop.is_some() =>
-        {
-            error!("stopped: {}, {}; reset the board to go on", seen.stop, seen.fault);
+        Phase::Feeding { .. } | Phase::Finishing { .. } | Phase::Done { .. } if seen.fault.is_some() => {
+            error!("stopped: {}; reset the board to go on", seen.fault);
             Phase::Stopped
         }
+        Phase::Feeding { .. } | Phase::Finishing { .. } if pressed && seen.state == ExecState::Stopped => {
+            control.lock(|control| control.kernel.resume());
+            info!("program stop ended");
+            phase
+        }
         Phase::Feeding { .. } => phase,
-        Phase::Finishing { feeder, here, ticks_left: 0 } if seen.state == ExecState::Idle => {
+        Phase::Finishing { feeder, ticks_left: 0 } if seen.state == ExecState::Idle => {
             info!("done: press the blue button to run again");
-            Phase::Done { feeder, here }
+            Phase::Done { feeder }
         }
-        Phase::Finishing { feeder, here, ticks_left } => {
-            Phase::Finishing { feeder, here, ticks_left: ticks_left.saturating_sub(1) }
+        Phase::Finishing { feeder, ticks_left } => {
+            Phase::Finishing { feeder, ticks_left: ticks_left.saturating_sub(1) }
         }
-        Phase::Done { feeder, here } if pressed => run_program(feeder, here, control),
+        // At rest the set position is exactly where the streams ended.
+        Phase::Done { feeder } if pressed => run_program(feeder, seen.position, machine, control),
         Phase::Done { .. } => phase,
     }
 }
 
 /// The first start: takes the actual position, gives the streams to the tick, enables the drives.
-fn start(streams: &'static mut Streams, healthy: bool, control: &mut impl Mutex<T = Control>) -> Phase {
+fn start(
+    streams: &'static mut Streams,
+    healthy: bool,
+    machine: &Machine,
+    control: &mut impl Mutex<T = Control>,
+) -> Phase {
     if !healthy {
         warn!("not started: the emergency stop is open or a drive is not ready");
         return Phase::Ready(streams);
     }
+    // With the faults of a machine that was not ready yet.
     let here = control.lock(|control| control.kernel.clear_fault());
-    let (feeder, intake) = streams.split(RULES, here);
+    let (feeder, intake) = streams.split(machine.header().rules, here);
     control.lock(|control| {
-        control.stop = None;
         control.intake = intake;
         control.kernel.enable(SETTLE_TICKS);
     });
-    run_program(feeder, here, control)
+    run_program(feeder, here, machine, control)
 }
 
 /// Begins a run of the program from `here`.
 fn run_program(
     feeder: Feeder<'static, f32, AXES>,
     here: [Position; AXES],
+    machine: &Machine,
     control: &mut impl Mutex<T = Control>,
 ) -> Phase {
-    match Program::new(here) {
-        Ok(program) => {
+    match Run::new(machine, here) {
+        Ok(run) => {
             info!("started: from {=[?]} mm", here.map(Position::to_mm));
-            Phase::Feeding { feeder, program }
+            Phase::Feeding { feeder, run }
         }
         Err(error) => refused(error, control),
     }
 }
 
-/// Fills the streams as far as they have room. Here is where the program's items come from; whatever offers
-/// them has to return when the streams are full.
+/// Fills the streams as far as they have room.
 fn feed(phase: Phase, control: &mut impl Mutex<T = Control>) -> Phase {
-    let Phase::Feeding { mut feeder, mut program } = phase else { return phase };
-    match program.fill(&mut feeder) {
-        Ok(false) => Phase::Feeding { feeder, program },
+    let Phase::Feeding { mut feeder, mut run } = phase else { return phase };
+    match run.fill(&mut feeder) {
+        Ok(false) => Phase::Feeding { feeder, run },
         // Idle means done only when the drives have settled and a tick has seen the last item.
-        Ok(true) => Phase::Finishing { feeder, here: program.end(), ticks_left: SETTLE_TICKS + 2 },
+        Ok(true) => Phase::Finishing { feeder, ticks_left: SETTLE_TICKS + 2 },
         Err(error) => refused(error, control),
     }
 }
 
-/// The program is wrong: nothing of it may go on.
-fn refused(error: TravelError, control: &mut impl Mutex<T = Control>) -> Phase {
+/// The program can't go on: nothing of it may.
+fn refused(error: RunError, control: &mut impl Mutex<T = Control>) -> Phase {
     control.lock(|control| control.kernel.disable());
     error!("program refused: {}", error);
     Phase::Stopped

@@ -1,4 +1,4 @@
-//! What tick and background share, and how the board stops the kernel.
+//! What tick and background share.
 //!
 //! The tick has the higher priority and takes it freely; the background takes it for some tens of
 //! instructions, right behind a tick.
@@ -6,10 +6,9 @@
 use motion_kernel::exec::ExecState;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::queue::Intake;
+use motion_kernel::units::Position;
 use nucleo_f446re::machine::AXES;
 use nucleo_f446re::tick_log::TickLog;
-
-use crate::drives::Stop;
 
 /// The streams: 63 pieces and 63 segments, 17 KiB.
 pub(crate) type Streams = motion_kernel::queue::Streams<f32, AXES, 64, 64>;
@@ -21,17 +20,9 @@ pub struct Control {
     pub(crate) intake: Intake<'static, f32, AXES>,
     /// What the executor was doing at the end of the last tick.
     pub(crate) state: ExecState,
-    /// The first reason for which the board stopped the kernel.
-    pub(crate) stop: Option<Stop>,
+    /// The set position of that tick.
+    pub(crate) position: [Position; AXES],
     /// The inputs allow a start.
     pub(crate) healthy: bool,
     pub(crate) log: TickLog,
-}
-
-impl Control {
-    /// Stops the machine with this tick: outputs 0 V, drives off. The first reason stays.
-    pub(crate) fn trip(&mut self, stop: Stop) {
-        self.stop.get_or_insert(stop);
-        self.kernel.disable();
-    }
 }

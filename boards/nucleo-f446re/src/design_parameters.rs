@@ -117,7 +117,11 @@ pub const REPORT_TICKS: u32 = TICK_HZ;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine;
+    use crate::machine::{Machine, PROGRAM};
+
+    fn machine() -> Machine {
+        Machine::new(PROGRAM).expect("suits")
+    }
 
     #[test]
     fn the_pll_makes_the_core_clock_within_its_ranges() {
@@ -149,7 +153,8 @@ mod tests {
 
     #[test]
     fn encoders_count_twice_the_fastest_axis() {
-        let fastest_per_s = machine::FEED_MM_S / machine::MM_PER_COUNT;
+        let header = *machine().header();
+        let fastest_per_s = header.rules.feed_mm_s / header.axes[0].mm_per_count;
         assert!(f64::from(ENCODER_COUNTS_PER_S_MAX) >= 2.0 * fastest_per_s, "{fastest_per_s}");
         assert_eq!(ENCODER_COUNTS_PER_S_MAX, 6_000_000);
         assert_eq!(ENCODER_FILTER_REMOVES_NS, 119);
@@ -168,7 +173,7 @@ mod tests {
         // It must live through a tick that overruns; it must reset before the machine has gone far.
         assert!(WATCHDOG_MIN_NS >= 5 * tick_ns, "{WATCHDOG_MIN_NS}");
         const { assert!(WATCHDOG_MAX_NS <= 10_000_000) };
-        let path_mm = machine::FEED_MM_S * f64::from(WATCHDOG_MAX_NS) * 1e-9;
+        let path_mm = machine().header().rules.feed_mm_s * f64::from(WATCHDOG_MAX_NS) * 1e-9;
         assert!(path_mm < 3.0, "{path_mm}");
         // As the HAL computes them from the timeout.
         assert_eq!(WATCHDOG_COUNTS * WATCHDOG_PRESCALER / 32, WATCHDOG_MS);

@@ -6,20 +6,9 @@
 //! This is not a safety function: the emergency stop must cut the drives' power by itself, and only tells the
 //! firmware that it has.
 
+use motion_kernel::fault::FaultKind;
 use nucleo_f446re::machine::AXES;
 use stm32f4xx_hal::gpio::{AnyPin, Input, Output};
-
-/// Why the board stops the machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-pub(crate) enum Stop {
-    /// The emergency stop's chain is open.
-    EmergencyStop,
-    /// A drive is not ready.
-    Drive {
-        /// The axis, from 0.
-        axis: usize,
-    },
-}
 
 /// The drives' wires.
 pub(crate) struct Drives {
@@ -31,16 +20,16 @@ pub(crate) struct Drives {
 impl Drives {
     /// What there is to stop for, the emergency stop first. If there is anything, the drives are off when this
     /// returns, whatever else happens in the tick.
-    pub(crate) fn check(&mut self) -> Option<Stop> {
-        let stop = if self.emergency_stop.is_high() {
-            Some(Stop::EmergencyStop)
+    pub(crate) fn check(&mut self) -> Option<FaultKind<f32>> {
+        let fault = if self.emergency_stop.is_high() {
+            Some(FaultKind::EmergencyStop)
         } else {
-            self.ready.iter().position(AnyPin::is_high).map(|axis| Stop::Drive { axis })
+            self.ready.iter().position(AnyPin::is_high).map(|axis| FaultKind::Drive { axis })
         };
-        if stop.is_some() {
+        if fault.is_some() {
             self.switch(false);
         }
-        stop
+        fault
     }
 
     /// Switches all enables.

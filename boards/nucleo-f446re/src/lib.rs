@@ -2,8 +2,8 @@
 //!
 //! - [`design_parameters`]: every number of the firmware with its derivation;
 //! - [`pins`]: which signal is on which pin;
-//! - [`machine`]: the axes;
-//! - [`travel`] and [`program`]: what the start button runs, planned on the board;
+//! - [`machine`]: the program in flash and the axes it is for;
+//! - [`travel`] and [`program`]: what the start button runs;
 //! - [`tick_log`] and [`liveness`]: what the tick keeps about itself.
 //!
 //! The firmware itself is `main.rs` and the modules beside it. From the board's folder:

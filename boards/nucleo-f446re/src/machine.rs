@@ -1,106 +1,117 @@
-//! The axes of the machine on this board: the reference machine's, all three alike.
+//! The machine that the board drives: the one that its program was compiled for.
 //!
-//! Produces the kernel's configuration, once, before the first tick. A machine of your own is changed
-//! here: scale, sign, gains and limits. For the first motion of an axis lower [`OUTPUT_LIMIT_V`] and
-//! [`FOLLOWING_ERROR_LIMIT_MM`]; `README.md` says when.
+//! Consumes the program in flash, which `motion compile` wrote with the machine's scales, gains and limits;
+//! produces the kernel's configuration, once, before the first tick. So there is one description of the
+//! machine, its file on the PC, and the board checks here what only it can know. A program that is damaged or
+//! does not suit the board is refused before anything is enabled.
 
-use motion_kernel::axis::{AxisConfig, EncoderScale, Feedforward, Gains, OutputScale, Regulator, ScaleError};
-use motion_kernel::law::Limits;
-use motion_kernel::queue::PathRules;
+use motion_kernel::axis::{AxisConfig, ScaleError};
+use motion_kernel::program::{Header, ProgramError, Reader};
 
-use crate::design_parameters::TICK_S;
+use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
 
 /// Number of axes: X, Y, Z.
 pub const AXES: usize = 3;
-/// Travel a count, after ×4 \[mm\]; negative for an encoder that counts the other way.
-pub const MM_PER_COUNT: f64 = 1.0e-4;
-/// Velocity at +10 V \[mm/s\]; negative if +10 V moves the axis backwards.
-pub const MM_S_AT_10_V: f64 = 20_000.0 / 60.0;
-/// Voltage at which the drive stands still \[V\].
-pub const OUTPUT_OFFSET_V: f64 = 0.0;
-/// Greatest output in either direction \[V\].
-pub const OUTPUT_LIMIT_V: f64 = 10.0;
-/// Following error at which an axis faults \[mm\].
-pub const FOLLOWING_ERROR_LIMIT_MM: f64 = 1.0;
-/// Feedback.
-pub const GAINS: Gains = Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 };
-/// Feedforward.
-pub const FEEDFORWARD: Feedforward =
-    Feedforward { velocity: 1.0, accel_s: 0.001_675, jerk_s2: 2.231_850_25e-5 };
-/// Greatest feed, of the path and of each axis \[mm/s\].
-pub const FEED_MM_S: f64 = 300.0;
-/// Greatest acceleration, jerk and snap, of the path and of each axis.
-pub const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5.0e3, snap_mm_s4: 4.0e5 };
 
-/// What the streams are held to.
-pub const RULES: PathRules = PathRules {
-    limits: LIMITS,
-    feed_mm_s: FEED_MM_S,
-    // 0.5°, as the reference machine's.
-    joint_angle_rad: 0.008_728_65,
-    joint_gap_mm: 5.0e-6,
-};
+/// The program in flash: `program/stringer.bin`, the host's `stringer.ngc` for the reference machine, or what
+/// `MOTION_PROGRAM` named when this was built.
+pub static PROGRAM: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/program.bin"));
 
-/// The kernel's axes.
-///
-/// # Errors
-/// A constant above is out of its range.
-pub fn axis_configs() -> Result<[AxisConfig<f32>; AXES], ScaleError> {
-    let axis = AxisConfig {
-        encoder: EncoderScale::new(MM_PER_COUNT)?,
-        output: OutputScale::new(MM_S_AT_10_V, OUTPUT_OFFSET_V, OUTPUT_LIMIT_V)?,
-        regulator: Regulator::new(GAINS, FEEDFORWARD, TICK_S, FOLLOWING_ERROR_LIMIT_MM)?,
-        following_error_limit_mm: FOLLOWING_ERROR_LIMIT_MM as f32,
-    };
-    Ok([axis; AXES])
+/// Why the board can't run a program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(target_arch = "arm", derive(defmt::Format))]
+pub enum MachineError {
+    /// The bytes are no program for it.
+    Program(ProgramError),
+    /// The program is for another tick \[s\].
+    Tick {
+        /// The program's.
+        found: f64,
+        /// The board's.
+        expected: f64,
+    },
+    /// An axis would count faster than its input filter is sure to pass.
+    CountRate {
+        /// The axis, from 0.
+        axis: usize,
+        /// At twice the greatest feed, for what an axis does beyond its set-point \[1/s\].
+        counts_per_s: f64,
+        /// What passes \[1/s\].
+        limit: f64,
+    },
+    /// A figure of an axis is out of its range.
+    Scale(ScaleError),
+}
+
+/// A program that suits the board, and its machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Machine {
+    /// All of the program's items.
+    pub program: Reader<'static, AXES>,
+    /// The kernel's axes.
+    pub axes: [AxisConfig<f32>; AXES],
+}
+
+impl Machine {
+    /// The machine of the program in `bytes`.
+    ///
+    /// # Errors
+    /// [`MachineError`].
+    pub fn new(bytes: &'static [u8]) -> Result<Self, MachineError> {
+        let program = Reader::new(bytes).map_err(MachineError::Program)?;
+        let Header { tick_s, rules, axes, .. } = program.header();
+        // To the bit: both are the same decimal, or they are different ticks.
+        if *tick_s != TICK_S {
+            return Err(MachineError::Tick { found: *tick_s, expected: TICK_S });
+        }
+        let limit = f64::from(ENCODER_COUNTS_PER_S_MAX);
+        for (axis, figures) in axes.iter().enumerate() {
+            let counts_per_s = 2.0 * rules.feed_mm_s / figures.mm_per_count.abs();
+            if !(counts_per_s <= limit) {
+                return Err(MachineError::CountRate { axis, counts_per_s, limit });
+            }
+        }
+        let config = |figures| AxisConfig::new(figures, TICK_S).map_err(MachineError::Scale);
+        let [x, y, z] = axes;
+        Ok(Self { axes: [config(x)?, config(y)?, config(z)?], program })
+    }
+
+    /// What the program was planned for.
+    #[must_use]
+    pub fn header(&self) -> &Header<AXES> {
+        self.program.header()
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use motion_kernel::program::write;
+
     use super::*;
 
-    #[test]
-    fn the_configuration_is_valid() {
-        axis_configs().expect("in range");
+    /// The machine of the program with a changed header.
+    fn with(change: impl Fn(&mut Header<AXES>)) -> Result<Machine, MachineError> {
+        let mut header = *Machine::new(PROGRAM).expect("suits").header();
+        change(&mut header);
+        let mut bytes = Vec::new();
+        write(&header, &[], &mut bytes).expect("short");
+        Machine::new(bytes.leak())
     }
 
-    /// The plan in flash is made for the reference machine, so the board must be one.
     #[test]
-    fn it_is_the_reference_machine() {
-        let text = include_str!("../../../host/src/machine/reference.toml");
-        let values = |key: &str| -> Vec<f64> {
-            text.lines()
-                .filter_map(|line| line.split_once('='))
-                .filter(|(name, _)| name.trim() == key)
-                .map(|(_, value)| value.trim().parse().expect(key))
-                .collect()
-        };
-        for (key, expected, count) in [
-            ("tick_s", TICK_S, 1),
-            ("mm_per_count", MM_PER_COUNT, AXES),
-            ("mm_min_at_10_v", 60.0 * MM_S_AT_10_V, AXES),
-            ("offset_v", OUTPUT_OFFSET_V, AXES),
-            ("limit_v", OUTPUT_LIMIT_V, AXES),
-            ("following_error_limit_mm", FOLLOWING_ERROR_LIMIT_MM, AXES),
-            ("kp_per_s", GAINS.kp_per_s, AXES),
-            ("ki_per_s2", GAINS.ki_per_s2, AXES),
-            ("kd", GAINS.kd, AXES),
-            ("feedforward_velocity", FEEDFORWARD.velocity, AXES),
-            ("feedforward_accel_s", FEEDFORWARD.accel_s, AXES),
-            ("feedforward_jerk_s2", FEEDFORWARD.jerk_s2, AXES),
-            // Once for the path, once for each axis.
-            ("feed_mm_s", FEED_MM_S, 1 + AXES),
-            ("accel_mm_s2", LIMITS.accel_mm_s2, 1 + AXES),
-            ("jerk_mm_s3", LIMITS.jerk_mm_s3, 1 + AXES),
-            ("snap_mm_s4", LIMITS.snap_mm_s4, 1 + AXES),
-        ] {
-            let found = values(key);
-            assert_eq!(found.len(), count, "{key}");
-            for value in found {
-                assert!((value - expected).abs() <= 1e-12 * expected.abs(), "{key}: {value}, {expected}");
-            }
-        }
-        let joint_rad = values("joint_angle_deg")[0].to_radians();
-        assert!((RULES.joint_angle_rad - joint_rad).abs() < 3e-6);
+    fn the_program_in_flash_suits() {
+        Machine::new(PROGRAM).expect("suits");
+    }
+
+    #[test]
+    fn others_are_refused() {
+        let slow = with(|header| header.tick_s = 0.001).map(|_| ());
+        assert_eq!(slow, Err(MachineError::Tick { found: 0.001, expected: TICK_S }));
+        let fine = with(|header| header.axes[1].mm_per_count = -5e-5).map(|_| ());
+        let expected = MachineError::CountRate { axis: 1, counts_per_s: 1.2e7, limit: 6e6 };
+        assert_eq!(fine, Err(expected));
+        let still = with(|header| header.axes[2].mm_s_at_10_v = 0.0).map(|_| ());
+        assert!(matches!(still, Err(MachineError::Scale(_))));
+        assert!(matches!(Machine::new(&PROGRAM[1..]), Err(MachineError::Program(_))));
     }
 }

@@ -41,8 +41,7 @@ mod app {
     use motion_kernel::kernel::Kernel;
     use nucleo_f446re::design_parameters::TICK_PRIORITY;
     use nucleo_f446re::liveness::Liveness;
-    use nucleo_f446re::machine::{AXES, RULES, axis_configs};
-    use nucleo_f446re::program::START;
+    use nucleo_f446re::machine::{AXES, Machine, PROGRAM};
     use nucleo_f446re::tick_log::TickLog;
     use stm32f4xx_hal::gpio::{Input, Output, PA10, PC13};
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
@@ -69,6 +68,7 @@ mod app {
         scope: PA10<Output>,
         button: PC13<Input>,
         streams: &'static mut Streams,
+        machine: Machine,
     }
 
     #[init(local = [
@@ -79,14 +79,16 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let Board { mut hardware, mut tick_timer, mut watchdog, scope, button } =
             Board::new(cx.device, cx.core);
-        let configs = defmt::unwrap!(axis_configs());
-        let kernel = Kernel::new(configs, START, hardware.encoders.latch());
-        let (_, intake) = cx.local.empty.split(RULES, START);
+        let machine = defmt::unwrap!(Machine::new(PROGRAM));
+        // Where the machine stands is called the program's start.
+        let start = machine.header().start;
+        let kernel = Kernel::new(machine.axes, start, hardware.encoders.latch());
+        let (_, intake) = cx.local.empty.split(machine.header().rules, start);
         let control = Control {
             kernel,
             intake,
             state: ExecState::Idle,
-            stop: None,
+            position: start,
             healthy: false,
             log: TickLog::new(),
         };
@@ -99,6 +101,7 @@ mod app {
             scope,
             button,
             streams: cx.local.storage,
+            machine,
         };
         (Shared { control }, local)
     }
@@ -118,14 +121,15 @@ mod app {
         let hardware = cx.local.hardware;
         cx.local.scope.set_high();
         cx.shared.control.lock(|control| {
-            let stop = hardware.drives.check();
-            control.healthy = stop.is_none();
-            if let Some(stop) = stop {
-                control.trip(stop);
-            }
             let Control { kernel, intake, .. } = control;
+            let fault = hardware.drives.check();
+            if let Some(kind) = fault {
+                kernel.trip(kind);
+            }
             let trace = kernel.tick(intake, hardware);
+            control.healthy = fault.is_none();
             control.state = trace.executed.state;
+            control.position = trace.executed.setpoints.map(|setpoint| setpoint.position);
             if cx.local.liveness.may_feed(TURNS.load(Ordering::Relaxed)) {
                 cx.local.watchdog.feed();
             }
@@ -137,8 +141,8 @@ mod app {
     }
 
     /// The background.
-    #[idle(local = [streams, button], shared = [control])]
+    #[idle(local = [streams, button, machine], shared = [control])]
     fn idle(cx: idle::Context) -> ! {
-        background::run(cx.shared.control, cx.local.streams, cx.local.button)
+        background::run(cx.shared.control, cx.local.streams, cx.local.machine, cx.local.button)
     }
 }

@@ -4,7 +4,7 @@
 //! they have room. Background, double precision. [`Travel::fill`] never waits: it takes as long as the room
 //! in the streams allows, at most their capacity in items.
 
-use motion_kernel::law::{FeedSegment, Law, LimitError, SegmentError};
+use motion_kernel::law::{FeedSegment, Law, LimitError, Limits, SegmentError};
 use motion_kernel::num::{Real, Root};
 use motion_kernel::path::{Piece, PieceError};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, plan, segments};
@@ -12,7 +12,7 @@ use motion_kernel::queue::{Feeder, Refused, Rejection};
 use motion_kernel::units::Position;
 
 use crate::design_parameters::TICK_S;
-use crate::machine::{AXES, LIMITS};
+use crate::machine::AXES;
 
 /// Why a move can't be planned or is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,10 +32,12 @@ pub enum TravelError {
     Rejected(Rejection),
 }
 
+/// It belongs to no line of a program.
+const NO_LINE: u32 = 0;
+
 /// A straight move and how much of it is in the streams.
 #[derive(Clone, Copy, Debug)]
 pub struct Travel {
-    line: u32,
     start: [Position; AXES],
     end: [Position; AXES],
     direction: [f64; AXES],
@@ -48,13 +50,12 @@ pub struct Travel {
 }
 
 impl Travel {
-    /// From `start` to `end` at `feed_mm_s` along the path; `line` is shown as the program line. A move of no
-    /// length is done at once.
+    /// From `start` to `end` at `feed_mm_s` along the path, within `limits`. A move of no length is done at once.
     ///
     /// # Errors
     /// [`TravelError`]; nothing has entered the streams.
     pub fn new(
-        line: u32,
+        limits: Limits<f64>,
         start: [Position; AXES],
         end: [Position; AXES],
         feed_mm_s: f64,
@@ -66,7 +67,6 @@ impl Travel {
         let length_mm = Root::sqrt(way_mm.iter().map(|mm| mm * mm).sum::<f64>());
         let length = Position::from_mm(length_mm).ok_or(TravelError::Length(length_mm))?;
         let mut travel = Self {
-            line,
             start,
             end,
             direction: [0.0; AXES],
@@ -87,7 +87,7 @@ impl Travel {
             length_mm,
             cap_mm_s: feed_mm_s,
             joint_mm_s: f64::INFINITY,
-            law: Law::new(LIMITS).map_err(TravelError::Limit)?,
+            law: Law::new(limits).map_err(TravelError::Limit)?,
         };
         let mut plans = [BlockPlan::default()];
         plan(&[block], 0.0, 0.0, &mut plans).map_err(TravelError::Plan)?;
@@ -95,12 +95,6 @@ impl Travel {
         travel.segments =
             segments(&block, &planned, Position::ZERO, length, TICK_S).map_err(TravelError::Segment)?;
         Ok(travel)
-    }
-
-    /// Where it ends.
-    #[must_use]
-    pub fn end(&self) -> [Position; AXES] {
-        self.end
     }
 
     /// Offers what is left to the streams until they are full; whether all of it has entered.
@@ -141,7 +135,7 @@ impl Travel {
             *start = *start + Position::from_mm(mm).ok_or(TravelError::Length(mm))?;
         }
         let length = self.on_path(self.next_piece + 1) - from;
-        Piece::line(self.line, start, self.direction, length).map_err(TravelError::Piece)
+        Piece::line(NO_LINE, start, self.direction, length).map_err(TravelError::Piece)
     }
 
     /// The path position at which piece number `piece` begins; the last one ends exactly at the length.
@@ -163,10 +157,14 @@ fn entered<T>(answer: Result<(), Refused<T>>) -> Result<bool, TravelError> {
 #[cfg(test)]
 mod tests {
     use motion_kernel::exec::{ExecState, Executor};
-    use motion_kernel::queue::Streams;
+    use motion_kernel::queue::{PathRules, Streams};
 
     use super::*;
-    use crate::machine::{FEED_MM_S, RULES};
+    use crate::machine::{Machine, PROGRAM};
+
+    fn rules() -> PathRules {
+        Machine::new(PROGRAM).expect("suits").header().rules
+    }
 
     fn at(mm: [f64; AXES]) -> [Position; AXES] {
         mm.map(|mm| Position::from_mm(mm).expect("in range"))
@@ -175,12 +173,12 @@ mod tests {
     /// Runs the moves one after the other as the board does: one fill, one tick. The ticks that it takes.
     fn run(from: [f64; AXES], to: &[[f64; AXES]], feed_mm_s: f64) -> u32 {
         let mut streams = Streams::<f32, AXES, 64, 64>::new();
-        let (mut feeder, mut intake) = streams.split(RULES, at(from));
+        let (mut feeder, mut intake) = streams.split(rules(), at(from));
         let mut executor = Executor::new(at(from));
         let mut here = at(from);
         let mut ticks = 0;
         for &to in to {
-            let mut travel = Travel::new(1, here, at(to), feed_mm_s).expect("plannable");
+            let mut travel = Travel::new(rules().limits, here, at(to), feed_mm_s).expect("plannable");
             loop {
                 let filled = travel.fill(&mut feeder).expect("accepted");
                 let executed = executor.tick(&mut intake).expect("no fault");
@@ -194,7 +192,7 @@ mod tests {
                     break;
                 }
             }
-            here = travel.end();
+            here = at(to);
         }
         ticks
     }
@@ -215,7 +213,7 @@ mod tests {
             for direction in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.48, -0.64, 0.6]] {
                 let start = [123.456, -78.9, 1000.0];
                 let end = core::array::from_fn(|axis| start[axis] + mm * direction[axis]);
-                run(start, &[end], FEED_MM_S);
+                run(start, &[end], rules().feed_mm_s);
             }
         }
     }
@@ -223,8 +221,9 @@ mod tests {
     #[test]
     fn no_distance_is_done_at_once() {
         let mut streams = Streams::<f32, AXES, 64, 64>::new();
-        let (mut feeder, _intake) = streams.split(RULES, at([1.0; AXES]));
-        let mut travel = Travel::new(1, at([1.0; AXES]), at([1.0; AXES]), 50.0).expect("plannable");
+        let (mut feeder, _intake) = streams.split(rules(), at([1.0; AXES]));
+        let mut travel =
+            Travel::new(rules().limits, at([1.0; AXES]), at([1.0; AXES]), 50.0).expect("plannable");
         assert_eq!(travel.fill(&mut feeder), Ok(true));
     }
 }
