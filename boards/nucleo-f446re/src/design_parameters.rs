@@ -27,8 +27,8 @@ const _: () = assert!(APB1_HZ <= 45_000_000 && APB2_HZ <= 90_000_000);
 
 // --- Tick ------------------------------------------------------------------------------------------
 
-/// Control ticks a second \[Hz\]: the measured machine's 0.5 ms (S4). A drive with a bandwidth of
-/// 100 Hz sees ten samples in its time constant, and the tick leaves most of the processor idle.
+/// Control ticks a second \[Hz\]: the measured machine's 0.5 ms, a twentieth of its axis's time constant of
+/// 9.83 ms (S4).
 pub const TICK_HZ: u32 = 2_000;
 /// The same as a duration \[s\].
 pub const TICK_S: f64 = 1.0 / TICK_HZ as f64;
