@@ -1,0 +1,253 @@
+//! The background: start button, streams, log.
+//!
+//! Consumes the button and what the tick has left in [`Control`]; produces items for the streams. Runs in what
+//! the ticks leave of the processor, one turn after each tick, for ever.
+//!
+//! Its turn begins right behind a tick, with what keeps interrupts off: taking figures out of [`Control`], at
+//! most one line of log (defmt encodes it with interrupts masked). Both are over long before the next
+//! tick, so neither delays any. Then come planning and filling, which may take several ticks and keep
+//! nothing off.
+//!
+//! Fails by disabling the drives and saying why.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m::peripheral::DWT;
+use defmt::{error, info, warn};
+use motion_kernel::exec::ExecState;
+use motion_kernel::fault::Fault;
+use motion_kernel::queue::Feeder;
+use motion_kernel::units::Position;
+use nucleo_f446re::design_parameters::{BUTTON_TICKS, REPORT_TICKS, SETTLE_TICKS, SYSCLK_HZ};
+use nucleo_f446re::machine::{AXES, Machine};
+use nucleo_f446re::program::{Run, RunError};
+use nucleo_f446re::tick_log::TickLog;
+use rtic::Mutex;
+use stm32f4xx_hal::gpio::{Input, PC13};
+
+use crate::control::{Control, Streams};
+
+/// Ticks since the start; counted by the tick.
+pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
+/// Turns of the background; the tick feeds the watchdog only while they are counted.
+pub(crate) static TURNS: AtomicU32 = AtomicU32::new(0);
+
+/// Where the machine is in its day.
+#[allow(clippy::large_enum_variant, reason = "there is one of it, and no heap to put a part of it on")]
+enum Phase {
+    /// Drives off, streams empty, never started. They can be split once, so this is the only phase in which
+    /// the machine may be found at another place than the program expects.
+    Ready(&'static mut Streams),
+    /// The program is entering the streams.
+    Feeding { feeder: Feeder<'static, f32, AXES>, run: Run },
+    /// The program has entered; `ticks_left` until the last of it can be told from never begun.
+    Finishing { feeder: Feeder<'static, f32, AXES>, ticks_left: u32 },
+    /// The program is done, the machine is held at its end.
+    Done { feeder: Feeder<'static, f32, AXES> },
+    /// Drives off until reset.
+    Stopped,
+}
+
+/// What the tick last left.
+#[derive(Clone, Copy)]
+struct Seen {
+    state: ExecState,
+    position: [Position; AXES],
+    fault: Option<Fault<f32>>,
+    healthy: bool,
+}
+
+/// Runs for ever.
+pub(crate) fn run(
+    mut control: impl Mutex<T = Control>,
+    streams: &'static mut Streams,
+    machine: &Machine,
+    button: &PC13<Input>,
+) -> ! {
+    let mut phase = Phase::Ready(streams);
+    let mut press = Press::default();
+    let mut report = Report::default();
+    info!("ready: press the blue button to start");
+    loop {
+        wait_for_tick();
+        TURNS.store(TURNS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        let begin = DWT::cycle_count();
+
+        let seen = control.lock(|control| Seen {
+            state: control.state,
+            position: control.position,
+            fault: control.kernel.fault(),
+            healthy: control.healthy,
+        });
+        let pressed = press.is_new(button.is_low());
+        let before = core::mem::discriminant(&phase);
+        phase = turn(phase, seen, pressed, machine, &mut control);
+        // A change of phase has had its line.
+        if core::mem::discriminant(&phase) == before && !pressed {
+            report.line(&mut control);
+        }
+        phase = feed(phase, &mut control);
+
+        report.longest_turn_cycles = report.longest_turn_cycles.max(DWT::cycle_count().wrapping_sub(begin));
+    }
+}
+
+/// Returns when a tick has just ended. (Not with `wfi`: in sleep the probe can't read the log.)
+fn wait_for_tick() {
+    let before = TICKS.load(Ordering::Relaxed);
+    while TICKS.load(Ordering::Relaxed) == before {
+        core::hint::spin_loop();
+    }
+}
+
+/// What follows from what the tick has left, and from the button. At most one line of log.
+fn turn(
+    phase: Phase,
+    seen: Seen,
+    pressed: bool,
+    machine: &Machine,
+    control: &mut impl Mutex<T = Control>,
+) -> Phase {
+    match phase {
+        Phase::Stopped => Phase::Stopped,
+        Phase::Ready(streams) if pressed => start(streams, seen.healthy, machine, control),
+        Phase::Ready(streams) => Phase::Ready(streams),
+        Phase::Feeding { .. } | Phase::Finishing { .. } | Phase::Done { .. } if seen.fault.is_some() => {
+            error!("stopped: {}; reset the board to go on", seen.fault);
+            Phase::Stopped
+        }
+        Phase::Feeding { .. } | Phase::Finishing { .. } if pressed && seen.state == ExecState::Stopped => {
+            control.lock(|control| control.kernel.resume());
+            info!("program stop ended");
+            phase
+        }
+        Phase::Feeding { .. } => phase,
+        Phase::Finishing { feeder, ticks_left: 0 } if seen.state == ExecState::Idle => {
+            info!("done: press the blue button to run again");
+            Phase::Done { feeder }
+        }
+        Phase::Finishing { feeder, ticks_left } => {
+            Phase::Finishing { feeder, ticks_left: ticks_left.saturating_sub(1) }
+        }
+        // At rest the set position is exactly where the streams ended.
+        Phase::Done { feeder } if pressed => run_program(feeder, seen.position, machine, control),
+        Phase::Done { .. } => phase,
+    }
+}
+
+/// The first start: takes the actual position, gives the streams to the tick, enables the drives.
+fn start(
+    streams: &'static mut Streams,
+    healthy: bool,
+    machine: &Machine,
+    control: &mut impl Mutex<T = Control>,
+) -> Phase {
+    if !healthy {
+        warn!("not started: the emergency stop is open or a drive is not ready");
+        return Phase::Ready(streams);
+    }
+    // With the faults of a machine that was not ready yet.
+    let here = control.lock(|control| control.kernel.clear_fault());
+    let (feeder, intake) = streams.split(machine.header().rules, here);
+    control.lock(|control| {
+        control.intake = intake;
+        control.kernel.enable(SETTLE_TICKS);
+    });
+    run_program(feeder, here, machine, control)
+}
+
+/// Begins a run of the program from `here`.
+fn run_program(
+    feeder: Feeder<'static, f32, AXES>,
+    here: [Position; AXES],
+    machine: &Machine,
+    control: &mut impl Mutex<T = Control>,
+) -> Phase {
+    match Run::new(machine, here) {
+        Ok(run) => {
+            info!("started: from {=[?]} mm", here.map(Position::to_mm));
+            Phase::Feeding { feeder, run }
+        }
+        Err(error) => refused(error, control),
+    }
+}
+
+/// Fills the streams as far as they have room.
+fn feed(phase: Phase, control: &mut impl Mutex<T = Control>) -> Phase {
+    let Phase::Feeding { mut feeder, mut run } = phase else { return phase };
+    match run.fill(&mut feeder) {
+        Ok(false) => Phase::Feeding { feeder, run },
+        // Idle means done only when the drives have settled and a tick has seen the last item.
+        Ok(true) => Phase::Finishing { feeder, ticks_left: SETTLE_TICKS + 2 },
+        Err(error) => refused(error, control),
+    }
+}
+
+/// The program can't go on: nothing of it may.
+fn refused(error: RunError, control: &mut impl Mutex<T = Control>) -> Phase {
+    control.lock(|control| control.kernel.disable());
+    error!("program refused: {}", error);
+    Phase::Stopped
+}
+
+/// The button, debounced.
+#[derive(Default)]
+struct Press {
+    ticks: u32,
+}
+
+impl Press {
+    /// Whether it has just been held for long enough. Once a turn.
+    fn is_new(&mut self, down: bool) -> bool {
+        self.ticks = if down { self.ticks.saturating_add(1) } else { 0 };
+        self.ticks == BUTTON_TICKS
+    }
+}
+
+/// The figures that are logged once a second, a line a turn.
+#[derive(Default)]
+struct Report {
+    next_ticks: u32,
+    step: u8,
+    overruns: u32,
+    longest_turn_cycles: u32,
+}
+
+impl Report {
+    fn line(&mut self, control: &mut impl Mutex<T = Control>) {
+        match self.step {
+            0 => {
+                let ticks = TICKS.load(Ordering::Relaxed);
+                // Across the wrap of the counter too.
+                if self.next_ticks.wrapping_sub(ticks).wrapping_sub(1) < REPORT_TICKS {
+                    return;
+                }
+                self.next_ticks = ticks.wrapping_add(REPORT_TICKS);
+                let log = control.lock(|control| control.log.take());
+                self.tick(&log);
+            }
+            1 => {
+                let peaks_mm = control.lock(|control| control.kernel.take_peak_following_error_mm());
+                info!("peak following error {=[?]} um", peaks_mm.map(|mm| 1e3 * mm));
+            }
+            _ => {
+                let us = core::mem::take(&mut self.longest_turn_cycles) / (SYSCLK_HZ / 1_000_000);
+                info!("longest background turn {=u32} us", us);
+            }
+        }
+        self.step = (self.step + 1) % 3;
+    }
+
+    fn tick(&mut self, log: &TickLog) {
+        self.overruns = self.overruns.saturating_add(log.overruns);
+        info!(
+            "tick cycles min {=u32} max {=u32} last {=u32}, latency {=u32} to {=u32}, overruns {=u32}",
+            log.min_cycles,
+            log.max_cycles,
+            log.last_cycles,
+            log.min_latency_cycles,
+            log.max_latency_cycles,
+            self.overruns
+        );
+    }
+}

@@ -1,0 +1,133 @@
+//! The board from reset to its first tick: pins, clocks, peripherals.
+//!
+//! Consumes the peripherals, once; produces what the tick and the background own. Before anything else the
+//! enables become outputs and low, which their pull-downs have held them at since reset. Panics where the
+//! hardware is not as `design_parameters.rs` says; nothing is enabled then. Without the ST-LINK's clock it
+//! waits for it for ever, with everything off.
+
+use defmt::{info, unwrap};
+use embedded_hal_bus::spi::ExclusiveDevice;
+use motion_kernel::hal::Ad5754Output;
+use nucleo_f446re::design_parameters::{
+    APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, HSE_HZ, SYSCLK_HZ, WATCHDOG_MS,
+};
+use stm32f4xx_hal::gpio::{Input, Output, PA10, PC13, Speed};
+use stm32f4xx_hal::pac::{self, SPI2};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::Config;
+use stm32f4xx_hal::spi::{Spi, SpiExt};
+use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+use crate::dac::{self, Sync};
+use crate::drives::Drives;
+use crate::encoders::Encoders;
+use crate::hal::Hardware;
+use crate::tick_timer::TickTimer;
+
+/// Everything the firmware uses, ready to tick.
+pub(crate) struct Board {
+    pub(crate) hardware: Hardware,
+    pub(crate) tick_timer: TickTimer,
+    pub(crate) watchdog: IndependentWatchdog,
+    /// High while the tick runs.
+    pub(crate) scope: PA10<Output>,
+    /// B1: low while it is pressed (the board has the pull-up).
+    pub(crate) button: PC13<Input>,
+}
+
+impl Board {
+    /// Sets the board up. Takes a few milliseconds; the tick's timer and the watchdog do not run yet.
+    pub(crate) fn new(device: pac::Peripherals, mut core: cortex_m::Peripherals) -> Self {
+        let mut rcc = device.RCC.constrain();
+        let gpioa = device.GPIOA.split(&mut rcc);
+        let gpiob = device.GPIOB.split(&mut rcc);
+        let gpioc = device.GPIOC.split(&mut rcc);
+        let gpiod = device.GPIOD.split(&mut rcc);
+
+        let drives = Drives {
+            enables: [
+                gpioc.pc8.into_push_pull_output().erase(),
+                gpioc.pc6.into_push_pull_output().erase(),
+                gpioc.pc5.into_push_pull_output().erase(),
+            ],
+            ready: [
+                gpioc.pc10.into_pull_up_input().erase(),
+                gpioc.pc11.into_pull_up_input().erase(),
+                gpioc.pc12.into_pull_up_input().erase(),
+            ],
+            emergency_stop: gpiod.pd2.into_pull_up_input().erase(),
+        };
+
+        let after_watchdog = rcc.csr().read().wdgrstf().bit_is_set();
+        rcc.csr().modify(|_, w| w.rmvf().set_bit());
+        // Flash wait states, prefetch and both caches are set by the HAL on the way (RM0390 section 3.4).
+        let mut rcc = rcc.freeze(
+            Config::hse(HSE_HZ.Hz())
+                .bypass_hse_oscillator()
+                .sysclk(SYSCLK_HZ.Hz())
+                .pclk1(APB1_HZ.Hz())
+                .pclk2(APB2_HZ.Hz()),
+        );
+        let clocks = &rcc.clocks;
+        defmt::assert_eq!(clocks.sysclk().raw(), SYSCLK_HZ);
+        defmt::assert_eq!(clocks.pclk1().raw(), APB1_HZ);
+        defmt::assert_eq!(clocks.pclk2().raw(), APB2_HZ);
+        defmt::assert_eq!(clocks.timclk1().raw(), APB1_TIMER_HZ);
+        defmt::assert_eq!(clocks.timclk2().raw(), APB2_TIMER_HZ);
+        info!("nucleo-f446re: {=u32} MHz, {=str}", SYSCLK_HZ / 1_000_000, start_cause(after_watchdog));
+
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+
+        let encoders = Encoders::new(
+            (device.TIM5, gpioa.pa0.into(), gpioa.pa1.into()),
+            (device.TIM2, gpiob.pb8.into(), gpiob.pb9.into()),
+            (device.TIM3, gpioa.pa6.into(), gpioa.pa7.into()),
+            &mut rcc,
+        );
+
+        // Edges of 21 MHz need the second fastest drive strength (DS10693, I/O AC characteristics).
+        let clock = gpiob.pb13.into_alternate::<5>().speed(Speed::High);
+        let data = gpiob.pb15.into_alternate::<5>().speed(Speed::High);
+        let mut sync = gpiob.pb12.into_push_pull_output_in_state(stm32f4xx_hal::gpio::PinState::High);
+        sync.set_speed(Speed::High);
+        let bus = Spi::new(
+            device.SPI2,
+            (Some(clock), SPI2::NoMiso, Some(data)),
+            dac::MODE,
+            dac::CLOCK_HZ.Hz(),
+            &mut rcc,
+        );
+        let spi = unwrap!(ExclusiveDevice::new_no_delay(bus, Sync(sync)).ok(), "SYNC can't fail");
+        let mut delay = core.SYST.delay(&rcc.clocks);
+        let outputs = match Ad5754Output::setup(spi, &mut delay) {
+            Ok(outputs) => outputs,
+            Err(error) => defmt::panic!("converter: {}", defmt::Debug2Format(&error)),
+        };
+
+        let watchdog = IndependentWatchdog::new(device.IWDG);
+        // Not even the debugger stops it: a halted processor with drives enabled is just what it is for.
+        watchdog.stop_on_debug(&device.DBGMCU, false);
+
+        Self {
+            hardware: Hardware { encoders, outputs, drives },
+            tick_timer: TickTimer::new(device.TIM7, &mut rcc),
+            watchdog,
+            scope: gpioa.pa10.into_push_pull_output(),
+            button: gpioc.pc13.into_input(),
+        }
+    }
+
+    /// Starts the watchdog, then the tick, which has to feed it.
+    pub(crate) fn start(tick_timer: &mut TickTimer, watchdog: &mut IndependentWatchdog) {
+        watchdog.start(WATCHDOG_MS.millis());
+        // Its registers take five periods of the LSI to take their values (RM0390, IWDG_SR): 0.3 ms at most.
+        cortex_m::asm::delay(SYSCLK_HZ / 2000);
+        defmt::assert_eq!(watchdog.interval().ticks(), WATCHDOG_MS);
+        tick_timer.start();
+    }
+}
+
+fn start_cause(after_watchdog: bool) -> &'static str {
+    if after_watchdog { "RESET BY THE WATCHDOG" } else { "started" }
+}

@@ -1,0 +1,52 @@
+//! The AD5754 on SPI2: bus, chip select, and the kernel's adapter over them.
+//!
+//! Consumes nothing but pins; produces the outputs of three axes at 0 V. Four frames a tick, each with its own
+//! SYNC; the last one loads all outputs at once (LDAC is wired high). Polled: while a burst runs the processor
+//! has nothing else to do in the tick, and a transfer by DMA would cost as much to set up. It can't hang
+//! the board: the bus is clocked by this side, and behind it is the watchdog.
+
+use core::convert::Infallible;
+
+use embedded_hal::digital::{ErrorType, OutputPin};
+use embedded_hal::spi::{MODE_1, Mode};
+use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
+use motion_kernel::hal::Ad5754Output;
+use nucleo_f446re::design_parameters::{SPI_HZ, SYNC_HIGH_CYCLES};
+use nucleo_f446re::machine::AXES;
+use stm32f4xx_hal::gpio::{Output, PB12};
+use stm32f4xx_hal::pac::SPI2;
+use stm32f4xx_hal::spi::Spi;
+
+/// The converter takes a bit at every falling edge of SCLK, 24 of them while SYNC is low (AD5754, serial
+/// interface, standalone operation). Both modes 1 and 2 give that. Mode 1 it is: the clock rests low, so the
+/// 24th falling edge is the last edge of all and nothing is left of the clock when SYNC rises.
+pub(crate) const MODE: Mode = MODE_1;
+
+/// SCLK. One for both `Mode` types.
+pub(crate) const CLOCK_HZ: u32 = SPI_HZ;
+
+/// SYNC, which stays high for as long as the converter needs between two frames.
+pub(crate) struct Sync(pub(crate) PB12<Output>);
+
+impl ErrorType for Sync {
+    type Error = Infallible;
+}
+
+impl OutputPin for Sync {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.0.set_low();
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.0.set_high();
+        cortex_m::asm::delay(SYNC_HIGH_CYCLES);
+        Ok(())
+    }
+}
+
+/// The converter on a bus of its own.
+pub(crate) type Device = ExclusiveDevice<Spi<SPI2>, Sync, NoDelay>;
+
+/// The outputs of all axes.
+pub(crate) type Outputs = Ad5754Output<Device, AXES>;

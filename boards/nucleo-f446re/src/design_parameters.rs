@@ -1,0 +1,181 @@
+//! Every number of the firmware, with its derivation.
+//!
+//! Consumes the manuals: RM0390 (reference manual of the STM32F446), DS10693 (its data sheet), UM1724
+//! (the board), AD5754 (the converter's data sheet). Produces constants. What one constant must be to
+//! another is asserted at compile time; margins are in the tests below.
+//!
+//! To change the tick, change [`TICK_HZ`]: the rest follows or does not compile.
+
+// --- Clock tree: RM0390 section 6.2, limits DS10693 section 6.3.1 ---------------------------------
+
+/// Clock from the ST-LINK's MCO at OSC_IN, oscillator bypassed (UM1724, "OSC clock supply") \[Hz\].
+pub const HSE_HZ: u32 = 8_000_000;
+/// Core and AHB \[Hz\]: the fastest without over-drive (DS10693: 168 MHz at regulator scale 1).
+pub const SYSCLK_HZ: u32 = 168_000_000;
+/// APB1: SPI2 \[Hz\]. At most 45 MHz; AHB / 4.
+pub const APB1_HZ: u32 = 42_000_000;
+/// APB2 \[Hz\]. At most 90 MHz; AHB / 2. Nothing here uses it; it is set so that it is known.
+pub const APB2_HZ: u32 = 84_000_000;
+/// Timers on APB1: TIM2, TIM3, TIM5, TIM7 \[Hz\]. Twice the bus where its prescaler is not 1 (RM0390
+/// section 6.2, TIMPRE = 0).
+pub const APB1_TIMER_HZ: u32 = 2 * APB1_HZ;
+/// Timers on APB2 \[Hz\].
+pub const APB2_TIMER_HZ: u32 = 2 * APB2_HZ;
+
+const _: () = assert!(SYSCLK_HZ == 4 * APB1_HZ && SYSCLK_HZ == 2 * APB2_HZ);
+const _: () = assert!(APB1_HZ <= 45_000_000 && APB2_HZ <= 90_000_000);
+
+// --- Tick ------------------------------------------------------------------------------------------
+
+/// Control ticks a second \[Hz\]: the measured machine's 0.5 ms, a twentieth of its axis's time constant of
+/// 9.83 ms (S4).
+pub const TICK_HZ: u32 = 2_000;
+/// The same as a duration \[s\].
+pub const TICK_S: f64 = 1.0 / TICK_HZ as f64;
+/// Prescaler register of the tick's timer, TIM7: counts at [`APB1_TIMER_HZ`], 11.9 ns, which is also the
+/// resolution of the measured latency.
+pub const TICK_TIMER_PRESCALER: u16 = 0;
+/// Reload register: period − 1.
+pub const TICK_TIMER_RELOAD: u16 = (APB1_TIMER_HZ / TICK_HZ - 1) as u16;
+/// Core cycles a tick.
+pub const TICK_CYCLES: u32 = SYSCLK_HZ / TICK_HZ;
+/// Priority of the tick's interrupt as RTIC counts it: 16 is the highest of the processor's 16 levels,
+/// the NVIC's 0 (DS10693: 4 bits). The only interrupt; `main.rs` repeats it, where only a literal may stand.
+pub const TICK_PRIORITY: u8 = 16;
+
+const _: () = assert!(APB1_TIMER_HZ.is_multiple_of(TICK_HZ), "the period would not be exact");
+const _: () = assert!(APB1_TIMER_HZ / TICK_HZ <= 1 << 16, "the period does not fit the timer");
+
+// --- Converter -------------------------------------------------------------------------------------
+
+/// SPI clock \[Hz\]: APB1 / 2. AD5754, timing characteristics: at most 30 MHz (t1 at least 33 ns, t2 and
+/// t3 at least 13 ns each). 21 MHz has 47.6 ns and 23.8 ns.
+pub const SPI_HZ: u32 = APB1_HZ / 2;
+/// The converter's greatest SPI clock \[Hz\].
+pub const SPI_MAX_HZ: u32 = 30_000_000;
+/// Frames a tick: one for each axis and the load command.
+pub const DAC_FRAMES_PER_TICK: u32 = 3 + 1;
+/// Bits of a frame.
+pub const DAC_FRAME_BITS: u32 = 24;
+/// Time the clock runs for the frames of one tick \[ns\]: 96 bits at 21 MHz, 4.57 µs. The processor feeds the
+/// bytes and switches SYNC; with that the burst takes about twice as long (to be seen on SYNC with a scope).
+pub const DAC_BURST_CLOCK_NS: u32 =
+    (1_000_000_000_u64 * (DAC_FRAMES_PER_TICK * DAC_FRAME_BITS) as u64 / SPI_HZ as u64) as u32;
+/// Least time that SYNC must be high between two frames \[ns\] (AD5754, t6 in write mode).
+pub const SYNC_HIGH_NS: u32 = 100;
+/// The same in core cycles, rounded up.
+pub const SYNC_HIGH_CYCLES: u32 = (SYSCLK_HZ as u64 * SYNC_HIGH_NS as u64).div_ceil(1_000_000_000) as u32;
+
+const _: () = assert!(SPI_HZ <= SPI_MAX_HZ);
+
+// --- Encoders --------------------------------------------------------------------------------------
+
+/// Samples that must agree before the input filter passes a level: ICxF = 0100 (RM0390, TIMx_CCMR1).
+pub const ENCODER_FILTER_SAMPLES: u32 = 6;
+/// Sampling clock of that filter \[Hz\]: f_DTS / 2, where f_DTS is the timer's clock (CKD = 0).
+pub const ENCODER_FILTER_HZ: u32 = APB1_TIMER_HZ / 2;
+/// The longest pulse that the filter is sure to remove \[ns\]: shorter than N − 1 sampling periods.
+pub const ENCODER_FILTER_REMOVES_NS: u32 =
+    ((ENCODER_FILTER_SAMPLES - 1) as u64 * 1_000_000_000 / ENCODER_FILTER_HZ as u64) as u32;
+/// Counts a second that are sure to pass \[1/s\]: one count lasts N + 1 sampling periods, so that A and B
+/// may be any part of a count out of step. An ideal encoder passes at twice that rate.
+pub const ENCODER_COUNTS_PER_S_MAX: u32 = ENCODER_FILTER_HZ / (ENCODER_FILTER_SAMPLES + 1);
+/// Bits of the narrowest counter: TIM3's.
+pub const ENCODER_BITS_MIN: u32 = 16;
+
+// --- Watchdog and background -----------------------------------------------------------------------
+
+/// Nominal timeout of the independent watchdog \[ms\], at 32 kHz. Nothing else stops the outputs when the
+/// processor stops, so it is short: a drive at full speed goes on for at most [`WATCHDOG_MAX_NS`].
+pub const WATCHDOG_MS: u32 = 5;
+/// What the HAL makes of it: prescaler and counts.
+pub const WATCHDOG_PRESCALER: u32 = 32;
+/// Counts of the watchdog until it resets.
+pub const WATCHDOG_COUNTS: u32 = 5;
+/// Range of the LSI oscillator over parts and temperature \[Hz\] (DS10693, LSI characteristics).
+pub const LSI_MIN_HZ: u32 = 17_000;
+/// The upper end \[Hz\].
+pub const LSI_MAX_HZ: u32 = 47_000;
+/// Least time to the reset \[ns\]: the prescaler runs free, so the first count may be cut.
+pub const WATCHDOG_MIN_NS: u32 =
+    ((WATCHDOG_COUNTS - 1) as u64 * WATCHDOG_PRESCALER as u64 * 1_000_000_000 / LSI_MAX_HZ as u64) as u32;
+/// Greatest time to the reset \[ns\].
+pub const WATCHDOG_MAX_NS: u32 =
+    (WATCHDOG_COUNTS as u64 * WATCHDOG_PRESCALER as u64 * 1_000_000_000 / LSI_MIN_HZ as u64) as u32;
+/// For so long the background may be silent before the tick stops feeding the watchdog \[ticks\]: 0.1 s. Its
+/// longest turn refills both streams, 126 items of some 20 000 cycles (double precision in software):
+/// 15 ms. The log's "background turn" is the measurement.
+pub const BACKGROUND_SILENT_TICKS_MAX: u32 = TICK_HZ / 10;
+
+/// How long the machine is held still after the drives are enabled \[ticks\]: 0.2 s for their relays and brakes.
+pub const SETTLE_TICKS: u32 = TICK_HZ / 5;
+/// How long the button must be held to count \[ticks\]: 20 ms, longer than its contacts bounce.
+pub const BUTTON_TICKS: u32 = TICK_HZ / 50;
+/// How often the background reports \[ticks\]: once a second.
+pub const REPORT_TICKS: u32 = TICK_HZ;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::{Machine, PROGRAM};
+
+    fn machine() -> Machine {
+        Machine::new(PROGRAM).expect("suits")
+    }
+
+    #[test]
+    fn the_pll_makes_the_core_clock_within_its_ranges() {
+        // What the HAL chooses: M = 4, N = 168, P = 2. RM0390, RCC_PLLCFGR: input 1 to 2 MHz, output of the
+        // VCO 100 to 432 MHz.
+        let (input_hz, vco_hz) = (HSE_HZ / 4, HSE_HZ / 4 * 168);
+        assert!((1_000_000..=2_000_000).contains(&input_hz));
+        assert!((100_000_000..=432_000_000).contains(&vco_hz));
+        assert_eq!(vco_hz / 2, SYSCLK_HZ);
+        assert_eq!((APB1_TIMER_HZ, APB2_TIMER_HZ), (84_000_000, 168_000_000));
+    }
+
+    #[test]
+    fn the_tick_is_exact() {
+        let period = u32::from(TICK_TIMER_RELOAD) + 1;
+        assert_eq!(period * (u32::from(TICK_TIMER_PRESCALER) + 1) * TICK_HZ, APB1_TIMER_HZ);
+        assert_eq!(TICK_CYCLES * TICK_HZ, SYSCLK_HZ);
+        // As a number it is the measured machine's, to the bit.
+        assert_eq!(TICK_S.to_bits(), 0.0005_f64.to_bits());
+    }
+
+    #[test]
+    fn the_converter_burst_is_a_small_part_of_the_tick() {
+        assert_eq!(DAC_BURST_CLOCK_NS, 4571);
+        // Even at four times its clock time it is below a twentieth of the tick.
+        const { assert!(4 * DAC_BURST_CLOCK_NS < 1_000_000_000 / TICK_HZ / 20) };
+        assert_eq!(SYNC_HIGH_CYCLES, 17);
+    }
+
+    #[test]
+    fn encoders_count_twice_the_fastest_axis() {
+        let header = *machine().header();
+        let fastest_per_s = header.rules.feed_mm_s / header.axes[0].mm_per_count;
+        assert!(f64::from(ENCODER_COUNTS_PER_S_MAX) >= 2.0 * fastest_per_s, "{fastest_per_s}");
+        assert_eq!(ENCODER_COUNTS_PER_S_MAX, 6_000_000);
+        assert_eq!(ENCODER_FILTER_REMOVES_NS, 119);
+    }
+
+    #[test]
+    fn a_sixteen_bit_counter_never_wraps_unseen() {
+        // Ten times in hand even at the rate that the filter passes at most.
+        let counts_per_tick = ENCODER_COUNTS_PER_S_MAX / TICK_HZ;
+        assert!(10 * counts_per_tick < 1 << (ENCODER_BITS_MIN - 1));
+    }
+
+    #[test]
+    fn the_watchdog_spans_ticks_but_not_many() {
+        let tick_ns = 1_000_000_000 / TICK_HZ;
+        // It must live through a tick that overruns; it must reset before the machine has gone far.
+        assert!(WATCHDOG_MIN_NS >= 5 * tick_ns, "{WATCHDOG_MIN_NS}");
+        const { assert!(WATCHDOG_MAX_NS <= 10_000_000) };
+        let path_mm = machine().header().rules.feed_mm_s * f64::from(WATCHDOG_MAX_NS) * 1e-9;
+        assert!(path_mm < 3.0, "{path_mm}");
+        // As the HAL computes them from the timeout.
+        assert_eq!(WATCHDOG_COUNTS * WATCHDOG_PRESCALER / 32, WATCHDOG_MS);
+    }
+}

@@ -1,0 +1,28 @@
+//! What of the board's firmware can be tested without the board.
+//!
+//! - [`design_parameters`]: every number of the firmware with its derivation;
+//! - [`pins`]: which signal is on which pin;
+//! - [`machine`]: the program in flash and the axes it is for;
+//! - [`travel`] and [`program`]: what the start button runs;
+//! - [`tick_log`] and [`liveness`]: what the tick keeps about itself.
+//!
+//! The firmware itself is `main.rs` and the modules beside it. From the board's folder:
+//!
+//! ```console
+//! cargo test --lib --target x86_64-unknown-linux-gnu
+//! ```
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+// No panic path in what runs on a board; tests may.
+#![cfg_attr(
+    not(test),
+    deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)
+)]
+
+pub mod design_parameters;
+pub mod pins;
+pub mod machine;
+pub mod travel;
+pub mod program;
+pub mod tick_log;
+pub mod liveness;

@@ -1,0 +1,117 @@
+//! The machine that the board drives: the one that its program was compiled for.
+//!
+//! Consumes the program in flash, which `motion compile` wrote with the machine's scales, gains and limits;
+//! produces the kernel's configuration, once, before the first tick. So there is one description of the
+//! machine, its file on the PC, and the board checks here what only it can know. A program that is damaged or
+//! does not suit the board is refused before anything is enabled.
+
+use motion_kernel::axis::{AxisConfig, ScaleError};
+use motion_kernel::program::{Header, ProgramError, Reader};
+
+use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
+
+/// Number of axes: X, Y, Z.
+pub const AXES: usize = 3;
+
+/// The program in flash: `program/stringer.bin`, the host's `stringer.ngc` for the reference machine, or what
+/// `MOTION_PROGRAM` named when this was built.
+pub static PROGRAM: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/program.bin"));
+
+/// Why the board can't run a program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(target_arch = "arm", derive(defmt::Format))]
+pub enum MachineError {
+    /// The bytes are no program for it.
+    Program(ProgramError),
+    /// The program is for another tick \[s\].
+    Tick {
+        /// The program's.
+        found: f64,
+        /// The board's.
+        expected: f64,
+    },
+    /// An axis would count faster than its input filter is sure to pass.
+    CountRate {
+        /// The axis, from 0.
+        axis: usize,
+        /// At twice the greatest feed, for what an axis does beyond its set-point \[1/s\].
+        counts_per_s: f64,
+        /// What passes \[1/s\].
+        limit: f64,
+    },
+    /// A figure of an axis is out of its range.
+    Scale(ScaleError),
+}
+
+/// A program that suits the board, and its machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Machine {
+    /// All of the program's items.
+    pub program: Reader<'static, AXES>,
+    /// The kernel's axes.
+    pub axes: [AxisConfig<f32>; AXES],
+}
+
+impl Machine {
+    /// The machine of the program in `bytes`.
+    ///
+    /// # Errors
+    /// [`MachineError`].
+    pub fn new(bytes: &'static [u8]) -> Result<Self, MachineError> {
+        let program = Reader::new(bytes).map_err(MachineError::Program)?;
+        let Header { tick_s, rules, axes, .. } = program.header();
+        // To the bit: both are the same decimal, or they are different ticks.
+        if *tick_s != TICK_S {
+            return Err(MachineError::Tick { found: *tick_s, expected: TICK_S });
+        }
+        let limit = f64::from(ENCODER_COUNTS_PER_S_MAX);
+        for (axis, figures) in axes.iter().enumerate() {
+            let counts_per_s = 2.0 * rules.feed_mm_s / figures.mm_per_count.abs();
+            if !(counts_per_s <= limit) {
+                return Err(MachineError::CountRate { axis, counts_per_s, limit });
+            }
+        }
+        let config = |figures| AxisConfig::new(figures, TICK_S).map_err(MachineError::Scale);
+        let [x, y, z] = axes;
+        Ok(Self { axes: [config(x)?, config(y)?, config(z)?], program })
+    }
+
+    /// What the program was planned for.
+    #[must_use]
+    pub fn header(&self) -> &Header<AXES> {
+        self.program.header()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motion_kernel::program::write;
+
+    use super::*;
+
+    /// The machine of the program with a changed header.
+    fn with(change: impl Fn(&mut Header<AXES>)) -> Result<Machine, MachineError> {
+        let mut header = *Machine::new(PROGRAM).expect("suits").header();
+        change(&mut header);
+        let mut bytes = Vec::new();
+        write(&header, &[], &mut bytes).expect("short");
+        Machine::new(bytes.leak())
+    }
+
+    #[test]
+    fn the_program_in_flash_suits() {
+        Machine::new(PROGRAM).expect("suits");
+    }
+
+    #[test]
+    fn others_are_refused() {
+        let slow = with(|header| header.tick_s = 0.001).map(|_| ());
+        assert_eq!(slow, Err(MachineError::Tick { found: 0.001, expected: TICK_S }));
+        let fine = with(|header| header.axes[1].mm_per_count = -5e-5).map(|_| ());
+        let expected = MachineError::CountRate { axis: 1, counts_per_s: 1.2e7, limit: 6e6 };
+        assert_eq!(fine, Err(expected));
+        let still = with(|header| header.axes[2].mm_s_at_10_v = 0.0).map(|_| ());
+        assert!(matches!(still, Err(MachineError::Scale(_))));
+        assert!(matches!(Machine::new(&PROGRAM[1..]), Err(MachineError::Program(_))));
+    }
+}

@@ -1,0 +1,148 @@
+//! Firmware: the motion kernel on an ST NUCLEO-F446RE, three axes.
+//!
+//! ```text
+//! TIM7 ─► tick (the only interrupt)                      background (idle)
+//!         drives: emergency stop, ready   ── Control ──  button, log
+//!         encoders ─► kernel ─► converter ◄─ streams ──  program
+//!         watchdog ◄───────────────────────── turns ───
+//! ```
+//!
+//! The tick is a hardware task with a static priority and nothing above it: its latest end is its own
+//! longest time after the timer's event, plus the longest time for which the background keeps interrupts off.
+//! `README.md` has wiring, bring-up and what to expect; `design_parameters.rs` every number.
+#![no_std]
+#![no_main]
+// No panic path in the tick.
+#![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
+
+mod board;
+mod encoders;
+mod dac;
+mod drives;
+mod hal;
+mod tick_timer;
+mod control;
+mod background;
+
+use core::sync::atomic::Ordering;
+
+use defmt_rtt as _;
+use panic_probe as _;
+
+// The tick's number before every line of the log.
+defmt::timestamp!("{=u32}", background::TICKS.load(Ordering::Relaxed));
+
+#[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
+mod app {
+    use core::sync::atomic::Ordering;
+
+    use cortex_m::peripheral::DWT;
+    use motion_kernel::exec::ExecState;
+    use motion_kernel::kernel::Kernel;
+    use nucleo_f446re::design_parameters::TICK_PRIORITY;
+    use nucleo_f446re::liveness::Liveness;
+    use nucleo_f446re::machine::{AXES, Machine, PROGRAM};
+    use nucleo_f446re::tick_log::TickLog;
+    use stm32f4xx_hal::gpio::{Input, Output, PA10, PC13};
+    use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+    use crate::background::{self, TICKS, TURNS};
+    use crate::board::Board;
+    use crate::control::{Control, Streams};
+    use crate::hal::Hardware;
+    use crate::tick_timer::TickTimer;
+
+    /// Shared by tick and background.
+    #[shared]
+    struct Shared {
+        control: Control,
+    }
+
+    /// Owned by one of them.
+    #[local]
+    struct Local {
+        hardware: Hardware,
+        tick_timer: TickTimer,
+        watchdog: IndependentWatchdog,
+        liveness: Liveness,
+        scope: PA10<Output>,
+        button: PC13<Input>,
+        streams: &'static mut Streams,
+        machine: Machine,
+    }
+
+    #[init(local = [
+        storage: Streams = Streams::new(),
+        // Nothing ever enters it: what the kernel looks at until there is a program.
+        empty: motion_kernel::queue::Streams<f32, AXES, 2, 2> = motion_kernel::queue::Streams::new(),
+    ])]
+    fn init(cx: init::Context) -> (Shared, Local) {
+        let Board { mut hardware, mut tick_timer, mut watchdog, scope, button } =
+            Board::new(cx.device, cx.core);
+        let machine = defmt::unwrap!(Machine::new(PROGRAM));
+        // Where the machine stands is called the program's start.
+        let start = machine.header().start;
+        let kernel = Kernel::new(machine.axes, start, hardware.encoders.latch());
+        let (_, intake) = cx.local.empty.split(machine.header().rules, start);
+        let control = Control {
+            kernel,
+            intake,
+            state: ExecState::Idle,
+            position: start,
+            healthy: false,
+            log: TickLog::new(),
+        };
+        Board::start(&mut tick_timer, &mut watchdog);
+        let local = Local {
+            hardware,
+            tick_timer,
+            watchdog,
+            liveness: Liveness::new(),
+            scope,
+            button,
+            streams: cx.local.storage,
+            machine,
+        };
+        (Shared { control }, local)
+    }
+
+    const _: () = assert!(TICK_PRIORITY == 16, "repeated as a literal below");
+
+    /// One control tick.
+    #[task(
+        binds = TIM7,
+        priority = 16,
+        local = [hardware, tick_timer, watchdog, liveness, scope],
+        shared = [control]
+    )]
+    fn tick(mut cx: tick::Context) {
+        let begin = DWT::cycle_count();
+        let latency_cycles = cx.local.tick_timer.take();
+        let hardware = cx.local.hardware;
+        cx.local.scope.set_high();
+        cx.shared.control.lock(|control| {
+            let Control { kernel, intake, .. } = control;
+            let fault = hardware.drives.check();
+            if let Some(kind) = fault {
+                kernel.trip(kind);
+            }
+            let trace = kernel.tick(intake, hardware);
+            control.healthy = fault.is_none();
+            control.state = trace.executed.state;
+            control.position = trace.executed.setpoints.map(|setpoint| setpoint.position);
+            if cx.local.liveness.may_feed(TURNS.load(Ordering::Relaxed)) {
+                cx.local.watchdog.feed();
+            }
+            let overrun = cx.local.tick_timer.due_again();
+            control.log.add(DWT::cycle_count().wrapping_sub(begin), latency_cycles, overrun);
+        });
+        TICKS.store(TICKS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        cx.local.scope.set_low();
+    }
+
+    /// The background.
+    #[idle(local = [streams, button, machine], shared = [control])]
+    fn idle(cx: idle::Context) -> ! {
+        background::run(cx.shared.control, cx.local.streams, cx.local.machine, cx.local.button)
+    }
+}
