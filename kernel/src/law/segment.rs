@@ -168,11 +168,11 @@ const fn portion(length: i64, fraction: u32) -> i64 {
     high.wrapping_add(low as i64)
 }
 
-/// The product of two fractions in 2⁻³².
+/// The product of two fractions in 2⁻³², rounded up: the fractions themselves have been rounded down.
 #[inline]
 #[allow(clippy::cast_possible_truncation)]
 const fn times(a: u32, b: u32) -> u32 {
-    ((a as u64).wrapping_mul(b as u64) >> 32) as u32
+    ((a as u64).wrapping_mul(b as u64).wrapping_add(0xFFFF_FFFF) >> 32) as u32
 }
 
 /// An item of the feed stream: a ramp or a cruise over a length of path. Immutable.
@@ -370,7 +370,8 @@ impl<R: Real> FeedSegment<R> {
             let s = self
                 .hold_start_bits
                 .wrapping_add(portion(self.hold_linear_bits, x))
-                .wrapping_add(portion(self.hold_square_bits, times(x, x)));
+                // One factor after the other: in a braking hold its error adds to that of twice the length.
+                .wrapping_add(portion(portion(self.hold_square_bits, x), x));
             return PathMotion {
                 s: Position::from_bits(s).min(self.length),
                 v_mm_s: self.hold_v_mm_s + self.hold_gain_mm_s.scaled(R::Unit::from_fraction(fraction)),
