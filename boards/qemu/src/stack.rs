@@ -2,7 +2,7 @@
 //! longer paint after it.
 
 /// What is painted \[bytes\]: more than a tick may take.
-const PAINTED: usize = 2048;
+const PAINTED: usize = if super::IS_SMALL { 768 } else { 4096 };
 /// Left unpainted for the frame of [`paint`] itself \[bytes\].
 const MARGIN: usize = 64;
 const PAINT: u32 = 0x5AFE_C0DE;

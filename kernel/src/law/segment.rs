@@ -274,7 +274,7 @@ impl<R: Real> FeedSegment<R> {
                 value: libm::fabs(length_scale),
             });
         }
-        let end = Shape::at(1.0);
+        let end = Shape::END;
         let (hold_a, hold_v) = (accel * end.accel, from_mm_s + speed * end.speed);
         // A scale that a narrow type can't hold must be refused here, not overflow in a tick.
         let real = |quantity, value: f64| {
@@ -363,7 +363,7 @@ impl<R: Real> FeedSegment<R> {
 
     /// The motion at a normalised time of a phase; `s` counts from the segment's start and is never beyond its
     /// end. In the tick.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
         if phase == Phase::Hold {
             let x = (fraction >> 32) as u32;

@@ -105,6 +105,17 @@ coefficients!(f32, table::f32s);
 coefficients!(f64, table::f64s);
 coefficients!(I3F29, table::fixed_points);
 
+impl Shape<f64> {
+    /// At x = 1, S1 (7)–(9).
+    pub const END: Self = Self {
+        jerk: 0.0,
+        accel: 0.5,
+        speed: 0.25,
+        length: 1.0 / 12.0 - 1.0 / (8.0 * core::f64::consts::PI * core::f64::consts::PI),
+        snap: 0.0,
+    };
+}
+
 impl<U: Unit> Shape<U> {
     /// The shapes at `x` in \[0, 1\].
     #[inline]

@@ -13,7 +13,7 @@
 
 use core::marker::PhantomData;
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 
@@ -28,6 +28,9 @@ const PREFIX: usize = MAGIC.len() + 2;
 const CHECKSUM: usize = 4;
 /// No header and no item of eight axes is longer.
 const ENTRY_MAX: usize = 1024;
+
+/// Without a table: a kilobyte of flash is worth more than the milliseconds.
+const CHECKSUMS: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// What a program was planned for. A board executes it with this or not at all.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -101,8 +104,7 @@ pub fn write<'a, const AXES: usize>(
     items: impl IntoIterator<Item = &'a Item<AXES>>,
     out: &mut impl Extend<u8>,
 ) -> Result<(), postcard::Error> {
-    let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
-    let mut digest = crc.digest();
+    let mut digest = CHECKSUMS.digest();
     let mut put = |bytes: &[u8]| {
         digest.update(bytes);
         out.extend(bytes.iter().copied());
@@ -149,8 +151,7 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
             return Err(ProgramError::Axes { found: axes, expected: AXES });
         }
         let expected = checksum.iter().rev().fold(0, |sum, &byte| sum << 8 | u32::from(byte));
-        let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
-        let mut digest = crc.digest();
+        let mut digest = CHECKSUMS.digest();
         digest.update(prefix);
         digest.update(body);
         let found = digest.finalize();

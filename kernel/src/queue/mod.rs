@@ -69,6 +69,9 @@ pub struct Streams<R: Real, const AXES: usize, const PIECES: usize, const SEGMEN
 struct Shared {
     /// Ends of stretch entered so far.
     stretches: AtomicU32,
+    /// Items entered so far, in either stream. The queue's own length takes a division.
+    path_entered: AtomicU32,
+    feed_entered: AtomicU32,
     /// In the stretch being entered, the feed covers at least as much path as the pieces.
     feed_covers_path: AtomicBool,
     /// And the pieces at least as much as the feed.
@@ -86,6 +89,8 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             feed: Queue::new(),
             shared: Shared {
                 stretches: AtomicU32::new(0),
+                path_entered: AtomicU32::new(0),
+                feed_entered: AtomicU32::new(0),
                 feed_covers_path: AtomicBool::new(true),
                 path_covers_feed: AtomicBool::new(true),
             },
@@ -106,15 +111,11 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
         let mut feeder =
             Feeder { path: path_in, feed: feed_in, shared, accept: accept::Acceptance::new(rules, position) };
         feeder.publish();
+        let path = Taken::new(&shared.path_entered, PIECES - 1);
+        let feed = Taken::new(&shared.feed_entered, SEGMENTS - 1);
         let finished = shared.stretches.load(Ordering::Relaxed);
-        let intake = Intake {
-            path: path_out,
-            feed: feed_out,
-            shared,
-            finished,
-            taken_from_path: 0,
-            taken_from_feed: 0,
-        };
+        let intake =
+            Intake { path: path_out, feed: feed_out, shared, finished, path_taken: path, feed_taken: feed };
         (feeder, intake)
     }
 }
@@ -143,6 +144,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     pub fn piece(&mut self, piece: Piece<R, AXES>) -> Result<(), Refused<Piece<R, AXES>>> {
         let next = self.accept.piece(&piece).map_err(Refused::Invalid)?;
         self.path.enqueue(PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
+        count(&self.shared.path_entered);
         self.accept = next;
         self.publish();
         Ok(())
@@ -155,6 +157,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     pub fn segment(&mut self, segment: FeedSegment<R>) -> Result<(), Refused<FeedSegment<R>>> {
         let next = self.accept.segment(&segment).map_err(Refused::Invalid)?;
         self.feed.enqueue(FeedItem::Segment(segment)).map_err(|_| Refused::Full(segment))?;
+        count(&self.shared.feed_entered);
         self.accept = next;
         self.publish();
         Ok(())
@@ -174,10 +177,11 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
         let path = self.path.enqueue(PathItem::EndOfStretch(position));
         let feed = self.feed.enqueue(FeedItem::EndOfStretch);
         debug_assert!(path.is_ok() && feed.is_ok());
+        count(&self.shared.path_entered);
+        count(&self.shared.feed_entered);
         self.accept = next;
         self.publish();
-        let stretches = &self.shared.stretches;
-        stretches.store(stretches.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
+        count(&self.shared.stretches);
         Ok(())
     }
 
@@ -195,6 +199,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     pub fn dwell(&mut self, duration: Ticks) -> Result<(), Refused<Ticks>> {
         let next = self.accept.dwell(duration).map_err(Refused::Invalid)?;
         self.feed.enqueue(FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))?;
+        count(&self.shared.feed_entered);
         self.accept = next;
         Ok(())
     }
@@ -205,7 +210,37 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     /// The queue is full, or a stretch is under way.
     pub fn program_stop(&mut self) -> Result<(), Refused<()>> {
         self.accept.at_rest().map_err(Refused::Invalid)?;
-        self.feed.enqueue(FeedItem::ProgramStop).map_err(|_| Refused::Full(()))
+        self.feed.enqueue(FeedItem::ProgramStop).map_err(|_| Refused::Full(()))?;
+        count(&self.shared.feed_entered);
+        Ok(())
+    }
+}
+
+/// One more. There is a single writer, so that cores without read-modify-write instructions count too.
+fn count(counter: &AtomicU32) {
+    counter.store(counter.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
+}
+
+/// How full a queue was as the tick began.
+#[derive(Clone, Copy, Debug)]
+struct Taken {
+    so_far: u32,
+    before_tick: u32,
+    capacity: i32,
+}
+
+impl Taken {
+    /// Of an empty queue.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
+    fn new(entered: &AtomicU32, capacity: usize) -> Self {
+        let so_far = entered.load(Ordering::Relaxed);
+        Self { so_far, before_tick: so_far, capacity: capacity as i32 }
+    }
+
+    /// Whether the queue was full as the tick began: the producer has not had its turn since.
+    fn was_full(&self, entered: &AtomicU32) -> bool {
+        // Below 0 where the tick has met the producer between an item and its count.
+        entered.load(Ordering::Acquire).wrapping_sub(self.before_tick).cast_signed() >= self.capacity
     }
 }
 
@@ -215,16 +250,16 @@ pub struct Intake<'a, R: Real, const AXES: usize> {
     feed: Consumer<'a, FeedItem<R>>,
     shared: &'a Shared,
     finished: u32,
-    /// Items taken in this tick: the producer could not have filled their places yet.
-    taken_from_path: usize,
-    taken_from_feed: usize,
+    path_taken: Taken,
+    feed_taken: Taken,
 }
 
 impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// A new tick: the producer has had its turn.
     #[inline]
     pub(crate) fn start_tick(&mut self) {
-        (self.taken_from_path, self.taken_from_feed) = (0, 0);
+        self.path_taken.before_tick = self.path_taken.so_far;
+        self.feed_taken.before_tick = self.feed_taken.so_far;
     }
 
     /// The first item of the feed stream: the one under way, or the next.
@@ -236,7 +271,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// The first item of the feed stream is done.
     #[inline]
     pub(crate) fn drop_feed(&mut self) {
-        self.taken_from_feed += 1;
+        self.feed_taken.so_far = self.feed_taken.so_far.wrapping_add(1);
         self.feed.dequeue();
     }
 
@@ -249,7 +284,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// The first item of the path stream is done.
     #[inline]
     pub(crate) fn drop_path(&mut self) {
-        self.taken_from_path += 1;
+        self.path_taken.so_far = self.path_taken.so_far.wrapping_add(1);
         if matches!(self.path.dequeue(), Some(PathItem::EndOfStretch(_))) {
             self.finished = self.finished.wrapping_add(1);
         }
@@ -259,8 +294,8 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// no more of it can be had, and the other queue was full too or covers as much path.
     #[inline]
     pub(crate) fn may_start(&self) -> bool {
-        let feed_full = self.feed.len() + self.taken_from_feed >= self.feed.capacity();
-        let path_full = self.path.len() + self.taken_from_path >= self.path.capacity();
+        let feed_full = self.feed_taken.was_full(&self.shared.feed_entered);
+        let path_full = self.path_taken.was_full(&self.shared.path_entered);
         self.shared.stretches.load(Ordering::Acquire) != self.finished
             || (path_full && (feed_full || self.shared.feed_covers_path.load(Ordering::Acquire)))
             || (feed_full && self.shared.path_covers_feed.load(Ordering::Acquire))

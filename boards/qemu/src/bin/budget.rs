@@ -43,11 +43,14 @@ fn main() -> ! {
     hprintln!("ram {}", kernel + size_of::<Streams<Number, AXES, PIECES, SEGMENTS>>());
     // Not on the stack, where the one that is measured needs the room.
     let streams = cortex_m::singleton!(: Queues<AXES> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
+    // 16 KiB hold one machine only.
+    #[cfg(target_has_atomic = "8")]
     let one = cortex_m::singleton!(: Queues<1> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     for bytes in programs() {
         hprintln!("program");
         match Reader::<AXES>::new(bytes) {
             Ok(program) => measure(&counter, program, streams, budgeted_tick),
+            #[cfg(target_has_atomic = "8")]
             Err(ProgramError::Axes { found: 1, .. }) => {
                 let program = Reader::<1>::new(bytes).unwrap_or_else(|error| fail(&error));
                 measure(&counter, program, one, Kernel::tick);
@@ -69,6 +72,7 @@ fn budgeted_tick<'a>(
     kernel.tick(intake, memory)
 }
 
+#[inline(never)]
 fn measure<const N: usize>(
     counter: &Counter,
     program: Reader<'_, N>,
@@ -116,6 +120,7 @@ fn ticks<const N: usize>(counter: &Counter, program: Reader<'_, N>, streams: &mu
 }
 
 /// The stages by themselves, over all that the program contains.
+#[inline(never)]
 fn stages<const N: usize>(counter: &Counter, program: Reader<'_, N>) {
     let &Header { tick_s, rules, .. } = program.header();
     let limits = rules.limits;

@@ -1,0 +1,87 @@
+//! The kernel as a board links it, with nothing around it: the program's bytes read, the streams filled, the tick
+//! in SysTick, and peripherals that are plain memory. Its size is the kernel's, and its symbols tell whether a
+//! tick can panic. It is linked, not run.
+#![no_std]
+#![no_main]
+
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m_rt::{entry, exception};
+use critical_section::Mutex;
+use hal_sim::closed_loop::InMemory;
+use motion_kernel::axis::AxisConfig;
+use motion_kernel::kernel::Kernel;
+use motion_kernel::program::{Reader, Supply};
+use motion_kernel::queue::{Intake, Streams};
+use motion_kernel::units::{Counts, DacCode};
+use qemu_boards::programs::programs;
+use qemu_boards::{AXES, Number, PIECES, SEGMENTS};
+
+/// What the tick owns.
+struct Foreground {
+    kernel: Kernel<Number, AXES>,
+    intake: Intake<'static, Number, AXES>,
+    memory: InMemory<AXES>,
+}
+
+static FOREGROUND: Mutex<RefCell<Option<Foreground>>> = Mutex::new(RefCell::new(None));
+/// Read, so that nothing of a tick is left out of the image.
+static CODES: AtomicU32 = AtomicU32::new(0);
+
+#[entry]
+fn main() -> ! {
+    run();
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+fn run() -> Option<()> {
+    let program = Reader::<AXES>::new(programs().next()?).ok()?;
+    let header = *program.header();
+    let streams = cortex_m::singleton!(: Streams<Number, AXES, PIECES, SEGMENTS> = Streams::new())?;
+    let (mut feeder, intake) = streams.split(header.rules, header.start);
+    let mut supply = Supply::new(program, header.tick_s);
+    let config = |figures| AxisConfig::<Number>::new(figures, header.tick_s).ok();
+    let mut configs = [config(&header.axes[0])?; AXES];
+    for (place, figures) in configs.iter_mut().zip(&header.axes) {
+        *place = config(figures)?;
+    }
+    let counts = [Counts(0); AXES];
+    let mut kernel = Kernel::new(configs, header.start, counts);
+    kernel.enable(100);
+    let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
+    critical_section::with(|cs| {
+        *FOREGROUND.borrow(cs).try_borrow_mut().ok()? = Some(Foreground { kernel, intake, memory });
+        Some(())
+    })?;
+    while supply.fill(&mut feeder).is_ok() {
+        cortex_m::asm::wfi();
+    }
+    None
+}
+
+#[exception]
+fn SysTick() {
+    critical_section::with(|cs| {
+        // A tick that comes while it is borrowed is a tick that comes inside itself: there is none.
+        let Ok(mut foreground) = FOREGROUND.borrow(cs).try_borrow_mut() else { return };
+        if let Some(Foreground { kernel, intake, memory }) = foreground.as_mut() {
+            kernel_tick(kernel, intake, memory);
+            let sum = memory.codes.iter().fold(0, |sum: u32, code| sum.wrapping_add(code.0 as u32));
+            CODES.store(sum, Ordering::Relaxed);
+        }
+    });
+}
+
+/// The root of all that a tick may call.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn kernel_tick(
+    kernel: &mut Kernel<Number, AXES>,
+    intake: &mut Intake<'static, Number, AXES>,
+    memory: &mut InMemory<AXES>,
+) {
+    kernel.tick(intake, memory);
+}
