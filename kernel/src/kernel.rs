@@ -120,10 +120,10 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             Power::Starting { ticks_left } => *ticks_left -= 1,
             Power::On => {}
         }
-        if self.power == Power::On {
-            if let Err(fault) = self.executor.tick_into(intake, &mut self.trace.executed) {
-                self.latch_fault(FaultKind::Executor(fault));
-            }
+        if self.power == Power::On
+            && let Err(fault) = self.executor.tick_into(intake, &mut self.trace.executed)
+        {
+            self.latch_fault(FaultKind::Executor(fault));
         }
     }
 

@@ -21,10 +21,10 @@ use walk::{WalkError, Walker};
 
 pub use walk::PIECES_PER_TICK_MAX;
 
-/// Greatest number of steps of the executor within one tick. A segment takes one to be taken, three for
-/// its phases, and with a stretch of its own two more to end and to begin; so do the segments that end
-/// in the tick and the one that begins in it.
-pub const STEPS_PER_TICK_MAX: usize = 6 * (SEGMENTS_PER_TICK_MAX + 1) + 1;
+/// Greatest number of steps of the executor within one tick. A segment takes up to three for its phases, and one
+/// more to begin, where it is the first of a stretch or had not arrived in time; so do the segments that end in the
+/// tick and the one that begins in it. A dwell takes two.
+pub const STEPS_PER_TICK_MAX: usize = 4 * (SEGMENTS_PER_TICK_MAX + 1) + 1;
 
 /// What the executor is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -183,6 +183,8 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
                     if !moving.next_phase(segment) {
                         self.activity = moving.ended(segment);
                         intake.drop_feed();
+                        // What follows is most often there; where it is not, the next step sees to it.
+                        self.go_on(intake)?;
                     }
                 }
                 (Activity::Dwell { left: dwell }, _) => {
@@ -196,11 +198,11 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
                     self.activity = Activity::Rest;
                 }
                 (Activity::Stopped, _) | (Activity::Rest, None) => return Ok(None),
-                (Activity::Rest, Some(FeedItem::Segment(_))) => {
+                (Activity::Rest, Some(FeedItem::Segment(segment))) => {
                     if !intake.may_start() {
                         return Ok(None);
                     }
-                    self.activity = Activity::Between { s: Position::ZERO, v_mm_s: R::ZERO };
+                    self.activity = Activity::Moving(Moving::new(segment, Position::ZERO));
                 }
                 (Activity::Rest, Some(&FeedItem::Dwell(left))) => {
                     intake.drop_feed();
@@ -210,12 +212,10 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
                     intake.drop_feed();
                     self.activity = Activity::Stopped;
                 }
-                (Activity::Between { s, .. }, Some(FeedItem::Segment(segment))) => {
-                    self.activity = Activity::Moving(Moving::new(segment, *s));
+                (Activity::Between { .. }, Some(FeedItem::Segment(_) | FeedItem::EndOfStretch)) => {
+                    self.go_on(intake)?;
                 }
-                (Activity::Rest | Activity::Between { .. }, Some(FeedItem::EndOfStretch)) => {
-                    self.end_stretch(intake)?;
-                }
+                (Activity::Rest, Some(FeedItem::EndOfStretch)) => self.end_stretch(intake)?,
                 // The next item is not needed yet, or there is time to wait for it at rest.
                 (Activity::Between { s, v_mm_s }, None) if left == Ticks::ZERO || *v_mm_s <= R::ZERO => {
                     return Ok(Some(PathMotion { s: *s, v_mm_s: *v_mm_s, ..PathMotion::default() }));
@@ -225,6 +225,19 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
             }
         }
         Err(ExecFault::TooManySegments)
+    }
+
+    /// From between two segments to the next one, or to the stretch's end, if it is there.
+    #[inline]
+    fn go_on(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), ExecFault> {
+        match (&self.activity, intake.feed()) {
+            (Activity::Between { s, .. }, Some(FeedItem::Segment(segment))) => {
+                self.activity = Activity::Moving(Moving::new(segment, *s));
+                Ok(())
+            }
+            (Activity::Between { .. }, Some(FeedItem::EndOfStretch)) => self.end_stretch(intake),
+            _ => Ok(()),
+        }
     }
 
     fn end_stretch(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), ExecFault> {

@@ -19,7 +19,14 @@ pub(super) struct Moving {
 impl Moving {
     #[inline]
     pub(super) fn new<R: Real>(segment: &FeedSegment<R>, start: Position) -> Self {
-        Self { start, phase: Phase::Rise, left: segment.phase_duration(Phase::Rise), fraction: 0 }
+        let rise = segment.phase_duration(Phase::Rise);
+        // A cruise has a hold only.
+        let (phase, left) = if rise > Ticks::ZERO {
+            (Phase::Rise, rise)
+        } else {
+            (Phase::Hold, segment.phase_duration(Phase::Hold))
+        };
+        Self { start, phase, left, fraction: 0 }
     }
 
     /// Spends `time` ≤ 1 tick in the phase. If the phase ends by then: what is left of the time.
@@ -40,17 +47,17 @@ impl Moving {
         over
     }
 
-    /// Goes on to the next phase; false if that was the last one.
+    /// Goes on to the next phase that takes time; false if that was the last one.
     #[inline]
     pub(super) fn next_phase<R: Real>(&mut self, segment: &FeedSegment<R>) -> bool {
-        self.phase = match self.phase {
-            Phase::Rise => Phase::Hold,
-            Phase::Hold => Phase::Fall,
-            Phase::Fall => return false,
+        let next = |phase| (phase, segment.phase_duration(phase));
+        let (phase, left) = match (self.phase, next(Phase::Hold)) {
+            (Phase::Rise, hold @ (_, duration)) if duration > Ticks::ZERO => hold,
+            (Phase::Rise | Phase::Hold, _) => next(Phase::Fall),
+            (Phase::Fall, _) => return false,
         };
-        self.left = segment.phase_duration(self.phase);
-        self.fraction = 0;
-        true
+        (self.phase, self.left, self.fraction) = (phase, left, 0);
+        left > Ticks::ZERO
     }
 
     /// What follows the segment's end.

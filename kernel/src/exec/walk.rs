@@ -61,7 +61,7 @@ impl<const AXES: usize> Walker<AXES> {
         intake: &mut Intake<'_, R, AXES>,
         setpoints: &mut [Setpoint<R>; AXES],
     ) -> Result<u32, WalkError> {
-        for _ in 0..=PIECES_PER_TICK_MAX {
+        for _ in 0..PIECES_PER_TICK_MAX + 1 {
             let Some(PathItem::Piece(piece)) = intake.path() else { return Err(WalkError::Starved) };
             if !self.is_on_piece {
                 if self.piece_start == Position::ZERO && !self.stands_at(&piece.start()) {
@@ -84,11 +84,11 @@ impl<const AXES: usize> Walker<AXES> {
     /// Ends the stretch: what is left of its pieces is passed, and the machine rests at its end.
     #[inline]
     pub(super) fn finish<R: Real>(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
-        for _ in 0..=PIECES_PER_TICK_MAX {
+        for _ in 0..PIECES_PER_TICK_MAX + 1 {
             match intake.path() {
-                Some(&PathItem::EndOfStretch(end)) => {
-                    intake.drop_path();
-                    (self.piece_start, self.rest) = (Position::ZERO, end);
+                Some(PathItem::EndOfStretch(end)) => {
+                    (self.piece_start, self.rest) = (Position::ZERO, *end);
+                    intake.drop_end_of_path();
                     return Ok(());
                 }
                 Some(PathItem::Piece(_)) => self.end_piece(intake)?,
@@ -100,17 +100,18 @@ impl<const AXES: usize> Walker<AXES> {
 
     #[inline]
     fn end_piece<R: Real>(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
-        intake.drop_path();
+        intake.drop_piece();
         self.is_on_piece = false;
         self.ends_left = self.ends_left.checked_sub(1).ok_or(WalkError::TooManyPieces)?;
         Ok(())
     }
 
     fn stands_at(&self, start: &[Position; AXES]) -> bool {
-        let tolerance = START_TOLERANCE;
+        // Both signs in one comparison.
+        let tolerance = START_TOLERANCE.to_bits();
         self.rest.iter().zip(start).all(|(&rest, &start)| {
-            let gap = start - rest;
-            gap <= tolerance && -gap <= tolerance
+            let gap = (start - rest).to_bits();
+            gap.wrapping_add(tolerance).cast_unsigned() <= 2 * tolerance.unsigned_abs()
         })
     }
 

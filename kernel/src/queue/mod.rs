@@ -281,23 +281,28 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         self.path.peek()
     }
 
-    /// The first item of the path stream is done.
+    /// The first item of the path stream, a piece, is done.
     #[inline]
-    pub(crate) fn drop_path(&mut self) {
+    pub(crate) fn drop_piece(&mut self) {
         self.path_taken.so_far = self.path_taken.so_far.wrapping_add(1);
-        if matches!(self.path.dequeue(), Some(PathItem::EndOfStretch(_))) {
-            self.finished = self.finished.wrapping_add(1);
-        }
+        self.path.dequeue();
+    }
+
+    /// The first item of the path stream, the end of a stretch, is done.
+    #[inline]
+    pub(crate) fn drop_end_of_path(&mut self) {
+        self.drop_piece();
+        self.finished = self.finished.wrapping_add(1);
     }
 
     /// Whether a stretch may begin: its end is queued; or a queue was full when the tick began, so that
     /// no more of it can be had, and the other queue was full too or covers as much path.
     #[inline]
     pub(crate) fn may_start(&self) -> bool {
-        let feed_full = self.feed_taken.was_full(&self.shared.feed_entered);
-        let path_full = self.path_taken.was_full(&self.shared.path_entered);
+        let feed_full = || self.feed_taken.was_full(&self.shared.feed_entered);
+        let path_full = || self.path_taken.was_full(&self.shared.path_entered);
         self.shared.stretches.load(Ordering::Acquire) != self.finished
-            || (path_full && (feed_full || self.shared.feed_covers_path.load(Ordering::Acquire)))
-            || (feed_full && self.shared.path_covers_feed.load(Ordering::Acquire))
+            || (path_full() && (feed_full() || self.shared.feed_covers_path.load(Ordering::Acquire)))
+            || (feed_full() && self.shared.path_covers_feed.load(Ordering::Acquire))
     }
 }

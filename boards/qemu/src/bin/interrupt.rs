@@ -20,7 +20,7 @@ use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail};
 
 /// Timer steps between two ticks: several times what kernel and simulation take, so that there is time for the
 /// background.
-const TICK_STEPS: u32 = 8_000_000;
+const TICK_STEPS: u32 = 2_000_000;
 
 /// What the interrupt owns.
 struct Foreground {
@@ -43,13 +43,8 @@ fn main() -> ! {
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
     let bytes = programs().next().unwrap_or_else(|| fail(&"a bundle without a program"));
     let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
-    let parameters = reference_machine(program.header(), SUBSTEPS);
-    let machine = cortex_m::singleton!(: SimMachine<AXES, LINE> =
-        SimMachine::new(&parameters).unwrap_or_else(|error| fail(&error)))
-    .unwrap_or_else(|| fail(&"machine"));
-    let streams = cortex_m::singleton!(: Streams<Number, AXES, PIECES, SEGMENTS> = Streams::new())
-        .unwrap_or_else(|| fail(&"streams"));
-    let (mut producer, closed_loop) = close(program, streams, machine).unwrap_or_else(|error| fail(&error));
+    let (mut producer, closed_loop) =
+        close(program, streams(), machine(&program)).unwrap_or_else(|error| fail(&error));
     let mut is_all = producer.fill().unwrap_or_else(|error| fail(&error));
     let foreground =
         Foreground { closed_loop, digest: Digest::new(), ticks: 0, is_idle: false, is_faulted: false };
@@ -77,6 +72,22 @@ fn main() -> ! {
             exit(true)
         }
     }
+}
+
+// Each made in a frame of its own, which is gone before the ticks begin: 16 KiB are not much.
+
+#[inline(never)]
+fn machine(program: &Reader<'_, AXES>) -> &'static SimMachine<AXES, LINE> {
+    let parameters = reference_machine(program.header(), SUBSTEPS);
+    cortex_m::singleton!(: SimMachine<AXES, LINE> =
+        SimMachine::new(&parameters).unwrap_or_else(|error| fail(&error)))
+    .unwrap_or_else(|| fail(&"machine"))
+}
+
+#[inline(never)]
+fn streams() -> &'static mut Streams<Number, AXES, PIECES, SEGMENTS> {
+    cortex_m::singleton!(: Streams<Number, AXES, PIECES, SEGMENTS> = Streams::new())
+        .unwrap_or_else(|| fail(&"streams"))
 }
 
 #[exception]

@@ -1,0 +1,82 @@
+//! Instructions of a tick, whole and by stage.
+
+use std::collections::BTreeMap;
+
+use motion_tests::figures::{Table, hold};
+
+use crate::programs;
+use crate::tools::{BOARDS, Board, Clock, M0, M3, M3_SOFT, M4F, Tools};
+
+/// Growth that fails.
+pub(crate) const GROWTH: f64 = 0.02;
+
+/// Figures that an image printed, by name, sorted.
+pub(crate) fn by_name(printed: &str) -> BTreeMap<String, Vec<u32>> {
+    let mut figures = BTreeMap::<String, Vec<u32>>::new();
+    for line in printed.lines() {
+        if let Some((name, figure)) = line.rsplit_once(' ')
+            && let Ok(figure) = figure.parse()
+        {
+            figures.entry(name.to_owned()).or_default().push(figure);
+        }
+    }
+    figures.values_mut().for_each(|figures| figures.sort_unstable());
+    figures
+}
+
+/// Least, median, 99th percentile, greatest.
+fn distribution(sorted: &[u32]) -> [u32; 4] {
+    let last = sorted.len() - 1;
+    [sorted[0], sorted[last / 2], sorted[last * 99 / 100], sorted[last]]
+}
+
+fn row(table: &mut Table, board: Board, what: &str, sorted: &[u32]) -> [u32; 4] {
+    let figures = distribution(sorted);
+    let mut cells = vec![board.core.to_owned(), board.number.to_owned(), what.to_owned()];
+    cells.extend(figures.map(|figure| figure.to_string()));
+    table.row(&cells);
+    figures
+}
+
+pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
+    let mut table = Table::new(&["core", "number", "instructions of", "min", "median", "p99", "max"]);
+    let mut ticks = Vec::new();
+    for board in BOARDS.into_iter().chain([M3_SOFT]) {
+        let printed = tools.run(board, "budget", &programs::worst_ticks(), Clock::Counting)?;
+        let figures = by_name(&printed);
+        let of = |name: &str| figures.get(name).ok_or_else(|| format!("{}: no {name}", board.core));
+        ticks.push((board, row(&mut table, board, "a tick, 3 axes", of("tick")?)));
+        for (stage, name) in [("law", "law"), ("path, 3 axes", "path"), ("regulator, 1 axis", "regulator")] {
+            row(&mut table, board, stage, of(name)?);
+        }
+        if board.core == M0.core {
+            continue;
+        }
+        let alone = |bytes: Vec<u8>| tools.run(board, "budget", &[bytes], Clock::Counting);
+        let one = by_name(&alone(programs::one_axis())?);
+        let one = row(&mut table, board, "a tick, 1 axis", &one["tick"]);
+        if board == M4F && one[3] > 700 {
+            return Err(format!("one axis on {}: at most {}, promised 700", board.core, one[3]));
+        }
+        let densest = by_name(&alone(programs::densest())?);
+        row(&mut table, board, "a tick, 3 axes, 15 pieces in it", &densest["tick"]);
+    }
+    tools.accept_compiler()?;
+    promised(&ticks)?;
+    hold("budgets", &table, GROWTH)
+}
+
+/// What the README promises, whatever is committed.
+fn promised(ticks: &[(Board, [u32; 4])]) -> Result<(), String> {
+    let of = |board: Board| {
+        ticks.iter().find(|(found, _)| *found == board).map_or([u32::MAX; 4], |(_, figures)| *figures)
+    };
+    let ([_, median, _, most], [.., fixed], [.., soft]) = (of(M4F), of(M3), of(M3_SOFT));
+    if median > 800 || most > 1500 {
+        return Err(format!("M4F: median {median}, at most {most}; promised 800 and 1500"));
+    }
+    if fixed > 4000 || 3 * fixed > soft {
+        return Err(format!("M3: at most {fixed} in fixed point, {soft} in f32; promised 4000 and a third"));
+    }
+    Ok(())
+}

@@ -1,0 +1,108 @@
+//! One digest over everything that a run sets, reads and puts out: equal on the PC and on every core.
+
+use hal_sim::SimMachine;
+use hal_sim::closed_loop::{close, reference_machine};
+use motion_kernel::exec::ExecState;
+use motion_kernel::num::{Fixed, Real};
+use motion_kernel::program::Reader;
+use motion_kernel::queue::Streams;
+use motion_kernel::trace::Digest;
+
+use crate::programs;
+use crate::tools::{BOARDS, Board, Clock, M0, M4F, Tools};
+
+/// As the boards simulate (`boards/qemu/src/lib.rs`).
+const LINE: usize = 16;
+const SUBSTEPS: u32 = 4;
+const GENERATED: usize = 50;
+
+/// What a board prints of a run.
+fn on_the_pc_in<R: Real>(bytes: &[u8]) -> String {
+    let program = Reader::<3>::new(bytes).expect("a program");
+    let parameters = reference_machine(program.header(), SUBSTEPS);
+    let machine = SimMachine::<3, LINE>::new(&parameters).expect("a machine");
+    let mut streams = Streams::<R, 3, 64, 64>::new();
+    let (mut producer, mut closed_loop) = close(program, &mut streams, &machine).expect("a loop");
+    let (mut digest, mut ticks) = (Digest::new(), 0);
+    loop {
+        let is_all = producer.fill().expect("accepted");
+        let trace = closed_loop.tick();
+        digest.add(&trace);
+        ticks += 1;
+        if trace.fault.is_some() || (is_all && trace.executed.state == ExecState::Idle) {
+            return format!("{ticks} ticks digest {:016x} fault {}", digest.value(), trace.fault.is_some());
+        }
+    }
+}
+
+fn on_the_pc(board: Board, bytes: &[u8]) -> String {
+    if board.number == "f32" { on_the_pc_in::<f32>(bytes) } else { on_the_pc_in::<Fixed>(bytes) }
+}
+
+/// Programs in bundles that fit the board.
+fn bundles(board: Board, programs: &[Vec<u8>]) -> Vec<Vec<Vec<u8>>> {
+    let mut bundles = vec![Vec::new()];
+    let mut room = board.room - 4;
+    for program in programs {
+        let needed = program.len().next_multiple_of(4) + 4;
+        if needed > room {
+            bundles.push(Vec::new());
+            room = board.room - 4;
+        }
+        room -= needed;
+        bundles.last_mut().expect("one at least").push(program.clone());
+    }
+    bundles
+}
+
+pub(crate) fn the_same_bits_on_every_core(tools: &Tools) -> Result<(), String> {
+    let generated = programs::generated(GENERATED);
+    let mut all = vec![("the stringer".to_owned(), programs::stringer())];
+    all.extend(generated.into_iter().map(|(seed, bytes)| (format!("seed {seed}"), bytes)));
+    let bytes: Vec<_> = all.iter().map(|(_, bytes)| bytes.clone()).collect();
+    for board in BOARDS {
+        let mut printed = String::new();
+        for bundle in bundles(board, &bytes) {
+            printed += &tools.run(board, "closed_loop", &bundle, Clock::Free)?;
+        }
+        let lines: Vec<_> = printed.lines().collect();
+        if lines.len() != all.len() {
+            return Err(format!("{}: {} runs of {}", board.core, lines.len(), all.len()));
+        }
+        for ((name, bytes), line) in all.iter().zip(lines) {
+            let expected = on_the_pc(board, bytes);
+            if line != expected {
+                return Err(format!("{}, {name}: {line}, on the PC {expected}", board.core));
+            }
+            if !line.ends_with("fault false") {
+                return Err(format!("{name}: {line}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+pub(crate) fn the_same_bits_from_an_interrupt(tools: &Tools) -> Result<(), String> {
+    let stringer = programs::stringer();
+    for board in BOARDS {
+        let printed = tools.run(board, "interrupt", core::slice::from_ref(&stringer), Clock::Counting)?;
+        let expected = on_the_pc(board, &stringer);
+        if printed.trim() != expected {
+            return Err(format!("{}: {printed}, on the PC {expected}", board.core));
+        }
+    }
+    Ok(())
+}
+
+/// A coefficient of the path that is off by one last place of an f32 gives another digest, and the same other one everywhere.
+pub(crate) fn one_last_place_is_seen(tools: &Tools) -> Result<(), String> {
+    let (stringer, changed) = (programs::stringer(), programs::stringer_off_by_a_last_place());
+    for board in [M4F, M0] {
+        let (before, after) = (on_the_pc(board, &stringer), on_the_pc(board, &changed));
+        let printed = tools.run(board, "closed_loop", core::slice::from_ref(&changed), Clock::Free)?;
+        if before == after || printed.trim() != after {
+            return Err(format!("{}: {before}, changed {after}, on the board {printed}", board.core));
+        }
+    }
+    Ok(())
+}

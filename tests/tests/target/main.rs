@@ -1,0 +1,74 @@
+//! The kernel on emulated Cortex-M boards: the same bits as on a PC, instruction budgets, sizes, and an image
+//! that cannot panic.
+//!
+//! Needs `qemu-system-arm` and a compiler that builds for Cortex-M; without them every test is listed and ignored
+//! with the reason, but fails where `CI=true`. Figures are held to committed tables (`tests/expected`); a compiler
+//! other than the one they were measured with makes other figures, so outside of CI their tests are then ignored
+//! too.
+//!
+//! ```text
+//! cargo test -p motion-tests --test target                       compare
+//! MOTION_ACCEPT=1 cargo test -p motion-tests --test target       accept what is measured
+//! ```
+
+mod budget;
+mod cycles;
+mod digest;
+mod functions;
+mod image;
+mod programs;
+mod tools;
+
+#[path = "../check/mod.rs"]
+#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
+mod check;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+use tools::Tools;
+
+type Test = fn(&Tools) -> Result<(), String>;
+
+/// Name, whether it holds figures that depend on the compiler, and the test.
+const TESTS: [(&str, bool, Test); 8] = [
+    ("the_same_bits_on_every_core", false, digest::the_same_bits_on_every_core),
+    ("the_same_bits_from_an_interrupt", false, digest::the_same_bits_from_an_interrupt),
+    ("one_last_place_is_seen", false, digest::one_last_place_is_seen),
+    ("nothing_can_panic", false, image::nothing_can_panic),
+    ("instructions_of_a_tick", true, budget::instructions_of_a_tick),
+    ("instructions_of_functions", true, functions::instructions_of_functions),
+    ("sizes", true, image::sizes),
+    ("estimated_cycles", true, cycles::estimated_cycles),
+];
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let is_ci = std::env::var("CI").is_ok_and(|value| value == "true");
+    let tools = Tools::find().map(Arc::new);
+    if let Err(reason) = &tools {
+        eprintln!("emulated boards: {reason}");
+    }
+    let trials = TESTS
+        .into_iter()
+        .map(|(name, is_of_a_compiler, test)| {
+            let reason = match &tools {
+                Err(reason) => Some(reason.clone()),
+                Ok(tools) if is_of_a_compiler => tools.other_compiler(),
+                Ok(_) => None,
+            };
+            let tools = tools.clone();
+            let run = move || match tools {
+                Ok(tools) => test(&tools).map_err(Failed::from),
+                Err(reason) => Err(Failed::from(reason)),
+            };
+            match reason {
+                // The kind is what the harness prints beside the name.
+                Some(reason) if !is_ci => Trial::test(name, run).with_kind(reason).with_ignored_flag(true),
+                _ => Trial::test(name, run),
+            }
+        })
+        .collect();
+    libtest_mimic::run(&arguments, trials).exit_code()
+}

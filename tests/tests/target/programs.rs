@@ -1,0 +1,147 @@
+//! What the boards execute: the stringer, generated programs, and a program full of worst ticks.
+
+use motion_host::gcode;
+use motion_host::machine::Machine;
+use motion_host::planning::{Executable, Mode, Plan, plan_program};
+use motion_kernel::num::Fixed;
+use motion_kernel::program::{Header, Item, write};
+
+use crate::check::random::Random;
+use crate::check::{machine, program};
+
+const STRINGER: &str = include_str!("../../../host/src/cli/stringer.ngc");
+/// Longer ones take the emulators too long [s].
+const TIME_MAX_S: f64 = 4.0;
+/// Bytes that fit the smallest board.
+const BYTES_MAX: usize = 32 << 10;
+
+fn plan(text: &str, machine: &Machine, mode: Mode) -> Plan {
+    let read = gcode::read("board.ngc", text.as_bytes()).expect("G-code");
+    plan_program("board.ngc", &read, machine, mode).expect("a plan")
+}
+
+/// Checked for both number types, whose pieces are cut alike.
+fn executable(plan: &Plan) -> Option<Executable> {
+    let executable = Executable::new::<f32>(plan).expect("executable");
+    let fixed = Executable::new::<Fixed>(plan).ok()?;
+    assert_eq!(executable.items, fixed.items);
+    Some(executable)
+}
+
+fn bytes(text: &str, machine: &Machine, mode: Mode) -> Vec<u8> {
+    executable(&plan(text, machine, mode)).expect("within fixed point").to_bytes(machine)
+}
+
+/// The stringer on the reference machine.
+pub(crate) fn stringer() -> Vec<u8> {
+    bytes(STRINGER, &Machine::reference(), Mode::Merged)
+}
+
+/// The stringer with one coefficient of its first arc one last place of an f32 off.
+pub(crate) fn stringer_off_by_a_last_place() -> Vec<u8> {
+    let machine = Machine::reference();
+    let mut executable = executable(&plan(STRINGER, &machine, Mode::Merged)).expect("within fixed point");
+    let arc = executable.items.iter_mut().find_map(|item| match item {
+        Item::Septic { coefficients, .. } => Some(coefficients),
+        _ => None,
+    });
+    let coefficient = &mut arc.expect("the stringer has arcs")[0][0];
+    *coefficient = f64::from((*coefficient as f32).next_up());
+    executable.to_bytes(&machine)
+}
+
+/// So many random programs that the boards have time and room for, by seed.
+pub(crate) fn generated(count: usize) -> Vec<(u64, Vec<u8>)> {
+    let mut programs = Vec::new();
+    for seed in 1.. {
+        let mut random = Random::new(seed);
+        let machine = machine::gentle(&mut random);
+        let fragments = 1 + random.below(3);
+        let generated = program::generate(&mut random, fragments, 30.0);
+        let read = gcode::read("random.ngc", generated.text.as_bytes()).expect("generated");
+        let Ok(plan) = plan_program("random.ngc", &read, &machine, Mode::Merged) else { continue };
+        if plan.time_s > TIME_MAX_S {
+            continue;
+        }
+        let Some(bytes) = executable(&plan).map(|executable| executable.to_bytes(&machine)) else { continue };
+        if bytes.len() <= BYTES_MAX {
+            programs.push((seed, bytes));
+        }
+        if programs.len() == count {
+            break;
+        }
+    }
+    programs
+}
+
+/// Short lines and arcs, planned per block: pieces, segments and phases end all the time, often several in a tick.
+fn facets() -> String {
+    use std::fmt::Write;
+    let mut text = "G91 G1 F4000\n".to_owned();
+    for facet in 0..60 {
+        let _ = writeln!(
+            text,
+            "X{:.3}\nX{:.3} F{}",
+            0.02 + 0.004 * f64::from(facet),
+            0.9,
+            3000 + facet * 37 % 1500
+        );
+        if facet % 6 == 5 {
+            text.push_str("G3 X0.8 Y0.8 I0 J0.8\nG3 X-0.8 Y0.8 I-0.8 J0\nG3 X-0.8 Y-0.8 I0 J-0.8\nG3 X0.8 Y-0.8 I0.8 J0\nG1\n");
+        }
+    }
+    text
+}
+
+/// The programs of the budgets: the stringer; facets; the stringer with outputs that saturate.
+pub(crate) fn worst_ticks() -> Vec<Vec<u8>> {
+    let reference = Machine::reference();
+    let mut weak = Machine::reference();
+    for axis in &mut weak.axes {
+        // 48 mm/s where the program asks for 83: the axes fall behind, and catch up.
+        axis.output_limit_v = 1.45;
+        axis.following_error_limit_mm = 100.0;
+    }
+    vec![stringer(), bytes(&facets(), &reference, Mode::PerBlock), bytes(STRINGER, &weak, Mode::Merged)]
+}
+
+/// As many pieces a tick as the kernel accepts: lines that the path passes within little more than a sixteenth of a
+/// tick each.
+pub(crate) fn densest() -> Vec<u8> {
+    let machine = Machine::reference();
+    let feed_mm_s = 50.0;
+    let length_mm = feed_mm_s * machine.tick_s / 15.5;
+    let text = format!("G91 G1 F{}\n", feed_mm_s * 60.0) + &format!("X{length_mm:.7}\n").repeat(6000);
+    bytes(&text, &machine, Mode::Merged)
+}
+
+/// The X axis of the stringer's lines alone.
+pub(crate) fn one_axis() -> Vec<u8> {
+    let machine = Machine::reference();
+    let text = "G1 X20 F5000\nX18\nG4 P0.01\nX40 F3000\nX40.3 F5000\nX44\nM2\n";
+    let header = machine.header();
+    let header = Header::<1> {
+        tick_s: header.tick_s,
+        rules: header.rules,
+        axes: [header.axes[0]],
+        start: [header.start[0]],
+    };
+    let executable = executable(&plan(text, &machine, Mode::PerBlock)).expect("within fixed point");
+    let items: Vec<Item<1>> = executable
+        .items
+        .into_iter()
+        .map(|item| match item {
+            Item::Line { line, start, direction, length } => {
+                Item::Line { line, start: [start[0]], direction: [direction[0]], length }
+            }
+            Item::Septic { .. } => unreachable!("a program of lines"),
+            Item::Feed { ramp, length } => Item::Feed { ramp, length },
+            Item::EndOfStretch(end) => Item::EndOfStretch([end[0]]),
+            Item::Dwell(duration) => Item::Dwell(duration),
+            Item::Stop => Item::Stop,
+        })
+        .collect();
+    let mut bytes = Vec::new();
+    write(&header, &items, &mut bytes).expect("one axis");
+    bytes
+}

@@ -1,0 +1,262 @@
+//! Emulator and compiler; images are built once, when they are first asked for.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+
+/// A core to run on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Board {
+    /// As people call it.
+    pub(crate) core: &'static str,
+    /// QEMU's machine.
+    machine: &'static str,
+    pub(crate) target: &'static str,
+    pub(crate) number: &'static str,
+    /// Where its programs lie (`boards/qemu/src/programs.rs`), and how much fits there.
+    address: usize,
+    pub(crate) room: usize,
+    features: &'static str,
+}
+
+const MIB: usize = 1 << 20;
+const KIB: usize = 1 << 10;
+
+pub(crate) const M4F: Board = Board {
+    core: "Cortex-M4F",
+    machine: "mps2-an386",
+    target: "thumbv7em-none-eabihf",
+    number: "f32",
+    address: 2 * MIB,
+    room: 2 * MIB,
+    features: "",
+};
+pub(crate) const M7: Board = Board { core: "Cortex-M7", machine: "mps2-an500", ..M4F };
+pub(crate) const M3: Board =
+    Board { core: "Cortex-M3", machine: "mps2-an385", target: "thumbv7m-none-eabi", number: "fixed", ..M4F };
+pub(crate) const M3_SOFT: Board = Board { number: "f32 in software", features: "soft-float", ..M3 };
+pub(crate) const M0: Board = Board {
+    core: "Cortex-M0",
+    machine: "microbit",
+    target: "thumbv6m-none-eabi",
+    number: "fixed",
+    address: 192 * KIB,
+    room: 64 * KIB,
+    features: "",
+};
+/// Every core with the number type that is meant for it.
+pub(crate) const BOARDS: [Board; 4] = [M4F, M7, M3, M0];
+
+/// How instructions become time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Clock {
+    /// As fast as it goes.
+    Free,
+    /// By the number of instructions, so that a timer counts them.
+    Counting,
+}
+
+/// The tools of this machine.
+pub(crate) struct Tools {
+    compiler: Compiler,
+    /// Built images, by target and features.
+    built: Mutex<BTreeMap<(String, String), PathBuf>>,
+}
+
+struct Compiler {
+    rustc: PathBuf,
+    /// It lacks the library for the target, and has its source.
+    builds_core: bool,
+    version: String,
+}
+
+fn output(command: &mut Command) -> Option<String> {
+    let output = command.output().ok()?;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+impl Tools {
+    /// What this machine has, or what is missing.
+    pub(crate) fn find() -> Result<Self, String> {
+        if output(Command::new("qemu-system-arm").arg("--version")).is_none() {
+            return Err("needs qemu-system-arm".to_owned());
+        }
+        let compiler = Compiler::with_source().or_else(Compiler::with_targets).ok_or(
+            "needs a compiler for Cortex-M: Debian's rustc-web and rust-web-src, or rustup target add \
+             thumbv7em-none-eabihf thumbv7m-none-eabi thumbv6m-none-eabi",
+        )?;
+        Ok(Self { compiler, built: Mutex::default() })
+    }
+
+    /// Why figures measured here can't be compared with the committed ones.
+    pub(crate) fn other_compiler(&self) -> Option<String> {
+        if std::env::var_os("MOTION_ACCEPT").is_some() {
+            return None;
+        }
+        let committed = std::fs::read_to_string(root().join("tests/expected/compiler.txt")).ok()?;
+        let (committed, found) = (committed.trim(), &self.compiler.version);
+        (committed != found).then(|| format!("figures are those of {committed}, here is {found}"))
+    }
+
+    /// Notes the compiler of figures that are being accepted.
+    pub(crate) fn accept_compiler(&self) -> Result<(), String> {
+        if std::env::var_os("MOTION_ACCEPT").is_none() {
+            return Ok(());
+        }
+        let path = root().join("tests/expected/compiler.txt");
+        std::fs::write(&path, format!("{}\n", self.compiler.version)).map_err(|error| error.to_string())
+    }
+
+    /// The image `name` for a board.
+    pub(crate) fn image(&self, board: Board, name: &str) -> Result<PathBuf, String> {
+        let key = (board.target.to_owned(), board.features.to_owned());
+        // One build at a time: others would wait for cargo's lock anyway.
+        let mut built = self.built.lock().map_err(|_| "a build panicked".to_owned())?;
+        if !built.contains_key(&key) {
+            let folder = self.build(board)?;
+            built.insert(key.clone(), folder);
+        }
+        Ok(built[&key].join(name))
+    }
+
+    fn build(&self, board: Board) -> Result<PathBuf, String> {
+        let target_dir = root().join("target/boards").join(if board.features.is_empty() {
+            "plain"
+        } else {
+            board.features
+        });
+        let mut cargo = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()));
+        // Not what the outer cargo was told.
+        for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
+            cargo.env_remove(name);
+        }
+        cargo
+            .current_dir(root().join("boards/qemu"))
+            .args(["build", "--release", "--locked", "--target", board.target, "--features", board.features])
+            .arg("--target-dir")
+            .arg(&target_dir)
+            .env("RUSTC", &self.compiler.rustc);
+        if self.compiler.builds_core {
+            let linker = linker().ok_or("the Rust toolchain has no rust-lld")?;
+            cargo
+                .arg("-Zbuild-std=core")
+                .env("RUSTC_BOOTSTRAP", "1")
+                .env("RUSTFLAGS", format!("-C linker={}", linker.display()));
+        }
+        let done = cargo.output().map_err(|error| format!("cargo: {error}"))?;
+        if !done.status.success() {
+            return Err(format!("build for {}: {}", board.target, String::from_utf8_lossy(&done.stderr)));
+        }
+        Ok(target_dir.join(board.target).join("release"))
+    }
+
+    /// QEMU with an image and a bundle of programs, not yet started.
+    pub(crate) fn emulator(&self, board: Board, name: &str, bundle: &Path) -> Result<Command, String> {
+        let mut command = Command::new("timeout");
+        command
+            .args(["300", "qemu-system-arm", "-M", board.machine, "-nographic"])
+            .args(["-monitor", "none", "-serial", "none"])
+            .args(["-semihosting-config", "enable=on,target=native"])
+            .arg("-device")
+            .arg(format!("loader,file={},addr={:#x},force-raw=on", bundle.display(), board.address))
+            .arg("-kernel")
+            .arg(self.image(board, name)?);
+        Ok(command)
+    }
+
+    /// Runs an image over `programs`; what it printed.
+    pub(crate) fn run(
+        &self,
+        board: Board,
+        name: &str,
+        programs: &[Vec<u8>],
+        clock: Clock,
+    ) -> Result<String, String> {
+        let bundle = Bundle::new(programs)?;
+        let mut command = self.emulator(board, name, bundle.path())?;
+        if clock == Clock::Counting {
+            command.args(["-icount", "shift=6,sleep=off"]);
+        }
+        let done = command.output().map_err(|error| format!("qemu-system-arm: {error}"))?;
+        let printed = String::from_utf8_lossy(&done.stdout).into_owned();
+        if done.status.success() {
+            Ok(printed)
+        } else {
+            let errors = String::from_utf8_lossy(&done.stderr);
+            let end: Vec<_> = printed.lines().rev().take(3).collect();
+            Err(format!("{name} on {}: {}: {end:?} {errors}", board.core, done.status))
+        }
+    }
+}
+
+impl Compiler {
+    /// One with the library's source, for targets that rustup can't add.
+    fn with_source() -> Option<Self> {
+        let rustc = PathBuf::from("/usr/bin/rustc");
+        let sysroot = output(Command::new(&rustc).args(["--print", "sysroot"]))?;
+        if !Path::new(&sysroot).join("lib/rustlib/src/rust/library/core/Cargo.toml").exists() {
+            return None;
+        }
+        let version = output(Command::new(&rustc).arg("--version"))?;
+        Some(Self { rustc, builds_core: true, version })
+    }
+
+    /// One with the targets' libraries.
+    fn with_targets() -> Option<Self> {
+        let rustc = PathBuf::from("rustc");
+        let sysroot = output(Command::new(&rustc).args(["--print", "sysroot"]))?;
+        let has = |board: &Board| Path::new(&sysroot).join("lib/rustlib").join(board.target).exists();
+        if !BOARDS.iter().all(has) {
+            return None;
+        }
+        let version = output(Command::new(&rustc).arg("--version"))?;
+        Some(Self { rustc, builds_core: false, version })
+    }
+}
+
+/// The linker that every rustup toolchain brings.
+fn linker() -> Option<PathBuf> {
+    let sysroot = output(Command::new("rustc").args(["--print", "sysroot"]))?;
+    let host = output(Command::new("rustc").arg("-vV"))?;
+    let host = host.lines().find_map(|line| line.strip_prefix("host: "))?.to_owned();
+    let linker = Path::new(&sysroot).join("lib/rustlib").join(host).join("bin/rust-lld");
+    linker.exists().then_some(linker)
+}
+
+/// Programs in a file of their own, removed with it.
+pub(crate) struct Bundle(PathBuf);
+
+impl Bundle {
+    /// See `boards/qemu/src/programs.rs`.
+    pub(crate) fn new(programs: &[Vec<u8>]) -> Result<Self, String> {
+        use std::sync::atomic::{AtomicU32, Ordering};
+        static BUNDLES: AtomicU32 = AtomicU32::new(0);
+        let mut bytes =
+            u32::try_from(programs.len()).map_err(|error| error.to_string())?.to_le_bytes().to_vec();
+        for program in programs {
+            let length = u32::try_from(program.len()).map_err(|error| error.to_string())?;
+            bytes.extend(length.to_le_bytes());
+            bytes.extend(program);
+            bytes.resize(bytes.len().next_multiple_of(4), 0);
+        }
+        let number = BUNDLES.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("motion-{}-{number}.bin", std::process::id()));
+        std::fs::write(&path, bytes).map_err(|error| format!("{}: {error}", path.display()))?;
+        Ok(Self(path))
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Bundle {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
