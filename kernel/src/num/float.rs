@@ -165,7 +165,7 @@ mod tests {
         let mut state = 1_u64;
         for _ in 0..10_000_000 {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let bits = state.cast_signed() >> (state >> 7) % 63;
+            let bits = state.cast_signed() >> ((state >> 7) % 63);
             let (found, plain) = (f32_from_q32(bits), bits as f32 * (1.0 / 4_294_967_296.0));
             if i32::try_from(bits).is_ok() {
                 assert_eq!(found.to_bits(), plain.to_bits(), "{bits}");

@@ -11,7 +11,7 @@ use motion_kernel::trace::Digest;
 use crate::programs;
 use crate::tools::{BOARDS, Board, Clock, M0, M4F, Tools};
 
-/// As the boards simulate (`boards/qemu/src/lib.rs`).
+/// As the boards simulate (`boards/qemu-mps2/src/lib.rs`).
 const LINE: usize = 16;
 const SUBSTEPS: u32 = 4;
 const GENERATED: usize = 50;

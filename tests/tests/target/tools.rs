@@ -14,7 +14,7 @@ pub(crate) struct Board {
     machine: &'static str,
     pub(crate) target: &'static str,
     pub(crate) number: &'static str,
-    /// Where its programs lie (`boards/qemu/src/programs.rs`), and how much fits there.
+    /// Where its programs lie (`boards/qemu-mps2/src/programs.rs`), and how much fits there.
     address: usize,
     pub(crate) room: usize,
     features: &'static str,
@@ -136,7 +136,7 @@ impl Tools {
             cargo.env_remove(name);
         }
         cargo
-            .current_dir(root().join("boards/qemu"))
+            .current_dir(root().join("boards/qemu-mps2"))
             .args(["build", "--release", "--locked", "--target", board.target, "--features", board.features])
             .arg("--target-dir")
             .arg(&target_dir)
@@ -232,7 +232,7 @@ fn linker() -> Option<PathBuf> {
 pub(crate) struct Bundle(PathBuf);
 
 impl Bundle {
-    /// See `boards/qemu/src/programs.rs`.
+    /// See `boards/qemu-mps2/src/programs.rs`.
     pub(crate) fn new(programs: &[Vec<u8>]) -> Result<Self, String> {
         use std::sync::atomic::{AtomicU32, Ordering};
         static BUNDLES: AtomicU32 = AtomicU32::new(0);
