@@ -82,9 +82,7 @@ pub fn hold(name: &str, measured: &Table, growth: f64) -> Result<(), String> {
     let path = root().join("tests/expected").join(format!("{name}.md"));
     if std::env::var("MOTION_ACCEPT").is_ok_and(|value| value == "1") {
         write(&path, &measured.to_markdown())?;
-        return each_copy(name, |document, text, shown| {
-            write(document, &text.replacen(shown, &measured.to_markdown(), 1))
-        });
+        return each_copy(name, |document, copy| write(document, &copy.replaced(&measured.to_markdown())));
     }
     let committed = std::fs::read_to_string(&path)
         .map_err(|error| format!("{}: {error}; MOTION_ACCEPT=1 writes it", path.display()))?;
@@ -99,8 +97,8 @@ pub fn hold(name: &str, measured: &Table, growth: f64) -> Result<(), String> {
             measured.to_markdown()
         ));
     }
-    each_copy(name, |document, _, shown| {
-        if shown == committed {
+    each_copy(name, |document, copy| {
+        if copy.shown == committed {
             Ok(())
         } else {
             Err(format!("{} shows other figures than {}", document.display(), path.display()))
@@ -131,17 +129,35 @@ fn differences(committed: &Table, measured: &Table, growth: f64) -> Vec<String> 
     found
 }
 
-/// Calls `act` with every document that shows the figures `name`: its path, its text, what it shows.
-fn each_copy(name: &str, act: impl Fn(&Path, &str, &str) -> Result<(), String>) -> Result<(), String> {
-    let begin = format!("<!-- figures: {name} -->\n");
+/// A document's text around the figures it shows.
+struct Copy<'a> {
+    before: &'a str,
+    shown: &'a str,
+    after: &'a str,
+}
+
+impl<'a> Copy<'a> {
+    /// The copy of the figures `name`; none if the document does not show them, or does not say where they end.
+    fn find(text: &'a str, name: &str) -> Option<Self> {
+        let begin = format!("<!-- figures: {name} -->\n");
+        let start = text.find(&begin)? + begin.len();
+        let end = start + text[start..].find(END)?;
+        Some(Self { before: &text[..start], shown: &text[start..end], after: &text[end..] })
+    }
+
+    fn replaced(&self, figures: &str) -> String {
+        [self.before, figures, self.after].concat()
+    }
+}
+
+/// Calls `act` with every document that shows the figures `name`.
+fn each_copy(name: &str, act: impl Fn(&Path, &Copy<'_>) -> Result<(), String>) -> Result<(), String> {
     for document in DOCUMENTS {
         let path = root().join(document);
         let Ok(text) = std::fs::read_to_string(&path) else { continue };
-        let Some((_, from)) = text.split_once(&begin) else { continue };
-        let Some((shown, _)) = from.split_once(END) else {
-            return Err(format!("{document}: `{}` without `{END}`", begin.trim()));
-        };
-        act(&path, &text, shown)?;
+        if let Some(copy) = Copy::find(&text, name) {
+            act(&path, &copy)?;
+        }
     }
     Ok(())
 }
@@ -162,6 +178,18 @@ mod tests {
         let mut table = Table::new(&["what", "figure", "text"]);
         table.row(&["tick", figure, text]);
         table
+    }
+
+    #[test]
+    fn a_copy_is_replaced_where_it_stands() {
+        let text =
+            format!("head\n<!-- figures: a -->\n{END}\nmiddle\n<!-- figures: b -->\nold\n{END}\ntail\n");
+        let replaced = Copy::find(&text, "a").unwrap().replaced("new\n");
+        assert_eq!(replaced, text.replacen("a -->\n", "a -->\nnew\n", 1));
+        let copy = Copy::find(&replaced, "b").unwrap();
+        assert_eq!(copy.shown, "old\n");
+        assert_eq!(copy.replaced("new\n"), replaced.replacen("old", "new", 1));
+        assert!(Copy::find(&text, "c").is_none() && Copy::find("<!-- figures: a -->\nopen", "a").is_none());
     }
 
     #[test]

@@ -300,3 +300,68 @@ fn converter_bus() {
         assert_eq!(kernel.fault(), Some(fault));
     }
 }
+
+/// In the middle of a move: the machine, its streams, and what it has done.
+fn moving(then: impl FnOnce(&mut Kernel<f32, 2>, &mut Intake<'_, f32, 2>, &mut Bench)) {
+    let (mut kernel, mut bench) = (kernel(), Bench::default());
+    let mut streams = Streams::<f32, 2, 8, 8>::new();
+    let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
+    offer(&mut feeder, 0.0);
+    for _ in 0..100 {
+        assert_eq!(tick(&mut kernel, &mut intake, &mut bench), None);
+    }
+    assert!(bench.is_enabled && bench.written[0] != DacCode::ZERO);
+    then(&mut kernel, &mut intake, &mut bench);
+}
+
+/// What the board has found ends like any other fault, in the very next tick, whose number it has.
+#[test]
+fn faults_that_the_board_reports() {
+    for kind in [FaultKind::EmergencyStop, FaultKind::Drive { axis: 1 }] {
+        moving(|kernel, intake, bench| {
+            kernel.trip(kind);
+            kernel.trip(FaultKind::Encoder); // not the first one
+            let trace = *kernel.tick(intake, bench);
+            assert_eq!(trace.fault.map(|fault| (fault.kind, fault.tick)), Some((kind, trace.tick)));
+            assert_eq!(trace.tick, 100);
+            assert!(!bench.is_enabled && bench.written == [DacCode::ZERO; 2], "{bench:?}");
+            kernel.enable(0);
+            assert_eq!(tick(kernel, intake, bench), Some(kind));
+            assert!(!bench.is_enabled, "a fault is not enabled away");
+        });
+    }
+}
+
+/// Disabling is no fault: outputs and drives go off, and the streams stand still.
+#[test]
+fn disabling_takes_effect_in_the_next_tick() {
+    moving(|kernel, intake, bench| {
+        kernel.disable();
+        let set = kernel.tick(intake, bench).executed.setpoints[0].position;
+        assert!(!bench.is_enabled && bench.written == [DacCode::ZERO; 2], "{bench:?}");
+        for _ in 0..10 {
+            let trace = kernel.tick(intake, bench);
+            assert_eq!((trace.fault, trace.executed.setpoints[0].position), (None, set));
+        }
+        assert_eq!(kernel.stand_here()[0].to_bits() >> 20, set.to_bits() >> 20);
+    });
+}
+
+/// The peak is the greatest magnitude since it was last asked for.
+#[test]
+fn peaks_are_held_until_they_are_taken() {
+    moving(|kernel, intake, bench| {
+        let first = kernel.take_peak_following_error_mm();
+        assert!(first[0] > 0.0 && first[1].abs() < 1e-6, "{first:?}");
+        assert!(kernel.take_peak_following_error_mm().iter().all(|peak| *peak == 0.0));
+        // 0.2 mm ahead for one tick.
+        bench.counts[0].0 += 2000;
+        kernel.tick(intake, bench);
+        bench.counts[0].0 -= 2000;
+        for _ in 0..5 {
+            tick(kernel, intake, bench);
+        }
+        let peak = kernel.take_peak_following_error_mm()[0];
+        assert!((0.19..0.21).contains(&peak), "{peak}");
+    });
+}
