@@ -8,7 +8,7 @@
 
 use core::convert::Infallible;
 
-use motion_kernel::axis::{AxisConfig, ScaleError};
+use motion_kernel::axis::{AxesConfig, AxesError};
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{Ad5754Error, Ad5754Output, DriveEnable, Encoder, VelocityChannel};
 use motion_kernel::kernel::Kernel;
@@ -85,7 +85,7 @@ impl<const AXES: usize> DriveEnable<AXES> for InMemory<AXES> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoopError {
     /// An axis can't be regulated.
-    Scale(ScaleError),
+    Axes(AxesError),
     /// The converter refused its configuration.
     Converter(Ad5754Error<ChipError>),
 }
@@ -136,14 +136,10 @@ pub fn close<
     machine: &'a SimMachine<AXES, LINE>,
 ) -> Result<Closed<'a, R, AXES, LINE>, LoopError> {
     let &Header { tick_s, rules, axes, start } = program.header();
-    let first = AxisConfig::new(&axes[0], tick_s).map_err(LoopError::Scale)?;
-    let mut configs = [first; AXES];
-    for (config, figures) in configs.iter_mut().zip(&axes) {
-        *config = AxisConfig::new(figures, tick_s).map_err(LoopError::Scale)?;
-    }
+    let config = AxesConfig::new(&axes, tick_s).map_err(LoopError::Axes)?;
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
     let Ok(counts) = (&*machine).latch();
-    let mut kernel = Kernel::new(configs, start, counts);
+    let mut kernel = Kernel::new(config, start, counts);
     kernel.enable(0);
     let (feeder, intake) = streams.split(rules, start);
     let supply = Supply::new(program, tick_s);

@@ -11,8 +11,8 @@
 //! the voltage of standing still (0 V plus trim), the drives are disabled, and both stay so until
 //! [`Kernel::clear_fault`]. A fault that is found in writing the outputs shows in them from the next tick on.
 
-use crate::axis::{AxisConfig, AxisOutput, AxisState};
-use crate::exec::Executor;
+use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Preview};
+use crate::exec::{ExecState, Executor};
 use crate::fault::{Fault, FaultKind};
 use crate::hal::{DriveEnable, Encoder, VelocityChannel};
 use crate::num::Real;
@@ -36,6 +36,7 @@ enum Power {
 pub struct Kernel<R: Real, const AXES: usize> {
     config: [AxisConfig<R>; AXES],
     executor: Executor<R, AXES>,
+    preview: Preview<AXES>,
     axes: [AxisState<R>; AXES],
     power: Power,
     /// What the drives were last told; `None` before the first time and where that failed.
@@ -47,7 +48,8 @@ pub struct Kernel<R: Real, const AXES: usize> {
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// A kernel at rest at `position`, where the encoders read `counts`, drives disabled.
     #[must_use]
-    pub fn new(config: [AxisConfig<R>; AXES], position: [Position; AXES], counts: [Counts; AXES]) -> Self {
+    pub fn new(config: AxesConfig<R, AXES>, position: [Position; AXES], counts: [Counts; AXES]) -> Self {
+        let AxesConfig { axes: config, preview_ticks } = config;
         let mut axes = [AxisState::default(); AXES];
         for (((axis, config), &counts), &position) in axes.iter_mut().zip(&config).zip(&counts).zip(&position)
         {
@@ -59,10 +61,18 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             tick: u64::MAX,
             executed: executor.resting(),
             counts,
-            axes: [AxisOutput::default(); AXES],
+            axes: position.map(|set| AxisOutput { set, ..AxisOutput::default() }),
             fault: None,
         };
-        Self { config, executor, axes, power: Power::Off, told: None, trace }
+        Self {
+            config,
+            executor,
+            preview: Preview::new(preview_ticks, position),
+            axes,
+            power: Power::Off,
+            told: None,
+            trace,
+        }
     }
 
     /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (what
@@ -97,7 +107,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             Err(_) => self.latch_fault(FaultKind::Encoder),
         }
         self.execute(intake);
-        self.regulate();
+        self.regulate(intake);
         if hal.write(&self.trace.axes.each_ref().map(|axis| axis.code)).is_err() {
             self.latch_fault(FaultKind::Output);
         }
@@ -130,13 +140,22 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// The outputs of all axes. Where the drives are off they stand still, and regulators and peaks
     /// keep what they had.
     #[inline]
-    fn regulate(&mut self) {
+    fn regulate(&mut self, intake: &mut Intake<'_, R, AXES>) {
         let Trace { executed, counts, axes: outputs, .. } = &mut self.trace;
         if self.power != Power::Off {
+            self.preview.delay(&executed.setpoints, outputs.iter_mut().map(|output| &mut output.set));
+            let correction = match intake.correction() {
+                Some(correction) if executed.state == ExecState::Moving => {
+                    correction.next(executed.stretches)
+                }
+                _ => [R::ZERO; AXES],
+            };
             let mut is_lost = false;
             let parts = self.axes.iter_mut().zip(&self.config).zip(&executed.setpoints).zip(&*counts);
-            for (output, (((axis, config), setpoint), counts)) in outputs.iter_mut().zip(parts) {
-                axis.tick_into(config, setpoint, counts, output);
+            for ((output, correction), (((axis, config), setpoint), counts)) in
+                outputs.iter_mut().zip(correction).zip(parts)
+            {
+                axis.tick(config, setpoint, counts, correction, output);
                 is_lost |= output.lost;
             }
             if is_lost {
@@ -158,10 +177,10 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     }
 
     fn stand_still(&mut self) {
-        let Trace { executed, counts, axes: outputs, .. } = &mut self.trace;
-        let parts = self.axes.iter().zip(&self.config).zip(&executed.setpoints).zip(&*counts);
-        for (output, (((axis, config), setpoint), &counts)) in outputs.iter_mut().zip(parts) {
-            *output = axis.stand_still(config, setpoint, counts);
+        let Trace { counts, axes: outputs, .. } = &mut self.trace;
+        let parts = self.axes.iter().zip(&self.config).zip(&*counts);
+        for (output, ((axis, config), &counts)) in outputs.iter_mut().zip(parts) {
+            *output = axis.stand_still(config, output.set, counts);
         }
     }
 
@@ -195,7 +214,11 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             axis.regulator = crate::axis::RegulatorState::default();
         }
         self.executor = Executor::new(position);
+        self.preview.rest_at(position);
         self.trace.executed = self.executor.resting();
+        for (output, &set) in self.trace.axes.iter_mut().zip(&position) {
+            output.set = set;
+        }
         position
     }
 

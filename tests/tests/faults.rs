@@ -8,6 +8,7 @@ use check::bench::{LIMITS, RULES, line, mm, point, ramp, rest_to_rest};
 use hal_sim::{AxisParameters, MachineParameters, SimMachine};
 use motion_host::machine::Machine;
 use motion_host::simulate::rig::Rig;
+use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::{ExecFault, ExecState};
 use motion_kernel::fault::FaultKind;
 use motion_kernel::hal::{DriveEnable, Encoder, VelocityChannel};
@@ -66,8 +67,9 @@ fn kernel() -> Kernel<f32, 2> {
         axis.following_error_limit_mm = 0.5;
         axis.mm_per_count = MM_PER_COUNT;
     }
-    let [x, y, _] = machine.axis_configs().expect("axes");
-    let mut kernel = Kernel::new([x, y], point([0.0, 0.0]), [Counts(0); 2]);
+    let [x, y, _] = machine.axes;
+    let config = AxesConfig::new(&[x.figures(), y.figures()], machine.tick_s).expect("axes");
+    let mut kernel = Kernel::new(config, point([0.0, 0.0]), [Counts(0); 2]);
     kernel.enable(0);
     kernel
 }
@@ -266,7 +268,7 @@ fn converter_bus() {
         let mut rig = Rig::new(&simulated).expect("a converter");
         let Ok(counts) = rig.latch();
         let start = [Position::ZERO; 3];
-        let mut kernel = Kernel::<f32, 3>::new(reference.axis_configs().expect("axes"), start, counts);
+        let mut kernel = Kernel::<f32, 3>::new(reference.axes_config().expect("axes"), start, counts);
         kernel.enable(0);
         let mut streams = Streams::<f32, 3, 8, 8>::new();
         let (mut feeder, mut intake) = streams.split(reference.rules(), start);

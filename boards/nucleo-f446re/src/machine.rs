@@ -5,7 +5,7 @@
 //! machine, its file on the PC, and the board checks here what only it can know. A program that is damaged or
 //! does not suit the board is refused before anything is enabled.
 
-use motion_kernel::axis::{AxisConfig, ScaleError};
+use motion_kernel::axis::{AxesConfig, AxesError};
 use motion_kernel::program::{Header, ProgramError, Reader};
 
 use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
@@ -40,7 +40,7 @@ pub enum MachineError {
         limit: f64,
     },
     /// A figure of an axis is out of its range.
-    Scale(ScaleError),
+    Axes(AxesError),
 }
 
 /// A program that suits the board, and its machine.
@@ -49,7 +49,7 @@ pub struct Machine {
     /// All of the program's items.
     pub program: Reader<'static, AXES>,
     /// The kernel's axes.
-    pub axes: [AxisConfig<f32>; AXES],
+    pub axes: AxesConfig<f32, AXES>,
 }
 
 impl Machine {
@@ -71,9 +71,7 @@ impl Machine {
                 return Err(MachineError::CountRate { axis, counts_per_s, limit });
             }
         }
-        let config = |figures| AxisConfig::new(figures, TICK_S).map_err(MachineError::Scale);
-        let [x, y, z] = axes;
-        Ok(Self { axes: [config(x)?, config(y)?, config(z)?], program })
+        Ok(Self { axes: AxesConfig::new(axes, TICK_S).map_err(MachineError::Axes)?, program })
     }
 
     /// What the program was planned for.
@@ -111,7 +109,7 @@ mod tests {
         let expected = MachineError::CountRate { axis: 1, counts_per_s: 1.2e7, limit: 6e6 };
         assert_eq!(fine, Err(expected));
         let still = with(|header| header.axes[2].mm_s_at_10_v = 0.0).map(|_| ());
-        assert!(matches!(still, Err(MachineError::Scale(_))));
+        assert!(matches!(still, Err(MachineError::Axes(_))));
         assert!(matches!(Machine::new(&PROGRAM[1..]), Err(MachineError::Program(_))));
     }
 }

@@ -3,15 +3,16 @@
 use std::ops::Range;
 
 use hal_sim::{BedMode, DriveParameters, EncoderNoise, TimerBits};
-use motion_kernel::axis::{Feedforward, Gains};
+use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Gains, TABLE_POINTS, Table, Tables};
 use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
 use toml::Spanned;
 
 use super::error::{MachineError, quote};
 use super::range::{
-    CurveShare, DeadTime, FeedforwardGain, FollowingError, Gain, Inertia, JointAngle, Limit, OutputLimit,
-    OutputOffset, Positive, Resolution, Tick, Velocity, Within,
+    CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime,
+    InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio, OutputLimit, OutputOffset, Positive,
+    Resolution, Reversal, TablePoint, Tick, Velocity, Within,
 };
 use super::settings::{AxisSettings, Machine, PathSettings};
 
@@ -134,6 +135,63 @@ struct RegulatorTable {
     feedforward_velocity: Within<FeedforwardGain>,
     feedforward_accel_s: Within<FeedforwardGain>,
     feedforward_jerk_s2: Within<FeedforwardGain>,
+    feedforward_lead_s: Option<Within<LeadTime>>,
+    feedforward_velocity_table: Option<TableTable>,
+    feedforward_accel_table: Option<TableTable>,
+    feedforward_jerk_table: Option<TableTable>,
+    inverse: Option<InverseTable>,
+}
+
+/// Tables of velocity commands; the reach has the unit of what they are over.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TableTable {
+    reach: Within<Limit>,
+    mm_s: [Within<TablePoint>; TABLE_POINTS],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InverseTable {
+    velocity_gain_per_s: Within<InverseGain>,
+    integral_time_s: Within<IntegralTime>,
+    current_lag_s: Within<Lag>,
+    viscous_friction_per_s: Within<Friction>,
+    coulomb_friction_mm_s2: Within<Friction>,
+    reversal_mm_s: Within<Reversal>,
+    bed: Option<InverseBedTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InverseBedTable {
+    frequency_hz: Within<Positive>,
+    damping_ratio: Within<Damping>,
+    mass_ratio: Within<MassRatio>,
+}
+
+impl TableTable {
+    fn table(&self) -> Table {
+        Table { reach: self.reach.0, mm_s: self.mm_s.each_ref().map(|point| point.0 as f32) }
+    }
+}
+
+impl InverseTable {
+    fn drive(&self) -> DriveInverse {
+        DriveInverse {
+            velocity_gain_per_s: self.velocity_gain_per_s.0,
+            integral_time_s: self.integral_time_s.0,
+            current_lag_s: self.current_lag_s.0,
+            viscous_friction_per_s: self.viscous_friction_per_s.0,
+            coulomb_friction_mm_s2: self.coulomb_friction_mm_s2.0,
+            reversal_mm_s: self.reversal_mm_s.0,
+            bed: self.bed.as_ref().map(|bed| BedInverse {
+                frequency_hz: bed.frequency_hz.0,
+                damping_ratio: bed.damping_ratio.0,
+                mass_ratio: bed.mass_ratio.0,
+            }),
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -210,6 +268,13 @@ impl AxisTable {
                 velocity: self.regulator.feedforward_velocity.0,
                 accel_s: self.regulator.feedforward_accel_s.0,
                 jerk_s2: self.regulator.feedforward_jerk_s2.0,
+                lead_s: self.regulator.feedforward_lead_s.map_or(0.0, |lead| lead.0),
+                tables: Tables {
+                    velocity: self.regulator.feedforward_velocity_table.as_ref().map(TableTable::table),
+                    accel: self.regulator.feedforward_accel_table.as_ref().map(TableTable::table),
+                    jerk: self.regulator.feedforward_jerk_table.as_ref().map(TableTable::table),
+                },
+                drive: self.regulator.inverse.as_ref().map(InverseTable::drive),
             },
             drive: self.drive.parameters(),
         }

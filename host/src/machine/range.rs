@@ -48,6 +48,15 @@ ranges! {
     FeedforwardGain: "a number from -1000 to 1000", |value| value.abs() <= 1000.0;
     Positive: "a number from 1e-6 to 1e9", |value| (1e-6..=1e9).contains(&value);
     DeadTime: "a number from 0 to 0.01", |value| (0.0..=0.01).contains(&value);
+    LeadTime: "a number from 0 to 0.1", |value| (0.0..=0.1).contains(&value);
+    TablePoint: "a number from -100000 to 100000", |value| value.abs() <= 1e5;
+    InverseGain: "a number from 0.001 to 1e6", |value| (1e-3..=1e6).contains(&value);
+    IntegralTime: "a number from 0.00002 to 1e6", |value| (2e-5..=1e6).contains(&value);
+    Lag: "a number from 0 to 1", |value| (0.0..=1.0).contains(&value);
+    Friction: "a number from 0 to 1e6", |value| (0.0..=1e6).contains(&value);
+    Reversal: "a number from 0.001 to 1e6", |value| (1e-3..=1e6).contains(&value);
+    Damping: "a number from 0.001 to 1", |value| (1e-3..=1.0).contains(&value);
+    MassRatio: "a number from 1e-6 to 100", |value| (1e-6..=100.0).contains(&value);
     Inertia: "a number above -1, at most 1000", |value| value > -1.0 && value <= 1000.0;
 }
 

@@ -4,7 +4,7 @@ use hal_sim::{
     AxisParameters, DriveParameters, EncoderNoise, EncoderParameters, MachineParameters, REFERENCE_TICK_S,
     REFERENCE_X, REFERENCE_Y, REFERENCE_Z, SUBSTEPS_MAX, TimerBits,
 };
-use motion_kernel::axis::{AxisConfig, AxisFigures, Feedforward, Gains};
+use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
 use motion_kernel::law::Limits;
 use motion_kernel::num::Real;
 use motion_kernel::plan::{AxisLimits, CURVE_FEED_SHARE, MachineLimits};
@@ -163,9 +163,10 @@ impl Machine {
     ///
     /// # Errors
     /// The first axis with a value that the kernel can't use.
-    pub fn axis_configs<R: Real>(&self) -> Result<[AxisConfig<R>; 3], AxisError> {
-        let [x, y, z] = &self.axes;
-        Ok([x.config(self.tick_s)?, y.config(self.tick_s)?, z.config(self.tick_s)?])
+    pub fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, 3>, AxisError> {
+        let figures = self.axes.each_ref().map(AxisSettings::figures);
+        AxesConfig::new(&figures, self.tick_s)
+            .map_err(|error| AxisError { axis: self.axes[error.axis].name.clone(), source: error.cause })
     }
 
     /// What a compiled program carries: everything that the kernel has to know of the machine, which stands at
@@ -218,7 +219,12 @@ impl AxisSettings {
             output_limit_v: 10.0,
             gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
             // The measured machine ran 0.35 of the drive's own J, 6.376715·10⁻⁵ s².
-            feedforward: Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.231_850_25e-5 },
+            feedforward: Feedforward {
+                velocity: 1.0,
+                accel_s: 1.675e-3,
+                jerk_s2: 2.231_850_25e-5,
+                ..Feedforward::default()
+            },
             drive,
         }
     }
@@ -242,11 +248,6 @@ impl AxisSettings {
             feedforward: self.feedforward,
             following_error_limit_mm: self.following_error_limit_mm,
         }
-    }
-
-    fn config<R: Real>(&self, tick_s: f64) -> Result<AxisConfig<R>, AxisError> {
-        AxisConfig::new(&self.figures(), tick_s)
-            .map_err(|source| AxisError { axis: self.name.clone(), source })
     }
 
     fn simulated(&self) -> AxisParameters {

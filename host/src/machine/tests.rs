@@ -1,6 +1,6 @@
 //! The machine file against the built-in machine, and every refusal.
 
-use motion_kernel::axis::AxisConfig;
+use motion_kernel::axis::AxesConfig;
 
 use super::{Machine, REFERENCE_TOML};
 
@@ -25,10 +25,10 @@ fn the_file_is_the_built_in_machine() {
 #[test]
 fn the_stages_take_it() {
     let machine = Machine::reference();
-    let narrow: [AxisConfig<f32>; 3] = machine.axis_configs().expect("f32");
-    let wide: [AxisConfig<f64>; 3] = machine.axis_configs().expect("f64");
-    assert!((narrow[0].encoder.mm_per_count() - 1e-4).abs() < 1e-15);
-    assert!((wide[2].output.limits().1 - 1000.0 / 3.0).abs() < 1e-9);
+    let narrow: AxesConfig<f32, 3> = machine.axes_config().expect("f32");
+    let wide: AxesConfig<f64, 3> = machine.axes_config().expect("f64");
+    assert!((narrow.axes[0].encoder.mm_per_count() - 1e-4).abs() < 1e-15);
+    assert!((wide.axes[2].output.limits().1 - 1000.0 / 3.0).abs() < 1e-9);
     assert_eq!(
         machine.simulated(),
         hal_sim::MachineParameters::at_reference_tick([

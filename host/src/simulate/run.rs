@@ -99,7 +99,7 @@ fn run_in<R: Real>(
     let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
     let Ok(counts) = rig.latch();
     let start = [Position::ZERO; AXES];
-    let mut kernel = Kernel::<R, AXES>::new(machine.axis_configs()?, start, counts);
+    let mut kernel = Kernel::<R, AXES>::new(machine.axes_config()?, start, counts);
     kernel.enable(0);
     let mut streams = Streams::<R, AXES, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
@@ -169,7 +169,7 @@ fn tick_record<R: Real>(trace: &Trace<R, AXES>, start_mm: f64, contour: &mut Con
     let axes = core::array::from_fn(|index| {
         let (setpoint, output) = (&executed.setpoints[index], &trace.axes[index]);
         AxisTick {
-            set_mm: setpoint.position.to_mm(),
+            set_mm: output.set.to_mm(),
             vel_mm_s: setpoint.velocity_mm_s.to_f64(),
             acc_mm_s2: setpoint.accel_mm_s2.to_f64(),
             jerk_mm_s3: setpoint.jerk_mm_s3.to_f64(),

@@ -4,16 +4,24 @@
 //! fault is reported, not thrown.
 //!
 //! - [`scale`]: mm ↔ counts, mm/s ↔ volts;
-//! - [`regulator`]: S4 (1), P(ID) on the following error plus feedforward of velocity, acceleration
-//!   and jerk, with saturation and anti-windup.
+//! - [`preview`]: position set-points delayed, so that feedforward comes early;
+//! - [`feedforward`]: F_V, F_a, F_J of S4 (1), and the inverse of the drive;
+//! - [`regulator`]: S4 (1), P(ID) on the following error plus feedforward, with saturation and anti-windup;
+//! - [`correction`]: what was learnt of a stretch, added to feedforward.
 //!
-//! Configuration ([`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so gains can
+//! Configuration ([`AxesConfig`], [`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so gains can
 //! change without a bump.
 
+pub mod correction;
+pub mod feedforward;
+pub mod preview;
 pub mod regulator;
 pub mod scale;
 
-pub use regulator::{Command, Feedforward, Gains, Regulator, RegulatorState};
+pub use correction::{Correction, CorrectionError};
+pub use feedforward::{BedInverse, DriveInverse, Feedforward, TABLE_POINTS, Table, Tables};
+pub use preview::{PREVIEW_TICKS_MAX, Preview};
+pub use regulator::{Command, Gains, Regulator, RegulatorState};
 pub use scale::{EncoderScale, OutputScale, ScaleError};
 
 use serde::{Deserialize, Serialize};
@@ -35,7 +43,7 @@ pub struct AxisFigures {
     pub output_limit_v: f64,
     /// Feedback gains.
     pub gains: Gains,
-    /// Feedforward gains.
+    /// Feedforward.
     pub feedforward: Feedforward,
     /// Following error at which the axis faults \[mm\], > 0.
     pub following_error_limit_mm: f64,
@@ -54,12 +62,62 @@ pub struct AxisConfig<R> {
     pub following_error_limit_mm: R,
 }
 
-impl<R: Real> AxisConfig<R> {
-    /// The axis for a control tick of `tick_s`. Background.
+/// What is fixed about all axes of a machine while they run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxesConfig<R, const AXES: usize> {
+    /// Each axis.
+    pub axes: [AxisConfig<R>; AXES],
+    /// By how many ticks position set-points are delayed.
+    pub preview_ticks: u8,
+}
+
+/// An axis that can't be used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct AxesError {
+    /// The axis, from 0.
+    pub axis: usize,
+    /// What is wrong with it.
+    pub cause: ScaleError,
+}
+
+impl core::fmt::Display for AxesError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "axis {}: {}", self.axis, self.cause)
+    }
+}
+
+impl core::error::Error for AxesError {}
+
+impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
+    const ONE_AT_LEAST: () = assert!(AXES > 0, "a machine has an axis");
+
+    /// The axes for a control tick of `tick_s`. Background.
     ///
     /// # Errors
     /// The first figure that is out of its range or beyond the number type's.
-    pub fn new(figures: &AxisFigures, tick_s: f64) -> Result<Self, ScaleError> {
+    pub fn new(figures: &[AxisFigures; AXES], tick_s: f64) -> Result<Self, AxesError> {
+        let () = Self::ONE_AT_LEAST;
+        let error = |(axis, cause)| AxesError { axis, cause };
+        let preview_ticks = preview::preview_ticks(figures, tick_s).map_err(error)?;
+        let config = |axis: usize| {
+            AxisConfig::new(&figures[axis], preview_ticks, tick_s).map_err(|cause| error((axis, cause)))
+        };
+        // Without allocation an array is filled by a fallible function only over something already there.
+        let mut axes = [config(0)?; AXES];
+        for (axis, place) in axes.iter_mut().enumerate().skip(1) {
+            *place = config(axis)?;
+        }
+        Ok(Self { axes, preview_ticks })
+    }
+}
+
+impl<R: Real> AxisConfig<R> {
+    /// The axis for a control tick of `tick_s`, with position set-points delayed by `preview_ticks`. Background.
+    ///
+    /// # Errors
+    /// The first figure that is out of its range or beyond the number type's.
+    pub fn new(figures: &AxisFigures, preview_ticks: u8, tick_s: f64) -> Result<Self, ScaleError> {
         let &AxisFigures { mm_per_count, mm_s_at_10_v, output_offset_v, output_limit_v, .. } = figures;
         let limit_mm = figures.following_error_limit_mm;
         let following_error_limit_mm =
@@ -71,7 +129,7 @@ impl<R: Real> AxisConfig<R> {
         Ok(Self {
             encoder: EncoderScale::new(mm_per_count)?,
             output: OutputScale::new(mm_s_at_10_v, output_offset_v, output_limit_v)?,
-            regulator: Regulator::new(figures.gains, figures.feedforward, tick_s, limit_mm)?,
+            regulator: Regulator::new(figures.gains, &figures.feedforward, preview_ticks, tick_s, limit_mm)?,
             following_error_limit_mm,
         })
     }
@@ -91,6 +149,8 @@ pub struct AxisState<R> {
 /// The outcome of one tick of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisOutput<R> {
+    /// The position set-point that is regulated to: the present one, or a past one where there is a preview.
+    pub set: Position,
     /// Actual position from the encoder.
     pub actual: Position,
     /// Following error: set-point − actual \[mm\].
@@ -117,45 +177,43 @@ impl<R: Real> AxisState<R> {
 
     /// The output of an axis whose drive is off: the voltage at which it stands still.
     #[inline]
-    pub fn stand_still(
-        &self,
-        config: &AxisConfig<R>,
-        setpoint: &Setpoint<R>,
-        counts: Counts,
-    ) -> AxisOutput<R> {
+    pub fn stand_still(&self, config: &AxisConfig<R>, set: Position, counts: Counts) -> AxisOutput<R> {
         let actual = self.position(config, counts);
         AxisOutput {
+            set,
             actual,
-            following_error_mm: (setpoint.position - actual).to_offset(),
+            following_error_mm: (set - actual).to_offset(),
             code: config.output.code(R::ZERO),
             saturated: false,
             lost: false,
         }
     }
 
-    /// One control tick.
-    pub fn tick(&mut self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, counts: Counts) -> AxisOutput<R> {
-        let mut output = AxisOutput::default();
-        self.tick_into(config, setpoint, &counts, &mut output);
-        output
-    }
-
-    /// [`AxisState::tick`] into `output`. Not inlined: three copies of it would fight for the registers.
+    /// One control tick: `setpoint` is the present one, of which feedforward is made; `output.set` is the position
+    /// to regulate to; `correction_mm_s` is added to the command. The rest of `output` is written.
+    // Not inlined: three copies of it would fight for the registers.
     #[inline(never)]
-    pub(crate) fn tick_into(
+    pub fn tick(
         &mut self,
         config: &AxisConfig<R>,
         setpoint: &Setpoint<R>,
         &counts: &Counts,
+        correction_mm_s: R,
         output: &mut AxisOutput<R>,
     ) {
-        let actual = self.position(config, counts);
+        let (set, actual) = (output.set, self.position(config, counts));
         // Subtracted in fixed point, converted afterwards.
-        let following_error_mm: R = (setpoint.position - actual).to_offset();
+        let following_error_mm: R = (set - actual).to_offset();
         self.peak_following_error_mm = self.peak_following_error_mm.max(following_error_mm.abs());
-        let command =
-            config.regulator.tick(&mut self.regulator, following_error_mm, setpoint, config.output.limits());
+        let command = config.regulator.tick(
+            &mut self.regulator,
+            following_error_mm,
+            setpoint,
+            correction_mm_s,
+            config.output.limits(),
+        );
         *output = AxisOutput {
+            set,
             actual,
             following_error_mm,
             code: config.output.code(command.velocity_mm_s),

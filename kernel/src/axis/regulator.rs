@@ -4,7 +4,8 @@
 //! U = kp·ε + kd·Δε + ki·Σε + F_V(V) + F_a(a) + F_J(J)
 //! ```
 //!
-//! ε is the following error; V, a, J are the commanded velocity, acceleration and jerk of this tick.
+//! ε is the following error; V, a, J are the commanded velocity, acceleration and jerk of this tick; the F are
+//! [`super::feedforward`].
 //! P, PI, PD, PID and open loop are choices of the gains. Gains are given in units of time, so they
 //! keep their meaning when the tick changes; [`Regulator::new`] turns them into per-tick factors.
 //!
@@ -13,6 +14,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::feedforward::{Feedforward, FeedforwardConfig, FeedforwardState};
 use super::scale::ScaleError;
 use crate::num::Real;
 use crate::path::Setpoint;
@@ -28,26 +30,13 @@ pub struct Gains {
     pub kd: f64,
 }
 
-/// Feedforward gains.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Feedforward {
-    /// Of velocity \[1\]; 1 for a drive whose gain is known.
-    pub velocity: f64,
-    /// Of acceleration \[s\].
-    pub accel_s: f64,
-    /// Of jerk \[s²\].
-    pub jerk_s2: f64,
-}
-
 /// The regulator's configuration, per tick. Immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Regulator<R> {
     kp: R,
     ki: R,
     kd: R,
-    velocity: R,
-    accel: R,
-    jerk: R,
+    feedforward: FeedforwardConfig<R>,
 }
 
 /// What the regulator remembers.
@@ -57,6 +46,7 @@ pub struct RegulatorState<R> {
     integral_mm_s: R,
     /// ε of the tick before \[mm\]; none in the first tick, so that it has no derivative kick.
     last_error_mm: Option<R>,
+    feedforward: FeedforwardState<R>,
 }
 
 /// The regulator's output.
@@ -69,54 +59,52 @@ pub struct Command<R> {
 }
 
 impl<R: Real> Regulator<R> {
-    /// The regulator for a control tick of `tick_s` and following errors up to `error_limit_mm`, beyond
-    /// which the axis faults.
+    /// The regulator for a control tick of `tick_s`, position set-points delayed by `preview_ticks`, and
+    /// following errors up to `error_limit_mm`, beyond which the axis faults.
     ///
     /// # Errors
-    /// A gain or the tick is not finite, kp, ki or kd is negative, the tick is not positive, or a gain
-    /// at the error limit is beyond the number type's range.
+    /// A gain or the tick is not finite, kp, ki or kd is negative, the tick is not positive, a gain
+    /// at the error limit is beyond the number type's range, or feedforward is refused.
     pub fn new(
         gains: Gains,
-        feedforward: Feedforward,
+        feedforward: &Feedforward,
+        preview_ticks: u8,
         tick_s: f64,
         error_limit_mm: f64,
     ) -> Result<Self, ScaleError> {
         if !(tick_s > 0.0 && tick_s.is_finite()) {
             return Err(ScaleError { quantity: "tick [s]", value: tick_s, expected: "a positive number" });
         }
-        let real = |quantity, value: f64, per_mm: f64, least: f64| {
+        let real = |quantity, value: f64, per_mm: f64| {
             // With room for the sum of all the terms.
             let fits = R::checked_from_f64(8.0 * libm::fabs(value) * per_mm).is_some();
-            R::checked_from_f64(value).filter(|_| value >= least && fits).ok_or(ScaleError {
+            R::checked_from_f64(value).filter(|_| value >= 0.0 && fits).ok_or(ScaleError {
                 quantity,
                 value,
-                expected: "a number within the kernel's range, not below 0 for a gain",
+                expected: "a number within the kernel's range, not below 0",
             })
         };
         Ok(Self {
-            kp: real("kp [1/s]", gains.kp_per_s, error_limit_mm, 0.0)?,
-            ki: real("ki [1/s²]", gains.ki_per_s2 * tick_s, error_limit_mm, 0.0)?,
-            kd: real("kd [1]", gains.kd / tick_s, 2.0 * error_limit_mm, 0.0)?,
-            velocity: real("velocity feedforward [1]", feedforward.velocity, 1.0, f64::MIN)?,
-            accel: real("acceleration feedforward [s]", feedforward.accel_s, 1.0, f64::MIN)?,
-            jerk: real("jerk feedforward [s²]", feedforward.jerk_s2, 1.0, f64::MIN)?,
+            kp: real("kp [1/s]", gains.kp_per_s, error_limit_mm)?,
+            ki: real("ki [1/s²]", gains.ki_per_s2 * tick_s, error_limit_mm)?,
+            kd: real("kd [1]", gains.kd / tick_s, 2.0 * error_limit_mm)?,
+            feedforward: FeedforwardConfig::new(feedforward, preview_ticks, tick_s)?,
         })
     }
 
-    /// One tick: the velocity command, cut at `limits` \[mm/s\].
+    /// One tick: the velocity command, `correction_mm_s` added, cut at `limits` \[mm/s\].
     #[inline]
     pub fn tick(
         &self,
         state: &mut RegulatorState<R>,
         error_mm: R,
         setpoint: &Setpoint<R>,
+        correction_mm_s: R,
         limits: (R, R),
     ) -> Command<R> {
         let change_mm = state.last_error_mm.map_or(R::ZERO, |last| error_mm - last);
         state.last_error_mm = Some(error_mm);
-        let feedforward = self.velocity * setpoint.velocity_mm_s
-            + self.accel * setpoint.accel_mm_s2
-            + self.jerk * setpoint.jerk_mm_s3;
+        let feedforward = self.feedforward.tick(&mut state.feedforward, setpoint) + correction_mm_s;
         let integral_mm_s = state.integral_mm_s + self.ki * error_mm;
         let wanted = feedforward + self.kp * error_mm + self.kd * change_mm + integral_mm_s;
         let (least, greatest) = limits;
@@ -140,17 +128,17 @@ mod tests {
 
     const TICK_S: f64 = 0.0005;
     const WIDE: (f64, f64) = (-1e9, 1e9);
-    const NO_FEEDFORWARD: Feedforward = Feedforward { velocity: 0.0, accel_s: 0.0, jerk_s2: 0.0 };
 
     fn regulator(gains: Gains, feedforward: Feedforward) -> Regulator<f64> {
-        Regulator::new(gains, feedforward, TICK_S, 1.0).expect("valid")
+        Regulator::new(gains, &feedforward, 0, TICK_S, 1.0).expect("valid")
     }
 
     /// S4 (1) written out, on a random sequence of errors and set-points.
     #[test]
     fn is_the_papers_equation() {
         let gains = Gains { kp_per_s: 230.0, ki_per_s2: 900.0, kd: 0.003 };
-        let feedforward = Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.2e-5 };
+        let feedforward =
+            Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.2e-5, ..Feedforward::default() };
         let regulator = regulator(gains, feedforward);
         let mut state = RegulatorState::default();
         let (mut random, mut errors) = (7_u64, Vec::new());
@@ -167,7 +155,7 @@ mod tests {
             };
             errors.push(0.01 * unit());
             let error = errors[errors.len() - 1];
-            let found = regulator.tick(&mut state, error, &setpoint, WIDE);
+            let found = regulator.tick(&mut state, error, &setpoint, 0.0, WIDE);
             let change = if errors.len() > 1 { error - errors[errors.len() - 2] } else { 0.0 };
             let expected = gains.kp_per_s * error
                 + gains.kd / TICK_S * change
@@ -182,34 +170,38 @@ mod tests {
 
     #[test]
     fn gains_of_zero_open_the_loop() {
-        let open = regulator(Gains::default(), Feedforward { velocity: 1.0, ..NO_FEEDFORWARD });
+        let open = regulator(Gains::default(), Feedforward { velocity: 1.0, ..Feedforward::default() });
         let setpoint = Setpoint { velocity_mm_s: 120.0, ..Setpoint::default() };
-        let command = open.tick(&mut RegulatorState::default(), 55.0, &setpoint, WIDE);
+        let command = open.tick(&mut RegulatorState::default(), 55.0, &setpoint, 0.0, WIDE);
         assert!((command.velocity_mm_s - 120.0).abs() < 1e-12);
+        let corrected = open.tick(&mut RegulatorState::default(), 55.0, &setpoint, -2.5, WIDE);
+        assert!((corrected.velocity_mm_s - 117.5).abs() < 1e-12);
     }
 
     /// After a long saturation the output must come back as soon as the error changes sign.
     #[test]
     fn the_sum_does_not_wind_up() {
-        let regulator = regulator(Gains { kp_per_s: 10.0, ki_per_s2: 1e4, kd: 0.0 }, NO_FEEDFORWARD);
+        let regulator = regulator(Gains { kp_per_s: 10.0, ki_per_s2: 1e4, kd: 0.0 }, Feedforward::default());
         let mut state = RegulatorState::default();
         let still = Setpoint::default();
         for _ in 0..100_000 {
-            let command = regulator.tick(&mut state, 5.0, &still, (-40.0, 30.0));
+            let command = regulator.tick(&mut state, 5.0, &still, 0.0, (-40.0, 30.0));
             assert!(command.saturated && (command.velocity_mm_s - 30.0).abs() < 1e-12);
         }
-        let back = regulator.tick(&mut state, -1.0, &still, (-40.0, 30.0));
+        let back = regulator.tick(&mut state, -1.0, &still, 0.0, (-40.0, 30.0));
         assert!(back.velocity_mm_s < 0.0, "{}", back.velocity_mm_s);
     }
 
     #[test]
     fn refuses_gains_that_are_not_numbers() {
         let gains = Gains { kp_per_s: f64::NAN, ..Gains::default() };
-        assert!(Regulator::<f32>::new(gains, NO_FEEDFORWARD, TICK_S, 1.0).is_err());
-        assert!(Regulator::<f32>::new(Gains::default(), NO_FEEDFORWARD, 0.0, 1.0).is_err());
+        assert!(Regulator::<f32>::new(gains, &Feedforward::default(), 0, TICK_S, 1.0).is_err());
+        assert!(Regulator::<f32>::new(Gains::default(), &Feedforward::default(), 0, 0.0, 1.0).is_err());
         // 8·10⁷·100 mm/s do not fit 32.32 bits.
         let strong = Gains { kp_per_s: 1e7, ..Gains::default() };
-        assert!(Regulator::<crate::num::Fixed>::new(strong, NO_FEEDFORWARD, TICK_S, 220.0).is_err());
-        assert!(Regulator::<f32>::new(strong, NO_FEEDFORWARD, TICK_S, 220.0).is_ok());
+        assert!(
+            Regulator::<crate::num::Fixed>::new(strong, &Feedforward::default(), 0, TICK_S, 220.0).is_err()
+        );
+        assert!(Regulator::<f32>::new(strong, &Feedforward::default(), 0, TICK_S, 220.0).is_ok());
     }
 }

@@ -3,7 +3,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MOTN` |
-//! | 1 | version of this format, 1 |
+//! | 1 | version of this format, 2 |
 //! | 1 | number of axes |
 //! | … | [`Header`], then [`Item`]s to the end, each in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
@@ -23,11 +23,11 @@ use crate::queue::PathRules;
 use crate::units::Position;
 
 const MAGIC: [u8; 4] = *b"MOTN";
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 const PREFIX: usize = MAGIC.len() + 2;
 const CHECKSUM: usize = 4;
 /// No header and no item of eight axes is longer.
-const ENTRY_MAX: usize = 1024;
+const ENTRY_MAX: usize = 4096;
 
 /// Without a table: a kilobyte of flash is worth more than the milliseconds.
 const CHECKSUMS: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
@@ -55,7 +55,7 @@ pub enum ProgramError {
     NotAProgram,
     /// It is of another version of the format.
     Version {
-        /// Its version; 1 is expected.
+        /// Its version; 2 is expected.
         found: u8,
     },
     /// It is for a machine with another number of axes.
@@ -203,7 +203,12 @@ mod tests {
             output_offset_v: 0.0,
             output_limit_v: 10.0,
             gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
-            feedforward: Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.2e-5 },
+            feedforward: Feedforward {
+                velocity: 1.0,
+                accel_s: 1.675e-3,
+                jerk_s2: 2.2e-5,
+                ..Feedforward::default()
+            },
             following_error_limit_mm: 1.0,
         };
         let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };

@@ -15,6 +15,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
+use crate::axis::Correction;
 use crate::law::{FeedSegment, Ticks};
 use crate::num::Real;
 use crate::path::Piece;
@@ -114,8 +115,15 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
         let path = Taken::new(&shared.path_entered, PIECES - 1);
         let feed = Taken::new(&shared.feed_entered, SEGMENTS - 1);
         let finished = shared.stretches.load(Ordering::Relaxed);
-        let intake =
-            Intake { path: path_out, feed: feed_out, shared, finished, path_taken: path, feed_taken: feed };
+        let intake = Intake {
+            path: path_out,
+            feed: feed_out,
+            shared,
+            finished,
+            path_taken: path,
+            feed_taken: feed,
+            correction: None,
+        };
         (feeder, intake)
     }
 }
@@ -252,9 +260,20 @@ pub struct Intake<'a, R: Real, const AXES: usize> {
     finished: u32,
     path_taken: Taken,
     feed_taken: Taken,
+    correction: Option<Correction<'a, R, AXES>>,
 }
 
-impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
+impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
+    /// What was learnt of a stretch to come; replaces any other. None if there is nothing to correct.
+    pub fn correct(&mut self, correction: Option<Correction<'a, R, AXES>>) {
+        self.correction = correction;
+    }
+
+    #[inline]
+    pub(crate) fn correction(&mut self) -> Option<&mut Correction<'a, R, AXES>> {
+        self.correction.as_mut()
+    }
+
     /// A new tick: the producer has had its turn.
     #[inline]
     pub(crate) fn start_tick(&mut self) {

@@ -11,7 +11,7 @@ use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use hal_sim::SimMachine;
 use hal_sim::closed_loop::{InMemory, close, reference_machine};
-use motion_kernel::axis::{AxisConfig, AxisOutput, AxisState};
+use motion_kernel::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState};
 use motion_kernel::exec::ExecState;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::law::{FeedSegment, PathMotion, Phase, Ticks};
@@ -91,7 +91,7 @@ fn ticks<const N: usize>(counter: &Counter, program: Reader<'_, N>, streams: &mu
     let (mut producer, mut closed_loop) =
         close(program, streams, &machine).unwrap_or_else(|error| fail(&error));
     // A regulator of its own beside the kernel's, fed with the same.
-    let config = AxisConfig::<Number>::new(&axes[0], tick_s).unwrap_or_else(|error| fail(&error));
+    let [config, ..] = AxesConfig::<Number, N>::new(&axes, tick_s).unwrap_or_else(|error| fail(&error)).axes;
     let mut axis = Axis::default();
     axis.set_position(&config, Counts::default(), start[0]);
     let mut deepest = 0;
@@ -181,5 +181,7 @@ fn regulate(
     setpoint: &Setpoint<Number>,
     counts: Counts,
 ) -> AxisOutput<Number> {
-    axis.tick(config, setpoint, counts)
+    let mut output = AxisOutput { set: setpoint.position, ..AxisOutput::default() };
+    axis.tick(config, setpoint, &counts, Number::ZERO, &mut output);
+    output
 }

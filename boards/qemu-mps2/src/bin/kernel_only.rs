@@ -10,7 +10,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception};
 use critical_section::Mutex;
 use hal_sim::closed_loop::InMemory;
-use motion_kernel::axis::AxisConfig;
+use motion_kernel::axis::AxesConfig;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::program::{Reader, Supply};
 use motion_kernel::queue::{Intake, Streams};
@@ -43,13 +43,9 @@ fn run() -> Option<()> {
     let streams = cortex_m::singleton!(: Streams<Number, AXES, PIECES, SEGMENTS> = Streams::new())?;
     let (mut feeder, intake) = streams.split(header.rules, header.start);
     let mut supply = Supply::new(program, header.tick_s);
-    let config = |figures| AxisConfig::<Number>::new(figures, header.tick_s).ok();
-    let mut configs = [config(&header.axes[0])?; AXES];
-    for (place, figures) in configs.iter_mut().zip(&header.axes) {
-        *place = config(figures)?;
-    }
+    let config = AxesConfig::<Number, AXES>::new(&header.axes, header.tick_s).ok()?;
     let counts = [Counts(0); AXES];
-    let mut kernel = Kernel::new(configs, header.start, counts);
+    let mut kernel = Kernel::new(config, header.start, counts);
     kernel.enable(100);
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
     critical_section::with(|cs| {

@@ -5,7 +5,7 @@
 
 use cortex_m_rt::entry;
 use hal_sim::closed_loop::InMemory;
-use motion_kernel::axis::AxisConfig;
+use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::ExecState;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::program::{Header, Reader, Supply};
@@ -20,9 +20,8 @@ fn main() -> ! {
     let bytes = programs().next().unwrap_or_else(|| fail(&"a bundle without a program"));
     let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
     let &Header { tick_s, rules, axes, start } = program.header();
-    let config =
-        axes.map(|figures| AxisConfig::<Number>::new(&figures, tick_s).unwrap_or_else(|error| fail(&error)));
-    let steps = config.map(|config| config.encoder.position(Counts(1)).to_bits());
+    let config = AxesConfig::<Number, _>::new(&axes, tick_s).unwrap_or_else(|error| fail(&error));
+    let steps = config.axes.map(|config| config.encoder.position(Counts(1)).to_bits());
     let mut streams = Streams::<Number, AXES, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(rules, start);
     let mut supply = Supply::new(program, tick_s);

@@ -1,0 +1,405 @@
+//! Feedforward: what the drive has to be told so that the axis moves as commanded, before any error shows.
+//!
+//! Consumes the set-point's velocity, acceleration and jerk, produces a velocity command. In the tick.
+//!
+//! ```text
+//! F_V(V) + F_a(a) + F_J(J)                                        S4 (1): each a gain plus a table
+//!   + HP{ (1 + Tc·s)·(a + b·V) + a_c·sgn V + z″ } / Kv            the drive's inverse
+//! ```
+//!
+//! **Lead.** Drive and converter take time: dead time, and half a tick for holding the output. Feedforward can't
+//! undo that after the fact, but it can come early: position set-points are delayed by a few ticks, all axes alike,
+//! so that the path does not change ([`Preview`](super::preview::Preview)), and feedforward is not. What a lead is
+//! short of those whole ticks is taken off by the series V(t − φ) = V − φ·a + φ²/2·J, which costs nothing: it is in the
+//! gains. Two axes' leads may differ by more than a tick; at 2 ms the terms left out are 0.1 µm at 13 Hz.
+//!
+//! **The drive's inverse.** A velocity drive is a PI controller with gain Kv and integral time Ti over a current loop
+//! with lag Tc. To make acceleration a against friction it needs the torque a + b·V + a_c·sgn V, (1 + Tc·s) of it
+//! because of the lag, and its controller makes that of the velocity difference torque/Kv, until the integral part
+//! has taken over: a high-pass HP with Ti. A bed that the axis shakes accelerates by z″ under it; the axis pushes
+//! that, too. Coulomb friction turns where the axis will, Tc early, over a small range of velocity.
+
+use serde::{Deserialize, Serialize};
+
+use super::scale::ScaleError;
+use crate::num::Real;
+use crate::path::Setpoint;
+
+/// Feedforward of an axis. The default is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Feedforward {
+    /// Gain of velocity \[1\]; 1 for a drive whose gain is known.
+    pub velocity: f64,
+    /// Gain of acceleration \[s\].
+    pub accel_s: f64,
+    /// Gain of jerk \[s²\].
+    pub jerk_s2: f64,
+    /// How far it comes before the position set-point \[s\], 0 or more: the drive's dead time plus half a tick.
+    pub lead_s: f64,
+    /// Added to the gains.
+    pub tables: Tables,
+    /// The drive to be inverted.
+    pub drive: Option<DriveInverse>,
+}
+
+/// The tables of F_V, F_a and F_J.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tables {
+    /// Over velocity \[mm/s\].
+    pub velocity: Option<Table>,
+    /// Over acceleration \[mm/s²\].
+    pub accel: Option<Table>,
+    /// Over jerk \[mm/s³\].
+    pub jerk: Option<Table>,
+}
+
+/// Points of a [`Table`].
+pub const TABLE_POINTS: usize = 9;
+
+/// A velocity command over a quantity, straight between points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// The points lie evenly from −reach to +reach, in the quantity's unit; > 0. Beyond, the end points hold.
+    pub reach: f64,
+    /// Velocity commands \[mm/s\].
+    pub mm_s: [f32; TABLE_POINTS],
+}
+
+/// A drive with its mechanics, to be inverted. Everything is per unit of the inertia that it moves.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DriveInverse {
+    /// Proportional gain of the velocity controller \[1/s\], > 0.
+    pub velocity_gain_per_s: f64,
+    /// Integral time of the velocity controller \[s\], > 0.
+    pub integral_time_s: f64,
+    /// Lag of the current loop \[s\], 0 or more.
+    pub current_lag_s: f64,
+    /// Viscous friction \[1/s\], 0 or more.
+    pub viscous_friction_per_s: f64,
+    /// Coulomb friction \[mm/s²\], 0 or more.
+    pub coulomb_friction_mm_s2: f64,
+    /// Velocity from which on all of Coulomb friction is compensated \[mm/s\], > 0; below, a part in proportion.
+    pub reversal_mm_s: f64,
+    /// The machine bed, if the axis shakes it.
+    pub bed: Option<BedInverse>,
+}
+
+/// One mode of the machine bed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BedInverse {
+    /// Natural frequency of the bed alone \[Hz\], > 0, below a quarter of the tick's frequency.
+    pub frequency_hz: f64,
+    /// Fraction of critical damping, from 0.001 to 1.
+    pub damping_ratio: f64,
+    /// Moving mass over the bed's modal mass, > 0.
+    pub mass_ratio: f64,
+}
+
+/// Greatest velocity, acceleration and jerk that a set-point may have where numbers have a range.
+const REACH: [f64; 3] = [1e6, 1e9, 2e9];
+
+/// A linear function of velocity, acceleration and jerk.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Linear<R> {
+    velocity: R,
+    accel: R,
+    jerk: R,
+}
+
+impl<R: Real> Linear<R> {
+    /// `gains` at what the set-point was `late_s` ago.
+    fn new(quantity: &'static str, gains: [f64; 3], late_s: f64) -> Result<Self, ScaleError> {
+        let [velocity, accel, jerk] = gains;
+        let gains =
+            [velocity, accel - late_s * velocity, jerk - late_s * accel + late_s * late_s / 2.0 * velocity];
+        // With room for the sum of all that is added to it.
+        let most: f64 = gains.iter().zip(REACH).map(|(gain, reach)| libm::fabs(*gain) * reach).sum();
+        let refused = ScaleError {
+            quantity,
+            value: gains.into_iter().find(|gain| !gain.is_finite()).unwrap_or(most),
+            expected: "numbers within the kernel's range",
+        };
+        let real = |value| R::checked_from_f64(value).ok_or(refused);
+        real(8.0 * most)?;
+        let [velocity, accel, jerk] = gains;
+        Ok(Self { velocity: real(velocity)?, accel: real(accel)?, jerk: real(jerk)? })
+    }
+
+    #[inline]
+    fn at(&self, setpoint: &Setpoint<R>) -> R {
+        self.velocity * setpoint.velocity_mm_s
+            + self.accel * setpoint.accel_mm_s2
+            + self.jerk * setpoint.jerk_mm_s3
+    }
+}
+
+/// A [`Table`] made for the tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Lookup<R> {
+    reach: R,
+    per_unit: R,
+    mm_s: [R; TABLE_POINTS],
+}
+
+impl<R: Real> Lookup<R> {
+    fn new(quantity: &'static str, table: &Table) -> Result<Self, ScaleError> {
+        let refused = |value| ScaleError {
+            quantity,
+            value,
+            expected: "a reach above 0, and points within the kernel's range",
+        };
+        let reach = R::checked_from_f64(table.reach).filter(|_| table.reach > 1e-6);
+        let mut mm_s = [R::ZERO; TABLE_POINTS];
+        for (place, &point) in mm_s.iter_mut().zip(&table.mm_s) {
+            let point = f64::from(point);
+            *place = R::checked_from_f64(8.0 * point)
+                .and_then(|_| R::checked_from_f64(point))
+                .ok_or(refused(point))?;
+        }
+        let per_unit = R::from_f64((TABLE_POINTS - 1) as f64 / 2.0 / table.reach);
+        Ok(Self { reach: reach.ok_or(refused(table.reach))?, per_unit, mm_s })
+    }
+
+    fn at(&self, value: R) -> R {
+        // From 0 at −reach to 8 at +reach, in steps of 2⁻³².
+        let place = ((value.max(-self.reach).min(self.reach) + self.reach) * self.per_unit).to_q32();
+        let index = (place >> 32).clamp(0, TABLE_POINTS as i64 - 2) as usize;
+        let part = R::from_q32(place - ((index as i64) << 32));
+        match (self.mm_s.get(index), self.mm_s.get(index + 1)) {
+            (Some(&from), Some(&to)) => from + (to - from) * part,
+            // The index is clamped.
+            _ => R::ZERO,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LookupTables<R> {
+    velocity: Option<Lookup<R>>,
+    accel: Option<Lookup<R>>,
+    jerk: Option<Lookup<R>>,
+    /// How late the tables' arguments are taken \[s\].
+    late: R,
+}
+
+impl<R: Real> LookupTables<R> {
+    fn new(tables: &Tables, late_s: f64) -> Result<Option<Self>, ScaleError> {
+        let Tables { velocity, accel, jerk } = tables;
+        if velocity.is_none() && accel.is_none() && jerk.is_none() {
+            return Ok(None);
+        }
+        let lookup = |quantity, table: &Option<Table>| {
+            table.as_ref().map(|table| Lookup::new(quantity, table)).transpose()
+        };
+        Ok(Some(Self {
+            velocity: lookup("velocity feedforward table", velocity)?,
+            accel: lookup("acceleration feedforward table", accel)?,
+            jerk: lookup("jerk feedforward table", jerk)?,
+            late: R::from_f64(late_s),
+        }))
+    }
+
+    fn at(&self, setpoint: &Setpoint<R>) -> R {
+        let of =
+            |lookup: &Option<Lookup<R>>, value: R| lookup.as_ref().map_or(R::ZERO, |lookup| lookup.at(value));
+        of(&self.velocity, setpoint.velocity_mm_s - self.late * setpoint.accel_mm_s2)
+            + of(&self.accel, setpoint.accel_mm_s2 - self.late * setpoint.jerk_mm_s3)
+            + of(&self.jerk, setpoint.jerk_mm_s3)
+    }
+}
+
+/// The bed's acceleration that the commanded one will cause.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Bed<R> {
+    /// −ω²/(1+μ), −2ζω/(1+μ), and −μ/(1+μ) of the acceleration and of the jerk.
+    displacement: R,
+    velocity: R,
+    drive: [R; 2],
+    tick_s: R,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct BedState<R> {
+    displacement_mm: R,
+    velocity_mm_s: R,
+}
+
+impl<R: Real> Bed<R> {
+    fn new(bed: &BedInverse, late_s: f64, tick_s: f64) -> Result<Self, ScaleError> {
+        let &BedInverse { frequency_hz, damping_ratio, mass_ratio } = bed;
+        let check = |quantity, value: f64, holds: bool, expected| {
+            if holds && value.is_finite() { Ok(()) } else { Err(ScaleError { quantity, value, expected }) }
+        };
+        check(
+            "bed frequency [Hz]",
+            frequency_hz,
+            frequency_hz > 0.0 && frequency_hz * tick_s < 0.25,
+            "more than 0, less than a quarter of the tick's frequency",
+        )?;
+        check(
+            "bed damping ratio",
+            damping_ratio,
+            (0.001..=1.0).contains(&damping_ratio),
+            "a number from 0.001 to 1",
+        )?;
+        // At the resonance the bed's acceleration is μ/2ζ of the axis'.
+        let peak = REACH[1] * (1.0 + mass_ratio / damping_ratio);
+        let fits = mass_ratio > 0.0 && R::checked_from_f64(peak).is_some();
+        check("bed mass ratio", mass_ratio, fits, "more than 0, and a resonance within the kernel's range")?;
+        let per_mass = 1.0 / (1.0 + mass_ratio);
+        // The frequency of one step a tick is too high by a part (ω·Ts)²/24; this takes it off.
+        let omega = 2.0 * core::f64::consts::PI * frequency_hz;
+        let own = omega * libm::sqrt(per_mass);
+        let stepped = 2.0 * libm::sin(own * tick_s / 2.0) / tick_s;
+        Ok(Self {
+            displacement: R::from_f64(-stepped * stepped),
+            velocity: R::from_f64(-2.0 * damping_ratio * omega * per_mass),
+            drive: [R::from_f64(-mass_ratio * per_mass), R::from_f64(late_s * mass_ratio * per_mass)],
+            tick_s: R::from_f64(tick_s),
+        })
+    }
+
+    /// The bed's acceleration now; its motion to the next tick.
+    #[inline]
+    fn tick(&self, state: &mut BedState<R>, setpoint: &Setpoint<R>) -> R {
+        let [of_accel, of_jerk] = self.drive;
+        let accel_mm_s2 = self.displacement * state.displacement_mm
+            + self.velocity * state.velocity_mm_s
+            + of_accel * setpoint.accel_mm_s2
+            + of_jerk * setpoint.jerk_mm_s3;
+        state.velocity_mm_s = state.velocity_mm_s + self.tick_s * accel_mm_s2;
+        state.displacement_mm = state.displacement_mm + self.tick_s * state.velocity_mm_s;
+        accel_mm_s2
+    }
+}
+
+/// [`DriveInverse`] made for the tick. All torques are divided by Kv, so that they are velocities.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Inverse<R> {
+    /// (1 + Tc·s)·(a + b·V).
+    torque: Linear<R>,
+    /// The velocity that Coulomb friction turns with.
+    turning: Linear<R>,
+    reversal_mm_s: R,
+    friction: R,
+    /// What the high-pass forgets in a tick.
+    forgets: R,
+    bed: Option<(Bed<R>, R)>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct InverseState<R> {
+    last_mm_s: R,
+    output_mm_s: R,
+    bed: BedState<R>,
+}
+
+impl<R: Real> Inverse<R> {
+    fn new(drive: &DriveInverse, late_s: f64, tick_s: f64) -> Result<Self, ScaleError> {
+        let &DriveInverse {
+            velocity_gain_per_s: gain_per_s,
+            integral_time_s,
+            current_lag_s: lag_s,
+            viscous_friction_per_s: viscous_per_s,
+            coulomb_friction_mm_s2,
+            reversal_mm_s,
+            bed,
+        } = drive;
+        let check = |quantity, value: f64, least: f64, most: f64, expected| {
+            if value >= least && value <= most {
+                Ok(())
+            } else {
+                Err(ScaleError { quantity, value, expected })
+            }
+        };
+        check("drive velocity gain [1/s]", gain_per_s, 1e-3, 1e6, "a number from 1e-3 to 1e6")?;
+        check("drive integral time [s]", integral_time_s, tick_s, 1e6, "a number from the tick to 1e6")?;
+        check("drive current lag [s]", lag_s, 0.0, 1.0, "a number from 0 to 1")?;
+        check("viscous friction [1/s]", viscous_per_s, 0.0, 1e6, "a number from 0 to 1e6")?;
+        check("Coulomb friction [mm/s²]", coulomb_friction_mm_s2, 0.0, 1e6, "a number from 0 to 1e6")?;
+        check("reversal velocity [mm/s]", reversal_mm_s, 1e-3, 1e6, "a number from 1e-3 to 1e6")?;
+        let torque = [viscous_per_s, 1.0 + lag_s * viscous_per_s, lag_s].map(|part| part / gain_per_s);
+        let friction = coulomb_friction_mm_s2 / gain_per_s / reversal_mm_s;
+        let quantity = "Coulomb friction over drive velocity gain and reversal velocity [1]";
+        let expected = "a number within the kernel's range";
+        let friction = R::checked_from_f64(friction)
+            .filter(|_| R::checked_from_f64(8.0 * coulomb_friction_mm_s2 / gain_per_s).is_some())
+            .ok_or(ScaleError { quantity, value: friction, expected })?;
+        Ok(Self {
+            torque: Linear::new("drive inverse", torque, late_s)?,
+            turning: Linear::new("reversal", [1.0, 0.0, 0.0], late_s - lag_s)?,
+            reversal_mm_s: R::from_f64(reversal_mm_s),
+            friction,
+            forgets: R::from_f64(-libm::expm1(-tick_s / integral_time_s)),
+            bed: match &bed {
+                Some(bed) => Some((Bed::new(bed, late_s - lag_s, tick_s)?, R::from_f64(1.0 / gain_per_s))),
+                None => None,
+            },
+        })
+    }
+
+    #[inline]
+    fn tick(&self, state: &mut InverseState<R>, setpoint: &Setpoint<R>) -> R {
+        let turning = self.turning.at(setpoint).max(-self.reversal_mm_s).min(self.reversal_mm_s);
+        let mut torque = self.torque.at(setpoint) + self.friction * turning;
+        if let Some((bed, per_gain)) = &self.bed {
+            torque = torque + *per_gain * bed.tick(&mut state.bed, setpoint);
+        }
+        let output = state.output_mm_s - self.forgets * state.output_mm_s + (torque - state.last_mm_s);
+        (state.last_mm_s, state.output_mm_s) = (torque, output);
+        output
+    }
+}
+
+/// [`Feedforward`] made for the tick. Immutable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeedforwardConfig<R> {
+    gains: Linear<R>,
+    tables: Option<LookupTables<R>>,
+    inverse: Option<Inverse<R>>,
+}
+
+/// What feedforward remembers. At rest: the default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FeedforwardState<R> {
+    inverse: InverseState<R>,
+}
+
+impl<R: Real> FeedforwardConfig<R> {
+    /// For a tick of `tick_s`, where position set-points are delayed by `preview_ticks` ticks.
+    ///
+    /// # Errors
+    /// The first figure that is not finite, out of its range or beyond the number type's, or a lead longer than the
+    /// preview.
+    pub fn new(feedforward: &Feedforward, preview_ticks: u8, tick_s: f64) -> Result<Self, ScaleError> {
+        let &Feedforward { velocity, accel_s, jerk_s2, lead_s, tables, drive } = feedforward;
+        let preview_s = f64::from(preview_ticks) * tick_s;
+        // What is beyond by rounding alone is not late by less than nothing.
+        let late_s = if preview_s > lead_s { preview_s - lead_s } else { 0.0 };
+        if !(lead_s >= 0.0 && lead_s <= preview_s * (1.0 + 1e-6)) {
+            let expected = "a number from 0 to the machine's preview";
+            return Err(ScaleError { quantity: "feedforward lead [s]", value: lead_s, expected });
+        }
+        Ok(Self {
+            gains: Linear::new("feedforward gains", [velocity, accel_s, jerk_s2], late_s)?,
+            tables: LookupTables::new(&tables, late_s)?,
+            inverse: match &drive {
+                Some(drive) => Some(Inverse::new(drive, late_s, tick_s)?),
+                None => None,
+            },
+        })
+    }
+
+    /// The velocity command for this tick \[mm/s\].
+    #[inline]
+    pub fn tick(&self, state: &mut FeedforwardState<R>, setpoint: &Setpoint<R>) -> R {
+        let mut command = self.gains.at(setpoint);
+        if let Some(tables) = &self.tables {
+            command = command + tables.at(setpoint);
+        }
+        if let Some(inverse) = &self.inverse {
+            command = command + inverse.tick(&mut state.inverse, setpoint);
+        }
+        command
+    }
+}

@@ -1,0 +1,81 @@
+//! Preview: position set-points are delayed, feedforward is not, so it comes before the position.
+//!
+//! All axes are delayed alike, by the same whole number of ticks: the path stays what it is, and is driven later by a
+//! few milliseconds. In the tick, one place read and written.
+
+use super::AxisFigures;
+use super::scale::ScaleError;
+use crate::path::Setpoint;
+use crate::units::Position;
+
+/// Greatest delay \[ticks\].
+pub const PREVIEW_TICKS_MAX: u8 = 32;
+
+/// The delay that all axes share: the whole ticks that the longest lead needs.
+///
+/// # Errors
+/// A lead is not finite, negative, or longer than [`PREVIEW_TICKS_MAX`] ticks; with the axis, from 0.
+pub(super) fn preview_ticks(axes: &[AxisFigures], tick_s: f64) -> Result<u8, (usize, ScaleError)> {
+    let mut most = 0;
+    for (axis, figures) in axes.iter().enumerate() {
+        let value = figures.feedforward.lead_s;
+        // A lead of so many ticks exactly is not one more for rounding.
+        let ticks = libm::ceil(value / tick_s - 1e-6);
+        if !(value >= 0.0 && ticks <= f64::from(PREVIEW_TICKS_MAX)) {
+            let expected = "a number from 0 to 32 ticks";
+            return Err((axis, ScaleError { quantity: "feedforward lead [s]", value, expected }));
+        }
+        most = core::cmp::max(most, ticks as u8);
+    }
+    Ok(most)
+}
+
+/// The positions of the last ticks.
+#[derive(Clone, Copy, Debug)]
+pub struct Preview<const AXES: usize> {
+    past: [[Position; AXES]; PREVIEW_TICKS_MAX as usize],
+    ticks: u8,
+    next: u8,
+}
+
+impl<const AXES: usize> Preview<AXES> {
+    /// A machine that has been at rest at `position`, delayed by `ticks`, at most [`PREVIEW_TICKS_MAX`].
+    #[must_use]
+    pub fn new(ticks: u8, position: [Position; AXES]) -> Self {
+        Self { past: [position; PREVIEW_TICKS_MAX as usize], ticks: ticks.min(PREVIEW_TICKS_MAX), next: 0 }
+    }
+
+    /// The delay \[ticks\].
+    #[must_use]
+    pub fn ticks(&self) -> u8 {
+        self.ticks
+    }
+
+    /// As if the machine had always been at `position`.
+    pub fn rest_at(&mut self, position: [Position; AXES]) {
+        *self = Self::new(self.ticks, position);
+    }
+
+    /// The positions of `ticks` ago, into `set`; remembers those of now.
+    #[inline]
+    pub(crate) fn delay<'a, R: 'a>(
+        &mut self,
+        setpoints: &[Setpoint<R>; AXES],
+        set: impl Iterator<Item = &'a mut Position>,
+    ) {
+        if self.ticks == 0 {
+            for (set, setpoint) in set.zip(setpoints) {
+                *set = setpoint.position;
+            }
+            return;
+        }
+        // The ring is as long as the delay: the place read is the one written.
+        if let Some(place) = self.past.get_mut(usize::from(self.next)) {
+            for ((set, place), setpoint) in set.zip(place).zip(setpoints) {
+                *set = *place;
+                *place = setpoint.position;
+            }
+        }
+        self.next = if self.next + 1 >= self.ticks { 0 } else { self.next + 1 };
+    }
+}
