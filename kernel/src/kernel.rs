@@ -77,8 +77,13 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
     /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (what
     /// brakes and relays need), then executes the streams. Without effect in a fault.
+    ///
+    /// What was cut off in the middle of a stretch is given up, as by [`Kernel::stand_here`].
     pub fn enable(&mut self, settle_ticks: u32) {
         if self.trace.fault.is_none() && self.power == Power::Off {
+            if !self.executor.is_at_rest() {
+                self.stand_here();
+            }
             self.power = Power::Starting { ticks_left: settle_ticks };
         }
     }
