@@ -96,7 +96,8 @@ fn circle<R: Real>(axes: &[AxisFigures; 2], frequency_hz: f64) -> ([f64; 2], f64
             };
             outputs[axis].set = Position::from_mm(radius_mm * set[axis]).expect("near");
             let (config, output) = (&config.axes[axis], &mut outputs[axis]);
-            states[axis].tick(config, &setpoint, &counts[axis], R::ZERO, output);
+            output.counts = counts[axis];
+            states[axis].tick(config, &setpoint, output);
             if tick >= 6000 {
                 worst_um[axis] = worst_um[axis].max(1e3 * output.following_error_mm.to_f64().abs());
             }
@@ -207,7 +208,7 @@ fn is_the_formula_in_every_number_type() {
             };
             // No error: feedforward alone.
             let mut output = AxisOutput::<R>::default();
-            state.tick(&config.axes[0], &setpoint, &motion_kernel::units::Counts(0), R::ZERO, &mut output);
+            state.tick(&config.axes[0], &setpoint, &mut output);
             let earlier = |late_s: f64| [v - late_s * a + late_s * late_s / 2.0 * j, a - late_s * j, j];
             let [v_late, a_late, j_late] = earlier(late_s);
             let turning = earlier(late_s - 0.00037)[0].clamp(-0.5, 0.5) / 0.5;

@@ -368,6 +368,12 @@ impl<R: Real> Inverse<R> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeedforwardConfig<R> {
     gains: Linear<R>,
+    more: Option<More<R>>,
+}
+
+/// What is beyond gains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct More<R> {
     tables: Option<LookupTables<R>>,
     inverse: Option<Inverse<R>>,
 }
@@ -393,26 +399,35 @@ impl<R: Real> FeedforwardConfig<R> {
             let expected = "a number from 0 to the machine's preview";
             return Err(ScaleError { quantity: "feedforward lead [s]", value: lead_s, expected });
         }
-        Ok(Self {
-            gains: Linear::new("feedforward gains", [velocity, accel_s, jerk_s2], late_s)?,
-            tables: LookupTables::new(&tables, late_s)?,
-            inverse: match &drive {
-                Some(drive) => Some(Inverse::new(drive, late_s, tick_s)?),
-                None => None,
-            },
-        })
+        let gains = Linear::new("feedforward gains", [velocity, accel_s, jerk_s2], late_s)?;
+        let tables = LookupTables::new(&tables, late_s)?;
+        let inverse = match &drive {
+            Some(drive) => Some(Inverse::new(drive, late_s, tick_s)?),
+            None => None,
+        };
+        let more = (tables.is_some() || inverse.is_some()).then_some(More { tables, inverse });
+        Ok(Self { gains, more })
     }
 
     /// The velocity command for this tick \[mm/s\].
     #[inline]
     pub fn tick(&self, state: &mut FeedforwardState<R>, setpoint: &Setpoint<R>) -> R {
-        let mut command = self.gains.at(setpoint);
-        if let Some(tables) = &self.tables {
-            command = command + tables.at(setpoint);
+        let command = self.gains.at(setpoint);
+        match &self.more {
+            Some(more) => command + more.tick(state, setpoint),
+            None => command,
         }
-        if let Some(inverse) = &self.inverse {
-            command = command + inverse.tick(&mut state.inverse, setpoint);
+    }
+}
+
+impl<R: Real> More<R> {
+    // A function of its own, so that axes without it don't pay for its registers.
+    #[inline(never)]
+    fn tick(&self, state: &mut FeedforwardState<R>, setpoint: &Setpoint<R>) -> R {
+        let tables = self.tables.as_ref().map_or(R::ZERO, |tables| tables.at(setpoint));
+        match &self.inverse {
+            Some(inverse) => tables + inverse.tick(&mut state.inverse, setpoint),
+            None => tables,
         }
-        command
     }
 }

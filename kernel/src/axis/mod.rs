@@ -149,6 +149,8 @@ pub struct AxisState<R> {
 /// The outcome of one tick of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisOutput<R> {
+    /// What the encoder read at the start of the tick.
+    pub counts: Counts,
     /// The position set-point that is regulated to: the present one, or a past one where there is a preview.
     pub set: Position,
     /// Actual position from the encoder.
@@ -175,51 +177,40 @@ impl<R: Real> AxisState<R> {
         config.encoder.position(counts) + self.offset
     }
 
-    /// The output of an axis whose drive is off: the voltage at which it stands still.
+    /// The output of an axis whose drive is off: the voltage at which it stands still. In and out as
+    /// [`AxisState::tick`].
     #[inline]
-    pub fn stand_still(&self, config: &AxisConfig<R>, set: Position, counts: Counts) -> AxisOutput<R> {
+    pub fn stand_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) {
+        let AxisOutput { counts, set, .. } = *output;
         let actual = self.position(config, counts);
-        AxisOutput {
+        *output = AxisOutput {
+            counts,
             set,
             actual,
             following_error_mm: (set - actual).to_offset(),
             code: config.output.code(R::ZERO),
             saturated: false,
             lost: false,
-        }
+        };
+        self.regulator.watch(output.following_error_mm);
     }
 
-    /// One control tick: `setpoint` is the present one, of which feedforward is made; `output.set` is the position
-    /// to regulate to; `correction_mm_s` is added to the command. The rest of `output` is written.
+    /// One control tick: `setpoint` is the present one, of which feedforward is made; `output` comes with what the
+    /// encoder read and the position to regulate to, and leaves with the rest.
     // Not inlined: three copies of it would fight for the registers.
     #[inline(never)]
-    pub fn tick(
-        &mut self,
-        config: &AxisConfig<R>,
-        setpoint: &Setpoint<R>,
-        &counts: &Counts,
-        correction_mm_s: R,
-        output: &mut AxisOutput<R>,
-    ) {
-        let (set, actual) = (output.set, self.position(config, counts));
+    pub fn tick(&mut self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, output: &mut AxisOutput<R>) {
+        let actual = self.position(config, output.counts);
         // Subtracted in fixed point, converted afterwards.
-        let following_error_mm: R = (set - actual).to_offset();
+        let following_error_mm: R = (output.set - actual).to_offset();
         self.peak_following_error_mm = self.peak_following_error_mm.max(following_error_mm.abs());
-        let command = config.regulator.tick(
-            &mut self.regulator,
-            following_error_mm,
-            setpoint,
-            correction_mm_s,
-            config.output.limits(),
-        );
-        *output = AxisOutput {
-            set,
-            actual,
-            following_error_mm,
-            code: config.output.code(command.velocity_mm_s),
-            saturated: command.saturated,
-            // Written so that what is not a number counts as lost.
-            lost: !(following_error_mm.abs() <= config.following_error_limit_mm),
-        };
+        let command =
+            config.regulator.tick(&mut self.regulator, following_error_mm, setpoint, config.output.limits());
+        output.actual = actual;
+        output.following_error_mm = following_error_mm;
+        output.code = config.output.code(command.velocity_mm_s);
+        output.saturated = command.saturated;
+        // Written so that what is not a number counts as lost.
+        output.lost = !(following_error_mm.abs() <= config.following_error_limit_mm);
     }
 }
