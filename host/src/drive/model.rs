@@ -78,6 +78,18 @@ pub fn response(drive: &DriveParameters, tick_s: f64, frequency_hz: f64) -> Comp
     Complex::new(cosine, sine) / filter * (open / (one + open))
 }
 
+/// The frequency at which the linear model's amplitude falls below `ratio` for good \[Hz\], to 0.1 Hz; none up to half
+/// the tick's frequency.
+#[must_use]
+pub fn bandwidth_hz(drive: &DriveParameters, tick_s: f64, ratio: f64) -> Option<f64> {
+    let at = |tenths: u32| f64::from(tenths) / 10.0;
+    (1..(5.0 / tick_s) as u32)
+        .rev()
+        .find(|&tenths| response(drive, tick_s, at(tenths)).magnitude() >= ratio)
+        .map(|last| at(last + 1))
+        .filter(|&hz| hz < 0.5 / tick_s)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
