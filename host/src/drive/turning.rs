@@ -115,7 +115,7 @@ impl Turning {
     }
 
     /// The set and the actual point of a tick, from the circle's centre \[mm\].
-    pub(super) fn from_centre(&self, axes: &[AxisTick; AXES]) -> ([f64; 2], [f64; 2]) {
+    pub(super) fn relative_to_centre(&self, axes: &[AxisTick; AXES]) -> ([f64; 2], [f64; 2]) {
         let [first, second] = self.axes();
         let radius_mm = self.radius_mm();
         (

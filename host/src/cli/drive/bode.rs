@@ -38,7 +38,7 @@ pub struct BodeArguments {
     #[arg(long, value_name = "HZ", default_value_t = 100.0, allow_negative_numbers = true)]
     to: f64,
     /// How many frequencies, in equal ratios.
-    #[arg(long, value_name = "NUMBER", default_value_t = 25)]
+    #[arg(long, value_name = "NUMBER", default_value_t = 41)]
     points: u32,
     /// Feed of the step and of the harmonics, mm/min.
     #[arg(long, value_name = "MM_MIN", default_value_t = 9549.0, allow_negative_numbers = true)]

@@ -80,8 +80,9 @@ impl Stack {
                 )?;
                 for series in &graph.series {
                     let points = series.points.iter().map(|&(at, value)| (along(at), value));
-                    let shown = points.filter(|point| point.0 >= x.0 && point.0 <= x.1);
-                    let shown = shown.map(|(at, value)| (at, value.clamp(y.0, y.1)));
+                    // What lies beyond a picture that shows a part is left out.
+                    let is_inside = |end: (f64, f64), value: f64| value >= end.0 && value <= end.1;
+                    let shown = points.filter(|point| is_inside(x, point.0) && is_inside(y, point.1));
                     curve(
                         &mut chart,
                         decimate::by_column(shown, x, sheet.columns),
@@ -97,6 +98,10 @@ impl Stack {
 
     /// A single graph gets more room than each of a stack.
     fn graph_height(&self, sheet: &Sheet) -> u32 {
-        if self.graphs.len() == 1 { 2 * sheet.panel_height } else { sheet.panel_height * 5 / 4 }
+        match self.graphs.len() {
+            1 => 2 * sheet.panel_height,
+            2 => sheet.panel_height * 8 / 5,
+            _ => sheet.panel_height * 5 / 4,
+        }
     }
 }
