@@ -14,7 +14,7 @@
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
 //! - [`sine`], [`spectrum`], [`model`]: the mathematics of it;
-//! - [`reference`]: what S4 measured, and what the reference machine has to give.
+//! - [`mod@reference`]: what S4 measured, and what the reference machine has to give.
 
 pub mod bode;
 pub mod circle;

@@ -97,8 +97,8 @@ mod tests {
     /// Slow motion lags by the first term of the inverse series, τ + Ts/2 + b·Ti/Kv = 1.675 ms.
     #[test]
     fn slow_motion_lags_by_the_series_first_term() {
-        let found = response(&hal_sim::REFERENCE_X, 5e-4, 0.5);
-        assert!((-found.phase_rad() / (TAU * 0.5) - 1.675e-3).abs() < 1e-6);
+        let found = response(&hal_sim::REFERENCE_X, 5e-4, 0.02);
+        assert!((-found.phase_rad() / (TAU * 0.02) - 1.675e-3).abs() < 1e-6);
         assert!((found.magnitude() - 1.0).abs() < 1e-3);
     }
 }
