@@ -32,7 +32,7 @@ pub struct Response {
     pub phase_rad: f64,
     /// The lag as a time \[s\].
     pub delay_s: f64,
-    /// Third harmonic over the fundamental, negative where it makes the velocity more pointed: 0 for a sine, +1/9 for a
+    /// Third harmonic over the fundamental, positive where it makes the velocity more pointed: 0 for a sine, 1/9 for a
     /// triangle.
     pub third_harmonic: f64,
 }

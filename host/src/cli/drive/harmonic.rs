@@ -172,6 +172,14 @@ pub fn run(arguments: &HarmonicArguments, out: &mut dyn Write) -> Result<Outcome
 
 /// Why bandwidths of one drive differ.
 fn explanation(bandwidths: &Bandwidths, feed_mm_min: f64, name: &str) -> String {
+    if bandwidths.linear_hz.is_some_and(|linear_hz| linear_hz < bandwidths.current_limited_hz) {
+        return format!(
+            "At {feed_mm_min} mm/min the loop ends the bandwidth of {name}: linear, it has its −3 dB at {} Hz, and the\n\
+             current limit would end it only at {:.1} Hz.",
+            or_dash(bandwidths.linear_hz, 1),
+            bandwidths.current_limited_hz,
+        );
+    }
     format!(
         "At {feed_mm_min} mm/min it is the current limit that ends the bandwidth of {name}, not the loop: the linear\n\
          loop has its −3 dB at {} Hz. A limited acceleration a makes a triangle of the velocity, which swings through\n\
