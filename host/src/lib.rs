@@ -9,6 +9,7 @@
 //!   planning   Program ─► Plan                    ceilings with reasons, feed over path
 //!   simulate   Plan ─► ticks                      the kernel against hal-sim
 //!   record     TickRecord, RunRecord              what a run leaves behind
+//!   drive      Machine ─► figures of its axes     step, harmonics, circles
 //!   report     RunRecord ─► HTML                  one file, pictures inside
 //!   cli        the `motion` command
 //! ```
@@ -20,4 +21,5 @@ pub mod toolpath;
 pub mod planning;
 pub mod simulate;
 pub mod record;
+pub mod drive;
 pub mod report;
