@@ -125,7 +125,7 @@ pub enum Terms {
     Va,
     /// Velocity, acceleration and jerk.
     Vaj,
-    /// All that the machine has.
+    /// All that the machine has: lead, tables, and the drive's inverse, too.
     #[default]
     AsIs,
 }
@@ -148,10 +148,14 @@ impl Terms {
         let mut machine = machine.clone();
         for axis in &mut machine.axes {
             let all = axis.feedforward;
+            let Feedforward { velocity, accel_s, jerk_s2, .. } = all;
+            // The paper's terms: neither lead nor anything else.
+            let vaj = Feedforward { velocity, accel_s, jerk_s2, ..Feedforward::default() };
             axis.feedforward = match self {
-                Self::V => Feedforward { accel_s: 0.0, jerk_s2: 0.0, ..all },
-                Self::Va => Feedforward { jerk_s2: 0.0, ..all },
-                Self::Vaj | Self::AsIs => all,
+                Self::V => Feedforward { accel_s: 0.0, jerk_s2: 0.0, ..vaj },
+                Self::Va => Feedforward { jerk_s2: 0.0, ..vaj },
+                Self::Vaj => vaj,
+                Self::AsIs => all,
             };
         }
         machine
@@ -165,7 +169,7 @@ pub fn open_loop(machine: &Machine) -> Machine {
     let mut machine = machine.clone();
     for axis in &mut machine.axes {
         axis.gains = Gains::default();
-        axis.feedforward = Feedforward { velocity: 1.0, accel_s: 0.0, jerk_s2: 0.0 };
+        axis.feedforward = Feedforward { velocity: 1.0, ..Feedforward::default() };
         axis.following_error_limit_mm = OPEN_LOOP_ERROR_MM;
     }
     machine
