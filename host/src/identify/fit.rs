@@ -1,0 +1,217 @@
+//! The fit of the drive model, in stages: from a coarse grid on the steps to everything on all runs, and the question
+//! whether there is a bed.
+
+use super::confidence::{correlation_factor, covariance};
+use super::differences::Parabolas;
+use super::parameters::{ALL, COUNT, Unknown, Unknowns, without_bed};
+use super::recording::{AxisRecording, span};
+use super::search::{Effort, Found, misfit, search};
+use super::simulation::{Residuals, Runs, SUBSTEPS, dot};
+use super::{AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
+
+/// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\].
+const GAINS_PER_S: [f64; 5] = [60.0, 150.0, 300.0, 600.0, 1200.0];
+const INTEGRAL_TIMES_S: [f64; 3] = [0.008, 0.025, 0.08];
+const LAGS_TICKS: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+
+/// Starts that are followed.
+const STARTS: usize = 3;
+
+/// Unknowns of the first stage.
+const COARSE: [Unknown; 6] = [
+    Unknown::Gain,
+    Unknown::VelocityGain,
+    Unknown::IntegralTime,
+    Unknown::Lag,
+    Unknown::AccelLimit,
+    Unknown::Coulomb,
+];
+
+const COARSE_EFFORT: Effort = Effort { substeps: 5, jacobians: 5, least_gain: 20.0 };
+const MIDDLE_EFFORT: Effort = Effort { substeps: SUBSTEPS / 2, jacobians: 8, least_gain: 20.0 };
+const LAST_EFFORT: Effort = Effort { substeps: SUBSTEPS, jacobians: 6, least_gain: 1.0 };
+
+/// A bed must raise the likelihood as much as chance does in one of e³⁰ cases, ...
+const BED_GAIN: f64 = 60.0;
+/// ... explain a share of all residuals that the model's own roughness can't, ...
+const BED_GAIN_PER_READING: f64 = 0.02;
+/// ... and have a mass ratio of this many standard deviations.
+const BED_DEVIATIONS: f64 = 4.0;
+
+/// Root mean square of the residuals over the travel, above which the model is none.
+const MISS_MAX: f64 = 0.05;
+
+pub(super) struct Fit {
+    pub(super) parameters: AxisParametersFound,
+    pub(super) runs: Vec<RunMatch>,
+}
+
+/// Fits the model to checked recordings.
+pub(super) fn fit(
+    recordings: &[AxisRecording],
+    resolution_mm: f64,
+    sustained_accel_mm_s2: f64,
+) -> Result<Fit, IdentifyError> {
+    let runs = Runs::new(recordings);
+    let too_late = IdentifyError::TooLate { limit_s: runs.lag_limit_s() };
+    let start = coarse(recordings, resolution_mm, sustained_accel_mm_s2)?.ok_or(too_late.clone())?;
+
+    let rigid = search(&runs, resolution_mm, start, without_bed(), MIDDLE_EFFORT).ok_or(too_late.clone())?;
+    let suspected = likeliest(&runs, resolution_mm, &rigid);
+    let rigid =
+        search(&runs, resolution_mm, rigid.unknowns, without_bed(), LAST_EFFORT).ok_or(too_late.clone())?;
+    let with_bed = suspected
+        .and_then(|bed| search(&runs, resolution_mm, bed, &ALL, MIDDLE_EFFORT))
+        .and_then(|bed| search(&runs, resolution_mm, bed.unknowns, &ALL, LAST_EFFORT))
+        .filter(|bed| is_bed(&runs, resolution_mm, &rigid, bed));
+    let found = with_bed.as_ref().unwrap_or(&rigid);
+    let matches = matches(&runs, recordings, &found.residuals)?;
+    let free: &[Unknown] = if with_bed.is_some() { &ALL } else { without_bed() };
+    let parameters = estimates(&runs, resolution_mm, found, free, recordings[0].tick_s).ok_or(too_late)?;
+    Ok(Fit { parameters, runs: matches })
+}
+
+/// The first stage, on runs that are not harmonic if there are such: a grid, and a search from its best points.
+fn coarse(
+    recordings: &[AxisRecording],
+    resolution_mm: f64,
+    sustained_accel_mm_s2: f64,
+) -> Result<Option<Unknowns>, IdentifyError> {
+    let steps: Vec<AxisRecording> =
+        recordings.iter().filter(|run| run.harmonic_hz.is_none()).cloned().collect();
+    let chosen = if steps.is_empty() { recordings } else { &steps };
+    let runs = Runs::new(chosen);
+    let gain = slope(chosen);
+    if gain < 0.0 {
+        return Err(IdentifyError::Reversed { slope: gain });
+    }
+    let mut first = Unknowns([0.0; COUNT]);
+    first.set(Unknown::Gain, gain.clamp(0.2, 5.0));
+    first.set(Unknown::AccelLimit, 1.02 * sustained_accel_mm_s2);
+    first.set(Unknown::Coulomb, 0.01 * sustained_accel_mm_s2);
+    first.set(Unknown::Viscous, 0.05);
+    first.set(Unknown::BedFrequency, 10.0);
+
+    let mut starts = Vec::new();
+    for velocity_gain_per_s in GAINS_PER_S {
+        for integral_time_s in INTEGRAL_TIMES_S {
+            for lag_ticks in LAGS_TICKS {
+                let mut start = first;
+                let lag_s = lag_ticks * chosen[0].tick_s;
+                start.set(Unknown::VelocityGain, velocity_gain_per_s);
+                start.set(Unknown::IntegralTime, integral_time_s);
+                start.set(Unknown::Lag, lag_s);
+                start.set(Unknown::CurrentLag, 0.2 * lag_s);
+                if let Some(residuals) = runs.residuals(&start, COARSE_EFFORT.substeps) {
+                    starts.push((misfit(&runs, &residuals, resolution_mm), start));
+                }
+            }
+        }
+    }
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let followed = starts.iter().take(STARTS);
+    let found =
+        followed.filter_map(|(_, start)| search(&runs, resolution_mm, *start, &COARSE, COARSE_EFFORT));
+    Ok(found.min_by(|a, b| a.misfit.total_cmp(&b.misfit)).map(|found| found.unknowns))
+}
+
+/// Change of position over change of the command's integral, over all runs.
+fn slope(recordings: &[AxisRecording]) -> f64 {
+    let (mut common, mut power) = (0.0, 0.0);
+    for run in recordings {
+        let commanded = run.commanded_mm();
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let (actual_mean, commanded_mean) = (mean(&run.actual_mm), mean(&commanded));
+        for (actual, commanded) in run.actual_mm.iter().zip(&commanded) {
+            common += (actual - actual_mean) * (commanded - commanded_mean);
+            power += (commanded - commanded_mean).powi(2);
+        }
+    }
+    if power > 0.0 { common / power } else { 1.0 }
+}
+
+/// A start with a bed, if one promises to be worth a search.
+fn likeliest(runs: &Runs, resolution_mm: f64, rigid: &Found) -> Option<Unknowns> {
+    let readings: f64 = runs.readings().iter().sum();
+    super::bed::likeliest_bed(runs, resolution_mm, rigid, MIDDLE_EFFORT.substeps)
+        .filter(|(_, gain)| *gain > BED_GAIN && *gain > 0.5 * BED_GAIN_PER_READING * readings)
+        .map(|(start, _)| start)
+}
+
+/// Whether the recordings tell the two models apart.
+fn is_bed(runs: &Runs, resolution_mm: f64, rigid: &Found, bed: &Found) -> bool {
+    let readings = runs.readings();
+    let powers: Vec<f64> =
+        readings.iter().zip(&bed.residuals).map(|(n, run)| n / correlation_factor(run)).collect();
+    let independent = powers.iter().sum::<f64>() / readings.iter().sum::<f64>();
+    let gain = rigid.misfit - bed.misfit;
+    let is_likely =
+        gain * independent > BED_GAIN && gain > BED_GAIN_PER_READING * readings.iter().sum::<f64>();
+    let ratio = bed.unknowns.get(Unknown::BedMassRatio);
+    let deviation = covariance(runs, resolution_mm, &bed.unknowns, &bed.residuals, &ALL, SUBSTEPS / 2)
+        .map(|covariance| covariance.deviation(Unknown::BedMassRatio));
+    is_likely && deviation.is_some_and(|deviation| ratio > BED_DEVIATIONS * deviation)
+}
+
+fn matches(
+    runs: &Runs,
+    recordings: &[AxisRecording],
+    residuals: &Residuals,
+) -> Result<Vec<RunMatch>, IdentifyError> {
+    let mut matches = Vec::with_capacity(recordings.len());
+    for ((recording, residuals), n) in recordings.iter().zip(residuals).zip(runs.readings()) {
+        let error_mm_rms = (dot(residuals, residuals) / n).sqrt();
+        let travel_mm = span(&recording.actual_mm);
+        if !(error_mm_rms <= MISS_MAX * travel_mm) {
+            return Err(IdentifyError::UnlikeModel {
+                run: matches.len() + 1,
+                error_mm: error_mm_rms,
+                travel_mm,
+            });
+        }
+        matches.push(RunMatch { error_mm_rms, travel_mm });
+    }
+    Ok(matches)
+}
+
+fn estimates(
+    runs: &Runs,
+    resolution_mm: f64,
+    found: &Found,
+    free: &[Unknown],
+    tick_s: f64,
+) -> Option<AxisParametersFound> {
+    let unknowns = &found.unknowns;
+    let covariance = covariance(runs, resolution_mm, unknowns, &found.residuals, free, SUBSTEPS)?;
+    let of = |unknown| Estimate::new(unknowns.get(unknown), covariance.deviation(unknown));
+    let (lag, current_lag) = (of(Unknown::Lag), of(Unknown::CurrentLag));
+    Some(AxisParametersFound {
+        command_gain: of(Unknown::Gain),
+        command_offset_mm_s: of(Unknown::Offset),
+        velocity_gain_per_s: of(Unknown::VelocityGain),
+        integral_time_s: of(Unknown::IntegralTime),
+        dead_time_s: Estimate::new(
+            lag.value - current_lag.value,
+            covariance.deviation_of_difference(Unknown::Lag, Unknown::CurrentLag),
+        ),
+        current_lag_s: current_lag,
+        total_delay_s: Estimate { value: lag.value + tick_s / 2.0, ..lag },
+        accel_limit_mm_s2: of(Unknown::AccelLimit),
+        coulomb_friction_mm_s2: of(Unknown::Coulomb),
+        viscous_friction_per_s: of(Unknown::Viscous),
+        bed: free.contains(&Unknown::BedMassRatio).then(|| BedEstimate {
+            frequency_hz: of(Unknown::BedFrequency),
+            damping_ratio: of(Unknown::BedDamping),
+            mass_ratio: of(Unknown::BedMassRatio),
+        }),
+    })
+}
+
+/// The greatest acceleration that lasted for 5 ms in any run \[mm/s²\].
+pub(super) fn sustained_accel_mm_s2(recordings: &[AxisRecording]) -> f64 {
+    let of_run = |run: &AxisRecording| {
+        let parabolas = Parabolas::over(5e-3, run.tick_s);
+        parabolas.of(&run.actual_mm).map(|(_, _, accel)| accel.abs()).fold(0.0, f64::max)
+    };
+    recordings.iter().map(of_run).fold(0.0, f64::max)
+}
