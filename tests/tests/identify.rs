@@ -46,7 +46,7 @@ fn record(drive: DriveParameters, rig: Rig, excitation: &Excitation) -> AxisReco
     let parameters =
         AxisParameters { drive, encoder, start_position_mm: 12.345_678_9, ..AxisParameters::REFERENCE_X };
     let mut axis = SimAxis::<LINE>::new(parameters, REFERENCE_TICK_S, rig.substeps).expect("an axis");
-    let mut latch_mm = |axis: &mut SimAxis<LINE>| axis.latch().0 as f64 * encoder.resolution_mm;
+    let latch_mm = |axis: &mut SimAxis<LINE>| axis.latch().0 as f64 * encoder.resolution_mm;
     let start_mm = latch_mm(&mut axis);
     let mut recording = AxisRecording {
         tick_s: REFERENCE_TICK_S,
@@ -174,7 +174,7 @@ fn explore() {
         let rig = Rig { resolution_um, ..RIG };
         cases.push((REFERENCE_X, rig));
         cases.push((REFERENCE_Y, rig));
-        for seed in 0..n {
+        for seed in std::env::var("S").ok().and_then(|n| n.parse().ok()).unwrap_or(0)..n {
             cases.push((random_drive(seed), rig));
         }
     }

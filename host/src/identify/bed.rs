@@ -5,7 +5,7 @@
 //! best rigid model leaves; the frequency that would explain most of it is where the search starts.
 
 use super::parameters::{Unknown, Unknowns, without_bed};
-use super::search::{Found, variances};
+use super::search::{Found, Noise};
 use super::simulation::{Residuals, Runs, dot};
 
 /// Frequencies that are tried, equally spaced in their logarithm \[Hz\].
@@ -26,8 +26,7 @@ pub(super) fn likeliest_bed(
     substeps: u32,
 ) -> Option<(Unknowns, f64)> {
     let linear = runs.linearised(&found.unknowns, without_bed(), substeps)?;
-    let weights: Vec<f64> =
-        variances(runs, &found.residuals, resolution_mm).iter().map(|variance| variance.recip()).collect();
+    let weights = Noise::uncorrelated(runs, &found.residuals, resolution_mm).weights();
     let mut normal = linear.normal(&weights);
     for index in 0..linear.free.len() {
         *normal.at_mut(index, index) *= 1.0 + 1e-9;

@@ -6,7 +6,7 @@
 
 use super::cholesky::Symmetric;
 use super::parameters::{COUNT, Unknown, Unknowns};
-use super::search::variances;
+use super::search::Noise;
 use super::simulation::{Residuals, Runs, dot};
 
 /// Lags over which autocorrelation is summed at most.
@@ -38,13 +38,7 @@ pub(super) fn covariance(
     substeps: u32,
 ) -> Option<Covariance> {
     let linear = runs.linearised(unknowns, free, substeps)?;
-    let variances = variances(runs, residuals, resolution_mm);
-    let informations: Vec<f64> = variances
-        .iter()
-        .zip(residuals)
-        .map(|(variance, run)| 1.0 / (variance * correlation_factor(run)))
-        .collect();
-    let mut information = linear.normal(&informations);
+    let mut information = linear.normal(&Noise::of(runs, residuals, resolution_mm).weights());
     for (index, unknown) in free.iter().enumerate() {
         // An unknown that no run shows ends with this width, far beyond what counts as determined.
         *information.at_mut(index, index) += unknown.ignorance().powi(-2);

@@ -1,18 +1,20 @@
 //! The fit of the drive model, in stages: from a coarse grid on the steps to everything on all runs, and the question
 //! whether there is a bed.
 
-use super::confidence::{correlation_factor, covariance};
+use super::confidence::covariance;
 use super::differences::Parabolas;
 use super::parameters::{ALL, COUNT, Unknown, Unknowns, without_bed};
 use super::recording::{AxisRecording, span};
-use super::search::{Effort, Found, misfit, search};
-use super::simulation::{Residuals, Runs, SUBSTEPS, dot};
+use super::search::{Effort, Found, Noise, search};
+use super::simulation::{Residuals, Runs, SUBSTEPS, dot, squares};
 use super::{AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
 
-/// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\].
+/// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\] ...
 const GAINS_PER_S: [f64; 5] = [60.0, 150.0, 300.0, 600.0, 1200.0];
 const INTEGRAL_TIMES_S: [f64; 3] = [0.008, 0.025, 0.08];
 const LAGS_TICKS: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+/// ... and current limit over the greatest acceleration, in which friction and bed may have helped.
+const LIMITS: [f64; 2] = [0.8, 1.02];
 
 /// Starts that are followed.
 const STARTS: usize = 3;
@@ -27,9 +29,10 @@ const COARSE: [Unknown; 6] = [
     Unknown::Coulomb,
 ];
 
-const COARSE_EFFORT: Effort = Effort { substeps: 5, jacobians: 5, least_gain: 20.0 };
-const MIDDLE_EFFORT: Effort = Effort { substeps: SUBSTEPS / 2, jacobians: 8, least_gain: 20.0 };
-const LAST_EFFORT: Effort = Effort { substeps: SUBSTEPS, jacobians: 6, least_gain: 1.0 };
+const COARSE_EFFORT: Effort = Effort { substeps: 5, jacobians: 5, is_near: false, least_gain: 20.0 };
+const MIDDLE_EFFORT: Effort =
+    Effort { substeps: SUBSTEPS / 2, jacobians: 8, is_near: false, least_gain: 100.0 };
+const LAST_EFFORT: Effort = Effort { substeps: SUBSTEPS, jacobians: 6, is_near: true, least_gain: 1.0 };
 
 /// A bed must raise the likelihood as much as chance does in one of e³⁰ cases, ...
 const BED_GAIN: f64 = 60.0;
@@ -47,14 +50,10 @@ pub(super) struct Fit {
 }
 
 /// Fits the model to checked recordings.
-pub(super) fn fit(
-    recordings: &[AxisRecording],
-    resolution_mm: f64,
-    sustained_accel_mm_s2: f64,
-) -> Result<Fit, IdentifyError> {
+pub(super) fn fit(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Fit, IdentifyError> {
     let runs = Runs::new(recordings);
     let too_late = IdentifyError::TooLate { limit_s: runs.lag_limit_s() };
-    let start = coarse(recordings, resolution_mm, sustained_accel_mm_s2)?.ok_or(too_late.clone())?;
+    let start = coarse(recordings, resolution_mm)?.ok_or(too_late.clone())?;
 
     let rigid = search(&runs, resolution_mm, start, without_bed(), MIDDLE_EFFORT).ok_or(too_late.clone())?;
     let suspected = likeliest(&runs, resolution_mm, &rigid);
@@ -65,6 +64,11 @@ pub(super) fn fit(
         .and_then(|bed| search(&runs, resolution_mm, bed.unknowns, &ALL, LAST_EFFORT))
         .filter(|bed| is_bed(&runs, resolution_mm, &rigid, bed));
     let found = with_bed.as_ref().unwrap_or(&rigid);
+    if std::env::var("DBG").is_ok() {
+        eprintln!("start {:.4?}\nsuspected {suspected:.4?}", start.0);
+        eprintln!("rigid {:.4?} {:.5?}", rigid.unknowns.0, squares(&rigid.residuals));
+        eprintln!("found {:.4?} {:.5?}", found.unknowns.0, squares(&found.residuals));
+    }
     let matches = matches(&runs, recordings, &found.residuals)?;
     let free: &[Unknown] = if with_bed.is_some() { &ALL } else { without_bed() };
     let parameters = estimates(&runs, resolution_mm, found, free, recordings[0].tick_s).ok_or(too_late)?;
@@ -72,38 +76,38 @@ pub(super) fn fit(
 }
 
 /// The first stage, on runs that are not harmonic if there are such: a grid, and a search from its best points.
-fn coarse(
-    recordings: &[AxisRecording],
-    resolution_mm: f64,
-    sustained_accel_mm_s2: f64,
-) -> Result<Option<Unknowns>, IdentifyError> {
+fn coarse(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Option<Unknowns>, IdentifyError> {
     let steps: Vec<AxisRecording> =
         recordings.iter().filter(|run| run.harmonic_hz.is_none()).cloned().collect();
     let chosen = if steps.is_empty() { recordings } else { &steps };
     let runs = Runs::new(chosen);
     let gain = slope(chosen);
+    let sustained_accel_mm_s2 = sustained_accel_mm_s2(chosen);
     if gain < 0.0 {
         return Err(IdentifyError::Reversed { slope: gain });
     }
     let mut first = Unknowns([0.0; COUNT]);
     first.set(Unknown::Gain, gain.clamp(0.2, 5.0));
-    first.set(Unknown::AccelLimit, 1.02 * sustained_accel_mm_s2);
     first.set(Unknown::Coulomb, 0.01 * sustained_accel_mm_s2);
     first.set(Unknown::Viscous, 0.05);
     first.set(Unknown::BedFrequency, 10.0);
 
+    let misfit =
+        |residuals: &Residuals| Noise::uncorrelated(&runs, residuals, resolution_mm).misfit(residuals);
     let mut starts = Vec::new();
     for velocity_gain_per_s in GAINS_PER_S {
         for integral_time_s in INTEGRAL_TIMES_S {
-            for lag_ticks in LAGS_TICKS {
+            for (lag_ticks, limit) in LAGS_TICKS.into_iter().flat_map(|lag| LIMITS.map(|limit| (lag, limit)))
+            {
                 let mut start = first;
                 let lag_s = lag_ticks * chosen[0].tick_s;
+                start.set(Unknown::AccelLimit, limit * sustained_accel_mm_s2);
                 start.set(Unknown::VelocityGain, velocity_gain_per_s);
                 start.set(Unknown::IntegralTime, integral_time_s);
                 start.set(Unknown::Lag, lag_s);
                 start.set(Unknown::CurrentLag, 0.2 * lag_s);
                 if let Some(residuals) = runs.residuals(&start, COARSE_EFFORT.substeps) {
-                    starts.push((misfit(&runs, &residuals, resolution_mm), start));
+                    starts.push((misfit(&residuals), start));
                 }
             }
         }
@@ -112,7 +116,8 @@ fn coarse(
     let followed = starts.iter().take(STARTS);
     let found =
         followed.filter_map(|(_, start)| search(&runs, resolution_mm, *start, &COARSE, COARSE_EFFORT));
-    Ok(found.min_by(|a, b| a.misfit.total_cmp(&b.misfit)).map(|found| found.unknowns))
+    let best = found.min_by(|a, b| misfit(&a.residuals).total_cmp(&misfit(&b.residuals)));
+    Ok(best.map(|found| found.unknowns))
 }
 
 /// Change of position over change of the command's integral, over all runs.
@@ -132,21 +137,16 @@ fn slope(recordings: &[AxisRecording]) -> f64 {
 
 /// A start with a bed, if one promises to be worth a search.
 fn likeliest(runs: &Runs, resolution_mm: f64, rigid: &Found) -> Option<Unknowns> {
-    let readings: f64 = runs.readings().iter().sum();
     super::bed::likeliest_bed(runs, resolution_mm, rigid, MIDDLE_EFFORT.substeps)
-        .filter(|(_, gain)| *gain > BED_GAIN && *gain > 0.5 * BED_GAIN_PER_READING * readings)
+        .filter(|(_, gain)| *gain > BED_GAIN)
         .map(|(start, _)| start)
 }
 
 /// Whether the recordings tell the two models apart.
 fn is_bed(runs: &Runs, resolution_mm: f64, rigid: &Found, bed: &Found) -> bool {
-    let readings = runs.readings();
-    let powers: Vec<f64> =
-        readings.iter().zip(&bed.residuals).map(|(n, run)| n / correlation_factor(run)).collect();
-    let independent = powers.iter().sum::<f64>() / readings.iter().sum::<f64>();
-    let gain = rigid.misfit - bed.misfit;
-    let is_likely =
-        gain * independent > BED_GAIN && gain > BED_GAIN_PER_READING * readings.iter().sum::<f64>();
+    let noise = Noise::of(runs, &bed.residuals, resolution_mm);
+    let gain = noise.misfit(&rigid.residuals) - noise.misfit(&bed.residuals);
+    let is_likely = gain > BED_GAIN && gain > BED_GAIN_PER_READING * noise.independent();
     let ratio = bed.unknowns.get(Unknown::BedMassRatio);
     let deviation = covariance(runs, resolution_mm, &bed.unknowns, &bed.residuals, &ALL, SUBSTEPS / 2)
         .map(|covariance| covariance.deviation(Unknown::BedMassRatio));

@@ -74,7 +74,7 @@ pub use step_figures::StepFigures;
 /// Recordings that can't be evaluated, that show no motion, or that a velocity servo could not have made.
 pub fn identify(runs: &[AxisRecording]) -> Result<Identification, IdentifyError> {
     let figures = figures(runs)?;
-    let fit = fit::fit(runs, figures.resolution_mm, figures.sustained_accel_mm_s2)?;
+    let fit = fit::fit(runs, figures.resolution_mm)?;
     Ok(Identification { parameters: fit.parameters, figures, runs: fit.runs })
 }
 

@@ -1,11 +1,13 @@
 //! The search: Levenberg and Marquardt's steps on the residuals of all runs.
 //!
 //! The variance of a run's residuals is unknown and differs: rounding of the encoder, and in runs that saturate the
-//! sub-steps of the model. So every run is weighted by one over the variance that it had last, which ends where the
-//! likelihood of normally distributed residuals is greatest. A Jacobian costs a dozen simulations and serves for
+//! sub-steps of the model. So every run is weighted by one over the variance that it had last, and by how many
+//! independent readings its correlated residuals are worth, which ends where the likelihood of normally distributed
+//! residuals is greatest. A Jacobian costs a dozen simulations and serves for
 //! several steps while they gain.
 
 use super::cholesky::Symmetric;
+use super::confidence::correlation_factor;
 use super::parameters::{Unknown, Unknowns};
 use super::simulation::{Linearised, Residuals, Runs, squares};
 
@@ -14,8 +16,6 @@ use super::simulation::{Linearised, Residuals, Runs, squares};
 pub(super) struct Found {
     pub(super) unknowns: Unknowns,
     pub(super) residuals: Residuals,
-    /// Σ n·ln(variance) over the runs: −2 × the logarithm of the likelihood, up to a constant.
-    pub(super) misfit: f64,
 }
 
 /// How a search is made.
@@ -24,6 +24,9 @@ pub(super) struct Effort {
     pub(super) substeps: u32,
     /// Most Jacobians.
     pub(super) jacobians: usize,
+    /// Whether the start is close. Far from it all residuals are correlated, and weights by that would give up runs
+    /// that the model does not follow yet.
+    pub(super) is_near: bool,
     /// The gain in misfit below which it ends.
     pub(super) least_gain: f64,
 }
@@ -34,15 +37,62 @@ const STEPS_PER_JACOBIAN: usize = 6;
 /// Dampings tried for one step.
 const DAMPINGS: usize = 5;
 
-/// Variances of the runs, none below what rounding alone leaves of an encoder step.
-pub(super) fn variances(runs: &Runs, residuals: &Residuals, resolution_mm: f64) -> Vec<f64> {
-    let least = (0.25 * resolution_mm).powi(2).max(1e-18);
-    squares(residuals).iter().zip(runs.readings()).map(|(sum, n)| (sum / n).max(least)).collect()
+/// What the residuals of each run are worth: their variance, and how many independent readings they are.
+#[derive(Clone, Debug)]
+pub(super) struct Noise {
+    variances: Vec<f64>,
+    independent: Vec<f64>,
+    least_variance: f64,
+    readings: Vec<f64>,
 }
 
-pub(super) fn misfit(runs: &Runs, residuals: &Residuals, resolution_mm: f64) -> f64 {
-    let variances = variances(runs, residuals, resolution_mm);
-    variances.iter().zip(runs.readings()).map(|(variance, n)| n * variance.ln()).sum()
+impl Noise {
+    pub(super) fn of(runs: &Runs, residuals: &Residuals, resolution_mm: f64) -> Self {
+        let readings = runs.readings();
+        let independent =
+            readings.iter().zip(residuals).map(|(n, run)| n / correlation_factor(run)).collect();
+        Self::with(runs, residuals, resolution_mm, independent)
+    }
+
+    /// As if every reading were independent.
+    pub(super) fn uncorrelated(runs: &Runs, residuals: &Residuals, resolution_mm: f64) -> Self {
+        Self::with(runs, residuals, resolution_mm, runs.readings())
+    }
+
+    fn with(runs: &Runs, residuals: &Residuals, resolution_mm: f64, independent: Vec<f64>) -> Self {
+        // Below what rounding alone leaves of an encoder step, a run has been met.
+        let least_variance = (0.25 * resolution_mm).powi(2).max(1e-18);
+        let readings = runs.readings();
+        let mut noise = Self { variances: Vec::new(), independent, least_variance, readings };
+        noise.variances = noise.variances_of(residuals);
+        noise
+    }
+
+    fn variances_of(&self, residuals: &Residuals) -> Vec<f64> {
+        let means = squares(residuals).into_iter().zip(&self.readings).map(|(sum, n)| sum / n);
+        means.map(|variance| variance.max(self.least_variance)).collect()
+    }
+
+    /// Information of one reading of each run: one over its variance and its correlation.
+    pub(super) fn weights(&self) -> Vec<f64> {
+        let of_run = |((variance, independent), n): ((&f64, &f64), &f64)| independent / n / variance;
+        self.variances.iter().zip(&self.independent).zip(&self.readings).map(of_run).collect()
+    }
+
+    /// Independent readings of all runs.
+    pub(super) fn independent(&self) -> f64 {
+        self.independent.iter().sum()
+    }
+
+    /// Σ n·ln(variance) over the runs, n their independent readings here: −2 × the logarithm of the likelihood, up to
+    /// a constant.
+    pub(super) fn misfit(&self, residuals: &Residuals) -> f64 {
+        self.variances_of(residuals)
+            .iter()
+            .zip(&self.independent)
+            .map(|(variance, n)| n * variance.ln())
+            .sum()
+    }
 }
 
 /// Searches from `start` over the `free` unknowns; `None` if the start can't be simulated.
@@ -57,41 +107,40 @@ pub(super) fn search(
     let mut unknowns = start;
     let mut damping = 1e-3;
     let mut residuals = runs.residuals(&unknowns, effort.substeps)?;
-    let mut last = misfit(runs, &residuals, resolution_mm);
     for _ in 0..effort.jacobians {
         let linear = runs.linearised(&unknowns, free, effort.substeps)?;
-        let before = last;
+        let mut gained = 0.0;
         for _ in 0..STEPS_PER_JACOBIAN {
-            let weights: Vec<f64> =
-                variances(runs, &residuals, resolution_mm).iter().map(|variance| variance.recip()).collect();
+            let of = if effort.is_near { Noise::of } else { Noise::uncorrelated };
+            let noise = of(runs, &residuals, resolution_mm);
+            let last = noise.misfit(&residuals);
+            let weights = noise.weights();
             let step = Step { linear: &linear, weights: &weights, unknowns: &unknowns, lag_limit_s };
-            let mut gained = None;
+            let mut gain = 0.0;
             for _ in 0..DAMPINGS {
                 let next = step.from(&residuals, damping);
                 let tried = next.and_then(|next| Some((next, runs.residuals(&next, effort.substeps)?)));
-                let better = tried
-                    .map(|(next, tried)| (misfit(runs, &tried, resolution_mm), next, tried))
-                    .filter(|(misfit, ..)| *misfit < last);
-                if let Some((misfit, next, tried)) = better {
-                    gained = Some(last - misfit);
-                    (unknowns, residuals, last) = (next, tried, misfit);
-                    damping = (damping * 0.2).max(1e-9);
+                if let Some((next, tried)) = tried.filter(|(_, tried)| noise.misfit(tried) < last) {
+                    gain = last - noise.misfit(&tried);
+                    (unknowns, residuals) = (next, tried);
+                    damping = (damping * 0.1).max(1e-9);
                     break;
                 }
                 damping = (damping * 10.0).min(1e6);
             }
+            gained += gain;
             // A Jacobian that gains little where it was taken has done its part.
-            if gained.is_none_or(|gain| gain < 10.0 * effort.least_gain) {
+            if gain < 10.0 * effort.least_gain {
                 break;
             }
         }
-        if before - last < effort.least_gain {
+        if gained < effort.least_gain {
             break;
         }
-        // One refusal with an old Jacobian says nothing about a new one.
-        damping = damping.min(1e-2);
+        // A refusal with an old Jacobian says nothing about a new one.
+        damping = damping.min(1e-3);
     }
-    Some(Found { unknowns, residuals, misfit: last })
+    Some(Found { unknowns, residuals })
 }
 
 struct Step<'a> {
