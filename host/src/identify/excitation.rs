@@ -44,6 +44,7 @@ pub fn identification_plan() -> Vec<Excitation> {
         Excitation::Steps { feed_mm_s: per_minute(1.0), cruise_s: 0.25, rest_s: 0.1 },
         Excitation::Steps { feed_mm_s: per_minute(7.2), cruise_s: 0.5, rest_s: 0.15 },
         harmonic(0.12, 2.0, 3),
+        harmonic(7.2, 3.0, 4),
         harmonic(2.150, 4.0, 4),
         harmonic(2.150, 10.0, 6),
         harmonic(2.150, 13.0, 9),
