@@ -191,3 +191,8 @@ fn explore() {
 fn show() {
     println!("{}", identify(&recordings(REFERENCE_Y, RIG)).unwrap());
 }
+#[test]
+fn one() {
+    let seed = std::env::var("SEED").ok().and_then(|n| n.parse().ok()).unwrap_or(2);
+    println!("{}", identify(&recordings(random_drive(seed), Rig { resolution_um: 1.0, ..RIG })).unwrap());
+}

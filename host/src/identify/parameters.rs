@@ -74,18 +74,18 @@ impl Unknown {
 
     /// Step of the difference quotients, in the search's coordinate.
     ///
-    /// Large: the model's limits act from sub-step to sub-step, so its output is rough below about 10⁻³.
+    /// Large: the model's limits act from sub-step to sub-step, so its positions are rough by about 1 µm where a run
+    /// saturates. Roughness over a small step would pass for sensitivity.
     pub(super) fn difference(self) -> f64 {
         match self {
             Gain => 1e-3,
-            Offset => 0.02,
-            VelocityGain | IntegralTime | AccelLimit => 0.01,
-            Lag => 1.5e-5,
-            CurrentLag => 3e-5,
-            Coulomb => 4.0,
-            Viscous => 0.02,
-            BedFrequency => 0.002,
-            BedDamping | BedMassRatio => 0.002,
+            Offset => 0.1,
+            VelocityGain | IntegralTime | AccelLimit => 0.02,
+            Lag => 5e-5,
+            CurrentLag => 5e-5,
+            Coulomb => 15.0,
+            Viscous => 0.5,
+            BedFrequency | BedDamping | BedMassRatio => 0.005,
         }
     }
 

@@ -129,6 +129,17 @@ pub(super) fn search(
                 damping = (damping * 10.0).min(1e6);
             }
             gained += gain;
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "{} {} gain {gain:.2} damping {damping:e} Kv {:.2} b {:.3} rms {:.3?} n {:.0?}",
+                    effort.substeps,
+                    free.len(),
+                    unknowns.0[2],
+                    unknowns.0[8],
+                    noise.variances.iter().map(|v| v.sqrt() * 1e3).collect::<Vec<_>>(),
+                    noise.independent
+                );
+            }
             // A Jacobian that gains little where it was taken has done its part.
             if gain < 10.0 * effort.least_gain {
                 break;
