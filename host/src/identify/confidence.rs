@@ -5,9 +5,9 @@
 //! is left.
 
 use super::cholesky::Symmetric;
-use super::parameters::{COUNT, Unknown, Unknowns};
-use super::search::Noise;
-use super::simulation::{Residuals, Runs, dot};
+use super::parameters::{COUNT, Unknown};
+use super::search::{Found, Noise};
+use super::simulation::{Runs, dot};
 
 /// Lags over which autocorrelation is summed at most.
 const LAGS_MAX: usize = 400;
@@ -28,17 +28,13 @@ pub(super) fn correlation_factor(residuals: &[f64]) -> f64 {
     1.0 + 2.0 * correlations.take_while(|&correlation| correlation > 0.0).sum::<f64>()
 }
 
-/// The covariance of the `free` unknowns at `unknowns`; `None` if the model can't be simulated about them.
-pub(super) fn covariance(
-    runs: &Runs,
-    resolution_mm: f64,
-    unknowns: &Unknowns,
-    residuals: &Residuals,
-    free: &[Unknown],
-    substeps: u32,
-) -> Option<Covariance> {
-    let linear = runs.linearised(unknowns, free, substeps)?;
-    let mut information = linear.normal(&Noise::of(runs, residuals, resolution_mm).weights());
+/// The covariance of what a search found; `None` if it found nothing that can be linearised.
+pub(super) fn covariance(runs: &Runs, resolution_mm: f64, found: &Found) -> Option<Covariance> {
+    let unknowns = &found.unknowns;
+    let linear = found.linear.as_ref()?;
+    let free = &linear.free;
+    let noise = Noise::of(runs, &found.residuals, resolution_mm).careful();
+    let mut information = linear.normal(&noise.weights());
     for (index, unknown) in free.iter().enumerate() {
         // An unknown that no run shows ends with this width, far beyond what counts as determined.
         *information.at_mut(index, index) += unknown.ignorance().powi(-2);

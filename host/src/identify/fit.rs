@@ -31,8 +31,8 @@ const COARSE: [Unknown; 6] = [
 
 const COARSE_EFFORT: Effort = Effort { substeps: 5, jacobians: 5, is_near: false, least_gain: 20.0 };
 const MIDDLE_EFFORT: Effort =
-    Effort { substeps: SUBSTEPS / 2, jacobians: 8, is_near: false, least_gain: 100.0 };
-const LAST_EFFORT: Effort = Effort { substeps: SUBSTEPS, jacobians: 6, is_near: true, least_gain: 1.0 };
+    Effort { substeps: SUBSTEPS / 2, jacobians: 6, is_near: false, least_gain: 100.0 };
+const LAST_EFFORT: Effort = Effort { substeps: SUBSTEPS, jacobians: 5, is_near: true, least_gain: 2.0 };
 
 /// A bed must raise the likelihood as much as chance does in one of e³⁰ cases, ...
 const BED_GAIN: f64 = 60.0;
@@ -40,6 +40,10 @@ const BED_GAIN: f64 = 60.0;
 const BED_GAIN_PER_READING: f64 = 0.02;
 /// ... and have a mass ratio of this many standard deviations.
 const BED_DEVIATIONS: f64 = 4.0;
+
+/// Gain in misfit for each reading from which a bed needs no comparison at full effort: it halves the errors, more
+/// than coarser sub-steps can.
+const OBVIOUS: f64 = 1.4;
 
 /// Root mean square of the residuals over the travel, above which the model is none.
 const MISS_MAX: f64 = 0.05;
@@ -56,22 +60,21 @@ pub(super) fn fit(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Fi
     let start = coarse(recordings, resolution_mm)?.ok_or(too_late.clone())?;
 
     let rigid = search(&runs, resolution_mm, start, without_bed(), MIDDLE_EFFORT).ok_or(too_late.clone())?;
-    let suspected = likeliest(&runs, resolution_mm, &rigid);
-    let rigid =
-        search(&runs, resolution_mm, rigid.unknowns, without_bed(), LAST_EFFORT).ok_or(too_late.clone())?;
-    let with_bed = suspected
-        .and_then(|bed| search(&runs, resolution_mm, bed, &ALL, MIDDLE_EFFORT))
-        .and_then(|bed| search(&runs, resolution_mm, bed.unknowns, &ALL, LAST_EFFORT))
-        .filter(|bed| is_bed(&runs, resolution_mm, &rigid, bed));
-    let found = with_bed.as_ref().unwrap_or(&rigid);
-    if std::env::var("DBG").is_ok() {
-        eprintln!("start {:.4?}\nsuspected {suspected:.4?}", start.0);
-        eprintln!("rigid {:.4?} {:.5?}", rigid.unknowns.0, squares(&rigid.residuals));
-        eprintln!("found {:.4?} {:.5?}", found.unknowns.0, squares(&found.residuals));
-    }
+    let suspected = likeliest(&runs, resolution_mm, &rigid)
+        .and_then(|bed| search(&runs, resolution_mm, bed, &ALL, MIDDLE_EFFORT));
+    let is_obvious =
+        suspected.as_ref().is_some_and(|bed| gain_per_reading(&runs, resolution_mm, &rigid, bed) > OBVIOUS);
+    let with_bed = suspected.and_then(|bed| search(&runs, resolution_mm, bed.unknowns, &ALL, LAST_EFFORT));
+    let found = match with_bed {
+        Some(bed) if is_obvious && is_heavy(&runs, resolution_mm, &bed) => bed,
+        with_bed => {
+            let rigid = search(&runs, resolution_mm, rigid.unknowns, without_bed(), LAST_EFFORT)
+                .ok_or(too_late.clone())?;
+            with_bed.filter(|bed| is_bed(&runs, resolution_mm, &rigid, bed)).unwrap_or(rigid)
+        }
+    };
     let matches = matches(&runs, recordings, &found.residuals)?;
-    let free: &[Unknown] = if with_bed.is_some() { &ALL } else { without_bed() };
-    let parameters = estimates(&runs, resolution_mm, found, free, recordings[0].tick_s).ok_or(too_late)?;
+    let parameters = estimates(&runs, resolution_mm, &found, recordings[0].tick_s).ok_or(too_late)?;
     Ok(Fit { parameters, runs: matches })
 }
 
@@ -142,15 +145,24 @@ fn likeliest(runs: &Runs, resolution_mm: f64, rigid: &Found) -> Option<Unknowns>
         .map(|(start, _)| start)
 }
 
+/// Gain in misfit by the bed for each reading, all of them taken as independent.
+fn gain_per_reading(runs: &Runs, resolution_mm: f64, rigid: &Found, bed: &Found) -> f64 {
+    let noise = Noise::uncorrelated(runs, &bed.residuals, resolution_mm);
+    (noise.misfit(&rigid.residuals) - noise.misfit(&bed.residuals)) / noise.independent()
+}
+
 /// Whether the recordings tell the two models apart.
 fn is_bed(runs: &Runs, resolution_mm: f64, rigid: &Found, bed: &Found) -> bool {
     let noise = Noise::of(runs, &bed.residuals, resolution_mm);
     let gain = noise.misfit(&rigid.residuals) - noise.misfit(&bed.residuals);
-    let is_likely = gain > BED_GAIN && gain > BED_GAIN_PER_READING * noise.independent();
+    gain > BED_GAIN && gain > BED_GAIN_PER_READING * noise.independent() && is_heavy(runs, resolution_mm, bed)
+}
+
+/// Whether the bed's mass ratio differs from 0.
+fn is_heavy(runs: &Runs, resolution_mm: f64, bed: &Found) -> bool {
     let ratio = bed.unknowns.get(Unknown::BedMassRatio);
-    let deviation = covariance(runs, resolution_mm, &bed.unknowns, &bed.residuals, &ALL, SUBSTEPS / 2)
-        .map(|covariance| covariance.deviation(Unknown::BedMassRatio));
-    is_likely && deviation.is_some_and(|deviation| ratio > BED_DEVIATIONS * deviation)
+    covariance(runs, resolution_mm, bed)
+        .is_some_and(|covariance| ratio > BED_DEVIATIONS * covariance.deviation(Unknown::BedMassRatio))
 }
 
 fn matches(
@@ -174,15 +186,9 @@ fn matches(
     Ok(matches)
 }
 
-fn estimates(
-    runs: &Runs,
-    resolution_mm: f64,
-    found: &Found,
-    free: &[Unknown],
-    tick_s: f64,
-) -> Option<AxisParametersFound> {
+fn estimates(runs: &Runs, resolution_mm: f64, found: &Found, tick_s: f64) -> Option<AxisParametersFound> {
     let unknowns = &found.unknowns;
-    let covariance = covariance(runs, resolution_mm, unknowns, &found.residuals, free, SUBSTEPS)?;
+    let covariance = covariance(runs, resolution_mm, found)?;
     let of = |unknown| Estimate::new(unknowns.get(unknown), covariance.deviation(unknown));
     let (lag, current_lag) = (of(Unknown::Lag), of(Unknown::CurrentLag));
     Some(AxisParametersFound {
@@ -199,7 +205,7 @@ fn estimates(
         accel_limit_mm_s2: of(Unknown::AccelLimit),
         coulomb_friction_mm_s2: of(Unknown::Coulomb),
         viscous_friction_per_s: of(Unknown::Viscous),
-        bed: free.contains(&Unknown::BedMassRatio).then(|| BedEstimate {
+        bed: (unknowns.get(Unknown::BedMassRatio) > 0.0).then(|| BedEstimate {
             frequency_hz: of(Unknown::BedFrequency),
             damping_ratio: of(Unknown::BedDamping),
             mass_ratio: of(Unknown::BedMassRatio),

@@ -16,6 +16,8 @@ use super::simulation::{Linearised, Residuals, Runs, squares};
 pub(super) struct Found {
     pub(super) unknowns: Unknowns,
     pub(super) residuals: Residuals,
+    /// The last Jacobian, a few steps before the end.
+    pub(super) linear: Option<Linearised>,
 }
 
 /// How a search is made.
@@ -33,6 +35,12 @@ pub(super) struct Effort {
 
 /// Steps with one Jacobian.
 const STEPS_PER_JACOBIAN: usize = 6;
+
+/// Correlation factor from which residuals are the model's and not the encoder's.
+const CORRELATED: f64 = 3.0;
+
+/// Moments of a run at which the model is rough.
+const MOMENTS: f64 = 4.0;
 
 /// Dampings tried for one step.
 const DAMPINGS: usize = 5;
@@ -79,6 +87,17 @@ impl Noise {
         self.variances.iter().zip(&self.independent).zip(&self.readings).map(of_run).collect()
     }
 
+    /// The same for runs that the model does not quite follow, careful: what is left of them are the few errors of the
+    /// moments at which they saturate or reverse, whatever their autocorrelation promises.
+    pub(super) fn careful(mut self) -> Self {
+        for (independent, n) in self.independent.iter_mut().zip(&self.readings) {
+            if *independent < n / CORRELATED {
+                *independent = independent.min(MOMENTS);
+            }
+        }
+        self
+    }
+
     /// Independent readings of all runs.
     pub(super) fn independent(&self) -> f64 {
         self.independent.iter().sum()
@@ -107,6 +126,7 @@ pub(super) fn search(
     let mut unknowns = start;
     let mut damping = 1e-3;
     let mut residuals = runs.residuals(&unknowns, effort.substeps)?;
+    let mut last_linear = None;
     for _ in 0..effort.jacobians {
         let linear = runs.linearised(&unknowns, free, effort.substeps)?;
         let mut gained = 0.0;
@@ -129,29 +149,19 @@ pub(super) fn search(
                 damping = (damping * 10.0).min(1e6);
             }
             gained += gain;
-            if std::env::var("DBG").is_ok() {
-                eprintln!(
-                    "{} {} gain {gain:.2} damping {damping:e} Kv {:.2} b {:.3} rms {:.3?} n {:.0?}",
-                    effort.substeps,
-                    free.len(),
-                    unknowns.0[2],
-                    unknowns.0[8],
-                    noise.variances.iter().map(|v| v.sqrt() * 1e3).collect::<Vec<_>>(),
-                    noise.independent
-                );
-            }
             // A Jacobian that gains little where it was taken has done its part.
             if gain < 10.0 * effort.least_gain {
                 break;
             }
         }
+        last_linear = Some(linear);
         if gained < effort.least_gain {
             break;
         }
         // A refusal with an old Jacobian says nothing about a new one.
         damping = damping.min(1e-3);
     }
-    Some(Found { unknowns, residuals })
+    Some(Found { unknowns, residuals, linear: last_linear })
 }
 
 struct Step<'a> {
