@@ -6,7 +6,7 @@ use super::differences::Parabolas;
 use super::parameters::{ALL, COUNT, Unknown, Unknowns, without_bed};
 use super::recording::{AxisRecording, span};
 use super::search::{Effort, Found, Noise, search};
-use super::simulation::{Residuals, Runs, SUBSTEPS, dot, squares};
+use super::simulation::{Residuals, Runs, SUBSTEPS, dot};
 use super::{AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
 
 /// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\] ...

@@ -42,6 +42,10 @@ const CORRELATED: f64 = 3.0;
 /// Moments of a run at which the model is rough.
 const MOMENTS: f64 = 4.0;
 
+/// Error of one such moment with [`SUBSTEPS`](super::simulation::SUBSTEPS) \[mm\]: the integrator of the drive stops or
+/// goes on a sub-step too early or too late.
+const ROUGHNESS_MM: f64 = 0.5e-3;
+
 /// Dampings tried for one step.
 const DAMPINGS: usize = 5;
 
@@ -90,9 +94,11 @@ impl Noise {
     /// The same for runs that the model does not quite follow, careful: what is left of them are the few errors of the
     /// moments at which they saturate or reverse, whatever their autocorrelation promises.
     pub(super) fn careful(mut self) -> Self {
-        for (independent, n) in self.independent.iter_mut().zip(&self.readings) {
+        let runs = self.independent.iter_mut().zip(&mut self.variances).zip(&self.readings);
+        for ((independent, variance), n) in runs {
             if *independent < n / CORRELATED {
                 *independent = independent.min(MOMENTS);
+                *variance = variance.max(ROUGHNESS_MM * ROUGHNESS_MM);
             }
         }
         self
