@@ -252,7 +252,7 @@ fn other_ways_to_record_find_the_same() {
     check(&[
         case("X closed loop", REFERENCE_X, closed),
         case("Y closed loop", REFERENCE_Y, closed),
-        case("Y closed, noise", REFERENCE_Y, Rig { noise_seed: Some(3), resolution_um: 1.0, ..closed }),
+        case("Y closed loop", REFERENCE_Y, Rig { noise_seed: Some(3), resolution_um: 1.0, ..closed }),
         case("X gain, offset", REFERENCE_X, Rig { output_gain: 0.96, output_offset_v: 0.01, ..RIG }),
         case("Y gain, offset", REFERENCE_Y, Rig { output_gain: 1.05, output_offset_v: -0.02, ..RIG }),
     ]);
@@ -297,6 +297,26 @@ fn finer_simulations_are_met_too() {
     }
 }
 
+/// A drive that has stopped against friction keeps torque in its integrator; a recording that begins there doesn't say.
+#[test]
+fn a_lead_in_covers_what_was_before_the_recording() {
+    let mut runs = recordings(REFERENCE_Y, RIG);
+    for run in &mut runs[1..3] {
+        // In the rest between both directions.
+        let middle = run.actual_mm.len() / 2;
+        run.actual_mm.drain(..middle);
+        run.command_mm_s.drain(..middle);
+        run.lead_in_ticks = (0.25 / REFERENCE_TICK_S) as usize;
+    }
+    let case = case("Y cut", REFERENCE_Y, RIG);
+    let found = identify(&runs).expect("a result");
+    for ((deviation, _), Column { name, limit }) in deviations(&case, &found.parameters).iter().zip(&COLUMNS)
+    {
+        println!("{name:>10}: {deviation:.3}");
+        assert!(deviation.abs() <= *limit, "{name}: {deviation}, expected at most {limit}");
+    }
+}
+
 #[test]
 fn a_limit_that_no_run_reaches_is_not_determined() {
     let gentle = [
@@ -310,6 +330,7 @@ fn a_limit_that_no_run_reaches_is_not_determined() {
     assert!(!found.parameters.accel_limit_mm_s2.is_determined(), "{:?}", found.parameters.accel_limit_mm_s2);
     let gain_per_s = found.parameters.velocity_gain_per_s.value;
     assert!((gain_per_s / 440.0 - 1.0).abs() < 0.03, "{gain_per_s}");
+    assert!(found.runs.iter().all(|run| run.error_mm_rms < 0.1e-3), "{:?}", found.runs);
 }
 
 #[test]

@@ -8,20 +8,24 @@ use super::step_figures::StepFigures;
 /// Half an interval over the value, up to which a value counts as determined.
 const DETERMINED: f64 = 0.3;
 
+/// Intervals are wider than the scatter alone makes them: the search ends a little beside the optimum, because the
+/// model is rough. Over a hundred and fifty simulated axes the true value lay within 1.96 deviations in 50 to 90 of 100
+/// cases.
+const MARGIN: f64 = 2.0;
+
 /// A value with its 95 % confidence interval, from the scatter of the recordings about the model. It does not
-/// contain what the model lacks.
+/// contain what the model lacks: backlash, cogging, pitch errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// In the unit of the field that holds it.
     pub value: f64,
-    /// The true value lies within value ± this in 95 of 100 cases; in the same unit. May be infinite.
+    /// The true value lies within value ± this in about 95 of 100 cases; in the same unit. May be infinite.
     pub half_width_95: f64,
 }
 
 impl Estimate {
     pub(super) fn new(value: f64, deviation: f64) -> Self {
-        // Of the normal distribution.
-        Self { value, half_width_95: 1.96 * deviation }
+        Self { value, half_width_95: MARGIN * 1.96 * deviation }
     }
 
     /// Whether the recordings fix the value: to ± 30 % or better.
@@ -161,8 +165,8 @@ mod tests {
 
     #[test]
     fn determined_is_relative() {
-        assert!(Estimate::new(-10.0, 1.5).is_determined());
-        assert!(!Estimate::new(10.0, 1.6).is_determined());
+        assert!(Estimate::new(-10.0, 0.75).is_determined());
+        assert!(!Estimate::new(10.0, 0.8).is_determined());
         assert!(!Estimate::new(0.0, 1e-9).is_determined());
         assert!(!Estimate::new(1.0, f64::NAN).is_determined());
     }

@@ -31,7 +31,7 @@ const COARSE: [Unknown; 6] = [
 
 const COARSE_EFFORT: Effort = Effort { substeps: 5, jacobians: 5, is_near: false, least_gain: 20.0 };
 const MIDDLE_EFFORT: Effort =
-    Effort { substeps: SUBSTEPS / 2, jacobians: 6, is_near: false, least_gain: 100.0 };
+    Effort { substeps: SUBSTEPS / 2, jacobians: 12, is_near: false, least_gain: 100.0 };
 const LAST_EFFORT: Effort = Effort { substeps: SUBSTEPS, jacobians: 5, is_near: true, least_gain: 2.0 };
 
 /// A bed must raise the likelihood as much as chance does in one of e³⁰ cases, ...

@@ -4,7 +4,8 @@ use core::f64::consts::PI;
 
 use super::recording::AxisRecording;
 
-/// Amplitude and delay of one harmonic motion.
+/// Amplitude and delay of one harmonic motion. What is commanded is what the converter puts out, in a closed loop too: the
+/// figures are the drive's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HarmonicFigures {
     /// Frequency \[Hz\].

@@ -39,6 +39,10 @@ const STEPS_PER_JACOBIAN: usize = 6;
 /// Correlation factor from which residuals are the model's and not the encoder's.
 const CORRELATED: f64 = 3.0;
 
+/// The most that correlation takes from a run during the search: one that the model does not follow yet must still
+/// outweigh the last digit of the others.
+const CORRELATION_MAX: f64 = 30.0;
+
 /// Moments of a run at which the model is rough.
 const MOMENTS: f64 = 4.0;
 
@@ -61,8 +65,11 @@ pub(super) struct Noise {
 impl Noise {
     pub(super) fn of(runs: &Runs, residuals: &Residuals, resolution_mm: f64) -> Self {
         let readings = runs.readings();
-        let independent =
-            readings.iter().zip(residuals).map(|(n, run)| n / correlation_factor(run)).collect();
+        let independent = readings
+            .iter()
+            .zip(residuals)
+            .map(|(n, run)| n / correlation_factor(run).min(CORRELATION_MAX))
+            .collect();
         Self::with(runs, residuals, resolution_mm, independent)
     }
 
