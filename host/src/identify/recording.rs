@@ -81,7 +81,7 @@ pub(super) fn span(values: &[f64]) -> f64 {
 
 /// The encoder's step: the least difference between two readings of the runs \[mm\].
 ///
-/// Differences below a millionth of the travel are the rounding of the numbers, not of an encoder.
+/// Differences below a billionth of the travel are the rounding of the numbers, not of an encoder.
 pub(super) fn resolution_mm(runs: &[AxisRecording]) -> f64 {
     let floor_mm = 1e-9 * runs.iter().map(|run| span(&run.actual_mm)).fold(0.0, f64::max).max(1e-6);
     let steps = runs.iter().flat_map(|run| run.actual_mm.windows(2)).map(|pair| (pair[1] - pair[0]).abs());
