@@ -11,7 +11,7 @@ use crate::gcode::{self, GcodeError};
 use crate::machine::Machine;
 use crate::planning::{Mode, PlanningError, plan_program};
 use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
-use crate::simulate::{self, RunError};
+use crate::simulate::{self, RunError, RunOptions};
 
 /// Feeds and limits are compared in f32: this much more is the same.
 pub(super) const ROUNDING: f64 = 1e-6;
@@ -252,10 +252,24 @@ impl Recording {
         machine: Machine,
         feed_mm_s: f64,
     ) -> Result<Self, DriveError> {
+        Self::with(&RunOptions::default(), experiment, program, machine, feed_mm_s)
+    }
+
+    /// [`Recording::of`], run as `options` say.
+    ///
+    /// # Errors
+    /// As there, and a correction that can't be used.
+    pub fn with(
+        options: &RunOptions<'_>,
+        experiment: String,
+        program: &str,
+        machine: Machine,
+        feed_mm_s: f64,
+    ) -> Result<Self, DriveError> {
         let program = gcode::read(&experiment, program.as_bytes())?;
         let plan = plan_program(&experiment, &program, &machine, Mode::Merged)?;
         let mut ticks = Vec::with_capacity((plan.time_s / machine.tick_s) as usize + 2);
-        let summary = simulate::run(&plan, &machine, &mut |tick| ticks.push(*tick))?;
+        let summary = simulate::run_with(options, &plan, &machine, &mut |tick| ticks.push(*tick))?;
         match summary.faults.into_iter().next() {
             Some(fault) => Err(DriveError::Fault { experiment, fault }),
             None => Ok(Self { experiment, machine, feed_mm_s, ticks }),

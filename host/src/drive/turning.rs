@@ -10,6 +10,7 @@ use super::experiment::{Demands, DriveError, Recording, raised, within};
 use crate::gcode::Plane;
 use crate::machine::Machine;
 use crate::record::{AXES, AxisTick, TickRecord};
+use crate::simulate::RunOptions;
 
 /// Turns for reaching the feed and for braking from it.
 const RAMP_TURNS: f64 = 6.0;
@@ -67,6 +68,14 @@ impl Turning {
     /// # Errors
     /// A quantity is out of its range, the machine can't reach the feed, or a fault ended the run.
     pub fn record(&self, machine: &Machine) -> Result<Recording, DriveError> {
+        self.record_with(&RunOptions::default(), machine)
+    }
+
+    /// [`Turning::record`], run as `options` say. All turns are one stretch.
+    ///
+    /// # Errors
+    /// As there, and a correction that can't be used.
+    pub fn record_with(&self, options: &RunOptions<'_>, machine: &Machine) -> Result<Recording, DriveError> {
         let &Self { frequency_hz, feed_mm_s, plane, .. } = self;
         let fastest_hz = 1.0 / (TICKS_PER_TURN_MIN * machine.tick_s);
         within("frequency [Hz]", frequency_hz, (FREQUENCY_HZ_MIN, fastest_hz))?;
@@ -94,7 +103,7 @@ impl Turning {
         );
         let program = format!("G21 G90 {select} F{:.10}\n{}M2\n", feed_mm_s * 60.0, turn.repeat(turns));
         let experiment = format!("circles at {frequency_hz} Hz and {} mm/min", feed_mm_s * 60.0);
-        Recording::of(experiment, &program, machine, feed_mm_s)
+        Recording::with(options, experiment, &program, machine, feed_mm_s)
     }
 
     /// What a circle takes at constant feed, over the share of it that planning uses.
