@@ -66,6 +66,11 @@ pub fn propose(axis: &AxisSettings, found: &Identification, method: Method, tick
     tuning
 }
 
+/// To the four decimals that are shown; 0 without a sign.
+fn rounded_to(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4 + 0.0
+}
+
 /// Actual over nominal scale; 1 where the recordings do not tell it from 1.
 fn command_gain(parameters: &AxisParametersFound) -> f64 {
     let gain = parameters.command_gain;
@@ -139,7 +144,10 @@ fn changes(
             Some(axis.output_offset_v),
             Some(tuning.output_offset_v),
             "V",
-            format!("at a command of 0 the axis moves at {:.4} mm/s", parameters.command_offset_mm_s.value),
+            format!(
+                "at a command of 0 the axis moves at {:.4} mm/s",
+                rounded_to(parameters.command_offset_mm_s.value)
+            ),
         ),
         change(
             "regulator.kp_per_s",
