@@ -36,7 +36,7 @@ pub fn write_circle(
         .iter()
         .map(|sweep| {
             let hz = sweep.limit_hz.map_or_else(|| "–".to_owned(), |hz| figure(hz, 3));
-            format!("{hz} Hz with {}", sweep.name)
+            format!("{hz} Hz ({})", sweep.name)
         })
         .collect();
     let sentence = format!(
