@@ -44,7 +44,7 @@ mod tests {
     fn the_gain_is_the_greatest_that_keeps_margins() {
         for drive in [hal_sim::REFERENCE_X, hal_sim::REFERENCE_Y] {
             let (kp_per_s, margins) = proportional(&drive, 5e-4);
-            assert!((190.0..230.0).contains(&kp_per_s), "{kp_per_s}");
+            assert!((210.0..235.0).contains(&kp_per_s), "{kp_per_s}");
             assert!(margins.phase_deg >= PHASE_MIN_DEG && margins.gain >= GAIN_MIN);
             let more = Margins::of(&drive, 1.01 * kp_per_s, 5e-4);
             assert!(more.phase_deg < PHASE_MIN_DEG || more.gain < GAIN_MIN);
