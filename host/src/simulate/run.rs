@@ -103,7 +103,7 @@ fn run_in<R: Real>(
     kernel.enable(0);
     let mut streams = Streams::<R, AXES, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
-    let mut supply = Supply::<R, AXES, _>::new(executable.supplied(), executable.tick_s);
+    let mut supply = Supply::<R, AXES, _, _>::new(executable.supplied(), executable.tick_s);
 
     let mut summary = RunSummary {
         tick_s: machine.tick_s,

@@ -100,13 +100,15 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
         let () = Self::ONE_AT_LEAST;
         let error = |(axis, cause)| AxesError { axis, cause };
         let preview_ticks = preview::preview_ticks(figures, tick_s).map_err(error)?;
-        let config = |axis: usize| {
-            AxisConfig::new(&figures[axis], preview_ticks, tick_s).map_err(|cause| error((axis, cause)))
+        let config = |(axis, figures): (usize, &AxisFigures)| {
+            AxisConfig::new(figures, preview_ticks, tick_s).map_err(|cause| error((axis, cause)))
         };
+        let mut each = figures.iter().enumerate();
+        let none = ScaleError { quantity: "number of axes", value: 0.0, expected: "one at least" };
         // Without allocation an array is filled by a fallible function only over something already there.
-        let mut axes = [config(0)?; AXES];
-        for (axis, place) in axes.iter_mut().enumerate().skip(1) {
-            *place = config(axis)?;
+        let mut axes = [config(each.next().ok_or(error((0, none)))?)?; AXES];
+        for (place, figures) in axes.iter_mut().skip(1).zip(each) {
+            *place = config(figures)?;
         }
         Ok(Self { axes, preview_ticks })
     }
@@ -159,7 +161,7 @@ pub struct AxisOutput<R> {
     pub code: DacCode,
     /// The output reached the limit.
     pub saturated: bool,
-    /// The following error is beyond its limit.
+    /// The following error is beyond its limit. Then no gain is applied to it: the output is that of standing still.
     pub lost: bool,
 }
 
@@ -191,6 +193,9 @@ impl<R: Real> AxisState<R> {
 
     /// One control tick: `setpoint` is the present one, of which feedforward is made; `output.set` is the position
     /// to regulate to; `correction_mm_s` is added to the command. The rest of `output` is written.
+    ///
+    /// Beyond the limit of the following error the axis is lost and its regulator does not move: what a broken encoder
+    /// makes of the gains may be beyond the number type.
     // Not inlined: three copies of it would fight for the registers.
     #[inline(never)]
     pub fn tick(
@@ -204,7 +209,13 @@ impl<R: Real> AxisState<R> {
         let (set, actual) = (output.set, self.position(config, counts));
         // Subtracted in fixed point, converted afterwards.
         let following_error_mm: R = (set - actual).to_offset();
-        self.peak_following_error_mm = self.peak_following_error_mm.max(following_error_mm.abs());
+        let size_mm = following_error_mm.abs();
+        self.peak_following_error_mm = self.peak_following_error_mm.max(size_mm);
+        // Written so that what is not a number counts as lost.
+        if !(size_mm <= config.following_error_limit_mm) {
+            *output = AxisOutput { lost: true, ..self.stand_still(config, set, counts) };
+            return;
+        }
         let command = config.regulator.tick(
             &mut self.regulator,
             following_error_mm,
@@ -218,8 +229,43 @@ impl<R: Real> AxisState<R> {
             following_error_mm,
             code: config.output.code(command.velocity_mm_s),
             saturated: command.saturated,
-            // Written so that what is not a number counts as lost.
-            lost: !(following_error_mm.abs() <= config.following_error_limit_mm),
+            lost: false,
         };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::{Fixed, Scalar};
+
+    /// An encoder that jumps by ten kilometres, with gains that would make more of it than fixed point holds.
+    #[test]
+    fn an_axis_that_is_lost_stands_still_and_overflows_nothing() {
+        let figures = AxisFigures {
+            mm_per_count: 1e-4,
+            mm_s_at_10_v: 1000.0 / 3.0,
+            output_offset_v: 0.5,
+            output_limit_v: 10.0,
+            gains: Gains { kp_per_s: 230.0, ki_per_s2: 1e4, kd: 1.0 },
+            feedforward: Feedforward::default(),
+            following_error_limit_mm: 1.0,
+        };
+        let config = AxisConfig::<Fixed>::new(&figures, 0, 5e-4).expect("valid");
+        let setpoint = Setpoint::default();
+        for mm in [1e7, -1e7, 2e9, 1.001] {
+            let mut axis = AxisState::default();
+            let mut output = AxisOutput::default();
+            axis.tick(&config, &setpoint, &Counts(0), Fixed::ZERO, &mut output);
+            let before = (axis.regulator, output.lost);
+            axis.tick(&config, &setpoint, &Counts((mm * 1e4) as i64), Fixed::ZERO, &mut output);
+            assert_eq!((axis.regulator, false), before);
+            assert!(output.lost && output.code == config.output.code(Fixed::ZERO), "{mm}: {output:?}");
+            assert!((output.following_error_mm.to_f64() + mm).abs() < 1e-3, "{mm}: {output:?}");
+            assert_eq!(axis.peak_following_error_mm, output.following_error_mm.abs());
+        }
+        let mut output = AxisOutput::default();
+        AxisState::default().tick(&config, &setpoint, &Counts(9_999), Fixed::ZERO, &mut output);
+        assert!(!output.lost && output.code != config.output.code(Fixed::ZERO));
     }
 }

@@ -5,12 +5,15 @@
 //!
 //! - [`Item`]: one item of a program, in f64 and position steps; made into the same bits on every target;
 //! - [`supply`]: keeps the two streams filled from items;
+//! - [`mod@check`]: whether all of a program can be executed, before any of it is;
 //! - [`mod@bytes`]: a program as bytes, with the machine it is for.
 
 pub mod bytes;
+pub mod check;
 pub mod supply;
 
 pub use bytes::{Header, ProgramError, Reader, write};
+pub use check::{CheckError, check};
 pub use supply::{Supply, SupplyError};
 
 use serde::{Deserialize, Serialize};

@@ -21,6 +21,7 @@ use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
 
+pub(crate) use accept::Acceptance;
 pub use accept::{PathRules, Rejection, SEGMENTS_PER_TICK_MAX};
 
 /// An item of the path stream.
@@ -152,9 +153,9 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     pub fn piece(&mut self, piece: Piece<R, AXES>) -> Result<(), Refused<Piece<R, AXES>>> {
         let next = self.accept.piece(&piece).map_err(Refused::Invalid)?;
         self.path.enqueue(PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
-        count(&self.shared.path_entered);
         self.accept = next;
         self.publish();
+        count(&self.shared.path_entered);
         Ok(())
     }
 
@@ -165,9 +166,9 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     pub fn segment(&mut self, segment: FeedSegment<R>) -> Result<(), Refused<FeedSegment<R>>> {
         let next = self.accept.segment(&segment).map_err(Refused::Invalid)?;
         self.feed.enqueue(FeedItem::Segment(segment)).map_err(|_| Refused::Full(segment))?;
-        count(&self.shared.feed_entered);
         self.accept = next;
         self.publish();
+        count(&self.shared.feed_entered);
         Ok(())
     }
 
@@ -185,15 +186,17 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
         let path = self.path.enqueue(PathItem::EndOfStretch(position));
         let feed = self.feed.enqueue(FeedItem::EndOfStretch);
         debug_assert!(path.is_ok() && feed.is_ok());
-        count(&self.shared.path_entered);
-        count(&self.shared.feed_entered);
         self.accept = next;
         self.publish();
+        count(&self.shared.path_entered);
+        count(&self.shared.feed_entered);
         count(&self.shared.stretches);
         Ok(())
     }
 
-    /// Tells the intake which stream is ahead.
+    /// Tells the intake which stream is ahead: behind the item that changes it, and before that is counted. A tick
+    /// that comes in between finds what is said to be ahead in its queue, and that queue, which had room, not full yet.
+    /// Counted first, a queue would be full while the other one was still said to cover it.
     fn publish(&mut self) {
         let ahead = self.accept.feed_ahead_of_path();
         self.shared.feed_covers_path.store(ahead.is_ge(), Ordering::Release);
