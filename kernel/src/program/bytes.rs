@@ -16,7 +16,6 @@ use core::marker::PhantomData;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::{Deserialize, Serialize};
-use serde_big_array::BigArray;
 
 use super::Item;
 use crate::axis::AxisFigures;
@@ -43,10 +42,10 @@ pub struct Header<const AXES: usize> {
     /// What the streams are held to.
     pub rules: PathRules,
     /// The machine's axes.
-    #[serde(with = "BigArray")]
+    #[serde(with = "super::array")]
     pub axes: [AxisFigures; AXES],
     /// Where the machine stands when it starts.
-    #[serde(with = "BigArray")]
+    #[serde(with = "super::array")]
     pub start: [Position; AXES],
 }
 
