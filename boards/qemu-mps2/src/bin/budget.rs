@@ -91,7 +91,7 @@ fn ticks<const N: usize>(counter: &Counter, program: Reader<'_, N>, streams: &mu
     let (mut producer, mut closed_loop) =
         close(program, streams, &machine).unwrap_or_else(|error| fail(&error));
     // A regulator of its own beside the kernel's, fed with the same.
-    let [config, ..] = AxesConfig::<Number, N>::new(&axes, tick_s).unwrap_or_else(|error| fail(&error)).axes;
+    let config = AxesConfig::<Number, N>::new(&axes, tick_s).unwrap_or_else(|error| fail(&error)).axes[0];
     let mut axis = Axis::default();
     axis.set_position(&config, Counts::default(), start[0]);
     let mut deepest = 0;
