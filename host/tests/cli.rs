@@ -477,3 +477,101 @@ fn alone_it_demonstrates() {
     }
     assert!(desk.read("stringer.html").contains("<svg"));
 }
+
+#[test]
+fn drive_prints_its_keys() {
+    let desk = Desk::new("drive");
+    let step = desk.json(&["drive", "step", "--json", "--report", "step.html"]);
+    assert_has(
+        &step,
+        &[
+            "axis",
+            "feed_mm_min",
+            "delay_ms",
+            "time_constant_ms",
+            "overshoot_percent",
+            "settling_ms",
+            "peak_accel_m_s2",
+            "peak_jerk_m_s3",
+            "bandwidth_hz",
+            "reference",
+        ],
+    );
+    assert!((number(&step["delay_ms"]) - 2.013).abs() < 0.1);
+    let figures = step["reference"].as_array().expect("figures");
+    assert_eq!(figures.len(), 7);
+    assert_has(&figures[0], &["quantity", "unit", "measured", "expected", "tolerance", "published", "holds"]);
+
+    let harmonic = desk.json(&["drive", "harmonic", "--from", "8", "--to", "9", "--by", "1", "--json"]);
+    let axis = &harmonic["axes"][1];
+    assert_has(axis, &["name", "bandwidth_swing_hz", "bandwidth_fundamental_hz", "current_limited_hz"]);
+    let point = &axis["points"][0];
+    assert_has(
+        point,
+        &["frequency_hz", "radius_mm", "swing_ratio", "fundamental_ratio", "phase_deg", "delay_ms"],
+    );
+
+    let inertia = desk.json(&["drive", "inertia", "--loads", "2", "--json", "--report", "inertia.html"]);
+    assert_has(&inertia["loads"][0], &["load_inertia_ratio", "plateau_accel_m_s2", "is_limited"]);
+
+    // Not the published feed: nothing to compare with.
+    let two =
+        ["drive", "circle", "--from", "4", "--to", "5", "--feed-mm-min", "2000", "--feedforward", "v,as-is"];
+    let circle = desk.json(&[&two[..], &["--json", "--report", "circle.html"]].concat());
+    assert_eq!(circle["reference"].as_array().map(Vec::len), Some(0));
+    let names: Vec<&Value> =
+        circle["feedforward"].as_array().expect("two").iter().map(|f| &f["name"]).collect();
+    assert_eq!(names, ["V", "as is"]);
+    let figures = &circle["feedforward"][0]["circles"][0];
+    assert_has(
+        figures,
+        &[
+            "radius_mm",
+            "contour_error_um",
+            "contour_error_um_max",
+            "contour_error_um_min",
+            "form_deviation_um",
+            "following_error_x_um",
+            "following_error_y_um",
+        ],
+    );
+
+    let bode =
+        desk.json(&["drive", "bode", "--points", "3", "--axis", "z", "--json", "--report", "bode.html"]);
+    assert_has(&bode["points"][2], &["step_ratio", "swing_ratio", "harmonic_phase_deg", "linear_phase_deg"]);
+    for report in ["step.html", "inertia.html", "circle.html", "bode.html"] {
+        let page = desk.read(report);
+        assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"), "{report}");
+        assert!(page.contains("<svg") && !page.contains("NaN"), "{report}");
+    }
+}
+
+#[test]
+fn drive_refuses_what_cannot_be_done() {
+    let desk = Desk::new("drive-refusals");
+    for (arguments, words) in [
+        (&["step", "--axis", "W"][..], "found axis W, expected"),
+        (
+            &["step", "--feed-mm-min", "20001"],
+            "found a feed of 20001 mm/min, expected at most 20000.0 mm/min",
+        ),
+        (&["step", "--duration-s", "0"], "found duration [s] 0, expected"),
+        (&["circle", "--from", "0"], "found frequencies from 0 to 16 by 1 Hz, expected"),
+        (&["circle", "--feed-mm-min", "30000"], "what the ±10 V of axis X reach"),
+        (&["circle", "--limit-um", "0"], "found contour limit [µm] 0, expected"),
+        (&["harmonic", "--feed-mm-min", "-3"], "found feed [mm/min] -3, expected"),
+        (
+            &["harmonic", "--to", "300", "--by", "148"],
+            "found frequency [Hz] 300, expected a number from 0.05 to 200",
+        ),
+        (&["inertia", "--frequency", "0"], "found frequency [Hz] 0, expected"),
+        (&["bode", "--points", "1"], "found 1 frequencies from 1 to 100 Hz, expected"),
+        (&["step", "--machine", "none.toml"], "none.toml: found"),
+    ] {
+        let refusal = desk.refusal(&[&["drive"], arguments].concat());
+        assert!(refusal.contains(words), "{arguments:?}: {refusal}");
+    }
+    // What the parser of arguments refuses has the same status.
+    assert_eq!(desk.motion(&["drive", "circle", "--feedforward", "q"]).status.code(), Some(2));
+    assert_eq!(desk.motion(&["drive", "harmonic", "--feedforward", "v"]).status.code(), Some(2));
+}

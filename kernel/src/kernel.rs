@@ -55,13 +55,16 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         {
             axis.set_position(config, counts, position);
         }
+        let mut outputs = [AxisOutput::default(); AXES];
+        for ((output, &counts), &set) in outputs.iter_mut().zip(&counts).zip(&position) {
+            (output.counts, output.set) = (counts, set);
+        }
         let executor = Executor::new(position);
         let trace = Trace {
             // The first tick is number 0.
             tick: u64::MAX,
             executed: executor.resting(),
-            counts,
-            axes: position.map(|set| AxisOutput { set, ..AxisOutput::default() }),
+            axes: outputs,
             fault: None,
         };
         Self {
@@ -77,8 +80,13 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
     /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (what
     /// brakes and relays need), then executes the streams. Without effect in a fault.
+    ///
+    /// What was cut off in the middle of a stretch is given up, as by [`Kernel::stand_here`].
     pub fn enable(&mut self, settle_ticks: u32) {
         if self.trace.fault.is_none() && self.power == Power::Off {
+            if !self.executor.is_at_rest() {
+                self.stand_here();
+            }
             self.power = Power::Starting { ticks_left: settle_ticks };
         }
     }
@@ -103,7 +111,11 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     {
         self.trace.tick = self.trace.tick.wrapping_add(1);
         match hal.latch() {
-            Ok(counts) => self.trace.counts = counts,
+            Ok(counts) => {
+                for (output, counts) in self.trace.axes.iter_mut().zip(counts) {
+                    output.counts = counts;
+                }
+            }
             Err(_) => self.latch_fault(FaultKind::Encoder),
         }
         self.execute(intake);
@@ -141,21 +153,20 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// keep what they had.
     #[inline]
     fn regulate(&mut self, intake: &mut Intake<'_, R, AXES>) {
-        let Trace { executed, counts, axes: outputs, .. } = &mut self.trace;
+        let Trace { executed, axes: outputs, .. } = &mut self.trace;
         if self.power != Power::Off {
-            self.preview.delay(&executed.setpoints, outputs.iter_mut().map(|output| &mut output.set));
-            let correction = match intake.correction() {
-                Some(correction) if executed.state == ExecState::Moving => {
-                    correction.next(executed.stretches)
+            if let Some(correction) = intake.correction() {
+                let is_moving = executed.state == ExecState::Moving;
+                let corrections = correction.next(is_moving.then_some(executed.stretches));
+                for (axis, correction_mm_s) in self.axes.iter_mut().zip(corrections) {
+                    axis.regulator.correction_mm_s = correction_mm_s;
                 }
-                _ => [R::ZERO; AXES],
-            };
+            }
+            self.preview.delay(&executed.setpoints, outputs.iter_mut().map(|output| &mut output.set));
             let mut is_lost = false;
-            let parts = self.axes.iter_mut().zip(&self.config).zip(&executed.setpoints).zip(&*counts);
-            for ((output, correction), (((axis, config), setpoint), counts)) in
-                outputs.iter_mut().zip(correction).zip(parts)
-            {
-                axis.tick(config, setpoint, counts, correction, output);
+            let parts = self.axes.iter_mut().zip(&self.config).zip(&executed.setpoints);
+            for (output, ((axis, config), setpoint)) in outputs.iter_mut().zip(parts) {
+                axis.tick(config, setpoint, output);
                 is_lost |= output.lost;
             }
             if is_lost {
@@ -177,10 +188,8 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     }
 
     fn stand_still(&mut self) {
-        let Trace { counts, axes: outputs, .. } = &mut self.trace;
-        let parts = self.axes.iter().zip(&self.config).zip(&*counts);
-        for (output, ((axis, config), &counts)) in outputs.iter_mut().zip(parts) {
-            *output = axis.stand_still(config, output.set, counts);
+        for ((output, axis), config) in self.trace.axes.iter_mut().zip(&mut self.axes).zip(&self.config) {
+            axis.stand_still(config, output);
         }
     }
 
@@ -207,18 +216,16 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     pub fn stand_here(&mut self) -> [Position; AXES] {
         self.power = Power::Off;
         let mut position = [Position::ZERO; AXES];
-        for (((position, axis), config), &counts) in
-            position.iter_mut().zip(&mut self.axes).zip(&self.config).zip(&self.trace.counts)
+        for (((position, axis), config), output) in
+            position.iter_mut().zip(&mut self.axes).zip(&self.config).zip(&mut self.trace.axes)
         {
-            *position = axis.position(config, counts);
+            *position = axis.position(config, output.counts);
+            output.set = *position;
             axis.regulator = crate::axis::RegulatorState::default();
         }
         self.executor = Executor::new(position);
         self.preview.rest_at(position);
         self.trace.executed = self.executor.resting();
-        for (output, &set) in self.trace.axes.iter_mut().zip(&position) {
-            output.set = set;
-        }
         position
     }
 

@@ -1,6 +1,6 @@
 //! Real-time motion for boards that drive ±10 V velocity servos.
 //!
-//! Every control tick the kernel evaluates the sin² jerk feed law in closed form, walks the path,
+//! Every control tick the kernel evaluates the sin² jerk feed law, walks the path,
 //! regulates every axis with P(ID) and feedforward of velocity, acceleration and jerk, and writes a
 //! voltage. No allocation, no unsafe code, no panic, no loop without a constant bound.
 //!

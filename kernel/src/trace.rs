@@ -5,7 +5,6 @@ use crate::exec::ExecState;
 use crate::exec::Executed;
 use crate::fault::Fault;
 use crate::num::Scalar;
-use crate::units::Counts;
 
 /// One tick of the whole kernel.
 #[derive(Clone, Copy, Debug)]
@@ -14,9 +13,7 @@ pub struct Trace<R, const AXES: usize> {
     pub tick: u64,
     /// Set values along the path and per axis. In a fault the last ones before it.
     pub executed: Executed<R, AXES>,
-    /// What the encoders read at the start of the tick.
-    pub counts: [Counts; AXES],
-    /// Actual values and outputs. In a fault the outputs are 0 V.
+    /// What the encoders read, actual values and outputs. In a fault the outputs are 0 V.
     pub axes: [AxisOutput<R>; AXES],
     /// The latched fault, if there is one.
     pub fault: Option<Fault<R>>,
@@ -44,14 +41,12 @@ impl Digest {
         for quantity in [motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4] {
             self.word(quantity.to_bits64());
         }
-        for ((setpoint, output), counts) in
-            trace.executed.setpoints.iter().zip(&trace.axes).zip(&trace.counts)
-        {
+        for (setpoint, output) in trace.executed.setpoints.iter().zip(&trace.axes) {
             self.word(setpoint.position.to_bits().cast_unsigned());
             for quantity in [setpoint.velocity_mm_s, setpoint.accel_mm_s2, setpoint.jerk_mm_s3] {
                 self.word(quantity.to_bits64());
             }
-            self.word(counts.0.cast_unsigned());
+            self.word(output.counts.0.cast_unsigned());
             self.word(u64::from(output.code.0.cast_unsigned()));
         }
         let state = match trace.executed.state {

@@ -349,6 +349,24 @@ fn disabling_takes_effect_in_the_next_tick() {
     });
 }
 
+/// Drives that come back in the middle of a stretch hold still. What is left of it does not move them: it does not
+/// start where they stand.
+#[test]
+fn enabling_after_disabling_stands_still() {
+    moving(|kernel, intake, bench| {
+        kernel.disable();
+        kernel.tick(intake, bench);
+        kernel.enable(400);
+        for _ in 0..400 {
+            let trace = kernel.tick(intake, bench);
+            assert_eq!((trace.fault, trace.executed.state), (None, ExecState::Idle));
+            assert!(bench.is_enabled && bench.written == [DacCode::ZERO; 2], "{bench:?}");
+        }
+        let fault = kernel.tick(intake, bench).fault.map(|fault| fault.kind);
+        assert_eq!(fault, Some(FaultKind::Executor(ExecFault::NotHere)));
+    });
+}
+
 /// The peak is the greatest magnitude since it was last asked for.
 #[test]
 fn peaks_are_held_until_they_are_taken() {

@@ -16,7 +16,7 @@ use check::totals::Totals;
 use check::{drive, machine, program};
 use motion_host::gcode;
 use motion_host::planning::{Mode, plan_program};
-use motion_host::simulate::{Number, run_with};
+use motion_host::simulate::run;
 use motion_kernel::num::Fixed;
 
 /// Programs in the form that runs with every `cargo test`, and in the long form.
@@ -141,7 +141,7 @@ fn random_programs_run_on_the_simulated_machine() {
             ticks += 1;
             end_mm = tick.axes.map(|axis| axis.set_mm);
         };
-        let summary = run_with(Number::F32, &plan, &machine, &mut observe).expect("a run");
+        let summary = run(&plan, &machine, &mut observe).expect("a run");
         assert!(summary.faults.is_empty(), "seed {seed}: {:?}", summary.faults);
         let last = program.asked.iter().rev().find_map(|asked| match asked {
             program::Asked::Move(step) => Some(step.to.map(check::geometry::mm)),

@@ -3,7 +3,7 @@
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Mode, Plan, plan_blocks, plan_program};
-use motion_host::simulate::{Number, RunSummary, run_with};
+use motion_host::simulate::{Number, RunOptions, RunSummary, run_with};
 
 const PROGRAM: &str = include_str!("../../host/src/cli/stringer.ngc");
 
@@ -86,7 +86,10 @@ fn reasons_are_the_papers() {
 fn executed(machine: &Machine, number: Number) -> RunSummary {
     let plan = planned(machine);
     let mut last = None;
-    let summary = run_with(number, &plan, machine, &mut |tick| last = Some(*tick)).expect("a run");
+    let summary = run_with(&RunOptions { number, ..RunOptions::default() }, &plan, machine, &mut |tick| {
+        last = Some(*tick)
+    })
+    .expect("a run");
     let last = last.expect("ticks");
     assert!(summary.faults.is_empty(), "{:?}", summary.faults);
     assert!((summary.time_s - summary.planned_time_s).abs() <= summary.tick_s, "{summary:?}");

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use thiserror::Error;
 
+use crate::drive::DriveError;
 use crate::gcode::GcodeError;
 use crate::machine::MachineError;
 use crate::planning::PlanningError;
@@ -69,6 +70,9 @@ pub enum CliError {
         /// Why.
         source: RunError,
     },
+    /// The drive experiment can't be made, or a fault ended it.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
     /// Arguments that are right one by one and don't fit together.
     #[error("found {found}, expected {expected}")]
     Arguments {
@@ -80,11 +84,18 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// 2, but for output that failed and for a plan that the kernel refuses: these are not the user's input.
+    /// 2, but for output that failed, for a plan that the kernel refuses and for an experiment that ended in a fault or
+    /// found nothing to measure: these are not the user's input.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Output(_) | Self::Run { source: RunError::Rejected(_), .. } => ExitCode::FAILURE,
+            Self::Drive(
+                DriveError::Fault { .. }
+                | DriveError::NotSteady { .. }
+                | DriveError::NoMotion { .. }
+                | DriveError::Run(RunError::Rejected(_)),
+            ) => ExitCode::FAILURE,
             _ => ExitCode::from(2),
         }
     }

@@ -7,6 +7,7 @@
 //! - [`profile`]: one ramp of the feed law, in figures;
 //! - [`plan`]: the feed plan of a program or a block list;
 //! - [`run`]: a program through plan, kernel and simulated machine;
+//! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
 //! - [`machine`]: the reference machine's file;
 //! - [`demo`]: what `motion` alone does;
@@ -15,6 +16,7 @@
 
 pub mod compile;
 pub mod demo;
+pub mod drive;
 pub mod error;
 pub mod machine;
 pub mod plan;
@@ -39,6 +41,7 @@ Examples:
   motion run part.ngc --report part.html         run a program, look at what the axes did
   motion plan part.ngc                           what limits the feed, block by block
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
+  motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
   motion machine > mine.toml                     a machine file to start from
 
@@ -59,6 +62,7 @@ enum Command {
     Run(run::RunArguments),
     Plan(plan::PlanArguments),
     Profile(profile::ProfileArguments),
+    Drive(drive::DriveArguments),
     Compile(compile::CompileArguments),
     Machine(machine::MachineArguments),
 }
@@ -88,6 +92,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Run(arguments)) => run::run(arguments, out),
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),
+        Some(Command::Drive(arguments)) => drive::drive(arguments, out),
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),
         Some(Command::Machine(_)) => machine::print(out),
     }

@@ -32,6 +32,12 @@ impl Progress {
         }
     }
 
+    /// One of few steps is done.
+    pub(super) fn step(&mut self) {
+        self.ticks += 1;
+        self.bar.set_position(self.ticks);
+    }
+
     pub(super) fn finish(&self) {
         self.bar.finish_and_clear();
     }

@@ -76,7 +76,7 @@ pub struct AxisSettings {
     pub snap_mm_s4: f64,
     /// Following error at which the axis faults \[mm\], 0.0001 to 1000.
     pub following_error_limit_mm: f64,
-    /// Travel per encoder count \[mm\], between 10⁻⁸ and 1; so much that a tick at twice `feed_mm_s` is less than
+    /// Travel per encoder count \[mm\], between 10⁻⁸ and 0.5; so much that a tick at twice `feed_mm_s` is less than
     /// half the register of `timer`.
     pub mm_per_count: f64,
     /// Width of the encoder's counter register.

@@ -6,6 +6,7 @@
 //! and say what they left out. Fails only if the output cannot be written.
 
 mod decimate;
+pub mod drive;
 mod format;
 mod palette;
 mod plots;
@@ -43,7 +44,7 @@ const NOTICES_MAX: usize = 100;
 pub fn write_html(record: &RunRecord, out: &mut impl Write) -> io::Result<()> {
     let summary = Summary::of(record);
     let names = axis_names(record);
-    head(record, out)?;
+    head(file_name(program_name(record)), out)?;
     header(record, &summary, &names, out)?;
     if !record.ticks.is_empty() {
         path_section(record, &summary, &names, out)?;
@@ -66,14 +67,14 @@ fn axis_names(record: &RunRecord) -> [String; AXES] {
     })
 }
 
-fn head(record: &RunRecord, out: &mut impl Write) -> io::Result<()> {
-    let program = program_name(record);
+/// Everything before what the page has to say about `subject`.
+fn head(subject: &str, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
          <title>{} – motion report</title>\n<style>\n{}{}</style></head>\n<body><main>",
-        escape(file_name(program)),
+        escape(subject),
         include_str!("style.css"),
         palette::style_sheet(),
     )

@@ -108,6 +108,21 @@ pub(super) const CLASSES: [Ink; 6] = [
     solid(0xE07A1F, 0xF3F26E),
 ];
 
+/// Curves of one plot that are of one kind: axes, methods, gains.
+pub(super) const SERIES: [Ink; 6] = [
+    solid(0x1E65AF, 0x6AB0F4),
+    dashed(0xAF5100, 0xF1A053, "36 12"),
+    dashed(0x0A795E, 0x3BCAA3, "12 10"),
+    dashed(0x863FB4, 0xC495ED, "36 10 10 10"),
+    dashed(0xA7225D, 0xF487B3, "60 14"),
+    dashed(0x4D6900, 0xB1CD4A, "20 8 6 8"),
+];
+
+/// Ink of a curve among others of its kind; from the seventh on they begin anew.
+pub(super) fn series(index: usize) -> Ink {
+    SERIES[index % SERIES.len()]
+}
+
 /// Inks that stand alone.
 const SINGLE: [Ink; 15] = [
     TEXT,
@@ -129,7 +144,7 @@ const SINGLE: [Ink; 15] = [
 
 /// Rules that put every ink on dark paper, and its dashes on every line drawn in it.
 pub(super) fn style_sheet() -> String {
-    let inks = || SINGLE.iter().chain(&CEILINGS).chain(&CLASSES);
+    let inks = || SINGLE.iter().chain(&CEILINGS).chain(&CLASSES).chain(&SERIES);
     let mut dashes = String::new();
     let mut dark = String::new();
     for ink in inks() {
@@ -167,7 +182,7 @@ mod tests {
     #[test]
     fn every_line_stands_out_from_its_paper() {
         let lines = [AXIS, LIMIT, FAULT, FEED, ACCELERATION, JERK, SNAP, ERROR, CONTOUR, VOLTS, UNREACHED];
-        for ink in lines.iter().chain(&CEILINGS).chain(&CLASSES) {
+        for ink in lines.iter().chain(&CEILINGS).chain(&CLASSES).chain(&SERIES) {
             let hex = ink.hex();
             assert!(contrast(ink.light, LIGHT_PAPER) >= 3.0, "{hex} {}", contrast(ink.light, LIGHT_PAPER));
             assert!(contrast(ink.dark, DARK_PAPER) >= 3.0, "{hex} {}", contrast(ink.dark, DARK_PAPER));
@@ -186,7 +201,7 @@ mod tests {
     #[test]
     fn a_colour_names_one_ink() {
         let mut seen: Vec<u32> =
-            SINGLE.iter().chain(&CEILINGS).chain(&CLASSES).map(|ink| ink.light).collect();
+            SINGLE.iter().chain(&CEILINGS).chain(&CLASSES).chain(&SERIES).map(|ink| ink.light).collect();
         let number = seen.len();
         seen.sort_unstable();
         seen.dedup();

@@ -14,7 +14,7 @@ pub mod rig;
 pub mod run;
 pub mod summary;
 
-pub use run::{Number, RunError, run, run_with};
+pub use run::{Number, RunError, RunOptions, StretchCorrection, run, run_with};
 pub use summary::{AxisSummary, RunSummary};
 
 use crate::record::TickRecord;

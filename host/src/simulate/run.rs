@@ -2,6 +2,7 @@
 
 use core::convert::Infallible;
 
+use motion_kernel::axis::{Correction, CorrectionError};
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::hal::Encoder;
@@ -38,6 +39,28 @@ pub enum Number {
     Fixed,
 }
 
+/// A correction of one stretch of a program, for the kernel's [`Correction`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct StretchCorrection {
+    /// Which stretch, from 0.
+    pub stretch: u32,
+    /// Ticks from knot to knot.
+    pub knot_ticks: u16,
+    /// Velocity commands \[mm/s\], the first one in the stretch's first tick.
+    pub knots_mm_s: Vec<[f64; AXES]>,
+    /// No knot is of a greater magnitude \[mm/s\].
+    pub bound_mm_s: f64,
+}
+
+/// How a program is run.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RunOptions<'a> {
+    /// The kernel's number type.
+    pub number: Number,
+    /// What was learnt of one of its stretches.
+    pub correction: Option<&'a StretchCorrection>,
+}
+
 /// Why a run could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
@@ -50,6 +73,9 @@ pub enum RunError {
     /// The simulated machine can't be built.
     #[error("simulated machine: {0}")]
     Simulation(String),
+    /// The correction can't be used.
+    #[error("correction: {0}")]
+    Correction(#[from] CorrectionError),
     /// The kernel refused what the planner made.
     #[error("the kernel rejects the plan: {0}")]
     Rejected(SupplyError<Infallible>),
@@ -60,27 +86,28 @@ pub enum RunError {
 /// # Errors
 /// The plan or the machine can't be executed. Faults of the run itself are in the summary.
 pub fn run(plan: &Plan, machine: &Machine, observe: &mut Observer<'_>) -> Result<RunSummary, RunError> {
-    run_with(Number::F32, plan, machine, observe)
+    run_with(&RunOptions::default(), plan, machine, observe)
 }
 
-/// Runs `plan` with the given number type.
+/// Runs `plan` as `options` say.
 ///
 /// # Errors
 /// As [`run`].
 pub fn run_with(
-    number: Number,
+    options: &RunOptions<'_>,
     plan: &Plan,
     machine: &Machine,
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
-    match number {
-        Number::F32 => run_in::<f32>(plan, machine, observe),
-        Number::F64 => run_in::<f64>(plan, machine, observe),
-        Number::Fixed => run_in::<Fixed>(plan, machine, observe),
+    match options.number {
+        Number::F32 => run_in::<f32>(options.correction, plan, machine, observe),
+        Number::F64 => run_in::<f64>(options.correction, plan, machine, observe),
+        Number::Fixed => run_in::<Fixed>(options.correction, plan, machine, observe),
     }
 }
 
 fn run_in<R: Real>(
+    correction: Option<&StretchCorrection>,
     plan: &Plan,
     machine: &Machine,
     observe: &mut Observer<'_>,
@@ -101,8 +128,16 @@ fn run_in<R: Real>(
     let start = [Position::ZERO; AXES];
     let mut kernel = Kernel::<R, AXES>::new(machine.axes_config()?, start, counts);
     kernel.enable(0);
+    let knots_mm_s: Vec<[R; AXES]> = correction
+        .iter()
+        .flat_map(|correction| &correction.knots_mm_s)
+        .map(|knot| knot.map(R::from_f64))
+        .collect();
     let mut streams = Streams::<R, AXES, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
+    if let Some(&StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
+        intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?);
+    }
     let mut supply = Supply::<R, AXES, _, _>::new(executable.supplied(), executable.tick_s);
 
     let mut summary = RunSummary {

@@ -84,9 +84,9 @@ impl<'a, R: Real, const AXES: usize> Correction<'a, R, AXES> {
         Ok(Self { knots_mm_s, knot_ticks, per_knot, stretch, knot: 0, ticks: 0 })
     }
 
-    /// The correction in the next tick of motion, if that belongs to stretch `stretch`.
-    pub(crate) fn next(&mut self, stretch: u32) -> [R; AXES] {
-        if stretch != self.stretch {
+    /// The correction in the next tick, which belongs to motion in stretch `stretch`, or to none.
+    pub(crate) fn next(&mut self, stretch: Option<u32>) -> [R; AXES] {
+        if stretch != Some(self.stretch) {
             return [R::ZERO; AXES];
         }
         let (Some(from), to) = (self.knots_mm_s.get(self.knot), self.knots_mm_s.get(self.knot + 1)) else {
@@ -115,14 +115,15 @@ mod tests {
     fn is_straight_between_knots_and_nothing_elsewhere() {
         let knots = [[1.0, -2.0], [3.0, 2.0], [0.5, 0.0]];
         let mut correction = Correction::<f64, 2>::new(7, &knots, 4, 3.0).unwrap();
-        assert_eq!(correction.next(6), [0.0; 2]);
-        let first: [f64; 10] = core::array::from_fn(|_| correction.next(7)[0]);
+        assert_eq!(correction.next(Some(6)), [0.0; 2]);
+        assert_eq!(correction.next(None), [0.0; 2]);
+        let first: [f64; 10] = core::array::from_fn(|_| correction.next(Some(7))[0]);
         assert_eq!(first, [1.0, 1.5, 2.0, 2.5, 3.0, 2.375, 1.75, 1.125, 0.5, 0.5]);
-        assert_eq!(correction.next(8), [0.0; 2]);
+        assert_eq!(correction.next(Some(8)), [0.0; 2]);
         for _ in 0..20 {
-            correction.next(7);
+            correction.next(Some(7));
         }
-        assert_eq!(correction.next(7), [0.0; 2]);
+        assert_eq!(correction.next(Some(7)), [0.0; 2]);
     }
 
     #[test]

@@ -151,6 +151,8 @@ pub struct AxisState<R> {
 /// The outcome of one tick of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisOutput<R> {
+    /// What the encoder read at the start of the tick.
+    pub counts: Counts,
     /// The position set-point that is regulated to: the present one, or a past one where there is a preview.
     pub set: Position,
     /// Actual position from the encoder.
@@ -177,60 +179,52 @@ impl<R: Real> AxisState<R> {
         config.encoder.position(counts) + self.offset
     }
 
-    /// The output of an axis whose drive is off: the voltage at which it stands still.
+    /// The output of an axis whose drive is off: the voltage at which it stands still. In and out as
+    /// [`AxisState::tick`].
     #[inline]
-    pub fn stand_still(&self, config: &AxisConfig<R>, set: Position, counts: Counts) -> AxisOutput<R> {
+    pub fn stand_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) {
+        let AxisOutput { counts, set, .. } = *output;
         let actual = self.position(config, counts);
-        AxisOutput {
+        *output = AxisOutput {
+            counts,
             set,
             actual,
             following_error_mm: (set - actual).to_offset(),
             code: config.output.code(R::ZERO),
             saturated: false,
             lost: false,
-        }
+        };
+        // No change from here to the next tick is beyond what the gains were accepted for.
+        let limit_mm = config.following_error_limit_mm;
+        self.regulator.watch(output.following_error_mm.max(-limit_mm).min(limit_mm));
     }
 
-    /// One control tick: `setpoint` is the present one, of which feedforward is made; `output.set` is the position
-    /// to regulate to; `correction_mm_s` is added to the command. The rest of `output` is written.
+    /// One control tick: `setpoint` is the present one, of which feedforward is made; `output` comes with what the
+    /// encoder read and the position to regulate to, and leaves with the rest.
     ///
     /// Beyond the limit of the following error the axis is lost and its regulator does not move: what a broken encoder
     /// makes of the gains may be beyond the number type.
     // Not inlined: three copies of it would fight for the registers.
     #[inline(never)]
-    pub fn tick(
-        &mut self,
-        config: &AxisConfig<R>,
-        setpoint: &Setpoint<R>,
-        &counts: &Counts,
-        correction_mm_s: R,
-        output: &mut AxisOutput<R>,
-    ) {
-        let (set, actual) = (output.set, self.position(config, counts));
+    pub fn tick(&mut self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, output: &mut AxisOutput<R>) {
+        let actual = self.position(config, output.counts);
         // Subtracted in fixed point, converted afterwards.
-        let following_error_mm: R = (set - actual).to_offset();
+        let following_error_mm: R = (output.set - actual).to_offset();
         let size_mm = following_error_mm.abs();
         self.peak_following_error_mm = self.peak_following_error_mm.max(size_mm);
         // Written so that what is not a number counts as lost.
         if !(size_mm <= config.following_error_limit_mm) {
-            *output = AxisOutput { lost: true, ..self.stand_still(config, set, counts) };
+            self.stand_still(config, output);
+            output.lost = true;
             return;
         }
-        let command = config.regulator.tick(
-            &mut self.regulator,
-            following_error_mm,
-            setpoint,
-            correction_mm_s,
-            config.output.limits(),
-        );
-        *output = AxisOutput {
-            set,
-            actual,
-            following_error_mm,
-            code: config.output.code(command.velocity_mm_s),
-            saturated: command.saturated,
-            lost: false,
-        };
+        let command =
+            config.regulator.tick(&mut self.regulator, following_error_mm, setpoint, config.output.limits());
+        output.actual = actual;
+        output.following_error_mm = following_error_mm;
+        output.code = config.output.code(command.velocity_mm_s);
+        output.saturated = command.saturated;
+        output.lost = false;
     }
 }
 
@@ -253,19 +247,21 @@ mod tests {
         };
         let config = AxisConfig::<Fixed>::new(&figures, 0, 5e-4).expect("valid");
         let setpoint = Setpoint::default();
+        let at = |mm: f64| AxisOutput { counts: Counts((mm * 1e4) as i64), ..AxisOutput::default() };
         for mm in [1e7, -1e7, 2e9, 1.001] {
             let mut axis = AxisState::default();
-            let mut output = AxisOutput::default();
-            axis.tick(&config, &setpoint, &Counts(0), Fixed::ZERO, &mut output);
-            let before = (axis.regulator, output.lost);
-            axis.tick(&config, &setpoint, &Counts((mm * 1e4) as i64), Fixed::ZERO, &mut output);
-            assert_eq!((axis.regulator, false), before);
+            let mut output = at(mm);
+            axis.tick(&config, &setpoint, &mut output);
             assert!(output.lost && output.code == config.output.code(Fixed::ZERO), "{mm}: {output:?}");
             assert!((output.following_error_mm.to_f64() + mm).abs() < 1e-3, "{mm}: {output:?}");
             assert_eq!(axis.peak_following_error_mm, output.following_error_mm.abs());
+            // And back again.
+            let mut output = at(0.0);
+            axis.tick(&config, &setpoint, &mut output);
+            assert!(!output.lost);
         }
-        let mut output = AxisOutput::default();
-        AxisState::default().tick(&config, &setpoint, &Counts(9_999), Fixed::ZERO, &mut output);
+        let mut output = at(0.9999);
+        AxisState::default().tick(&config, &setpoint, &mut output);
         assert!(!output.lost && output.code != config.output.code(Fixed::ZERO));
     }
 }

@@ -44,9 +44,11 @@ pub struct Regulator<R> {
 pub struct RegulatorState<R> {
     /// ki·Σε \[mm/s\]: in units of the output, so that a new ki does not move it.
     integral_mm_s: R,
-    /// ε of the tick before \[mm\]; none in the first tick, so that it has no derivative kick.
-    last_error_mm: Option<R>,
+    /// ε of the tick before \[mm\].
+    last_error_mm: R,
     feedforward: FeedforwardState<R>,
+    /// Added to the command \[mm/s\]: what was learnt of this stretch.
+    pub correction_mm_s: R,
 }
 
 /// The regulator's output.
@@ -56,6 +58,14 @@ pub struct Command<R> {
     pub velocity_mm_s: R,
     /// It was cut at a limit.
     pub saturated: bool,
+}
+
+impl<R: Real> RegulatorState<R> {
+    /// A tick without output: the next one has no derivative kick.
+    #[inline]
+    pub fn watch(&mut self, error_mm: R) {
+        self.last_error_mm = error_mm;
+    }
 }
 
 impl<R: Real> Regulator<R> {
@@ -92,19 +102,18 @@ impl<R: Real> Regulator<R> {
         })
     }
 
-    /// One tick: the velocity command, `correction_mm_s` added, cut at `limits` \[mm/s\].
+    /// One tick: the velocity command, cut at `limits` \[mm/s\].
     #[inline]
     pub fn tick(
         &self,
         state: &mut RegulatorState<R>,
         error_mm: R,
         setpoint: &Setpoint<R>,
-        correction_mm_s: R,
         limits: (R, R),
     ) -> Command<R> {
-        let change_mm = state.last_error_mm.map_or(R::ZERO, |last| error_mm - last);
-        state.last_error_mm = Some(error_mm);
-        let feedforward = self.feedforward.tick(&mut state.feedforward, setpoint) + correction_mm_s;
+        let change_mm = error_mm - state.last_error_mm;
+        state.last_error_mm = error_mm;
+        let feedforward = self.feedforward.tick(&mut state.feedforward, setpoint) + state.correction_mm_s;
         let integral_mm_s = state.integral_mm_s + self.ki * error_mm;
         let wanted = feedforward + self.kp * error_mm + self.kd * change_mm + integral_mm_s;
         let (least, greatest) = limits;
@@ -155,8 +164,8 @@ mod tests {
             };
             errors.push(0.01 * unit());
             let error = errors[errors.len() - 1];
-            let found = regulator.tick(&mut state, error, &setpoint, 0.0, WIDE);
-            let change = if errors.len() > 1 { error - errors[errors.len() - 2] } else { 0.0 };
+            let found = regulator.tick(&mut state, error, &setpoint, WIDE);
+            let change = error - if errors.len() > 1 { errors[errors.len() - 2] } else { 0.0 };
             let expected = gains.kp_per_s * error
                 + gains.kd / TICK_S * change
                 + gains.ki_per_s2 * TICK_S * errors.iter().sum::<f64>()
@@ -172,9 +181,10 @@ mod tests {
     fn gains_of_zero_open_the_loop() {
         let open = regulator(Gains::default(), Feedforward { velocity: 1.0, ..Feedforward::default() });
         let setpoint = Setpoint { velocity_mm_s: 120.0, ..Setpoint::default() };
-        let command = open.tick(&mut RegulatorState::default(), 55.0, &setpoint, 0.0, WIDE);
+        let command = open.tick(&mut RegulatorState::default(), 55.0, &setpoint, WIDE);
         assert!((command.velocity_mm_s - 120.0).abs() < 1e-12);
-        let corrected = open.tick(&mut RegulatorState::default(), 55.0, &setpoint, -2.5, WIDE);
+        let mut state = RegulatorState { correction_mm_s: -2.5, ..RegulatorState::default() };
+        let corrected = open.tick(&mut state, 55.0, &setpoint, WIDE);
         assert!((corrected.velocity_mm_s - 117.5).abs() < 1e-12);
     }
 
@@ -185,10 +195,10 @@ mod tests {
         let mut state = RegulatorState::default();
         let still = Setpoint::default();
         for _ in 0..100_000 {
-            let command = regulator.tick(&mut state, 5.0, &still, 0.0, (-40.0, 30.0));
+            let command = regulator.tick(&mut state, 5.0, &still, (-40.0, 30.0));
             assert!(command.saturated && (command.velocity_mm_s - 30.0).abs() < 1e-12);
         }
-        let back = regulator.tick(&mut state, -1.0, &still, 0.0, (-40.0, 30.0));
+        let back = regulator.tick(&mut state, -1.0, &still, (-40.0, 30.0));
         assert!(back.velocity_mm_s < 0.0, "{}", back.velocity_mm_s);
     }
 

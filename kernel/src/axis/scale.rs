@@ -29,10 +29,9 @@ impl core::error::Error for ScaleError {}
 /// position step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderScale {
-    /// mm per count in 2⁻⁶⁴ mm, in halves.
-    step_high: u32,
+    /// mm per count in 2⁻⁶⁴ mm, in halves; the sign is the upper one's.
+    step_high: i32,
     step_low: u32,
-    reversed: bool,
 }
 
 impl EncoderScale {
@@ -40,31 +39,28 @@ impl EncoderScale {
     /// counts the other way.
     ///
     /// # Errors
-    /// |mm_per_count| is not from 10⁻⁸ to 1 mm, exclusive.
+    /// |mm_per_count| is not from 10⁻⁸ to 0.5 mm, exclusive.
     pub fn new(mm_per_count: f64) -> Result<Self, ScaleError> {
         let size = libm::fabs(mm_per_count);
-        if !(size > 1.0e-8 && size < 1.0) {
+        if !(size > 1.0e-8 && size < 0.5) {
             return Err(ScaleError {
                 quantity: "encoder resolution [mm/count]",
                 value: mm_per_count,
-                expected: "a magnitude between 1e-8 and 1",
+                expected: "a magnitude between 1e-8 and 0.5",
             });
         }
-        let scaled = size * 4_294_967_296.0;
-        let step_high = scaled as u32;
-        let step_low = ((scaled - f64::from(step_high)) * 4_294_967_296.0) as u32;
-        Ok(Self { step_high, step_low, reversed: mm_per_count < 0.0 })
+        let scaled = mm_per_count * 4_294_967_296.0;
+        let step_high = libm::floor(scaled);
+        let step_low = ((scaled - step_high) * 4_294_967_296.0) as u32;
+        Ok(Self { step_high: step_high as i32, step_low })
     }
 
     /// The position of `counts`. In the tick: four 32×32-bit products.
     #[inline]
     #[must_use]
     pub fn position(&self, counts: Counts) -> Position {
-        // −1 turns the sign: −x is the complement of x, plus 1.
-        let sign = -i64::from(self.reversed);
-        let counts = (counts.0 ^ sign).wrapping_sub(sign);
         // Halves times halves; what is beyond 64 bits is beyond the range.
-        let (counts_high, counts_low) = (counts >> 32, counts & 0xFFFF_FFFF);
+        let (counts_high, counts_low) = (counts.0 >> 32, counts.0 & 0xFFFF_FFFF);
         let (step_high, step_low) = (i64::from(self.step_high), i64::from(self.step_low));
         let lowest = ((counts_low as u64).wrapping_mul(step_low as u64) >> 32) as i64;
         let middle = counts_low.wrapping_mul(step_high).wrapping_add(counts_high.wrapping_mul(step_low));
@@ -75,8 +71,7 @@ impl EncoderScale {
     /// Millimetres per count, with its sign.
     #[must_use]
     pub fn mm_per_count(&self) -> f64 {
-        let size = (f64::from(self.step_high) + f64::from(self.step_low) / 4_294_967_296.0) / 4_294_967_296.0;
-        if self.reversed { -size } else { size }
+        (f64::from(self.step_high) + f64::from(self.step_low) / 4_294_967_296.0) / 4_294_967_296.0
     }
 }
 

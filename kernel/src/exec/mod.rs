@@ -116,6 +116,11 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         executed
     }
 
+    /// Whether nothing is under way: at rest between stretches, dwelling or stopped.
+    pub fn is_at_rest(&self) -> bool {
+        !matches!(self.activity, Activity::Moving(_) | Activity::Between { .. })
+    }
+
     /// Ends a program stop. Without effect in any other state.
     pub fn resume(&mut self) {
         if matches!(self.activity, Activity::Stopped) {
@@ -145,9 +150,10 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         intake.start_tick();
         match self.advance(intake)? {
             Some(motion) => {
+                // In this order: where the path has run dry, motion and set-points stay those of the tick before.
+                executed.line =
+                    self.walker.follow(&motion, intake, &mut executed.setpoints).map_err(walk_fault)?;
                 executed.motion = motion;
-                let Executed { motion, setpoints, .. } = executed;
-                executed.line = self.walker.follow(motion, intake, setpoints).map_err(walk_fault)?;
             }
             None => {
                 (executed.motion, executed.line) = (PathMotion::default(), 0);

@@ -267,9 +267,10 @@ pub struct Intake<'a, R: Real, const AXES: usize> {
 }
 
 impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
-    /// What was learnt of a stretch to come; replaces any other. None if there is nothing to correct.
-    pub fn correct(&mut self, correction: Option<Correction<'a, R, AXES>>) {
-        self.correction = correction;
+    /// What was learnt of a stretch to come. Another one replaces it; there is no way back to none but one without
+    /// knots.
+    pub fn correct(&mut self, correction: Correction<'a, R, AXES>) {
+        self.correction = Some(correction);
     }
 
     #[inline]

@@ -107,7 +107,7 @@ fn ticks<const N: usize>(counter: &Counter, program: Reader<'_, N>, streams: &mu
         });
         hprintln!("tick {}", spent);
         let (_, spent) =
-            counter.count(|| regulate(&mut axis, &config, &trace.executed.setpoints[0], trace.counts[0]));
+            counter.count(|| regulate(&mut axis, &config, &trace.executed.setpoints[0], trace.axes[0]));
         hprintln!("regulator {}", spent);
         if trace.fault.is_some() {
             fail(&"a fault");
@@ -179,9 +179,8 @@ fn regulate(
     axis: &mut Axis,
     config: &AxisConfig<Number>,
     setpoint: &Setpoint<Number>,
-    counts: Counts,
+    mut output: AxisOutput<Number>,
 ) -> AxisOutput<Number> {
-    let mut output = AxisOutput { set: setpoint.position, ..AxisOutput::default() };
-    axis.tick(config, setpoint, &counts, Number::ZERO, &mut output);
+    axis.tick(config, setpoint, &mut output);
     output
 }

@@ -30,6 +30,7 @@ pub(in crate::report) fn draw(
             x_name: Some("path length [mm]"),
             // As wide as the plot of the feed, which has a second axis there.
             right: sheet.left,
+            is_logarithmic: false,
             shade: &[],
         };
         let mut chart = panel.draw(area, sheet)?;

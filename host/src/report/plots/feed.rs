@@ -197,6 +197,7 @@ fn draw_on(
         y: (0.0, 1.14 * top_mm_s),
         x_name: Some("path length [mm]"),
         right: sheet.left,
+        is_logarithmic: false,
         shade: &[],
     };
     let mut chart = panel.draw(area, sheet)?;

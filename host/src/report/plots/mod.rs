@@ -6,7 +6,9 @@
 
 pub(super) mod contour;
 pub(super) mod feed;
+pub(super) mod graph;
 pub(super) mod path;
+pub(super) mod polar;
 pub(super) mod time;
 
 use std::io;
@@ -159,6 +161,8 @@ pub(super) struct Panel<'a> {
     pub(super) x_name: Option<&'a str>,
     /// Room on the right.
     pub(super) right: u32,
+    /// The horizontal axis holds decimal logarithms, and is marked with what they are of.
+    pub(super) is_logarithmic: bool,
     /// Stretches of the horizontal axis to be shaded.
     pub(super) shade: &'a [(f64, f64)],
 }
@@ -187,7 +191,7 @@ impl Panel<'_> {
             .bold_line_style(palette::GRID.rgb().stroke_width(4))
             .axis_style(palette::AXIS.rgb().stroke_width(4))
             .set_all_tick_mark_size(16)
-            .x_labels(sheet.marks.0)
+            .x_labels(if self.is_logarithmic { 0 } else { sheet.marks.0 })
             .y_labels(sheet.marks.1)
             .x_label_formatter(&|x| scale_mark(*x, x_span))
             .y_label_formatter(&|y| scale_mark(*y, y_span))
@@ -195,6 +199,9 @@ impl Panel<'_> {
             .label_style(sheet.letters(palette::TEXT, HPos::Center, VPos::Center))
             .axis_desc_style(sheet.letters(palette::TEXT, HPos::Center, VPos::Center))
             .draw()?;
+        if self.is_logarithmic {
+            self.decades(&mut chart, area, sheet)?;
+        }
         if self.y.0 < 0.0 && self.y.1 > 0.0 {
             chart.draw_series([PathElement::new(
                 [(self.x.0, 0.0), (self.x.1, 0.0)],
@@ -202,6 +209,31 @@ impl Panel<'_> {
             )])?;
         }
         Ok(chart)
+    }
+
+    /// Grid lines and marks at 1, 2, 5, 10, …
+    fn decades(&self, chart: &mut Chart<'_>, area: &Area<'_>, sheet: &Sheet) -> Drawn {
+        let (low, high) = (self.x.0.floor() as i32, self.x.1.ceil() as i32);
+        let all = (low..=high).flat_map(|decade| [1.0, 2.0, 5.0].map(|part| part * 10f64.powi(decade)));
+        let rounding = 1e-9;
+        let marks: Vec<f64> =
+            all.filter(|mark| (self.x.0 - rounding..=self.x.1 + rounding).contains(&mark.log10())).collect();
+        let grid = palette::GRID.rgb().stroke_width(4);
+        chart.draw_series(
+            marks
+                .iter()
+                .map(|mark| PathElement::new([(mark.log10(), self.y.0), (mark.log10(), self.y.1)], grid)),
+        )?;
+        if self.x_name.is_some() {
+            let (left, top) = area.get_base_pixel();
+            for mark in marks {
+                let (x, y) = chart.backend_coord(&(mark.log10(), self.y.0));
+                let style = sheet.letters(palette::TEXT, HPos::Center, VPos::Top);
+                let at = (x - left, y - top + sheet.text as i32 / 3);
+                area.draw(&Text::new(scale_mark(mark, mark), at, style))?;
+            }
+        }
+        Ok(())
     }
 }
 

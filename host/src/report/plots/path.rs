@@ -104,6 +104,7 @@ pub(in crate::report) fn draw(
                 y: scale.y_mm,
                 x_name: Some(&format!("{} [mm]", names[view.right])),
                 right: sheet.right,
+                is_logarithmic: false,
                 shade: &[],
             };
             let mut chart = panel.draw(area, sheet)?;

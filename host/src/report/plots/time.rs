@@ -154,6 +154,7 @@ fn stack<V: Fn(&TickRecord) -> f64>(
                 y: shown.ends(),
                 x_name: last.then_some("time [s]"),
                 right: sheet.right,
+                is_logarithmic: false,
                 shade: &shades(&summary.rests, x, sheet.columns),
             };
             let mut chart = panel.draw(part, sheet)?;

@@ -1,0 +1,207 @@
+//! `motion drive circle`: contour error over frequency, closed loop.
+
+use std::io::{self, Write};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::{
+    Common, ComparisonJson, Feedforward, comparisons_json, frequencies, is_feed, or_dash, outcome,
+    write_comparisons,
+};
+use crate::cli::error::{CliError, Outcome};
+use crate::cli::progress::Progress;
+use crate::cli::table::{self, Align};
+use crate::cli::write_json;
+use crate::drive::circle::{CircleFigures, Sweep, sweep};
+use crate::drive::reference;
+use crate::drive::turning::Turning;
+use crate::machine::Machine;
+use crate::report;
+
+const HELP: &str = "\
+Read from encoder positions over the last second at constant feed: the contour error is the actual radius less the
+programmed one, the form deviation its greatest less its least value.
+
+JSON: feed_mm_min, limit_um, feedforward: list of {name, velocity, accel_s, jerk_s2 (of X), limit_hz (null: not passed
+within the range), circles: list of {frequency_hz, radius_mm, contour_error_um, contour_error_um_max,
+contour_error_um_min, form_deviation_um, following_error_x_um, following_error_y_um}}, reference.";
+
+/// Drive circles over a range of frequencies, closed loop; contour error, form deviation, following error.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct CircleArguments {
+    /// First frequency, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 1.0, allow_negative_numbers = true)]
+    from: f64,
+    /// Last frequency, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 16.0, allow_negative_numbers = true)]
+    to: f64,
+    /// Step between frequencies, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 1.0, allow_negative_numbers = true)]
+    by: f64,
+    /// Feed on the circle, mm/min.
+    #[arg(long, value_name = "MM_MIN", default_value_t = 2150.0, allow_negative_numbers = true)]
+    feed_mm_min: f64,
+    /// Which feedforward terms of the machine act, one choice after another.
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_values_t = [Feedforward::V, Feedforward::Va, Feedforward::Vaj]
+    )]
+    feedforward: Vec<Feedforward>,
+    /// Contour error whose frequency is looked for, µm.
+    #[arg(long, value_name = "UM", default_value_t = 20.0, allow_negative_numbers = true)]
+    limit_um: f64,
+    /// Frequencies that the report draws around the circle and over a turn, Hz.
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',', default_values_t = [4.0, 13.0])]
+    show: Vec<f64>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Serialize)]
+struct CircleJson {
+    feed_mm_min: f64,
+    limit_um: f64,
+    feedforward: Vec<SweepJson>,
+    reference: Vec<ComparisonJson>,
+}
+
+#[derive(Serialize)]
+struct SweepJson {
+    name: &'static str,
+    velocity: f64,
+    accel_s: f64,
+    jerk_s2: f64,
+    limit_hz: Option<f64>,
+    circles: Vec<FiguresJson>,
+}
+
+#[derive(Serialize)]
+struct FiguresJson {
+    frequency_hz: f64,
+    radius_mm: f64,
+    contour_error_um: f64,
+    contour_error_um_max: f64,
+    contour_error_um_min: f64,
+    form_deviation_um: f64,
+    following_error_x_um: f64,
+    following_error_y_um: f64,
+}
+
+/// Runs the circles and prints their errors.
+///
+/// # Errors
+/// An argument is refused, a fault ended a run, or a file can't be written.
+pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let machine = arguments.common.machine()?;
+    let frequencies_hz = frequencies(arguments.from, arguments.to, arguments.by)?;
+    let report = arguments.common.report()?;
+    let feed_mm_s = arguments.feed_mm_min / 60.0;
+    let limit = (arguments.limit_um, (arguments.from, arguments.to, arguments.by));
+    let mut progress = Progress::new((frequencies_hz.len() * arguments.feedforward.len()) as u64);
+    let mut sweeps = Vec::with_capacity(arguments.feedforward.len());
+    for choice in &arguments.feedforward {
+        let terms = choice.terms();
+        sweeps.push(sweep(&machine, terms, feed_mm_s, &frequencies_hz, limit, &mut || progress.step())?);
+    }
+    progress.finish();
+    let is_published = is_feed(arguments.feed_mm_min, reference::CIRCLE_FEED_MM_S);
+    let comparisons = if is_published && reference::is_reference(&machine) {
+        reference::compare_circle(&machine)?
+    } else {
+        Vec::new()
+    };
+    if arguments.common.json {
+        let json = CircleJson {
+            feed_mm_min: arguments.feed_mm_min,
+            limit_um: arguments.limit_um,
+            feedforward: sweeps.iter().map(|sweep| sweep_json(&machine, sweep)).collect(),
+            reference: comparisons_json(&comparisons),
+        };
+        write_json(&json, out)?;
+    } else {
+        writeln!(out, "Circles at {} mm/min, closed loop", arguments.feed_mm_min)
+            .and_then(|()| write_sweeps(&machine, &sweeps, arguments.limit_um, out))
+            .and_then(|()| write_comparisons(&comparisons, out))
+            .map_err(CliError::Output)?;
+    }
+    if report.is_some() {
+        let mut shown = Vec::new();
+        for &frequency_hz in &arguments.show {
+            let turning = Turning::new(frequency_hz, feed_mm_s);
+            for sweep in &sweeps {
+                shown.push((sweep.terms, turning, turning.record(&sweep.terms.of(&machine))?));
+            }
+        }
+        arguments.common.write_report(report, out, |file| {
+            report::drive::write_circle(&machine, &sweeps, arguments.limit_um, &shown, &comparisons, file)
+        })?;
+    }
+    Ok(outcome(&comparisons))
+}
+
+fn sweep_json(machine: &Machine, sweep: &Sweep) -> SweepJson {
+    let gains = sweep.terms.of(machine).axes[0].feedforward;
+    let circle = |figures: &CircleFigures| FiguresJson {
+        frequency_hz: figures.frequency_hz,
+        radius_mm: figures.radius_mm,
+        contour_error_um: figures.contour_um(),
+        contour_error_um_max: figures.contour_um_max,
+        contour_error_um_min: figures.contour_um_min,
+        form_deviation_um: figures.form_um(),
+        following_error_x_um: figures.following_um[0],
+        following_error_y_um: figures.following_um[1],
+    };
+    SweepJson {
+        name: sweep.terms.name(),
+        velocity: gains.velocity,
+        accel_s: gains.accel_s,
+        jerk_s2: gains.jerk_s2,
+        limit_hz: sweep.limit_hz,
+        circles: sweep.circles.iter().map(circle).collect(),
+    }
+}
+
+fn write_sweeps(machine: &Machine, sweeps: &[Sweep], limit_um: f64, out: &mut dyn Write) -> io::Result<()> {
+    let columns = [
+        ("frequency", "Hz", Align::Right),
+        ("radius", "mm", Align::Right),
+        ("contour max", "µm", Align::Right),
+        ("min", "µm", Align::Right),
+        ("form deviation", "µm", Align::Right),
+        ("following X", "µm", Align::Right),
+        ("Y", "µm", Align::Right),
+    ];
+    for sweep in sweeps {
+        let gains = sweep.terms.of(machine).axes[0].feedforward;
+        writeln!(
+            out,
+            "\nFeedforward {}: velocity {}, acceleration {} s, jerk {:e} s²\n",
+            sweep.terms.name(),
+            gains.velocity,
+            gains.accel_s,
+            gains.jerk_s2
+        )?;
+        let rows: Vec<[String; 7]> = sweep
+            .circles
+            .iter()
+            .map(|figures| {
+                [
+                    format!("{:.2}", figures.frequency_hz),
+                    format!("{:.4}", figures.radius_mm),
+                    format!("{:.2}", figures.contour_um_max),
+                    format!("{:.2}", figures.contour_um_min),
+                    format!("{:.2}", figures.form_um()),
+                    format!("{:.2}", figures.following_um[0]),
+                    format!("{:.2}", figures.following_um[1]),
+                ]
+            })
+            .collect();
+        table::write(&columns, &rows, out)?;
+        writeln!(out, "\n  contour error ≤ {limit_um} µm up to {} Hz", or_dash(sweep.limit_hz, 2))?;
+    }
+    Ok(())
+}

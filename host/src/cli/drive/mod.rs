@@ -1,0 +1,235 @@
+//! `motion drive`: experiments with the drives, through the kernel.
+//!
+//! - [`step`]: the velocity steps within one tick;
+//! - [`harmonic`]: amplitude and phase over frequency;
+//! - [`inertia`]: harmonic motion under a growing load;
+//! - [`circle`]: contour error over frequency;
+//! - [`bode`]: the step's spectrum, harmonics and the linear model side by side.
+
+pub mod bode;
+pub mod circle;
+pub mod harmonic;
+pub mod inertia;
+pub mod step;
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::input::{self, Output};
+use super::table::{self, Align};
+use crate::drive::Terms;
+use crate::drive::reference::Comparison;
+use crate::machine::Machine;
+
+/// More frequencies than this are a mistyped step.
+const FREQUENCIES_MAX: f64 = 1000.0;
+/// A last frequency this close to the end, in steps, is the end.
+const SAME_STEP: f64 = 1e-6;
+
+const EXAMPLES: &str = "\
+Examples:
+  motion drive step                                  delay, time constant, overshoot, peaks, bandwidth
+  motion drive harmonic --from 8 --to 40 --by 4      amplitude and phase of X and Y, open loop
+  motion drive inertia --loads 0,1,2                 the current limit, seen under load
+  motion drive circle --report circle.html           contour error with V, VA and VAJ feedforward
+  motion drive bode --axis Y --json                  curves from step, harmonics and the linear model
+
+On the reference machine at the published settings, the published figures stand beside; exit status 1 if the run
+misses what the machine has to give.";
+
+/// Experiments with the drives: velocity step, harmonic motion, circle test. All run through planner and kernel.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct DriveArguments {
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(Debug, Subcommand)]
+enum Experiment {
+    Step(step::StepArguments),
+    Harmonic(harmonic::HarmonicArguments),
+    Inertia(inertia::InertiaArguments),
+    Circle(circle::CircleArguments),
+    Bode(bode::BodeArguments),
+}
+
+/// Makes the experiment and prints its figures.
+///
+/// # Errors
+/// An argument or the machine file is refused, a fault ended the run, or a file can't be written.
+pub fn drive(arguments: &DriveArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    match &arguments.experiment {
+        Experiment::Step(arguments) => step::run(arguments, out),
+        Experiment::Harmonic(arguments) => harmonic::run(arguments, out),
+        Experiment::Inertia(arguments) => inertia::run(arguments, out),
+        Experiment::Circle(arguments) => circle::run(arguments, out),
+        Experiment::Bode(arguments) => bode::run(arguments, out),
+    }
+}
+
+/// What every experiment takes.
+#[derive(Debug, Args)]
+pub(super) struct Common {
+    /// Machine file (`motion machine` prints one); without it, the reference machine.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    /// Write a self-contained HTML page with the curves; an existing file is replaced.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Print JSON; every key carries its unit.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Common {
+    fn machine(&self) -> Result<Machine, CliError> {
+        input::machine(self.machine.as_ref())
+    }
+
+    /// Opened before the experiment: a wrong path should not cost the user a long one.
+    fn report(&self) -> Result<Option<Output>, CliError> {
+        self.report.as_deref().map(Output::create).transpose()
+    }
+
+    /// Writes the page, and says where unless a script reads.
+    fn write_report(
+        &self,
+        report: Option<Output>,
+        out: &mut dyn Write,
+        write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    ) -> Result<(), CliError> {
+        let Some(mut output) = report else {
+            return Ok(());
+        };
+        let written = write(&mut output.file).and_then(|()| output.file.flush());
+        written.map_err(|source| CliError::Write { path: output.name.clone(), source })?;
+        if !self.json {
+            writeln!(out, "\n  report written to {}", output.name).map_err(CliError::Output)?;
+        }
+        Ok(())
+    }
+}
+
+/// Feedforward terms, as options call them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Feedforward {
+    /// Velocity only.
+    V,
+    /// Velocity and acceleration.
+    Va,
+    /// Velocity, acceleration and jerk.
+    Vaj,
+    /// All that the machine file has.
+    AsIs,
+}
+
+impl Feedforward {
+    fn terms(self) -> Terms {
+        match self {
+            Self::V => Terms::V,
+            Self::Va => Terms::Va,
+            Self::Vaj => Terms::Vaj,
+            Self::AsIs => Terms::AsIs,
+        }
+    }
+}
+
+/// The axis of that name.
+fn axis_named(machine: &Machine, name: &str) -> Result<usize, CliError> {
+    let found = machine.axes.iter().position(|axis| axis.name.eq_ignore_ascii_case(name));
+    found.ok_or_else(|| CliError::Arguments {
+        found: format!("axis {name}"),
+        expected: "the name of an axis of the machine",
+    })
+}
+
+/// `from`, `from + by`, … up to `to`.
+fn frequencies(from_hz: f64, to_hz: f64, by_hz: f64) -> Result<Vec<f64>, CliError> {
+    let steps = (to_hz - from_hz) / by_hz;
+    if !(from_hz > 0.0 && by_hz > 0.0 && (0.0..FREQUENCIES_MAX).contains(&steps)) {
+        return Err(CliError::Arguments {
+            found: format!("frequencies from {from_hz} to {to_hz} by {by_hz} Hz"),
+            expected: "positive frequencies in ascending order, at most 1000 of them",
+        });
+    }
+    Ok((0..=(steps + SAME_STEP) as u32).map(|step| from_hz + f64::from(step) * by_hz).collect())
+}
+
+#[derive(Serialize)]
+struct ComparisonJson {
+    quantity: &'static str,
+    unit: &'static str,
+    measured: f64,
+    expected: f64,
+    tolerance: f64,
+    published: f64,
+    holds: bool,
+}
+
+fn comparisons_json(comparisons: &[Comparison]) -> Vec<ComparisonJson> {
+    comparisons
+        .iter()
+        .map(|comparison| ComparisonJson {
+            quantity: comparison.figure.quantity,
+            unit: comparison.figure.unit,
+            measured: comparison.measured,
+            expected: comparison.figure.expected,
+            tolerance: comparison.figure.tolerance,
+            published: comparison.figure.paper,
+            holds: comparison.holds(),
+        })
+        .collect()
+}
+
+/// The figures beside what was published and what the machine has to give; nothing if there are none.
+fn write_comparisons(comparisons: &[Comparison], out: &mut dyn Write) -> io::Result<()> {
+    if comparisons.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "\nThe reference machine's figures\n")?;
+    let columns = [
+        ("figure", "", Align::Left),
+        ("measured", "", Align::Right),
+        ("expected", "", Align::Right),
+        ("±", "", Align::Right),
+        ("published", "", Align::Right),
+        ("unit", "", Align::Left),
+        ("", "", Align::Left),
+    ];
+    let rows: Vec<[String; 7]> = comparisons
+        .iter()
+        .map(|comparison| {
+            let figure = &comparison.figure;
+            [
+                figure.quantity.to_owned(),
+                format!("{:.2}", comparison.measured),
+                format!("{:.2}", figure.expected),
+                figure.tolerance.to_string(),
+                figure.paper.to_string(),
+                figure.unit.to_owned(),
+                if comparison.holds() { "holds" } else { "MISSED" }.to_owned(),
+            ]
+        })
+        .collect();
+    table::write(&columns, &rows, out)
+}
+
+fn outcome(comparisons: &[Comparison]) -> Outcome {
+    if comparisons.iter().all(Comparison::holds) { Outcome::Done } else { Outcome::Failed }
+}
+
+/// A figure that may be missing.
+fn or_dash(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.decimals$}"))
+}
+
+/// Whether a feed given in mm/min is `mm_s`.
+fn is_feed(feed_mm_min: f64, mm_s: f64) -> bool {
+    (feed_mm_min / 60.0 - mm_s).abs() < 1e-9 * mm_s
+}

@@ -1,0 +1,143 @@
+//! The circle test of S4, closed loop: how far the machine is beside the circle.
+//!
+//! Everything is read from the encoders over the last second at constant feed. The radius deviation is the distance of
+//! the actual point from the centre, less the programmed radius: the contour error δ is its extremes, the form
+//! deviation Δδ their distance. The following error is set less actual position, tick by tick.
+
+use super::experiment::{DriveError, Recording, Terms};
+use super::harmonic::first_crossing;
+use super::turning::Turning;
+use crate::machine::Machine;
+
+/// A frequency at which the contour error passes a limit is found to this \[Hz\].
+const RESOLUTION_HZ: f64 = 0.01;
+
+/// What is read from a circle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CircleFigures {
+    /// Turns per second \[Hz\].
+    pub frequency_hz: f64,
+    /// Feed \[mm/s\].
+    pub feed_mm_s: f64,
+    /// Radius \[mm\].
+    pub radius_mm: f64,
+    /// Greatest radius deviation, outwards positive \[µm\].
+    pub contour_um_max: f64,
+    /// Least radius deviation \[µm\].
+    pub contour_um_min: f64,
+    /// Greatest |following error| of the plane's first and second axis \[µm\].
+    pub following_um: [f64; 2],
+}
+
+impl CircleFigures {
+    /// Contour error: the greatest |radius deviation| \[µm\].
+    #[must_use]
+    pub fn contour_um(&self) -> f64 {
+        self.contour_um_max.abs().max(self.contour_um_min.abs())
+    }
+
+    /// Form deviation: greatest less least radius \[µm\].
+    #[must_use]
+    pub fn form_um(&self) -> f64 {
+        self.contour_um_max - self.contour_um_min
+    }
+}
+
+/// Drives the circle on `machine` with its gains: 3 s to settle, the last second measured.
+///
+/// # Errors
+/// As [`Turning::record`].
+pub fn measure(machine: &Machine, frequency_hz: f64, feed_mm_s: f64) -> Result<CircleFigures, DriveError> {
+    let turning = Turning::new(frequency_hz, feed_mm_s);
+    figures(&turning.record(machine)?, &turning)
+}
+
+/// Reads a recording of the circle.
+///
+/// # Errors
+/// The feed was not held long enough.
+pub fn figures(recording: &Recording, turning: &Turning) -> Result<CircleFigures, DriveError> {
+    let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+    for (_, deviation_um) in deviations(recording, turning)? {
+        least = least.min(deviation_um);
+        greatest = greatest.max(deviation_um);
+    }
+    let mut following_um = [0.0_f64; 2];
+    for tick in turning.measured(recording)? {
+        for (greatest, axis) in following_um.iter_mut().zip(turning.axes()) {
+            *greatest = greatest.max(tick.axes[axis].err_um.abs());
+        }
+    }
+    Ok(CircleFigures {
+        frequency_hz: turning.frequency_hz,
+        feed_mm_s: turning.feed_mm_s,
+        radius_mm: turning.radius_mm(),
+        contour_um_max: greatest,
+        contour_um_min: least,
+        following_um,
+    })
+}
+
+/// Angle of the set point, −π to π, and radius deviation of every measured tick \[rad, µm\].
+///
+/// # Errors
+/// The feed was not held long enough.
+pub fn deviations(recording: &Recording, turning: &Turning) -> Result<Vec<(f64, f64)>, DriveError> {
+    let radius_mm = turning.radius_mm();
+    let deviation = |tick: &crate::record::TickRecord| {
+        let (set, actual) = turning.relative_to_centre(&tick.axes);
+        (libm::atan2(set[1], set[0]), (libm::hypot(actual[0], actual[1]) - radius_mm) * 1e3)
+    };
+    Ok(turning.measured(recording)?.iter().map(deviation).collect())
+}
+
+/// The lowest frequency in `range_hz` (from, to, steps of the search) at which the contour error passes `limit_um`
+/// \[Hz\]; none if it does not, or if it is beyond from the start.
+///
+/// # Errors
+/// As [`measure`].
+pub fn limit_frequency(
+    machine: &Machine,
+    feed_mm_s: f64,
+    limit_um: f64,
+    range_hz: (f64, f64, f64),
+) -> Result<Option<f64>, DriveError> {
+    super::experiment::within("contour limit [µm]", limit_um, (1e-3, 1e6))?;
+    let is_beyond = |frequency_hz| Ok(measure(machine, frequency_hz, feed_mm_s)?.contour_um() > limit_um);
+    first_crossing(range_hz, RESOLUTION_HZ, is_beyond)
+}
+
+/// Circles over a list of frequencies, with one choice of feedforward.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sweep {
+    /// Which terms acted.
+    pub terms: Terms,
+    /// By frequency.
+    pub circles: Vec<CircleFigures>,
+    /// Where the contour error passes the limit \[Hz\]; none if it does not, or if it is beyond from the start.
+    pub limit_hz: Option<f64>,
+}
+
+/// Drives the circles of `frequencies_hz` on `machine` with `terms` of its feedforward, and looks within
+/// `range_hz` for the frequency at which the contour error passes `limit_um`. `progress` is called after each circle
+/// of the list.
+///
+/// # Errors
+/// As [`measure`].
+pub fn sweep(
+    machine: &Machine,
+    terms: Terms,
+    feed_mm_s: f64,
+    frequencies_hz: &[f64],
+    (limit_um, range_hz): (f64, (f64, f64, f64)),
+    progress: &mut dyn FnMut(),
+) -> Result<Sweep, DriveError> {
+    let machine = terms.of(machine);
+    let mut circles = Vec::with_capacity(frequencies_hz.len());
+    for &frequency_hz in frequencies_hz {
+        circles.push(measure(&machine, frequency_hz, feed_mm_s)?);
+        progress();
+    }
+    let limit_hz = limit_frequency(&machine, feed_mm_s, limit_um, range_hz)?;
+    Ok(Sweep { terms, circles, limit_hz })
+}

@@ -1,0 +1,34 @@
+//! The drive experiments of S4: what a ±10 V axis does with a velocity step, with harmonic motion and on a circle.
+//!
+//! Consumes a [`Machine`](crate::machine::Machine); produces figures and the recordings they were taken from. Every
+//! experiment is a program that is planned, fed through the streams, executed and regulated by the kernel in f32 and put
+//! out through the converter's adapter, as on a board; only the drive is a model. The figures come from what a board
+//! knows as well: set positions, encoder readings, output voltages. Runs in the background. Fails with a [`DriveError`]
+//! if the machine can't do the motion, before anything moves, or if a fault ended it.
+//!
+//! - [`experiment`]: a program on a changed machine, and the [`Recording`] it leaves;
+//! - [`turning`]: circles of constant feed, the motion of two experiments;
+//! - [`step`]: the feed steps within one tick, open loop;
+//! - [`harmonic`]: amplitude and phase of the velocity;
+//! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;
+//! - [`circle`](mod@circle): contour error, form deviation, following error;
+//! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
+//! - [`sine`], [`spectrum`], [`model`]: the mathematics of it;
+//! - [`mod@reference`]: what S4 measured, and what the reference machine has to give.
+
+pub mod bode;
+pub mod circle;
+pub mod experiment;
+pub mod harmonic;
+pub mod inertia;
+pub mod model;
+pub mod reference;
+pub mod sine;
+pub mod spectrum;
+pub mod step;
+pub mod turning;
+
+pub use experiment::{DriveError, Recording, Terms};
+
+/// −3 dB as a ratio of amplitudes.
+pub const HALF_POWER: f64 = core::f64::consts::FRAC_1_SQRT_2;

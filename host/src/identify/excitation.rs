@@ -1,0 +1,121 @@
+//! Motions that show every parameter of an axis, and the set of them that identification asks for.
+//!
+//! What shows what: small steps the velocity controller and the delay; large steps the current limit, the
+//! viscous friction and, while the axis cruises, the bed that they left ringing; harmonic motion the bed once
+//! more and the split of the delay; slow motion the Coulomb friction.
+
+use core::f64::consts::PI;
+
+/// A motion of one axis about its starting point, as the commanded velocity over time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Excitation {
+    /// 0 → feed → 0 → −feed → 0, each change within one tick (S4).
+    Steps {
+        /// Velocity \[mm/s\], > 0.
+        feed_mm_s: f64,
+        /// Time at either feed \[s\].
+        cruise_s: f64,
+        /// Time at rest before, between and after \[s\].
+        rest_s: f64,
+    },
+    /// A sine of constant velocity amplitude (S4 (2)), which grows and decays over one period each.
+    Harmonic {
+        /// Velocity amplitude \[mm/s\], > 0.
+        amplitude_mm_s: f64,
+        /// Frequency \[Hz\], > 0.
+        frequency_hz: f64,
+        /// Periods in all, at least 3.
+        periods: u32,
+    },
+}
+
+/// The motions to run, in any order: about 9 s of machine time and 50 mm of travel to one side.
+///
+/// They were chosen for axes like those of S4 (Kv 300 … 600 /s, 8 … 16 m/s², bed at 9 … 18 Hz).
+#[must_use]
+pub fn identification_plan() -> Vec<Excitation> {
+    let per_minute = |m_min: f64| m_min * 1000.0 / 60.0;
+    let harmonic = |feed_m_min, frequency_hz, periods| Excitation::Harmonic {
+        amplitude_mm_s: per_minute(feed_m_min),
+        frequency_hz,
+        periods,
+    };
+    vec![
+        Excitation::Steps { feed_mm_s: per_minute(1.0), cruise_s: 0.25, rest_s: 0.1 },
+        Excitation::Steps { feed_mm_s: per_minute(7.2), cruise_s: 0.4, rest_s: 0.1 },
+        Excitation::Steps { feed_mm_s: per_minute(9.549), cruise_s: 0.3, rest_s: 0.1 },
+        harmonic(0.12, 2.0, 3),
+        harmonic(7.2, 3.0, 4),
+        harmonic(2.150, 4.0, 4),
+        harmonic(2.150, 10.0, 6),
+        harmonic(2.150, 13.0, 9),
+        harmonic(2.150, 20.0, 8),
+        harmonic(2.150, 40.0, 14),
+        harmonic(9.549, 16.0, 6),
+    ]
+}
+
+impl Excitation {
+    /// Commanded velocity of each tick \[mm/s\], for ticks of `tick_s` > 0 \[s\].
+    #[must_use]
+    pub fn velocity_mm_s(&self, tick_s: f64) -> Vec<f64> {
+        // The cast cuts off; lengths that are not finite make no motion.
+        let ticks = |time_s: f64| (time_s / tick_s).round() as usize;
+        match *self {
+            Self::Steps { feed_mm_s, cruise_s, rest_s } => {
+                let mut velocity = Vec::new();
+                for (feed, time_s) in [
+                    (0.0, rest_s),
+                    (feed_mm_s, cruise_s),
+                    (0.0, rest_s),
+                    (-feed_mm_s, cruise_s),
+                    (0.0, rest_s),
+                ] {
+                    velocity.resize(velocity.len() + ticks(time_s), feed);
+                }
+                velocity
+            }
+            Self::Harmonic { amplitude_mm_s, frequency_hz, periods } => {
+                let periods = f64::from(periods);
+                let at = |tick: usize| {
+                    let phase = tick as f64 * tick_s * frequency_hz;
+                    let edge = phase.min(periods - phase).clamp(0.0, 1.0);
+                    let envelope = 0.5 - 0.5 * (PI * edge).cos();
+                    amplitude_mm_s * envelope * (2.0 * PI * phase).sin()
+                };
+                (0..ticks(periods / frequency_hz)).map(at).collect()
+            }
+        }
+    }
+
+    /// What to put into [`AxisRecording::harmonic_hz`](super::AxisRecording::harmonic_hz).
+    #[must_use]
+    pub fn harmonic_hz(&self) -> Option<f64> {
+        match *self {
+            Self::Steps { .. } => None,
+            Self::Harmonic { frequency_hz, .. } => Some(frequency_hz),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_plan_is_short_and_stays_within_its_travel() {
+        let tick_s = 0.5e-3;
+        let mut time_s = 0.0;
+        for excitation in identification_plan() {
+            let velocity = excitation.velocity_mm_s(tick_s);
+            time_s += velocity.len() as f64 * tick_s;
+            let mut position_mm: f64 = 0.0;
+            for v in &velocity {
+                position_mm += v * tick_s;
+                assert!((-10.0..=50.0).contains(&position_mm), "{excitation:?}: {position_mm} mm");
+            }
+            assert!(velocity[0].abs() < 1e-12 && velocity.last().unwrap().abs() < 1.0, "{excitation:?}");
+        }
+        assert!((8.0..10.0).contains(&time_s), "{time_s} s");
+    }
+}

@@ -1,0 +1,99 @@
+//! Identification: what a servo axis is, from recordings of what was put out and what the encoder read.
+//!
+//! Consumes [`AxisRecording`]s of the motions in [`identification_plan`], or of any others that start at rest, from
+//! an open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, in about a second for
+//! ten seconds of recordings. It never sees the parameters of a simulation: a machine gives the same two columns.
+//!
+//! Two ways, side by side:
+//!
+//! - **Figures without a model**: delay, time constant, overshoot and settling of steps, gain and delay of harmonic
+//!   motion, −3 dB bandwidth, sustained acceleration (S4).
+//! - **The drive model of hal-sim**, run on the recorded commands. Its parameters are moved until its positions are
+//!   those that were recorded (output error, least squares). Noise of the encoder thus enters once, is not
+//!   differentiated, and does not bend the result.
+//!
+//! The model knows nothing of backlash, cogging and pitch errors. Where these matter, the error of the runs
+//! ([`RunMatch`]) stays far above the rounding of the encoder, and intervals are too narrow.
+//!
+//! # Example
+//!
+//! ```
+//! use hal_sim::{DriveModel, DriveState, REFERENCE_X};
+//! use motion_host::identify::{AxisRecording, identification_plan, identify};
+//!
+//! // In place of a machine.
+//! let tick_s = 0.5e-3;
+//! let model = DriveModel::new(REFERENCE_X, tick_s, 20)?;
+//! let mut runs = Vec::new();
+//! for excitation in identification_plan() {
+//!     let mut axis = DriveState::<128>::at_rest(&model, 0.0)?;
+//!     let command_mm_s = excitation.velocity_mm_s(tick_s);
+//!     let mut latch = |command_mm_s: &f64| {
+//!         let counts = (axis.position_mm() / 1e-4).round();
+//!         model.tick(&mut axis, *command_mm_s);
+//!         counts * 1e-4
+//!     };
+//!     let actual_mm = command_mm_s.iter().map(&mut latch).collect();
+//!     let harmonic_hz = excitation.harmonic_hz();
+//!     runs.push(AxisRecording { tick_s, command_mm_s, actual_mm, lead_in_ticks: 0, harmonic_hz });
+//! }
+//!
+//! let axis = identify(&runs)?;
+//! assert!((axis.parameters.velocity_gain_per_s.value - 440.0).abs() < 4.4);
+//! assert!(axis.parameters.bed.is_none());
+//! println!("{axis}");
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
+
+mod error;
+mod excitation;
+mod recording;
+mod differences;
+mod step_figures;
+mod harmonic_figures;
+mod parameters;
+mod simulation;
+mod cholesky;
+mod search;
+mod bed;
+mod confidence;
+mod fit;
+mod estimate;
+mod display;
+
+pub use error::IdentifyError;
+pub use estimate::{AxisParametersFound, BedEstimate, Estimate, Figures, Identification, RunMatch};
+pub use excitation::{Excitation, identification_plan};
+pub use harmonic_figures::{Bandwidth, HarmonicFigures};
+pub use recording::AxisRecording;
+pub use step_figures::StepFigures;
+
+/// Identifies an axis.
+///
+/// # Errors
+/// Recordings that can't be evaluated, that show no motion, or that a velocity servo could not have made.
+pub fn identify(runs: &[AxisRecording]) -> Result<Identification, IdentifyError> {
+    let figures = figures(runs)?;
+    let fit = fit::fit(runs, figures.resolution_mm)?;
+    Ok(Identification { parameters: fit.parameters, figures, runs: fit.runs })
+}
+
+/// The figures that need no model.
+///
+/// # Errors
+/// Recordings that can't be evaluated or show no motion.
+pub fn figures(runs: &[AxisRecording]) -> Result<Figures, IdentifyError> {
+    let first = runs.first().ok_or(IdentifyError::NoRuns)?;
+    for (index, run) in runs.iter().enumerate() {
+        run.check(index + 1, first.tick_s)?;
+    }
+    let resolution_mm = recording::resolution_mm(runs);
+    let harmonics: Vec<_> = runs.iter().filter_map(harmonic_figures::harmonic_figures).collect();
+    Ok(Figures {
+        resolution_mm,
+        steps: runs.iter().flat_map(|run| step_figures::step_figures(run, resolution_mm)).collect(),
+        bandwidths: harmonic_figures::bandwidths(&harmonics),
+        harmonics,
+        sustained_accel_mm_s2: fit::sustained_accel_mm_s2(runs),
+    })
+}
