@@ -98,7 +98,11 @@ fn kernel_command(
             let peaks = kernel.take_peak_following_error_mm();
             CODES.store(peaks.iter().fold(0, |sum, mm| sum ^ mm.to_bits64() as u32), Ordering::Relaxed);
         }
-        6 => intake.correct(Correction::new(0, &KNOTS, 2, 1.0).ok()),
+        6 => {
+            if let Ok(correction) = Correction::new(0, &KNOTS, 2, 1.0) {
+                intake.correct(correction);
+            }
+        }
         7 => kernel.enable(100),
         8 => CODES.store(u32::from(kernel.fault().is_some()), Ordering::Relaxed),
         _ => {}
