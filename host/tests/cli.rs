@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use motion_host::machine::Machine;
+use motion_kernel::num::Fixed;
+use motion_kernel::program::{Reader, check};
 use serde_json::Value;
 
 /// A directory of a test's own, removed afterwards.
@@ -614,4 +616,31 @@ fn drive_tune_writes_what_it_has_verified() {
     assert!(refusal.contains("found axis W, expected the name of an axis of the machine"), "{refusal}");
     let refusal = desk.refusal(&["drive", "tune", "--machine", "missing.toml"]);
     assert!(refusal.contains("missing.toml"), "{refusal}");
+}
+
+/// What a board gets is a program to it; what is wrong with the input is said with file and line, and nothing is written.
+#[test]
+fn compile_writes_a_program_or_says_why_not() {
+    let desk = Desk::new("compile");
+    desk.put("part.ngc", "G1 X10 Y5 F3000\nG2 X20 Y15 I5 J5 F1000\nG4 P0.1\nG0 Z3\nM2\n");
+    for number in ["f32", "fixed"] {
+        let said = desk.stdout(&["compile", "part.ngc", "--number", number, "--output", "part.bin"]);
+        let bytes = fs::read(desk.0.join("part.bin")).expect("a file");
+        assert!(said.contains(&format!(" {} bytes", bytes.len())), "{said}");
+        let program = Reader::<3>::new(&bytes).expect("a program");
+        assert_eq!(*program.header(), Machine::reference().header());
+        assert_eq!(check::<f32, 3, _>(program.header(), program), Ok(()));
+        assert_eq!(check::<Fixed, 3, _>(program.header(), program), Ok(()));
+        assert!(said.contains(&format!(" {} items", program.count())), "{said}");
+        fs::remove_file(desk.0.join("part.bin")).expect("it is there");
+    }
+    desk.put("wrong.ngc", "G1 X10 F3000\nG1 X2O\nM2\n");
+    let refusal = desk.refusal(&["compile", "wrong.ngc", "--output", "part.bin"]);
+    assert!(refusal.starts_with("wrong.ngc:2:") && refusal.contains(", expected"), "{refusal}");
+    desk.put("dense.ngc", "G1 X1 F600\nG1 X1.0000000001\nM2\n");
+    let refusal = desk.refusal(&["compile", "dense.ngc", "--output", "part.bin"]);
+    assert!(refusal.starts_with("dense.ngc:2: found "), "{refusal}");
+    assert!(!desk.0.join("part.bin").exists());
+    let refusal = desk.refusal(&["compile", "part.ngc", "--output", "no/such/place"]);
+    assert!(refusal.starts_with("no/such/place: found ") && refusal.contains(", expected"), "{refusal}");
 }
