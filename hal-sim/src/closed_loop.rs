@@ -13,7 +13,7 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{Ad5754Error, Ad5754Output, DriveEnable, Encoder, VelocityChannel};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Real;
-use motion_kernel::program::{Header, ProgramError, Reader, Supply, SupplyError};
+use motion_kernel::program::{Header, Items, ProgramError, Reader, Supply, SupplyError};
 use motion_kernel::queue::{Feeder, Intake, Streams};
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
@@ -93,7 +93,7 @@ pub enum LoopError {
 /// The background's part: keeps the streams full.
 pub struct Producer<'a, R: Real, const AXES: usize> {
     feeder: Feeder<'a, R, AXES>,
-    supply: Supply<R, AXES, Reader<'a, AXES>, ProgramError>,
+    supply: Supply<R, AXES, Items<'a, AXES>, ProgramError>,
 }
 
 impl<R: Real, const AXES: usize> Producer<'_, R, AXES> {
@@ -123,6 +123,8 @@ pub type Closed<'a, R, const AXES: usize, const LINE: usize> =
 ///
 /// # Errors
 /// The program's machine can't be regulated or simulated.
+// Not inlined: what it makes on the way is gone before the ticks begin.
+#[inline(never)]
 pub fn close<
     'a,
     R: Real,
@@ -131,20 +133,22 @@ pub fn close<
     const SEGMENTS: usize,
     const LINE: usize,
 >(
-    program: Reader<'a, AXES>,
+    program: &Reader<'a, AXES>,
     streams: &'a mut Streams<R, AXES, PIECES, SEGMENTS>,
     machine: &'a SimMachine<AXES, LINE>,
 ) -> Result<Closed<'a, R, AXES, LINE>, LoopError> {
-    let &Header { tick_s, rules, axes, start } = program.header();
-    let config = AxesConfig::new(&axes, tick_s).map_err(LoopError::Axes)?;
+    let &Header { tick_s, rules, ref axes, start } = program.header();
+    let config = AxesConfig::new(axes, tick_s).map_err(LoopError::Axes)?;
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
     let Ok(counts) = (&*machine).latch();
-    let mut kernel = Kernel::new(config, start, counts);
-    kernel.enable(0);
+    // Enabled where it lies: it is large, and copies of it are more than a small board has room for.
+    let kernel = Kernel::new(&config, start, counts);
     let (feeder, intake) = streams.split(rules, start);
-    let supply = Supply::new(program, tick_s);
+    let supply = Supply::new(program.items(), tick_s);
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
-    Ok((Producer { feeder, supply }, ClosedLoop { kernel, intake, machine, outputs, memory }))
+    let mut closed = (Producer { feeder, supply }, ClosedLoop { kernel, intake, machine, outputs, memory });
+    closed.1.kernel.enable(0);
+    Ok(closed)
 }
 
 impl<R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'_, R, AXES, LINE> {

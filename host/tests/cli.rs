@@ -629,9 +629,9 @@ fn compile_writes_a_program_or_says_why_not() {
         assert!(said.contains(&format!(" {} bytes", bytes.len())), "{said}");
         let program = Reader::<3>::new(&bytes).expect("a program");
         assert_eq!(*program.header(), Machine::reference().header());
-        assert_eq!(check::<f32, 3, _>(program.header(), program), Ok(()));
-        assert_eq!(check::<Fixed, 3, _>(program.header(), program), Ok(()));
-        assert!(said.contains(&format!(" {} items", program.count())), "{said}");
+        assert_eq!(check::<f32, 3, _>(program.header(), program.items()), Ok(()));
+        assert_eq!(check::<Fixed, 3, _>(program.header(), program.items()), Ok(()));
+        assert!(said.contains(&format!(" {} items", program.items().count())), "{said}");
         fs::remove_file(desk.0.join("part.bin")).expect("it is there");
     }
     desk.put("wrong.ngc", "G1 X10 F3000\nG1 X2O\nM2\n");

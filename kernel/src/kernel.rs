@@ -48,10 +48,10 @@ pub struct Kernel<R: Real, const AXES: usize> {
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// A kernel at rest at `position`, where the encoders read `counts`, drives disabled.
     #[must_use]
-    pub fn new(config: AxesConfig<R, AXES>, position: [Position; AXES], counts: [Counts; AXES]) -> Self {
-        let AxesConfig { axes: config, preview_ticks } = config;
+    pub fn new(config: &AxesConfig<R, AXES>, position: [Position; AXES], counts: [Counts; AXES]) -> Self {
+        let &AxesConfig { axes: ref config, preview_ticks } = config;
         let mut axes = [AxisState::default(); AXES];
-        for (((axis, config), &counts), &position) in axes.iter_mut().zip(&config).zip(&counts).zip(&position)
+        for (((axis, config), &counts), &position) in axes.iter_mut().zip(config).zip(&counts).zip(&position)
         {
             axis.set_position(config, counts, position);
         }
@@ -68,7 +68,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             fault: None,
         };
         Self {
-            config,
+            config: *config,
             executor,
             preview: Preview::new(preview_ticks, position),
             axes,

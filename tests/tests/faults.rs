@@ -69,7 +69,7 @@ fn kernel() -> Kernel<f32, 2> {
     }
     let [x, y, _] = machine.axes;
     let config = AxesConfig::new(&[x.figures(), y.figures()], machine.tick_s).expect("axes");
-    let mut kernel = Kernel::new(config, point([0.0, 0.0]), [Counts(0); 2]);
+    let mut kernel = Kernel::new(&config, point([0.0, 0.0]), [Counts(0); 2]);
     kernel.enable(0);
     kernel
 }
@@ -268,7 +268,7 @@ fn converter_bus() {
         let mut rig = Rig::new(&simulated).expect("a converter");
         let Ok(counts) = rig.latch();
         let start = [Position::ZERO; 3];
-        let mut kernel = Kernel::<f32, 3>::new(reference.axes_config().expect("axes"), start, counts);
+        let mut kernel = Kernel::<f32, 3>::new(&reference.axes_config().expect("axes"), start, counts);
         kernel.enable(0);
         let mut streams = Streams::<f32, 3, 8, 8>::new();
         let (mut feeder, mut intake) = streams.split(reference.rules(), start);

@@ -74,7 +74,7 @@ impl Machine {
             }
         }
         let axes = AxesConfig::new(axes, TICK_S).map_err(MachineError::Axes)?;
-        check::<f32, AXES, _>(program.header(), program).map_err(MachineError::Items)?;
+        check::<f32, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
         Ok(Self { program, axes })
     }
 
@@ -111,7 +111,7 @@ mod tests {
     fn an_item_that_cannot_be_executed_is_found_before_the_start() {
         let good = Machine::new(PROGRAM).expect("suits").program;
         let header = *good.header();
-        let mut items: Vec<Item<AXES>> = good.map(|item| item.expect("an item")).collect();
+        let mut items: Vec<Item<AXES>> = good.items().map(|item| item.expect("an item")).collect();
         let at = items.iter().rposition(|item| matches!(item, Item::Line { .. })).expect("a line");
         if let Item::Line { direction, .. } = &mut items[at] {
             direction[0] = f64::NAN;

@@ -82,7 +82,7 @@ mod app {
         let machine = defmt::unwrap!(Machine::new(PROGRAM));
         // Where the machine stands is called the program's start.
         let start = machine.header().start;
-        let kernel = Kernel::new(machine.axes, start, hardware.encoders.latch());
+        let kernel = Kernel::new(&machine.axes, start, hardware.encoders.latch());
         let (_, intake) = cx.local.empty.split(machine.header().rules, start);
         let control = Control {
             kernel,

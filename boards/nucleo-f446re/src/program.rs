@@ -2,7 +2,7 @@
 //!
 //! Consumes the machine's position and the items in flash; offers both to the streams. Background.
 
-use motion_kernel::program::{ProgramError, Reader, Supply, SupplyError};
+use motion_kernel::program::{Items, ProgramError, Supply, SupplyError};
 use motion_kernel::queue::Feeder;
 use motion_kernel::units::Position;
 
@@ -27,7 +27,7 @@ pub enum RunError {
 #[derive(Debug)]
 pub struct Run {
     to_start: Travel,
-    program: Supply<f32, AXES, Reader<'static, AXES>, ProgramError>,
+    program: Supply<f32, AXES, Items<'static, AXES>, ProgramError>,
 }
 
 impl Run {
@@ -41,7 +41,7 @@ impl Run {
         let to_start = Travel::new(header.rules.limits, here, header.start, feed_mm_s);
         Ok(Self {
             to_start: to_start.map_err(RunError::Travel)?,
-            program: Supply::new(machine.program, TICK_S),
+            program: Supply::new(machine.program.items(), TICK_S),
         })
     }
 

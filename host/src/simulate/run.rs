@@ -126,7 +126,7 @@ fn run_in<R: Real>(
     let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
     let Ok(counts) = rig.latch();
     let start = [Position::ZERO; AXES];
-    let mut kernel = Kernel::<R, AXES>::new(machine.axes_config()?, start, counts);
+    let mut kernel = Kernel::<R, AXES>::new(&machine.axes_config()?, start, counts);
     kernel.enable(0);
     let knots_mm_s: Vec<[R; AXES]> = correction
         .iter()

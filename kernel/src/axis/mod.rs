@@ -98,19 +98,27 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
     /// The first figure that is out of its range or beyond the number type's.
     pub fn new(figures: &[AxisFigures; AXES], tick_s: f64) -> Result<Self, AxesError> {
         let () = Self::ONE_AT_LEAST;
-        let error = |(axis, cause)| AxesError { axis, cause };
-        let preview_ticks = preview::preview_ticks(figures, tick_s).map_err(error)?;
+        let preview_ticks = Self::preview_ticks(figures, tick_s)?;
         let config = |(axis, figures): (usize, &AxisFigures)| {
-            AxisConfig::new(figures, preview_ticks, tick_s).map_err(|cause| error((axis, cause)))
+            AxisConfig::new(figures, preview_ticks, tick_s).map_err(|cause| AxesError { axis, cause })
         };
         let mut each = figures.iter().enumerate();
         let none = ScaleError { quantity: "number of axes", value: 0.0, expected: "one at least" };
+        let none = AxesError { axis: 0, cause: none };
         // Without allocation an array is filled by a fallible function only over something already there.
-        let mut axes = [config(each.next().ok_or(error((0, none)))?)?; AXES];
+        let mut axes = [config(each.next().ok_or(none)?)?; AXES];
         for (place, figures) in axes.iter_mut().skip(1).zip(each) {
             *place = config(figures)?;
         }
         Ok(Self { axes, preview_ticks })
+    }
+
+    /// By how many ticks these axes need their position set-points delayed: as the longest lead asks for.
+    ///
+    /// # Errors
+    /// The first lead that is not from 0 to [`PREVIEW_TICKS_MAX`] ticks.
+    pub fn preview_ticks(figures: &[AxisFigures; AXES], tick_s: f64) -> Result<u8, AxesError> {
+        preview::preview_ticks(figures, tick_s).map_err(|(axis, cause)| AxesError { axis, cause })
     }
 }
 

@@ -126,13 +126,19 @@ pub fn write<'a, const AXES: usize>(
     Ok(())
 }
 
-/// Reads a program's items in order, from bytes that stay where they are.
+/// A program in bytes that stay where they are.
 #[derive(Clone, Copy, Debug)]
 pub struct Reader<'a, const AXES: usize> {
     header: Header<AXES>,
-    /// Header and items.
-    body: &'a [u8],
+    items: Items<'a, AXES>,
+}
+
+/// A program's items, in order. Some words; the header, a kilobyte, stays with the [`Reader`].
+#[derive(Clone, Copy, Debug)]
+pub struct Items<'a, const AXES: usize> {
     left: &'a [u8],
+    /// Where the items end, from the start of the program.
+    end: usize,
     items: PhantomData<Item<AXES>>,
 }
 
@@ -165,23 +171,28 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
         }
         let (header, left) = postcard::take_from_bytes::<Header<AXES>>(body)
             .map_err(|_| ProgramError::Malformed { at: PREFIX })?;
-        Ok(Self { header, body, left, items: PhantomData })
+        Ok(Self { header, items: Items { left, end: PREFIX + body.len(), items: PhantomData } })
     }
 
     /// What the program was planned for.
     pub fn header(&self) -> &Header<AXES> {
         &self.header
     }
+
+    /// All of its items.
+    pub fn items(&self) -> Items<'a, AXES> {
+        self.items
+    }
 }
 
-impl<const AXES: usize> Iterator for Reader<'_, AXES> {
+impl<const AXES: usize> Iterator for Items<'_, AXES> {
     type Item = Result<Item<AXES>, ProgramError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.left.is_empty() {
             return None;
         }
-        let at = PREFIX + self.body.len() - self.left.len();
+        let at = self.end - self.left.len();
         Some(match postcard::take_from_bytes(self.left) {
             Ok((item, left)) => {
                 self.left = left;
@@ -244,7 +255,7 @@ mod tests {
         let (items, bytes) = program();
         let reader = Reader::<2>::new(&bytes).expect("a program");
         assert_eq!(*reader.header(), header());
-        assert_eq!(reader.collect::<Result<Vec<_>, _>>(), Ok(items));
+        assert_eq!(reader.items().collect::<Result<Vec<_>, _>>(), Ok(items));
     }
 
     /// Entries are longest with every figure there and every number at its longest.

@@ -13,7 +13,7 @@ pub mod bytes;
 pub mod check;
 pub mod supply;
 
-pub use bytes::{Header, ProgramError, Reader, write};
+pub use bytes::{Header, Items, ProgramError, Reader, write};
 pub use check::{CheckError, check};
 pub use supply::{Supply, SupplyError};
 

@@ -24,7 +24,7 @@ fn on_the_pc_in<R: Real>(bytes: &[u8]) -> String {
     let parameters = reference_machine(program.header(), SUBSTEPS);
     let machine = SimMachine::<3, LINE>::new(&parameters).expect("a machine");
     let mut streams = Streams::<R, 3, 64, 64>::new();
-    let (mut producer, mut closed_loop) = close(program, &mut streams, &machine).expect("a loop");
+    let (mut producer, mut closed_loop) = close(&program, &mut streams, &machine).expect("a loop");
     let (mut digest, mut ticks) = (Digest::new(), 0);
     loop {
         let is_all = producer.fill().expect("accepted");

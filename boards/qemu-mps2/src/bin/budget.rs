@@ -48,17 +48,19 @@ fn main() -> ! {
     let one = cortex_m::singleton!(: Queues<1> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     for bytes in programs() {
         hprintln!("program");
-        match Reader::<AXES>::new(bytes) {
-            Ok(program) => measure(&counter, program, streams, budgeted_tick),
+        match refusal(bytes) {
+            None => measure(&counter, bytes, streams, budgeted_tick),
             #[cfg(target_has_atomic = "8")]
-            Err(ProgramError::Axes { found: 1, .. }) => {
-                let program = Reader::<1>::new(bytes).unwrap_or_else(|error| fail(&error));
-                measure(&counter, program, one, Kernel::tick);
-            }
-            Err(error) => fail(&error),
+            Some(ProgramError::Axes { found: 1, .. }) => measure(&counter, bytes, one, Kernel::tick),
+            Some(error) => fail(&error),
         }
     }
     exit(true)
+}
+
+#[inline(never)]
+fn refusal(bytes: &[u8]) -> Option<ProgramError> {
+    Reader::<AXES>::new(bytes).err()
 }
 
 /// The whole tick of the kernel. Outlined under this name, by which a trace of executed instructions is cut.
@@ -73,27 +75,25 @@ fn budgeted_tick<'a>(
 }
 
 #[inline(never)]
-fn measure<const N: usize>(
-    counter: &Counter,
-    program: Reader<'_, N>,
-    streams: &mut Queues<N>,
-    tick: Tick<N>,
-) {
-    ticks(counter, program, streams, tick);
-    stages(counter, program);
+fn measure<const N: usize>(counter: &Counter, bytes: &[u8], streams: &mut Queues<N>, tick: Tick<N>) {
+    // Looked at where it is: a header is a kilobyte.
+    match &Reader::<N>::new(bytes) {
+        Ok(program) => {
+            ticks(counter, program, streams, tick);
+            stages(counter, program);
+        }
+        Err(error) => fail(error),
+    }
 }
 
 #[inline(never)]
-fn ticks<const N: usize>(counter: &Counter, program: Reader<'_, N>, streams: &mut Queues<N>, tick: Tick<N>) {
-    let &Header { tick_s, axes, start, .. } = program.header();
-    let machine = SimMachine::<N, LINE>::new(&reference_machine(program.header(), SUBSTEPS))
-        .unwrap_or_else(|error| fail(&error));
-    let (mut producer, mut closed_loop) =
-        close(program, streams, &machine).unwrap_or_else(|error| fail(&error));
+fn ticks<const N: usize>(counter: &Counter, program: &Reader<'_, N>, streams: &mut Queues<N>, tick: Tick<N>) {
+    let machine = simulated(program.header());
+    let mut closed = close(program, streams, &machine);
+    // In place: the microbit has no room for another one.
+    let (producer, closed_loop) = closed.as_mut().unwrap_or_else(|error| fail(error));
     // A regulator of its own beside the kernel's, fed with the same.
-    let config = AxesConfig::<Number, N>::new(&axes, tick_s).unwrap_or_else(|error| fail(&error)).axes[0];
-    let mut axis = Axis::default();
-    axis.set_position(&config, Counts::default(), start[0]);
+    let (config, mut axis) = beside(program.header());
     let mut deepest = 0;
     loop {
         let is_all = producer.fill().unwrap_or_else(|error| fail(&error));
@@ -119,9 +119,29 @@ fn ticks<const N: usize>(counter: &Counter, program: Reader<'_, N>, streams: &mu
     hprintln!("stack {}", deepest);
 }
 
+// Each in a frame of its own, which is gone before the ticks begin: 16 KiB are not much.
+
+#[inline(never)]
+fn simulated<const N: usize>(header: &Header<N>) -> SimMachine<N, LINE> {
+    SimMachine::new(&reference_machine(header, SUBSTEPS)).unwrap_or_else(|error| fail(&error))
+}
+
+/// The first axis and its state at the program's start.
+#[inline(never)]
+fn beside<const N: usize>(header: &Header<N>) -> (AxisConfig<Number>, Axis) {
+    let preview_ticks = AxesConfig::<Number, N>::preview_ticks(&header.axes, header.tick_s);
+    let config = preview_ticks
+        .map_err(|error| error.cause)
+        .and_then(|preview_ticks| AxisConfig::new(&header.axes[0], preview_ticks, header.tick_s));
+    let config = config.unwrap_or_else(|error| fail(&error));
+    let mut axis = Axis::default();
+    axis.set_position(&config, Counts::default(), header.start[0]);
+    (config, axis)
+}
+
 /// The stages by themselves, over all that the program contains.
 #[inline(never)]
-fn stages<const N: usize>(counter: &Counter, program: Reader<'_, N>) {
+fn stages<const N: usize>(counter: &Counter, program: &Reader<'_, N>) {
     let &Header { tick_s, rules, .. } = program.header();
     let limits = rules.limits;
     let motion = PathMotion {
@@ -132,7 +152,7 @@ fn stages<const N: usize>(counter: &Counter, program: Reader<'_, N>) {
         snap_mm_s4: Number::from_f64(-0.5 * limits.snap_mm_s4),
     };
     let mut setpoints = [Setpoint::default(); N];
-    for item in program {
+    for item in program.items() {
         let item = item.unwrap_or_else(|error| fail(&error));
         match item.ready::<Number, ProgramError>(tick_s).unwrap_or_else(|error| fail(&error)) {
             Ready::Segment(segment) => {

@@ -28,8 +28,9 @@ fn run(bytes: &[u8]) {
     let machine = SimMachine::<AXES, LINE>::new(&reference_machine(program.header(), SUBSTEPS))
         .unwrap_or_else(|error| fail(&error));
     let mut streams = Streams::<Number, AXES, PIECES, SEGMENTS>::new();
-    let (mut producer, mut closed_loop) =
-        close(program, &mut streams, &machine).unwrap_or_else(|error| fail(&error));
+    let mut closed = close(&program, &mut streams, &machine);
+    // In place: the microbit has no room for another one.
+    let (producer, closed_loop) = closed.as_mut().unwrap_or_else(|error| fail(error));
     let (mut digest, mut ticks) = (Digest::new(), 0_u32);
     loop {
         let is_all = producer.fill().unwrap_or_else(|error| fail(&error));

@@ -15,7 +15,7 @@ use cortex_m_rt::{entry, exception};
 use cortex_m_semihosting::hprintln;
 use critical_section::Mutex;
 use hal_sim::SimMachine;
-use hal_sim::closed_loop::{ClosedLoop, close, reference_machine};
+use hal_sim::closed_loop::{Closed, ClosedLoop, close, reference_machine};
 use motion_kernel::exec::ExecState;
 use motion_kernel::program::Reader;
 use motion_kernel::queue::Streams;
@@ -55,9 +55,7 @@ static FOREGROUND: Mutex<RefCell<Option<Foreground>>> = Mutex::new(RefCell::new(
 fn main() -> ! {
     let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
     let bytes = programs().next().unwrap_or_else(|| fail(&"a bundle without a program"));
-    let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
-    let (mut producer, closed_loop) =
-        close(program, streams(), machine(&program)).unwrap_or_else(|error| fail(&error));
+    let (mut producer, closed_loop) = closed(bytes);
     let mut is_all = producer.fill().unwrap_or_else(|error| fail(&error));
     core.SYST.set_clock_source(SystClkSource::Core);
     core.SYST.set_reload(LONG_STEPS - 1);
@@ -101,6 +99,12 @@ fn main() -> ! {
 }
 
 // Each made in a frame of its own, which is gone before the ticks begin: 16 KiB are not much.
+
+#[inline(never)]
+fn closed(bytes: &'static [u8]) -> Closed<'static, Number, AXES, LINE> {
+    let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
+    close(&program, streams(), machine(&program)).unwrap_or_else(|error| fail(&error))
+}
 
 #[inline(never)]
 fn machine(program: &Reader<'_, AXES>) -> &'static SimMachine<AXES, LINE> {

@@ -44,13 +44,13 @@ fn main() -> ! {
 
 fn run() -> Option<()> {
     let program = Reader::<AXES>::new(programs().next()?).ok()?;
-    let header = *program.header();
+    let header = program.header();
     let streams = cortex_m::singleton!(: Streams<Number, AXES, PIECES, SEGMENTS> = Streams::new())?;
     let (mut feeder, intake) = streams.split(header.rules, header.start);
-    let mut supply = Supply::new(program, header.tick_s);
+    let mut supply = Supply::new(program.items(), header.tick_s);
     let config = AxesConfig::<Number, AXES>::new(&header.axes, header.tick_s).ok()?;
     let counts = [Counts(0); AXES];
-    let mut kernel = Kernel::new(config, header.start, counts);
+    let mut kernel = Kernel::new(&config, header.start, counts);
     kernel.enable(100);
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
     critical_section::with(|cs| {

@@ -19,14 +19,14 @@ use qemu_boards::{AXES, Number, PIECES, SEGMENTS, exit, fail};
 fn main() -> ! {
     let bytes = programs().next().unwrap_or_else(|| fail(&"a bundle without a program"));
     let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
-    let &Header { tick_s, rules, axes, start } = program.header();
-    let config = AxesConfig::<Number, _>::new(&axes, tick_s).unwrap_or_else(|error| fail(&error));
+    let &Header { tick_s, rules, ref axes, start } = program.header();
+    let config = AxesConfig::<Number, _>::new(axes, tick_s).unwrap_or_else(|error| fail(&error));
     let steps = config.axes.map(|config| config.encoder.position(Counts(1)).to_bits());
     let mut streams = Streams::<Number, AXES, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(rules, start);
-    let mut supply = Supply::new(program, tick_s);
+    let mut supply = Supply::new(program.items(), tick_s);
     let mut memory = InMemory { counts: [Counts(0); AXES], codes: [DacCode::ZERO; AXES], enabled: None };
-    let mut kernel = Kernel::new(config, start, memory.counts);
+    let mut kernel = Kernel::new(&config, start, memory.counts);
     kernel.enable(0);
     loop {
         supply.fill(&mut feeder).unwrap_or_else(|error| fail(&error));
