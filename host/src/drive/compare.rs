@@ -8,6 +8,7 @@
 //!   [`Choice::Vaj`], less what differencing adds, so that with exact set positions it does the same;
 //! - [`Choice::Vaj`] has the set-points' own velocity, acceleration and jerk, with the machine's gains;
 //! - [`Choice::PeerFitted`] and [`Choice::VajFitted`] have the gains that follow best ([`fit`]), one fit for both;
+//!   [`Choice::PeerFittedTwo`] does without the third difference, as one does whose set-points are coarse;
 //! - [`Choice::Inverse`] inverts the drive: with the machine file's inverse, or, if it has none, with the simulated
 //!   drive's own figures, which identification finds within a few per cent.
 //!
@@ -15,8 +16,8 @@
 
 use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Gains};
 
-use super::circle::{self, CircleFigures};
-use super::experiment::{DriveError, Recording, Terms};
+use super::circle;
+use super::experiment::{CLOSED_LOOP_ERROR_MM, DriveError, Recording, Terms};
 use super::peer_regulator::PeerGains;
 use super::replay::{Law, Replayed, replay};
 use super::turning::Turning;
@@ -43,6 +44,8 @@ pub enum Choice {
     Pv,
     /// Differenced position commands, gains as [`Choice::Vaj`].
     Peer,
+    /// Differenced position commands without the third difference, fitted.
+    PeerFittedTwo,
     /// Differenced position commands, fitted.
     PeerFitted,
     /// Velocity, acceleration and jerk of the set-point, the machine's gains.
@@ -55,7 +58,19 @@ pub enum Choice {
 
 impl Choice {
     /// All of them, in the order of tables.
-    pub const ALL: [Self; 7] =
+    pub const ALL: [Self; 8] = [
+        Self::P,
+        Self::Pv,
+        Self::Peer,
+        Self::Vaj,
+        Self::PeerFittedTwo,
+        Self::PeerFitted,
+        Self::VajFitted,
+        Self::Inverse,
+    ];
+
+    /// Those that pictures show.
+    pub const SHOWN: [Self; 7] =
         [Self::P, Self::Pv, Self::Peer, Self::Vaj, Self::PeerFitted, Self::VajFitted, Self::Inverse];
 
     /// As tables call it.
@@ -64,9 +79,10 @@ impl Choice {
         match self {
             Self::P => "P",
             Self::Pv => "P + V",
-            Self::Peer => "P + FF1–FF3, differenced",
+            Self::Peer => "P + FF1–FF3 differenced",
             Self::Vaj => "P + V + A + J",
-            Self::PeerFitted => "P + FF1–FF3, differenced, fitted",
+            Self::PeerFittedTwo => "P + FF1, FF2 differenced, fitted",
+            Self::PeerFitted => "P + FF1–FF3 differenced, fitted",
             Self::VajFitted => "P + V + A + J, fitted",
             Self::Inverse => "P + inverse with preview",
         }
@@ -79,6 +95,8 @@ pub struct Regulators {
     machine: Machine,
     /// Fitted gains of each axis.
     pub fitted: [PeerGains; AXES],
+    /// And without the third difference.
+    pub fitted_two: [PeerGains; AXES],
 }
 
 impl Regulators {
@@ -89,12 +107,13 @@ impl Regulators {
     /// As [`Turning::record`].
     pub fn new(machine: &Machine, feed_mm_s: f64, progress: &mut dyn FnMut()) -> Result<Self, DriveError> {
         let machine = p_only(machine);
-        let fitted = fit(&machine, feed_mm_s, progress)?;
-        Ok(Self { machine, fitted })
+        let fitted = fit(&machine, feed_mm_s, Differences::Three, progress)?;
+        let fitted_two = fit(&machine, feed_mm_s, Differences::Two, progress)?;
+        Ok(Self { machine, fitted, fitted_two })
     }
 
     /// Steps of [`Regulators::new`].
-    pub const STEPS: usize = FIT_HZ.len() * FIT_ROUNDS;
+    pub const STEPS: usize = 2 * FIT_HZ.len() * FIT_ROUNDS;
 
     /// The machine on which `choice` runs through the kernel, or whose set positions it is told.
     #[must_use]
@@ -102,10 +121,8 @@ impl Regulators {
         let tick_s = self.machine.tick_s;
         let mut machine = match choice {
             Choice::Pv => Terms::V.of(&self.machine),
-            Choice::P | Choice::Peer | Choice::PeerFitted | Choice::Vaj | Choice::VajFitted => {
-                Terms::Vaj.of(&self.machine)
-            }
             Choice::Inverse => return with_inverse(&self.machine),
+            _ => Terms::Vaj.of(&self.machine),
         };
         for (axis, fitted) in machine.axes.iter_mut().zip(&self.fitted) {
             match choice {
@@ -123,19 +140,8 @@ impl Regulators {
         match choice {
             Choice::Peer => Law::Peer(peer_gains(&self.machine)),
             Choice::PeerFitted => Law::Peer(self.fitted),
+            Choice::PeerFittedTwo => Law::Peer(self.fitted_two),
             _ => Law::Kernel,
-        }
-    }
-
-    /// `choice` on `motion` with exact set positions: for the kernel's own regulators, a run through the kernel.
-    ///
-    /// # Errors
-    /// As [`Turning::record`].
-    pub fn record(&self, choice: Choice, motion: &Motion) -> Result<Recording, DriveError> {
-        let recording = motion.record(&self.machine(choice))?;
-        match self.law(choice) {
-            Law::Kernel => Ok(recording),
-            law => Ok(replay(&recording, &law, 0.0)?.recording),
         }
     }
 
@@ -160,26 +166,99 @@ impl Regulators {
         Ok(all)
     }
 
-    /// `choice` on circles of `frequencies_hz` with exact set positions. `progress` is called after each circle.
+    /// Output of the axis that moves first, with set positions in steps of `resolution_um` \[µm\]: time from the start
+    /// of the measured part \[s\] and volts, for `duration_s`.
     ///
     /// # Errors
-    /// As [`Turning::record`].
-    pub fn sweep(
+    /// As [`Turning::record`], and a resolution out of its range.
+    pub fn output(
         &self,
         choice: Choice,
-        feed_mm_s: f64,
-        frequencies_hz: &[f64],
-        progress: &mut dyn FnMut(),
-    ) -> Result<Vec<CircleFigures>, DriveError> {
+        turning: &Turning,
+        resolution_um: f64,
+        duration_s: f64,
+    ) -> Result<Vec<(f64, f64)>, DriveError> {
+        let recording = turning.record(&self.machine(choice))?;
+        let replayed = replay(&recording, &self.law(choice), resolution_um / 1e3)?.recording;
+        let [first, _] = turning.axes();
+        let times = (0_u32..).map(|tick| f64::from(tick) * replayed.tick_s());
+        let ticks = turning.measured(&replayed)?;
+        let points = times.zip(ticks).map(|(time_s, tick)| (time_s, tick.axes[first].out_v));
+        Ok(points.take_while(|point| point.0 <= duration_s).collect())
+    }
+}
+
+/// A regulator over frequency.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sweep {
+    /// The regulator.
+    pub choice: Choice,
+    /// Frequency \[Hz\], and what it did on that circle.
+    pub circles: Vec<(f64, Measured)>,
+}
+
+/// A regulator on every motion, with one resolution of set positions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The regulator.
+    pub choice: Choice,
+    /// Steps of the set positions \[µm\]; 0 if they were exact.
+    pub resolution_um: f64,
+    /// By motion.
+    pub measured: Vec<Measured>,
+}
+
+/// All regulators on `motions`, with exact set positions and in steps of each of `resolutions_um` \[µm\]. `progress`
+/// is called after each regulator.
+///
+/// # Errors
+/// As [`Regulators::measure`].
+pub fn rows(
+    regulators: &Regulators,
+    motions: &[Motion],
+    resolutions_um: &[f64],
+    progress: &mut dyn FnMut(),
+) -> Result<Vec<Row>, DriveError> {
+    let mut rows = Vec::new();
+    for choice in Choice::ALL {
+        let exact_and_steps = core::iter::once(0.0).chain(resolutions_um.iter().copied());
+        let mut of: Vec<Row> = exact_and_steps
+            .map(|resolution_um| Row { choice, resolution_um, measured: Vec::new() })
+            .collect();
+        for motion in motions {
+            let measured = regulators.measure(choice, motion, resolutions_um)?;
+            of.iter_mut().zip(measured).for_each(|(row, measured)| row.measured.push(measured));
+        }
+        rows.append(&mut of);
+        progress();
+    }
+    Ok(rows)
+}
+
+/// The regulators of [`Choice::SHOWN`] on circles of `frequencies_hz` with set positions in steps of `resolution_um`
+/// \[µm\]. `progress` is called after each regulator.
+///
+/// # Errors
+/// As [`Regulators::measure`].
+pub fn sweeps(
+    regulators: &Regulators,
+    feed_mm_s: f64,
+    frequencies_hz: &[f64],
+    resolution_um: f64,
+    progress: &mut dyn FnMut(),
+) -> Result<Vec<Sweep>, DriveError> {
+    let mut sweeps = Vec::with_capacity(Choice::SHOWN.len());
+    for choice in Choice::SHOWN {
         let mut circles = Vec::with_capacity(frequencies_hz.len());
         for &frequency_hz in frequencies_hz {
-            let turning = Turning::new(frequency_hz, feed_mm_s);
-            let recording = self.record(choice, &Motion::Circle(turning))?;
-            circles.push(circle::figures(&recording, &turning)?);
-            progress();
+            let circle = Motion::Circle(Turning::new(frequency_hz, feed_mm_s));
+            let measured = regulators.measure(choice, &circle, &[resolution_um])?;
+            circles.extend(measured.last().map(|&last| (frequency_hz, last)));
         }
-        Ok(circles)
+        sweeps.push(Sweep { choice, circles });
+        progress();
     }
+    Ok(sweeps)
 }
 
 /// What the axes are to do.
@@ -192,6 +271,17 @@ pub enum Motion {
 }
 
 impl Motion {
+    /// As tables call it.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Circle(turning) => {
+                format!("circle at {} Hz, {} mm/min", turning.frequency_hz, turning.feed_mm_s * 60.0)
+            }
+            Self::Program(name, _) => (*name).to_owned(),
+        }
+    }
+
     fn record(&self, machine: &Machine) -> Result<Recording, DriveError> {
         match self {
             Self::Circle(turning) => turning.record(machine),
@@ -249,8 +339,7 @@ impl Measured {
             let volts = ticks.iter().zip(exact_ticks).map(|(a, b)| a.axes[axis].out_v - b.axes[axis].out_v);
             output_noise_v = output_noise_v.max(rms(volts));
             let limit_mm_s2 = found.recording.machine.axes[axis].drive.accel_limit_mm_s2;
-            let torques =
-                found.torque_mm_s2[range.clone()].iter().zip(&exact.torque_mm_s2[range.clone()]);
+            let torques = found.torque_mm_s2[range.clone()].iter().zip(&exact.torque_mm_s2[range.clone()]);
             current_noise = current_noise.max(rms(torques.map(|(a, b)| a[axis] - b[axis])) / limit_mm_s2);
         }
         Ok(Self {
@@ -268,10 +357,11 @@ fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     (values.map(|value| value * value).sum::<f64>() / count).sqrt()
 }
 
-/// The machine with its kp as the only feedback.
+/// The machine with its kp as the only feedback, and with room for the following error of P alone.
 fn p_only(machine: &Machine) -> Machine {
     let mut machine = machine.clone();
     for axis in &mut machine.axes {
+        axis.following_error_limit_mm = axis.following_error_limit_mm.max(CLOSED_LOOP_ERROR_MM);
         axis.gains = Gains { kp_per_s: axis.gains.kp_per_s, ..Gains::default() };
     }
     machine
@@ -285,6 +375,15 @@ fn peer_gains(machine: &Machine) -> [PeerGains; AXES] {
     })
 }
 
+/// Which differences a fit uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Differences {
+    /// FF2; FF3 is 0.
+    Two,
+    /// FF2 and FF3.
+    Three,
+}
+
 /// FF2 and FF3 of every axis with the least rms following error, over circles of [`FIT_HZ`] with exact set positions;
 /// FF1 stays the machine's. Axes that no circle moves keep the machine's gains.
 ///
@@ -293,10 +392,14 @@ fn peer_gains(machine: &Machine) -> [PeerGains; AXES] {
 pub fn fit(
     machine: &Machine,
     feed_mm_s: f64,
+    differences: Differences,
     progress: &mut dyn FnMut(),
 ) -> Result<[PeerGains; AXES], DriveError> {
     let machine = Terms::Vaj.of(machine);
     let mut gains = peer_gains(&machine);
+    if differences == Differences::Two {
+        gains = gains.map(|gains| PeerGains { ff3_s2: 0.0, ..gains });
+    }
     let mut circles = Vec::with_capacity(FIT_HZ.len());
     for frequency_hz in FIT_HZ {
         let turning = Turning::new(frequency_hz, feed_mm_s);
@@ -335,7 +438,9 @@ pub fn fit(
             let [[aa, ab, ae], [_, bb, be], _] = sums;
             let determinant = aa * bb - ab * ab;
             // An axis at rest shows no error to learn from.
-            if determinant > 1e-6 * aa * bb {
+            if differences == Differences::Two {
+                gains.ff2_s -= if *aa > 0.0 { FIT_STEPS[0] * ae / aa } else { 0.0 };
+            } else if determinant > 1e-6 * aa * bb {
                 gains.ff2_s -= FIT_STEPS[0] * (bb * ae - ab * be) / determinant;
                 gains.ff3_s2 -= FIT_STEPS[1] * (aa * be - ab * ae) / determinant;
             }

@@ -14,9 +14,9 @@ use super::experiment::{DriveError, Recording, within};
 use super::peer_regulator::{PeerGains, PeerRegulator};
 use crate::machine::Machine;
 use crate::record::{AXES, TickRecord};
+use crate::simulate::RunError;
 use crate::simulate::contour::Contour;
 use crate::simulate::rig::{Rig, Simulated};
-use crate::simulate::RunError;
 
 /// What regulates.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,6 +7,7 @@
 //!
 //! - [`settings`]: the values, and what the stages make of them;
 //! - [`error`]: refusals and their places;
+//! - [`keys`]: every key of the file, for people;
 //! - `file`: the layout of the file and the rules that join several keys;
 //! - `range`: numbers that carry their range, so that a wrong one is refused where it stands.
 //!
@@ -23,6 +24,7 @@
 //! ```
 
 pub mod error;
+pub mod keys;
 pub mod settings;
 
 mod file;
