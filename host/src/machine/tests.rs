@@ -90,7 +90,7 @@ fn every_range_is_kept() {
         let row = REFERENCE_TOML[..position].lines().count() + 1;
         let column = key.len() + 4;
         for value in values.iter().chain(ANY) {
-            let error = refused(line, &format!("{key} = {value}"));
+            let error = refused(&format!("\n{line}"), &format!("\n{key} = {value}"));
             assert!(error.starts_with(&format!("test.toml:{row}:{column}: found {key} = ")), "{error}");
             assert!(error.contains(", expected "), "{error}");
         }

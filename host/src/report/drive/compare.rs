@@ -21,8 +21,10 @@ fn inked(choices: impl Iterator<Item = Choice>) -> Vec<(Ink, String)> {
     choices.map(|choice| (ink(choice), choice.name().to_owned())).collect()
 }
 
+/// The solid line is the inverse's, which lies low.
 fn ink(choice: Choice) -> Ink {
-    palette::series(Choice::SHOWN.iter().position(|&shown| shown == choice).unwrap_or(0))
+    let last_first = Choice::SHOWN.iter().rev().position(|&shown| shown == choice);
+    palette::series(last_first.unwrap_or(0))
 }
 
 fn errors(sweeps: &[Sweep], id: &str) -> io::Result<String> {
@@ -68,7 +70,7 @@ fn outputs_drawn(outputs: &Outputs, id: &str) -> io::Result<String> {
             title: format!("{}: output [V]", choice.name()),
             y: None,
             series: vec![Series {
-                ink: ink(*choice),
+                ink: palette::VOLTS,
                 points: points.iter().map(|(time_s, volts)| (time_s * 1e3, *volts)).collect(),
             }],
             levels: Vec::new(),
