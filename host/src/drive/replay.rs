@@ -38,15 +38,17 @@ pub struct Replayed {
 
 /// A regulator of three axes at work.
 enum Regulator<'a> {
-    Kernel(AxesConfig<f32, AXES>, [AxisState<f32>; AXES]),
-    Peer(AxesConfig<f64, AXES>, &'a [PeerGains; AXES], [PeerRegulator; AXES]),
+    Kernel(Box<AxesConfig<f32, AXES>>, [AxisState<f32>; AXES]),
+    Peer(Box<AxesConfig<f64, AXES>>, &'a [PeerGains; AXES], [PeerRegulator; AXES]),
 }
 
 impl<'a> Regulator<'a> {
     fn new(law: &'a Law, machine: &Machine) -> Result<Self, RunError> {
         Ok(match law {
-            Law::Kernel => Self::Kernel(machine.axes_config()?, [AxisState::default(); AXES]),
-            Law::Peer(gains) => Self::Peer(machine.axes_config()?, gains, [PeerRegulator::default(); AXES]),
+            Law::Kernel => Self::Kernel(Box::new(machine.axes_config()?), [AxisState::default(); AXES]),
+            Law::Peer(gains) => {
+                Self::Peer(Box::new(machine.axes_config()?), gains, [PeerRegulator::default(); AXES])
+            }
         })
     }
 

@@ -32,11 +32,13 @@ fn errors(sweeps: &[Sweep], id: &str) -> io::Result<String> {
         let greatest =
             |sweep: &Sweep| sweep.circles.iter().map(|(_, found)| value(found)).fold(0.0, f64::max);
         let of_velocity = sweeps.iter().filter(|sweep| sweep.choice == Choice::Pv).map(greatest);
-        let points = |sweep: &Sweep| sweep.circles.iter().map(|(hz, found)| (*hz, value(found))).collect();
+        let top = AIR * of_velocity.fold(1e-3, f64::max);
+        let points =
+            |sweep: &Sweep| sweep.circles.iter().map(|(hz, found)| (*hz, value(found).min(top))).collect();
         let series = |sweep: &Sweep| Series { ink: ink(sweep.choice), points: points(sweep) };
         Graph {
             title: title.to_owned(),
-            y: Some((0.0, AIR * of_velocity.fold(1e-3, f64::max))),
+            y: Some((0.0, top)),
             series: sweeps.iter().map(series).collect(),
             levels: Vec::new(),
         }
@@ -119,13 +121,15 @@ pub fn write_compare(
     let [over_frequency_um, over_time_um] = resolutions_um.map(|um| figure(um, 3));
     writeln!(out, "<section><h2>Errors over frequency</h2>")?;
     let words = format!(
-        "Circles of constant feed, set positions in steps of {over_frequency_um} µm. What lies beyond the picture is \
-         left out; the table has the figures."
+        "Circles of constant feed, set positions in steps of {over_frequency_um} µm. What lies beyond a picture \
+         runs along its upper edge; the table has the figures."
     );
     let legend = inked(sweeps.iter().map(|sweep| sweep.choice));
     figure_html(&errors(sweeps, "errors")?, &legend, &words, out)?;
     writeln!(out, "</section><section><h2>Outputs</h2>")?;
-    let words = format!("Set positions in steps of {over_time_um} µm, the same gains.");
+    let words = format!(
+        "Set positions in steps of {over_time_um} µm. Both have the same gains; each picture has its own scale."
+    );
     figure_html(&outputs_drawn(outputs, "outputs")?, &[], &words, out)?;
     writeln!(out, "</section><section><h2>Figures</h2>")?;
     for (index, motion) in motions.iter().enumerate() {
