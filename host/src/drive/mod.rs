@@ -10,6 +10,7 @@
 //! - [`turning`]: circles of constant feed, the motion of two experiments;
 //! - [`step`]: the feed steps within one tick, open loop;
 //! - [`harmonic`]: amplitude and phase of the velocity;
+//! - [`identification`]: the runs that [`crate::identify`] asks for;
 //! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
 //! - [`compare`]: regulators side by side; [`peer_regulator`]: one that differences positions; [`replay`](mod@replay): set
@@ -23,6 +24,7 @@ pub mod circle;
 pub mod compare;
 pub mod experiment;
 pub mod harmonic;
+pub mod identification;
 pub mod inertia;
 pub mod model;
 pub mod peer_regulator;

@@ -6,6 +6,7 @@
 //! what was found and what was expected; nothing is clamped or filled in silently.
 //!
 //! - [`settings`]: the values, and what the stages make of them;
+//! - [`edit`]: values written back into a file;
 //! - [`error`]: refusals and their places;
 //! - [`keys`]: every key of the file, for people;
 //! - `file`: the layout of the file and the rules that join several keys;
@@ -23,6 +24,7 @@
 //! # Ok::<(), motion_host::machine::MachineError>(())
 //! ```
 
+pub mod edit;
 pub mod error;
 pub mod keys;
 pub mod settings;
@@ -32,6 +34,7 @@ mod range;
 #[cfg(test)]
 mod tests;
 
+pub use edit::{AxisEdit, edited};
 pub use error::{AxisError, MachineError};
 pub use settings::{AxisSettings, DEAD_TIME_CELLS, Machine, PathSettings};
 

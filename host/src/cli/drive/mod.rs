@@ -5,7 +5,8 @@
 //! - [`inertia`]: harmonic motion under a growing load;
 //! - [`circle`]: contour error over frequency;
 //! - [`compare`]: regulators side by side;
-//! - [`bode`]: the step's spectrum, harmonics and the linear model side by side.
+//! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
+//! - [`tune`]: identification, proposal, verification.
 
 pub mod bode;
 pub mod circle;
@@ -13,6 +14,7 @@ pub mod compare;
 pub mod harmonic;
 pub mod inertia;
 pub mod step;
+pub mod tune;
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -41,6 +43,8 @@ Examples:
   motion drive circle --report circle.html           contour error with V, VA and VAJ feedforward
   motion drive compare --report regulators.html      regulators side by side, with coarse set-points
   motion drive bode --axis Y --json                  curves from step, harmonics and the linear model
+  motion drive tune --machine mine.toml --output mine.toml
+                                                     identify the axes and set their regulators
 
 On the reference machine at the published settings, the published figures stand beside; exit status 1 if the run
 misses what the machine has to give.";
@@ -61,6 +65,7 @@ enum Experiment {
     Circle(circle::CircleArguments),
     Compare(compare::CompareArguments),
     Bode(bode::BodeArguments),
+    Tune(tune::TuneArguments),
 }
 
 /// Makes the experiment and prints its figures.
@@ -75,6 +80,7 @@ pub fn drive(arguments: &DriveArguments, out: &mut dyn Write) -> Result<Outcome,
         Experiment::Circle(arguments) => circle::run(arguments, out),
         Experiment::Compare(arguments) => compare::run(arguments, out),
         Experiment::Bode(arguments) => bode::run(arguments, out),
+        Experiment::Tune(arguments) => tune::run(arguments, out),
     }
 }
 
