@@ -11,7 +11,7 @@ use motion_host::drive::turning::Turning;
 use motion_host::drive::{Recording, Terms};
 use motion_host::machine::Machine;
 use motion_host::report::drive::{picture_of_errors, picture_of_outputs};
-use motion_tests::figures::{Table, hold};
+use motion_tests::figures::{Table, hold, is_accepting};
 
 const RESOLUTIONS_UM: [f64; 2] = [0.1, 1.0];
 /// Pictures stay small enough for a document.
@@ -173,7 +173,7 @@ fn pictures_of_the_regulators() {
         let picture = picture.expect("a drawing");
         assert!(picture.len() < PICTURE_BYTES_MAX, "{name}: {} bytes", picture.len());
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host").join(name);
-        if std::env::var("MOTION_ACCEPT").is_ok_and(|value| value == "1") {
+        if is_accepting() {
             std::fs::write(&path, &picture).expect("a file");
         }
         let committed = std::fs::read_to_string(&path).expect("a picture; MOTION_ACCEPT=1 draws it");
