@@ -168,6 +168,50 @@ fn machine_prints_its_file() {
 }
 
 #[test]
+fn machine_explains_its_keys() {
+    let desk = Desk::new("explain");
+    let text = desk.stdout(&["machine", "--explain"]);
+    for words in [
+        "[axis.regulator.inverse.bed]",
+        "kp_per_s [1/s]: a number from 0 to 1e9; required",
+        "timer_bits: 16 or 32; default 32",
+        "mm_s [mm/s]: 9 times a number from -100000 to 100000; required",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let keys = desk.json(&["machine", "--explain", "--json"]);
+    let keys = keys.as_array().expect("a list");
+    assert_has(
+        &keys[0],
+        &["table", "table_is_optional", "key", "unit", "values", "range", "default", "meaning"],
+    );
+    let lead = keys.iter().find(|key| key["key"] == "feedforward_lead_s").expect("the lead");
+    assert_eq!((&lead["table"], &lead["default"]), (&Value::from("axis.regulator"), &Value::from("0")));
+    assert_eq!(desk.motion(&["machine", "--json"]).status.code(), Some(2));
+}
+
+#[test]
+fn drive_compares_regulators() {
+    let desk = Desk::new("compare");
+    let arguments = ["drive", "compare", "--from", "5", "--to", "5", "--resolutions-um", "1"];
+    let text = desk.stdout(&[&arguments[..], &["--report", "compare.html"]].concat());
+    assert!(text.contains("stringer.ngc") && text.contains("P + inverse with preview"), "{text}");
+    let page = desk.read("compare.html");
+    assert!(page.contains("<svg") && !page.contains("NaN") && page.trim_end().ends_with("</html>"));
+    let json = desk.json(&[&arguments[..], &["--json"]].concat());
+    assert_has(&json["fitted"][2], &["axis", "ff1", "ff2_s", "ff3_s2"]);
+    let rows = json["regulators"].as_array().expect("a list");
+    assert_eq!((rows.len(), rows[1]["set_resolution_um"].as_f64()), (16, Some(1.0)));
+    let keys = ["following_error_um", "contour_error_um", "output_noise_mv", "current_noise_percent"];
+    assert_has(&rows[1]["motions"][2], &keys);
+    assert_has(&json["sweeps"][6]["circles"][0], &keys);
+    for wrong in ["0", "-1", "nan", "1001"] {
+        let refusal = desk.refusal(&["drive", "compare", &format!("--resolutions-um={wrong}")]);
+        assert!(refusal.contains("found set-point resolutions [") && refusal.contains("expected 1 to 10"));
+    }
+}
+
+#[test]
 fn plan_of_the_stringer() {
     let desk = Desk::new("plan");
     desk.put("part.ngc", STRINGER);

@@ -3,6 +3,7 @@
 //! S4's machine had 4 µm of following error at 4 Hz, a contour error of 20 µm at 10 Hz, and 32 µm of form deviation at
 //! its resonance of 13 Hz.
 
+#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
 mod check;
 
 use motion_host::drive::circle::{self, CircleFigures};

@@ -9,7 +9,7 @@
 //! - [`run`]: a program through plan, kernel and simulated machine;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
-//! - [`machine`]: the reference machine's file;
+//! - [`machine`]: the reference machine's file, and what its keys mean;
 //! - [`demo`]: what `motion` alone does;
 //! - [`error`]: errors and exit statuses;
 //! - `input`, `table`, `trace`, `progress`: what the commands share.
@@ -44,6 +44,7 @@ Examples:
   motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
   motion machine > mine.toml                     a machine file to start from
+  motion machine --explain                       what every key of it means
 
 Exit status: 0 done, 1 the run ended in a fault or a check failed, 2 wrong input.";
 
@@ -94,7 +95,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),
         Some(Command::Drive(arguments)) => drive::drive(arguments, out),
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),
-        Some(Command::Machine(_)) => machine::print(out),
+        Some(Command::Machine(arguments)) => machine::print(arguments, out),
     }
 }
 

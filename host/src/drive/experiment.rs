@@ -19,7 +19,7 @@ pub(super) const ROUNDING: f64 = 1e-6;
 /// Following error that an open loop may reach \[mm\]: nothing holds the axis to its path.
 const OPEN_LOOP_ERROR_MM: f64 = 1000.0;
 /// And a closed one, which is thrown into full motion from rest \[mm\].
-const CLOSED_LOOP_ERROR_MM: f64 = 10.0;
+pub(super) const CLOSED_LOOP_ERROR_MM: f64 = 10.0;
 /// Counter registers are followed up to this part of their range in a tick, as for machine files: an axis may be
 /// twice as fast as its feed while it catches up.
 const COUNTER_SHARE: f64 = 0.25;

@@ -13,18 +13,23 @@
 //! - [`identification`]: the runs that [`crate::identify`] asks for;
 //! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
+//! - [`compare`]: regulators side by side; [`peer_regulator`]: one that differences positions; [`replay`](mod@replay): set
+//!   values once more, under another regulator;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
 //! - [`sine`], [`spectrum`], [`model`]: the mathematics of it;
 //! - [`mod@reference`]: what S4 measured, and what the reference machine has to give.
 
 pub mod bode;
 pub mod circle;
+pub mod compare;
 pub mod experiment;
 pub mod harmonic;
 pub mod identification;
 pub mod inertia;
 pub mod model;
+pub mod peer_regulator;
 pub mod reference;
+pub mod replay;
 pub mod sine;
 pub mod spectrum;
 pub mod step;

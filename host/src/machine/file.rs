@@ -3,23 +3,28 @@
 use std::ops::Range;
 
 use hal_sim::{BedMode, DriveParameters, EncoderNoise, TimerBits};
-use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Gains, TABLE_POINTS, Table, Tables};
+use motion_kernel::axis::{
+    AxesConfig, BedInverse, DriveInverse, Feedforward, Gains, PREVIEW_TICKS_MAX, TABLE_POINTS, Table, Tables,
+};
 use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
 use toml::Spanned;
 
 use super::error::{MachineError, quote};
 use super::range::{
-    CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime,
-    InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio, OutputLimit, OutputOffset, Positive,
-    Resolution, Reversal, TablePoint, Tick, Velocity, Within,
+    AXIS_NAME, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction, Gain, Inertia,
+    IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio, NAME_CHARACTERS_MAX,
+    NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, Positive, Resolution, Reversal,
+    TIMER_BITS, TablePoint, Tick, Velocity, Within,
 };
 use super::settings::{AxisSettings, Machine, PathSettings};
 
-/// Longest axis name: it heads seven columns of a trace.
-const NAME_CHARACTERS_MAX: usize = 8;
 /// Seconds per minute: feeds in mm/min exist in this file only.
 const S_PER_MIN: f64 = 60.0;
+/// A lead of so many ticks exactly is not one more for rounding; the kernel's own \[ticks\].
+const LEAD_ROUNDING: f64 = 1e-6;
+/// The bed's inverse steps once a tick: its frequency is below this part of the tick's.
+const BED_SHARE: f64 = 0.25;
 /// An encoder's register tells a move from its complement only while the axis moves by less than half the
 /// register from one tick to the next. An axis may be faster than its feed, while it overshoots or catches up,
 /// and readings have noise: it is held to twice its feed.
@@ -57,6 +62,37 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
             );
             return Err(refuse(places.mm_per_count.clone(), expected));
         }
+        let &AxisSettings { feedforward: Feedforward { lead_s, drive, .. }, .. } = axis;
+        if let Some(at) = &places.lead_s
+            && lead_s / tick_s > f64::from(PREVIEW_TICKS_MAX) + LEAD_ROUNDING
+        {
+            let most_s = f64::from(PREVIEW_TICKS_MAX) * tick_s;
+            let expected = format!("at most {most_s}, {PREVIEW_TICKS_MAX} ticks of tick_s = {tick_s}");
+            return Err(refuse(at.clone(), expected));
+        }
+        if let (Some(at), Some(drive)) = (&places.inverse_integral_time_s, drive)
+            && drive.integral_time_s < tick_s
+        {
+            return Err(refuse(at.clone(), format!("at least tick_s = {tick_s}")));
+        }
+        if let (Some(at), Some(bed)) = (&places.inverse_bed_hz, drive.and_then(|drive| drive.bed))
+            && bed.frequency_hz * tick_s >= BED_SHARE
+        {
+            let below_hz = BED_SHARE / tick_s;
+            let expected = format!("below {below_hz}, a quarter of the frequency of tick_s = {tick_s}");
+            return Err(refuse(at.clone(), expected));
+        }
+    }
+    // What only the kernel's numbers can't hold has no key of its own: it stands at the axis.
+    let figures = [0, 1, 2].map(|index: usize| axes[index].1.figures());
+    if let Err(error) = AxesConfig::<f32, 3>::new(&figures, tick_s) {
+        let (places, axis) = &axes[error.axis];
+        let cause = error.cause;
+        let problem = format!(
+            "axis {}: found {} {}, expected {}",
+            axis.name, cause.quantity, cause.value, cause.expected
+        );
+        return Err(MachineError::new(source_name, text, &places.name, problem));
     }
     Ok(Machine { name: file.name, tick_s, path: file.path.settings(), axes: axes.map(|(_, axis)| axis) })
 }
@@ -67,6 +103,9 @@ struct Places {
     feed_mm_s: Range<usize>,
     offset_v: Range<usize>,
     mm_per_count: Range<usize>,
+    lead_s: Option<Range<usize>>,
+    inverse_integral_time_s: Option<Range<usize>>,
+    inverse_bed_hz: Option<Range<usize>>,
 }
 
 #[derive(Deserialize)]
@@ -114,8 +153,8 @@ struct EncoderTable {
     timer_bits: Timer,
     #[serde(default)]
     noise_counts: NoiseCounts,
-    #[serde(default = "first_seed")]
-    noise_seed: u64,
+    #[serde(default)]
+    noise_seed: Seed,
 }
 
 #[derive(Deserialize)]
@@ -135,7 +174,7 @@ struct RegulatorTable {
     feedforward_velocity: Within<FeedforwardGain>,
     feedforward_accel_s: Within<FeedforwardGain>,
     feedforward_jerk_s2: Within<FeedforwardGain>,
-    feedforward_lead_s: Option<Within<LeadTime>>,
+    feedforward_lead_s: Option<Spanned<Within<LeadTime>>>,
     feedforward_velocity_table: Option<TableTable>,
     feedforward_accel_table: Option<TableTable>,
     feedforward_jerk_table: Option<TableTable>,
@@ -154,7 +193,7 @@ struct TableTable {
 #[serde(deny_unknown_fields)]
 struct InverseTable {
     velocity_gain_per_s: Within<InverseGain>,
-    integral_time_s: Within<IntegralTime>,
+    integral_time_s: Spanned<Within<IntegralTime>>,
     current_lag_s: Within<Lag>,
     viscous_friction_per_s: Within<Friction>,
     coulomb_friction_mm_s2: Within<Friction>,
@@ -165,7 +204,7 @@ struct InverseTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct InverseBedTable {
-    frequency_hz: Within<Positive>,
+    frequency_hz: Spanned<Within<Positive>>,
     damping_ratio: Within<Damping>,
     mass_ratio: Within<MassRatio>,
 }
@@ -180,13 +219,13 @@ impl InverseTable {
     fn drive(&self) -> DriveInverse {
         DriveInverse {
             velocity_gain_per_s: self.velocity_gain_per_s.0,
-            integral_time_s: self.integral_time_s.0,
+            integral_time_s: self.integral_time_s.get_ref().0,
             current_lag_s: self.current_lag_s.0,
             viscous_friction_per_s: self.viscous_friction_per_s.0,
             coulomb_friction_mm_s2: self.coulomb_friction_mm_s2.0,
             reversal_mm_s: self.reversal_mm_s.0,
             bed: self.bed.as_ref().map(|bed| BedInverse {
-                frequency_hz: bed.frequency_hz.0,
+                frequency_hz: bed.frequency_hz.get_ref().0,
                 damping_ratio: bed.damping_ratio.0,
                 mass_ratio: bed.mass_ratio.0,
             }),
@@ -233,7 +272,12 @@ impl PathTable {
 
 impl AxisTable {
     fn places(&self) -> Places {
+        let inverse = self.regulator.inverse.as_ref();
+        let bed = inverse.and_then(|inverse| inverse.bed.as_ref());
         Places {
+            lead_s: self.regulator.feedforward_lead_s.as_ref().map(Spanned::span),
+            inverse_integral_time_s: inverse.map(|inverse| inverse.integral_time_s.span()),
+            inverse_bed_hz: bed.map(|bed| bed.frequency_hz.span()),
             name: self.name.span(),
             feed_mm_s: self.feed_mm_s.span(),
             offset_v: self.output.offset_v.span(),
@@ -244,7 +288,7 @@ impl AxisTable {
     fn settings(self) -> AxisSettings {
         let noise = match self.encoder.noise_counts.0 {
             0 => None,
-            amplitude_counts => Some(EncoderNoise { amplitude_counts, seed: self.encoder.noise_seed }),
+            amplitude_counts => Some(EncoderNoise { amplitude_counts, seed: self.encoder.noise_seed.0 }),
         };
         AxisSettings {
             name: self.name.into_inner().0,
@@ -268,7 +312,7 @@ impl AxisTable {
                 velocity: self.regulator.feedforward_velocity.0,
                 accel_s: self.regulator.feedforward_accel_s.0,
                 jerk_s2: self.regulator.feedforward_jerk_s2.0,
-                lead_s: self.regulator.feedforward_lead_s.map_or(0.0, |lead| lead.0),
+                lead_s: self.regulator.feedforward_lead_s.map_or(0.0, |lead| lead.into_inner().0),
                 tables: Tables {
                     velocity: self.regulator.feedforward_velocity_table.as_ref().map(TableTable::table),
                     accel: self.regulator.feedforward_accel_table.as_ref().map(TableTable::table),
@@ -319,8 +363,7 @@ impl<'de> Deserialize<'de> for AxisName {
         if fits && name.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
             Ok(Self(name))
         } else {
-            let expected = format!("1 to {NAME_CHARACTERS_MAX} letters and digits");
-            Err(D::Error::custom(format!("name {name:?}, expected {expected}")))
+            Err(D::Error::custom(format!("name {name:?}, expected {AXIS_NAME}")))
         }
     }
 }
@@ -346,7 +389,7 @@ impl<'de> Deserialize<'de> for Timer {
         match i64::deserialize(deserializer)? {
             16 => Ok(Self(TimerBits::Sixteen)),
             32 => Ok(Self(TimerBits::ThirtyTwo)),
-            bits => Err(D::Error::custom(format!("timer_bits = {bits}, expected 16 or 32"))),
+            bits => Err(D::Error::custom(format!("timer_bits = {bits}, expected {TIMER_BITS}"))),
         }
     }
 }
@@ -357,15 +400,27 @@ struct NoiseCounts(u16);
 
 impl<'de> Deserialize<'de> for NoiseCounts {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        const MAX: u16 = 1000;
         let counts = i64::deserialize(deserializer)?;
         match u16::try_from(counts) {
-            Ok(counts) if counts <= MAX => Ok(Self(counts)),
-            _ => Err(D::Error::custom(format!("noise_counts = {counts}, expected from 0 to {MAX}"))),
+            Ok(counts) if counts <= NOISE_COUNTS_MAX => Ok(Self(counts)),
+            _ => Err(D::Error::custom(format!("noise_counts = {counts}, expected {NOISE_COUNTS}"))),
         }
     }
 }
 
-fn first_seed() -> u64 {
-    1
+/// Seed of an encoder's noise.
+struct Seed(u64);
+
+impl Default for Seed {
+    fn default() -> Self {
+        Self(1)
+    }
+}
+
+impl<'de> Deserialize<'de> for Seed {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let seed = i64::deserialize(deserializer)?;
+        let refused = |_| D::Error::custom(format!("noise_seed = {seed}, expected {NOISE_SEED}"));
+        u64::try_from(seed).map(Self).map_err(refused)
+    }
 }

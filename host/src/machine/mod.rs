@@ -8,6 +8,7 @@
 //! - [`settings`]: the values, and what the stages make of them;
 //! - [`edit`]: values written back into a file;
 //! - [`error`]: refusals and their places;
+//! - [`keys`]: every key of the file, for people;
 //! - `file`: the layout of the file and the rules that join several keys;
 //! - `range`: numbers that carry their range, so that a wrong one is refused where it stands.
 //!
@@ -25,6 +26,7 @@
 
 pub mod edit;
 pub mod error;
+pub mod keys;
 pub mod settings;
 
 mod file;

@@ -17,6 +17,19 @@ pub(super) trait Range {
     fn contains(value: f64) -> bool;
 }
 
+/// What the name of an axis may be: it heads seven columns of a trace.
+pub(super) const AXIS_NAME: &str = "1 to 8 letters and digits";
+/// Most characters of an axis's name.
+pub(super) const NAME_CHARACTERS_MAX: usize = 8;
+/// Widths of a counter register.
+pub(super) const TIMER_BITS: &str = "16 or 32";
+/// Amplitudes of an encoder's noise.
+pub(super) const NOISE_COUNTS: &str = "a whole number from 0 to 1000";
+/// The greatest of them.
+pub(super) const NOISE_COUNTS_MAX: u16 = 1000;
+/// Seeds of an encoder's noise.
+pub(super) const NOISE_SEED: &str = "a whole number, 0 or more";
+
 /// A number within `R`.
 pub(super) struct Within<R>(pub(super) f64, PhantomData<R>);
 
@@ -86,5 +99,60 @@ impl<'de, R: Range> Deserialize<'de> for Within<R> {
         }
 
         deserializer.deserialize_f64(Number(PhantomData::<R>)).map(|value| Self(value, PhantomData))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The words name the ends: what lies on them is told from what lies beyond them as they say.
+    fn words_are_the_range<R: Range>() {
+        let words = R::EXPECTED;
+        let mut ends = words.split([' ', ',']).filter_map(|word| word.parse::<f64>().ok());
+        let (Some(low), Some(high), None) = (ends.next(), ends.next(), ends.next()) else {
+            panic!("{words}: expected two numbers");
+        };
+        let has_low = !words.contains("above");
+        let has_high = !words.contains("below");
+        assert_eq!((R::contains(low), R::contains(high)), (has_low, has_high), "{words}");
+        let inside = |end: f64, to: f64| end + 1e-9 * (to - end);
+        let beyond = |end: f64, from: f64| end + 1e-9 * (end - from);
+        assert!(R::contains(inside(low, high)) && R::contains(inside(high, low)), "{words}");
+        assert!(!R::contains(beyond(high, low)), "{words}");
+        if words.contains("magnitude") {
+            assert!(!R::contains(0.999 * low) && !R::contains(-0.999 * low), "{words}");
+            assert!(R::contains(-high) && !R::contains(-beyond(high, low)), "{words}");
+        } else {
+            assert!(!R::contains(beyond(low, high)) && !R::contains(-high - 1.0), "{words}");
+        }
+        assert!(!R::contains(f64::NAN) && !R::contains(f64::INFINITY), "{words}");
+    }
+
+    #[test]
+    fn words_and_checks_agree() {
+        words_are_the_range::<Tick>();
+        words_are_the_range::<Limit>();
+        words_are_the_range::<JointAngle>();
+        words_are_the_range::<CurveShare>();
+        words_are_the_range::<FollowingError>();
+        words_are_the_range::<Resolution>();
+        words_are_the_range::<Velocity>();
+        words_are_the_range::<OutputLimit>();
+        words_are_the_range::<OutputOffset>();
+        words_are_the_range::<Gain>();
+        words_are_the_range::<FeedforwardGain>();
+        words_are_the_range::<Positive>();
+        words_are_the_range::<DeadTime>();
+        words_are_the_range::<LeadTime>();
+        words_are_the_range::<TablePoint>();
+        words_are_the_range::<InverseGain>();
+        words_are_the_range::<IntegralTime>();
+        words_are_the_range::<Lag>();
+        words_are_the_range::<Friction>();
+        words_are_the_range::<Reversal>();
+        words_are_the_range::<Damping>();
+        words_are_the_range::<MassRatio>();
+        words_are_the_range::<Inertia>();
     }
 }

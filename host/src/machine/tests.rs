@@ -2,6 +2,7 @@
 
 use motion_kernel::axis::AxesConfig;
 
+use super::keys::{KEY_TABLES, KeyTable};
 use super::{Machine, REFERENCE_TOML};
 
 /// The refusal of the reference file with the first `from` replaced by `to`.
@@ -89,7 +90,7 @@ fn every_range_is_kept() {
         let row = REFERENCE_TOML[..position].lines().count() + 1;
         let column = key.len() + 4;
         for value in values.iter().chain(ANY) {
-            let error = refused(line, &format!("{key} = {value}"));
+            let error = refused(&format!("\n{line}"), &format!("\n{key} = {value}"));
             assert!(error.starts_with(&format!("test.toml:{row}:{column}: found {key} = ")), "{error}");
             assert!(error.contains(", expected "), "{error}");
         }
@@ -158,4 +159,187 @@ fn dead_times_fit() {
         let simulated = hal_sim::SimMachine::<3, { super::DEAD_TIME_CELLS }>::new(&machine.simulated());
         assert!(simulated.is_ok(), "{} s: {:?}", machine.tick_s, simulated.err());
     }
+}
+
+/// The reference file with all its optional keys in use: a "#" without a blank behind it is taken away.
+fn with_optional_keys() -> String {
+    let in_use = |line: &str| match line.strip_prefix('#') {
+        Some(rest) if rest.starts_with(|c: char| c == '[' || c.is_ascii_lowercase()) => rest.to_owned(),
+        _ => line.to_owned(),
+    };
+    REFERENCE_TOML.lines().map(|line| in_use(line) + "\n").collect()
+}
+
+#[test]
+fn optional_keys_are_read() {
+    let machine = Machine::from_toml("full.toml", &with_optional_keys()).expect("valid");
+    let feedforward = machine.axes[0].feedforward;
+    assert!((feedforward.lead_s - 0.00167).abs() < 1e-12);
+    let table = feedforward.tables.velocity.expect("a table");
+    assert_eq!((table.reach, table.mm_s[0], table.mm_s[8]), (300.0, -0.6, 0.6));
+    assert_eq!(feedforward.tables.accel.expect("a table").reach, 500.0);
+    assert_eq!(feedforward.tables.jerk.expect("a table").reach, 5000.0);
+    let drive = feedforward.drive.expect("an inverse");
+    let bed = drive.bed.expect("a bed");
+    assert_eq!((drive.velocity_gain_per_s, drive.integral_time_s), (440.0, 0.0275));
+    assert_eq!((drive.current_lag_s, drive.viscous_friction_per_s), (0.000_37, 0.08));
+    assert_eq!((drive.coulomb_friction_mm_s2, drive.reversal_mm_s), (85.0, 0.5));
+    assert_eq!((bed.frequency_hz, bed.damping_ratio, bed.mass_ratio), (13.4, 0.03, 0.06));
+    // The others stay what they are.
+    assert_eq!(machine.axes[1..], Machine::reference().axes[1..]);
+    // Tables stand alone, and so does the inverse without its bed.
+    let text = with_optional_keys();
+    let (before, bed) = text.split_once("[axis.regulator.inverse.bed]").expect("a bed");
+    let after = &bed[bed.find("[axis.drive]").expect("a drive")..];
+    let machine = Machine::from_toml("no_bed.toml", &[before, after].concat()).expect("valid");
+    assert_eq!(machine.axes[0].feedforward.drive.expect("an inverse").bed, None);
+}
+
+/// `text` with the value of a key, first of its table, replaced; where the value stands.
+fn set(text: &str, table: &KeyTable, name: &str, value: &str) -> (String, usize, usize) {
+    let start = match table.name {
+        "" => 0,
+        "axis" => text.find("\n[[axis]]\n").expect("axes"),
+        name => text.find(&format!("\n[{name}]\n")).expect(name),
+    };
+    let key = start + text[start..].find(&format!("\n{name} = ")).expect(name) + 1;
+    let line = text[key..].lines().next().expect("a line");
+    let row = text[..key].lines().count() + 1;
+    ([&text[..key], name, " = ", value, &text[key + line.len()..]].concat(), row, name.len() + 4)
+}
+
+/// The names in backquotes of a refusal after its first, in order.
+fn names(error: &str) -> Vec<&str> {
+    error.split('`').skip(3).step_by(2).collect()
+}
+
+#[test]
+fn the_reader_knows_exactly_the_explained_keys() {
+    let text = with_optional_keys();
+    for table in KEY_TABLES {
+        let first = table.keys[0].name;
+        let (unknown, row, _) = set(&text, table, first, "0\nunknown_key = 0");
+        // The value before would be refused first.
+        let line = text.lines().nth(row - 1).expect("a line");
+        let unknown = unknown.replacen(&format!("{first} = 0\nunknown"), &format!("{line}\nunknown"), 1);
+        let error = Machine::from_toml("unknown.toml", &unknown).expect_err("an unknown key").to_string();
+        assert!(error.starts_with(&format!("unknown.toml:{}:1: found unknown key `unknown_key`", row + 1)));
+        let mut found = names(&error);
+        found.sort_unstable();
+        let prefix = if table.name.is_empty() { String::new() } else { format!("{}.", table.name) };
+        let inner = KEY_TABLES.iter().filter_map(|other| other.name.strip_prefix(&prefix));
+        let inner = inner.filter(|name| !name.is_empty() && !name.contains('.'));
+        let mut expected: Vec<&str> = table.keys.iter().map(|key| key.name).chain(inner).collect();
+        expected.sort_unstable();
+        assert_eq!(found, expected, "[{}]", table.name);
+    }
+}
+
+#[test]
+fn the_reader_refuses_values_with_the_explained_ranges() {
+    let text = with_optional_keys();
+    for table in KEY_TABLES {
+        for key in table.keys.iter().filter(|key| key.range != "any text") {
+            let wrong = match (key.values, key.unit, key.name) {
+                (1, "", "name") => "\"no name\"".to_owned(),
+                (1, "" | "counts", _) => "-1".to_owned(),
+                (1, ..) => "1e300".to_owned(),
+                (values, ..) => format!("[{}1e300]", "0, ".repeat(values - 1)),
+            };
+            let (refused, row, column) = set(&text, table, key.name, &wrong);
+            let error = Machine::from_toml("wrong.toml", &refused).expect_err(key.name).to_string();
+            // A value in a list stands behind those before it.
+            let column = column + wrong.find("1e300").unwrap_or(0);
+            assert!(error.starts_with(&format!("wrong.toml:{row}:{column}: found ")), "{error}");
+            assert!(error.ends_with(&format!(", expected {}", key.range)), "{error}, {}", key.range);
+        }
+    }
+}
+
+#[test]
+fn defaults_and_only_they_may_be_left_out() {
+    let text = with_optional_keys();
+    let full = Machine::from_toml("full.toml", &text).expect("valid");
+    for table in KEY_TABLES {
+        for key in table.keys {
+            let (marked, row, _) = set(&text, table, key.name, "0");
+            let without: String = marked
+                .lines()
+                .enumerate()
+                .filter(|(index, _)| index + 1 != row)
+                .map(|(_, line)| line.to_owned() + "\n")
+                .collect();
+            let found = Machine::from_toml("without.toml", &without);
+            let Some(default) = key.default else {
+                let error = found.expect_err(key.name).to_string();
+                assert!(error.contains(&format!("found no key `{}`", key.name)), "{error}");
+                continue;
+            };
+            let written = set(&text, table, key.name, default).0;
+            let written = Machine::from_toml("written.toml", &written).expect("valid");
+            assert_eq!(found.expect("valid"), written, "{}", key.name);
+        }
+        if table.is_optional {
+            let start = text.find(&format!("\n[{}]\n", table.name)).expect("a table");
+            let end = text[start + 1..].find("\n[").map_or(text.len(), |end| start + 1 + end);
+            let without = [&text[..start], &text[end..]].concat();
+            let inner = KEY_TABLES.iter().any(|other| other.name.starts_with(&format!("{}.", table.name)));
+            // An inner table opens its outer one, which then lacks its keys.
+            assert_eq!(Machine::from_toml("without.toml", &without).is_err(), inner, "[{}]", table.name);
+        }
+    }
+    assert_ne!(full, Machine::reference());
+}
+
+/// Ranges of the optional keys on every side, and what is not a number.
+#[test]
+fn ranges_of_optional_keys_are_kept() {
+    let text = with_optional_keys();
+    let cases: &[(&str, &str, &[&str])] = &[
+        ("axis.regulator", "feedforward_lead_s", &["-1e-9", "0.11"]),
+        ("axis.regulator.feedforward_velocity_table", "reach", &["0", "-1", "2e12"]),
+        (
+            "axis.regulator.feedforward_velocity_table",
+            "mm_s",
+            &["[0, 0]", "[0, 0, 0, 0, 0, 0, 0, 0, -100001]", "0"],
+        ),
+        ("axis.regulator.inverse", "velocity_gain_per_s", &["0", "0.0009", "2e6", "-440"]),
+        ("axis.regulator.inverse", "integral_time_s", &["0", "0.00001", "2e6"]),
+        ("axis.regulator.inverse", "current_lag_s", &["-1e-9", "1.1"]),
+        ("axis.regulator.inverse", "viscous_friction_per_s", &["-0.1", "2e6"]),
+        ("axis.regulator.inverse", "coulomb_friction_mm_s2", &["-0.1", "2e6"]),
+        ("axis.regulator.inverse", "reversal_mm_s", &["0", "0.0009", "2e6"]),
+        ("axis.regulator.inverse.bed", "frequency_hz", &["0", "-13", "2e9"]),
+        ("axis.regulator.inverse.bed", "damping_ratio", &["0", "0.0009", "1.1"]),
+        ("axis.regulator.inverse.bed", "mass_ratio", &["0", "-0.06", "101"]),
+    ];
+    for (table, key, values) in cases {
+        let table = KEY_TABLES.iter().find(|known| known.name == *table).expect("known");
+        for value in values.iter().chain(&["nan", "-inf", "inf", "\"5\"", "true"]) {
+            let (refused, row, _) = set(&text, table, key, value);
+            let error = Machine::from_toml("test.toml", &refused).expect_err(key).to_string();
+            assert!(error.starts_with(&format!("test.toml:{row}:")), "{key} = {value}: {error}");
+            assert!(error.contains(": found ") && error.contains(", expected "), "{error}");
+        }
+    }
+}
+
+#[test]
+fn rules_that_join_optional_keys() {
+    let text = with_optional_keys();
+    let change = |table: &str, key: &str, value: &str| {
+        let table = KEY_TABLES.iter().find(|known| known.name == table).expect("known");
+        let (text, row, column) = set(&text, table, key, value);
+        let found = Machine::from_toml("test.toml", &text).map_err(|error| error.to_string());
+        (found, format!("test.toml:{row}:{column}: found {key} = {value}, expected "))
+    };
+    let (found, _) = change("axis.regulator", "feedforward_lead_s", "0.016");
+    assert!(found.is_ok(), "32 ticks: {found:?}");
+    let (found, place) = change("axis.regulator", "feedforward_lead_s", "0.01601");
+    assert_eq!(found, Err(format!("{place}at most 0.016, 32 ticks of tick_s = 0.0005")));
+    let (found, place) = change("axis.regulator.inverse", "integral_time_s", "0.0004");
+    assert_eq!(found, Err(format!("{place}at least tick_s = 0.0005")));
+    let (found, place) = change("axis.regulator.inverse.bed", "frequency_hz", "500");
+    assert_eq!(found, Err(format!("{place}below 500, a quarter of the frequency of tick_s = 0.0005")));
+    assert!(change("axis.regulator.inverse.bed", "frequency_hz", "499").0.is_ok());
 }

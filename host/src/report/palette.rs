@@ -109,16 +109,17 @@ pub(super) const CLASSES: [Ink; 6] = [
 ];
 
 /// Curves of one plot that are of one kind: axes, methods, gains.
-pub(super) const SERIES: [Ink; 6] = [
+pub(super) const SERIES: [Ink; 7] = [
     solid(0x1E65AF, 0x6AB0F4),
     dashed(0xAF5100, 0xF1A053, "36 12"),
     dashed(0x0A795E, 0x3BCAA3, "12 10"),
     dashed(0x863FB4, 0xC495ED, "36 10 10 10"),
     dashed(0xA7225D, 0xF487B3, "60 14"),
     dashed(0x4D6900, 0xB1CD4A, "20 8 6 8"),
+    dashed(0x705A46, 0xC9AF96, "6 10"),
 ];
 
-/// Ink of a curve among others of its kind; from the seventh on they begin anew.
+/// Ink of a curve among others of its kind; from the eighth on they begin anew.
 pub(super) fn series(index: usize) -> Ink {
     SERIES[index % SERIES.len()]
 }
@@ -142,16 +143,27 @@ const SINGLE: [Ink; 15] = [
     UNREACHED,
 ];
 
+fn inks() -> impl Iterator<Item = &'static Ink> {
+    SINGLE.iter().chain(&CEILINGS).chain(&CLASSES).chain(&SERIES)
+}
+
+/// Rules that put its dashes on every line drawn in an ink of `inks`.
+fn dashes<'a>(inks: impl Iterator<Item = &'a Ink>) -> String {
+    let rule = |ink: &Ink| format!("svg [stroke=\"{}\"]{{stroke-dasharray:{}}}\n", ink.hex(), ink.dash);
+    inks.filter(|ink| !ink.dash.is_empty()).map(rule).collect()
+}
+
+/// Rules for a picture of its own, on white paper: the dashes of limits and of [`SERIES`].
+pub(super) fn picture_style_sheet() -> String {
+    dashes(SERIES.iter().chain([&LIMIT]))
+}
+
 /// Rules that put every ink on dark paper, and its dashes on every line drawn in it.
 pub(super) fn style_sheet() -> String {
-    let inks = || SINGLE.iter().chain(&CEILINGS).chain(&CLASSES).chain(&SERIES);
-    let mut dashes = String::new();
+    let dashes = dashes(inks());
     let mut dark = String::new();
     for ink in inks() {
         let hex = ink.hex();
-        if !ink.dash.is_empty() {
-            dashes.push_str(&format!("svg [stroke=\"{hex}\"]{{stroke-dasharray:{}}}\n", ink.dash));
-        }
         dark.push_str(&format!("svg [stroke=\"{hex}\"]{{stroke:#{:06X}}}", ink.dark));
         dark.push_str(&format!("svg [fill=\"{hex}\"]{{fill:#{:06X}}}\n", ink.dark));
     }

@@ -7,14 +7,14 @@ const AT_REST_MM_S: f64 = 1e-6;
 
 /// Contour error tick by tick. It remembers the direction of the path.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Contour {
+pub(crate) struct Contour {
     direction: Option<[f64; AXES]>,
 }
 
 impl Contour {
     /// The part of the following error across the path \[µm\], 0 or more. The path is taken as straight over the
     /// error's length, which at 20 µm on a radius of 1 mm hides 0.2 µm. At rest the last direction counts.
-    pub(super) fn error_um(&mut self, axes: &[AxisTick; AXES]) -> f64 {
+    pub(crate) fn error_um(&mut self, axes: &[AxisTick; AXES]) -> f64 {
         let velocity = axes.map(|axis| axis.vel_mm_s);
         let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
         if speed > AT_REST_MM_S {

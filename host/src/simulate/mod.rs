@@ -9,7 +9,7 @@
 //! - [`run`](mod@run): the ticks;
 //! - [`summary`]: maxima, following and contour error.
 
-mod contour;
+pub(crate) mod contour;
 pub mod rig;
 pub mod run;
 pub mod summary;

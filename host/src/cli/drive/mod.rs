@@ -4,11 +4,13 @@
 //! - [`harmonic`]: amplitude and phase over frequency;
 //! - [`inertia`]: harmonic motion under a growing load;
 //! - [`circle`]: contour error over frequency;
+//! - [`compare`]: regulators side by side;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
 //! - [`tune`]: identification, proposal, verification.
 
 pub mod bode;
 pub mod circle;
+pub mod compare;
 pub mod harmonic;
 pub mod inertia;
 pub mod step;
@@ -39,6 +41,7 @@ Examples:
   motion drive harmonic --from 8 --to 40 --by 4      amplitude and phase of X and Y, open loop
   motion drive inertia --loads 0,1,2                 the current limit, seen under load
   motion drive circle --report circle.html           contour error with V, VA and VAJ feedforward
+  motion drive compare --report regulators.html      regulators side by side, with coarse set-points
   motion drive bode --axis Y --json                  curves from step, harmonics and the linear model
   motion drive tune --machine mine.toml --output mine.toml
                                                      identify the axes and set their regulators
@@ -60,6 +63,7 @@ enum Experiment {
     Harmonic(harmonic::HarmonicArguments),
     Inertia(inertia::InertiaArguments),
     Circle(circle::CircleArguments),
+    Compare(compare::CompareArguments),
     Bode(bode::BodeArguments),
     Tune(tune::TuneArguments),
 }
@@ -74,6 +78,7 @@ pub fn drive(arguments: &DriveArguments, out: &mut dyn Write) -> Result<Outcome,
         Experiment::Harmonic(arguments) => harmonic::run(arguments, out),
         Experiment::Inertia(arguments) => inertia::run(arguments, out),
         Experiment::Circle(arguments) => circle::run(arguments, out),
+        Experiment::Compare(arguments) => compare::run(arguments, out),
         Experiment::Bode(arguments) => bode::run(arguments, out),
         Experiment::Tune(arguments) => tune::run(arguments, out),
     }

@@ -299,7 +299,7 @@ fn write_words(
 
 /// A value of a file, or that it is not in it.
 fn number(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| toml_number(value))
+    value.map_or_else(|| "–".to_owned(), toml_number)
 }
 
 /// As Rust prints the shortest number that reads back, small ones with an exponent.

@@ -4,12 +4,14 @@
 //! a run. Fails only if the output cannot be written.
 
 mod circle;
+mod compare;
 mod harmonic;
 mod step;
 
 use std::io::{self, Write};
 
 pub use self::circle::{Shown, write_circle};
+pub use self::compare::{Outputs, picture_of_errors, picture_of_outputs, write_compare};
 pub use self::harmonic::{write_bode, write_harmonic, write_inertia};
 pub use self::step::write_step;
 

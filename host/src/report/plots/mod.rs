@@ -149,6 +149,39 @@ pub(super) fn on_both_sheets(
     Ok(page)
 }
 
+/// The wide one of two `drawings` as a picture of its own, on white paper, with its legend under it.
+pub(super) fn picture(drawings: &str, legend: &[(Ink, String)]) -> String {
+    let wide = drawings.split_once("</svg>").map_or("", |(wide, _)| wide);
+    let (tag, body) = wide.split_once('>').unwrap_or_default();
+    let height = tag.split('"').nth(3).and_then(|view| view.rsplit(' ').next()?.parse().ok()).unwrap_or(0);
+    let (width, row) = (WIDE.width, WIDE.text * 8 / 5);
+    let all = height + row * (legend.len() as u32 + 1);
+    let id = tag.split('"').find(|part| part.ends_with("-wide-t")).unwrap_or("");
+    let mut svg = format!(
+        "<svg viewBox=\"0 0 {width} {all}\" role=\"img\" aria-labelledby=\"{}\" \
+         xmlns=\"http://www.w3.org/2000/svg\" font-family=\"sans-serif\">\n<style>\n\
+         svg polyline{{stroke-linejoin:round}}\n{}</style>\n<rect width=\"{width}\" height=\"{all}\" \
+         fill=\"#FFFFFF\"/>{body}",
+        id,
+        palette::picture_style_sheet(),
+    );
+    let (left, line) = (WIDE.left, 60 * UNITS_PER_PX);
+    for ((ink, words), index) in legend.iter().zip(1..) {
+        let y = height + row * index;
+        svg.push_str(&format!(
+            "<path d=\"M{left} {y}h{line}\" fill=\"none\" stroke-width=\"12\" stroke=\"{}\"/>\
+             <text x=\"{}\" y=\"{y}\" dy=\"0.35em\" font-size=\"{}\" fill=\"{}\">{}</text>\n",
+            ink.hex(),
+            left + line + WIDE.text / 2,
+            WIDE.text * 25 / 31,
+            palette::TEXT.hex(),
+            escape(words),
+        ));
+    }
+    svg.push_str("</svg>\n");
+    svg
+}
+
 /// A pair of axes to be drawn.
 pub(super) struct Panel<'a> {
     /// Quantity and unit, above the axes.

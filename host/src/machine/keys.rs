@@ -1,0 +1,312 @@
+//! Every key of a machine file: unit, range, default, meaning.
+//!
+//! The ranges are the words that the reader refuses values with. The tests hold the rest to the reader: it must know
+//! exactly these keys, require exactly those without a default, and refuse a value with the range that stands here.
+
+use motion_kernel::axis::TABLE_POINTS;
+
+use super::range::{
+    AXIS_NAME, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction, Gain, Inertia,
+    IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio, NOISE_COUNTS, NOISE_SEED,
+    OutputLimit, OutputOffset, Positive, Range, Resolution, Reversal, TIMER_BITS, TablePoint, Tick, Velocity,
+};
+
+/// A table of the file with its keys, without its tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KeyTable {
+    /// Its name in dots; empty for what stands before the first table.
+    pub name: &'static str,
+    /// It may be left out.
+    pub is_optional: bool,
+    /// What it is about.
+    pub meaning: &'static str,
+    /// Its keys, in the order of the reference file.
+    pub keys: &'static [Key],
+}
+
+/// A key of the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Key {
+    /// Its name.
+    pub name: &'static str,
+    /// Unit of its value; "1" for a number without one, empty for what is no number.
+    pub unit: &'static str,
+    /// How many values it has.
+    pub values: usize,
+    /// What a value may be, in the words of refusals.
+    pub range: &'static str,
+    /// What holds if it is left out; none if it is required.
+    pub default: Option<&'static str>,
+    /// What it means, and rules that join it with other keys.
+    pub meaning: &'static str,
+}
+
+impl Key {
+    const fn new(name: &'static str, unit: &'static str, range: &'static str, meaning: &'static str) -> Self {
+        Self { name, unit, values: 1, range, default: None, meaning }
+    }
+
+    const fn or(self, default: &'static str) -> Self {
+        Self { default: Some(default), ..self }
+    }
+
+    const fn points(name: &'static str, meaning: &'static str) -> Self {
+        Self { values: TABLE_POINTS, ..Self::new(name, "mm/s", TablePoint::EXPECTED, meaning) }
+    }
+}
+
+const fn table(name: &'static str, meaning: &'static str, keys: &'static [Key]) -> KeyTable {
+    KeyTable { name, is_optional: false, meaning, keys }
+}
+
+const fn optional(name: &'static str, meaning: &'static str, keys: &'static [Key]) -> KeyTable {
+    KeyTable { name, is_optional: true, meaning, keys }
+}
+
+/// All tables, in the order of the reference file.
+pub const KEY_TABLES: &[KeyTable] = &[
+    table(
+        "",
+        "The machine.",
+        &[
+            Key::new("name", "", "any text", "Shown in reports."),
+            Key::new(
+                "tick_s",
+                "s",
+                Tick::EXPECTED,
+                "Control tick: feed law, path, regulators and outputs run once per tick.",
+            ),
+        ],
+    ),
+    table(
+        "path",
+        "What holds along the path, whatever the axes could do.",
+        &[
+            Key::new("feed_mm_s", "mm/s", Limit::EXPECTED, "Greatest feed, also of rapids."),
+            Key::new("accel_mm_s2", "mm/s²", Limit::EXPECTED, "Greatest acceleration, as a vector."),
+            Key::new("jerk_mm_s3", "mm/s³", Limit::EXPECTED, "Greatest jerk, as a vector."),
+            Key::new("snap_mm_s4", "mm/s⁴", Limit::EXPECTED, "Greatest rate of change of jerk."),
+            Key::new(
+                "joint_angle_deg",
+                "°",
+                JointAngle::EXPECTED,
+                "Greatest change of direction between two blocks that is driven through; beyond it the motion stops \
+                 at the joint.",
+            ),
+            Key::new(
+                "accel_step_mm_s2",
+                "mm/s²",
+                Limit::EXPECTED,
+                "Greatest jump of acceleration at a joint, where the curvature jumps.",
+            ),
+            Key::new(
+                "curve_feed_share",
+                "1",
+                CurveShare::EXPECTED,
+                "Part of the feed that a curve's radius allows to plan with; the rest is left for changing the feed \
+                 on the curve.",
+            ),
+        ],
+    ),
+    table(
+        "axis",
+        "An axis; exactly three [[axis]] tables, moved by the words X, Y and Z.",
+        &[
+            Key::new("name", "", AXIS_NAME, "Heads the axis's columns in tables and traces; no two are equal."),
+            Key::new(
+                "feed_mm_s",
+                "mm/s",
+                Limit::EXPECTED,
+                "Greatest velocity of this axis; within reach of the output's limit.",
+            ),
+            Key::new("accel_mm_s2", "mm/s²", Limit::EXPECTED, "Greatest acceleration of this axis."),
+            Key::new("jerk_mm_s3", "mm/s³", Limit::EXPECTED, "Greatest jerk of this axis."),
+            Key::new("snap_mm_s4", "mm/s⁴", Limit::EXPECTED, "Greatest snap of this axis."),
+            Key::new(
+                "following_error_limit_mm",
+                "mm",
+                FollowingError::EXPECTED,
+                "Following error (set-point − actual position) at which the axis faults.",
+            ),
+        ],
+    ),
+    table(
+        "axis.encoder",
+        "How the axis's position is read.",
+        &[
+            Key::new(
+                "mm_per_count",
+                "mm",
+                Resolution::EXPECTED,
+                "Travel per count; so much that a tick at twice feed_mm_s is less than half the counter register.",
+            ),
+            Key::new("timer_bits", "", TIMER_BITS, "Width of the board's counter register.").or("32"),
+            Key::new(
+                "noise_counts",
+                "counts",
+                NOISE_COUNTS,
+                "Largest reading error of the simulated encoder in either direction, every reading anew.",
+            )
+            .or("0"),
+            Key::new("noise_seed", "", NOISE_SEED, "Seed of the noise: the same seed, the same noise.").or("1"),
+        ],
+    ),
+    table(
+        "axis.output",
+        "How a velocity command becomes a voltage.",
+        &[
+            Key::new(
+                "mm_min_at_10_v",
+                "mm/min",
+                Velocity::EXPECTED,
+                "Velocity at +10 V; negative if +10 V moves the axis backwards.",
+            ),
+            Key::new(
+                "offset_v",
+                "V",
+                OutputOffset::EXPECTED,
+                "Added to every output, so that a command of 0 holds the drive still; its magnitude is below limit_v.",
+            ),
+            Key::new("limit_v", "V", OutputLimit::EXPECTED, "Greatest output in either direction."),
+        ],
+    ),
+    table(
+        "axis.regulator",
+        "Velocity command of a following error, and feedforward.",
+        &[
+            Key::new("kp_per_s", "1/s", Gain::EXPECTED, "Proportional gain."),
+            Key::new("ki_per_s2", "1/s²", Gain::EXPECTED, "Integral gain."),
+            Key::new("kd", "1", Gain::EXPECTED, "Derivative gain."),
+            Key::new(
+                "feedforward_velocity",
+                "1",
+                FeedforwardGain::EXPECTED,
+                "Feedforward of the commanded velocity; 1 if mm_min_at_10_v is right.",
+            ),
+            Key::new(
+                "feedforward_accel_s",
+                "s",
+                FeedforwardGain::EXPECTED,
+                "Feedforward of the commanded acceleration: the drive's delay and lag.",
+            ),
+            Key::new(
+                "feedforward_jerk_s2",
+                "s²",
+                FeedforwardGain::EXPECTED,
+                "Feedforward of the commanded jerk.",
+            ),
+            Key::new(
+                "feedforward_lead_s",
+                "s",
+                LeadTime::EXPECTED,
+                "How far feedforward comes before the position set-point: the drive's dead time plus half a tick; at \
+                 most 32 ticks. Position set-points of all axes are delayed together.",
+            )
+            .or("0"),
+        ],
+    ),
+    optional(
+        "axis.regulator.feedforward_velocity_table",
+        "Added to feedforward of the velocity.",
+        &[
+            Key::new("reach", "mm/s", Limit::EXPECTED, "Velocity at the last point; beyond, the ends hold."),
+            Key::points("mm_s", "Velocity commands at points evenly from −reach to +reach."),
+        ],
+    ),
+    optional(
+        "axis.regulator.feedforward_accel_table",
+        "Added to feedforward of the acceleration.",
+        &[
+            Key::new("reach", "mm/s²", Limit::EXPECTED, "Acceleration at the last point; beyond, the ends hold."),
+            Key::points("mm_s", "Velocity commands at points evenly from −reach to +reach."),
+        ],
+    ),
+    optional(
+        "axis.regulator.feedforward_jerk_table",
+        "Added to feedforward of the jerk.",
+        &[
+            Key::new("reach", "mm/s³", Limit::EXPECTED, "Jerk at the last point; beyond, the ends hold."),
+            Key::points("mm_s", "Velocity commands at points evenly from −reach to +reach."),
+        ],
+    ),
+    optional(
+        "axis.regulator.inverse",
+        "The drive to be inverted, per unit of the inertia that the axis moves.",
+        &[
+            Key::new(
+                "velocity_gain_per_s",
+                "1/s",
+                InverseGain::EXPECTED,
+                "Proportional gain of the drive's velocity controller.",
+            ),
+            Key::new(
+                "integral_time_s",
+                "s",
+                IntegralTime::EXPECTED,
+                "Integral time of the velocity controller; at least tick_s.",
+            ),
+            Key::new("current_lag_s", "s", Lag::EXPECTED, "Lag of the current loop."),
+            Key::new("viscous_friction_per_s", "1/s", Friction::EXPECTED, "Viscous friction."),
+            Key::new("coulomb_friction_mm_s2", "mm/s²", Friction::EXPECTED, "Coulomb friction."),
+            Key::new(
+                "reversal_mm_s",
+                "mm/s",
+                Reversal::EXPECTED,
+                "Velocity from which on all of Coulomb friction is compensated; below, a part in proportion.",
+            ),
+        ],
+    ),
+    optional(
+        "axis.regulator.inverse.bed",
+        "The machine bed that this axis shakes, as the inverse knows it.",
+        &[
+            Key::new(
+                "frequency_hz",
+                "Hz",
+                Positive::EXPECTED,
+                "Natural frequency of the bed alone; below a quarter of the tick's frequency.",
+            ),
+            Key::new("damping_ratio", "1", Damping::EXPECTED, "Fraction of critical damping."),
+            Key::new("mass_ratio", "1", MassRatio::EXPECTED, "Moving mass over the bed's modal mass."),
+        ],
+    ),
+    table(
+        "axis.drive",
+        "The simulated drive and its mechanics; torque as the acceleration it gives the unloaded axis.",
+        &[
+            Key::new(
+                "velocity_gain_per_s",
+                "1/s",
+                Positive::EXPECTED,
+                "Proportional gain of the drive's velocity controller.",
+            ),
+            Key::new("integral_time_s", "s", Positive::EXPECTED, "Integral time of the velocity controller."),
+            Key::new("current_lag_s", "s", Gain::EXPECTED, "Lag of the current loop; 0 for none."),
+            Key::new(
+                "dead_time_s",
+                "s",
+                DeadTime::EXPECTED,
+                "Dead time from the output to the velocity controller.",
+            ),
+            Key::new(
+                "command_filter_s",
+                "s",
+                Gain::EXPECTED,
+                "Time constant of the drive's command filter; 0 for none.",
+            ),
+            Key::new("accel_limit_mm_s2", "mm/s²", Positive::EXPECTED, "Current limit."),
+            Key::new("load_inertia_ratio", "1", Inertia::EXPECTED, "Added inertia over unloaded inertia."),
+            Key::new("coulomb_friction_mm_s2", "mm/s²", Gain::EXPECTED, "Coulomb friction."),
+            Key::new("viscous_friction_per_s", "1/s", Gain::EXPECTED, "Viscous friction."),
+        ],
+    ),
+    optional(
+        "axis.drive.bed",
+        "The machine bed that the simulated axis shakes: one lightly damped mode.",
+        &[
+            Key::new("frequency_hz", "Hz", Positive::EXPECTED, "Natural frequency of the bed alone."),
+            Key::new("damping_ratio", "1", Gain::EXPECTED, "Fraction of critical damping."),
+            Key::new("mass_ratio", "1", Positive::EXPECTED, "Moving mass over the bed's modal mass."),
+        ],
+    ),
+];
