@@ -12,6 +12,7 @@
 //! - [`harmonic`]: amplitude and phase of the velocity;
 //! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
+//! - [`learning`]: a correction of a path that is driven again and again;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
 //! - [`sine`], [`spectrum`], [`model`]: the mathematics of it;
 //! - [`mod@reference`]: what S4 measured, and what the reference machine has to give.
@@ -21,6 +22,7 @@ pub mod circle;
 pub mod experiment;
 pub mod harmonic;
 pub mod inertia;
+pub mod learning;
 pub mod model;
 pub mod reference;
 pub mod sine;

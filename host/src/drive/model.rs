@@ -1,7 +1,7 @@
-//! The drive's linear model: what it would do with a small signal, without friction, current limit and bed.
+//! The drive's linear model: what it would do with a small signal, without Coulomb friction and current limit.
 
 use core::f64::consts::TAU;
-use core::ops::{Add, Div, Mul};
+use core::ops::{Add, Div, Mul, Sub};
 
 use hal_sim::DriveParameters;
 
@@ -35,12 +35,25 @@ impl Complex {
     pub fn phase_rad(self) -> f64 {
         libm::atan2(self.im, self.re)
     }
+
+    /// re − i·im.
+    #[must_use]
+    pub const fn conjugate(self) -> Self {
+        Self::new(self.re, -self.im)
+    }
 }
 
 impl Add for Complex {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Self::new(self.re + other.re, self.im + other.im)
+    }
+}
+
+impl Sub for Complex {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self::new(self.re - other.re, self.im - other.im)
     }
 }
 
@@ -62,8 +75,10 @@ impl Div for Complex {
 /// Actual over commanded velocity at a frequency above 0, the command held over ticks of `tick_s`:
 ///
 /// ```text
-/// G = e^(−s(τ + Ts/2))/(1 + Tf·s) · H/(1 + H),   H = Kv(1 + 1/(Ti·s))/((1 + Tc·s)((1 + ρ)s + b))
+/// G = e^(−s(τ + Ts/2))/(1 + Tf·s) · H/(1 + H),   H = Kv(1 + 1/(Ti·s))/((1 + Tc·s)((1 + ρ)(1 + B)s + b))
 /// ```
+///
+/// The bed accelerates by B = −μs²/((1 + μ)s² + 2ζωs + ω²) of what the axis does.
 #[must_use]
 pub fn response(drive: &DriveParameters, tick_s: f64, frequency_hz: f64) -> Complex {
     let real = |value: f64| Complex::new(value, 0.0);
@@ -71,7 +86,12 @@ pub fn response(drive: &DriveParameters, tick_s: f64, frequency_hz: f64) -> Comp
     let one = real(1.0);
     let controller = real(drive.velocity_gain_per_s) * (one + one / (real(drive.integral_time_s) * s));
     let current = one + real(drive.current_lag_s) * s;
-    let axis = real(1.0 + drive.load_inertia_ratio) * s + real(drive.viscous_friction_per_s);
+    let bed = drive.bed.map_or(Complex::ZERO, |bed| {
+        let omega = TAU * bed.frequency_hz;
+        let damped = real(2.0 * bed.damping_ratio * omega) * s + real(omega * omega);
+        real(-bed.mass_ratio) * s * s / (real(1.0 + bed.mass_ratio) * s * s + damped)
+    });
+    let axis = real(1.0 + drive.load_inertia_ratio) * (one + bed) * s + real(drive.viscous_friction_per_s);
     let open = controller / (current * axis);
     let (sine, cosine) = libm::sincos(-TAU * frequency_hz * (drive.dead_time_s + 0.5 * tick_s));
     let filter = one + real(drive.command_filter_s) * s;
