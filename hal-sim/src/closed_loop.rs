@@ -93,7 +93,7 @@ pub enum LoopError {
 /// The background's part: keeps the streams full.
 pub struct Producer<'a, R: Real, const AXES: usize> {
     feeder: Feeder<'a, R, AXES>,
-    supply: Supply<R, AXES, Reader<'a, AXES>>,
+    supply: Supply<R, AXES, Reader<'a, AXES>, ProgramError>,
 }
 
 impl<R: Real, const AXES: usize> Producer<'_, R, AXES> {

@@ -5,6 +5,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use motion_host::machine::Machine;
+use motion_kernel::num::Fixed;
+use motion_kernel::program::{Reader, check};
 use serde_json::Value;
 
 /// A directory of a test's own, removed afterwards.
@@ -574,4 +577,70 @@ fn drive_refuses_what_cannot_be_done() {
     // What the parser of arguments refuses has the same status.
     assert_eq!(desk.motion(&["drive", "circle", "--feedforward", "q"]).status.code(), Some(2));
     assert_eq!(desk.motion(&["drive", "harmonic", "--feedforward", "v"]).status.code(), Some(2));
+}
+
+/// A machine is tuned, the file is what was verified, and what would be worse is not written.
+#[test]
+fn drive_tune_writes_what_it_has_verified() {
+    let desk = Desk::new("tune");
+    let json = desk.json(&["drive", "tune", "--axis", "x,Y", "--output", "tuned.toml", "--json"]);
+    assert_has(&json, &["axes", "output", "verification"]);
+    assert_eq!(json["output"], "tuned.toml");
+    let axes = json["axes"].as_array().expect("a list");
+    assert_eq!(axes.len(), 2);
+    for axis in axes {
+        assert_has(axis, &["changes", "found", "margins", "name", "remarks"]);
+        assert_has(&axis["margins"], &["crossover_hz", "gain", "phase_deg", "sensitivity"]);
+        assert!((number(&axis["found"]["velocity_gain_per_s"]["value"]) - 440.0).abs() < 4.4);
+        for change in axis["changes"].as_array().expect("a list") {
+            assert_has(change, &["after", "before", "key", "reason", "unit"]);
+        }
+    }
+    assert!(axes[0]["found"]["bed"].is_null() && axes[1]["found"]["bed"].is_object());
+    for circle in json["verification"]["circles"].as_array().expect("a list") {
+        let contour_um = |when: &str| number(&circle[when]["contour_error_um"]);
+        assert!(contour_um("after") < 1.0 && contour_um("before") > 5.0, "{circle}");
+    }
+    let tuned = Machine::from_toml("tuned.toml", &desk.read("tuned.toml")).expect("a machine file");
+    let [x, _, z] = &tuned.axes;
+    assert!((x.feedforward.lead_s - 1.67e-3).abs() < 1e-5 && x.feedforward.drive.is_some());
+    assert_eq!(z, &Machine::reference().axes[2]);
+
+    let worse = ["drive", "tune", "--machine", "tuned.toml", "--method", "series", "--output", "worse.toml"];
+    let output = desk.motion(&worse);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("a circle got worse: nothing is written"));
+    assert!(!desk.0.join("worse.toml").exists());
+
+    let refusal = desk.refusal(&["drive", "tune", "--axis", "W"]);
+    assert!(refusal.contains("found axis W, expected the name of an axis of the machine"), "{refusal}");
+    let refusal = desk.refusal(&["drive", "tune", "--machine", "missing.toml"]);
+    assert!(refusal.contains("missing.toml"), "{refusal}");
+}
+
+/// What a board gets is a program to it; what is wrong with the input is said with file and line, and nothing is written.
+#[test]
+fn compile_writes_a_program_or_says_why_not() {
+    let desk = Desk::new("compile");
+    desk.put("part.ngc", "G1 X10 Y5 F3000\nG2 X20 Y15 I5 J5 F1000\nG4 P0.1\nG0 Z3\nM2\n");
+    for number in ["f32", "fixed"] {
+        let said = desk.stdout(&["compile", "part.ngc", "--number", number, "--output", "part.bin"]);
+        let bytes = fs::read(desk.0.join("part.bin")).expect("a file");
+        assert!(said.contains(&format!(" {} bytes", bytes.len())), "{said}");
+        let program = Reader::<3>::new(&bytes).expect("a program");
+        assert_eq!(*program.header(), Machine::reference().header());
+        assert_eq!(check::<f32, 3, _>(program.header(), program), Ok(()));
+        assert_eq!(check::<Fixed, 3, _>(program.header(), program), Ok(()));
+        assert!(said.contains(&format!(" {} items", program.count())), "{said}");
+        fs::remove_file(desk.0.join("part.bin")).expect("it is there");
+    }
+    desk.put("wrong.ngc", "G1 X10 F3000\nG1 X2O\nM2\n");
+    let refusal = desk.refusal(&["compile", "wrong.ngc", "--output", "part.bin"]);
+    assert!(refusal.starts_with("wrong.ngc:2:") && refusal.contains(", expected"), "{refusal}");
+    desk.put("dense.ngc", "G1 X1 F600\nG1 X1.0000000001\nM2\n");
+    let refusal = desk.refusal(&["compile", "dense.ngc", "--output", "part.bin"]);
+    assert!(refusal.starts_with("dense.ngc:2: found "), "{refusal}");
+    assert!(!desk.0.join("part.bin").exists());
+    let refusal = desk.refusal(&["compile", "part.ngc", "--output", "no/such/place"]);
+    assert!(refusal.starts_with("no/such/place: found ") && refusal.contains(", expected"), "{refusal}");
 }

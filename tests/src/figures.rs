@@ -2,7 +2,7 @@
 //! the documents show.
 //!
 //! A test measures, then calls [`hold`]: it fails if a figure has grown by more than its tolerance, if any
-//! text differs, or if a document shows something else. With `MOTION_ACCEPT=1` in the environment the
+//! text differs, or if a document shows something else or none shows it. With `MOTION_ACCEPT=1` in the environment the
 //! measured table is written instead, to the file and into the documents:
 //!
 //! ```text
@@ -15,8 +15,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// The documents that may show figures, from the repository's root.
-const DOCUMENTS: [&str; 5] =
-    ["README.md", "ARCHITECTURE.md", "kernel/README.md", "boards/README.md", "boards/qemu-mps2/README.md"];
+const DOCUMENTS: [&str; 4] =
+    ["README.md", "ARCHITECTURE.md", "boards/README.md", "boards/qemu-mps2/README.md"];
 const END: &str = "<!-- end of figures -->";
 
 /// A table of figures. A cell that reads as a number is compared with a tolerance, any other as text.
@@ -73,6 +73,12 @@ fn number(cell: &str) -> Option<f64> {
     cell.parse().ok()
 }
 
+/// Whether what is measured is to be written instead of compared.
+#[must_use]
+pub fn is_accepting() -> bool {
+    std::env::var("MOTION_ACCEPT").is_ok_and(|value| value == "1")
+}
+
 /// Holds `measured` to the committed table `name`; no figure may have grown by more than the part `growth`
 /// of it.
 ///
@@ -80,7 +86,7 @@ fn number(cell: &str) -> Option<f64> {
 /// What differs, and the command that accepts it.
 pub fn hold(name: &str, measured: &Table, growth: f64) -> Result<(), String> {
     let path = root().join("tests/expected").join(format!("{name}.md"));
-    if std::env::var("MOTION_ACCEPT").is_ok_and(|value| value == "1") {
+    if is_accepting() {
         write(&path, &measured.to_markdown())?;
         return each_copy(name, |document, copy| write(document, &copy.replaced(&measured.to_markdown())));
     }
@@ -150,14 +156,19 @@ impl<'a> Copy<'a> {
     }
 }
 
-/// Calls `act` with every document that shows the figures `name`.
+/// Calls `act` with every document that shows the figures `name`: one at least does.
 fn each_copy(name: &str, act: impl Fn(&Path, &Copy<'_>) -> Result<(), String>) -> Result<(), String> {
+    let mut shown = 0;
     for document in DOCUMENTS {
         let path = root().join(document);
-        let Ok(text) = std::fs::read_to_string(&path) else { continue };
+        let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         if let Some(copy) = Copy::find(&text, name) {
             act(&path, &copy)?;
+            shown += 1;
         }
+    }
+    if shown == 0 {
+        return Err(format!("no document shows {name} between <!-- figures: {name} --> and {END}"));
     }
     Ok(())
 }
@@ -190,6 +201,18 @@ mod tests {
         assert_eq!(copy.shown, "old\n");
         assert_eq!(copy.replaced("new\n"), replaced.replacen("old", "new", 1));
         assert!(Copy::find(&text, "c").is_none() && Copy::find("<!-- figures: a -->\nopen", "a").is_none());
+    }
+
+    #[test]
+    fn every_committed_table_is_shown() {
+        for file in std::fs::read_dir(root().join("tests/expected")).unwrap() {
+            let path = file.unwrap().path();
+            if path.extension().is_some_and(|extension| extension == "md") {
+                let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+                each_copy(&name, |_, _| Ok(())).unwrap();
+            }
+        }
+        assert!(each_copy("none of them", |_, _| Ok(())).is_err());
     }
 
     #[test]

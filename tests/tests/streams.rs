@@ -13,8 +13,8 @@ use motion_host::planning::{Executable, Mode, Problem, plan_program};
 use motion_kernel::exec::{ExecFault, ExecState, Executed, Executor, PIECES_PER_TICK_MAX};
 use motion_kernel::law::{FeedSegment, Limits, Ticks};
 use motion_kernel::path::{Piece, PieceError};
-use motion_kernel::program::Supply;
 use motion_kernel::program::supply::Ready;
+use motion_kernel::program::{self, CheckError, Header, Item, Supply, SupplyError};
 use motion_kernel::queue::{Feeder, PathRules, Refused, Rejection, SEGMENTS_PER_TICK_MAX, Streams};
 use motion_kernel::units::Position;
 
@@ -488,6 +488,65 @@ fn a_program_too_dense_for_a_tick_is_refused_with_its_line_and_the_feed_that_wou
     assert_eq!(would_do, Ok(()), "the feed that it names");
     let executed = execute::<64>(&executable(&short_lines(15.9)), |_| true);
     assert!(executed.len() > 100);
+}
+
+/// The same refusals as while it runs, before it does.
+#[test]
+fn a_check_finds_whatever_the_streams_would_refuse() {
+    let good = executable(SHORT);
+    let header = Machine::reference().header();
+    let found = |header: &Header<3>, items: &[Item<3>]| {
+        program::check::<f32, 3, Infallible>(header, items.iter().map(|&item| Ok(item)))
+    };
+    let with = |index: usize, change: &dyn Fn(&mut Item<3>)| {
+        let mut items = good.items.clone();
+        change(&mut items[index]);
+        found(&header, &items)
+    };
+    assert_eq!(found(&header, &good.items), Ok(()));
+    let mut lines = good.items.iter().enumerate().filter(|(_, item)| matches!(item, Item::Line { .. }));
+    let index = lines.nth(3).expect("lines").0;
+    let refused = with(index, &|item| {
+        if let Item::Line { direction, .. } = item {
+            direction[1] = f64::NAN;
+        }
+    });
+    let not_finite = SupplyError::Piece(PieceError::NotFinite { axis: 1 });
+    assert_eq!(refused, Err(CheckError::Item { index: index as u32, cause: not_finite }));
+    let refused = with(index, &|item| {
+        if let Item::Line { start, .. } = item {
+            start[2] = start[2] + mm(0.001);
+        }
+    });
+    let Err(CheckError::Item { index: at, cause: SupplyError::Rejected(Rejection::Gap { axis: 2, .. }) }) =
+        refused
+    else {
+        panic!("{refused:?}")
+    };
+    assert_eq!(at as usize, index);
+    let unfinished = &good.items[..good.items.len() - 1];
+    assert_eq!(found(&header, unfinished), Err(CheckError::Unfinished));
+    let far = Header { start: [Position::ZERO, Position::from_bits(i64::MIN), Position::ZERO], ..header };
+    assert!(matches!(found(&far, &good.items), Err(CheckError::Start { axis: 1, .. })));
+}
+
+/// What follows an item that was refused would not continue what is queued.
+#[test]
+fn a_supply_stays_where_it_failed() {
+    let header = Machine::reference().header();
+    let mut items = executable(SHORT).items;
+    let Item::Line { direction, .. } = &mut items[0] else { panic!("{:?}", items[0]) };
+    direction[0] = f64::INFINITY;
+    let mut streams = Box::new(Streams::<f32, 3, 64, 64>::new());
+    let (mut feeder, mut intake) = streams.split(header.rules, header.start);
+    let mut supply = Supply::new(items.into_iter().map(Ok::<_, Infallible>), header.tick_s);
+    let mut executor = Executor::<f32, 3>::new(header.start);
+    for _ in 0..100 {
+        let refused = supply.fill(&mut feeder);
+        assert_eq!(refused, Err(SupplyError::Piece(PieceError::NotFinite { axis: 0 })));
+        assert!(!supply.is_empty());
+        assert_eq!(executor.tick(&mut intake).expect("nothing entered").state, ExecState::Idle);
+    }
 }
 
 /// 10 000 lines of 1 nm: refused with a helpful message, or executed within the bounds.

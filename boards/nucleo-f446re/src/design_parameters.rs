@@ -102,10 +102,24 @@ pub const WATCHDOG_MIN_NS: u32 =
 /// Greatest time to the reset \[ns\].
 pub const WATCHDOG_MAX_NS: u32 =
     (WATCHDOG_COUNTS as u64 * WATCHDOG_PRESCALER as u64 * 1_000_000_000 / LSI_MIN_HZ as u64) as u32;
+/// What an item of a program takes the background \[cycles\]: some 20 000, double precision in software.
+/// Assumed, not measured; the log's "background turn" is the measurement.
+pub const ITEM_CYCLES: u32 = 20_000;
+/// What a tick takes from the background \[cycles\]: twice what is estimated for one with slow memory.
+pub const TICK_CYCLES_TAKEN: u32 = 4_000;
+/// Items that the background sustains \[1/s\]: 8000, four a tick. What the streams accept at most is 16 pieces and 8
+/// segments a tick, 48 000; beyond this the streams run dry, which is a fault.
+pub const ITEMS_PER_S: u32 = (SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) / ITEM_CYCLES;
+/// The items of both streams.
+pub const ITEMS_QUEUED_MAX: u32 = 2 * 63;
 /// For so long the background may be silent before the tick stops feeding the watchdog \[ticks\]: 0.1 s. Its
-/// longest turn refills both streams, 126 items of some 20 000 cycles (double precision in software):
-/// 15 ms. The log's "background turn" is the measurement.
+/// longest turn refills both streams, in 16 ms.
 pub const BACKGROUND_SILENT_TICKS_MAX: u32 = TICK_HZ / 10;
+
+const _: () = assert!(
+    4 * ITEMS_QUEUED_MAX * TICK_HZ < BACKGROUND_SILENT_TICKS_MAX * ITEMS_PER_S,
+    "the longest turn is close to what the watchdog takes for silence"
+);
 
 /// How long the machine is held still after the drives are enabled \[ticks\]: 0.2 s for their relays and brakes.
 pub const SETTLE_TICKS: u32 = TICK_HZ / 5;
@@ -165,6 +179,12 @@ mod tests {
         // Ten times in hand even at the rate that the filter passes at most.
         let counts_per_tick = ENCODER_COUNTS_PER_S_MAX / TICK_HZ;
         assert!(10 * counts_per_tick < 1 << (ENCODER_BITS_MIN - 1));
+    }
+
+    #[test]
+    fn the_readme_says_what_the_background_sustains() {
+        assert_eq!(ITEMS_PER_S, 8000);
+        assert!(include_str!("../README.md").contains("8000 items a second"));
     }
 
     #[test]

@@ -2,11 +2,11 @@
 //!
 //! Consumes the program in flash, which `motion compile` wrote with the machine's scales, gains and limits;
 //! produces the kernel's configuration, once, before the first tick. So there is one description of the
-//! machine, its file on the PC, and the board checks here what only it can know. A program that is damaged or
-//! does not suit the board is refused before anything is enabled.
+//! machine, its file on the PC, and the board checks here what only it can know. A program that is damaged, does
+//! not suit the board, or holds an item anywhere that could not be executed is refused before anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
-use motion_kernel::program::{Header, ProgramError, Reader};
+use motion_kernel::program::{CheckError, Header, ProgramError, Reader, check};
 
 use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
 
@@ -41,6 +41,8 @@ pub enum MachineError {
     },
     /// A figure of an axis is out of its range.
     Axes(AxesError),
+    /// An item can't be executed, or the program starts or ends where it can't.
+    Items(CheckError<ProgramError>),
 }
 
 /// A program that suits the board, and its machine.
@@ -71,7 +73,9 @@ impl Machine {
                 return Err(MachineError::CountRate { axis, counts_per_s, limit });
             }
         }
-        Ok(Self { axes: AxesConfig::new(axes, TICK_S).map_err(MachineError::Axes)?, program })
+        let axes = AxesConfig::new(axes, TICK_S).map_err(MachineError::Axes)?;
+        check::<f32, AXES, _>(program.header(), program).map_err(MachineError::Items)?;
+        Ok(Self { program, axes })
     }
 
     /// What the program was planned for.
@@ -83,7 +87,8 @@ impl Machine {
 
 #[cfg(test)]
 mod tests {
-    use motion_kernel::program::write;
+    use motion_kernel::program::{Item, SupplyError, write};
+    use motion_kernel::units::Position;
 
     use super::*;
 
@@ -99,6 +104,28 @@ mod tests {
     #[test]
     fn the_program_in_flash_suits() {
         Machine::new(PROGRAM).expect("suits");
+    }
+
+    /// The last item but one is damaged, behind a checksum that is right: nothing of the program starts.
+    #[test]
+    fn an_item_that_cannot_be_executed_is_found_before_the_start() {
+        let good = Machine::new(PROGRAM).expect("suits").program;
+        let header = *good.header();
+        let mut items: Vec<Item<AXES>> = good.map(|item| item.expect("an item")).collect();
+        let at = items.iter().rposition(|item| matches!(item, Item::Line { .. })).expect("a line");
+        if let Item::Line { direction, .. } = &mut items[at] {
+            direction[0] = f64::NAN;
+        }
+        let mut bytes = Vec::new();
+        write(&header, &items, &mut bytes).expect("short");
+        let refused = Machine::new(bytes.leak()).map(|_| ());
+        assert!(
+            matches!(refused, Err(MachineError::Items(CheckError::Item { index, cause: SupplyError::Piece(_) }))
+                if index as usize == at),
+            "{refused:?}"
+        );
+        let far = with(|header| header.start[1] = Position::from_bits(i64::MAX)).map(|_| ());
+        assert!(matches!(far, Err(MachineError::Items(CheckError::Start { axis: 1, .. }))), "{far:?}");
     }
 
     #[test]

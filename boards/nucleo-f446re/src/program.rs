@@ -27,7 +27,7 @@ pub enum RunError {
 #[derive(Debug)]
 pub struct Run {
     to_start: Travel,
-    program: Supply<f32, AXES, Reader<'static, AXES>>,
+    program: Supply<f32, AXES, Reader<'static, AXES>, ProgramError>,
 }
 
 impl Run {

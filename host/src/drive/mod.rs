@@ -10,6 +10,7 @@
 //! - [`turning`]: circles of constant feed, the motion of two experiments;
 //! - [`step`]: the feed steps within one tick, open loop;
 //! - [`harmonic`]: amplitude and phase of the velocity;
+//! - [`identification`]: the runs that [`crate::identify`] asks for;
 //! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
 //! - [`learning`]: a correction of a path that is driven again and again;
@@ -21,6 +22,7 @@ pub mod bode;
 pub mod circle;
 pub mod experiment;
 pub mod harmonic;
+pub mod identification;
 pub mod inertia;
 pub mod learning;
 pub mod model;

@@ -147,6 +147,7 @@ fn unmade(error: &SegmentError, tick_s: f64) -> String {
         SegmentError::LengthMismatch { ramp_mm, path_mm } => {
             format!("a ramp of {ramp_mm} mm, expected the length of its path, {path_mm} mm")
         }
+        SegmentError::FeedStep { .. } => error.to_string().replacen(": expected", ", expected", 1),
     }
 }
 

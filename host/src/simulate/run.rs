@@ -138,7 +138,7 @@ fn run_in<R: Real>(
     if let Some(&StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
         intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?);
     }
-    let mut supply = Supply::<R, AXES, _>::new(executable.supplied(), executable.tick_s);
+    let mut supply = Supply::<R, AXES, _, _>::new(executable.supplied(), executable.tick_s);
 
     let mut summary = RunSummary {
         tick_s: machine.tick_s,

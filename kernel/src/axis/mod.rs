@@ -100,13 +100,15 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
         let () = Self::ONE_AT_LEAST;
         let error = |(axis, cause)| AxesError { axis, cause };
         let preview_ticks = preview::preview_ticks(figures, tick_s).map_err(error)?;
-        let config = |axis: usize| {
-            AxisConfig::new(&figures[axis], preview_ticks, tick_s).map_err(|cause| error((axis, cause)))
+        let config = |(axis, figures): (usize, &AxisFigures)| {
+            AxisConfig::new(figures, preview_ticks, tick_s).map_err(|cause| error((axis, cause)))
         };
+        let mut each = figures.iter().enumerate();
+        let none = ScaleError { quantity: "number of axes", value: 0.0, expected: "one at least" };
         // Without allocation an array is filled by a fallible function only over something already there.
-        let mut axes = [config(0)?; AXES];
-        for (axis, place) in axes.iter_mut().enumerate().skip(1) {
-            *place = config(axis)?;
+        let mut axes = [config(each.next().ok_or(error((0, none)))?)?; AXES];
+        for (place, figures) in axes.iter_mut().skip(1).zip(each) {
+            *place = config(figures)?;
         }
         Ok(Self { axes, preview_ticks })
     }
@@ -161,7 +163,7 @@ pub struct AxisOutput<R> {
     pub code: DacCode,
     /// The output reached the limit.
     pub saturated: bool,
-    /// The following error is beyond its limit.
+    /// The following error is beyond its limit. Then no gain is applied to it: the output is that of standing still.
     pub lost: bool,
 }
 
@@ -192,25 +194,74 @@ impl<R: Real> AxisState<R> {
             saturated: false,
             lost: false,
         };
-        self.regulator.watch(output.following_error_mm);
+        // No change from here to the next tick is beyond what the gains were accepted for.
+        let limit_mm = config.following_error_limit_mm;
+        self.regulator.watch(output.following_error_mm.max(-limit_mm).min(limit_mm));
     }
 
     /// One control tick: `setpoint` is the present one, of which feedforward is made; `output` comes with what the
     /// encoder read and the position to regulate to, and leaves with the rest.
+    ///
+    /// Beyond the limit of the following error the axis is lost and its regulator does not move: what a broken encoder
+    /// makes of the gains may be beyond the number type.
     // Not inlined: three copies of it would fight for the registers.
     #[inline(never)]
     pub fn tick(&mut self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, output: &mut AxisOutput<R>) {
         let actual = self.position(config, output.counts);
         // Subtracted in fixed point, converted afterwards.
         let following_error_mm: R = (output.set - actual).to_offset();
-        self.peak_following_error_mm = self.peak_following_error_mm.max(following_error_mm.abs());
+        let size_mm = following_error_mm.abs();
+        self.peak_following_error_mm = self.peak_following_error_mm.max(size_mm);
+        // Written so that what is not a number counts as lost.
+        if !(size_mm <= config.following_error_limit_mm) {
+            self.stand_still(config, output);
+            output.lost = true;
+            return;
+        }
         let command =
             config.regulator.tick(&mut self.regulator, following_error_mm, setpoint, config.output.limits());
         output.actual = actual;
         output.following_error_mm = following_error_mm;
         output.code = config.output.code(command.velocity_mm_s);
         output.saturated = command.saturated;
-        // Written so that what is not a number counts as lost.
-        output.lost = !(following_error_mm.abs() <= config.following_error_limit_mm);
+        output.lost = false;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::num::{Fixed, Scalar};
+
+    /// An encoder that jumps by ten kilometres, with gains that would make more of it than fixed point holds.
+    #[test]
+    fn an_axis_that_is_lost_stands_still_and_overflows_nothing() {
+        let figures = AxisFigures {
+            mm_per_count: 1e-4,
+            mm_s_at_10_v: 1000.0 / 3.0,
+            output_offset_v: 0.5,
+            output_limit_v: 10.0,
+            gains: Gains { kp_per_s: 230.0, ki_per_s2: 1e4, kd: 1.0 },
+            feedforward: Feedforward::default(),
+            following_error_limit_mm: 1.0,
+        };
+        let config = AxisConfig::<Fixed>::new(&figures, 0, 5e-4).expect("valid");
+        let setpoint = Setpoint::default();
+        let at = |mm: f64| AxisOutput { counts: Counts((mm * 1e4) as i64), ..AxisOutput::default() };
+        for mm in [1e7, -1e7, 2e9, 1.001] {
+            let mut axis = AxisState::default();
+            let mut output = at(mm);
+            axis.tick(&config, &setpoint, &mut output);
+            assert!(output.lost && output.code == config.output.code(Fixed::ZERO), "{mm}: {output:?}");
+            assert!((output.following_error_mm.to_f64() + mm).abs() < 1e-3, "{mm}: {output:?}");
+            assert_eq!(axis.peak_following_error_mm, output.following_error_mm.abs());
+            // And back again.
+            let mut output = at(0.0);
+            axis.tick(&config, &setpoint, &mut output);
+            assert!(!output.lost);
+        }
+        let mut output = at(0.9999);
+        AxisState::default().tick(&config, &setpoint, &mut output);
+        assert!(!output.lost && output.code != config.output.code(Fixed::ZERO));
     }
 }

@@ -108,6 +108,13 @@ pub enum SegmentError {
         /// The length of path \[mm\].
         path_mm: f64,
     },
+    /// The feed would change in no time.
+    FeedStep {
+        /// F₀ \[mm/s\].
+        from_mm_s: f64,
+        /// F \[mm/s\].
+        to_mm_s: f64,
+    },
 }
 
 impl core::fmt::Display for SegmentError {
@@ -116,6 +123,12 @@ impl core::fmt::Display for SegmentError {
             Self::OutOfRange { quantity, value } => write!(f, "{quantity} {value} is out of range"),
             Self::LengthMismatch { ramp_mm, path_mm } => {
                 write!(f, "a ramp of {ramp_mm} mm over {path_mm} mm of path")
+            }
+            Self::FeedStep { from_mm_s, to_mm_s } => {
+                write!(
+                    f,
+                    "a step of the feed from {from_mm_s} to {to_mm_s} mm/s: expected a rise that takes time"
+                )
             }
         }
     }
@@ -209,7 +222,7 @@ impl<R: Real> FeedSegment<R> {
     /// A ramp over `length` of path, which must be its own length to 10⁻⁸ mm (rounding).
     ///
     /// # Errors
-    /// A figure is not finite, negative or too large, or the lengths differ.
+    /// A figure is not finite, negative or too large, the lengths differ, or the feed steps.
     pub fn ramp<P: Root>(ramp: &Ramp<P>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
         let ramp = to_f64(ramp);
         let path_mm = length.to_mm();
@@ -254,6 +267,9 @@ impl<R: Real> FeedSegment<R> {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(SegmentError::OutOfRange { quantity, value });
             }
+        }
+        if t1_s <= 0.0 && from_mm_s != to_mm_s {
+            return Err(SegmentError::FeedStep { from_mm_s, to_mm_s });
         }
         let ticks = |quantity, value| {
             Ticks::from_seconds(value, tick_s).ok_or(SegmentError::OutOfRange { quantity, value })

@@ -15,8 +15,16 @@
 //! A product of two `Unit`s is one 32×32→64-bit multiplication; of a [`Fixed`] and a `Unit` two; of
 //! two [`Fixed`] four, of which the tick has a few dozen: the chain rule's and the regulator's.
 //!
-//! Products are rounded down. Sums and products of accepted input can't overflow: items are checked
-//! for it when they are made ([`FeedSegment`](crate::law::FeedSegment), [`Piece`](crate::path::Piece)).
+//! Products are rounded down. Sums and products of accepted input don't overflow, because of what is refused before:
+//!
+//! | what | where | how |
+//! |---|---|---|
+//! | scales of a ramp | [`FeedSegment`](crate::law::FeedSegment), when it is made | each fits, and sums of them stay between its feeds |
+//! | a septic's sums | [`Piece::septic`](crate::path::Piece::septic) | Σ k(k−1)(k−2)·\|qₖ\| and its like below 4 |
+//! | set-points and what leads to them | [`Feeder`](crate::queue::Feeder), where piece and feed meet | the chain rule with greatest values, at most [`Real::SETPOINT_MAX`] |
+//! | feedforward | [`AxesConfig`](crate::axis::AxesConfig) | gains times [`Real::SETPOINT_MAX`] within an eighth of the range |
+//! | feedback | [`AxesConfig`](crate::axis::AxesConfig) | gains times the following-error limit within an eighth; beyond the limit the axis is lost and no gain is applied |
+//!
 //! They wrap if they do; in a build with debug assertions that is found.
 //!
 //! # Planning
@@ -165,6 +173,8 @@ impl Real for Fixed {
     const EPSILON: f64 = 1.0 / 4_294_967_296.0;
     const PIECE_MM_MAX: f64 = 16.0;
     const RAMP_MM_MAX: f64 = 90.0e3;
+    // A part of 0.93 of the range: the rest is for rounding.
+    const SETPOINT_MAX: Option<[f64; 3]> = Some([1.0e6, 1.0e9, 2.0e9]);
 
     fn checked_from_f64(value: f64) -> Option<Self> {
         (libm::fabs(value) < 2_147_483_648.0).then(|| Self::from_f64(value))
@@ -287,6 +297,7 @@ impl Scalar for I3F29 {
 
 impl Unit for I3F29 {
     const SERIES_TERMS: usize = 8;
+    const LIMIT: f64 = 4.0;
 
     #[inline]
     #[allow(clippy::cast_possible_truncation)]

@@ -33,6 +33,7 @@ macro_rules! float {
 
         impl Unit for $float {
             const SERIES_TERMS: usize = $terms;
+            const LIMIT: f64 = f64::INFINITY;
 
             #[inline]
             fn from_fraction($f: u64) -> Self {
@@ -45,6 +46,7 @@ macro_rules! float {
             const EPSILON: f64 = $float::EPSILON as f64;
             const PIECE_MM_MAX: f64 = $piece;
             const RAMP_MM_MAX: f64 = $ramp;
+            const SETPOINT_MAX: Option<[f64; 3]> = None;
 
             fn checked_from_f64(value: f64) -> Option<Self> {
                 let narrow = Self::from_f64(value);

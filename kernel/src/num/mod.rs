@@ -82,6 +82,8 @@ pub trait Unit: Scalar + Coefficients {
     /// Terms of the power series of the law's shapes that this type resolves over half a phase, at
     /// most 12 (see [`crate::law::shape`]).
     const SERIES_TERMS: usize;
+    /// Magnitudes below this are held; infinite for floats.
+    const LIMIT: f64;
 
     /// A fraction of one in steps of 2⁻⁶⁴.
     fn from_fraction(fraction: u64) -> Self;
@@ -101,6 +103,11 @@ pub trait Real: Scalar {
     /// \[mm\]: a five-hundredth of it is scaled by a sine of this type, good to six [`Self::EPSILON`] in a
     /// float and 70 steps of 2⁻²⁹ in fixed point. Reached by limits so soft that a ramp takes a minute.
     const RAMP_MM_MAX: f64;
+
+    /// Greatest velocity, acceleration and jerk that an axis may be asked for \[mm/s, mm/s², mm/s³\], and with the
+    /// last the greatest number on the way to them, whatever its unit; none for floats, whose range is out of reach.
+    /// Feedforward is accepted with room for as much.
+    const SETPOINT_MAX: Option<[f64; 3]>;
 
     /// The nearest value to `value`; `None` if it is not finite or beyond the type's range.
     fn checked_from_f64(value: f64) -> Option<Self>;

@@ -6,4 +6,5 @@
 
 pub mod piece;
 
+pub(crate) use piece::Steepness;
 pub use piece::{Geometry, Piece, PieceError, Setpoint};

@@ -79,6 +79,13 @@ pub enum PieceError {
         /// The longest allowed \[mm\].
         longest_mm: f64,
     },
+    /// Its derivatives could outgrow the number type.
+    Bent {
+        /// The axis, from 0.
+        axis: usize,
+        /// The greatest of Σ|qₖ|, Σ k·|qₖ|, Σ k(k−1)·|qₖ| and Σ k(k−1)(k−2)·|qₖ|.
+        sum: f64,
+    },
     /// The derivative by arc length is not a unit vector.
     NotArcLength {
         /// Its magnitude.
@@ -96,6 +103,9 @@ impl core::fmt::Display for PieceError {
             Self::Length { length_mm, longest_mm } => {
                 write!(f, "length {length_mm} mm: expected more than 0 and at most {longest_mm} mm")
             }
+            Self::Bent { axis, sum } => {
+                write!(f, "derivatives of axis {axis} up to {sum} parts of the length: expected less than 4")
+            }
             Self::NotArcLength { magnitude } => {
                 write!(f, "tangent of magnitude {magnitude}: expected 1, a polynomial of arc length")
             }
@@ -109,6 +119,9 @@ impl core::error::Error for PieceError {}
 const TANGENT_CHECKS: u8 = 13;
 /// How far the tangent's magnitude may be from 1: a part in 10⁵ of the feed.
 const TANGENT_TOLERANCE: f64 = 1.0e-5;
+/// What rounding may add to a derivative of a septic in a unit of fixed point: 512 steps of 2⁻²⁹, of which
+/// [`derivatives`] makes some 300.
+const ROUNDING: f64 = 1.0 / 1_048_576.0;
 
 impl<R: Real, const AXES: usize> Piece<R, AXES> {
     /// A line of `length` from `start` along the unit vector `direction`; `line` is the program line
@@ -134,8 +147,8 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     /// u = s/length, as parts of the length.
     ///
     /// # Errors
-    /// A coefficient is not finite, the length is out of range, or a tangent at an end is not a unit
-    /// vector.
+    /// A coefficient is not finite, the length is out of range, a derivative could outgrow the number type, or
+    /// a tangent is not a unit vector.
     pub fn septic(
         line: u32,
         start: [Position; AXES],
@@ -148,11 +161,18 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         let mut unit = [[R::Unit::ZERO; 7]; AXES];
         for (axis, (unit, coefficients)) in unit.iter_mut().zip(&coefficients).enumerate() {
             for (unit, &c) in unit.iter_mut().zip(coefficients) {
-                // Half the range of a unit, so that the derivatives' sums have room.
                 if !(libm::fabs(c) < 2.0) {
                     return Err(PieceError::OutOfRange { axis, coefficient: c });
                 }
                 *unit = R::Unit::from_f64(c);
+            }
+            if R::Unit::LIMIT.is_finite() {
+                // With all coefficients positive, every partial sum of Horner's scheme is at most its end, and
+                // greatest at u = 1.
+                let sum = derivatives(&coefficients.map(libm::fabs), 1.0).into_iter().fold(0.0, f64::max);
+                if !(sum < R::Unit::LIMIT - ROUNDING) {
+                    return Err(PieceError::Bent { axis, sum });
+                }
             }
         }
         let geometry = Geometry::Septic { coefficients: unit, per_mm, length_mm: R::from_f64(length_mm) };
@@ -206,8 +226,34 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
 
     /// The unit tangent at `s_mm` from the start.
     pub fn tangent_at(&self, s_mm: R) -> [R; AXES] {
-        let unit = PathMotion { v_mm_s: R::ONE, ..PathMotion::default() };
-        self.at(s_mm, &unit).map(|setpoint| setpoint.velocity_mm_s)
+        // Without the chain rule: what it makes of a piece that is too short for its feed may not fit.
+        match &self.geometry {
+            Geometry::Line { direction } => direction.map(|d| R::ONE.scaled(d)),
+            Geometry::Septic { coefficients, per_mm, .. } => {
+                let u = (s_mm * *per_mm).to_unit();
+                coefficients.map(|q| {
+                    let [_, q1, ..] = derivatives(&q, u);
+                    R::ONE.scaled(q1)
+                })
+            }
+        }
+    }
+
+    /// How steep it is at most.
+    pub(crate) fn steepness(&self) -> Steepness {
+        let Geometry::Septic { coefficients, per_mm, .. } = &self.geometry else {
+            return Steepness::STRAIGHT;
+        };
+        let per_mm = per_mm.to_f64();
+        let mut sums = [0.0; 4];
+        for q in coefficients {
+            let of_axis = derivatives(&q.map(Scalar::abs), R::Unit::ONE);
+            for (sum, of_axis) in sums.iter_mut().zip(of_axis) {
+                *sum = f64::max(*sum, of_axis.to_f64() + ROUNDING);
+            }
+        }
+        let [_, slope, bend, twist] = sums;
+        Steepness { per_mm, slope, bend_per_mm: bend * per_mm, twist_per_mm2: twist * per_mm * per_mm }
     }
 
     /// The set-points of all axes at `s_mm` from the piece's start, for the motion along the path.
@@ -251,6 +297,45 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
                 }
             }
         }
+    }
+}
+
+/// Bounds of what [`Piece::set`] multiplies a motion with, of any axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Steepness {
+    /// 1/length.
+    per_mm: f64,
+    /// Of |x'|, |x''|, |x'''| by arc length.
+    slope: f64,
+    bend_per_mm: f64,
+    twist_per_mm2: f64,
+}
+
+impl Steepness {
+    /// Of a line.
+    pub(crate) const STRAIGHT: Self = Self { per_mm: 0.0, slope: 1.0, bend_per_mm: 0.0, twist_per_mm2: 0.0 };
+
+    /// Of two pieces.
+    pub(crate) fn max(&self, other: &Self) -> Self {
+        Self {
+            per_mm: f64::max(self.per_mm, other.per_mm),
+            slope: f64::max(self.slope, other.slope),
+            bend_per_mm: f64::max(self.bend_per_mm, other.bend_per_mm),
+            twist_per_mm2: f64::max(self.twist_per_mm2, other.twist_per_mm2),
+        }
+    }
+
+    /// The greatest velocity, acceleration and jerk of any axis under a motion of at most `v`, `a`, `j`
+    /// \[mm/s, mm/s², mm/s³\]. The last also bounds every other product on the way, whatever its unit.
+    pub(crate) fn setpoint_max(&self, v: f64, a: f64, j: f64) -> [f64; 3] {
+        // In the order of `set`.
+        let w = v * self.per_mm;
+        let bend = v * self.bend_per_mm;
+        let twist = v * v * self.twist_per_mm2;
+        let jerk = twist * v + bend * 3.0 * a + self.slope * j;
+        // `set` takes one factor at a time: w times a unit, below 4, is on its way to the twist.
+        let greatest = [4.0 * w, bend, twist, 3.0 * a].into_iter().fold(jerk, f64::max);
+        [v * self.slope, bend * v + a * self.slope, greatest]
     }
 }
 

@@ -8,14 +8,14 @@
 //! | … | [`Header`], then [`Item`]s to the end, each in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
 //!
-//! A board checks the whole before anything moves. f64 figures are kept, so that the program runs in any
+//! A [`Reader`] is made of a whole and undamaged program only; whether its items can be executed is what
+//! [`check`](super::check()) tells a board before anything moves. f64 figures are kept, so that the program runs in any
 //! number type, and gives the same bits wherever it is read.
 
 use core::marker::PhantomData;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::{Deserialize, Serialize};
-use serde_big_array::BigArray;
 
 use super::Item;
 use crate::axis::AxisFigures;
@@ -26,7 +26,9 @@ const MAGIC: [u8; 4] = *b"MOTN";
 const VERSION: u8 = 2;
 const PREFIX: usize = MAGIC.len() + 2;
 const CHECKSUM: usize = 4;
-/// No header and no item of eight axes is longer.
+/// Axes of the largest machine.
+const AXES_MAX: usize = 8;
+/// No header and no item of so many axes is longer.
 const ENTRY_MAX: usize = 4096;
 
 /// Without a table: a kilobyte of flash is worth more than the milliseconds.
@@ -40,10 +42,10 @@ pub struct Header<const AXES: usize> {
     /// What the streams are held to.
     pub rules: PathRules,
     /// The machine's axes.
-    #[serde(with = "BigArray")]
+    #[serde(with = "super::array")]
     pub axes: [AxisFigures; AXES],
     /// Where the machine stands when it starts.
-    #[serde(with = "BigArray")]
+    #[serde(with = "super::array")]
     pub start: [Position; AXES],
 }
 
@@ -98,12 +100,15 @@ impl core::error::Error for ProgramError {}
 /// Appends a program to `out`.
 ///
 /// # Errors
-/// An entry is longer than the format's bound: more axes than eight.
+/// There are more axes than eight, for which an entry may be longer than the format's bound.
 pub fn write<'a, const AXES: usize>(
     header: &Header<AXES>,
     items: impl IntoIterator<Item = &'a Item<AXES>>,
     out: &mut impl Extend<u8>,
 ) -> Result<(), postcard::Error> {
+    if AXES > AXES_MAX {
+        return Err(postcard::Error::SerializeBufferFull);
+    }
     let mut digest = CHECKSUMS.digest();
     let mut put = |bytes: &[u8]| {
         digest.update(bytes);
@@ -240,6 +245,37 @@ mod tests {
         let reader = Reader::<2>::new(&bytes).expect("a program");
         assert_eq!(*reader.header(), header());
         assert_eq!(reader.collect::<Result<Vec<_>, _>>(), Ok(items));
+    }
+
+    /// Entries are longest with every figure there and every number at its longest.
+    #[test]
+    fn eight_axes_fit_and_nine_are_refused() {
+        use crate::axis::{BedInverse, DriveInverse, TABLE_POINTS, Table, Tables};
+        let table = Some(Table { reach: 1.0, mm_s: [1.0; TABLE_POINTS] });
+        let bed = Some(BedInverse { frequency_hz: 30.0, damping_ratio: 0.1, mass_ratio: 0.1 });
+        let drive = DriveInverse {
+            velocity_gain_per_s: 100.0,
+            integral_time_s: 0.01,
+            current_lag_s: 1e-3,
+            viscous_friction_per_s: 1.0,
+            coulomb_friction_mm_s2: 1.0,
+            reversal_mm_s: 1.0,
+            bed,
+        };
+        let mut axis = header().axes[0];
+        axis.feedforward.tables = Tables { velocity: table, accel: table, jerk: table };
+        axis.feedforward.drive = Some(drive);
+        fn longest<const AXES: usize>(axis: AxisFigures) -> Result<usize, postcard::Error> {
+            let Header { tick_s, rules, .. } = header();
+            let far = [Position::from_bits(i64::MIN); AXES];
+            let header = Header { tick_s, rules, axes: [axis; AXES], start: far };
+            let item =
+                Item::Septic { line: u32::MAX, start: far, coefficients: [[1.0; 7]; AXES], length: far[0] };
+            let mut bytes = Vec::new();
+            write(&header, &[item], &mut bytes).map(|()| bytes.len())
+        }
+        assert!(longest::<8>(axis).is_ok_and(|bytes| bytes > 2000));
+        assert_eq!(longest::<9>(axis), Err(postcard::Error::SerializeBufferFull));
     }
 
     /// Every single damaged byte, every shorter program, and every kind of stranger.

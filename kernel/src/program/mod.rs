@@ -5,16 +5,19 @@
 //!
 //! - [`Item`]: one item of a program, in f64 and position steps; made into the same bits on every target;
 //! - [`supply`]: keeps the two streams filled from items;
+//! - [`mod@check`]: whether all of a program can be executed, before any of it is;
 //! - [`mod@bytes`]: a program as bytes, with the machine it is for.
 
+mod array;
 pub mod bytes;
+pub mod check;
 pub mod supply;
 
 pub use bytes::{Header, ProgramError, Reader, write};
+pub use check::{CheckError, check};
 pub use supply::{Supply, SupplyError};
 
 use serde::{Deserialize, Serialize};
-use serde_big_array::BigArray;
 
 use crate::law::{Ramp, Ticks};
 use crate::units::Position;
@@ -28,10 +31,10 @@ pub enum Item<const AXES: usize> {
         /// The program line it came from.
         line: u32,
         /// Where it starts.
-        #[serde(with = "BigArray")]
+        #[serde(with = "array")]
         start: [Position; AXES],
         /// A unit vector.
-        #[serde(with = "BigArray")]
+        #[serde(with = "array")]
         direction: [f64; AXES],
         /// Its length.
         length: Position,
@@ -41,10 +44,10 @@ pub enum Item<const AXES: usize> {
         /// The program line it came from.
         line: u32,
         /// Where it starts.
-        #[serde(with = "BigArray")]
+        #[serde(with = "array")]
         start: [Position; AXES],
         /// q₁ … q₇ of every axis, parts of the length.
-        #[serde(with = "BigArray")]
+        #[serde(with = "array")]
         coefficients: [[f64; 7]; AXES],
         /// Its length.
         length: Position,
@@ -57,7 +60,7 @@ pub enum Item<const AXES: usize> {
         length: Position,
     },
     /// The stretch ends here, at rest.
-    EndOfStretch(#[serde(with = "BigArray")] [Position; AXES]),
+    EndOfStretch(#[serde(with = "array")] [Position; AXES]),
     /// Rest, between stretches.
     Dwell(Ticks),
     /// Rest until told to resume, between stretches.

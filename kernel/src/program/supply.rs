@@ -77,30 +77,40 @@ impl<const AXES: usize> Item<AXES> {
 
 /// Where the supply stands.
 #[derive(Debug)]
-pub struct Supply<R: Real, const AXES: usize, I> {
+pub struct Supply<R: Real, const AXES: usize, I, E> {
     items: I,
     tick_s: f64,
     /// Made ready, and not yet taken by the queues.
     pending: Option<Ready<R, AXES>>,
     is_at_end: bool,
+    /// What ended it. The item it was for is gone, and what follows it would not continue what is queued.
+    error: Option<SupplyError<E>>,
 }
 
-impl<R: Real, const AXES: usize, E, I: Iterator<Item = Result<Item<AXES>, E>>> Supply<R, AXES, I> {
+impl<R: Real, const AXES: usize, E: Clone, I: Iterator<Item = Result<Item<AXES>, E>>> Supply<R, AXES, I, E> {
     /// All of `items` still to do, for ticks of `tick_s`.
     pub fn new(items: I, tick_s: f64) -> Self {
-        Self { items, tick_s, pending: None, is_at_end: false }
+        Self { items, tick_s, pending: None, is_at_end: false, error: None }
     }
 
-    /// Whether everything has been offered and taken.
+    /// Whether everything has been offered and taken; never after an error.
     pub fn is_empty(&self) -> bool {
-        self.is_at_end && self.pending.is_none()
+        self.is_at_end && self.pending.is_none() && self.error.is_none()
     }
 
     /// Fills the streams.
     ///
     /// # Errors
-    /// The next item can't be executed; what is queued before it is untouched.
+    /// The next item can't be executed; what is queued before it is untouched. So it stays: every later call
+    /// returns the same error.
     pub fn fill(&mut self, feeder: &mut Feeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+        if let Some(error) = &self.error {
+            return Err(error.clone());
+        }
+        self.fill_on(feeder).inspect_err(|error| self.error = Some(error.clone()))
+    }
+
+    fn fill_on(&mut self, feeder: &mut Feeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
         loop {
             let ready = match self.pending.take() {
                 Some(ready) => ready,

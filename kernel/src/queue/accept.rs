@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::law::{FeedSegment, Limits, Ticks};
 use crate::num::Real;
-use crate::path::Piece;
+use crate::path::{Piece, Steepness};
 use crate::units::Position;
 
 /// How many segments or dwells may end within one tick. Denser ones are rejected when they are offered.
@@ -50,11 +50,11 @@ pub enum Rejection {
         /// The segment's \[mm/s\].
         to_mm_s: f64,
     },
-    /// A segment exceeds a limit.
+    /// A segment exceeds a limit, or on its piece of path asks an axis for more than the number type holds.
     Limit {
         /// Which one, with its unit.
         quantity: &'static str,
-        /// The segment's value.
+        /// The segment's value, or an axis' where piece and segment meet.
         value: f64,
         /// The limit.
         limit: f64,
@@ -115,7 +115,7 @@ impl core::error::Error for Rejection {}
 
 /// Where the streams stand.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Acceptance<R: Real, const AXES: usize> {
+pub(crate) struct Acceptance<R: Real, const AXES: usize> {
     rules: PathRules,
     position: [Position; AXES],
     /// Of the last piece of this stretch.
@@ -125,10 +125,15 @@ pub(super) struct Acceptance<R: Real, const AXES: usize> {
     feed_mm_s: R,
     /// Durations of the latest segments, the newest first.
     recent: [Ticks; SEGMENTS_PER_TICK_MAX],
+    /// Of what one stream has beyond the other's end: the steepest of its curves and where the last of them ends, the
+    /// greatest feed. A fast ramp may follow a sharp curve, but must not be on it.
+    steepness: Steepness,
+    curved_until: Position,
+    ahead_mm_s: f64,
 }
 
 impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
-    pub(super) fn new(rules: PathRules, position: [Position; AXES]) -> Self {
+    pub(crate) fn new(rules: PathRules, position: [Position; AXES]) -> Self {
         Self {
             rules,
             position,
@@ -137,10 +142,13 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
             feed_length: Position::ZERO,
             feed_mm_s: R::ZERO,
             recent: [Ticks::ONE; SEGMENTS_PER_TICK_MAX],
+            steepness: Steepness::STRAIGHT,
+            curved_until: Position::ZERO,
+            ahead_mm_s: 0.0,
         }
     }
 
-    pub(super) fn piece(&self, piece: &Piece<R, AXES>) -> Result<Self, Rejection> {
+    pub(crate) fn piece(&self, piece: &Piece<R, AXES>) -> Result<Self, Rejection> {
         self.continuous(&piece.start())?;
         if let Some(before) = self.tangent {
             let after = piece.tangent_at(R::ZERO);
@@ -165,15 +173,27 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         }
         let path_length = self.path_length + piece.length();
         within_range(path_length)?;
-        Ok(Self {
+        let mut next = Self {
             position: end,
             tangent: Some(piece.tangent_at(piece.length().to_offset())),
             path_length,
             ..*self
-        })
+        };
+        if R::SETPOINT_MAX.is_some() {
+            let steepness = piece.steepness();
+            if self.path_length < self.feed_length {
+                self.fits(&steepness, self.ahead_mm_s)?;
+            }
+            if steepness != Steepness::STRAIGHT {
+                let was_ahead = self.curved_until > self.feed_length;
+                next.steepness = if was_ahead { self.steepness.max(&steepness) } else { steepness };
+                next.curved_until = path_length;
+            }
+        }
+        Ok(next)
     }
 
-    pub(super) fn segment(&self, segment: &FeedSegment<R>) -> Result<Self, Rejection> {
+    pub(crate) fn segment(&self, segment: &FeedSegment<R>) -> Result<Self, Rejection> {
         let ramp = segment.as_ramp();
         let step = (ramp.from_mm_s - self.feed_mm_s).abs();
         if !(step <= R::from_f64(4.0 * R::EPSILON) * self.feed_mm_s) {
@@ -197,10 +217,33 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         let recent = self.not_too_dense(segment.duration())?;
         let feed_length = self.feed_length + segment.length();
         within_range(feed_length)?;
-        Ok(Self { feed_mm_s: ramp.to_mm_s, feed_length, recent, ..*self })
+        let mut next = Self { feed_mm_s: ramp.to_mm_s, feed_length, recent, ..*self };
+        if R::SETPOINT_MAX.is_some() {
+            let v_mm_s = ramp.from_mm_s.max(ramp.to_mm_s).to_f64();
+            let is_on_curve = self.feed_length < self.curved_until;
+            self.fits(if is_on_curve { &self.steepness } else { &Steepness::STRAIGHT }, v_mm_s)?;
+            let was_ahead = self.feed_length > self.path_length;
+            next.ahead_mm_s = if was_ahead { f64::max(self.ahead_mm_s, v_mm_s) } else { v_mm_s };
+        }
+        Ok(next)
     }
 
-    pub(super) fn end_of_stretch(&self, position: [Position; AXES]) -> Result<Self, Rejection> {
+    /// Whether the number type holds what a feed of up to `v_mm_s` on a piece of this steepness asks of the axes,
+    /// and what is computed on the way.
+    fn fits(&self, steepness: &Steepness, v_mm_s: f64) -> Result<(), Rejection> {
+        let Some(most) = R::SETPOINT_MAX else { return Ok(()) };
+        let Limits { accel_mm_s2, jerk_mm_s3, .. } = self.rules.limits;
+        let quantities = ["axis velocity [mm/s]", "axis acceleration [mm/s²]", "axis jerk [mm/s³]"];
+        let values = steepness.setpoint_max(v_mm_s, accel_mm_s2, jerk_mm_s3);
+        for ((quantity, value), limit) in quantities.into_iter().zip(values).zip(most) {
+            if !(value <= limit) {
+                return Err(Rejection::Limit { quantity, value, limit });
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn end_of_stretch(&self, position: [Position; AXES]) -> Result<Self, Rejection> {
         self.continuous(&position)?;
         if self.feed_mm_s > R::ZERO {
             return Err(Rejection::Moving { feed_mm_s: self.feed_mm_s.to_f64() });
@@ -217,17 +260,17 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         Ok(Self { recent: self.recent, ..Self::new(self.rules, position) })
     }
 
-    pub(super) fn dwell(&self, duration: Ticks) -> Result<Self, Rejection> {
+    pub(crate) fn dwell(&self, duration: Ticks) -> Result<Self, Rejection> {
         self.at_rest()?;
         Ok(Self { recent: self.not_too_dense(duration)?, ..*self })
     }
 
     /// How the feed's length of this stretch compares with the path's.
-    pub(super) fn feed_ahead_of_path(&self) -> core::cmp::Ordering {
+    pub(crate) fn feed_ahead_of_path(&self) -> core::cmp::Ordering {
         self.feed_length.cmp(&self.path_length)
     }
 
-    pub(super) fn at_rest(&self) -> Result<(), Rejection> {
+    pub(crate) fn at_rest(&self) -> Result<(), Rejection> {
         if self.tangent.is_some() || self.feed_length > Position::ZERO {
             return Err(Rejection::InsideStretch);
         }

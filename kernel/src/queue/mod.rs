@@ -21,6 +21,7 @@ use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
 
+pub(crate) use accept::Acceptance;
 pub use accept::{PathRules, Rejection, SEGMENTS_PER_TICK_MAX};
 
 /// An item of the path stream.
@@ -151,10 +152,10 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     /// The queue is full, or the piece does not continue its predecessor.
     pub fn piece(&mut self, piece: Piece<R, AXES>) -> Result<(), Refused<Piece<R, AXES>>> {
         let next = self.accept.piece(&piece).map_err(Refused::Invalid)?;
-        self.path.enqueue(PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
-        count(&self.shared.path_entered);
+        enter(&mut self.path, PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
         self.accept = next;
         self.publish();
+        count(&self.shared.path_entered);
         Ok(())
     }
 
@@ -164,10 +165,10 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     /// The queue is full, or the segment does not continue its predecessor or exceeds a limit.
     pub fn segment(&mut self, segment: FeedSegment<R>) -> Result<(), Refused<FeedSegment<R>>> {
         let next = self.accept.segment(&segment).map_err(Refused::Invalid)?;
-        self.feed.enqueue(FeedItem::Segment(segment)).map_err(|_| Refused::Full(segment))?;
-        count(&self.shared.feed_entered);
+        enter(&mut self.feed, FeedItem::Segment(segment)).map_err(|_| Refused::Full(segment))?;
         self.accept = next;
         self.publish();
+        count(&self.shared.feed_entered);
         Ok(())
     }
 
@@ -178,22 +179,24 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     /// does not end there.
     pub fn end_stretch(&mut self, position: [Position; AXES]) -> Result<(), Refused<[Position; AXES]>> {
         let next = self.accept.end_of_stretch(position).map_err(Refused::Invalid)?;
-        if !(self.path.ready() && self.feed.ready()) {
+        if !(has_room(&self.path) && has_room(&self.feed)) {
             return Err(Refused::Full(position));
         }
         // Room was there and only this end fills the queues: neither can fail.
-        let path = self.path.enqueue(PathItem::EndOfStretch(position));
-        let feed = self.feed.enqueue(FeedItem::EndOfStretch);
+        let path = enter(&mut self.path, PathItem::EndOfStretch(position));
+        let feed = enter(&mut self.feed, FeedItem::EndOfStretch);
         debug_assert!(path.is_ok() && feed.is_ok());
-        count(&self.shared.path_entered);
-        count(&self.shared.feed_entered);
         self.accept = next;
         self.publish();
+        count(&self.shared.path_entered);
+        count(&self.shared.feed_entered);
         count(&self.shared.stretches);
         Ok(())
     }
 
-    /// Tells the intake which stream is ahead.
+    /// Tells the intake which stream is ahead: behind the item that changes it, and before that is counted. A tick
+    /// that comes in between finds what is said to be ahead in its queue, and that queue, which had room, not full yet.
+    /// Counted first, a queue would be full while the other one was still said to cover it.
     fn publish(&mut self) {
         let ahead = self.accept.feed_ahead_of_path();
         self.shared.feed_covers_path.store(ahead.is_ge(), Ordering::Release);
@@ -206,7 +209,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     /// The queue is full, or a stretch is under way.
     pub fn dwell(&mut self, duration: Ticks) -> Result<(), Refused<Ticks>> {
         let next = self.accept.dwell(duration).map_err(Refused::Invalid)?;
-        self.feed.enqueue(FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))?;
+        enter(&mut self.feed, FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))?;
         count(&self.shared.feed_entered);
         self.accept = next;
         Ok(())
@@ -218,10 +221,28 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     /// The queue is full, or a stretch is under way.
     pub fn program_stop(&mut self) -> Result<(), Refused<()>> {
         self.accept.at_rest().map_err(Refused::Invalid)?;
-        self.feed.enqueue(FeedItem::ProgramStop).map_err(|_| Refused::Full(()))?;
+        enter(&mut self.feed, FeedItem::ProgramStop).map_err(|_| Refused::Full(()))?;
         count(&self.shared.feed_entered);
         Ok(())
     }
+}
+
+/// Always. A queue takes remainders by its places, and where the compiler does not know that there are any it links
+/// a panic; their number less one is the capacity.
+#[inline]
+fn has_places<T>(queue: &Producer<'_, T>) -> bool {
+    queue.capacity() != usize::MAX
+}
+
+/// Enters an item; gives it back if the queue is full.
+#[inline]
+fn enter<T>(queue: &mut Producer<'_, T>, item: T) -> Result<(), T> {
+    if has_places(queue) { queue.enqueue(item) } else { Err(item) }
+}
+
+#[inline]
+fn has_room<T>(queue: &Producer<'_, T>) -> bool {
+    has_places(queue) && queue.ready()
 }
 
 /// One more. There is a single writer, so that cores without read-modify-write instructions count too.

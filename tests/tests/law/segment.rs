@@ -318,6 +318,12 @@ fn refusals() {
         let infinite = feed == f64::INFINITY;
         assert!(matches!(cruise, Err(SegmentError::OutOfRange { .. })), "{feed} {infinite} {cruise:?}");
     }
+    // A ramp without a rise would step at its end, and the set-points with it.
+    for from_mm_s in [0.0, 100.0, 199.999] {
+        let (t1_s, t2_s, peak_jerk_mm_s3) = (0.0, 120.0 / (from_mm_s + 200.0), 0.0);
+        let step = Ramp { from_mm_s, t1_s, t2_s, peak_jerk_mm_s3, ..ramp };
+        assert_eq!(made(&step, 60.0, 5e-4), Err(SegmentError::FeedStep { from_mm_s, to_mm_s: 200.0 }));
+    }
     let nan = Ramp { from_mm_s: f64::NAN, ..ramp };
     assert!(made(&nan, 60.0, 5e-4).is_err());
     for (mut broken, quantity) in [(ramp, "t2 − t1 [s]"), (ramp, "t1 [s]")] {

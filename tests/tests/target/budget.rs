@@ -5,10 +5,13 @@ use std::collections::BTreeMap;
 use motion_tests::figures::{Table, hold};
 
 use crate::programs;
-use crate::tools::{BOARDS, Board, Clock, M0, M3, M3_SOFT, M4F, Tools};
+use crate::tools::{BOARDS, Board, Clock, M0, M3, M3_SOFT, M4F, M7, Tools};
 
 /// Growth that fails.
 pub(crate) const GROWTH: f64 = 0.02;
+
+/// Bounds of a tick that no accepted program exceeds.
+const UTMOST: [(Board, u32); 3] = [(M4F, 3300), (M7, 3300), (M3, 4800)];
 
 /// Figures that an image printed, by name, sorted.
 pub(crate) fn by_name(printed: &str) -> BTreeMap<String, Vec<u32>> {
@@ -46,7 +49,7 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
         let printed = tools.run(board, "budget", &programs::worst_ticks(), Clock::Counting)?;
         let figures = by_name(&printed);
         let of = |name: &str| figures.get(name).ok_or_else(|| format!("{}: no {name}", board.core));
-        ticks.push((board, row(&mut table, board, "3 axes", of("tick")?)));
+        let mut ordinary = row(&mut table, board, "3 axes", of("tick")?);
         for (stage, name) in [("law", "law"), ("path, 3 axes", "path"), ("regulator, 1 axis", "regulator")] {
             row(&mut stages, board, stage, of(name)?);
         }
@@ -60,7 +63,22 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
             return Err(format!("one axis on {}: at most {}, promised 700", board.core, one[3]));
         }
         let densest = by_name(&alone(programs::densest())?);
-        row(&mut table, board, "3 axes, 15 pieces in every tick", &densest["tick"]);
+        let densest = row(&mut table, board, "3 axes, 15 pieces in every tick", &densest["tick"]);
+        // Of all that is ordinary, the promise is for the worst.
+        ordinary[3] = ordinary[3].max(densest[3]);
+        ticks.push((board, ordinary));
+        let what = "8 segments and 15 pieces in every tick";
+        let utmost = by_name(&alone(programs::utmost::<1>())?);
+        row(&mut table, board, &format!("1 axis, {what}"), &utmost["tick"]);
+        let utmost = by_name(&alone(programs::utmost::<3>())?);
+        let most = row(&mut table, board, &format!("3 axes, {what}"), &utmost["tick"])[3];
+        let bound = UTMOST.iter().find(|(of, _)| *of == board).map_or(u32::MAX, |(_, bound)| *bound);
+        if most > bound {
+            return Err(format!(
+                "{}: {most} instructions of what may be accepted at most, promised {bound}",
+                board.core
+            ));
+        }
     }
     tools.accept_compiler()?;
     promised(&ticks)?;

@@ -3,8 +3,10 @@
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan, plan_program};
+use motion_kernel::law::{Law, Ramp};
 use motion_kernel::num::Fixed;
 use motion_kernel::program::{Header, Item, write};
+use motion_kernel::units::Position;
 
 use crate::check::random::Random;
 use crate::check::{machine, program};
@@ -75,7 +77,7 @@ pub(crate) fn generated(count: usize) -> Vec<(u64, Vec<u8>)> {
 }
 
 /// Short lines and arcs, planned per block: pieces, segments and phases end all the time, often several in a tick.
-fn facets() -> String {
+pub(crate) fn facets() -> Vec<u8> {
     use std::fmt::Write;
     let mut text = "G91 G1 F4000\n".to_owned();
     for facet in 0..60 {
@@ -90,19 +92,18 @@ fn facets() -> String {
             text.push_str("G3 X0.8 Y0.8 I0 J0.8\nG3 X-0.8 Y0.8 I-0.8 J0\nG3 X-0.8 Y-0.8 I0 J-0.8\nG3 X0.8 Y-0.8 I0.8 J0\nG1\n");
         }
     }
-    text
+    bytes(&text, &Machine::reference(), Mode::PerBlock)
 }
 
 /// The programs of the budgets: the stringer; facets; the stringer with outputs that saturate.
 pub(crate) fn worst_ticks() -> Vec<Vec<u8>> {
-    let reference = Machine::reference();
     let mut weak = Machine::reference();
     for axis in &mut weak.axes {
         // 48 mm/s where the program asks for 83: the axes fall behind, and catch up.
         axis.output_limit_v = 1.45;
         axis.following_error_limit_mm = 100.0;
     }
-    vec![stringer(), bytes(&facets(), &reference, Mode::PerBlock), bytes(STRINGER, &weak, Mode::Merged)]
+    vec![stringer(), facets(), bytes(STRINGER, &weak, Mode::Merged)]
 }
 
 /// As many pieces a tick as the kernel accepts: lines that the path passes within little more than a sixteenth of a
@@ -113,6 +114,76 @@ pub(crate) fn densest() -> Vec<u8> {
     let length_mm = feed_mm_s * machine.tick_s / 15.5;
     let text = format!("G91 G1 F{}\n", feed_mm_s * 60.0) + &format!("X{length_mm:.7}\n").repeat(6000);
     bytes(&text, &machine, Mode::Merged)
+}
+
+/// What the feeder accepts at most: little less than 8 segments of three phases and 16 curved pieces end in every tick,
+/// while all outputs saturate. No planner makes such a program.
+pub(crate) fn utmost<const AXES: usize>() -> Vec<u8> {
+    const SEGMENTS: usize = 3000;
+    let machine = Machine::reference();
+    let reference = machine.header();
+    let mut axis = reference.axes[0];
+    // 17 mm/s where 50 are asked for.
+    (axis.output_limit_v, axis.following_error_limit_mm) = (0.5, 100.0);
+    let header = Header::<AXES> {
+        tick_s: reference.tick_s,
+        rules: reference.rules,
+        axes: [axis; AXES],
+        start: [Position::ZERO; AXES],
+    };
+    let feed_mm_s = 50.0;
+    let law = Law::new(reference.rules.limits).expect("limits");
+    let (up, down) = (Ramp::new(&law, 0.0, feed_mm_s), Ramp::new(&law, feed_mm_s, 0.0));
+    // A nanometre a second up and down again, each a third of its time rising, holding and falling.
+    let change = |index: usize| {
+        let third_s = reference.tick_s / 7.9 / 3.0;
+        let (low, high) = (feed_mm_s, feed_mm_s + 1e-9);
+        let (from_mm_s, to_mm_s) = if index.is_multiple_of(2) { (low, high) } else { (high, low) };
+        Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3: 1.0, t1_s: third_s, t2_s: 2.0 * third_s, ..up }
+    };
+    let length = |mm: f64| Position::from_mm(mm).expect("in range");
+    let ramps = core::iter::once(up).chain((0..SEGMENTS).map(change)).chain([down]);
+    let feed: Vec<Item<AXES>> =
+        ramps.map(|ramp| Item::Feed { ramp, length: length(ramp.length_mm()) }).collect();
+    let of = |items: &[Item<AXES>]| -> i64 {
+        let bits =
+            items.iter().map(|item| if let Item::Feed { length, .. } = item { length.to_bits() } else { 0 });
+        bits.sum()
+    };
+    // Straight, but as curves, along the diagonal.
+    let along = 1.0 / (AXES as f64).sqrt();
+    let mut coefficients = [[0.0; 7]; AXES];
+    coefficients.iter_mut().for_each(|axis| axis[0] = along);
+    let dense_mm = feed_mm_s * reference.tick_s / 15.5;
+    let mut pieces = Vec::new();
+    let mut start = 0;
+    for (bits, longest_mm) in
+        [(of(&feed[..1]), 10.0), (of(&feed[1..=SEGMENTS]), dense_mm), (of(&feed[SEGMENTS + 1..]), 10.0)]
+    {
+        let (begin, parts) = (start, bits / length(longest_mm).to_bits() + 1);
+        for part in 1..=parts {
+            let end = begin + (i128::from(bits) * i128::from(part) / i128::from(parts)) as i64;
+            let at = [length(along * Position::from_bits(start).to_mm()); AXES];
+            let length = Position::from_bits(end - start);
+            pieces.push((start, Item::Septic { line: 1, start: at, coefficients, length }));
+            start = end;
+        }
+    }
+    // Both streams in the order of where their items start.
+    let mut items = Vec::new();
+    let (mut pieces, mut at) = (pieces.into_iter().peekable(), 0);
+    for item in feed {
+        while let Some((_, piece)) = pieces.next_if(|(start, _)| *start <= at) {
+            items.push(piece);
+        }
+        at += of(&[item]);
+        items.push(item);
+    }
+    items.extend(pieces.map(|(_, piece)| piece));
+    items.push(Item::EndOfStretch([length(along * Position::from_bits(start).to_mm()); AXES]));
+    let mut bytes = Vec::new();
+    write(&header, &items, &mut bytes).expect("few axes");
+    bytes
 }
 
 /// The X axis of the stringer's lines alone.

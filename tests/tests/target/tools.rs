@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 
+use motion_tests::figures::is_accepting;
+
 /// A core to run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Board {
@@ -95,7 +97,7 @@ impl Tools {
 
     /// Why figures measured here can't be compared with the committed ones.
     pub(crate) fn other_compiler(&self) -> Option<String> {
-        if std::env::var_os("MOTION_ACCEPT").is_some() {
+        if is_accepting() {
             return None;
         }
         let committed = std::fs::read_to_string(root().join("tests/expected/compiler.txt")).ok()?;
@@ -105,7 +107,7 @@ impl Tools {
 
     /// Notes the compiler of figures that are being accepted.
     pub(crate) fn accept_compiler(&self) -> Result<(), String> {
-        if std::env::var_os("MOTION_ACCEPT").is_none() {
+        if !is_accepting() {
             return Ok(());
         }
         let path = root().join("tests/expected/compiler.txt");

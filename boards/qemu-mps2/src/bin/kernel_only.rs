@@ -1,6 +1,6 @@
 //! The kernel as a board links it, with nothing around it: the program's bytes read, the streams filled, the tick
-//! in SysTick, and peripherals that are plain memory. Its size is the kernel's, and its symbols tell whether a
-//! tick can panic. It is linked, not run.
+//! in SysTick with all that a board may tell the kernel between ticks, and peripherals that are plain memory. Its
+//! size is the kernel's, and its symbols tell whether any of it can panic. It is linked, not run.
 #![no_std]
 #![no_main]
 
@@ -10,8 +10,10 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception};
 use critical_section::Mutex;
 use hal_sim::closed_loop::InMemory;
-use motion_kernel::axis::AxesConfig;
+use motion_kernel::axis::{AxesConfig, Correction};
+use motion_kernel::fault::FaultKind;
 use motion_kernel::kernel::Kernel;
+use motion_kernel::num::Scalar;
 use motion_kernel::program::{Reader, Supply};
 use motion_kernel::queue::{Intake, Streams};
 use motion_kernel::units::{Counts, DacCode};
@@ -28,6 +30,9 @@ struct Foreground {
 static FOREGROUND: Mutex<RefCell<Option<Foreground>>> = Mutex::new(RefCell::new(None));
 /// Read, so that nothing of a tick is left out of the image.
 static CODES: AtomicU32 = AtomicU32::new(0);
+/// What the board tells the kernel next; written from outside.
+#[unsafe(no_mangle)]
+static COMMAND: AtomicU32 = AtomicU32::new(0);
 
 #[entry]
 fn main() -> ! {
@@ -64,11 +69,44 @@ fn SysTick() {
         // A tick that comes while it is borrowed is a tick that comes inside itself: there is none.
         let Ok(mut foreground) = FOREGROUND.borrow(cs).try_borrow_mut() else { return };
         if let Some(Foreground { kernel, intake, memory }) = foreground.as_mut() {
+            kernel_command(COMMAND.load(Ordering::Relaxed), kernel, intake);
             kernel_tick(kernel, intake, memory);
             let sum = memory.codes.iter().fold(0, |sum: u32, code| sum.wrapping_add(code.0 as u32));
             CODES.store(sum, Ordering::Relaxed);
         }
     });
+}
+
+/// The root of all that a board may call between two ticks.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn kernel_command(
+    command: u32,
+    kernel: &mut Kernel<Number, AXES>,
+    intake: &mut Intake<'static, Number, AXES>,
+) {
+    static KNOTS: [[Number; AXES]; 2] = [[Number::ZERO; AXES]; 2];
+    match command {
+        1 => kernel.trip(FaultKind::Encoder),
+        2 => CODES.store(
+            kernel.clear_fault().iter().fold(0, |sum, at| sum ^ at.to_bits() as u32),
+            Ordering::Relaxed,
+        ),
+        3 => kernel.disable(),
+        4 => kernel.resume(),
+        5 => {
+            let peaks = kernel.take_peak_following_error_mm();
+            CODES.store(peaks.iter().fold(0, |sum, mm| sum ^ mm.to_bits64() as u32), Ordering::Relaxed);
+        }
+        6 => {
+            if let Ok(correction) = Correction::new(0, &KNOTS, 2, 1.0) {
+                intake.correct(correction);
+            }
+        }
+        7 => kernel.enable(100),
+        8 => CODES.store(u32::from(kernel.fault().is_some()), Ordering::Relaxed),
+        _ => {}
+    }
 }
 
 /// The root of all that a tick may call.

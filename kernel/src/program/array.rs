@@ -1,0 +1,45 @@
+//! Arrays whose length is a parameter, which serde itself does not know: as tuples, element by element, without a
+//! panic path.
+
+use core::fmt;
+use core::marker::PhantomData;
+
+use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+use serde::ser::{Serialize, SerializeTuple, Serializer};
+
+pub(super) fn serialize<T: Serialize, S: Serializer, const N: usize>(
+    array: &[T; N],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let mut tuple = serializer.serialize_tuple(N)?;
+    for element in array {
+        tuple.serialize_element(element)?;
+    }
+    tuple.end()
+}
+
+pub(super) fn deserialize<'de, T: Copy + Deserialize<'de>, D: Deserializer<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<[T; N], D::Error> {
+    deserializer.deserialize_tuple(N, Elements(PhantomData))
+}
+
+struct Elements<T, const N: usize>(PhantomData<T>);
+
+impl<'de, T: Copy + Deserialize<'de>, const N: usize> Visitor<'de> for Elements<T, N> {
+    type Value = [T; N];
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{N} elements, one at least")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<[T; N], A::Error> {
+        let missing = |index| Error::invalid_length(index, &"one for each axis");
+        let first = sequence.next_element()?.ok_or_else(|| missing(0))?;
+        let mut array = [first; N];
+        for (index, place) in array.iter_mut().enumerate().skip(1) {
+            *place = sequence.next_element()?.ok_or_else(|| missing(index))?;
+        }
+        Ok(array)
+    }
+}
