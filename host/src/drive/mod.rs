@@ -15,6 +15,7 @@
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
 //! - [`compare`]: regulators side by side; [`peer_regulator`]: one that differences positions; [`replay`](mod@replay): set
 //!   values once more, under another regulator;
+//! - [`learning`]: a correction of a path that is driven again and again;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
 //! - [`sine`], [`spectrum`], [`model`]: the mathematics of it;
 //! - [`mod@reference`]: what S4 measured, and what the reference machine has to give.
@@ -26,6 +27,7 @@ pub mod experiment;
 pub mod harmonic;
 pub mod identification;
 pub mod inertia;
+pub mod learning;
 pub mod model;
 pub mod peer_regulator;
 pub mod reference;

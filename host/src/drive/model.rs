@@ -1,7 +1,7 @@
 //! The drive's linear model: what it would do with a small signal, without Coulomb friction and current limit.
 
 use core::f64::consts::TAU;
-use core::ops::{Add, Div, Mul};
+use core::ops::{Add, Div, Mul, Sub};
 
 use hal_sim::DriveParameters;
 
@@ -35,12 +35,25 @@ impl Complex {
     pub fn phase_rad(self) -> f64 {
         libm::atan2(self.im, self.re)
     }
+
+    /// re − i·im.
+    #[must_use]
+    pub const fn conjugate(self) -> Self {
+        Self::new(self.re, -self.im)
+    }
 }
 
 impl Add for Complex {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         Self::new(self.re + other.re, self.im + other.im)
+    }
+}
+
+impl Sub for Complex {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self::new(self.re - other.re, self.im - other.im)
     }
 }
 
