@@ -8,9 +8,10 @@
 //!   toolpath   moves ─► Element ─► Piece          arc length, septic polynomials
 //!   planning   Program ─► Plan                    ceilings with reasons, feed over path
 //!   simulate   Plan ─► ticks                      the kernel against hal-sim
-//!   identify   recordings ─► drive parameters    what an axis is, from its runs
 //!   record     TickRecord, RunRecord              what a run leaves behind
 //!   drive      Machine ─► figures of its axes     step, harmonics, circles
+//!   identify   recordings ─► drive parameters     what an axis is, from its runs
+//!   tuning     drive parameters ─► gains          with the reason for each
 //!   report     RunRecord ─► HTML                  one file, pictures inside
 //!   cli        the `motion` command
 //! ```
@@ -21,7 +22,8 @@ pub mod gcode;
 pub mod toolpath;
 pub mod planning;
 pub mod simulate;
-pub mod identify;
 pub mod record;
 pub mod drive;
+pub mod identify;
+pub mod tuning;
 pub mod report;

@@ -579,6 +579,45 @@ fn drive_refuses_what_cannot_be_done() {
     assert_eq!(desk.motion(&["drive", "harmonic", "--feedforward", "v"]).status.code(), Some(2));
 }
 
+/// A machine is tuned, the file is what was verified, and what would be worse is not written.
+#[test]
+fn drive_tune_writes_what_it_has_verified() {
+    let desk = Desk::new("tune");
+    let json = desk.json(&["drive", "tune", "--axis", "x,Y", "--output", "tuned.toml", "--json"]);
+    assert_has(&json, &["axes", "output", "verification"]);
+    assert_eq!(json["output"], "tuned.toml");
+    let axes = json["axes"].as_array().expect("a list");
+    assert_eq!(axes.len(), 2);
+    for axis in axes {
+        assert_has(axis, &["changes", "found", "margins", "name", "remarks"]);
+        assert_has(&axis["margins"], &["crossover_hz", "gain", "phase_deg", "sensitivity"]);
+        assert!((number(&axis["found"]["velocity_gain_per_s"]["value"]) - 440.0).abs() < 4.4);
+        for change in axis["changes"].as_array().expect("a list") {
+            assert_has(change, &["after", "before", "key", "reason", "unit"]);
+        }
+    }
+    assert!(axes[0]["found"]["bed"].is_null() && axes[1]["found"]["bed"].is_object());
+    for circle in json["verification"]["circles"].as_array().expect("a list") {
+        let contour_um = |when: &str| number(&circle[when]["contour_error_um"]);
+        assert!(contour_um("after") < 1.0 && contour_um("before") > 5.0, "{circle}");
+    }
+    let tuned = Machine::from_toml("tuned.toml", &desk.read("tuned.toml")).expect("a machine file");
+    let [x, _, z] = &tuned.axes;
+    assert!((x.feedforward.lead_s - 1.67e-3).abs() < 1e-5 && x.feedforward.drive.is_some());
+    assert_eq!(z, &Machine::reference().axes[2]);
+
+    let worse = ["drive", "tune", "--machine", "tuned.toml", "--method", "series", "--output", "worse.toml"];
+    let output = desk.motion(&worse);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("a circle got worse: nothing is written"));
+    assert!(!desk.0.join("worse.toml").exists());
+
+    let refusal = desk.refusal(&["drive", "tune", "--axis", "W"]);
+    assert!(refusal.contains("found axis W, expected the name of an axis of the machine"), "{refusal}");
+    let refusal = desk.refusal(&["drive", "tune", "--machine", "missing.toml"]);
+    assert!(refusal.contains("missing.toml"), "{refusal}");
+}
+
 /// What a board gets is a program to it; what is wrong with the input is said with file and line, and nothing is written.
 #[test]
 fn compile_writes_a_program_or_says_why_not() {

@@ -94,6 +94,7 @@ impl CliError {
                 DriveError::Fault { .. }
                 | DriveError::NotSteady { .. }
                 | DriveError::NoMotion { .. }
+                | DriveError::Identification { .. }
                 | DriveError::Run(RunError::Rejected(_)),
             ) => ExitCode::FAILURE,
             _ => ExitCode::from(2),

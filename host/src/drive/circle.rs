@@ -4,7 +4,7 @@
 //! the actual point from the centre, less the programmed radius: the contour error δ is its extremes, the form
 //! deviation Δδ their distance. The following error is set less actual position, tick by tick.
 
-use super::experiment::{DriveError, Recording, Terms};
+use super::experiment::{DriveError, Recording};
 use super::harmonic::first_crossing;
 use super::turning::Turning;
 use crate::machine::Machine;
@@ -107,37 +107,38 @@ pub fn limit_frequency(
     first_crossing(range_hz, RESOLUTION_HZ, is_beyond)
 }
 
-/// Circles over a list of frequencies, with one choice of feedforward.
+/// Circles over a list of frequencies, on one machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
-    /// Which terms acted.
-    pub terms: Terms,
+    /// What acted, in words.
+    pub name: &'static str,
+    /// The machine as it ran.
+    pub machine: Machine,
     /// By frequency.
     pub circles: Vec<CircleFigures>,
     /// Where the contour error passes the limit \[Hz\]; none if it does not, or if it is beyond from the start.
     pub limit_hz: Option<f64>,
 }
 
-/// Drives the circles of `frequencies_hz` on `machine` with `terms` of its feedforward, and looks within
+/// Drives the circles of `frequencies_hz` on `machine`, called `name`, and looks within
 /// `range_hz` for the frequency at which the contour error passes `limit_um`. `progress` is called after each circle
 /// of the list.
 ///
 /// # Errors
 /// As [`measure`].
 pub fn sweep(
-    machine: &Machine,
-    terms: Terms,
+    machine: Machine,
+    name: &'static str,
     feed_mm_s: f64,
     frequencies_hz: &[f64],
     (limit_um, range_hz): (f64, (f64, f64, f64)),
     progress: &mut dyn FnMut(),
 ) -> Result<Sweep, DriveError> {
-    let machine = terms.of(machine);
     let mut circles = Vec::with_capacity(frequencies_hz.len());
     for &frequency_hz in frequencies_hz {
         circles.push(measure(&machine, frequency_hz, feed_mm_s)?);
         progress();
     }
     let limit_hz = limit_frequency(&machine, feed_mm_s, limit_um, range_hz)?;
-    Ok(Sweep { terms, circles, limit_hz })
+    Ok(Sweep { name, machine, circles, limit_hz })
 }

@@ -8,6 +8,7 @@ use std::ops::Range;
 use motion_kernel::axis::{Feedforward, Gains};
 
 use crate::gcode::{self, GcodeError};
+use crate::identify::IdentifyError;
 use crate::machine::Machine;
 use crate::planning::{Mode, PlanningError, plan_program};
 use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
@@ -92,6 +93,14 @@ pub enum DriveError {
         found_s: f64,
         /// How long it had to be \[s\].
         needed_s: f64,
+    },
+    /// The axis does not answer like a velocity servo.
+    #[error("identification of axis {axis}: {source}")]
+    Identification {
+        /// The axis's name.
+        axis: String,
+        /// What was found.
+        source: IdentifyError,
     },
     /// The axis did not move, so there is nothing to relate.
     #[error("{experiment}: axis {axis} did not move")]

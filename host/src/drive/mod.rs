@@ -10,6 +10,7 @@
 //! - [`turning`]: circles of constant feed, the motion of two experiments;
 //! - [`step`]: the feed steps within one tick, open loop;
 //! - [`harmonic`]: amplitude and phase of the velocity;
+//! - [`identification`]: the runs that [`crate::identify`] asks for;
 //! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
@@ -20,6 +21,7 @@ pub mod bode;
 pub mod circle;
 pub mod experiment;
 pub mod harmonic;
+pub mod identification;
 pub mod inertia;
 pub mod model;
 pub mod reference;

@@ -1,4 +1,4 @@
-//! The drive's linear model: what it would do with a small signal, without friction, current limit and bed.
+//! The drive's linear model: what it would do with a small signal, without Coulomb friction and current limit.
 
 use core::f64::consts::TAU;
 use core::ops::{Add, Div, Mul};
@@ -62,8 +62,10 @@ impl Div for Complex {
 /// Actual over commanded velocity at a frequency above 0, the command held over ticks of `tick_s`:
 ///
 /// ```text
-/// G = e^(−s(τ + Ts/2))/(1 + Tf·s) · H/(1 + H),   H = Kv(1 + 1/(Ti·s))/((1 + Tc·s)((1 + ρ)s + b))
+/// G = e^(−s(τ + Ts/2))/(1 + Tf·s) · H/(1 + H),   H = Kv(1 + 1/(Ti·s))/((1 + Tc·s)((1 + ρ)(1 + B)s + b))
 /// ```
+///
+/// The bed accelerates by B = −μs²/((1 + μ)s² + 2ζωs + ω²) of what the axis does.
 #[must_use]
 pub fn response(drive: &DriveParameters, tick_s: f64, frequency_hz: f64) -> Complex {
     let real = |value: f64| Complex::new(value, 0.0);
@@ -71,7 +73,12 @@ pub fn response(drive: &DriveParameters, tick_s: f64, frequency_hz: f64) -> Comp
     let one = real(1.0);
     let controller = real(drive.velocity_gain_per_s) * (one + one / (real(drive.integral_time_s) * s));
     let current = one + real(drive.current_lag_s) * s;
-    let axis = real(1.0 + drive.load_inertia_ratio) * s + real(drive.viscous_friction_per_s);
+    let bed = drive.bed.map_or(Complex::ZERO, |bed| {
+        let omega = TAU * bed.frequency_hz;
+        let damped = real(2.0 * bed.damping_ratio * omega) * s + real(omega * omega);
+        real(-bed.mass_ratio) * s * s / (real(1.0 + bed.mass_ratio) * s * s + damped)
+    });
+    let axis = real(1.0 + drive.load_inertia_ratio) * (one + bed) * s + real(drive.viscous_friction_per_s);
     let open = controller / (current * axis);
     let (sine, cosine) = libm::sincos(-TAU * frequency_hz * (drive.dead_time_s + 0.5 * tick_s));
     let filter = one + real(drive.command_filter_s) * s;

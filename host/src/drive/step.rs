@@ -33,6 +33,18 @@ pub struct Step {
     pub duration_s: f64,
 }
 
+/// What a step of the feed within one tick takes.
+pub(super) fn demands(feed_mm_s: f64, tick_s: f64) -> Demands {
+    let steeper = STEEPNESS / tick_s;
+    let accel_mm_s2 = feed_mm_s * steeper;
+    Demands {
+        feed_mm_s,
+        accel_mm_s2,
+        jerk_mm_s3: accel_mm_s2 * steeper,
+        snap_mm_s4: accel_mm_s2 * steeper * steeper,
+    }
+}
+
 /// What is read from a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepFigures {
@@ -68,15 +80,7 @@ impl Step {
         within("axis", axis as f64, (0.0, AXES as f64 - 1.0))?;
         within("feed [mm/min]", feed_mm_s * 60.0, (1.0, 1e6))?;
         within("duration [s]", duration_s, (0.05, 60.0))?;
-        let steeper = STEEPNESS / machine.tick_s;
-        let accel_mm_s2 = feed_mm_s * steeper;
-        let demands = Demands {
-            feed_mm_s,
-            accel_mm_s2,
-            jerk_mm_s3: accel_mm_s2 * steeper,
-            snap_mm_s4: accel_mm_s2 * steeper * steeper,
-        };
-        let machine = raised(&open_loop(machine), &demands, &[axis])?;
+        let machine = raised(&open_loop(machine), &demands(feed_mm_s, machine.tick_s), &[axis])?;
         let (letter, feed_mm_min) = (["X", "Y", "Z"][axis], feed_mm_s * 60.0);
         let program = format!("G21 G90 G1 {letter}{:.10} F{feed_mm_min:.10}\nM2\n", feed_mm_s * duration_s);
         let experiment = format!("step of axis {} to {feed_mm_min} mm/min", machine.axes[axis].name);

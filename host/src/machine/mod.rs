@@ -6,6 +6,7 @@
 //! what was found and what was expected; nothing is clamped or filled in silently.
 //!
 //! - [`settings`]: the values, and what the stages make of them;
+//! - [`edit`]: values written back into a file;
 //! - [`error`]: refusals and their places;
 //! - `file`: the layout of the file and the rules that join several keys;
 //! - `range`: numbers that carry their range, so that a wrong one is refused where it stands.
@@ -22,6 +23,7 @@
 //! # Ok::<(), motion_host::machine::MachineError>(())
 //! ```
 
+pub mod edit;
 pub mod error;
 pub mod settings;
 
@@ -30,6 +32,7 @@ mod range;
 #[cfg(test)]
 mod tests;
 
+pub use edit::{AxisEdit, edited};
 pub use error::{AxisError, MachineError};
 pub use settings::{AxisSettings, DEAD_TIME_CELLS, Machine, PathSettings};
 

@@ -16,7 +16,6 @@ use crate::cli::write_json;
 use crate::drive::circle::{CircleFigures, Sweep, sweep};
 use crate::drive::reference;
 use crate::drive::turning::Turning;
-use crate::machine::Machine;
 use crate::report;
 
 const HELP: &str = "\
@@ -105,7 +104,9 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
     let mut sweeps = Vec::with_capacity(arguments.feedforward.len());
     for choice in &arguments.feedforward {
         let terms = choice.terms();
-        sweeps.push(sweep(&machine, terms, feed_mm_s, &frequencies_hz, limit, &mut || progress.step())?);
+        sweeps.push(sweep(terms.of(&machine), terms.name(), feed_mm_s, &frequencies_hz, limit, &mut || {
+            progress.step()
+        })?);
     }
     progress.finish();
     let is_published = is_feed(arguments.feed_mm_min, reference::CIRCLE_FEED_MM_S);
@@ -118,13 +119,13 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
         let json = CircleJson {
             feed_mm_min: arguments.feed_mm_min,
             limit_um: arguments.limit_um,
-            feedforward: sweeps.iter().map(|sweep| sweep_json(&machine, sweep)).collect(),
+            feedforward: sweeps.iter().map(sweep_json).collect(),
             reference: comparisons_json(&comparisons),
         };
         write_json(&json, out)?;
     } else {
         writeln!(out, "Circles at {} mm/min, closed loop", arguments.feed_mm_min)
-            .and_then(|()| write_sweeps(&machine, &sweeps, arguments.limit_um, out))
+            .and_then(|()| write_sweeps(&sweeps, arguments.limit_um, out))
             .and_then(|()| write_comparisons(&comparisons, out))
             .map_err(CliError::Output)?;
     }
@@ -133,7 +134,7 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
         for &frequency_hz in &arguments.show {
             let turning = Turning::new(frequency_hz, feed_mm_s);
             for sweep in &sweeps {
-                shown.push((sweep.terms, turning, turning.record(&sweep.terms.of(&machine))?));
+                shown.push((sweep.name, turning, turning.record(&sweep.machine)?));
             }
         }
         arguments.common.write_report(report, out, |file| {
@@ -143,8 +144,8 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
     Ok(outcome(&comparisons))
 }
 
-fn sweep_json(machine: &Machine, sweep: &Sweep) -> SweepJson {
-    let gains = sweep.terms.of(machine).axes[0].feedforward;
+fn sweep_json(sweep: &Sweep) -> SweepJson {
+    let gains = sweep.machine.axes[0].feedforward;
     let circle = |figures: &CircleFigures| FiguresJson {
         frequency_hz: figures.frequency_hz,
         radius_mm: figures.radius_mm,
@@ -156,7 +157,7 @@ fn sweep_json(machine: &Machine, sweep: &Sweep) -> SweepJson {
         following_error_y_um: figures.following_um[1],
     };
     SweepJson {
-        name: sweep.terms.name(),
+        name: sweep.name,
         velocity: gains.velocity,
         accel_s: gains.accel_s,
         jerk_s2: gains.jerk_s2,
@@ -165,7 +166,7 @@ fn sweep_json(machine: &Machine, sweep: &Sweep) -> SweepJson {
     }
 }
 
-fn write_sweeps(machine: &Machine, sweeps: &[Sweep], limit_um: f64, out: &mut dyn Write) -> io::Result<()> {
+fn write_sweeps(sweeps: &[Sweep], limit_um: f64, out: &mut dyn Write) -> io::Result<()> {
     let columns = [
         ("frequency", "Hz", Align::Right),
         ("radius", "mm", Align::Right),
@@ -176,14 +177,11 @@ fn write_sweeps(machine: &Machine, sweeps: &[Sweep], limit_um: f64, out: &mut dy
         ("Y", "µm", Align::Right),
     ];
     for sweep in sweeps {
-        let gains = sweep.terms.of(machine).axes[0].feedforward;
+        let gains = sweep.machine.axes[0].feedforward;
         writeln!(
             out,
             "\nFeedforward {}: velocity {}, acceleration {} s, jerk {:e} s²\n",
-            sweep.terms.name(),
-            gains.velocity,
-            gains.accel_s,
-            gains.jerk_s2
+            sweep.name, gains.velocity, gains.accel_s, gains.jerk_s2
         )?;
         let rows: Vec<[String; 7]> = sweep
             .circles

@@ -4,13 +4,15 @@
 //! - [`harmonic`]: amplitude and phase over frequency;
 //! - [`inertia`]: harmonic motion under a growing load;
 //! - [`circle`]: contour error over frequency;
-//! - [`bode`]: the step's spectrum, harmonics and the linear model side by side.
+//! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
+//! - [`tune`]: identification, proposal, verification.
 
 pub mod bode;
 pub mod circle;
 pub mod harmonic;
 pub mod inertia;
 pub mod step;
+pub mod tune;
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -38,6 +40,8 @@ Examples:
   motion drive inertia --loads 0,1,2                 the current limit, seen under load
   motion drive circle --report circle.html           contour error with V, VA and VAJ feedforward
   motion drive bode --axis Y --json                  curves from step, harmonics and the linear model
+  motion drive tune --machine mine.toml --output mine.toml
+                                                     identify the axes and set their regulators
 
 On the reference machine at the published settings, the published figures stand beside; exit status 1 if the run
 misses what the machine has to give.";
@@ -57,6 +61,7 @@ enum Experiment {
     Inertia(inertia::InertiaArguments),
     Circle(circle::CircleArguments),
     Bode(bode::BodeArguments),
+    Tune(tune::TuneArguments),
 }
 
 /// Makes the experiment and prints its figures.
@@ -70,6 +75,7 @@ pub fn drive(arguments: &DriveArguments, out: &mut dyn Write) -> Result<Outcome,
         Experiment::Inertia(arguments) => inertia::run(arguments, out),
         Experiment::Circle(arguments) => circle::run(arguments, out),
         Experiment::Bode(arguments) => bode::run(arguments, out),
+        Experiment::Tune(arguments) => tune::run(arguments, out),
     }
 }
 

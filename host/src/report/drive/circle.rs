@@ -8,14 +8,14 @@ use super::super::palette;
 use super::super::plots::graph::{Graph, Series, Stack};
 use super::super::plots::{Caption, polar};
 use super::{legend, table};
+use crate::drive::Recording;
 use crate::drive::circle::{CircleFigures, Sweep, deviations};
 use crate::drive::reference::Comparison;
 use crate::drive::turning::Turning;
-use crate::drive::{Recording, Terms};
 use crate::machine::Machine;
 
 /// A circle to be shown: what acted, the motion, its recording.
-pub type Shown = (Terms, Turning, Recording);
+pub type Shown = (&'static str, Turning, Recording);
 
 /// Writes the page.
 ///
@@ -36,7 +36,7 @@ pub fn write_circle(
         .iter()
         .map(|sweep| {
             let hz = sweep.limit_hz.map_or_else(|| "–".to_owned(), |hz| figure(hz, 3));
-            format!("{hz} Hz with {}", sweep.terms.name())
+            format!("{hz} Hz ({})", sweep.name)
         })
         .collect();
     let sentence = format!(
@@ -58,7 +58,7 @@ pub fn write_circle(
         one_frequency(machine, index, hz, limit_um, &of, out)?;
     }
     writeln!(out, "<section><h2>Figures</h2>")?;
-    let rows = sweeps.iter().flat_map(|sweep| sweep.circles.iter().map(|circle| row(sweep.terms, circle)));
+    let rows = sweeps.iter().flat_map(|sweep| sweep.circles.iter().map(|circle| row(sweep.name, circle)));
     let headings = [
         "feedforward, frequency",
         "radius [mm]",
@@ -73,9 +73,9 @@ pub fn write_circle(
     super::close(out)
 }
 
-fn row(terms: Terms, circle: &CircleFigures) -> Vec<String> {
+fn row(name: &str, circle: &CircleFigures) -> Vec<String> {
     vec![
-        format!("{}, {} Hz", terms.name(), figure(circle.frequency_hz, 4)),
+        format!("{}, {} Hz", name, figure(circle.frequency_hz, 4)),
         fixed(circle.radius_mm, 4),
         fixed(circle.contour_um_max, 2),
         fixed(circle.contour_um_min, 2),
@@ -116,7 +116,7 @@ fn over_frequency(sweeps: &[Sweep], limit_um: f64, out: &mut impl Write) -> io::
         title: "Errors of the circle over frequency",
         description: "Greatest and least contour error, form deviation and following error over frequency.",
     };
-    let mut words = legend(sweeps.iter().map(|sweep| sweep.terms.name().to_owned()));
+    let mut words = legend(sweeps.iter().map(|sweep| sweep.name.to_owned()));
     words.push((palette::LIMIT, format!("±{} µm", figure(limit_um, 3))));
     let remark = "Actual less programmed radius: each feedforward has a curve of its greatest and one of its least value.";
     writeln!(out, "<section><h2>Errors over frequency</h2>")?;
@@ -151,7 +151,7 @@ fn one_frequency(
         };
         following.push(Series { ink, points: ticks.iter().enumerate().map(over_time).collect() });
     }
-    let words = legend(shown.iter().map(|(terms, _, _)| terms.name().to_owned()));
+    let words = legend(shown.iter().map(|(name, _, _)| (*name).to_owned()));
     writeln!(out, "<section><h2>At {hz} Hz: radius {} mm</h2>", figure(radius_mm, 4))?;
     let title = format!("Contour error around the circle at {hz} Hz, magnified");
     let caption = Caption { id: &format!("polar{index}"), title: &title, description: &title };

@@ -1,0 +1,468 @@
+//! `motion drive tune`: identify the axes, propose regulator figures with their reasons, verify them on circles, and
+//! write them into the machine file.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::axis_named;
+use crate::cli::error::{CliError, Outcome};
+use crate::cli::input::Output;
+use crate::cli::progress::Progress;
+use crate::cli::table::{self, Align};
+use crate::cli::write_json;
+use crate::drive::circle::{CircleFigures, Sweep, figures};
+use crate::drive::identification::identify_axes;
+use crate::drive::reference::CIRCLE_FEED_MM_S;
+use crate::drive::turning::Turning;
+use crate::gcode::Plane;
+use crate::identify::{Estimate, Identification};
+use crate::machine::{AxisEdit, Machine, REFERENCE_TOML, edited};
+use crate::report::{self, drive::Shown};
+use crate::tuning::{self, AxisTuning, propose};
+
+const HELP: &str = "\
+Runs velocity steps and circles open loop, finds the drive's parameters in what the converter put out and the encoders
+read, and makes of them a position gain with margins and a feedforward. Then it drives circles before and after.
+
+Examples:
+  motion drive tune                                  see what the reference machine could do
+  motion drive tune --machine mine.toml --output mine.toml
+                                                     write the figures into the file; its comments stay
+  motion drive tune --axis X --method fit --json     V, A and J gains only, for a script
+
+JSON: axes: list of {name, found: {kp…: {value, half_width_95, determined}}, margins: {crossover_hz, phase_deg, gain,
+sensitivity}, changes: list of {key, before, after, unit, reason}, remarks}, verification: {feed_mm_min, circles: list of
+{frequency_hz, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
+following_error_second_um}}}, output.
+
+Exit status 1: the tuned machine is worse on a circle than it was; nothing is written then.";
+
+/// Frequencies of the circles before and after \[Hz\].
+const VERIFIED_HZ: [f64; 6] = [1.0, 4.0, 10.0, 13.0, 16.0, 28.0];
+/// The contour error that S4 asks for \[µm\].
+const LIMIT_UM: f64 = 20.0;
+/// What a circle may get worse by, in counts of the encoder.
+const WORSE_COUNTS: f64 = 2.0;
+
+/// Identify the axes, propose gains and feedforward with their reasons, verify them on circles.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct TuneArguments {
+    /// Axes to tune; without it, all.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    axis: Vec<String>,
+    /// How feedforward is made.
+    #[arg(long, value_enum, default_value_t = Method::Inverse)]
+    method: Method,
+    /// Write the machine file with the new figures; it may be the one that was read.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Machine file (`motion machine` prints one); without it, the reference machine.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    /// Write a self-contained HTML page with the circles before and after; an existing file is replaced.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Print JSON; every key carries its unit.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How feedforward is made, as the option says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// The drive's inverse with friction and bed, led by its dead time.
+    Inverse,
+    /// V, A and J gains of the inverse's series.
+    Series,
+    /// V, A and J gains with the least following error from 1 to 20 Hz.
+    Fit,
+}
+
+impl From<Method> for tuning::Method {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Inverse => Self::Inverse,
+            Method::Series => Self::Series,
+            Method::Fit => Self::Fit,
+        }
+    }
+}
+
+/// Identifies, proposes, verifies, prints and writes.
+///
+/// # Errors
+/// An argument is refused, an axis can't be identified, a fault ended a run, or a file can't be written.
+pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let source = Source::read(arguments.machine.as_ref())?;
+    let machine = Machine::from_toml(&source.name, &source.text)?;
+    let axes = match arguments.axis.as_slice() {
+        [] => (0..machine.axes.len()).collect(),
+        names => names.iter().map(|name| axis_named(&machine, name)).collect::<Result<Vec<_>, _>>()?,
+    };
+    let report = arguments.report.as_deref().map(Output::create).transpose()?;
+    let found = identify_axes(&machine, &axes)?;
+    let tunings: Vec<Tuned> = axes
+        .iter()
+        .zip(found)
+        .map(|(&axis, found)| {
+            let tuning = propose(&machine.axes[axis], &found, arguments.method.into(), machine.tick_s);
+            Tuned { axis, found, tuning }
+        })
+        .collect();
+    // What is verified is what the file will say.
+    let edits: Vec<AxisEdit> = tunings.iter().map(Tuned::edit).collect();
+    let text = edited(&source.name, &source.text, &edits)?;
+    let tuned = Machine::from_toml(&source.name, &text)?;
+    let plane = if axes.iter().any(|axis| *axis < 2) { Plane::Xy } else { Plane::Yz };
+    let verification = Verification::new(&machine, &tuned, plane)?;
+    let is_better = verification.is_better(&tuned, &axes);
+    if is_better && let Some(path) = &arguments.output {
+        fs::write(path, &text)
+            .map_err(|source| CliError::Write { path: path.display().to_string(), source })?;
+    }
+    if arguments.json {
+        let output = arguments.output.as_ref().filter(|_| is_better).map(|path| path.display().to_string());
+        write_json(&json(&machine, &tunings, &verification, output), out)?;
+    } else {
+        write_words(&machine, &tunings, &verification, out).map_err(CliError::Output)?;
+        let end = match (&arguments.output, is_better) {
+            (_, false) => "  a circle got worse: nothing is written".to_owned(),
+            (Some(path), true) => format!("  written to {}", path.display()),
+            (None, true) => "  nothing is written; --output FILE writes the machine file".to_owned(),
+        };
+        writeln!(out, "\n{end}").map_err(CliError::Output)?;
+    }
+    if let Some(mut output) = report {
+        let written = verification.write_report(&tuned, &mut output.file).and_then(|()| output.file.flush());
+        written.map_err(|source| CliError::Write { path: output.name.clone(), source })?;
+        if !arguments.json {
+            writeln!(out, "  report written to {}", output.name).map_err(CliError::Output)?;
+        }
+    }
+    Ok(if is_better { Outcome::Done } else { Outcome::Failed })
+}
+
+/// The machine file's text: of a file, or the reference machine's.
+struct Source {
+    name: String,
+    text: String,
+}
+
+impl Source {
+    fn read(path: Option<&PathBuf>) -> Result<Self, CliError> {
+        let Some(path) = path else {
+            return Ok(Self { name: "reference.toml".to_owned(), text: REFERENCE_TOML.to_owned() });
+        };
+        let name = path.display().to_string();
+        match fs::read_to_string(path) {
+            Ok(text) => Ok(Self { name, text }),
+            Err(source) => Err(CliError::Read { path: name, source }),
+        }
+    }
+}
+
+/// An axis, what was found of it, what it should be set to.
+struct Tuned {
+    axis: usize,
+    found: Identification,
+    tuning: AxisTuning,
+}
+
+impl Tuned {
+    fn edit(&self) -> AxisEdit {
+        let &AxisTuning { gains, feedforward, output_offset_v, .. } = &self.tuning;
+        AxisEdit { axis: self.axis, gains, feedforward, output_offset_v }
+    }
+}
+
+/// Circles before and after.
+struct Verification {
+    sweeps: [Sweep; 2],
+    shown: Vec<Shown>,
+}
+
+impl Verification {
+    /// Frequencies whose circles the report draws \[Hz\].
+    const SHOWN_HZ: [f64; 2] = [4.0, 13.0];
+
+    fn new(before: &Machine, after: &Machine, plane: Plane) -> Result<Self, CliError> {
+        let mut progress = Progress::new(2 * VERIFIED_HZ.len() as u64);
+        let mut shown = Vec::new();
+        let mut sweep = |name: &'static str, machine: &Machine| -> Result<Sweep, CliError> {
+            let mut circles = Vec::with_capacity(VERIFIED_HZ.len());
+            for frequency_hz in VERIFIED_HZ {
+                let turning = Turning { plane, ..Turning::new(frequency_hz, CIRCLE_FEED_MM_S) };
+                let recording = turning.record(machine)?;
+                circles.push(figures(&recording, &turning)?);
+                if Self::SHOWN_HZ.contains(&frequency_hz) {
+                    shown.push((name, turning, recording));
+                }
+                progress.step();
+            }
+            let within = |figures: &&CircleFigures| figures.contour_um() <= LIMIT_UM;
+            let limit_hz = circles.iter().take_while(within).last().map(|figures| figures.frequency_hz);
+            Ok(Sweep { name, machine: machine.clone(), circles, limit_hz })
+        };
+        let sweeps = [sweep("before", before)?, sweep("after", after)?];
+        progress.finish();
+        Ok(Self { sweeps, shown })
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (&CircleFigures, &CircleFigures)> {
+        let [before, after] = &self.sweeps;
+        before.circles.iter().zip(&after.circles)
+    }
+
+    /// Whether no circle got worse, but for the encoders' rounding.
+    fn is_better(&self, machine: &Machine, axes: &[usize]) -> bool {
+        let count_um =
+            axes.iter().map(|&axis| machine.axes[axis].mm_per_count.abs() * 1e3).fold(0.0, f64::max);
+        let margin_um = WORSE_COUNTS * count_um;
+        self.pairs().all(|(before, after)| after.contour_um() <= before.contour_um() + margin_um)
+    }
+
+    fn write_report(&self, tuned: &Machine, out: &mut impl Write) -> io::Result<()> {
+        report::drive::write_circle(tuned, &self.sweeps, LIMIT_UM, &self.shown, &[], out)
+    }
+}
+
+fn write_words(
+    machine: &Machine,
+    tunings: &[Tuned],
+    verification: &Verification,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    for Tuned { axis, found, tuning } in tunings {
+        writeln!(out, "Axis {}\n\n{}", machine.axes[*axis].name, found.parameters)?;
+        let columns = [
+            ("key", "", Align::Left),
+            ("before", "", Align::Right),
+            ("after", "", Align::Right),
+            ("unit", "", Align::Left),
+            ("because", "", Align::Left),
+        ];
+        let rows: Vec<[String; 5]> = tuning
+            .changes
+            .iter()
+            .map(|change| {
+                [
+                    change.key.to_owned(),
+                    number(change.before),
+                    number(change.after),
+                    change.unit.to_owned(),
+                    change.reason.clone(),
+                ]
+            })
+            .collect();
+        table::write(&columns, &rows, out)?;
+        for remark in &tuning.remarks {
+            writeln!(out, "  note: {remark}")?;
+        }
+        writeln!(out)?;
+    }
+    writeln!(out, "Circles at {:.0} mm/min, before and after\n", CIRCLE_FEED_MM_S * 60.0)?;
+    let columns = [
+        ("frequency", "Hz", Align::Right),
+        ("contour", "µm", Align::Right),
+        ("", "µm", Align::Right),
+        ("form deviation", "µm", Align::Right),
+        ("", "µm", Align::Right),
+        ("following, first axis", "µm", Align::Right),
+        ("", "µm", Align::Right),
+        ("second axis", "µm", Align::Right),
+        ("", "µm", Align::Right),
+    ];
+    let rows: Vec<[String; 9]> = verification
+        .pairs()
+        .map(|(before, after)| {
+            let um = |value: f64| format!("{value:.2}");
+            [
+                before.frequency_hz.to_string(),
+                um(before.contour_um()),
+                um(after.contour_um()),
+                um(before.form_um()),
+                um(after.form_um()),
+                um(before.following_um[0]),
+                um(after.following_um[0]),
+                um(before.following_um[1]),
+                um(after.following_um[1]),
+            ]
+        })
+        .collect();
+    table::write(&columns, &rows, out)
+}
+
+/// A value of a file, or that it is not in it.
+fn number(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| toml_number(value))
+}
+
+/// As Rust prints the shortest number that reads back, small ones with an exponent.
+fn toml_number(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-3 { format!("{value:e}") } else { value.to_string() }
+}
+
+#[derive(Serialize)]
+struct TuneJson<'run> {
+    axes: Vec<AxisJson<'run>>,
+    verification: VerificationJson,
+    output: Option<String>,
+}
+
+#[derive(Serialize)]
+struct AxisJson<'run> {
+    name: &'run str,
+    found: FoundJson,
+    margins: MarginsJson,
+    changes: Vec<ChangeJson<'run>>,
+    remarks: &'run [String],
+}
+
+#[derive(Serialize)]
+struct FoundJson {
+    command_gain: EstimateJson,
+    command_offset_mm_s: EstimateJson,
+    velocity_gain_per_s: EstimateJson,
+    integral_time_s: EstimateJson,
+    dead_time_s: EstimateJson,
+    current_lag_s: EstimateJson,
+    total_delay_s: EstimateJson,
+    accel_limit_mm_s2: EstimateJson,
+    coulomb_friction_mm_s2: EstimateJson,
+    viscous_friction_per_s: EstimateJson,
+    bed: Option<BedJson>,
+}
+
+#[derive(Serialize)]
+struct BedJson {
+    frequency_hz: EstimateJson,
+    damping_ratio: EstimateJson,
+    mass_ratio: EstimateJson,
+}
+
+#[derive(Serialize)]
+struct EstimateJson {
+    value: f64,
+    /// Null where it has no end.
+    half_width_95: Option<f64>,
+    determined: bool,
+}
+
+#[derive(Serialize)]
+struct MarginsJson {
+    crossover_hz: f64,
+    phase_deg: f64,
+    gain: Option<f64>,
+    sensitivity: f64,
+}
+
+#[derive(Serialize)]
+struct ChangeJson<'run> {
+    key: &'run str,
+    before: Option<f64>,
+    after: Option<f64>,
+    unit: &'run str,
+    reason: &'run str,
+}
+
+#[derive(Serialize)]
+struct VerificationJson {
+    feed_mm_min: f64,
+    circles: Vec<PairJson>,
+}
+
+#[derive(Serialize)]
+struct PairJson {
+    frequency_hz: f64,
+    before: CircleJson,
+    after: CircleJson,
+}
+
+#[derive(Serialize)]
+struct CircleJson {
+    contour_error_um: f64,
+    form_deviation_um: f64,
+    following_error_first_um: f64,
+    following_error_second_um: f64,
+}
+
+fn json<'run>(
+    machine: &'run Machine,
+    tunings: &'run [Tuned],
+    verification: &Verification,
+    output: Option<String>,
+) -> TuneJson<'run> {
+    let circle = |figures: &CircleFigures| CircleJson {
+        contour_error_um: figures.contour_um(),
+        form_deviation_um: figures.form_um(),
+        following_error_first_um: figures.following_um[0],
+        following_error_second_um: figures.following_um[1],
+    };
+    TuneJson {
+        axes: tunings.iter().map(|tuned| axis_json(&machine.axes[tuned.axis].name, tuned)).collect(),
+        verification: VerificationJson {
+            feed_mm_min: CIRCLE_FEED_MM_S * 60.0,
+            circles: verification
+                .pairs()
+                .map(|(before, after)| PairJson {
+                    frequency_hz: before.frequency_hz,
+                    before: circle(before),
+                    after: circle(after),
+                })
+                .collect(),
+        },
+        output,
+    }
+}
+
+fn axis_json<'run>(name: &'run str, Tuned { found, tuning, .. }: &'run Tuned) -> AxisJson<'run> {
+    let estimate = |estimate: Estimate| EstimateJson {
+        value: estimate.value,
+        half_width_95: Some(estimate.half_width_95).filter(|width| width.is_finite()),
+        determined: estimate.is_determined(),
+    };
+    let (parameters, margins) = (&found.parameters, &tuning.margins);
+    AxisJson {
+        name,
+        found: FoundJson {
+            command_gain: estimate(parameters.command_gain),
+            command_offset_mm_s: estimate(parameters.command_offset_mm_s),
+            velocity_gain_per_s: estimate(parameters.velocity_gain_per_s),
+            integral_time_s: estimate(parameters.integral_time_s),
+            dead_time_s: estimate(parameters.dead_time_s),
+            current_lag_s: estimate(parameters.current_lag_s),
+            total_delay_s: estimate(parameters.total_delay_s),
+            accel_limit_mm_s2: estimate(parameters.accel_limit_mm_s2),
+            coulomb_friction_mm_s2: estimate(parameters.coulomb_friction_mm_s2),
+            viscous_friction_per_s: estimate(parameters.viscous_friction_per_s),
+            bed: parameters.bed.map(|bed| BedJson {
+                frequency_hz: estimate(bed.frequency_hz),
+                damping_ratio: estimate(bed.damping_ratio),
+                mass_ratio: estimate(bed.mass_ratio),
+            }),
+        },
+        margins: MarginsJson {
+            crossover_hz: margins.crossover_hz,
+            phase_deg: margins.phase_deg,
+            gain: Some(margins.gain).filter(|gain| gain.is_finite()),
+            sensitivity: margins.sensitivity,
+        },
+        changes: tuning
+            .changes
+            .iter()
+            .map(|change| ChangeJson {
+                key: change.key,
+                before: change.before,
+                after: change.after,
+                unit: change.unit,
+                reason: &change.reason,
+            })
+            .collect(),
+        remarks: &tuning.remarks,
+    }
+}

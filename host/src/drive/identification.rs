@@ -1,0 +1,93 @@
+//! The runs that identification asks for, through the kernel.
+//!
+//! Steps there and back move one axis at a time, circles two. All are open loop, as in S4: what the drive does then is
+//! not bent by a regulator. Of each run only the converter's output and the encoder's readings are used.
+
+use std::thread;
+
+use super::experiment::{DriveError, Recording, open_loop, raised};
+use super::step;
+use super::turning::Turning;
+use crate::gcode::Plane;
+use crate::identify::{AxisRecording, Excitation, Identification, identification_plan, identify};
+use crate::machine::Machine;
+use crate::record::AXES;
+
+const LETTERS: [&str; AXES] = ["X", "Y", "Z"];
+
+/// Identifies the axes `axes` (from 0) of `machine`, in that order.
+///
+/// # Errors
+/// A run can't be made, or an axis does not answer like a velocity servo.
+pub fn identify_axes(machine: &Machine, axes: &[usize]) -> Result<Vec<Identification>, DriveError> {
+    let one = |axis: usize| -> Result<Identification, DriveError> {
+        let runs = recordings(machine, axis)?;
+        let name = machine.axes.get(axis).map_or_else(String::new, |axis| axis.name.clone());
+        identify(&runs).map_err(|source| DriveError::Identification { axis: name, source })
+    };
+    thread::scope(|scope| {
+        let workers: Vec<_> = axes.iter().map(|&axis| scope.spawn(move || one(axis))).collect();
+        let join = |worker: thread::ScopedJoinHandle<'_, _>| {
+            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        workers.into_iter().map(join).collect()
+    })
+}
+
+/// The recordings of one axis, in the order of [`identification_plan`].
+///
+/// # Errors
+/// A run can't be made.
+pub fn recordings(machine: &Machine, axis: usize) -> Result<Vec<AxisRecording>, DriveError> {
+    super::experiment::within("axis", axis as f64, (0.0, AXES as f64 - 1.0))?;
+    identification_plan()
+        .iter()
+        .map(|excitation| {
+            let recording = match *excitation {
+                Excitation::Steps { feed_mm_s, cruise_s, rest_s } => {
+                    steps(machine, axis, feed_mm_s, cruise_s, rest_s)?
+                }
+                Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods } => {
+                    let turning = Turning {
+                        // Any plane with the axis in it.
+                        plane: if axis == 2 { Plane::Yz } else { Plane::Xy },
+                        settle_s: 0.0,
+                        measured_s: f64::from(periods) / frequency_hz,
+                        ..Turning::new(frequency_hz, amplitude_mm_s)
+                    };
+                    turning.record(&open_loop(machine))?
+                }
+            };
+            Ok(of_axis(&recording, axis, excitation.harmonic_hz()))
+        })
+        .collect()
+}
+
+/// 0 → feed → 0 → −feed → 0, each change within one tick.
+fn steps(
+    machine: &Machine,
+    axis: usize,
+    feed_mm_s: f64,
+    cruise_s: f64,
+    rest_s: f64,
+) -> Result<Recording, DriveError> {
+    let machine = raised(&open_loop(machine), &step::demands(feed_mm_s, machine.tick_s), &[axis])?;
+    let (letter, feed_mm_min, far_mm) = (LETTERS[axis], feed_mm_s * 60.0, feed_mm_s * cruise_s);
+    let program = format!(
+        "G21 G90 F{feed_mm_min:.10}\nG4 P{rest_s}\nG1 {letter}{far_mm:.10}\nG4 P{rest_s}\nG1 {letter}0\nG4 P{rest_s}\nM2\n"
+    );
+    let experiment = format!("steps of axis {} to {feed_mm_min:.1} mm/min", machine.axes[axis].name);
+    Recording::of(experiment, &program, machine, feed_mm_s)
+}
+
+fn of_axis(recording: &Recording, axis: usize, harmonic_hz: Option<f64>) -> AxisRecording {
+    let settings = &recording.machine.axes[axis];
+    let mm_s_per_volt = settings.mm_s_at_10_v / 10.0;
+    AxisRecording {
+        tick_s: recording.tick_s(),
+        command_mm_s: recording.axis(axis).map(|tick| tick.out_v * mm_s_per_volt).collect(),
+        actual_mm: recording.axis(axis).map(|tick| tick.act_mm).collect(),
+        lead_in_ticks: 0,
+        harmonic_hz,
+    }
+}

@@ -1,0 +1,167 @@
+//! Values written into a machine file, whose comments and layout stay as they are.
+
+use motion_kernel::axis::{Feedforward, Gains};
+use toml_edit::{DocumentMut, Item, Table, value};
+
+use super::error::MachineError;
+
+/// New values of one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisEdit {
+    /// The axis, from 0.
+    pub axis: usize,
+    /// Feedback gains.
+    pub gains: Gains,
+    /// Feedforward; its tables are left as they are in the file.
+    pub feedforward: Feedforward,
+    /// Trim of the output \[V\].
+    pub output_offset_v: f64,
+}
+
+/// `text`, a machine file, with the values of `edits`.
+///
+/// # Errors
+/// The text is no machine file: not TOML, or without the tables that the values belong to.
+pub fn edited(source_name: &str, text: &str, edits: &[AxisEdit]) -> Result<String, MachineError> {
+    let refused =
+        |at: std::ops::Range<usize>, problem: String| MachineError::new(source_name, text, &at, problem);
+    let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| {
+        refused(error.span().unwrap_or(0..0), format!("found {}", error.message().replace('\n', ", ")))
+    })?;
+    for edit in edits {
+        let missing = |table: &str| {
+            let place =
+                format!("found no table [axis.{table}] of axis {}, expected [[axis]] with it", edit.axis + 1);
+            refused(0..0, place)
+        };
+        let axes = document.get_mut("axis").and_then(Item::as_array_of_tables_mut);
+        let axis = axes.and_then(|axes| axes.get_mut(edit.axis)).ok_or_else(|| missing("regulator"))?;
+        let output = axis.get_mut("output").and_then(Item::as_table_mut).ok_or_else(|| missing("output"))?;
+        set(output, "offset_v", Some(edit.output_offset_v));
+        let regulator =
+            axis.get_mut("regulator").and_then(Item::as_table_mut).ok_or_else(|| missing("regulator"))?;
+        set_regulator(regulator, edit);
+    }
+    Ok(document.to_string())
+}
+
+fn set_regulator(regulator: &mut Table, edit: &AxisEdit) {
+    let AxisEdit { gains, feedforward, .. } = edit;
+    set(regulator, "kp_per_s", Some(gains.kp_per_s));
+    set(regulator, "ki_per_s2", Some(gains.ki_per_s2));
+    set(regulator, "kd", Some(gains.kd));
+    set(regulator, "feedforward_velocity", Some(feedforward.velocity));
+    set(regulator, "feedforward_accel_s", Some(feedforward.accel_s));
+    set(regulator, "feedforward_jerk_s2", Some(feedforward.jerk_s2));
+    set(regulator, "feedforward_lead_s", (feedforward.lead_s != 0.0).then_some(feedforward.lead_s));
+    let Some(drive) = &feedforward.drive else {
+        regulator.remove("inverse");
+        return;
+    };
+    let inverse = child(regulator, "inverse");
+    set(inverse, "velocity_gain_per_s", Some(drive.velocity_gain_per_s));
+    set(inverse, "integral_time_s", Some(drive.integral_time_s));
+    set(inverse, "current_lag_s", Some(drive.current_lag_s));
+    set(inverse, "viscous_friction_per_s", Some(drive.viscous_friction_per_s));
+    set(inverse, "coulomb_friction_mm_s2", Some(drive.coulomb_friction_mm_s2));
+    set(inverse, "reversal_mm_s", Some(drive.reversal_mm_s));
+    let Some(bed) = &drive.bed else {
+        inverse.remove("bed");
+        return;
+    };
+    let table = child(inverse, "bed");
+    set(table, "frequency_hz", Some(bed.frequency_hz));
+    set(table, "damping_ratio", Some(bed.damping_ratio));
+    set(table, "mass_ratio", Some(bed.mass_ratio));
+}
+
+/// The table `name`, new if there was none.
+fn child<'table>(parent: &'table mut Table, name: &str) -> &'table mut Table {
+    let item = parent.entry(name).or_insert_with(toml_edit::table);
+    if !item.is_table() {
+        *item = toml_edit::table();
+    }
+    item.as_table_mut().expect("made a table")
+}
+
+/// Sets `key`, keeping what is written around its value, or takes it out.
+fn set(table: &mut Table, key: &str, to: Option<f64>) {
+    match (to, table.get_mut(key).and_then(Item::as_value_mut)) {
+        (None, _) => {
+            table.remove(key);
+        }
+        (Some(to), Some(old)) => {
+            let decor = old.decor().clone();
+            *old = toml_edit::Value::from(to);
+            *old.decor_mut() = decor;
+        }
+        (Some(to), None) => {
+            table.insert(key, value(to));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motion_kernel::axis::{BedInverse, DriveInverse};
+
+    use super::*;
+    use crate::machine::{Machine, REFERENCE_TOML};
+
+    fn edit(machine: &Machine, axis: usize) -> AxisEdit {
+        let settings = &machine.axes[axis];
+        AxisEdit {
+            axis,
+            gains: settings.gains,
+            feedforward: settings.feedforward,
+            output_offset_v: settings.output_offset_v,
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_what_is_read() {
+        let mut machine = Machine::reference();
+        let bed = BedInverse { frequency_hz: 13.4, damping_ratio: 0.03, mass_ratio: 0.06 };
+        for (axis, bed) in machine.axes[..2].iter_mut().zip([None, Some(bed)]) {
+            axis.output_offset_v = -0.0125;
+            axis.gains = Gains { kp_per_s: 217.5, ki_per_s2: 0.0, kd: 1e-5 };
+            axis.feedforward = Feedforward {
+                velocity: 0.998,
+                lead_s: 1.67e-3,
+                drive: Some(DriveInverse {
+                    velocity_gain_per_s: 440.12,
+                    integral_time_s: 0.0275,
+                    current_lag_s: 3.7e-4,
+                    viscous_friction_per_s: 0.08,
+                    coulomb_friction_mm_s2: 85.0,
+                    reversal_mm_s: 0.5,
+                    bed,
+                }),
+                ..Feedforward::default()
+            };
+        }
+        let edits = [edit(&machine, 0), edit(&machine, 1)];
+        let text = edited("m.toml", REFERENCE_TOML, &edits).expect("a machine file");
+        assert_eq!(Machine::from_toml("m.toml", &text), Ok(machine.clone()));
+        // Every comment is still there.
+        let comments = |text: &str| text.lines().filter(|line| line.starts_with('#')).count();
+        assert_eq!(comments(&text), comments(REFERENCE_TOML));
+        // Twice is once; and back again, what is no longer wanted goes.
+        assert_eq!(edited("m.toml", &text, &edits).expect("a machine file"), text);
+        let reference = Machine::reference();
+        let back =
+            edited("m.toml", &text, &[edit(&reference, 0), edit(&reference, 1)]).expect("a machine file");
+        assert_eq!(Machine::from_toml("m.toml", &back), Ok(reference));
+    }
+
+    #[test]
+    fn what_is_no_machine_file_is_refused_with_its_place() {
+        let edits = [edit(&Machine::reference(), 2)];
+        let of = |text: &str| edited("m.toml", text, &edits).expect_err("refused").to_string();
+        assert!(of("a = \n").starts_with("m.toml:1:"), "{}", of("a = \n"));
+        assert_eq!(
+            of("name = \"x\""),
+            "m.toml:1:1: found no table [axis.regulator] of axis 3, expected [[axis]] with it"
+        );
+    }
+}
