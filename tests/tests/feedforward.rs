@@ -172,7 +172,7 @@ fn leads_are_exact_to_a_fraction_of_a_tick() {
 #[test]
 fn is_the_formula_in_every_number_type() {
     fn deviation<R: Real>() -> f64 {
-        let table = |reach, points: [f32; 9]| Some(Table { reach, mm_s: points });
+        let table = |reach, points: [f64; 9]| Some(Table::new(reach, &points));
         let tables = Tables {
             velocity: table(40.0, [-3.0, -2.0, -1.0, -0.5, 0.25, 0.5, 1.0, 2.0, 4.0]),
             accel: table(2000.0, [1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, -0.5, -1.0]),
@@ -192,7 +192,7 @@ fn is_the_formula_in_every_number_type() {
         let lookup = |table: &Table, value: f64| {
             let place = (value.clamp(-table.reach, table.reach) / table.reach + 1.0) * 4.0;
             let index = (place.floor() as usize).min(7);
-            let [from, to] = [table.mm_s[index], table.mm_s[index + 1]].map(f64::from);
+            let [from, to] = [table.mm_s()[index], table.mm_s()[index + 1]];
             from + (to - from) * (place - index as f64)
         };
         let (mut state, mut torques, mut worst) = (AxisState::<R>::default(), vec![], 0.0_f64);
@@ -276,7 +276,7 @@ fn figures_out_of_range_are_refused() {
     assert_eq!(bed(|bed| bed.frequency_hz = 500.0), "bed frequency [Hz]");
     assert_eq!(bed(|bed| bed.damping_ratio = 0.0), "bed damping ratio");
     assert_eq!(bed(|bed| bed.mass_ratio = 10.0), "bed mass ratio");
-    let points = [0.0, 0.0, 0.0, 0.0, f32::NAN, 0.0, 0.0, 0.0, 0.0];
-    let table = Some(Table { reach: 1.0, mm_s: points });
+    let points = [0.0, 0.0, 0.0, 0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0];
+    let table = Some(Table::new(1.0, &points));
     assert_eq!(refusal(&|feedforward| feedforward.tables.jerk = table), "jerk feedforward table");
 }

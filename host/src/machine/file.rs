@@ -211,7 +211,7 @@ struct InverseBedTable {
 
 impl TableTable {
     fn table(&self) -> Table {
-        Table { reach: self.reach.0, mm_s: self.mm_s.each_ref().map(|point| point.0 as f32) }
+        Table::new(self.reach.0, &self.mm_s.each_ref().map(|point| point.0))
     }
 }
 

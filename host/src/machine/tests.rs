@@ -176,7 +176,7 @@ fn optional_keys_are_read() {
     let feedforward = machine.axes[0].feedforward;
     assert!((feedforward.lead_s - 0.00167).abs() < 1e-12);
     let table = feedforward.tables.velocity.expect("a table");
-    assert_eq!((table.reach, table.mm_s[0], table.mm_s[8]), (300.0, -0.6, 0.6));
+    assert_eq!((table.reach, table.mm_s()[0], table.mm_s()[8]), (300.0, -0.6, 0.6));
     assert_eq!(feedforward.tables.accel.expect("a table").reach, 500.0);
     assert_eq!(feedforward.tables.jerk.expect("a table").reach, 5000.0);
     let drive = feedforward.drive.expect("an inverse");

@@ -56,13 +56,35 @@ pub struct Tables {
 /// Points of a [`Table`].
 pub const TABLE_POINTS: usize = 9;
 
-/// A velocity command over a quantity, straight between points.
+/// A velocity command over a quantity, straight between points. In 16 bits a point, because every axis keeps room for
+/// three: a table of ±5 mm/s has steps of 0.15 µm/s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
-    /// The points lie evenly from −reach to +reach, in the quantity's unit; > 0. Beyond, the end points hold.
+    /// The points lie evenly from −reach to +reach, in the quantity's unit; > 10⁻⁶. Beyond, the end points hold.
     pub reach: f64,
-    /// Velocity commands \[mm/s\].
-    pub mm_s: [f32; TABLE_POINTS],
+    /// Velocity of a step \[mm/s\], 0 or more.
+    pub mm_s_per_step: f64,
+    /// Velocity commands in steps.
+    pub steps: [i16; TABLE_POINTS],
+}
+
+impl Table {
+    /// The table of `mm_s` \[mm/s\]. What is not a number makes its step one that is refused.
+    #[must_use]
+    pub fn new(reach: f64, mm_s: &[f64; TABLE_POINTS]) -> Self {
+        let greatest = mm_s.iter().fold(0.0_f64, |greatest, point| greatest.max(libm::fabs(*point)));
+        let is_number = mm_s.iter().all(|point| point.is_finite());
+        let mm_s_per_step = if is_number { greatest / f64::from(i16::MAX) } else { f64::NAN };
+        let step =
+            |point: f64| if mm_s_per_step > 0.0 { libm::round(point / mm_s_per_step) as i16 } else { 0 };
+        Self { reach, mm_s_per_step, steps: mm_s.map(step) }
+    }
+
+    /// The points \[mm/s\].
+    #[must_use]
+    pub fn mm_s(&self) -> [f64; TABLE_POINTS] {
+        self.steps.map(|step| f64::from(step) * self.mm_s_per_step)
+    }
 }
 
 /// A drive with its mechanics, to be inverted. Everything is per unit of the inertia that it moves.
@@ -97,6 +119,27 @@ pub struct BedInverse {
 
 /// Greatest velocity, acceleration and jerk that a set-point may have where numbers have a range.
 const REACH: [f64; 3] = [1e6, 1e9, 2e9];
+
+/// eˣ − 1 for |x| ≤ 2. A loop of a few operations: general functions in f64 are kilobytes on a core without it.
+fn expm1(x: f64) -> f64 {
+    let (mut term, mut sum) = (1.0, 0.0);
+    for n in 1..=24_u8 {
+        term = term * x / f64::from(n);
+        sum += term;
+    }
+    sum
+}
+
+/// 1 − cos √x for 0 ≤ x ≤ 4.
+fn versine(x: f64) -> f64 {
+    let (mut term, mut sum) = (-1.0, 0.0);
+    for n in 1..=12_u8 {
+        let twice = f64::from(2 * n);
+        term = -term * x / (twice * (twice - 1.0));
+        sum += term;
+    }
+    sum
+}
 
 /// A linear function of velocity, acceleration and jerk.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,8 +176,7 @@ impl<R: Real> Linear<R> {
     }
 }
 
-/// A [`Table`] made for the tick. Every axis keeps room for three: 16 bits a point are a step of 0.15 µm/s in
-/// a table of ±5 mm/s.
+/// A [`Table`] made for the tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Lookup<R> {
     reach: R,
@@ -145,26 +187,18 @@ struct Lookup<R> {
 
 impl<R: Real> Lookup<R> {
     fn new(quantity: &'static str, table: &Table) -> Result<Self, ScaleError> {
+        let &Table { reach, mm_s_per_step, steps } = table;
         let refused = |value| ScaleError {
             quantity,
             value,
-            expected: "a reach above 0, and points within the kernel's range",
+            expected: "a reach above 1e-6 and steps of at most 10 mm/s",
         };
-        let reach = R::checked_from_f64(table.reach).filter(|_| table.reach > 1e-6);
-        let mut greatest = 0.0_f64;
-        for &point in &table.mm_s {
-            let point = f64::from(point);
-            R::checked_from_f64(8.0 * point).ok_or(refused(point))?;
-            greatest = greatest.max(point).max(-point);
-        }
-        let per_step = greatest / f64::from(i16::MAX);
-        let mut steps = [0; TABLE_POINTS];
-        for (step, &point) in steps.iter_mut().zip(&table.mm_s) {
-            *step = if per_step > 0.0 { libm::round(f64::from(point) / per_step) as i16 } else { 0 };
-        }
-        let per_unit = R::from_f64((TABLE_POINTS - 1) as f64 / 2.0 / table.reach);
-        let reach = reach.ok_or(refused(table.reach))?;
-        Ok(Self { reach, per_unit, mm_s_per_step: R::from_f64(per_step), steps })
+        let per_unit = R::from_f64((TABLE_POINTS - 1) as f64 / 2.0 / reach);
+        let is_step = (0.0..=10.0).contains(&mm_s_per_step);
+        let mm_s_per_step =
+            R::checked_from_f64(mm_s_per_step).filter(|_| is_step).ok_or(refused(mm_s_per_step))?;
+        let reach = R::checked_from_f64(reach).filter(|_| reach > 1e-6).ok_or(refused(reach))?;
+        Ok(Self { reach, per_unit, mm_s_per_step, steps })
     }
 
     fn at(&self, value: R) -> R {
@@ -265,11 +299,10 @@ impl<R: Real> Bed<R> {
         let share = mass_ratio / (1.0 + mass_ratio);
         let decay = damping_ratio * omega / (1.0 + mass_ratio) * tick_s;
         let square = omega * omega / (1.0 + mass_ratio) * tick_s * tick_s;
-        let turn = libm::sqrt(square - decay * decay);
-        let forgets = -libm::expm1(-2.0 * decay);
-        let half = libm::sin(turn / 2.0);
+        let shrinks = expm1(-decay);
+        let forgets = -shrinks * (2.0 + shrinks);
         // 1 + e^(−2σTs) − 2·e^(−σTs)·cos, without cancellation.
-        let stiffness = libm::expm1(-decay) * libm::expm1(-decay) + 4.0 * libm::exp(-decay) * half * half;
+        let stiffness = shrinks * shrinks + 2.0 * (1.0 + shrinks) * versine(square - decay * decay);
         let drive = -share * stiffness / square;
         Ok(Self {
             displacement: R::from_f64(-stiffness / tick_s / tick_s),
@@ -439,6 +472,20 @@ impl<R: Real> More<R> {
         match &self.inverse {
             Some(inverse) => tables + inverse.tick(&mut state.inverse, setpoint),
             None => tables,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn loops_are_the_functions() {
+        for index in 0..=200 {
+            let x = f64::from(index) / 100.0;
+            assert!((expm1(-x) - libm::expm1(-x)).abs() < 1e-15);
+            assert!((versine(x * x) - (1.0 - libm::cos(x))).abs() < 1e-15);
         }
     }
 }

@@ -20,12 +20,13 @@ pub(super) fn preview_ticks(axes: &[AxisFigures], tick_s: f64) -> Result<u8, (us
     for (axis, figures) in axes.iter().enumerate() {
         let value = figures.feedforward.lead_s;
         // A lead of so many ticks exactly is not one more for rounding.
-        let ticks = libm::ceil(value / tick_s - 1e-6);
+        let ticks = value / tick_s - 1e-6;
         if !(value >= 0.0 && ticks <= f64::from(PREVIEW_TICKS_MAX)) {
             let expected = "a number from 0 to 32 ticks";
             return Err((axis, ScaleError { quantity: "feedforward lead [s]", value, expected }));
         }
-        most = core::cmp::max(most, ticks as u8);
+        let whole = ticks as u8;
+        most = core::cmp::max(most, if f64::from(whole) < ticks { whole + 1 } else { whole });
     }
     Ok(most)
 }

@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn eight_axes_fit_and_nine_are_refused() {
         use crate::axis::{BedInverse, DriveInverse, TABLE_POINTS, Table, Tables};
-        let table = Some(Table { reach: 1.0, mm_s: [1.0; TABLE_POINTS] });
+        let table = Some(Table { reach: 1.0, mm_s_per_step: 1.0, steps: [i16::MAX; TABLE_POINTS] });
         let bed = Some(BedInverse { frequency_hz: 30.0, damping_ratio: 0.1, mass_ratio: 0.1 });
         let drive = DriveInverse {
             velocity_gain_per_s: 100.0,
