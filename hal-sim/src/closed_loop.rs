@@ -121,9 +121,10 @@ pub type Closed<'a, R, const AXES: usize, const LINE: usize> =
 
 /// Closes the loop of a program over `machine`, drives enabled.
 ///
+/// In steps of their own frames: a board with 16 KiB has no room for copies that lie beside each other.
+///
 /// # Errors
 /// The program's machine can't be regulated or simulated.
-// Not inlined: what it makes on the way is gone before the ticks begin.
 #[inline(never)]
 pub fn close<
     'a,
@@ -137,18 +138,22 @@ pub fn close<
     streams: &'a mut Streams<R, AXES, PIECES, SEGMENTS>,
     machine: &'a SimMachine<AXES, LINE>,
 ) -> Result<Closed<'a, R, AXES, LINE>, LoopError> {
-    let &Header { tick_s, rules, ref axes, start } = program.header();
-    let config = AxesConfig::new(axes, tick_s).map_err(LoopError::Axes)?;
+    let config = &regulated(program.header());
+    let config = config.as_ref().map_err(|error| *error)?;
+    let &Header { tick_s, rules, start, .. } = program.header();
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
     let Ok(counts) = (&*machine).latch();
-    // Enabled where it lies: it is large, and copies of it are more than a small board has room for.
-    let kernel = Kernel::new(&config, start, counts);
     let (feeder, intake) = streams.split(rules, start);
     let supply = Supply::new(program.items(), tick_s);
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
-    let mut closed = (Producer { feeder, supply }, ClosedLoop { kernel, intake, machine, outputs, memory });
-    closed.1.kernel.enable(0);
-    Ok(closed)
+    let mut kernel = Kernel::new(config, start, counts);
+    kernel.enable(0);
+    Ok((Producer { feeder, supply }, ClosedLoop { kernel, intake, machine, outputs, memory }))
+}
+
+#[inline(never)]
+fn regulated<R: Real, const AXES: usize>(header: &Header<AXES>) -> Result<AxesConfig<R, AXES>, LoopError> {
+    AxesConfig::new(&header.axes, header.tick_s).map_err(LoopError::Axes)
 }
 
 impl<R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'_, R, AXES, LINE> {

@@ -262,7 +262,7 @@ fn figures_out_of_range_are_refused() {
             bed.map(change).unwrap_or_default();
         })
     };
-    for lead_s in [-1e-9, 0.0161, f64::NAN, f64::INFINITY] {
+    for lead_s in [-1e-9, 0.0121, f64::NAN, f64::INFINITY] {
         assert_eq!(refusal(&|feedforward| feedforward.lead_s = lead_s), "feedforward lead [s]");
     }
     assert_eq!(refusal(&|feedforward| feedforward.accel_s = 0.5), "feedforward gains");

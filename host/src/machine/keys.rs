@@ -200,7 +200,7 @@ pub const KEY_TABLES: &[KeyTable] = &[
                 "s",
                 LeadTime::EXPECTED,
                 "How far feedforward comes before the position set-point: the drive's dead time plus half a tick; at \
-                 most 32 ticks. Position set-points of all axes are delayed together.",
+                 most 24 ticks. Position set-points of all axes are delayed together.",
             )
             .or("0"),
         ],

@@ -9,7 +9,7 @@ use crate::path::Setpoint;
 use crate::units::Position;
 
 /// Greatest delay \[ticks\].
-pub const PREVIEW_TICKS_MAX: u8 = 32;
+pub const PREVIEW_TICKS_MAX: u8 = 24;
 
 /// The delay that all axes share: the whole ticks that the longest lead needs.
 ///
@@ -22,7 +22,7 @@ pub(super) fn preview_ticks(axes: &[AxisFigures], tick_s: f64) -> Result<u8, (us
         // A lead of so many ticks exactly is not one more for rounding.
         let ticks = value / tick_s - 1e-6;
         if !(value >= 0.0 && ticks <= f64::from(PREVIEW_TICKS_MAX)) {
-            let expected = "a number from 0 to 32 ticks";
+            let expected = "a number from 0 to 24 ticks";
             return Err((axis, ScaleError { quantity: "feedforward lead [s]", value, expected }));
         }
         let whole = ticks as u8;

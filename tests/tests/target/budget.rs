@@ -64,8 +64,10 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
         }
         let densest = by_name(&alone(programs::densest())?);
         let densest = row(&mut table, board, "3 axes, 15 pieces in every tick", &densest["tick"]);
+        let inverted = by_name(&tools.run(board, "budget", &programs::inverted(), Clock::Counting)?);
+        let inverted = row(&mut table, board, "3 axes, drives inverted", &inverted["tick"]);
         // Of all that is ordinary, the promise is for the worst.
-        ordinary[3] = ordinary[3].max(densest[3]);
+        ordinary[3] = ordinary[3].max(densest[3]).max(inverted[3]);
         ticks.push((board, ordinary));
         let what = "8 segments and 15 pieces in every tick";
         let utmost = by_name(&alone(programs::utmost::<1>())?);

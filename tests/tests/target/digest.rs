@@ -60,6 +60,8 @@ fn bundles(board: Board, programs: &[Vec<u8>]) -> Vec<Vec<Vec<u8>>> {
 pub(crate) fn the_same_bits_on_every_core(tools: &Tools) -> Result<(), String> {
     let generated = programs::generated(GENERATED);
     let mut all = vec![("the stringer".to_owned(), programs::stringer())];
+    all.extend(programs::inverted().into_iter().map(|bytes| ("drives inverted".to_owned(), bytes)));
+    all.push(("tables of feedforward".to_owned(), programs::with_tables()));
     all.extend(generated.into_iter().map(|(seed, bytes)| (format!("seed {seed}"), bytes)));
     let bytes: Vec<_> = all.iter().map(|(_, bytes)| bytes.clone()).collect();
     for board in BOARDS {

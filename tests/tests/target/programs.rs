@@ -3,6 +3,7 @@
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan, plan_program};
+use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Table, Tables};
 use motion_kernel::law::{Law, Ramp};
 use motion_kernel::num::Fixed;
 use motion_kernel::program::{Header, Item, write};
@@ -37,6 +38,46 @@ fn bytes(text: &str, machine: &Machine, mode: Mode) -> Vec<u8> {
 /// The stringer on the reference machine.
 pub(crate) fn stringer() -> Vec<u8> {
     bytes(STRINGER, &Machine::reference(), Mode::Merged)
+}
+
+/// The reference machine with all that feedforward can have on every axis: lead, the drive's inverse with friction and
+/// bed, and tables.
+fn inverting() -> Machine {
+    let mut machine = Machine::reference();
+    let bed = BedInverse { frequency_hz: 13.4, damping_ratio: 0.03, mass_ratio: 0.06 };
+    for axis in &mut machine.axes {
+        axis.feedforward = Feedforward {
+            velocity: 1.0,
+            lead_s: 0.00167,
+            drive: Some(DriveInverse {
+                velocity_gain_per_s: 440.0,
+                integral_time_s: 0.0275,
+                current_lag_s: 0.00037,
+                viscous_friction_per_s: 0.08,
+                coulomb_friction_mm_s2: 260.0,
+                reversal_mm_s: 0.5,
+                bed: Some(bed),
+            }),
+            ..Feedforward::default()
+        };
+    }
+    machine
+}
+
+/// The stringer and facets under feedforward that inverts the drive.
+pub(crate) fn inverted() -> Vec<Vec<u8>> {
+    let machine = inverting();
+    vec![bytes(STRINGER, &machine, Mode::Merged), bytes(&facets_text(), &machine, Mode::PerBlock)]
+}
+
+/// The stringer, with tables of feedforward too.
+pub(crate) fn with_tables() -> Vec<u8> {
+    let mut machine = inverting();
+    let table = |reach: f64| Some(Table::new(reach, &[-0.5, -0.3, -0.25, -0.2, 0.0, 0.1, 0.2, 0.4, 0.6]));
+    for axis in &mut machine.axes {
+        axis.feedforward.tables = Tables { velocity: table(60.0), accel: table(400.0), jerk: table(4e3) };
+    }
+    bytes(STRINGER, &machine, Mode::Merged)
 }
 
 /// The stringer with one coefficient of its first arc one last place of an f32 off.
@@ -78,6 +119,10 @@ pub(crate) fn generated(count: usize) -> Vec<(u64, Vec<u8>)> {
 
 /// Short lines and arcs, planned per block: pieces, segments and phases end all the time, often several in a tick.
 pub(crate) fn facets() -> Vec<u8> {
+    bytes(&facets_text(), &Machine::reference(), Mode::PerBlock)
+}
+
+fn facets_text() -> String {
     use std::fmt::Write;
     let mut text = "G91 G1 F4000\n".to_owned();
     for facet in 0..60 {
@@ -92,7 +137,7 @@ pub(crate) fn facets() -> Vec<u8> {
             text.push_str("G3 X0.8 Y0.8 I0 J0.8\nG3 X-0.8 Y0.8 I-0.8 J0\nG3 X-0.8 Y-0.8 I0 J-0.8\nG3 X0.8 Y-0.8 I0.8 J0\nG1\n");
         }
     }
-    bytes(&text, &Machine::reference(), Mode::PerBlock)
+    text
 }
 
 /// The programs of the budgets: the stringer; facets; the stringer with outputs that saturate.

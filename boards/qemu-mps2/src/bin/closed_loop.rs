@@ -14,22 +14,24 @@ use motion_kernel::trace::Digest;
 use qemu_boards::programs::programs;
 use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail};
 
+type Queues = Streams<Number, AXES, PIECES, SEGMENTS>;
+
 #[entry]
 fn main() -> ! {
+    let streams = cortex_m::singleton!(: Queues = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     for bytes in programs() {
-        run(bytes);
+        run(bytes, streams);
     }
     exit(true)
 }
 
 #[inline(never)]
-fn run(bytes: &[u8]) {
-    let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
-    let machine = SimMachine::<AXES, LINE>::new(&reference_machine(program.header(), SUBSTEPS))
-        .unwrap_or_else(|error| fail(&error));
-    let mut streams = Streams::<Number, AXES, PIECES, SEGMENTS>::new();
-    let mut closed = close(&program, &mut streams, &machine);
-    // In place: the microbit has no room for another one.
+fn run(bytes: &[u8], streams: &mut Queues) {
+    // Looked at where it is, as all that is large: the microbit has no room for another one.
+    let program = &Reader::<AXES>::new(bytes);
+    let program = program.as_ref().unwrap_or_else(|error| fail(error));
+    let machine = simulated(program);
+    let mut closed = close(program, streams, &machine);
     let (producer, closed_loop) = closed.as_mut().unwrap_or_else(|error| fail(error));
     let (mut digest, mut ticks) = (Digest::new(), 0_u32);
     loop {
@@ -42,4 +44,9 @@ fn run(bytes: &[u8]) {
             return;
         }
     }
+}
+
+#[inline(never)]
+fn simulated(program: &Reader<'_, AXES>) -> SimMachine<AXES, LINE> {
+    SimMachine::new(&reference_machine(program.header(), SUBSTEPS)).unwrap_or_else(|error| fail(&error))
 }
