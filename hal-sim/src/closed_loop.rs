@@ -101,6 +101,8 @@ impl<R: Real, const AXES: usize> Producer<'_, R, AXES> {
     ///
     /// # Errors
     /// The program holds an item that can't be executed.
+    // A frame of its own, as the tick's: both at once are more than 16 KiB hold.
+    #[inline(never)]
     pub fn fill(&mut self) -> Result<bool, SupplyError<ProgramError>> {
         self.supply.fill(&mut self.feeder).map(|()| self.supply.is_empty())
     }
@@ -158,6 +160,7 @@ fn regulated<R: Real, const AXES: usize>(header: &Header<AXES>) -> Result<AxesCo
 
 impl<R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'_, R, AXES, LINE> {
     /// One tick of the kernel and of the machine. A program stop is resumed at once.
+    #[inline(never)]
     pub fn tick(&mut self) -> Trace<R, AXES> {
         self.tick_by(|kernel, intake, memory| *kernel.tick(intake, memory))
     }

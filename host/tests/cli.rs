@@ -628,7 +628,8 @@ fn drive_refuses_what_cannot_be_done() {
 fn drive_tune_writes_what_it_has_verified() {
     let desk = Desk::new("tune");
     let json = desk.json(&["drive", "tune", "--axis", "x,Y", "--output", "tuned.toml", "--json"]);
-    assert_has(&json, &["axes", "output", "verification"]);
+    assert_has(&json, &["axes", "learning", "output", "verification"]);
+    assert!(json["learning"].is_null());
     assert_eq!(json["output"], "tuned.toml");
     let axes = json["axes"].as_array().expect("a list");
     assert_eq!(axes.len(), 2);
@@ -649,6 +650,16 @@ fn drive_tune_writes_what_it_has_verified() {
     let [x, _, z] = &tuned.axes;
     assert!((x.feedforward.lead_s - 1.67e-3).abs() < 1e-5 && x.feedforward.drive.is_some());
     assert_eq!(z, &Machine::reference().axes[2]);
+
+    let arguments = ["drive", "tune", "--axis", "X,Y", "--method", "series", "--learn", "2", "--json"];
+    let learning = &desk.json(&arguments)["learning"];
+    let contours: Vec<f64> = learning["repeats"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|repeat| number(&repeat["contour_error_um"]))
+        .collect();
+    assert!(contours.len() == 3 && contours[0] > 10.0 && contours[2] < 2.5, "{contours:?}");
 
     let worse = ["drive", "tune", "--machine", "tuned.toml", "--method", "series", "--output", "worse.toml"];
     let output = desk.motion(&worse);

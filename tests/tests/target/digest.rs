@@ -9,7 +9,7 @@ use motion_kernel::queue::Streams;
 use motion_kernel::trace::Digest;
 
 use crate::programs;
-use crate::tools::{BOARDS, Board, Clock, M0, M4F, Tools};
+use crate::tools::{BOARDS, Board, Clock, M0, M3, M4F, M7, Tools};
 
 /// As the boards simulate (`boards/qemu-mps2/src/lib.rs`).
 const LINE: usize = 16;
@@ -89,7 +89,8 @@ pub(crate) fn the_same_bits_on_every_core(tools: &Tools) -> Result<(), String> {
 pub(crate) fn the_same_bits_from_an_interrupt(tools: &Tools) -> Result<(), String> {
     // The stringer's items all fit the streams: there would be nothing to stop.
     let facets = programs::facets();
-    for board in BOARDS {
+    // The M0's 16 KiB hold the loop on the stack, stepped, but not moved into what an interrupt owns.
+    for board in [M4F, M7, M3] {
         let printed = tools.run(board, "interrupt", core::slice::from_ref(&facets), Clock::Counting)?;
         let expected = on_the_pc(board, &facets);
         let mut lines = printed.lines();

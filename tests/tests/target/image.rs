@@ -12,7 +12,7 @@ const PANIC: [&str; 5] = ["panic", "unwrap_failed", "expect_failed", "slice_inde
 
 /// Flash of the kernel, RAM of 3 axes with 64 pieces and 64 segments, and stack of the tick that are promised on
 /// the M4F [bytes].
-const FLASH_MAX: u64 = 32 << 10;
+const FLASH_MAX: u64 = 48 << 10;
 const STACK_MAX: u64 = 1 << 10;
 
 fn file(tools: &Tools, board: Board, name: &str) -> Result<Vec<u8>, String> {
@@ -62,7 +62,7 @@ pub(crate) fn sizes(tools: &Tools) -> Result<(), String> {
         let figures = by_name(&tools.run(board, "budget", &programs::worst_ticks(), Clock::Counting)?);
         let greatest = |name: &str| figures.get(name).and_then(|sorted| sorted.last().copied()).unwrap_or(0);
         let (ram, stack) = (greatest("ram"), greatest("stack"));
-        let capacity = if board.room < 1 << 20 { "18, 10" } else { "64, 64" };
+        let capacity = if board.room < 1 << 20 { "12, 8" } else { "64, 64" };
         let cells = [flash.to_string(), ram.to_string(), capacity.to_owned(), stack.to_string()];
         table.row(&[&[board.core.to_owned(), board.number.to_owned()], &cells[..]].concat());
         if board == M4F && (flash > FLASH_MAX || u64::from(stack) > STACK_MAX || stack == 0) {

@@ -5,8 +5,8 @@
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use hal_sim::SimMachine;
-use hal_sim::closed_loop::{close, reference_machine};
+use hal_sim::closed_loop::{Closed, LoopError, close, reference_machine};
+use hal_sim::{MachineParameters, SimMachine};
 use motion_kernel::exec::ExecState;
 use motion_kernel::program::Reader;
 use motion_kernel::queue::Streams;
@@ -20,18 +20,16 @@ type Queues = Streams<Number, AXES, PIECES, SEGMENTS>;
 fn main() -> ! {
     let streams = cortex_m::singleton!(: Queues = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     for bytes in programs() {
-        run(bytes, streams);
+        run(bytes, &machine_parameters(bytes), streams);
     }
     exit(true)
 }
 
 #[inline(never)]
-fn run(bytes: &[u8], streams: &mut Queues) {
-    // Looked at where it is, as all that is large: the microbit has no room for another one.
-    let program = &Reader::<AXES>::new(bytes);
-    let program = program.as_ref().unwrap_or_else(|error| fail(error));
-    let machine = simulated(program);
-    let mut closed = close(program, streams, &machine);
+fn run(bytes: &[u8], parameters: &MachineParameters<AXES>, streams: &mut Queues) {
+    // All that is large is looked at where it is: the microbit has no room for another one.
+    let machine = &simulated(parameters);
+    let mut closed = closed(bytes, streams, machine);
     let (producer, closed_loop) = closed.as_mut().unwrap_or_else(|error| fail(error));
     let (mut digest, mut ticks) = (Digest::new(), 0_u32);
     loop {
@@ -46,7 +44,25 @@ fn run(bytes: &[u8], streams: &mut Queues) {
     }
 }
 
+// The program's header, a kilobyte, is gone before the ticks begin.
+
 #[inline(never)]
-fn simulated(program: &Reader<'_, AXES>) -> SimMachine<AXES, LINE> {
-    SimMachine::new(&reference_machine(program.header(), SUBSTEPS)).unwrap_or_else(|error| fail(&error))
+fn machine_parameters(bytes: &[u8]) -> MachineParameters<AXES> {
+    let program = &Reader::<AXES>::new(bytes);
+    reference_machine(program.as_ref().unwrap_or_else(|error| fail(error)).header(), SUBSTEPS)
+}
+
+#[inline(never)]
+fn simulated(parameters: &MachineParameters<AXES>) -> SimMachine<AXES, LINE> {
+    SimMachine::new(parameters).unwrap_or_else(|error| fail(&error))
+}
+
+#[inline(never)]
+fn closed<'a>(
+    bytes: &'a [u8],
+    streams: &'a mut Queues,
+    machine: &'a SimMachine<AXES, LINE>,
+) -> Result<Closed<'a, Number, AXES, LINE>, LoopError> {
+    let program = &Reader::<AXES>::new(bytes);
+    close(program.as_ref().unwrap_or_else(|error| fail(error)), streams, machine)
 }

@@ -98,7 +98,7 @@ fn main() -> ! {
     }
 }
 
-// Each made in a frame of its own, which is gone before the ticks begin: 16 KiB are not much.
+// Each made in a frame of its own, which is gone before the ticks begin.
 
 #[inline(never)]
 fn closed(bytes: &'static [u8]) -> Closed<'static, Number, AXES, LINE> {

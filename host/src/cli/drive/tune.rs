@@ -16,6 +16,7 @@ use crate::cli::table::{self, Align};
 use crate::cli::write_json;
 use crate::drive::circle::{CircleFigures, Sweep, figures};
 use crate::drive::identification::identify_axes;
+use crate::drive::learning::{LearningOptions, Learnt, Reason, learn};
 use crate::drive::reference::CIRCLE_FEED_MM_S;
 use crate::drive::turning::Turning;
 use crate::gcode::Plane;
@@ -32,12 +33,14 @@ Examples:
   motion drive tune                                  see what the reference machine could do
   motion drive tune --machine mine.toml --output mine.toml
                                                      write the figures into the file; its comments stay
+  motion drive tune --method series --learn 5        and see what learning from repeats adds
   motion drive tune --axis X --method fit --json     V, A and J gains only, for a script
 
 JSON: axes: list of {name, found: {kp…: {value, half_width_95, determined}}, margins: {crossover_hz, phase_deg, gain,
 sensitivity}, changes: list of {key, before, after, unit, reason}, remarks}, verification: {feed_mm_min, circles: list of
 {frequency_hz, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
-following_error_second_um}}}, output.
+following_error_second_um}}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
+axes}, best_repeat, ended}, output.
 
 Exit status 1: the tuned machine is worse on a circle than it was; nothing is written then.";
 
@@ -58,6 +61,18 @@ pub struct TuneArguments {
     /// How feedforward is made.
     #[arg(long, value_enum, default_value_t = Method::Inverse)]
     method: Method,
+    /// Then drive a circle so many times, and learn from each repeat; off without it.
+    #[arg(long, value_name = "REPEATS")]
+    learn: Option<usize>,
+    /// Frequency of the circle that is learnt, Hz.
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 10.0,
+        allow_negative_numbers = true,
+        requires = "learn"
+    )]
+    learn_hz: f64,
     /// Write the machine file with the new figures; it may be the one that was read.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -121,15 +136,21 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let plane = if axes.iter().any(|axis| *axis < 2) { Plane::Xy } else { Plane::Yz };
     let verification = Verification::new(&machine, &tuned, plane)?;
     let is_better = verification.is_better(&tuned, &axes);
+    let learnt =
+        arguments.learn.map(|repeats| learn_on(&tuned, &tunings, plane, repeats, arguments.learn_hz));
+    let learnt = learnt.transpose()?;
     if is_better && let Some(path) = &arguments.output {
         fs::write(path, &text)
             .map_err(|source| CliError::Write { path: path.display().to_string(), source })?;
     }
     if arguments.json {
         let output = arguments.output.as_ref().filter(|_| is_better).map(|path| path.display().to_string());
-        write_json(&json(&machine, &tunings, &verification, output), out)?;
+        write_json(&json(&machine, &tunings, &verification, learnt.as_ref(), output), out)?;
     } else {
         write_words(&machine, &tunings, &verification, out).map_err(CliError::Output)?;
+        if let Some(learnt) = &learnt {
+            write_learnt(&tuned, learnt, arguments.learn_hz, out).map_err(CliError::Output)?;
+        }
         let end = match (&arguments.output, is_better) {
             (_, false) => "  a circle got worse: nothing is written".to_owned(),
             (Some(path), true) => format!("  written to {}", path.display()),
@@ -297,6 +318,69 @@ fn write_words(
     table::write(&columns, &rows, out)
 }
 
+/// Learns the circle of `frequency_hz` on the tuned machine, by the drives that were found; an axis that was not tuned is
+/// taken as the machine file has it.
+fn learn_on(
+    tuned: &Machine,
+    tunings: &[Tuned],
+    plane: Plane,
+    repeats: usize,
+    frequency_hz: f64,
+) -> Result<Learnt, CliError> {
+    let mut models = tuned.axes.each_ref().map(|axis| axis.drive);
+    for tuning in tunings {
+        models[tuning.axis] = tuning.found.parameters.drive();
+    }
+    let turning = Turning { plane, ..Turning::new(frequency_hz, CIRCLE_FEED_MM_S) };
+    Ok(learn(tuned, &turning, &models, &LearningOptions { repeats, ..LearningOptions::default() })?)
+}
+
+fn write_learnt(
+    machine: &Machine,
+    learnt: &Learnt,
+    frequency_hz: f64,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    writeln!(out, "\nLearning a circle at {frequency_hz} Hz\n")?;
+    let columns = [
+        ("repeat", "", Align::Right),
+        ("contour", "µm", Align::Right),
+        ("following, rms, first axis", "µm", Align::Right),
+        ("second", "µm", Align::Right),
+        ("third", "µm", Align::Right),
+    ];
+    let rows: Vec<[String; 5]> = learnt
+        .repeats
+        .iter()
+        .zip(0..)
+        .map(|(figures, repeat)| {
+            let [x, y, z] = figures.rms_um.map(|um| format!("{um:.3}"));
+            [repeat.to_string(), format!("{:.2}", figures.contour_um), x, y, z]
+        })
+        .collect();
+    table::write(&columns, &rows, out)?;
+    for (axis, robustness) in machine.axes.iter().zip(&learnt.robustness) {
+        if let Some(robustness) = robustness {
+            writeln!(
+                out,
+                "  {}: a repeat leaves at most {:.2} of an error (at {:.0} Hz), with every parameter of the drive up to a \
+                 fifth off",
+                axis.name, robustness.contraction, robustness.at_hz
+            )?;
+        }
+    }
+    writeln!(out, "  repeat {} is the best; ended: {}", learnt.best_repeat, ended(&learnt.stopped))
+}
+
+fn ended(reason: &Reason) -> String {
+    match reason {
+        Reason::Repeats => "all repeats made".to_owned(),
+        Reason::Resolved => "the error is below the encoders' steps".to_owned(),
+        Reason::NoBetter => "two repeats in a row were no better".to_owned(),
+        Reason::Fault(fault) => format!("a fault: {}", fault.fault),
+    }
+}
+
 /// A value of a file, or that it is not in it.
 fn number(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), toml_number)
@@ -311,7 +395,21 @@ fn toml_number(value: f64) -> String {
 struct TuneJson<'run> {
     axes: Vec<AxisJson<'run>>,
     verification: VerificationJson,
+    learning: Option<LearningJson>,
     output: Option<String>,
+}
+
+#[derive(Serialize)]
+struct LearningJson {
+    repeats: Vec<RepeatJson>,
+    best_repeat: usize,
+    ended: String,
+}
+
+#[derive(Serialize)]
+struct RepeatJson {
+    contour_error_um: f64,
+    following_error_um_rms: [f64; 3],
 }
 
 #[derive(Serialize)]
@@ -395,6 +493,7 @@ fn json<'run>(
     machine: &'run Machine,
     tunings: &'run [Tuned],
     verification: &Verification,
+    learnt: Option<&Learnt>,
     output: Option<String>,
 ) -> TuneJson<'run> {
     let circle = |figures: &CircleFigures| CircleJson {
@@ -416,6 +515,18 @@ fn json<'run>(
                 })
                 .collect(),
         },
+        learning: learnt.map(|learnt| LearningJson {
+            repeats: learnt
+                .repeats
+                .iter()
+                .map(|figures| RepeatJson {
+                    contour_error_um: figures.contour_um,
+                    following_error_um_rms: figures.rms_um,
+                })
+                .collect(),
+            best_repeat: learnt.best_repeat,
+            ended: ended(&learnt.stopped),
+        }),
         output,
     }
 }
