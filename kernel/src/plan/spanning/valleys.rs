@@ -1,0 +1,412 @@
+//! Which ceilings of a stretch are rested in.
+//!
+//! Consumes the ceilings of a stretch; divides it into **humps**: from one valley to the next the feed rises, holds
+//! and falls again, once. A valley is a ceiling that is worth coming down to from both sides; all others are stairs
+//! on the way up or down, the top of their hump, or too high to matter.
+//!
+//! The ceilings are looked at from the lowest up, in the tree of their minima: what lies beside a stair and is higher
+//! need not be looked at any more, so that the work is proportional to the number of ceilings.
+
+use super::climb::{Stair, Stairs};
+use crate::law::{Law, Ramp, peak};
+use crate::plan::Block;
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// What a ceiling is in the plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Role {
+    /// It limits nothing.
+    #[default]
+    Free,
+    /// Held up to its end, on the way up.
+    Rising,
+    /// Held from its start, on the way down.
+    Falling,
+}
+
+/// A ceiling: a block's, that of several equal ones, or that of a joint. Working memory of the planner.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    start_mm: f64,
+    end_mm: f64,
+    feed_mm_s: f64,
+    /// The time from the stretch's start to its end, everything driven at its ceiling \[s\].
+    ideal_s: f64,
+    /// The block whose law it has.
+    block: u32,
+    /// Lowest ceilings to its left and right that are not below it; while the tree is made, the next lower one to
+    /// the left is in `up`.
+    left: u32,
+    right: u32,
+    up: u32,
+    /// For a valley: what is to be done to its right once what is to its left has been.
+    right_valley: u32,
+    right_bound: u32,
+    role: Role,
+}
+
+impl Node {
+    /// Memory not used yet.
+    pub const EMPTY: Self = Self {
+        start_mm: 0.0,
+        end_mm: 0.0,
+        feed_mm_s: 0.0,
+        ideal_s: 0.0,
+        block: 0,
+        left: NONE,
+        right: NONE,
+        up: NONE,
+        right_valley: NONE,
+        right_bound: NONE,
+        role: Role::Free,
+    };
+}
+
+/// The part of a stretch between two valleys.
+#[derive(Clone, Copy, Debug)]
+pub struct Hump {
+    /// Where it starts and ends \[mm\].
+    pub start_mm: f64,
+    #[allow(missing_docs)]
+    pub end_mm: f64,
+    /// The feeds there \[mm/s\].
+    pub enter_mm_s: f64,
+    #[allow(missing_docs)]
+    pub exit_mm_s: f64,
+    /// Its ceiling \[mm/s\], as far as known.
+    pub top_mm_s: f64,
+    /// Stairs, from the start, and from the end.
+    pub rising: Stairs,
+    #[allow(missing_docs)]
+    pub falling: Stairs,
+    /// Nodes inside, from and up to.
+    nodes: (usize, usize),
+}
+
+/// The ceilings of a stretch and what has been found out about them.
+pub struct Valleys<'a> {
+    blocks: &'a [Block<f64>],
+    nodes: &'a mut [Node],
+    /// Greatest acceleration of any block.
+    accel_mm_s2: f64,
+    /// What is open: the valley to the left, what bounds it on the left, the valley to the right, what bounds it on
+    /// the right, the lowest ceiling between.
+    open: Option<Open>,
+    /// Valleys whose right side waits, the last one first: linked through `up`.
+    waiting: u32,
+}
+
+/// What lies between two ceilings.
+struct Gap {
+    length_mm: f64,
+    /// The time with everything driven at its ceiling \[s\].
+    ideal_s: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Open {
+    left_valley: u32,
+    left_bound: u32,
+    right_valley: u32,
+    right_bound: u32,
+    root: u32,
+}
+
+impl<'a> Valleys<'a> {
+    /// Makes the nodes. `None` if there are too few places for them.
+    pub fn new(
+        blocks: &'a [Block<f64>],
+        start_mm_s: f64,
+        end_mm_s: f64,
+        places: &'a mut [Node],
+    ) -> Option<Self> {
+        let mut count = 0;
+        let mut put = |node: Node| -> Option<()> {
+            *places.get_mut(count)? = node;
+            count += 1;
+            Some(())
+        };
+        put(Node { feed_mm_s: start_mm_s, ..Node::EMPTY })?;
+        let (mut at_mm, mut accel_mm_s2) = (0.0, 0.0_f64);
+        let mut open: Option<Node> = None;
+        for (index, block) in blocks.iter().enumerate() {
+            accel_mm_s2 = accel_mm_s2.max(block.law.limits().accel_mm_s2);
+            let end_mm = at_mm + block.length_mm;
+            let next_mm_s = blocks.get(index + 1).map_or(f64::INFINITY, |next| next.cap_mm_s);
+            let is_joint = index + 1 < blocks.len() && block.joint_mm_s < block.cap_mm_s.min(next_mm_s);
+            match &mut open {
+                Some(last)
+                    if last.feed_mm_s == block.cap_mm_s
+                        && blocks.get(last.block as usize).is_some_and(|before| before.law == block.law) =>
+                {
+                    last.end_mm = end_mm;
+                }
+                _ => {
+                    if let Some(last) = open.take() {
+                        put(last)?;
+                    }
+                    if block.length_mm > 0.0 {
+                        let block_index = index as u32;
+                        open = Some(Node {
+                            start_mm: at_mm,
+                            end_mm,
+                            feed_mm_s: block.cap_mm_s,
+                            block: block_index,
+                            ..Node::EMPTY
+                        });
+                    }
+                }
+            }
+            if is_joint {
+                if let Some(last) = open.take() {
+                    put(last)?;
+                }
+                put(Node {
+                    start_mm: end_mm,
+                    end_mm,
+                    feed_mm_s: block.joint_mm_s,
+                    block: index as u32,
+                    ..Node::EMPTY
+                })?;
+            }
+            at_mm = end_mm;
+        }
+        if let Some(last) = open {
+            put(last)?;
+        }
+        put(Node { start_mm: at_mm, end_mm: at_mm, feed_mm_s: end_mm_s, ..Node::EMPTY })?;
+        let nodes = places.get_mut(..count)?;
+        let mut ideal_s = 0.0;
+        for node in nodes.iter_mut() {
+            if node.end_mm > node.start_mm {
+                ideal_s += (node.end_mm - node.start_mm) / node.feed_mm_s;
+            }
+            node.ideal_s = ideal_s;
+        }
+        let root = tree(nodes);
+        let last = (count - 1) as u32;
+        let open = Some(Open { left_valley: 0, left_bound: 0, right_valley: last, right_bound: last, root });
+        Some(Self { blocks, nodes, accel_mm_s2, open, waiting: NONE })
+    }
+
+    fn node(&self, index: u32) -> Node {
+        self.nodes.get(index as usize).copied().unwrap_or(Node::EMPTY)
+    }
+
+    fn node_mut(&mut self, index: u32) -> Option<&mut Node> {
+        self.nodes.get_mut(index as usize)
+    }
+
+    fn law(&self, index: u32) -> Option<Law<f64>> {
+        self.blocks.get(self.node(index).block as usize).map(|block| block.law)
+    }
+
+    /// The next hump, in path order.
+    pub fn next_hump(&mut self) -> Option<Hump> {
+        let mut open = self.open.take()?;
+        let mut top_mm_s = f64::INFINITY;
+        while open.root != NONE {
+            let root = self.node(open.root);
+            let (left, right) = (self.node(open.left_bound), self.node(open.right_bound));
+            let squared = |feed: f64, length_mm: f64| feed * feed + 2.0 * self.accel_mm_s2 * length_mm;
+            let ceiling = root.feed_mm_s * root.feed_mm_s;
+            if squared(left.feed_mm_s, root.end_mm - left.end_mm) <= ceiling {
+                // Too high to be reached from the left, and so is all between.
+                open.root = root.right;
+                continue;
+            }
+            if squared(right.feed_mm_s, right.start_mm - root.start_mm) <= ceiling {
+                open.root = root.left;
+                continue;
+            }
+            let (before, after) = (self.gap(&left, &root), self.gap(&root, &right));
+            let can_rise = root.feed_mm_s >= left.feed_mm_s;
+            let can_fall = root.feed_mm_s >= right.feed_mm_s;
+            // From the valley itself too: a stair before this one may not be reached.
+            let (first, last) = (self.node(open.left_valley), self.node(open.right_valley));
+            let all_before = (first.feed_mm_s, root.start_mm - first.end_mm);
+            let all_after = (last.feed_mm_s, last.start_mm - root.end_mm);
+            let lost_left = self.lost(&root, &left, &before, all_before, root.left, can_rise);
+            let lost_right = self.lost(&root, &right, &after, all_after, root.right, can_fall);
+            let rises = can_rise && lost_left <= self.broken(&root, &left, &before, &right, &after, root.right);
+            let falls = can_fall && lost_right <= self.broken(&root, &right, &after, &left, &before, root.left);
+            match (rises, falls) {
+                (true, true) if root.left == NONE && root.right == NONE => {
+                    top_mm_s = root.feed_mm_s;
+                    break;
+                }
+                // Something is left on one side only, or less is lost on it.
+                (true, true) if lost_left <= 0.0 && lost_right <= 0.0 => {
+                    top_mm_s = root.feed_mm_s;
+                    break;
+                }
+                (true, other) if !other || lost_left <= lost_right => {
+                    if let Some(node) = self.node_mut(open.root) {
+                        node.role = Role::Rising;
+                    }
+                    open.left_bound = open.root;
+                    open.root = root.right;
+                }
+                (_, true) => {
+                    if let Some(node) = self.node_mut(open.root) {
+                        node.role = Role::Falling;
+                    }
+                    open.right_bound = open.root;
+                    open.root = root.left;
+                }
+                _ => {
+                    // A valley: its right side waits.
+                    let (waiting, valley) = (self.waiting, open.root);
+                    if let Some(node) = self.node_mut(valley) {
+                        node.right_valley = open.right_valley;
+                        node.right_bound = open.right_bound;
+                        node.up = waiting;
+                    }
+                    self.waiting = valley;
+                    (open.right_valley, open.right_bound) = (valley, valley);
+                    open.root = root.left;
+                }
+            }
+        }
+        Some(self.close(&open, top_mm_s))
+    }
+
+    /// The hump that is open, and what is open next.
+    fn close(&mut self, open: &Open, top_mm_s: f64) -> Hump {
+        let (left, right) = (self.node(open.left_valley), self.node(open.right_valley));
+        let (mut rising, mut falling) = (Stairs::NONE, Stairs::NONE);
+        let inside = open.left_valley as usize + 1..open.right_valley as usize;
+        let nodes = self.nodes.get(inside.clone()).unwrap_or(&[]);
+        for node in nodes.iter().filter(|node| node.role == Role::Rising) {
+            rising.push(Stair { end_mm: node.end_mm - left.end_mm, feed_mm_s: node.feed_mm_s });
+        }
+        for node in nodes.iter().rev().filter(|node| node.role == Role::Falling) {
+            falling.push(Stair { end_mm: right.start_mm - node.start_mm, feed_mm_s: node.feed_mm_s });
+        }
+        if open.right_valley == self.waiting {
+            let valley = self.waiting;
+            self.waiting = right.up;
+            self.open = Some(Open {
+                left_valley: valley,
+                left_bound: valley,
+                right_valley: right.right_valley,
+                right_bound: right.right_bound,
+                root: right.right,
+            });
+        }
+        Hump {
+            start_mm: left.end_mm,
+            end_mm: right.start_mm,
+            enter_mm_s: left.feed_mm_s,
+            exit_mm_s: right.feed_mm_s,
+            top_mm_s,
+            rising,
+            falling,
+            nodes: (inside.start, inside.end),
+        }
+    }
+
+    /// A valley's own length, to be run through at its feed, that ends where `hump` starts.
+    pub fn valley_before(&self, hump: &Hump) -> f64 {
+        let valley = hump.nodes.0.checked_sub(1).and_then(|index| self.nodes.get(index));
+        valley.map_or(0.0, |node| node.end_mm - node.start_mm)
+    }
+
+    /// What lies between two nodes.
+    fn gap(&self, left: &Node, right: &Node) -> Gap {
+        let length_mm = right.start_mm - left.end_mm;
+        let own_s = if right.end_mm > right.start_mm {
+            (right.end_mm - right.start_mm) / right.feed_mm_s
+        } else {
+            0.0
+        };
+        Gap { length_mm, ideal_s: right.ideal_s - own_s - left.ideal_s }
+    }
+
+    /// At most so much time is lost by not rising above `root` in the gap between it and `bound` \[s\]. Infinite if
+    /// `bound` is above the root.
+    fn lost(
+        &self,
+        root: &Node,
+        bound: &Node,
+        gap: &Gap,
+        (valley_mm_s, valley_mm): (f64, f64),
+        between: u32,
+        is_below: bool,
+    ) -> f64 {
+        if !is_below {
+            return f64::INFINITY;
+        }
+        let Some(law) = self.law(between).filter(|_| between != NONE) else { return 0.0 };
+        let feed = root.feed_mm_s;
+        let left_mm = (gap.length_mm - law.ramp_length_mm(bound.feed_mm_s, feed))
+            .min(valley_mm - law.ramp_length_mm(valley_mm_s, feed));
+        if left_mm <= 0.0 {
+            return 0.0;
+        }
+        let top = peak(&law, feed, feed, left_mm);
+        let time_s = 2.0 * law.ramp_time_s(top - feed) + (left_mm - 2.0 * law.ramp_length_mm(feed, top)) / top;
+        (left_mm / feed - time_s).min(gap.length_mm / feed - gap.ideal_s)
+    }
+
+    /// About the time lost by resting in `root` \[s\] on the way from `bound` over `gap` to what is beyond, towards
+    /// `other`.
+    fn broken(&self, root: &Node, bound: &Node, gap: &Gap, other: &Node, beyond: &Gap, next: u32) -> f64 {
+        let Some(law) = self.law(next).filter(|_| next != NONE) else { return 0.0 };
+        let feed = root.feed_mm_s;
+        let most = peak(&law, feed, other.feed_mm_s, beyond.length_mm);
+        let top = most.min(beyond.length_mm / beyond.ideal_s);
+        if !(top > feed) {
+            return 0.0;
+        }
+        let lag_s = |from: f64, to: f64| law.ramp_time_s(to - from) - law.ramp_length_mm(from, to) / top;
+        let rested = lag_s(bound.feed_mm_s, feed) + lag_s(feed, top);
+        let ramp = Ramp::new(&law, bound.feed_mm_s, top);
+        let waited_mm = (root.end_mm - root.start_mm) + gap.length_mm - ramp.length_to_feed_mm(feed);
+        let waited_s = match (waited_mm > 0.0, bound.feed_mm_s > 0.0) {
+            (false, _) => 0.0,
+            (true, true) => waited_mm * (1.0 / bound.feed_mm_s - 1.0 / top),
+            (true, false) => f64::INFINITY,
+        };
+        (rested - lag_s(bound.feed_mm_s, top) - waited_s).max(0.0)
+    }
+
+    /// The block in which `s_mm` lies, for a hump: its law limits what happens there.
+    pub fn blocks_of(&self, hump: &Hump) -> impl Iterator<Item = (f64, f64, Law<f64>)> + Clone {
+        let nodes = self.nodes.get(hump.nodes.0..hump.nodes.1).unwrap_or(&[]);
+        let blocks = self.blocks;
+        nodes
+            .iter()
+            .filter(|node| node.end_mm > node.start_mm)
+            .filter_map(move |node| Some((node.start_mm, node.end_mm, blocks.get(node.block as usize)?.law)))
+    }
+}
+
+/// Links every node but the first and the last to the lowest ones beside it; returns the lowest of all.
+fn tree(nodes: &mut [Node]) -> u32 {
+    let last = nodes.len().saturating_sub(1);
+    let mut root = NONE;
+    let mut before = NONE;
+    for index in 1..last {
+        let Some(feed) = nodes.get(index).map(|node| node.feed_mm_s) else { break };
+        let (mut at, mut below) = (before, NONE);
+        while let Some(node) = nodes.get(at as usize).filter(|node| node.feed_mm_s > feed) {
+            (below, at) = (at, node.up);
+        }
+        let here = index as u32;
+        if let Some(node) = nodes.get_mut(index) {
+            (node.left, node.up) = (below, at);
+        }
+        if let Some(node) = nodes.get_mut(below as usize) {
+            node.up = here;
+        }
+        match nodes.get_mut(at as usize) {
+            Some(node) => node.right = here,
+            None => root = here,
+        }
+        before = here;
+    }
+    root
+}
