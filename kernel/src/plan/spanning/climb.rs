@@ -8,7 +8,7 @@
 use crate::law::{Law, Limits, Ramp};
 
 /// Stairs that are looked at one by one; of more, those are joined that lose the least by it.
-pub const STAIRS_MAX: usize = 32;
+pub const STAIRS_MAX: usize = 48;
 /// A chain's ramps, and where each one starts.
 pub const LEGS_MAX: usize = STAIRS_MAX + 1;
 /// Steps of the search for the best acceleration of a ramp below stairs.

@@ -17,7 +17,7 @@ pub use valleys::Node;
 use self::climb::{Climb, climb};
 use self::valleys::{Hump, Valleys};
 use super::lookahead::{Block, PlanError, check};
-use crate::law::{Limits, Ramp};
+use crate::law::{Law, Limits, Ramp};
 
 /// A ramp or a cruise, with its place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +38,8 @@ pub const fn nodes_for(blocks: usize) -> usize {
 
 /// Solver steps for the feed at the top of a hump.
 const TOP_STEPS: usize = 24;
+/// No more steps once so small a part of the hump is left to cruise at its top.
+const TOP_GAP: f64 = 1.0e-4;
 
 /// Plans a stretch with ramps that may span blocks, and hands every ramp and cruise to `put`, in path order. Returns
 /// the time it takes \[s\], or `None` where no such plan was found (one pair of ramps a block may still be possible).
@@ -56,14 +58,17 @@ pub fn plan_spanning(
     let Some(mut valleys) = Valleys::new(blocks, start_mm_s, end_mm_s, places) else {
         return Err(PlanError::Output { blocks: nodes_for(blocks.len()), plans: room });
     };
+    let fits = |valleys: &Valleys<'_>, hump: &Hump| match Sides::new(hump, valleys) {
+        Some(sides) => sides.fit(sides.lowest()).is_some(),
+        None => hump.enter_mm_s == hump.exit_mm_s,
+    };
+    if !valleys.settle(fits) {
+        return Ok(None);
+    }
     let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
-    while let Some(hump) = valleys.next_hump() {
+    for hump in valleys.humps() {
         out.cruise(hump.start_mm, hump.enter_mm_s);
-        if solve(&hump, &valleys, &mut out).is_none() {
-            #[cfg(feature = "debugprint")]
-            extern crate std;
-            #[cfg(feature = "debugprint")]
-            std::println!("{hump:?}");
+        if drive(&hump, &valleys, &mut out).is_none() {
             return Ok(None);
         }
     }
@@ -96,58 +101,83 @@ impl<F: FnMut(FeedSpan)> Out<'_, F> {
     }
 }
 
-/// Up, along and down.
-fn solve<F: FnMut(FeedSpan)>(hump: &Hump, valleys: &Valleys<'_>, out: &mut Out<'_, F>) -> Option<()> {
-    let room_mm = hump.end_mm - hump.start_mm;
-    if !(room_mm > 0.0) {
-        return (hump.enter_mm_s == hump.exit_mm_s).then_some(());
+/// The two sides of a hump, for any top.
+struct Sides<'a> {
+    hump: &'a Hump,
+    valleys: &'a Valleys<'a>,
+    /// The law of all its blocks, if it is one.
+    uniform: Option<Law<f64>>,
+}
+
+impl<'a> Sides<'a> {
+    /// `None` if the hump has no blocks.
+    fn new(hump: &'a Hump, valleys: &'a Valleys<'a>) -> Option<Self> {
+        let mut laws = valleys.blocks_of(hump).map(|(_, _, law)| law);
+        let first = laws.next()?;
+        let uniform = laws.all(|law| law == first).then_some(first);
+        Some(Self { hump, valleys, uniform })
     }
-    let blocks = valleys.blocks_of(hump);
-    let mut laws = blocks.clone().map(|(_, _, law)| law);
-    let first = laws.next()?;
-    let is_uniform = laws.all(|law| law == first);
-    // The least limits between two positions.
-    let least = |from_mm: f64, to_mm: f64| {
-        if is_uniform {
-            return first.limits();
+
+    /// The lowest top there is.
+    fn lowest(&self) -> f64 {
+        self.hump.enter_mm_s.max(self.hump.exit_mm_s)
+    }
+
+    /// The highest top that is worth trying: the ceiling, or what acceleration alone would reach.
+    fn highest(&self) -> f64 {
+        let Hump { enter_mm_s, exit_mm_s, start_mm, end_mm, top_mm_s, .. } = *self.hump;
+        let accel = self.valleys.blocks_of(self.hump).map(|(_, _, law)| law.limits().accel_mm_s2);
+        let squares = 0.5 * (enter_mm_s * enter_mm_s + exit_mm_s * exit_mm_s);
+        let reached = libm::sqrt(squares + accel.fold(0.0, f64::max) * (end_mm - start_mm));
+        top_mm_s.min(reached).max(self.lowest())
+    }
+
+    /// The least limits between two positions.
+    fn limits(&self, from_mm: f64, to_mm: f64) -> Limits<f64> {
+        if let Some(law) = self.uniform {
+            return law.limits();
         }
-        let touched = blocks.clone().filter(|&(start, end, _)| end > from_mm && start < to_mm.max(from_mm + 1e-12));
-        touched.map(|(_, _, law)| law.limits()).reduce(least).unwrap_or(first.limits())
-    };
-    let sides = |top: f64| -> Option<(Climb, Climb)> {
-        let (start, end) = (hump.start_mm, hump.end_mm);
-        let up = climb(&hump.rising, hump.enter_mm_s, top, room_mm, |a, b| least(start + a, start + b))?;
-        let down = climb(&hump.falling, hump.exit_mm_s, top, room_mm, |a, b| least(end - b, end - a))?;
-        Some((up, down))
-    };
-    let gap = |(up, down): &(Climb, Climb)| room_mm - up.length_mm - down.length_mm;
-    // What acceleration alone would reach.
-    let accel = blocks.clone().map(|(_, _, law)| law.limits().accel_mm_s2).fold(0.0, f64::max);
-    let squares = 0.5 * (hump.enter_mm_s * hump.enter_mm_s + hump.exit_mm_s * hump.exit_mm_s);
-    let mut high = hump.top_mm_s.min(libm::sqrt(squares + accel * room_mm));
-    let mut low = hump.enter_mm_s.max(hump.exit_mm_s);
-    high = high.max(low);
-    let mut best = sides(high).filter(|both| gap(both) >= 0.0).map(|both| (high, both));
-    if best.is_none() {
-        let mut at_low = sides(low).filter(|both| gap(both) >= 0.0)?;
-        let mut gap_low = gap(&at_low);
+        let blocks = self.valleys.blocks_of(self.hump);
+        let touched = blocks.filter(|&(start, end, _)| end > from_mm && start <= to_mm);
+        let all = touched.map(|(_, _, law)| law.limits());
+        all.reduce(least).unwrap_or_else(|| self.limits(self.hump.start_mm, self.hump.end_mm))
+    }
+
+    /// Both sides up to `top`, and what is left between them \[mm\], if there is room.
+    fn fit(&self, top: f64) -> Option<(Climb, Climb, f64)> {
+        let Hump { start_mm, end_mm, enter_mm_s, exit_mm_s, rising, falling, .. } = self.hump;
+        let room_mm = end_mm - start_mm;
+        let up = climb(rising, *enter_mm_s, top, room_mm, |a, b| self.limits(start_mm + a, start_mm + b))?;
+        let down = climb(falling, *exit_mm_s, top, room_mm, |a, b| self.limits(end_mm - b, end_mm - a))?;
+        let left_mm = room_mm - up.length_mm - down.length_mm;
+        (left_mm >= 0.0).then_some((up, down, left_mm))
+    }
+
+    /// Up to the highest top there is room for.
+    fn best(&self) -> Option<(f64, Climb, Climb)> {
+        let (mut low, mut high) = (self.lowest(), self.highest());
+        if let Some((up, down, _)) = self.fit(high) {
+            return Some((high, up, down));
+        }
+        let mut best = self.fit(low)?;
         for _ in 0..TOP_STEPS {
-            let middle = 0.5 * (low + high);
-            match sides(middle).filter(|both| gap(both) >= 0.0) {
-                Some(both) => {
-                    low = middle;
-                    gap_low = gap(&both);
-                    at_low = both;
-                }
-                None => high = middle,
-            }
-            if gap_low < 1e-4 * room_mm {
+            if best.2 < TOP_GAP * (self.hump.end_mm - self.hump.start_mm) {
                 break;
             }
+            let middle = 0.5 * (low + high);
+            match self.fit(middle) {
+                Some(fitting) => (low, best) = (middle, fitting),
+                None => high = middle,
+            }
         }
-        best = Some((low, at_low));
+        Some((low, best.0, best.1))
     }
-    let (top, (up, down)) = best?;
+}
+
+/// Up, along and down.
+fn drive<F: FnMut(FeedSpan)>(hump: &Hump, valleys: &Valleys<'_>, out: &mut Out<'_, F>) -> Option<()> {
+    let Some(sides) = Sides::new(hump, valleys) else { return Some(()) };
+    let (top, up, down) = sides.best()?;
     let mut feed = hump.enter_mm_s;
     for leg in up.legs() {
         out.cruise(hump.start_mm + leg.start_mm, feed);

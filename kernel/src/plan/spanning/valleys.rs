@@ -24,6 +24,8 @@ enum Role {
     Rising,
     /// Held from its start, on the way down.
     Falling,
+    /// Rested in: the feed comes down to it, or starts or ends there.
+    Valley,
 }
 
 /// A ceiling: a block's, that of several equal ones, or that of a joint. Working memory of the planner.
@@ -36,14 +38,15 @@ pub struct Node {
     ideal_s: f64,
     /// The block whose law it has.
     block: u32,
-    /// Lowest ceilings to its left and right that are not below it; while the tree is made, the next lower one to
-    /// the left is in `up`.
+    /// The lowest of the ceilings to its left, and to its right, that are not below it.
     left: u32,
     right: u32,
-    up: u32,
-    /// For a valley: what is to be done to its right once what is to its left has been.
-    right_valley: u32,
-    right_bound: u32,
+    /// The next lower one to the left; the valley that waits behind it; the valley before it.
+    link: u32,
+    /// For a valley that waits: what its right side reaches to.
+    bounds: (u32, u32),
+    /// For a valley: the ceiling of the hump after it \[mm/s\].
+    top_mm_s: f64,
     role: Role,
 }
 
@@ -57,9 +60,9 @@ impl Node {
         block: 0,
         left: NONE,
         right: NONE,
-        up: NONE,
-        right_valley: NONE,
-        right_bound: NONE,
+        link: NONE,
+        bounds: (NONE, NONE),
+        top_mm_s: f64::INFINITY,
         role: Role::Free,
     };
 }
@@ -91,11 +94,29 @@ pub struct Valleys<'a> {
     nodes: &'a mut [Node],
     /// Greatest acceleration of any block.
     accel_mm_s2: f64,
-    /// What is open: the valley to the left, what bounds it on the left, the valley to the right, what bounds it on
-    /// the right, the lowest ceiling between.
-    open: Option<Open>,
-    /// Valleys whose right side waits, the last one first: linked through `up`.
-    waiting: u32,
+}
+
+/// A part of the stretch that is looked at: the valleys it lies between, and the nodes next to what is left of it.
+#[derive(Clone, Copy)]
+struct Open {
+    left_valley: u32,
+    left_bound: u32,
+    right_valley: u32,
+    right_bound: u32,
+    /// The lowest ceiling that is left.
+    root: u32,
+}
+
+/// What a ceiling means for the hump it lies in.
+enum Seen {
+    /// It is not reached from the left.
+    BelowLeft,
+    /// It is not reached from the right.
+    BelowRight,
+    /// The feed holds there.
+    Top,
+    /// It is passed, or rested in.
+    Limits(Role),
 }
 
 /// What lies between two ceilings.
@@ -103,15 +124,6 @@ struct Gap {
     length_mm: f64,
     /// The time with everything driven at its ceiling \[s\].
     ideal_s: f64,
-}
-
-#[derive(Clone, Copy)]
-struct Open {
-    left_valley: u32,
-    left_bound: u32,
-    right_valley: u32,
-    right_bound: u32,
-    root: u32,
 }
 
 impl<'a> Valleys<'a> {
@@ -187,8 +199,9 @@ impl<'a> Valleys<'a> {
         }
         let root = tree(nodes);
         let last = (count - 1) as u32;
-        let open = Some(Open { left_valley: 0, left_bound: 0, right_valley: last, right_bound: last, root });
-        Some(Self { blocks, nodes, accel_mm_s2, open, waiting: NONE })
+        let mut valleys = Self { blocks, nodes, accel_mm_s2 };
+        valleys.find(Open { left_valley: 0, left_bound: 0, right_valley: last, right_bound: last, root });
+        Some(valleys)
     }
 
     fn node(&self, index: u32) -> Node {
@@ -203,115 +216,193 @@ impl<'a> Valleys<'a> {
         self.blocks.get(self.node(index).block as usize).map(|block| block.law)
     }
 
-    /// The next hump, in path order.
-    pub fn next_hump(&mut self) -> Option<Hump> {
-        let mut open = self.open.take()?;
-        let mut top_mm_s = f64::INFINITY;
-        while open.root != NONE {
-            let root = self.node(open.root);
-            let (left, right) = (self.node(open.left_bound), self.node(open.right_bound));
-            let squared = |feed: f64, length_mm: f64| feed * feed + 2.0 * self.accel_mm_s2 * length_mm;
-            let ceiling = root.feed_mm_s * root.feed_mm_s;
-            if squared(left.feed_mm_s, root.end_mm - left.end_mm) <= ceiling {
-                // Too high to be reached from the left, and so is all between.
-                open.root = root.right;
-                continue;
-            }
-            if squared(right.feed_mm_s, right.start_mm - root.start_mm) <= ceiling {
-                open.root = root.left;
-                continue;
-            }
-            let (before, after) = (self.gap(&left, &root), self.gap(&root, &right));
-            let can_rise = root.feed_mm_s >= left.feed_mm_s;
-            let can_fall = root.feed_mm_s >= right.feed_mm_s;
-            // From the valley itself too: a stair before this one may not be reached.
-            let (first, last) = (self.node(open.left_valley), self.node(open.right_valley));
-            let all_before = (first.feed_mm_s, root.start_mm - first.end_mm);
-            let all_after = (last.feed_mm_s, last.start_mm - root.end_mm);
-            let lost_left = self.lost(&root, &left, &before, all_before, root.left, can_rise);
-            let lost_right = self.lost(&root, &right, &after, all_after, root.right, can_fall);
-            let rises = can_rise && lost_left <= self.broken(&root, &left, &before, &right, &after, root.right);
-            let falls = can_fall && lost_right <= self.broken(&root, &right, &after, &left, &before, root.left);
-            match (rises, falls) {
-                (true, true) if root.left == NONE && root.right == NONE => {
-                    top_mm_s = root.feed_mm_s;
-                    break;
-                }
-                // Something is left on one side only, or less is lost on it.
-                (true, true) if lost_left <= 0.0 && lost_right <= 0.0 => {
-                    top_mm_s = root.feed_mm_s;
-                    break;
-                }
-                (true, other) if !other || lost_left <= lost_right => {
-                    if let Some(node) = self.node_mut(open.root) {
-                        node.role = Role::Rising;
-                    }
-                    open.left_bound = open.root;
-                    open.root = root.right;
-                }
-                (_, true) => {
-                    if let Some(node) = self.node_mut(open.root) {
-                        node.role = Role::Falling;
-                    }
-                    open.right_bound = open.root;
-                    open.root = root.left;
-                }
-                _ => {
-                    // A valley: its right side waits.
-                    let (waiting, valley) = (self.waiting, open.root);
-                    if let Some(node) = self.node_mut(valley) {
-                        node.right_valley = open.right_valley;
-                        node.right_bound = open.right_bound;
-                        node.up = waiting;
-                    }
-                    self.waiting = valley;
-                    (open.right_valley, open.right_bound) = (valley, valley);
-                    open.root = root.left;
-                }
+    /// Gives every node its role.
+    fn find(&mut self, all: Open) {
+        for sentinel in [all.left_valley, all.right_valley] {
+            if let Some(node) = self.node_mut(sentinel) {
+                node.role = Role::Valley;
             }
         }
-        Some(self.close(&open, top_mm_s))
+        // Valleys whose right side waits, linked, the last one first.
+        let (mut open, mut waiting) = (all, NONE);
+        loop {
+            let mut top_mm_s = f64::INFINITY;
+            while open.root != NONE {
+                let root = self.node(open.root);
+                let role = match self.look(&open, &root) {
+                    Seen::BelowLeft => {
+                        open.root = root.right;
+                        continue;
+                    }
+                    Seen::BelowRight => {
+                        open.root = root.left;
+                        continue;
+                    }
+                    Seen::Top => {
+                        top_mm_s = root.feed_mm_s;
+                        break;
+                    }
+                    Seen::Limits(role) => role,
+                };
+                let here = open.root;
+                if let Some(node) = self.node_mut(here) {
+                    node.role = role;
+                }
+                match role {
+                    Role::Rising => (open.left_bound, open.root) = (here, root.right),
+                    Role::Falling => (open.right_bound, open.root) = (here, root.left),
+                    Role::Valley | Role::Free => {
+                        if let Some(node) = self.node_mut(here) {
+                            node.bounds = (open.right_valley, open.right_bound);
+                            node.link = waiting;
+                        }
+                        waiting = here;
+                        (open.right_valley, open.right_bound, open.root) = (here, here, root.left);
+                    }
+                }
+            }
+            if let Some(node) = self.node_mut(open.left_valley) {
+                node.top_mm_s = top_mm_s;
+            }
+            if open.right_valley != waiting || waiting == NONE {
+                return;
+            }
+            let valley = self.node(waiting);
+            open = Open {
+                left_valley: waiting,
+                left_bound: waiting,
+                right_valley: valley.bounds.0,
+                right_bound: valley.bounds.1,
+                root: valley.right,
+            };
+            waiting = valley.link;
+        }
     }
 
-    /// The hump that is open, and what is open next.
-    fn close(&mut self, open: &Open, top_mm_s: f64) -> Hump {
-        let (left, right) = (self.node(open.left_valley), self.node(open.right_valley));
-        let (mut rising, mut falling) = (Stairs::NONE, Stairs::NONE);
-        let inside = open.left_valley as usize + 1..open.right_valley as usize;
+    /// What the lowest ceiling that is left means.
+    fn look(&self, open: &Open, root: &Node) -> Seen {
+        let (left, right) = (self.node(open.left_bound), self.node(open.right_bound));
+        let squared = |feed: f64, length_mm: f64| feed * feed + 2.0 * self.accel_mm_s2 * length_mm;
+        let ceiling = root.feed_mm_s * root.feed_mm_s;
+        // Acceleration alone does not reach it, nor anything before it.
+        if squared(left.feed_mm_s, root.end_mm - left.end_mm) <= ceiling {
+            return Seen::BelowLeft;
+        }
+        if squared(right.feed_mm_s, right.start_mm - root.start_mm) <= ceiling {
+            return Seen::BelowRight;
+        }
+        let (before, after) = (self.gap(&left, root), self.gap(root, &right));
+        // From the valley itself too: a stair before this one may not be reached.
+        let (first, last) = (self.node(open.left_valley), self.node(open.right_valley));
+        let all_before = (first.feed_mm_s, root.start_mm - first.end_mm);
+        let all_after = (last.feed_mm_s, last.start_mm - root.end_mm);
+        let can_rise = root.feed_mm_s >= left.feed_mm_s;
+        let can_fall = root.feed_mm_s >= right.feed_mm_s;
+        let lost_left = self.lost(root, &left, &before, all_before, root.left, can_rise);
+        let lost_right = self.lost(root, &right, &after, all_after, root.right, can_fall);
+        let rises = can_rise && lost_left <= self.broken(root, &left, &before, &right, &after, root.right);
+        let falls = can_fall && lost_right <= self.broken(root, &right, &after, &left, &before, root.left);
+        match (rises, falls) {
+            (true, true) if lost_left <= 0.0 && lost_right <= 0.0 => Seen::Top,
+            (true, true) if lost_left <= lost_right => Seen::Limits(Role::Rising),
+            (true, false) => Seen::Limits(Role::Rising),
+            (_, true) => Seen::Limits(Role::Falling),
+            (false, false) => Seen::Limits(Role::Valley),
+        }
+    }
+
+    /// Gives up valleys that cannot be reached below the stairs from the one before, or left for the one after;
+    /// `fits` says whether a hump can be driven. Returns whether all humps that are left can.
+    pub fn settle(&mut self, fits: impl Fn(&Self, &Hump) -> bool) -> bool {
+        let (mut left, mut right) = (0, self.next_valley(0));
+        while right != NONE {
+            let hump = self.hump(left, right);
+            if fits(self, &hump) {
+                if let Some(node) = self.node_mut(right) {
+                    node.link = left;
+                }
+                (left, right) = (right, self.next_valley(right));
+                continue;
+            }
+            #[cfg(feature = "debugprint")]
+            extern crate std;
+            #[cfg(feature = "debugprint")]
+            std::println!("giveup {hump:?}");
+            let last = self.nodes.len() - 1;
+            let top_mm_s = self.node(right).top_mm_s;
+            if hump.enter_mm_s > hump.exit_mm_s && left != 0 {
+                // On the way down to the right one.
+                self.give_up(left, Role::Falling, left as usize + 1..right as usize);
+                left = self.node(left).link;
+            } else if hump.enter_mm_s <= hump.exit_mm_s && right as usize != last {
+                self.give_up(right, Role::Rising, left as usize + 1..right as usize);
+                if let Some(node) = self.node_mut(left) {
+                    node.top_mm_s = top_mm_s;
+                }
+                right = self.next_valley(right);
+            } else {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Makes a stair of a valley; what lies on the side where it is passed at its feed or below limits no more.
+    fn give_up(&mut self, valley: u32, role: Role, passed: core::ops::Range<usize>) {
+        let feed_mm_s = self.node(valley).feed_mm_s;
+        if let Some(node) = self.node_mut(valley) {
+            node.role = role;
+        }
+        for node in self.nodes.get_mut(passed).unwrap_or(&mut []) {
+            if node.role != role || node.feed_mm_s >= feed_mm_s {
+                node.role = Role::Free;
+            }
+        }
+    }
+
+    /// The valley after one, [`NONE`] after the last.
+    fn next_valley(&self, valley: u32) -> u32 {
+        let after = valley as usize + 1;
+        let found = self.nodes.iter().skip(after).position(|node| node.role == Role::Valley);
+        found.map_or(NONE, |steps| (after + steps) as u32)
+    }
+
+    /// The humps, in path order.
+    pub fn humps(&self) -> impl Iterator<Item = Hump> + '_ {
+        let mut left = 0;
+        core::iter::from_fn(move || {
+            let right = self.next_valley(left);
+            if right == NONE {
+                return None;
+            }
+            let hump = self.hump(left, right);
+            left = right;
+            Some(hump)
+        })
+    }
+
+    /// The hump between two valleys.
+    fn hump(&self, left: u32, right: u32) -> Hump {
+        let inside = left as usize + 1..right as usize;
         let nodes = self.nodes.get(inside.clone()).unwrap_or(&[]);
+        let (left, right) = (self.node(left), self.node(right));
+        let (mut rising, mut falling) = (Stairs::NONE, Stairs::NONE);
         for node in nodes.iter().filter(|node| node.role == Role::Rising) {
             rising.push(Stair { end_mm: node.end_mm - left.end_mm, feed_mm_s: node.feed_mm_s });
         }
         for node in nodes.iter().rev().filter(|node| node.role == Role::Falling) {
             falling.push(Stair { end_mm: right.start_mm - node.start_mm, feed_mm_s: node.feed_mm_s });
         }
-        if open.right_valley == self.waiting {
-            let valley = self.waiting;
-            self.waiting = right.up;
-            self.open = Some(Open {
-                left_valley: valley,
-                left_bound: valley,
-                right_valley: right.right_valley,
-                right_bound: right.right_bound,
-                root: right.right,
-            });
-        }
         Hump {
             start_mm: left.end_mm,
             end_mm: right.start_mm,
             enter_mm_s: left.feed_mm_s,
             exit_mm_s: right.feed_mm_s,
-            top_mm_s,
+            top_mm_s: left.top_mm_s,
             rising,
             falling,
             nodes: (inside.start, inside.end),
         }
-    }
-
-    /// A valley's own length, to be run through at its feed, that ends where `hump` starts.
-    pub fn valley_before(&self, hump: &Hump) -> f64 {
-        let valley = hump.nodes.0.checked_sub(1).and_then(|index| self.nodes.get(index));
-        valley.map_or(0.0, |node| node.end_mm - node.start_mm)
     }
 
     /// What lies between two nodes.
@@ -393,14 +484,14 @@ fn tree(nodes: &mut [Node]) -> u32 {
         let Some(feed) = nodes.get(index).map(|node| node.feed_mm_s) else { break };
         let (mut at, mut below) = (before, NONE);
         while let Some(node) = nodes.get(at as usize).filter(|node| node.feed_mm_s > feed) {
-            (below, at) = (at, node.up);
+            (below, at) = (at, node.link);
         }
         let here = index as u32;
         if let Some(node) = nodes.get_mut(index) {
-            (node.left, node.up) = (below, at);
+            (node.left, node.link) = (below, at);
         }
         if let Some(node) = nodes.get_mut(below as usize) {
-            node.up = here;
+            node.link = here;
         }
         match nodes.get_mut(at as usize) {
             Some(node) => node.right = here,
