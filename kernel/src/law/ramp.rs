@@ -110,6 +110,11 @@ impl<R: Root> Ramp<R> {
         (self.from_mm_s + self.to_mm_s).times_per(self.duration_s(), R::from_f64(2.0))
     }
 
+    /// The greatest acceleration \[mm/s²\], without its sign: J_p·t₁/2.
+    pub fn peak_accel_mm_s2(&self) -> R {
+        self.peak_jerk_mm_s3.times_per(self.t1_s, R::from_f64(2.0))
+    }
+
     /// J_p with the sign of the change of feed.
     pub(super) fn signed_jerk_mm_s3(&self) -> R {
         if self.to_mm_s < self.from_mm_s { -self.peak_jerk_mm_s3 } else { self.peak_jerk_mm_s3 }

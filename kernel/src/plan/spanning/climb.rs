@@ -12,7 +12,13 @@ pub const STAIRS_MAX: usize = 48;
 /// A chain's ramps, and where each one starts.
 pub const LEGS_MAX: usize = STAIRS_MAX + 1;
 /// Steps of the search for the best acceleration of a ramp below stairs.
-const GENTLER_STEPS: usize = 10;
+const GENTLER_STEPS: usize = 8;
+/// The golden section.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+/// By how much a ramp may be softer than it would be.
+const SOFTEST: f64 = 16.0;
+/// How often a ramp may get longer because of what it passes.
+const LIMITS_STEPS: usize = 8;
 
 /// A ceiling that holds up to a position, counted from where the climb begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,6 +70,11 @@ impl Stairs {
         self.count -= 1;
     }
 
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
     fn as_slice(&self) -> &[Stair] {
         self.stairs.get(..self.count).unwrap_or(&[])
     }
@@ -78,209 +89,249 @@ pub struct Leg {
     pub ramp: Ramp<f64>,
 }
 
-/// A chain of ramps, in order.
-#[derive(Clone, Copy, Debug)]
-pub struct Climb {
-    legs: [Option<Leg>; LEGS_MAX],
-    /// Where the feed is reached \[mm\].
-    pub length_mm: f64,
-    /// When \[s\].
-    pub time_s: f64,
-}
-
-impl Climb {
-    /// Its ramps, in order.
-    pub fn legs(&self) -> impl DoubleEndedIterator<Item = &Leg> {
-        self.legs.iter().flatten()
-    }
-}
-
 /// What is known of the best chain to one feed.
 #[derive(Clone, Copy, Debug)]
 struct Reached {
     feed_mm_s: f64,
     /// No ramp may leave it before.
     ready_mm: f64,
+    /// Where and when it is reached.
     length_mm: f64,
     time_s: f64,
-    /// Time less what the length takes at this feed: less is better.
+    /// That time less what the length takes at this feed: less is better.
     lag_s: f64,
+    /// The feed before, and the ramp from there.
     from: usize,
     leg: Option<Leg>,
 }
 
-/// The best chain of ramps from `from_mm_s` to `to_mm_s` that keeps below `stairs`. `limits` says what may be used
-/// between two positions. `None` if there is none within `room_mm`.
-pub fn climb(
-    stairs: &Stairs,
-    from_mm_s: f64,
-    to_mm_s: f64,
-    room_mm: f64,
-    limits: impl Fn(f64, f64) -> Limits<f64>,
-) -> Option<Climb> {
-    let mut reached = [Reached {
-        feed_mm_s: from_mm_s,
+impl Reached {
+    const NOT: Self = Self {
+        feed_mm_s: 0.0,
         ready_mm: 0.0,
         length_mm: 0.0,
         time_s: 0.0,
-        lag_s: 0.0,
+        lag_s: f64::INFINITY,
         from: 0,
         leg: None,
-    }; LEGS_MAX + 1];
-    // The feeds to rest at: what is not above the start only delays it.
-    let mut last = 0;
-    for stair in stairs.as_slice() {
-        if stair.feed_mm_s <= from_mm_s {
-            if let Some(start) = reached.first_mut() {
-                start.ready_mm = start.ready_mm.max(stair.end_mm);
-            }
-        } else if stair.feed_mm_s < to_mm_s {
-            last += 1;
-            if let Some(next) = reached.get_mut(last) {
-                (next.feed_mm_s, next.ready_mm, next.lag_s) = (stair.feed_mm_s, stair.end_mm, f64::INFINITY);
-            }
-        }
-    }
-    if to_mm_s > from_mm_s {
-        last += 1;
-        if let Some(next) = reached.get_mut(last) {
-            (next.feed_mm_s, next.ready_mm, next.lag_s) = (to_mm_s, 0.0, f64::INFINITY);
-        }
-    }
-    let mut is_best = false;
-    for from in 0..last {
-        let mut step = 1;
-        // All the way first: if nothing is in its way there is nothing better.
-        let mut to = last;
-        loop {
-            let (below, above) = reached.split_at_mut(from + 1);
-            let (Some(start), Some(target)) = (below.last(), above.get(to - from - 1)) else { break };
-            let mut is_free = false;
-            if start.lag_s < f64::INFINITY {
-                let between = above.get(..to - from - 1).unwrap_or(&[]);
-                let start_mm = start.length_mm.max(start.ready_mm);
-                if let Some((leg, is_hindered)) = fit(start, start_mm, target.feed_mm_s, room_mm, between, &limits) {
-                    is_free = !is_hindered;
-                    let waited_mm = leg.start_mm - start.length_mm;
-                    let waited_s = if waited_mm > 0.0 { waited_mm / start.feed_mm_s } else { 0.0 };
-                    let time_s = start.time_s + waited_s + leg.ramp.duration_s();
-                    let length_mm = leg.start_mm + leg.ramp.length_mm();
-                    let lag_s = time_s - length_mm / target.feed_mm_s;
-                    if lag_s < target.lag_s
-                        && length_mm <= room_mm
-                        && let Some(target) = above.get_mut(to - from - 1)
-                    {
-                        *target = Reached { length_mm, time_s, lag_s, from, leg: Some(leg), ..*target };
-                    }
-                }
-            }
-            if to == last && is_free && from == 0 {
-                is_best = true;
-                break;
-            }
-            to = from + step;
-            step = if step < 4 { step + 1 } else { step + step / 2 };
-            if to >= last {
-                break;
-            }
-        }
-        if is_best {
-            break;
-        }
-    }
-    let top = reached.get(last)?;
-    if !(top.lag_s < f64::INFINITY) {
-        return None;
-    }
-    let mut climb = Climb { legs: [None; LEGS_MAX], length_mm: top.length_mm, time_s: top.time_s };
-    let mut at = last;
-    while at > 0 {
-        let here = reached.get(at)?;
-        *climb.legs.get_mut(at - 1)? = here.leg;
-        at = here.from;
-    }
-    Some(climb)
+    };
 }
 
-/// The ramp from `start`, where it may leave from `start_mm` on, to `to_mm_s`, passing the stairs `between`; and
-/// whether they hinder it.
-fn fit(
-    start: &Reached,
-    start_mm: f64,
-    to_mm_s: f64,
-    room_mm: f64,
-    between: &[Reached],
-    limits: &impl Fn(f64, f64) -> Limits<f64>,
-) -> Option<(Leg, bool)> {
-    let from_mm_s = start.feed_mm_s;
-    // With at most this acceleration.
-    let made = |accel_mm_s2: f64| -> Option<Leg> {
-        let mut within = limits(start_mm, start_mm);
-        // What is passed later may allow less; the ramp gets longer by it.
-        for _ in 0..8 {
-            let softened = Limits { accel_mm_s2: within.accel_mm_s2.min(accel_mm_s2), ..within };
-            let ramp = Ramp::new(&Law::new(softened).ok()?, from_mm_s, to_mm_s);
-            let mut at_mm = start_mm;
-            for stair in between {
-                at_mm = at_mm.max(stair.ready_mm - ramp.length_to_feed_mm(stair.feed_mm_s));
+/// The best chain of ramps up one side. Working memory, used again and again.
+#[derive(Clone, Copy, Debug)]
+pub struct Climb {
+    reached: [Reached; LEGS_MAX + 1],
+    last: usize,
+    legs: [u8; LEGS_MAX],
+}
+
+impl Climb {
+    /// None yet.
+    pub const NONE: Self = Self { reached: [Reached::NOT; LEGS_MAX + 1], last: 0, legs: [0; LEGS_MAX] };
+
+    /// Finds the chain from `from_mm_s` to `to_mm_s` that keeps below `stairs`, within `room_mm`; returns its length
+    /// \[mm\]. `limits` says what may be used between two positions. `None` if there is no chain.
+    pub fn find(
+        &mut self,
+        stairs: &Stairs,
+        from_mm_s: f64,
+        to_mm_s: f64,
+        room_mm: f64,
+        limits: impl Fn(f64, f64) -> Limits<f64>,
+    ) -> Option<f64> {
+        self.feeds(stairs, from_mm_s, to_mm_s);
+        // All the way first: if nothing is in its way there is nothing better.
+        if self.extend(0, self.last, room_mm, &limits) != Some(Way::Free) {
+            for to in 1..=self.last {
+                // From the stairs just below first: it takes a good chain to see early that others are worse.
+                let (mut step, mut more) = (1, 1);
+                while step <= to {
+                    self.extend(to - step, to, room_mm, &limits);
+                    more += usize::from(step >= 4) * (more / 2).max(1);
+                    step += more;
+                }
             }
-            let passed = limits(at_mm, at_mm + ramp.length_mm());
-            let least = Limits {
-                accel_mm_s2: within.accel_mm_s2.min(passed.accel_mm_s2),
-                jerk_mm_s3: within.jerk_mm_s3.min(passed.jerk_mm_s3),
-                snap_mm_s4: within.snap_mm_s4.min(passed.snap_mm_s4),
-            };
+        }
+        let top = self.reached.get(self.last)?;
+        (top.lag_s < f64::INFINITY).then_some(top.length_mm)
+    }
+
+    /// The feeds to rest at. What is not above the start only delays it.
+    fn feeds(&mut self, stairs: &Stairs, from_mm_s: f64, to_mm_s: f64) {
+        let mut start = Reached { feed_mm_s: from_mm_s, lag_s: 0.0, ..Reached::NOT };
+        self.last = 0;
+        let mut put = |feed_mm_s, ready_mm| {
+            self.last += 1;
+            if let Some(next) = self.reached.get_mut(self.last) {
+                *next = Reached { feed_mm_s, ready_mm, ..Reached::NOT };
+            }
+        };
+        for stair in stairs.as_slice() {
+            if stair.feed_mm_s <= from_mm_s {
+                start.ready_mm = start.ready_mm.max(stair.end_mm);
+            } else if stair.feed_mm_s < to_mm_s {
+                put(stair.feed_mm_s, stair.end_mm);
+            }
+        }
+        if to_mm_s > from_mm_s {
+            put(to_mm_s, 0.0);
+        }
+        if let Some(first) = self.reached.first_mut() {
+            *first = start;
+        }
+    }
+
+    /// Takes the chain to feed `from` and a ramp from there to feed `to`, if it is better than what is known.
+    fn extend(
+        &mut self,
+        from: usize,
+        to: usize,
+        room_mm: f64,
+        limits: &impl Fn(f64, f64) -> Limits<f64>,
+    ) -> Option<Way> {
+        let (start, target) = (self.reached.get(from)?, self.reached.get(to)?);
+        let between = self.reached.get(from + 1..to)?;
+        if !(start.lag_s < f64::INFINITY) {
+            return None;
+        }
+        let start_mm = start.length_mm.max(start.ready_mm);
+        let waited_s = if start_mm > start.length_mm { (start_mm - start.length_mm) / start.feed_mm_s } else { 0.0 };
+        // What is lost before the ramp, as seen from the target.
+        let before_s = start.time_s + waited_s - start_mm / target.feed_mm_s;
+        let jump = Jump { start_mm, from_mm_s: start.feed_mm_s, to_mm_s: target.feed_mm_s, room_mm, between, limits };
+        let (leg, way) = jump.best(target.lag_s - before_s)?;
+        let held_s = if leg.start_mm > start_mm { (leg.start_mm - start_mm) / start.feed_mm_s } else { 0.0 };
+        let time_s = start.time_s + waited_s + held_s + leg.ramp.duration_s();
+        let length_mm = leg.start_mm + leg.ramp.length_mm();
+        let lag_s = time_s - length_mm / target.feed_mm_s;
+        let target = self.reached.get_mut(to)?;
+        if lag_s < target.lag_s {
+            *target = Reached { length_mm, time_s, lag_s, from, leg: Some(leg), ..*target };
+        }
+        Some(way)
+    }
+
+    /// The chain's ramps, in order.
+    pub fn legs(&mut self) -> impl DoubleEndedIterator<Item = &Leg> {
+        let (mut at, mut count) = (self.last, 0);
+        while at > 0 {
+            if let Some(place) = self.legs.get_mut(count) {
+                *place = at as u8;
+            }
+            count += 1;
+            at = self.reached.get(at).map_or(0, |here| here.from);
+        }
+        let legs = self.legs.get(..count).unwrap_or(&[]);
+        legs.iter().rev().filter_map(|&at| self.reached.get(usize::from(at))?.leg.as_ref())
+    }
+}
+
+/// Whether a ramp could be as it likes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    Free,
+    Hindered,
+}
+
+/// One ramp to be found.
+struct Jump<'a, L> {
+    /// It may start here.
+    start_mm: f64,
+    from_mm_s: f64,
+    to_mm_s: f64,
+    /// It must end here.
+    room_mm: f64,
+    /// The stairs it passes.
+    between: &'a [Reached],
+    limits: &'a L,
+}
+
+/// What a ramp with one acceleration loses.
+enum Tried {
+    Lost(f64, Leg),
+    /// It loses too much before anything is in its way.
+    TooSoft,
+    /// It would have to wait too long.
+    TooHard,
+}
+
+impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
+    /// The ramp that loses the least, if it is less than `most_s`.
+    fn best(&self, most_s: f64) -> Option<(Leg, Way)> {
+        let accel = (self.limits)(self.start_mm, self.start_mm).accel_mm_s2;
+        let mut most_s = most_s;
+        // As hard as allowed.
+        let mut best = None;
+        match self.with(accel, most_s) {
+            Tried::Lost(_, leg) if leg.start_mm <= self.start_mm => return Some((leg, Way::Free)),
+            Tried::Lost(lost_s, leg) => {
+                most_s = lost_s;
+                best = Some((leg, Way::Hindered));
+            }
+            Tried::TooSoft => return None,
+            Tried::TooHard => {}
+        }
+        // Golden section over the acceleration, down from what the ramp would reach.
+        let reached = Law::new((self.limits)(self.start_mm, self.start_mm)).ok()?;
+        let hardest = Ramp::new(&reached, self.from_mm_s, self.to_mm_s).peak_accel_mm_s2();
+        let (mut low, mut high) = (hardest / SOFTEST, hardest);
+        let mut try_at = |accel: f64| {
+            let tried = self.with(accel, f64::INFINITY.min(most_s));
+            if let Tried::Lost(lost_s, leg) = tried {
+                if lost_s < most_s {
+                    most_s = lost_s;
+                    best = Some((leg, Way::Hindered));
+                }
+                return (lost_s, false);
+            }
+            (f64::INFINITY, matches!(tried, Tried::TooHard))
+        };
+        let at = |low: f64, high: f64| (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+        let (mut softer, mut harder) = (try_at(at(low, high).0), try_at(at(low, high).1));
+        for _ in 0..GENTLER_STEPS {
+            if harder.1 || softer.0 < harder.0 {
+                high = at(low, high).1;
+                (softer, harder) = (try_at(at(low, high).0), softer);
+            } else {
+                low = at(low, high).0;
+                (softer, harder) = (harder, try_at(at(low, high).1));
+            }
+        }
+        best
+    }
+
+    /// The ramp with at most this acceleration, if it loses at most `most_s`.
+    fn with(&self, accel_mm_s2: f64, most_s: f64) -> Tried {
+        let mut within = (self.limits)(self.start_mm, self.start_mm);
+        // What is passed later may allow less; the ramp gets longer by it.
+        for _ in 0..LIMITS_STEPS {
+            let softened = Limits { accel_mm_s2: within.accel_mm_s2.min(accel_mm_s2), ..within };
+            let Ok(law) = Law::new(softened) else { return Tried::TooSoft };
+            let ramp = Ramp::new(&law, self.from_mm_s, self.to_mm_s);
+            let length_mm = ramp.length_mm();
+            let own_s = ramp.duration_s() - length_mm / self.to_mm_s;
+            if !(own_s < most_s) || self.start_mm + length_mm > self.room_mm {
+                return Tried::TooSoft;
+            }
+            // At rest nothing can be waited for.
+            let wait_s_mm = 1.0 / self.from_mm_s - 1.0 / self.to_mm_s;
+            let wait_most_mm = if wait_s_mm < f64::INFINITY { (most_s - own_s) / wait_s_mm } else { 0.0 };
+            let latest_mm = (self.start_mm + wait_most_mm).min(self.room_mm - length_mm);
+            let mut at_mm = self.start_mm;
+            for stair in self.between {
+                at_mm = at_mm.max(stair.ready_mm - ramp.length_to_feed_mm(stair.feed_mm_s));
+                if at_mm > latest_mm {
+                    return Tried::TooHard;
+                }
+            }
+            let passed = (self.limits)(at_mm, at_mm + length_mm);
+            let least = passed.least(&within);
             if least == within {
-                return Some(Leg { start_mm: at_mm, ramp });
+                let waited_s = if at_mm > self.start_mm { (at_mm - self.start_mm) * wait_s_mm } else { 0.0 };
+                return Tried::Lost(own_s + waited_s, Leg { start_mm: at_mm, ramp });
             }
             within = least;
         }
-        None
-    };
-    let lost = |leg: &Leg| {
-        if leg.start_mm + leg.ramp.length_mm() > room_mm {
-            return f64::INFINITY;
-        }
-        let waited_mm = leg.start_mm - start_mm;
-        let waited_s = match (waited_mm > 0.0, from_mm_s > 0.0) {
-            (false, _) => 0.0,
-            (true, true) => waited_mm * (1.0 / from_mm_s - 1.0 / to_mm_s),
-            (true, false) => f64::INFINITY,
-        };
-        waited_s + leg.ramp.duration_s() - leg.ramp.length_mm() / to_mm_s
-    };
-    let accel = limits(start_mm, start_mm).accel_mm_s2;
-    let leg = made(accel)?;
-    if leg.start_mm <= start_mm {
-        return Some((leg, false));
+        Tried::TooSoft
     }
-    // Golden section over the acceleration.
-    let ratio = 0.618_033_988_749_895;
-    let (mut low, mut high) = (accel / 32.0, accel);
-    let mut best = (lost(&leg), leg);
-    let mut inner = [high - ratio * (high - low), low + ratio * (high - low)].map(|a| {
-        let leg = made(a)?;
-        Some((a, lost(&leg), leg))
-    });
-    for _ in 0..GENTLER_STEPS {
-        let [Some((a, lost_a, leg_a)), Some((b, lost_b, leg_b))] = inner else { break };
-        for (lost, leg) in [(lost_a, leg_a), (lost_b, leg_b)] {
-            if lost < best.0 {
-                best = (lost, leg);
-            }
-        }
-        // At rest nothing can be waited for: what waits is too fast.
-        let is_lower = lost_a < lost_b || (lost_a.is_infinite() && lost_b.is_infinite());
-        let next;
-        if is_lower {
-            high = b;
-            next = high - ratio * (high - low);
-            inner = [made(next).map(|leg| (next, lost(&leg), leg)), Some((a, lost_a, leg_a))];
-        } else {
-            low = a;
-            next = low + ratio * (high - low);
-            inner = [Some((b, lost_b, leg_b)), made(next).map(|leg| (next, lost(&leg), leg))];
-        }
-    }
-    (best.0 < f64::INFINITY).then_some((best.1, true))
 }

@@ -14,10 +14,10 @@ pub mod valleys;
 
 pub use valleys::Node;
 
-use self::climb::{Climb, climb};
+use self::climb::Climb;
 use self::valleys::{Hump, Valleys};
 use super::lookahead::{Block, PlanError, check};
-use crate::law::{Law, Limits, Ramp};
+use crate::law::{Law, Limits, Ramp, peak};
 
 /// A ramp or a cruise, with its place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub const fn nodes_for(blocks: usize) -> usize {
 /// Solver steps for the feed at the top of a hump.
 const TOP_STEPS: usize = 24;
 /// No more steps once so small a part of the hump is left to cruise at its top.
-const TOP_GAP: f64 = 1.0e-4;
+const TOP_GAP: f64 = 1.0e-3;
 
 /// Plans a stretch with ramps that may span blocks, and hands every ramp and cruise to `put`, in path order. Returns
 /// the time it takes \[s\], or `None` where no such plan was found (one pair of ramps a block may still be possible).
@@ -59,7 +59,10 @@ pub fn plan_spanning(
         return Err(PlanError::Output { blocks: nodes_for(blocks.len()), plans: room });
     };
     let fits = |valleys: &Valleys<'_>, hump: &Hump| match Sides::new(hump, valleys) {
-        Some(sides) => sides.fit(sides.lowest()).is_some(),
+        Some(sides) => {
+            let (mut up, mut down) = (Climb::NONE, Climb::NONE);
+            sides.fit(sides.lowest(), &mut up, &mut down).is_some_and(|left| left >= 0.0)
+        }
         None => hump.enter_mm_s == hump.exit_mm_s,
     };
     if !valleys.settle(fits) {
@@ -140,44 +143,63 @@ impl<'a> Sides<'a> {
         let blocks = self.valleys.blocks_of(self.hump);
         let touched = blocks.filter(|&(start, end, _)| end > from_mm && start <= to_mm);
         let all = touched.map(|(_, _, law)| law.limits());
-        all.reduce(least).unwrap_or_else(|| self.limits(self.hump.start_mm, self.hump.end_mm))
+        all.reduce(|a, b| a.least(&b)).unwrap_or_else(|| self.limits(self.hump.start_mm, self.hump.end_mm))
     }
 
-    /// Both sides up to `top`, and what is left between them \[mm\], if there is room.
-    fn fit(&self, top: f64) -> Option<(Climb, Climb, f64)> {
+    /// Both sides up to `top`; returns what is left between them \[mm\], less than 0 if there is no room. `None` if there
+    /// is none for one side by itself.
+    fn fit(&self, top: f64, up: &mut Climb, down: &mut Climb) -> Option<f64> {
         let Hump { start_mm, end_mm, enter_mm_s, exit_mm_s, rising, falling, .. } = self.hump;
         let room_mm = end_mm - start_mm;
-        let up = climb(rising, *enter_mm_s, top, room_mm, |a, b| self.limits(start_mm + a, start_mm + b))?;
-        let down = climb(falling, *exit_mm_s, top, room_mm, |a, b| self.limits(end_mm - b, end_mm - a))?;
-        let left_mm = room_mm - up.length_mm - down.length_mm;
-        (left_mm >= 0.0).then_some((up, down, left_mm))
+        let up_mm = up.find(rising, *enter_mm_s, top, room_mm, |a, b| self.limits(start_mm + a, start_mm + b))?;
+        let down_mm = down.find(falling, *exit_mm_s, top, room_mm, |a, b| self.limits(end_mm - b, end_mm - a))?;
+        Some(room_mm - up_mm - down_mm)
     }
 
-    /// Up to the highest top there is room for.
-    fn best(&self) -> Option<(f64, Climb, Climb)> {
+    /// Up to the highest top there is room for, which is returned.
+    fn best(&self, up: &mut Climb, down: &mut Climb) -> Option<f64> {
         let (mut low, mut high) = (self.lowest(), self.highest());
-        if let Some((up, down, _)) = self.fit(high) {
-            return Some((high, up, down));
+        let room_mm = self.hump.end_mm - self.hump.start_mm;
+        if let Some(law) = self.uniform.filter(|_| self.hump.rising.is_empty() && self.hump.falling.is_empty()) {
+            high = high.min(peak(&law, self.hump.enter_mm_s, self.hump.exit_mm_s, room_mm)).max(low);
         }
-        let mut best = self.fit(low)?;
+        let mut left_high = match self.fit(high, up, down) {
+            Some(left) if left >= 0.0 => return Some(high),
+            Some(left) => left,
+            None => f64::NEG_INFINITY,
+        };
+        let mut left_low = self.fit(low, up, down).filter(|&left| left >= 0.0)?;
+        let mut gap_mm = left_low;
+        // False position, with halving where that stands still; aimed a little short, so that there is room.
+        let aim_mm = 0.5 * TOP_GAP * room_mm;
         for _ in 0..TOP_STEPS {
-            if best.2 < TOP_GAP * (self.hump.end_mm - self.hump.start_mm) {
+            if gap_mm < TOP_GAP * room_mm {
                 break;
             }
-            let middle = 0.5 * (low + high);
-            match self.fit(middle) {
-                Some(fitting) => (low, best) = (middle, fitting),
-                None => high = middle,
+            let part = (left_low - aim_mm) / (left_low - left_high);
+            let part = if part > 0.02 && part < 0.98 { part } else { 0.5 };
+            let middle = low + part * (high - low);
+            match self.fit(middle, up, down) {
+                Some(left) if left >= 0.0 => {
+                    (low, left_low, gap_mm) = (middle, left, left);
+                    left_high *= 0.5;
+                }
+                tried => {
+                    (high, left_high) = (middle, tried.unwrap_or(f64::NEG_INFINITY));
+                    left_low *= 0.5;
+                }
             }
         }
-        Some((low, best.0, best.1))
+        // The last one tried may not be the best.
+        self.fit(low, up, down).map(|_| low)
     }
 }
 
 /// Up, along and down.
 fn drive<F: FnMut(FeedSpan)>(hump: &Hump, valleys: &Valleys<'_>, out: &mut Out<'_, F>) -> Option<()> {
     let Some(sides) = Sides::new(hump, valleys) else { return Some(()) };
-    let (top, up, down) = sides.best()?;
+    let (mut up, mut down) = (Climb::NONE, Climb::NONE);
+    let top = sides.best(&mut up, &mut down)?;
     let mut feed = hump.enter_mm_s;
     for leg in up.legs() {
         out.cruise(hump.start_mm + leg.start_mm, feed);
@@ -193,12 +215,4 @@ fn drive<F: FnMut(FeedSpan)>(hump: &Hump, valleys: &Valleys<'_>, out: &mut Out<'
     }
     out.cruise(hump.end_mm, feed);
     Some(())
-}
-
-fn least(a: Limits<f64>, b: Limits<f64>) -> Limits<f64> {
-    Limits {
-        accel_mm_s2: a.accel_mm_s2.min(b.accel_mm_s2),
-        jerk_mm_s3: a.jerk_mm_s3.min(b.jerk_mm_s3),
-        snap_mm_s4: a.snap_mm_s4.min(b.snap_mm_s4),
-    }
 }

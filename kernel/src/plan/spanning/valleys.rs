@@ -324,10 +324,6 @@ impl<'a> Valleys<'a> {
                 (left, right) = (right, self.next_valley(right));
                 continue;
             }
-            #[cfg(feature = "debugprint")]
-            extern crate std;
-            #[cfg(feature = "debugprint")]
-            std::println!("giveup {hump:?}");
             let last = self.nodes.len() - 1;
             let top_mm_s = self.node(right).top_mm_s;
             if hump.enter_mm_s > hump.exit_mm_s && left != 0 {
