@@ -86,7 +86,7 @@ struct FeedJson {
 pub fn plan(arguments: &PlanArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Merged };
+    let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
     let is_block_list =
         arguments.program.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
     let mut plan = if is_block_list {

@@ -195,10 +195,18 @@ impl Climb {
             return None;
         }
         let start_mm = start.length_mm.max(start.ready_mm);
-        let waited_s = if start_mm > start.length_mm { (start_mm - start.length_mm) / start.feed_mm_s } else { 0.0 };
+        let waited_s =
+            if start_mm > start.length_mm { (start_mm - start.length_mm) / start.feed_mm_s } else { 0.0 };
         // What is lost before the ramp, as seen from the target.
         let before_s = start.time_s + waited_s - start_mm / target.feed_mm_s;
-        let jump = Jump { start_mm, from_mm_s: start.feed_mm_s, to_mm_s: target.feed_mm_s, room_mm, between, limits };
+        let jump = Jump {
+            start_mm,
+            from_mm_s: start.feed_mm_s,
+            to_mm_s: target.feed_mm_s,
+            room_mm,
+            between,
+            limits,
+        };
         let (leg, way) = jump.best(target.lag_s - before_s)?;
         let held_s = if leg.start_mm > start_mm { (leg.start_mm - start_mm) / start.feed_mm_s } else { 0.0 };
         let time_s = start.time_s + waited_s + held_s + leg.ramp.duration_s();

@@ -151,8 +151,10 @@ impl<'a> Sides<'a> {
     fn fit(&self, top: f64, up: &mut Climb, down: &mut Climb) -> Option<f64> {
         let Hump { start_mm, end_mm, enter_mm_s, exit_mm_s, rising, falling, .. } = self.hump;
         let room_mm = end_mm - start_mm;
-        let up_mm = up.find(rising, *enter_mm_s, top, room_mm, |a, b| self.limits(start_mm + a, start_mm + b))?;
-        let down_mm = down.find(falling, *exit_mm_s, top, room_mm, |a, b| self.limits(end_mm - b, end_mm - a))?;
+        let up_mm =
+            up.find(rising, *enter_mm_s, top, room_mm, |a, b| self.limits(start_mm + a, start_mm + b))?;
+        let down_mm =
+            down.find(falling, *exit_mm_s, top, room_mm, |a, b| self.limits(end_mm - b, end_mm - a))?;
         Some(room_mm - up_mm - down_mm)
     }
 
@@ -160,7 +162,9 @@ impl<'a> Sides<'a> {
     fn best(&self, up: &mut Climb, down: &mut Climb) -> Option<f64> {
         let (mut low, mut high) = (self.lowest(), self.highest());
         let room_mm = self.hump.end_mm - self.hump.start_mm;
-        if let Some(law) = self.uniform.filter(|_| self.hump.rising.is_empty() && self.hump.falling.is_empty()) {
+        if let Some(law) =
+            self.uniform.filter(|_| self.hump.rising.is_empty() && self.hump.falling.is_empty())
+        {
             high = high.min(peak(&law, self.hump.enter_mm_s, self.hump.exit_mm_s, room_mm)).max(low);
         }
         let mut left_high = match self.fit(high, up, down) {

@@ -434,7 +434,8 @@ impl<'a> Valleys<'a> {
             return 0.0;
         }
         let top = peak(&law, feed, feed, left_mm);
-        let time_s = 2.0 * law.ramp_time_s(top - feed) + (left_mm - 2.0 * law.ramp_length_mm(feed, top)) / top;
+        let time_s =
+            2.0 * law.ramp_time_s(top - feed) + (left_mm - 2.0 * law.ramp_length_mm(feed, top)) / top;
         (left_mm / feed - time_s).min(gap.length_mm / feed - gap.ideal_s)
     }
 
