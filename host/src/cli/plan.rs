@@ -36,7 +36,7 @@ pub struct PlanArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
-    /// One pair of ramps per block; without it, ramps may span blocks with equal ceilings.
+    /// One pair of ramps per block; without it, ramps may span blocks.
     #[arg(long)]
     per_block: bool,
     /// Print JSON: time_s, blocks, feed.

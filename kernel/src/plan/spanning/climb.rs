@@ -11,12 +11,13 @@ use crate::law::{Law, Limits, Ramp};
 pub const STAIRS_MAX: usize = 48;
 /// A chain's ramps, and where each one starts.
 pub const LEGS_MAX: usize = STAIRS_MAX + 1;
-/// Steps of the search for the best acceleration of a ramp below stairs.
-const GENTLER_STEPS: usize = 8;
+/// A ramp below stairs is made softer by this factor, so often at most.
+const SOFTER: f64 = 3.0;
+const SOFTER_STEPS: usize = 9;
+/// Steps of the search for its best acceleration.
+const GOLDEN_STEPS: usize = 5;
 /// The golden section.
 const GOLDEN: f64 = 0.618_033_988_749_895;
-/// By how much a ramp may be softer than it would be.
-const SOFTEST: f64 = 16.0;
 /// How often a ramp may get longer because of what it passes.
 const LIMITS_STEPS: usize = 8;
 
@@ -34,11 +35,14 @@ pub struct Stair {
 pub struct Stairs {
     stairs: [Stair; STAIRS_MAX],
     count: usize,
+    /// The time lost by joining some, at most \[s\].
+    pub lost_s: f64,
 }
 
 impl Stairs {
     /// Level ground.
-    pub const NONE: Self = Self { stairs: [Stair { end_mm: 0.0, feed_mm_s: 0.0 }; STAIRS_MAX], count: 0 };
+    pub const NONE: Self =
+        Self { stairs: [Stair { end_mm: 0.0, feed_mm_s: 0.0 }; STAIRS_MAX], count: 0, lost_s: 0.0 };
 
     /// Adds the next higher stair.
     pub fn push(&mut self, stair: Stair) {
@@ -62,12 +66,19 @@ impl Stairs {
             }
         }
         let at = least.1;
+        self.lost_s += least.0;
         let end_mm = self.stairs.get(at + 1).map_or(0.0, |high| high.end_mm);
         if let Some(low) = self.stairs.get_mut(at) {
             low.end_mm = end_mm;
         }
         self.stairs.copy_within((at + 2).min(STAIRS_MAX).., (at + 1).min(STAIRS_MAX - 1));
         self.count -= 1;
+    }
+
+    /// The lowest and the highest feed \[mm/s\].
+    pub fn range_mm_s(&self) -> (f64, f64) {
+        let feed = |stair: Option<&Stair>| stair.map_or(0.0, |stair| stair.feed_mm_s);
+        (feed(self.as_slice().first()), feed(self.as_slice().last()))
     }
 
     /// Whether there is none.
@@ -279,12 +290,8 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
             Tried::TooSoft => return None,
             Tried::TooHard => {}
         }
-        // Golden section over the acceleration, down from what the ramp would reach.
-        let reached = Law::new((self.limits)(self.start_mm, self.start_mm)).ok()?;
-        let hardest = Ramp::new(&reached, self.from_mm_s, self.to_mm_s).peak_accel_mm_s2();
-        let (mut low, mut high) = (hardest / SOFTEST, hardest);
         let mut try_at = |accel: f64| {
-            let tried = self.with(accel, f64::INFINITY.min(most_s));
+            let tried = self.with(accel, most_s);
             if let Tried::Lost(lost_s, leg) = tried {
                 if lost_s < most_s {
                     most_s = lost_s;
@@ -294,9 +301,25 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
             }
             (f64::INFINITY, matches!(tried, Tried::TooHard))
         };
+        // Softer by steps, from what the ramp would reach, as long as it helps.
+        let law = Law::new((self.limits)(self.start_mm, self.start_mm)).ok()?;
+        let hardest = Ramp::new(&law, self.from_mm_s, self.to_mm_s).peak_accel_mm_s2();
+        let (mut good, mut good_s) = (hardest, f64::INFINITY);
+        let mut next = hardest;
+        for _ in 0..SOFTER_STEPS {
+            next /= SOFTER;
+            let (lost_s, is_too_hard) = try_at(next);
+            if lost_s < good_s {
+                (good, good_s) = (next, lost_s);
+            } else if !is_too_hard {
+                break;
+            }
+        }
+        // Golden section around the best of them.
+        let (mut low, mut high) = (good / SOFTER, (good * SOFTER).min(hardest));
         let at = |low: f64, high: f64| (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
         let (mut softer, mut harder) = (try_at(at(low, high).0), try_at(at(low, high).1));
-        for _ in 0..GENTLER_STEPS {
+        for _ in 0..GOLDEN_STEPS {
             if harder.1 || softer.0 < harder.0 {
                 high = at(low, high).1;
                 (softer, harder) = (try_at(at(low, high).0), softer);

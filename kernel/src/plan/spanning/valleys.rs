@@ -11,6 +11,9 @@ use super::climb::{Stair, Stairs};
 use crate::law::{Law, Ramp, peak};
 use crate::plan::Block;
 
+/// Joining stairs may lose so much of the time of a ramp over all of them; otherwise the staircase is divided.
+const DIVIDE_SHARE: f64 = 0.05;
+
 /// No node.
 const NONE: u32 = u32::MAX;
 
@@ -48,6 +51,8 @@ pub struct Node {
     /// For a valley: the ceiling of the hump after it \[mm/s\].
     top_mm_s: f64,
     role: Role,
+    /// The role it had before it became a valley to divide a long staircase.
+    divides: Option<Role>,
 }
 
 impl Node {
@@ -64,6 +69,7 @@ impl Node {
         bounds: (NONE, NONE),
         top_mm_s: f64::INFINITY,
         role: Role::Free,
+        divides: None,
     };
 }
 
@@ -159,16 +165,8 @@ impl<'a> Valleys<'a> {
                     if let Some(last) = open.take() {
                         put(last)?;
                     }
-                    if block.length_mm > 0.0 {
-                        let block_index = index as u32;
-                        open = Some(Node {
-                            start_mm: at_mm,
-                            end_mm,
-                            feed_mm_s: block.cap_mm_s,
-                            block: block_index,
-                            ..Node::EMPTY
-                        });
-                    }
+                    let (feed_mm_s, block) = (block.cap_mm_s, index as u32);
+                    open = Some(Node { start_mm: at_mm, end_mm, feed_mm_s, block, ..Node::EMPTY });
                 }
             }
             if is_joint {
@@ -317,6 +315,10 @@ impl<'a> Valleys<'a> {
         let (mut left, mut right) = (0, self.next_valley(0));
         while right != NONE {
             let hump = self.hump(left, right);
+            if let Some(divide) = self.divide(&hump, left, right) {
+                right = divide;
+                continue;
+            }
             if fits(self, &hump) {
                 if let Some(node) = self.node_mut(right) {
                     node.link = left;
@@ -341,6 +343,35 @@ impl<'a> Valleys<'a> {
             }
         }
         true
+    }
+
+    /// Rests in the middle of a staircase that is too long to be climbed at once; returns the new valley.
+    fn divide(&mut self, hump: &Hump, left: u32, right: u32) -> Option<u32> {
+        let is_long = |stairs: &Stairs| {
+            let (low, high) = stairs.range_mm_s();
+            let law = self.law(left + 1);
+            stairs.lost_s > law.map_or(f64::INFINITY, |law| DIVIDE_SHARE * law.ramp_time_s(high - low))
+        };
+        let role = match (is_long(&hump.rising), is_long(&hump.falling)) {
+            (true, _) => Role::Rising,
+            (_, true) => Role::Falling,
+            _ => return None,
+        };
+        let inside = left as usize + 1..right as usize;
+        let steps =
+            || inside.clone().filter(|&index| self.nodes.get(index).is_some_and(|node| node.role == role));
+        let middle = steps().nth(steps().count() / 2)? as u32;
+        let (feed_mm_s, top_mm_s) = (self.node(middle).feed_mm_s, self.node(left).top_mm_s);
+        let node = self.node_mut(middle).filter(|node| node.divides.is_none())?;
+        (node.role, node.divides) = (Role::Valley, Some(role));
+        // What lies towards the foot of the staircase stays below its middle.
+        if role == Role::Rising {
+            node.top_mm_s = top_mm_s;
+            self.node_mut(left)?.top_mm_s = feed_mm_s;
+        } else {
+            node.top_mm_s = feed_mm_s;
+        }
+        Some(middle)
     }
 
     /// Makes a stair of a valley; what lies on the side where it is passed at its feed or below limits no more.
@@ -379,19 +410,25 @@ impl<'a> Valleys<'a> {
 
     /// The hump between two valleys.
     fn hump(&self, left: u32, right: u32) -> Hump {
-        let inside = left as usize + 1..right as usize;
-        let nodes = self.nodes.get(inside.clone()).unwrap_or(&[]);
+        let (first, last) = (left as usize, right as usize);
         let (left, right) = (self.node(left), self.node(right));
+        // A stair that divides a staircase is rested in at its far end only, and belongs to the hump before that.
+        let is_stair = |node: &Node, role: Role| node.divides == Some(role);
+        let inside = first + usize::from(!is_stair(&left, Role::Falling))
+            ..last + usize::from(is_stair(&right, Role::Rising));
+        let start_mm = if is_stair(&left, Role::Falling) { left.start_mm } else { left.end_mm };
+        let end_mm = if is_stair(&right, Role::Rising) { right.end_mm } else { right.start_mm };
+        let nodes = self.nodes.get(inside.clone()).unwrap_or(&[]);
         let (mut rising, mut falling) = (Stairs::NONE, Stairs::NONE);
         for node in nodes.iter().filter(|node| node.role == Role::Rising) {
-            rising.push(Stair { end_mm: node.end_mm - left.end_mm, feed_mm_s: node.feed_mm_s });
+            rising.push(Stair { end_mm: node.end_mm - start_mm, feed_mm_s: node.feed_mm_s });
         }
         for node in nodes.iter().rev().filter(|node| node.role == Role::Falling) {
-            falling.push(Stair { end_mm: right.start_mm - node.start_mm, feed_mm_s: node.feed_mm_s });
+            falling.push(Stair { end_mm: end_mm - node.start_mm, feed_mm_s: node.feed_mm_s });
         }
         Hump {
-            start_mm: left.end_mm,
-            end_mm: right.start_mm,
+            start_mm,
+            end_mm,
             enter_mm_s: left.feed_mm_s,
             exit_mm_s: right.feed_mm_s,
             top_mm_s: left.top_mm_s,
