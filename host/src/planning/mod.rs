@@ -10,7 +10,7 @@
 //!
 //! - [`program`]: steps to stretches: where motion must stop, what each joint allows;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
-//! - `lookahead`: the kernel's look-ahead, merged or per block;
+//! - `lookahead`: the kernel's look-ahead, with ramps that span blocks or per block;
 //! - [`profile`]: feed and time at any path position of a planned stretch;
 //! - [`blocks`]: bare block lists, BLOCKS.json;
 //! - [`executable`]: a plan in the kernel's terms;
@@ -34,12 +34,12 @@ pub use stretch::Stretch;
 
 use crate::record::BlockRecord;
 
-/// Whether neighbours with equal ceilings are planned as one block.
+/// How ramps and blocks go together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// Equal neighbours are merged: a ramp may span them.
+    /// A ramp may span blocks.
     #[default]
-    Merged,
+    Spanning,
     /// One pair of ramps per block, as S3 plans.
     PerBlock,
 }
