@@ -1,8 +1,9 @@
-//! Blocks of path with one geometry: lines, and arcs with all that goes by that name in G-code.
+//! Blocks of path with one geometry: lines, arcs with all that goes by that name in G-code, and polynomials.
 
 use motion_kernel::plan::Bend;
 
 use super::curve::{Curve, Spiral, by_arc_length};
+use super::polynomial::Polynomial;
 use super::{Vector, add, cross, norm, scale, subtract};
 use crate::gcode::{ArcMove, LineMove};
 
@@ -29,6 +30,26 @@ pub enum Element {
         /// Indices of the plane's axes.
         plane: [usize; 2],
     },
+    /// A polynomial.
+    Polynomial {
+        /// Start \[mm\].
+        from: Vector,
+        /// End \[mm\].
+        to: Vector,
+        /// Its shape, from the start.
+        shape: Polynomial,
+        /// What it is there for.
+        role: Role,
+    },
+}
+
+/// What a polynomial is there for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// It rounds a corner.
+    Blend,
+    /// It was programmed.
+    Spline,
 }
 
 /// Tangent and curvature vector at an end of an element.
@@ -38,6 +59,13 @@ pub struct End {
     pub tangent: Vector,
     /// κN \[1/mm\].
     pub curvature: Vector,
+}
+
+impl End {
+    fn of(curve: &impl Curve, parameter: f64) -> Self {
+        let [tangent, curvature, _] = by_arc_length(curve.derivatives(parameter));
+        Self { tangent, curvature }
+    }
 }
 
 impl Element {
@@ -74,13 +102,21 @@ impl Element {
         Self::Arc { from, to, shape, sweep_rad, plane: [first, second] }
     }
 
-    /// "line", "arc" or "helix".
+    /// The polynomial `shape` from `from`.
+    #[must_use]
+    pub fn polynomial(from: Vector, shape: Polynomial, role: Role) -> Self {
+        Self::Polynomial { from, to: add(from, shape.chord()), shape, role }
+    }
+
+    /// "line", "arc", "helix", "blend" or "spline".
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Line { .. } => "line",
             Self::Arc { shape, .. } if shape.height_per_rad == 0.0 => "arc",
             Self::Arc { .. } => "helix",
+            Self::Polynomial { role: Role::Blend, .. } => "blend",
+            Self::Polynomial { role: Role::Spline, .. } => "spline",
         }
     }
 
@@ -88,7 +124,9 @@ impl Element {
     #[must_use]
     pub fn ends_mm(&self) -> (Vector, Vector) {
         match *self {
-            Self::Line { from, to } | Self::Arc { from, to, .. } => (from, to),
+            Self::Line { from, to } | Self::Arc { from, to, .. } | Self::Polynomial { from, to, .. } => {
+                (from, to)
+            }
         }
     }
 
@@ -103,6 +141,7 @@ impl Element {
                 let at = |part: f64| sweep_rad * part / parts;
                 (0..parts as u32).map(|part| shape.length(at(f64::from(part)), at(f64::from(part + 1)))).sum()
             }
+            Self::Polynomial { shape, .. } => shape.length(0.0, 1.0),
         }
     }
 
@@ -114,10 +153,8 @@ impl Element {
                 let tangent = scale(subtract(*to, *from), 1.0 / self.length_mm());
                 [End { tangent, curvature: [0.0; 3] }; 2]
             }
-            Self::Arc { shape, sweep_rad, .. } => [0.0, *sweep_rad].map(|angle| {
-                let [tangent, curvature, _] = by_arc_length(shape.derivatives(angle));
-                End { tangent, curvature }
-            }),
+            Self::Arc { shape, sweep_rad, .. } => [0.0, *sweep_rad].map(|angle| End::of(shape, angle)),
+            Self::Polynomial { shape, .. } => [0.0, 1.0].map(|u| End::of(shape, u)),
         }
     }
 
@@ -130,6 +167,7 @@ impl Element {
                 let radius = shape.radius_mm.min(shape.radius_mm + shape.radius_per_rad * sweep_rad);
                 Bend::circle(radius, self.planar())
             }
+            Self::Polynomial { shape, .. } => shape.greatest().bend,
         }
     }
 
@@ -138,6 +176,7 @@ impl Element {
     pub fn tangent_max(&self) -> Vector {
         match self {
             Self::Line { .. } => self.ends()[0].tangent.map(f64::abs),
+            Self::Polynomial { shape, .. } => shape.greatest().tangent,
             Self::Arc { plane, .. } => {
                 let planar = self.planar();
                 // Conservative for arcs that never run along one of their axes.
@@ -153,13 +192,14 @@ impl Element {
         match self {
             Self::Line { .. } => [false; 3],
             Self::Arc { plane, .. } => core::array::from_fn(|axis| plane.contains(&axis)),
+            Self::Polynomial { shape, .. } => shape.greatest().curved,
         }
     }
 
     /// The part of the length that lies in the plane of the arc.
     fn planar(&self) -> f64 {
         match self {
-            Self::Line { .. } => 1.0,
+            Self::Line { .. } | Self::Polynomial { .. } => 1.0,
             Self::Arc { shape, .. } => shape.radius_mm / libm::hypot(shape.radius_mm, shape.height_per_rad),
         }
     }
