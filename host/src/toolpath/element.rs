@@ -27,8 +27,6 @@ pub enum Element {
         shape: Spiral,
         /// The angle run through \[rad\], > 0.
         sweep_rad: f64,
-        /// Indices of the plane's axes.
-        plane: [usize; 2],
     },
     /// A polynomial.
     Polynomial {
@@ -99,7 +97,7 @@ impl Element {
             radius_per_rad: (step.end_radius_mm - radius_mm) / sweep_rad,
             height_per_rad: (to[normal] - from[normal]) / sweep_rad,
         };
-        Self::Arc { from, to, shape, sweep_rad, plane: [first, second] }
+        Self::Arc { from, to, shape, sweep_rad }
     }
 
     /// The polynomial `shape` from `from`.
@@ -117,6 +115,33 @@ impl Element {
             Self::Arc { .. } => "helix",
             Self::Polynomial { role: Role::Blend, .. } => "blend",
             Self::Polynomial { role: Role::Spline, .. } => "spline",
+        }
+    }
+
+    /// What is left of a line or an arc without the first and the last millimetres, on an arc by the speed at its
+    /// start and end. A polynomial stays whole.
+    #[must_use]
+    pub fn trimmed(&self, first_mm: f64, last_mm: f64) -> Self {
+        match *self {
+            Self::Line { from, to } => {
+                let tangent = self.ends()[0].tangent;
+                Self::Line {
+                    from: add(from, scale(tangent, first_mm)),
+                    to: add(to, scale(scale(tangent, -1.0), last_mm)),
+                }
+            }
+            Self::Arc { from, to, shape, sweep_rad } => {
+                let rad_per_mm = |angle| 1.0 / norm(shape.derivatives(angle)[0]);
+                let first = rad_per_mm(0.0) * first_mm;
+                let last = sweep_rad - rad_per_mm(sweep_rad) * last_mm;
+                Self::Arc {
+                    from: add(from, shape.offset(0.0, first)),
+                    to: add(to, shape.offset(sweep_rad, last)),
+                    shape: shape.turned(first),
+                    sweep_rad: last - first,
+                }
+            }
+            Self::Polynomial { .. } => *self,
         }
     }
 
@@ -177,11 +202,12 @@ impl Element {
         match self {
             Self::Line { .. } => self.ends()[0].tangent.map(f64::abs),
             Self::Polynomial { shape, .. } => shape.greatest().tangent,
-            Self::Arc { plane, .. } => {
+            Self::Arc { shape, .. } => {
                 let planar = self.planar();
                 // Conservative for arcs that never run along one of their axes.
                 let axial = (1.0 - planar * planar).max(0.0).sqrt();
-                core::array::from_fn(|axis| if plane.contains(&axis) { planar } else { axial })
+                let part = shape.in_plane();
+                core::array::from_fn(|axis| (planar * part[axis] + axial * shape.normal[axis].abs()).min(1.0))
             }
         }
     }
@@ -191,7 +217,7 @@ impl Element {
     pub fn curved(&self) -> [bool; 3] {
         match self {
             Self::Line { .. } => [false; 3],
-            Self::Arc { plane, .. } => core::array::from_fn(|axis| plane.contains(&axis)),
+            Self::Arc { shape, .. } => shape.in_plane().map(|part| part > 0.0),
             Self::Polynomial { shape, .. } => shape.greatest().curved,
         }
     }
