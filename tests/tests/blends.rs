@@ -11,7 +11,7 @@ use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Item as PlanItem, Mode, Plan, plan_program};
 use motion_kernel::exec::{ExecState, Executor};
-use motion_kernel::num::Real;
+use motion_kernel::num::{Fixed, Real};
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
@@ -445,8 +445,10 @@ fn driven<R: Real>(plan: &Plan, machine: &Machine) -> Result<Worst, String> {
         worst.path[1] = worst.path[1].max(norm(j) / machine.path.jerk_mm_s3);
         last_jerk = j;
         worst.ticks += 1;
-        if executed.state == ExecState::Idle && supply.is_empty() {
-            return Ok(worst);
+        match executed.state {
+            ExecState::Idle if supply.is_empty() => return Ok(worst),
+            ExecState::Stopped => executor.resume(),
+            _ => {}
         }
         if worst.ticks as f64 > plan.time_s / machine.tick_s + 1000.0 {
             return Err("no end".to_owned());
@@ -565,6 +567,37 @@ fn a_tessellated_circle_runs_smoothly() {
         println!("P{tolerance}: {feed} mm/s on average");
         // A true circle from rest to rest: 36 mm/s.
         assert!(feed > 30.0, "P{tolerance}: {feed} mm/s");
+    }
+}
+
+/// The programs of the tests, blended, in every number type.
+#[test]
+fn whole_programs_keep_the_limits_in_every_number_type() {
+    let machine = Machine::reference();
+    for (name, text) in [
+        ("pockets", include_str!("../programs/pockets.ngc")),
+        ("nameplate", include_str!("../programs/nameplate_inch.ngc")),
+        ("thread mill", include_str!("../programs/thread_mill_helix.ngc")),
+        ("stringer", include_str!("../../host/src/cli/stringer.ngc")),
+    ] {
+        let exact = planned(text, &machine).expect("a plan");
+        // Where nothing says G61, exact path is what is so at the start.
+        let blended = if text.contains("G61") {
+            text.replace("G61", "G64 P0.05")
+        } else {
+            format!("G64 P0.05\n{text}")
+        };
+        let plan = planned(&blended, &machine).expect("a plan");
+        assert!(plan.blocks.iter().any(|block| block.kind == "blend"), "{name}");
+        println!("{name}: {} s exact, {} s blended", exact.time_s, plan.time_s);
+        for worst in
+            [driven::<f64>(&plan, &machine), driven::<f32>(&plan, &machine), driven::<Fixed>(&plan, &machine)]
+        {
+            let worst = worst.unwrap_or_else(|error| panic!("{name}: {error}"));
+            // f32 and fixed point round jerk to some millionths of its limit.
+            let all = worst.axis.into_iter().chain(worst.path).chain([worst.jerk_step]);
+            assert!(all.fold(0.0, f64::max) < 1.0 + 1e-4, "{name}: {worst:?}");
+        }
     }
 }
 
