@@ -393,7 +393,7 @@ fn a_blend_keeps_its_tolerance_and_steps_nowhere() {
     println!("{blends} blends, worst {worst} of the tolerance, {close} above 0.99");
     assert_none(&failures);
     if check::from_env("MOTION_TEST_PROGRAMS").is_none() {
-        assert!(blends > 3000 && close > 800, "{blends} blends, {close} that use their tolerance");
+        assert!(blends > 3000 && close > 600, "{blends} blends, {close} that use their tolerance");
     }
 }
 
@@ -537,6 +537,22 @@ fn corners_are_passed_as_fast_as_septic_blends_can_be() {
         assert!(blend.enter_mm_s >= feed_mm_s && blend.exit_mm_s >= feed_mm_s);
         let worst = driven::<f64>(&plan, &machine).expect("a run");
         assert!(worst.check().is_ok(), "{worst:?}");
+    }
+}
+
+/// Gentle corners are passed in less time than stopping takes, however short the lines beside them.
+#[test]
+fn gentle_corners_cost_less_than_stops() {
+    let machine = Machine::reference();
+    for degrees in [2.0_f64, 5.0, 15.0] {
+        for length in [0.2, 1.0, 10.0] {
+            let first = line([0.0; 3], [1.0, 0.0, 0.0], length);
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            let text = program(&[first, line(first.to(), [cosine, sine, 0.0], length)], 0.05, 6000.0);
+            let blended = planned(&text, &machine).expect("a plan").time_s;
+            let exact = planned(&text.replace("G64 P0.0500000000", "G61"), &machine).expect("a plan").time_s;
+            assert!(blended < 0.9 * exact, "{degrees}°, {length} mm: {blended} s, with a stop {exact} s");
+        }
     }
 }
 

@@ -23,7 +23,7 @@ pub mod smooth;
 
 pub use compile::{CompileError, Placed, compile, exact, on_path};
 pub use element::{Element, Role};
-pub use polynomial::Polynomial;
+pub use polynomial::{Greatest, Polynomial};
 
 /// A point or a vector, X Y Z \[mm\].
 pub type Vector = [f64; 3];
