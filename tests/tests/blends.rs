@@ -517,6 +517,60 @@ fn every_tick_of_blended_programs_keeps_the_limits() {
     assert_none(&failures);
 }
 
+/// Curves and corners in short chords that lie beside them by a part of the tolerance, as a scanner or a rounding
+/// postprocessor leaves them.
+fn chords(random: &mut Random, tolerance: f64) -> Vec<Asked> {
+    let (mut on_curve, mut heading) = ([0.0, 0.0], random.between(0.0, core::f64::consts::TAU));
+    let (mut at, mut asked) = ([0.0; 3], Vec::new());
+    let beside = tolerance * random.between(0.0, 0.5);
+    for _ in 0..4 {
+        heading += random.between(-1.2, 1.2);
+        let length = tolerance * random.log_between(0.5, 20.0);
+        let turn = random.between(-0.05, 0.05);
+        for _ in 0..10 + random.below(40) {
+            heading += turn;
+            on_curve = [on_curve[0] + length * heading.cos(), on_curve[1] + length * heading.sin()];
+            let to = [0, 1].map(|axis| rounded(on_curve[axis] + beside * random.between(-1.0, 1.0)));
+            let to = [to[0], to[1], 0.0];
+            asked.push(Asked::Line { from: at, to });
+            at = to;
+        }
+    }
+    asked
+}
+
+/// What merging and blending leave of the tolerance together.
+#[test]
+fn merged_chords_keep_the_tolerance() {
+    let machine = Machine::reference();
+    let mut failures = Vec::new();
+    let (mut worst, mut merged, mut all) = (0.0_f64, 0, 0);
+    for seed in seeds(CHAINS) {
+        let mut random = Random::new(seed);
+        let tolerance = rounded(random.log_between(3e-3, 0.3));
+        let asked = chords(&mut random, tolerance);
+        let text = program(&asked, tolerance, 6000.0);
+        let done = || -> Result<f64, String> {
+            let plan = planned(&text, &machine)?;
+            all += asked.len();
+            merged += plan.blocks.iter().filter(|block| block.kind != "blend").count();
+            let stretches = compiled(&plan);
+            continuous(&stretches)?;
+            let ratio = distance(&asked, &stretches, tolerance, 24);
+            if ratio > 1.0 + 1e-6 { Err(format!("{ratio} times the tolerance")) } else { Ok(ratio) }
+        }();
+        match done {
+            Ok(ratio) => worst = worst.max(ratio),
+            Err(error) => failures.push(format!("MOTION_TEST_SEED={seed}: {error}\n{text}")),
+        }
+    }
+    println!("{all} chords became {merged} lines and arcs, worst {worst} of the tolerance");
+    assert_none(&failures);
+    if check::from_env("MOTION_TEST_PROGRAMS").is_none() {
+        assert!(2 * merged < all && worst > 0.9, "{merged} of {all}, worst {worst}");
+    }
+}
+
 /// The feeds of septic blends that the literature of the method quotes, for 30°, 60°, 90° and 120° within 0.05 mm
 /// at 500 mm/s² and 5000 mm/s³; snap does not limit them there.
 #[test]
