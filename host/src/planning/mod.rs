@@ -8,7 +8,8 @@
 //! 0.5 ms. Between two full stops there may be one kilometre of path (10⁶ mm), and every point of the path lies
 //! within one kilometre of the origin on each axis. What is beyond is refused, with the line of the block.
 //!
-//! - [`program`]: steps to stretches: where motion must stop, what each joint allows;
+//! - [`program`]: steps to stretches: where motion must stop;
+//! - `ceilings`: ceilings of moves and blends, what each joint allows;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
 //! - `lookahead`: the kernel's look-ahead, with ramps that span blocks or per block;
 //! - [`profile`]: feed and time at any path position of a planned stretch;
@@ -18,6 +19,7 @@
 //! - [`error`]: what is refused, with file and line.
 
 pub mod blocks;
+mod ceilings;
 mod density;
 pub mod error;
 pub mod executable;

@@ -1,14 +1,14 @@
-//! Steps of a program to stretches: where the motion must stop, and what each joint allows.
+//! Steps of a program to stretches: where the motion must stop.
 
-use motion_kernel::plan::{Ceiling, Joint, joint};
-
+use super::ceilings::blocks;
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
 use super::{Item, Mode, Plan};
-use crate::gcode::{Feed, Program, StepKind};
+use crate::gcode::{Feed, PathMode, Program, StepKind};
 use crate::machine::Machine;
-use crate::toolpath::{Element, angle, norm, subtract};
+use crate::toolpath::Element;
+use crate::toolpath::smooth::{Move, smooth};
 
 /// Plans a whole program for a machine.
 ///
@@ -38,13 +38,17 @@ pub fn plan_program(
         notices: program.notices.iter().map(ToString::to_string).collect(),
         tick_s: machine.tick_s,
     };
-    let mut open: Vec<StretchBlock> = Vec::new();
+    let mut run: Vec<Move> = Vec::new();
     for step in &program.steps {
-        let (element, feed) = match &step.kind {
-            StepKind::Line(line) => (Element::line(line), line.feed),
-            StepKind::Arc(arc) => (Element::arc(arc), arc.feed),
+        match &step.kind {
+            StepKind::Line(line) => {
+                run.push(path_move(step.line, Element::line(line), line.feed, line.mode, machine));
+            }
+            StepKind::Arc(arc) => {
+                run.push(path_move(step.line, Element::arc(arc), arc.feed, arc.mode, machine));
+            }
             StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => {
-                close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
+                append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
                 match step.kind {
                     // A dwell of no time changes nothing but the stop it makes.
                     StepKind::Dwell { seconds } if seconds > 0.0 => {
@@ -54,60 +58,43 @@ pub fn plan_program(
                     StepKind::Stop => plan.items.push(Item::Stop { line: step.line }),
                     _ => {}
                 }
-                continue;
-            }
-        };
-        let block = block(&element, step.line, feed, machine).map_err(at(step.line))?;
-        if let Some(last) = open.last_mut() {
-            last.joint_mm_s = joint_feed(&last.element, &element, machine);
-            if last.joint_mm_s <= 0.0 {
-                close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
             }
         }
-        open.push(block);
     }
-    close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
+    append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
     // What the tick can't do is to be refused here, not on the machine.
     Executable::new::<f32>(&plan)?;
     Ok(plan)
 }
 
-fn block(element: &Element, line: u32, feed: Feed, machine: &Machine) -> Result<StretchBlock, Problem> {
+fn path_move(line: u32, element: Element, feed: Feed, mode: PathMode, machine: &Machine) -> Move {
     let feed_mm_s = match feed {
         Feed::Rapid => f64::INFINITY,
         Feed::MmPerMin(feed) => feed / 60.0,
     };
-    let ceiling = Ceiling::new(
-        &machine.limits(),
-        feed_mm_s,
-        &element.tangent_max(),
-        &element.curved(),
-        &element.bend(),
-    )?;
-    Ok(StretchBlock { line, element: *element, ceiling, joint_mm_s: 0.0 })
+    let tolerance_mm = match mode {
+        PathMode::ExactPath => 0.0,
+        PathMode::Blend { tolerance_mm } => tolerance_mm.unwrap_or(machine.path.blend_tolerance_mm),
+    };
+    Move { line, element, feed_mm_s, tolerance_mm }
 }
 
-/// Directions computed from coordinates that are exact to 10⁻¹⁰ mm agree to this where they are meant to.
-const TANGENT_ROUNDING_RAD: f64 = 1.0e-9;
-
-/// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.
-fn joint_feed(before: &Element, after: &Element, machine: &Machine) -> f64 {
-    let ([_, end], [start, _]) = (before.ends(), after.ends());
-    let angle_rad = angle(end.tangent, start.tangent);
-    let steps = Joint { angle_rad, curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)) };
-    joint(
-        &steps,
-        machine.path.joint_angle_rad.max(TANGENT_ROUNDING_RAD),
-        machine.path.accel_step_mm_s2,
-        machine.tick_s,
-    )
+/// Appends the stretches of moves that follow each other, smoothed.
+fn append(run: &mut Vec<Move>, plan: &mut Plan, machine: &Machine, mode: Mode) -> Result<(), (u32, Problem)> {
+    let mut open: Vec<StretchBlock> = Vec::new();
+    for block in blocks(&smooth(run, &machine.limits().in_any_direction()), machine)? {
+        open.push(block);
+        // Also after the last.
+        if block.joint_mm_s <= 0.0 {
+            close(&mut open, plan, mode)?;
+        }
+    }
+    run.clear();
+    Ok(())
 }
 
 /// Plans the open stretch and appends it.
 fn close(open: &mut Vec<StretchBlock>, plan: &mut Plan, mode: Mode) -> Result<(), (u32, Problem)> {
-    if open.is_empty() {
-        return Ok(());
-    }
     let stretch = Stretch::new(std::mem::take(open), plan.length_mm, mode, plan.tick_s)?;
     plan.blocks.extend(stretch.block_records());
     plan.feed.extend(stretch.feed_records());

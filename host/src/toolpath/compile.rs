@@ -119,7 +119,7 @@ pub fn compile<R: Real>(
         here = next;
         if length > Position::ZERO { Ok(length) } else { Err(CompileError::TooShort { length_mm }) }
     };
-    match element {
+    let septics = match element {
         Element::Line { .. } => {
             let direction = scale(subtract(to, from), 1.0 / length_mm);
             let parts = (length_mm / longest_mm).ceil().max(1.0) as u64;
@@ -132,21 +132,20 @@ pub fn compile<R: Real>(
                 Piece::<R, 3>::line(line, start, direction, length)?;
                 pieces.push(Placed { length, item: Item::Line { line, start, direction, length } });
             }
+            return Ok(end_mm);
         }
-        Element::Arc { shape, sweep_rad, .. } => {
-            use super::curve::Curve;
-            let septics = fit(shape, 0.0, *sweep_rad, WIDEST_RAD, longest_mm)?;
-            let (mut gone_mm, count) = (0.0, septics.len());
-            for (index, septic) in septics.iter().enumerate() {
-                let start = exact(add(from, shape.offset(0.0, septic.span.0)))?;
-                gone_mm += septic.length_mm;
-                let part_end_mm = if index + 1 == count { end_mm } else { start_mm + gone_mm };
-                let length = length_to(part_end_mm, septic.length_mm)?;
-                let coefficients = septic.coefficients.map(|axis| axis.map(|mm| mm / septic.length_mm));
-                Piece::<R, 3>::septic(line, start, coefficients, length)?;
-                pieces.push(Placed { length, item: Item::Septic { line, start, coefficients, length } });
-            }
-        }
+        Element::Arc { shape, sweep_rad, .. } => fit(shape, 0.0, *sweep_rad, WIDEST_RAD, longest_mm)?,
+        Element::Polynomial { shape, .. } => fit(shape, 0.0, 1.0, 1.0, longest_mm)?,
+    };
+    let mut gone_mm = 0.0;
+    for (index, septic) in septics.iter().enumerate() {
+        let start = exact(add(from, septic.start))?;
+        gone_mm += septic.length_mm;
+        let part_end_mm = if index + 1 == septics.len() { end_mm } else { start_mm + gone_mm };
+        let length = length_to(part_end_mm, septic.length_mm)?;
+        let coefficients = septic.coefficients.map(|axis| axis.map(|mm| mm / septic.length_mm));
+        Piece::<R, 3>::septic(line, start, coefficients, length)?;
+        pieces.push(Placed { length, item: Item::Septic { line, start, coefficients, length } });
     }
     Ok(end_mm)
 }

@@ -13,12 +13,16 @@ pub trait Curve {
     /// Arc length from `a` to `b` \[mm\], `b` ≥ `a`. The default integrates |r'| by 16 Gauss points, which
     /// resolves a turn of up to an eighth of a circle to the last place.
     fn length(&self, a: f64, b: f64) -> f64 {
-        let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-        let speed = |u| norm(self.derivatives(u)[0]);
-        let sum: f64 =
-            GAUSS_16.iter().map(|(x, w)| w * (speed(middle - half * x) + speed(middle + half * x))).sum();
-        half * sum
+        gauss(a, b, |u| norm(self.derivatives(u)[0]))
     }
+}
+
+/// The integral of `function` from `a` to `b` by 16 Gauss points.
+pub(super) fn gauss(a: f64, b: f64, function: impl Fn(f64) -> f64) -> f64 {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let sum: f64 =
+        GAUSS_16.iter().map(|(x, w)| w * (function(middle - half * x) + function(middle + half * x))).sum();
+    half * sum
 }
 
 /// First to third derivative by arc length, from those by a parameter.
@@ -39,6 +43,25 @@ pub fn by_arc_length([d1, d2, d3]: [Vector; 3]) -> [Vector; 3] {
         1.0 / (speed * speed * speed),
     );
     [tangent, second, third]
+}
+
+/// Fourth derivative by arc length, from the first four by a parameter.
+///
+/// With σ, s2, s3, s4 the derivatives of the arc length: r4 = x4·σ⁴ + 6x3·σ²·s2 + x2·(4σ·s3 + 3s2²) + t·s4, and
+/// t·x4 = −3x2·x3 because |t| = 1.
+#[must_use]
+pub fn fourth_by_arc_length([d1, d2, d3, d4]: [Vector; 4]) -> Vector {
+    let speed = norm(d1);
+    let [tangent, second, third] = by_arc_length([d1, d2, d3]);
+    let square = speed * speed;
+    let s2 = dot(tangent, d2);
+    let s3 = dot(tangent, d3) + dot(second, second) * square * speed;
+    let rest = subtract(
+        subtract(d4, scale(third, 6.0 * square * s2)),
+        scale(second, 4.0 * speed * s3 + 3.0 * s2 * s2),
+    );
+    let across = subtract(rest, scale(tangent, dot(tangent, rest)));
+    add(scale(across, 1.0 / (square * square)), scale(tangent, -3.0 * dot(second, third)))
 }
 
 /// Positive abscissae and weights of the 16-point Gauss–Legendre rule.
@@ -71,6 +94,24 @@ pub struct Spiral {
 }
 
 impl Spiral {
+    /// Greatest |component| of a unit vector in the plane on each axis; exactly 0 or 1 where it is so but for
+    /// rounding.
+    #[must_use]
+    pub fn in_plane(&self) -> Vector {
+        core::array::from_fn(|axis| {
+            let part = libm::hypot(self.outward[axis], self.onward[axis]);
+            if (part - part.round()).abs() < 1e-9 { part.round() } else { part }
+        })
+    }
+
+    /// The same spiral, its angle counted from `angle` on.
+    #[must_use]
+    pub fn turned(&self, angle: f64) -> Self {
+        let (outward, onward) = self.frame(angle);
+        let radius_mm = self.radius_mm + self.radius_per_rad * angle;
+        Self { outward, onward, radius_mm, ..*self }
+    }
+
     /// Direction from the centre at `angle`, and a quarter turn on.
     fn frame(&self, angle: f64) -> (Vector, Vector) {
         let (sine, cosine) = libm::sincos(angle);

@@ -1,8 +1,9 @@
-//! Blocks of path with one geometry: lines, and arcs with all that goes by that name in G-code.
+//! Blocks of path with one geometry: lines, arcs with all that goes by that name in G-code, and polynomials.
 
 use motion_kernel::plan::Bend;
 
 use super::curve::{Curve, Spiral, by_arc_length};
+use super::polynomial::{Greatest, Polynomial};
 use super::{Vector, add, cross, norm, scale, subtract};
 use crate::gcode::{ArcMove, LineMove};
 
@@ -26,9 +27,27 @@ pub enum Element {
         shape: Spiral,
         /// The angle run through \[rad\], > 0.
         sweep_rad: f64,
-        /// Indices of the plane's axes.
-        plane: [usize; 2],
     },
+    /// A polynomial.
+    Polynomial {
+        /// Start \[mm\].
+        from: Vector,
+        /// End \[mm\].
+        to: Vector,
+        /// Its shape, from the start.
+        shape: Polynomial,
+        /// What it is there for.
+        role: Role,
+    },
+}
+
+/// What a polynomial is there for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// It rounds a corner.
+    Blend,
+    /// It was programmed.
+    Spline,
 }
 
 /// Tangent and curvature vector at an end of an element.
@@ -38,6 +57,13 @@ pub struct End {
     pub tangent: Vector,
     /// κN \[1/mm\].
     pub curvature: Vector,
+}
+
+impl End {
+    fn of(curve: &impl Curve, parameter: f64) -> Self {
+        let [tangent, curvature, _] = by_arc_length(curve.derivatives(parameter));
+        Self { tangent, curvature }
+    }
 }
 
 impl Element {
@@ -71,16 +97,51 @@ impl Element {
             radius_per_rad: (step.end_radius_mm - radius_mm) / sweep_rad,
             height_per_rad: (to[normal] - from[normal]) / sweep_rad,
         };
-        Self::Arc { from, to, shape, sweep_rad, plane: [first, second] }
+        Self::Arc { from, to, shape, sweep_rad }
     }
 
-    /// "line", "arc" or "helix".
+    /// The polynomial `shape` from `from`.
+    #[must_use]
+    pub fn polynomial(from: Vector, shape: Polynomial, role: Role) -> Self {
+        Self::Polynomial { from, to: add(from, shape.chord()), shape, role }
+    }
+
+    /// "line", "arc", "helix", "blend" or "spline".
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Line { .. } => "line",
             Self::Arc { shape, .. } if shape.height_per_rad == 0.0 => "arc",
             Self::Arc { .. } => "helix",
+            Self::Polynomial { role: Role::Blend, .. } => "blend",
+            Self::Polynomial { role: Role::Spline, .. } => "spline",
+        }
+    }
+
+    /// What is left of a line or an arc without the first and the last millimetres, on an arc by the speed at its
+    /// start and end. A polynomial stays whole.
+    #[must_use]
+    pub fn trimmed(&self, first_mm: f64, last_mm: f64) -> Self {
+        match *self {
+            Self::Line { from, to } => {
+                let tangent = self.ends()[0].tangent;
+                Self::Line {
+                    from: add(from, scale(tangent, first_mm)),
+                    to: add(to, scale(scale(tangent, -1.0), last_mm)),
+                }
+            }
+            Self::Arc { from, to, shape, sweep_rad } => {
+                let rad_per_mm = |angle| 1.0 / norm(shape.derivatives(angle)[0]);
+                let first = rad_per_mm(0.0) * first_mm;
+                let last = sweep_rad - rad_per_mm(sweep_rad) * last_mm;
+                Self::Arc {
+                    from: add(from, shape.offset(0.0, first)),
+                    to: add(to, shape.offset(sweep_rad, last)),
+                    shape: shape.turned(first),
+                    sweep_rad: last - first,
+                }
+            }
+            Self::Polynomial { .. } => *self,
         }
     }
 
@@ -88,7 +149,9 @@ impl Element {
     #[must_use]
     pub fn ends_mm(&self) -> (Vector, Vector) {
         match *self {
-            Self::Line { from, to } | Self::Arc { from, to, .. } => (from, to),
+            Self::Line { from, to } | Self::Arc { from, to, .. } | Self::Polynomial { from, to, .. } => {
+                (from, to)
+            }
         }
     }
 
@@ -103,6 +166,7 @@ impl Element {
                 let at = |part: f64| sweep_rad * part / parts;
                 (0..parts as u32).map(|part| shape.length(at(f64::from(part)), at(f64::from(part + 1)))).sum()
             }
+            Self::Polynomial { shape, .. } => shape.length(0.0, 1.0),
         }
     }
 
@@ -114,53 +178,34 @@ impl Element {
                 let tangent = scale(subtract(*to, *from), 1.0 / self.length_mm());
                 [End { tangent, curvature: [0.0; 3] }; 2]
             }
-            Self::Arc { shape, sweep_rad, .. } => [0.0, *sweep_rad].map(|angle| {
-                let [tangent, curvature, _] = by_arc_length(shape.derivatives(angle));
-                End { tangent, curvature }
-            }),
+            Self::Arc { shape, sweep_rad, .. } => [0.0, *sweep_rad].map(|angle| End::of(shape, angle)),
+            Self::Polynomial { shape, .. } => [0.0, 1.0].map(|u| End::of(shape, u)),
         }
     }
 
-    /// How it bends, at its tightest.
+    /// How it bends at its tightest, and which axes take part.
     #[must_use]
-    pub fn bend(&self) -> Bend<f64> {
+    pub fn greatest(&self) -> Greatest {
         match self {
-            Self::Line { .. } => Bend::default(),
+            Self::Line { .. } => Greatest {
+                bend: Bend::default(),
+                tangent: self.ends()[0].tangent.map(f64::abs),
+                curved: [false; 3],
+            },
             Self::Arc { shape, sweep_rad, .. } => {
                 let radius = shape.radius_mm.min(shape.radius_mm + shape.radius_per_rad * sweep_rad);
-                Bend::circle(radius, self.planar())
-            }
-        }
-    }
-
-    /// Greatest |component| of the tangent on each axis.
-    #[must_use]
-    pub fn tangent_max(&self) -> Vector {
-        match self {
-            Self::Line { .. } => self.ends()[0].tangent.map(f64::abs),
-            Self::Arc { plane, .. } => {
-                let planar = self.planar();
+                let planar = shape.radius_mm / libm::hypot(shape.radius_mm, shape.height_per_rad);
                 // Conservative for arcs that never run along one of their axes.
                 let axial = (1.0 - planar * planar).max(0.0).sqrt();
-                core::array::from_fn(|axis| if plane.contains(&axis) { planar } else { axial })
+                let part = shape.in_plane();
+                let of_axis = |axis: usize| planar * part[axis] + axial * shape.normal[axis].abs();
+                Greatest {
+                    bend: Bend::circle(radius, planar),
+                    tangent: core::array::from_fn(|axis| of_axis(axis).min(1.0)),
+                    curved: part.map(|part| part > 0.0),
+                }
             }
-        }
-    }
-
-    /// Which axes take part in the bend.
-    #[must_use]
-    pub fn curved(&self) -> [bool; 3] {
-        match self {
-            Self::Line { .. } => [false; 3],
-            Self::Arc { plane, .. } => core::array::from_fn(|axis| plane.contains(&axis)),
-        }
-    }
-
-    /// The part of the length that lies in the plane of the arc.
-    fn planar(&self) -> f64 {
-        match self {
-            Self::Line { .. } => 1.0,
-            Self::Arc { shape, .. } => shape.radius_mm / libm::hypot(shape.radius_mm, shape.height_per_rad),
+            Self::Polynomial { shape, .. } => shape.greatest(),
         }
     }
 }

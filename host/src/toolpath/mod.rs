@@ -4,18 +4,26 @@
 //! and what planning needs to know of each block's geometry. Background, f64; angles by libm and roots by the
 //! standard library, so that every host computes the same bits.
 //!
-//! - [`element`]: lines, arcs, helices and spirals: length, tangents, curvature, bend;
+//! - [`element`]: lines, arcs, helices, spirals, polynomials: length, tangents, curvature, bend;
+//! - [`polynomial`]: curves of degree seven, which blends and splines are;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
+//! - [`smooth`]: corners of a run of elements rounded within a tolerance, by
+//!   [`blend`]: one corner's septic blend, and [`merge`]: short lines to fewer lines and arcs;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`mod@compile`]: elements to pieces over exact path positions.
 
+pub mod blend;
 pub mod compile;
 pub mod curve;
 pub mod element;
+pub mod merge;
+pub mod polynomial;
 pub mod septic;
+pub mod smooth;
 
 pub use compile::{CompileError, Placed, compile, exact, on_path};
-pub use element::Element;
+pub use element::{Element, Role};
+pub use polynomial::{Greatest, Polynomial};
 
 /// A point or a vector, X Y Z \[mm\].
 pub type Vector = [f64; 3];

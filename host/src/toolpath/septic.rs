@@ -11,6 +11,9 @@ use super::{norm, subtract};
 pub const POSITION_TOLERANCE_MM: f64 = 1.0e-6;
 /// Greatest deviation of a piece's |r'| from 1, which is the relative error of the feed.
 pub const FEED_TOLERANCE: f64 = 1.0e-6;
+/// The greatest sum of k(k−1)(k−2)·|cₖ| as a part of the length, so that every number type's unit (below 4) holds
+/// the third derivative, and with it the lower ones.
+const STEEPNESS_MAX: f64 = 3.9;
 /// Halvings after which a curve is given up: 2¹⁶ pieces of it.
 pub const HALVINGS_MAX: u32 = 16;
 
@@ -19,6 +22,8 @@ pub const HALVINGS_MAX: u32 = 16;
 pub struct Septic {
     /// Parameter at the start and at the end.
     pub span: (f64, f64),
+    /// Its start minus the curve's \[mm\].
+    pub start: Vector,
     /// Arc length \[mm\].
     pub length_mm: f64,
     /// c₁ … c₇ per axis \[mm\] over u = s/length.
@@ -28,8 +33,8 @@ pub struct Septic {
 /// A curve that no reasonable number of pieces follows.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "a curve that {HALVINGS_MAX} halvings miss by {error_mm:.2e} mm from {} to {} rad, expected at most \
-     {POSITION_TOLERANCE_MM:e} mm and a feed within a millionth",
+    "a curve that {HALVINGS_MAX} halvings miss by {error_mm:.2e} mm between {} and {} of its parameter, expected at \
+     most {POSITION_TOLERANCE_MM:e} mm and a feed within a millionth",
     span.0, span.1
 )]
 pub struct FitError {
@@ -57,9 +62,11 @@ pub fn fit(
     // Spans still to do, the next one last.
     let mut spans: Vec<(f64, f64, u32)> = (0..parts).rev().map(|part| (at(part), at(part + 1), 0)).collect();
     while let Some((a, b, halvings)) = spans.pop() {
-        let piece = hermite(curve, a, b);
+        let piece = hermite(curve, from, a, b);
         let (error_mm, feed_error) = deviation(curve, &piece);
-        let good = error_mm <= POSITION_TOLERANCE_MM && feed_error <= FEED_TOLERANCE;
+        let good = error_mm <= POSITION_TOLERANCE_MM
+            && feed_error <= FEED_TOLERANCE
+            && piece.steepness() <= STEEPNESS_MAX;
         if good && piece.length_mm <= longest_mm {
             pieces.push(piece);
         } else if halvings == HALVINGS_MAX {
@@ -73,8 +80,8 @@ pub fn fit(
     Ok(pieces)
 }
 
-/// The piece over one span.
-fn hermite(curve: &impl Curve, a: f64, b: f64) -> Septic {
+/// The piece over one span of a curve that starts at `from`.
+fn hermite(curve: &impl Curve, from: f64, a: f64, b: f64) -> Septic {
     let length_mm = curve.length(a, b);
     let (start, end) = (by_arc_length(curve.derivatives(a)), by_arc_length(curve.derivatives(b)));
     let chord = curve.offset(a, b);
@@ -99,7 +106,7 @@ fn hermite(curve: &impl Curve, a: f64, b: f64) -> Septic {
             -20.0 * d0 + 10.0 * d1 - 2.0 * d2 + d3 / 6.0,
         ]
     });
-    Septic { span: (a, b), length_mm, coefficients }
+    Septic { span: (a, b), start: curve.offset(from, a), length_mm, coefficients }
 }
 
 /// Greatest distance between piece and curve, and greatest error of |r'|, at seven inner points.
@@ -118,6 +125,14 @@ fn deviation(curve: &impl Curve, piece: &Septic) -> (f64, f64) {
 }
 
 impl Septic {
+    /// The greatest sum over an axis of |third derivative|'s terms, in parts of the length.
+    fn steepness(&self) -> f64 {
+        const FACTORS: [f64; 7] = [0.0, 0.0, 6.0, 24.0, 60.0, 120.0, 210.0];
+        let of_axis =
+            |axis: &[f64; 7]| axis.iter().zip(FACTORS).map(|(c, factor)| factor * c.abs()).sum::<f64>();
+        self.coefficients.iter().map(of_axis).fold(0.0, f64::max) / self.length_mm
+    }
+
     /// Offset from the start and derivative by arc length at u = s/length.
     #[must_use]
     pub fn at(&self, u: f64) -> (Vector, Vector) {

@@ -1,0 +1,319 @@
+//! Polynomial curves: what corner blends and splines are made of.
+//!
+//! A curve of degree seven at most in a parameter u from 0 to 1, kept relative to its start, so that a blend of
+//! a micrometre a kilometre out is as precise as one at the origin. Consumes control points or coefficients \[mm\];
+//! produces what every [`Curve`] has, parts of itself, and the greatest derivatives by arc length, from which
+//! ceilings are made. Any finite coefficients are accepted; a curve that stands still somewhere (|r'| = 0)
+//! has no tangent there and is refused when it is made into pieces.
+
+use motion_kernel::plan::Bend;
+
+use super::curve::{Curve, by_arc_length, fourth_by_arc_length};
+use super::{Vector, add, norm, scale};
+
+/// Highest power.
+pub const DEGREE: usize = 7;
+
+/// How often a length is halved before its quadrature is taken as it is.
+const HALVINGS_MAX: u32 = 20;
+/// Relative error at which a quadrature is good.
+const LENGTH_TOLERANCE: f64 = 1.0e-13;
+
+/// In how many parts a curve is cut to look for its greatest derivatives.
+const BEND_PARTS: usize = 64;
+
+/// A component of curvature below this part of the greatest is rounding.
+const STRAIGHT: f64 = 1.0e-9;
+
+/// Σ cₖ·uᵏ, k = 1 … 7, u from 0 to 1: a curve relative to its start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polynomial {
+    /// c₁ … c₇ \[mm\].
+    coefficients: [Vector; DEGREE],
+}
+
+/// The greatest derivatives by arc length, each where it is greatest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Greatest {
+    /// Of κ, |r'''| and |r''''|.
+    pub bend: Bend<f64>,
+    /// |component| of the tangent on each axis, at most 1.
+    pub tangent: Vector,
+    /// Whether the axis takes part in the bend.
+    pub curved: [bool; 3],
+}
+
+impl Polynomial {
+    /// The curve with c₁ … c₇ \[mm\].
+    #[must_use]
+    pub const fn new(coefficients: [Vector; DEGREE]) -> Self {
+        Self { coefficients }
+    }
+
+    /// The Bézier curve of degree seven with these control points \[mm\], relative to the first one or not.
+    #[must_use]
+    pub fn bezier(points: [Vector; DEGREE + 1]) -> Self {
+        // cₖ = C(7, k)·Δᵏb₀, the k-th forward difference of the control points.
+        const BINOMIALS: [f64; DEGREE] = [7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
+        let mut differences = points;
+        let coefficients = core::array::from_fn(|index| {
+            for i in 0..DEGREE - index {
+                differences[i] = add(differences[i + 1], scale(differences[i], -1.0));
+            }
+            scale(differences[0], BINOMIALS[index])
+        });
+        Self { coefficients }
+    }
+
+    /// c₁ … c₇ \[mm\].
+    #[must_use]
+    pub fn coefficients(&self) -> &[Vector; DEGREE] {
+        &self.coefficients
+    }
+
+    /// From the start to the end \[mm\].
+    #[must_use]
+    pub fn chord(&self) -> Vector {
+        self.offset(0.0, 1.0)
+    }
+
+    /// The part from `a` to `b`, as a curve with a parameter from 0 to 1, relative to its own start.
+    #[must_use]
+    pub fn part(&self, a: f64, b: f64) -> Self {
+        let mut power = 1.0;
+        let coefficients = self.about(a).map(|coefficient| {
+            power *= b - a;
+            scale(coefficient, power)
+        });
+        Self { coefficients }
+    }
+
+    /// First to fourth derivative by the parameter at `u`.
+    #[must_use]
+    pub fn four_derivatives(&self, u: f64) -> [Vector; 4] {
+        let [c1, c2, c3, c4, ..] = self.about(u);
+        [c1, scale(c2, 2.0), scale(c3, 6.0), scale(c4, 24.0)]
+    }
+
+    /// The greatest derivatives by arc length, from 64 parts. Between two points of these a smooth
+    /// function rises above both by an eighth of its second difference; twice that is added.
+    #[must_use]
+    pub fn greatest(&self) -> Greatest {
+        self.greatest_of(BEND_PARTS)
+    }
+
+    /// The same from fewer `parts`.
+    pub(super) fn greatest_of(&self, parts: usize) -> Greatest {
+        let mut norms = [Peak::default(); 3];
+        let mut tangents = [Peak::default(); 3];
+        let mut curvatures = [0.0_f64; 3];
+        for part in 0..=parts {
+            let derivatives = self.four_derivatives(part as f64 / parts as f64);
+            let [d1, d2, d3, _] = derivatives;
+            let [tangent, second, third] = by_arc_length([d1, d2, d3]);
+            let fourth = fourth_by_arc_length(derivatives);
+            for (peak, derivative) in norms.iter_mut().zip([second, third, fourth]) {
+                peak.next(norm(derivative));
+            }
+            for axis in 0..3 {
+                tangents[axis].next(tangent[axis].abs());
+                curvatures[axis] = curvatures[axis].max(second[axis].abs());
+            }
+        }
+        let [second, third, fourth] = norms.map(|peak| peak.greatest);
+        let bend = Bend {
+            curvature_per_mm: second,
+            third_root_per_mm: third.sqrt(),
+            fourth_root_per_mm: libm::cbrt(fourth),
+        };
+        let tangent = tangents.map(|peak| peak.greatest.min(1.0));
+        Greatest { bend, tangent, curved: curvatures.map(|curvature| curvature > STRAIGHT * second) }
+    }
+
+    /// The coefficients of the same curve in u − `origin`, relative to the point at `origin`.
+    fn about(&self, origin: f64) -> [Vector; DEGREE] {
+        let mut shifted = self.coefficients;
+        if origin == 0.0 {
+            return shifted;
+        }
+        // Horner's scheme, applied to its own results. Its first pass makes the point itself, which is left out,
+        // and the second c₁ at index 0.
+        for pass in 0..DEGREE {
+            for index in (pass.saturating_sub(1)..DEGREE - 1).rev() {
+                shifted[index] = add(shifted[index], scale(shifted[index + 1], origin));
+            }
+        }
+        shifted
+    }
+
+    fn speed(&self, u: f64) -> f64 {
+        let mut slope = [0.0; 3];
+        for (index, &coefficient) in self.coefficients.iter().enumerate().rev() {
+            slope = add(scale(slope, u), scale(coefficient, (index + 1) as f64));
+        }
+        norm(slope)
+    }
+
+    /// Halves [a, b], whose quadrature is `whole`, until both halves together say the same.
+    fn refined(&self, a: f64, b: f64, whole: f64, halvings: u32) -> f64 {
+        let middle = 0.5 * (a + b);
+        let gauss = |a, b| super::curve::gauss(a, b, |u| self.speed(u));
+        let (left, right) = (gauss(a, middle), gauss(middle, b));
+        let both = left + right;
+        if halvings == HALVINGS_MAX || (both - whole).abs() <= LENGTH_TOLERANCE * both || !both.is_finite() {
+            return both;
+        }
+        self.refined(a, middle, left, halvings + 1) + self.refined(middle, b, right, halvings + 1)
+    }
+}
+
+impl Curve for Polynomial {
+    fn offset(&self, origin: f64, u: f64) -> Vector {
+        let step = u - origin;
+        self.about(origin).iter().rev().fold([0.0; 3], |sum, &c| scale(add(sum, c), step))
+    }
+
+    fn derivatives(&self, u: f64) -> [Vector; 3] {
+        let [first, second, third, _] = self.four_derivatives(u);
+        [first, second, third]
+    }
+
+    fn length(&self, a: f64, b: f64) -> f64 {
+        self.refined(a, b, super::curve::gauss(a, b, |u| self.speed(u)), 0)
+    }
+}
+
+/// The greatest value of a sampled function, between its samples too.
+#[derive(Clone, Copy, Debug, Default)]
+struct Peak {
+    greatest: f64,
+    before: [Option<f64>; 2],
+}
+
+impl Peak {
+    fn next(&mut self, value: f64) {
+        let bulge = match self.before {
+            [Some(first), Some(second)] => 0.25 * (first - 2.0 * second + value).abs(),
+            _ => 0.0,
+        };
+        let highest = self.before.iter().flatten().fold(value, |highest, &before| highest.max(before));
+        // What is not a number must not be overlooked.
+        if !(highest + bulge <= self.greatest) {
+            self.greatest = highest + bulge;
+        }
+        self.before = [self.before[1], Some(value)];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::subtract;
+    use super::*;
+
+    fn curve() -> Polynomial {
+        Polynomial::bezier([
+            [3.0, 1.0, 0.0],
+            [4.0, 1.0, 0.2],
+            [5.0, 1.5, 0.1],
+            [6.0, 2.0, -0.3],
+            [6.5, 3.0, 0.0],
+            [6.0, 4.0, 0.5],
+            [6.0, 5.0, 1.0],
+            [6.5, 6.0, 1.0],
+        ])
+    }
+
+    /// De Casteljau's construction is the independent evaluation.
+    #[test]
+    fn control_points_make_their_bezier_curve() {
+        let points =
+            [[0.0, 1.0], [2.0, -1.0], [3.0, 0.5], [3.5, 2.0], [4.0, 2.5], [5.0, 1.0], [7.0, 0.0], [8.0, 1.0]];
+        let curve = Polynomial::bezier(points.map(|[x, y]| [x, y, x * y]));
+        for part in 0..=10 {
+            let u = f64::from(part) / 10.0;
+            let mut row = points.map(|[x, y]| [x, y, x * y]).to_vec();
+            while row.len() > 1 {
+                row = row.windows(2).map(|pair| add(scale(pair[0], 1.0 - u), scale(pair[1], u))).collect();
+            }
+            let expected = subtract(row[0], [0.0, 1.0, 0.0]);
+            assert!(norm(subtract(curve.offset(0.0, u), expected)) < 1e-13, "{u}");
+        }
+    }
+
+    /// Each derivative against the central difference of the one before, the fourth by arc length too.
+    #[test]
+    fn derivatives_are_those_of_the_curve() {
+        let (curve, h) = (curve(), 1e-5);
+        for u in [0.1, 0.5, 0.83] {
+            let [d1, d2, d3, d4] = curve.four_derivatives(u);
+            let (before, after) = (curve.four_derivatives(u - h), curve.four_derivatives(u + h));
+            let slope = scale(curve.offset(u - h, u + h), 0.5 / h);
+            assert!(norm(subtract(d1, slope)) < 1e-7, "{d1:?} {slope:?}");
+            for (order, exact) in [d2, d3, d4].into_iter().enumerate() {
+                let found = scale(subtract(after[order], before[order]), 0.5 / h);
+                assert!(norm(subtract(exact, found)) < 1e-5, "{order}: {exact:?} {found:?}");
+            }
+            let third = |[d1, d2, d3, _]: [Vector; 4]| by_arc_length([d1, d2, d3])[2];
+            let found = scale(subtract(third(after), third(before)), 1.0 / curve.length(u - h, u + h));
+            let exact = fourth_by_arc_length([d1, d2, d3, d4]);
+            assert!(norm(subtract(exact, found)) < 1e-6 * (1.0 + norm(exact)), "{exact:?} {found:?}");
+        }
+    }
+
+    #[test]
+    fn offsets_do_not_cancel() {
+        let (curve, step) = (curve(), 1e-13);
+        let offset = curve.offset(0.4, 0.4 + step);
+        let taken = (0.4 + step) - 0.4;
+        let expected = scale(curve.four_derivatives(0.4)[0], taken);
+        assert!(norm(subtract(offset, expected)) < 1e-12 * norm(expected));
+    }
+
+    #[test]
+    fn a_part_is_the_curve_over_its_range() {
+        let (curve, part) = (curve(), curve().part(0.3, 0.7));
+        for u in [0.0, 0.25, 1.0] {
+            let expected = curve.offset(0.3, 0.3 + 0.4 * u);
+            assert!(norm(subtract(part.offset(0.0, u), expected)) < 1e-14);
+        }
+        let whole = curve.length(0.0, 0.3) + part.length(0.0, 1.0) + curve.length(0.7, 1.0);
+        assert!((whole - curve.length(0.0, 1.0)).abs() < 1e-12);
+    }
+
+    /// A parabola of known length, and one so sharp that a single quadrature misses it.
+    #[test]
+    fn lengths_have_twelve_digits() {
+        for slope in [1.0, 1e4_f64] {
+            let mut coefficients = [[0.0; 3]; DEGREE];
+            coefficients[0] = [1.0, -slope, 0.0];
+            coefficients[1] = [0.0, slope, 0.0];
+            // y = slope·(u² − u): half of it is the arc of w = slope·(2u − 1) from 0 to slope.
+            let half = (slope * slope.hypot(1.0) + slope.asinh()) / (4.0 * slope);
+            let length = Polynomial::new(coefficients).length(0.0, 1.0);
+            assert!((length / (2.0 * half) - 1.0).abs() < 1e-12, "{slope}: {length} {half}");
+        }
+    }
+
+    /// No point of a fine grid lies above, and none of the figures is far above them all.
+    #[test]
+    fn greatest_derivatives_are_bounds_and_close() {
+        let curve = curve();
+        let Greatest { bend, tangent, curved } = curve.greatest();
+        let mut found = [0.0_f64; 3];
+        let mut found_tangent = [0.0_f64; 3];
+        for part in 0..=10_007 {
+            let derivatives = curve.four_derivatives(f64::from(part) / 10_007.0);
+            let [d1, d2, d3, _] = derivatives;
+            let [t, second, third] = by_arc_length([d1, d2, d3]);
+            for (found, vector) in found.iter_mut().zip([second, third, fourth_by_arc_length(derivatives)]) {
+                *found = found.max(norm(vector));
+            }
+            found_tangent = core::array::from_fn(|axis| found_tangent[axis].max(t[axis].abs()));
+        }
+        let bound = [bend.curvature_per_mm, bend.third_root_per_mm.powi(2), bend.fourth_root_per_mm.powi(3)];
+        for (bound, found) in bound.into_iter().chain(tangent).zip(found.into_iter().chain(found_tangent)) {
+            assert!(bound >= found * (1.0 - 1e-15) && bound < 1.02 * found, "{bound} {found}");
+        }
+        assert_eq!(curved, [true; 3]);
+    }
+}

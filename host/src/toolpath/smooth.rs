@@ -1,0 +1,293 @@
+//! A run of moves with its corners blended.
+//!
+//! Consumes moves that follow each other without a stop, each with the tolerance that its ends may be rounded
+//! within; produces moves in the same order with a blend at every joint that would step otherwise, and the
+//! elements on both sides cut short. Background, in time linear in the moves.
+//!
+//! **Short lines.** Where lines are shorter than the blends at their ends would be, three fifths of the tolerance are spent
+//! on making fewer lines and arcs of them, the rest on blends between these. One that stays alone among longer
+//! ones is made part of the line before it, if that can be led past their corner.
+//!
+//! **Who gets the room.** A blend takes at most nine tenths of an element, and two on the same element together:
+//! what the one does not need is the other's, else both get half, and half is all where motion starts or ends. A tenth stays, so that the rest of a short
+//! element still has a direction of its own.
+
+use motion_kernel::law::Limits;
+
+use super::blend::{Blend, way_mm};
+use super::element::Element;
+use super::merge::{Merged, merge};
+use super::{Vector, angle, norm, subtract};
+
+/// Part of an element that blends may take together.
+const TAKEN_MAX: f64 = 0.9;
+
+/// Part of the tolerance that short lines are merged within.
+const MERGED_SHARE: f64 = 0.6;
+
+/// Directions computed from coordinates that are exact to 10⁻¹⁰ mm agree to this where they are meant to \[rad\];
+/// curvatures agree to the same part of themselves.
+pub const TANGENT_ROUNDING_RAD: f64 = 1.0e-9;
+
+/// An element of the path with what the program says of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Move {
+    /// Program line.
+    pub line: u32,
+    /// Geometry.
+    pub element: Element,
+    /// Programmed feed \[mm/s\], infinite for a rapid.
+    pub feed_mm_s: f64,
+    /// Greatest distance that the path may be led past the move and its ends \[mm\]; 0 for exact path. At a joint the
+    /// smaller one of both moves holds.
+    pub tolerance_mm: f64,
+}
+
+/// The moves with blends between them, as far as their tolerances allow. `limits` are those of the path, for
+/// blends in any direction.
+#[must_use]
+pub fn smooth(moves: &[Move], limits: &Limits<f64>) -> Vec<Move> {
+    let (moves, distances_mm) = merged(moves);
+    let lengths_mm: Vec<f64> = moves.iter().map(|step| step.element.length_mm()).collect();
+    let joint = |index: usize, room_mm: f64| -> Option<Blend> {
+        let (before, after) = (&moves[index], &moves[index + 1]);
+        // A move of exact path is cut at neither end.
+        let tolerance_mm = before.tolerance_mm.min(after.tolerance_mm);
+        let tolerance_mm = tolerance_mm - distances_mm[index].max(distances_mm[index + 1]);
+        Blend::new(&before.element, &after.element, tolerance_mm, room_mm, limits)
+    };
+    // At the start and the end of the run motion needs room of its own, to set out and to stop.
+    let last = moves.len().saturating_sub(1);
+    let share = |index: usize| if index == 0 || index == last { 0.5 * TAKEN_MAX } else { TAKEN_MAX };
+    // First as if each were alone, then those that touch within what the other leaves.
+    let alone: Vec<Option<Blend>> = (0..last)
+        .map(|index| {
+            let pair = [&moves[index].element, &moves[index + 1].element];
+            let taken_mm = |index: usize| share(index) * lengths_mm[index];
+            let room_mm = taken_mm(index).min(taken_mm(index + 1));
+            if is_smooth(pair) { None } else { joint(index, room_mm) }
+        })
+        .collect();
+    let way_mm = |index: Option<usize>| {
+        index.and_then(|index| alone.get(index)).and_then(Option::as_ref).map_or(0.0, |blend| blend.way_mm)
+    };
+    let left_mm = |element: usize, other: Option<usize>| {
+        let taken_mm = share(element) * lengths_mm[element];
+        (taken_mm - way_mm(other)).max(0.5 * TAKEN_MAX * lengths_mm[element])
+    };
+    let blends: Vec<Option<Blend>> = alone
+        .iter()
+        .enumerate()
+        .map(|(index, blend)| {
+            let room_mm = left_mm(index, index.checked_sub(1)).min(left_mm(index + 1, Some(index + 1)));
+            blend.and_then(|blend| if blend.way_mm <= room_mm { Some(blend) } else { joint(index, room_mm) })
+        })
+        .collect();
+    let mut smooth = Vec::with_capacity(2 * moves.len());
+    for (index, step) in moves.iter().enumerate() {
+        let first = index.checked_sub(1).and_then(|index| blends[index]);
+        let last = blends.get(index).copied().flatten();
+        let trimmed = |blend: Option<Blend>| blend.map_or(0.0, |blend| blend.way_mm);
+        let element = if first.is_none() && last.is_none() {
+            step.element
+        } else {
+            step.element.trimmed(trimmed(first), trimmed(last))
+        };
+        smooth.push(Move { element, ..*step });
+        if let Some(blend) = last {
+            let feed_mm_s = step.feed_mm_s.min(moves[index + 1].feed_mm_s);
+            smooth.push(Move { element: blend.element, feed_mm_s, ..*step });
+        }
+    }
+    smooth
+}
+
+/// The moves, with fewer in place of runs of short lines, and each one's distance from the moves it stands for.
+fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
+    let (mut merged, mut distances_mm) = (Vec::with_capacity(moves.len()), Vec::with_capacity(moves.len()));
+    let mut rest = moves;
+    while let Some(first) = rest.first() {
+        let count = rest.windows(2).take_while(|pair| is_same_run(&pair[0], &pair[1])).count() + 1;
+        let (run, after) = rest.split_at(count);
+        rest = after;
+        let tolerance_mm = MERGED_SHARE * first.tolerance_mm;
+        let rooms: Vec<Room> = (0..count).map(|index| Room::of(run, index)).collect();
+        let mut done = 0;
+        for same in rooms.chunk_by(|a, b| (*a == Room::Enough) == (*b == Room::Enough)) {
+            let steps = &run[done..done + same.len()];
+            let before = (done > 0).then(|| merged.last_mut().zip(distances_mm.last_mut())).flatten();
+            done += same.len();
+            if !same.contains(&Room::TooLittle) {
+                merged.extend_from_slice(steps);
+                distances_mm.resize(merged.len(), 0.0);
+                continue;
+            }
+            let ends = steps.iter().map(|step| step.element.ends_mm());
+            let points: Vec<Vector> =
+                core::iter::once(steps[0].element.ends_mm().0).chain(ends.map(|(_, to)| to)).collect();
+            let parts = merge(&points, tolerance_mm);
+            if let ([part], Some((before, distance_mm))) = (&parts[..], before)
+                && let Some((line, straight_mm)) = straightened(before, *distance_mm, part, tolerance_mm)
+            {
+                (before.element, *distance_mm) = (line, straight_mm);
+                continue;
+            }
+            for part in parts {
+                merged.push(Move { element: part.element, ..steps[part.first] });
+                distances_mm.push(part.distance_mm);
+            }
+        }
+    }
+    (merged, distances_mm)
+}
+
+/// One line in place of two, the second of them alone between longer ones, and its distance from the path.
+fn straightened(before: &Move, before_mm: f64, part: &Merged, tolerance_mm: f64) -> Option<(Element, f64)> {
+    let (Element::Line { from, to: corner }, Element::Line { to, .. }) = (before.element, part.element)
+    else {
+        return None;
+    };
+    let spent_mm = before_mm.max(part.distance_mm);
+    let [line] = merge(&[from, corner, to], tolerance_mm - spent_mm)[..] else { return None };
+    Some((line.element, spent_mm + line.distance_mm))
+}
+
+/// Whether two moves may become one: lines with one feed and one tolerance.
+fn is_same_run(before: &Move, after: &Move) -> bool {
+    let is_line = |step: &Move| matches!(step.element, Element::Line { .. });
+    is_line(before)
+        && is_line(after)
+        && before.feed_mm_s == after.feed_mm_s
+        && before.tolerance_mm == after.tolerance_mm
+        && before.tolerance_mm > 0.0
+}
+
+/// What a line has for blends at its ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Room {
+    /// Both have the length they want.
+    Enough,
+    /// One of them would be shorter than the tolerance lets it be.
+    TooLittle,
+    /// There are none to be made: it goes straight on at both ends.
+    Unneeded,
+}
+
+impl Room {
+    fn of(run: &[Move], index: usize) -> Self {
+        let way_mm = |before: Option<&Move>, after: Option<&Move>| {
+            let (before, after) = (before?, after?);
+            let angle_rad = angle(before.element.ends()[1].tangent, after.element.ends()[0].tangent);
+            (angle_rad > TANGENT_ROUNDING_RAD).then(|| way_mm(angle_rad, before.tolerance_mm))
+        };
+        let step = &run[index];
+        let before = way_mm(index.checked_sub(1).map(|before| &run[before]), Some(step));
+        let after = way_mm(Some(step), run.get(index + 1));
+        match before.into_iter().chain(after).reduce(f64::max) {
+            None => Self::Unneeded,
+            Some(longest_mm) if 0.5 * TAKEN_MAX * step.element.length_mm() < longest_mm => Self::TooLittle,
+            Some(_) => Self::Enough,
+        }
+    }
+}
+
+/// Whether nothing steps from one element to the next.
+fn is_smooth([before, after]: [&Element; 2]) -> bool {
+    let ([_, end], [start, _]) = (before.ends(), after.ends());
+    let step = norm(subtract(start.curvature, end.curvature));
+    angle(end.tangent, start.tangent) <= TANGENT_ROUNDING_RAD
+        && step <= TANGENT_ROUNDING_RAD * norm(start.curvature).max(norm(end.curvature))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+
+    fn path(points: &[[f64; 2]], tolerance_mm: f64) -> Vec<Move> {
+        let point = |[x, y]: [f64; 2]| [x, y, 0.0];
+        points
+            .windows(2)
+            .zip(1..)
+            .map(|(pair, line)| {
+                let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
+                Move { line, element, feed_mm_s: 10.0 * f64::from(line), tolerance_mm }
+            })
+            .collect()
+    }
+
+    fn kinds(moves: &[Move]) -> Vec<(u32, &'static str)> {
+        moves.iter().map(|step| (step.line, step.element.kind())).collect()
+    }
+
+    #[test]
+    fn blends_take_the_slower_feed_and_the_first_line() {
+        let moves = smooth(&path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [10.0, 20.0]], 0.05), &LIMITS);
+        assert_eq!(kinds(&moves), [(1, "line"), (1, "blend"), (2, "line"), (3, "line")]);
+        let feeds: Vec<_> = moves.iter().map(|step| step.feed_mm_s).collect();
+        assert_eq!(feeds, [10.0, 10.0, 20.0, 30.0]);
+        for pair in moves.windows(2) {
+            assert_eq!(pair[0].element.ends_mm().1, pair[1].element.ends_mm().0);
+        }
+    }
+
+    #[test]
+    fn without_a_tolerance_nothing_changes() {
+        let moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]], 0.0);
+        assert_eq!(smooth(&moves, &LIMITS), moves);
+        assert!(smooth(&[], &LIMITS).is_empty());
+    }
+
+    /// Between a small blend and a big one, the big one gets what the small one leaves; two big ones share.
+    #[test]
+    fn neighbours_share_a_short_element() {
+        let whole_mm = 1.0;
+        let rest_mm = |points: &[[f64; 2]]| {
+            let moves = smooth(&path(points, 0.2), &LIMITS);
+            assert_eq!(kinds(&moves)[2], (2, "line"));
+            moves[2].element.length_mm()
+        };
+        let both = rest_mm(&[[0.0, 0.0], [10.0, 0.0], [10.0, whole_mm], [20.0, whole_mm]]);
+        assert!((both - 0.1 * whole_mm).abs() < 1e-12, "{both}");
+        // 2° and 150°: the first wants more than the whole line, the second a third of it.
+        let (sine, cosine) = libm::sincos(2.0_f64.to_radians());
+        let turn = libm::sincos(152.0_f64.to_radians());
+        let corner = [10.0 + cosine, sine];
+        let end = [corner[0] + 10.0 * turn.1, corner[1] + 10.0 * turn.0];
+        let moves = smooth(&path(&[[0.0, 0.0], [10.0, 0.0], corner, end], 0.2), &LIMITS);
+        let way_mm = |index: usize, whole_mm: f64| whole_mm - moves[index].element.length_mm();
+        let (first, second) = (way_mm(0, 10.0), way_mm(4, 10.0));
+        assert!(first > 0.5 && second > 0.2 && (first + second - 0.9).abs() < 1e-9, "{first} {second}");
+    }
+
+    /// A corner that was cut off by a micrometre is one corner.
+    #[test]
+    fn a_tiny_line_among_long_ones_joins_the_one_before() {
+        let mut moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0007, 0.0007], [10.0007, 10.0]], 0.05);
+        assert_eq!(smooth(&moves, &LIMITS).len(), 5);
+        moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
+        let smoothed = smooth(&moves, &LIMITS);
+        assert_eq!(kinds(&smoothed), [(1, "line"), (1, "blend"), (3, "line")]);
+        assert_eq!(smoothed[2].element.ends_mm().1, [10.0007, 10.0, 0.0]);
+    }
+
+    /// Merging is for lines of one feed, and spends part of the tolerance only.
+    #[test]
+    fn short_lines_are_merged_where_their_feed_is_one() {
+        let points: Vec<[f64; 2]> = (0..=100)
+            .map(|index| {
+                let (sine, cosine) = libm::sincos(0.01 * f64::from(index));
+                [10.0 * cosine, 10.0 * sine]
+            })
+            .collect();
+        let mut moves = path(&points, 0.01);
+        moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
+        assert_eq!(kinds(&smooth(&moves, &LIMITS)), [(1, "arc")]);
+        moves.iter_mut().for_each(|step| step.feed_mm_s = if step.line <= 40 { 50.0 } else { 60.0 });
+        assert_eq!(kinds(&smooth(&moves, &LIMITS)), [(1, "arc"), (41, "arc")]);
+        // The chords' sagitta, 0.125 µm, is more than a part of this tolerance.
+        moves.iter_mut().for_each(|step| step.tolerance_mm = 1e-4);
+        assert!(smooth(&moves, &LIMITS).len() > 100);
+    }
+}
