@@ -41,7 +41,7 @@ impl Estimate {
     }
 
     /// The same in another unit.
-    pub(super) fn times(self, factor: f64) -> Self {
+    pub(crate) fn times(self, factor: f64) -> Self {
         Self { value: self.value * factor, half_width_95: self.half_width_95 * factor.abs() }
     }
 }
