@@ -664,13 +664,57 @@ fn drive_tune_writes_what_it_has_verified() {
     let worse = ["drive", "tune", "--machine", "tuned.toml", "--method", "series", "--output", "worse.toml"];
     let output = desk.motion(&worse);
     assert_eq!(output.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&output.stdout).contains("a circle got worse: nothing is written"));
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("a circle got worse: nothing is written"), "{said}");
+    // All axes were tuned, and all of them moved.
+    assert!(said.contains("Circles of X and Y at") && said.contains("Circles of Z and X at"), "{said}");
     assert!(!desk.0.join("worse.toml").exists());
 
     let refusal = desk.refusal(&["drive", "tune", "--axis", "W"]);
     assert!(refusal.contains("found axis W, expected the name of an axis of the machine"), "{refusal}");
     let refusal = desk.refusal(&["drive", "tune", "--machine", "missing.toml"]);
     assert!(refusal.contains("missing.toml"), "{refusal}");
+}
+
+/// One axis alone is judged by its own error, in a plane that it moves in: beside an untuned one the contour gets worse,
+/// because axes that lag alike leave none.
+#[test]
+fn drive_tune_judges_one_axis_by_itself() {
+    let desk = Desk::new("tune-one");
+    let mut text = motion_host::machine::REFERENCE_TOML.to_owned();
+    // A machine whose axes are matched.
+    text = text.replace("coulomb_friction_mm_s2 = 260.0", "coulomb_friction_mm_s2 = 85.0");
+    let bed = text.find("[axis.drive.bed]").expect("Y's bed");
+    let end =
+        bed + text[bed..].find("mass_ratio = 0.06\n").expect("its last key") + "mass_ratio = 0.06\n".len();
+    text.replace_range(bed..end, "");
+    desk.put("pair.toml", &text);
+    for (name, plane, moved) in [("X", ["X", "Y"], "first"), ("Z", ["Z", "X"], "first")] {
+        let file = format!("{name}.toml");
+        let json = desk.json(&[
+            "drive",
+            "tune",
+            "--machine",
+            "pair.toml",
+            "--axis",
+            name,
+            "--output",
+            &file,
+            "--json",
+        ]);
+        assert_eq!(json["output"], file.as_str());
+        let circles = json["verification"]["circles"].as_array().expect("a list");
+        let um = |circle: &Value, when: &str, of: &str| number(&circle[when][of]);
+        for circle in circles {
+            assert_eq!(circle["axes"].as_array().expect("a list"), &plane);
+            let following = format!("following_error_{moved}_um");
+            assert!(um(circle, "after", &following) < um(circle, "before", &following), "{circle}");
+        }
+        let is_worse = |circle: &Value| {
+            um(circle, "after", "contour_error_um") > um(circle, "before", "contour_error_um") + 0.2
+        };
+        assert!(circles.iter().any(is_worse), "matched axes");
+    }
 }
 
 /// What a board gets is a program to it; what is wrong with the input is said with file and line, and nothing is written.

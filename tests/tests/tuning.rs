@@ -22,7 +22,7 @@ fn tuned(machine: &Machine, method: Method) -> (Machine, Vec<AxisTuning>) {
     let mut tuned = machine.clone();
     let mut tunings = vec![];
     for (axis, found) in tuned.axes.iter_mut().zip(&found) {
-        let tuning = propose(axis, found, method, machine.tick_s);
+        let tuning = propose(axis, found, method, machine.tick_s).expect("a proposal");
         axis.gains = tuning.gains;
         axis.feedforward = tuning.feedforward;
         axis.output_offset_v = tuning.output_offset_v;
@@ -162,7 +162,7 @@ fn fifty_drives_are_found_tuned_and_stable() {
         ];
         let delay_s = drive.dead_time_s + drive.current_lag_s + 0.5 * machine.tick_s;
         let delay_off_s = (values.total_delay_s.value - delay_s).abs();
-        let tuning = propose(&machine.axes[1], &found, Method::Inverse, machine.tick_s);
+        let tuning = propose(&machine.axes[1], &found, Method::Inverse, machine.tick_s).expect("a proposal");
         let margins = Margins::of(&drive, tuning.gains.kp_per_s, machine.tick_s);
         let axis = &mut machine.axes[1];
         (axis.gains, axis.feedforward) = (tuning.gains, tuning.feedforward);

@@ -15,6 +15,8 @@ const RESOLUTION_HZ: f64 = 0.01;
 /// What is read from a circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleFigures {
+    /// The plane's first and second axis, from 0.
+    pub axes: [usize; 2],
     /// Turns per second \[Hz\].
     pub frequency_hz: f64,
     /// Feed \[mm/s\].
@@ -69,6 +71,7 @@ pub fn figures(recording: &Recording, turning: &Turning) -> Result<CircleFigures
         }
     }
     Ok(CircleFigures {
+        axes: turning.axes(),
         frequency_hz: turning.frequency_hz,
         feed_mm_s: turning.feed_mm_s,
         radius_mm: turning.radius_mm(),

@@ -7,8 +7,7 @@ use std::thread;
 
 use super::experiment::{DriveError, Recording, open_loop, raised};
 use super::step;
-use super::turning::Turning;
-use crate::gcode::Plane;
+use super::turning::{Turning, plane_of};
 use crate::identify::{AxisRecording, Excitation, Identification, identification_plan, identify};
 use crate::machine::Machine;
 use crate::record::AXES;
@@ -49,8 +48,7 @@ pub fn recordings(machine: &Machine, axis: usize) -> Result<Vec<AxisRecording>, 
                 }
                 Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods } => {
                     let turning = Turning {
-                        // Any plane with the axis in it.
-                        plane: if axis == 2 { Plane::Yz } else { Plane::Xy },
+                        plane: plane_of(axis),
                         settle_s: 0.0,
                         measured_s: f64::from(periods) / frequency_hz,
                         ..Turning::new(frequency_hz, amplitude_mm_s)

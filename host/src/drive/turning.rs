@@ -36,6 +36,12 @@ pub struct Turning {
     pub measured_s: f64,
 }
 
+/// The plane in which an axis is driven: with X or Y the other of the two, with Z X.
+#[must_use]
+pub fn plane_of(axis: usize) -> Plane {
+    if axis == 2 { Plane::Zx } else { Plane::Xy }
+}
+
 impl Turning {
     /// 3 s to settle, 1 s to measure, in X and Y.
     #[must_use]

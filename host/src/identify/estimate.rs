@@ -6,7 +6,7 @@ use super::harmonic_figures::{Bandwidth, HarmonicFigures};
 use super::step_figures::StepFigures;
 
 /// Half an interval over the value, up to which a value counts as determined.
-const DETERMINED: f64 = 0.3;
+pub const DETERMINED: f64 = 0.3;
 
 /// Intervals are wider than the scatter alone makes them: the search ends a little beside the optimum, because the
 /// model is rough where it saturates. Over fifty simulated axes the true value lay within the interval in 80 to 100 of

@@ -62,7 +62,9 @@ mod estimate;
 mod display;
 
 pub use error::IdentifyError;
-pub use estimate::{AxisParametersFound, BedEstimate, Estimate, Figures, Identification, RunMatch};
+pub use estimate::{
+    AxisParametersFound, BedEstimate, DETERMINED, Estimate, Figures, Identification, RunMatch,
+};
 pub use excitation::{Excitation, identification_plan};
 pub use harmonic_figures::{Bandwidth, HarmonicFigures};
 pub use recording::AxisRecording;

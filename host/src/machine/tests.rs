@@ -296,7 +296,7 @@ fn defaults_and_only_they_may_be_left_out() {
 fn ranges_of_optional_keys_are_kept() {
     let text = with_optional_keys();
     let cases: &[(&str, &str, &[&str])] = &[
-        ("axis.regulator", "feedforward_lead_s", &["-1e-9", "0.11"]),
+        ("axis.regulator", "feedforward_lead_s", &["-1e-9", "0.481"]),
         ("axis.regulator.feedforward_velocity_table", "reach", &["0", "-1", "2e12"]),
         (
             "axis.regulator.feedforward_velocity_table",
