@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::drive::DriveError;
 use crate::gcode::GcodeError;
-use crate::machine::MachineError;
+use crate::machine::{AxisError, MachineError};
 use crate::planning::PlanningError;
 use crate::simulate::RunError;
 use crate::tuning::TuningError;
@@ -60,6 +60,14 @@ pub enum CliError {
     /// The machine file is refused.
     #[error(transparent)]
     Machine(#[from] MachineError),
+    /// The number type that was asked for does not hold an axis.
+    #[error("machine {machine:?}: {source}")]
+    Axis {
+        /// The machine's name.
+        machine: String,
+        /// Which axis, and why.
+        source: AxisError,
+    },
     /// There is no plan.
     #[error(transparent)]
     Planning(#[from] PlanningError),
