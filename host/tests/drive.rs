@@ -3,7 +3,7 @@
 use motion_host::drive::reference::{self, BANDWIDTH_FEED_MM_S, CIRCLE_FEED_MM_S, Comparison};
 use motion_host::drive::step::Step;
 use motion_host::drive::turning::Turning;
-use motion_host::drive::{DriveError, Terms, bode, circle, experiment, harmonic, inertia};
+use motion_host::drive::{DriveError, Terms, bode, circle, experiment, harmonic, identification, inertia};
 use motion_host::gcode::Plane;
 use motion_host::machine::Machine;
 
@@ -184,6 +184,26 @@ fn a_load_shows_the_current_limit() {
             let limit_mm_s2 = machine.axes[0].drive.accel_limit_mm_s2 / (1.0 + load);
             assert!((found.plateau_accel_mm_s2 / limit_mm_s2 - 1.0).abs() < 0.03, "{found:?}");
         }
+    }
+}
+
+/// A slow X is found beside a fast Y, and Y beside it, by motions that X reaches.
+#[test]
+fn a_slow_axis_is_identified() {
+    let mut machine = Machine::reference();
+    let x = &mut machine.axes[0];
+    (x.mm_s_at_10_v, x.feed_mm_s) = (100.0, 90.0);
+    for (axis, found) in identification::identify_axes(&machine, &[0, 1]).expect("both").iter().enumerate() {
+        let (found, drive) = (&found.parameters, &machine.axes[axis].drive);
+        let parts = [
+            found.velocity_gain_per_s.value / drive.velocity_gain_per_s,
+            found.integral_time_s.value / drive.integral_time_s,
+            found.accel_limit_mm_s2.value / drive.accel_limit_mm_s2,
+            found.coulomb_friction_mm_s2.value / drive.coulomb_friction_mm_s2,
+        ];
+        println!("{parts:.4?}");
+        assert!(parts.iter().all(|part| (part - 1.0).abs() < 0.02), "{axis}: {parts:?}");
+        assert_eq!(found.bed.is_some(), axis == 1);
     }
 }
 

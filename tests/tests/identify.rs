@@ -71,7 +71,7 @@ fn record(drive: DriveParameters, rig: Rig, excitation: &Excitation) -> AxisReco
 
 fn recordings(drive: DriveParameters, rig: Rig) -> Vec<AxisRecording> {
     let noisy = |run: usize| Rig { noise_seed: rig.noise_seed.map(|seed| seed + run as u64), ..rig };
-    identification_plan()
+    identification_plan(f64::INFINITY)
         .iter()
         .enumerate()
         .map(|(run, excitation)| record(drive, noisy(run), excitation))

@@ -25,7 +25,7 @@
 //! let tick_s = 0.5e-3;
 //! let model = DriveModel::new(REFERENCE_X, tick_s, 20)?;
 //! let mut runs = Vec::new();
-//! for excitation in identification_plan() {
+//! for excitation in identification_plan(333.0) {
 //!     let mut axis = DriveState::<128>::at_rest(&model, 0.0)?;
 //!     let command_mm_s = excitation.velocity_mm_s(tick_s);
 //!     let mut latch = |command_mm_s: &f64| {

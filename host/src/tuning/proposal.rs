@@ -391,7 +391,8 @@ mod tests {
             let harmonic_hz = excitation.harmonic_hz();
             AxisRecording { tick_s: TICK_S, command_mm_s, actual_mm, lead_in_ticks: 0, harmonic_hz }
         };
-        identify(&identification_plan().iter().map(run).collect::<Vec<_>>()).expect("an identification")
+        identify(&identification_plan(f64::INFINITY).iter().map(run).collect::<Vec<_>>())
+            .expect("an identification")
     }
 
     /// What everything depends on has to be known; what the rest is not known to be stays, as far as the recordings allow.
