@@ -651,12 +651,39 @@ fn drive_tune_writes_what_it_has_verified() {
     assert!((x.feedforward.lead_s - 1.67e-3).abs() < 1e-5 && x.feedforward.drive.is_some());
     assert_eq!(z, &Machine::reference().axes[2]);
 
-    let arguments = ["drive", "tune", "--axis", "X,Y", "--method", "series", "--learn", "2", "--json"];
+    let arguments = [
+        "drive",
+        "tune",
+        "--axis",
+        "X,Y",
+        "--method",
+        "series",
+        "--learn",
+        "2",
+        "--learn-output",
+        "learnt.csv",
+        "--json",
+    ];
     // The series is worse at 28 Hz than what was published; learning goes on all the same.
     let output = desk.motion(&arguments);
     assert_eq!(output.status.code(), Some(1));
     let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let learning = &json["learning"];
+    let robustness = learning["robustness"].as_array().expect("a list");
+    assert_eq!(robustness.len(), 2);
+    for axis in robustness {
+        assert_has(axis, &["axis", "contraction", "contraction_hz", "filter_corner_hz"]);
+        assert!(number(&axis["contraction"]) < 1.0 && number(&axis["filter_corner_hz"]) > 50.0, "{axis}");
+    }
+    let csv = desk.read("learnt.csv");
+    let mut lines = csv.lines();
+    assert_eq!(lines.next(), Some("time_s,X_mm_s,Y_mm_s,Z_mm_s"));
+    let row: Vec<f64> =
+        lines.nth(500).expect("a knot").split(',').map(|cell| cell.parse().expect("a number")).collect();
+    assert!(
+        (row[0] - 1.0).abs() < 1e-9 && row[1].abs() + row[2].abs() > 0.0 && row[3].abs() <= 0.0,
+        "{row:?}"
+    );
     let contours: Vec<f64> = learning["repeats"]
         .as_array()
         .expect("a list")
@@ -674,6 +701,16 @@ fn drive_tune_writes_what_it_has_verified() {
     assert!(said.contains("Circles of X and Y at") && said.contains("Circles of Z and X at"), "{said}");
     assert!(!desk.0.join("worse.toml").exists());
 
+    // Before the work, and so before a file is made.
+    for (arguments, words) in [
+        (&["--learn", "0"][..], "found repeats 0, expected a number from 1 to 1000"),
+        (&["--learn", "2", "--learn-hz", "0"], "found frequency [Hz] 0, expected"),
+    ] {
+        let arguments = [&["drive", "tune", "--report", "early.html"], arguments].concat();
+        let refusal = desk.refusal(&arguments);
+        assert!(refusal.contains(words), "{refusal}");
+        assert!(!desk.0.join("early.html").exists());
+    }
     let refusal = desk.refusal(&["drive", "tune", "--axis", "W"]);
     assert!(refusal.contains("found axis W, expected the name of an axis of the machine"), "{refusal}");
     let refusal = desk.refusal(&["drive", "tune", "--machine", "missing.toml"]);

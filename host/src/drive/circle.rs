@@ -94,6 +94,10 @@ pub fn deviations(recording: &Recording, turning: &Turning) -> Result<Vec<(f64, 
     Ok(turning.measured(recording)?.iter().map(deviation).collect())
 }
 
+fn check_limit(limit_um: f64) -> Result<(), DriveError> {
+    super::experiment::within("contour limit [µm]", limit_um, (1e-3, 1e6))
+}
+
 /// The lowest frequency in `range_hz` (from, to, steps of the search) at which the contour error passes `limit_um`
 /// \[Hz\]; none if it does not, or if it is beyond from the start.
 ///
@@ -105,7 +109,7 @@ pub fn limit_frequency(
     limit_um: f64,
     range_hz: (f64, f64, f64),
 ) -> Result<Option<f64>, DriveError> {
-    super::experiment::within("contour limit [µm]", limit_um, (1e-3, 1e6))?;
+    check_limit(limit_um)?;
     let is_beyond = |frequency_hz| Ok(measure(machine, frequency_hz, feed_mm_s)?.contour_um() > limit_um);
     first_crossing(range_hz, RESOLUTION_HZ, is_beyond)
 }
@@ -137,6 +141,8 @@ pub fn sweep(
     (limit_um, range_hz): (f64, (f64, f64, f64)),
     progress: &mut dyn FnMut(),
 ) -> Result<Sweep, DriveError> {
+    // Before the work.
+    check_limit(limit_um)?;
     let mut circles = Vec::with_capacity(frequencies_hz.len());
     for &frequency_hz in frequencies_hz {
         circles.push(measure(&machine, frequency_hz, feed_mm_s)?);

@@ -15,12 +15,12 @@ use crate::cli::input::Output;
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
 use crate::drive::identification::identify_axes;
-use crate::drive::learning::{LearningOptions, Learnt, Reason, learn};
+use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, learn};
 use crate::drive::reference::CIRCLE_FEED_MM_S;
 use crate::drive::turning::Turning;
-use crate::gcode::Plane;
 use crate::identify::{Estimate, Identification};
 use crate::machine::{AxisEdit, Machine, REFERENCE_TOML, edited};
+use crate::simulate::StretchCorrection;
 use crate::tuning::{self, AxisTuning, TuningError, propose};
 
 const HELP: &str = "\
@@ -40,7 +40,11 @@ JSON: axes: list of {name, found: {velocity_gain_per_s…: {value, half_width_95
 sensitivity}, changes: list of {key, before, after, unit, reason}, remarks}, verification: {feed_mm_min, circles: list of
 {axes, frequency_hz, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
 following_error_second_um}}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
-axes}, best_repeat, ended}, output.
+axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}}, output.
+
+--learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, what feedforward is
+to be given in addition, straight between rows; the kernel takes it as Intake::correct. Without a row if nothing was
+better than no correction. Without this option what was learnt is only shown.
 
 Exit status 1, and nothing is written: the tuned machine is worse on a circle than it was, or the recordings do not
 determine what everything depends on (command gain, Kv, Ti, total delay).";
@@ -67,6 +71,9 @@ pub struct TuneArguments {
         requires = "learn"
     )]
     learn_hz: f64,
+    /// Write the best correction that was learnt: CSV, velocity commands over the time in the stretch.
+    #[arg(long, value_name = "FILE", requires = "learn")]
+    learn_output: Option<PathBuf>,
     /// Write the machine file with the new figures; it may be the one that was read.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -113,6 +120,17 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         [] => (0..machine.axes.len()).collect(),
         names => names.iter().map(|name| axis_named(&machine, name)).collect::<Result<Vec<_>, _>>()?,
     };
+    // Before the work: a wrong argument should not cost the user a long one.
+    let plane = planes(&axes).first().copied().unwrap_or_default();
+    let learning = arguments.learn.map(|repeats| Lesson {
+        turning: Turning { plane, ..Turning::new(arguments.learn_hz, CIRCLE_FEED_MM_S) },
+        options: LearningOptions { repeats, ..LearningOptions::default() },
+    });
+    if let Some(lesson) = &learning {
+        lesson.turning.check(machine.tick_s)?;
+        lesson.options.check(&machine)?;
+    }
+    let learn_output = arguments.learn_output.as_deref().map(Output::create).transpose()?;
     let report = arguments.report.as_deref().map(Output::create).transpose()?;
     let found = identify_axes(&machine, &axes)?;
     let tunings: Vec<Tuned> = axes
@@ -129,10 +147,7 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let tuned = Machine::from_toml(&source.name, &text)?;
     let verification = Verification::new(&machine, &tuned, &axes)?;
     let is_better = verification.is_better();
-    let plane = planes(&axes).first().copied().unwrap_or_default();
-    let learnt =
-        arguments.learn.map(|repeats| learn_on(&tuned, &tunings, plane, repeats, arguments.learn_hz));
-    let learnt = learnt.transpose()?;
+    let learnt = learning.map(|lesson| lesson.learn(&tuned, &tunings)).transpose()?;
     if is_better && let Some(path) = &arguments.output {
         fs::write(path, &text)
             .map_err(|source| CliError::Write { path: path.display().to_string(), source })?;
@@ -151,6 +166,13 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
             (None, true) => "  nothing is written; --output FILE writes the machine file".to_owned(),
         };
         writeln!(out, "{end}").map_err(CliError::Output)?;
+    }
+    if let (Some(mut output), Some(learnt)) = (learn_output, &learnt) {
+        let written = write_correction(&tuned, learnt, &mut output.file).and_then(|()| output.file.flush());
+        written.map_err(|source| CliError::Write { path: output.name.clone(), source })?;
+        if !arguments.json {
+            writeln!(out, "  correction written to {}", output.name).map_err(CliError::Output)?;
+        }
     }
     if let Some(mut output) = report {
         let written = verification.write_report(&tuned, &mut output.file).and_then(|()| output.file.flush());
@@ -232,21 +254,41 @@ fn write_words(
     verification.write_words(out)
 }
 
-/// Learns the circle of `frequency_hz` on the tuned machine, by the drives that were found; an axis that was not tuned is
-/// taken as the machine file has it.
-fn learn_on(
-    tuned: &Machine,
-    tunings: &[Tuned],
-    plane: Plane,
-    repeats: usize,
-    frequency_hz: f64,
-) -> Result<Learnt, CliError> {
-    let mut models = tuned.axes.each_ref().map(|axis| axis.drive);
-    for tuning in tunings {
-        models[tuning.axis] = tuning.found.parameters.drive();
+/// A circle to be learnt.
+struct Lesson {
+    turning: Turning,
+    options: LearningOptions,
+}
+
+impl Lesson {
+    /// On the tuned machine, by the drives that were found; an axis that was not tuned is taken as the machine file has it.
+    fn learn(&self, tuned: &Machine, tunings: &[Tuned]) -> Result<Learnt, CliError> {
+        let mut models = tuned.axes.each_ref().map(|axis| Model::from(axis.drive));
+        for Tuned { axis, found, .. } in tunings {
+            let command_gain = found.parameters.command_gain.value;
+            models[*axis] = Model { drive: found.parameters.drive(), command_gain };
+        }
+        Ok(learn(tuned, &self.turning, &models, &self.options)?)
     }
-    let turning = Turning { plane, ..Turning::new(frequency_hz, CIRCLE_FEED_MM_S) };
-    Ok(learn(tuned, &turning, &models, &LearningOptions { repeats, ..LearningOptions::default() })?)
+}
+
+/// The correction of the best repeat, by its knots.
+fn write_correction(machine: &Machine, learnt: &Learnt, out: &mut impl Write) -> io::Result<()> {
+    let StretchCorrection { knot_ticks, knots_mm_s, .. } = &learnt.best;
+    write!(out, "time_s")?;
+    for axis in &machine.axes {
+        write!(out, ",{}_mm_s", axis.name)?;
+    }
+    writeln!(out)?;
+    for (index, knot) in knots_mm_s.iter().enumerate() {
+        let time_s = index as f64 * f64::from(*knot_ticks) * machine.tick_s;
+        write!(out, "{time_s:.6}")?;
+        for value in knot {
+            write!(out, ",{value:.6}")?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
 }
 
 fn write_learnt(
@@ -277,9 +319,9 @@ fn write_learnt(
         if let Some(robustness) = robustness {
             writeln!(
                 out,
-                "  {}: a repeat leaves at most {:.2} of an error (at {:.0} Hz), with every parameter of the drive up to a \
-                 fifth off",
-                axis.name, robustness.contraction, robustness.at_hz
+                "  {}: filter of {:.0} Hz; a repeat leaves at most {:.2} of an error (at {:.0} Hz), with Kv, Ti, current \
+                 lag, dead time and the bed's frequency up to a fifth off",
+                axis.name, robustness.filter.corner_hz, robustness.contraction, robustness.at_hz
             )?;
         }
     }
@@ -309,15 +351,24 @@ fn toml_number(value: f64) -> String {
 struct TuneJson<'run> {
     axes: Vec<AxisJson<'run>>,
     verification: VerificationJson,
-    learning: Option<LearningJson>,
+    learning: Option<LearningJson<'run>>,
     output: Option<String>,
 }
 
 #[derive(Serialize)]
-struct LearningJson {
+struct LearningJson<'run> {
     repeats: Vec<RepeatJson>,
     best_repeat: usize,
     ended: String,
+    robustness: Vec<RobustnessJson<'run>>,
+}
+
+#[derive(Serialize)]
+struct RobustnessJson<'run> {
+    axis: &'run str,
+    filter_corner_hz: f64,
+    contraction: f64,
+    contraction_hz: f64,
 }
 
 #[derive(Serialize)]
@@ -403,6 +454,18 @@ fn json<'run>(
                 .collect(),
             best_repeat: learnt.best_repeat,
             ended: ended(&learnt.stopped),
+            robustness: machine
+                .axes
+                .iter()
+                .zip(&learnt.robustness)
+                .filter_map(|(axis, robustness)| robustness.map(|robustness| (axis, robustness)))
+                .map(|(axis, robustness)| RobustnessJson {
+                    axis: &axis.name,
+                    filter_corner_hz: robustness.filter.corner_hz,
+                    contraction: robustness.contraction,
+                    contraction_hz: robustness.at_hz,
+                })
+                .collect(),
         }),
         output,
     }
