@@ -22,9 +22,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::preview::PREVIEW_TICKS_MAX;
+use super::preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX};
 use super::scale::ScaleError;
-use crate::num::Real;
+use crate::num::{Fixed, Real};
 use crate::path::Setpoint;
 
 /// Feedforward of an axis. The default is none.
@@ -62,9 +62,10 @@ pub const TABLE_POINTS: usize = 9;
 /// three: a table of ±5 mm/s has steps of 0.15 µm/s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
-    /// The points lie evenly from −reach to +reach, in the quantity's unit; > 10⁻⁶. Beyond, the end points hold.
+    /// The points lie evenly from −reach to +reach, in the quantity's unit: above 10⁻⁶, in fixed point below 2³¹. Beyond,
+    /// the end points hold.
     pub reach: f64,
-    /// Velocity of a step \[mm/s\], 0 or more.
+    /// Velocity of a step \[mm/s\], 0 to 10.
     pub mm_s_per_step: f64,
     /// Velocity commands in steps.
     pub steps: [i16; TABLE_POINTS],
@@ -92,17 +93,18 @@ impl Table {
 /// A drive with its mechanics, to be inverted. Everything is per unit of the inertia that it moves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveInverse {
-    /// Proportional gain of the velocity controller \[1/s\], > 0.
+    /// Proportional gain of the velocity controller \[1/s\], 10⁻³ to 10⁶.
     pub velocity_gain_per_s: f64,
-    /// Integral time of the velocity controller \[s\], > 0.
+    /// Integral time of the velocity controller \[s\], a tick to 10⁶.
     pub integral_time_s: f64,
-    /// Lag of the current loop \[s\], 0 or more.
+    /// Lag of the current loop \[s\], 0 to 1.
     pub current_lag_s: f64,
-    /// Viscous friction \[1/s\], 0 or more.
+    /// Viscous friction \[1/s\], 0 to 10⁶.
     pub viscous_friction_per_s: f64,
-    /// Coulomb friction \[mm/s²\], 0 or more.
+    /// Coulomb friction \[mm/s²\], 0 to 10⁶; over Kv and the next one it must fit the number type.
     pub coulomb_friction_mm_s2: f64,
-    /// Velocity from which on all of Coulomb friction is compensated \[mm/s\], > 0; below, a part in proportion.
+    /// Velocity from which on all of Coulomb friction is compensated \[mm/s\], 10⁻³ to 10⁶; below, a part in
+    /// proportion.
     pub reversal_mm_s: f64,
     /// The machine bed, if the axis shakes it.
     pub bed: Option<BedInverse>,
@@ -111,16 +113,22 @@ pub struct DriveInverse {
 /// One mode of the machine bed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BedInverse {
-    /// Natural frequency of the bed alone \[Hz\], > 0, below a quarter of the tick's frequency.
+    /// Natural frequency of the bed alone \[Hz\], above 0, below [`BED_TICK_SHARE_MAX`] of the tick's frequency.
     pub frequency_hz: f64,
     /// Fraction of critical damping, from 0.001 to 1.
     pub damping_ratio: f64,
-    /// Moving mass over the bed's modal mass, > 0.
+    /// Moving mass over the bed's modal mass, above 0; a resonance with it must fit the number type.
     pub mass_ratio: f64,
 }
 
-/// Greatest velocity, acceleration and jerk that a set-point may have where numbers have a range.
-const REACH: [f64; 3] = [1e6, 1e9, 2e9];
+/// The bed's inverse steps once a tick: its frequency is below this part of the tick's.
+pub const BED_TICK_SHARE_MAX: f64 = 0.25;
+
+/// Greatest velocity, acceleration and jerk that room is kept for: a set-point's where numbers have a range, and as much
+/// in floats.
+fn reach<R: Real>() -> [f64; 3] {
+    R::SETPOINT_MAX.or(Fixed::SETPOINT_MAX).unwrap_or_default()
+}
 
 /// eˣ − 1 for |x| ≤ 2. A loop of a few operations: general functions in f64 are kilobytes on a core without it.
 fn expm1(x: f64) -> f64 {
@@ -158,7 +166,7 @@ impl<R: Real> Linear<R> {
         let gains =
             [velocity, accel - late_s * velocity, jerk - late_s * accel + late_s * late_s / 2.0 * velocity];
         // With room for the sum of all that is added to it.
-        let most: f64 = gains.iter().zip(REACH).map(|(gain, reach)| libm::fabs(*gain) * reach).sum();
+        let most: f64 = gains.iter().zip(reach::<R>()).map(|(gain, reach)| libm::fabs(*gain) * reach).sum();
         let refused = ScaleError {
             quantity,
             value: gains.into_iter().find(|gain| !gain.is_finite()).unwrap_or(most),
@@ -292,7 +300,7 @@ impl<R: Real> Bed<R> {
         check(
             "bed frequency [Hz]",
             frequency_hz,
-            frequency_hz > 0.0 && frequency_hz * tick_s < 0.25,
+            frequency_hz > 0.0 && frequency_hz * tick_s < BED_TICK_SHARE_MAX,
             "more than 0, less than a quarter of the tick's frequency",
         )?;
         check(
@@ -303,7 +311,8 @@ impl<R: Real> Bed<R> {
         )?;
         // Shaken as badly as can be, to and fro at the resonance, the bed's acceleration is 2/π·μ/ζ of the axis', and
         // μ at first.
-        let peak = REACH[1] * mass_ratio * (2.0 + 0.75 / damping_ratio);
+        let [_, accel_mm_s2, _] = reach::<R>();
+        let peak = accel_mm_s2 * mass_ratio * (2.0 + 0.75 / damping_ratio);
         let fits = mass_ratio > 0.0 && R::checked_from_f64(peak).is_some();
         check("bed mass ratio", mass_ratio, fits, "more than 0, and a resonance within the kernel's range")?;
         // With the moving mass on it: z″ + 2σ·z′ + ω²·z = −share·a. Steps of a tick have the poles of this, and its
@@ -475,11 +484,11 @@ impl<R: Real> FeedforwardConfig<R> {
         let preview_s = f64::from(preview_ticks) * tick_s;
         // Whole ticks of what it comes too early; a whole one is not one less for rounding, nor is what is left less
         // than nothing.
-        let early_ticks = (preview_s - lead_s) / tick_s + 1e-6;
+        let early_ticks = (preview_s - lead_s) / tick_s + LEAD_ROUNDING_TICKS;
         let delay_ticks = (early_ticks as u8).min(PREVIEW_TICKS_MAX);
         let late_s = preview_s - lead_s - f64::from(delay_ticks) * tick_s;
         let late_s = if late_s > 0.0 { late_s } else { 0.0 };
-        if !(lead_s >= 0.0 && lead_s <= preview_s * (1.0 + 1e-6)) {
+        if !(lead_s >= 0.0 && lead_s <= preview_s + LEAD_ROUNDING_TICKS * tick_s) {
             let expected = "a number from 0 to the machine's preview";
             return Err(ScaleError { quantity: "feedforward lead [s]", value: lead_s, expected });
         }
@@ -543,9 +552,9 @@ mod tests {
         for reach in [1.1e-6, 1e-3, 0.7, 1.0, 300.0, 5e3, 1e6, 1e8, 5e8, 1.5e9, 2.1e9] {
             holds::<f32>(reach);
             holds::<f64>(reach);
-            holds::<crate::num::Fixed>(reach);
+            holds::<Fixed>(reach);
         }
-        assert!(Lookup::<crate::num::Fixed>::new("table", &Table::new(2.2e9, &[0.0; TABLE_POINTS])).is_err());
+        assert!(Lookup::<Fixed>::new("table", &Table::new(2.2e9, &[0.0; TABLE_POINTS])).is_err());
     }
 
     #[test]
