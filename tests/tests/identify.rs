@@ -259,6 +259,14 @@ fn other_ways_to_record_find_the_same() {
 }
 
 #[test]
+fn a_few_drives_are_found_with_every_encoder() {
+    for resolution_um in RESOLUTIONS_UM {
+        let of_seed = |seed| case(&format!("seed {seed}"), random_drive(seed), Rig { resolution_um, ..RIG });
+        check(&(0..3).map(of_seed).collect::<Vec<_>>());
+    }
+}
+
+#[test]
 #[ignore = "takes three minutes; tuning.rs finds fifty drives through the kernel"]
 fn fifty_drives_are_found_with_every_encoder() {
     for resolution_um in RESOLUTIONS_UM {
