@@ -66,7 +66,11 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
         let densest = row(&mut table, board, "3 axes, 15 pieces in every tick", &densest["tick"]);
         let inverted = by_name(&tools.run(board, "budget", &programs::inverted(), Clock::Counting)?);
         let inverted = row(&mut table, board, "3 axes, drives inverted", &inverted["tick"]);
-        // Of all that is ordinary, the promise is for the worst.
+        let tables = by_name(&alone(programs::with_tables())?);
+        row(&mut table, board, "3 axes, drives inverted, tables, a command delayed", &tables["tick"]);
+        let both = by_name(&alone(programs::densest_inverted())?);
+        row(&mut table, board, "3 axes, drives inverted, 15 pieces in every tick", &both["tick"]);
+        // Of what is ordinary, the promise is for the worst.
         ordinary[3] = ordinary[3].max(densest[3]).max(inverted[3]);
         ticks.push((board, ordinary));
         let what = "8 segments and 15 pieces in every tick";
