@@ -8,11 +8,11 @@ use core::f64::consts::TAU;
 use super::experiment::{DriveError, open_loop};
 use super::harmonic::{self, Response};
 use super::model;
-use super::sine::as_lag_rad;
 use super::spectrum::Spectrum;
 use super::step::{Step, StepFigures};
 use super::turning::{Turning, plane_of};
 use crate::machine::Machine;
+use crate::sine::as_lag_rad;
 
 /// Amplitude ratio and phase at a frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]

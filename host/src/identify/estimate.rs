@@ -2,8 +2,8 @@
 
 use hal_sim::{BedMode, DriveParameters};
 
-use super::harmonic_figures::{Bandwidth, HarmonicFigures};
-use super::step_figures::StepFigures;
+use super::harmonic_reading::{Bandwidth, HarmonicReading};
+use super::step_reading::StepReading;
 
 /// Half an interval over the value, up to which a value counts as determined.
 pub const DETERMINED: f64 = 0.3;
@@ -129,9 +129,9 @@ pub struct Figures {
     /// The encoder's step \[mm\]: the least difference between two readings.
     pub resolution_mm: f64,
     /// Every velocity step from rest, in the order of the runs.
-    pub steps: Vec<StepFigures>,
+    pub steps: Vec<StepReading>,
     /// Every harmonic run, in order.
-    pub harmonics: Vec<HarmonicFigures>,
+    pub harmonics: Vec<HarmonicReading>,
     /// −3 dB points of the harmonic runs.
     pub bandwidths: Vec<Bandwidth>,
     /// The greatest acceleration that lasted for 5 ms, friction already overcome \[mm/s²\]. With a run that

@@ -49,8 +49,8 @@ mod error;
 mod excitation;
 mod recording;
 mod differences;
-mod step_figures;
-mod harmonic_figures;
+mod step_reading;
+mod harmonic_reading;
 mod parameters;
 mod simulation;
 mod cholesky;
@@ -66,9 +66,9 @@ pub use estimate::{
     AxisParametersFound, BedEstimate, DETERMINED, Estimate, Figures, Identification, RunMatch,
 };
 pub use excitation::{Excitation, identification_plan};
-pub use harmonic_figures::{Bandwidth, HarmonicFigures};
+pub use harmonic_reading::{Bandwidth, HarmonicReading};
 pub use recording::AxisRecording;
-pub use step_figures::StepFigures;
+pub use step_reading::StepReading;
 
 /// Identifies an axis.
 ///
@@ -90,11 +90,11 @@ pub fn figures(runs: &[AxisRecording]) -> Result<Figures, IdentifyError> {
         run.check(index + 1, first.tick_s)?;
     }
     let resolution_mm = recording::resolution_mm(runs);
-    let harmonics: Vec<_> = runs.iter().filter_map(harmonic_figures::harmonic_figures).collect();
+    let harmonics: Vec<_> = runs.iter().filter_map(harmonic_reading::harmonic_reading).collect();
     Ok(Figures {
         resolution_mm,
-        steps: runs.iter().flat_map(|run| step_figures::step_figures(run, resolution_mm)).collect(),
-        bandwidths: harmonic_figures::bandwidths(&harmonics),
+        steps: runs.iter().flat_map(|run| step_reading::step_reading(run, resolution_mm)).collect(),
+        bandwidths: harmonic_reading::bandwidths(&harmonics),
         harmonics,
         sustained_accel_mm_s2: fit::sustained_accel_mm_s2(runs),
     })
