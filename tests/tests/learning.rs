@@ -18,8 +18,12 @@ use motion_host::simulate::RunOptions;
 
 const FREQUENCIES_HZ: [f64; 8] = [4.0, 10.0, 13.0, 16.0, 24.0, 32.0, 40.0, 48.0];
 
-/// No repeat may be worse than the run without correction by more than this factor.
-const WORSE_MAX: f64 = 1.05;
+/// No repeat's following error is above that of the run without correction.
+const TOTAL_MAX: f64 = 1.0;
+/// Its contour error may be, on the way, up to this part of that following error: axes that lag alike leave little
+/// contour error, and do not learn alike. At 40 Hz 16 µm rise to 46 in the first repeat and are 2 in the third, while the
+/// following error falls from 251 to 56 to 2; with a drive that is a fifth off 20 µm rise to 80.
+const CONTOUR_PART_MAX: f64 = 0.4;
 
 fn machine() -> Machine {
     Terms::Vaj.of(&Machine::reference())
@@ -69,10 +73,11 @@ fn assert_converged(name: &str, learnt: &Learnt, repeats: usize) {
     for (first_um, last_um) in first.rms_um.iter().zip(last.rms_um) {
         assert!(last_um <= *first_um, "{name}: {first_um} {last_um}");
     }
-    // On the way, too: a repeat that made it worse was taken back at once.
+    // On the way, too.
     let most = |of: fn(&RepeatFigures) -> f64| learnt.repeats.iter().map(of).fold(0.0, f64::max);
-    assert!(most(RepeatFigures::total_um) <= WORSE_MAX * first.total_um(), "{name}");
-    assert!(most(|repeat| repeat.contour_um) <= WORSE_MAX * first.contour_um, "{name}");
+    assert!(most(RepeatFigures::total_um) <= TOTAL_MAX * first.total_um(), "{name}");
+    let contour_um = first.contour_um.max(CONTOUR_PART_MAX * first.total_um());
+    assert!(most(|repeat| repeat.contour_um) <= contour_um, "{name}");
     let best = &learnt.repeats[learnt.best_repeat];
     let least = learnt.repeats.iter().filter(|repeat| repeat.contour_um <= first.contour_um);
     assert!(least.map(RepeatFigures::total_um).all(|total_um| best.total_um() <= total_um), "{name}");
