@@ -140,7 +140,8 @@ fn offset_v(axis: &AxisSettings, parameters: &AxisParametersFound) -> f64 {
     let v_per_mm_s = DacCode::FULL_SCALE_V / parameters.command_gain.value / axis.mm_s_at_10_v;
     let still = parameters.command_offset_mm_s.times(-v_per_mm_s);
     let least_v = still.half_width_95.max(1.0 / DacCode::PER_VOLT);
-    let trim_v = rounded(still.value);
+    // To a microvolt, a three-hundredth of a converter step; 0 without a sign.
+    let trim_v = (still.value * 1e6).round() / 1e6 + 0.0;
     let is_told = (trim_v - axis.output_offset_v).abs() > least_v;
     if is_told && trim_v.abs() < axis.output_limit_v { trim_v } else { axis.output_offset_v }
 }
