@@ -8,7 +8,7 @@
 
 use core::convert::Infallible;
 
-use motion_kernel::axis::{AxesConfig, AxesError};
+use motion_kernel::axis::{AxesConfig, AxesError, Correction, CorrectionError};
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{Ad5754Error, Ad5754Output, DriveEnable, Encoder, VelocityChannel};
 use motion_kernel::kernel::Kernel;
@@ -158,7 +158,23 @@ fn regulated<R: Real, const AXES: usize>(header: &Header<AXES>) -> Result<AxesCo
     AxesConfig::new(&header.axes, header.tick_s).map_err(LoopError::Axes)
 }
 
-impl<R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'_, R, AXES, LINE> {
+/// Knots of a correction that no learning has made: for runs that are compared with one another \[mm/s\].
+#[must_use]
+pub fn some_knots<R: Real, const AXES: usize>() -> [[R; AXES]; 4] {
+    [0.0, 0.625, -0.375, 0.25]
+        .map(|mm_s| core::array::from_fn(|axis| R::from_f64(mm_s * (1.0 + axis as f64))))
+}
+
+impl<'a, R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'a, R, AXES, LINE> {
+    /// Corrects the second stretch by `knots`, 40 ticks from one to the next.
+    ///
+    /// # Errors
+    /// A knot is above 4 mm/s.
+    pub fn correct(&mut self, knots_mm_s: &'a [[R; AXES]]) -> Result<(), CorrectionError> {
+        self.intake.correct(Correction::new(1, knots_mm_s, 40, 4.0)?);
+        Ok(())
+    }
+
     /// One tick of the kernel and of the machine. A program stop is resumed at once.
     #[inline(never)]
     pub fn tick(&mut self) -> Trace<R, AXES> {

@@ -27,3 +27,4 @@ pub mod drive;
 pub mod identify;
 pub mod tuning;
 pub mod report;
+pub mod sine;

@@ -1,11 +1,14 @@
 //! The drive experiments through planner, streams and kernel in f32, against the reference machine's figures.
 
+use motion_host::drive::inverse::inverse;
 use motion_host::drive::reference::{self, BANDWIDTH_FEED_MM_S, CIRCLE_FEED_MM_S, Comparison};
 use motion_host::drive::step::Step;
 use motion_host::drive::turning::Turning;
-use motion_host::drive::{DriveError, Terms, bode, circle, experiment, harmonic, inertia};
+use motion_host::drive::{DriveError, Terms, bode, circle, experiment, harmonic, identification, inertia};
 use motion_host::gcode::Plane;
 use motion_host::machine::Machine;
+use motion_host::tuning::feedforward::series;
+use motion_kernel::axis::Feedforward;
 
 #[track_caller]
 fn assert_hold(comparisons: &[Comparison]) {
@@ -110,19 +113,97 @@ const CONTOUR_VAJ: ContourTable = [
     (23.01, 1.19),
 ];
 
+/// All three, the jerk gain of the drive's series.
+const CONTOUR_SERIES: ContourTable = [
+    (5.54, 0.67),
+    (6.01, 0.68),
+    (6.78, 0.7),
+    (7.87, 0.74),
+    (9.1, 0.77),
+    (10.39, 0.81),
+    (11.55, 0.85),
+    (12.5, 0.88),
+    (13.26, 0.9),
+    (13.85, 0.92),
+    (14.7, 0.94),
+    (18.04, 1.04),
+    (27.97, 1.34),
+    (8.59, 0.76),
+    (6.54, 0.7),
+    (5.03, 0.65),
+];
+
+/// The drives' inverse, friction included, without the bed.
+const CONTOUR_INVERSE: ContourTable = [
+    (0.35, 0.51),
+    (0.2, 0.51),
+    (0.15, 0.5),
+    (0.16, 0.5),
+    (0.17, 0.51),
+    (0.25, 0.51),
+    (0.38, 0.51),
+    (0.56, 0.52),
+    (0.95, 0.53),
+    (1.67, 0.55),
+    (3.24, 0.6),
+    (7.79, 0.73),
+    (16.86, 1.01),
+    (10.57, 0.82),
+    (7.05, 0.71),
+    (5.73, 0.67),
+];
+
+/// And with the bed.
+const CONTOUR_INVERSE_BED: ContourTable = [
+    (0.35, 0.51),
+    (0.2, 0.51),
+    (0.15, 0.5),
+    (0.14, 0.5),
+    (0.14, 0.5),
+    (0.16, 0.5),
+    (0.17, 0.51),
+    (0.17, 0.51),
+    (0.2, 0.51),
+    (0.15, 0.5),
+    (0.27, 0.51),
+    (0.31, 0.51),
+    (0.46, 0.51),
+    (0.19, 0.51),
+    (0.23, 0.51),
+    (0.29, 0.51),
+];
+
 #[test]
 fn contour_errors_are_those_of_the_reference_model() {
     let machine = Machine::reference();
-    for (terms, table) in [(Terms::V, CONTOUR_V), (Terms::Va, CONTOUR_VA), (Terms::Vaj, CONTOUR_VAJ)] {
-        let machine = terms.of(&machine);
+    let with = |feedforward: &dyn Fn(&hal_sim::DriveParameters) -> Feedforward| {
+        let mut machine = machine.clone();
+        for axis in &mut machine.axes {
+            axis.feedforward = feedforward(&axis.drive);
+        }
+        machine
+    };
+    let series = with(&|drive| {
+        let [accel_s, jerk_s2] = series(drive, machine.tick_s);
+        Feedforward { velocity: 1.0, accel_s, jerk_s2, ..Feedforward::default() }
+    });
+    let per_axis = with(&|drive| inverse(&hal_sim::DriveParameters { bed: None, ..*drive }, machine.tick_s));
+    let whole = with(&|drive| inverse(drive, machine.tick_s));
+    for (name, machine, table) in [
+        ("V", Terms::V.of(&machine), CONTOUR_V),
+        ("VA", Terms::Va.of(&machine), CONTOUR_VA),
+        ("VAJ", Terms::Vaj.of(&machine), CONTOUR_VAJ),
+        ("series", series, CONTOUR_SERIES),
+        ("inverse", per_axis, CONTOUR_INVERSE),
+        ("inverse with bed", whole, CONTOUR_INVERSE_BED),
+    ] {
         for (index, (expected_um, tolerance_um)) in table.into_iter().enumerate() {
             let frequency_hz = (index + 1) as f64;
             let found_um =
                 circle::measure(&machine, frequency_hz, CIRCLE_FEED_MM_S).expect("a circle").contour_um();
             assert!(
                 (found_um - expected_um).abs() <= tolerance_um,
-                "{} at {frequency_hz} Hz: {found_um} µm, expected {expected_um} ± {tolerance_um}",
-                terms.name()
+                "{name} at {frequency_hz} Hz: {found_um} µm, expected {expected_um} ± {tolerance_um}"
             );
         }
     }
@@ -184,6 +265,26 @@ fn a_load_shows_the_current_limit() {
             let limit_mm_s2 = machine.axes[0].drive.accel_limit_mm_s2 / (1.0 + load);
             assert!((found.plateau_accel_mm_s2 / limit_mm_s2 - 1.0).abs() < 0.03, "{found:?}");
         }
+    }
+}
+
+/// A slow X is found beside a fast Y, and Y beside it, by motions that X reaches.
+#[test]
+fn a_slow_axis_is_identified() {
+    let mut machine = Machine::reference();
+    let x = &mut machine.axes[0];
+    (x.mm_s_at_10_v, x.feed_mm_s) = (100.0, 90.0);
+    for (axis, found) in identification::identify_axes(&machine, &[0, 1]).expect("both").iter().enumerate() {
+        let (found, drive) = (&found.parameters, &machine.axes[axis].drive);
+        let parts = [
+            found.velocity_gain_per_s.value / drive.velocity_gain_per_s,
+            found.integral_time_s.value / drive.integral_time_s,
+            found.accel_limit_mm_s2.value / drive.accel_limit_mm_s2,
+            found.coulomb_friction_mm_s2.value / drive.coulomb_friction_mm_s2,
+        ];
+        println!("{parts:.4?}");
+        assert!(parts.iter().all(|part| (part - 1.0).abs() < 0.02), "{axis}: {parts:?}");
+        assert_eq!(found.bed.is_some(), axis == 1);
     }
 }
 

@@ -32,17 +32,19 @@ enum Power {
 }
 
 /// The real-time motion kernel of a machine with `AXES` axes.
+// In this order: what a tick touches most lies within reach of the core's short addresses.
+#[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel<R: Real, const AXES: usize> {
-    config: [AxisConfig<R>; AXES],
-    executor: Executor<R, AXES>,
-    preview: Preview<AXES>,
-    axes: [AxisState<R>; AXES],
     power: Power,
     /// What the drives were last told; `None` before the first time and where that failed.
     told: Option<bool>,
+    executor: Executor<R, AXES>,
     /// What the latest tick did; the next one goes on from it.
     trace: Trace<R, AXES>,
+    axes: [AxisState<R>; AXES],
+    config: [AxisConfig<R>; AXES],
+    preview: Preview<AXES>,
 }
 
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {

@@ -6,6 +6,7 @@
 mod check;
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,15 +14,19 @@ use check::drive::{PIECES, SEGMENTS, is_beyond_fixed_point};
 use check::random::Random;
 use check::totals::Totals;
 use check::{drive, machine, program};
+use motion_host::drive::inverse::inverse;
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan, plan_program};
+use motion_kernel::axis::feedforward::{FeedforwardConfig, FeedforwardState};
+use motion_kernel::axis::{DriveInverse, Feedforward, Table, Tables};
 use motion_kernel::exec::{ExecState, Executed, Executor};
 use motion_kernel::num::{Fixed, Real};
+use motion_kernel::path::Setpoint;
 use motion_kernel::program::Supply;
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
-use motion_tests::figures::{Table, hold};
+use motion_tests::figures::{Table as Figures, hold};
 
 const STRINGER: &str = include_str!("../../host/src/cli/stringer.ngc");
 const MM_PER_COUNT: f64 = 1e-4;
@@ -32,6 +37,9 @@ const PROGRAMS: u64 = 1000;
 const TICKS_MAX: f64 = 150_000.0;
 /// So many of them have to be executed.
 const EXECUTED_MIN: u64 = 900;
+
+/// The preview of the reference machine's inverse \[ticks\].
+const PREVIEW_TICKS: u8 = 4;
 
 /// What an executor says of a tick, in f64: state, stretches, positions, then feed, acceleration, jerk and snap along
 /// the path, then velocity, acceleration and jerk of the axes.
@@ -234,12 +242,95 @@ fn random_programs() -> Programs {
     all.into_inner().expect("no worker panics")
 }
 
+/// What feedforward makes of set-points (velocity, acceleration, jerk of each tick), in `R` \[mm/s\].
+fn commands<R: Real>(feedforward: &Feedforward, tick_s: f64, setpoints: &[[f64; 3]]) -> Vec<f64> {
+    let config =
+        FeedforwardConfig::<R>::new(feedforward, PREVIEW_TICKS, tick_s).expect("within the type's range");
+    let mut state = FeedforwardState::default();
+    let command = |&[velocity, accel, jerk]: &[f64; 3]| {
+        let setpoint = Setpoint {
+            position: Position::ZERO,
+            velocity_mm_s: R::from_f64(velocity),
+            accel_mm_s2: R::from_f64(accel),
+            jerk_mm_s3: R::from_f64(jerk),
+        };
+        config.tick(&mut state, &setpoint).to_f64()
+    };
+    setpoints.iter().map(command).collect()
+}
+
+/// The set-points of X that a plan has in `R`.
+fn of_x<R: Real>(executable: &Executable, machine: &Machine) -> Vec<[f64; 3]> {
+    let mut setpoints = Vec::new();
+    execute::<R>(executable, machine, |tick| setpoints.push(tick.axes[0])).expect("executed");
+    setpoints
+}
+
+/// Feedforward by itself: what differs from f64 in the command, of set-points of the same number type, so that all that a
+/// tick rounds is counted.
+#[test]
+fn feedforward_in_fixed_point_and_f32_against_f64() {
+    let machine = Machine::reference();
+    let tick_s = machine.tick_s;
+    let program = gcode::read("accuracy.ngc", STRINGER.as_bytes()).expect("G-code");
+    let plan = plan_program("accuracy.ngc", &program, &machine, Mode::Merged).expect("a plan");
+    let executable = Executable::new::<Fixed>(&plan).expect("within fixed point");
+    let stringer = [
+        of_x::<f64>(&executable, &machine),
+        of_x::<Fixed>(&executable, &machine),
+        of_x::<f32>(&executable, &machine),
+    ];
+    // 20 s of the motion that shakes the bed most: rounding would add up in its state.
+    let omega = TAU * 13.4 / 1.06_f64.sqrt();
+    let swing = |tick: u32| {
+        let (sine, cosine) = (omega * f64::from(tick) * tick_s).sin_cos();
+        [35.8 * sine, 35.8 * omega * cosine, -35.8 * omega * omega * sine]
+    };
+    let shaken: Vec<[f64; 3]> = (0..40_000).map(swing).collect();
+    let shaken = [shaken.clone(), shaken.clone(), shaken];
+
+    let whole = inverse(&machine.axes[1].drive, tick_s);
+    let without_bed = whole.drive.map(|drive| DriveInverse { bed: None, ..drive });
+    let line = |reach: f64| Some(Table::new(reach, &[-0.5, -0.3, -0.25, -0.2, 0.0, 0.1, 0.2, 0.4, 0.6]));
+    let tables = Tables { velocity: line(60.0), accel: line(400.0), jerk: line(4e3) };
+    let mut table = Figures::new(&["feedforward", "set-points", "number type", "command off f64 [nm/s]"]);
+    for (what, feedforward) in [
+        ("V, A, J", Feedforward { lead_s: 0.00167, ..machine.axes[0].feedforward }),
+        ("with tables", Feedforward { lead_s: 0.00167, tables, ..machine.axes[0].feedforward }),
+        ("inverse", Feedforward { drive: without_bed, ..whole }),
+        ("inverse with bed", whole),
+    ] {
+        for (run, setpoints) in [("stringer flange", &stringer), ("13 Hz, 20 s", &shaken)] {
+            let [exact, fixed, single] = setpoints;
+            let exact = commands::<f64>(&feedforward, tick_s, exact);
+            let found = [
+                commands::<Fixed>(&feedforward, tick_s, fixed),
+                commands::<f32>(&feedforward, tick_s, single),
+            ];
+            for (number, found) in NUMBERS[1..].iter().zip(found) {
+                let off = |(found, exact): (&f64, &f64)| (found - exact).abs();
+                let worst_mm_s = found.iter().zip(&exact).map(off).fold(0.0, f64::max);
+                // A hundredth of the converter's step, 0.01 mm/s.
+                assert!(
+                    worst_mm_s < 1e-4 && found.len() == exact.len(),
+                    "{what}, {run}, {number}: {worst_mm_s}"
+                );
+                table.row(&[what, run, number, &format!("{:.1}", worst_mm_s * 1e6)]);
+            }
+        }
+    }
+    println!("{}", table.to_markdown());
+    if let Err(difference) = hold("feedforward", &table, 0.02) {
+        panic!("{difference}");
+    }
+}
+
 /// Two digits.
 fn part(value: f64) -> String {
     if value <= 0.0 { "0".to_owned() } else { format!("{value:.1e}") }
 }
 
-fn rows(table: &mut Table, run: &str, worst: &[Worst; 3]) {
+fn rows(table: &mut Figures, run: &str, worst: &[Worst; 3]) {
     for (number, worst) in NUMBERS.iter().zip(worst) {
         let mut cells = vec![run.to_owned(), (*number).to_owned()];
         if *number == "f64" {
@@ -266,7 +357,7 @@ fn fixed_point_and_f32_against_f64() {
         programs.refused.iter().map(|(reason, count)| format!(", {count} {reason}")).collect();
     let run = format!("{PROGRAMS} random programs{refused}");
 
-    let mut table = Table::new(&[
+    let mut table = Figures::new(&[
         "executed",
         "number type",
         "positions off f64 [counts of 0.1 µm]",

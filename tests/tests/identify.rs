@@ -71,7 +71,7 @@ fn record(drive: DriveParameters, rig: Rig, excitation: &Excitation) -> AxisReco
 
 fn recordings(drive: DriveParameters, rig: Rig) -> Vec<AxisRecording> {
     let noisy = |run: usize| Rig { noise_seed: rig.noise_seed.map(|seed| seed + run as u64), ..rig };
-    identification_plan()
+    identification_plan(f64::INFINITY)
         .iter()
         .enumerate()
         .map(|(run, excitation)| record(drive, noisy(run), excitation))
@@ -256,6 +256,14 @@ fn other_ways_to_record_find_the_same() {
         case("X gain, offset", REFERENCE_X, Rig { output_gain: 0.96, output_offset_v: 0.01, ..RIG }),
         case("Y gain, offset", REFERENCE_Y, Rig { output_gain: 1.05, output_offset_v: -0.02, ..RIG }),
     ]);
+}
+
+#[test]
+fn a_few_drives_are_found_with_every_encoder() {
+    for resolution_um in RESOLUTIONS_UM {
+        let of_seed = |seed| case(&format!("seed {seed}"), random_drive(seed), Rig { resolution_um, ..RIG });
+        check(&(0..3).map(of_seed).collect::<Vec<_>>());
+    }
 }
 
 #[test]

@@ -15,6 +15,8 @@ use motion_tests::figures::{Table, hold};
 use crate::check::random::Random;
 
 const FEED_MM_S: f64 = 2150.0 / 60.0;
+/// What identification is off by at most, as a part; the README says so.
+const PART_OFF_MAX: f64 = 0.02;
 
 /// `machine` with X and Y tuned.
 fn tuned(machine: &Machine, method: Method) -> (Machine, Vec<AxisTuning>) {
@@ -22,7 +24,7 @@ fn tuned(machine: &Machine, method: Method) -> (Machine, Vec<AxisTuning>) {
     let mut tuned = machine.clone();
     let mut tunings = vec![];
     for (axis, found) in tuned.axes.iter_mut().zip(&found) {
-        let tuning = propose(axis, found, method, machine.tick_s);
+        let tuning = propose(axis, found, method, machine.tick_s).expect("a proposal");
         axis.gains = tuning.gains;
         axis.feedforward = tuning.feedforward;
         axis.output_offset_v = tuning.output_offset_v;
@@ -88,7 +90,8 @@ fn changed(machine: &Machine, change: &dyn Fn(&mut hal_sim::DriveParameters)) ->
 }
 
 /// Each of Kv, Ti, dead time and inertia off by a fifth, then all of them slow together. Y has three times the friction
-/// of X, whose compensation is off with Kv, and keeps more error: 2.0 µm where X has 1.3.
+/// of X, whose compensation is off with Kv, and keeps more error: 2.0 µm where X has 1.3, beyond the 1.5 µm that both
+/// should keep. The README states these figures.
 #[test]
 fn a_fifth_of_any_parameter_may_change() {
     type Change = fn(&mut hal_sim::DriveParameters, f64);
@@ -104,7 +107,7 @@ fn a_fifth_of_any_parameter_may_change() {
             println!("{name} × {by}");
             let machine = changed(&machine, &|drive| change(drive, by));
             let following_um = circle(&machine, 4.0).following_um;
-            assert!(following_um[0] <= 1.5 && following_um[1] <= 2.1, "{name} {by}: {following_um:?}");
+            assert!(following_um[0] <= 1.35 && following_um[1] <= 2.05, "{name} {by}: {following_um:?}");
             for frequency_hz in [10.0, 13.0, 16.0, 19.0, 22.0, 25.0] {
                 let contour_um = circle(&machine, frequency_hz).contour_um();
                 assert!(contour_um <= 20.0, "{name} {by}, {frequency_hz} Hz: {contour_um}");
@@ -120,7 +123,7 @@ fn a_fifth_of_any_parameter_may_change() {
         drive.load_inertia_ratio = 0.2;
     });
     let following_um = circle(&machine, 4.0).following_um;
-    assert!(following_um[0] <= 4.5 && following_um[1] <= 4.6, "{following_um:?}");
+    assert!(following_um[0] <= 4.2 && following_um[1] <= 4.55, "{following_um:?}");
     for frequency_hz in [8.0, 10.0, 11.0] {
         let contour_um = circle(&machine, frequency_hz).contour_um();
         assert!(contour_um <= 20.0, "{frequency_hz} Hz: {contour_um}");
@@ -162,7 +165,7 @@ fn fifty_drives_are_found_tuned_and_stable() {
         ];
         let delay_s = drive.dead_time_s + drive.current_lag_s + 0.5 * machine.tick_s;
         let delay_off_s = (values.total_delay_s.value - delay_s).abs();
-        let tuning = propose(&machine.axes[1], &found, Method::Inverse, machine.tick_s);
+        let tuning = propose(&machine.axes[1], &found, Method::Inverse, machine.tick_s).expect("a proposal");
         let margins = Margins::of(&drive, tuning.gains.kp_per_s, machine.tick_s);
         let axis = &mut machine.axes[1];
         (axis.gains, axis.feedforward) = (tuning.gains, tuning.feedforward);
@@ -174,7 +177,7 @@ fn fifty_drives_are_found_tuned_and_stable() {
             delay_off_s * 1e6
         );
         assert!(
-            errors.iter().all(|part| *part < 0.1) && delay_off_s < 1e-4,
+            errors.iter().all(|part| *part < PART_OFF_MAX) && delay_off_s < 1e-4,
             "seed {seed}: {errors:?} {delay_off_s}"
         );
         // Designed for 40° and a factor of 2 in the model that was found.

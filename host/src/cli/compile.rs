@@ -4,12 +4,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use motion_kernel::num::Fixed;
+use motion_kernel::num::{Fixed, Root};
 
 use super::error::{CliError, Outcome};
 use super::input::{self, Output};
 use crate::gcode;
-use crate::planning::{Executable, Mode, plan_program};
+use crate::machine::Machine;
+use crate::planning::{Executable, Mode, Plan, plan_program};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -56,8 +57,8 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
     let program = gcode::read(&source.name, &source.text)?;
     let plan = plan_program(&source.name, &program, &machine, mode)?;
     let executable = match arguments.number {
-        Number::F32 => Executable::new::<f32>(&plan),
-        Number::Fixed => Executable::new::<Fixed>(&plan),
+        Number::F32 => executable::<f32>(&plan, &machine),
+        Number::Fixed => executable::<Fixed>(&plan, &machine),
     }?;
     let bytes = executable.to_bytes(&machine);
     write(&arguments.output, &bytes)?;
@@ -77,6 +78,12 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
     )
     .map_err(CliError::Output)?;
     Ok(Outcome::Done)
+}
+
+/// The program in the board's numbers, if they hold its axes, too.
+fn executable<R: Root>(plan: &Plan, machine: &Machine) -> Result<Executable, CliError> {
+    machine.axes_config::<R>().map_err(|source| CliError::Axis { machine: machine.name.clone(), source })?;
+    Ok(Executable::new::<R>(plan)?)
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {

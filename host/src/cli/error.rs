@@ -7,9 +7,10 @@ use thiserror::Error;
 
 use crate::drive::DriveError;
 use crate::gcode::GcodeError;
-use crate::machine::MachineError;
+use crate::machine::{AxisError, MachineError};
 use crate::planning::PlanningError;
 use crate::simulate::RunError;
+use crate::tuning::TuningError;
 
 /// How a command that ran to its end ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +60,14 @@ pub enum CliError {
     /// The machine file is refused.
     #[error(transparent)]
     Machine(#[from] MachineError),
+    /// The number type that was asked for does not hold an axis.
+    #[error("machine {machine:?}: {source}")]
+    Axis {
+        /// The machine's name.
+        machine: String,
+        /// Which axis, and why.
+        source: AxisError,
+    },
     /// There is no plan.
     #[error(transparent)]
     Planning(#[from] PlanningError),
@@ -73,6 +82,9 @@ pub enum CliError {
     /// The drive experiment can't be made, or a fault ended it.
     #[error(transparent)]
     Drive(#[from] DriveError),
+    /// There is nothing to tune an axis by.
+    #[error(transparent)]
+    Tuning(#[from] TuningError),
     /// Arguments that are right one by one and don't fit together.
     #[error("found {found}, expected {expected}")]
     Arguments {
@@ -84,12 +96,14 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// 2, but for output that failed, for a plan that the kernel refuses and for an experiment that ended in a fault or
-    /// found nothing to measure: these are not the user's input.
+    /// 2, but for output that failed, for a plan that the kernel refuses for an experiment that ended in a fault or
+    /// found nothing to measure, and for one that found too little to tune by: these are not the user's input.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Output(_) | Self::Run { source: RunError::Rejected(_), .. } => ExitCode::FAILURE,
+            Self::Output(_) | Self::Tuning(_) | Self::Run { source: RunError::Rejected(_), .. } => {
+                ExitCode::FAILURE
+            }
             Self::Drive(
                 DriveError::Fault { .. }
                 | DriveError::NotSteady { .. }

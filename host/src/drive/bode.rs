@@ -8,12 +8,11 @@ use core::f64::consts::TAU;
 use super::experiment::{DriveError, open_loop};
 use super::harmonic::{self, Response};
 use super::model;
-use super::sine::as_lag_rad;
 use super::spectrum::Spectrum;
 use super::step::{Step, StepFigures};
-use super::turning::Turning;
-use crate::gcode::Plane;
+use super::turning::{Turning, plane_of};
 use crate::machine::Machine;
+use crate::sine::as_lag_rad;
 
 /// Amplitude ratio and phase at a frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,12 +78,6 @@ pub fn measure(
         progress();
     }
     Ok(Bode { axis, feed_mm_s, points, step })
-}
-
-/// The plane in which an axis is driven: with X or Y the other of the two, with Z X.
-#[must_use]
-pub fn plane_of(axis: usize) -> Plane {
-    if axis == 2 { Plane::Zx } else { Plane::Xy }
 }
 
 fn point(response: model::Complex) -> Point {

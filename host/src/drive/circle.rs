@@ -15,6 +15,8 @@ const RESOLUTION_HZ: f64 = 0.01;
 /// What is read from a circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleFigures {
+    /// The plane's first and second axis, from 0.
+    pub axes: [usize; 2],
     /// Turns per second \[Hz\].
     pub frequency_hz: f64,
     /// Feed \[mm/s\].
@@ -69,6 +71,7 @@ pub fn figures(recording: &Recording, turning: &Turning) -> Result<CircleFigures
         }
     }
     Ok(CircleFigures {
+        axes: turning.axes(),
         frequency_hz: turning.frequency_hz,
         feed_mm_s: turning.feed_mm_s,
         radius_mm: turning.radius_mm(),
@@ -91,6 +94,10 @@ pub fn deviations(recording: &Recording, turning: &Turning) -> Result<Vec<(f64, 
     Ok(turning.measured(recording)?.iter().map(deviation).collect())
 }
 
+fn check_limit(limit_um: f64) -> Result<(), DriveError> {
+    super::experiment::within("contour limit [µm]", limit_um, (1e-3, 1e6))
+}
+
 /// The lowest frequency in `range_hz` (from, to, steps of the search) at which the contour error passes `limit_um`
 /// \[Hz\]; none if it does not, or if it is beyond from the start.
 ///
@@ -102,7 +109,7 @@ pub fn limit_frequency(
     limit_um: f64,
     range_hz: (f64, f64, f64),
 ) -> Result<Option<f64>, DriveError> {
-    super::experiment::within("contour limit [µm]", limit_um, (1e-3, 1e6))?;
+    check_limit(limit_um)?;
     let is_beyond = |frequency_hz| Ok(measure(machine, frequency_hz, feed_mm_s)?.contour_um() > limit_um);
     first_crossing(range_hz, RESOLUTION_HZ, is_beyond)
 }
@@ -134,6 +141,8 @@ pub fn sweep(
     (limit_um, range_hz): (f64, (f64, f64, f64)),
     progress: &mut dyn FnMut(),
 ) -> Result<Sweep, DriveError> {
+    // Before the work.
+    check_limit(limit_um)?;
     let mut circles = Vec::with_capacity(frequencies_hz.len());
     for &frequency_hz in frequencies_hz {
         circles.push(measure(&machine, frequency_hz, feed_mm_s)?);

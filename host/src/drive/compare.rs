@@ -14,14 +14,15 @@
 //!
 //! The kernel's regulators run through the kernel. In coarser set-points all of them are [replayed](super::replay).
 
-use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Gains};
+use motion_kernel::axis::{Feedforward, Gains};
 
 use super::circle;
 use super::experiment::{CLOSED_LOOP_ERROR_MM, DriveError, Recording, Terms};
+use super::inverse::inverse;
 use super::peer_regulator::PeerGains;
 use super::replay::{Law, Replayed, replay};
 use super::turning::Turning;
-use crate::machine::{AxisSettings, Machine};
+use crate::machine::Machine;
 use crate::record::AXES;
 
 /// Frequencies at which the differencing regulator's gains are fitted \[Hz\].
@@ -30,8 +31,6 @@ pub const FIT_HZ: [f64; 3] = [4.0, 10.0, 16.0];
 const FIT_ROUNDS: usize = 2;
 /// Steps of the fit's difference quotients: FF2 \[s\] and FF3 \[s²\].
 const FIT_STEPS: [f64; 2] = [1e-4, 5e-6];
-/// Velocity over which the inverse turns Coulomb friction, if the machine file does not say \[mm/s\].
-const REVERSAL_MM_S: f64 = 0.5;
 /// An axis that moves less than this over the measured time does not count \[mm\].
 const AT_REST_MM: f64 = 1e-6;
 
@@ -455,33 +454,8 @@ pub fn with_inverse(machine: &Machine) -> Machine {
     let mut machine = machine.clone();
     for axis in &mut machine.axes {
         if axis.feedforward.drive.is_none() {
-            axis.feedforward = known_inverse(axis, machine.tick_s);
+            axis.feedforward = inverse(&axis.drive, machine.tick_s);
         }
     }
     machine
-}
-
-/// The inverse of the simulated drive, per unit of the inertia that it moves: what identification would find if it
-/// were exact. Dead time, command filter and the half tick for which outputs are held are the lead.
-fn known_inverse(axis: &AxisSettings, tick_s: f64) -> Feedforward {
-    let drive = &axis.drive;
-    let inertia = 1.0 + drive.load_inertia_ratio;
-    Feedforward {
-        velocity: 1.0,
-        lead_s: drive.dead_time_s + drive.command_filter_s + tick_s / 2.0,
-        drive: Some(DriveInverse {
-            velocity_gain_per_s: drive.velocity_gain_per_s / inertia,
-            integral_time_s: drive.integral_time_s,
-            current_lag_s: drive.current_lag_s,
-            viscous_friction_per_s: drive.viscous_friction_per_s / inertia,
-            coulomb_friction_mm_s2: drive.coulomb_friction_mm_s2 / inertia,
-            reversal_mm_s: REVERSAL_MM_S,
-            bed: drive.bed.map(|bed| BedInverse {
-                frequency_hz: bed.frequency_hz,
-                damping_ratio: bed.damping_ratio,
-                mass_ratio: bed.mass_ratio,
-            }),
-        }),
-        ..Feedforward::default()
-    }
 }

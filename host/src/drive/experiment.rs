@@ -9,7 +9,7 @@ use motion_kernel::axis::{Feedforward, Gains};
 
 use crate::gcode::{self, GcodeError};
 use crate::identify::IdentifyError;
-use crate::machine::Machine;
+use crate::machine::{AxisSettings, Machine};
 use crate::planning::{Mode, PlanningError, plan_program};
 use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
 use crate::simulate::{self, RunError, RunOptions};
@@ -184,6 +184,22 @@ pub fn open_loop(machine: &Machine) -> Machine {
     machine
 }
 
+/// The velocity that the encoder's register can follow \[mm/s\].
+fn countable_mm_s(axis: &AxisSettings, tick_s: f64) -> f64 {
+    let range_counts = match axis.timer {
+        hal_sim::TimerBits::Sixteen => f64::from(u16::MAX),
+        hal_sim::TimerBits::ThirtyTwo => f64::from(u32::MAX),
+    };
+    COUNTER_SHARE * range_counts * axis.mm_per_count.abs() / tick_s
+}
+
+/// The greatest feed of an experiment that moves all of `axes` \[mm/s\]: what their outputs reach and their encoders
+/// can follow.
+pub(super) fn fastest_mm_s(machine: &Machine, axes: &[usize]) -> f64 {
+    let of = |axis: &AxisSettings| axis.reachable_mm_s().min(countable_mm_s(axis, machine.tick_s));
+    axes.iter().filter_map(|&axis| machine.axes.get(axis)).map(of).fold(f64::INFINITY, f64::min)
+}
+
 /// What an experiment's motion needs of a machine.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Demands {
@@ -209,11 +225,7 @@ pub(super) fn raised(machine: &Machine, demands: &Demands, moved: &[usize]) -> R
                 limit_v: axis.output_limit_v,
             });
         }
-        let range_counts = match axis.timer {
-            hal_sim::TimerBits::Sixteen => f64::from(u16::MAX),
-            hal_sim::TimerBits::ThirtyTwo => f64::from(u32::MAX),
-        };
-        let most_mm_s = COUNTER_SHARE * range_counts * axis.mm_per_count.abs() / machine.tick_s;
+        let most_mm_s = countable_mm_s(axis, machine.tick_s);
         if demands.feed_mm_s > most_mm_s {
             let axis = axis.name.clone();
             return Err(DriveError::Counter { axis, feed_mm_min, most_mm_min: most_mm_s * 60.0 });

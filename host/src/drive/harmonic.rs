@@ -10,9 +10,9 @@ use core::f64::consts::TAU;
 
 use super::HALF_POWER;
 use super::experiment::{DriveError, Recording, differences};
-use super::sine::{self, fit};
 use super::turning::Turning;
 use crate::machine::Machine;
+use crate::sine::{Baseline, as_lag_rad, fit};
 
 /// The phase is not told of a velocity below this part of the commanded one.
 const LEAST_RATIO: f64 = 1e-3;
@@ -102,8 +102,8 @@ fn response(recording: &Recording, turning: &Turning, axis: usize) -> Result<Res
     let periods = ((set.len() as f64 + 0.5) / period).floor().max(1.0);
     let whole = ((periods * period).round() as usize).min(set.len());
     let [set, actual] = [&set[..whole], &actual[..whole]];
-    let [commanded, found] = [set, actual].map(|values| fit(values, omega_per_s, tick_s));
-    let third = fit(actual, 3.0 * omega_per_s, tick_s);
+    let [commanded, found] = [set, actual].map(|values| fit(values, omega_per_s, tick_s, Baseline::Mean));
+    let third = fit(actual, 3.0 * omega_per_s, tick_s, Baseline::Mean);
     if !(commanded.amplitude > 0.0 && found.amplitude > LEAST_RATIO * commanded.amplitude) {
         return Err(DriveError::NoMotion {
             experiment: recording.experiment.clone(),
@@ -112,7 +112,7 @@ fn response(recording: &Recording, turning: &Turning, axis: usize) -> Result<Res
     }
     let (least, greatest) =
         actual.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)));
-    let phase_rad = sine::as_lag_rad(found.phase_rad - commanded.phase_rad);
+    let phase_rad = as_lag_rad(found.phase_rad - commanded.phase_rad);
     Ok(Response {
         axis,
         swing_ratio: 0.5 * (greatest - least) / commanded.amplitude,

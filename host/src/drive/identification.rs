@@ -5,10 +5,9 @@
 
 use std::thread;
 
-use super::experiment::{DriveError, Recording, open_loop, raised};
+use super::experiment::{DriveError, Recording, fastest_mm_s, open_loop, raised};
 use super::step;
-use super::turning::Turning;
-use crate::gcode::Plane;
+use super::turning::{Turning, plane_of};
 use crate::identify::{AxisRecording, Excitation, Identification, identification_plan, identify};
 use crate::machine::Machine;
 use crate::record::AXES;
@@ -40,17 +39,23 @@ pub fn identify_axes(machine: &Machine, axes: &[usize]) -> Result<Vec<Identifica
 /// A run can't be made.
 pub fn recordings(machine: &Machine, axis: usize) -> Result<Vec<AxisRecording>, DriveError> {
     super::experiment::within("axis", axis as f64, (0.0, AXES as f64 - 1.0))?;
-    identification_plan()
-        .iter()
-        .map(|excitation| {
-            let recording = match *excitation {
+    // Steps move this axis, circles another one, too, which may be slower.
+    let plane = plane_of(axis);
+    let [first, second, _] = plane.axes();
+    let alone = identification_plan(fastest_mm_s(machine, &[axis]));
+    let in_pairs = identification_plan(fastest_mm_s(machine, &[first, second]));
+    alone
+        .into_iter()
+        .zip(in_pairs)
+        .map(|(alone, in_pairs)| {
+            let excitation = if alone.harmonic_hz().is_some() { in_pairs } else { alone };
+            let recording = match excitation {
                 Excitation::Steps { feed_mm_s, cruise_s, rest_s } => {
                     steps(machine, axis, feed_mm_s, cruise_s, rest_s)?
                 }
                 Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods } => {
                     let turning = Turning {
-                        // Any plane with the axis in it.
-                        plane: if axis == 2 { Plane::Yz } else { Plane::Xy },
+                        plane,
                         settle_s: 0.0,
                         measured_s: f64::from(periods) / frequency_hz,
                         ..Turning::new(frequency_hz, amplitude_mm_s)

@@ -44,7 +44,7 @@ pub fn loaded(machine: &Machine, axis: usize, load_inertia_ratio: f64) -> Machin
 /// Runs the motion in open loop with one axis of its plane under the load.
 ///
 /// # Errors
-/// A load of −1 or less; otherwise as [`harmonic::measure`].
+/// A load below 0 or above 1000; otherwise as [`harmonic::measure`].
 pub fn measure(
     machine: &Machine,
     turning: &Turning,

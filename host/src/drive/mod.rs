@@ -17,7 +17,7 @@
 //!   values once more, under another regulator;
 //! - [`learning`]: a correction of a path that is driven again and again;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
-//! - [`sine`], [`spectrum`], [`model`]: the mathematics of it;
+//! - [`spectrum`], [`model`]: the mathematics of it; [`inverse`](mod@inverse): what undoes it;
 //! - [`mod@reference`]: what S4 measured, and what the reference machine has to give.
 
 pub mod bode;
@@ -27,12 +27,13 @@ pub mod experiment;
 pub mod harmonic;
 pub mod identification;
 pub mod inertia;
+pub mod inverse;
 pub mod learning;
 pub mod model;
 pub mod peer_regulator;
 pub mod reference;
 pub mod replay;
-pub mod sine;
+
 pub mod spectrum;
 pub mod step;
 pub mod turning;

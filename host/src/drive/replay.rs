@@ -38,14 +38,14 @@ pub struct Replayed {
 
 /// A regulator of three axes at work.
 enum Regulator<'a> {
-    Kernel(Box<AxesConfig<f32, AXES>>, [AxisState<f32>; AXES]),
+    Kernel(Box<(AxesConfig<f32, AXES>, [AxisState<f32>; AXES])>),
     Peer(Box<AxesConfig<f64, AXES>>, &'a [PeerGains; AXES], [PeerRegulator; AXES]),
 }
 
 impl<'a> Regulator<'a> {
     fn new(law: &'a Law, machine: &Machine) -> Result<Self, RunError> {
         Ok(match law {
-            Law::Kernel => Self::Kernel(Box::new(machine.axes_config()?), [AxisState::default(); AXES]),
+            Law::Kernel => Self::Kernel(Box::new((machine.axes_config()?, [AxisState::default(); AXES]))),
             Law::Peer(gains) => {
                 Self::Peer(Box::new(machine.axes_config()?), gains, [PeerRegulator::default(); AXES])
             }
@@ -64,7 +64,8 @@ impl<'a> Regulator<'a> {
         for (index, code) in codes.iter_mut().enumerate() {
             let axis = &mut tick.axes[index];
             match self {
-                Self::Kernel(config, states) => {
+                Self::Kernel(axes) => {
+                    let (config, states) = axes.as_mut();
                     let setpoint = Setpoint {
                         position: Position::default(),
                         velocity_mm_s: f32::from_f64(axis.vel_mm_s),

@@ -36,6 +36,12 @@ pub struct Turning {
     pub measured_s: f64,
 }
 
+/// The plane in which an axis is driven: with X or Y the other of the two, with Z X.
+#[must_use]
+pub fn plane_of(axis: usize) -> Plane {
+    if axis == 2 { Plane::Zx } else { Plane::Xy }
+}
+
 impl Turning {
     /// 3 s to settle, 1 s to measure, in X and Y.
     #[must_use]
@@ -76,12 +82,8 @@ impl Turning {
     /// # Errors
     /// As there, and a correction that can't be used.
     pub fn record_with(&self, options: &RunOptions<'_>, machine: &Machine) -> Result<Recording, DriveError> {
+        self.check(machine.tick_s)?;
         let &Self { frequency_hz, feed_mm_s, plane, .. } = self;
-        let fastest_hz = 1.0 / (TICKS_PER_TURN_MIN * machine.tick_s);
-        within("frequency [Hz]", frequency_hz, (FREQUENCY_HZ_MIN, fastest_hz))?;
-        within("feed [mm/min]", feed_mm_s * 60.0, (1.0, 1e6))?;
-        within("settling time [s]", self.settle_s, (0.0, 60.0))?;
-        within("measuring time [s]", self.measured_s, (0.0, 60.0))?;
         let machine = raised(machine, &self.demands(machine.path.curve_feed_share), &self.axes())?;
         let [first, second] = self.axes();
         let (letters, offsets) = (["X", "Y", "Z"], ["I", "J", "K"]);
@@ -104,6 +106,18 @@ impl Turning {
         let program = format!("G21 G90 {select} F{:.10}\n{}M2\n", feed_mm_s * 60.0, turn.repeat(turns));
         let experiment = format!("circles at {frequency_hz} Hz and {} mm/min", feed_mm_s * 60.0);
         Recording::with(options, experiment, &program, machine, feed_mm_s)
+    }
+
+    /// Whether all of it is in range in ticks of `tick_s`.
+    ///
+    /// # Errors
+    /// The first quantity that is not.
+    pub fn check(&self, tick_s: f64) -> Result<(), DriveError> {
+        let fastest_hz = 1.0 / (TICKS_PER_TURN_MIN * tick_s);
+        within("frequency [Hz]", self.frequency_hz, (FREQUENCY_HZ_MIN, fastest_hz))?;
+        within("feed [mm/min]", self.feed_mm_s * 60.0, (1.0, 1e6))?;
+        within("settling time [s]", self.settle_s, (0.0, 60.0))?;
+        within("measuring time [s]", self.measured_s, (0.0, 60.0))
     }
 
     /// What a circle takes at constant feed, over the share of it that planning uses.

@@ -2,11 +2,11 @@
 
 use hal_sim::{BedMode, DriveParameters};
 
-use super::harmonic_figures::{Bandwidth, HarmonicFigures};
-use super::step_figures::StepFigures;
+use super::harmonic_reading::{Bandwidth, HarmonicReading};
+use super::step_reading::StepReading;
 
 /// Half an interval over the value, up to which a value counts as determined.
-const DETERMINED: f64 = 0.3;
+pub const DETERMINED: f64 = 0.3;
 
 /// Intervals are wider than the scatter alone makes them: the search ends a little beside the optimum, because the
 /// model is rough where it saturates. Over fifty simulated axes the true value lay within the interval in 80 to 100 of
@@ -41,7 +41,7 @@ impl Estimate {
     }
 
     /// The same in another unit.
-    pub(super) fn times(self, factor: f64) -> Self {
+    pub(crate) fn times(self, factor: f64) -> Self {
         Self { value: self.value * factor, half_width_95: self.half_width_95 * factor.abs() }
     }
 }
@@ -129,9 +129,9 @@ pub struct Figures {
     /// The encoder's step \[mm\]: the least difference between two readings.
     pub resolution_mm: f64,
     /// Every velocity step from rest, in the order of the runs.
-    pub steps: Vec<StepFigures>,
+    pub steps: Vec<StepReading>,
     /// Every harmonic run, in order.
-    pub harmonics: Vec<HarmonicFigures>,
+    pub harmonics: Vec<HarmonicReading>,
     /// −3 dB points of the harmonic runs.
     pub bandwidths: Vec<Bandwidth>,
     /// The greatest acceleration that lasted for 5 ms, friction already overcome \[mm/s²\]. With a run that

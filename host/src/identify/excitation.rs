@@ -6,6 +6,11 @@
 
 use core::f64::consts::PI;
 
+/// The fastest motion of the plan \[m/min\].
+const FASTEST_M_MIN: f64 = 9.549;
+/// And the part of what an axis reaches that it may take: drift and trim need some of the output, too.
+const REACH_SHARE: f64 = 0.95;
+
 /// A motion of one axis about its starting point, as the commanded velocity over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Excitation {
@@ -31,10 +36,12 @@ pub enum Excitation {
 
 /// The motions to run, in any order: about 9 s of machine time and 50 mm of travel to one side.
 ///
-/// They were chosen for axes like those of S4 (Kv 300 … 600 /s, 8 … 16 m/s², bed at 9 … 18 Hz).
+/// They were chosen for axes like those of S4 (Kv 300 … 600 /s, 8 … 16 m/s², bed at 9 … 18 Hz), which are faster than
+/// the plan. An axis that reaches no more than `fastest_mm_s` \[mm/s\], > 0, gets all of it slower in proportion.
 #[must_use]
-pub fn identification_plan() -> Vec<Excitation> {
-    let per_minute = |m_min: f64| m_min * 1000.0 / 60.0;
+pub fn identification_plan(fastest_mm_s: f64) -> Vec<Excitation> {
+    let part = (REACH_SHARE * fastest_mm_s / (FASTEST_M_MIN * 1000.0 / 60.0)).min(1.0);
+    let per_minute = |m_min: f64| part * m_min * 1000.0 / 60.0;
     let harmonic = |feed_m_min, frequency_hz, periods| Excitation::Harmonic {
         amplitude_mm_s: per_minute(feed_m_min),
         frequency_hz,
@@ -43,7 +50,7 @@ pub fn identification_plan() -> Vec<Excitation> {
     vec![
         Excitation::Steps { feed_mm_s: per_minute(1.0), cruise_s: 0.25, rest_s: 0.1 },
         Excitation::Steps { feed_mm_s: per_minute(7.2), cruise_s: 0.4, rest_s: 0.1 },
-        Excitation::Steps { feed_mm_s: per_minute(9.549), cruise_s: 0.3, rest_s: 0.1 },
+        Excitation::Steps { feed_mm_s: per_minute(FASTEST_M_MIN), cruise_s: 0.3, rest_s: 0.1 },
         harmonic(0.12, 2.0, 3),
         harmonic(7.2, 3.0, 4),
         harmonic(2.150, 4.0, 4),
@@ -51,7 +58,7 @@ pub fn identification_plan() -> Vec<Excitation> {
         harmonic(2.150, 13.0, 9),
         harmonic(2.150, 20.0, 8),
         harmonic(2.150, 40.0, 14),
-        harmonic(9.549, 16.0, 6),
+        harmonic(FASTEST_M_MIN, 16.0, 6),
     ]
 }
 
@@ -106,7 +113,7 @@ mod tests {
     fn the_plan_is_short_and_stays_within_its_travel() {
         let tick_s = 0.5e-3;
         let mut time_s = 0.0;
-        for excitation in identification_plan() {
+        for excitation in identification_plan(f64::INFINITY) {
             let velocity = excitation.velocity_mm_s(tick_s);
             time_s += velocity.len() as f64 * tick_s;
             let mut position_mm: f64 = 0.0;
@@ -117,5 +124,18 @@ mod tests {
             assert!(velocity[0].abs() < 1e-12 && velocity.last().unwrap().abs() < 1.0, "{excitation:?}");
         }
         assert!((8.0..10.0).contains(&time_s), "{time_s} s");
+    }
+
+    #[test]
+    fn a_slow_axis_gets_what_it_reaches() {
+        let greatest_mm_s = |fastest_mm_s: f64| {
+            let motions = identification_plan(fastest_mm_s);
+            let velocities = motions.iter().flat_map(|motion| motion.velocity_mm_s(0.5e-3));
+            velocities.fold(0.0, f64::max)
+        };
+        for fastest_mm_s in [1.0, 100.0, 160.0] {
+            assert!((greatest_mm_s(fastest_mm_s) - REACH_SHARE * fastest_mm_s).abs() < 1e-9);
+        }
+        assert!((greatest_mm_s(1000.0) - 159.15).abs() < 1e-9);
     }
 }

@@ -25,7 +25,7 @@
 //! let tick_s = 0.5e-3;
 //! let model = DriveModel::new(REFERENCE_X, tick_s, 20)?;
 //! let mut runs = Vec::new();
-//! for excitation in identification_plan() {
+//! for excitation in identification_plan(333.0) {
 //!     let mut axis = DriveState::<128>::at_rest(&model, 0.0)?;
 //!     let command_mm_s = excitation.velocity_mm_s(tick_s);
 //!     let mut latch = |command_mm_s: &f64| {
@@ -49,8 +49,8 @@ mod error;
 mod excitation;
 mod recording;
 mod differences;
-mod step_figures;
-mod harmonic_figures;
+mod step_reading;
+mod harmonic_reading;
 mod parameters;
 mod simulation;
 mod cholesky;
@@ -62,11 +62,13 @@ mod estimate;
 mod display;
 
 pub use error::IdentifyError;
-pub use estimate::{AxisParametersFound, BedEstimate, Estimate, Figures, Identification, RunMatch};
+pub use estimate::{
+    AxisParametersFound, BedEstimate, DETERMINED, Estimate, Figures, Identification, RunMatch,
+};
 pub use excitation::{Excitation, identification_plan};
-pub use harmonic_figures::{Bandwidth, HarmonicFigures};
+pub use harmonic_reading::{Bandwidth, HarmonicReading};
 pub use recording::AxisRecording;
-pub use step_figures::StepFigures;
+pub use step_reading::StepReading;
 
 /// Identifies an axis.
 ///
@@ -88,11 +90,11 @@ pub fn figures(runs: &[AxisRecording]) -> Result<Figures, IdentifyError> {
         run.check(index + 1, first.tick_s)?;
     }
     let resolution_mm = recording::resolution_mm(runs);
-    let harmonics: Vec<_> = runs.iter().filter_map(harmonic_figures::harmonic_figures).collect();
+    let harmonics: Vec<_> = runs.iter().filter_map(harmonic_reading::harmonic_reading).collect();
     Ok(Figures {
         resolution_mm,
-        steps: runs.iter().flat_map(|run| step_figures::step_figures(run, resolution_mm)).collect(),
-        bandwidths: harmonic_figures::bandwidths(&harmonics),
+        steps: runs.iter().flat_map(|run| step_reading::step_reading(run, resolution_mm)).collect(),
+        bandwidths: harmonic_reading::bandwidths(&harmonics),
         harmonics,
         sustained_accel_mm_s2: fit::sustained_accel_mm_s2(runs),
     })

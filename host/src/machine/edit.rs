@@ -12,7 +12,7 @@ pub struct AxisEdit {
     pub axis: usize,
     /// Feedback gains.
     pub gains: Gains,
-    /// Feedforward; its tables are left as they are in the file.
+    /// Feedforward. Tables that it has are left as they are in the file, those that it has not are taken out.
     pub feedforward: Feedforward,
     /// Trim of the output \[V\].
     pub output_offset_v: f64,
@@ -54,6 +54,16 @@ fn set_regulator(regulator: &mut Table, edit: &AxisEdit) {
     set(regulator, "feedforward_accel_s", Some(feedforward.accel_s));
     set(regulator, "feedforward_jerk_s2", Some(feedforward.jerk_s2));
     set(regulator, "feedforward_lead_s", (feedforward.lead_s != 0.0).then_some(feedforward.lead_s));
+    let tables = &feedforward.tables;
+    for (key, table) in [
+        ("feedforward_velocity_table", tables.velocity),
+        ("feedforward_accel_table", tables.accel),
+        ("feedforward_jerk_table", tables.jerk),
+    ] {
+        if table.is_none() {
+            regulator.remove(key);
+        }
+    }
     let Some(drive) = &feedforward.drive else {
         regulator.remove("inverse");
         return;
@@ -152,6 +162,21 @@ mod tests {
         let back =
             edited("m.toml", &text, &[edit(&reference, 0), edit(&reference, 1)]).expect("a machine file");
         assert_eq!(Machine::from_toml("m.toml", &back), Ok(reference));
+    }
+
+    #[test]
+    fn tables_that_are_not_wanted_go() {
+        let mut machine = Machine::reference();
+        let table = "[axis.regulator.feedforward_velocity_table]\nreach = 300.0\nmm_s = [-1, -1, -1, -1, 0, 1, 1, 1, 1]\n\n";
+        let text = REFERENCE_TOML.replacen("[axis.drive]", &format!("{table}[axis.drive]"), 1);
+        let read = |text: &str| Machine::from_toml("m.toml", text).expect("a machine file");
+        let tables = read(&text).axes[0].feedforward.tables;
+        assert!(tables.velocity.is_some());
+        let without = edited("m.toml", &text, &[edit(&machine, 0)]).expect("a machine file");
+        assert_eq!(read(&without), machine);
+        machine.axes[0].feedforward.tables = tables;
+        let with = edited("m.toml", &text, &[edit(&machine, 0)]).expect("a machine file");
+        assert_eq!(read(&with), machine);
     }
 
     #[test]

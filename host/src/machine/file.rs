@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use hal_sim::{BedMode, DriveParameters, EncoderNoise, TimerBits};
 use motion_kernel::axis::{
-    AxesConfig, BedInverse, DriveInverse, Feedforward, Gains, PREVIEW_TICKS_MAX, TABLE_POINTS, Table, Tables,
+    AxesConfig, BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, Gains, LEAD_ROUNDING_TICKS,
+    PREVIEW_TICKS_MAX, TABLE_POINTS, Table, Tables,
 };
 use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
@@ -21,10 +22,6 @@ use super::settings::{AxisSettings, BLEND_TOLERANCE_MM, Machine, PathSettings};
 
 /// Seconds per minute: feeds in mm/min exist in this file only.
 const S_PER_MIN: f64 = 60.0;
-/// A lead of so many ticks exactly is not one more for rounding; the kernel's own \[ticks\].
-const LEAD_ROUNDING: f64 = 1e-6;
-/// The bed's inverse steps once a tick: its frequency is below this part of the tick's.
-const BED_SHARE: f64 = 0.25;
 /// An encoder's register tells a move from its complement only while the axis moves by less than half the
 /// register from one tick to the next. An axis may be faster than its feed, while it overshoots or catches up,
 /// and readings have noise: it is held to twice its feed.
@@ -64,7 +61,7 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
         }
         let &AxisSettings { feedforward: Feedforward { lead_s, drive, .. }, .. } = axis;
         if let Some(at) = &places.lead_s
-            && lead_s / tick_s > f64::from(PREVIEW_TICKS_MAX) + LEAD_ROUNDING
+            && lead_s / tick_s > f64::from(PREVIEW_TICKS_MAX) + LEAD_ROUNDING_TICKS
         {
             let most_s = f64::from(PREVIEW_TICKS_MAX) * tick_s;
             let expected = format!("at most {most_s}, {PREVIEW_TICKS_MAX} ticks of tick_s = {tick_s}");
@@ -76,9 +73,9 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
             return Err(refuse(at.clone(), format!("at least tick_s = {tick_s}")));
         }
         if let (Some(at), Some(bed)) = (&places.inverse_bed_hz, drive.and_then(|drive| drive.bed))
-            && bed.frequency_hz * tick_s >= BED_SHARE
+            && bed.frequency_hz * tick_s >= BED_TICK_SHARE_MAX
         {
-            let below_hz = BED_SHARE / tick_s;
+            let below_hz = BED_TICK_SHARE_MAX / tick_s;
             let expected = format!("below {below_hz}, a quarter of the frequency of tick_s = {tick_s}");
             return Err(refuse(at.clone(), expected));
         }

@@ -62,7 +62,7 @@ ranges! {
     FeedforwardGain: "a number from -1000 to 1000", |value| value.abs() <= 1000.0;
     Positive: "a number from 1e-6 to 1e9", |value| (1e-6..=1e9).contains(&value);
     DeadTime: "a number from 0 to 0.01", |value| (0.0..=0.01).contains(&value);
-    LeadTime: "a number from 0 to 0.1", |value| (0.0..=0.1).contains(&value);
+    LeadTime: "a number from 0 to 0.48", |value| (0.0..=0.48).contains(&value);
     TablePoint: "a number from -100000 to 100000", |value| value.abs() <= 1e5;
     InverseGain: "a number from 0.001 to 1e6", |value| (1e-3..=1e6).contains(&value);
     IntegralTime: "a number from 0.00002 to 1e6", |value| (2e-5..=1e6).contains(&value);

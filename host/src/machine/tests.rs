@@ -1,6 +1,6 @@
 //! The machine file against the built-in machine, and every refusal.
 
-use motion_kernel::axis::AxesConfig;
+use motion_kernel::axis::{AxesConfig, PREVIEW_TICKS_MAX};
 
 use super::keys::{KEY_TABLES, KeyTable};
 use super::{Machine, REFERENCE_TOML};
@@ -21,6 +21,23 @@ fn refused(from: &str, to: &str) -> String {
 #[test]
 fn the_file_is_the_built_in_machine() {
     assert_eq!(Machine::from_toml("reference.toml", REFERENCE_TOML), Ok(Machine::reference()));
+}
+
+/// What texts say of the longest lead is the kernel's.
+#[test]
+fn texts_have_the_kernels_preview() {
+    let ticks = PREVIEW_TICKS_MAX;
+    assert!(REFERENCE_TOML.contains(&format!("the longest lead needs, at most {ticks}: ")));
+    // At the slowest tick.
+    let most_s = f64::from(ticks) * 0.02;
+    assert!(REFERENCE_TOML.contains(&format!("0 … {most_s}, at most {ticks}·tick_s. Optional")));
+    let mut keys = KEY_TABLES.iter().flat_map(|table| table.keys);
+    let lead = keys.find(|key| key.name == "feedforward_lead_s").expect("a key");
+    assert!(lead.meaning.contains(&format!("at most {ticks} ticks.")), "{}", lead.meaning);
+    let mut axis = Machine::reference().axes[0].figures();
+    axis.feedforward.lead_s = 1.0;
+    let refusal = AxesConfig::<f32, 1>::new(&[axis], 5e-4).expect_err("too long").to_string();
+    assert!(refusal.contains(&format!("from 0 to {ticks} ticks")), "{refusal}");
 }
 
 #[test]
@@ -297,7 +314,7 @@ fn defaults_and_only_they_may_be_left_out() {
 fn ranges_of_optional_keys_are_kept() {
     let text = with_optional_keys();
     let cases: &[(&str, &str, &[&str])] = &[
-        ("axis.regulator", "feedforward_lead_s", &["-1e-9", "0.11"]),
+        ("axis.regulator", "feedforward_lead_s", &["-1e-9", "0.481"]),
         ("axis.regulator.feedforward_velocity_table", "reach", &["0", "-1", "2e12"]),
         (
             "axis.regulator.feedforward_velocity_table",

@@ -7,13 +7,11 @@
 use core::f64::consts::TAU;
 
 use hal_sim::DriveParameters;
-use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward};
+use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, PREVIEW_TICKS_MAX};
 
+use crate::drive::inverse::inverse;
 use crate::drive::model::{Complex, response};
 
-/// From this velocity on the whole Coulomb friction is compensated \[mm/s\]: at 900 mm/s² (4 Hz in S4's circles) it is
-/// passed within about a tick.
-pub const REVERSAL_MM_S: f64 = 0.5;
 /// Frequencies over which gains are fitted \[Hz\].
 const FITTED_HZ: core::ops::RangeInclusive<u32> = 1..=20;
 
@@ -77,35 +75,38 @@ pub fn feedforward(
     kp_per_s: f64,
     tick_s: f64,
 ) -> Feedforward {
-    let velocity = rounded(1.0 / command_gain);
+    let of = |all: Feedforward| Feedforward {
+        velocity: rounded(all.velocity / command_gain),
+        accel_s: rounded(all.accel_s / command_gain),
+        jerk_s2: rounded(all.jerk_s2 / command_gain),
+        // Rounding takes no lead beyond what the kernel has room for.
+        lead_s: rounded(all.lead_s).min(f64::from(PREVIEW_TICKS_MAX) * tick_s),
+        tables: all.tables,
+        drive: all.drive.map(|drive| DriveInverse {
+            velocity_gain_per_s: rounded(drive.velocity_gain_per_s * command_gain),
+            integral_time_s: rounded(drive.integral_time_s),
+            current_lag_s: rounded(drive.current_lag_s),
+            viscous_friction_per_s: rounded(drive.viscous_friction_per_s),
+            coulomb_friction_mm_s2: rounded(drive.coulomb_friction_mm_s2),
+            reversal_mm_s: drive.reversal_mm_s,
+            bed: drive.bed.map(|bed| BedInverse {
+                frequency_hz: rounded(bed.frequency_hz),
+                damping_ratio: rounded(bed.damping_ratio),
+                mass_ratio: rounded(bed.mass_ratio),
+            }),
+        }),
+    };
     let gains = |[accel_s, jerk_s2]: [f64; 2]| Feedforward {
-        velocity,
-        accel_s: rounded(accel_s / command_gain),
-        jerk_s2: rounded(jerk_s2 / command_gain),
+        velocity: 1.0,
+        accel_s,
+        jerk_s2,
         ..Feedforward::default()
     };
-    match method {
+    of(match method {
         Method::Series => gains(series(drive, tick_s)),
         Method::Fit => gains(fit(drive, kp_per_s, tick_s)),
-        Method::Inverse => Feedforward {
-            velocity,
-            lead_s: rounded(drive.dead_time_s + 0.5 * tick_s),
-            drive: Some(DriveInverse {
-                velocity_gain_per_s: rounded(drive.velocity_gain_per_s * command_gain),
-                integral_time_s: rounded(drive.integral_time_s),
-                current_lag_s: rounded(drive.current_lag_s.max(0.0)),
-                viscous_friction_per_s: rounded(drive.viscous_friction_per_s.max(0.0)),
-                coulomb_friction_mm_s2: rounded(drive.coulomb_friction_mm_s2.max(0.0)),
-                reversal_mm_s: REVERSAL_MM_S,
-                bed: drive.bed.map(|bed| BedInverse {
-                    frequency_hz: rounded(bed.frequency_hz),
-                    damping_ratio: rounded(bed.damping_ratio),
-                    mass_ratio: rounded(bed.mass_ratio),
-                }),
-            }),
-            ..Feedforward::default()
-        },
-    }
+        Method::Inverse => inverse(drive, tick_s),
+    })
 }
 
 /// To six significant digits: more than any identification knows, and what a file shows is what runs.

@@ -9,9 +9,10 @@
 //!
 //! **Lead.** Drive and converter take time: dead time, and half a tick for holding the output. Feedforward can't
 //! undo that after the fact, but it can come early: position set-points are delayed by a few ticks, all axes alike,
-//! so that the path does not change ([`Preview`](super::preview::Preview)), and feedforward is not. What a lead is
-//! short of those whole ticks is taken off by the series V(t − φ) = V − φ·a + φ²/2·J, which costs nothing: it is in the
-//! gains. Two axes' leads may differ by more than a tick; at 2 ms the terms left out are 0.1 µm at 13 Hz.
+//! so that the path does not change ([`Preview`](super::preview::Preview)), and feedforward is not. The longest lead
+//! decides by how many. What another one is short of them is taken off again: whole ticks by delaying the command,
+//! which is exact, the rest by the series V(t − φ) = V − φ·a + φ²/2·J, which costs nothing: it is in the gains. φ is
+//! below a tick; of half a millisecond the terms left out are 10⁻⁴ of the velocity at 28 Hz.
 //!
 //! **The drive's inverse.** A velocity drive is a PI controller with gain Kv and integral time Ti over a current loop
 //! with lag Tc. To make acceleration a against friction it needs the torque a + b·V + a_c·sgn V, (1 + Tc·s) of it
@@ -21,8 +22,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX};
 use super::scale::ScaleError;
-use crate::num::Real;
+use crate::num::{Fixed, Real};
 use crate::path::Setpoint;
 
 /// Feedforward of an axis. The default is none.
@@ -60,9 +62,10 @@ pub const TABLE_POINTS: usize = 9;
 /// three: a table of ±5 mm/s has steps of 0.15 µm/s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
-    /// The points lie evenly from −reach to +reach, in the quantity's unit; > 10⁻⁶. Beyond, the end points hold.
+    /// The points lie evenly from −reach to +reach, in the quantity's unit: above 10⁻⁶, in fixed point below 2³¹. Beyond,
+    /// the end points hold.
     pub reach: f64,
-    /// Velocity of a step \[mm/s\], 0 or more.
+    /// Velocity of a step \[mm/s\], 0 to 10.
     pub mm_s_per_step: f64,
     /// Velocity commands in steps.
     pub steps: [i16; TABLE_POINTS],
@@ -90,17 +93,18 @@ impl Table {
 /// A drive with its mechanics, to be inverted. Everything is per unit of the inertia that it moves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveInverse {
-    /// Proportional gain of the velocity controller \[1/s\], > 0.
+    /// Proportional gain of the velocity controller \[1/s\], 10⁻³ to 10⁶.
     pub velocity_gain_per_s: f64,
-    /// Integral time of the velocity controller \[s\], > 0.
+    /// Integral time of the velocity controller \[s\], a tick to 10⁶.
     pub integral_time_s: f64,
-    /// Lag of the current loop \[s\], 0 or more.
+    /// Lag of the current loop \[s\], 0 to 1.
     pub current_lag_s: f64,
-    /// Viscous friction \[1/s\], 0 or more.
+    /// Viscous friction \[1/s\], 0 to 10⁶.
     pub viscous_friction_per_s: f64,
-    /// Coulomb friction \[mm/s²\], 0 or more.
+    /// Coulomb friction \[mm/s²\], 0 to 10⁶; over Kv and the next one it must fit the number type.
     pub coulomb_friction_mm_s2: f64,
-    /// Velocity from which on all of Coulomb friction is compensated \[mm/s\], > 0; below, a part in proportion.
+    /// Velocity from which on all of Coulomb friction is compensated \[mm/s\], 10⁻³ to 10⁶; below, a part in
+    /// proportion.
     pub reversal_mm_s: f64,
     /// The machine bed, if the axis shakes it.
     pub bed: Option<BedInverse>,
@@ -109,16 +113,22 @@ pub struct DriveInverse {
 /// One mode of the machine bed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BedInverse {
-    /// Natural frequency of the bed alone \[Hz\], > 0, below a quarter of the tick's frequency.
+    /// Natural frequency of the bed alone \[Hz\], above 0, below [`BED_TICK_SHARE_MAX`] of the tick's frequency.
     pub frequency_hz: f64,
     /// Fraction of critical damping, from 0.001 to 1.
     pub damping_ratio: f64,
-    /// Moving mass over the bed's modal mass, > 0.
+    /// Moving mass over the bed's modal mass, above 0; a resonance with it must fit the number type.
     pub mass_ratio: f64,
 }
 
-/// Greatest velocity, acceleration and jerk that a set-point may have where numbers have a range.
-const REACH: [f64; 3] = [1e6, 1e9, 2e9];
+/// The bed's inverse steps once a tick: its frequency is below this part of the tick's.
+pub const BED_TICK_SHARE_MAX: f64 = 0.25;
+
+/// Greatest velocity, acceleration and jerk that room is kept for: a set-point's where numbers have a range, and as much
+/// in floats.
+fn reach<R: Real>() -> [f64; 3] {
+    R::SETPOINT_MAX.or(Fixed::SETPOINT_MAX).unwrap_or_default()
+}
 
 /// eˣ − 1 for |x| ≤ 2. A loop of a few operations: general functions in f64 are kilobytes on a core without it.
 fn expm1(x: f64) -> f64 {
@@ -156,7 +166,7 @@ impl<R: Real> Linear<R> {
         let gains =
             [velocity, accel - late_s * velocity, jerk - late_s * accel + late_s * late_s / 2.0 * velocity];
         // With room for the sum of all that is added to it.
-        let most: f64 = gains.iter().zip(REACH).map(|(gain, reach)| libm::fabs(*gain) * reach).sum();
+        let most: f64 = gains.iter().zip(reach::<R>()).map(|(gain, reach)| libm::fabs(*gain) * reach).sum();
         let refused = ScaleError {
             quantity,
             value: gains.into_iter().find(|gain| !gain.is_finite()).unwrap_or(most),
@@ -180,7 +190,10 @@ impl<R: Real> Linear<R> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Lookup<R> {
     reach: R,
-    per_unit: R,
+    /// A power of two that brings the reach to at most 1, and from there to points: in fixed point the quotient of both
+    /// in one has no digits left at a long reach.
+    scale: R,
+    per_scaled: R,
     mm_s_per_step: R,
     steps: [i16; TABLE_POINTS],
 }
@@ -193,17 +206,26 @@ impl<R: Real> Lookup<R> {
             value,
             expected: "a reach above 1e-6 and steps of at most 10 mm/s",
         };
-        let per_unit = R::from_f64((TABLE_POINTS - 1) as f64 / 2.0 / reach);
+        let mut scale = 1.0;
+        // 2³¹ is as far as a reach goes in fixed point.
+        for _ in 0..31 {
+            if scale * reach > 1.0 {
+                scale *= 0.5;
+            }
+        }
+        let per_scaled = (TABLE_POINTS - 1) as f64 / 2.0 / (scale * reach);
         let is_step = (0.0..=10.0).contains(&mm_s_per_step);
         let mm_s_per_step =
             R::checked_from_f64(mm_s_per_step).filter(|_| is_step).ok_or(refused(mm_s_per_step))?;
         let reach = R::checked_from_f64(reach).filter(|_| reach > 1e-6).ok_or(refused(reach))?;
-        Ok(Self { reach, per_unit, mm_s_per_step, steps })
+        let per_scaled = R::from_f64(per_scaled);
+        Ok(Self { reach, scale: R::from_f64(scale), per_scaled, mm_s_per_step, steps })
     }
 
     fn at(&self, value: R) -> R {
         // From 0 at −reach to 8 at +reach, in steps of 2⁻³².
-        let place = ((value.max(-self.reach).min(self.reach) + self.reach) * self.per_unit).to_q32();
+        let from_middle = value.max(-self.reach).min(self.reach) * self.scale * self.per_scaled;
+        let place = from_middle.to_q32() + ((TABLE_POINTS as i64 - 1) << 31);
         let index = (place >> 32).clamp(0, TABLE_POINTS as i64 - 2) as usize;
         let part = R::from_q32(place - ((index as i64) << 32));
         match (self.steps.get(index), self.steps.get(index + 1)) {
@@ -278,7 +300,7 @@ impl<R: Real> Bed<R> {
         check(
             "bed frequency [Hz]",
             frequency_hz,
-            frequency_hz > 0.0 && frequency_hz * tick_s < 0.25,
+            frequency_hz > 0.0 && frequency_hz * tick_s < BED_TICK_SHARE_MAX,
             "more than 0, less than a quarter of the tick's frequency",
         )?;
         check(
@@ -289,7 +311,8 @@ impl<R: Real> Bed<R> {
         )?;
         // Shaken as badly as can be, to and fro at the resonance, the bed's acceleration is 2/π·μ/ζ of the axis', and
         // μ at first.
-        let peak = REACH[1] * mass_ratio * (2.0 + 0.75 / damping_ratio);
+        let [_, accel_mm_s2, _] = reach::<R>();
+        let peak = accel_mm_s2 * mass_ratio * (2.0 + 0.75 / damping_ratio);
         let fits = mass_ratio > 0.0 && R::checked_from_f64(peak).is_some();
         check("bed mass ratio", mass_ratio, fits, "more than 0, and a resonance within the kernel's range")?;
         // With the moving mass on it: z″ + 2σ·z′ + ω²·z = −share·a. Steps of a tick have the poles of this, and its
@@ -420,12 +443,34 @@ pub struct FeedforwardConfig<R> {
 struct More<R> {
     tables: Option<LookupTables<R>>,
     inverse: Option<Inverse<R>>,
+    /// By how many ticks the command is delayed.
+    delay_ticks: u8,
 }
 
 /// What feedforward remembers. At rest: the default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeedforwardState<R> {
     inverse: InverseState<R>,
+    delay: Delay<R>,
+}
+
+/// The commands of the last ticks. Delaying what comes out is delaying what goes in, and is one number instead of three.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Delay<R> {
+    past_mm_s: [R; PREVIEW_TICKS_MAX as usize],
+    next: u8,
+}
+
+impl<R: Real> Delay<R> {
+    /// The command of `ticks` ago, 1 or more; remembers that of now.
+    fn tick(&mut self, ticks: u8, command_mm_s: R) -> R {
+        // The ring is as long as the delay: the place read is the one written.
+        let Some(place) = self.past_mm_s.get_mut(usize::from(self.next)) else { return command_mm_s };
+        let delayed_mm_s = *place;
+        *place = command_mm_s;
+        self.next = if self.next + 1 >= ticks { 0 } else { self.next + 1 };
+        delayed_mm_s
+    }
 }
 
 impl<R: Real> FeedforwardConfig<R> {
@@ -437,9 +482,13 @@ impl<R: Real> FeedforwardConfig<R> {
     pub fn new(feedforward: &Feedforward, preview_ticks: u8, tick_s: f64) -> Result<Self, ScaleError> {
         let &Feedforward { velocity, accel_s, jerk_s2, lead_s, tables, drive } = feedforward;
         let preview_s = f64::from(preview_ticks) * tick_s;
-        // What is beyond by rounding alone is not late by less than nothing.
-        let late_s = if preview_s > lead_s { preview_s - lead_s } else { 0.0 };
-        if !(lead_s >= 0.0 && lead_s <= preview_s * (1.0 + 1e-6)) {
+        // Whole ticks of what it comes too early; a whole one is not one less for rounding, nor is what is left less
+        // than nothing.
+        let early_ticks = (preview_s - lead_s) / tick_s + LEAD_ROUNDING_TICKS;
+        let delay_ticks = (early_ticks as u8).min(PREVIEW_TICKS_MAX);
+        let late_s = preview_s - lead_s - f64::from(delay_ticks) * tick_s;
+        let late_s = if late_s > 0.0 { late_s } else { 0.0 };
+        if !(lead_s >= 0.0 && lead_s <= preview_s + LEAD_ROUNDING_TICKS * tick_s) {
             let expected = "a number from 0 to the machine's preview";
             return Err(ScaleError { quantity: "feedforward lead [s]", value: lead_s, expected });
         }
@@ -449,7 +498,8 @@ impl<R: Real> FeedforwardConfig<R> {
             Some(drive) => Some(Inverse::new(drive, late_s, tick_s)?),
             None => None,
         };
-        let more = (tables.is_some() || inverse.is_some()).then_some(More { tables, inverse });
+        let is_more = tables.is_some() || inverse.is_some() || delay_ticks > 0;
+        let more = is_more.then_some(More { tables, inverse, delay_ticks });
         Ok(Self { gains, more })
     }
 
@@ -458,7 +508,7 @@ impl<R: Real> FeedforwardConfig<R> {
     pub fn tick(&self, state: &mut FeedforwardState<R>, setpoint: &Setpoint<R>) -> R {
         let command = self.gains.at(setpoint);
         match &self.more {
-            Some(more) => command + more.tick(state, setpoint),
+            Some(more) => more.tick(state, setpoint, command),
             None => command,
         }
     }
@@ -467,18 +517,45 @@ impl<R: Real> FeedforwardConfig<R> {
 impl<R: Real> More<R> {
     // A function of its own, so that axes without it don't pay for its registers.
     #[inline(never)]
-    fn tick(&self, state: &mut FeedforwardState<R>, setpoint: &Setpoint<R>) -> R {
-        let tables = self.tables.as_ref().map_or(R::ZERO, |tables| tables.at(setpoint));
-        match &self.inverse {
-            Some(inverse) => tables + inverse.tick(&mut state.inverse, setpoint),
-            None => tables,
+    fn tick(&self, state: &mut FeedforwardState<R>, setpoint: &Setpoint<R>, gained: R) -> R {
+        let mut command = gained;
+        if let Some(tables) = &self.tables {
+            command = command + tables.at(setpoint);
         }
+        if let Some(inverse) = &self.inverse {
+            command = command + inverse.tick(&mut state.inverse, setpoint);
+        }
+        if self.delay_ticks > 0 { state.delay.tick(self.delay_ticks, command) } else { command }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// At both ends of the reach, between them and beyond, every number type gives the table's value.
+    #[test]
+    fn tables_are_exact_over_their_whole_reach() {
+        fn holds<R: Real>(reach: f64) {
+            // A line: what is between points is known.
+            let points: [f64; TABLE_POINTS] = core::array::from_fn(|index| 25.0 * (index as f64 - 4.0));
+            let lookup = Lookup::<R>::new("table", &Table::new(reach, &points)).expect("valid");
+            for part in [-2.0, -1.0, -0.99, -0.5, -0.01, 0.0, 0.3, 0.5, 0.999, 1.0, 1.5] {
+                let value = R::checked_from_f64(part * reach).unwrap_or(R::from_f64(part.signum() * reach));
+                let expected = 100.0 * part.clamp(-1.0, 1.0);
+                let found = lookup.at(value).to_f64();
+                // A step of the argument at a short reach, and the table's own steps of 16 bits.
+                let tolerance = 100.0 * (1e-4 + 1e-3 * f64::from(u8::from(reach < 1e-3)));
+                assert!((found - expected).abs() < tolerance, "{reach:e} at {part}: {found}");
+            }
+        }
+        for reach in [1.1e-6, 1e-3, 0.7, 1.0, 300.0, 5e3, 1e6, 1e8, 5e8, 1.5e9, 2.1e9] {
+            holds::<f32>(reach);
+            holds::<f64>(reach);
+            holds::<Fixed>(reach);
+        }
+        assert!(Lookup::<Fixed>::new("table", &Table::new(2.2e9, &[0.0; TABLE_POINTS])).is_err());
+    }
 
     #[test]
     fn loops_are_the_functions() {

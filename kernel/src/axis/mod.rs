@@ -19,8 +19,10 @@ pub mod regulator;
 pub mod scale;
 
 pub use correction::{Correction, CorrectionError};
-pub use feedforward::{BedInverse, DriveInverse, Feedforward, TABLE_POINTS, Table, Tables};
-pub use preview::{PREVIEW_TICKS_MAX, Preview};
+pub use feedforward::{
+    BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, TABLE_POINTS, Table, Tables,
+};
+pub use preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX, Preview};
 pub use regulator::{Command, Gains, Regulator, RegulatorState};
 pub use scale::{EncoderScale, OutputScale, ScaleError};
 

@@ -10,6 +10,8 @@ use crate::units::Position;
 
 /// Greatest delay \[ticks\].
 pub const PREVIEW_TICKS_MAX: u8 = 24;
+/// A lead of so many ticks exactly is not one more, or less, for rounding \[ticks\].
+pub const LEAD_ROUNDING_TICKS: f64 = 1e-6;
 
 /// The delay that all axes share: the whole ticks that the longest lead needs.
 ///
@@ -19,8 +21,7 @@ pub(super) fn preview_ticks(axes: &[AxisFigures], tick_s: f64) -> Result<u8, (us
     let mut most = 0;
     for (axis, figures) in axes.iter().enumerate() {
         let value = figures.feedforward.lead_s;
-        // A lead of so many ticks exactly is not one more for rounding.
-        let ticks = value / tick_s - 1e-6;
+        let ticks = value / tick_s - LEAD_ROUNDING_TICKS;
         if !(value >= 0.0 && ticks <= f64::from(PREVIEW_TICKS_MAX)) {
             let expected = "a number from 0 to 24 ticks";
             return Err((axis, ScaleError { quantity: "feedforward lead [s]", value, expected }));

@@ -23,6 +23,7 @@
 //! | a septic's sums | [`Piece::septic`](crate::path::Piece::septic) | Σ k(k−1)(k−2)·\|qₖ\| and its like below 4 |
 //! | set-points and what leads to them | [`Feeder`](crate::queue::Feeder), where piece and feed meet | the chain rule with greatest values, at most [`Real::SETPOINT_MAX`] |
 //! | feedforward | [`AxesConfig`](crate::axis::AxesConfig) | gains times [`Real::SETPOINT_MAX`] within an eighth of the range |
+//! | tables of feedforward | [`AxesConfig`](crate::axis::AxesConfig) | what is looked up is at most 10⁹ + 2·10⁹ times a tick of 0.02 s, is cut at the reach, and brought below 1 by a power of two, then to ±4 points; a table gives at most 2¹⁵ steps of 10 mm/s |
 //! | feedback | [`AxesConfig`](crate::axis::AxesConfig) | gains times the following-error limit within an eighth; beyond the limit the axis is lost and no gain is applied |
 //!
 //! They wrap if they do; in a build with debug assertions that is found.

@@ -64,15 +64,20 @@ fn inverting() -> Machine {
     machine
 }
 
-/// The stringer and facets under feedforward that inverts the drive.
+/// The stringer, facets, and the stringer with outputs that saturate, under feedforward that inverts the drive.
 pub(crate) fn inverted() -> Vec<Vec<u8>> {
-    let machine = inverting();
-    vec![bytes(STRINGER, &machine, Mode::Spanning), bytes(&facets_text(), &machine, Mode::PerBlock)]
+    worst_ticks_of(&inverting())
 }
 
-/// The stringer, with tables of feedforward too.
+/// With feedforward that inverts the drive, as many pieces a tick as the kernel accepts.
+pub(crate) fn densest_inverted() -> Vec<u8> {
+    densest_of(&inverting())
+}
+
+/// All that feedforward can do: the drive's inverse, tables, and leads that differ by ticks, so that a command is delayed.
 pub(crate) fn with_tables() -> Vec<u8> {
     let mut machine = inverting();
+    machine.axes[1].feedforward.lead_s = 0.0054;
     let table = |reach: f64| Some(Table::new(reach, &[-0.5, -0.3, -0.25, -0.2, 0.0, 0.1, 0.2, 0.4, 0.6]));
     for axis in &mut machine.axes {
         axis.feedforward.tables = Tables { velocity: table(60.0), accel: table(400.0), jerk: table(4e3) };
@@ -142,23 +147,34 @@ fn facets_text() -> String {
 
 /// The programs of the budgets: the stringer; facets; the stringer with outputs that saturate.
 pub(crate) fn worst_ticks() -> Vec<Vec<u8>> {
-    let mut weak = Machine::reference();
+    worst_ticks_of(&Machine::reference())
+}
+
+fn worst_ticks_of(machine: &Machine) -> Vec<Vec<u8>> {
+    let mut weak = machine.clone();
     for axis in &mut weak.axes {
         // 48 mm/s where the program asks for 83: the axes fall behind, and catch up.
         axis.output_limit_v = 1.45;
         axis.following_error_limit_mm = 100.0;
     }
-    vec![stringer(), facets(), bytes(STRINGER, &weak, Mode::Spanning)]
+    vec![
+        bytes(STRINGER, machine, Mode::Spanning),
+        bytes(&facets_text(), machine, Mode::PerBlock),
+        bytes(STRINGER, &weak, Mode::Spanning),
+    ]
 }
 
 /// As many pieces a tick as the kernel accepts: lines that the path passes within little more than a sixteenth of a
 /// tick each.
 pub(crate) fn densest() -> Vec<u8> {
-    let machine = Machine::reference();
+    densest_of(&Machine::reference())
+}
+
+fn densest_of(machine: &Machine) -> Vec<u8> {
     let feed_mm_s = 50.0;
     let length_mm = feed_mm_s * machine.tick_s / 15.5;
     let text = format!("G91 G1 F{}\n", feed_mm_s * 60.0) + &format!("X{length_mm:.7}\n").repeat(6000);
-    bytes(&text, &machine, Mode::Spanning)
+    bytes(&text, machine, Mode::Spanning)
 }
 
 /// What the feeder accepts at most: little less than 8 segments of three phases and 16 curved pieces end in every tick,

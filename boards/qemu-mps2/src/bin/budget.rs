@@ -9,8 +9,8 @@ use core::hint::black_box;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use hal_sim::SimMachine;
-use hal_sim::closed_loop::{InMemory, close, reference_machine};
+use hal_sim::closed_loop::{Closed, InMemory, LoopError, close, reference_machine};
+use hal_sim::{MachineParameters, SimMachine};
 use motion_kernel::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState};
 use motion_kernel::exec::ExecState;
 use motion_kernel::kernel::Kernel;
@@ -76,24 +76,40 @@ fn budgeted_tick<'a>(
 
 #[inline(never)]
 fn measure<const N: usize>(counter: &Counter, bytes: &[u8], streams: &mut Queues<N>, tick: Tick<N>) {
-    // Looked at where it is: a header is a kilobyte.
-    match &Reader::<N>::new(bytes) {
-        Ok(program) => {
-            ticks(counter, program, streams, tick);
-            stages(counter, program);
-        }
-        Err(error) => fail(error),
-    }
+    looped(counter, bytes, &parameters(bytes), streams, tick);
+    stages::<N>(counter, bytes);
+}
+
+/// The program, which is accepted. A header is a kilobyte: looked at where it is, and gone before the ticks begin.
+fn program<'a, const N: usize>(read: &'a Result<Reader<'a, N>, ProgramError>) -> &'a Reader<'a, N> {
+    read.as_ref().unwrap_or_else(|error| fail(error))
+}
+
+/// Closes the loop with nothing else in its frame: closing it is what needs the most room.
+#[inline(never)]
+fn looped<const N: usize>(
+    counter: &Counter,
+    bytes: &[u8],
+    parameters: &MachineParameters<N>,
+    streams: &mut Queues<N>,
+    tick: Tick<N>,
+) {
+    let machine = simulated(parameters);
+    let mut closed = closed(bytes, streams, &machine);
+    // In place: the microbit has no room for another one.
+    let closed = closed.as_mut().unwrap_or_else(|error| fail(error));
+    ticks(counter, bytes, closed, tick);
 }
 
 #[inline(never)]
-fn ticks<const N: usize>(counter: &Counter, program: &Reader<'_, N>, streams: &mut Queues<N>, tick: Tick<N>) {
-    let machine = simulated(program.header());
-    let mut closed = close(program, streams, &machine);
-    // In place: the microbit has no room for another one.
-    let (producer, closed_loop) = closed.as_mut().unwrap_or_else(|error| fail(error));
+fn ticks<const N: usize>(
+    counter: &Counter,
+    bytes: &[u8],
+    (producer, closed_loop): &mut Closed<'_, Number, N, LINE>,
+    tick: Tick<N>,
+) {
     // A regulator of its own beside the kernel's, fed with the same.
-    let (config, mut axis) = beside(program.header());
+    let (config, mut axis) = beside::<N>(bytes);
     let mut deepest = 0;
     loop {
         let is_all = producer.fill().unwrap_or_else(|error| fail(&error));
@@ -122,13 +138,29 @@ fn ticks<const N: usize>(counter: &Counter, program: &Reader<'_, N>, streams: &m
 // Each in a frame of its own, which is gone before the ticks begin: 16 KiB are not much.
 
 #[inline(never)]
-fn simulated<const N: usize>(header: &Header<N>) -> SimMachine<N, LINE> {
-    SimMachine::new(&reference_machine(header, SUBSTEPS)).unwrap_or_else(|error| fail(&error))
+fn simulated<const N: usize>(parameters: &MachineParameters<N>) -> SimMachine<N, LINE> {
+    SimMachine::new(parameters).unwrap_or_else(|error| fail(&error))
+}
+
+#[inline(never)]
+fn parameters<const N: usize>(bytes: &[u8]) -> MachineParameters<N> {
+    reference_machine(program(&Reader::<N>::new(bytes)).header(), SUBSTEPS)
+}
+
+#[inline(never)]
+fn closed<'a, const N: usize>(
+    bytes: &'a [u8],
+    streams: &'a mut Queues<N>,
+    machine: &'a SimMachine<N, LINE>,
+) -> Result<Closed<'a, Number, N, LINE>, LoopError> {
+    close(Reader::<N>::new(bytes).as_ref().unwrap_or_else(|error| fail(error)), streams, machine)
 }
 
 /// The first axis and its state at the program's start.
 #[inline(never)]
-fn beside<const N: usize>(header: &Header<N>) -> (AxisConfig<Number>, Axis) {
+fn beside<const N: usize>(bytes: &[u8]) -> (AxisConfig<Number>, Axis) {
+    let read = Reader::<N>::new(bytes);
+    let header = program(&read).header();
     let preview_ticks = AxesConfig::<Number, N>::preview_ticks(&header.axes, header.tick_s);
     let config = preview_ticks
         .map_err(|error| error.cause)
@@ -141,7 +173,9 @@ fn beside<const N: usize>(header: &Header<N>) -> (AxisConfig<Number>, Axis) {
 
 /// The stages by themselves, over all that the program contains.
 #[inline(never)]
-fn stages<const N: usize>(counter: &Counter, program: &Reader<'_, N>) {
+fn stages<const N: usize>(counter: &Counter, bytes: &[u8]) {
+    let read = Reader::<N>::new(bytes);
+    let program = program(&read);
     let &Header { tick_s, rules, .. } = program.header();
     let limits = rules.limits;
     let motion = PathMotion {

@@ -1,11 +1,11 @@
-//! Executes every program of the bundle in closed loop with the simulated machine, one tick after the other,
-//! and prints a digest of each run.
+//! Executes every program of the bundle in closed loop with the simulated machine, one tick after the other, its second
+//! stretch with a correction, and prints a digest of each run.
 #![no_std]
 #![no_main]
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use hal_sim::closed_loop::{Closed, LoopError, close, reference_machine};
+use hal_sim::closed_loop::{Closed, LoopError, close, reference_machine, some_knots};
 use hal_sim::{MachineParameters, SimMachine};
 use motion_kernel::exec::ExecState;
 use motion_kernel::program::Reader;
@@ -29,8 +29,16 @@ fn main() -> ! {
 fn run(bytes: &[u8], parameters: &MachineParameters<AXES>, streams: &mut Queues) {
     // All that is large is looked at where it is: the microbit has no room for another one.
     let machine = &simulated(parameters);
+    let knots = some_knots::<Number, AXES>();
     let mut closed = closed(bytes, streams, machine);
-    let (producer, closed_loop) = closed.as_mut().unwrap_or_else(|error| fail(error));
+    let closed = closed.as_mut().unwrap_or_else(|error| fail(error));
+    closed.1.correct(&knots).unwrap_or_else(|error| fail(&error));
+    ticks(closed);
+}
+
+// Closing the loop is what needs the most room: nothing of this is in the frame then.
+#[inline(never)]
+fn ticks((producer, closed_loop): &mut Closed<'_, Number, AXES, LINE>) {
     let (mut digest, mut ticks) = (Digest::new(), 0_u32);
     loop {
         let is_all = producer.fill().unwrap_or_else(|error| fail(&error));

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use clap::Args;
+use motion_kernel::axis::{Feedforward as KernelFeedforward, Tables};
 use serde::Serialize;
 
 use super::{
@@ -16,14 +17,15 @@ use crate::cli::write_json;
 use crate::drive::circle::{CircleFigures, Sweep, sweep};
 use crate::drive::reference;
 use crate::drive::turning::Turning;
+use crate::machine::AxisSettings;
 use crate::report;
 
 const HELP: &str = "\
 Read from encoder positions over the last second at constant feed: the contour error is the actual radius less the
 programmed one, the form deviation its greatest less its least value.
 
-JSON: feed_mm_min, limit_um, feedforward: list of {name, velocity, accel_s, jerk_s2 (of X), limit_hz (null: not passed
-within the range), circles: list of {frequency_hz, radius_mm, contour_error_um, contour_error_um_max,
+JSON: feed_mm_min, limit_um, feedforward: list of {name, axes: list of {axis, velocity, accel_s, jerk_s2, lead_s,
+has_inverse, has_tables}, limit_hz (null: not passed within the range), circles: list of {frequency_hz, radius_mm, contour_error_um, contour_error_um_max,
 contour_error_um_min, form_deviation_um, following_error_x_um, following_error_y_um}}, reference.";
 
 /// Drive circles over a range of frequencies, closed loop; contour error, form deviation, following error.
@@ -71,11 +73,20 @@ struct CircleJson {
 #[derive(Serialize)]
 struct SweepJson {
     name: &'static str,
+    axes: Vec<GainsJson>,
+    limit_hz: Option<f64>,
+    circles: Vec<FiguresJson>,
+}
+
+#[derive(Serialize)]
+struct GainsJson {
+    axis: String,
     velocity: f64,
     accel_s: f64,
     jerk_s2: f64,
-    limit_hz: Option<f64>,
-    circles: Vec<FiguresJson>,
+    lead_s: f64,
+    has_inverse: bool,
+    has_tables: bool,
 }
 
 #[derive(Serialize)]
@@ -145,7 +156,6 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
 }
 
 fn sweep_json(sweep: &Sweep) -> SweepJson {
-    let gains = sweep.machine.axes[0].feedforward;
     let circle = |figures: &CircleFigures| FiguresJson {
         frequency_hz: figures.frequency_hz,
         radius_mm: figures.radius_mm,
@@ -158,12 +168,51 @@ fn sweep_json(sweep: &Sweep) -> SweepJson {
     };
     SweepJson {
         name: sweep.name,
-        velocity: gains.velocity,
-        accel_s: gains.accel_s,
-        jerk_s2: gains.jerk_s2,
+        axes: driven(sweep).map(gains_json).collect(),
         limit_hz: sweep.limit_hz,
         circles: sweep.circles.iter().map(circle).collect(),
     }
+}
+
+/// The axes that the circles move.
+fn driven(sweep: &Sweep) -> impl Iterator<Item = &AxisSettings> {
+    let axes = sweep.circles.first().map_or([0, 1], |circle| circle.axes);
+    axes.into_iter().map(|axis| &sweep.machine.axes[axis])
+}
+
+fn has_tables(feedforward: &KernelFeedforward) -> bool {
+    feedforward.tables != Tables::default()
+}
+
+fn gains_json(axis: &AxisSettings) -> GainsJson {
+    let feedforward = &axis.feedforward;
+    GainsJson {
+        axis: axis.name.clone(),
+        velocity: feedforward.velocity,
+        accel_s: feedforward.accel_s,
+        jerk_s2: feedforward.jerk_s2,
+        lead_s: feedforward.lead_s,
+        has_inverse: feedforward.drive.is_some(),
+        has_tables: has_tables(feedforward),
+    }
+}
+
+/// All that feedforward of an axis has.
+fn gains_words(axis: &AxisSettings) -> String {
+    let feedforward = &axis.feedforward;
+    let KernelFeedforward { velocity, accel_s, jerk_s2, lead_s, .. } = feedforward;
+    let mut words =
+        format!("{}: velocity {velocity}, acceleration {accel_s} s, jerk {jerk_s2:e} s²", axis.name);
+    if *lead_s > 0.0 {
+        words += &format!(", lead {lead_s} s");
+    }
+    if has_tables(feedforward) {
+        words += ", tables";
+    }
+    if let Some(drive) = &feedforward.drive {
+        words += if drive.bed.is_some() { ", inverse of drive and bed" } else { ", inverse of the drive" };
+    }
+    words
 }
 
 fn write_sweeps(sweeps: &[Sweep], limit_um: f64, out: &mut dyn Write) -> io::Result<()> {
@@ -177,12 +226,11 @@ fn write_sweeps(sweeps: &[Sweep], limit_um: f64, out: &mut dyn Write) -> io::Res
         ("Y", "µm", Align::Right),
     ];
     for sweep in sweeps {
-        let gains = sweep.machine.axes[0].feedforward;
-        writeln!(
-            out,
-            "\nFeedforward {}: velocity {}, acceleration {} s, jerk {:e} s²\n",
-            sweep.name, gains.velocity, gains.accel_s, gains.jerk_s2
-        )?;
+        writeln!(out, "\nFeedforward {}", sweep.name)?;
+        for axis in driven(sweep) {
+            writeln!(out, "  {}", gains_words(axis))?;
+        }
+        writeln!(out)?;
         let rows: Vec<[String; 7]> = sweep
             .circles
             .iter()

@@ -10,9 +10,8 @@ use crate::cli::error::{CliError, Outcome};
 use crate::cli::progress::Progress;
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
-use crate::drive::bode::plane_of;
 use crate::drive::inertia::{InertiaFigures, measure};
-use crate::drive::turning::Turning;
+use crate::drive::turning::{Turning, plane_of};
 use crate::report;
 
 const HELP: &str = "\

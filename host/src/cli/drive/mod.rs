@@ -6,7 +6,7 @@
 //! - [`circle`]: contour error over frequency;
 //! - [`compare`]: regulators side by side;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
-//! - [`tune`]: identification, proposal, verification.
+//! - [`tune`]: identification, proposal, verification (`verification`).
 
 pub mod bode;
 pub mod circle;
@@ -15,6 +15,8 @@ pub mod harmonic;
 pub mod inertia;
 pub mod step;
 pub mod tune;
+
+mod verification;
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

@@ -9,25 +9,25 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::axis_named;
+use super::verification::{Verification, VerificationJson, planes};
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::input::Output;
-use crate::cli::progress::Progress;
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
-use crate::drive::circle::{CircleFigures, Sweep, figures};
 use crate::drive::identification::identify_axes;
-use crate::drive::learning::{LearningOptions, Learnt, Reason, learn};
+use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, learn};
 use crate::drive::reference::CIRCLE_FEED_MM_S;
 use crate::drive::turning::Turning;
-use crate::gcode::Plane;
 use crate::identify::{Estimate, Identification};
 use crate::machine::{AxisEdit, Machine, REFERENCE_TOML, edited};
-use crate::report::{self, drive::Shown};
-use crate::tuning::{self, AxisTuning, propose};
+use crate::simulate::StretchCorrection;
+use crate::tuning::{self, AxisTuning, TuningError, propose};
 
 const HELP: &str = "\
 Runs velocity steps and circles open loop, finds the drive's parameters in what the converter put out and the encoders
-read, and makes of them a position gain with margins and a feedforward. Then it drives circles before and after.
+read, and makes of them a position gain with margins and a feedforward. Then it drives circles before and after, in as
+many planes as let every tuned axis move. Where both axes of a plane were tuned their contour error is judged, where one
+was, its following error.
 
 Examples:
   motion drive tune                                  see what the reference machine could do
@@ -36,20 +36,18 @@ Examples:
   motion drive tune --method series --learn 5        and see what learning from repeats adds
   motion drive tune --axis X --method fit --json     V, A and J gains only, for a script
 
-JSON: axes: list of {name, found: {kp…: {value, half_width_95, determined}}, margins: {crossover_hz, phase_deg, gain,
+JSON: axes: list of {name, found: {velocity_gain_per_s…: {value, half_width_95, determined}}, margins: {crossover_hz, phase_deg, gain,
 sensitivity}, changes: list of {key, before, after, unit, reason}, remarks}, verification: {feed_mm_min, circles: list of
-{frequency_hz, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
+{axes, frequency_hz, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
 following_error_second_um}}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
-axes}, best_repeat, ended}, output.
+axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}}, output.
 
-Exit status 1: the tuned machine is worse on a circle than it was; nothing is written then.";
+--learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, what feedforward is
+to be given in addition, straight between rows; the kernel takes it as Intake::correct. Without a row if nothing was
+better than no correction. Without this option what was learnt is only shown.
 
-/// Frequencies of the circles before and after \[Hz\].
-const VERIFIED_HZ: [f64; 6] = [1.0, 4.0, 10.0, 13.0, 16.0, 28.0];
-/// The contour error that S4 asks for \[µm\].
-const LIMIT_UM: f64 = 20.0;
-/// What a circle may get worse by, in counts of the encoder.
-const WORSE_COUNTS: f64 = 2.0;
+Exit status 1, and nothing is written: the tuned machine is worse on a circle than it was, or the recordings do not
+determine what everything depends on (command gain, Kv, Ti, total delay).";
 
 /// Identify the axes, propose gains and feedforward with their reasons, verify them on circles.
 #[derive(Debug, Args)]
@@ -73,6 +71,9 @@ pub struct TuneArguments {
         requires = "learn"
     )]
     learn_hz: f64,
+    /// Write the best correction that was learnt: CSV, velocity commands over the time in the stretch.
+    #[arg(long, value_name = "FILE", requires = "learn")]
+    learn_output: Option<PathBuf>,
     /// Write the machine file with the new figures; it may be the one that was read.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -119,26 +120,34 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         [] => (0..machine.axes.len()).collect(),
         names => names.iter().map(|name| axis_named(&machine, name)).collect::<Result<Vec<_>, _>>()?,
     };
+    // Before the work: a wrong argument should not cost the user a long one.
+    let plane = planes(&axes).first().copied().unwrap_or_default();
+    let learning = arguments.learn.map(|repeats| Lesson {
+        turning: Turning { plane, ..Turning::new(arguments.learn_hz, CIRCLE_FEED_MM_S) },
+        options: LearningOptions { repeats, ..LearningOptions::default() },
+    });
+    if let Some(lesson) = &learning {
+        lesson.turning.check(machine.tick_s)?;
+        lesson.options.check(&machine)?;
+    }
+    let learn_output = arguments.learn_output.as_deref().map(Output::create).transpose()?;
     let report = arguments.report.as_deref().map(Output::create).transpose()?;
     let found = identify_axes(&machine, &axes)?;
     let tunings: Vec<Tuned> = axes
         .iter()
         .zip(found)
         .map(|(&axis, found)| {
-            let tuning = propose(&machine.axes[axis], &found, arguments.method.into(), machine.tick_s);
-            Tuned { axis, found, tuning }
+            let tuning = propose(&machine.axes[axis], &found, arguments.method.into(), machine.tick_s)?;
+            Ok(Tuned { axis, found, tuning })
         })
-        .collect();
+        .collect::<Result<_, TuningError>>()?;
     // What is verified is what the file will say.
     let edits: Vec<AxisEdit> = tunings.iter().map(Tuned::edit).collect();
     let text = edited(&source.name, &source.text, &edits)?;
     let tuned = Machine::from_toml(&source.name, &text)?;
-    let plane = if axes.iter().any(|axis| *axis < 2) { Plane::Xy } else { Plane::Yz };
-    let verification = Verification::new(&machine, &tuned, plane)?;
-    let is_better = verification.is_better(&tuned, &axes);
-    let learnt =
-        arguments.learn.map(|repeats| learn_on(&tuned, &tunings, plane, repeats, arguments.learn_hz));
-    let learnt = learnt.transpose()?;
+    let verification = Verification::new(&machine, &tuned, &axes)?;
+    let is_better = verification.is_better();
+    let learnt = learning.map(|lesson| lesson.learn(&tuned, &tunings)).transpose()?;
     if is_better && let Some(path) = &arguments.output {
         fs::write(path, &text)
             .map_err(|source| CliError::Write { path: path.display().to_string(), source })?;
@@ -156,7 +165,14 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
             (Some(path), true) => format!("  written to {}", path.display()),
             (None, true) => "  nothing is written; --output FILE writes the machine file".to_owned(),
         };
-        writeln!(out, "\n{end}").map_err(CliError::Output)?;
+        writeln!(out, "{end}").map_err(CliError::Output)?;
+    }
+    if let (Some(mut output), Some(learnt)) = (learn_output, &learnt) {
+        let written = write_correction(&tuned, learnt, &mut output.file).and_then(|()| output.file.flush());
+        written.map_err(|source| CliError::Write { path: output.name.clone(), source })?;
+        if !arguments.json {
+            writeln!(out, "  correction written to {}", output.name).map_err(CliError::Output)?;
+        }
     }
     if let Some(mut output) = report {
         let written = verification.write_report(&tuned, &mut output.file).and_then(|()| output.file.flush());
@@ -201,57 +217,6 @@ impl Tuned {
     }
 }
 
-/// Circles before and after.
-struct Verification {
-    sweeps: [Sweep; 2],
-    shown: Vec<Shown>,
-}
-
-impl Verification {
-    /// Frequencies whose circles the report draws \[Hz\].
-    const SHOWN_HZ: [f64; 2] = [4.0, 13.0];
-
-    fn new(before: &Machine, after: &Machine, plane: Plane) -> Result<Self, CliError> {
-        let mut progress = Progress::new(2 * VERIFIED_HZ.len() as u64);
-        let mut shown = Vec::new();
-        let mut sweep = |name: &'static str, machine: &Machine| -> Result<Sweep, CliError> {
-            let mut circles = Vec::with_capacity(VERIFIED_HZ.len());
-            for frequency_hz in VERIFIED_HZ {
-                let turning = Turning { plane, ..Turning::new(frequency_hz, CIRCLE_FEED_MM_S) };
-                let recording = turning.record(machine)?;
-                circles.push(figures(&recording, &turning)?);
-                if Self::SHOWN_HZ.contains(&frequency_hz) {
-                    shown.push((name, turning, recording));
-                }
-                progress.step();
-            }
-            let within = |figures: &&CircleFigures| figures.contour_um() <= LIMIT_UM;
-            let limit_hz = circles.iter().take_while(within).last().map(|figures| figures.frequency_hz);
-            Ok(Sweep { name, machine: machine.clone(), circles, limit_hz })
-        };
-        let sweeps = [sweep("before", before)?, sweep("after", after)?];
-        progress.finish();
-        Ok(Self { sweeps, shown })
-    }
-
-    fn pairs(&self) -> impl Iterator<Item = (&CircleFigures, &CircleFigures)> {
-        let [before, after] = &self.sweeps;
-        before.circles.iter().zip(&after.circles)
-    }
-
-    /// Whether no circle got worse, but for the encoders' rounding.
-    fn is_better(&self, machine: &Machine, axes: &[usize]) -> bool {
-        let count_um =
-            axes.iter().map(|&axis| machine.axes[axis].mm_per_count.abs() * 1e3).fold(0.0, f64::max);
-        let margin_um = WORSE_COUNTS * count_um;
-        self.pairs().all(|(before, after)| after.contour_um() <= before.contour_um() + margin_um)
-    }
-
-    fn write_report(&self, tuned: &Machine, out: &mut impl Write) -> io::Result<()> {
-        report::drive::write_circle(tuned, &self.sweeps, LIMIT_UM, &self.shown, &[], out)
-    }
-}
-
 fn write_words(
     machine: &Machine,
     tunings: &[Tuned],
@@ -286,53 +251,44 @@ fn write_words(
         }
         writeln!(out)?;
     }
-    writeln!(out, "Circles at {:.0} mm/min, before and after\n", CIRCLE_FEED_MM_S * 60.0)?;
-    let columns = [
-        ("frequency", "Hz", Align::Right),
-        ("contour", "µm", Align::Right),
-        ("", "µm", Align::Right),
-        ("form deviation", "µm", Align::Right),
-        ("", "µm", Align::Right),
-        ("following, first axis", "µm", Align::Right),
-        ("", "µm", Align::Right),
-        ("second axis", "µm", Align::Right),
-        ("", "µm", Align::Right),
-    ];
-    let rows: Vec<[String; 9]> = verification
-        .pairs()
-        .map(|(before, after)| {
-            let um = |value: f64| format!("{value:.2}");
-            [
-                before.frequency_hz.to_string(),
-                um(before.contour_um()),
-                um(after.contour_um()),
-                um(before.form_um()),
-                um(after.form_um()),
-                um(before.following_um[0]),
-                um(after.following_um[0]),
-                um(before.following_um[1]),
-                um(after.following_um[1]),
-            ]
-        })
-        .collect();
-    table::write(&columns, &rows, out)
+    verification.write_words(out)
 }
 
-/// Learns the circle of `frequency_hz` on the tuned machine, by the drives that were found; an axis that was not tuned is
-/// taken as the machine file has it.
-fn learn_on(
-    tuned: &Machine,
-    tunings: &[Tuned],
-    plane: Plane,
-    repeats: usize,
-    frequency_hz: f64,
-) -> Result<Learnt, CliError> {
-    let mut models = tuned.axes.each_ref().map(|axis| axis.drive);
-    for tuning in tunings {
-        models[tuning.axis] = tuning.found.parameters.drive();
+/// A circle to be learnt.
+struct Lesson {
+    turning: Turning,
+    options: LearningOptions,
+}
+
+impl Lesson {
+    /// On the tuned machine, by the drives that were found; an axis that was not tuned is taken as the machine file has it.
+    fn learn(&self, tuned: &Machine, tunings: &[Tuned]) -> Result<Learnt, CliError> {
+        let mut models = tuned.axes.each_ref().map(|axis| Model::from(axis.drive));
+        for Tuned { axis, found, .. } in tunings {
+            let command_gain = found.parameters.command_gain.value;
+            models[*axis] = Model { drive: found.parameters.drive(), command_gain };
+        }
+        Ok(learn(tuned, &self.turning, &models, &self.options)?)
     }
-    let turning = Turning { plane, ..Turning::new(frequency_hz, CIRCLE_FEED_MM_S) };
-    Ok(learn(tuned, &turning, &models, &LearningOptions { repeats, ..LearningOptions::default() })?)
+}
+
+/// The correction of the best repeat, by its knots.
+fn write_correction(machine: &Machine, learnt: &Learnt, out: &mut impl Write) -> io::Result<()> {
+    let StretchCorrection { knot_ticks, knots_mm_s, .. } = &learnt.best;
+    write!(out, "time_s")?;
+    for axis in &machine.axes {
+        write!(out, ",{}_mm_s", axis.name)?;
+    }
+    writeln!(out)?;
+    for (index, knot) in knots_mm_s.iter().enumerate() {
+        let time_s = index as f64 * f64::from(*knot_ticks) * machine.tick_s;
+        write!(out, "{time_s:.6}")?;
+        for value in knot {
+            write!(out, ",{value:.6}")?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
 }
 
 fn write_learnt(
@@ -341,7 +297,7 @@ fn write_learnt(
     frequency_hz: f64,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    writeln!(out, "\nLearning a circle at {frequency_hz} Hz\n")?;
+    writeln!(out, "Learning a circle at {frequency_hz} Hz\n")?;
     let columns = [
         ("repeat", "", Align::Right),
         ("contour", "µm", Align::Right),
@@ -363,13 +319,13 @@ fn write_learnt(
         if let Some(robustness) = robustness {
             writeln!(
                 out,
-                "  {}: a repeat leaves at most {:.2} of an error (at {:.0} Hz), with every parameter of the drive up to a \
-                 fifth off",
-                axis.name, robustness.contraction, robustness.at_hz
+                "  {}: filter of {:.0} Hz; a repeat leaves at most {:.2} of an error (at {:.0} Hz), with Kv, Ti, current \
+                 lag, dead time and the bed's frequency up to a fifth off",
+                axis.name, robustness.filter.corner_hz, robustness.contraction, robustness.at_hz
             )?;
         }
     }
-    writeln!(out, "  repeat {} is the best; ended: {}", learnt.best_repeat, ended(&learnt.stopped))
+    writeln!(out, "  repeat {} is the best; ended: {}\n", learnt.best_repeat, ended(&learnt.stopped))
 }
 
 fn ended(reason: &Reason) -> String {
@@ -395,15 +351,24 @@ fn toml_number(value: f64) -> String {
 struct TuneJson<'run> {
     axes: Vec<AxisJson<'run>>,
     verification: VerificationJson,
-    learning: Option<LearningJson>,
+    learning: Option<LearningJson<'run>>,
     output: Option<String>,
 }
 
 #[derive(Serialize)]
-struct LearningJson {
+struct LearningJson<'run> {
     repeats: Vec<RepeatJson>,
     best_repeat: usize,
     ended: String,
+    robustness: Vec<RobustnessJson<'run>>,
+}
+
+#[derive(Serialize)]
+struct RobustnessJson<'run> {
+    axis: &'run str,
+    filter_corner_hz: f64,
+    contraction: f64,
+    contraction_hz: f64,
 }
 
 #[derive(Serialize)]
@@ -468,27 +433,6 @@ struct ChangeJson<'run> {
     reason: &'run str,
 }
 
-#[derive(Serialize)]
-struct VerificationJson {
-    feed_mm_min: f64,
-    circles: Vec<PairJson>,
-}
-
-#[derive(Serialize)]
-struct PairJson {
-    frequency_hz: f64,
-    before: CircleJson,
-    after: CircleJson,
-}
-
-#[derive(Serialize)]
-struct CircleJson {
-    contour_error_um: f64,
-    form_deviation_um: f64,
-    following_error_first_um: f64,
-    following_error_second_um: f64,
-}
-
 fn json<'run>(
     machine: &'run Machine,
     tunings: &'run [Tuned],
@@ -496,25 +440,9 @@ fn json<'run>(
     learnt: Option<&Learnt>,
     output: Option<String>,
 ) -> TuneJson<'run> {
-    let circle = |figures: &CircleFigures| CircleJson {
-        contour_error_um: figures.contour_um(),
-        form_deviation_um: figures.form_um(),
-        following_error_first_um: figures.following_um[0],
-        following_error_second_um: figures.following_um[1],
-    };
     TuneJson {
         axes: tunings.iter().map(|tuned| axis_json(&machine.axes[tuned.axis].name, tuned)).collect(),
-        verification: VerificationJson {
-            feed_mm_min: CIRCLE_FEED_MM_S * 60.0,
-            circles: verification
-                .pairs()
-                .map(|(before, after)| PairJson {
-                    frequency_hz: before.frequency_hz,
-                    before: circle(before),
-                    after: circle(after),
-                })
-                .collect(),
-        },
+        verification: verification.json(),
         learning: learnt.map(|learnt| LearningJson {
             repeats: learnt
                 .repeats
@@ -526,6 +454,18 @@ fn json<'run>(
                 .collect(),
             best_repeat: learnt.best_repeat,
             ended: ended(&learnt.stopped),
+            robustness: machine
+                .axes
+                .iter()
+                .zip(&learnt.robustness)
+                .filter_map(|(axis, robustness)| robustness.map(|robustness| (axis, robustness)))
+                .map(|(axis, robustness)| RobustnessJson {
+                    axis: &axis.name,
+                    filter_corner_hz: robustness.filter.corner_hz,
+                    contraction: robustness.contraction,
+                    contraction_hz: robustness.at_hz,
+                })
+                .collect(),
         }),
         output,
     }

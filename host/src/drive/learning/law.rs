@@ -6,7 +6,7 @@
 //! Q = 1/(1 + (√2 − 1)(f/fq)⁶) zero phase, −3 dB at fq
 //! ```
 //!
-//! G is the drive with its bed, C the regulator's feedback. Following error is e = e₀ − P·u, so with
+//! G is the drive with its bed and the scale of its commands, C the regulator's feedback. Following error is e = e₀ − P·u, so with
 //! u′ = Q·(u + L·e) the correction's distance from its fixed point shrinks from repeat to repeat by |Q(1 − L·P)| at
 //! every frequency (Bristow, Tharayil, Alleyne: A survey of iterative learning control, IEEE Control Systems Magazine,
 //! 2006, gives the condition that it is below 1). The P in L is the model's, the other one is the machine's: the greatest value over a whole range of
@@ -20,7 +20,8 @@ use motion_kernel::axis::Gains;
 use super::fourier;
 use crate::drive::model::{Complex, response};
 
-/// What the machine's drive may differ by from the model, as a part: every parameter alone and all together.
+/// What the machine's drive may differ by from the model, as a part: Kv, Ti, Tc, τ and the bed's frequency, in every
+/// combination.
 pub const SPREAD: f64 = 0.2;
 /// The law's filter is chosen so that a repeat leaves at most this part of a distance, whatever the machine.
 pub const CONTRACTION_MAX: f64 = 0.8;
@@ -74,6 +75,8 @@ pub struct Robustness {
 /// One axis as the law sees it.
 pub(super) struct Loop<'a> {
     pub(super) drive: &'a DriveParameters,
+    /// Actual over nominal scale of commands.
+    pub(super) command_gain: f64,
     pub(super) gains: Gains,
     pub(super) tick_s: f64,
     pub(super) knot_ticks: u16,
@@ -92,7 +95,8 @@ impl Loop<'_> {
         let feedback = real(self.gains.kp_per_s)
             + real(self.gains.ki_per_s2 * self.tick_s) / change
             + real(self.gains.kd / self.tick_s) * change;
-        let forward = response(drive, self.tick_s, frequency_hz) / Complex::new(0.0, omega);
+        let forward =
+            real(self.command_gain) * response(drive, self.tick_s, frequency_hz) / Complex::new(0.0, omega);
         forward / (one + feedback * forward)
     }
 
@@ -271,7 +275,7 @@ mod tests {
     const GAINS: Gains = Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 };
 
     fn reference(drive: &DriveParameters) -> Loop<'_> {
-        Loop { drive, gains: GAINS, tick_s: 5e-4, knot_ticks: 4 }
+        Loop { drive, command_gain: 1.0, gains: GAINS, tick_s: 5e-4, knot_ticks: 4 }
     }
 
     #[test]
@@ -287,6 +291,19 @@ mod tests {
         let axis = reference(&hal_sim::REFERENCE_X);
         let inverse = axis.inverse(0.1, (1.0, 0.0));
         assert!((inverse.magnitude() - 230.0).abs() < 0.5, "{inverse:?}");
+    }
+
+    /// A drive that moves twice as far as its commands say is held by half the gain, and learns from half the command.
+    #[test]
+    fn the_scale_of_commands_is_a_part_of_the_loop() {
+        let once = reference(&hal_sim::REFERENCE_X);
+        let gains = Gains { kp_per_s: 115.0, ..GAINS };
+        let twice = Loop { command_gain: 2.0, gains, ..reference(&hal_sim::REFERENCE_X) };
+        for hz in [1.0, 10.0, 60.0] {
+            let (once, twice) = (once.position(once.drive, hz), twice.position(twice.drive, hz));
+            let half = Complex::new(0.5, 0.0) * twice;
+            assert!((once.re - half.re).abs() + (once.im - half.im).abs() < 1e-12, "{once:?} {twice:?}");
+        }
     }
 
     /// A model that is right leaves what the filter and ε leave; a machine that is 20 % off still converges.

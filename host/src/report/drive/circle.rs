@@ -45,7 +45,7 @@ pub fn write_circle(
         escape(&passed.join(", "))
     );
     super::open(&title, machine, &sentence, comparisons, out)?;
-    over_frequency(sweeps, limit_um, out)?;
+    over_frequency(machine, sweeps, limit_um, out)?;
     let mut frequencies_hz: Vec<f64> = Vec::new();
     for (_, turning, _) in shown {
         if !frequencies_hz.iter().any(|hz| hz.total_cmp(&turning.frequency_hz).is_eq()) {
@@ -59,18 +59,37 @@ pub fn write_circle(
     }
     writeln!(out, "<section><h2>Figures</h2>")?;
     let rows = sweeps.iter().flat_map(|sweep| sweep.circles.iter().map(|circle| row(sweep.name, circle)));
+    let [first, second] = axis_names(machine, sweeps).map(|name| format!("following {name} [µm]"));
     let headings = [
         "feedforward, frequency",
         "radius [mm]",
         "contour max [µm]",
         "min [µm]",
         "form deviation [µm]",
-        "following X [µm]",
-        "following Y [µm]",
+        first.as_str(),
+        second.as_str(),
     ];
     table(&headings, rows, out)?;
     writeln!(out, "</section>")?;
     super::close(out)
+}
+
+/// The names of the two axes that all circles have in common.
+fn axis_names(machine: &Machine, sweeps: &[Sweep]) -> [String; 2] {
+    let circles = || sweeps.iter().flat_map(|sweep| &sweep.circles);
+    [
+        name_of(machine, circles().map(|circle| circle.axes[0]), "the first axis"),
+        name_of(machine, circles().map(|circle| circle.axes[1]), "the second axis"),
+    ]
+}
+
+/// The name of the axis that all of `axes` are; `else_name` where planes differ.
+fn name_of(machine: &Machine, mut axes: impl Iterator<Item = usize>, else_name: &str) -> String {
+    let first = axes.next().and_then(|axis| machine.axes.get(axis).map(|settings| (axis, settings)));
+    match first {
+        Some((axis, settings)) if axes.all(|other| other == axis) => settings.name.clone(),
+        _ => else_name.to_owned(),
+    }
 }
 
 fn row(name: &str, circle: &CircleFigures) -> Vec<String> {
@@ -86,7 +105,13 @@ fn row(name: &str, circle: &CircleFigures) -> Vec<String> {
 }
 
 /// Error bands and form deviation over frequency.
-fn over_frequency(sweeps: &[Sweep], limit_um: f64, out: &mut impl Write) -> io::Result<()> {
+fn over_frequency(
+    machine: &Machine,
+    sweeps: &[Sweep],
+    limit_um: f64,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let [first, _] = axis_names(machine, sweeps);
     let curves = |value: fn(&CircleFigures) -> f64| -> Vec<Series> {
         let points =
             |sweep: &Sweep| sweep.circles.iter().map(|circle| (circle.frequency_hz, value(circle))).collect();
@@ -108,7 +133,11 @@ fn over_frequency(sweeps: &[Sweep], limit_um: f64, out: &mut impl Write) -> io::
         graphs: vec![
             graph("Contour error, greatest and least [µm]", bands, vec![limit_um, -limit_um]),
             graph("Form deviation [µm]", curves(CircleFigures::form_um), Vec::new()),
-            graph("Following error of X, greatest [µm]", curves(|circle| circle.following_um[0]), Vec::new()),
+            graph(
+                &format!("Following error of {first}, greatest [µm]"),
+                curves(|circle| circle.following_um[0]),
+                Vec::new(),
+            ),
         ],
     };
     let caption = Caption {
@@ -160,7 +189,7 @@ fn one_frequency(
     rings.push((palette::LIMIT, format!("±{} µm", figure(limit_um, 3))));
     let remark = "The error is magnified, the circle is not to scale with it: the rings show how much.";
     figure_html(&polar::draw(&around, limit_um, &caption)?, &rings, remark, out)?;
-    let name = &machine.axes[0].name;
+    let name = name_of(machine, shown.iter().map(|(_, turning, _)| turning.axes()[0]), "the first axis");
     let graph = Graph {
         title: format!("Following error of {name} [µm]"),
         y: None,

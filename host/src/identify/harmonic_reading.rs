@@ -3,11 +3,12 @@
 use core::f64::consts::PI;
 
 use super::recording::AxisRecording;
+use crate::sine::{Baseline, fit};
 
-/// Amplitude and delay of one harmonic motion. What is commanded is what the converter puts out, in a closed loop too: the
+/// Amplitude and delay of one harmonic motion, of positions. What is commanded is what the converter puts out, in a closed loop too: the
 /// figures are the drive's.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HarmonicFigures {
+pub struct HarmonicReading {
     /// Frequency \[Hz\].
     pub frequency_hz: f64,
     /// Amplitude of the commanded velocity \[mm/s\].
@@ -32,7 +33,7 @@ const GROWTH_PERIODS: f64 = 1.5;
 const DECAY_PERIODS: f64 = 1.0;
 
 /// The figures of a harmonic run; `None` for other runs and for less than one steady period.
-pub(super) fn harmonic_figures(run: &AxisRecording) -> Option<HarmonicFigures> {
+pub(super) fn harmonic_reading(run: &AxisRecording) -> Option<HarmonicReading> {
     let frequency_hz = run.harmonic_hz?;
     let period = 1.0 / (frequency_hz * run.tick_s);
     let first = run.lead_in_ticks as f64 + GROWTH_PERIODS * period;
@@ -42,49 +43,30 @@ pub(super) fn harmonic_figures(run: &AxisRecording) -> Option<HarmonicFigures> {
     }
     let steady = first as usize..(first + periods * period) as usize;
     let omega = 2.0 * PI / period;
-    let (actual_sin, actual_cos) = sine(run.actual_mm.get(steady.clone())?, omega);
+    let actual = fit(run.actual_mm.get(steady.clone())?, omega, 1.0, Baseline::Line);
     let commanded = run.commanded_mm();
-    let (command_sin, command_cos) = sine(commanded.get(steady)?, omega);
-    let (actual, command) = (actual_sin.hypot(actual_cos), command_sin.hypot(command_cos));
-    if !(command > 0.0) {
+    let command = fit(commanded.get(steady)?, omega, 1.0, Baseline::Line);
+    if !(command.amplitude > 0.0) {
         return None;
     }
-    let lag = actual_sin.atan2(actual_cos) - command_sin.atan2(command_cos);
-    Some(HarmonicFigures {
+    let lag = command.phase_rad - actual.phase_rad;
+    Some(HarmonicReading {
         frequency_hz,
-        amplitude_mm_s: command * 2.0 * PI * frequency_hz,
-        gain: actual / command,
+        amplitude_mm_s: command.amplitude * 2.0 * PI * frequency_hz,
+        gain: actual.amplitude / command.amplitude,
         delay_s: lag.rem_euclid(2.0 * PI) / (2.0 * PI * frequency_hz) + run.tick_s / 2.0,
     })
 }
 
-/// Amplitudes of sine and cosine in `values` beside an offset and a drift, by least squares.
-fn sine(values: &[f64], omega: f64) -> (f64, f64) {
-    let mut normal = super::cholesky::Symmetric::zero(4);
-    let mut right = vec![0.0; 4];
-    let middle = values.len() as f64 / 2.0;
-    for (index, value) in values.iter().enumerate() {
-        let (sin, cos) = (omega * index as f64).sin_cos();
-        let row = [1.0, (index as f64 - middle) / middle, sin, cos];
-        for (i, left) in row.iter().enumerate() {
-            right[i] += left * (value - values[0]);
-            for (j, other) in row.iter().enumerate() {
-                *normal.at_mut(i, j) += left * other;
-            }
-        }
-    }
-    normal.solve(&right).map_or((0.0, 0.0), |solution| (solution[2], solution[3]))
-}
-
 /// −3 dB points, one for each velocity amplitude that was run at frequencies on both sides of it.
-pub(super) fn bandwidths(figures: &[HarmonicFigures]) -> Vec<Bandwidth> {
+pub(super) fn bandwidths(figures: &[HarmonicReading]) -> Vec<Bandwidth> {
     let mut left = figures.to_vec();
     left.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let mut found = Vec::new();
     while let Some(first) = left.first().copied() {
         let is_like =
-            |point: &HarmonicFigures| (point.amplitude_mm_s / first.amplitude_mm_s - 1.0).abs() < 0.05;
-        let group: Vec<HarmonicFigures> = left.iter().copied().filter(is_like).collect();
+            |point: &HarmonicReading| (point.amplitude_mm_s / first.amplitude_mm_s - 1.0).abs() < 0.05;
+        let group: Vec<HarmonicReading> = left.iter().copied().filter(is_like).collect();
         left.retain(|point| !is_like(point));
         let limit = 0.5_f64.sqrt();
         let crossing = group.windows(2).find(|pair| pair[0].gain >= limit && pair[1].gain < limit);
@@ -117,7 +99,7 @@ mod tests {
             harmonic_hz: Some(hz),
             ..AxisRecording::default()
         };
-        let figures = harmonic_figures(&run).unwrap();
+        let figures = harmonic_reading(&run).unwrap();
         assert!((figures.gain - 0.8).abs() < 1e-3, "{figures:?}");
         assert!((figures.amplitude_mm_s - 40.0).abs() < 0.05, "{figures:?}");
         assert!((figures.delay_s - delay_s).abs() < 1e-6, "{figures:?}");
@@ -126,12 +108,12 @@ mod tests {
     #[test]
     fn the_bandwidth_is_interpolated() {
         let point =
-            |frequency_hz, gain| HarmonicFigures { frequency_hz, amplitude_mm_s: 30.0, gain, delay_s: 0.0 };
+            |frequency_hz, gain| HarmonicReading { frequency_hz, amplitude_mm_s: 30.0, gain, delay_s: 0.0 };
         let found = bandwidths(&[point(40.0, 0.607_106_78), point(20.0, 0.807_106_78), point(10.0, 1.0)]);
         assert_eq!(found.len(), 1);
         assert!((found[0].frequency_hz - 30.0).abs() < 1e-5);
         assert!(
-            bandwidths(&[point(10.0, 1.0), HarmonicFigures { amplitude_mm_s: f64::NAN, ..point(9.0, 0.1) }])
+            bandwidths(&[point(10.0, 1.0), HarmonicReading { amplitude_mm_s: f64::NAN, ..point(9.0, 0.1) }])
                 .is_empty()
         );
     }

@@ -6,7 +6,7 @@ use super::recording::AxisRecording;
 /// A step response. Velocities and accelerations come from local parabolas, which have no lag; backward differences,
 /// as S4 has them, find delays longer by about half a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepFigures {
+pub struct StepReading {
     /// The command stepped to \[mm/s\].
     pub feed_mm_s: f64,
     /// From the command's step to where the steepest tangent of the velocity leaves 0 \[s\].
@@ -33,7 +33,7 @@ const REST_S: f64 = 0.03;
 const CRUISE_S: f64 = 0.1;
 
 /// All steps from rest of a run.
-pub(super) fn step_figures(run: &AxisRecording, resolution_mm: f64) -> Vec<StepFigures> {
+pub(super) fn step_reading(run: &AxisRecording, resolution_mm: f64) -> Vec<StepReading> {
     let command = &run.command_mm_s;
     let (rest, cruise) = (ticks(REST_S, run.tick_s), ticks(CRUISE_S, run.tick_s));
     let mut figures = Vec::new();
@@ -54,7 +54,7 @@ fn ticks(time_s: f64, tick_s: f64) -> usize {
     ((time_s / tick_s) as usize).max(1)
 }
 
-fn step(run: &AxisRecording, resolution_mm: f64, at: usize, stands: usize) -> Option<StepFigures> {
+fn step(run: &AxisRecording, resolution_mm: f64, at: usize, stands: usize) -> Option<StepReading> {
     let tick_s = run.tick_s;
     let feed = run.command_mm_s[at];
     let start = at - ticks(REST_S, tick_s) / 2;
@@ -79,7 +79,7 @@ fn step(run: &AxisRecording, resolution_mm: f64, at: usize, stands: usize) -> Op
     let is_resolved = 4.0 * parabolas.velocity_error_mm_s(resolution_mm) < band;
     let end = readings.len() - parabolas.half() - 1;
     let settled = outside.filter(|&(index, ..)| is_resolved && index + ticks(0.02, tick_s) < end);
-    Some(StepFigures {
+    Some(StepReading {
         feed_mm_s: feed,
         delay_s: since_step_s(index) - velocity / accel,
         time_constant_s: final_mm_s / accel,
