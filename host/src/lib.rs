@@ -6,6 +6,7 @@
 //!   machine    TOML ─► Machine                    limits, axes, drives
 //!   gcode      text ─► Program                    exact decimals, modal state
 //!   toolpath   moves ─► Element ─► Piece          arc length, septic polynomials
+//!   smoothness points, arcs ─► axis jerk          what the degree of a path does to the axes
 //!   planning   Program ─► Plan                    ceilings with reasons, feed over path
 //!   simulate   Plan ─► ticks                      the kernel against hal-sim
 //!   record     TickRecord, RunRecord              what a run leaves behind
@@ -20,6 +21,7 @@ pub mod machine;
 pub mod cli;
 pub mod gcode;
 pub mod toolpath;
+pub mod smoothness;
 pub mod planning;
 pub mod simulate;
 pub mod record;

@@ -120,6 +120,16 @@ impl Element {
         }
     }
 
+    /// Its curve and the parameter at its end, 0 at its start; nothing for a line.
+    #[must_use]
+    pub fn curve(&self) -> Option<(&dyn Curve, f64)> {
+        match self {
+            Self::Line { .. } => None,
+            Self::Arc { shape, sweep_rad, .. } => Some((shape, *sweep_rad)),
+            Self::Polynomial { shape, .. } => Some((shape, 1.0)),
+        }
+    }
+
     /// Where it starts and ends \[mm\].
     #[must_use]
     pub fn ends_mm(&self) -> (Vector, Vector) {

@@ -6,6 +6,7 @@
 //!
 //! - [`element`]: lines, arcs, helices, spirals, polynomials: length, tangents, curvature, bend;
 //! - [`polynomial`]: curves of degree seven, which blends and splines are;
+//! - [`spline`]: splines through points, or close to them;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`mod@compile`]: elements to pieces over exact path positions.
@@ -15,6 +16,7 @@ pub mod curve;
 pub mod element;
 pub mod polynomial;
 pub mod septic;
+pub mod spline;
 
 pub use compile::{CompileError, Placed, compile, exact, on_path};
 pub use element::{Element, Role};
