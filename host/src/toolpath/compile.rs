@@ -12,7 +12,7 @@ use super::element::Element;
 use super::septic::{FitError, fit};
 use super::{Vector, add, scale, subtract};
 
-/// Widest piece of an arc \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off.
+/// Widest piece of an arc or an involute \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off.
 const WIDEST_RAD: f64 = core::f64::consts::FRAC_PI_4;
 
 /// The shortest piece that is sure to advance the path position, which goes in steps of 2⁻³² mm and is
@@ -136,6 +136,7 @@ pub fn compile<R: Real>(
         }
         Element::Arc { shape, sweep_rad, .. } => fit(shape, 0.0, *sweep_rad, WIDEST_RAD, longest_mm)?,
         Element::Polynomial { shape, .. } => fit(shape, 0.0, 1.0, 1.0, longest_mm)?,
+        Element::Involute { shape, .. } => fit(shape, 0.0, shape.sweep_rad(), WIDEST_RAD, longest_mm)?,
     };
     let mut gone_mm = 0.0;
     for (index, septic) in septics.iter().enumerate() {

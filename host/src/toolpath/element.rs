@@ -1,8 +1,10 @@
-//! Blocks of path with one geometry: lines, arcs with all that goes by that name in G-code, and polynomials.
+//! Blocks of path with one geometry: lines, arcs with all that goes by that name in G-code, polynomials and
+//! involutes.
 
 use motion_kernel::plan::Bend;
 
 use super::curve::{Curve, Spiral, by_arc_length};
+use super::involute::Involute;
 use super::polynomial::Polynomial;
 use super::{Vector, add, cross, norm, scale, subtract};
 use crate::gcode::{ArcMove, LineMove};
@@ -40,6 +42,15 @@ pub enum Element {
         shape: Polynomial,
         /// What it is there for.
         role: Role,
+    },
+    /// A part of an involute.
+    Involute {
+        /// Start \[mm\].
+        from: Vector,
+        /// End \[mm\].
+        to: Vector,
+        /// Its shape.
+        shape: Involute,
     },
 }
 
@@ -108,7 +119,14 @@ impl Element {
         Self::Polynomial { from, to: add(from, shape.chord()), shape, role }
     }
 
-    /// "line", "arc", "helix", "blend" or "spline".
+    /// `shape` about a base circle with its centre in `centre`.
+    #[must_use]
+    pub fn involute(centre: Vector, shape: Involute) -> Self {
+        let from = add(centre, shape.start_mm());
+        Self::Involute { from, to: add(from, shape.offset(0.0, shape.sweep_rad())), shape }
+    }
+
+    /// "line", "arc", "helix", "blend", "spline" or "involute".
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
@@ -117,6 +135,7 @@ impl Element {
             Self::Arc { .. } => "helix",
             Self::Polynomial { role: Role::Blend, .. } => "blend",
             Self::Polynomial { role: Role::Spline, .. } => "spline",
+            Self::Involute { .. } => "involute",
         }
     }
 
@@ -127,6 +146,7 @@ impl Element {
             Self::Line { .. } => None,
             Self::Arc { shape, sweep_rad, .. } => Some((shape, *sweep_rad)),
             Self::Polynomial { shape, .. } => Some((shape, 1.0)),
+            Self::Involute { shape, .. } => Some((shape, shape.sweep_rad())),
         }
     }
 
@@ -134,9 +154,10 @@ impl Element {
     #[must_use]
     pub fn ends_mm(&self) -> (Vector, Vector) {
         match *self {
-            Self::Line { from, to } | Self::Arc { from, to, .. } | Self::Polynomial { from, to, .. } => {
-                (from, to)
-            }
+            Self::Line { from, to }
+            | Self::Arc { from, to, .. }
+            | Self::Polynomial { from, to, .. }
+            | Self::Involute { from, to, .. } => (from, to),
         }
     }
 
@@ -152,6 +173,7 @@ impl Element {
                 (0..parts as u32).map(|part| shape.length(at(f64::from(part)), at(f64::from(part + 1)))).sum()
             }
             Self::Polynomial { shape, .. } => shape.length(0.0, 1.0),
+            Self::Involute { shape, .. } => shape.length(0.0, shape.sweep_rad()),
         }
     }
 
@@ -165,6 +187,7 @@ impl Element {
             }
             Self::Arc { shape, sweep_rad, .. } => [0.0, *sweep_rad].map(|angle| End::of(shape, angle)),
             Self::Polynomial { shape, .. } => [0.0, 1.0].map(|u| End::of(shape, u)),
+            Self::Involute { shape, .. } => [0.0, shape.sweep_rad()].map(|u| End::of(shape, u)),
         }
     }
 
@@ -178,6 +201,7 @@ impl Element {
                 Bend::circle(radius, self.planar())
             }
             Self::Polynomial { shape, .. } => shape.greatest().bend,
+            Self::Involute { shape, .. } => shape.bend(),
         }
     }
 
@@ -187,6 +211,7 @@ impl Element {
         match self {
             Self::Line { .. } => self.ends()[0].tangent.map(f64::abs),
             Self::Polynomial { shape, .. } => shape.greatest().tangent,
+            Self::Involute { shape, .. } => shape.tangent_max(),
             Self::Arc { plane, .. } => {
                 let planar = self.planar();
                 // Conservative for arcs that never run along one of their axes.
@@ -203,13 +228,14 @@ impl Element {
             Self::Line { .. } => [false; 3],
             Self::Arc { plane, .. } => core::array::from_fn(|axis| plane.contains(&axis)),
             Self::Polynomial { shape, .. } => shape.greatest().curved,
+            Self::Involute { shape, .. } => shape.tangent_max().map(|component| component > 0.0),
         }
     }
 
     /// The part of the length that lies in the plane of the arc.
     fn planar(&self) -> f64 {
         match self {
-            Self::Line { .. } | Self::Polynomial { .. } => 1.0,
+            Self::Line { .. } | Self::Polynomial { .. } | Self::Involute { .. } => 1.0,
             Self::Arc { shape, .. } => shape.radius_mm / libm::hypot(shape.radius_mm, shape.height_per_rad),
         }
     }
