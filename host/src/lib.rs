@@ -5,6 +5,7 @@
 //! ```text
 //!   machine    TOML ─► Machine                    limits, axes, drives
 //!   gcode      text ─► Program                    exact decimals, modal state
+//!   points     CSV ─► Points                    what a spline goes through
 //!   toolpath   moves ─► Element ─► Piece          arc length, septic polynomials
 //!   smoothness points, arcs ─► axis jerk          what the degree of a path does to the axes
 //!   planning   Program ─► Plan                    ceilings with reasons, feed over path
@@ -20,6 +21,7 @@
 pub mod machine;
 pub mod cli;
 pub mod gcode;
+pub mod points;
 pub mod toolpath;
 pub mod smoothness;
 pub mod planning;

@@ -9,6 +9,7 @@
 //! within one kilometre of the origin on each axis. What is beyond is refused, with the line of the block.
 //!
 //! - [`program`]: steps to stretches: where motion must stop, what each joint allows;
+//! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
 //! - `lookahead`: the kernel's look-ahead, merged or per block;
 //! - [`profile`]: feed and time at any path position of a planned stretch;
@@ -24,12 +25,14 @@ pub mod executable;
 mod lookahead;
 pub mod profile;
 pub mod program;
+pub mod spline;
 pub mod stretch;
 
 pub use blocks::plan_blocks;
 pub use error::{Place, PlanningError, Problem};
 pub use executable::Executable;
-pub use program::plan_program;
+pub use program::{Move, plan_moves, plan_program};
+pub use spline::plan_spline;
 pub use stretch::Stretch;
 
 use crate::record::BlockRecord;
@@ -84,6 +87,22 @@ pub struct Plan {
     pub notices: Vec<String>,
     /// The control tick it was planned for \[s\].
     pub tick_s: f64,
+}
+
+impl Plan {
+    /// Without anything to do.
+    fn empty(source: &str, tick_s: f64) -> Self {
+        Self {
+            source: source.to_owned(),
+            blocks: Vec::new(),
+            feed: Vec::new(),
+            time_s: 0.0,
+            length_mm: 0.0,
+            items: Vec::new(),
+            notices: Vec::new(),
+            tick_s,
+        }
+    }
 }
 
 /// One thing to execute.

@@ -28,16 +28,8 @@ pub fn plan_program(
             problem,
         }
     };
-    let mut plan = Plan {
-        source: source_name.to_owned(),
-        blocks: Vec::new(),
-        feed: Vec::new(),
-        time_s: 0.0,
-        length_mm: 0.0,
-        items: Vec::new(),
-        notices: program.notices.iter().map(ToString::to_string).collect(),
-        tick_s: machine.tick_s,
-    };
+    let mut plan = Plan::empty(source_name, machine.tick_s);
+    plan.notices = program.notices.iter().map(ToString::to_string).collect();
     let mut open: Vec<StretchBlock> = Vec::new();
     for step in &program.steps {
         let (element, feed) = match &step.kind {
@@ -57,14 +49,12 @@ pub fn plan_program(
                 continue;
             }
         };
-        let block = block(&element, step.line, feed, machine).map_err(at(step.line))?;
-        if let Some(last) = open.last_mut() {
-            last.joint_mm_s = joint_feed(&last.element, &element, machine);
-            if last.joint_mm_s <= 0.0 {
-                close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
-            }
-        }
-        open.push(block);
+        let feed_mm_s = match feed {
+            Feed::Rapid => f64::INFINITY,
+            Feed::MmPerMin(feed) => feed / 60.0,
+        };
+        let step = Move { line: step.line, element, feed_mm_s };
+        append(&step, &mut open, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
     }
     close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
     // What the tick can't do is to be refused here, not on the machine.
@@ -72,11 +62,64 @@ pub fn plan_program(
     Ok(plan)
 }
 
-fn block(element: &Element, line: u32, feed: Feed, machine: &Machine) -> Result<StretchBlock, Problem> {
-    let feed_mm_s = match feed {
-        Feed::Rapid => f64::INFINITY,
-        Feed::MmPerMin(feed) => feed / 60.0,
+/// A block of path that is to be driven.
+#[derive(Clone, Copy, Debug)]
+pub struct Move {
+    /// Program line.
+    pub line: u32,
+    /// Geometry.
+    pub element: Element,
+    /// Feed \[mm/s\]; infinite for a rapid.
+    pub feed_mm_s: f64,
+}
+
+/// Plans moves that follow each other, from rest to rest.
+///
+/// # Errors
+/// As [`plan_program`].
+pub fn plan_moves(
+    source_name: &str,
+    moves: &[Move],
+    machine: &Machine,
+    mode: Mode,
+) -> Result<Plan, PlanningError> {
+    let at = |(line, problem): (u32, Problem)| PlanningError {
+        source_name: source_name.to_owned(),
+        place: line.into(),
+        problem,
     };
+    let mut plan = Plan::empty(source_name, machine.tick_s);
+    let mut open: Vec<StretchBlock> = Vec::new();
+    for step in moves {
+        append(step, &mut open, &mut plan, machine, mode).map_err(at)?;
+    }
+    close(&mut open, &mut plan, mode).map_err(at)?;
+    // What the tick can't do is to be refused here, not on the machine.
+    Executable::new::<f32>(&plan)?;
+    Ok(plan)
+}
+
+/// Appends a move to the open stretch, which is closed before if the machine has to stop there.
+fn append(
+    step: &Move,
+    open: &mut Vec<StretchBlock>,
+    plan: &mut Plan,
+    machine: &Machine,
+    mode: Mode,
+) -> Result<(), (u32, Problem)> {
+    let block =
+        block(&step.element, step.line, step.feed_mm_s, machine).map_err(|problem| (step.line, problem))?;
+    if let Some(last) = open.last_mut() {
+        last.joint_mm_s = joint_feed(&last.element, &step.element, machine);
+        if last.joint_mm_s <= 0.0 {
+            close(open, plan, mode)?;
+        }
+    }
+    open.push(block);
+    Ok(())
+}
+
+fn block(element: &Element, line: u32, feed_mm_s: f64, machine: &Machine) -> Result<StretchBlock, Problem> {
     let ceiling = Ceiling::new(
         &machine.limits(),
         feed_mm_s,

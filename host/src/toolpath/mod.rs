@@ -20,7 +20,7 @@ pub mod polynomial;
 pub mod septic;
 pub mod spline;
 
-pub use compile::{CompileError, Placed, compile, exact, on_path};
+pub use compile::{CompileError, Placed, compile, exact, on_path, septics};
 pub use element::{Element, Role};
 pub use involute::Involute;
 pub use polynomial::Polynomial;

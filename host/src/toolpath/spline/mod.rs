@@ -167,6 +167,12 @@ impl Spline {
         self.degree
     }
 
+    /// Where it starts \[mm\].
+    #[must_use]
+    pub fn start_mm(&self) -> Vector {
+        self.starts[0]
+    }
+
     /// Parameters at the ends of the spans, one more than there are spans.
     #[must_use]
     pub fn knots(&self) -> &[f64] {
