@@ -120,11 +120,8 @@ impl Interpreter {
     }
 
     fn note_path_mode(&mut self, block: &Block<'_>) {
-        if block.is_blend() {
-            self.notice(NoticeKind::Blending);
-            if block.letter(b'Q').is_some() {
-                self.notice(NoticeKind::Simplification);
-            }
+        if block.is_blend() && block.letter(b'Q').is_some() {
+            self.notice(NoticeKind::Simplification);
         }
     }
 
@@ -343,7 +340,6 @@ mod tests {
                 (NoticeKind::Spindle, 1, 2),
                 (NoticeKind::Coolant, 2, 2),
                 (NoticeKind::ToolChange, 3, 1),
-                (NoticeKind::Blending, 5, 2),
                 (NoticeKind::Simplification, 5, 1),
                 (NoticeKind::RadiusEnlarged, 7, 1),
             ]

@@ -169,8 +169,6 @@ pub enum NoticeKind {
     ToolChange,
     /// M7, M8, M9.
     Coolant,
-    /// G64.
-    Blending,
     /// Q of G64.
     Simplification,
     /// F in a line that switches the units: controllers differ in which unit they take it.
@@ -190,8 +188,9 @@ impl fmt::Display for Notice {
             NoticeKind::SpindleSpeed => "S is not acted on: there is no spindle",
             NoticeKind::ToolChange => "M6 is not acted on: there is no tool changer",
             NoticeKind::Coolant => "M7, M8, M9 are not acted on: there is no coolant",
-            NoticeKind::Blending => "G64 is not acted on: blends do not exist yet, corners are exact stops",
-            NoticeKind::Simplification => "Q of G64 is not acted on: every programmed point is kept",
+            NoticeKind::Simplification => {
+                "Q of G64 is not acted on: P alone says how far the path may be left"
+            }
             NoticeKind::FeedInNewUnits => "F in a line that switches the units is taken in the new unit",
             NoticeKind::RadiusEnlarged => {
                 "R falls short of half the chord by a rounding error: half circle made"

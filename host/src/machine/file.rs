@@ -12,12 +12,12 @@ use toml::Spanned;
 
 use super::error::{MachineError, quote};
 use super::range::{
-    AXIS_NAME, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction, Gain, Inertia,
-    IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio, NAME_CHARACTERS_MAX,
-    NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, Positive, Resolution, Reversal,
-    TIMER_BITS, TablePoint, Tick, Velocity, Within,
+    AXIS_NAME, BlendTolerance, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction,
+    Gain, Inertia, IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio,
+    NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, Positive,
+    Resolution, Reversal, TIMER_BITS, TablePoint, Tick, Velocity, Within,
 };
-use super::settings::{AxisSettings, Machine, PathSettings};
+use super::settings::{AxisSettings, BLEND_TOLERANCE_MM, Machine, PathSettings};
 
 /// Seconds per minute: feeds in mm/min exist in this file only.
 const S_PER_MIN: f64 = 60.0;
@@ -128,6 +128,7 @@ struct PathTable {
     joint_angle_deg: Within<JointAngle>,
     accel_step_mm_s2: Within<Limit>,
     curve_feed_share: Within<CurveShare>,
+    blend_tolerance_mm: Option<Within<BlendTolerance>>,
 }
 
 #[derive(Deserialize)]
@@ -266,6 +267,10 @@ impl PathTable {
             joint_angle_rad: self.joint_angle_deg.0.to_radians(),
             accel_step_mm_s2: self.accel_step_mm_s2.0,
             curve_feed_share: self.curve_feed_share.0,
+            blend_tolerance_mm: self
+                .blend_tolerance_mm
+                .as_ref()
+                .map_or(BLEND_TOLERANCE_MM, |tolerance| tolerance.0),
         }
     }
 }

@@ -6,9 +6,10 @@
 use motion_kernel::axis::TABLE_POINTS;
 
 use super::range::{
-    AXIS_NAME, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction, Gain, Inertia,
-    IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio, NOISE_COUNTS, NOISE_SEED,
-    OutputLimit, OutputOffset, Positive, Range, Resolution, Reversal, TIMER_BITS, TablePoint, Tick, Velocity,
+    AXIS_NAME, BlendTolerance, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction,
+    Gain, Inertia, IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio, NOISE_COUNTS,
+    NOISE_SEED, OutputLimit, OutputOffset, Positive, Range, Resolution, Reversal, TIMER_BITS, TablePoint,
+    Tick, Velocity,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -106,6 +107,13 @@ pub const KEY_TABLES: &[KeyTable] = &[
                 "Part of the feed that a curve's radius allows to plan with; the rest is left for changing the feed \
                  on the curve.",
             ),
+            Key::new(
+                "blend_tolerance_mm",
+                "mm",
+                BlendTolerance::EXPECTED,
+                "How far blends of corners may leave the programmed path under a G64 without P; 0 for exact path.",
+            )
+            .or("0.01"),
         ],
     ),
     table(

@@ -52,6 +52,7 @@ ranges! {
     Limit: "a number from 0.001 to 1e12", |value| (0.001..=1e12).contains(&value);
     JointAngle: "a number from 0 to 30", |value| (0.0..=30.0).contains(&value);
     CurveShare: "a number from 0.1 to 0.85", |value| (0.1..=CURVE_FEED_SHARE_MAX).contains(&value);
+    BlendTolerance: "a number from 0 to 10", |value| (0.0..=10.0).contains(&value);
     FollowingError: "a number from 0.0001 to 1000", |value| (0.0001..=1000.0).contains(&value);
     Resolution: "a number above 1e-8 and below 0.5", |value| value > 1e-8 && value < 0.5;
     Velocity: "a number of magnitude 0.001 to 1e9", |value| (0.001..=1e9).contains(&value.abs());

@@ -21,6 +21,9 @@ const JOINT_ANGLE_ROUNDING_RAD: f64 = 2.0e-6;
 /// Greatest gap between two pieces \[mm\]: pieces are rounded, to a twentieth of a count of 0.1 µm.
 const JOINT_GAP_MM: f64 = 5e-6;
 
+/// Tolerance of a G64 without P \[mm\]: so little that a program written for another controller still makes its part.
+pub(super) const BLEND_TOLERANCE_MM: f64 = 0.01;
+
 /// The simulation's step \[s\]; a tick is divided into as many as come closest to it, so a step is at least 3/4 of it.
 const SUBSTEP_S: f64 = 25e-6;
 
@@ -59,6 +62,8 @@ pub struct PathSettings {
     /// Part of a curve's greatest feed that is planned with, 0.1 to 0.85; what it leaves of acceleration, jerk and
     /// snap is for changing the feed on the curve.
     pub curve_feed_share: f64,
+    /// How far blends may leave the path under a G64 without P \[mm\]; 0 to 10, 0 for exact path.
+    pub blend_tolerance_mm: f64,
 }
 
 /// One axis. Limits are from 0.001 to 10¹².
@@ -113,6 +118,7 @@ impl Machine {
                 joint_angle_rad: 0.5_f64.to_radians(),
                 accel_step_mm_s2: 500.0,
                 curve_feed_share: CURVE_FEED_SHARE,
+                blend_tolerance_mm: BLEND_TOLERANCE_MM,
             },
             axes: [
                 AxisSettings::reference("X", REFERENCE_X),

@@ -31,7 +31,7 @@ pub mod stretch;
 pub use blocks::plan_blocks;
 pub use error::{Place, PlanningError, Problem};
 pub use executable::Executable;
-pub use program::{Move, plan_moves, plan_program};
+pub use program::{plan_moves, plan_program};
 pub use spline::plan_spline;
 pub use stretch::Stretch;
 

@@ -1,14 +1,15 @@
 //! Steps of a program to stretches: where the motion must stop, and what each joint allows.
 
-use motion_kernel::plan::{Ceiling, Joint, joint};
+use motion_kernel::plan::{BLEND_FEED_SHARE, Ceiling, Joint, joint};
 
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
 use super::{Item, Mode, Plan};
-use crate::gcode::{Feed, Program, StepKind};
+use crate::gcode::{Feed, PathMode, Program, StepKind};
 use crate::machine::Machine;
-use crate::toolpath::{Element, angle, norm, subtract};
+use crate::toolpath::smooth::{Move, TANGENT_ROUNDING_RAD, smooth};
+use crate::toolpath::{Element, Role, angle, norm, subtract};
 
 /// Plans a whole program for a machine.
 ///
@@ -30,13 +31,17 @@ pub fn plan_program(
     };
     let mut plan = Plan::empty(source_name, machine.tick_s);
     plan.notices = program.notices.iter().map(ToString::to_string).collect();
-    let mut open: Vec<StretchBlock> = Vec::new();
+    let mut run: Vec<Move> = Vec::new();
     for step in &program.steps {
-        let (element, feed) = match &step.kind {
-            StepKind::Line(line) => (Element::line(line), line.feed),
-            StepKind::Arc(arc) => (Element::arc(arc), arc.feed),
+        match &step.kind {
+            StepKind::Line(line) => {
+                run.push(path_move(step.line, Element::line(line), line.feed, line.mode, machine));
+            }
+            StepKind::Arc(arc) => {
+                run.push(path_move(step.line, Element::arc(arc), arc.feed, arc.mode, machine));
+            }
             StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => {
-                close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
+                append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
                 match step.kind {
                     // A dwell of no time changes nothing but the stop it makes.
                     StepKind::Dwell { seconds } if seconds > 0.0 => {
@@ -46,31 +51,13 @@ pub fn plan_program(
                     StepKind::Stop => plan.items.push(Item::Stop { line: step.line }),
                     _ => {}
                 }
-                continue;
             }
-        };
-        let feed_mm_s = match feed {
-            Feed::Rapid => f64::INFINITY,
-            Feed::MmPerMin(feed) => feed / 60.0,
-        };
-        let step = Move { line: step.line, element, feed_mm_s };
-        append(&step, &mut open, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
+        }
     }
-    close(&mut open, &mut plan, mode).map_err(|(line, problem)| at(line)(problem))?;
+    append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
     // What the tick can't do is to be refused here, not on the machine.
     Executable::new::<f32>(&plan)?;
     Ok(plan)
-}
-
-/// A block of path that is to be driven.
-#[derive(Clone, Copy, Debug)]
-pub struct Move {
-    /// Program line.
-    pub line: u32,
-    /// Geometry.
-    pub element: Element,
-    /// Feed \[mm/s\]; infinite for a rapid.
-    pub feed_mm_s: f64,
 }
 
 /// Plans moves that follow each other, from rest to rest.
@@ -79,59 +66,60 @@ pub struct Move {
 /// As [`plan_program`].
 pub fn plan_moves(
     source_name: &str,
-    moves: &[Move],
+    mut moves: Vec<Move>,
     machine: &Machine,
     mode: Mode,
 ) -> Result<Plan, PlanningError> {
-    let at = |(line, problem): (u32, Problem)| PlanningError {
+    let mut plan = Plan::empty(source_name, machine.tick_s);
+    append(&mut moves, &mut plan, machine, mode).map_err(|(line, problem)| PlanningError {
         source_name: source_name.to_owned(),
         place: line.into(),
         problem,
-    };
-    let mut plan = Plan::empty(source_name, machine.tick_s);
-    let mut open: Vec<StretchBlock> = Vec::new();
-    for step in moves {
-        append(step, &mut open, &mut plan, machine, mode).map_err(at)?;
-    }
-    close(&mut open, &mut plan, mode).map_err(at)?;
-    // What the tick can't do is to be refused here, not on the machine.
+    })?;
+    // As for a program.
     Executable::new::<f32>(&plan)?;
     Ok(plan)
 }
 
-/// Appends a move to the open stretch, which is closed before if the machine has to stop there.
-fn append(
-    step: &Move,
-    open: &mut Vec<StretchBlock>,
-    plan: &mut Plan,
-    machine: &Machine,
-    mode: Mode,
-) -> Result<(), (u32, Problem)> {
-    let block =
-        block(&step.element, step.line, step.feed_mm_s, machine).map_err(|problem| (step.line, problem))?;
-    if let Some(last) = open.last_mut() {
-        last.joint_mm_s = joint_feed(&last.element, &step.element, machine);
-        if last.joint_mm_s <= 0.0 {
-            close(open, plan, mode)?;
+fn path_move(line: u32, element: Element, feed: Feed, mode: PathMode, machine: &Machine) -> Move {
+    let feed_mm_s = match feed {
+        Feed::Rapid => f64::INFINITY,
+        Feed::MmPerMin(feed) => feed / 60.0,
+    };
+    let tolerance_mm = match mode {
+        PathMode::ExactPath => 0.0,
+        PathMode::Blend { tolerance_mm } => tolerance_mm.unwrap_or(machine.path.blend_tolerance_mm),
+    };
+    Move { line, element, feed_mm_s, tolerance_mm }
+}
+
+/// Appends the stretches of moves that follow each other, smoothed.
+fn append(run: &mut Vec<Move>, plan: &mut Plan, machine: &Machine, mode: Mode) -> Result<(), (u32, Problem)> {
+    let mut open: Vec<StretchBlock> = Vec::new();
+    for step in smooth(run, &machine.limits().in_any_direction()) {
+        let block = block(&step, machine).map_err(|problem| (step.line, problem))?;
+        if let Some(last) = open.last_mut() {
+            last.joint_mm_s = joint_feed(&last.element, &step.element, machine);
+            if last.joint_mm_s <= 0.0 {
+                close(&mut open, plan, mode)?;
+            }
         }
+        open.push(block);
     }
-    open.push(block);
-    Ok(())
+    run.clear();
+    close(&mut open, plan, mode)
 }
 
-fn block(element: &Element, line: u32, feed_mm_s: f64, machine: &Machine) -> Result<StretchBlock, Problem> {
-    let ceiling = Ceiling::new(
-        &machine.limits(),
-        feed_mm_s,
-        &element.tangent_max(),
-        &element.curved(),
-        &element.bend(),
-    )?;
-    Ok(StretchBlock { line, element: *element, ceiling, joint_mm_s: 0.0 })
+fn block(step: &Move, machine: &Machine) -> Result<StretchBlock, Problem> {
+    let element = step.element;
+    let mut limits = machine.limits();
+    if matches!(element, Element::Polynomial { role: Role::Blend, .. }) {
+        limits.curve_feed_share = BLEND_FEED_SHARE;
+    }
+    let ceiling =
+        Ceiling::new(&limits, step.feed_mm_s, &element.tangent_max(), &element.curved(), &element.bend())?;
+    Ok(StretchBlock { line: step.line, element, ceiling, joint_mm_s: 0.0 })
 }
-
-/// Directions computed from coordinates that are exact to 10⁻¹⁰ mm agree to this where they are meant to.
-const TANGENT_ROUNDING_RAD: f64 = 1.0e-9;
 
 /// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.
 fn joint_feed(before: &Element, after: &Element, machine: &Machine) -> f64 {

@@ -1,10 +1,11 @@
 //! A spline to a plan: one stretch from its start to its end.
 
 use super::error::{PlanningError, Problem};
-use super::program::{Move, plan_moves};
+use super::program::plan_moves;
 use super::{Mode, Plan};
 use crate::machine::Machine;
 use crate::toolpath::septic::Deviation;
+use crate::toolpath::smooth::Move;
 use crate::toolpath::spline::Spline;
 use crate::toolpath::{Element, norm, septics};
 
@@ -37,8 +38,14 @@ pub fn plan_spline(
         line: line(0),
         element: Element::Line { from: [0.0; 3], to: start },
         feed_mm_s: f64::INFINITY,
+        tolerance_mm: 0.0,
     };
-    let spans = spline.elements().map(|(point, element)| Move { line: line(point), element, feed_mm_s });
+    let spans = spline.elements().map(|(point, element)| Move {
+        line: line(point),
+        element,
+        feed_mm_s,
+        tolerance_mm: 0.0,
+    });
     let moves: Vec<Move> = (norm(start) > 0.0).then_some(approach).into_iter().chain(spans).collect();
     // Before the plan, which knows a cusp only as a limit of 0.
     let pieces = pieces(&moves).map_err(|(line, problem)| PlanningError {
@@ -46,7 +53,7 @@ pub fn plan_spline(
         place: line.into(),
         problem,
     })?;
-    Ok((plan_moves(source_name, &moves, machine, Mode::Merged)?, pieces))
+    Ok((plan_moves(source_name, moves, machine, Mode::Merged)?, pieces))
 }
 
 fn pieces(moves: &[Move]) -> Result<Pieces, (u32, Problem)> {

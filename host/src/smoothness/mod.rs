@@ -66,7 +66,7 @@ pub fn arcs() -> Course {
             radius_per_rad: 0.0,
             height_per_rad: 0.0,
         };
-        Element::Arc { from: at(outward), to: at(onward), shape, sweep_rad: FRAC_PI_2, plane: [0, 1] }
+        Element::Arc { from: at(outward), to: at(onward), shape, sweep_rad: FRAC_PI_2 }
     };
     let (left, up, right) = ([-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]);
     Course::new("arcs", [arc(RADII_MM[0], 0.0, left, up), arc(RADII_MM[1], SECOND_CENTRE_Y_MM, up, right)])

@@ -94,6 +94,24 @@ pub struct Spiral {
 }
 
 impl Spiral {
+    /// Greatest |component| of a unit vector in the plane on each axis; exactly 0 or 1 where it is so but for
+    /// rounding.
+    #[must_use]
+    pub fn in_plane(&self) -> Vector {
+        core::array::from_fn(|axis| {
+            let part = libm::hypot(self.outward[axis], self.onward[axis]);
+            if (part - part.round()).abs() < 1e-9 { part.round() } else { part }
+        })
+    }
+
+    /// The same spiral, its angle counted from `angle` on.
+    #[must_use]
+    pub fn turned(&self, angle: f64) -> Self {
+        let (outward, onward) = self.frame(angle);
+        let radius_mm = self.radius_mm + self.radius_per_rad * angle;
+        Self { outward, onward, radius_mm, ..*self }
+    }
+
     /// Direction from the centre at `angle`, and a quarter turn on.
     fn frame(&self, angle: f64) -> (Vector, Vector) {
         let (sine, cosine) = libm::sincos(angle);

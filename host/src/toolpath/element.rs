@@ -29,8 +29,6 @@ pub enum Element {
         shape: Spiral,
         /// The angle run through \[rad\], > 0.
         sweep_rad: f64,
-        /// Indices of the plane's axes.
-        plane: [usize; 2],
     },
     /// A polynomial.
     Polynomial {
@@ -110,7 +108,7 @@ impl Element {
             radius_per_rad: (step.end_radius_mm - radius_mm) / sweep_rad,
             height_per_rad: (to[normal] - from[normal]) / sweep_rad,
         };
-        Self::Arc { from, to, shape, sweep_rad, plane: [first, second] }
+        Self::Arc { from, to, shape, sweep_rad }
     }
 
     /// The polynomial `shape` from `from`.
@@ -147,6 +145,33 @@ impl Element {
             Self::Arc { shape, sweep_rad, .. } => Some((shape, *sweep_rad)),
             Self::Polynomial { shape, .. } => Some((shape, 1.0)),
             Self::Involute { shape, .. } => Some((shape, shape.sweep_rad())),
+        }
+    }
+
+    /// What is left of a line or an arc without the first and the last millimetres, on an arc by the speed at its
+    /// start and end. Polynomials and involutes stay whole.
+    #[must_use]
+    pub fn trimmed(&self, first_mm: f64, last_mm: f64) -> Self {
+        match *self {
+            Self::Line { from, to } => {
+                let tangent = self.ends()[0].tangent;
+                Self::Line {
+                    from: add(from, scale(tangent, first_mm)),
+                    to: add(to, scale(scale(tangent, -1.0), last_mm)),
+                }
+            }
+            Self::Arc { from, to, shape, sweep_rad } => {
+                let rad_per_mm = |angle| 1.0 / norm(shape.derivatives(angle)[0]);
+                let first = rad_per_mm(0.0) * first_mm;
+                let last = sweep_rad - rad_per_mm(sweep_rad) * last_mm;
+                Self::Arc {
+                    from: add(from, shape.offset(0.0, first)),
+                    to: add(to, shape.offset(sweep_rad, last)),
+                    shape: shape.turned(first),
+                    sweep_rad: last - first,
+                }
+            }
+            Self::Polynomial { .. } | Self::Involute { .. } => *self,
         }
     }
 
@@ -212,11 +237,12 @@ impl Element {
             Self::Line { .. } => self.ends()[0].tangent.map(f64::abs),
             Self::Polynomial { shape, .. } => shape.greatest().tangent,
             Self::Involute { shape, .. } => shape.tangent_max(),
-            Self::Arc { plane, .. } => {
+            Self::Arc { shape, .. } => {
                 let planar = self.planar();
                 // Conservative for arcs that never run along one of their axes.
                 let axial = (1.0 - planar * planar).max(0.0).sqrt();
-                core::array::from_fn(|axis| if plane.contains(&axis) { planar } else { axial })
+                let part = shape.in_plane();
+                core::array::from_fn(|axis| (planar * part[axis] + axial * shape.normal[axis].abs()).min(1.0))
             }
         }
     }
@@ -226,7 +252,7 @@ impl Element {
     pub fn curved(&self) -> [bool; 3] {
         match self {
             Self::Line { .. } => [false; 3],
-            Self::Arc { plane, .. } => core::array::from_fn(|axis| plane.contains(&axis)),
+            Self::Arc { shape, .. } => shape.in_plane().map(|part| part > 0.0),
             Self::Polynomial { shape, .. } => shape.greatest().curved,
             Self::Involute { shape, .. } => shape.tangent_max().map(|component| component > 0.0),
         }

@@ -9,15 +9,20 @@
 //! - [`involute`]: involutes of circles and their offsets;
 //! - [`spline`]: splines through points, or close to them;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
+//! - [`smooth`]: corners of a run of elements rounded within a tolerance, by
+//!   [`blend`]: one corner's septic blend, and [`merge`]: short lines to fewer lines and arcs;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`mod@compile`]: elements to pieces over exact path positions.
 
+pub mod blend;
 pub mod compile;
 pub mod curve;
 pub mod element;
 pub mod involute;
+pub mod merge;
 pub mod polynomial;
 pub mod septic;
+pub mod smooth;
 pub mod spline;
 
 pub use compile::{CompileError, Placed, compile, exact, on_path, septics};

@@ -21,13 +21,18 @@ use crate::num::Root;
 /// A good value for [`MachineLimits::curve_feed_share`]: it costs a fifth of the feed on a long arc and
 /// leaves three quarters of the acceleration, and a third of the jerk, for ramps at its very top.
 pub const CURVE_FEED_SHARE: f64 = 0.8;
-/// The greatest share that leaves something of every limit for ramps.
+/// The greatest share that leaves enough of every limit for ramps on curves of any length.
 pub const CURVE_FEED_SHARE_MAX: f64 = 0.85;
+/// The share for a short curve between straighter ones, which is to be passed rather than used for a change of
+/// feed: some hundredths of the limits are left for ramps.
+pub const BLEND_FEED_SHARE: f64 = 0.97;
 /// Part of the jerk limit that ramps may use across the path, 3κ·v·a.
 const NORMAL_JERK_SHARE: f64 = 0.55;
 /// Parts of the snap limit that ramps may use: 3κ·a² and 4κ·v·j across, 6κ'·v²·a along the path.
 const NORMAL_SNAP_SHARES: (f64, f64) = (0.1, 0.3);
 const TANGENTIAL_SNAP_SHARE: f64 = 0.2;
+/// The same across the path, of what constant feed leaves, where that is less.
+const NORMAL_SNAP_REST_SHARES: (f64, f64) = (0.21, 0.63);
 
 /// The limits of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +53,14 @@ pub struct MachineLimits<R, const AXES: usize> {
     /// Part of a curve's greatest feed that blocks are planned with, above 0 and at most
     /// [`CURVE_FEED_SHARE_MAX`]; the rest of the limits is for changing the feed on the curve.
     pub curve_feed_share: R,
+}
+
+impl<R: Root, const AXES: usize> MachineLimits<R, AXES> {
+    /// Acceleration, jerk and snap that the path and every axis allow in any direction.
+    #[must_use]
+    pub fn in_any_direction(&self) -> Limits<R> {
+        self.axes.iter().fold(self.path.limits, |limits, axis| least(&limits, &axis.limits, R::ONE))
+    }
 }
 
 /// How a block bends. The derivatives' roots stand for them, because R⁻³ of a radius of 1 m has no digits
@@ -189,17 +202,36 @@ impl<R: Root> Ceiling<R> {
         let [w1, w2, w3] = bends.map(|bend| bend * feed + R::MARGIN);
         let normal_accel = w1 * feed;
         let along_jerk = w2 * (w2 * feed);
+        let across_snap = w3 * (w3 * (w3 * feed));
+        // Where constant feed leaves little, ramps get parts of what it leaves: across, what keeps half of the jerk
+        // along the path, and parts of the snap; along, half of the snap that these leave.
+        let half = constant(0.5);
+        let middle_jerk = half * (jerk + along_jerk);
+        let rest_jerk = (jerk - middle_jerk).sqrt_product(jerk + middle_jerk);
+        let snap_rest = snap - across_snap;
+        let (accel_rest, jerk_rest) = (
+            constant(NORMAL_SNAP_REST_SHARES.0) * snap_rest,
+            constant(NORMAL_SNAP_REST_SHARES.1) * snap_rest,
+        );
+        let used_snap = across_snap
+            + accel_rest.min(constant(NORMAL_SNAP_SHARES.0) * snap)
+            + jerk_rest.min(constant(NORMAL_SNAP_SHARES.1) * snap);
+        let rest_along = half * (snap - used_snap).sqrt_product(snap + used_snap);
         let ramp_accel = (accel - normal_accel)
             .sqrt_product(accel + normal_accel)
             .min(constant(NORMAL_JERK_SHARE / 3.0) * jerk / w1)
+            .min(constant(1.0 / 3.0) * rest_jerk / w1)
             .min((constant(NORMAL_SNAP_SHARES.0 / 3.0) * snap).sqrt_product(r1))
+            .min((constant(1.0 / 3.0) * accel_rest).sqrt_product(r1))
             .min(constant(TANGENTIAL_SNAP_SHARE / 6.0) * snap / w2 / w2)
+            .min(constant(1.0 / 6.0) * rest_along / w2 / w2)
             .min(along.accel_mm_s2);
         let normal_jerk = constant(3.0) * (w1 * ramp_accel);
         let ramp_jerk = ((jerk - normal_jerk).sqrt_product(jerk + normal_jerk) - along_jerk)
             .min(constant(NORMAL_SNAP_SHARES.1 / 4.0) * snap / w1)
+            .min(constant(0.25) * jerk_rest / w1)
             .min(along.jerk_mm_s3);
-        let normal_snap = w3 * (w3 * (w3 * feed))
+        let normal_snap = across_snap
             + constant(3.0) * (kappa * ramp_accel * ramp_accel)
             + constant(4.0) * (w1 * ramp_jerk);
         let along_snap = constant(6.0) * (w2 * (w2 * ramp_accel));
@@ -234,7 +266,7 @@ mod tests {
     /// Worst vectors over every state a ramp on the arc can be in, radii from 1 µm to 100 m.
     #[test]
     fn shared_budget_keeps_the_vectors_within_the_limits() {
-        for share in [0.3, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX] {
+        for share in [0.3, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX, BLEND_FEED_SHARE] {
             vectors_stay_within(&MachineLimits { curve_feed_share: share, ..machine() });
         }
     }

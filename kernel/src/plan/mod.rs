@@ -15,7 +15,10 @@ pub mod feed;
 pub mod joint;
 pub mod lookahead;
 
-pub use ceiling::{AxisLimits, Bend, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX, Ceiling, MachineLimits, Reason};
+pub use ceiling::{
+    AxisLimits, BLEND_FEED_SHARE, Bend, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX, Ceiling, MachineLimits,
+    Reason,
+};
 pub use feed::segments;
 pub use joint::{Joint, joint};
 pub use lookahead::{Block, BlockPlan, PlanError, merge_equal, plan};

@@ -1,0 +1,324 @@
+//! A corner blend: the septic curve that leaves one element and enters the next with the same tangent, curvature
+//! and derivative of curvature (G³), so that velocity, acceleration and jerk of every axis go through it without
+//! a step.
+//!
+//! Consumes two lines or arcs that meet, a tolerance and the room on either side; produces the blend and how much
+//! of both it stands for, or none where the path has to stay as it is: a corner sharper than [`ANGLE_MAX_RAD`], no
+//! tolerance, no room. A tangent joint whose curvature jumps (a line meets an arc) is a corner of 0° and is
+//! blended like the others. Background; a bounded number of steps per corner.
+//!
+//! **Shape.** Both ends give four control points each. On a line they stand at a₁, a₂, a₃ of the way d to the
+//! corner; on an arc the same speeds |r'|, s'', s''' by the parameter are used with the arc's own derivatives by
+//! arc length. [`SHAPES`] holds the a's that allow the greatest feed at a given tolerance under a limit of jerk
+//! alone and of snap alone, by corner angle; of these, three between them and an evenly spaced one, that with the
+//! greatest feed under all limits is taken. They were found by searching all a₁ ≤ a₂ ≤ a₃ ≤ 1.
+//!
+//! **Tolerance.** The path before and after the corner and the blend are walked together: up to a place u* of the
+//! blend each of its points is held against the nearest of the element before, from there on against that of the
+//! element after, and u* itself against the corner. All pairs taken, the way is continuous on both curves and
+//! leaves nothing out, so the greatest distance of a pair bounds that of any point of either curve from the other.
+//! For two lines it is the distance from the corner to the blend's middle.
+
+use motion_kernel::law::Limits;
+
+use super::curve::{Curve, Spiral, by_arc_length};
+use super::element::{Element, Role};
+use super::polynomial::Polynomial;
+use super::{Vector, add, angle, dot, norm, scale, subtract};
+
+/// The sharpest corner that is blended \[rad\]: a turn of 170°. The feed there is a hundredth of that at 10°.
+pub const ANGLE_MAX_RAD: f64 = 170.0 * core::f64::consts::PI / 180.0;
+
+/// The greatest part of an arc that one blend stands for \[rad\].
+const ARC_RAD_MAX: f64 = core::f64::consts::FRAC_PI_4;
+
+/// Corner angle \[°\], and a₁ a₂ a₃ for the greatest feed by jerk and by snap.
+const SHAPES: [(f64, [f64; 3], [f64; 3]); 9] = [
+    (0.0, [0.1833, 0.3738, 0.9679], [0.3504, 0.6370, 0.8443]),
+    (15.0, [0.1945, 0.3823, 0.9593], [0.3502, 0.6326, 0.8424]),
+    (30.0, [0.2303, 0.4005, 0.9417], [0.3444, 0.6118, 0.8413]),
+    (60.0, [0.2421, 0.4583, 0.8542], [0.4248, 0.5470, 0.8514]),
+    (90.0, [0.2482, 0.4826, 0.7500], [0.3310, 0.4838, 0.7658]),
+    (120.0, [0.1868, 0.4070, 0.5993], [0.2719, 0.3848, 0.6498]),
+    (150.0, [0.1115, 0.2411, 0.3864], [0.2000, 0.2398, 0.4500]),
+    (160.0, [0.0945, 0.1689, 0.2941], [0.1287, 0.1694, 0.3275]),
+    (170.0, [0.0883, 0.0985, 0.1883], [0.0756, 0.0915, 0.1881]),
+];
+/// Parts of the way from the first to the second.
+const BETWEEN: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// Evenly spaced control points: the best for a jump of curvature without a corner.
+const EVEN: [f64; 3] = [2.0 / 7.0, 4.0 / 7.0, 6.0 / 7.0];
+
+/// In how many parts a blend is cut to compare shapes; ceilings look closer.
+const COMPARED_PARTS: usize = 24;
+/// In how many parts it is cut to measure its distance from the path.
+const MEASURED_PARTS: usize = 32;
+/// Corrections of the way d until the distance fits the tolerance.
+const CORRECTIONS_MAX: usize = 8;
+/// Part of the tolerance at which it fits.
+const CLOSE: f64 = 0.998;
+/// Part of the tolerance that is made use of: the pieces are a little off their curve, by 10⁻⁶ mm at most, and a
+/// millionth of its length.
+const TOLERANCE_USED: f64 = 0.999;
+
+/// A blend, and what it stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blend {
+    /// The blend.
+    pub element: Element,
+    /// Path it stands for on either side of the corner \[mm\].
+    pub way_mm: f64,
+    /// A bound on its distance from the path and the path's from it \[mm\].
+    pub distance_mm: f64,
+}
+
+impl Blend {
+    /// The blend of the corner between `before` and `after`, within `tolerance_mm` and with at most `room_mm` of
+    /// either element, that allows the greatest feed under `limits`.
+    #[must_use]
+    pub fn new(
+        before: &Element,
+        after: &Element,
+        tolerance_mm: f64,
+        room_mm: f64,
+        limits: &Limits<f64>,
+    ) -> Option<Self> {
+        let corner = Corner::new(before, after, room_mm)?;
+        // Written so that what is not a number is no tolerance either.
+        if !(tolerance_mm > 0.0 && corner.room_mm > 0.0) {
+            return None;
+        }
+        let mut best: Option<(f64, Self)> = None;
+        for shape in shapes(corner.angle_rad) {
+            let Some((way_mm, curve, distance_mm)) = corner.within(tolerance_mm * TOLERANCE_USED, &shape)
+            else {
+                continue;
+            };
+            let feed = feed_mm_s(&curve, limits);
+            if best.is_none_or(|(most, _)| feed > most) && feed.is_finite() && feed > 0.0 {
+                let (start, _) = corner.before.at(way_mm);
+                let (end, _) = corner.after.at(way_mm);
+                let (from, to) = (add(corner.point, start), add(corner.point, end));
+                let element = Element::Polynomial { from, to, shape: curve, role: Role::Blend };
+                best = Some((feed, Self { element, way_mm, distance_mm }));
+            }
+        }
+        best.map(|(_, blend)| blend)
+    }
+}
+
+/// The way that a corner of `angle_rad` between two lines takes of both within `tolerance_mm` \[mm\].
+#[must_use]
+pub fn way_mm(angle_rad: f64, tolerance_mm: f64) -> f64 {
+    let Some([a1, a2, a3]) = shapes(angle_rad).nth(BETWEEN.len() / 2) else { return 0.0 };
+    // The middle of the blend, from the corner: control points on either line with the weights of u = 1/2.
+    let part = (1.0 + 7.0 * (1.0 - a1) + 21.0 * (1.0 - a2) + 35.0 * (1.0 - a3)) / 128.0;
+    tolerance_mm / (2.0 * part * libm::sin(0.5 * angle_rad))
+}
+
+/// The greatest feed at which a curve alone keeps the limits \[mm/s\].
+#[must_use]
+pub fn feed_mm_s(curve: &Polynomial, limits: &Limits<f64>) -> f64 {
+    let bend = curve.greatest_of(COMPARED_PARTS).bend;
+    let by_accel = (limits.accel_mm_s2 / bend.curvature_per_mm).sqrt();
+    let by_jerk = libm::cbrt(limits.jerk_mm_s3 / (bend.third_root_per_mm * bend.third_root_per_mm));
+    let by_snap = (limits.snap_mm_s4 / bend.fourth_root_per_mm.powi(3)).sqrt().sqrt();
+    // Not `min`, which would overlook what is not a number.
+    [by_jerk, by_snap].into_iter().fold(by_accel, |least, feed| if feed >= least { least } else { feed })
+}
+
+/// The shapes to choose from.
+fn shapes(angle_rad: f64) -> impl Iterator<Item = [f64; 3]> {
+    let degrees = angle_rad.to_degrees();
+    let above = SHAPES.iter().position(|&(angle, ..)| angle >= degrees).unwrap_or(SHAPES.len() - 1).max(1);
+    let ((low, low_jerk, low_snap), (high, high_jerk, high_snap)) = (SHAPES[above - 1], SHAPES[above]);
+    let part = (degrees - low) / (high - low);
+    let (jerk, snap) = (mix(low_jerk, high_jerk, part), mix(low_snap, high_snap, part));
+    BETWEEN.into_iter().map(move |part| mix(jerk, snap, part)).chain([EVEN])
+}
+
+fn mix(a: [f64; 3], b: [f64; 3], part: f64) -> [f64; 3] {
+    core::array::from_fn(|index| a[index] + (b[index] - a[index]) * part)
+}
+
+/// Two elements as seen from where they meet.
+struct Corner {
+    point: Vector,
+    before: Leg,
+    after: Leg,
+    angle_rad: f64,
+    room_mm: f64,
+}
+
+/// One of them; what is measured along it counts from the corner.
+enum Leg {
+    /// Away from the corner, and the tangent of the path.
+    Line { away: Vector, tangent: Vector },
+    /// The angle at the corner, and how it goes with the way.
+    Arc { shape: Spiral, corner_rad: f64, rad_per_mm: f64 },
+}
+
+impl Corner {
+    fn new(before: &Element, after: &Element, room_mm: f64) -> Option<Self> {
+        let (before_leg, after_leg) = (Leg::new(before, true)?, Leg::new(after, false)?);
+        let angle_rad = angle(before_leg.at(0.0).1[0], after_leg.at(0.0).1[0]);
+        if !(angle_rad <= ANGLE_MAX_RAD) {
+            return None;
+        }
+        let room_mm = room_mm.min(before_leg.room_mm()).min(after_leg.room_mm());
+        Some(Self { point: after.ends_mm().0, before: before_leg, after: after_leg, angle_rad, room_mm })
+    }
+
+    /// The blend over `way_mm` on either side.
+    fn curve(&self, way_mm: f64, [a1, a2, a3]: &[f64; 3]) -> (Vector, Polynomial) {
+        let speed = 7.0 * a1 * way_mm;
+        let (s2, s3) = (42.0 * (a2 - 2.0 * a1) * way_mm, 210.0 * (a3 - 3.0 * a2 + 3.0 * a1) * way_mm);
+        let ends = [(&self.before, s2), (&self.after, -s2)].map(|(leg, s2)| {
+            let (point, [tangent, second, third]) = leg.at(way_mm);
+            let by_parameter = [
+                scale(tangent, speed),
+                add(scale(second, speed * speed), scale(tangent, s2)),
+                add(
+                    add(scale(third, speed * speed * speed), scale(second, 3.0 * speed * s2)),
+                    scale(tangent, s3),
+                ),
+            ];
+            (point, by_parameter)
+        });
+        let [(start, [d1, d2, d3]), (end, [e1, e2, e3])] = ends;
+        // From the derivatives at an end, the control points next to it.
+        let near = |point, d1, d2, d3| {
+            let first = add(point, scale(d1, 1.0 / 7.0));
+            let second = add(subtract(scale(first, 2.0), point), scale(d2, 1.0 / 42.0));
+            let third = add(add(scale(subtract(second, first), 3.0), point), scale(d3, 1.0 / 210.0));
+            [first, second, third]
+        };
+        let [b1, b2, b3] = near(start, d1, d2, d3);
+        let [b6, b5, b4] = near(end, scale(e1, -1.0), e2, scale(e3, -1.0));
+        (start, Polynomial::bezier([start, b1, b2, b3, b4, b5, b6, end]))
+    }
+
+    /// The longest blend of a shape within a tolerance: its way, itself, its distance from the path.
+    fn within(&self, tolerance_mm: f64, shape: &[f64; 3]) -> Option<(f64, Polynomial, f64)> {
+        let mut best: Option<(f64, Polynomial, f64)> = None;
+        // The distance of a corner goes with the way, that of a jump of curvature with its square; in between, the
+        // last two tries tell.
+        let (mut way_mm, mut power) = (self.room_mm, 1.0);
+        let mut last: Option<(f64, f64)> = None;
+        for _ in 0..CORRECTIONS_MAX {
+            let (start, curve) = self.curve(way_mm, shape);
+            let distance_mm = self.distance_mm(start, &curve, way_mm);
+            if distance_mm <= tolerance_mm {
+                if best.is_none_or(|(longest_mm, ..)| way_mm > longest_mm) {
+                    best = Some((way_mm, curve, distance_mm));
+                }
+                if way_mm >= self.room_mm || distance_mm >= CLOSE * tolerance_mm {
+                    break;
+                }
+            }
+            if let Some((last_way_mm, last_distance_mm)) = last {
+                let found = libm::log(distance_mm / last_distance_mm) / libm::log(way_mm / last_way_mm);
+                if (0.5..=4.0).contains(&found) {
+                    power = found;
+                }
+            }
+            last = Some((way_mm, distance_mm));
+            let aimed_at = 0.5 * (1.0 + CLOSE) * tolerance_mm;
+            way_mm = (way_mm * libm::pow(aimed_at / distance_mm, 1.0 / power)).min(self.room_mm);
+            if !(way_mm > 0.0) {
+                break;
+            }
+        }
+        best
+    }
+
+    fn is_straight(&self) -> bool {
+        matches!((&self.before, &self.after), (Leg::Line { .. }, Leg::Line { .. }))
+    }
+
+    /// The greatest distance between the blend and what it stands for.
+    fn distance_mm(&self, start: Vector, curve: &Polynomial, way_mm: f64) -> f64 {
+        let point = |part: usize| add(start, curve.offset(0.0, part as f64 / MEASURED_PARTS as f64));
+        if self.is_straight() {
+            return norm(point(MEASURED_PARTS / 2));
+        }
+        let points: [Vector; MEASURED_PARTS + 1] = core::array::from_fn(point);
+        let (mut before, mut after) = ([0.0; MEASURED_PARTS + 1], [0.0; MEASURED_PARTS + 1]);
+        let mut greatest = 0.0_f64;
+        for (part, &point) in points.iter().enumerate() {
+            greatest = greatest.max(self.before.distance_mm(point, way_mm));
+            before[part] = greatest;
+        }
+        greatest = 0.0;
+        for (part, &point) in points.iter().enumerate().rev() {
+            greatest = greatest.max(self.after.distance_mm(point, way_mm));
+            after[part] = greatest;
+        }
+        let at = |part: usize| before[part].max(after[part]).max(norm(points[part]));
+        let least = (0..=MEASURED_PARTS).map(at).fold(f64::INFINITY, f64::min);
+        // Between two points the distance may rise above both by an eighth of its second difference, which is
+        // below this part of the greatest for the curves made here.
+        least * (1.0 + 8.0 / (MEASURED_PARTS * MEASURED_PARTS) as f64)
+    }
+}
+
+impl Leg {
+    /// The leg that `element` is, before or after the corner. None for a polynomial.
+    fn new(element: &Element, is_before: bool) -> Option<Self> {
+        match element {
+            Element::Line { from, to } => {
+                let [end, _] = element.ends();
+                let away = if is_before { scale(end.tangent, -1.0) } else { end.tangent };
+                (from != to).then_some(Self::Line { away, tangent: end.tangent })
+            }
+            Element::Arc { shape, sweep_rad, .. } => {
+                let corner_rad = if is_before { *sweep_rad } else { 0.0 };
+                let rad_per_mm = 1.0 / norm(shape.derivatives(corner_rad)[0]);
+                let rad_per_mm = if is_before { -rad_per_mm } else { rad_per_mm };
+                Some(Self::Arc { shape: *shape, corner_rad, rad_per_mm })
+            }
+            Element::Polynomial { .. } | Element::Involute { .. } => None,
+        }
+    }
+
+    fn room_mm(&self) -> f64 {
+        match self {
+            Self::Line { .. } => f64::INFINITY,
+            Self::Arc { rad_per_mm, .. } => ARC_RAD_MAX / rad_per_mm.abs(),
+        }
+    }
+
+    /// The point `way_mm` from the corner, relative to it, and the path's derivatives by arc length there.
+    fn at(&self, way_mm: f64) -> (Vector, [Vector; 3]) {
+        match self {
+            Self::Line { away, tangent } => (scale(*away, way_mm), [*tangent, [0.0; 3], [0.0; 3]]),
+            Self::Arc { shape, corner_rad, rad_per_mm } => {
+                let angle = corner_rad + rad_per_mm * way_mm;
+                (shape.offset(*corner_rad, angle), by_arc_length(shape.derivatives(angle)))
+            }
+        }
+    }
+
+    /// How far `point`, relative to the corner, is from the first `way_mm` of the leg.
+    fn distance_mm(&self, point: Vector, way_mm: f64) -> f64 {
+        match self {
+            Self::Line { away, .. } => {
+                let foot = dot(point, *away).clamp(0.0, way_mm);
+                norm(subtract(point, scale(*away, foot)))
+            }
+            Self::Arc { shape, corner_rad, rad_per_mm } => {
+                let end = corner_rad + rad_per_mm * way_mm;
+                let (least, most) = (corner_rad.min(end), corner_rad.max(end));
+                let mut angle = 0.5 * (least + most);
+                // Newton; wherever it gets to is a point of the arc, so the distance is never too small.
+                for _ in 0..4 {
+                    let [d1, d2, _] = shape.derivatives(angle);
+                    let gap = subtract(point, shape.offset(*corner_rad, angle));
+                    let step = dot(gap, d1) / (dot(d1, d1) - dot(gap, d2)).max(0.1 * dot(d1, d1));
+                    angle = (angle + step).clamp(least, most);
+                }
+                norm(subtract(point, shape.offset(*corner_rad, angle)))
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Runs of short lines to fewer lines and arcs.
+//!
+//! A curve that was cut into chords has a corner at every one of them, and no room for blends that are worth it.
+//! Consumes the points of such a run; produces the longest lines and arcs through some of them, first to last,
+//! from which the run is nowhere farther than a tolerance, nor they from the run. Background; greedy, with
+//! O(n log n) looks at a point.
+//!
+//! **Why both ways.** A segment of the run and the part of a line or arc that stands for it are walked together, by
+//! their projection on the line or by the angle about the arc's centre, which have to grow along the run. So
+//! every point of either has a partner on the other, and the greatest distance between partners bounds both.
+
+use super::curve::Spiral;
+use super::element::Element;
+use super::{Vector, add, cross, dot, norm, scale, subtract};
+
+/// The widest arc that stands for a run \[rad\]: three quarters of a turn, so that its ends stay apart.
+const SWEEP_RAD_MAX: f64 = 1.5 * core::f64::consts::PI;
+/// The fewest segments that an arc stands for: two always have one through their three points.
+const ARC_SEGMENTS_MIN: usize = 3;
+/// The greatest radius, over the chord: beyond, an arc is as good as straight, and its centre has no digits.
+const RADIUS_RATIO_MAX: f64 = 1.0e5;
+
+/// A line or arc for the segments from one point of a run to a later one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Merged {
+    /// Index of the segment it begins with.
+    pub first: usize,
+    /// The line or arc.
+    pub element: Element,
+    /// A bound on the distance between it and the segments \[mm\]; 0 for a segment that stays.
+    pub distance_mm: f64,
+}
+
+/// Lines and arcs for the run through `points`, at most `tolerance_mm` from it.
+#[must_use]
+pub fn merge(points: &[Vector], tolerance_mm: f64) -> Vec<Merged> {
+    let mut merged = Vec::new();
+    let mut first = 0;
+    while first + 1 < points.len() {
+        let single = (Element::Line { from: points[first], to: points[first + 1] }, 0.0);
+        let (mut segments, mut best) = (1, single);
+        let mut accept = |count: usize| {
+            let found = points.get(first..=first + count).and_then(|points| fit(points, tolerance_mm));
+            if let Some(found) = found {
+                (segments, best) = (count, found);
+            }
+            found.is_some()
+        };
+        // Twice as many as long as that goes (an arc has to be tried at its shortest), then as many as go.
+        let (mut good, mut bad) = (1, 2);
+        loop {
+            if accept(bad) {
+                good = bad;
+            } else if bad >= ARC_SEGMENTS_MIN {
+                break;
+            }
+            bad = (2 * good).max(bad + 1);
+        }
+        while bad - good > 1 {
+            let middle = usize::midpoint(good, bad);
+            if accept(middle) { good = middle } else { bad = middle }
+        }
+        let (element, distance_mm) = best;
+        merged.push(Merged { first, element, distance_mm });
+        first += segments;
+    }
+    merged
+}
+
+/// The line from the first point to the last, or the arc through one in the middle too, if it is close enough.
+fn fit(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
+    line(points, tolerance_mm).or_else(|| arc(points, tolerance_mm))
+}
+
+fn line(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
+    let (&from, &to) = (points.first()?, points.last()?);
+    let chord = subtract(to, from);
+    let length_mm = norm(chord);
+    let direction = scale(chord, 1.0 / length_mm);
+    let (mut before_mm, mut distance_mm) = (0.0, 0.0_f64);
+    for &point in points {
+        let offset = subtract(point, from);
+        let along_mm = dot(offset, direction);
+        let across_mm = norm(subtract(offset, scale(direction, along_mm)));
+        // Not the other way round, which would accept what is not a number.
+        if !(along_mm >= before_mm && across_mm <= tolerance_mm) {
+            return None;
+        }
+        before_mm = along_mm;
+        distance_mm = distance_mm.max(across_mm);
+    }
+    Some((Element::Line { from, to }, distance_mm))
+}
+
+fn arc(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
+    if points.len() <= ARC_SEGMENTS_MIN {
+        return None;
+    }
+    let (&from, &to) = (points.first()?, points.last()?);
+    let middle = *points.get(points.len() / 2)?;
+    // The circle through three points, relative to the first.
+    let (chord, part) = (subtract(to, from), subtract(middle, from));
+    let normal = cross(part, chord);
+    let square = dot(normal, normal);
+    let to_centre = scale(
+        add(scale(cross(normal, part), dot(chord, chord)), scale(cross(chord, normal), dot(part, part))),
+        0.5 / square,
+    );
+    let radius_mm = norm(to_centre);
+    if !(radius_mm <= RADIUS_RATIO_MAX * norm(chord)) || radius_mm <= 0.0 {
+        return None;
+    }
+    let axis = scale(normal, 1.0 / square.sqrt());
+    let outward = scale(to_centre, -1.0 / radius_mm);
+    let onward = cross(axis, outward);
+    let (mut turned, mut distance_mm) = (0.0, 0.0_f64);
+    let mut before: Option<(Vector, f64)> = None;
+    for &point in points {
+        let spoke = subtract(subtract(point, from), to_centre);
+        let height_mm = dot(spoke, axis);
+        let spoke = subtract(spoke, scale(axis, height_mm));
+        let (mut off_mm, mut high_mm) = ((norm(spoke) - radius_mm).abs(), height_mm.abs());
+        if let Some((before, before_high_mm)) = before {
+            // Along a segment the distance from the axis has its greatest at the ends, and its least at the foot.
+            high_mm = high_mm.max(before_high_mm);
+            let segment = subtract(spoke, before);
+            let foot = -dot(before, segment) / dot(segment, segment);
+            if foot > 0.0 && foot < 1.0 {
+                off_mm = off_mm.max((norm(add(before, scale(segment, foot))) - radius_mm).abs());
+            }
+            let angle = libm::atan2(dot(cross(before, spoke), axis), dot(before, spoke));
+            turned += angle;
+            // A segment that turns back, or by a quarter at once, is no chord of this arc.
+            if !(0.0..core::f64::consts::FRAC_PI_2).contains(&angle) || turned > SWEEP_RAD_MAX {
+                return None;
+            }
+        }
+        before = Some((spoke, height_mm.abs()));
+        let point_mm = libm::hypot(off_mm, high_mm);
+        if !(point_mm <= tolerance_mm) {
+            return None;
+        }
+        distance_mm = distance_mm.max(point_mm);
+    }
+    let shape = Spiral { outward, onward, normal: axis, radius_mm, radius_per_rad: 0.0, height_per_rad: 0.0 };
+    Some((Element::Arc { from, to, shape, sweep_rad: turned }, distance_mm))
+}

@@ -1,0 +1,156 @@
+//! A run of moves with its corners blended.
+//!
+//! Consumes moves that follow each other without a stop, each with the tolerance that its end may be rounded
+//! within; produces moves in the same order with a blend at every joint that would step otherwise, and the
+//! elements on both sides cut short. Background, in time linear in the moves.
+//!
+//! **Short lines.** Where lines are shorter than the blends at their ends would be, half of the tolerance is spent
+//! on making fewer lines and arcs of them, the rest on blends between these.
+//!
+//! **Who gets the room.** A blend takes at most nine tenths of an element, and two on the same element together:
+//! what the one does not need is the other's, else both get half. A tenth stays, so that the rest of a short
+//! element still has a direction of its own.
+
+use motion_kernel::law::Limits;
+
+use super::blend::{Blend, way_mm};
+use super::element::Element;
+use super::merge::merge;
+use super::{Vector, angle, norm, subtract};
+
+/// Part of an element that blends may take together.
+const TAKEN_MAX: f64 = 0.9;
+
+/// Part of the tolerance that short lines are merged within.
+const MERGED_SHARE: f64 = 0.5;
+
+/// Directions computed from coordinates that are exact to 10⁻¹⁰ mm agree to this where they are meant to \[rad\];
+/// curvatures agree to the same part of themselves.
+pub const TANGENT_ROUNDING_RAD: f64 = 1.0e-9;
+
+/// An element of the path with what the program says of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Move {
+    /// Program line.
+    pub line: u32,
+    /// Geometry.
+    pub element: Element,
+    /// Programmed feed \[mm/s\], infinite for a rapid.
+    pub feed_mm_s: f64,
+    /// Greatest distance that the path may be led past the move and its end \[mm\]; 0 for exact path.
+    pub tolerance_mm: f64,
+}
+
+/// The moves with blends between them, as far as their tolerances allow. `limits` are those of the path, for
+/// blends in any direction.
+#[must_use]
+pub fn smooth(moves: &[Move], limits: &Limits<f64>) -> Vec<Move> {
+    let (moves, distances_mm) = merged(moves);
+    let lengths_mm: Vec<f64> = moves.iter().map(|step| step.element.length_mm()).collect();
+    let joint = |index: usize, room_mm: f64| -> Option<Blend> {
+        let (before, after) = (&moves[index], &moves[index + 1]);
+        let tolerance_mm = before.tolerance_mm - distances_mm[index].max(distances_mm[index + 1]);
+        Blend::new(&before.element, &after.element, tolerance_mm, room_mm, limits)
+    };
+    // First as if each were alone, then those that touch within what the other leaves.
+    let alone: Vec<Option<Blend>> = (0..moves.len().saturating_sub(1))
+        .map(|index| {
+            let pair = [&moves[index].element, &moves[index + 1].element];
+            let room_mm = TAKEN_MAX * lengths_mm[index].min(lengths_mm[index + 1]);
+            if is_smooth(pair) { None } else { joint(index, room_mm) }
+        })
+        .collect();
+    let way_mm = |index: Option<usize>| {
+        index.and_then(|index| alone.get(index)).and_then(Option::as_ref).map_or(0.0, |blend| blend.way_mm)
+    };
+    let left_mm = |element: usize, other: Option<usize>| {
+        let taken_mm = TAKEN_MAX * lengths_mm[element];
+        (taken_mm - way_mm(other)).max(0.5 * taken_mm)
+    };
+    let blends: Vec<Option<Blend>> = alone
+        .iter()
+        .enumerate()
+        .map(|(index, blend)| {
+            let room_mm = left_mm(index, index.checked_sub(1)).min(left_mm(index + 1, Some(index + 1)));
+            blend.and_then(|blend| if blend.way_mm <= room_mm { Some(blend) } else { joint(index, room_mm) })
+        })
+        .collect();
+    let mut smooth = Vec::with_capacity(2 * moves.len());
+    for (index, step) in moves.iter().enumerate() {
+        let first = index.checked_sub(1).and_then(|index| blends[index]);
+        let last = blends.get(index).copied().flatten();
+        let trimmed = |blend: Option<Blend>| blend.map_or(0.0, |blend| blend.way_mm);
+        let element = if first.is_none() && last.is_none() {
+            step.element
+        } else {
+            step.element.trimmed(trimmed(first), trimmed(last))
+        };
+        smooth.push(Move { element, ..*step });
+        if let Some(blend) = last {
+            let feed_mm_s = step.feed_mm_s.min(moves[index + 1].feed_mm_s);
+            smooth.push(Move { element: blend.element, feed_mm_s, ..*step });
+        }
+    }
+    smooth
+}
+
+/// The moves, with fewer in place of runs of short lines, and each one's distance from the moves it stands for.
+fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
+    let (mut merged, mut distances_mm) = (Vec::with_capacity(moves.len()), Vec::with_capacity(moves.len()));
+    let mut rest = moves;
+    while let Some(first) = rest.first() {
+        let count = rest.windows(2).take_while(|pair| is_same_run(&pair[0], &pair[1])).count() + 1;
+        let (run, after) = rest.split_at(count);
+        rest = after;
+        let is_short: Vec<bool> = (0..count).map(|index| is_short(run, index)).collect();
+        let mut done = 0;
+        for same in is_short.chunk_by(|a, b| a == b) {
+            let steps = &run[done..done + same.len()];
+            done += same.len();
+            if !same[0] || steps.len() < 2 {
+                merged.extend_from_slice(steps);
+                distances_mm.resize(merged.len(), 0.0);
+                continue;
+            }
+            let ends = steps.iter().map(|step| step.element.ends_mm());
+            let points: Vec<Vector> =
+                core::iter::once(steps[0].element.ends_mm().0).chain(ends.map(|(_, to)| to)).collect();
+            for part in merge(&points, MERGED_SHARE * first.tolerance_mm) {
+                merged.push(Move { element: part.element, ..steps[part.first] });
+                distances_mm.push(part.distance_mm);
+            }
+        }
+    }
+    (merged, distances_mm)
+}
+
+/// Whether two moves may become one: lines with one feed and one tolerance.
+fn is_same_run(before: &Move, after: &Move) -> bool {
+    let is_line = |step: &Move| matches!(step.element, Element::Line { .. });
+    is_line(before)
+        && is_line(after)
+        && before.feed_mm_s == after.feed_mm_s
+        && before.tolerance_mm == after.tolerance_mm
+        && before.tolerance_mm > 0.0
+}
+
+/// Whether a line is shorter than the blends at its ends would be.
+fn is_short(run: &[Move], index: usize) -> bool {
+    let way_mm = |before: Option<&Move>, after: Option<&Move>| {
+        let (Some(before), Some(after)) = (before, after) else { return 0.0 };
+        let angle_rad = angle(before.element.ends()[1].tangent, after.element.ends()[0].tangent);
+        if angle_rad > TANGENT_ROUNDING_RAD { way_mm(angle_rad, before.tolerance_mm) } else { 0.0 }
+    };
+    let (before, step, after) =
+        (index.checked_sub(1).map(|index| &run[index]), &run[index], run.get(index + 1));
+    let longest_mm = way_mm(before, Some(step)).max(way_mm(Some(step), after));
+    0.5 * TAKEN_MAX * step.element.length_mm() < longest_mm
+}
+
+/// Whether nothing steps from one element to the next.
+fn is_smooth([before, after]: [&Element; 2]) -> bool {
+    let ([_, end], [start, _]) = (before.ends(), after.ends());
+    let step = norm(subtract(start.curvature, end.curvature));
+    angle(end.tangent, start.tangent) <= TANGENT_ROUNDING_RAD
+        && step <= TANGENT_ROUNDING_RAD * norm(start.curvature).max(norm(end.curvature))
+}
