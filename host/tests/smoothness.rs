@@ -111,3 +111,24 @@ fn differences_converge_to_the_derivatives() {
         }
     }
 }
+
+/// Every better way is better, and septic pieces are within their tolerance; figures of the quintic at 1 ms.
+#[test]
+fn septic_pieces_keep_the_feed_best() {
+    let [well, badly] = smoothness::well_and_badly_parametrised().expect("splines").map(|course| {
+        smoothness::evaluators(&course, FEED_MM_S, TICK_S).map(|evaluator| evaluator.feed_error)
+    });
+    println!("{well:?} {badly:?}");
+    for [first, second, _, newton, septic] in [well, badly] {
+        assert!(first > 10.0 * second && second > newton && newton > septic, "{well:?} {badly:?}");
+        assert!(septic <= 1.25e-6);
+    }
+    assert!((2e-3..4e-3).contains(&well[0]) && (3e-5..5e-5).contains(&well[1]), "{well:?}");
+    // The error of the first order goes with the tick, that of the second with its square.
+    let course = smoothness::course(&smoothness::spline(Degree::Quintic).expect("a spline"));
+    let finer = smoothness::evaluators(&course, FEED_MM_S, 0.1 * TICK_S);
+    for (index, expected) in [(0, 10.0), (1, 100.0)] {
+        let ratio = well[index] / finer[index].feed_error;
+        assert!((0.8..1.25).contains(&(ratio / expected)), "{index}: {ratio}");
+    }
+}

@@ -31,8 +31,9 @@ Examples:
 
 JSON of a run: that of `motion run`, and spline: degree, points, spans, length_mm, deviation_mm (greatest, of a point),
 jerk_step_mm_s3 (greatest, at a knot and the programmed feed), pieces, position_error_mm and feed_error (of the pieces).
-JSON of the experiment: feed_mm_s, tick_s, paths: list of name, length_mm, time_s, ticks, deviation_mm (from the arcs),
-joints, by_tick, evaluators.";
+JSON of the experiment: feed_mm_s, tick_s; paths: list of name, length_mm, time_s, ticks, deviation_mm (from the arcs), joints
+(time_s, published_s, accel_step_mm_s2 of X and Y, jerk_step_mm_s3), by_tick (tick_s, jerk_max_mm_s3, jerk_step_max_mm_s3);
+evaluators: list of name, feed_error, feed_error_badly_parametrised.";
 
 /// Run a spline through points, or compare arcs, cubic and quintic splines.
 ///

@@ -14,7 +14,7 @@ use crate::toolpath::{Element, norm, septics};
 pub struct Pieces {
     /// How many there are.
     pub count: usize,
-    /// How far they are from the path.
+    /// How far they are from the path at most.
     pub deviation: Deviation,
 }
 
@@ -64,5 +64,6 @@ fn pieces(moves: &[Move]) -> Result<Pieces, (u32, Problem)> {
         let deviations = septics.iter().map(|septic| septic.deviation);
         pieces.deviation = deviations.fold(pieces.deviation, Deviation::or_greater);
     }
+    pieces.deviation = pieces.deviation.bound();
     Ok(pieces)
 }

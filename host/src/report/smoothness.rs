@@ -9,16 +9,22 @@ use super::head;
 use super::palette;
 use super::plots::Caption;
 use super::plots::graph::{Graph, Series, Stack};
-use crate::smoothness::{AxisTicks, Course, FEED_MM_S, Figures, TABLE_2_S, TICK_S};
+use crate::smoothness::evaluators::WAYS;
+use crate::smoothness::{AxisTicks, Course, Evaluator, FEED_MM_S, Figures, TABLE_2_S, TICK_S};
 use crate::toolpath::Vector;
 
 const AXES: [&str; 2] = ["X", "Y"];
 
-/// Writes the page: `paths` are the arcs, then the splines.
+/// Writes the page: `paths` are the arcs, then the splines; `evaluators` those of a well and of a badly parametrised
+/// spline.
 ///
 /// # Errors
 /// Whatever `out` reports.
-pub fn write_smoothness(paths: &[(Course, Figures)], out: &mut impl Write) -> io::Result<()> {
+pub fn write_smoothness(
+    paths: &[(Course, Figures)],
+    [well, badly]: &[[Evaluator; WAYS]; 2],
+    out: &mut impl Write,
+) -> io::Result<()> {
     let title = format!("Path smoothness at {FEED_MM_S} mm/s");
     head(&title, out)?;
     writeln!(out, "<header><h1>{}</h1>", escape(&title))?;
@@ -53,6 +59,16 @@ pub fn write_smoothness(paths: &[(Course, Figures)], out: &mut impl Write) -> io
     for (index, ((course, _), ticks)) in paths.iter().zip(&ticks).enumerate() {
         one_path(course.name, index, ticks, (index > 0).then_some(common), out)?;
     }
+    writeln!(out, "<section><h2>Feed of a tick</h2>")?;
+    let headings = ["evaluator", "greatest error, well parametrised", "badly parametrised"];
+    let rows = well.iter().zip(badly).map(|(well, badly)| {
+        vec![well.name.to_owned(), format!("{:.1e}", well.feed_error), format!("{:.1e}", badly.feed_error)]
+    });
+    table(&headings, rows, out)?;
+    writeln!(
+        out,
+        "<p>Quintic splines through the ten points: over the published u, and over one that grows by steps of four and five in          turn. Only septic pieces are what the kernel runs.</p></section>"
+    )?;
     close(out)
 }
 

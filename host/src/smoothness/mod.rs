@@ -12,12 +12,15 @@
 //! odd degree.
 //!
 //! - [`course`]: a path at constant feed, tick by tick;
-//! - [`figures`]: what is read off it.
+//! - [`figures`]: what is read off it;
+//! - [`evaluators`]: how constant the feed is that a control makes of a curve over u.
 
 pub mod course;
+pub mod evaluators;
 pub mod figures;
 
 pub use course::{AxisTicks, Course, JointStep};
+pub use evaluators::{Evaluator, evaluators};
 pub use figures::Figures;
 
 use core::f64::consts::{FRAC_PI_2, PI};
@@ -80,6 +83,25 @@ pub fn spline(degree: Degree) -> Result<Spline, SplineError> {
     let points = TABLE_1.map(|(_, x, y)| [x, y, 0.0]);
     let parameters = TABLE_1.map(|(u, _, _)| u);
     interpolate(&points, &parameters, degree, &Ends::Clamped(end_derivatives()))
+}
+
+/// Splines that evaluators are compared on: the quintic one, and one through the same points over a u that grows by steps of four and
+/// five in turn, which is run through at a speed that goes up and down.
+///
+/// # Errors
+/// None: the points have both.
+pub fn well_and_badly_parametrised() -> Result<[Course; 2], SplineError> {
+    let points = TABLE_1.map(|(_, x, y)| [x, y, 0.0]);
+    let uneven: Vec<f64> = (0..TABLE_1.len()).map(|index| (9 * index / 2) as f64).collect();
+    // The same tangents and curvatures at the ends, by the new parameter: its first and its last step are four.
+    let [first, last] = end_derivatives();
+    let over = |Derivatives { first, second }: Derivatives, rate: f64| Derivatives {
+        first: first.map(|mm| mm * rate),
+        second: second.map(|mm| mm * rate * rate),
+    };
+    let ends = Ends::Clamped([over(first, 0.1 / 4.0), over(last, 0.125 / 4.0)]);
+    let bad = interpolate(&points, &uneven, Degree::Quintic, &ends)?;
+    Ok([course(&spline(Degree::Quintic)?), course(&bad)])
 }
 
 /// The arcs' derivatives by u at their ends: the angle is π·u.

@@ -10,7 +10,8 @@ use super::super::table::{self, Align};
 use super::super::{csv_failure, write_json};
 use super::{SplineArguments, files};
 use crate::report;
-use crate::smoothness::{self, AxisTicks, Course, FEED_MM_S, Figures, TABLE_2_S, TICK_S};
+use crate::smoothness::evaluators::WAYS;
+use crate::smoothness::{self, AxisTicks, Course, Evaluator, FEED_MM_S, Figures, TABLE_2_S, TICK_S};
 
 pub(super) fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
@@ -21,16 +22,22 @@ pub(super) fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Ou
         let figures = Figures::of(&course, FEED_MM_S);
         (course, figures)
     });
+    let evaluated = smoothness::well_and_badly_parametrised()
+        .map_err(|source| CliError::Spline { place: "the built-in points".to_owned(), source })?
+        .map(|course| smoothness::evaluators(&course, FEED_MM_S, TICK_S));
     if let Some(output) = trace {
         write(output, |file| write_trace(&paths, file))?;
     }
     if let Some(output) = report {
-        write(output, |file| report::smoothness::write_smoothness(&paths, file))?;
+        write(output, |file| report::smoothness::write_smoothness(&paths, &evaluated, file))?;
     }
     if arguments.json {
-        write_json(&json(&paths), out)?;
+        write_json(&json(&paths, &evaluated), out)?;
     } else {
-        write_tables(&paths, out).and_then(|()| files(arguments, out)).map_err(CliError::Output)?;
+        write_tables(&paths, out)
+            .and_then(|()| write_evaluators(&evaluated, out))
+            .and_then(|()| files(arguments, out))
+            .map_err(CliError::Output)?;
     }
     Ok(Outcome::Done)
 }
@@ -81,6 +88,14 @@ struct ExperimentJson {
     feed_mm_s: f64,
     tick_s: f64,
     paths: Vec<PathJson>,
+    evaluators: Vec<EvaluatorJson>,
+}
+
+#[derive(Serialize)]
+struct EvaluatorJson {
+    name: &'static str,
+    feed_error: f64,
+    feed_error_badly_parametrised: f64,
 }
 
 #[derive(Serialize)]
@@ -110,7 +125,7 @@ struct ByTickJson {
     jerk_step_max_mm_s3: f64,
 }
 
-fn json(paths: &[(Course, Figures)]) -> ExperimentJson {
+fn json(paths: &[(Course, Figures)], [well, badly]: &[[Evaluator; WAYS]; 2]) -> ExperimentJson {
     let path = |figures: &Figures| {
         let is_spline = figures.joints.len() == TABLE_2_S.len();
         let joints = figures.joints.iter().enumerate().map(|(index, joint)| JointJson {
@@ -138,6 +153,15 @@ fn json(paths: &[(Course, Figures)]) -> ExperimentJson {
         feed_mm_s: FEED_MM_S,
         tick_s: TICK_S,
         paths: paths.iter().map(|(_, figures)| path(figures)).collect(),
+        evaluators: well
+            .iter()
+            .zip(badly)
+            .map(|(well, badly)| EvaluatorJson {
+                name: well.name,
+                feed_error: well.feed_error,
+                feed_error_badly_parametrised: badly.feed_error,
+            })
+            .collect(),
     }
 }
 
@@ -237,4 +261,25 @@ fn write_tables(paths: &[(Course, Figures); 3], out: &mut dyn Write) -> io::Resu
         "\nOn the arcs the jerk is none of the path but of the tick; on the cubic spline its steps stay, on the quintic they go \
          with the tick."
     )
+}
+
+/// How constant the feed is that ways to walk a spline make.
+fn write_evaluators([well, badly]: &[[Evaluator; WAYS]; 2], out: &mut dyn Write) -> io::Result<()> {
+    writeln!(
+        out,
+        "\nGreatest error of the feed in a tick, on the quintic spline and on one whose u grows by steps of four and five in turn\n"
+    )?;
+    let columns = [
+        ("evaluator", "", Align::Left),
+        ("well", "", Align::Right),
+        ("badly parametrised", "", Align::Right),
+    ];
+    let rows: Vec<[String; 3]> = well
+        .iter()
+        .zip(badly)
+        .map(|(well, badly)| {
+            [well.name.to_owned(), format!("{:.1e}", well.feed_error), format!("{:.1e}", badly.feed_error)]
+        })
+        .collect();
+    table::write(&columns, &rows, out)
 }
