@@ -304,6 +304,7 @@ fn run_of_the_stringer() {
             "max",
             "axes",
             "contour_error_um_max",
+            "limit_active_share",
             "faults",
         ],
     );

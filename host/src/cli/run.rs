@@ -45,7 +45,7 @@ pub struct RunArguments {
     /// Write a self-contained HTML page about the run; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Print JSON: ticks, times, maxima along the path, errors of the axes, faults.
+    /// Print JSON: ticks, times, maxima along the path, share of it on which a limit is active, errors of the axes, faults.
     #[arg(long)]
     json: bool,
 }
@@ -147,6 +147,7 @@ pub(super) struct RunJson<'run> {
     time_s: f64,
     path_length_mm: f64,
     max: MaxJson,
+    limit_active_share: f64,
     axes: Vec<AxisJson<'run>>,
     contour_error_um_max: f64,
     faults: Vec<FaultJson<'run>>,
@@ -204,6 +205,7 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
             jerk_mm_s3: summary.max_jerk_mm_s3,
             snap_mm_s4: summary.max_snap_mm_s4,
         },
+        limit_active_share: summary.limit_active_share,
         axes: summary.axes.iter().map(axis).collect(),
         contour_error_um_max: summary.contour_error_um_max,
         faults: summary.faults.iter().map(fault).collect(),
@@ -228,6 +230,7 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
         summary.max_jerk_mm_s3,
         summary.max_snap_mm_s4,
     )?;
+    writeln!(out, "  a limit is active on {:.1} % of the length", summary.limit_active_share * 100.0)?;
     writeln!(out, "  contour error at most {:.2} µm\n", summary.contour_error_um_max)?;
     let columns = [
         ("axis", "", Align::Left),

@@ -6,10 +6,12 @@
 //!
 //! - [`rig`]: the simulated machine as the kernel's hardware;
 //! - `contour`: how far the machine is beside its path;
+//! - `limit_share`: on how much of the path a limit is active;
 //! - [`run`](mod@run): the ticks;
 //! - [`summary`]: maxima, following and contour error.
 
 pub(crate) mod contour;
+mod limit_share;
 pub mod rig;
 pub mod run;
 pub mod summary;

@@ -15,6 +15,7 @@ use motion_kernel::units::Position;
 
 use super::Observer;
 use super::contour::Contour;
+use super::limit_share::LimitShare;
 use super::rig::{Rig, Simulated};
 use super::summary::{Collector, RunSummary};
 use crate::machine::{AxisError, Machine};
@@ -149,6 +150,7 @@ fn run_in<R: Real>(
     };
     let mut collector = Collector::default();
     let mut contour = Contour::default();
+    let mut limit_share = LimitShare::new(plan, machine);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     loop {
         supply.fill(&mut feeder).map_err(RunError::Rejected)?;
@@ -161,6 +163,7 @@ fn run_in<R: Real>(
         let start_mm = starts.get(trace.executed.stretches as usize).copied().unwrap_or(plan.length_mm);
         let record = tick_record(&trace, start_mm, &mut contour);
         collector.add(&record);
+        limit_share.add(&record);
         observe(&record);
         if let Some(fault) = trace.fault {
             summary.faults.push(fault_record(&fault, machine));
@@ -176,6 +179,7 @@ fn run_in<R: Real>(
         }
     }
     collector.fill(&mut summary);
+    summary.limit_active_share = limit_share.share();
     summary.time_s = (summary.ticks - stopped_ticks) as f64 * machine.tick_s;
     if stops > 0 {
         summary.notices.push(match stops {

@@ -322,3 +322,114 @@ impl Leg {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+
+    fn corner(degrees: f64) -> [Element; 2] {
+        let (sine, cosine) = libm::sincos(degrees.to_radians());
+        [
+            Element::Line { from: [-10.0, 0.0, 0.0], to: [0.0; 3] },
+            Element::Line { from: [0.0; 3], to: [10.0 * cosine, 10.0 * sine, 0.0] },
+        ]
+    }
+
+    /// Lines x < 0 along X, then a circle of 5 mm to the left that they touch.
+    fn line_and_arc() -> [Element; 2] {
+        let shape = Spiral {
+            outward: [0.0, -1.0, 0.0],
+            onward: [1.0, 0.0, 0.0],
+            normal: [0.0, 0.0, 1.0],
+            radius_mm: 5.0,
+            radius_per_rad: 0.0,
+            height_per_rad: 0.0,
+        };
+        let sweep_rad = core::f64::consts::FRAC_PI_2;
+        let line = Element::Line { from: [-10.0, 0.0, 0.0], to: [0.0; 3] };
+        [line, Element::Arc { from: [0.0; 3], to: [5.0, 5.0, 0.0], shape, sweep_rad }]
+    }
+
+    fn blended([before, after]: &[Element; 2], tolerance_mm: f64, room_mm: f64) -> Option<Blend> {
+        Blend::new(before, after, tolerance_mm, room_mm, &LIMITS)
+    }
+
+    /// By symmetry the middle is nearest to the corner, and it is as near as it may be.
+    #[test]
+    fn the_middle_of_a_corners_blend_uses_the_tolerance() {
+        for degrees in [1.0, 15.0, 45.0, 90.0, 137.0, 165.0, 169.9] {
+            let blend = blended(&corner(degrees), 0.02, 1e3).expect("a blend");
+            let Element::Polynomial { from, shape, .. } = blend.element else { panic!("a polynomial") };
+            let middle = norm(add(from, shape.offset(0.0, 0.5)));
+            assert!(middle <= 0.02 && middle > 0.0199, "{degrees}°: {middle}");
+            assert!((blend.distance_mm - middle).abs() < 1e-12);
+            assert!((way_mm(degrees.to_radians(), 0.02) / blend.way_mm - 1.0).abs() < 0.3, "{degrees}°");
+        }
+    }
+
+    #[test]
+    fn room_and_tolerance_are_kept_and_needed() {
+        let blend = blended(&corner(60.0), 1.0, 0.01).expect("a blend");
+        assert!((blend.way_mm - 0.01).abs() < 1e-15 && blend.distance_mm < 0.01);
+        assert_eq!(blended(&corner(60.0), 0.0, 1.0), None);
+        assert_eq!(blended(&corner(60.0), f64::NAN, 1.0), None);
+        assert_eq!(blended(&corner(60.0), 1.0, 0.0), None);
+        assert_eq!(blended(&corner(170.1), 1.0, 1.0), None);
+        assert_eq!(blended(&corner(180.0), 1.0, 1.0), None);
+    }
+
+    /// Tangent, curvature and its derivative are those of the elements where they are left and entered.
+    #[test]
+    fn ends_are_continuous_to_the_third_derivative() {
+        for pair in [corner(75.0), line_and_arc()] {
+            let blend = blended(&pair, 0.01, 5.0).expect("a blend");
+            let Element::Polynomial { from, to, shape, .. } = blend.element else { panic!("a polynomial") };
+            let rests = [pair[0].trimmed(0.0, blend.way_mm), pair[1].trimmed(blend.way_mm, 0.0)];
+            assert_eq!((rests[0].ends_mm().1, rests[1].ends_mm().0), (from, to));
+            let third = |element: &Element, is_end: bool| match element {
+                Element::Arc { shape, sweep_rad, .. } => {
+                    by_arc_length(shape.derivatives(if is_end { *sweep_rad } else { 0.0 }))
+                }
+                _ => [element.ends()[0].tangent, [0.0; 3], [0.0; 3]],
+            };
+            for (rest, is_end, u) in [(&rests[0], true, 0.0), (&rests[1], false, 1.0)] {
+                let of_blend = by_arc_length(shape.derivatives(u));
+                for (order, (a, b)) in of_blend.into_iter().zip(third(rest, is_end)).enumerate() {
+                    let step = norm(subtract(a, b));
+                    assert!(
+                        step < 1e-9 * 10.0_f64.powi(2 * order as i32),
+                        "derivative {order} steps by {step}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// A jump of curvature without a corner is ramped over a length that the tolerance allows.
+    #[test]
+    fn a_tangent_arc_is_entered_gradually() {
+        let blend = blended(&line_and_arc(), 0.01, 5.0).expect("a blend");
+        assert!(blend.distance_mm <= 0.01 && blend.distance_mm > 0.0099, "{blend:?}");
+        assert!(blend.way_mm > 0.5 && blend.way_mm < 3.0, "{}", blend.way_mm);
+        let Element::Polynomial { shape, .. } = blend.element else { panic!("a polynomial") };
+        // Faster than the curvature's step lets pass, 500 mm/s² · 5 mm: 50 mm/s; the arc itself allows 50.
+        assert!(feed_mm_s(&shape, &LIMITS) > 20.0, "{}", feed_mm_s(&shape, &LIMITS));
+    }
+
+    /// Each of the shapes is there because it is the best somewhere.
+    #[test]
+    fn jerk_and_snap_choose_different_shapes() {
+        let [before, after] = corner(90.0);
+        let feed = |limits: &Limits<f64>, under: &Limits<f64>| {
+            let blend = Blend::new(&before, &after, 0.05, 1e3, limits).expect("a blend");
+            let Element::Polynomial { shape, .. } = blend.element else { panic!("a polynomial") };
+            feed_mm_s(&shape, under)
+        };
+        let jerk = Limits { snap_mm_s4: 1e9, ..LIMITS };
+        let snap = Limits { accel_mm_s2: 1e9, jerk_mm_s3: 1e9, ..LIMITS };
+        assert!(feed(&jerk, &jerk) > 1.02 * feed(&snap, &jerk));
+        assert!(feed(&snap, &snap) > 1.1 * feed(&jerk, &snap));
+    }
+}

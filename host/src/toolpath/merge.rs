@@ -145,3 +145,57 @@ fn arc(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
     let shape = Spiral { outward, onward, normal: axis, radius_mm, radius_per_rad: 0.0, height_per_rad: 0.0 };
     Some((Element::Arc { from, to, shape, sweep_rad: turned }, distance_mm))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn circle(radius_mm: f64, segments: u32, of: u32) -> Vec<Vector> {
+        (0..=segments)
+            .map(|index| {
+                let (sine, cosine) = libm::sincos(core::f64::consts::TAU * f64::from(index) / f64::from(of));
+                // A plane that no axis lies in.
+                [radius_mm * cosine, radius_mm * sine * 0.6, radius_mm * sine * 0.8]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn chords_of_a_circle_become_arcs() {
+        let merged = merge(&circle(10.0, 400, 400), 1e-3);
+        assert_eq!(merged.len(), 2);
+        for part in &merged {
+            let Element::Arc { shape, sweep_rad, .. } = part.element else { panic!("an arc: {part:?}") };
+            assert!((shape.radius_mm - 10.0).abs() < 1e-9 && sweep_rad <= SWEEP_RAD_MAX);
+            // The chords' sagitta.
+            let sagitta_mm = 10.0 * (1.0 - libm::cos(core::f64::consts::PI / 400.0));
+            assert!((part.distance_mm - sagitta_mm).abs() < 1e-9, "{} {sagitta_mm}", part.distance_mm);
+        }
+        assert_eq!((merged[0].first, merged[1].first), (0, 300));
+        // Below the sagitta no arc is close enough, and a line even less.
+        assert_eq!(merge(&circle(10.0, 400, 400), 1e-4).len(), 400);
+    }
+
+    #[test]
+    fn straight_runs_become_lines_and_corners_stay() {
+        let mut points: Vec<Vector> =
+            (0..=50).map(|i| [f64::from(i), 1e-3 * f64::from(i % 2), 0.0]).collect();
+        points.extend((1..=50).map(|i| [50.0, f64::from(i), 0.0]));
+        let merged = merge(&points, 2e-3);
+        let lines: Vec<_> =
+            merged.iter().map(|part| (part.first, part.element.kind(), part.element.ends_mm())).collect();
+        assert_eq!(
+            lines,
+            [(0, "line", ([0.0; 3], [50.0, 0.0, 0.0])), (50, "line", ([50.0, 0.0, 0.0], [50.0, 50.0, 0.0]))]
+        );
+        assert!((merged[0].distance_mm - 1e-3).abs() < 1e-15);
+    }
+
+    /// What turns back is not straight, however close: the reversal was programmed.
+    #[test]
+    fn reversals_are_kept() {
+        let points = [0.0, 1.0, 2.0, 1.5, 2.5, 3.5].map(|x| [x, 0.0, 0.0]);
+        let firsts: Vec<_> = merge(&points, 0.1).iter().map(|part| part.first).collect();
+        assert_eq!(firsts, [0, 2, 3]);
+    }
+}

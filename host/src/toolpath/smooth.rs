@@ -4,7 +4,7 @@
 //! within; produces moves in the same order with a blend at every joint that would step otherwise, and the
 //! elements on both sides cut short. Background, in time linear in the moves.
 //!
-//! **Short lines.** Where lines are shorter than the blends at their ends would be, half of the tolerance is spent
+//! **Short lines.** Where lines are shorter than the blends at their ends would be, three fifths of the tolerance are spent
 //! on making fewer lines and arcs of them, the rest on blends between these.
 //!
 //! **Who gets the room.** A blend takes at most nine tenths of an element, and two on the same element together:
@@ -22,7 +22,7 @@ use super::{Vector, angle, norm, subtract};
 const TAKEN_MAX: f64 = 0.9;
 
 /// Part of the tolerance that short lines are merged within.
-const MERGED_SHARE: f64 = 0.5;
+const MERGED_SHARE: f64 = 0.6;
 
 /// Directions computed from coordinates that are exact to 10⁻¹⁰ mm agree to this where they are meant to \[rad\];
 /// curvatures agree to the same part of themselves.
@@ -102,12 +102,12 @@ fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
         let count = rest.windows(2).take_while(|pair| is_same_run(&pair[0], &pair[1])).count() + 1;
         let (run, after) = rest.split_at(count);
         rest = after;
-        let is_short: Vec<bool> = (0..count).map(|index| is_short(run, index)).collect();
+        let rooms: Vec<Room> = (0..count).map(|index| Room::of(run, index)).collect();
         let mut done = 0;
-        for same in is_short.chunk_by(|a, b| a == b) {
+        for same in rooms.chunk_by(|a, b| (*a == Room::Enough) == (*b == Room::Enough)) {
             let steps = &run[done..done + same.len()];
             done += same.len();
-            if !same[0] || steps.len() < 2 {
+            if steps.len() < 2 || !same.contains(&Room::TooLittle) {
                 merged.extend_from_slice(steps);
                 distances_mm.resize(merged.len(), 0.0);
                 continue;
@@ -134,17 +134,33 @@ fn is_same_run(before: &Move, after: &Move) -> bool {
         && before.tolerance_mm > 0.0
 }
 
-/// Whether a line is shorter than the blends at its ends would be.
-fn is_short(run: &[Move], index: usize) -> bool {
-    let way_mm = |before: Option<&Move>, after: Option<&Move>| {
-        let (Some(before), Some(after)) = (before, after) else { return 0.0 };
-        let angle_rad = angle(before.element.ends()[1].tangent, after.element.ends()[0].tangent);
-        if angle_rad > TANGENT_ROUNDING_RAD { way_mm(angle_rad, before.tolerance_mm) } else { 0.0 }
-    };
-    let (before, step, after) =
-        (index.checked_sub(1).map(|index| &run[index]), &run[index], run.get(index + 1));
-    let longest_mm = way_mm(before, Some(step)).max(way_mm(Some(step), after));
-    0.5 * TAKEN_MAX * step.element.length_mm() < longest_mm
+/// What a line has for blends at its ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Room {
+    /// Both have the length they want.
+    Enough,
+    /// One of them would be shorter than the tolerance lets it be.
+    TooLittle,
+    /// There are none to be made: it goes straight on at both ends.
+    Unneeded,
+}
+
+impl Room {
+    fn of(run: &[Move], index: usize) -> Self {
+        let way_mm = |before: Option<&Move>, after: Option<&Move>| {
+            let (before, after) = (before?, after?);
+            let angle_rad = angle(before.element.ends()[1].tangent, after.element.ends()[0].tangent);
+            (angle_rad > TANGENT_ROUNDING_RAD).then(|| way_mm(angle_rad, before.tolerance_mm))
+        };
+        let step = &run[index];
+        let before = way_mm(index.checked_sub(1).map(|before| &run[before]), Some(step));
+        let after = way_mm(Some(step), run.get(index + 1));
+        match before.into_iter().chain(after).reduce(f64::max) {
+            None => Self::Unneeded,
+            Some(longest_mm) if 0.5 * TAKEN_MAX * step.element.length_mm() < longest_mm => Self::TooLittle,
+            Some(_) => Self::Enough,
+        }
+    }
 }
 
 /// Whether nothing steps from one element to the next.
@@ -153,4 +169,86 @@ fn is_smooth([before, after]: [&Element; 2]) -> bool {
     let step = norm(subtract(start.curvature, end.curvature));
     angle(end.tangent, start.tangent) <= TANGENT_ROUNDING_RAD
         && step <= TANGENT_ROUNDING_RAD * norm(start.curvature).max(norm(end.curvature))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+
+    fn path(points: &[[f64; 2]], tolerance_mm: f64) -> Vec<Move> {
+        let point = |[x, y]: [f64; 2]| [x, y, 0.0];
+        points
+            .windows(2)
+            .zip(1..)
+            .map(|(pair, line)| {
+                let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
+                Move { line, element, feed_mm_s: 10.0 * f64::from(line), tolerance_mm }
+            })
+            .collect()
+    }
+
+    fn kinds(moves: &[Move]) -> Vec<(u32, &'static str)> {
+        moves.iter().map(|step| (step.line, step.element.kind())).collect()
+    }
+
+    #[test]
+    fn blends_take_the_slower_feed_and_the_first_line() {
+        let moves = smooth(&path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [10.0, 20.0]], 0.05), &LIMITS);
+        assert_eq!(kinds(&moves), [(1, "line"), (1, "blend"), (2, "line"), (3, "line")]);
+        let feeds: Vec<_> = moves.iter().map(|step| step.feed_mm_s).collect();
+        assert_eq!(feeds, [10.0, 10.0, 20.0, 30.0]);
+        for pair in moves.windows(2) {
+            assert_eq!(pair[0].element.ends_mm().1, pair[1].element.ends_mm().0);
+        }
+    }
+
+    #[test]
+    fn without_a_tolerance_nothing_changes() {
+        let moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]], 0.0);
+        assert_eq!(smooth(&moves, &LIMITS), moves);
+        assert!(smooth(&[], &LIMITS).is_empty());
+    }
+
+    /// Between a small blend and a big one, the big one gets what the small one leaves; two big ones share.
+    #[test]
+    fn neighbours_share_a_short_element() {
+        let whole_mm = 1.0;
+        let rest_mm = |points: &[[f64; 2]]| {
+            let moves = smooth(&path(points, 0.2), &LIMITS);
+            assert_eq!(kinds(&moves)[2], (2, "line"));
+            moves[2].element.length_mm()
+        };
+        let both = rest_mm(&[[0.0, 0.0], [10.0, 0.0], [10.0, whole_mm], [20.0, whole_mm]]);
+        assert!((both - 0.1 * whole_mm).abs() < 1e-12, "{both}");
+        // 2° and 150°: the first wants more than the whole line, the second a third of it.
+        let (sine, cosine) = libm::sincos(2.0_f64.to_radians());
+        let turn = libm::sincos(152.0_f64.to_radians());
+        let corner = [10.0 + cosine, sine];
+        let end = [corner[0] + 10.0 * turn.1, corner[1] + 10.0 * turn.0];
+        let moves = smooth(&path(&[[0.0, 0.0], [10.0, 0.0], corner, end], 0.2), &LIMITS);
+        let way_mm = |index: usize, whole_mm: f64| whole_mm - moves[index].element.length_mm();
+        let (first, second) = (way_mm(0, 10.0), way_mm(4, 10.0));
+        assert!(first > 0.5 && second > 0.2 && (first + second - 0.9).abs() < 1e-9, "{first} {second}");
+    }
+
+    /// Merging is for lines of one feed, and spends part of the tolerance only.
+    #[test]
+    fn short_lines_are_merged_where_their_feed_is_one() {
+        let points: Vec<[f64; 2]> = (0..=100)
+            .map(|index| {
+                let (sine, cosine) = libm::sincos(0.01 * f64::from(index));
+                [10.0 * cosine, 10.0 * sine]
+            })
+            .collect();
+        let mut moves = path(&points, 0.01);
+        moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
+        assert_eq!(kinds(&smooth(&moves, &LIMITS)), [(1, "arc")]);
+        moves.iter_mut().for_each(|step| step.feed_mm_s = if step.line <= 40 { 50.0 } else { 60.0 });
+        assert_eq!(kinds(&smooth(&moves, &LIMITS)), [(1, "arc"), (41, "arc")]);
+        // The chords' sagitta, 0.125 µm, is more than a part of this tolerance.
+        moves.iter_mut().for_each(|step| step.tolerance_mm = 1e-4);
+        assert!(smooth(&moves, &LIMITS).len() > 100);
+    }
 }

@@ -25,7 +25,7 @@ pub const CURVE_FEED_SHARE: f64 = 0.8;
 pub const CURVE_FEED_SHARE_MAX: f64 = 0.85;
 /// The share for a short curve between straighter ones, which is to be passed rather than used for a change of
 /// feed: some hundredths of the limits are left for ramps.
-pub const BLEND_FEED_SHARE: f64 = 0.97;
+pub const BLEND_FEED_SHARE: f64 = 0.995;
 /// Part of the jerk limit that ramps may use across the path, 3κ·v·a.
 const NORMAL_JERK_SHARE: f64 = 0.55;
 /// Parts of the snap limit that ramps may use: 3κ·a² and 4κ·v·j across, 6κ'·v²·a along the path.
