@@ -382,7 +382,9 @@ fn pathological_curves_are_named() {
         let found = refused(&polynomial(&[[1.0, 0.0, 0.0], [0.0, value, 0.0]]));
         assert!(matches!(found, FitError::NotFinite { .. }), "{value}: {found}");
     }
-    for error in [refused(&polynomial(&[])), refused(&polynomial(&[[f64::NAN; 3]]))] {
+    let found = refused(&polynomial(&[[1e7, 0.0, 0.0]]));
+    assert!(matches!(found, FitError::TooLong { length_mm, .. } if length_mm == 1e7), "{found}");
+    for error in [found, refused(&polynomial(&[])), refused(&polynomial(&[[f64::NAN; 3]]))] {
         assert!(error.to_string().contains(", expected "), "{error}");
     }
     // A curve that crosses itself is none of it.

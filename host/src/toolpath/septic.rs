@@ -86,6 +86,17 @@ pub enum FitError {
         /// Where, to a part of 2⁻¹⁶.
         parameter: f64,
     },
+    /// It is longer than its pieces can be made to reach.
+    #[error(
+        "a curve of {length_mm:.0} mm, expected one whose parts by halving it {HALVINGS_MAX} times are not longer than \
+         {longest_mm:.0} mm"
+    )]
+    TooLong {
+        /// Its length \[mm\].
+        length_mm: f64,
+        /// The longest piece that is allowed \[mm\].
+        longest_mm: f64,
+    },
     /// It bends too sharply, or too often.
     #[error(
         "a curve that {pieces} pieces and more miss by {error_mm:.2e} mm between {} and {} of its parameter, expected at \
@@ -106,7 +117,7 @@ pub enum FitError {
 /// in the parameter than `widest`.
 ///
 /// # Errors
-/// The curve is not finite, stands still somewhere, or is missed after [`HALVINGS_MAX`] halvings or with
+/// The curve is not finite, too long, stands still somewhere, or is missed after [`HALVINGS_MAX`] halvings or with
 /// [`REFINEMENTS_MAX`] pieces more than its length asks for.
 pub fn fit(
     curve: &(impl Curve + ?Sized),
@@ -133,6 +144,9 @@ pub fn fit(
         if good && piece.length_mm <= longest_mm {
             pieces.push(piece);
         } else if halvings == HALVINGS_MAX || (!good && refinements == REFINEMENTS_MAX) {
+            if good {
+                return Err(FitError::TooLong { length_mm: curve.length(from, to), longest_mm });
+            }
             return Err(still(curve, from, to, &piece).unwrap_or(FitError::TooManyPieces {
                 span: (a, b),
                 error_mm: piece.deviation.position_mm,
