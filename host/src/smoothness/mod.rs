@@ -11,9 +11,9 @@
 //! The honest statement is "a continuous third derivative": a quartic spline has one too, and the quintic is the practical
 //! odd degree.
 //!
-//! - [`course`]: a path at constant feed, tick by tick;
+//! - [`mod@course`]: a path at constant feed, tick by tick;
 //! - [`figures`]: what is read off it;
-//! - [`evaluators`]: how constant the feed is that a control makes of a curve over u.
+//! - [`mod@evaluators`]: how constant the feed is that a control makes of a curve over u.
 
 pub mod course;
 pub mod evaluators;

@@ -1,7 +1,8 @@
 //! Curves to pieces of degree seven in arc length.
 //!
 //! Each piece matches position and the first three derivatives by arc length at both ends; it is
-//! halved until position and feed agree with the curve between them too.
+//! halved until position and feed agree with the curve between them too, and says how well they do. A
+//! curve that no reasonable number of pieces follows is refused, and its cusp named if that is why.
 
 use super::Vector;
 use super::curve::{Curve, by_arc_length};

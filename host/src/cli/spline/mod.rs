@@ -3,7 +3,7 @@
 mod experiment;
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -110,7 +110,7 @@ pub fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Outcome, 
     }
 }
 
-fn run_points(path: &PathBuf, arguments: &SplineArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let feed_mm_s = arguments.feed / 60.0;
     if !(feed_mm_s > 0.0 && feed_mm_s.is_finite()) {
         return Err(CliError::Arguments {
