@@ -5,7 +5,8 @@
 //! elements on both sides cut short. Background, in time linear in the moves.
 //!
 //! **Short lines.** Where lines are shorter than the blends at their ends would be, three fifths of the tolerance are spent
-//! on making fewer lines and arcs of them, the rest on blends between these.
+//! on making fewer lines and arcs of them, the rest on blends between these. One that stays alone among longer
+//! ones is made part of the line before it, if that can be led past their corner.
 //!
 //! **Who gets the room.** A blend takes at most nine tenths of an element, and two on the same element together:
 //! what the one does not need is the other's, else both get half. A tenth stays, so that the rest of a short
@@ -15,7 +16,7 @@ use motion_kernel::law::Limits;
 
 use super::blend::{Blend, way_mm};
 use super::element::Element;
-use super::merge::merge;
+use super::merge::{Merged, merge};
 use super::{Vector, angle, norm, subtract};
 
 /// Part of an element that blends may take together.
@@ -102,12 +103,14 @@ fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
         let count = rest.windows(2).take_while(|pair| is_same_run(&pair[0], &pair[1])).count() + 1;
         let (run, after) = rest.split_at(count);
         rest = after;
+        let tolerance_mm = MERGED_SHARE * first.tolerance_mm;
         let rooms: Vec<Room> = (0..count).map(|index| Room::of(run, index)).collect();
         let mut done = 0;
         for same in rooms.chunk_by(|a, b| (*a == Room::Enough) == (*b == Room::Enough)) {
             let steps = &run[done..done + same.len()];
+            let before = (done > 0).then(|| merged.last_mut().zip(distances_mm.last_mut())).flatten();
             done += same.len();
-            if steps.len() < 2 || !same.contains(&Room::TooLittle) {
+            if !same.contains(&Room::TooLittle) {
                 merged.extend_from_slice(steps);
                 distances_mm.resize(merged.len(), 0.0);
                 continue;
@@ -115,13 +118,31 @@ fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
             let ends = steps.iter().map(|step| step.element.ends_mm());
             let points: Vec<Vector> =
                 core::iter::once(steps[0].element.ends_mm().0).chain(ends.map(|(_, to)| to)).collect();
-            for part in merge(&points, MERGED_SHARE * first.tolerance_mm) {
+            let parts = merge(&points, tolerance_mm);
+            if let ([part], Some((before, distance_mm))) = (&parts[..], before)
+                && let Some((line, straight_mm)) = straightened(before, *distance_mm, part, tolerance_mm)
+            {
+                (before.element, *distance_mm) = (line, straight_mm);
+                continue;
+            }
+            for part in parts {
                 merged.push(Move { element: part.element, ..steps[part.first] });
                 distances_mm.push(part.distance_mm);
             }
         }
     }
     (merged, distances_mm)
+}
+
+/// One line in place of two, the second of them alone between longer ones, and its distance from the path.
+fn straightened(before: &Move, before_mm: f64, part: &Merged, tolerance_mm: f64) -> Option<(Element, f64)> {
+    let (Element::Line { from, to: corner }, Element::Line { to, .. }) = (before.element, part.element)
+    else {
+        return None;
+    };
+    let spent_mm = before_mm.max(part.distance_mm);
+    let [line] = merge(&[from, corner, to], tolerance_mm - spent_mm)[..] else { return None };
+    Some((line.element, spent_mm + line.distance_mm))
 }
 
 /// Whether two moves may become one: lines with one feed and one tolerance.
@@ -231,6 +252,17 @@ mod tests {
         let way_mm = |index: usize, whole_mm: f64| whole_mm - moves[index].element.length_mm();
         let (first, second) = (way_mm(0, 10.0), way_mm(4, 10.0));
         assert!(first > 0.5 && second > 0.2 && (first + second - 0.9).abs() < 1e-9, "{first} {second}");
+    }
+
+    /// A corner that was cut off by a micrometre is one corner.
+    #[test]
+    fn a_tiny_line_among_long_ones_joins_the_one_before() {
+        let mut moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0007, 0.0007], [10.0007, 10.0]], 0.05);
+        assert_eq!(smooth(&moves, &LIMITS).len(), 5);
+        moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
+        let smoothed = smooth(&moves, &LIMITS);
+        assert_eq!(kinds(&smoothed), [(1, "line"), (1, "blend"), (3, "line")]);
+        assert_eq!(smoothed[2].element.ends_mm().1, [10.0007, 10.0, 0.0]);
     }
 
     /// Merging is for lines of one feed, and spends part of the tolerance only.

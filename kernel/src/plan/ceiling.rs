@@ -24,7 +24,7 @@ pub const CURVE_FEED_SHARE: f64 = 0.8;
 /// The greatest share that leaves enough of every limit for ramps on curves of any length.
 pub const CURVE_FEED_SHARE_MAX: f64 = 0.85;
 /// The share for a short curve between straighter ones, which is to be passed rather than used for a change of
-/// feed: some hundredths of the limits are left for ramps.
+/// feed: a hundredth of the limits is left for ramps.
 pub const BLEND_FEED_SHARE: f64 = 0.995;
 /// Part of the jerk limit that ramps may use across the path, 3κ·v·a.
 const NORMAL_JERK_SHARE: f64 = 0.55;
