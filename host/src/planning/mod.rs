@@ -8,7 +8,8 @@
 //! 0.5 ms. Between two full stops there may be one kilometre of path (10⁶ mm), and every point of the path lies
 //! within one kilometre of the origin on each axis. What is beyond is refused, with the line of the block.
 //!
-//! - [`program`]: steps to stretches: where motion must stop, what each joint allows;
+//! - [`program`]: steps to stretches: where motion must stop;
+//! - `ceilings`: ceilings of moves and blends, what each joint allows;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
 //! - `lookahead`: the kernel's look-ahead, merged or per block;
@@ -19,6 +20,7 @@
 //! - [`error`]: what is refused, with file and line.
 
 pub mod blocks;
+mod ceilings;
 mod density;
 pub mod error;
 pub mod executable;

@@ -1,15 +1,14 @@
-//! Steps of a program to stretches: where the motion must stop, and what each joint allows.
+//! Steps of a program to stretches: where the motion must stop.
 
-use motion_kernel::plan::{BLEND_FEED_SHARE, Ceiling, Joint, joint};
-
+use super::ceilings::blocks;
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
 use super::{Item, Mode, Plan};
 use crate::gcode::{Feed, PathMode, Program, StepKind};
 use crate::machine::Machine;
-use crate::toolpath::smooth::{Move, TANGENT_ROUNDING_RAD, smooth};
-use crate::toolpath::{Element, Role, angle, norm, subtract};
+use crate::toolpath::Element;
+use crate::toolpath::smooth::{Move, smooth};
 
 /// Plans a whole program for a machine.
 ///
@@ -96,49 +95,19 @@ fn path_move(line: u32, element: Element, feed: Feed, mode: PathMode, machine: &
 /// Appends the stretches of moves that follow each other, smoothed.
 fn append(run: &mut Vec<Move>, plan: &mut Plan, machine: &Machine, mode: Mode) -> Result<(), (u32, Problem)> {
     let mut open: Vec<StretchBlock> = Vec::new();
-    for step in smooth(run, &machine.limits().in_any_direction()) {
-        let block = block(&step, machine).map_err(|problem| (step.line, problem))?;
-        if let Some(last) = open.last_mut() {
-            last.joint_mm_s = joint_feed(&last.element, &step.element, machine);
-            if last.joint_mm_s <= 0.0 {
-                close(&mut open, plan, mode)?;
-            }
-        }
+    for block in blocks(&smooth(run, &machine.limits().in_any_direction()), machine)? {
         open.push(block);
+        // Also after the last.
+        if block.joint_mm_s <= 0.0 {
+            close(&mut open, plan, mode)?;
+        }
     }
     run.clear();
-    close(&mut open, plan, mode)
-}
-
-fn block(step: &Move, machine: &Machine) -> Result<StretchBlock, Problem> {
-    let element = step.element;
-    let mut limits = machine.limits();
-    if matches!(element, Element::Polynomial { role: Role::Blend, .. }) {
-        limits.curve_feed_share = BLEND_FEED_SHARE;
-    }
-    let ceiling =
-        Ceiling::new(&limits, step.feed_mm_s, &element.tangent_max(), &element.curved(), &element.bend())?;
-    Ok(StretchBlock { line: step.line, element, ceiling, joint_mm_s: 0.0 })
-}
-
-/// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.
-fn joint_feed(before: &Element, after: &Element, machine: &Machine) -> f64 {
-    let ([_, end], [start, _]) = (before.ends(), after.ends());
-    let angle_rad = angle(end.tangent, start.tangent);
-    let steps = Joint { angle_rad, curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)) };
-    joint(
-        &steps,
-        machine.path.joint_angle_rad.max(TANGENT_ROUNDING_RAD),
-        machine.path.accel_step_mm_s2,
-        machine.tick_s,
-    )
+    Ok(())
 }
 
 /// Plans the open stretch and appends it.
 fn close(open: &mut Vec<StretchBlock>, plan: &mut Plan, mode: Mode) -> Result<(), (u32, Problem)> {
-    if open.is_empty() {
-        return Ok(());
-    }
     let stretch = Stretch::new(std::mem::take(open), plan.length_mm, mode, plan.tick_s)?;
     plan.blocks.extend(stretch.block_records());
     plan.feed.extend(stretch.feed_records());

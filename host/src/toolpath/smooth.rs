@@ -9,7 +9,7 @@
 //! ones is made part of the line before it, if that can be led past their corner.
 //!
 //! **Who gets the room.** A blend takes at most nine tenths of an element, and two on the same element together:
-//! what the one does not need is the other's, else both get half. A tenth stays, so that the rest of a short
+//! what the one does not need is the other's, else both get half, and half is all where motion starts or ends. A tenth stays, so that the rest of a short
 //! element still has a direction of its own.
 
 use motion_kernel::law::Limits;
@@ -53,11 +53,15 @@ pub fn smooth(moves: &[Move], limits: &Limits<f64>) -> Vec<Move> {
         let tolerance_mm = before.tolerance_mm - distances_mm[index].max(distances_mm[index + 1]);
         Blend::new(&before.element, &after.element, tolerance_mm, room_mm, limits)
     };
+    // At the start and the end of the run motion needs room of its own, to set out and to stop.
+    let last = moves.len().saturating_sub(1);
+    let share = |index: usize| if index == 0 || index == last { 0.5 * TAKEN_MAX } else { TAKEN_MAX };
     // First as if each were alone, then those that touch within what the other leaves.
-    let alone: Vec<Option<Blend>> = (0..moves.len().saturating_sub(1))
+    let alone: Vec<Option<Blend>> = (0..last)
         .map(|index| {
             let pair = [&moves[index].element, &moves[index + 1].element];
-            let room_mm = TAKEN_MAX * lengths_mm[index].min(lengths_mm[index + 1]);
+            let taken_mm = |index: usize| share(index) * lengths_mm[index];
+            let room_mm = taken_mm(index).min(taken_mm(index + 1));
             if is_smooth(pair) { None } else { joint(index, room_mm) }
         })
         .collect();
@@ -65,8 +69,8 @@ pub fn smooth(moves: &[Move], limits: &Limits<f64>) -> Vec<Move> {
         index.and_then(|index| alone.get(index)).and_then(Option::as_ref).map_or(0.0, |blend| blend.way_mm)
     };
     let left_mm = |element: usize, other: Option<usize>| {
-        let taken_mm = TAKEN_MAX * lengths_mm[element];
-        (taken_mm - way_mm(other)).max(0.5 * taken_mm)
+        let taken_mm = share(element) * lengths_mm[element];
+        (taken_mm - way_mm(other)).max(0.5 * TAKEN_MAX * lengths_mm[element])
     };
     let blends: Vec<Option<Blend>> = alone
         .iter()
