@@ -397,32 +397,53 @@ fn pathological_curves_are_named() {
 /// A line that quivers: smooth, and with ever so many waves.
 struct Quiver {
     waves: f64,
+    height_mm: f64,
     calls: std::cell::Cell<u64>,
+}
+
+impl Quiver {
+    fn new(waves: f64, height_mm: f64) -> Self {
+        Self { waves, height_mm, calls: std::cell::Cell::new(0) }
+    }
 }
 
 impl Curve for Quiver {
     fn offset(&self, origin: f64, u: f64) -> Vector {
-        let wave = |u: f64| (self.waves * u).sin();
+        let wave = |u: f64| self.height_mm * (self.waves * u).sin();
         [u - origin, wave(u) - wave(origin), 0.0]
     }
 
     fn derivatives(&self, u: f64) -> [Vector; 3] {
         self.calls.set(self.calls.get() + 1);
-        let (w, angle) = (self.waves, self.waves * u);
-        [[1.0, w * angle.cos(), 0.0], [0.0, -w * w * angle.sin(), 0.0], [0.0, -w.powi(3) * angle.cos(), 0.0]]
+        let (w, h, angle) = (self.waves, self.height_mm, self.waves * u);
+        [
+            [1.0, h * w * angle.cos(), 0.0],
+            [0.0, -h * w * w * angle.sin(), 0.0],
+            [0.0, -h * w.powi(3) * angle.cos(), 0.0],
+        ]
     }
 }
 
-/// The cap is hard: in the number of pieces, and in what finding out takes.
+/// The cap is hard: in depth, in the number of pieces, and in what finding out takes.
 #[test]
 fn endless_curves_hit_the_cap() {
-    for waves in [1e4, 1e6, 1e9] {
-        let curve = Quiver { waves, calls: std::cell::Cell::new(0) };
-        let found = refused(&curve);
-        assert!(matches!(found, FitError::TooManyPieces { pieces, .. } if pieces <= 4200), "{found}");
-        assert!(found.to_string().contains(", expected at most"), "{found}");
-        assert!(curve.calls.get() < 4_000_000, "{}", curve.calls.get());
+    let pieces = |error: FitError| {
+        assert!(error.to_string().contains(", expected at most"), "{error}");
+        let FitError::TooManyPieces { pieces, .. } = error else { panic!("{error}") };
+        pieces
+    };
+    for waves in [1e5, 1e6, 1e9] {
+        let curve = Quiver::new(waves, 1.0);
+        assert!(pieces(refused(&curve)) < 100);
+        assert!(curve.calls.get() < 100_000, "{}", curve.calls.get());
     }
+    // Gentle waves: each is followed by a few pieces, so that their number is what ends it.
+    let curve = Quiver::new(6e3, 1.0 / 6e3);
+    let found = pieces(refused(&curve));
+    assert!((2000..=4200).contains(&found), "{found}");
+    assert!(curve.calls.get() < 4_000_000, "{}", curve.calls.get());
+    let fewer = septic_fit(&Quiver::new(6e2, 1.0 / 6e2), 0.0, 1.0, 1.0, 16.0).expect("a tenth of the waves");
+    assert!((400..=4200).contains(&fewer.len()), "{}", fewer.len());
 }
 
 /// Random polynomials of every kind, cusps and loops among them: pieces or a typed error, and nothing that is not finite.
