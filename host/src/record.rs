@@ -50,7 +50,7 @@ pub struct PathLimits {
 pub struct BlockRecord {
     /// G-code line, from 1.
     pub line: u32,
-    /// "line", "arc" or "helix".
+    /// "line", "arc", "helix", "blend" or "spline".
     pub kind: &'static str,
     /// Where the block starts, from the program's start along the path \[mm\].
     pub start_mm: f64,

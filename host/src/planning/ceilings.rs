@@ -14,7 +14,7 @@ use super::error::Problem;
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
 use crate::toolpath::smooth::{Move, TANGENT_ROUNDING_RAD};
-use crate::toolpath::{Element, Role, angle, norm, subtract};
+use crate::toolpath::{Element, Greatest, Role, angle, norm, subtract};
 
 /// The blocks of `moves`; the joint feed of the last one is 0. An error comes with the program line.
 pub(super) fn blocks(moves: &[Move], machine: &Machine) -> Result<Vec<StretchBlock>, (u32, Problem)> {
@@ -39,9 +39,9 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> Result<Vec<StretchBlo
 fn block(step: &Move, curve_feed_share: f64, machine: &Machine) -> Result<StretchBlock, (u32, Problem)> {
     let Move { line, element, feed_mm_s, .. } = *step;
     let limits = MachineLimits { curve_feed_share, ..machine.limits() };
+    let Greatest { bend, tangent, curved } = element.greatest();
     let ceiling =
-        Ceiling::new(&limits, feed_mm_s, &element.tangent_max(), &element.curved(), &element.bend())
-            .map_err(|error| (line, error.into()))?;
+        Ceiling::new(&limits, feed_mm_s, &tangent, &curved, &bend).map_err(|error| (line, error.into()))?;
     Ok(StretchBlock { line, element, ceiling, joint_mm_s: 0.0 })
 }
 

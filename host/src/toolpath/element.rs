@@ -5,7 +5,7 @@ use motion_kernel::plan::Bend;
 
 use super::curve::{Curve, Spiral, by_arc_length};
 use super::involute::Involute;
-use super::polynomial::Polynomial;
+use super::polynomial::{Greatest, Polynomial};
 use super::{Vector, add, cross, norm, scale, subtract};
 use crate::gcode::{ArcMove, LineMove};
 
@@ -216,53 +216,30 @@ impl Element {
         }
     }
 
-    /// How it bends, at its tightest.
+    /// How it bends at its tightest, and which axes take part.
     #[must_use]
-    pub fn bend(&self) -> Bend<f64> {
+    pub fn greatest(&self) -> Greatest {
         match self {
-            Self::Line { .. } => Bend::default(),
+            Self::Line { .. } => Greatest {
+                bend: Bend::default(),
+                tangent: self.ends()[0].tangent.map(f64::abs),
+                curved: [false; 3],
+            },
             Self::Arc { shape, sweep_rad, .. } => {
                 let radius = shape.radius_mm.min(shape.radius_mm + shape.radius_per_rad * sweep_rad);
-                Bend::circle(radius, self.planar())
-            }
-            Self::Polynomial { shape, .. } => shape.greatest().bend,
-            Self::Involute { shape, .. } => shape.bend(),
-        }
-    }
-
-    /// Greatest |component| of the tangent on each axis.
-    #[must_use]
-    pub fn tangent_max(&self) -> Vector {
-        match self {
-            Self::Line { .. } => self.ends()[0].tangent.map(f64::abs),
-            Self::Polynomial { shape, .. } => shape.greatest().tangent,
-            Self::Involute { shape, .. } => shape.tangent_max(),
-            Self::Arc { shape, .. } => {
-                let planar = self.planar();
+                let planar = shape.radius_mm / libm::hypot(shape.radius_mm, shape.height_per_rad);
                 // Conservative for arcs that never run along one of their axes.
                 let axial = (1.0 - planar * planar).max(0.0).sqrt();
                 let part = shape.in_plane();
-                core::array::from_fn(|axis| (planar * part[axis] + axial * shape.normal[axis].abs()).min(1.0))
+                let of_axis = |axis: usize| planar * part[axis] + axial * shape.normal[axis].abs();
+                Greatest {
+                    bend: Bend::circle(radius, planar),
+                    tangent: core::array::from_fn(|axis| of_axis(axis).min(1.0)),
+                    curved: part.map(|part| part > 0.0),
+                }
             }
-        }
-    }
-
-    /// Which axes take part in the bend.
-    #[must_use]
-    pub fn curved(&self) -> [bool; 3] {
-        match self {
-            Self::Line { .. } => [false; 3],
-            Self::Arc { shape, .. } => shape.in_plane().map(|part| part > 0.0),
-            Self::Polynomial { shape, .. } => shape.greatest().curved,
-            Self::Involute { shape, .. } => shape.tangent_max().map(|component| component > 0.0),
-        }
-    }
-
-    /// The part of the length that lies in the plane of the arc.
-    fn planar(&self) -> f64 {
-        match self {
-            Self::Line { .. } | Self::Polynomial { .. } | Self::Involute { .. } => 1.0,
-            Self::Arc { shape, .. } => shape.radius_mm / libm::hypot(shape.radius_mm, shape.height_per_rad),
+            Self::Polynomial { shape, .. } => shape.greatest(),
+            Self::Involute { shape, .. } => shape.greatest(),
         }
     }
 }

@@ -15,6 +15,7 @@
 use motion_kernel::plan::Bend;
 
 use super::curve::Curve;
+use super::polynomial::Greatest;
 use super::{Vector, add, cross, dot, norm, scale, subtract};
 
 /// The least angle that an involute may reach \[rad\]: a radius of curvature of a thousandth of its base circle's.
@@ -115,25 +116,21 @@ impl Involute {
     }
 
     /// How it bends at its tightest, which is its smallest angle: |r'''| = κ²·√(1 + φ⁻²) and
-    /// |r''''| = κ³·√(1 + 3φ⁻² + 9φ⁻⁴), of which each falls as φ grows.
+    /// |r''''| = κ³·√(1 + 3φ⁻² + 9φ⁻⁴), of which each falls as φ grows; and which axes take part.
     #[must_use]
-    pub fn bend(&self) -> Bend<f64> {
+    pub fn greatest(&self) -> Greatest {
         let angle = self.angles_rad.0.min(self.angles_rad.1);
         let curvature = 1.0 / (self.base_mm * angle);
         let steep = 1.0 / (angle * angle);
-        Bend {
+        let bend = Bend {
             curvature_per_mm: curvature,
             third_root_per_mm: curvature * (1.0 + steep).sqrt().sqrt(),
             fourth_root_per_mm: curvature * libm::cbrt((1.0 + 3.0 * steep + 9.0 * steep * steep).sqrt()),
-        }
-    }
-
-    /// Greatest |component| that a tangent can have on each axis.
-    #[must_use]
-    pub fn tangent_max(&self) -> Vector {
+        };
         // Of all directions in the plane: conservative where it turns through a part of them only.
-        let axial = cross(self.outward, self.onward);
-        axial.map(|component| (1.0 - component * component).max(0.0).sqrt())
+        let normal = cross(self.outward, self.onward);
+        let tangent = normal.map(|component| (1.0 - component * component).max(0.0).sqrt());
+        Greatest { bend, tangent, curved: tangent.map(|component| component > 0.0) }
     }
 
     /// +1 as it unwinds, −1 as it winds up.
@@ -247,7 +244,7 @@ mod tests {
     fn the_bend_is_the_greatest() {
         for (from, to) in [(0.05, 4.0), (7.0, 0.5)] {
             let involute = involute(12.0, from, to);
-            let bend = involute.bend();
+            let bend = involute.greatest().bend;
             let bounds =
                 [bend.curvature_per_mm, bend.third_root_per_mm.powi(2), bend.fourth_root_per_mm.powi(3)];
             let mut greatest = [0.0_f64; 3];

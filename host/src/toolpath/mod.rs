@@ -28,7 +28,7 @@ pub mod spline;
 pub use compile::{CompileError, Placed, compile, exact, on_path, septics};
 pub use element::{Element, Role};
 pub use involute::Involute;
-pub use polynomial::Polynomial;
+pub use polynomial::{Greatest, Polynomial};
 
 /// A point or a vector, X Y Z \[mm\].
 pub type Vector = [f64; 3];
