@@ -9,7 +9,7 @@
 //!
 //! **Shape.** Both ends give four control points each. On a line they stand at a₁, a₂, a₃ of the way d to the
 //! corner; on an arc the same speeds |r'|, s'', s''' by the parameter are used with the arc's own derivatives by
-//! arc length. [`SHAPES`] holds the a's that allow the greatest feed at a given tolerance under a limit of jerk
+//! arc length. `SHAPES` holds the a's that allow the greatest feed at a given tolerance under a limit of jerk
 //! alone and of snap alone, by corner angle; of these, three between them and an evenly spaced one, that with the
 //! greatest feed under all limits is taken. They were found by searching all a₁ ≤ a₂ ≤ a₃ ≤ 1.
 //!
