@@ -1,8 +1,9 @@
 //! Lists of points, which splines go through: CSV.
 //!
-//! Consumes text with the heading `x_mm,y_mm,z_mm` or `x_mm,y_mm,z_mm,u` and a row of numbers for every point; produces the
-//! points, their parameters if there are any, and their lines. Blank lines, and lines that start with `#`, are left out. Nothing
-//! is guessed: what is not a finite number is refused with line and column. Background; linear.
+//! Consumes text with the heading `x_mm,y_mm,z_mm` or `x_mm,y_mm,z_mm,u` and a row of numbers for every point;
+//! produces the points, their parameters if there are any, and their lines. Blank lines, and lines that start with
+//! `#`, are left out. Nothing is guessed: what is not a finite number is refused with line and column. Background;
+//! linear.
 
 use csv::{ByteRecord, ReaderBuilder};
 

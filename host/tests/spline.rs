@@ -297,8 +297,8 @@ fn measured(curve: &dyn Curve, from: f64, to: f64, steps: u32) -> Vec<(f64, Vect
         .collect()
 }
 
-/// Pieces are where the curve is at the same length, and as fast, within what they state and a quarter; they follow each other, and
-/// are as long as the curve.
+/// Pieces are where the curve is at the same length, and as fast, within what they state and a quarter; they follow
+/// each other, and are as long as the curve.
 #[test]
 fn pieces_are_as_close_as_they_say() {
     let mut random = Random::new(5);
@@ -505,7 +505,8 @@ fn a_spline_runs_as_it_was_programmed() {
     let summary = simulate::run(&plan, &machine, &mut |tick| {
         let there = course.at(tick.s_mm).expect("on the path");
         let set = tick.axes.map(|axis| axis.set_mm);
-        // Set positions of the record are those of the axes, which preview may delay: on the reference machine it does not.
+        // Set positions of the record are those of the axes, which preview may delay: on the reference machine it
+        // does not.
         farthest = farthest.max(norm(minus(set, there.point)));
         let velocity = tick.axes.map(|axis| axis.vel_mm_s);
         fastest = fastest.max(norm(minus(velocity, there.tangent.map(|t| t * tick.v_mm_s))));

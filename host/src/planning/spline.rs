@@ -23,8 +23,8 @@ pub struct Pieces {
 /// The machine comes from the origin by a rapid, unless the spline starts there.
 ///
 /// # Errors
-/// A span has no pieces (it has a cusp, for one), the kernel can't execute it, or the plan would exceed what a tick can do; the
-/// error names the line of the span's last point.
+/// A span has no pieces (it has a cusp, for one), the kernel can't execute it, or the plan would exceed what a tick
+/// can do; the error names the line of the span's last point.
 pub fn plan_spline(
     source_name: &str,
     spline: &Spline,

@@ -36,12 +36,13 @@ pub struct JointStep {
     pub time_s: f64,
     /// Step of the acceleration of every axis \[mm/s²\].
     pub accel_mm_s2: Vector,
-    /// Step of the jerk of every axis, where that is what it is: beside a step of acceleration there is none to be had \[mm/s³\].
+    /// Step of the jerk of every axis, where that is what it is: beside a step of acceleration there is none to be
+    /// had \[mm/s³\].
     pub jerk_mm_s3: Vector,
 }
 
-/// Velocity, acceleration and jerk of every axis, tick by tick. Accelerations and jerks are differences over ticks, S2 (7):
-/// the first acceleration is that of tick 1, the first jerk that of tick 2.
+/// Velocity, acceleration and jerk of every axis, tick by tick. Accelerations and jerks are differences over ticks,
+/// S2 (7): the first acceleration is that of tick 1, the first jerk that of tick 2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisTicks {
     /// The control tick τ \[s\].

@@ -1,6 +1,7 @@
 //! The involute of a circle: flanks of gears, scrolls, and spiral paths that open a hole. S3 names it among its blocks.
 //!
-//! With the base circle's radius r and the angle of unwinding φ, in a frame (e₁, e₂) of the plane about the circle's centre,
+//! With the base circle's radius r and the angle of unwinding φ, in a frame (e₁, e₂) of the plane about the circle's
+//! centre,
 //!
 //! ```text
 //! T = e₁·cos φ + e₂·sin φ     N = e₂·cos φ − e₁·sin φ
@@ -8,9 +9,9 @@
 //! length from 0 = r·φ²/2      curvature = 1/(r·φ)
 //! ```
 //!
-//! On the base circle itself, at φ = 0, curvature is infinite: an involute has to stay off it. At a distance d beside an involute
-//! lies the same involute, turned by −d/r and run through at angles that are greater by d/r ([`Involute::offset_by`]), so that a
-//! cutter's radius needs nothing new.
+//! On the base circle itself, at φ = 0, curvature is infinite: an involute has to stay off it. At a distance d beside
+//! an involute lies the same involute, turned by −d/r and run through at angles that are greater by d/r
+//! ([`Involute::offset_by`]), so that a cutter's radius needs nothing new.
 
 use motion_kernel::plan::Bend;
 

@@ -19,11 +19,11 @@ const STEEPNESS_MAX: f64 = 3.9;
 pub const HALVINGS_MAX: u32 = 16;
 /// Halvings of one part for the sake of the deviation, not of the length, after which a curve is given up.
 pub const REFINEMENTS_MAX: usize = 4096;
-/// What lies between the points at which a deviation is measured may exceed it by this factor: 1.14 was found over 8566 pieces of
-/// random splines.
+/// What lies between the points at which a deviation is measured may exceed it by this factor: 1.14 was found over
+/// 8566 pieces of random splines.
 const BETWEEN: f64 = 1.25;
-/// A failed span is that of a cusp if the curve is slower there than this part of its greatest speed: on a cusp, where the speed
-/// grows linearly, it is some 2⁻¹⁶.
+/// A failed span is that of a cusp if the curve is slower there than this part of its greatest speed: on a cusp,
+/// where the speed grows linearly, it is some 2⁻¹⁶.
 const STILL: f64 = 1.0e-3;
 /// At how many parts of a curve its greatest speed is looked for.
 const SPEEDS: u32 = 64;

@@ -5,8 +5,8 @@ use super::DEGREE_MAX;
 /// Factors of the control points that act on one span, the first one first; unused ones are 0.
 pub(super) type Row = [f64; DEGREE_MAX + 1];
 
-/// The factors with which control points `span − degree` … `span` make the derivative of `order` ≤ `degree` at `u`, which lies
-/// between `knots[span]` and `knots[span + 1]`, of which the second is the greater.
+/// The factors with which control points `span − degree` … `span` make the derivative of `order` ≤ `degree` at `u`,
+/// which lies between `knots[span]` and `knots[span + 1]`, of which the second is the greater.
 ///
 /// A derivative is a spline of a lower degree whose control points are differences of those of the spline,
 /// P⁽ᵏ⁾ᵢ = (p − k + 1)·(P⁽ᵏ⁻¹⁾ᵢ₊₁ − P⁽ᵏ⁻¹⁾ᵢ)/(Uᵢ₊ₚ₊₁ − Uᵢ₊ₖ); here the differences are taken of the factors instead.
@@ -51,8 +51,7 @@ pub(super) fn clamped(breaks: &[f64], degree: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Against the definition: truncated powers make the same functions. Here by what it implies: the functions sum to 1,
-    /// and each derivative is the slope of the one below.
+    /// The functions sum to 1, and each derivative is the slope of the one below.
     #[test]
     fn derivatives_are_slopes() {
         let breaks = [0.0, 0.3, 1.0, 1.2, 2.7];

@@ -221,8 +221,8 @@ impl Spline {
     }
 }
 
-/// Parameters from 0 that grow by the distance from point to point \[mm\], so that the spline is run through at about constant
-/// speed.
+/// Parameters from 0 that grow by the distance from point to point \[mm\], so that the spline is run through at about
+/// constant speed.
 ///
 /// # Errors
 /// A coordinate is not finite, or a point is the one before.
@@ -302,9 +302,9 @@ pub fn interpolate(
     }
 }
 
-/// A spline no farther than `tolerance_mm` from any point, with as few knots as halving finds: where a span is
-/// too far from one of its points, it gets a knot at the point in its middle. Where that takes as many knots as there are points,
-/// and with a tolerance of 0, the spline goes through all points. The first and the last one are always met.
+/// A spline no farther than `tolerance_mm` from any point, with as few knots as halving finds: where a span is too
+/// far from one of its points, it gets a knot at the point in its middle. Where that takes as many knots as there are
+/// points, and with a tolerance of 0, the spline goes through all points. The first and the last one are always met.
 ///
 /// # Errors
 /// As [`interpolate`]; the tolerance is negative or not finite.
@@ -348,8 +348,8 @@ pub fn fit(
     through_all()
 }
 
-/// The spline with knots at `breaks` that comes closest to the points and meets the first and the last one; before it, the
-/// point it misses most, and by how much \[mm\]. Nothing if the points don't determine it.
+/// The spline with knots at `breaks` that comes closest to the points and meets the first and the last one; before
+/// it, the point it misses most, and by how much \[mm\]. Nothing if the points don't determine it.
 fn least_squares(
     points: &[Vector],
     parameters: &[f64],
