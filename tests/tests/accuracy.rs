@@ -160,7 +160,7 @@ fn all(plan: &Plan, machine: &Machine) -> Result<[Option<Worst>; 3], String> {
 fn reference_machine(text: &str) -> [Worst; 3] {
     let machine = Machine::reference();
     let program = gcode::read("accuracy.ngc", text.as_bytes()).expect("G-code");
-    let plan = plan_program("accuracy.ngc", &program, &machine, Mode::Merged).expect("a plan");
+    let plan = plan_program("accuracy.ngc", &program, &machine, Mode::Spanning).expect("a plan");
     all(&plan, &machine).expect("executed").map(|worst| worst.expect("within the type's range"))
 }
 
@@ -179,7 +179,7 @@ impl Programs {
         let machine = machine::any(&mut random);
         let fragments = 1 + random.below(24);
         let program = program::generate(&mut random, fragments, machine.path.feed_mm_s);
-        let mode = if random.chance(0.5) { Mode::Merged } else { Mode::PerBlock };
+        let mode = if random.chance(0.5) { Mode::Spanning } else { Mode::PerBlock };
         let mut totals = Totals::default();
         let plan = drive::plan(&program.text, &machine, mode, &mut totals)?;
         for (reason, count) in totals.refused {

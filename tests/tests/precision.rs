@@ -64,7 +64,7 @@ fn law(record: &FeedRecord, t: f64) -> [f64; 4] {
 /// Executes the last stretch of `text`, a single move, in f32 on the reference machine; compares every tick.
 fn compare(text: &str, element: &Element, from: [i64; 3], machine: &Machine) -> Worst {
     let program = gcode::read("precision.ngc", text.as_bytes()).expect("G-code");
-    let plan: Plan = plan_program("precision.ngc", &program, machine, Mode::Merged).expect("a plan");
+    let plan: Plan = plan_program("precision.ngc", &program, machine, Mode::Spanning).expect("a plan");
     let start_mm = plan.blocks.last().expect("a block").start_mm;
     let records: Vec<_> = plan.feed.iter().filter(|record| record.start_mm >= start_mm - 1e-6).collect();
     let mut executable = Executable::new::<f32>(&plan).expect("executable");
@@ -230,7 +230,7 @@ fn increments(count: i64) {
     // Slow enough for lines of 3.5 µm.
     let mut machine = Machine::reference();
     machine.path.feed_mm_s = 80.0;
-    let plan = plan_program("increments.ngc", &program, &machine, Mode::Merged).expect("a plan");
+    let plan = plan_program("increments.ngc", &program, &machine, Mode::Spanning).expect("a plan");
     let executable = Executable::new::<f32>(&plan).expect("executable");
     let start = [Position::ZERO; 3];
     let mut streams = Streams::<f32, 3, 64, 64>::new();

@@ -36,7 +36,7 @@ fn one(seed: u64, is_shown: bool) -> Result<Totals, String> {
     if is_shown {
         println!("{}\n{machine:#?}", program.text);
     }
-    let mode = if random.chance(0.5) { Mode::Merged } else { Mode::PerBlock };
+    let mode = if random.chance(0.5) { Mode::Spanning } else { Mode::PerBlock };
     let (number, result) = match random.below(5) {
         0 | 1 => ("f32", drive::execute::<f32>(&program, &machine, mode, seed)),
         2 => ("f64", drive::execute::<f64>(&program, &machine, mode, seed)),
@@ -99,7 +99,7 @@ fn blocks_whose_change_of_feed_is_a_few_last_places_are_planned() {
         let length_mm = 1e-5 * 1.03_f64.powi(step);
         let text = format!("G1 X200 F17000\nX{:.10} F18000\nX400 F17999\nM2\n", 200.0 + length_mm);
         let read = gcode::read("short.ngc", text.as_bytes()).expect("G-code");
-        if let Err(refused) = plan_program("short.ngc", &read, &reference, Mode::Merged) {
+        if let Err(refused) = plan_program("short.ngc", &read, &reference, Mode::Spanning) {
             failures.push(format!("{length_mm:e} mm: {refused}"));
         }
     }
@@ -116,7 +116,7 @@ fn kinks_around_the_programmed_feed_keep_the_acceleration_step() {
         let angle = 0.01 * f64::from(percent) * reference.path.accel_step_mm_s2 * reference.tick_s / 50.0;
         let points = [[30.0, 0.0], [30.0 + 30.0 * angle.cos(), 30.0 * angle.sin()]];
         let program = program::lines(&points.map(|[x, y]| [mm(x), mm(y), 0]), 3000.0);
-        for mode in [Mode::Merged, Mode::PerBlock] {
+        for mode in [Mode::Spanning, Mode::PerBlock] {
             let done = drive::execute::<f64>(&program, &reference, mode, u64::from(percent));
             assert!(done.is_ok(), "{percent} % {mode:?}: {done:?}");
         }
@@ -133,7 +133,7 @@ fn random_programs_run_on_the_simulated_machine() {
         let fragments = 1 + random.below(4);
         let program = program::generate(&mut random, fragments, 30.0);
         let read = gcode::read("random.ngc", program.text.as_bytes()).expect("generated");
-        let Ok(plan) = plan_program("random.ngc", &read, &machine, Mode::Merged) else { continue };
+        let Ok(plan) = plan_program("random.ngc", &read, &machine, Mode::Spanning) else { continue };
         let mut end_mm = [0.0; 3];
         let mut ticks = 0_u64;
         let mut observe = |tick: &motion_host::record::TickRecord| {

@@ -182,7 +182,7 @@ fn what_is_not_a_finite_positive_number_makes_no_item() {
 /// G-code on the reference machine.
 fn executable(text: &str) -> Executable {
     let program = gcode::read("streams.ngc", text.as_bytes()).expect("G-code");
-    let plan = plan_program("streams.ngc", &program, &Machine::reference(), Mode::Merged).expect("a plan");
+    let plan = plan_program("streams.ngc", &program, &Machine::reference(), Mode::Spanning).expect("a plan");
     Executable::new::<f32>(&plan).expect("executable")
 }
 
@@ -341,7 +341,7 @@ fn pieces_of_several_stretches_in_one_tick_are_counted_together() {
         let side = |word: &str| format!("{word}{}\n", 0.9 / moves as f64).repeat(moves);
         let text = format!("G91 G61 G1 F54000\n{}M2\n", (side("X") + &side("Y")).repeat(20));
         let program = gcode::read("stairs.ngc", text.as_bytes()).expect("G-code");
-        plan_program("stairs.ngc", &program, &machine, Mode::Merged).map(|_| ()).map_err(|e| e.problem)
+        plan_program("stairs.ngc", &program, &machine, Mode::Spanning).map(|_| ()).map_err(|e| e.problem)
     };
     assert_eq!(plan(2), Ok(()));
     let found = plan(6);
@@ -472,7 +472,7 @@ fn a_program_too_dense_for_a_tick_is_refused_with_its_line_and_the_feed_that_wou
     let machine = Machine::reference();
     let plan = |text: &str| {
         let program = gcode::read("dense.ngc", text.as_bytes()).expect("G-code");
-        plan_program("dense.ngc", &program, &machine, Mode::Merged)
+        plan_program("dense.ngc", &program, &machine, Mode::Spanning)
     };
     let Err(refused) = plan(&short_lines(20.0)) else { panic!("20 pieces a tick") };
     // Where the feed is reached, not where the program begins.
@@ -556,7 +556,7 @@ fn ten_thousand_lines_of_a_nanometre() {
         let line = format!("G1 X0.000001 F{feed_mm_min}\n");
         let text = "G91\n".to_owned() + &line.repeat(10_000);
         let program = gcode::read("nano.ngc", text.as_bytes()).expect("G-code");
-        match plan_program("nano.ngc", &program, &Machine::reference(), Mode::Merged) {
+        match plan_program("nano.ngc", &program, &Machine::reference(), Mode::Spanning) {
             Ok(plan) => {
                 let positions = execute::<64>(&Executable::new::<f32>(&plan).expect("executable"), |_| true);
                 let end = positions[positions.len() - 1][0];

@@ -65,7 +65,7 @@ fn per_block_plan_is_the_published_one() {
 
 fn planned(machine: &Machine) -> Plan {
     let program = gcode::read("stringer.ngc", PROGRAM.as_bytes()).expect("a program");
-    plan_program("stringer.ngc", &program, machine, Mode::Merged).expect("a plan")
+    plan_program("stringer.ngc", &program, machine, Mode::Spanning).expect("a plan")
 }
 
 /// S3's result on the reference machine: N2 and N4 limited by jerk, N3 by acceleration, N5 by braking.

@@ -52,7 +52,7 @@ enum Number {
 pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Merged };
+    let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
     let program = gcode::read(&source.name, &source.text)?;
     let plan = plan_program(&source.name, &program, &machine, mode)?;
     let executable = match arguments.number {

@@ -23,7 +23,7 @@ const REPORT: &str = "stringer.html";
 pub fn demonstrate(out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = Machine::reference();
     let program = gcode::read(STRINGER_NAME, STRINGER.as_bytes())?;
-    let plan = plan_program(STRINGER_NAME, &program, &machine, Mode::Merged)?;
+    let plan = plan_program(STRINGER_NAME, &program, &machine, Mode::Spanning)?;
     let report = Output::create(Path::new(REPORT))?;
     let mut say = |text: &str| writeln!(out, "{text}").map_err(CliError::Output);
     say("Demonstration: a stringer flange, 5000 mm/min, on the reference machine.\n")?;

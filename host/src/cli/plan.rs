@@ -36,7 +36,7 @@ pub struct PlanArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
-    /// One pair of ramps per block; without it, ramps may span blocks with equal ceilings.
+    /// One pair of ramps per block; without it, ramps may span blocks.
     #[arg(long)]
     per_block: bool,
     /// Print JSON: time_s, blocks, feed.
@@ -86,7 +86,7 @@ struct FeedJson {
 pub fn plan(arguments: &PlanArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Merged };
+    let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
     let is_block_list =
         arguments.program.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
     let mut plan = if is_block_list {

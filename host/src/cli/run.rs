@@ -58,7 +58,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let program = gcode::read(&source.name, &source.text)?;
-    let plan = plan_program(&source.name, &program, &machine, Mode::Merged)?;
+    let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;
     // Opened before the run: a wrong path should not cost the user a long one.
     let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
     let report = arguments.report.as_deref().map(Output::create).transpose()?;

@@ -276,7 +276,7 @@ impl Recording {
         feed_mm_s: f64,
     ) -> Result<Self, DriveError> {
         let program = gcode::read(&experiment, program.as_bytes())?;
-        let plan = plan_program(&experiment, &program, &machine, Mode::Merged)?;
+        let plan = plan_program(&experiment, &program, &machine, Mode::Spanning)?;
         let mut ticks = Vec::with_capacity((plan.time_s / machine.tick_s) as usize + 2);
         let summary = simulate::run_with(options, &plan, &machine, &mut |tick| ticks.push(*tick))?;
         match summary.faults.into_iter().next() {

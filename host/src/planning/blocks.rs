@@ -98,13 +98,15 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
             Some(*end)
         })
         .collect();
-    let planned = lookahead(blocks.clone(), &ends_mm, list.start_feed_mm_s.0, list.end_feed_mm_s.0, mode)
-        .map_err(|(block, problem)| match key(&problem) {
-            Some(key) => fail(line_of(text, key), problem),
-            None => fail(line_of_block(text, block), problem),
+    let (start, end) = (list.start_feed_mm_s.0, list.end_feed_mm_s.0);
+    let planned =
+        lookahead(&blocks, &ends_mm, start, end, mode, TICK_S).map_err(|(block, problem)| {
+            match key(&problem) {
+                Some(key) => fail(line_of(text, key), problem),
+                None => fail(line_of_block(text, block), problem),
+            }
         })?;
-    let profile = FeedProfile::new(&planned, TICK_S)
-        .map_err(|(block, problem)| fail(line_of_block(text, block), problem))?;
+    let profile = FeedProfile::new(&planned);
     let mut start_mm = 0.0;
     let mut records = Vec::with_capacity(blocks.len());
     for (block, &end_mm) in blocks.iter().zip(&ends_mm) {

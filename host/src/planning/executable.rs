@@ -12,6 +12,7 @@ use motion_kernel::units::Position;
 
 use super::density::{PiecePace, SegmentPace};
 use super::error::{PlanningError, Problem};
+use super::lookahead::PlannedSegment;
 use super::stretch::Stretch;
 use super::{Item as PlanItem, Plan};
 use crate::machine::Machine;
@@ -91,16 +92,13 @@ fn stretch_items<R: Real>(
     }
     piece_pace.stretch(stretch, &pieces, &piece_blocks, tick_s)?;
     let mut feed = Vec::new();
-    for planned in &stretch.planned {
-        let at_line = |(block, problem): (usize, Problem)| (stretch.blocks[block].line, problem);
-        for segment in planned.segments::<f64>(tick_s).map_err(at_line)? {
-            let (ramp, length) = (*segment.as_ramp(), segment.length());
-            // What the number type cannot hold is refused here.
-            let segment = FeedSegment::<R>::ramp(&ramp, length, tick_s)
-                .map_err(|error| at_line((planned.first, Problem::Segment { error, tick_s })))?;
-            segment_pace.next(segment.duration()).map_err(|problem| at_line((planned.first, problem)))?;
-            feed.push(Placed { length, item: Item::Feed { ramp, length } });
-        }
+    for &PlannedSegment { ramp, length, block } in &stretch.planned {
+        let at_line = |problem: Problem| (stretch.blocks[block].line, problem);
+        // What the number type cannot hold is refused here.
+        let segment = FeedSegment::<R>::ramp(&ramp, length, tick_s)
+            .map_err(|error| at_line(Problem::Segment { error, tick_s }))?;
+        segment_pace.next(segment.duration()).map_err(at_line)?;
+        feed.push(Placed { length, item: Item::Feed { ramp, length } });
     }
     in_order_of_start(&pieces, &feed, items);
     let last_line = stretch.blocks.last().map_or(0, |block| block.line);

@@ -12,7 +12,7 @@
 //! - `ceilings`: ceilings of moves and blends, what each joint allows;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
-//! - `lookahead`: the kernel's look-ahead, merged or per block;
+//! - `lookahead`: the kernel's look-ahead, with ramps that span blocks or per block;
 //! - [`profile`]: feed and time at any path position of a planned stretch;
 //! - [`blocks`]: bare block lists, BLOCKS.json;
 //! - [`executable`]: a plan in the kernel's terms;
@@ -39,12 +39,12 @@ pub use stretch::Stretch;
 
 use crate::record::BlockRecord;
 
-/// Whether neighbours with equal ceilings are planned as one block.
+/// How ramps and blocks go together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// Equal neighbours are merged: a ramp may span them.
+    /// A ramp may span blocks.
     #[default]
-    Merged,
+    Spanning,
     /// One pair of ramps per block, as S3 plans.
     PerBlock,
 }

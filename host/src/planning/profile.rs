@@ -1,11 +1,10 @@
 //! Feed and time at any path position of a planned stretch.
 
-use motion_kernel::law::{FeedSegment, Ramp};
+use motion_kernel::law::Ramp;
 use motion_kernel::plan::BlockPlan;
 
 use super::FeedRecord;
-use super::error::Problem;
-use super::lookahead::Planned;
+use super::lookahead::PlannedSegment;
 
 /// Positions closer than this are the same: segments start and end on position steps, blocks do not.
 const ROUNDING_MM: f64 = 1.0e-9;
@@ -28,19 +27,17 @@ struct Span {
 }
 
 impl FeedProfile {
-    /// An error comes with the index of the original block.
-    pub(super) fn new(planned: &[Planned], tick_s: f64) -> Result<Self, (usize, Problem)> {
-        let (mut spans, mut time_s) = (Vec::with_capacity(planned.len() * 3), 0.0);
-        for block in planned {
-            let mut start_mm = block.start.to_mm();
-            for segment in block.segments::<f64>(tick_s)? {
-                let span = Span::new(&segment, start_mm, time_s);
-                start_mm += span.length_mm;
-                time_s += span.time_s;
-                spans.push(span);
-            }
+    pub(super) fn new(planned: &[PlannedSegment]) -> Self {
+        let (mut start_mm, mut time_s) = (0.0, 0.0);
+        let mut spans = Vec::with_capacity(planned.len());
+        // Added up in f64: a stretch's positions are not exact, but what is compared with them is as long.
+        for segment in planned {
+            let (length_mm, ramp) = (segment.length.to_mm(), segment.ramp);
+            spans.push(Span { start_mm, length_mm, start_s: time_s, time_s: ramp.duration_s(), ramp });
+            start_mm += length_mm;
+            time_s += ramp.duration_s();
         }
-        Ok(Self { spans, time_s })
+        Self { spans, time_s }
     }
 
     /// Duration \[s\].
@@ -96,11 +93,6 @@ impl FeedProfile {
 }
 
 impl Span {
-    fn new(segment: &FeedSegment<f64>, start_mm: f64, start_s: f64) -> Self {
-        let ramp = *segment.as_ramp();
-        Self { start_mm, length_mm: segment.length().to_mm(), start_s, time_s: ramp.duration_s(), ramp }
-    }
-
     fn at(&self, s_mm: f64) -> (f64, f64) {
         let local_mm = s_mm - self.start_mm;
         if local_mm <= ROUNDING_MM {

@@ -3,7 +3,7 @@
 use motion_kernel::plan::{Block, Ceiling};
 
 use super::error::Problem;
-use super::lookahead::{Planned, lookahead};
+use super::lookahead::{PlannedSegment, lookahead};
 use super::profile::FeedProfile;
 use super::{FeedRecord, Mode};
 use crate::record::BlockRecord;
@@ -31,8 +31,8 @@ pub struct Stretch {
     pub blocks: Vec<StretchBlock>,
     /// Path position of every block's end, from the stretch's start \[mm\].
     ends_mm: Vec<f64>,
-    /// As planned; fewer than `blocks` where neighbours were merged.
-    pub(super) planned: Vec<Planned>,
+    /// As planned, in path order.
+    pub(super) planned: Vec<PlannedSegment>,
     /// Feed and time over the stretch.
     pub profile: FeedProfile,
 }
@@ -60,8 +60,8 @@ impl Stretch {
             });
         }
         let at_line = |(block, problem): (usize, Problem)| (blocks[block].line, problem);
-        let planned = lookahead(plan_blocks, &ends_mm, 0.0, 0.0, mode).map_err(at_line)?;
-        let profile = FeedProfile::new(&planned, tick_s).map_err(at_line)?;
+        let planned = lookahead(&plan_blocks, &ends_mm, 0.0, 0.0, mode, tick_s).map_err(at_line)?;
+        let profile = FeedProfile::new(&planned);
         Ok(Self { start_mm, blocks, ends_mm, planned, profile })
     }
 

@@ -45,6 +45,16 @@ impl core::fmt::Display for LimitError {
 impl core::error::Error for LimitError {}
 
 impl<R: Root> Limits<R> {
+    /// The smaller of each.
+    #[must_use]
+    pub fn least(&self, other: &Self) -> Self {
+        Self {
+            accel_mm_s2: self.accel_mm_s2.min(other.accel_mm_s2),
+            jerk_mm_s3: self.jerk_mm_s3.min(other.jerk_mm_s3),
+            snap_mm_s4: self.snap_mm_s4.min(other.snap_mm_s4),
+        }
+    }
+
     /// Whether plans can be made with them.
     ///
     /// # Errors

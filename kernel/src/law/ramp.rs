@@ -81,6 +81,25 @@ impl<R: Root> Ramp<R> {
         Self { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by }
     }
 
+    /// No change of feed for `time_s`.
+    #[must_use]
+    pub fn cruise(feed_mm_s: R, time_s: R) -> Self {
+        Self {
+            from_mm_s: feed_mm_s,
+            to_mm_s: feed_mm_s,
+            peak_jerk_mm_s3: R::ZERO,
+            t1_s: R::ZERO,
+            t2_s: time_s,
+            limited_by: LimitedBy::Snap,
+        }
+    }
+
+    /// The same change of feed the other way.
+    #[must_use]
+    pub fn reversed(self) -> Self {
+        Self { from_mm_s: self.to_mm_s, to_mm_s: self.from_mm_s, ..self }
+    }
+
     /// t_p \[s\]: (14).
     pub fn duration_s(&self) -> R {
         self.t1_s + self.t2_s
@@ -91,9 +110,44 @@ impl<R: Root> Ramp<R> {
         (self.from_mm_s + self.to_mm_s).times_per(self.duration_s(), R::from_f64(2.0))
     }
 
+    /// The greatest acceleration \[mm/s²\], without its sign: J_p·t₁/2.
+    pub fn peak_accel_mm_s2(&self) -> R {
+        self.peak_jerk_mm_s3.times_per(self.t1_s, R::from_f64(2.0))
+    }
+
     /// J_p with the sign of the change of feed.
     pub(super) fn signed_jerk_mm_s3(&self) -> R {
         if self.to_mm_s < self.from_mm_s { -self.peak_jerk_mm_s3 } else { self.peak_jerk_mm_s3 }
+    }
+
+    /// How far into an accelerating ramp its feed passes `feed_mm_s` \[mm\]: 0 at its start and below, its
+    /// length at its end and above. Never too short but by rounding.
+    #[must_use]
+    pub fn length_to_feed_mm(&self, feed_mm_s: R) -> R {
+        if feed_mm_s <= self.from_mm_s {
+            return R::ZERO;
+        }
+        if feed_mm_s >= self.to_mm_s {
+            return self.length_mm();
+        }
+        let (rise_s, jerk) = (self.t1_s, self.peak_jerk_mm_s3);
+        let speed_scale = jerk * rise_s * rise_s;
+        let length_scale = speed_scale * rise_s;
+        let (gained, left) = (feed_mm_s - self.from_mm_s, self.to_mm_s - feed_mm_s);
+        let curved = speed_scale * R::from_f64(Shape::END.speed);
+        if gained <= curved {
+            let (x, shape) = Shape::where_speed_is(gained / speed_scale);
+            self.from_mm_s * (rise_s * x) + length_scale.scaled(shape.length)
+        } else if left < curved {
+            let (x, shape) = Shape::where_speed_is(left / speed_scale);
+            self.length_mm() - (self.to_mm_s * (rise_s * x) - length_scale.scaled(shape.length))
+        } else {
+            let held_s = (gained - curved) / (jerk * rise_s * R::from_f64(Shape::END.accel));
+            let half = R::from_f64(0.5);
+            self.from_mm_s * rise_s
+                + length_scale * R::from_f64(Shape::END.length)
+                + held_s * (self.from_mm_s + curved + half * (gained - curved))
+        }
     }
 
     /// The motion at `t_s` after the ramp's start: (1)–(6). Before the start it is the start's,

@@ -33,7 +33,10 @@
 use fixed::types::I3F29;
 
 use crate::num::sine::SineCosine;
-use crate::num::{Unit, table};
+use crate::num::{Root, Unit, table};
+
+/// Newton steps after which [`Shape::where_speed_is`] has its last digit in f64.
+const SPEED_STEPS_MAX: usize = 8;
 
 /// The law's shapes at one normalised time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,6 +120,27 @@ impl Shape<f64> {
 }
 
 impl<U: Unit> Shape<U> {
+    /// Where in the phase the feed gained is `speed` of its scale, 0 … 1/4, and the shapes there. Background.
+    ///
+    /// Newton's method on a convex function from above: the result is never below the root but by rounding.
+    pub(super) fn where_speed_is<R: Root<Unit = U>>(speed: R) -> (R, Self) {
+        // Above the root: x⁴/4 is below the shape everywhere, and equal at the end.
+        let four = R::from_f64(4.0);
+        let mut x = (speed * four).sqrt().sqrt().min(R::ONE);
+        let mut shape = Self::at(x.to_unit());
+        for _ in 0..SPEED_STEPS_MAX {
+            let accel = R::ONE.scaled(shape.accel);
+            let next = x - (R::ONE.scaled(shape.speed) - speed) / accel;
+            // `<` also ends on what is not a number.
+            if !(next < x && next > R::ZERO) {
+                break;
+            }
+            x = next;
+            shape = Self::at(x.to_unit());
+        }
+        (x, shape)
+    }
+
     /// The shapes at `x` in \[0, 1\].
     #[inline]
     #[must_use]

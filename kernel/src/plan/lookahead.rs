@@ -160,7 +160,7 @@ pub fn plan<R: Root>(
     Ok(())
 }
 
-fn check<R: Root>(blocks: &[Block<R>], start: R, end: R) -> Result<(), PlanError> {
+pub(super) fn check<R: Root>(blocks: &[Block<R>], start: R, end: R) -> Result<(), PlanError> {
     let (slowest, fastest) = R::FEEDS_MM_S;
     for (index, block) in blocks.iter().enumerate() {
         let (length, cap, joint) = (block.length_mm, block.cap_mm_s, block.joint_mm_s);

@@ -8,12 +8,14 @@
 //!   and how much acceleration, jerk and snap are left for changing the feed on a curve;
 //! - [`mod@joint`]: what a joint between two blocks allows;
 //! - [`lookahead`]: stages 1 and 2 over the stretch: what can be reached, and from what one can brake;
+//! - [`spanning`]: ramps that begin and end between joints and may span many blocks;
 //! - [`feed`]: the planned blocks as feed segments over exact path positions.
 
 pub mod ceiling;
 pub mod feed;
 pub mod joint;
 pub mod lookahead;
+pub mod spanning;
 
 pub use ceiling::{
     AxisLimits, BLEND_FEED_SHARE, Bend, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX, Ceiling, MachineLimits,
@@ -22,3 +24,4 @@ pub use ceiling::{
 pub use feed::segments;
 pub use joint::{Joint, joint};
 pub use lookahead::{Block, BlockPlan, PlanError, merge_equal, plan};
+pub use spanning::{FeedSpan, Node, nodes_for, plan_spanning};

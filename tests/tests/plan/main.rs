@@ -9,6 +9,7 @@ mod fixed;
 mod maximal;
 mod refusals;
 mod segments;
+mod spanning;
 #[path = "../support/mod.rs"]
 mod support;
 

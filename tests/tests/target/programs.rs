@@ -37,7 +37,7 @@ fn bytes(text: &str, machine: &Machine, mode: Mode) -> Vec<u8> {
 
 /// The stringer on the reference machine.
 pub(crate) fn stringer() -> Vec<u8> {
-    bytes(STRINGER, &Machine::reference(), Mode::Merged)
+    bytes(STRINGER, &Machine::reference(), Mode::Spanning)
 }
 
 /// The reference machine with all that feedforward can have on every axis: lead, the drive's inverse with friction and
@@ -67,7 +67,7 @@ fn inverting() -> Machine {
 /// The stringer and facets under feedforward that inverts the drive.
 pub(crate) fn inverted() -> Vec<Vec<u8>> {
     let machine = inverting();
-    vec![bytes(STRINGER, &machine, Mode::Merged), bytes(&facets_text(), &machine, Mode::PerBlock)]
+    vec![bytes(STRINGER, &machine, Mode::Spanning), bytes(&facets_text(), &machine, Mode::PerBlock)]
 }
 
 /// The stringer, with tables of feedforward too.
@@ -77,13 +77,13 @@ pub(crate) fn with_tables() -> Vec<u8> {
     for axis in &mut machine.axes {
         axis.feedforward.tables = Tables { velocity: table(60.0), accel: table(400.0), jerk: table(4e3) };
     }
-    bytes(STRINGER, &machine, Mode::Merged)
+    bytes(STRINGER, &machine, Mode::Spanning)
 }
 
 /// The stringer with one coefficient of its first arc one last place of an f32 off.
 pub(crate) fn stringer_off_by_a_last_place() -> Vec<u8> {
     let machine = Machine::reference();
-    let mut executable = executable(&plan(STRINGER, &machine, Mode::Merged)).expect("within fixed point");
+    let mut executable = executable(&plan(STRINGER, &machine, Mode::Spanning)).expect("within fixed point");
     let arc = executable.items.iter_mut().find_map(|item| match item {
         Item::Septic { coefficients, .. } => Some(coefficients),
         _ => None,
@@ -102,7 +102,7 @@ pub(crate) fn generated(count: usize) -> Vec<(u64, Vec<u8>)> {
         let fragments = 1 + random.below(3);
         let generated = program::generate(&mut random, fragments, 30.0);
         let read = gcode::read("random.ngc", generated.text.as_bytes()).expect("generated");
-        let Ok(plan) = plan_program("random.ngc", &read, &machine, Mode::Merged) else { continue };
+        let Ok(plan) = plan_program("random.ngc", &read, &machine, Mode::Spanning) else { continue };
         if plan.time_s > TIME_MAX_S {
             continue;
         }
@@ -148,7 +148,7 @@ pub(crate) fn worst_ticks() -> Vec<Vec<u8>> {
         axis.output_limit_v = 1.45;
         axis.following_error_limit_mm = 100.0;
     }
-    vec![stringer(), facets(), bytes(STRINGER, &weak, Mode::Merged)]
+    vec![stringer(), facets(), bytes(STRINGER, &weak, Mode::Spanning)]
 }
 
 /// As many pieces a tick as the kernel accepts: lines that the path passes within little more than a sixteenth of a
@@ -158,7 +158,7 @@ pub(crate) fn densest() -> Vec<u8> {
     let feed_mm_s = 50.0;
     let length_mm = feed_mm_s * machine.tick_s / 15.5;
     let text = format!("G91 G1 F{}\n", feed_mm_s * 60.0) + &format!("X{length_mm:.7}\n").repeat(6000);
-    bytes(&text, &machine, Mode::Merged)
+    bytes(&text, &machine, Mode::Spanning)
 }
 
 /// What the feeder accepts at most: little less than 8 segments of three phases and 16 curved pieces end in every tick,

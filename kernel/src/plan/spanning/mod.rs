@@ -1,0 +1,222 @@
+//! Ramps that span blocks.
+//!
+//! Consumes the same blocks as [`plan`](super::plan()); produces ramps and cruises over path length that begin and end
+//! wherever it is best, not at joints. Every ceiling is kept at every point, and a ramp uses no more than the least
+//! limits of all the blocks it crosses.
+//!
+//! - [`valleys`]: which ceilings are rested in, and what lies between them: humps;
+//! - [`climb`]: up one side of a hump, below its stairs.
+//!
+//! Works in f64 on slices of the caller, allocates nothing, and takes time in proportion to the number of blocks.
+
+pub mod climb;
+pub mod valleys;
+
+pub use valleys::Node;
+
+use self::climb::Climb;
+use self::valleys::{Hump, Valleys};
+use super::lookahead::{Block, PlanError, check};
+use crate::law::{Law, Limits, Ramp, peak};
+
+/// A ramp or a cruise, with its place on the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeedSpan {
+    /// Where it starts \[mm\].
+    pub start_mm: f64,
+    /// Its length \[mm\].
+    pub length_mm: f64,
+    /// The ramp; a cruise has equal feeds and t₂ = its duration.
+    pub ramp: Ramp<f64>,
+}
+
+/// Places for nodes that are enough for any list of so many blocks.
+#[must_use]
+pub const fn nodes_for(blocks: usize) -> usize {
+    2 * blocks + 2
+}
+
+/// Solver steps for the feed at the top of a hump.
+const TOP_STEPS: usize = 24;
+/// No more steps once so small a part of the hump is left to cruise at its top.
+const TOP_GAP: f64 = 1.0e-3;
+
+/// Plans a stretch with ramps that may span blocks, and hands every ramp and cruise to `put`, in path order. Returns
+/// the time it takes \[s\], or `None` where no such plan was found (one pair of ramps a block may still be possible).
+///
+/// # Errors
+/// A figure is out of range, or `places` is shorter than [`nodes_for`] says.
+pub fn plan_spanning(
+    blocks: &[Block<f64>],
+    start_mm_s: f64,
+    end_mm_s: f64,
+    places: &mut [Node],
+    put: &mut impl FnMut(FeedSpan),
+) -> Result<Option<f64>, PlanError> {
+    check(blocks, start_mm_s, end_mm_s)?;
+    let room = places.len();
+    let Some(mut valleys) = Valleys::new(blocks, start_mm_s, end_mm_s, places) else {
+        return Err(PlanError::Output { blocks: nodes_for(blocks.len()), plans: room });
+    };
+    let fits = |valleys: &Valleys<'_>, hump: &Hump| match Sides::new(hump, valleys) {
+        Some(sides) => {
+            let (mut up, mut down) = (Climb::NONE, Climb::NONE);
+            sides.fit(sides.lowest(), &mut up, &mut down).is_some_and(|left| left >= 0.0)
+        }
+        None => hump.enter_mm_s == hump.exit_mm_s,
+    };
+    if !valleys.settle(fits) {
+        return Ok(None);
+    }
+    let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
+    for hump in valleys.humps() {
+        out.cruise(hump.start_mm, hump.enter_mm_s);
+        if drive(&hump, &valleys, &mut out).is_none() {
+            return Ok(None);
+        }
+    }
+    Ok(Some(out.time_s))
+}
+
+/// Where spans go.
+struct Out<'a, F> {
+    at_mm: f64,
+    time_s: f64,
+    put: &'a mut F,
+}
+
+impl<F: FnMut(FeedSpan)> Out<'_, F> {
+    fn cruise(&mut self, to_mm: f64, feed_mm_s: f64) {
+        let length_mm = to_mm - self.at_mm;
+        if length_mm > 0.0 && feed_mm_s > 0.0 {
+            let ramp = Ramp::cruise(feed_mm_s, length_mm / feed_mm_s);
+            (self.put)(FeedSpan { start_mm: self.at_mm, length_mm, ramp });
+            self.time_s += ramp.duration_s();
+        }
+        self.at_mm = self.at_mm.max(to_mm);
+    }
+
+    fn ramp(&mut self, ramp: &Ramp<f64>) {
+        let length_mm = ramp.length_mm();
+        (self.put)(FeedSpan { start_mm: self.at_mm, length_mm, ramp: *ramp });
+        self.time_s += ramp.duration_s();
+        self.at_mm += length_mm;
+    }
+}
+
+/// The two sides of a hump, for any top.
+struct Sides<'a> {
+    hump: &'a Hump,
+    valleys: &'a Valleys<'a>,
+    /// The law of all its blocks, if it is one.
+    uniform: Option<Law<f64>>,
+}
+
+impl<'a> Sides<'a> {
+    /// `None` if the hump has no blocks.
+    fn new(hump: &'a Hump, valleys: &'a Valleys<'a>) -> Option<Self> {
+        let mut laws = valleys.blocks_of(hump).map(|(_, _, law)| law);
+        let first = laws.next()?;
+        let uniform = laws.all(|law| law == first).then_some(first);
+        Some(Self { hump, valleys, uniform })
+    }
+
+    /// The lowest top there is.
+    fn lowest(&self) -> f64 {
+        self.hump.enter_mm_s.max(self.hump.exit_mm_s)
+    }
+
+    /// The highest top that is worth trying: the ceiling, or what acceleration alone would reach.
+    fn highest(&self) -> f64 {
+        let Hump { enter_mm_s, exit_mm_s, start_mm, end_mm, top_mm_s, .. } = *self.hump;
+        let accel = self.valleys.blocks_of(self.hump).map(|(_, _, law)| law.limits().accel_mm_s2);
+        let squares = 0.5 * (enter_mm_s * enter_mm_s + exit_mm_s * exit_mm_s);
+        let reached = libm::sqrt(squares + accel.fold(0.0, f64::max) * (end_mm - start_mm));
+        top_mm_s.min(reached).max(self.lowest())
+    }
+
+    /// The least limits between two positions.
+    fn limits(&self, from_mm: f64, to_mm: f64) -> Limits<f64> {
+        if let Some(law) = self.uniform {
+            return law.limits();
+        }
+        let blocks = self.valleys.blocks_of(self.hump);
+        let touched = blocks.filter(|&(start, end, _)| end > from_mm && start <= to_mm);
+        let all = touched.map(|(_, _, law)| law.limits());
+        all.reduce(|a, b| a.least(&b)).unwrap_or_else(|| self.limits(self.hump.start_mm, self.hump.end_mm))
+    }
+
+    /// Both sides up to `top`; returns what is left between them \[mm\], less than 0 if there is no room. `None` if there
+    /// is none for one side by itself.
+    fn fit(&self, top: f64, up: &mut Climb, down: &mut Climb) -> Option<f64> {
+        let Hump { start_mm, end_mm, enter_mm_s, exit_mm_s, rising, falling, .. } = self.hump;
+        let room_mm = end_mm - start_mm;
+        let up_mm =
+            up.find(rising, *enter_mm_s, top, room_mm, |a, b| self.limits(start_mm + a, start_mm + b))?;
+        let down_mm =
+            down.find(falling, *exit_mm_s, top, room_mm, |a, b| self.limits(end_mm - b, end_mm - a))?;
+        Some(room_mm - up_mm - down_mm)
+    }
+
+    /// Up to the highest top there is room for, which is returned.
+    fn best(&self, up: &mut Climb, down: &mut Climb) -> Option<f64> {
+        let (mut low, mut high) = (self.lowest(), self.highest());
+        let room_mm = self.hump.end_mm - self.hump.start_mm;
+        if let Some(law) =
+            self.uniform.filter(|_| self.hump.rising.is_empty() && self.hump.falling.is_empty())
+        {
+            high = high.min(peak(&law, self.hump.enter_mm_s, self.hump.exit_mm_s, room_mm)).max(low);
+        }
+        let mut left_high = match self.fit(high, up, down) {
+            Some(left) if left >= 0.0 => return Some(high),
+            Some(left) => left,
+            None => f64::NEG_INFINITY,
+        };
+        let mut left_low = self.fit(low, up, down).filter(|&left| left >= 0.0)?;
+        let mut gap_mm = left_low;
+        // False position, with halving where that stands still; aimed a little short, so that there is room.
+        let aim_mm = 0.5 * TOP_GAP * room_mm;
+        for _ in 0..TOP_STEPS {
+            if gap_mm < TOP_GAP * room_mm {
+                break;
+            }
+            let part = (left_low - aim_mm) / (left_low - left_high);
+            let part = if part > 0.02 && part < 0.98 { part } else { 0.5 };
+            let middle = low + part * (high - low);
+            match self.fit(middle, up, down) {
+                Some(left) if left >= 0.0 => {
+                    (low, left_low, gap_mm) = (middle, left, left);
+                    left_high *= 0.5;
+                }
+                tried => {
+                    (high, left_high) = (middle, tried.unwrap_or(f64::NEG_INFINITY));
+                    left_low *= 0.5;
+                }
+            }
+        }
+        // The last one tried may not be the best.
+        self.fit(low, up, down).map(|_| low)
+    }
+}
+
+/// Up, along and down.
+fn drive<F: FnMut(FeedSpan)>(hump: &Hump, valleys: &Valleys<'_>, out: &mut Out<'_, F>) -> Option<()> {
+    let Some(sides) = Sides::new(hump, valleys) else { return Some(()) };
+    let (mut up, mut down) = (Climb::NONE, Climb::NONE);
+    let top = sides.best(&mut up, &mut down)?;
+    let mut feed = hump.enter_mm_s;
+    for leg in up.legs() {
+        out.cruise(hump.start_mm + leg.start_mm, feed);
+        out.ramp(&leg.ramp);
+        feed = leg.ramp.to_mm_s;
+    }
+    feed = top;
+    for leg in down.legs().rev() {
+        let ramp = leg.ramp.reversed();
+        out.cruise(hump.end_mm - leg.start_mm - ramp.length_mm(), feed);
+        out.ramp(&ramp);
+        feed = ramp.to_mm_s;
+    }
+    out.cruise(hump.end_mm, feed);
+    Some(())
+}

@@ -1,0 +1,537 @@
+//! Which ceilings of a stretch are rested in.
+//!
+//! Consumes the ceilings of a stretch; divides it into **humps**: from one valley to the next the feed rises, holds
+//! and falls again, once. A valley is a ceiling that is worth coming down to from both sides; all others are stairs
+//! on the way up or down, the top of their hump, or too high to matter.
+//!
+//! The ceilings are looked at from the lowest up, in the tree of their minima: what lies beside a stair and is higher
+//! need not be looked at any more, so that the work is proportional to the number of ceilings.
+
+use super::climb::{Stair, Stairs};
+use crate::law::{Law, Ramp, peak};
+use crate::plan::Block;
+
+/// Joining stairs may lose so much of the time of a ramp over all of them; otherwise the staircase is divided.
+const DIVIDE_SHARE: f64 = 0.05;
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// What a ceiling is in the plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Role {
+    /// It limits nothing.
+    #[default]
+    Free,
+    /// Held up to its end, on the way up.
+    Rising,
+    /// Held from its start, on the way down.
+    Falling,
+    /// Rested in: the feed comes down to it, or starts or ends there.
+    Valley,
+}
+
+/// A ceiling: a block's, that of several equal ones, or that of a joint. Working memory of the planner.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    start_mm: f64,
+    end_mm: f64,
+    feed_mm_s: f64,
+    /// The time from the stretch's start to its end, everything driven at its ceiling \[s\].
+    ideal_s: f64,
+    /// The block whose law it has.
+    block: u32,
+    /// The lowest of the ceilings to its left, and to its right, that are not below it.
+    left: u32,
+    right: u32,
+    /// The next lower one to the left; the valley that waits behind it; the valley before it.
+    link: u32,
+    /// For a valley that waits: what its right side reaches to.
+    bounds: (u32, u32),
+    /// For a valley: the ceiling of the hump after it \[mm/s\].
+    top_mm_s: f64,
+    role: Role,
+    /// The role it had before it became a valley to divide a long staircase.
+    divides: Option<Role>,
+}
+
+impl Node {
+    /// Memory not used yet.
+    pub const EMPTY: Self = Self {
+        start_mm: 0.0,
+        end_mm: 0.0,
+        feed_mm_s: 0.0,
+        ideal_s: 0.0,
+        block: 0,
+        left: NONE,
+        right: NONE,
+        link: NONE,
+        bounds: (NONE, NONE),
+        top_mm_s: f64::INFINITY,
+        role: Role::Free,
+        divides: None,
+    };
+}
+
+/// The part of a stretch between two valleys.
+#[derive(Clone, Copy, Debug)]
+pub struct Hump {
+    /// Where it starts and ends \[mm\].
+    pub start_mm: f64,
+    #[allow(missing_docs)]
+    pub end_mm: f64,
+    /// The feeds there \[mm/s\].
+    pub enter_mm_s: f64,
+    #[allow(missing_docs)]
+    pub exit_mm_s: f64,
+    /// Its ceiling \[mm/s\], as far as known.
+    pub top_mm_s: f64,
+    /// Stairs, from the start, and from the end.
+    pub rising: Stairs,
+    #[allow(missing_docs)]
+    pub falling: Stairs,
+    /// Nodes inside, from and up to.
+    nodes: (usize, usize),
+}
+
+/// The ceilings of a stretch and what has been found out about them.
+pub struct Valleys<'a> {
+    blocks: &'a [Block<f64>],
+    nodes: &'a mut [Node],
+    /// Greatest acceleration of any block.
+    accel_mm_s2: f64,
+}
+
+/// A part of the stretch that is looked at: the valleys it lies between, and the nodes next to what is left of it.
+#[derive(Clone, Copy)]
+struct Open {
+    left_valley: u32,
+    left_bound: u32,
+    right_valley: u32,
+    right_bound: u32,
+    /// The lowest ceiling that is left.
+    root: u32,
+}
+
+/// What a ceiling means for the hump it lies in.
+enum Seen {
+    /// It is not reached from the left.
+    BelowLeft,
+    /// It is not reached from the right.
+    BelowRight,
+    /// The feed holds there.
+    Top,
+    /// It is passed, or rested in.
+    Limits(Role),
+}
+
+/// What lies between two ceilings.
+struct Gap {
+    length_mm: f64,
+    /// The time with everything driven at its ceiling \[s\].
+    ideal_s: f64,
+}
+
+impl<'a> Valleys<'a> {
+    /// Makes the nodes. `None` if there are too few places for them.
+    pub fn new(
+        blocks: &'a [Block<f64>],
+        start_mm_s: f64,
+        end_mm_s: f64,
+        places: &'a mut [Node],
+    ) -> Option<Self> {
+        let mut count = 0;
+        let mut put = |node: Node| -> Option<()> {
+            *places.get_mut(count)? = node;
+            count += 1;
+            Some(())
+        };
+        put(Node { feed_mm_s: start_mm_s, ..Node::EMPTY })?;
+        let (mut at_mm, mut accel_mm_s2) = (0.0, 0.0_f64);
+        let mut open: Option<Node> = None;
+        for (index, block) in blocks.iter().enumerate() {
+            accel_mm_s2 = accel_mm_s2.max(block.law.limits().accel_mm_s2);
+            let end_mm = at_mm + block.length_mm;
+            let next_mm_s = blocks.get(index + 1).map_or(f64::INFINITY, |next| next.cap_mm_s);
+            let is_joint = index + 1 < blocks.len() && block.joint_mm_s < block.cap_mm_s.min(next_mm_s);
+            match &mut open {
+                Some(last)
+                    if last.feed_mm_s == block.cap_mm_s
+                        && blocks.get(last.block as usize).is_some_and(|before| before.law == block.law) =>
+                {
+                    last.end_mm = end_mm;
+                }
+                _ => {
+                    if let Some(last) = open.take() {
+                        put(last)?;
+                    }
+                    let (feed_mm_s, block) = (block.cap_mm_s, index as u32);
+                    open = Some(Node { start_mm: at_mm, end_mm, feed_mm_s, block, ..Node::EMPTY });
+                }
+            }
+            if is_joint {
+                if let Some(last) = open.take() {
+                    put(last)?;
+                }
+                put(Node {
+                    start_mm: end_mm,
+                    end_mm,
+                    feed_mm_s: block.joint_mm_s,
+                    block: index as u32,
+                    ..Node::EMPTY
+                })?;
+            }
+            at_mm = end_mm;
+        }
+        if let Some(last) = open {
+            put(last)?;
+        }
+        put(Node { start_mm: at_mm, end_mm: at_mm, feed_mm_s: end_mm_s, ..Node::EMPTY })?;
+        let nodes = places.get_mut(..count)?;
+        let mut ideal_s = 0.0;
+        for node in nodes.iter_mut() {
+            if node.end_mm > node.start_mm {
+                ideal_s += (node.end_mm - node.start_mm) / node.feed_mm_s;
+            }
+            node.ideal_s = ideal_s;
+        }
+        let root = tree(nodes);
+        let last = (count - 1) as u32;
+        let mut valleys = Self { blocks, nodes, accel_mm_s2 };
+        valleys.find(Open { left_valley: 0, left_bound: 0, right_valley: last, right_bound: last, root });
+        Some(valleys)
+    }
+
+    fn node(&self, index: u32) -> Node {
+        self.nodes.get(index as usize).copied().unwrap_or(Node::EMPTY)
+    }
+
+    fn node_mut(&mut self, index: u32) -> Option<&mut Node> {
+        self.nodes.get_mut(index as usize)
+    }
+
+    fn law(&self, index: u32) -> Option<Law<f64>> {
+        self.blocks.get(self.node(index).block as usize).map(|block| block.law)
+    }
+
+    /// Gives every node its role.
+    fn find(&mut self, all: Open) {
+        for sentinel in [all.left_valley, all.right_valley] {
+            if let Some(node) = self.node_mut(sentinel) {
+                node.role = Role::Valley;
+            }
+        }
+        // Valleys whose right side waits, linked, the last one first.
+        let (mut open, mut waiting) = (all, NONE);
+        loop {
+            let mut top_mm_s = f64::INFINITY;
+            while open.root != NONE {
+                let root = self.node(open.root);
+                let role = match self.look(&open, &root) {
+                    Seen::BelowLeft => {
+                        open.root = root.right;
+                        continue;
+                    }
+                    Seen::BelowRight => {
+                        open.root = root.left;
+                        continue;
+                    }
+                    Seen::Top => {
+                        top_mm_s = root.feed_mm_s;
+                        break;
+                    }
+                    Seen::Limits(role) => role,
+                };
+                let here = open.root;
+                if let Some(node) = self.node_mut(here) {
+                    node.role = role;
+                }
+                match role {
+                    Role::Rising => (open.left_bound, open.root) = (here, root.right),
+                    Role::Falling => (open.right_bound, open.root) = (here, root.left),
+                    Role::Valley | Role::Free => {
+                        if let Some(node) = self.node_mut(here) {
+                            node.bounds = (open.right_valley, open.right_bound);
+                            node.link = waiting;
+                        }
+                        waiting = here;
+                        (open.right_valley, open.right_bound, open.root) = (here, here, root.left);
+                    }
+                }
+            }
+            if let Some(node) = self.node_mut(open.left_valley) {
+                node.top_mm_s = top_mm_s;
+            }
+            if open.right_valley != waiting || waiting == NONE {
+                return;
+            }
+            let valley = self.node(waiting);
+            open = Open {
+                left_valley: waiting,
+                left_bound: waiting,
+                right_valley: valley.bounds.0,
+                right_bound: valley.bounds.1,
+                root: valley.right,
+            };
+            waiting = valley.link;
+        }
+    }
+
+    /// What the lowest ceiling that is left means.
+    fn look(&self, open: &Open, root: &Node) -> Seen {
+        let (left, right) = (self.node(open.left_bound), self.node(open.right_bound));
+        let squared = |feed: f64, length_mm: f64| feed * feed + 2.0 * self.accel_mm_s2 * length_mm;
+        let ceiling = root.feed_mm_s * root.feed_mm_s;
+        // Acceleration alone does not reach it, nor anything before it.
+        if squared(left.feed_mm_s, root.end_mm - left.end_mm) <= ceiling {
+            return Seen::BelowLeft;
+        }
+        if squared(right.feed_mm_s, right.start_mm - root.start_mm) <= ceiling {
+            return Seen::BelowRight;
+        }
+        let (before, after) = (self.gap(&left, root), self.gap(root, &right));
+        // From the valley itself too: a stair before this one may not be reached.
+        let (first, last) = (self.node(open.left_valley), self.node(open.right_valley));
+        let all_before = (first.feed_mm_s, root.start_mm - first.end_mm);
+        let all_after = (last.feed_mm_s, last.start_mm - root.end_mm);
+        let can_rise = root.feed_mm_s >= left.feed_mm_s;
+        let can_fall = root.feed_mm_s >= right.feed_mm_s;
+        let lost_left = self.lost(root, &left, &before, all_before, root.left, can_rise);
+        let lost_right = self.lost(root, &right, &after, all_after, root.right, can_fall);
+        let rises = can_rise && lost_left <= self.broken(root, &left, &before, &right, &after, root.right);
+        let falls = can_fall && lost_right <= self.broken(root, &right, &after, &left, &before, root.left);
+        match (rises, falls) {
+            (true, true) if lost_left <= 0.0 && lost_right <= 0.0 => Seen::Top,
+            (true, true) if lost_left <= lost_right => Seen::Limits(Role::Rising),
+            (true, false) => Seen::Limits(Role::Rising),
+            (_, true) => Seen::Limits(Role::Falling),
+            (false, false) => Seen::Limits(Role::Valley),
+        }
+    }
+
+    /// Gives up valleys that cannot be reached below the stairs from the one before, or left for the one after;
+    /// `fits` says whether a hump can be driven. Returns whether all humps that are left can.
+    pub fn settle(&mut self, fits: impl Fn(&Self, &Hump) -> bool) -> bool {
+        let (mut left, mut right) = (0, self.next_valley(0));
+        while right != NONE {
+            let hump = self.hump(left, right);
+            if let Some(divide) = self.divide(&hump, left, right) {
+                right = divide;
+                continue;
+            }
+            if fits(self, &hump) {
+                if let Some(node) = self.node_mut(right) {
+                    node.link = left;
+                }
+                (left, right) = (right, self.next_valley(right));
+                continue;
+            }
+            let last = self.nodes.len() - 1;
+            let top_mm_s = self.node(right).top_mm_s;
+            if hump.enter_mm_s > hump.exit_mm_s && left != 0 {
+                // On the way down to the right one.
+                self.give_up(left, Role::Falling, left as usize + 1..right as usize);
+                left = self.node(left).link;
+            } else if hump.enter_mm_s <= hump.exit_mm_s && right as usize != last {
+                self.give_up(right, Role::Rising, left as usize + 1..right as usize);
+                if let Some(node) = self.node_mut(left) {
+                    node.top_mm_s = top_mm_s;
+                }
+                right = self.next_valley(right);
+            } else {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Rests in the middle of a staircase that is too long to be climbed at once; returns the new valley.
+    fn divide(&mut self, hump: &Hump, left: u32, right: u32) -> Option<u32> {
+        let is_long = |stairs: &Stairs| {
+            let (low, high) = stairs.range_mm_s();
+            let law = self.law(left + 1);
+            stairs.lost_s > law.map_or(f64::INFINITY, |law| DIVIDE_SHARE * law.ramp_time_s(high - low))
+        };
+        let role = match (is_long(&hump.rising), is_long(&hump.falling)) {
+            (true, _) => Role::Rising,
+            (_, true) => Role::Falling,
+            _ => return None,
+        };
+        let inside = left as usize + 1..right as usize;
+        let steps =
+            || inside.clone().filter(|&index| self.nodes.get(index).is_some_and(|node| node.role == role));
+        let middle = steps().nth(steps().count() / 2)? as u32;
+        let (feed_mm_s, top_mm_s) = (self.node(middle).feed_mm_s, self.node(left).top_mm_s);
+        let node = self.node_mut(middle).filter(|node| node.divides.is_none())?;
+        (node.role, node.divides) = (Role::Valley, Some(role));
+        // What lies towards the foot of the staircase stays below its middle.
+        if role == Role::Rising {
+            node.top_mm_s = top_mm_s;
+            self.node_mut(left)?.top_mm_s = feed_mm_s;
+        } else {
+            node.top_mm_s = feed_mm_s;
+        }
+        Some(middle)
+    }
+
+    /// Makes a stair of a valley; what lies on the side where it is passed at its feed or below limits no more.
+    fn give_up(&mut self, valley: u32, role: Role, passed: core::ops::Range<usize>) {
+        let feed_mm_s = self.node(valley).feed_mm_s;
+        if let Some(node) = self.node_mut(valley) {
+            node.role = role;
+        }
+        for node in self.nodes.get_mut(passed).unwrap_or(&mut []) {
+            if node.role != role || node.feed_mm_s >= feed_mm_s {
+                node.role = Role::Free;
+            }
+        }
+    }
+
+    /// The valley after one, [`NONE`] after the last.
+    fn next_valley(&self, valley: u32) -> u32 {
+        let after = valley as usize + 1;
+        let found = self.nodes.iter().skip(after).position(|node| node.role == Role::Valley);
+        found.map_or(NONE, |steps| (after + steps) as u32)
+    }
+
+    /// The humps, in path order.
+    pub fn humps(&self) -> impl Iterator<Item = Hump> + '_ {
+        let mut left = 0;
+        core::iter::from_fn(move || {
+            let right = self.next_valley(left);
+            if right == NONE {
+                return None;
+            }
+            let hump = self.hump(left, right);
+            left = right;
+            Some(hump)
+        })
+    }
+
+    /// The hump between two valleys.
+    fn hump(&self, left: u32, right: u32) -> Hump {
+        let (first, last) = (left as usize, right as usize);
+        let (left, right) = (self.node(left), self.node(right));
+        // A stair that divides a staircase is rested in at its far end only, and belongs to the hump before that.
+        let is_stair = |node: &Node, role: Role| node.divides == Some(role);
+        let inside = first + usize::from(!is_stair(&left, Role::Falling))
+            ..last + usize::from(is_stair(&right, Role::Rising));
+        let start_mm = if is_stair(&left, Role::Falling) { left.start_mm } else { left.end_mm };
+        let end_mm = if is_stair(&right, Role::Rising) { right.end_mm } else { right.start_mm };
+        let nodes = self.nodes.get(inside.clone()).unwrap_or(&[]);
+        let (mut rising, mut falling) = (Stairs::NONE, Stairs::NONE);
+        for node in nodes.iter().filter(|node| node.role == Role::Rising) {
+            rising.push(Stair { end_mm: node.end_mm - start_mm, feed_mm_s: node.feed_mm_s });
+        }
+        for node in nodes.iter().rev().filter(|node| node.role == Role::Falling) {
+            falling.push(Stair { end_mm: end_mm - node.start_mm, feed_mm_s: node.feed_mm_s });
+        }
+        Hump {
+            start_mm,
+            end_mm,
+            enter_mm_s: left.feed_mm_s,
+            exit_mm_s: right.feed_mm_s,
+            top_mm_s: left.top_mm_s,
+            rising,
+            falling,
+            nodes: (inside.start, inside.end),
+        }
+    }
+
+    /// What lies between two nodes.
+    fn gap(&self, left: &Node, right: &Node) -> Gap {
+        let length_mm = right.start_mm - left.end_mm;
+        let own_s = if right.end_mm > right.start_mm {
+            (right.end_mm - right.start_mm) / right.feed_mm_s
+        } else {
+            0.0
+        };
+        Gap { length_mm, ideal_s: right.ideal_s - own_s - left.ideal_s }
+    }
+
+    /// At most so much time is lost by not rising above `root` in the gap between it and `bound` \[s\]. Infinite if
+    /// `bound` is above the root.
+    fn lost(
+        &self,
+        root: &Node,
+        bound: &Node,
+        gap: &Gap,
+        (valley_mm_s, valley_mm): (f64, f64),
+        between: u32,
+        is_below: bool,
+    ) -> f64 {
+        if !is_below {
+            return f64::INFINITY;
+        }
+        let Some(law) = self.law(between).filter(|_| between != NONE) else { return 0.0 };
+        let feed = root.feed_mm_s;
+        let left_mm = (gap.length_mm - law.ramp_length_mm(bound.feed_mm_s, feed))
+            .min(valley_mm - law.ramp_length_mm(valley_mm_s, feed));
+        if left_mm <= 0.0 {
+            return 0.0;
+        }
+        let top = peak(&law, feed, feed, left_mm);
+        let time_s =
+            2.0 * law.ramp_time_s(top - feed) + (left_mm - 2.0 * law.ramp_length_mm(feed, top)) / top;
+        (left_mm / feed - time_s).min(gap.length_mm / feed - gap.ideal_s)
+    }
+
+    /// About the time lost by resting in `root` \[s\] on the way from `bound` over `gap` to what is beyond, towards
+    /// `other`.
+    fn broken(&self, root: &Node, bound: &Node, gap: &Gap, other: &Node, beyond: &Gap, next: u32) -> f64 {
+        let Some(law) = self.law(next).filter(|_| next != NONE) else { return 0.0 };
+        let feed = root.feed_mm_s;
+        let most = peak(&law, feed, other.feed_mm_s, beyond.length_mm);
+        let top = most.min(beyond.length_mm / beyond.ideal_s);
+        if !(top > feed) {
+            return 0.0;
+        }
+        let lag_s = |from: f64, to: f64| law.ramp_time_s(to - from) - law.ramp_length_mm(from, to) / top;
+        let rested = lag_s(bound.feed_mm_s, feed) + lag_s(feed, top);
+        let ramp = Ramp::new(&law, bound.feed_mm_s, top);
+        let waited_mm = (root.end_mm - root.start_mm) + gap.length_mm - ramp.length_to_feed_mm(feed);
+        let waited_s = match (waited_mm > 0.0, bound.feed_mm_s > 0.0) {
+            (false, _) => 0.0,
+            (true, true) => waited_mm * (1.0 / bound.feed_mm_s - 1.0 / top),
+            (true, false) => f64::INFINITY,
+        };
+        (rested - lag_s(bound.feed_mm_s, top) - waited_s).max(0.0)
+    }
+
+    /// The block in which `s_mm` lies, for a hump: its law limits what happens there.
+    pub fn blocks_of(&self, hump: &Hump) -> impl Iterator<Item = (f64, f64, Law<f64>)> + Clone {
+        let nodes = self.nodes.get(hump.nodes.0..hump.nodes.1).unwrap_or(&[]);
+        let blocks = self.blocks;
+        nodes
+            .iter()
+            .filter(|node| node.end_mm > node.start_mm)
+            .filter_map(move |node| Some((node.start_mm, node.end_mm, blocks.get(node.block as usize)?.law)))
+    }
+}
+
+/// Links every node but the first and the last to the lowest ones beside it; returns the lowest of all.
+fn tree(nodes: &mut [Node]) -> u32 {
+    let last = nodes.len().saturating_sub(1);
+    let mut root = NONE;
+    let mut before = NONE;
+    for index in 1..last {
+        let Some(feed) = nodes.get(index).map(|node| node.feed_mm_s) else { break };
+        let (mut at, mut below) = (before, NONE);
+        while let Some(node) = nodes.get(at as usize).filter(|node| node.feed_mm_s > feed) {
+            (below, at) = (at, node.link);
+        }
+        let here = index as u32;
+        if let Some(node) = nodes.get_mut(index) {
+            (node.left, node.link) = (below, at);
+        }
+        if let Some(node) = nodes.get_mut(below as usize) {
+            node.link = here;
+        }
+        match nodes.get_mut(at as usize) {
+            Some(node) => node.right = here,
+            None => root = here,
+        }
+        before = here;
+    }
+    root
+}
