@@ -315,6 +315,8 @@ fn run_of_the_stringer() {
             &["name", "following_error_um_max", "following_error_um_rms", "end_error_counts", "output_v_max"],
         );
     }
+    // The two small arcs and the cruise on the first line, at least; the ramps in between not.
+    assert!((0.2..0.9).contains(&number(&run["limit_active_share"])));
     assert_eq!(run["faults"], Value::Array(Vec::new()));
     assert!((number(&run["time_s"]) - number(&run["planned_time_s"])).abs() < 2.0 * number(&run["tick_s"]));
 

@@ -238,7 +238,7 @@ fn program(asked: &[Asked], tolerance: f64, feed_mm_min: f64) -> String {
 
 fn planned(text: &str, machine: &Machine) -> Result<Plan, String> {
     let program = gcode::read("corners.ngc", text.as_bytes()).map_err(|error| error.to_string())?;
-    plan_program("corners.ngc", &program, machine, Mode::Merged).map_err(|error| error.to_string())
+    plan_program("corners.ngc", &program, machine, Mode::default()).map_err(|error| error.to_string())
 }
 
 /// A piece as the kernel gets it: derivatives by arc length are computed here.
@@ -678,13 +678,13 @@ fn exact_path_stops_at_corners_only() {
     let text = "G61 F6000\nG1 X10\nX20\nY10\nG64 P0.05\nX30\nX30 Y20\nG61\nX40\nY30\nM2\n";
     let plan = planned(text, &machine).expect("a plan");
     let kinds: Vec<_> = plan.blocks.iter().map(|block| (block.line, block.kind)).collect();
-    let blended = [(6, "line"), (6, "blend"), (7, "line"), (7, "blend"), (9, "line")];
+    let blended = [(6, "line"), (6, "blend"), (7, "line"), (9, "line")];
     let mut expected = vec![(2, "line"), (3, "line"), (4, "line")];
     expected.extend(blended);
     expected.push((10, "line"));
     assert_eq!(kinds, expected);
     let stretches = plan.items.iter().filter(|item| matches!(item, PlanItem::Stretch(_))).count();
-    assert_eq!(stretches, 4);
+    assert_eq!(stretches, 5);
 }
 
 /// Without P the machine's tolerance holds; P0 and turns of more than 170° stay exact.

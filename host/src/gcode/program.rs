@@ -48,7 +48,7 @@ pub struct LineMove {
     pub to: [Length; 3],
     /// Feed along the line.
     pub feed: Feed,
-    /// How its end is passed.
+    /// How its ends are passed.
     pub mode: PathMode,
 }
 
@@ -76,7 +76,7 @@ pub struct ArcMove {
     pub sweep_rad: f64,
     /// Feed along the path, the height of a helix included.
     pub feed: Feed,
-    /// How its end is passed.
+    /// How its ends are passed.
     pub mode: PathMode,
 }
 
@@ -95,7 +95,7 @@ pub enum PathMode {
     /// G61, and before either is programmed: the path is kept.
     #[default]
     ExactPath,
-    /// G64: corners may be rounded.
+    /// G64: corners may be rounded; where two moves differ, within the smaller tolerance.
     Blend {
         /// Greatest distance from the programmed path \[mm\], 0 or more; the machine's choice if absent.
         tolerance_mm: Option<f64>,

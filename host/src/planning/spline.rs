@@ -53,7 +53,7 @@ pub fn plan_spline(
         place: line.into(),
         problem,
     })?;
-    Ok((plan_moves(source_name, moves, machine, Mode::Merged)?, pieces))
+    Ok((plan_moves(source_name, moves, machine, Mode::default())?, pieces))
 }
 
 fn pieces(moves: &[Move]) -> Result<Pieces, (u32, Problem)> {

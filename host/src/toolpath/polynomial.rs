@@ -95,7 +95,7 @@ impl Polynomial {
         [c1, scale(c2, 2.0), scale(c3, 6.0), scale(c4, 24.0)]
     }
 
-    /// The greatest derivatives by arc length, from `BEND_PARTS` parts. Between two points of these a smooth
+    /// The greatest derivatives by arc length, from 64 parts. Between two points of these a smooth
     /// function rises above both by an eighth of its second difference; twice that is added.
     #[must_use]
     pub fn greatest(&self) -> Greatest {

@@ -1,6 +1,6 @@
 //! A run of moves with its corners blended.
 //!
-//! Consumes moves that follow each other without a stop, each with the tolerance that its end may be rounded
+//! Consumes moves that follow each other without a stop, each with the tolerance that its ends may be rounded
 //! within; produces moves in the same order with a blend at every joint that would step otherwise, and the
 //! elements on both sides cut short. Background, in time linear in the moves.
 //!
@@ -38,7 +38,8 @@ pub struct Move {
     pub element: Element,
     /// Programmed feed \[mm/s\], infinite for a rapid.
     pub feed_mm_s: f64,
-    /// Greatest distance that the path may be led past the move and its end \[mm\]; 0 for exact path.
+    /// Greatest distance that the path may be led past the move and its ends \[mm\]; 0 for exact path. At a joint the
+    /// smaller one of both moves holds.
     pub tolerance_mm: f64,
 }
 
@@ -50,7 +51,9 @@ pub fn smooth(moves: &[Move], limits: &Limits<f64>) -> Vec<Move> {
     let lengths_mm: Vec<f64> = moves.iter().map(|step| step.element.length_mm()).collect();
     let joint = |index: usize, room_mm: f64| -> Option<Blend> {
         let (before, after) = (&moves[index], &moves[index + 1]);
-        let tolerance_mm = before.tolerance_mm - distances_mm[index].max(distances_mm[index + 1]);
+        // A move of exact path is cut at neither end.
+        let tolerance_mm = before.tolerance_mm.min(after.tolerance_mm);
+        let tolerance_mm = tolerance_mm - distances_mm[index].max(distances_mm[index + 1]);
         Blend::new(&before.element, &after.element, tolerance_mm, room_mm, limits)
     };
     // At the start and the end of the run motion needs room of its own, to set out and to stop.
