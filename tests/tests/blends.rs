@@ -238,7 +238,7 @@ fn program(asked: &[Asked], tolerance: f64, feed_mm_min: f64) -> String {
 
 fn planned(text: &str, machine: &Machine) -> Result<Plan, String> {
     let program = gcode::read("corners.ngc", text.as_bytes()).map_err(|error| error.to_string())?;
-    plan_program("corners.ngc", &program, machine, Mode::default()).map_err(|error| error.to_string())
+    plan_program("corners.ngc", &program, machine, Mode::Spanning).map_err(|error| error.to_string())
 }
 
 /// A piece as the kernel gets it: derivatives by arc length are computed here.
