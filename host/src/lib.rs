@@ -5,7 +5,9 @@
 //! ```text
 //!   machine    TOML ─► Machine                    limits, axes, drives
 //!   gcode      text ─► Program                    exact decimals, modal state
+//!   points     CSV ─► Points                    what a spline goes through
 //!   toolpath   moves ─► Element ─► Piece          arc length, septic polynomials
+//!   smoothness points, arcs ─► axis jerk          what the degree of a path does to the axes
 //!   planning   Program ─► Plan                    ceilings with reasons, feed over path
 //!   simulate   Plan ─► ticks                      the kernel against hal-sim
 //!   record     TickRecord, RunRecord              what a run leaves behind
@@ -19,7 +21,9 @@
 pub mod machine;
 pub mod cli;
 pub mod gcode;
+pub mod points;
 pub mod toolpath;
+pub mod smoothness;
 pub mod planning;
 pub mod simulate;
 pub mod record;

@@ -273,7 +273,7 @@ fn feedforward_in_fixed_point_and_f32_against_f64() {
     let machine = Machine::reference();
     let tick_s = machine.tick_s;
     let program = gcode::read("accuracy.ngc", STRINGER.as_bytes()).expect("G-code");
-    let plan = plan_program("accuracy.ngc", &program, &machine, Mode::Merged).expect("a plan");
+    let plan = plan_program("accuracy.ngc", &program, &machine, Mode::Spanning).expect("a plan");
     let executable = Executable::new::<Fixed>(&plan).expect("within fixed point");
     let stringer = [
         of_x::<f64>(&executable, &machine),

@@ -9,7 +9,9 @@ use crate::drive::DriveError;
 use crate::gcode::GcodeError;
 use crate::machine::{AxisError, MachineError};
 use crate::planning::PlanningError;
+use crate::points::PointsError;
 use crate::simulate::RunError;
+use crate::toolpath::spline::SplineError;
 use crate::tuning::TuningError;
 
 /// How a command that ran to its end ended.
@@ -57,6 +59,17 @@ pub enum CliError {
     /// The program is not G-code.
     #[error(transparent)]
     Gcode(#[from] GcodeError),
+    /// The file is no list of points.
+    #[error(transparent)]
+    Points(#[from] PointsError),
+    /// The points have no spline.
+    #[error("{place}: found {source}")]
+    Spline {
+        /// The file, and the line if it is about one.
+        place: String,
+        /// Why.
+        source: SplineError,
+    },
     /// The machine file is refused.
     #[error(transparent)]
     Machine(#[from] MachineError),

@@ -7,6 +7,7 @@
 //! - [`profile`]: one ramp of the feed law, in figures;
 //! - [`plan`]: the feed plan of a program or a block list;
 //! - [`run`]: a program through plan, kernel and simulated machine;
+//! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
 //! - [`machine`]: the reference machine's file, and what its keys mean;
@@ -22,6 +23,7 @@ pub mod machine;
 pub mod plan;
 pub mod profile;
 pub mod run;
+pub mod spline;
 
 mod input;
 mod progress;
@@ -41,6 +43,7 @@ Examples:
   motion run part.ngc --report part.html         run a program, look at what the axes did
   motion plan part.ngc                           what limits the feed, block by block
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
+  motion spline points.csv --tolerance 0.01      a quintic spline close to points, and its run
   motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
   motion machine > mine.toml                     a machine file to start from
@@ -63,6 +66,7 @@ enum Command {
     Run(run::RunArguments),
     Plan(plan::PlanArguments),
     Profile(profile::ProfileArguments),
+    Spline(spline::SplineArguments),
     Drive(drive::DriveArguments),
     Compile(compile::CompileArguments),
     Machine(machine::MachineArguments),
@@ -93,6 +97,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Run(arguments)) => run::run(arguments, out),
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),
+        Some(Command::Spline(arguments)) => spline::run(arguments, out),
         Some(Command::Drive(arguments)) => drive::drive(arguments, out),
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),
         Some(Command::Machine(arguments)) => machine::print(arguments, out),

@@ -140,7 +140,7 @@ fn record(plan: &Plan, machine: &Machine, summary: &RunSummary, ticks: Vec<TickR
 }
 
 #[derive(Serialize)]
-struct RunJson<'run> {
+pub(super) struct RunJson<'run> {
     ticks: u64,
     tick_s: f64,
     planned_time_s: f64,
@@ -179,7 +179,7 @@ struct FaultJson<'run> {
     detail: &'run str,
 }
 
-fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
+pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
     let axis = |axis: &'run AxisSummary| AxisJson {
         name: &axis.name,
         following_error_um_max: axis.following_error_um_max,

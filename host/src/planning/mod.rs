@@ -10,6 +10,7 @@
 //!
 //! - [`program`]: steps to stretches: where motion must stop;
 //! - `ceilings`: ceilings of moves and blends, what each joint allows;
+//! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
 //! - `lookahead`: the kernel's look-ahead, with ramps that span blocks or per block;
 //! - [`profile`]: feed and time at any path position of a planned stretch;
@@ -26,12 +27,14 @@ pub mod executable;
 mod lookahead;
 pub mod profile;
 pub mod program;
+pub mod spline;
 pub mod stretch;
 
 pub use blocks::plan_blocks;
 pub use error::{Place, PlanningError, Problem};
 pub use executable::Executable;
-pub use program::plan_program;
+pub use program::{plan_moves, plan_program};
+pub use spline::plan_spline;
 pub use stretch::Stretch;
 
 use crate::record::BlockRecord;
@@ -86,6 +89,22 @@ pub struct Plan {
     pub notices: Vec<String>,
     /// The control tick it was planned for \[s\].
     pub tick_s: f64,
+}
+
+impl Plan {
+    /// Without anything to do.
+    fn empty(source: &str, tick_s: f64) -> Self {
+        Self {
+            source: source.to_owned(),
+            blocks: Vec::new(),
+            feed: Vec::new(),
+            time_s: 0.0,
+            length_mm: 0.0,
+            items: Vec::new(),
+            notices: Vec::new(),
+            tick_s,
+        }
+    }
 }
 
 /// One thing to execute.

@@ -28,16 +28,8 @@ pub fn plan_program(
             problem,
         }
     };
-    let mut plan = Plan {
-        source: source_name.to_owned(),
-        blocks: Vec::new(),
-        feed: Vec::new(),
-        time_s: 0.0,
-        length_mm: 0.0,
-        items: Vec::new(),
-        notices: program.notices.iter().map(ToString::to_string).collect(),
-        tick_s: machine.tick_s,
-    };
+    let mut plan = Plan::empty(source_name, machine.tick_s);
+    plan.notices = program.notices.iter().map(ToString::to_string).collect();
     let mut run: Vec<Move> = Vec::new();
     for step in &program.steps {
         match &step.kind {
@@ -63,6 +55,27 @@ pub fn plan_program(
     }
     append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
     // What the tick can't do is to be refused here, not on the machine.
+    Executable::new::<f32>(&plan)?;
+    Ok(plan)
+}
+
+/// Plans moves that follow each other, from rest to rest.
+///
+/// # Errors
+/// As [`plan_program`].
+pub fn plan_moves(
+    source_name: &str,
+    mut moves: Vec<Move>,
+    machine: &Machine,
+    mode: Mode,
+) -> Result<Plan, PlanningError> {
+    let mut plan = Plan::empty(source_name, machine.tick_s);
+    append(&mut moves, &mut plan, machine, mode).map_err(|(line, problem)| PlanningError {
+        source_name: source_name.to_owned(),
+        place: line.into(),
+        problem,
+    })?;
+    // As for a program.
     Executable::new::<f32>(&plan)?;
     Ok(plan)
 }

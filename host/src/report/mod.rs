@@ -10,6 +10,7 @@ pub mod drive;
 mod format;
 mod palette;
 mod plots;
+pub mod smoothness;
 mod summary;
 mod tables;
 

@@ -277,7 +277,7 @@ impl Leg {
                 let rad_per_mm = if is_before { -rad_per_mm } else { rad_per_mm };
                 Some(Self::Arc { shape: *shape, corner_rad, rad_per_mm })
             }
-            Element::Polynomial { .. } => None,
+            Element::Polynomial { .. } | Element::Involute { .. } => None,
         }
     }
 

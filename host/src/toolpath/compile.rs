@@ -9,10 +9,10 @@ use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
 use super::element::Element;
-use super::septic::{FitError, fit};
+use super::septic::{FitError, Septic, fit};
 use super::{Vector, add, scale, subtract};
 
-/// Widest piece of an arc \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off.
+/// Widest piece of an arc or an involute \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off.
 const WIDEST_RAD: f64 = core::f64::consts::FRAC_PI_4;
 
 /// The shortest piece that is sure to advance the path position, which goes in steps of 2⁻³² mm and is
@@ -96,6 +96,26 @@ pub struct Placed {
     pub item: Item<3>,
 }
 
+/// Longest piece that the number type `R` is sure to take \[mm\].
+fn longest_mm<R: Real>() -> f64 {
+    R::PIECE_MM_MAX * (1.0 - 1e-9)
+}
+
+/// The curved pieces of `element` for the number type `R`, with how far each is from the curve; none of a line.
+///
+/// # Errors
+/// The element is not smooth.
+pub fn septics<R: Real>(element: &Element) -> Result<Vec<Septic>, FitError> {
+    let Some((curve, end)) = element.curve() else {
+        return Ok(Vec::new());
+    };
+    let widest = match element {
+        Element::Polynomial { .. } => end,
+        _ => WIDEST_RAD,
+    };
+    fit(curve, 0.0, end, widest, longest_mm::<R>())
+}
+
 /// Appends the pieces of `element`, which starts at `start_mm` of the stretch, to `pieces`, cut for the number
 /// type `R`; returns where it ends on the path. `line` is the program line.
 ///
@@ -111,7 +131,7 @@ pub fn compile<R: Real>(
     let length_mm = element.length_mm();
     let end_mm = start_mm + length_mm;
     let (from, to) = element.ends_mm();
-    let longest_mm = R::PIECE_MM_MAX * (1.0 - 1e-9);
+    let longest_mm = longest_mm::<R>();
     let mut here = on_path(start_mm)?;
     let mut length_to = |mm: f64, length_mm: f64| -> Result<Position, CompileError> {
         let next = on_path(mm)?;
@@ -119,24 +139,21 @@ pub fn compile<R: Real>(
         here = next;
         if length > Position::ZERO { Ok(length) } else { Err(CompileError::TooShort { length_mm }) }
     };
-    let septics = match element {
-        Element::Line { .. } => {
-            let direction = scale(subtract(to, from), 1.0 / length_mm);
-            let parts = (length_mm / longest_mm).ceil().max(1.0) as u64;
-            for part in 0..parts {
-                let (a, b) = (part as f64 / parts as f64, (part + 1) as f64 / parts as f64);
-                let start = exact(add(from, scale(subtract(to, from), a)))?;
-                let part_end_mm = if part + 1 == parts { end_mm } else { start_mm + length_mm * b };
-                let length = length_to(part_end_mm, length_mm / parts as f64)?;
-                // What the number type cannot hold is refused here.
-                Piece::<R, 3>::line(line, start, direction, length)?;
-                pieces.push(Placed { length, item: Item::Line { line, start, direction, length } });
-            }
-            return Ok(end_mm);
+    if matches!(element, Element::Line { .. }) {
+        let direction = scale(subtract(to, from), 1.0 / length_mm);
+        let parts = (length_mm / longest_mm).ceil().max(1.0) as u64;
+        for part in 0..parts {
+            let (a, b) = (part as f64 / parts as f64, (part + 1) as f64 / parts as f64);
+            let start = exact(add(from, scale(subtract(to, from), a)))?;
+            let part_end_mm = if part + 1 == parts { end_mm } else { start_mm + length_mm * b };
+            let length = length_to(part_end_mm, length_mm / parts as f64)?;
+            // What the number type cannot hold is refused here.
+            Piece::<R, 3>::line(line, start, direction, length)?;
+            pieces.push(Placed { length, item: Item::Line { line, start, direction, length } });
         }
-        Element::Arc { shape, sweep_rad, .. } => fit(shape, 0.0, *sweep_rad, WIDEST_RAD, longest_mm)?,
-        Element::Polynomial { shape, .. } => fit(shape, 0.0, 1.0, 1.0, longest_mm)?,
-    };
+        return Ok(end_mm);
+    }
+    let septics = septics::<R>(element)?;
     let mut gone_mm = 0.0;
     for (index, septic) in septics.iter().enumerate() {
         let start = exact(add(from, septic.start))?;

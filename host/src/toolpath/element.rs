@@ -1,8 +1,10 @@
-//! Blocks of path with one geometry: lines, arcs with all that goes by that name in G-code, and polynomials.
+//! Blocks of path with one geometry: lines, arcs with all that goes by that name in G-code, polynomials and
+//! involutes.
 
 use motion_kernel::plan::Bend;
 
 use super::curve::{Curve, Spiral, by_arc_length};
+use super::involute::Involute;
 use super::polynomial::{Greatest, Polynomial};
 use super::{Vector, add, cross, norm, scale, subtract};
 use crate::gcode::{ArcMove, LineMove};
@@ -38,6 +40,15 @@ pub enum Element {
         shape: Polynomial,
         /// What it is there for.
         role: Role,
+    },
+    /// A part of an involute.
+    Involute {
+        /// Start \[mm\].
+        from: Vector,
+        /// End \[mm\].
+        to: Vector,
+        /// Its shape.
+        shape: Involute,
     },
 }
 
@@ -106,7 +117,14 @@ impl Element {
         Self::Polynomial { from, to: add(from, shape.chord()), shape, role }
     }
 
-    /// "line", "arc", "helix", "blend" or "spline".
+    /// `shape` about a base circle with its centre in `centre`.
+    #[must_use]
+    pub fn involute(centre: Vector, shape: Involute) -> Self {
+        let from = add(centre, shape.start_mm());
+        Self::Involute { from, to: add(from, shape.offset(0.0, shape.sweep_rad())), shape }
+    }
+
+    /// "line", "arc", "helix", "blend", "spline" or "involute".
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
@@ -115,11 +133,23 @@ impl Element {
             Self::Arc { .. } => "helix",
             Self::Polynomial { role: Role::Blend, .. } => "blend",
             Self::Polynomial { role: Role::Spline, .. } => "spline",
+            Self::Involute { .. } => "involute",
+        }
+    }
+
+    /// Its curve and the parameter at its end, 0 at its start; nothing for a line.
+    #[must_use]
+    pub fn curve(&self) -> Option<(&dyn Curve, f64)> {
+        match self {
+            Self::Line { .. } => None,
+            Self::Arc { shape, sweep_rad, .. } => Some((shape, *sweep_rad)),
+            Self::Polynomial { shape, .. } => Some((shape, 1.0)),
+            Self::Involute { shape, .. } => Some((shape, shape.sweep_rad())),
         }
     }
 
     /// What is left of a line or an arc without the first and the last millimetres, on an arc by the speed at its
-    /// start and end. A polynomial stays whole.
+    /// start and end. Polynomials and involutes stay whole.
     #[must_use]
     pub fn trimmed(&self, first_mm: f64, last_mm: f64) -> Self {
         match *self {
@@ -141,7 +171,7 @@ impl Element {
                     sweep_rad: last - first,
                 }
             }
-            Self::Polynomial { .. } => *self,
+            Self::Polynomial { .. } | Self::Involute { .. } => *self,
         }
     }
 
@@ -149,9 +179,10 @@ impl Element {
     #[must_use]
     pub fn ends_mm(&self) -> (Vector, Vector) {
         match *self {
-            Self::Line { from, to } | Self::Arc { from, to, .. } | Self::Polynomial { from, to, .. } => {
-                (from, to)
-            }
+            Self::Line { from, to }
+            | Self::Arc { from, to, .. }
+            | Self::Polynomial { from, to, .. }
+            | Self::Involute { from, to, .. } => (from, to),
         }
     }
 
@@ -167,6 +198,7 @@ impl Element {
                 (0..parts as u32).map(|part| shape.length(at(f64::from(part)), at(f64::from(part + 1)))).sum()
             }
             Self::Polynomial { shape, .. } => shape.length(0.0, 1.0),
+            Self::Involute { shape, .. } => shape.length(0.0, shape.sweep_rad()),
         }
     }
 
@@ -180,6 +212,7 @@ impl Element {
             }
             Self::Arc { shape, sweep_rad, .. } => [0.0, *sweep_rad].map(|angle| End::of(shape, angle)),
             Self::Polynomial { shape, .. } => [0.0, 1.0].map(|u| End::of(shape, u)),
+            Self::Involute { shape, .. } => [0.0, shape.sweep_rad()].map(|u| End::of(shape, u)),
         }
     }
 
@@ -206,6 +239,7 @@ impl Element {
                 }
             }
             Self::Polynomial { shape, .. } => shape.greatest(),
+            Self::Involute { shape, .. } => shape.greatest(),
         }
     }
 }

@@ -4,8 +4,10 @@
 //! and what planning needs to know of each block's geometry. Background, f64; angles by libm and roots by the
 //! standard library, so that every host computes the same bits.
 //!
-//! - [`element`]: lines, arcs, helices, spirals, polynomials: length, tangents, curvature, bend;
+//! - [`element`]: lines, arcs, helices, spirals, polynomials, involutes: length, tangents, curvature, bend;
 //! - [`polynomial`]: curves of degree seven, which blends and splines are;
+//! - [`involute`]: involutes of circles and their offsets;
+//! - [`spline`]: splines through points, or close to them;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
 //! - [`smooth`]: corners of a run of elements rounded within a tolerance, by
 //!   [`blend`]: one corner's septic blend, and [`merge`]: short lines to fewer lines and arcs;
@@ -16,13 +18,16 @@ pub mod blend;
 pub mod compile;
 pub mod curve;
 pub mod element;
+pub mod involute;
 pub mod merge;
 pub mod polynomial;
 pub mod septic;
 pub mod smooth;
+pub mod spline;
 
-pub use compile::{CompileError, Placed, compile, exact, on_path};
+pub use compile::{CompileError, Placed, compile, exact, on_path, septics};
 pub use element::{Element, Role};
+pub use involute::Involute;
 pub use polynomial::{Greatest, Polynomial};
 
 /// A point or a vector, X Y Z \[mm\].

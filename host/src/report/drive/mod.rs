@@ -44,7 +44,7 @@ fn open(
     comparison_table(comparisons, out)
 }
 
-fn close(out: &mut impl Write) -> io::Result<()> {
+pub(super) fn close(out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "</main></body></html>")
 }
 
@@ -69,7 +69,11 @@ fn comparison_table(comparisons: &[Comparison], out: &mut impl Write) -> io::Res
 }
 
 /// A table whose first column names the row.
-fn table(headings: &[&str], rows: impl Iterator<Item = Vec<String>>, out: &mut impl Write) -> io::Result<()> {
+pub(super) fn table(
+    headings: &[&str],
+    rows: impl Iterator<Item = Vec<String>>,
+    out: &mut impl Write,
+) -> io::Result<()> {
     writeln!(out, "<div class=\"scroll\" tabindex=\"0\"><table><thead><tr>")?;
     for (index, heading) in headings.iter().enumerate() {
         let class = if index == 0 { " class=\"word\"" } else { "" };
@@ -92,6 +96,6 @@ fn table(headings: &[&str], rows: impl Iterator<Item = Vec<String>>, out: &mut i
 }
 
 /// Names of series in the order of their inks.
-fn legend(names: impl Iterator<Item = String>) -> Vec<(Ink, String)> {
+pub(super) fn legend(names: impl Iterator<Item = String>) -> Vec<(Ink, String)> {
     names.enumerate().map(|(index, name)| (palette::series(index), name)).collect()
 }

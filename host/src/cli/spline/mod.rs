@@ -1,0 +1,222 @@
+//! `motion spline`: points to a spline, to pieces, to a run; without points, the experiment on path smoothness.
+
+mod experiment;
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::input::{self, Output};
+use super::run::{self, RunJson};
+use super::write_json;
+use crate::planning::plan_spline;
+use crate::planning::spline::Pieces;
+use crate::points::{self, Points};
+use crate::toolpath::spline::{self, Degree, Spline, SplineError};
+
+const HELP: &str = "\
+POINTS.csv has the heading x_mm,y_mm,z_mm or x_mm,y_mm,z_mm,u and a point a line; without u, the parameter grows by the
+distance from point to point. The spline goes through all points, or, with a tolerance, no farther from each than that and
+with fewer knots. A quintic one has continuous derivatives up to the fourth, so the jerk of every axis is continuous; a cubic
+one steps in jerk at its knots. The machine comes from the origin by a rapid.
+
+Examples:
+  motion spline points.csv --feed 3000               through all points, on the reference machine
+  motion spline points.csv --tolerance 0.01 --report points.html
+                                                     within 10 µm of each, and the pictures of the run
+  motion spline --report smoothness.html             published arcs, cubic and quintic side by side
+
+JSON of a run: that of `motion run`, and spline: degree, points, spans, length_mm, deviation_mm (greatest, of a point),
+jerk_step_mm_s3 (greatest, at a knot and the programmed feed), pieces, position_error_mm and feed_error (of the pieces).
+JSON of the experiment: feed_mm_s, tick_s; paths: list of name, length_mm, time_s, ticks, deviation_mm (from the arcs), joints
+(time_s, published_s, accel_step_mm_s2 of X and Y, jerk_step_mm_s3), by_tick (tick_s, jerk_max_mm_s3, jerk_step_max_mm_s3);
+evaluators: list of name, feed_error, feed_error_badly_parametrised.";
+
+/// Run a spline through points, or compare arcs, cubic and quintic splines.
+///
+/// Without POINTS.csv: two arcs of 10 and 8 mm radius, and cubic and quintic splines through ten of their points, at
+/// constant feed; velocity, acceleration and jerk of the axes.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct SplineArguments {
+    /// The points; `-` is standard input.
+    #[arg(value_name = "POINTS.csv")]
+    points: Option<PathBuf>,
+    /// Degree of the spline.
+    #[arg(long, value_name = "DEGREE", default_value = "5", requires = "points")]
+    degree: DegreeArgument,
+    /// Feed, mm/min.
+    #[arg(
+        long,
+        value_name = "MM_MIN",
+        default_value_t = 1000.0,
+        requires = "points",
+        allow_negative_numbers = true
+    )]
+    feed: f64,
+    /// How far a point may lie beside the spline, mm; 0: the spline goes through all.
+    #[arg(
+        long,
+        value_name = "MM",
+        default_value_t = 0.0,
+        requires = "points",
+        allow_negative_numbers = true
+    )]
+    tolerance: f64,
+    /// Machine file (`motion machine` prints one); without it, the reference machine.
+    #[arg(long, value_name = "FILE", requires = "points")]
+    machine: Option<PathBuf>,
+    /// Write every tick as a row of CSV; an existing file is replaced.
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+    /// Write a self-contained HTML page; an existing file is replaced.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum DegreeArgument {
+    /// Continuous acceleration.
+    #[value(name = "3")]
+    Cubic,
+    /// Continuous jerk.
+    #[value(name = "5")]
+    Quintic,
+}
+
+impl DegreeArgument {
+    fn degree(self) -> Degree {
+        match self {
+            Self::Cubic => Degree::Cubic,
+            Self::Quintic => Degree::Quintic,
+        }
+    }
+}
+
+/// Runs the points' spline, or makes the experiment.
+///
+/// # Errors
+/// An argument, the points or the machine file is refused, there is no spline or no plan, or a file can't be written.
+pub fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    match &arguments.points {
+        Some(path) => run_points(path, arguments, out),
+        None => experiment::run(arguments, out),
+    }
+}
+
+fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let feed_mm_s = arguments.feed / 60.0;
+    if !(feed_mm_s > 0.0 && feed_mm_s.is_finite()) {
+        return Err(CliError::Arguments {
+            found: format!("--feed {}", arguments.feed),
+            expected: "a finite feed above 0 mm/min",
+        });
+    }
+    let machine = input::machine(arguments.machine.as_ref())?;
+    let source = input::read(path)?;
+    let points = points::read(&source.name, &source.text)?;
+    let spline = fit(&points, arguments).map_err(|error| {
+        let line = error.point().and_then(|point| points.lines.get(point));
+        let place = line.map_or_else(|| source.name.clone(), |line| format!("{}:{line}", source.name));
+        match error {
+            // An argument's, not the file's.
+            SplineError::Tolerance { mm } => CliError::Arguments {
+                found: format!("--tolerance {mm}"),
+                expected: "a finite number of mm that is not below 0",
+            },
+            source => CliError::Spline { place, source },
+        }
+    })?;
+    let (mut plan, pieces) = plan_spline(&source.name, &spline, &points.lines, feed_mm_s, &machine)?;
+    let figures = SplineFigures::of(&spline, points.points.len(), &pieces, feed_mm_s);
+    plan.notices.extend(figures.words());
+    let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
+    let report = arguments.report.as_deref().map(Output::create).transpose()?;
+    let summary = run::execute(&plan, &machine, trace, report)?;
+    if arguments.json {
+        write_json(&SplineJson { run: run::json(&summary), spline: figures }, out)?;
+    } else {
+        run::write_summary(&summary, out).and_then(|()| files(arguments, out)).map_err(CliError::Output)?;
+    }
+    Ok(if summary.faults.is_empty() { Outcome::Done } else { Outcome::Failed })
+}
+
+fn fit(points: &Points, arguments: &SplineArguments) -> Result<Spline, SplineError> {
+    let parameters = match &points.parameters {
+        Some(parameters) => parameters.clone(),
+        None => spline::chord_lengths(&points.points)?,
+    };
+    spline::fit(&points.points, &parameters, arguments.degree.degree(), arguments.tolerance)
+}
+
+/// Says where files were written.
+fn files(arguments: &SplineArguments, out: &mut dyn Write) -> io::Result<()> {
+    for (what, path) in [("trace", &arguments.trace), ("report", &arguments.report)] {
+        if let Some(path) = path {
+            writeln!(out, "  {what} written to {}", path.display())?;
+        }
+    }
+    Ok(())
+}
+
+#[derive(Serialize)]
+struct SplineJson<'run> {
+    #[serde(flatten)]
+    run: RunJson<'run>,
+    spline: SplineFigures,
+}
+
+#[derive(Serialize)]
+struct SplineFigures {
+    degree: usize,
+    points: usize,
+    spans: usize,
+    length_mm: f64,
+    deviation_mm: f64,
+    jerk_step_mm_s3: f64,
+    pieces: usize,
+    position_error_mm: f64,
+    feed_error: f64,
+}
+
+impl SplineFigures {
+    fn of(spline: &Spline, points: usize, pieces: &Pieces, feed_mm_s: f64) -> Self {
+        let course = crate::smoothness::course(spline);
+        let steps = course.joint_steps(feed_mm_s);
+        Self {
+            degree: spline.degree().number(),
+            points,
+            spans: spline.spans().len(),
+            length_mm: course.length_mm(),
+            deviation_mm: spline.deviation_mm(),
+            jerk_step_mm_s3: steps
+                .iter()
+                .map(crate::smoothness::JointStep::jerk_step_mm_s3)
+                .fold(0.0, f64::max),
+            pieces: pieces.count,
+            position_error_mm: pieces.deviation.position_mm,
+            feed_error: pieces.deviation.feed,
+        }
+    }
+
+    fn words(&self) -> [String; 2] {
+        let Self { degree, points, spans, length_mm, deviation_mm, jerk_step_mm_s3, .. } = self;
+        [
+            format!(
+                "spline of degree {degree}, {spans} spans, {length_mm:.4} mm: within {deviation_mm:.2e} mm of {points} points; \
+                 at the programmed feed the jerk steps by at most {jerk_step_mm_s3:.3} mm/s³ at a knot"
+            ),
+            format!(
+                "compiled to {} pieces of degree 7 in arc length: within {:.1e} mm of the spline, feed within {:.1e} of \
+                 what is set",
+                self.pieces, self.position_error_mm, self.feed_error
+            ),
+        ]
+    }
+}
