@@ -9,6 +9,7 @@
 //! - [`mod@joint`]: what a joint between two blocks allows;
 //! - [`lookahead`]: stages 1 and 2 over the stretch: what can be reached, and from what one can brake;
 //! - [`spanning`]: ramps that begin and end between joints and may span many blocks;
+//! - [`window`]: the same with a bounded window, blocks appended as they come;
 //! - [`feed`]: the planned blocks as feed segments over exact path positions.
 
 pub mod ceiling;
@@ -16,6 +17,7 @@ pub mod feed;
 pub mod joint;
 pub mod lookahead;
 pub mod spanning;
+pub mod window;
 
 pub use ceiling::{
     AxisLimits, BLEND_FEED_SHARE, Bend, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX, Ceiling, MachineLimits,
@@ -25,3 +27,4 @@ pub use feed::segments;
 pub use joint::{Joint, joint};
 pub use lookahead::{Block, BlockPlan, PlanError, merge_equal, plan};
 pub use spanning::{FeedSpan, Node, nodes_for, plan_spanning};
+pub use window::{Window, WindowError};

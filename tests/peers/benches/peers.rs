@@ -37,7 +37,9 @@ use motion_kernel::exec::Executor;
 use motion_kernel::law::{FeedSegment, Law, Limits, Phase, Ramp, Ticks, peak, reach};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
-use motion_kernel::plan::{Block, BlockPlan, merge_equal, plan, segments};
+use motion_kernel::plan::{
+    Block, BlockPlan, Node, merge_equal, nodes_for, plan, plan_spanning, segments,
+};
 use motion_kernel::queue::{Feeder, PathRules, Streams};
 use motion_kernel::units::Position;
 use rsruckig::prelude::{DataArrayOrVec, InputParameter, ThrowErrorHandler, Trajectory};
@@ -581,6 +583,24 @@ fn plans(all: &mut Vec<Contender>, random: &mut Random) {
             block(cap_mm_s)
         })
         .collect();
+    for (name, blocks) in [
+        ("spanning ramps, a block, tessellated", tessellated.clone()),
+        ("spanning ramps, a block, saw-tooth", (0..BLOCKS_PLANNED).map(|n| saw_tooth(n % 40)).collect()),
+    ] {
+        let mut places = vec![Node::EMPTY; nodes_for(BLOCKS_PLANNED)];
+        all.push(Contender {
+            name,
+            calls: BLOCKS_PLANNED,
+            run: Box::new(move || {
+                let start = Instant::now();
+                let time_s = plan_spanning(black_box(&blocks), 0.0, 0.0, &mut places, &mut |span| {
+                    black_box(span);
+                });
+                assert!(time_s.is_ok_and(|time_s| time_s.is_some()), "from rest to rest");
+                start.elapsed()
+            }),
+        });
+    }
     let mut blocks = tessellated.clone();
     let mut plans = vec![BlockPlan::default(); BLOCKS_PLANNED];
     all.push(Contender {
@@ -595,6 +615,13 @@ fn plans(all: &mut Vec<Contender>, random: &mut Random) {
             start.elapsed()
         }),
     });
+}
+
+/// A tooth of forty blocks of 0.3 mm whose ceilings rise from 20 to 98 mm/s.
+fn saw_tooth(step: usize) -> Block<f64> {
+    let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+    let law = Law::new(limits).expect("positive");
+    Block { length_mm: 0.3, cap_mm_s: 20.0 + 2.0 * step as f64, joint_mm_s: f64::INFINITY, law }
 }
 
 /// One of four machines: the paper's, a middling, a fast one, and one whose jerk limit never binds.

@@ -10,7 +10,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use motion_kernel::law::Ramp;
-use motion_kernel::plan::{Block, FeedSpan, Node, PlanError, merge_equal, nodes_for, plan_spanning};
+use motion_kernel::plan::{
+    Block, FeedSpan, Node, PlanError, Window, WindowError, merge_equal, nodes_for, plan_spanning,
+};
 
 use crate::support::Random;
 use crate::{block, from_rest, planned, random_blocks, reference, time_s};
@@ -397,5 +399,80 @@ fn a_ramp_passes_its_feeds_where_it_says() {
             (found - state.s_mm).abs() <= 1e-9 * ramp.length_mm() + slack,
             "{ramp:?} {t}: {found} {state:?}"
         );
+    }
+}
+
+/// The spans of a plan with a window of `room` blocks, and the largest number of blocks in it.
+fn windowed(blocks: &[Block<f64>], room: usize) -> Result<Vec<FeedSpan>, WindowError> {
+    let mut memory = vec![block(0.0, 1.0); room];
+    let mut places = vec![Node::EMPTY; nodes_for(room)];
+    let nothing = FeedSpan { start_mm: 0.0, length_mm: 0.0, ramp: Ramp::cruise(1.0, 0.0) };
+    let mut room_for_spans = vec![nothing; 4 * room];
+    let mut window = Window::new(&mut memory, &mut places, &mut room_for_spans);
+    let mut spans = Vec::new();
+    for &block in blocks {
+        window.push(block, &mut |span| spans.push(span))?;
+    }
+    window.finish(&mut |span| spans.push(span))?;
+    Ok(spans)
+}
+
+/// A window of twice the stopping length, however the ceilings run: legal, and hardly slower than the whole.
+#[test]
+fn a_window_loses_little_to_the_whole() {
+    let mut random = Random::new(34);
+    let mut worst = 0.0_f64;
+    for case in 0..200 {
+        let mut walk = 50.0;
+        let (count, length_mm) = (200 + random.below(400), random.log(0.3, 3.0));
+        let blocks: Vec<_> = (0..count)
+            .map(|n| match case % 4 {
+                0 => block(length_mm, 80.0),
+                1 => block(length_mm, 20.0 + 60.0 * random.log(0.01, 1.0)),
+                2 => block(length_mm, 5.0 + 8.0 * (n % 10) as f64),
+                _ => {
+                    walk = f64::clamp(walk * random.log(0.8, 1.25), 5.0, 90.0);
+                    block(length_mm, walk)
+                }
+            })
+            .collect();
+        let fastest = blocks.iter().map(|block| block.cap_mm_s).fold(0.0, f64::max);
+        let stop_mm = reference().ramp_length_mm(0.0, fastest);
+        let room = 2 + (2.0 * stop_mm / length_mm).ceil() as usize;
+        let spans = windowed(&blocks, room).expect("a plan");
+        if let Err(error) = legal(&blocks, 0.0, 0.0, &spans) {
+            panic!("case {case}: {error}");
+        }
+        let time_s: f64 = spans.iter().map(|span| span.ramp.duration_s()).sum();
+        let (whole_s, _) = self::spans(&blocks);
+        worst = worst.max(time_s / whole_s);
+    }
+    println!("at most {worst:.4} of the whole plan's time");
+    assert!(worst <= 1.03, "{worst}");
+}
+
+/// A program of any length in the same memory, planned at every block as if it were the last.
+#[test]
+fn a_long_program_passes_a_small_window() {
+    let mut random = Random::new(35);
+    let blocks: Vec<_> = (0..100_000).map(|_| block(0.1, 20.0 + 60.0 * random.log(0.01, 1.0))).collect();
+    let spans = windowed(&blocks, 400).expect("a plan");
+    let time_s: f64 = spans.iter().map(|span| span.ramp.duration_s()).sum();
+    let (whole_s, _) = self::spans(&blocks);
+    println!("{time_s:.3} s, whole {whole_s:.3} s");
+    assert!(time_s < 1.03 * whole_s);
+    let end = spans.last().map_or(0.0, |span| span.start_mm + span.length_mm);
+    assert!((end - 10_000.0).abs() < 1e-5, "{end}");
+}
+
+/// However short the window, every block is driven, legally.
+#[test]
+fn a_short_window_is_slow_but_legal() {
+    let blocks: Vec<_> = (0..400).map(|n| block(0.1, 40.0 + (n % 7) as f64)).collect();
+    for room in [1, 2, 20] {
+        let spans = windowed(&blocks, room).expect("a plan");
+        if let Err(error) = legal(&blocks, 0.0, 0.0, &spans) {
+            panic!("{room}: {error}");
+        }
     }
 }

@@ -36,6 +36,8 @@ pub const fn nodes_for(blocks: usize) -> usize {
     2 * blocks + 2
 }
 
+/// Lengths that differ by no more are equal \[mm\].
+const ROUNDING_MM: f64 = 1.0e-9;
 /// Solver steps for the feed at the top of a hump.
 const TOP_STEPS: usize = 24;
 /// No more steps once so small a part of the hump is left to cruise at its top.
@@ -150,7 +152,8 @@ impl<'a> Sides<'a> {
     /// is none for one side by itself.
     fn fit(&self, top: f64, up: &mut Climb, down: &mut Climb) -> Option<f64> {
         let Hump { start_mm, end_mm, enter_mm_s, exit_mm_s, rising, falling, .. } = self.hump;
-        let room_mm = end_mm - start_mm;
+        // A ramp that was planned before to end just here still does.
+        let room_mm = end_mm - start_mm + ROUNDING_MM;
         let up_mm =
             up.find(rising, *enter_mm_s, top, room_mm, |a, b| self.limits(start_mm + a, start_mm + b))?;
         let down_mm =

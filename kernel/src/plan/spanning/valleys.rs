@@ -338,6 +338,15 @@ impl<'a> Valleys<'a> {
                     node.top_mm_s = top_mm_s;
                 }
                 right = self.next_valley(right);
+            } else if hump.enter_mm_s > hump.exit_mm_s && right as usize != last {
+                // From the start, where the valley must be passed on the way down to a lower one: a ramp to a lower feed
+                // passes a feed earlier than one that ends at it.
+                let next = self.next_valley(right);
+                if self.node(next).feed_mm_s > hump.exit_mm_s {
+                    return false;
+                }
+                self.give_up(right, Role::Falling, right as usize + 1..next as usize);
+                right = next;
             } else {
                 return false;
             }
