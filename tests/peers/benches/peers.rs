@@ -37,9 +37,7 @@ use motion_kernel::exec::Executor;
 use motion_kernel::law::{FeedSegment, Law, Limits, Phase, Ramp, Ticks, peak, reach};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
-use motion_kernel::plan::{
-    Block, BlockPlan, Node, merge_equal, nodes_for, plan, plan_spanning, segments,
-};
+use motion_kernel::plan::{Block, BlockPlan, Node, merge_equal, nodes_for, plan, plan_spanning, segments};
 use motion_kernel::queue::{Feeder, PathRules, Streams};
 use motion_kernel::units::Position;
 use rsruckig::prelude::{DataArrayOrVec, InputParameter, ThrowErrorHandler, Trajectory};
