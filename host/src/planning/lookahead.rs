@@ -37,7 +37,8 @@ pub(super) fn lookahead(
     if mode == Mode::PerBlock {
         return Ok(per_block);
     }
-    let spanning = spanning(blocks, ends_mm, &ends, start_feed_mm_s, end_feed_mm_s, tick_s)?;
+    // Whatever speaks against this plan does not speak against the other.
+    let spanning = spanning(blocks, ends_mm, &ends, start_feed_mm_s, end_feed_mm_s, tick_s).ok().flatten();
     // One is as legal as the other; which is faster depends on how often the ceilings change.
     Ok(match spanning {
         Some(spanning) if time_s(&spanning) < time_s(&per_block) => spanning,
@@ -123,10 +124,10 @@ fn spanning(
         };
         let length = end - start;
         start = end;
-        if length <= Position::ZERO {
+        let is_cruise = span.ramp.peak_jerk_mm_s3 <= 0.0;
+        if is_cruise && length <= Position::ZERO {
             continue;
         }
-        let is_cruise = span.ramp.peak_jerk_mm_s3 <= 0.0;
         let made = if is_cruise {
             FeedSegment::<f64>::cruise(span.ramp.from_mm_s, length, tick_s)
         } else {

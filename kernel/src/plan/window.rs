@@ -38,6 +38,8 @@ pub enum WindowError {
         /// That feed.
         feed_mm_s: f64,
     },
+    /// There is no place for a single block.
+    NoPlaces,
     /// The plan has more spans than there are places.
     Spans {
         /// The places.
@@ -50,6 +52,7 @@ impl core::fmt::Display for WindowError {
         match self {
             Self::Plan(error) => error.fmt(f),
             Self::NoPlan { feed_mm_s } => write!(f, "no plan from {feed_mm_s} mm/s"),
+            Self::NoPlaces => write!(f, "a window without places, expected room for a block"),
             Self::Spans { places } => write!(f, "more ramps and cruises than the {places} places for them"),
         }
     }
@@ -70,9 +73,15 @@ impl<'a> Window<'a> {
     /// # Errors
     /// A block is out of range, or the window too small for what is in it. It is not used any further then.
     pub fn push(&mut self, block: Block<f64>, put: &mut impl FnMut(FeedSpan)) -> Result<(), WindowError> {
-        // Every turn commits a span at least.
-        while self.count > 0 && self.count == self.blocks.len() {
+        if self.blocks.is_empty() {
+            return Err(WindowError::NoPlaces);
+        }
+        while self.count == self.blocks.len() {
             self.plan(put)?;
+            if self.planned == 0 {
+                // Blocks of no length: there is nothing to drive.
+                self.count = 0;
+            }
             self.commit(put);
         }
         if let Some(place) = self.blocks.get_mut(self.count) {
@@ -136,8 +145,8 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// Hands on what lies further from the window's end than a stop takes, the first span in any case; a cruise is
-    /// divided there.
+    /// Hands on what lies further from the window's end than a stop takes; a cruise is divided there. If that is nothing,
+    /// what begins in the first half: every turn is to bring the window on.
     fn commit(&mut self, put: &mut impl FnMut(FeedSpan)) {
         let stops = self.in_window().iter().map(|block| block.law.ramp_length_mm(0.0, block.cap_mm_s));
         let up_to_mm = self.length_mm() - stops.fold(0.0, f64::max);
@@ -147,7 +156,12 @@ impl<'a> Window<'a> {
             spans.get(whole).filter(|span| span.ramp.peak_jerk_mm_s3 <= 0.0 && span.start_mm < up_to_mm);
         match divided {
             Some(_) => self.hand_on(whole, Some(up_to_mm), put),
-            None => self.hand_on(whole.max(1), None, put),
+            None if whole > 0 => self.hand_on(whole, None, put),
+            None => {
+                let half_mm = 0.5 * self.length_mm();
+                let half = spans.partition_point(|span| span.start_mm < half_mm);
+                self.hand_on(half.max(1), None, put);
+            }
         }
     }
 

@@ -137,15 +137,23 @@ impl<'a> Sides<'a> {
         top_mm_s.min(reached).max(self.lowest())
     }
 
-    /// The least limits between two positions.
-    fn limits(&self, from_mm: f64, to_mm: f64) -> Limits<f64> {
+    /// The least limits of the blocks between two positions; of a position by itself, of the block that comes next on
+    /// the way on, or on the way back.
+    fn limits(&self, low_mm: f64, high_mm: f64, is_back: bool) -> Limits<f64> {
         if let Some(law) = self.uniform {
             return law.limits();
         }
-        let blocks = self.valleys.blocks_of(self.hump);
-        let touched = blocks.filter(|&(start, end, _)| end > from_mm && start <= to_mm);
-        let all = touched.map(|(_, _, law)| law.limits());
-        all.reduce(|a, b| a.least(&b)).unwrap_or_else(|| self.limits(self.hump.start_mm, self.hump.end_mm))
+        let touched = |start: f64, end: f64| {
+            if is_back { end >= low_mm && start < high_mm } else { end > low_mm && start <= high_mm }
+        };
+        let blocks = || self.valleys.blocks_of(self.hump);
+        let limits = |(_, _, law): (f64, f64, Law<f64>)| law.limits();
+        let all = blocks().filter(|&(start, end, _)| touched(start, end)).map(limits);
+        // Beyond the hump's end, by rounding, those of all of it hold.
+        let least =
+            all.reduce(|a, b| a.least(&b)).or_else(|| blocks().map(limits).reduce(|a, b| a.least(&b)));
+        // A hump that is looked at has blocks.
+        least.unwrap_or(Limits { accel_mm_s2: 0.0, jerk_mm_s3: 0.0, snap_mm_s4: 0.0 })
     }
 
     /// Both sides up to `top`; returns what is left between them \[mm\], less than 0 if there is no room. `None` if there
@@ -154,10 +162,10 @@ impl<'a> Sides<'a> {
         let Hump { start_mm, end_mm, enter_mm_s, exit_mm_s, rising, falling, .. } = self.hump;
         // A ramp that was planned before to end just here still does.
         let room_mm = end_mm - start_mm + ROUNDING_MM;
-        let up_mm =
-            up.find(rising, *enter_mm_s, top, room_mm, |a, b| self.limits(start_mm + a, start_mm + b))?;
-        let down_mm =
-            down.find(falling, *exit_mm_s, top, room_mm, |a, b| self.limits(end_mm - b, end_mm - a))?;
+        let on = |a: f64, b: f64| self.limits(start_mm + a, start_mm + b, false);
+        let back = |a: f64, b: f64| self.limits(end_mm - b, end_mm - a, true);
+        let up_mm = up.find(rising, *enter_mm_s, top, room_mm, on)?;
+        let down_mm = down.find(falling, *exit_mm_s, top, room_mm, back)?;
         Some(room_mm - up_mm - down_mm)
     }
 

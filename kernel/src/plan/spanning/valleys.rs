@@ -14,6 +14,9 @@ use crate::plan::Block;
 /// Joining stairs may lose so much of the time of a ramp over all of them; otherwise the staircase is divided.
 const DIVIDE_SHARE: f64 = 0.05;
 
+/// How often all nodes may be looked at to settle which valleys are reached; a list that takes more has no plan.
+const LOOKS_MAX: usize = 256;
+
 /// No node.
 const NONE: u32 = u32::MAX;
 
@@ -290,7 +293,7 @@ impl<'a> Valleys<'a> {
             return Seen::BelowRight;
         }
         let (before, after) = (self.gap(&left, root), self.gap(root, &right));
-        // From the valley itself too: a stair before this one may not be reached.
+        // What can be gained counts from the valley itself too: a stair before this one may not be reached.
         let (first, last) = (self.node(open.left_valley), self.node(open.right_valley));
         let all_before = (first.feed_mm_s, root.start_mm - first.end_mm);
         let all_after = (last.feed_mm_s, last.start_mm - root.end_mm);
@@ -313,7 +316,13 @@ impl<'a> Valleys<'a> {
     /// `fits` says whether a hump can be driven. Returns whether all humps that are left can.
     pub fn settle(&mut self, fits: impl Fn(&Self, &Hump) -> bool) -> bool {
         let (mut left, mut right) = (0, self.next_valley(0));
+        let mut looked_at = 0;
         while right != NONE {
+            // Valleys that are given up one after the other make ever longer humps.
+            looked_at += (right - left) as usize;
+            if looked_at > LOOKS_MAX * self.nodes.len() {
+                return false;
+            }
             let hump = self.hump(left, right);
             if let Some(divide) = self.divide(&hump, left, right) {
                 right = divide;
@@ -367,11 +376,15 @@ impl<'a> Valleys<'a> {
             _ => return None,
         };
         let inside = left as usize + 1..right as usize;
+        // Where a dividing stair was given up there is no better one.
+        if self.nodes.get(inside.clone())?.iter().any(|node| node.divides.is_some()) {
+            return None;
+        }
         let steps =
             || inside.clone().filter(|&index| self.nodes.get(index).is_some_and(|node| node.role == role));
         let middle = steps().nth(steps().count() / 2)? as u32;
         let (feed_mm_s, top_mm_s) = (self.node(middle).feed_mm_s, self.node(left).top_mm_s);
-        let node = self.node_mut(middle).filter(|node| node.divides.is_none())?;
+        let node = self.node_mut(middle)?;
         (node.role, node.divides) = (Role::Valley, Some(role));
         // What lies towards the foot of the staircase stays below its middle.
         if role == Role::Rising {
