@@ -124,7 +124,7 @@ fn spanning(
         };
         let length = end - start;
         start = end;
-        let is_cruise = span.ramp.peak_jerk_mm_s3 <= 0.0;
+        let is_cruise = span.ramp.is_cruise();
         if is_cruise && length <= Position::ZERO {
             continue;
         }

@@ -101,7 +101,7 @@ impl Span {
         if local_mm >= self.length_mm - ROUNDING_MM {
             return (self.ramp.to_mm_s, self.start_s + self.time_s);
         }
-        if self.ramp.peak_jerk_mm_s3 <= 0.0 {
+        if self.ramp.is_cruise() {
             let feed = self.ramp.from_mm_s;
             return (feed, self.start_s + local_mm / feed);
         }

@@ -94,6 +94,11 @@ impl<R: Root> Ramp<R> {
         }
     }
 
+    /// Whether the feed does not change.
+    pub fn is_cruise(&self) -> bool {
+        self.peak_jerk_mm_s3 <= R::ZERO
+    }
+
     /// The same change of feed the other way.
     #[must_use]
     pub fn reversed(self) -> Self {

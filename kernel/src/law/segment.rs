@@ -241,15 +241,7 @@ impl<R: Real> FeedSegment<R> {
     /// # Errors
     /// A figure is not finite, the feed is not positive, or the duration is too long.
     pub fn cruise(feed_mm_s: f64, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
-        let duration_s = length.to_mm() / feed_mm_s;
-        let ramp = Ramp {
-            from_mm_s: feed_mm_s,
-            to_mm_s: feed_mm_s,
-            peak_jerk_mm_s3: 0.0,
-            t1_s: 0.0,
-            t2_s: duration_s,
-            limited_by: super::LimitedBy::Snap,
-        };
+        let ramp = Ramp::cruise(feed_mm_s, length.to_mm() / feed_mm_s);
         Self::new(&ramp, length, tick_s)
     }
 

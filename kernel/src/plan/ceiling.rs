@@ -244,11 +244,11 @@ impl<R: Root> Ceiling<R> {
 
 /// The smaller limits of `a` and of `b` divided by `component`.
 fn least<R: Root>(a: &Limits<R>, b: &Limits<R>, component: R) -> Limits<R> {
-    Limits {
-        accel_mm_s2: a.accel_mm_s2.min(b.accel_mm_s2 / component),
-        jerk_mm_s3: a.jerk_mm_s3.min(b.jerk_mm_s3 / component),
-        snap_mm_s4: a.snap_mm_s4.min(b.snap_mm_s4 / component),
-    }
+    a.least(&Limits {
+        accel_mm_s2: b.accel_mm_s2 / component,
+        jerk_mm_s3: b.jerk_mm_s3 / component,
+        snap_mm_s4: b.snap_mm_s4 / component,
+    })
 }
 
 #[cfg(test)]

@@ -11,8 +11,7 @@
 //! window is full, so that the work is proportional to the number of blocks.
 
 use super::lookahead::{Block, PlanError};
-use super::spanning::{FeedSpan, Node, plan_spanning};
-use crate::law::Ramp;
+use super::spanning::{FeedSpan, Node, ROUNDING_MM, plan_spanning};
 
 /// Blocks on their way to be spans.
 pub struct Window<'a> {
@@ -152,8 +151,7 @@ impl<'a> Window<'a> {
         let up_to_mm = self.length_mm() - stops.fold(0.0, f64::max);
         let spans = self.spans.get(..self.planned).unwrap_or(&[]);
         let whole = spans.partition_point(|span| span.start_mm + span.length_mm <= up_to_mm);
-        let divided =
-            spans.get(whole).filter(|span| span.ramp.peak_jerk_mm_s3 <= 0.0 && span.start_mm < up_to_mm);
+        let divided = spans.get(whole).filter(|span| span.ramp.is_cruise() && span.start_mm < up_to_mm);
         match divided {
             Some(_) => self.hand_on(whole, Some(up_to_mm), put),
             None if whole > 0 => self.hand_on(whole, None, put),
@@ -175,13 +173,8 @@ impl<'a> Window<'a> {
         }
         if let (Some(divide_mm), Some(span)) = (divide_mm, self.spans.get_mut(whole)) {
             let (start_mm, feed_mm_s) = (span.start_mm, span.ramp.from_mm_s);
-            let cruise = |start_mm: f64, end_mm: f64| {
-                let length_mm = end_mm - start_mm;
-                FeedSpan { start_mm, length_mm, ramp: Ramp::cruise(feed_mm_s, length_mm / feed_mm_s) }
-            };
-            let before = cruise(self.start_mm + start_mm, self.start_mm + divide_mm);
-            *span = cruise(divide_mm, start_mm + span.length_mm);
-            put(before);
+            *span = FeedSpan::cruise(divide_mm, start_mm + span.length_mm, feed_mm_s);
+            put(FeedSpan::cruise(self.start_mm + start_mm, self.start_mm + divide_mm, feed_mm_s));
             (gone_mm, self.feed_mm_s) = (divide_mm, feed_mm_s);
         }
         self.spans.copy_within(whole..self.planned, 0);
@@ -209,6 +202,3 @@ impl<'a> Window<'a> {
         self.count -= gone;
     }
 }
-
-/// Positions closer than this are the same.
-const ROUNDING_MM: f64 = 1.0e-9;

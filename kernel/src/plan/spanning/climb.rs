@@ -206,8 +206,10 @@ impl Climb {
             return None;
         }
         let start_mm = start.length_mm.max(start.ready_mm);
-        let waited_s =
-            if start_mm > start.length_mm { (start_mm - start.length_mm) / start.feed_mm_s } else { 0.0 };
+        let rested_s = |from_mm: f64, to_mm: f64| {
+            if to_mm > from_mm { (to_mm - from_mm) / start.feed_mm_s } else { 0.0 }
+        };
+        let waited_s = rested_s(start.length_mm, start_mm);
         // What is lost before the ramp, as seen from the target.
         let before_s = start.time_s + waited_s - start_mm / target.feed_mm_s;
         let jump = Jump {
@@ -216,10 +218,11 @@ impl Climb {
             to_mm_s: target.feed_mm_s,
             room_mm,
             between,
+            start_limits: limits(start_mm, start_mm),
             limits,
         };
         let (leg, way) = jump.best(target.lag_s - before_s)?;
-        let held_s = if leg.start_mm > start_mm { (leg.start_mm - start_mm) / start.feed_mm_s } else { 0.0 };
+        let held_s = rested_s(start_mm, leg.start_mm);
         let time_s = start.time_s + waited_s + held_s + leg.ramp.duration_s();
         let length_mm = leg.start_mm + leg.ramp.length_mm();
         let lag_s = time_s - length_mm / target.feed_mm_s;
@@ -262,6 +265,8 @@ struct Jump<'a, L> {
     room_mm: f64,
     /// The stairs it passes.
     between: &'a [Reached],
+    /// What may be used where it may start.
+    start_limits: Limits<f64>,
     limits: &'a L,
 }
 
@@ -277,11 +282,10 @@ enum Tried {
 impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
     /// The ramp that loses the least, if it is less than `most_s`.
     fn best(&self, most_s: f64) -> Option<(Leg, Way)> {
-        let accel = (self.limits)(self.start_mm, self.start_mm).accel_mm_s2;
         let mut most_s = most_s;
         // As hard as allowed.
         let mut best = None;
-        match self.with(accel, most_s) {
+        match self.with(self.start_limits.accel_mm_s2, most_s) {
             Tried::Lost(_, leg) if leg.start_mm <= self.start_mm => return Some((leg, Way::Free)),
             Tried::Lost(lost_s, leg) => {
                 most_s = lost_s;
@@ -302,7 +306,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
             (f64::INFINITY, matches!(tried, Tried::TooHard))
         };
         // Softer by steps, from what the ramp would reach, as long as it helps.
-        let law = Law::new((self.limits)(self.start_mm, self.start_mm)).ok()?;
+        let law = Law::new(self.start_limits).ok()?;
         let hardest = Ramp::new(&law, self.from_mm_s, self.to_mm_s).peak_accel_mm_s2();
         let (mut good, mut good_s) = (hardest, f64::INFINITY);
         let mut next = hardest;
@@ -333,7 +337,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
 
     /// The ramp with at most this acceleration, if it loses at most `most_s`.
     fn with(&self, accel_mm_s2: f64, most_s: f64) -> Tried {
-        let mut within = (self.limits)(self.start_mm, self.start_mm);
+        let mut within = self.start_limits;
         // What is passed later may allow less; the ramp gets longer by it.
         for _ in 0..LIMITS_STEPS {
             let softened = Limits { accel_mm_s2: within.accel_mm_s2.min(accel_mm_s2), ..within };

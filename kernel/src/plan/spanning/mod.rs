@@ -7,7 +7,8 @@
 //! - [`valleys`]: which ceilings are rested in, and what lies between them: humps;
 //! - [`climb`]: up one side of a hump, below its stairs.
 //!
-//! Works in f64 on slices of the caller, allocates nothing, and takes time in proportion to the number of blocks.
+//! Works in f64 on slices of the caller, allocates nothing. Time goes with the number of blocks; chains of valleys
+//! that cannot be reached cost more, up to a bound beyond which there is no such plan.
 
 pub mod climb;
 pub mod valleys;
@@ -30,6 +31,14 @@ pub struct FeedSpan {
     pub ramp: Ramp<f64>,
 }
 
+impl FeedSpan {
+    /// At one feed > 0 from one position to another.
+    pub(super) fn cruise(start_mm: f64, end_mm: f64, feed_mm_s: f64) -> Self {
+        let length_mm = end_mm - start_mm;
+        Self { start_mm, length_mm, ramp: Ramp::cruise(feed_mm_s, length_mm / feed_mm_s) }
+    }
+}
+
 /// Places for nodes that are enough for any list of so many blocks.
 #[must_use]
 pub const fn nodes_for(blocks: usize) -> usize {
@@ -37,7 +46,7 @@ pub const fn nodes_for(blocks: usize) -> usize {
 }
 
 /// Lengths that differ by no more are equal \[mm\].
-const ROUNDING_MM: f64 = 1.0e-9;
+pub(super) const ROUNDING_MM: f64 = 1.0e-9;
 /// Solver steps for the feed at the top of a hump.
 const TOP_STEPS: usize = 24;
 /// No more steps once so small a part of the hump is left to cruise at its top.
@@ -60,11 +69,10 @@ pub fn plan_spanning(
     let Some(mut valleys) = Valleys::new(blocks, start_mm_s, end_mm_s, places) else {
         return Err(PlanError::Output { blocks: nodes_for(blocks.len()), plans: room });
     };
+    // Several kilobytes each: used for all humps.
+    let (mut up, mut down) = (Climb::NONE, Climb::NONE);
     let fits = |valleys: &Valleys<'_>, hump: &Hump| match Sides::new(hump, valleys) {
-        Some(sides) => {
-            let (mut up, mut down) = (Climb::NONE, Climb::NONE);
-            sides.fit(sides.lowest(), &mut up, &mut down).is_some_and(|left| left >= 0.0)
-        }
+        Some(sides) => sides.fit(sides.lowest(), &mut up, &mut down).is_some_and(|left| left >= 0.0),
         None => hump.enter_mm_s == hump.exit_mm_s,
     };
     if !valleys.settle(fits) {
@@ -73,7 +81,7 @@ pub fn plan_spanning(
     let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
     for hump in valleys.humps() {
         out.cruise(hump.start_mm, hump.enter_mm_s);
-        if drive(&hump, &valleys, &mut out).is_none() {
+        if drive(&hump, &valleys, &mut up, &mut down, &mut out).is_none() {
             return Ok(None);
         }
     }
@@ -89,11 +97,10 @@ struct Out<'a, F> {
 
 impl<F: FnMut(FeedSpan)> Out<'_, F> {
     fn cruise(&mut self, to_mm: f64, feed_mm_s: f64) {
-        let length_mm = to_mm - self.at_mm;
-        if length_mm > 0.0 && feed_mm_s > 0.0 {
-            let ramp = Ramp::cruise(feed_mm_s, length_mm / feed_mm_s);
-            (self.put)(FeedSpan { start_mm: self.at_mm, length_mm, ramp });
-            self.time_s += ramp.duration_s();
+        if to_mm > self.at_mm && feed_mm_s > 0.0 {
+            let span = FeedSpan::cruise(self.at_mm, to_mm, feed_mm_s);
+            (self.put)(span);
+            self.time_s += span.ramp.duration_s();
         }
         self.at_mm = self.at_mm.max(to_mm);
     }
@@ -211,10 +218,15 @@ impl<'a> Sides<'a> {
 }
 
 /// Up, along and down.
-fn drive<F: FnMut(FeedSpan)>(hump: &Hump, valleys: &Valleys<'_>, out: &mut Out<'_, F>) -> Option<()> {
+fn drive<F: FnMut(FeedSpan)>(
+    hump: &Hump,
+    valleys: &Valleys<'_>,
+    up: &mut Climb,
+    down: &mut Climb,
+    out: &mut Out<'_, F>,
+) -> Option<()> {
     let Some(sides) = Sides::new(hump, valleys) else { return Some(()) };
-    let (mut up, mut down) = (Climb::NONE, Climb::NONE);
-    let top = sides.best(&mut up, &mut down)?;
+    let top = sides.best(up, down)?;
     let mut feed = hump.enter_mm_s;
     for leg in up.legs() {
         out.cruise(hump.start_mm + leg.start_mm, feed);

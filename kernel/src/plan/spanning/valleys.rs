@@ -6,16 +6,14 @@
 //!
 //! The ceilings are looked at from the lowest up, in the tree of their minima: what lies beside a stair and is higher
 //! need not be looked at any more, so that the work is proportional to the number of ceilings.
+//!
+//! - `settle`: whether the valleys can be reached, and which of them are given up.
+
+mod settle;
 
 use super::climb::{Stair, Stairs};
 use crate::law::{Law, Ramp, peak};
 use crate::plan::Block;
-
-/// Joining stairs may lose so much of the time of a ramp over all of them; otherwise the staircase is divided.
-const DIVIDE_SHARE: f64 = 0.05;
-
-/// How often all nodes may be looked at to settle which valleys are reached; a list that takes more has no plan.
-const LOOKS_MAX: usize = 256;
 
 /// No node.
 const NONE: u32 = u32::MAX;
@@ -79,19 +77,19 @@ impl Node {
 /// The part of a stretch between two valleys.
 #[derive(Clone, Copy, Debug)]
 pub struct Hump {
-    /// Where it starts and ends \[mm\].
+    /// Where it starts \[mm\].
     pub start_mm: f64,
-    #[allow(missing_docs)]
+    /// Where it ends \[mm\].
     pub end_mm: f64,
-    /// The feeds there \[mm/s\].
+    /// The feed at its start \[mm/s\].
     pub enter_mm_s: f64,
-    #[allow(missing_docs)]
+    /// The feed at its end \[mm/s\].
     pub exit_mm_s: f64,
     /// Its ceiling \[mm/s\], as far as known.
     pub top_mm_s: f64,
-    /// Stairs, from the start, and from the end.
+    /// Stairs on the way up, from its start.
     pub rising: Stairs,
-    #[allow(missing_docs)]
+    /// Stairs on the way down, from its end.
     pub falling: Stairs,
     /// Nodes inside, from and up to.
     nodes: (usize, usize),
@@ -309,103 +307,6 @@ impl<'a> Valleys<'a> {
             (true, false) => Seen::Limits(Role::Rising),
             (_, true) => Seen::Limits(Role::Falling),
             (false, false) => Seen::Limits(Role::Valley),
-        }
-    }
-
-    /// Gives up valleys that cannot be reached below the stairs from the one before, or left for the one after;
-    /// `fits` says whether a hump can be driven. Returns whether all humps that are left can.
-    pub fn settle(&mut self, fits: impl Fn(&Self, &Hump) -> bool) -> bool {
-        let (mut left, mut right) = (0, self.next_valley(0));
-        let mut looked_at = 0;
-        while right != NONE {
-            // Valleys that are given up one after the other make ever longer humps.
-            looked_at += (right - left) as usize;
-            if looked_at > LOOKS_MAX * self.nodes.len() {
-                return false;
-            }
-            let hump = self.hump(left, right);
-            if let Some(divide) = self.divide(&hump, left, right) {
-                right = divide;
-                continue;
-            }
-            if fits(self, &hump) {
-                if let Some(node) = self.node_mut(right) {
-                    node.link = left;
-                }
-                (left, right) = (right, self.next_valley(right));
-                continue;
-            }
-            let last = self.nodes.len() - 1;
-            let top_mm_s = self.node(right).top_mm_s;
-            if hump.enter_mm_s > hump.exit_mm_s && left != 0 {
-                // On the way down to the right one.
-                self.give_up(left, Role::Falling, left as usize + 1..right as usize);
-                left = self.node(left).link;
-            } else if hump.enter_mm_s <= hump.exit_mm_s && right as usize != last {
-                self.give_up(right, Role::Rising, left as usize + 1..right as usize);
-                if let Some(node) = self.node_mut(left) {
-                    node.top_mm_s = top_mm_s;
-                }
-                right = self.next_valley(right);
-            } else if hump.enter_mm_s > hump.exit_mm_s && right as usize != last {
-                // From the start, where the valley must be passed on the way down to a lower one: a ramp to a lower feed
-                // passes a feed earlier than one that ends at it.
-                let next = self.next_valley(right);
-                if self.node(next).feed_mm_s > hump.exit_mm_s {
-                    return false;
-                }
-                self.give_up(right, Role::Falling, right as usize + 1..next as usize);
-                right = next;
-            } else {
-                return false;
-            }
-        }
-        true
-    }
-
-    /// Rests in the middle of a staircase that is too long to be climbed at once; returns the new valley.
-    fn divide(&mut self, hump: &Hump, left: u32, right: u32) -> Option<u32> {
-        let is_long = |stairs: &Stairs| {
-            let (low, high) = stairs.range_mm_s();
-            let law = self.law(left + 1);
-            stairs.lost_s > law.map_or(f64::INFINITY, |law| DIVIDE_SHARE * law.ramp_time_s(high - low))
-        };
-        let role = match (is_long(&hump.rising), is_long(&hump.falling)) {
-            (true, _) => Role::Rising,
-            (_, true) => Role::Falling,
-            _ => return None,
-        };
-        let inside = left as usize + 1..right as usize;
-        // Where a dividing stair was given up there is no better one.
-        if self.nodes.get(inside.clone())?.iter().any(|node| node.divides.is_some()) {
-            return None;
-        }
-        let steps =
-            || inside.clone().filter(|&index| self.nodes.get(index).is_some_and(|node| node.role == role));
-        let middle = steps().nth(steps().count() / 2)? as u32;
-        let (feed_mm_s, top_mm_s) = (self.node(middle).feed_mm_s, self.node(left).top_mm_s);
-        let node = self.node_mut(middle)?;
-        (node.role, node.divides) = (Role::Valley, Some(role));
-        // What lies towards the foot of the staircase stays below its middle.
-        if role == Role::Rising {
-            node.top_mm_s = top_mm_s;
-            self.node_mut(left)?.top_mm_s = feed_mm_s;
-        } else {
-            node.top_mm_s = feed_mm_s;
-        }
-        Some(middle)
-    }
-
-    /// Makes a stair of a valley; what lies on the side where it is passed at its feed or below limits no more.
-    fn give_up(&mut self, valley: u32, role: Role, passed: core::ops::Range<usize>) {
-        let feed_mm_s = self.node(valley).feed_mm_s;
-        if let Some(node) = self.node_mut(valley) {
-            node.role = role;
-        }
-        for node in self.nodes.get_mut(passed).unwrap_or(&mut []) {
-            if node.role != role || node.feed_mm_s >= feed_mm_s {
-                node.role = Role::Free;
-            }
         }
     }
 
