@@ -9,7 +9,7 @@
 //! ```text
 //!   background                                   what it hands on
 //!   ──────────                                   ────────────────
-//!   plan    ceilings, joints, look-ahead         Block, BlockPlan
+//!   plan    ceilings, joints, look-ahead         Block, BlockPlan, FeedSpan
 //!   law     ramps; inverse problems              Ramp ─► FeedSegment ┐ two streams that measure
 //!   path    lines and septic pieces              Piece ──────────────┤ the same path length
 //!                                                                    │

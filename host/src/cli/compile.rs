@@ -35,7 +35,7 @@ pub struct CompileArguments {
     /// The number type of the board's kernel.
     #[arg(long, value_enum, default_value_t = Number::F32)]
     number: Number,
-    /// One pair of ramps per block; without it, ramps may span blocks with equal ceilings.
+    /// One pair of ramps per block; without it, ramps may span blocks.
     #[arg(long)]
     per_block: bool,
 }
