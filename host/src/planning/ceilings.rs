@@ -18,10 +18,12 @@ use crate::toolpath::{Element, Greatest, Role, angle, norm, subtract};
 
 /// The blocks of `moves`; the joint feed of the last one is 0. An error comes with the program line.
 pub(super) fn blocks(moves: &[Move], machine: &Machine) -> Result<Vec<StretchBlock>, (u32, Problem)> {
+    // How a curve bends takes a search along it: once for each, whatever share it is then given.
+    let bends: Vec<Greatest> = moves.iter().map(|step| step.element.greatest()).collect();
     let mut blocks = Vec::with_capacity(moves.len());
-    for step in moves {
+    for (step, greatest) in moves.iter().zip(&bends) {
         let share = if is_blend(&step.element) { BLEND_FEED_SHARE } else { machine.path.curve_feed_share };
-        blocks.push(block(step, share, machine)?);
+        blocks.push(block(step, greatest, share, machine)?);
     }
     for index in 1..blocks.len() {
         blocks[index - 1].joint_mm_s =
@@ -31,17 +33,23 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> Result<Vec<StretchBlo
         .filter(|&index| is_blend(&blocks[index].element) && is_crowded(&blocks, index, machine))
         .collect();
     for index in crowded {
-        blocks[index].ceiling = block(&moves[index], machine.path.curve_feed_share, machine)?.ceiling;
+        let share = machine.path.curve_feed_share;
+        blocks[index].ceiling = block(&moves[index], &bends[index], share, machine)?.ceiling;
     }
     Ok(blocks)
 }
 
-fn block(step: &Move, curve_feed_share: f64, machine: &Machine) -> Result<StretchBlock, (u32, Problem)> {
+fn block(
+    step: &Move,
+    greatest: &Greatest,
+    curve_feed_share: f64,
+    machine: &Machine,
+) -> Result<StretchBlock, (u32, Problem)> {
     let Move { line, element, feed_mm_s, .. } = *step;
     let limits = MachineLimits { curve_feed_share, ..machine.limits() };
-    let Greatest { bend, tangent, curved } = element.greatest();
+    let Greatest { bend, tangent, curved } = greatest;
     let ceiling =
-        Ceiling::new(&limits, feed_mm_s, &tangent, &curved, &bend).map_err(|error| (line, error.into()))?;
+        Ceiling::new(&limits, feed_mm_s, tangent, curved, bend).map_err(|error| (line, error.into()))?;
     Ok(StretchBlock { line, element, ceiling, joint_mm_s: 0.0 })
 }
 

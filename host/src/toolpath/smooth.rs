@@ -9,8 +9,8 @@
 //! ones is made part of the line before it, if that can be led past their corner.
 //!
 //! **Who gets the room.** A blend takes at most nine tenths of an element, and two on the same element together:
-//! what the one does not need is the other's, else both get half, and half is all where motion starts or ends. A tenth stays, so that the rest of a short
-//! element still has a direction of its own.
+//! what the one does not need is the other's, else both get half, and half is all where motion starts or ends. A
+//! tenth stays, so that the rest of a short element still has a direction of its own.
 
 use motion_kernel::law::Limits;
 

@@ -6,9 +6,9 @@
 //! end of what is committed, where the feed rests (a = 0), and what was planned from there before is kept until there
 //! is a new plan: so there always is one, and motion could always come to rest within the window.
 //!
-//! A window of twice the stopping length loses little to a plan of the whole program (a shorter one is legal too, but
-//! keeps stopping), and one plan is made each time the
-//! window is full, so that the work is proportional to the number of blocks.
+//! A window of twice the stopping length loses little to a plan of the whole program; a shorter one is legal too, but
+//! keeps stopping. A plan is made each time the window is full: where half of it leaves each time, every block is
+//! planned about twice.
 
 use super::lookahead::{Block, PlanError};
 use super::spanning::{FeedSpan, Node, ROUNDING_MM, plan_spanning};
