@@ -54,6 +54,8 @@ impl Digest {
             ExecState::Moving => 1,
             ExecState::Dwell => 2,
             ExecState::Stopped => 3,
+            // The next bit is the fault's.
+            ExecState::Held => 8,
         };
         self.word(state | u64::from(trace.fault.is_some()) << 2 | u64::from(trace.executed.line) << 32);
     }

@@ -240,6 +240,7 @@ fn state_name<R: Real>(trace: &Trace<R, AXES>) -> &'static str {
         ExecState::Moving => "moving",
         ExecState::Dwell => "dwell",
         ExecState::Stopped => "stopped",
+        ExecState::Held => "held",
     }
 }
 

@@ -38,6 +38,8 @@ pub enum ExecState {
     Dwell,
     /// At rest until told to resume.
     Stopped,
+    /// At rest inside a stretch: held, or out of data.
+    Held,
 }
 
 /// Why the executor can't go on. Latched by the kernel.
@@ -148,6 +150,9 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     ) -> Result<(), ExecFault> {
         self.walker.start_tick();
         intake.start_tick();
+        if intake.is_change_due() {
+            self.change_over(intake);
+        }
         match self.advance(intake)? {
             Some(motion) => {
                 // In this order: where the path has run dry, motion and set-points stay those of the tick before.
@@ -162,7 +167,32 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         }
         executed.state = self.state();
         executed.stretches = self.stretches;
+        intake.publish(match &self.activity {
+            Activity::Moving(moving) => Some(moving.inside()),
+            _ => None,
+        });
         Ok(())
+    }
+
+    /// Goes over to the feed list that is asked for: between two items, or within one that the new list repeats. What
+    /// can't be followed any more is refused.
+    #[cold]
+    fn change_over(&mut self, intake: &mut Intake<'_, R, AXES>) {
+        let carried = match (&self.activity, intake.feed(), intake.feed_after_change()) {
+            (Activity::Moving(moving), Some(FeedItem::Segment(before)), Some(FeedItem::Segment(segment))) => {
+                moving.carried_over(before, segment)
+            }
+            (Activity::Moving(_), _, _) => None,
+            _ if intake.takes_over_between_items() => return intake.take_over(),
+            _ => None,
+        };
+        match carried {
+            Some(moving) => {
+                self.activity = Activity::Moving(moving);
+                intake.take_over();
+            }
+            None => intake.refuse(),
+        }
     }
 
     #[inline]
@@ -171,6 +201,7 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
             Activity::Rest => ExecState::Idle,
             Activity::Dwell { .. } => ExecState::Dwell,
             Activity::Stopped => ExecState::Stopped,
+            Activity::Between { v_mm_s, .. } if v_mm_s <= R::ZERO => ExecState::Held,
             Activity::Moving(_) | Activity::Between { .. } => ExecState::Moving,
         }
     }

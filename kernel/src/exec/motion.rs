@@ -12,7 +12,7 @@ pub(super) struct Moving {
     phase: Phase,
     /// Time that the phase still takes.
     left: Ticks,
-    /// How much of it has passed, in 2⁻⁶⁴; 0 only before it begins.
+    /// The normalised time in it, in 2⁻⁶⁴.
     fraction: u64,
 }
 
@@ -36,12 +36,7 @@ impl Moving {
         if let Some(left) = self.left.minus(time)
             && over.is_none()
         {
-            // A phase that is already under way is given whole ticks only.
-            self.fraction = if self.fraction > 0 {
-                self.fraction.wrapping_add(segment.fraction_step(self.phase))
-            } else {
-                segment.fraction_at(self.phase, time)
-            };
+            self.fraction = self.fraction.wrapping_add(segment.fraction_in(self.phase, time));
             self.left = left;
         }
         over
@@ -56,8 +51,33 @@ impl Moving {
             (Phase::Rise | Phase::Hold, _) => next(Phase::Fall),
             (Phase::Fall, _) => return false,
         };
-        (self.phase, self.left, self.fraction) = (phase, left, 0);
+        (self.phase, self.left, self.fraction) = (phase, left, segment.fraction_at_start(phase));
         left > Ticks::ZERO
+    }
+
+    /// The same place in `segment`, which repeats the beginning of `before`; `None` if that ends here already.
+    #[cold]
+    pub(super) fn carried_over<R: Real>(
+        &self,
+        before: &FeedSegment<R>,
+        segment: &FeedSegment<R>,
+    ) -> Option<Self> {
+        let elapsed = before.phase_duration(self.phase).minus(self.left)?;
+        let left = segment.phase_duration(self.phase).minus(elapsed)?;
+        let fraction = match self.phase {
+            // As long a phase in both, but for where it ends.
+            Phase::Rise => self.fraction,
+            Phase::Hold => segment.fraction_after(Phase::Hold, elapsed),
+            // What falls back can't be ended earlier.
+            Phase::Fall => return None,
+        };
+        Some(Self { start: self.start, phase: self.phase, left, fraction })
+    }
+
+    /// The phase, and the time that it still takes.
+    #[inline]
+    pub(super) fn inside(&self) -> (Phase, Ticks) {
+        (self.phase, self.left)
     }
 
     /// What follows the segment's end.

@@ -11,6 +11,8 @@
 //! sine is fixed point times fractions, good to a few position steps and length·2⁻³² (1.9 nm over 8 m)
 //! whatever the number type; the sine's part, a five-hundredth of Jp·t₁³, is a `Real`.
 
+mod turn;
+
 use core::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
@@ -19,6 +21,8 @@ use super::ramp::Ramp;
 use super::shape::Shape;
 use crate::num::{Real, Root, Unit};
 use crate::units::Position;
+
+pub use turn::TurnedRamp;
 
 /// A duration in control ticks, in steps of 2⁻³² tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -53,6 +57,18 @@ impl Ticks {
         Self(self.0.saturating_add(other.0))
     }
 
+    /// So many steps of 2⁻³² tick.
+    #[must_use]
+    pub const fn from_bits(bits: u64) -> Self {
+        Self(bits)
+    }
+
+    /// Steps of 2⁻³² tick.
+    #[must_use]
+    pub const fn to_bits(self) -> u64 {
+        self.0
+    }
+
     /// What is left of `self` after `other`, or `None` if `other` is longer.
     #[must_use]
     pub const fn minus(self, other: Self) -> Option<Self> {
@@ -63,13 +79,13 @@ impl Ticks {
     }
 }
 
-/// The parts of a segment, in order. A cruise has only a hold.
+/// The parts of a segment, in order. A cruise has only a hold, and a ramp that is turned has its turn there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
     /// 0 … t₁: acceleration builds up.
     Rise,
-    /// t₁ … t₂: constant acceleration, or cruise.
+    /// t₁ … t₂: constant acceleration, or cruise; in a turned ramp from its turn to the turn's image.
     Hold,
     /// t₂ … t_p: acceleration falls back to 0.
     Fall,
@@ -155,13 +171,15 @@ impl Clock {
         Self { duration, step }
     }
 
-    /// The normalised time `elapsed` ≤ 1 tick after the phase's start.
+    /// The part of the phase that passes in `time` ≤ 1 tick; in a phase that is no longer than that, less.
     #[inline]
-    fn at(&self, elapsed: Ticks) -> u64 {
-        if self.duration > Ticks::ONE {
-            multiply_q32(self.step, elapsed.0)
+    fn part(&self, time: Ticks, is_long: bool) -> u64 {
+        if time == Ticks::ONE {
+            self.step
+        } else if is_long {
+            multiply_q32(self.step, time.0)
         } else {
-            self.step.wrapping_mul(elapsed.0)
+            self.step.wrapping_mul(time.0)
         }
     }
 }
@@ -195,6 +213,8 @@ pub struct FeedSegment<R> {
     ramp: Ramp<R>,
     rise: Clock,
     hold: Clock,
+    /// Where in the rise it turns, counted from 1 downwards in 2⁻⁶⁴; 0 if it does not, see [`FeedSegment::turned`].
+    turns_at: u64,
     /// F₀·t₁ and −F·t₁ less Jp·t₁³/(8π²), and Jp·t₁³/12, in position steps.
     rise_bits: i64,
     fall_bits: i64,
@@ -301,6 +321,7 @@ impl<R: Real> FeedSegment<R> {
             },
             rise: Clock::new(rise_ticks),
             hold: Clock::new(hold_ticks),
+            turns_at: 0,
             rise_bits: bits("entry feed · t1 [mm]", from_mm_s * t1_s - length_scale / (8.0 * PI * PI))?,
             fall_bits: bits("exit feed · t1 [mm]", -to_mm_s * t1_s - length_scale / (8.0 * PI * PI))?,
             cube_bits: bits("jerk · t1³/12 [mm]", length_scale / 12.0)?,
@@ -349,16 +370,29 @@ impl<R: Real> FeedSegment<R> {
         self.clock(phase).duration
     }
 
-    /// Normalised time in `phase`, `elapsed` ≤ 1 tick after the phase's start, in 2⁻⁶⁴.
+    /// The normalised time with which `phase` begins, in 2⁻⁶⁴.
     #[inline]
-    pub fn fraction_at(&self, phase: Phase, elapsed: Ticks) -> u64 {
-        self.clock(phase).at(elapsed)
+    pub fn fraction_at_start(&self, phase: Phase) -> u64 {
+        match phase {
+            Phase::Rise => 0,
+            Phase::Hold | Phase::Fall => self.turns_at,
+        }
     }
 
-    /// What one tick adds to the normalised time of `phase`. Only for phases longer than a tick.
+    /// What `time` ≤ 1 tick adds to the normalised time of `phase`, in 2⁻⁶⁴; a whole tick is for phases that are
+    /// longer than it.
     #[inline]
-    pub fn fraction_step(&self, phase: Phase) -> u64 {
-        self.clock(phase).step
+    pub fn fraction_in(&self, phase: Phase, time: Ticks) -> u64 {
+        let clock = self.clock(phase);
+        clock.part(time, clock.duration > Ticks::ONE || self.turns_at != 0)
+    }
+
+    /// The normalised time `elapsed` after the start of `phase`, in 2⁻⁶⁴.
+    pub fn fraction_after(&self, phase: Phase, elapsed: Ticks) -> u64 {
+        let clock = self.clock(phase);
+        let whole = clock.step.wrapping_mul(elapsed.0 >> 32);
+        let part = Ticks(elapsed.0 & 0xFFFF_FFFF);
+        self.fraction_at_start(phase).wrapping_add(whole).wrapping_add(self.fraction_in(phase, part))
     }
 
     #[inline]
@@ -374,6 +408,9 @@ impl<R: Real> FeedSegment<R> {
     #[inline(always)]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
         if phase == Phase::Hold {
+            if self.turns_at != 0 {
+                return self.at_turn(fraction);
+            }
             let x = (fraction >> 32) as u32;
             let s = self
                 .hold_start_bits

@@ -243,6 +243,24 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         Ok(())
     }
 
+    /// For feed that goes on from here, at `feed_mm_s`, whatever was accepted before.
+    pub(crate) fn feed_from(&self, feed_length: Position, feed_mm_s: R) -> Self {
+        Self { feed_length, feed_mm_s, recent: [Ticks::ONE; SEGMENTS_PER_TICK_MAX], ..*self }
+    }
+
+    pub(crate) fn feed_mm_s(&self) -> R {
+        self.feed_mm_s
+    }
+
+    /// The end of the path of a stretch, whose feed is accepted in lists of its own.
+    pub(crate) fn end_of_path(&self, position: [Position; AXES]) -> Result<Self, Rejection> {
+        self.continuous(&position)?;
+        if self.path_length == Position::ZERO {
+            return Err(Rejection::Empty);
+        }
+        Ok(Self::new(self.rules, position))
+    }
+
     pub(crate) fn end_of_stretch(&self, position: [Position; AXES]) -> Result<Self, Rejection> {
         self.continuous(&position)?;
         if self.feed_mm_s > R::ZERO {

@@ -10,6 +10,8 @@
 //! measured the same length.
 
 mod accept;
+mod change;
+mod live;
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
@@ -23,6 +25,8 @@ use crate::units::Position;
 
 pub(crate) use accept::Acceptance;
 pub use accept::{PathRules, Rejection, SEGMENTS_PER_TICK_MAX};
+pub use change::{Change, LISTS, Progress};
+pub use live::{LiveFeeder, LiveStreams};
 
 /// An item of the path stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,6 +82,8 @@ struct Shared {
     feed_covers_path: AtomicBool,
     /// And the pieces at least as much as the feed.
     path_covers_feed: AtomicBool,
+    /// Where motion can be changed.
+    words: change::Words,
 }
 
 impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
@@ -95,6 +101,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
                 feed_entered: AtomicU32::new(0),
                 feed_covers_path: AtomicBool::new(true),
                 path_covers_feed: AtomicBool::new(true),
+                words: change::Words::new(),
             },
         }
     }
@@ -123,6 +130,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             finished,
             path_taken: path,
             feed_taken: feed,
+            lists: None,
             correction: None,
         };
         (feeder, intake)
@@ -281,6 +289,7 @@ pub struct Intake<'a, R: Real, const AXES: usize> {
     finished: u32,
     path_taken: Taken,
     feed_taken: Taken,
+    lists: Option<live::Lists<'a, R>>,
     correction: Option<Correction<'a, R, AXES>>,
 }
 
@@ -301,6 +310,9 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     pub(crate) fn start_tick(&mut self) {
         self.path_taken.before_tick = self.path_taken.so_far;
         self.feed_taken.before_tick = self.feed_taken.so_far;
+        if self.lists.is_some() {
+            self.look_for_change();
+        }
     }
 
     /// The first item of the feed stream: the one under way, or the next.
@@ -314,6 +326,9 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     pub(crate) fn drop_feed(&mut self) {
         self.feed_taken.so_far = self.feed_taken.so_far.wrapping_add(1);
         self.feed.dequeue();
+        if self.lists.is_some() {
+            self.count_done();
+        }
     }
 
     /// The first item of the path stream: the one under way, or the next.
@@ -340,6 +355,10 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     /// no more of it can be had, and the other queue was full too or covers as much path.
     #[inline]
     pub(crate) fn may_start(&self) -> bool {
+        if self.lists.is_some() {
+            // What is handed over ends at rest on the path that is there.
+            return true;
+        }
         let feed_full = || self.feed_taken.was_full(&self.shared.feed_entered);
         let path_full = || self.path_taken.was_full(&self.shared.path_entered);
         self.shared.stretches.load(Ordering::Acquire) != self.finished

@@ -10,6 +10,7 @@ mod ramp;
 mod segment;
 #[path = "../support/mod.rs"]
 mod support;
+mod turned;
 
 use motion_kernel::law::Limits;
 use motion_kernel::num::Root;

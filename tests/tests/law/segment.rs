@@ -124,8 +124,8 @@ fn walk<R: Real>(
                 continue;
             }
             let fraction = segment
-                .fraction_at(phase, ticks(first))
-                .wrapping_add(segment.fraction_step(phase).wrapping_mul(count));
+                .fraction_in(phase, ticks(first))
+                .wrapping_add(segment.fraction_in(phase, Ticks::ONE).wrapping_mul(count));
             // Durations are rounded to 2⁻³³ tick; within a tick the time is divided by the duration in 2⁻³²
             // tick; each whole tick adds a step rounded to 2⁻⁶⁴.
             let drift = (count as f64 + 2.0) / TICK / TICK * duration.to_f64();
@@ -196,7 +196,8 @@ fn steps_add_up() {
         let segment = FeedSegment::<f64>::ramp(&ramp, length, 5e-4).expect("a segment");
         for phase in [Phase::Rise, Phase::Hold, Phase::Fall] {
             let duration = segment.phase_duration(phase);
-            let (first, step) = (segment.fraction_at(phase, ticks(0.5)), segment.fraction_step(phase));
+            let (first, step) =
+                (segment.fraction_in(phase, ticks(0.5)), segment.fraction_in(phase, Ticks::ONE));
             let (mut elapsed, mut fraction, mut before) = (0.5, first, Position::ZERO);
             while ticks(elapsed) < duration {
                 let (found, exact) = (fraction as f64 / TICK / TICK, elapsed / duration.to_f64());
@@ -251,7 +252,8 @@ fn long_and_slow() {
     let segment = FeedSegment::<f32>::cruise(0.01, length, 5e-4).expect("a segment");
     assert_eq!(segment.phase_duration(Phase::Rise), Ticks::ZERO);
     assert_eq!(segment.duration().to_f64(), 1.6e9);
-    let (first, step) = (segment.fraction_at(Phase::Hold, ticks(0.25)), segment.fraction_step(Phase::Hold));
+    let (first, step) =
+        (segment.fraction_in(Phase::Hold, ticks(0.25)), segment.fraction_in(Phase::Hold, Ticks::ONE));
     let mut worst = 0.0_f64;
     for part in 0..=1000_u32 {
         let count = (1.6e9 - 1.0) as u64 / 1000 * u64::from(part);

@@ -1,0 +1,154 @@
+//! A ramp that is given up while its acceleration still rises: the jerk goes back the way it came.
+//!
+//! Consumes a ramp under way and where in its rise it is to turn; produces a [`FeedSegment`] whose rise is that ramp's,
+//! bit for bit, up to there. With x = t/t₁, and a turn at x₁ ≤ 1/2, the jerk Jp·sin²πx runs up to x₁, back to 0, and the
+//! whole mirrored: the change of feed is symmetric about its middle like any ramp's, 4·x₁·t₁ long, and its limits are the
+//! ramp's, because jerk and snap only take values that they have in it. Snap steps where it turns.
+//!
+//! Between the turns lies one expression about the middle, where acceleration is greatest: with u the time from there in
+//! parts of t₁, V, A and S the feed, acceleration and position in the middle,
+//!
+//! ```text
+//! s = S + V·u·t₁ + A·(u·t₁)²/2 − Jp·t₁³·(x³/12 − x/(8π²) + sin 2πx/(16π³)),  x = |u|
+//! ```
+//!
+//! and its derivatives. Construction in the background, evaluation in the tick.
+
+use core::f64::consts::PI;
+
+use super::{Clock, FeedSegment, PathMotion, SegmentError, Ticks, portion, times};
+use crate::law::ramp::Ramp;
+use crate::law::shape::Shape;
+use crate::num::{Real, Unit};
+use crate::units::Position;
+
+/// A ramp that turns at `turn_s` of its rise, which is at most half of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TurnedRamp {
+    /// As it was begun.
+    pub ramp: Ramp<f64>,
+    /// When it turns \[s\].
+    pub turn_s: f64,
+}
+
+impl TurnedRamp {
+    /// The greatest acceleration, in the middle, with the sign of the change of feed \[mm/s²\].
+    #[must_use]
+    pub fn peak_accel_mm_s2(&self) -> f64 {
+        let shape = Shape::at(self.turn_s / self.ramp.t1_s);
+        2.0 * self.ramp.signed_jerk_mm_s3() * self.ramp.t1_s * shape.accel
+    }
+
+    /// The feed at its end \[mm/s\].
+    #[must_use]
+    pub fn to_mm_s(&self) -> f64 {
+        self.ramp.from_mm_s + 2.0 * self.turn_s * self.peak_accel_mm_s2()
+    }
+
+    /// Its duration \[s\].
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        4.0 * self.turn_s
+    }
+
+    /// Its length \[mm\].
+    #[must_use]
+    pub fn length_mm(&self) -> f64 {
+        0.5 * (self.ramp.from_mm_s + self.to_mm_s()) * self.duration_s()
+    }
+}
+
+/// Where a ramp turns may be off by half a step of time \[ticks\].
+const ROUNDING_TICKS: f64 = 1.0 / 4_294_967_296.0;
+
+impl<R: Real> FeedSegment<R> {
+    /// A ramp that turns `turn_at` after its start, over `length` of path, which must be its own to 10⁻⁸ mm.
+    ///
+    /// # Errors
+    /// The ramp does not turn in the first half of its rise, or rises in less than a tick; a figure is not finite or too
+    /// large; the lengths differ.
+    pub fn turned(
+        ramp: &Ramp<f64>,
+        turn_at: Ticks,
+        length: Position,
+        tick_s: f64,
+    ) -> Result<Self, SegmentError> {
+        let turned = TurnedRamp { ramp: *ramp, turn_s: turn_at.to_f64() * tick_s };
+        let TurnedRamp { turn_s, .. } = turned;
+        let rise_ticks = ramp.t1_s / tick_s;
+        if !(turn_s > 0.0 && turn_at.to_f64() <= 0.5 * rise_ticks + ROUNDING_TICKS && rise_ticks > 1.0) {
+            return Err(SegmentError::OutOfRange { quantity: "turn in the rise [s]", value: turn_s });
+        }
+        let (path_mm, ramp_mm) = (length.to_mm(), turned.length_mm());
+        if !(libm::fabs(ramp_mm - path_mm) <= super::LENGTH_TOLERANCE_MM) {
+            return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
+        }
+        // What is the same as in the whole ramp is made the same way: its rise must be equal to the bit.
+        let whole_mm = Position::from_mm(ramp.length_mm())
+            .ok_or(SegmentError::OutOfRange { quantity: "length [mm]", value: ramp.length_mm() })?;
+        let mut segment = Self::new(ramp, whole_mm, tick_s)?;
+        let to_mm_s = turned.to_mm_s();
+        let bits = |quantity, mm: f64| {
+            Position::from_mm(mm)
+                .map(Position::to_bits)
+                .ok_or(SegmentError::OutOfRange { quantity, value: mm })
+        };
+        let real = |quantity, value: f64| {
+            R::checked_from_f64(value).ok_or(SegmentError::OutOfRange { quantity, value })
+        };
+        let t1_s = ramp.t1_s;
+        let scale_mm = ramp.signed_jerk_mm_s3() * t1_s * t1_s * t1_s;
+        let peak = turned.peak_accel_mm_s2();
+        let middle_mm_s = ramp.from_mm_s + peak * turn_s;
+        let turn_mm = ramp.from_mm_s * turn_s + scale_mm * Shape::at(turn_s / t1_s).length;
+        let middle_mm = 2.0 * turn_mm + 0.5 * peak * turn_s * turn_s;
+        let step = segment.rise.step;
+        // x₁ as the tick counts it: so many steps.
+        let turned_part = (u128::from(step) * u128::from(turn_at.0)) >> 32;
+        segment.turns_at = (turned_part as u64).wrapping_neg();
+        segment.rise.duration = turn_at;
+        segment.hold = Clock { duration: turn_at.plus(turn_at), step };
+        segment.length = length;
+        segment.ramp.to_mm_s = real("exit feed [mm/s]", to_mm_s)?;
+        segment.fall_bits = bits("exit feed · t1 [mm]", -to_mm_s * t1_s - scale_mm / (8.0 * PI * PI))?;
+        segment.hold_start_bits = bits("length of the rise [mm]", middle_mm)?;
+        segment.hold_linear_bits = bits("feed · t1 [mm]", middle_mm_s * t1_s)?;
+        segment.hold_square_bits = bits("acceleration · t1² [mm]", 0.5 * peak * t1_s * t1_s)?;
+        segment.hold_v_mm_s = real("feed in the middle [mm/s]", middle_mm_s)?;
+        segment.hold_a_mm_s2 = real("acceleration in the middle [mm/s²]", peak)?;
+        segment.hold_gain_mm_s = real("acceleration · t1 [mm/s]", peak * t1_s)?;
+        Ok(segment)
+    }
+
+    /// Between the turns; the fraction counts from the middle, in parts of t₁. In the tick.
+    pub(super) fn at_turn(&self, fraction: u64) -> PathMotion<R> {
+        /// 12/(8π²), in 2⁻³².
+        const LINEAR: u32 = (12.0 / (8.0 * PI * PI) * 4_294_967_296.0) as u32;
+        let before = fraction.cast_signed() < 0;
+        let fraction = if before { fraction.wrapping_neg() } else { fraction };
+        let unit = R::Unit::from_fraction(fraction);
+        let shape = Shape::at(unit);
+        let x = (fraction >> 32) as u32;
+        let square = times(x, x);
+        let bent = portion(self.cube_bits, times(square, x))
+            .wrapping_sub(portion(portion(self.cube_bits, LINEAR), x));
+        let bent = Position::from_bits(bent) + Position::from_offset(self.sine_mm.scaled(shape.snap));
+        let even = portion(self.hold_linear_bits, x);
+        let gained = self.hold_gain_mm_s.scaled(unit) - self.speed_mm_s.scaled(shape.speed);
+        let jerk = self.jerk_mm_s3.scaled(shape.jerk);
+        let (even, v_mm_s, j_mm_s3) = if before {
+            (even.wrapping_neg(), self.hold_v_mm_s - gained, jerk)
+        } else {
+            (even, self.hold_v_mm_s + gained, -jerk)
+        };
+        let middle =
+            self.hold_start_bits.wrapping_add(even).wrapping_add(portion(self.hold_square_bits, square));
+        PathMotion {
+            s: (Position::from_bits(middle) - bent).min(self.length),
+            v_mm_s,
+            a_mm_s2: self.hold_a_mm_s2 - self.accel_mm_s2.scaled(shape.accel),
+            j_mm_s3,
+            snap_mm_s4: -self.snap_mm_s4.scaled(shape.snap),
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! From one feed list to another: what background and tick tell each other.
+//!
+//! A *feed list* holds a complete motion: it ends at rest. Motion is changed by making another list ready and saying
+//! where in the list under way it takes over, in one word ([`Change`]): after so many items of it, or inside the next
+//! one, whose beginning the other list's first segment then repeats. The tick follows that word exactly, whenever it
+//! finds it, or refuses it if it has passed the place; until then it is on a motion that ends at rest. So the background
+//! may take as long as it likes.
+//!
+//! The other way go a count of ticks and where the executor is ([`Progress`]).
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use crate::law::{Phase, Ticks};
+
+/// How many feed lists there are: one under way, one to follow, one for what is more urgent.
+pub const LISTS: u8 = 3;
+
+/// Where a list takes over from the one under way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Change {
+    /// The list under way, below [`LISTS`].
+    pub from: u8,
+    /// The list that takes over.
+    pub to: u8,
+    /// After so many items of `from`.
+    pub after: u32,
+    /// Within the item that follows them: the first segment of `to` is that item with another end.
+    pub within: bool,
+}
+
+impl Change {
+    const AFTER_BITS: u32 = 27;
+    /// No change is asked for.
+    const NONE: u32 = u32::MAX;
+
+    fn to_word(self) -> u32 {
+        u32::from(self.from) << 30
+            | u32::from(self.to) << 28
+            | u32::from(self.within) << Self::AFTER_BITS
+            | self.after & ((1 << Self::AFTER_BITS) - 1)
+    }
+
+    fn from_word(word: u32) -> Option<Self> {
+        let (from, to) = ((word >> 30) as u8, (word >> 28 & 3) as u8);
+        let within = word >> Self::AFTER_BITS & 1 == 1;
+        (from < LISTS && to < LISTS).then_some(Self {
+            from,
+            to,
+            after: word & ((1 << Self::AFTER_BITS) - 1),
+            within,
+        })
+    }
+}
+
+/// Where the executor was at the end of a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Ticks so far.
+    pub tick: u32,
+    /// The list under way.
+    pub list: u8,
+    /// Items of it that are done.
+    pub done: u32,
+    /// Inside a segment: its phase, and how long that still takes.
+    pub inside: Option<(Phase, Ticks)>,
+}
+
+/// The words between the two.
+#[derive(Debug)]
+pub(super) struct Words {
+    change: AtomicU32,
+    /// A change that came too late.
+    refused: AtomicU32,
+    /// A bit for each list that the background fills or has filled; the tick empties the others.
+    claimed: AtomicU32,
+    tick: AtomicU32,
+    /// List, phase and count of items done.
+    place: AtomicU32,
+    left_high: AtomicU32,
+    left_low: AtomicU32,
+}
+
+/// Looks at [`Words`] that a tick may interrupt; the second one is not interrupted, a tick apart.
+const LOOKS: usize = 4;
+
+impl Words {
+    pub(super) const fn new() -> Self {
+        Self {
+            change: AtomicU32::new(Change::NONE),
+            refused: AtomicU32::new(Change::NONE),
+            claimed: AtomicU32::new(1),
+            tick: AtomicU32::new(0),
+            place: AtomicU32::new(0),
+            left_high: AtomicU32::new(0),
+            left_low: AtomicU32::new(0),
+        }
+    }
+
+    /// As after [`Words::new`]. Neither end is in use.
+    pub(super) fn reset(&self) {
+        for word in [&self.change, &self.refused] {
+            word.store(Change::NONE, Ordering::Relaxed);
+        }
+        self.claimed.store(1, Ordering::Relaxed);
+        for word in [&self.tick, &self.place, &self.left_high, &self.left_low] {
+            word.store(0, Ordering::Relaxed);
+        }
+    }
+
+    /// The background asks for a change, in place of one that has not come about.
+    pub(super) fn ask(&self, change: Option<Change>) {
+        self.change.store(change.map_or(Change::NONE, Change::to_word), Ordering::Release);
+    }
+
+    /// Whether the change that was asked for last came too late.
+    pub(super) fn is_refused(&self) -> bool {
+        let asked = self.change.load(Ordering::Relaxed);
+        asked != Change::NONE && self.refused.load(Ordering::Acquire) == asked
+    }
+
+    pub(super) fn claim(&self, list: u8, claimed: bool) {
+        let (bits, bit) = (self.claimed.load(Ordering::Relaxed), 1 << list);
+        self.claimed.store(if claimed { bits | bit } else { bits & !bit }, Ordering::Release);
+    }
+
+    /// Where the executor is, as far as the background can know.
+    pub(super) fn progress(&self) -> Progress {
+        let mut progress = self.look();
+        for _ in 0..LOOKS {
+            if progress.tick == self.tick.load(Ordering::Acquire) {
+                break;
+            }
+            progress = self.look();
+        }
+        progress
+    }
+
+    fn look(&self) -> Progress {
+        let tick = self.tick.load(Ordering::Acquire);
+        let place = self.place.load(Ordering::Acquire);
+        let (high, low) = (self.left_high.load(Ordering::Acquire), self.left_low.load(Ordering::Acquire));
+        let left = Ticks::from_bits(u64::from(high) << 32 | u64::from(low));
+        let phase = match place >> 28 & 3 {
+            1 => Some(Phase::Rise),
+            2 => Some(Phase::Hold),
+            3 => Some(Phase::Fall),
+            _ => None,
+        };
+        Progress {
+            tick,
+            list: (place >> 30) as u8,
+            done: place & ((1 << 28) - 1),
+            inside: phase.map(|phase| (phase, left)),
+        }
+    }
+
+    /// The tick says where it is.
+    #[inline]
+    pub(super) fn publish(&self, list: u8, done: u32, inside: Option<(Phase, Ticks)>) {
+        let (phase, left) = match inside {
+            None => (0, Ticks::ZERO),
+            Some((Phase::Rise, left)) => (1, left),
+            Some((Phase::Hold, left)) => (2, left),
+            Some((Phase::Fall, left)) => (3, left),
+        };
+        let place = u32::from(list) << 30 | phase << 28 | done & ((1 << 28) - 1);
+        self.place.store(place, Ordering::Relaxed);
+        let bits = left.to_bits();
+        self.left_high.store((bits >> 32) as u32, Ordering::Relaxed);
+        self.left_low.store(bits as u32, Ordering::Relaxed);
+        self.tick.store(self.tick.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
+    }
+
+    #[inline]
+    pub(super) fn asked(&self) -> Option<Change> {
+        Change::from_word(self.change.load(Ordering::Acquire))
+    }
+
+    #[inline]
+    pub(super) fn is_claimed(&self, list: u8) -> bool {
+        self.claimed.load(Ordering::Acquire) >> list & 1 == 1
+    }
+
+    pub(super) fn refuse(&self, change: Change) {
+        self.refused.store(change.to_word(), Ordering::Release);
+    }
+}

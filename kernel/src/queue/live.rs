@@ -1,0 +1,319 @@
+//! Streams whose feed can be changed while it is under way: one path, three feed lists.
+//!
+//! Consumes pieces, and lists of feed items that each end at rest; hands them to the executor. What a list may hold is
+//! checked as in [`Feeder`](super::Feeder); that it ends at rest, on path that is queued, is what who fills it answers for
+//! (`kernel/live`).
+
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use super::change::{Change, LISTS, Progress, Words};
+use super::{
+    FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept, count, enter,
+};
+use crate::law::{FeedSegment, Phase, Ticks};
+use crate::num::Real;
+use crate::path::Piece;
+use crate::units::Position;
+
+/// The most items of a list that is not needed any more that go in one tick. A list is empty a tick after it was given
+/// up if it has no more places.
+const DROPPED_PER_TICK: usize = 16;
+
+/// Storage of a path and three feed lists: `PIECES` − 1 pieces, `SEGMENTS` − 1 items a list.
+#[derive(Debug)]
+pub struct LiveStreams<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> {
+    first: Streams<R, AXES, PIECES, SEGMENTS>,
+    second: Queue<FeedItem<R>, SEGMENTS>,
+    third: Queue<FeedItem<R>, SEGMENTS>,
+}
+
+impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
+    LiveStreams<R, AXES, PIECES, SEGMENTS>
+{
+    /// Empty streams.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { first: Streams::new(), second: Queue::new(), third: Queue::new() }
+    }
+
+    /// The two ends, for a machine that stands at `position`; the first list is under way, and empty. What was queued
+    /// before is dropped.
+    pub fn split(
+        &mut self,
+        rules: PathRules,
+        position: [Position; AXES],
+    ) -> (LiveFeeder<'_, R, AXES>, Intake<'_, R, AXES>) {
+        while self.second.dequeue().is_some() {}
+        while self.third.dequeue().is_some() {}
+        let Streams { path, feed, shared } = &mut self.first;
+        while path.dequeue().is_some() {}
+        while feed.dequeue().is_some() {}
+        let shared: &Shared = shared;
+        shared.words.reset();
+        let (path_in, path_out) = path.split();
+        let (first_in, first_out) = feed.split();
+        let (second_in, second_out) = self.second.split();
+        let (third_in, third_out) = self.third.split();
+        let acceptance = accept::Acceptance::new(rules, position);
+        let feeder = LiveFeeder {
+            path: path_in,
+            lists: [first_in, second_in, third_in],
+            shared,
+            path_accept: acceptance,
+            feed_accept: acceptance,
+        };
+        let intake = Intake {
+            path: path_out,
+            feed: first_out,
+            shared,
+            finished: 0,
+            path_taken: Taken::new(&shared.path_entered, PIECES - 1),
+            feed_taken: Taken::new(&shared.feed_entered, SEGMENTS - 1),
+            lists: Some(Lists {
+                current: 0,
+                others: [(1, second_out), (2, third_out)],
+                done: 0,
+                change: None,
+                refused: None,
+            }),
+            correction: None,
+        };
+        (feeder, intake)
+    }
+}
+
+impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> Default
+    for LiveStreams<R, AXES, PIECES, SEGMENTS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The background's end.
+pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
+    path: Producer<'a, PathItem<R, AXES>>,
+    lists: [Producer<'a, FeedItem<R>>; LISTS as usize],
+    shared: &'a Shared,
+    path_accept: accept::Acceptance<R, AXES>,
+    /// Of the list being filled.
+    feed_accept: accept::Acceptance<R, AXES>,
+}
+
+impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
+    /// Enters a piece of path.
+    ///
+    /// # Errors
+    /// The queue is full, or the piece does not continue its predecessor.
+    pub fn piece(&mut self, piece: Piece<R, AXES>) -> Result<(), Refused<Piece<R, AXES>>> {
+        let next = self.path_accept.piece(&piece).map_err(Refused::Invalid)?;
+        enter(&mut self.path, PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
+        self.path_accept = next;
+        count(&self.shared.path_entered);
+        Ok(())
+    }
+
+    /// Ends the path of a stretch exactly at `position`.
+    ///
+    /// # Errors
+    /// The queue is full, or the path does not end there.
+    pub fn end_of_path(&mut self, position: [Position; AXES]) -> Result<(), Refused<[Position; AXES]>> {
+        let next = self.path_accept.end_of_path(position).map_err(Refused::Invalid)?;
+        enter(&mut self.path, PathItem::EndOfStretch(position)).map_err(|_| Refused::Full(position))?;
+        self.path_accept = next;
+        count(&self.shared.path_entered);
+        Ok(())
+    }
+
+    /// Where the executor is.
+    #[must_use]
+    pub fn progress(&self) -> Progress {
+        self.shared.words.progress()
+    }
+
+    /// A list that is empty and not under way nor asked for, claimed for what goes on from path position `start` at
+    /// `feed_mm_s`; `None` if there is none now.
+    pub fn begin(&mut self, start: Position, feed_mm_s: R) -> Option<u8> {
+        let words: &Words = &self.shared.words;
+        let free = (0..LISTS)
+            .zip(&self.lists)
+            .find(|(list, queue)| !words.is_claimed(*list) && queue.is_empty())
+            .map(|(list, _)| list)?;
+        words.claim(free, true);
+        self.feed_accept = self.path_accept.feed_from(start, feed_mm_s);
+        Some(free)
+    }
+
+    /// Appends a segment to a list that was begun.
+    ///
+    /// # Errors
+    /// The list is full, or the segment does not continue it or exceeds a limit.
+    pub fn segment(&mut self, list: u8, segment: FeedSegment<R>) -> Result<(), Refused<FeedSegment<R>>> {
+        let next = self.feed_accept.segment(&segment).map_err(Refused::Invalid)?;
+        self.append(list, FeedItem::Segment(segment)).map_err(|_| Refused::Full(segment))?;
+        self.feed_accept = next;
+        Ok(())
+    }
+
+    /// Appends the end of the stretch. Its path is complete in the queue.
+    ///
+    /// # Errors
+    /// The list is full, or the feed is not 0.
+    pub fn end_of_feed(&mut self, list: u8) -> Result<(), Refused<()>> {
+        let feed_mm_s = self.feed_accept.feed_mm_s();
+        if feed_mm_s > R::ZERO {
+            return Err(Refused::Invalid(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() }));
+        }
+        self.append(list, FeedItem::EndOfStretch).map_err(|_| Refused::Full(()))
+    }
+
+    /// Appends a rest, between stretches.
+    ///
+    /// # Errors
+    /// The list is full.
+    pub fn dwell(&mut self, list: u8, duration: Ticks) -> Result<(), Refused<Ticks>> {
+        self.append(list, FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))
+    }
+
+    /// Appends a rest until told to resume, between stretches.
+    ///
+    /// # Errors
+    /// The list is full.
+    pub fn program_stop(&mut self, list: u8) -> Result<(), Refused<()>> {
+        self.append(list, FeedItem::ProgramStop).map_err(|_| Refused::Full(()))
+    }
+
+    fn append(&mut self, list: u8, item: FeedItem<R>) -> Result<(), FeedItem<R>> {
+        match self.lists.get_mut(usize::from(list)) {
+            Some(queue) => enter(queue, item),
+            None => Err(item),
+        }
+    }
+
+    /// How many more items a list takes.
+    #[must_use]
+    pub fn room(&self, list: u8) -> usize {
+        self.lists.get(usize::from(list)).map_or(0, |queue| queue.capacity().saturating_sub(queue.len()))
+    }
+
+    /// Asks for a change to a list that is complete, in place of one that was asked for before.
+    pub fn change(&mut self, change: Change) {
+        self.shared.words.ask(Some(change));
+    }
+
+    /// Takes back what was asked for. The tick may have followed it already.
+    pub fn no_change(&mut self) {
+        self.shared.words.ask(None);
+    }
+
+    /// Whether the change asked for came too late.
+    #[must_use]
+    pub fn is_refused(&self) -> bool {
+        self.shared.words.is_refused()
+    }
+
+    /// Gives up a list: the tick empties it.
+    pub fn give_up(&mut self, list: u8) {
+        self.shared.words.claim(list, false);
+    }
+}
+
+/// The tick's end of the lists; the one under way is the intake's feed.
+pub(super) struct Lists<'a, R: Real> {
+    current: u8,
+    others: [(u8, Consumer<'a, FeedItem<R>>); LISTS as usize - 1],
+    /// Items of the current list that are done.
+    done: u32,
+    /// What is asked for, as of the tick's start.
+    change: Option<Change>,
+    /// What came too late.
+    refused: Option<Change>,
+}
+
+impl<R: Real> Lists<'_, R> {
+    /// Whether the change is due where no segment is under way.
+    #[inline]
+    fn is_due(&self) -> bool {
+        self.change.is_some_and(|change| change.after == self.done)
+    }
+}
+
+impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
+    /// What the background asks for now; what it gave up goes.
+    pub(super) fn look_for_change(&mut self) {
+        let Some(lists) = &mut self.lists else { return };
+        let words = &self.shared.words;
+        for (list, queue) in &mut lists.others {
+            if !words.is_claimed(*list) {
+                for _ in 0..DROPPED_PER_TICK {
+                    if queue.dequeue().is_none() {
+                        break;
+                    }
+                }
+            }
+        }
+        lists.change =
+            words.asked().filter(|change| change.from == lists.current && lists.refused != Some(*change));
+    }
+
+    #[inline]
+    pub(super) fn count_done(&mut self) {
+        let Some(lists) = &mut self.lists else { return };
+        lists.done = lists.done.wrapping_add(1);
+        if lists.is_due() && lists.change.is_some_and(|change| !change.within) {
+            self.take_over();
+        }
+    }
+
+    /// A change that is asked for inside the item that is under way, or has been passed, or is due with nothing under
+    /// way.
+    #[inline]
+    pub(crate) fn is_change_due(&self) -> bool {
+        self.lists.as_ref().is_some_and(|lists| lists.change.is_some_and(|change| change.after <= lists.done))
+    }
+
+    /// The first item of the list that is asked for, if the place where it takes over lies within the item under way.
+    pub(crate) fn feed_after_change(&self) -> Option<&FeedItem<R>> {
+        let lists = self.lists.as_ref()?;
+        let change = lists.change.filter(|change| change.within && change.after == lists.done)?;
+        lists.others.iter().find(|(list, _)| *list == change.to)?.1.peek()
+    }
+
+    /// Whether the change that is due takes over where no segment is under way.
+    pub(crate) fn takes_over_between_items(&self) -> bool {
+        self.lists.as_ref().is_some_and(Lists::is_due)
+    }
+
+    /// Follows the change.
+    #[cold]
+    pub(crate) fn take_over(&mut self) {
+        let Some(lists) = &mut self.lists else { return };
+        let Some(change) = lists.change.take() else { return };
+        for (list, queue) in &mut lists.others {
+            if *list == change.to {
+                core::mem::swap(list, &mut lists.current);
+                core::mem::swap(queue, &mut self.feed);
+                lists.done = 0;
+                return;
+            }
+        }
+    }
+
+    /// The change came too late.
+    #[cold]
+    pub(crate) fn refuse(&mut self) {
+        let Some(lists) = &mut self.lists else { return };
+        if let Some(change) = lists.change.take() {
+            lists.refused = Some(change);
+            self.shared.words.refuse(change);
+        }
+    }
+
+    /// Where the executor is at the end of a tick.
+    #[inline]
+    pub(crate) fn publish(&self, inside: Option<(Phase, Ticks)>) {
+        if let Some(lists) = &self.lists {
+            self.shared.words.publish(lists.current, lists.done, inside);
+        }
+    }
+}
