@@ -88,6 +88,7 @@ pub mod law;
 pub mod path;
 pub mod queue;
 pub mod program;
+pub mod live;
 pub mod exec;
 pub mod axis;
 pub mod hal;

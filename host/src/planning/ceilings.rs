@@ -8,7 +8,7 @@
 //! that share leaves something of the limits for changing the feed on it.
 
 use motion_kernel::law::reach;
-use motion_kernel::plan::{BLEND_FEED_SHARE, Ceiling, Joint, MachineLimits, joint};
+use motion_kernel::plan::{BLEND_FEED_SHARE, Ceiling, Joint, MachineLimits, Reason, joint};
 
 use super::error::Problem;
 use super::stretch::StretchBlock;
@@ -34,7 +34,8 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> Result<Vec<StretchBlo
         .collect();
     for index in crowded {
         let share = machine.path.curve_feed_share;
-        blocks[index].ceiling = block(&moves[index], &bends[index], share, machine)?.ceiling;
+        let StretchBlock { ceiling, greatest, .. } = block(&moves[index], &bends[index], share, machine)?;
+        (blocks[index].ceiling, blocks[index].greatest) = (ceiling, greatest);
     }
     Ok(blocks)
 }
@@ -48,9 +49,12 @@ fn block(
     let Move { line, element, feed_mm_s, .. } = *step;
     let limits = MachineLimits { curve_feed_share, ..machine.limits() };
     let Greatest { bend, tangent, curved } = greatest;
-    let ceiling =
-        Ceiling::new(&limits, feed_mm_s, tangent, curved, bend).map_err(|error| (line, error.into()))?;
-    Ok(StretchBlock { line, element, ceiling, joint_mm_s: 0.0 })
+    let at = |feed_mm_s: f64| {
+        Ceiling::new(&limits, feed_mm_s, tangent, curved, bend).map_err(|error| (line, error.into()))
+    };
+    let ceiling = at(feed_mm_s)?;
+    let greatest = if ceiling.reason == Reason::Programmed { at(f64::INFINITY)? } else { ceiling };
+    Ok(StretchBlock { line, element, ceiling, greatest, feed_mm_s, joint_mm_s: 0.0 })
 }
 
 fn is_blend(element: &Element) -> bool {

@@ -5,9 +5,11 @@
 
 use core::convert::Infallible;
 
+use motion_kernel::exec::PIECES_PER_TICK_MAX;
 use motion_kernel::law::{FeedSegment, Ticks};
 use motion_kernel::num::Real;
-use motion_kernel::program::{Item, write};
+use motion_kernel::plan::Ceiling;
+use motion_kernel::program::{Allowed, Item, PathBlock, write};
 use motion_kernel::units::Position;
 
 use super::density::{PiecePace, SegmentPace};
@@ -16,7 +18,7 @@ use super::lookahead::PlannedSegment;
 use super::stretch::Stretch;
 use super::{Item as PlanItem, Plan};
 use crate::machine::Machine;
-use crate::toolpath::{Placed, compile, exact};
+use crate::toolpath::{Placed, compile, exact, on_path};
 
 /// What the two streams are fed with.
 #[derive(Clone, Debug)]
@@ -100,28 +102,83 @@ fn stretch_items<R: Real>(
         segment_pace.next(segment.duration()).map_err(at_line)?;
         feed.push(Placed { length, item: Item::Feed { ramp, length } });
     }
-    in_order_of_start(&pieces, &feed, items);
+    let blocks = path_blocks(stretch, &densest_mm_s(&pieces, tick_s))?;
+    in_order_of_start(&blocks, &pieces, &feed, items);
     let last_line = stretch.blocks.last().map_or(0, |block| block.line);
     let end = exact(end).map_err(|error| (last_line, error.into()))?;
     items.push(Item::EndOfStretch(end));
     Ok(())
 }
 
-/// Both streams as one, in the order of the path positions where the items start.
-fn in_order_of_start(pieces: &[Placed], feed: &[Placed], items: &mut Vec<Item<3>>) {
-    let (mut feed, mut feed_start) = (feed.iter(), Position::ZERO);
-    let mut next_feed = feed.next();
-    let mut piece_start = Position::ZERO;
+/// For every piece where it starts, and the greatest feed \[mm/s\] at which no more pieces end in a tick around it than
+/// the executor's bound.
+fn densest_mm_s(pieces: &[Placed], tick_s: f64) -> Vec<(Position, f64)> {
+    let mut starts = Vec::with_capacity(pieces.len() + 1);
+    let mut start = Position::ZERO;
     for piece in pieces {
-        while let Some(segment) = next_feed
-            && feed_start < piece_start
-        {
-            items.push(segment.item);
-            feed_start = feed_start + segment.length;
-            next_feed = feed.next();
-        }
-        items.push(piece.item);
-        piece_start = piece_start + piece.length;
+        starts.push(start);
+        start = start + piece.length;
     }
-    items.extend(next_feed.into_iter().chain(feed).map(|segment| segment.item));
+    starts.push(start);
+    let mut densest: Vec<(Position, f64)> =
+        starts[..pieces.len()].iter().map(|&start| (start, f64::INFINITY)).collect();
+    for (first, ends) in starts.windows(PIECES_PER_TICK_MAX + 1).enumerate() {
+        let feed_mm_s = (ends[PIECES_PER_TICK_MAX] - ends[0]).to_mm() / tick_s;
+        for (_, most) in &mut densest[first..first + PIECES_PER_TICK_MAX] {
+            *most = most.min(feed_mm_s);
+        }
+    }
+    densest
+}
+
+/// What holds the feed, along the path; neighbours that are held alike are one.
+fn path_blocks(stretch: &Stretch, densest_mm_s: &[(Position, f64)]) -> Result<Vec<Placed>, (u32, Problem)> {
+    let allowed = |ceiling: &Ceiling<f64>, most_mm_s: f64| Allowed {
+        cap_mm_s: ceiling.feed_mm_s.min(most_mm_s),
+        limits: ceiling.law.limits(),
+    };
+    let mut blocks: Vec<PathBlock> = Vec::new();
+    let mut start = Position::ZERO;
+    for (block, &end_mm) in stretch.blocks.iter().zip(stretch.ends_mm()) {
+        let end = on_path(end_mm).map_err(|error| (block.line, error.into()))?;
+        let within = densest_mm_s.partition_point(|&(at, _)| at < start)
+            ..densest_mm_s.partition_point(|&(at, _)| at < end);
+        // At least 0: a piece that begins before the block reaches into it.
+        let within = within.start.saturating_sub(1)..within.end;
+        let most_mm_s = densest_mm_s[within].iter().map(|&(_, feed)| feed).fold(f64::INFINITY, f64::min);
+        let next = PathBlock {
+            length: end - start,
+            feed_mm_s: block.feed_mm_s,
+            programmed: allowed(&block.ceiling, most_mm_s),
+            greatest: allowed(&block.greatest, most_mm_s),
+            joint_mm_s: block.joint_mm_s,
+        };
+        start = end;
+        match blocks.last_mut() {
+            Some(last)
+                if last.joint_mm_s >= last.greatest.cap_mm_s
+                    && PathBlock { length: next.length, joint_mm_s: next.joint_mm_s, ..*last } == next =>
+            {
+                last.length = last.length + next.length;
+                last.joint_mm_s = next.joint_mm_s;
+            }
+            _ => blocks.push(next),
+        }
+    }
+    Ok(blocks.into_iter().map(|block| Placed { length: block.length, item: Item::Block(block) }).collect())
+}
+
+/// Blocks and both streams as one, in the order of the path positions where the items start.
+fn in_order_of_start(blocks: &[Placed], pieces: &[Placed], feed: &[Placed], items: &mut Vec<Item<3>>) {
+    let mut ordered: Vec<(Position, Item<3>)> = Vec::with_capacity(blocks.len() + pieces.len() + feed.len());
+    for kind in [blocks, pieces, feed] {
+        let mut start = Position::ZERO;
+        for placed in kind {
+            ordered.push((start, placed.item));
+            start = start + placed.length;
+        }
+    }
+    // Stable: where all three start, a block comes before its piece, and that before its feed.
+    ordered.sort_by_key(|&(start, _)| start);
+    items.extend(ordered.into_iter().map(|(_, item)| item));
 }

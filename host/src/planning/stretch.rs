@@ -18,6 +18,10 @@ pub struct StretchBlock {
     pub element: Element,
     /// Ceiling with its reason, and the law for its ramps.
     pub ceiling: Ceiling<f64>,
+    /// The same whatever the program's feed.
+    pub greatest: Ceiling<f64>,
+    /// The program's feed \[mm/s\]; infinite for a rapid.
+    pub feed_mm_s: f64,
     /// Greatest feed through the joint at its end \[mm/s\].
     pub joint_mm_s: f64,
 }
@@ -63,6 +67,11 @@ impl Stretch {
         let planned = lookahead(&plan_blocks, &ends_mm, 0.0, 0.0, mode, tick_s).map_err(at_line)?;
         let profile = FeedProfile::new(&planned);
         Ok(Self { start_mm, blocks, ends_mm, planned, profile })
+    }
+
+    /// Path position of every block's end, from the stretch's start \[mm\].
+    pub(super) fn ends_mm(&self) -> &[f64] {
+        &self.ends_mm
     }
 
     /// Its length \[mm\].

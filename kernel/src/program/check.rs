@@ -86,6 +86,7 @@ fn after<R: Real, const AXES: usize, E>(
         Ready::EndOfStretch(end) => accept.end_of_stretch(*end),
         Ready::Dwell(duration) => accept.dwell(*duration),
         Ready::Stop => accept.at_rest().map(|()| *accept),
+        Ready::Block => Ok(*accept),
     }
     .map_err(SupplyError::Rejected)
 }

@@ -19,7 +19,7 @@ pub use supply::{Supply, SupplyError};
 
 use serde::{Deserialize, Serialize};
 
-use crate::law::{Ramp, Ticks};
+use crate::law::{Limits, Ramp, Ticks};
 use crate::units::Position;
 
 /// One thing for the streams. Within a stretch, pieces and ramps come in the order of the path positions
@@ -65,4 +65,31 @@ pub enum Item<const AXES: usize> {
     Dwell(Ticks),
     /// Rest until told to resume, between stretches.
     Stop,
+    /// What the feed over the next length of path is held to; the path's blocks follow each other without a gap. What
+    /// live control makes other plans with.
+    Block(PathBlock),
+}
+
+/// A length of path with what holds its feed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PathBlock {
+    /// Its length.
+    pub length: Position,
+    /// The program's feed \[mm/s\]; infinite for a rapid.
+    pub feed_mm_s: f64,
+    /// At up to the program's feed.
+    pub programmed: Allowed,
+    /// Whatever the program says.
+    pub greatest: Allowed,
+    /// Greatest feed through the joint at its end \[mm/s\]; 0 at the stretch's end.
+    pub joint_mm_s: f64,
+}
+
+/// What geometry and machine allow on a block.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Allowed {
+    /// Greatest feed \[mm/s\].
+    pub cap_mm_s: f64,
+    /// Limits of ramps up to that feed.
+    pub limits: Limits<f64>,
 }

@@ -50,6 +50,8 @@ pub enum Ready<R: Real, const AXES: usize> {
     Dwell(Ticks),
     /// Rest until told to resume.
     Stop,
+    /// Not for a stream.
+    Block,
 }
 
 impl<const AXES: usize> Item<AXES> {
@@ -71,6 +73,7 @@ impl<const AXES: usize> Item<AXES> {
             Self::EndOfStretch(end) => Ready::EndOfStretch(end),
             Self::Dwell(duration) => Ready::Dwell(duration),
             Self::Stop => Ready::Stop,
+            Self::Block(_) => Ready::Block,
         })
     }
 }
@@ -128,6 +131,7 @@ impl<R: Real, const AXES: usize, E: Clone, I: Iterator<Item = Result<Item<AXES>,
                 Ready::EndOfStretch(end) => is_taken(feeder.end_stretch(end)),
                 Ready::Dwell(duration) => is_taken(feeder.dwell(duration)),
                 Ready::Stop => is_taken(feeder.program_stop()),
+                Ready::Block => Ok(true),
             };
             if !is_taken.map_err(SupplyError::Rejected)? {
                 self.pending = Some(ready);
@@ -138,7 +142,7 @@ impl<R: Real, const AXES: usize, E: Clone, I: Iterator<Item = Result<Item<AXES>,
 }
 
 /// Whether the queue had room.
-fn is_taken<T>(answer: Result<(), Refused<T>>) -> Result<bool, Rejection> {
+pub(crate) fn is_taken<T>(answer: Result<(), Refused<T>>) -> Result<bool, Rejection> {
     match answer {
         Ok(()) => Ok(true),
         Err(Refused::Full(_)) => Ok(false),

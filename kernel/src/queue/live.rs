@@ -6,7 +6,7 @@
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use super::change::{Change, LISTS, Progress, Words};
+use super::change::{Change, LISTS, Progress};
 use super::{
     FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept, count, enter,
 };
@@ -131,15 +131,23 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         self.shared.words.progress()
     }
 
+    /// Whether there is a list to begin now.
+    #[must_use]
+    pub fn has_free_list(&self) -> bool {
+        self.free_list().is_some()
+    }
+
+    fn free_list(&self) -> Option<u8> {
+        let is_free =
+            |(list, queue): &(u8, &Producer<'_, _>)| !self.shared.words.is_claimed(*list) && queue.is_empty();
+        (0..LISTS).zip(&self.lists).find(is_free).map(|(list, _)| list)
+    }
+
     /// A list that is empty and not under way nor asked for, claimed for what goes on from path position `start` at
     /// `feed_mm_s`; `None` if there is none now.
     pub fn begin(&mut self, start: Position, feed_mm_s: R) -> Option<u8> {
-        let words: &Words = &self.shared.words;
-        let free = (0..LISTS)
-            .zip(&self.lists)
-            .find(|(list, queue)| !words.is_claimed(*list) && queue.is_empty())
-            .map(|(list, _)| list)?;
-        words.claim(free, true);
+        let free = self.free_list()?;
+        self.shared.words.claim(free, true);
         self.feed_accept = self.path_accept.feed_from(start, feed_mm_s);
         Some(free)
     }

@@ -129,7 +129,7 @@ pub(crate) fn is_beyond_fixed_point(problem: &Problem) -> bool {
 }
 
 /// The plan has the program's moves.
-fn same_lengths(plan: &Plan, path: &Path) -> Result<(), String> {
+pub(crate) fn same_lengths(plan: &Plan, path: &Path) -> Result<(), String> {
     let moves: Vec<_> = path.stretches.iter().flat_map(|stretch| &stretch.moves).collect();
     if moves.len() != plan.blocks.len() {
         return Err(format!("{} blocks planned, {} moves programmed", plan.blocks.len(), moves.len()));
@@ -149,7 +149,7 @@ fn same_lengths(plan: &Plan, path: &Path) -> Result<(), String> {
 }
 
 /// The machine rests exactly where the program says, to a step of 2⁻³² mm.
-fn at_end(path: &Path, stretch: usize, position: &[Position; 3]) -> Result<(), String> {
+pub(crate) fn at_end(path: &Path, stretch: usize, position: &[Position; 3]) -> Result<(), String> {
     let end =
         path.stretches.get(stretch).ok_or_else(|| format!("stretch {stretch} was not programmed"))?.end_bits;
     for (found, exact) in position.iter().zip(end) {

@@ -7,6 +7,7 @@ pub(crate) mod bench;
 pub(crate) mod bounds;
 pub(crate) mod drive;
 pub(crate) mod geometry;
+pub(crate) mod live;
 pub(crate) mod machine;
 pub(crate) mod motion;
 pub(crate) mod path;

@@ -21,6 +21,10 @@ use super::totals::Totals;
 /// integrated numerically.
 const HERMITE: [f64; 4] = [1.7059e-4, 2.7084e-3, 3.2076e-2, 0.25];
 
+/// The same where snap may step within its limit DJ, over DJ·τⁿ: the change of j itself, and with one derivative less
+/// on either side.
+const HERMITE_LIVE: [f64; 4] = [8.1e-3, 3.2076e-2, 0.25, 1.0];
+
 /// Within this of a joint both its moves count [mm]: segments end on position steps.
 const JOINT_MM: f64 = 1e-7;
 
@@ -49,6 +53,8 @@ pub(crate) struct Checker<'a> {
     block: usize,
     /// First record of the feed plan that may still matter.
     feed: usize,
+    /// Under live control, the greatest feed override: motion is not the plan's any more, but keeps the limits.
+    live: Option<f64>,
     pub(crate) totals: Totals,
 }
 
@@ -65,8 +71,19 @@ impl<'a> Checker<'a> {
             before: [0.0; 5],
             block: 0,
             feed: 0,
+            live: None,
             totals: Totals::default(),
         }
+    }
+
+    /// The same for motion under live control, with feed overrides up to `feed_override`.
+    pub(crate) fn live(self, feed_override: f64) -> Self {
+        Self { live: Some(feed_override), ..self }
+    }
+
+    /// How far the machine has come, from the program's start [mm].
+    pub(crate) fn s_mm(&self) -> f64 {
+        self.before[0]
     }
 
     /// Checks a tick; says what is wrong.
@@ -123,8 +140,43 @@ impl<'a> Checker<'a> {
         self.bound("snap limit", snap.abs(), path.snap_mm_s4 * rounding)
     }
 
+    /// Fits the tick before, with snap that may step within its limit and nothing known of the ramps.
+    fn along_live(&mut self, now: &Along) -> Result<(), String> {
+        let then = self.before;
+        let path = &self.machine.path;
+        let (accel, jerk, snap) = (path.accel_mm_s2, path.jerk_mm_s3, path.snap_mm_s4);
+        let peak = jerk.min((2.0 * accel * snap / PI).sqrt());
+        let longest_s = 2.0 * accel / peak;
+        let gained = peak * longest_s.powi(3);
+        if now[0] < then[0] - bounds::backward_mm(self.epsilon, gained) {
+            return Err(format!("goes back from {} to {} mm", then[0], now[0]));
+        }
+        let h = self.machine.tick_s;
+        let d: Along = core::array::from_fn(|k| now[k] - then[k]);
+        let m: Along = core::array::from_fn(|k| now[k] + then[k]);
+        let predicted =
+            [h * (m[1] / 2.0 - h * d[2] / 12.0), h * (m[2] / 2.0 - h * d[3] / 12.0), h * m[3] / 2.0, 0.0];
+        let sizes = [gained, path.feed_mm_s, accel, jerk];
+        let c = bounds::CONTINUITY_ROUNDING;
+        for (k, name) in ["fit of s", "fit of v", "fit of a", "fit of j"].into_iter().enumerate() {
+            let rounded: f64 = (k..4).map(|of| sizes[of] * h.powi((of - k) as i32)).sum();
+            let mut bound = HERMITE_LIVE[k] * snap * h.powi(4 - k as i32)
+                + c * self.epsilon * rounded
+                + c * h * sizes.get(k + 1).unwrap_or(&snap) * 2.0_f64.powi(-32);
+            if k == 0 {
+                bound += bounds::LENGTH_ROUNDING_MM + 2.0_f64.powi(-31) * self.plan.length_mm;
+            }
+            let fits = self.bound(name, (d[k] - predicted[k]).abs(), bound);
+            fits.map_err(|error| format!("{error}; from {then:?} to {now:?}"))?;
+        }
+        Ok(())
+    }
+
     /// Fits the tick before.
     fn along(&mut self, now: &Along) -> Result<(), String> {
+        if self.live.is_some() {
+            return self.along_live(now);
+        }
         let then = self.before;
         // Peaks in the segments under way.
         let (mut crackle, mut snap, mut jerk, mut accel) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
@@ -186,8 +238,11 @@ impl<'a> Checker<'a> {
             cap = cap.max(planned(placed.block));
             asked = asked.max(placed.feed_mm_s);
         }
-        self.bound("planned ceiling", v, cap * rounding)?;
-        self.bound("programmed feed", v, asked * rounding)
+        let most = self.live.unwrap_or(1.0).max(1.0);
+        if most <= 1.0 {
+            self.bound("planned ceiling", v, cap * rounding)?;
+        }
+        self.bound("programmed feed", v, asked * most * rounding)
     }
 
     /// The steps at the joints passed since the tick before.

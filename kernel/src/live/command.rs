@@ -1,0 +1,164 @@
+//! Commands: what takes over from the motion under way, and where.
+
+use heapless::Vec;
+
+use super::director::Director;
+use super::list::{Item, LIST_ITEMS, List};
+use super::road::Junction;
+use crate::law::{Phase, Ticks};
+use crate::num::Real;
+use crate::program::{self, SupplyError};
+use crate::queue::{Change, LiveFeeder, Progress};
+use crate::units::Position;
+
+/// Where a command may take over.
+struct Place {
+    change: Change,
+    /// Where the list begins that takes over.
+    start: Junction,
+    /// The item under way with another end, if it is inside one.
+    head: Option<Item>,
+}
+
+impl Place {
+    /// A list for it that holds nothing but the item under way.
+    fn list(&self, tick_s: f64) -> List {
+        let mut list = List::new(self.start, tick_s);
+        if let Some(head) = self.head {
+            list.push(head);
+        }
+        list
+    }
+
+    /// The items of the list under way that are driven.
+    fn driven(&self) -> usize {
+        self.change.after as usize
+    }
+}
+
+impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PLACES>
+where
+    R: Real,
+    E: Clone,
+    I: Iterator<Item = Result<program::Item<AXES>, E>>,
+{
+    /// In the order of time: here or within the item under way, and behind each item that is to be driven.
+    fn places(&self, progress: &Progress) -> Vec<Place, { LIST_ITEMS + 1 }> {
+        let mut places = Vec::new();
+        let list = &self.current.list;
+        let done = progress.done as usize;
+        let behind =
+            |count: usize| Place { change: self.change_after(count), start: list.after(count), head: None };
+        let first = match progress.inside {
+            Some((phase, left)) => self.within(done, phase, left),
+            None => Some(behind(done)),
+        };
+        if let Some(first) = first {
+            let _ = places.push(first);
+        }
+        for count in done + 1..=list.leave {
+            let _ = places.push(behind(count));
+        }
+        places
+    }
+
+    /// Within the item under way, given up as soon as possible.
+    fn within(&self, done: usize, phase: Phase, left: Ticks) -> Option<Place> {
+        let (start, item) = self.current.list.get(done)?;
+        let duration = item.phase_duration(phase, self.tick_s)?;
+        // Not where it begins: there is no beginning to repeat yet.
+        let lead = if left >= duration { self.lead.max(Ticks::ONE) } else { self.lead };
+        let elapsed = duration.minus(left)?.plus(lead);
+        if elapsed > duration {
+            return None;
+        }
+        let head = item.cut(phase, elapsed, self.tick_s)?;
+        Some(Place {
+            change: Change { within: true, ..self.change_after(done) },
+            start: *start,
+            head: Some(head),
+        })
+    }
+
+    /// Brakes to rest from the first place that allows it; if there is none, the list under way ends at rest.
+    pub(super) fn stop(
+        &mut self,
+        progress: &Progress,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        for place in &self.places(progress) {
+            let mut list = place.list(self.tick_s);
+            let junction = list.end();
+            if junction.feed_mm_s < place.start.feed_mm_s {
+                // What brakes goes on braking.
+                continue;
+            }
+            if junction.feed_mm_s <= 0.0 {
+                break;
+            }
+            let (path_end, _) = self.path_of(junction.stretch);
+            let Some((ramp, length)) = self.road.brake(&junction, 0.0, path_end, self.driven_override) else {
+                continue;
+            };
+            list.push(Item::Feed { ramp, length });
+            list.leave = list.len();
+            let end = list.end();
+            self.hand_over(list, place.change, feeder)?;
+            self.take_back_from(place.driven());
+            self.replan_from(end);
+            return Ok(());
+        }
+        let list = &mut self.current.list;
+        if list.leave < list.len() {
+            list.leave = list.len();
+            let end = list.end();
+            self.replan_from(end);
+        }
+        Ok(())
+    }
+
+    /// Goes on under another override from the first place that allows it; if there is none, from where the list under
+    /// way is left.
+    pub(super) fn respeed(
+        &mut self,
+        progress: &Progress,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        for place in &self.places(progress) {
+            let mut list = place.list(self.tick_s);
+            let heads = list.len();
+            let is_at_rest = heads == 0 && place.start.feed_mm_s <= 0.0;
+            if is_at_rest {
+                break;
+            }
+            if heads > 0 && !self.is_worth_cutting(progress, place, &list.end()) {
+                continue;
+            }
+            // Whatever comes of it: what is ahead of this stretch is planned anew from here on.
+            self.replan_through(place.start.stretch);
+            if self.gather_under_override(&mut list, false)
+                && self.end_in_a_stop(&mut list, self.feed_override)
+                && list.leave >= heads
+            {
+                let ahead = list.after(list.leave);
+                self.driven_override = self.feed_override;
+                self.hand_over(list, place.change, feeder)?;
+                self.take_back_from(place.driven());
+                self.replan_from(ahead);
+                return Ok(());
+            }
+        }
+        if self.ahead.at > Position::ZERO {
+            self.replan_from(self.ahead);
+        }
+        Ok(())
+    }
+
+    /// Whether the item under way does not change the feed, or takes it to where the override does not allow it.
+    fn is_worth_cutting(&self, progress: &Progress, place: &Place, cut: &Junction) -> bool {
+        let Some((start, item)) = self.current.list.get(progress.done as usize) else { return false };
+        let whole_mm_s = item.end(start, self.tick_s).feed_mm_s;
+        let cap_mm_s = self.road.from(cut).next().map_or(0.0, |block| block.allowed(self.feed_override).0);
+        cut.feed_mm_s == place.start.feed_mm_s || whole_mm_s > start.feed_mm_s && whole_mm_s > cap_mm_s
+    }
+}

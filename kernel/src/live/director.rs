@@ -1,0 +1,446 @@
+//! What follows what: reads items, obeys commands, makes lists and hands them over.
+
+use heapless::Deque;
+
+use super::list::{Item as ListItem, LIST_ITEMS, List};
+use super::road::{Junction, Road, is_before};
+use crate::law::{FeedSegment, Ticks};
+use crate::num::Real;
+use crate::program::supply::{Ready, is_taken};
+use crate::program::{Item, SupplyError};
+use crate::queue::{Change, LiveFeeder, Progress, Rejection};
+use crate::units::Position;
+
+/// What the director is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum State {
+    /// Going on as long as there are items.
+    Running,
+    /// Told to hold, and not at rest yet.
+    Holding,
+    /// Held, at rest.
+    Held,
+    /// Told to give up, and not at rest yet.
+    Aborting,
+    /// Given up, at rest: stand here and split the streams anew.
+    Aborted,
+    /// Everything is done.
+    Done,
+}
+
+/// What a command asks of the motion under way, until a list for it has been handed over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Wanted {
+    /// Come to rest.
+    Stop,
+    /// Go on under another override.
+    Respeed,
+}
+
+/// A list that the tick has or will have.
+#[derive(Debug)]
+pub(super) struct Handed {
+    id: u8,
+    pub(super) list: List,
+    /// Items that it takes back from the list before it, at the front of the course.
+    taken_back: usize,
+}
+
+/// The background of live control, with room for `PLACES` blocks and as many planned ramps.
+#[derive(Debug)]
+pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
+    items: I,
+    pub(super) tick_s: f64,
+    pending: Option<Ready<R, AXES>>,
+    /// There is no room for the next item.
+    is_full: bool,
+    is_at_end: bool,
+    error: Option<SupplyError<E>>,
+    /// The stretch being read, and the path of it that is queued.
+    reading: u32,
+    path_end: Position,
+    pub(super) road: Road<PLACES>,
+    /// The program's own feed from `ahead` on; of a stretch that is planned anew only its end.
+    pub(super) course: Deque<ListItem, PLACES>,
+    /// Where the next list begins.
+    pub(super) ahead: Junction,
+    /// The last stretch that is planned anew; those before it are, too, as far as they are still ahead.
+    replanned: Option<u32>,
+    pub(super) current: Handed,
+    next: Option<Handed>,
+    pub(super) feed_override: f64,
+    /// The one of the motion that was handed over last.
+    pub(super) driven_override: f64,
+    is_held: bool,
+    is_aborted: bool,
+    wanted: Option<Wanted>,
+    /// How far ahead of where the tick was seen a ramp is given up.
+    pub(super) lead: Ticks,
+    starvations: u32,
+}
+
+/// The greatest feed override.
+pub const OVERRIDE_MAX: f64 = 2.0;
+/// A ramp is given up at most so many ticks ahead.
+const LEAD_TICKS_MAX: u64 = 64;
+
+impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PLACES>
+where
+    R: Real,
+    E: Clone,
+    I: Iterator<Item = Result<Item<AXES>, E>>,
+{
+    /// All of `items` still to do, at rest, for ticks of `tick_s`; with freshly split streams. Where ticks come while the
+    /// background works, `lead_ticks` is how far ahead of what it saw it may change a ramp: as many as may pass meanwhile.
+    pub fn new(items: I, tick_s: f64, lead_ticks: u32) -> Self {
+        let start = Junction { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
+        Self {
+            items,
+            tick_s,
+            pending: None,
+            is_full: false,
+            is_at_end: false,
+            error: None,
+            reading: 0,
+            path_end: Position::ZERO,
+            road: Road::new(),
+            course: Deque::new(),
+            ahead: start,
+            replanned: None,
+            current: Handed { id: 0, list: List::new(start, tick_s), taken_back: 0 },
+            next: None,
+            feed_override: 1.0,
+            driven_override: 1.0,
+            is_held: false,
+            is_aborted: false,
+            wanted: None,
+            lead: Ticks::from_bits(u64::from(lead_ticks) << 32),
+            starvations: 0,
+        }
+    }
+
+    /// Feed hold: comes to rest on the path as soon as the law and the ceilings allow.
+    pub fn hold(&mut self) {
+        if !self.is_held {
+            (self.is_held, self.wanted) = (true, Some(Wanted::Stop));
+        }
+    }
+
+    /// Goes on after a hold, from rest; also one that is not at rest yet.
+    pub fn resume(&mut self) {
+        if self.is_held && !self.is_aborted {
+            self.is_held = false;
+            // A stop that is not handed over yet is not made; the override may be another one by now.
+            self.wanted = self.wanted.map(|_| Wanted::Respeed);
+        }
+    }
+
+    /// Comes to rest on the path and gives up the rest of the program.
+    pub fn abort(&mut self) {
+        self.hold();
+        self.is_aborted = true;
+    }
+
+    /// Drives at `feed_override` times the program's feed, from 0 to [`OVERRIDE_MAX`], under all ceilings; 0 is a hold of
+    /// its own.
+    ///
+    /// # Errors
+    /// It is not within that range; the value.
+    pub fn set_override(&mut self, feed_override: f64) -> Result<(), f64> {
+        if !(0.0..=OVERRIDE_MAX).contains(&feed_override) {
+            return Err(feed_override);
+        }
+        if feed_override != self.feed_override {
+            self.feed_override = feed_override;
+            if !self.is_held {
+                self.wanted = Some(if feed_override > 0.0 { Wanted::Respeed } else { Wanted::Stop });
+            }
+        }
+        Ok(())
+    }
+
+    /// How often motion had to stop because data came too late.
+    pub fn starvations(&self) -> u32 {
+        self.starvations
+    }
+
+    /// What it is doing.
+    pub fn state(&self, feeder: &LiveFeeder<'_, R, AXES>) -> State {
+        let progress = feeder.progress();
+        let is_through = progress.list == self.current.id
+            && self.next.is_none()
+            && progress.inside.is_none()
+            && progress.done as usize >= self.current.list.len();
+        let rests = is_through && self.wanted.is_none();
+        let is_read = self.is_at_end && self.pending.is_none() && self.course.is_empty();
+        match (self.is_aborted, self.is_held) {
+            (true, _) if rests => State::Aborted,
+            (true, _) => State::Aborting,
+            (false, true) if rests => State::Held,
+            (false, true) => State::Holding,
+            (false, false) if rests && is_read && self.ahead.at == Position::ZERO => State::Done,
+            (false, false) => State::Running,
+        }
+    }
+
+    /// One turn of the background: reads what there is room for, obeys what was commanded, hands over what follows.
+    ///
+    /// # Errors
+    /// An item can't be executed. What is under way ends as it would have; every later call returns the same error.
+    pub fn turn(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+        if let Some(error) = &self.error {
+            return Err(error.clone());
+        }
+        self.turn_on(feeder).inspect_err(|error| self.error = Some(error.clone()))
+    }
+
+    fn turn_on(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+        if feeder.is_refused() {
+            // The tick had passed the place: further ahead the next time.
+            if self.lead.to_bits() < LEAD_TICKS_MAX << 32 {
+                self.lead = self.lead.plus(Ticks::ONE);
+            }
+            self.take_back_next(feeder);
+        }
+        let progress = self.follow(feeder);
+        let place = self.current.list.after(progress.done as usize);
+        self.road.pass(place.stretch, place.at);
+        self.read(feeder)?;
+        if let Some(wanted) = self.wanted
+            && feeder.has_free_list()
+        {
+            let progress = self.take_back_next(feeder);
+            // What was taken back may have been the last free one.
+            if feeder.has_free_list() {
+                match wanted {
+                    Wanted::Stop => self.stop(&progress, feeder)?,
+                    Wanted::Respeed => self.respeed(&progress, feeder)?,
+                }
+                self.wanted = None;
+            }
+        }
+        self.note_starvation(feeder);
+        let is_to_rest = self.is_held || self.feed_override <= 0.0;
+        if self.next.is_none() && !is_to_rest && self.wanted.is_none() && feeder.has_free_list() {
+            self.go_on(feeder)?;
+        }
+        Ok(())
+    }
+
+    /// Where the tick is; the list that follows is the one under way as soon as it is on it.
+    fn follow(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Progress {
+        let progress = feeder.progress();
+        if let Some(next) = self.next.take_if(|next| next.id == progress.list) {
+            feeder.give_up(self.current.id);
+            self.current = next;
+        }
+        progress
+    }
+
+    /// Gives up the list that follows; what it holds is ahead again. What the tick does in between counts.
+    fn take_back_next(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Progress {
+        feeder.no_change();
+        let progress = self.follow(feeder);
+        if let Some(Handed { id, list, taken_back }) = self.next.take() {
+            feeder.give_up(id);
+            for _ in 0..taken_back {
+                self.course.pop_front();
+            }
+            // The list under way goes on to where it is left.
+            self.ahead = self.current.list.after(self.current.list.leave);
+            self.put_back(&list, list.len() - list.leave, 0);
+        }
+        progress
+    }
+
+    /// Puts the items of a list from `from` on in front of the course, but for its last `without`. Feed that was planned
+    /// anew is planned anew again.
+    pub(super) fn put_back(&mut self, list: &List, without: usize, from: usize) {
+        let is_replanned = self.replans(list.start.stretch);
+        for item in list.back_to(from).skip(without) {
+            if !(is_replanned && item.is_feed()) {
+                // There is room: reading leaves as much as a list holds.
+                let _ = self.course.push_front(*item);
+            }
+        }
+    }
+
+    /// Reads items while there is room for them.
+    fn read(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+        loop {
+            let answer = match &self.pending {
+                Some(Ready::Piece(piece)) => is_taken(feeder.piece(*piece)).inspect(|&taken| {
+                    if taken {
+                        self.path_end = self.path_end + piece.length();
+                    }
+                }),
+                Some(Ready::EndOfStretch(end)) => is_taken(feeder.end_of_path(*end)).inspect(|&taken| {
+                    if taken {
+                        let _ = self.course.push_back(ListItem::End);
+                        (self.reading, self.path_end) = (self.reading.wrapping_add(1), Position::ZERO);
+                    }
+                }),
+                Some(Ready::Segment(_) | Ready::Dwell(_) | Ready::Stop | Ready::Block) | None => Ok(true),
+            };
+            self.is_full = !answer.map_err(SupplyError::Rejected)?;
+            if self.is_full {
+                return Ok(());
+            }
+            self.pending = None;
+            self.is_full = self.course.len() + 2 * LIST_ITEMS >= PLACES || self.road.is_full();
+            if self.is_full || self.is_aborted {
+                return Ok(());
+            }
+            let Some(item) = self.items.next() else {
+                self.is_at_end = true;
+                return Ok(());
+            };
+            self.take(item.map_err(SupplyError::Source)?)?;
+        }
+    }
+
+    fn take(&mut self, item: Item<AXES>) -> Result<(), SupplyError<E>> {
+        let planned = match item {
+            Item::Block(block) => {
+                self.road.push(self.reading, block);
+                return Ok(());
+            }
+            Item::Line { .. } | Item::Septic { .. } | Item::EndOfStretch(_) => {
+                self.pending = Some(item.ready(self.tick_s)?);
+                return Ok(());
+            }
+            Item::Feed { .. } if self.replans(self.reading) => return Ok(()),
+            Item::Feed { ramp, length } => ListItem::Feed { ramp, length },
+            Item::Dwell(duration) => ListItem::Dwell(duration),
+            Item::Stop => ListItem::Stop,
+        };
+        let _ = self.course.push_back(planned);
+        Ok(())
+    }
+
+    /// How far the path of a stretch is queued, and whether that is all of it.
+    pub(super) fn path_of(&self, stretch: u32) -> (Position, bool) {
+        if stretch == self.reading {
+            (self.path_end, false)
+        } else {
+            (self.road.end_of(stretch).unwrap_or(Position::ZERO), true)
+        }
+    }
+
+    /// Whether a stretch is planned anew.
+    fn replans(&self, stretch: u32) -> bool {
+        self.replanned.is_some_and(|last| !is_before(last, stretch))
+    }
+
+    /// From now on the stretches up to this one are planned anew.
+    pub(super) fn replan_through(&mut self, stretch: u32) {
+        if !self.replans(stretch) {
+            self.replanned = Some(stretch);
+        }
+    }
+
+    /// What follows begins at `ahead`, and the rest of its stretch is planned anew.
+    pub(super) fn replan_from(&mut self, ahead: Junction) {
+        self.ahead = ahead;
+        self.replan_through(ahead.stretch);
+        while self.course.front().is_some_and(ListItem::is_feed) {
+            self.course.pop_front();
+        }
+    }
+
+    /// Where data came too late the list under way is in its stop: what follows begins there.
+    fn note_starvation(&mut self, feeder: &LiveFeeder<'_, R, AXES>) {
+        let progress = feeder.progress();
+        let Handed { id, list, .. } = &mut self.current;
+        let done = progress.done as usize;
+        let is_in_stop = done > list.leave || done == list.leave && progress.inside.is_some();
+        if self.next.is_none() && progress.list == *id && is_in_stop && list.leave < list.len() {
+            list.leave = list.len();
+            let end = list.end();
+            self.starvations = self.starvations.wrapping_add(1);
+            self.replan_from(end);
+        }
+    }
+
+    /// Hands over the list that follows the one under way.
+    fn go_on(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+        let begins = self.ahead.at == Position::ZERO && self.course.front().is_some_and(ListItem::is_feed);
+        if begins && self.feed_override != 1.0 {
+            self.replan_from(self.ahead);
+        }
+        let is_replanned = self.replans(self.ahead.stretch);
+        let mut list = List::new(self.ahead, self.tick_s);
+        let feed_override = if is_replanned { self.feed_override } else { 1.0 };
+        let is_found =
+            if is_replanned { self.gather_under_override(&mut list, true) } else { self.gather(&mut list) };
+        if is_found && self.end_in_a_stop(&mut list, feed_override) {
+            self.driven_override = feed_override;
+            let change = self.change_after(self.current.list.leave);
+            self.hand_over(list, change, feeder)
+        } else {
+            self.put_back(&list, 0, 0);
+            // At rest with no room for more path: the program's feed needs more of it to stop than there will be.
+            if self.is_full && self.ahead.feed_mm_s <= 0.0 && !is_replanned {
+                self.replan_from(self.ahead);
+            }
+            Ok(())
+        }
+    }
+
+    /// A change after so many items of the list under way.
+    pub(super) fn change_after(&self, count: usize) -> Change {
+        Change { from: self.current.id, to: self.current.id, after: count as u32, within: false }
+    }
+
+    /// Fills a list, of which there is a free one, and asks for the change to it.
+    pub(super) fn hand_over(
+        &mut self,
+        list: List,
+        change: Change,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        // A list that can't be begun or filled is a machine that was put together wrongly.
+        const TOO_SMALL: Rejection = Rejection::Empty;
+        let from = R::from_f64(list.start.feed_mm_s);
+        let id = feeder.begin(list.start.at, from).ok_or(SupplyError::Rejected(TOO_SMALL))?;
+        for item in list.items() {
+            let is_taken = match *item {
+                ListItem::Feed { ramp, length } => {
+                    let segment = FeedSegment::ramp(&ramp, length, self.tick_s);
+                    is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
+                }
+                ListItem::Turned { ramp, at, length } => {
+                    let segment = FeedSegment::turned(&ramp, at, length, self.tick_s);
+                    is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
+                }
+                ListItem::End => is_taken(feeder.end_of_feed(id)),
+                ListItem::Dwell(duration) => is_taken(feeder.dwell(id, duration)),
+                ListItem::Stop => is_taken(feeder.program_stop(id)),
+            };
+            if !is_taken.map_err(SupplyError::Rejected)? {
+                return Err(SupplyError::Rejected(TOO_SMALL));
+            }
+        }
+        feeder.change(Change { to: id, ..change });
+        self.ahead = list.after(list.leave);
+        self.next = Some(Handed { id, list, taken_back: 0 });
+        Ok(())
+    }
+
+    /// The list that follows takes the place of the items of the one under way from `from` on: what ends their stretch,
+    /// and what comes behind it, is ahead again.
+    pub(super) fn take_back_from(&mut self, from: usize) {
+        let mut count = 0;
+        let list = &self.current.list;
+        for item in list.back_to(from).skip(list.len() - list.leave.min(list.len())) {
+            if !item.is_feed() {
+                let _ = self.course.push_front(*item);
+                count += 1;
+            }
+        }
+        if let Some(next) = &mut self.next {
+            next.taken_back = count;
+        }
+    }
+}

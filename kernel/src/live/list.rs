@@ -1,0 +1,149 @@
+//! A feed list as the background sees it: what it holds, and where each item begins.
+
+use heapless::Vec;
+
+use super::road::Junction;
+use crate::law::{Phase, Ramp, Ticks, TurnedRamp};
+use crate::units::Position;
+
+/// The most items of a feed list: its queue needs one place more.
+pub const LIST_ITEMS: usize = 15;
+
+/// An item of a feed list.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Item {
+    /// A ramp or a cruise.
+    Feed { ramp: Ramp<f64>, length: Position },
+    /// A ramp that turns so long after its start.
+    Turned { ramp: Ramp<f64>, at: Ticks, length: Position },
+    /// The end of the stretch.
+    End,
+    /// Rest for a time.
+    Dwell(Ticks),
+    /// Rest until told to resume.
+    Stop,
+}
+
+impl Item {
+    /// Whether it is a part of the feed over a stretch.
+    pub(super) fn is_feed(&self) -> bool {
+        matches!(self, Self::Feed { .. } | Self::Turned { .. })
+    }
+
+    /// The junction at its end, if it begins at `start`.
+    pub(super) fn end(&self, start: &Junction, tick_s: f64) -> Junction {
+        match *self {
+            Self::Feed { ramp, length } => {
+                Junction { at: start.at + length, feed_mm_s: ramp.to_mm_s, ..*start }
+            }
+            Self::Turned { ramp, at, length } => {
+                let turned = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
+                Junction { at: start.at + length, feed_mm_s: turned.to_mm_s(), ..*start }
+            }
+            Self::End => {
+                Junction { stretch: start.stretch.wrapping_add(1), at: Position::ZERO, feed_mm_s: 0.0 }
+            }
+            Self::Dwell(_) | Self::Stop => *start,
+        }
+    }
+
+    /// The same item, given up `elapsed` after the start of `phase`: the shortest with that beginning that ends at a
+    /// feed that does not change. `None` where it can only be finished.
+    pub(super) fn cut(&self, phase: Phase, elapsed: Ticks, tick_s: f64) -> Option<Self> {
+        let &Self::Feed { ramp, .. } = self else { return None };
+        let elapsed_s = elapsed.to_f64() * tick_s;
+        let length = |mm: f64| Position::from_mm(mm);
+        match phase {
+            Phase::Hold if ramp.is_cruise() => {
+                let ramp = Ramp::cruise(ramp.from_mm_s, elapsed_s);
+                Some(Self::Feed { ramp, length: length(ramp.length_mm())? })
+            }
+            // Over before it could be turned.
+            Phase::Rise if ramp.t1_s <= tick_s => None,
+            Phase::Rise if 2.0 * elapsed_s <= ramp.t1_s => {
+                let turned = TurnedRamp { ramp, turn_s: elapsed_s };
+                Some(Self::Turned { ramp, at: elapsed, length: length(turned.length_mm())? })
+            }
+            Phase::Rise | Phase::Hold => {
+                let t2_s = if phase == Phase::Rise { ramp.t1_s } else { ramp.t1_s + elapsed_s };
+                let change_mm_s = (ramp.to_mm_s - ramp.from_mm_s) * (t2_s / ramp.t2_s);
+                let ramp = Ramp { to_mm_s: ramp.from_mm_s + change_mm_s, t2_s, ..ramp };
+                Some(Self::Feed { ramp, length: length(ramp.length_mm())? })
+            }
+            Phase::Fall => None,
+        }
+    }
+
+    /// The duration of a phase of its [`FeedSegment`](crate::law::FeedSegment), of an item that can be cut.
+    pub(super) fn phase_duration(&self, phase: Phase, tick_s: f64) -> Option<Ticks> {
+        let Self::Feed { ramp, .. } = self else { return None };
+        let seconds = match phase {
+            Phase::Rise | Phase::Fall => ramp.t1_s,
+            Phase::Hold => ramp.t2_s - ramp.t1_s,
+        };
+        Ticks::from_seconds(seconds, tick_s)
+    }
+}
+
+/// Items with where they begin.
+#[derive(Clone, Debug)]
+pub(super) struct List {
+    pub(super) start: Junction,
+    tick_s: f64,
+    items: Vec<(Junction, Item), LIST_ITEMS>,
+    /// What follows takes over after so many of them; the others are a stop, should nothing follow in time.
+    pub(super) leave: usize,
+}
+
+impl List {
+    pub(super) fn new(start: Junction, tick_s: f64) -> Self {
+        Self { start, tick_s, items: Vec::new(), leave: 0 }
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.items.is_full()
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.items.len()
+    }
+
+    /// Appends an item; there is room.
+    pub(super) fn push(&mut self, item: Item) {
+        let _ = self.items.push((self.end(), item));
+    }
+
+    pub(super) fn contains(&self, item: &Item) -> bool {
+        self.items().any(|other| other == item)
+    }
+
+    pub(super) fn truncate(&mut self, len: usize) {
+        self.items.truncate(len);
+    }
+
+    pub(super) fn items(&self) -> impl Iterator<Item = &Item> {
+        self.items.iter().map(|(_, item)| item)
+    }
+
+    pub(super) fn get(&self, index: usize) -> Option<&(Junction, Item)> {
+        self.items.get(index)
+    }
+
+    /// The items from the last to the one at `from`.
+    pub(super) fn back_to(&self, from: usize) -> impl Iterator<Item = &Item> {
+        self.items.get(from..).unwrap_or(&[]).iter().rev().map(|(_, item)| item)
+    }
+
+    /// Where its last item ends.
+    pub(super) fn end(&self) -> Junction {
+        self.items.last().map_or(self.start, |(start, item)| item.end(start, self.tick_s))
+    }
+
+    /// Where it stands after so many items.
+    pub(super) fn after(&self, count: usize) -> Junction {
+        match self.items.get(count) {
+            Some((start, _)) => *start,
+            None => self.end(),
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! Live control: hold, resume, feed override and abort at any tick, and a stop where data come too late.
+//!
+//! ```text
+//!   items ─► Director ─► path queue, feed lists ─► executor
+//!   commands ──┘  ▲                                   │
+//!                 └────────── where it is ◄───────────┘
+//! ```
+//!
+//! Consumes [`Item`](crate::program::Item)s and commands; produces pieces and **feed lists**, each a complete motion that
+//! ends at rest on path that is queued. All of it runs in the background: the tick only goes over from one list to the
+//! next where it was told to (see [`Change`](crate::queue::Change)). So motion is legal whatever the background does and
+//! however long it takes, and where it takes too long, the list under way ends in a stop on the path.
+//!
+//! A command is a list that begins at the next **junction**, a place where the feed does not change: anywhere in a
+//! cruise; a little later in a ramp that accelerates, which is given up by the shortest way (`Item::cut`); at the
+//! end of a ramp that brakes, because ceilings ahead may need all of it. From there on it brakes to rest or to another
+//! feed under the ceilings and limits of all the blocks it crosses; where a ceiling ahead does not let it begin, at the
+//! next junction that does. What follows a stop or an override is planned anew, to the end of the stretch; a stretch
+//! that nothing was changed in is driven by the program's own plan, to the bit.
+//!
+//! - `road`: blocks ahead, and how to brake on them;
+//! - `replan`: a plan from a junction on;
+//! - `list`: a feed list as the background sees it;
+//! - `gather`: what goes into the next list;
+//! - `command`: what takes over from the motion under way, and where;
+//! - [`director`]: what follows what.
+
+mod command;
+pub mod director;
+mod gather;
+mod list;
+mod replan;
+mod road;
+
+pub use director::{Director, State};
+pub use list::LIST_ITEMS;

@@ -1,0 +1,68 @@
+//! The feed from a junction on, planned anew over the blocks that are known.
+//!
+//! Consumes a junction, a feed override and the [`Road`]; produces ramps and cruises to rest where the known path ends.
+//! Background. Two stages and one pair of ramps for equal neighbours together, as [`plan`].
+
+use heapless::Vec;
+
+use super::list::{Item, List};
+use super::road::{Junction, Road, SLIVER};
+use crate::law::{Law, Limits};
+use crate::plan::{Block, BlockPlan, plan, segments};
+use crate::units::Position;
+
+/// The first items of a plan from `from` to rest at `end`, into `list`, as many as it has room for; whether that is all
+/// of it. `None` if there is no plan: the feed is above the ceiling, or the path too short to brake.
+pub(super) fn replan<const BLOCKS: usize>(
+    road: &Road<BLOCKS>,
+    from: &Junction,
+    feed_override: f64,
+    end: Position,
+    tick_s: f64,
+    list: &mut List,
+) -> Option<bool> {
+    let mut blocks: Vec<Block<f64>, BLOCKS> = Vec::new();
+    let mut ends: Vec<Position, BLOCKS> = Vec::new();
+    let mut limits: Option<Limits<f64>> = None;
+    // A sliver of a block belongs to the one behind it.
+    let mut start = from.at;
+    for block in road.from(from).take_while(|block| block.start < end) {
+        let (cap_mm_s, of_block) = block.allowed(feed_override);
+        let block_end = block.end.min(end);
+        if block_end - start <= SLIVER && block_end < end {
+            continue;
+        }
+        let length_mm = (block_end - start).to_mm();
+        start = block_end;
+        let joint_mm_s = block.joint_mm_s();
+        match (blocks.last_mut(), ends.last_mut()) {
+            (Some(last), Some(last_end))
+                if last.cap_mm_s == cap_mm_s && limits == Some(of_block) && last.joint_mm_s >= cap_mm_s =>
+            {
+                (last.length_mm, last.joint_mm_s, *last_end) =
+                    (last.length_mm + length_mm, joint_mm_s, block_end);
+            }
+            _ => {
+                let law = Law::new(of_block).ok()?;
+                limits = Some(of_block);
+                blocks.push(Block { length_mm, cap_mm_s, joint_mm_s, law }).ok()?;
+                ends.push(block_end).ok()?;
+            }
+        }
+    }
+    let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
+    plans.resize(blocks.len(), BlockPlan::default()).ok()?;
+    plan(&blocks, from.feed_mm_s, 0.0, &mut plans).ok()?;
+    let mut start = from.at;
+    for ((block, plan), &block_end) in blocks.iter().zip(&plans).zip(&ends) {
+        let made = segments::<f64, f64>(block, plan, start, block_end, tick_s).ok()?;
+        for segment in made.iter().flatten() {
+            if list.is_full() {
+                return Some(false);
+            }
+            list.push(Item::Feed { ramp: *segment.as_ramp(), length: segment.length() });
+        }
+        start = block_end;
+    }
+    Some(true)
+}
