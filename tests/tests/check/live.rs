@@ -24,6 +24,8 @@ pub(crate) enum Command {
     Resume,
     Override(f64),
     Abort,
+    /// The background does not get its turn.
+    Stall,
 }
 
 /// What a script sees of the tick that was.
@@ -64,14 +66,17 @@ pub(crate) fn execute<R: Number>(
     let mut executed = executor.tick(&mut intake).map_err(|fault| format!("{fault:?}"))?;
     loop {
         let state = director.state(&feeder);
-        match script(&Seen { ticks, state, executed: &executed }) {
-            None => {}
+        let command = script(&Seen { ticks, state, executed: &executed });
+        match command {
+            None | Some(Command::Stall) => {}
             Some(Command::Hold) => director.hold(),
             Some(Command::Resume) => director.resume(),
             Some(Command::Override(share)) => director.set_override(share).expect("within range"),
             Some(Command::Abort) => director.abort(),
         }
-        director.turn(&mut feeder).map_err(|error| format!("tick {ticks}: rejected: {error}"))?;
+        if command != Some(Command::Stall) {
+            director.turn(&mut feeder).map_err(|error| format!("tick {ticks}: rejected: {error}"))?;
+        }
         let before = executed.motion;
         executed = executor.tick(&mut intake).map_err(|fault| {
             let length_mm = path.stretches.get(stretches).map(|stretch| stretch.length_mm);

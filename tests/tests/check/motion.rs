@@ -148,7 +148,9 @@ impl<'a> Checker<'a> {
         let peak = jerk.min((2.0 * accel * snap / PI).sqrt());
         let longest_s = 2.0 * accel / peak;
         let gained = peak * longest_s.powi(3);
-        if now[0] < then[0] - bounds::backward_mm(self.epsilon, gained) {
+        // A ramp that turns has products of all the length that it would have had.
+        let ramp_mm = 3.0 * 2.0_f64.powi(-32) * path.feed_mm_s * longest_s;
+        if now[0] < then[0] - bounds::backward_mm(self.epsilon, gained) - ramp_mm {
             return Err(format!("goes back from {} to {} mm", then[0], now[0]));
         }
         let h = self.machine.tick_s;
@@ -164,7 +166,7 @@ impl<'a> Checker<'a> {
                 + c * self.epsilon * rounded
                 + c * h * sizes.get(k + 1).unwrap_or(&snap) * 2.0_f64.powi(-32);
             if k == 0 {
-                bound += bounds::LENGTH_ROUNDING_MM + 2.0_f64.powi(-31) * self.plan.length_mm;
+                bound += bounds::LENGTH_ROUNDING_MM + 2.0_f64.powi(-31) * self.plan.length_mm + ramp_mm;
             }
             let fits = self.bound(name, (d[k] - predicted[k]).abs(), bound);
             fits.map_err(|error| format!("{error}; from {then:?} to {now:?}"))?;
