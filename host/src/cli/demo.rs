@@ -9,6 +9,7 @@ use super::{plan, run};
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, plan_program};
+use crate::simulate::RunOptions;
 
 /// The program: line, arc R4, arc R10, arc R4, line, tangent to each other.
 pub const STRINGER: &str = include_str!("stringer.ngc");
@@ -32,7 +33,7 @@ pub fn demonstrate(out: &mut dyn Write) -> Result<Outcome, CliError> {
     }
     say("\nPlan: what limits the feed\n")?;
     plan::write_plan(&plan, out).map_err(CliError::Output)?;
-    let summary = run::execute(&plan, &machine, None, Some(report))?;
+    let summary = run::execute(&RunOptions::default(), &plan, &machine, None, Some(report))?;
     let mut say = |text: &str| writeln!(out, "{text}").map_err(CliError::Output);
     say("\nRun: the real-time kernel on simulated axes\n")?;
     run::write_summary(&summary, out).map_err(CliError::Output)?;

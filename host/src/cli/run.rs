@@ -17,7 +17,8 @@ use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
 use crate::record::{FaultRecord, PathLimits, RunRecord, TickRecord};
 use crate::report;
-use crate::simulate::{self, AxisSummary, RunSummary};
+use crate::simulate::live::Script;
+use crate::simulate::{self, AxisSummary, RunOptions, RunSummary};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -25,6 +26,8 @@ Examples:
   motion run part.ngc --report part.html             and a page with the pictures of the run
   motion run part.ngc --machine mine.toml --trace part.csv
                                                      every tick of every axis, for a spreadsheet
+  motion run part.ngc --at 2000:hold,2600:resume,3000:override=0.5
+                                                     with commands given before those ticks
   generate-part | motion run - --json                for a script
 
 Exit status 1: the run ended in a fault; the summary, the trace and the report are written all the same.";
@@ -45,6 +48,12 @@ pub struct RunArguments {
     /// Write a self-contained HTML page about the run; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    /// Live control: commands before given ticks, such as `2000:hold,2600:resume,3000:override=0.5`.
+    ///
+    /// A command is `hold` (come to rest on the path), `resume`, `abort` (come to rest and give up the rest) or
+    /// `override=SHARE` (drive at so many times the program's feed, from 0 to 2, never above what the machine allows).
+    #[arg(long, value_name = "TICK:COMMAND,…")]
+    at: Option<Script>,
     /// Print JSON: ticks, times, maxima along the path, share of it on which a limit is active, errors of the axes, faults.
     #[arg(long)]
     json: bool,
@@ -62,7 +71,8 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     // Opened before the run: a wrong path should not cost the user a long one.
     let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
     let report = arguments.report.as_deref().map(Output::create).transpose()?;
-    let summary = execute(&plan, &machine, trace, report)?;
+    let options = RunOptions { script: arguments.at.as_ref(), ..RunOptions::default() };
+    let summary = execute(&options, &plan, &machine, trace, report)?;
     if arguments.json {
         write_json(&json(&summary), out)?;
     } else {
@@ -78,6 +88,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
 
 /// Runs a plan; writes the trace as it goes and the report afterwards.
 pub(super) fn execute(
+    options: &RunOptions<'_>,
     plan: &Plan,
     machine: &Machine,
     trace: Option<Output>,
@@ -95,7 +106,7 @@ pub(super) fn execute(
     // Only a report needs all the ticks at once.
     let mut ticks: Vec<TickRecord> = Vec::new();
     let mut progress = Progress::new((plan.time_s / machine.tick_s) as u64);
-    let ran = simulate::run(plan, machine, &mut |tick| {
+    let ran = simulate::run_with(options, plan, machine, &mut |tick| {
         if let Some(trace) = &mut trace {
             trace.add(tick);
         }

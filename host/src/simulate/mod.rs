@@ -4,14 +4,18 @@
 //! [`TickRecord`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter and
 //! the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
+//! - [`live`]: commands before given ticks;
+//! - `background`: what fills the streams, with commands or without;
 //! - [`rig`]: the simulated machine as the kernel's hardware;
 //! - `contour`: how far the machine is beside its path;
 //! - `limit_share`: on how much of the path a limit is active;
 //! - [`run`](mod@run): the ticks;
 //! - [`summary`]: maxima, following and contour error.
 
+mod background;
 pub(crate) mod contour;
 mod limit_share;
+pub mod live;
 pub mod rig;
 pub mod run;
 pub mod summary;

@@ -8,23 +8,21 @@ use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
-use motion_kernel::program::{Supply, SupplyError};
-use motion_kernel::queue::Streams;
+use motion_kernel::program::SupplyError;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::Position;
 
 use super::Observer;
+use super::background::Storage;
 use super::contour::Contour;
 use super::limit_share::LimitShare;
+use super::live::Script;
 use super::rig::{Rig, Simulated};
 use super::summary::{Collector, RunSummary};
 use crate::machine::{AxisError, Machine};
 use crate::planning::{Executable, Item as PlanItem, Plan, PlanningError};
 use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
 
-/// Capacities of the two streams, as a board has them.
-const PIECES: usize = 64;
-const SEGMENTS: usize = 64;
 /// How long the machine is given to settle before its end position is read \[s\].
 const SETTLE_S: f64 = 0.2;
 
@@ -60,6 +58,8 @@ pub struct RunOptions<'a> {
     pub number: Number,
     /// What was learnt of one of its stretches.
     pub correction: Option<&'a StretchCorrection>,
+    /// Live control.
+    pub script: Option<&'a Script>,
 }
 
 /// Why a run could not be made.
@@ -101,18 +101,19 @@ pub fn run_with(
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
     match options.number {
-        Number::F32 => run_in::<f32>(options.correction, plan, machine, observe),
-        Number::F64 => run_in::<f64>(options.correction, plan, machine, observe),
-        Number::Fixed => run_in::<Fixed>(options.correction, plan, machine, observe),
+        Number::F32 => run_in::<f32>(options, plan, machine, observe),
+        Number::F64 => run_in::<f64>(options, plan, machine, observe),
+        Number::Fixed => run_in::<Fixed>(options, plan, machine, observe),
     }
 }
 
 fn run_in<R: Real>(
-    correction: Option<&StretchCorrection>,
+    options: &RunOptions<'_>,
     plan: &Plan,
     machine: &Machine,
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
+    let &RunOptions { correction, script, .. } = options;
     let executable = Executable::new::<R>(plan)?;
     let starts: Vec<f64> = plan
         .items
@@ -134,12 +135,12 @@ fn run_in<R: Real>(
         .flat_map(|correction| &correction.knots_mm_s)
         .map(|knot| knot.map(R::from_f64))
         .collect();
-    let mut streams = Streams::<R, AXES, PIECES, SEGMENTS>::new();
-    let (mut feeder, mut intake) = streams.split(machine.rules(), start);
+    let mut storage = Storage::<R>::new(script);
+    let (mut background, mut intake) =
+        storage.split(machine.rules(), start, executable.supplied(), executable.tick_s, script);
     if let Some(&StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
         intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?);
     }
-    let mut supply = Supply::<R, AXES, _, _>::new(executable.supplied(), executable.tick_s);
 
     let mut summary = RunSummary {
         tick_s: machine.tick_s,
@@ -153,13 +154,13 @@ fn run_in<R: Real>(
     let mut limit_share = LimitShare::new(plan, machine);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     loop {
-        supply.fill(&mut feeder).map_err(RunError::Rejected)?;
+        background.turn(collector.ticks()).map_err(RunError::Rejected)?;
         let trace = *kernel.tick(&mut intake, &mut rig);
         simulated.advance();
         let state = trace.executed.state;
         // What is idle after the last item is no longer part of the program, but for the tick in which
         // it ended.
-        let ended = supply.is_empty() && state == ExecState::Idle;
+        let ended = background.ended(state);
         let start_mm = starts.get(trace.executed.stretches as usize).copied().unwrap_or(plan.length_mm);
         let record = tick_record(&trace, start_mm, &mut contour);
         collector.add(&record);
@@ -169,7 +170,8 @@ fn run_in<R: Real>(
             summary.faults.push(fault_record(&fault, machine));
             break;
         }
-        if ended {
+        if let Some(reason) = ended {
+            summary.notices.extend(reason.map(str::to_owned));
             break;
         }
         if state == ExecState::Stopped {
@@ -179,6 +181,11 @@ fn run_in<R: Real>(
         }
     }
     collector.fill(&mut summary);
+    match background.starvations() {
+        0 => {}
+        1 => summary.notices.push("1 stop on the path because data came too late".to_owned()),
+        more => summary.notices.push(format!("{more} stops on the path because data came too late")),
+    }
     summary.limit_active_share = limit_share.share();
     summary.time_s = (summary.ticks - stopped_ticks) as f64 * machine.tick_s;
     if stops > 0 {

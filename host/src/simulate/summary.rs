@@ -63,6 +63,11 @@ pub(super) struct Collector {
 }
 
 impl Collector {
+    /// Ticks so far.
+    pub(super) fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
     pub(super) fn add(&mut self, tick: &TickRecord) {
         self.ticks += 1;
         let along = [tick.v_mm_s, tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4];

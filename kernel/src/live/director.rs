@@ -165,14 +165,24 @@ where
         self.starvations
     }
 
-    /// What it is doing.
-    pub fn state(&self, feeder: &LiveFeeder<'_, R, AXES>) -> State {
+    /// Whether it is at rest because the override is 0.
+    pub fn is_stopped_by_override(&self, feeder: &LiveFeeder<'_, R, AXES>) -> bool {
+        self.feed_override <= 0.0 && self.rests(feeder)
+    }
+
+    /// Whether all that was handed over has been driven, and nothing is wanted of it.
+    fn rests(&self, feeder: &LiveFeeder<'_, R, AXES>) -> bool {
         let progress = feeder.progress();
-        let is_through = progress.list == self.current.id
+        progress.list == self.current.id
             && self.next.is_none()
             && progress.inside.is_none()
-            && progress.done as usize >= self.current.list.len();
-        let rests = is_through && self.wanted.is_none();
+            && progress.done as usize >= self.current.list.len()
+            && self.wanted.is_none()
+    }
+
+    /// What it is doing.
+    pub fn state(&self, feeder: &LiveFeeder<'_, R, AXES>) -> State {
+        let rests = self.rests(feeder);
         let is_read = self.is_at_end && self.pending.is_none() && self.course.is_empty();
         match (self.is_aborted, self.is_held) {
             (true, _) if rests => State::Aborted,

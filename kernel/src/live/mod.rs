@@ -32,5 +32,5 @@ mod list;
 mod replan;
 mod road;
 
-pub use director::{Director, State};
+pub use director::{Director, OVERRIDE_MAX, State};
 pub use list::LIST_ITEMS;

@@ -15,6 +15,7 @@ use super::write_json;
 use crate::planning::plan_spline;
 use crate::planning::spline::Pieces;
 use crate::points::{self, Points};
+use crate::simulate::RunOptions;
 use crate::toolpath::spline::{self, Degree, Spline, SplineError};
 
 const HELP: &str = "\
@@ -138,7 +139,7 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
     plan.notices.extend(figures.words());
     let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
     let report = arguments.report.as_deref().map(Output::create).transpose()?;
-    let summary = run::execute(&plan, &machine, trace, report)?;
+    let summary = run::execute(&RunOptions::default(), &plan, &machine, trace, report)?;
     if arguments.json {
         write_json(&SplineJson { run: run::json(&summary), spline: figures }, out)?;
     } else {

@@ -196,7 +196,7 @@ pub fn learn<M: Motion + ?Sized>(
     for model in models {
         check_model(model)?;
     }
-    let first = motion.record(&RunOptions { number: options.number, correction: None }, machine)?;
+    let first = motion.record(&RunOptions { number: options.number, ..RunOptions::default() }, machine)?;
     let mut learning = Learning::new(&first, motion, models, options)?;
     let mut repeats = vec![learning.take(&first, motion)?];
     let (mut best_repeat, mut best) = (0, learning.correction());
@@ -214,7 +214,8 @@ pub fn learn<M: Motion + ?Sized>(
         }
         learning.update();
         let correction = learning.correction();
-        let run = RunOptions { number: options.number, correction: Some(&correction) };
+        let run =
+            RunOptions { number: options.number, correction: Some(&correction), ..RunOptions::default() };
         let recording = match motion.record(&run, machine) {
             Ok(recording) => recording,
             Err(DriveError::Fault { fault, .. }) => break Reason::Fault(fault),

@@ -1,0 +1,133 @@
+//! The background's part of a run: keeps the streams filled, and obeys a script.
+
+use core::convert::Infallible;
+
+use motion_kernel::exec::ExecState;
+use motion_kernel::live::{Director, State};
+use motion_kernel::num::Real;
+use motion_kernel::program::{Item, Supply, SupplyError};
+use motion_kernel::queue::{Feeder, Intake, LiveFeeder, LiveStreams, PathRules, Streams};
+use motion_kernel::units::Position;
+
+use super::live::{Command, Script};
+use crate::record::AXES;
+
+/// Capacities of the two streams, as a board has them.
+const PIECES: usize = 64;
+const SEGMENTS: usize = 64;
+/// Of a stream with live control: path enough to stop on, short feed lists, blocks ahead.
+const LIVE_PIECES: usize = 1024;
+const LIVE_SEGMENTS: usize = 16;
+const PLACES: usize = 256;
+
+/// The memory of the streams.
+pub(super) enum Storage<R: Real> {
+    Plain(Box<Streams<R, AXES, PIECES, SEGMENTS>>),
+    Live(Box<LiveStreams<R, AXES, LIVE_PIECES, LIVE_SEGMENTS>>),
+}
+
+/// What fills them.
+pub(super) enum Background<'a, R: Real, I> {
+    Plain(Box<(Feeder<'a, R, AXES>, Supply<R, AXES, I, Infallible>)>),
+    Live(Box<Live<'a, R, I>>),
+}
+
+/// Under live control.
+pub(super) struct Live<'a, R: Real, I> {
+    feeder: LiveFeeder<'a, R, AXES>,
+    director: Director<R, AXES, I, Infallible, PLACES>,
+    script: &'a Script,
+    /// Commands given so far.
+    given: usize,
+}
+
+impl<R: Real> Storage<R> {
+    pub(super) fn new(script: Option<&Script>) -> Self {
+        match script {
+            None => Self::Plain(Box::default()),
+            Some(_) => Self::Live(Box::default()),
+        }
+    }
+
+    /// The two ends, at `start`.
+    pub(super) fn split<'a, I: Iterator<Item = Result<Item<AXES>, Infallible>>>(
+        &'a mut self,
+        rules: PathRules,
+        start: [Position; AXES],
+        items: I,
+        tick_s: f64,
+        script: Option<&'a Script>,
+    ) -> (Background<'a, R, I>, Intake<'a, R, AXES>) {
+        match self {
+            Self::Plain(streams) => {
+                let (feeder, intake) = streams.split(rules, start);
+                (Background::Plain(Box::new((feeder, Supply::new(items, tick_s)))), intake)
+            }
+            Self::Live(streams) => {
+                let (feeder, intake) = streams.split(rules, start);
+                let director = Director::new(items, tick_s, 0);
+                const NONE: &Script = &Script::NONE;
+                let live = Live { feeder, director, script: script.unwrap_or(NONE), given: 0 };
+                (Background::Live(Box::new(live)), intake)
+            }
+        }
+    }
+}
+
+impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_, R, I> {
+    /// Before a tick.
+    pub(super) fn turn(&mut self, tick: u64) -> Result<(), SupplyError<Infallible>> {
+        match self {
+            Self::Plain(plain) => {
+                let (feeder, supply) = &mut **plain;
+                supply.fill(feeder)
+            }
+            Self::Live(live) => {
+                let Live { feeder, director, script, given } = &mut **live;
+                while let Some(timed) = script.commands().get(*given)
+                    && timed.tick <= tick
+                {
+                    match timed.command {
+                        Command::Hold => director.hold(),
+                        Command::Resume => director.resume(),
+                        Command::Abort => director.abort(),
+                        // A script holds none beyond the range.
+                        Command::Override(share) => director.set_override(share).unwrap_or_default(),
+                    }
+                    *given += 1;
+                    // Each by itself, as if time passed between them.
+                    director.turn(feeder)?;
+                }
+                director.turn(feeder)
+            }
+        }
+    }
+
+    /// Whether the run ends with a tick that ended in `state`: nothing is left, or nothing will let it go on. Why, if
+    /// that is not the program's end.
+    pub(super) fn ended(&self, state: ExecState) -> Option<Option<&'static str>> {
+        match self {
+            Self::Plain(plain) => (plain.1.is_empty() && state == ExecState::Idle).then_some(None),
+            Self::Live(live) => {
+                let is_last = live.given == live.script.commands().len();
+                match live.director.state(&live.feeder) {
+                    State::Done if state == ExecState::Idle => Some(None),
+                    State::Aborted => Some(Some("aborted: the rest of the program was given up")),
+                    State::Held if is_last => Some(Some("held to the end of the script, and not resumed")),
+                    State::Running if is_last && live.director.is_stopped_by_override(&live.feeder) => {
+                        Some(Some("at rest under an override of 0 to the end of the script"))
+                    }
+                    _ => None,
+                }
+            }
+        }
+    }
+
+    /// How often motion had to stop because data came too late.
+    pub(super) fn starvations(&self) -> u32 {
+        match self {
+            Self::Plain(_) => 0,
+            Self::Live(live) => live.director.starvations(),
+        }
+    }
+}
