@@ -103,7 +103,7 @@ fn random_commands(seed: u64) -> Option<Result<Run, String>> {
 #[test]
 fn any_command_at_any_tick_is_legal() {
     let mut totals = Totals::default();
-    let (mut ran, mut failures) = (0, Vec::new());
+    let (mut ran, mut starvations, mut failures) = (0, 0, Vec::new());
     let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
     let programs = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(400);
     for seed in first..first + programs {
@@ -111,6 +111,7 @@ fn any_command_at_any_tick_is_legal() {
             None => {}
             Some(Ok(run)) => {
                 totals.add(&run.totals);
+                starvations += run.starvations;
                 ran += 1;
             }
             // Fixed point's range has tests of its own.
@@ -118,7 +119,7 @@ fn any_command_at_any_tick_is_legal() {
             Some(Err(error)) => failures.push(format!("MOTION_TEST_SEED={seed}: {error}")),
         }
     }
-    println!("{ran} runs, {totals}");
+    println!("{ran} runs, {starvations} stops for want of a plan; {totals}");
     let shown: Vec<_> = failures.iter().take(200).map(String::as_str).collect();
     assert!(
         failures.is_empty(),

@@ -6,7 +6,7 @@
 use heapless::Vec;
 
 use super::list::{Item, List};
-use super::road::{Junction, Road, SLIVER};
+use super::road::{Junction, LENGTH_ROUNDING_MM, Road, SLIVER};
 use crate::law::{Law, Limits};
 use crate::plan::{Block, BlockPlan, plan, segments};
 use crate::units::Position;
@@ -52,7 +52,11 @@ pub(super) fn replan<const BLOCKS: usize>(
     }
     let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
     plans.resize(blocks.len(), BlockPlan::default()).ok()?;
-    plan(&blocks, from.feed_mm_s, 0.0, &mut plans).ok()?;
+    if plan(&blocks, from.feed_mm_s, 0.0, &mut plans).is_err() {
+        // Where one has to brake at once the feed may be a rounding too high for the length.
+        blocks.first_mut()?.length_mm += LENGTH_ROUNDING_MM;
+        plan(&blocks, from.feed_mm_s, 0.0, &mut plans).ok()?;
+    }
     let mut start = from.at;
     for ((block, plan), &block_end) in blocks.iter().zip(&plans).zip(&ends) {
         let made = segments::<f64, f64>(block, plan, start, block_end, tick_s).ok()?;

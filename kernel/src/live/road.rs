@@ -30,7 +30,7 @@ pub(super) struct RoadBlock {
 
 /// Rounding that is no violation, a part of a feed and a length \[mm\].
 const FEED_ROUNDING: f64 = 1.0e-9;
-const LENGTH_ROUNDING_MM: f64 = 4.0e-9;
+pub(super) const LENGTH_ROUNDING_MM: f64 = 4.0e-9;
 /// What is shorter is no path to plan on but rounding: a ramp over it would have no length in position steps. Less than
 /// what a segment's length may be off.
 pub(super) const SLIVER: Position = Position::from_bits(32);
