@@ -72,7 +72,10 @@ pub fn plan_spanning(
     // Several kilobytes each: used for all humps.
     let (mut up, mut down) = (Climb::NONE, Climb::NONE);
     let fits = |valleys: &Valleys<'_>, hump: &Hump| match Sides::new(hump, valleys) {
-        Some(sides) => sides.fit(sides.lowest(), &mut up, &mut down).is_some_and(|left| left >= 0.0),
+        Some(sides) => {
+            sides.start(&mut up, &mut down);
+            sides.fit(sides.lowest(), &mut up, &mut down).is_some_and(|left| left >= 0.0)
+        }
         None => hump.enter_mm_s == hump.exit_mm_s,
     };
     if !valleys.settle(fits) {
@@ -163,21 +166,29 @@ impl<'a> Sides<'a> {
         least.unwrap_or(Limits { accel_mm_s2: 0.0, jerk_mm_s3: 0.0, snap_mm_s4: 0.0 })
     }
 
+    /// Length of the hump, and a rounding: a ramp that was planned before to end just there still does.
+    fn room_mm(&self) -> f64 {
+        self.hump.end_mm - self.hump.start_mm + ROUNDING_MM
+    }
+
+    /// Puts both climbs before their stairs.
+    fn start(&self, up: &mut Climb, down: &mut Climb) {
+        up.start(&self.hump.rising, self.hump.enter_mm_s, self.room_mm());
+        down.start(&self.hump.falling, self.hump.exit_mm_s, self.room_mm());
+    }
+
     /// Both sides up to `top`; returns what is left between them \[mm\], less than 0 if there is no room. `None` if there
     /// is none for one side by itself.
     fn fit(&self, top: f64, up: &mut Climb, down: &mut Climb) -> Option<f64> {
-        let Hump { start_mm, end_mm, enter_mm_s, exit_mm_s, rising, falling, .. } = self.hump;
-        // A ramp that was planned before to end just here still does.
-        let room_mm = end_mm - start_mm + ROUNDING_MM;
-        let on = |a: f64, b: f64| self.limits(start_mm + a, start_mm + b, false);
-        let back = |a: f64, b: f64| self.limits(end_mm - b, end_mm - a, true);
-        let up_mm = up.find(rising, *enter_mm_s, top, room_mm, on)?;
-        let down_mm = down.find(falling, *exit_mm_s, top, room_mm, back)?;
-        Some(room_mm - up_mm - down_mm)
+        let (start_mm, end_mm) = (self.hump.start_mm, self.hump.end_mm);
+        let up_mm = up.find(top, |a, b| self.limits(start_mm + a, start_mm + b, false))?;
+        let down_mm = down.find(top, |a, b| self.limits(end_mm - b, end_mm - a, true))?;
+        Some(self.room_mm() - up_mm - down_mm)
     }
 
     /// Up to the highest top there is room for, which is returned.
     fn best(&self, up: &mut Climb, down: &mut Climb) -> Option<f64> {
+        self.start(up, down);
         let (mut low, mut high) = (self.lowest(), self.highest());
         let room_mm = self.hump.end_mm - self.hump.start_mm;
         if let Some(law) =
