@@ -130,9 +130,9 @@ impl<U: Unit> Shape<U> {
     ///
     /// Newton's method on a convex function from above: the result is never below the root but by rounding.
     pub(super) fn where_speed_is<R: Root<Unit = U>>(speed: R) -> (R, Self) {
-        // Above the root: x⁴/4 is below the shape everywhere, and equal at the end.
-        let four = R::from_f64(4.0);
-        let mut x = (speed * four).sqrt().sqrt().min(R::ONE);
+        // Above the root, but hardly.
+        let above = R::from_f64(1.0 + ABOUT_WITHIN[0]);
+        let mut x = (Self::about_where_speed_is(speed).0 * above).min(R::ONE);
         let mut shape = Self::at(x.to_unit());
         for _ in 0..SPEED_STEPS_MAX {
             let accel = R::ONE.scaled(shape.accel);
@@ -267,14 +267,8 @@ mod tests {
             let about: (f64, f64) = Shape::<f64>::about_where_speed_is(speed);
             assert!(i > 0 || about == (0.0, 0.0));
             if shape.length > f64::MIN_POSITIVE {
-                worst = [(about.0 / x - 1.0), (about.1 / shape.length - 1.0)]
-                    .map(f64::abs)
-                    .iter()
-                    .zip(worst)
-                    .map(|(a, b)| a.max(b))
-                    .collect::<Vec<_>>()
-                    .try_into()
-                    .expect("two");
+                worst[0] = worst[0].max((about.0 / x - 1.0).abs());
+                worst[1] = worst[1].max((about.1 / shape.length - 1.0).abs());
             }
         }
         println!("time, length: {worst:?}");

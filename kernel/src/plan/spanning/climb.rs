@@ -236,6 +236,7 @@ impl Climb {
             from_mm_s: start.feed_mm_s,
             to_mm_s: target.feed_mm_s,
             room_mm: self.room_mm,
+            wait_s_mm: 1.0 / start.feed_mm_s - 1.0 / target.feed_mm_s,
             between: self.reached.get(from + 1..=below)?,
             law,
             limits,

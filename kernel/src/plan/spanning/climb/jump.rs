@@ -31,6 +31,8 @@ pub(super) struct Jump<'a, L> {
     pub(super) to_mm_s: f64,
     /// It must end here.
     pub(super) room_mm: f64,
+    /// What is lost by a millimetre of waiting \[s/mm\]: infinite at rest, where nothing can be waited for.
+    pub(super) wait_s_mm: f64,
     /// The stairs it passes.
     pub(super) between: &'a [Reached],
     /// The law where it may start.
@@ -63,6 +65,13 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
             Tried::TooSoft => return None,
             Tried::TooHard => {}
         }
+        // The softest that might lose little enough: by itself a ramp loses its time × change/(2·to), and it takes no less
+        // than change/acceleration.
+        let change = self.to_mm_s - self.from_mm_s;
+        if best.is_none() && self.is_hopeless(change * change / (2.0 * self.to_mm_s * most_s), most_s) {
+            return None;
+        }
+        let all_s = most_s;
         let mut try_at = |accel: f64| {
             let tried = self.with(accel, most_s);
             if let Tried::Lost(lost_s, leg) = tried {
@@ -86,6 +95,9 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
             } else if !is_too_hard {
                 break;
             }
+        }
+        if good_s == f64::INFINITY && self.is_hopeless(hardest / SOFTER, all_s) {
+            return best;
         }
         // Golden section around the best of them.
         let (mut low, mut high) = (good / SOFTER, (good * SOFTER).min(hardest));
@@ -115,21 +127,38 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
             if !(own_s < most_s) || self.start_mm + length_mm > self.room_mm {
                 return Tried::TooSoft;
             }
-            // At rest nothing can be waited for.
-            let wait_s_mm = 1.0 / self.from_mm_s - 1.0 / self.to_mm_s;
-            let wait_most_mm = if wait_s_mm < f64::INFINITY { (most_s - own_s) / wait_s_mm } else { 0.0 };
+            let wait_most_mm = (most_s - own_s) / self.wait_s_mm;
+            let wait_most_mm = if self.wait_s_mm < f64::INFINITY { wait_most_mm } else { 0.0 };
             let latest_mm = (self.start_mm + wait_most_mm).min(self.room_mm - length_mm);
             let Some(at_mm) = self.earliest_mm(&ramp, latest_mm) else { return Tried::TooHard };
             let passed = (self.limits)(at_mm, at_mm + length_mm);
             let least = passed.least(&within.limits());
             if least == within.limits() {
-                let waited_s = if at_mm > self.start_mm { (at_mm - self.start_mm) * wait_s_mm } else { 0.0 };
+                let waited_s =
+                    if at_mm > self.start_mm { (at_mm - self.start_mm) * self.wait_s_mm } else { 0.0 };
                 return Tried::Lost(own_s + waited_s, Leg { start_mm: at_mm, ramp });
             }
             let Ok(law) = Law::new(least) else { return Tried::TooSoft };
             within = law;
         }
         Tried::TooSoft
+    }
+
+    /// Whether no ramp with so much acceleration or more loses less than `most_s`, as far as one stair can tell: what a ramp
+    /// loses by itself and where it passes the stair both grow with its time, nearly in proportion, so that between two
+    /// that lose too much because of the same stair there is none that does not.
+    fn is_hopeless(&self, accel_mm_s2: f64, most_s: f64) -> bool {
+        let Ok(softer) = self.law.softened(accel_mm_s2) else { return false };
+        let ends = [&self.law, &softer].map(|law| {
+            let ramp = Ramp::new(law, self.from_mm_s, self.to_mm_s);
+            let own_s = ramp.duration_s() - ramp.length_mm() / self.to_mm_s;
+            let wait_most_mm = if own_s < most_s { (most_s - own_s) / self.wait_s_mm } else { 0.0 };
+            (ramp, self.start_mm + wait_most_mm)
+        });
+        let is_late = |stair: &Reached, (ramp, latest_mm): &(Ramp<f64>, f64)| {
+            stair.ready_mm - ramp.about_length_to_feed_mm(stair.feed_mm_s).1 >= *latest_mm
+        };
+        self.between.iter().any(|stair| ends.iter().all(|end| is_late(stair, end)))
     }
 
     /// The first place from where the ramp passes no stair's feed before the stair ends, if it is not after `latest_mm`.
@@ -139,14 +168,28 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
             let (low_mm, high_mm) = ramp.about_length_to_feed_mm(stair.feed_mm_s);
             (stair.ready_mm - high_mm, stair.ready_mm - low_mm)
         };
-        let certain_mm = self.between.iter().map(|stair| about_mm(stair).0).fold(self.start_mm, f64::max);
-        if certain_mm > latest_mm {
-            return None;
-        }
-        let mut at_mm = self.start_mm;
+        let exact_mm = |stair: &Reached| stair.ready_mm - ramp.length_to_feed_mm(stair.feed_mm_s);
+        // The stair that surely makes it wait longest, and what others might.
+        let (mut first_mm, mut last_mm, mut longest) = (self.start_mm, self.start_mm, None);
+        let mut others_mm = self.start_mm;
         for stair in self.between {
-            if about_mm(stair).1 >= certain_mm.max(at_mm) {
-                at_mm = at_mm.max(stair.ready_mm - ramp.length_to_feed_mm(stair.feed_mm_s));
+            let (low_mm, high_mm) = about_mm(stair);
+            if low_mm > latest_mm {
+                return None;
+            }
+            if low_mm > first_mm {
+                others_mm = others_mm.max(last_mm);
+                (first_mm, last_mm, longest) = (low_mm, high_mm, Some(stair));
+            } else {
+                others_mm = others_mm.max(high_mm);
+            }
+        }
+        let mut at_mm = longest.map_or(self.start_mm, exact_mm).max(self.start_mm);
+        if others_mm > at_mm {
+            for stair in self.between {
+                if about_mm(stair).1 > at_mm {
+                    at_mm = at_mm.max(exact_mm(stair));
+                }
             }
         }
         (at_mm <= latest_mm).then_some(at_mm)
