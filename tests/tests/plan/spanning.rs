@@ -13,7 +13,7 @@ use motion_kernel::law::{Law, Limits, Ramp};
 use motion_kernel::plan::{Block, FeedSpan, Node, PlanError, merge_equal, nodes_for, plan_spanning};
 
 use crate::support::Random;
-use crate::{block, from_rest, planned, random_blocks, reference, time_s};
+use crate::{block, from_rest, law, planned, random_blocks, reference, time_s};
 
 pub(crate) fn spans_between(
     blocks: &[Block<f64>],
@@ -436,4 +436,35 @@ fn a_list_takes_as_long_backwards() {
     println!("worst {worst:.4}, together {:.6}", sums[0] / sums[1]);
     assert!((sums[0] / sums[1] - 1.0).abs() < 1e-4, "{sums:?}");
     assert!(worst < 0.02, "{worst}");
+}
+
+/// Strong and weak blocks by turns, of which only the strong ones would let every third ceiling be rested in: valleys that
+/// cannot be reached, by the thousand.
+pub(crate) fn unreachable(weak_mm_s2: f64, slope: f64, length_mm: f64) -> Vec<Block<f64>> {
+    let (weak, strong) = (law(weak_mm_s2, 1e4, 1e6), law(5e4, 1e9, 1e12));
+    (0..3000)
+        .flat_map(|n| {
+            let cap_mm_s = 100.0 * (1.0 + slope * f64::from(n) / 3000.0);
+            [(0.2, 1.0, weak), (0.4, 1.5, strong), (0.4, 2.0, weak)].map(|(part, higher, law)| Block {
+                length_mm: length_mm * part,
+                cap_mm_s: cap_mm_s * higher,
+                joint_mm_s: f64::INFINITY,
+                law,
+            })
+        })
+        .collect()
+}
+
+/// A chain of valleys that are given up one after the other from the same foot is no reason for having no plan.
+#[test]
+fn a_long_chain_of_valleys_is_given_up() {
+    let on = unreachable(500.0, 0.0, 0.01);
+    let back: Vec<_> = on.iter().rev().copied().collect();
+    for blocks in [on, back] {
+        let (time_s, made) = spans(&blocks);
+        if let Err(error) = legal(&blocks, 0.0, 0.0, &made) {
+            panic!("{error}");
+        }
+        assert!(time_s <= merged_s(&blocks) * (1.0 + 1e-9), "{time_s} {}", merged_s(&blocks));
+    }
 }

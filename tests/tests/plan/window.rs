@@ -3,9 +3,9 @@
 use motion_kernel::law::Ramp;
 use motion_kernel::plan::{Block, BlockPlan, FeedSpan, Node, PlanError, Window, WindowError, nodes_for};
 
-use crate::spanning::{legal, spans as whole, spans_between};
+use crate::spanning::{legal, spans as whole, spans_between, unreachable};
 use crate::support::Random;
-use crate::{block, planned, random_blocks, reference, time_s};
+use crate::{block, from_rest, planned, random_blocks, reference, time_s};
 
 /// The spans of a plan with a window of `room` blocks.
 fn windowed(blocks: &[Block<f64>], room: usize) -> Result<Vec<FeedSpan>, WindowError> {
@@ -200,4 +200,18 @@ fn a_bad_block_is_counted_from_the_first() {
             other => panic!("{other:?}"),
         }
     }
+}
+
+/// Where giving up valleys would take too long there are no ramps that span blocks, and still a plan.
+#[test]
+fn one_pair_of_ramps_a_block_is_the_last_resort() {
+    let blocks = unreachable(1.0, -0.5, 1.0);
+    assert_eq!(spans_between(&blocks, 0.0, 0.0), Ok(None));
+    let spans = windowed(&blocks, blocks.len()).expect("a plan");
+    if let Err(error) = legal(&blocks, 0.0, 0.0, &spans) {
+        panic!("{error}");
+    }
+    let time: f64 = spans.iter().map(|span| span.ramp.duration_s()).sum();
+    let per_block = time_s(&blocks, &from_rest(&blocks));
+    assert!(time <= per_block * (1.0 + 1e-6), "{time} {per_block}");
 }
