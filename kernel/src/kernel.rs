@@ -52,32 +52,30 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     #[must_use]
     pub fn new(config: &AxesConfig<R, AXES>, position: [Position; AXES], counts: [Counts; AXES]) -> Self {
         let &AxesConfig { axes: ref config, preview_ticks } = config;
-        let mut axes = [AxisState::default(); AXES];
-        for (((axis, config), &counts), &position) in axes.iter_mut().zip(config).zip(&counts).zip(&position)
-        {
-            axis.set_position(config, counts, position);
-        }
-        let mut outputs = [AxisOutput::default(); AXES];
-        for ((output, &counts), &set) in outputs.iter_mut().zip(&counts).zip(&position) {
-            (output.counts, output.set) = (counts, set);
-        }
-        let executor = Executor::new(position);
-        let trace = Trace {
-            // The first tick is number 0.
-            tick: u64::MAX,
-            executed: executor.resting(),
-            axes: outputs,
-            fault: None,
-        };
-        Self {
-            config: *config,
-            executor,
-            preview: Preview::new(preview_ticks, position),
-            axes,
+        let origin = [Position::ZERO; AXES];
+        let executor = Executor::new(origin);
+        let mut kernel = Self {
             power: Power::Off,
             told: None,
-            trace,
+            executor,
+            // The first tick is number 0.
+            trace: Trace {
+                tick: u64::MAX,
+                executed: executor.resting(),
+                axes: [AxisOutput::default(); AXES],
+                fault: None,
+            },
+            axes: [AxisState::default(); AXES],
+            config: *config,
+            preview: Preview::new(preview_ticks, origin),
+        };
+        let axes = kernel.axes.iter_mut().zip(&mut kernel.trace.axes).zip(config);
+        for (((axis, output), config), (&counts, &position)) in axes.zip(counts.iter().zip(&position)) {
+            output.counts = counts;
+            axis.set_position(config, counts, position);
         }
+        kernel.stand_here();
+        kernel
     }
 
     /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (what
@@ -221,9 +219,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         for (((position, axis), config), output) in
             position.iter_mut().zip(&mut self.axes).zip(&self.config).zip(&mut self.trace.axes)
         {
-            *position = axis.position(config, output.counts);
-            output.set = *position;
-            axis.regulator = crate::axis::RegulatorState::default();
+            *position = axis.stand_here(config, output);
         }
         self.executor = Executor::new(position);
         self.preview.rest_at(position);
