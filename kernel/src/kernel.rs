@@ -52,30 +52,24 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     #[must_use]
     pub fn new(config: &AxesConfig<R, AXES>, position: [Position; AXES], counts: [Counts; AXES]) -> Self {
         let &AxesConfig { axes: ref config, preview_ticks } = config;
-        let origin = [Position::ZERO; AXES];
-        let executor = Executor::new(origin);
-        let mut kernel = Self {
-            power: Power::Off,
-            told: None,
-            executor,
-            // The first tick is number 0.
-            trace: Trace {
-                tick: u64::MAX,
-                executed: executor.resting(),
-                axes: [AxisOutput::default(); AXES],
-                fault: None,
-            },
-            axes: [AxisState::default(); AXES],
-            config: *config,
-            preview: Preview::new(preview_ticks, origin),
-        };
-        let axes = kernel.axes.iter_mut().zip(&mut kernel.trace.axes).zip(config);
-        for (((axis, output), config), (&counts, &position)) in axes.zip(counts.iter().zip(&position)) {
-            output.counts = counts;
+        let (mut axes, mut outputs) = ([AxisState::default(); AXES], [AxisOutput::default(); AXES]);
+        let of_axes = axes.iter_mut().zip(&mut outputs).zip(config).zip(counts.iter().zip(&position));
+        for (((axis, output), config), (&counts, &position)) in of_axes {
+            (output.counts, output.set) = (counts, position);
             axis.set_position(config, counts, position);
         }
-        kernel.stand_here();
-        kernel
+        let executor = Executor::new(position);
+        // The first tick is number 0.
+        let trace = Trace { tick: u64::MAX, executed: executor.resting(), axes: outputs, fault: None };
+        Self {
+            config: *config,
+            executor,
+            preview: Preview::new(preview_ticks, position),
+            axes,
+            power: Power::Off,
+            told: None,
+            trace,
+        }
     }
 
     /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (what

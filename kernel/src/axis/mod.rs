@@ -102,7 +102,6 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
     ///
     /// # Errors
     /// The first figure that is out of its range or beyond the number type's.
-    #[inline(never)]
     pub fn new(figures: &[AxisFigures; AXES], tick_s: f64) -> Result<Self, AxesError> {
         let () = Self::ONE_AT_LEAST;
         let preview_ticks = Self::preview_ticks(figures, tick_s)?;

@@ -47,7 +47,10 @@ impl<const AXES: usize> Preview<AXES> {
     /// A machine that has been at rest at `position`, delayed by `ticks`, at most [`PREVIEW_TICKS_MAX`].
     #[must_use]
     pub fn new(ticks: u8, position: [Position; AXES]) -> Self {
-        Self { past: [position; PREVIEW_TICKS_MAX as usize], ticks: ticks.min(PREVIEW_TICKS_MAX), next: 0 }
+        let past = [[Position::ZERO; AXES]; PREVIEW_TICKS_MAX as usize];
+        let mut preview = Self { past, ticks: ticks.min(PREVIEW_TICKS_MAX), next: 0 };
+        preview.rest_at(position);
+        preview
     }
 
     /// The delay \[ticks\].
@@ -57,6 +60,7 @@ impl<const AXES: usize> Preview<AXES> {
     }
 
     /// As if the machine had always been at `position`.
+    #[inline(never)]
     pub fn rest_at(&mut self, position: [Position; AXES]) {
         for past in rolled(self.past.as_mut_slice()) {
             *past = position;
