@@ -52,23 +52,15 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     #[must_use]
     pub fn new(config: &AxesConfig<R, AXES>, position: [Position; AXES], counts: [Counts; AXES]) -> Self {
         let &AxesConfig { axes: ref config, preview_ticks } = config;
-        let mut axes = [AxisState::default(); AXES];
-        for (((axis, config), &counts), &position) in axes.iter_mut().zip(config).zip(&counts).zip(&position)
-        {
+        let (mut axes, mut outputs) = ([AxisState::default(); AXES], [AxisOutput::default(); AXES]);
+        let of_axes = axes.iter_mut().zip(&mut outputs).zip(config).zip(counts.iter().zip(&position));
+        for (((axis, output), config), (&counts, &position)) in of_axes {
+            (output.counts, output.set) = (counts, position);
             axis.set_position(config, counts, position);
         }
-        let mut outputs = [AxisOutput::default(); AXES];
-        for ((output, &counts), &set) in outputs.iter_mut().zip(&counts).zip(&position) {
-            (output.counts, output.set) = (counts, set);
-        }
         let executor = Executor::new(position);
-        let trace = Trace {
-            // The first tick is number 0.
-            tick: u64::MAX,
-            executed: executor.resting(),
-            axes: outputs,
-            fault: None,
-        };
+        // The first tick is number 0.
+        let trace = Trace { tick: u64::MAX, executed: executor.resting(), axes: outputs, fault: None };
         Self {
             config: *config,
             executor,
@@ -221,9 +213,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         for (((position, axis), config), output) in
             position.iter_mut().zip(&mut self.axes).zip(&self.config).zip(&mut self.trace.axes)
         {
-            *position = axis.position(config, output.counts);
-            output.set = *position;
-            axis.regulator = crate::axis::RegulatorState::default();
+            *position = axis.stand_here(config, output);
         }
         self.executor = Executor::new(position);
         self.preview.rest_at(position);

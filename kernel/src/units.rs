@@ -8,6 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::num::Real;
 
+const STEPS_PER_MM: f64 = 4_294_967_296.0;
+
 /// A position or a length in mm, in steps of 2⁻³² mm (0.23 pm), from −2³¹ to 2³¹ mm.
 ///
 /// Path positions and axis positions are kept in this type because a float degrades with distance:
@@ -39,14 +41,33 @@ impl Position {
     /// The nearest step to `mm`; `None` if `mm` is not finite or beyond ±[`Self::LIMIT_MM`].
     /// Background only.
     #[must_use]
+    #[inline(never)]
     pub fn from_mm(mm: f64) -> Option<Self> {
-        if libm::fabs(mm) <= Self::LIMIT_MM { I32F32::checked_from_num(mm).map(Self) } else { None }
+        if !(libm::fabs(mm) <= Self::LIMIT_MM) {
+            return None;
+        }
+        // Below 2⁵² steps. With 2⁵² on top the float's last place is a step: the sum is rounded to it, halves to even,
+        // and its lower bits are the number of steps.
+        const STEP_IS_LAST: f64 = 4_503_599_627_370_496.0;
+        let steps = (libm::fabs(mm) * STEPS_PER_MM + STEP_IS_LAST).to_bits() - STEP_IS_LAST.to_bits();
+        let steps = steps.cast_signed();
+        Some(Self::from_bits(if mm.is_sign_negative() { -steps } else { steps }))
     }
 
     /// The value in mm, rounded to f64 (exact up to 2 m). For records and reports, not for the tick.
     #[must_use]
+    #[inline(never)]
     pub fn to_mm(self) -> f64 {
-        self.0.to_num()
+        // Halves are exact in f64, and their sum is rounded once.
+        let bits = self.to_bits();
+        let (upper, lower) = ((bits >> 32) as i32, bits as u32);
+        f64::from(upper) + f64::from(lower) / STEPS_PER_MM
+    }
+
+    /// Whether it is within ±[`Self::LIMIT_MM`].
+    #[must_use]
+    pub fn is_within_limit(self) -> bool {
+        self.to_bits().unsigned_abs() <= (Self::LIMIT_MM * STEPS_PER_MM) as u64
     }
 
     /// A short local offset in mm as a step count, see [`Real::to_q32`].
@@ -126,5 +147,48 @@ impl DacCode {
     #[must_use]
     pub fn to_volts(self) -> f64 {
         f64::from(self.0) / Self::PER_VOLT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against the conversions of `fixed`, over all sizes and signs, halves of a step, and both ends.
+    #[test]
+    fn converts_as_fixed_does() {
+        let ends = [0.0, -0.0, 1.0e6, 1.0e6_f64.next_up(), f64::NAN, f64::INFINITY, f64::MIN_POSITIVE];
+        let mut state = 5_u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state ^ state >> 31
+        };
+        for index in 0..1_000_000 {
+            let bits = random().cast_signed() >> (random() % 64);
+            assert_eq!(
+                Position::from_bits(bits).to_mm().to_bits(),
+                I32F32::from_bits(bits).to_num::<f64>().to_bits()
+            );
+            assert_eq!(
+                Position::from_bits(bits).is_within_limit(),
+                bits.unsigned_abs() <= 1_000_000 << 32,
+                "{bits}"
+            );
+            let near = (bits >> 11) as f64 * 0.5 / STEPS_PER_MM;
+            let mm = ends.get(index).copied().unwrap_or(if index % 2 == 0 {
+                near
+            } else {
+                f64::from_bits(random())
+            });
+            for mm in [mm, -mm] {
+                let expected =
+                    if libm::fabs(mm) <= Position::LIMIT_MM { I32F32::checked_from_num(mm) } else { None };
+                assert_eq!(
+                    Position::from_mm(mm).map(Position::to_bits),
+                    expected.map(I32F32::to_bits),
+                    "{mm:e}"
+                );
+            }
+        }
     }
 }

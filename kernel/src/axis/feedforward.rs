@@ -22,9 +22,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::check::{Check, fits};
 use super::preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX};
-use super::scale::ScaleError;
-use crate::num::{Fixed, Real};
+use crate::num::{Fixed, Real, is_finite, whole};
 use crate::path::Setpoint;
 
 /// Feedforward of an axis. The default is none.
@@ -76,7 +76,7 @@ impl Table {
     #[must_use]
     pub fn new(reach: f64, mm_s: &[f64; TABLE_POINTS]) -> Self {
         let greatest = mm_s.iter().fold(0.0_f64, |greatest, point| greatest.max(libm::fabs(*point)));
-        let is_number = mm_s.iter().all(|point| point.is_finite());
+        let is_number = mm_s.iter().all(|&point| is_finite(point));
         let mm_s_per_step = if is_number { greatest / f64::from(i16::MAX) } else { f64::NAN };
         let step =
             |point: f64| if mm_s_per_step > 0.0 { libm::round(point / mm_s_per_step) as i16 } else { 0 };
@@ -110,6 +110,24 @@ pub struct DriveInverse {
     pub bed: Option<BedInverse>,
 }
 
+impl DriveInverse {
+    /// Whether every figure is within its range.
+    fn check(&self, check: &mut Check, tick_s: f64) {
+        const GAINS: [f64; 2] = [1e-3, 1e6];
+        const FRICTIONS: [f64; 2] = [0.0, 1e6];
+        let Self { velocity_gain_per_s, integral_time_s, current_lag_s, viscous_friction_per_s, .. } = *self;
+        let Self { coulomb_friction_mm_s2, reversal_mm_s, .. } = *self;
+        let (of_gain, of_friction) = ("a number from 1e-3 to 1e6", "a number from 0 to 1e6");
+        let of_time = "a number from the tick to 1e6";
+        check.within(GAINS, "drive velocity gain [1/s]", velocity_gain_per_s, of_gain);
+        check.within([tick_s, 1e6], "drive integral time [s]", integral_time_s, of_time);
+        check.within([0.0, 1.0], "drive current lag [s]", current_lag_s, "a number from 0 to 1");
+        check.within(FRICTIONS, "viscous friction [1/s]", viscous_friction_per_s, of_friction);
+        check.within(FRICTIONS, "Coulomb friction [mm/s²]", coulomb_friction_mm_s2, of_friction);
+        check.within(GAINS, "reversal velocity [mm/s]", reversal_mm_s, of_gain);
+    }
+}
+
 /// One mode of the machine bed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BedInverse {
@@ -130,22 +148,23 @@ fn reach<R: Real>() -> [f64; 3] {
     R::SETPOINT_MAX.or(Fixed::SETPOINT_MAX).unwrap_or_default()
 }
 
-/// eˣ − 1 for |x| ≤ 2. A loop of a few operations: general functions in f64 are kilobytes on a core without it.
+/// eˣ − 1 for |x| ≤ 2.
 fn expm1(x: f64) -> f64 {
-    let (mut term, mut sum) = (1.0, 0.0);
-    for n in 1..=24_u8 {
-        term = term * x / f64::from(n);
-        sum += term;
-    }
-    sum
+    series(1.0, x, 24, |n| n)
 }
 
 /// 1 − cos √x for 0 ≤ x ≤ 4.
 fn versine(x: f64) -> f64 {
-    let (mut term, mut sum) = (-1.0, 0.0);
-    for n in 1..=12_u8 {
-        let twice = f64::from(2 * n);
-        term = -term * x / (twice * (twice - 1.0));
+    series(-1.0, x, 12, |n| 2.0 * n * (1.0 - 2.0 * n))
+}
+
+/// Terms 1 to `terms` of a power series whose term n is the one before, the first of them `term`, times x/divisor(n). A
+/// loop of a few operations: general functions in f64 are kilobytes on a core without it.
+#[inline(never)]
+fn series(mut term: f64, x: f64, terms: u8, divisor: fn(f64) -> f64) -> f64 {
+    let mut sum = 0.0;
+    for n in 1..=terms {
+        term = term * x / divisor(f64::from(n));
         sum += term;
     }
     sum
@@ -161,21 +180,20 @@ struct Linear<R> {
 
 impl<R: Real> Linear<R> {
     /// `gains` at what the set-point was `late_s` ago.
-    fn new(quantity: &'static str, gains: [f64; 3], late_s: f64) -> Result<Self, ScaleError> {
+    #[inline(never)]
+    fn new(check: &mut Check, quantity: &'static str, gains: [f64; 3], late_s: f64) -> Self {
         let [velocity, accel, jerk] = gains;
-        let gains =
-            [velocity, accel - late_s * velocity, jerk - late_s * accel + late_s * late_s / 2.0 * velocity];
-        // With room for the sum of all that is added to it.
-        let most: f64 = gains.iter().zip(reach::<R>()).map(|(gain, reach)| libm::fabs(*gain) * reach).sum();
-        let refused = ScaleError {
-            quantity,
-            value: gains.into_iter().find(|gain| !gain.is_finite()).unwrap_or(most),
-            expected: "numbers within the kernel's range",
-        };
-        let real = |value| R::checked_from_f64(value).ok_or(refused);
-        real(8.0 * most)?;
-        let [velocity, accel, jerk] = gains;
-        Ok(Self { velocity: real(velocity)?, accel: real(accel)?, jerk: real(jerk)? })
+        let (accel, jerk) =
+            (accel - late_s * velocity, jerk - late_s * accel + late_s * late_s / 2.0 * velocity);
+        let [velocity_mm_s, accel_mm_s2, jerk_mm_s3] = reach::<R>();
+        let most = libm::fabs(velocity) * velocity_mm_s
+            + libm::fabs(accel) * accel_mm_s2
+            + libm::fabs(jerk) * jerk_mm_s3;
+        // With room for the sum of all that is added to it. Reaches are above 1: a gain that does not fit makes the sum
+        // one that does not.
+        let culprit = [velocity, accel, jerk].into_iter().find(|&gain| !is_finite(gain)).unwrap_or(most);
+        check.that(fits::<R>(8.0 * most), quantity, culprit, "numbers within the kernel's range");
+        Self { velocity: R::from_f64(velocity), accel: R::from_f64(accel), jerk: R::from_f64(jerk) }
     }
 
     #[inline]
@@ -198,28 +216,31 @@ struct Lookup<R> {
     steps: [i16; TABLE_POINTS],
 }
 
+/// The least power of two from 1 to 2³¹, as far as a reach goes in fixed point, that is not below `x`; 2³¹ if there is
+/// none.
+fn power_of_two_above(x: f64) -> f64 {
+    const EXPONENT: u32 = f64::MANTISSA_DIGITS - 1;
+    // One on top of the exponent, unless all digits behind the first are 0.
+    let next = x.to_bits().saturating_add((1 << EXPONENT) - 1) >> EXPONENT;
+    f64::from_bits(next.clamp(1023, 1023 + 31) << EXPONENT)
+}
+
 impl<R: Real> Lookup<R> {
-    fn new(quantity: &'static str, table: &Table) -> Result<Self, ScaleError> {
+    #[inline(never)]
+    fn new(check: &mut Check, quantity: &'static str, table: &Table) -> Self {
         let &Table { reach, mm_s_per_step, steps } = table;
-        let refused = |value| ScaleError {
-            quantity,
-            value,
-            expected: "a reach above 1e-6 and steps of at most 10 mm/s",
-        };
-        let mut scale = 1.0;
-        // 2³¹ is as far as a reach goes in fixed point.
-        for _ in 0..31 {
-            if scale * reach > 1.0 {
-                scale *= 0.5;
-            }
-        }
+        let expected = "a reach above 1e-6 and steps of at most 10 mm/s";
+        check.within([0.0, 10.0], quantity, mm_s_per_step, expected);
+        check.that(reach > 1e-6 && fits::<R>(reach), quantity, reach, expected);
+        let scale = 1.0 / power_of_two_above(reach);
         let per_scaled = (TABLE_POINTS - 1) as f64 / 2.0 / (scale * reach);
-        let is_step = (0.0..=10.0).contains(&mm_s_per_step);
-        let mm_s_per_step =
-            R::checked_from_f64(mm_s_per_step).filter(|_| is_step).ok_or(refused(mm_s_per_step))?;
-        let reach = R::checked_from_f64(reach).filter(|_| reach > 1e-6).ok_or(refused(reach))?;
-        let per_scaled = R::from_f64(per_scaled);
-        Ok(Self { reach, scale: R::from_f64(scale), per_scaled, mm_s_per_step, steps })
+        Self {
+            reach: R::from_f64(reach),
+            scale: R::from_f64(scale),
+            per_scaled: R::from_f64(per_scaled),
+            mm_s_per_step: R::from_f64(mm_s_per_step),
+            steps,
+        }
     }
 
     fn at(&self, value: R) -> R {
@@ -250,20 +271,19 @@ struct LookupTables<R> {
 }
 
 impl<R: Real> LookupTables<R> {
-    fn new(tables: &Tables, late_s: f64) -> Result<Option<Self>, ScaleError> {
+    fn new(check: &mut Check, tables: &Tables, late_s: f64) -> Option<Self> {
         let Tables { velocity, accel, jerk } = tables;
         if velocity.is_none() && accel.is_none() && jerk.is_none() {
-            return Ok(None);
+            return None;
         }
-        let lookup = |quantity, table: &Option<Table>| {
-            table.as_ref().map(|table| Lookup::new(quantity, table)).transpose()
-        };
-        Ok(Some(Self {
-            velocity: lookup("velocity feedforward table", velocity)?,
-            accel: lookup("acceleration feedforward table", accel)?,
-            jerk: lookup("jerk feedforward table", jerk)?,
+        let mut lookup =
+            |quantity, table: &Option<Table>| table.as_ref().map(|table| Lookup::new(check, quantity, table));
+        Some(Self {
+            velocity: lookup("velocity feedforward table", velocity),
+            accel: lookup("acceleration feedforward table", accel),
+            jerk: lookup("jerk feedforward table", jerk),
             late: R::from_f64(late_s),
-        }))
+        })
     }
 
     fn at(&self, setpoint: &Setpoint<R>) -> R {
@@ -292,29 +312,19 @@ struct BedState<R> {
 }
 
 impl<R: Real> Bed<R> {
-    fn new(bed: &BedInverse, late_s: f64, tick_s: f64) -> Result<Self, ScaleError> {
+    #[inline(never)]
+    fn new(check: &mut Check, bed: &BedInverse, late_s: f64, tick_s: f64) -> Self {
         let &BedInverse { frequency_hz, damping_ratio, mass_ratio } = bed;
-        let check = |quantity, value: f64, holds: bool, expected| {
-            if holds && value.is_finite() { Ok(()) } else { Err(ScaleError { quantity, value, expected }) }
-        };
-        check(
-            "bed frequency [Hz]",
-            frequency_hz,
-            frequency_hz > 0.0 && frequency_hz * tick_s < BED_TICK_SHARE_MAX,
-            "more than 0, less than a quarter of the tick's frequency",
-        )?;
-        check(
-            "bed damping ratio",
-            damping_ratio,
-            (0.001..=1.0).contains(&damping_ratio),
-            "a number from 0.001 to 1",
-        )?;
+        let is_slow = frequency_hz > 0.0 && frequency_hz * tick_s < BED_TICK_SHARE_MAX;
+        let expected = "more than 0, less than a quarter of the tick's frequency";
+        check.that(is_slow, "bed frequency [Hz]", frequency_hz, expected);
+        check.within([0.001, 1.0], "bed damping ratio", damping_ratio, "a number from 0.001 to 1");
         // Shaken as badly as can be, to and fro at the resonance, the bed's acceleration is 2/π·μ/ζ of the axis', and
         // μ at first.
         let [_, accel_mm_s2, _] = reach::<R>();
         let peak = accel_mm_s2 * mass_ratio * (2.0 + 0.75 / damping_ratio);
-        let fits = mass_ratio > 0.0 && R::checked_from_f64(peak).is_some();
-        check("bed mass ratio", mass_ratio, fits, "more than 0, and a resonance within the kernel's range")?;
+        let expected = "more than 0, and a resonance within the kernel's range";
+        check.that(mass_ratio > 0.0 && fits::<R>(peak), "bed mass ratio", mass_ratio, expected);
         // With the moving mass on it: z″ + 2σ·z′ + ω²·z = −share·a. Steps of a tick have the poles of this, and its
         // displacement under a constant acceleration; at a resonance of 16 a part in a thousand of the frequency
         // would be a part in thirty of the motion.
@@ -323,16 +333,16 @@ impl<R: Real> Bed<R> {
         let decay = damping_ratio * omega / (1.0 + mass_ratio) * tick_s;
         let square = omega * omega / (1.0 + mass_ratio) * tick_s * tick_s;
         let shrinks = expm1(-decay);
-        let forgets = -shrinks * (2.0 + shrinks);
+        let grows = shrinks * (2.0 + shrinks);
         // 1 + e^(−2σTs) − 2·e^(−σTs)·cos, without cancellation.
         let stiffness = shrinks * shrinks + 2.0 * (1.0 + shrinks) * versine(square - decay * decay);
-        let drive = -share * stiffness / square;
-        Ok(Self {
-            displacement: R::from_f64(-stiffness / tick_s / tick_s),
-            velocity: R::from_f64(-forgets / tick_s),
-            drive: [R::from_f64(drive), R::from_f64(-late_s * drive)],
+        let drive = share * stiffness / square;
+        Self {
+            displacement: -R::from_f64(stiffness / tick_s / tick_s),
+            velocity: R::from_f64(grows / tick_s),
+            drive: [-R::from_f64(drive), R::from_f64(late_s * drive)],
             tick_s: R::from_f64(tick_s),
-        })
+        }
     }
 
     /// The bed's acceleration now; its motion to the next tick.
@@ -372,7 +382,7 @@ struct InverseState<R> {
 }
 
 impl<R: Real> Inverse<R> {
-    fn new(drive: &DriveInverse, late_s: f64, tick_s: f64) -> Result<Self, ScaleError> {
+    fn new(check: &mut Check, drive: &DriveInverse, late_s: f64, tick_s: f64) -> Self {
         let &DriveInverse {
             velocity_gain_per_s: gain_per_s,
             integral_time_s,
@@ -382,39 +392,25 @@ impl<R: Real> Inverse<R> {
             reversal_mm_s,
             bed,
         } = drive;
-        let check = |quantity, value: f64, least: f64, most: f64, expected| {
-            if value >= least && value <= most {
-                Ok(())
-            } else {
-                Err(ScaleError { quantity, value, expected })
-            }
-        };
-        check("drive velocity gain [1/s]", gain_per_s, 1e-3, 1e6, "a number from 1e-3 to 1e6")?;
-        check("drive integral time [s]", integral_time_s, tick_s, 1e6, "a number from the tick to 1e6")?;
-        check("drive current lag [s]", lag_s, 0.0, 1.0, "a number from 0 to 1")?;
-        check("viscous friction [1/s]", viscous_per_s, 0.0, 1e6, "a number from 0 to 1e6")?;
-        check("Coulomb friction [mm/s²]", coulomb_friction_mm_s2, 0.0, 1e6, "a number from 0 to 1e6")?;
-        check("reversal velocity [mm/s]", reversal_mm_s, 1e-3, 1e6, "a number from 1e-3 to 1e6")?;
-        let torque = [viscous_per_s, 1.0 + lag_s * viscous_per_s, lag_s].map(|part| part / gain_per_s);
+        drive.check(check, tick_s);
+        let torque =
+            [viscous_per_s / gain_per_s, (1.0 + lag_s * viscous_per_s) / gain_per_s, lag_s / gain_per_s];
         let friction = coulomb_friction_mm_s2 / gain_per_s / reversal_mm_s;
+        let fits = fits::<R>(friction) && fits::<R>(8.0 * coulomb_friction_mm_s2 / gain_per_s);
         let quantity = "Coulomb friction over drive velocity gain and reversal velocity [1]";
-        let expected = "a number within the kernel's range";
-        let friction = R::checked_from_f64(friction)
-            .filter(|_| R::checked_from_f64(8.0 * coulomb_friction_mm_s2 / gain_per_s).is_some())
-            .ok_or(ScaleError { quantity, value: friction, expected })?;
-        Ok(Self {
-            torque: Linear::new("drive inverse", torque, late_s)?,
-            turning: Linear::new("reversal", [1.0, 0.0, 0.0], late_s - lag_s)?,
+        check.that(fits, quantity, friction, "a number within the kernel's range");
+        Self {
+            torque: Linear::new(check, "drive inverse", torque, late_s),
+            turning: Linear::new(check, "reversal", [1.0, 0.0, 0.0], late_s - lag_s),
             reversal_mm_s: R::from_f64(reversal_mm_s),
-            friction,
+            friction: R::from_f64(friction),
             // By the trapezoid rule: the plain difference would come half a tick late.
             takes: R::from_f64(1.0 / (1.0 + tick_s / integral_time_s / 2.0)),
             forgets: R::from_f64(1.0 / (0.5 + integral_time_s / tick_s)),
-            bed: match &bed {
-                Some(bed) => Some((Bed::new(bed, late_s - lag_s, tick_s)?, R::from_f64(1.0 / gain_per_s))),
-                None => None,
-            },
-        })
+            bed: bed
+                .as_ref()
+                .map(|bed| (Bed::new(check, bed, late_s - lag_s, tick_s), R::from_f64(1.0 / gain_per_s))),
+        }
     }
 
     #[inline]
@@ -476,31 +472,26 @@ impl<R: Real> Delay<R> {
 impl<R: Real> FeedforwardConfig<R> {
     /// For a tick of `tick_s`, where position set-points are delayed by `preview_ticks` ticks.
     ///
-    /// # Errors
-    /// The first figure that is not finite, out of its range or beyond the number type's, or a lead longer than the
+    /// Refused where a figure is not finite, out of its range or beyond the number type's, or a lead longer than the
     /// preview.
-    pub fn new(feedforward: &Feedforward, preview_ticks: u8, tick_s: f64) -> Result<Self, ScaleError> {
-        let &Feedforward { velocity, accel_s, jerk_s2, lead_s, tables, drive } = feedforward;
+    pub(super) fn new(check: &mut Check, feedforward: &Feedforward, preview_ticks: u8, tick_s: f64) -> Self {
+        let &Feedforward { velocity, accel_s, jerk_s2, lead_s, .. } = feedforward;
         let preview_s = f64::from(preview_ticks) * tick_s;
-        // Whole ticks of what it comes too early; a whole one is not one less for rounding, nor is what is left less
-        // than nothing.
-        let early_ticks = (preview_s - lead_s) / tick_s + LEAD_ROUNDING_TICKS;
-        let delay_ticks = (early_ticks as u8).min(PREVIEW_TICKS_MAX);
-        let late_s = preview_s - lead_s - f64::from(delay_ticks) * tick_s;
+        let early_s = preview_s - lead_s;
+        // A whole tick is not one less for rounding, nor is what is left less than nothing.
+        let leads = [0.0, preview_s + LEAD_ROUNDING_TICKS * tick_s];
+        check.within(leads, "feedforward lead [s]", lead_s, "a number from 0 to the machine's preview");
+        let early_ticks = early_s / tick_s + LEAD_ROUNDING_TICKS;
+        let delay_ticks = if early_ticks > 0.0 { whole(early_ticks) as u8 } else { 0 };
+        let delay_ticks = delay_ticks.min(PREVIEW_TICKS_MAX);
+        let late_s = early_s - f64::from(delay_ticks) * tick_s;
         let late_s = if late_s > 0.0 { late_s } else { 0.0 };
-        if !(lead_s >= 0.0 && lead_s <= preview_s + LEAD_ROUNDING_TICKS * tick_s) {
-            let expected = "a number from 0 to the machine's preview";
-            return Err(ScaleError { quantity: "feedforward lead [s]", value: lead_s, expected });
-        }
-        let gains = Linear::new("feedforward gains", [velocity, accel_s, jerk_s2], late_s)?;
-        let tables = LookupTables::new(&tables, late_s)?;
-        let inverse = match &drive {
-            Some(drive) => Some(Inverse::new(drive, late_s, tick_s)?),
-            None => None,
-        };
+        let gains = Linear::new(check, "feedforward gains", [velocity, accel_s, jerk_s2], late_s);
+        let tables = LookupTables::new(check, &feedforward.tables, late_s);
+        let inverse = feedforward.drive.as_ref().map(|drive| Inverse::new(check, drive, late_s, tick_s));
         let is_more = tables.is_some() || inverse.is_some() || delay_ticks > 0;
         let more = is_more.then_some(More { tables, inverse, delay_ticks });
-        Ok(Self { gains, more })
+        Self { gains, more }
     }
 
     /// The velocity command for this tick \[mm/s\].
@@ -539,7 +530,8 @@ mod tests {
         fn holds<R: Real>(reach: f64) {
             // A line: what is between points is known.
             let points: [f64; TABLE_POINTS] = core::array::from_fn(|index| 25.0 * (index as f64 - 4.0));
-            let lookup = Lookup::<R>::new("table", &Table::new(reach, &points)).expect("valid");
+            let table = Table::new(reach, &points);
+            let lookup = Check::all(|check| Lookup::<R>::new(check, "table", &table)).expect("valid");
             for part in [-2.0, -1.0, -0.99, -0.5, -0.01, 0.0, 0.3, 0.5, 0.999, 1.0, 1.5] {
                 let value = R::checked_from_f64(part * reach).unwrap_or(R::from_f64(part.signum() * reach));
                 let expected = 100.0 * part.clamp(-1.0, 1.0);
@@ -554,7 +546,8 @@ mod tests {
             holds::<f64>(reach);
             holds::<Fixed>(reach);
         }
-        assert!(Lookup::<Fixed>::new("table", &Table::new(2.2e9, &[0.0; TABLE_POINTS])).is_err());
+        let far = Table::new(2.2e9, &[0.0; TABLE_POINTS]);
+        assert!(Check::all(|check| Lookup::<Fixed>::new(check, "table", &far)).is_err());
     }
 
     #[test]
@@ -563,6 +556,26 @@ mod tests {
             let x = f64::from(index) / 100.0;
             assert!((expm1(-x) - libm::expm1(-x)).abs() < 1e-15);
             assert!((versine(x * x) - (1.0 - libm::cos(x))).abs() < 1e-15);
+        }
+    }
+
+    /// Halved until it is at most 1, as often as to 2³¹.
+    #[test]
+    fn a_reach_is_brought_to_one() {
+        let mut state = 17_u64;
+        for index in 0..100_000_i32 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let power = 2.0_f64.powi(index % 40 - 5);
+            let random = power * (1.0 + (state >> 12) as f64 / 4_503_599_627_370_496.0);
+            for reach in [power, power.next_up(), power.next_down(), random] {
+                let mut scale = 1.0;
+                for _ in 0..31 {
+                    if scale * reach > 1.0 {
+                        scale *= 0.5;
+                    }
+                }
+                assert_eq!(1.0 / power_of_two_above(reach), scale, "{reach:e}");
+            }
         }
     }
 }

@@ -12,6 +12,7 @@
 //! Configuration ([`AxesConfig`], [`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so gains can
 //! change without a bump.
 
+mod check;
 pub mod correction;
 pub mod feedforward;
 pub mod preview;
@@ -28,6 +29,8 @@ pub use scale::{EncoderScale, OutputScale, ScaleError};
 
 use serde::{Deserialize, Serialize};
 
+use check::{Check, fits};
+
 use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, DacCode, Position};
@@ -35,13 +38,14 @@ use crate::units::{Counts, DacCode, Position};
 /// An axis in figures of any number type: what a machine's file says of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisFigures {
-    /// Travel per encoder count \[mm\], see [`EncoderScale::new`].
+    /// Travel per encoder count \[mm\], a magnitude from 10⁻⁸ to 0.5, exclusive; negative for an encoder that counts the
+    /// other way.
     pub mm_per_count: f64,
-    /// Velocity at +10 V \[mm/s\], see [`OutputScale::new`].
+    /// Velocity at +10 V \[mm/s\], not 0; negative if +10 V moves in negative direction.
     pub mm_s_at_10_v: f64,
-    /// Added to every output \[V\].
+    /// Added to every output \[V\], below the limit in magnitude.
     pub output_offset_v: f64,
-    /// Greatest output in either direction \[V\].
+    /// Greatest output in either direction \[V\], above 0, at most 10.
     pub output_limit_v: f64,
     /// Feedback gains.
     pub gains: Gains,
@@ -101,18 +105,14 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
     pub fn new(figures: &[AxisFigures; AXES], tick_s: f64) -> Result<Self, AxesError> {
         let () = Self::ONE_AT_LEAST;
         let preview_ticks = Self::preview_ticks(figures, tick_s)?;
-        let config = |(axis, figures): (usize, &AxisFigures)| {
-            AxisConfig::new(figures, preview_ticks, tick_s).map_err(|cause| AxesError { axis, cause })
-        };
-        let mut each = figures.iter().enumerate();
-        let none = ScaleError { quantity: "number of axes", value: 0.0, expected: "one at least" };
-        let none = AxesError { axis: 0, cause: none };
-        // Without allocation an array is filled by a fallible function only over something already there.
-        let mut axes = [config(each.next().ok_or(none)?)?; AXES];
-        for (place, figures) in axes.iter_mut().skip(1).zip(each) {
-            *place = config(figures)?;
-        }
-        Ok(Self { axes, preview_ticks })
+        let (mut check, mut axis) = (Check::default(), 0);
+        let axes = figures.each_ref().map(|figures| {
+            let config = AxisConfig::checked(&mut check, figures, preview_ticks, tick_s);
+            axis += usize::from(check.refused.is_none());
+            config
+        });
+        // The axes before it are those without a refusal.
+        check.refused.map_or(Ok(Self { axes, preview_ticks }), |cause| Err(AxesError { axis, cause }))
     }
 
     /// By how many ticks these axes need their position set-points delayed: as the longest lead asks for.
@@ -130,20 +130,28 @@ impl<R: Real> AxisConfig<R> {
     /// # Errors
     /// The first figure that is out of its range or beyond the number type's.
     pub fn new(figures: &AxisFigures, preview_ticks: u8, tick_s: f64) -> Result<Self, ScaleError> {
+        Check::all(|check| Self::checked(check, figures, preview_ticks, tick_s))
+    }
+
+    #[inline(never)]
+    fn checked(check: &mut Check, figures: &AxisFigures, preview_ticks: u8, tick_s: f64) -> Self {
         let &AxisFigures { mm_per_count, mm_s_at_10_v, output_offset_v, output_limit_v, .. } = figures;
         let limit_mm = figures.following_error_limit_mm;
-        let following_error_limit_mm =
-            R::checked_from_f64(limit_mm).filter(|_| limit_mm > 0.0).ok_or(ScaleError {
-                quantity: "following error limit [mm]",
-                value: limit_mm,
-                expected: "a positive number within the kernel's range",
-            })?;
-        Ok(Self {
-            encoder: EncoderScale::new(mm_per_count)?,
-            output: OutputScale::new(mm_s_at_10_v, output_offset_v, output_limit_v)?,
-            regulator: Regulator::new(figures.gains, &figures.feedforward, preview_ticks, tick_s, limit_mm)?,
-            following_error_limit_mm,
-        })
+        let expected = "a positive number within the kernel's range";
+        check.that(limit_mm > 0.0 && fits::<R>(limit_mm), "following error limit [mm]", limit_mm, expected);
+        Self {
+            encoder: EncoderScale::new(check, mm_per_count),
+            output: OutputScale::new(check, mm_s_at_10_v, output_offset_v, output_limit_v),
+            regulator: Regulator::new(
+                check,
+                figures.gains,
+                &figures.feedforward,
+                preview_ticks,
+                tick_s,
+                limit_mm,
+            ),
+            following_error_limit_mm: R::from_f64(limit_mm),
+        }
     }
 }
 
@@ -187,6 +195,14 @@ impl<R: Real> AxisState<R> {
     #[inline]
     pub fn position(&self, config: &AxisConfig<R>, counts: Counts) -> Position {
         config.encoder.position(counts) + self.offset
+    }
+
+    /// Gives up what the regulator remembers and takes the actual position for the set position, which it returns.
+    #[inline(never)]
+    pub(crate) fn stand_here(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) -> Position {
+        output.set = self.position(config, output.counts);
+        self.regulator = RegulatorState::default();
+        output.set
     }
 
     /// The output of an axis whose drive is off: the voltage at which it stands still. In and out as

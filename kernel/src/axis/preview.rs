@@ -5,6 +5,7 @@
 
 use super::AxisFigures;
 use super::scale::ScaleError;
+use crate::num::{is_within, rolled, whole};
 use crate::path::Setpoint;
 use crate::units::Position;
 
@@ -19,15 +20,17 @@ pub const LEAD_ROUNDING_TICKS: f64 = 1e-6;
 /// A lead is not finite, negative, or longer than [`PREVIEW_TICKS_MAX`] ticks; with the axis, from 0.
 pub(super) fn preview_ticks(axes: &[AxisFigures], tick_s: f64) -> Result<u8, (usize, ScaleError)> {
     let mut most = 0;
-    for (axis, figures) in axes.iter().enumerate() {
+    for (axis, figures) in rolled(axes).iter().enumerate() {
         let value = figures.feedforward.lead_s;
         let ticks = value / tick_s - LEAD_ROUNDING_TICKS;
-        if !(value >= 0.0 && ticks <= f64::from(PREVIEW_TICKS_MAX)) {
+        if !(is_within(value, 0.0, f64::MAX) && ticks <= f64::from(PREVIEW_TICKS_MAX)) {
             let expected = "a number from 0 to 24 ticks";
             return Err((axis, ScaleError { quantity: "feedforward lead [s]", value, expected }));
         }
-        let whole = ticks as u8;
-        most = core::cmp::max(most, if f64::from(whole) < ticks { whole + 1 } else { whole });
+        if ticks > 0.0 {
+            let passed = whole(ticks) as u8;
+            most = core::cmp::max(most, if f64::from(passed) < ticks { passed + 1 } else { passed });
+        }
     }
     Ok(most)
 }
@@ -44,7 +47,10 @@ impl<const AXES: usize> Preview<AXES> {
     /// A machine that has been at rest at `position`, delayed by `ticks`, at most [`PREVIEW_TICKS_MAX`].
     #[must_use]
     pub fn new(ticks: u8, position: [Position; AXES]) -> Self {
-        Self { past: [position; PREVIEW_TICKS_MAX as usize], ticks: ticks.min(PREVIEW_TICKS_MAX), next: 0 }
+        let past = [[Position::ZERO; AXES]; PREVIEW_TICKS_MAX as usize];
+        let mut preview = Self { past, ticks: ticks.min(PREVIEW_TICKS_MAX), next: 0 };
+        preview.rest_at(position);
+        preview
     }
 
     /// The delay \[ticks\].
@@ -54,8 +60,12 @@ impl<const AXES: usize> Preview<AXES> {
     }
 
     /// As if the machine had always been at `position`.
+    #[inline(never)]
     pub fn rest_at(&mut self, position: [Position; AXES]) {
-        *self = Self::new(self.ticks, position);
+        for past in rolled(self.past.as_mut_slice()) {
+            *past = position;
+        }
+        self.next = 0;
     }
 
     /// The positions of `ticks` ago, into `set`; remembers those of now.

@@ -7,16 +7,16 @@
 //! ε is the following error; V, a, J are the commanded velocity, acceleration and jerk of this tick; the F are
 //! [`super::feedforward`].
 //! P, PI, PD, PID and open loop are choices of the gains. Gains are given in units of time, so they
-//! keep their meaning when the tick changes; [`Regulator::new`] turns them into per-tick factors.
+//! keep their meaning when the tick changes; [`AxesConfig`](super::AxesConfig) turns them into per-tick factors.
 //!
 //! **Anti-windup**: while the output is at its limit, the sum takes no error that would drive the
 //! output farther out.
 
 use serde::{Deserialize, Serialize};
 
+use super::check::{Check, fits};
 use super::feedforward::{Feedforward, FeedforwardConfig, FeedforwardState};
-use super::scale::ScaleError;
-use crate::num::Real;
+use crate::num::{Real, is_finite, is_within};
 use crate::path::Setpoint;
 
 /// Feedback gains, output \[mm/s\] per following error.
@@ -72,34 +72,23 @@ impl<R: Real> Regulator<R> {
     /// The regulator for a control tick of `tick_s`, position set-points delayed by `preview_ticks`, and
     /// following errors up to `error_limit_mm`, beyond which the axis faults.
     ///
-    /// # Errors
-    /// A gain or the tick is not finite, kp, ki or kd is negative, the tick is not positive, a gain
-    /// at the error limit is beyond the number type's range, or feedforward is refused.
-    pub fn new(
+    /// Refused where a gain or the tick is not finite, kp, ki or kd is negative, the tick is not positive, a gain at
+    /// the error limit is beyond the number type's range, or feedforward is.
+    pub(super) fn new(
+        check: &mut Check,
         gains: Gains,
         feedforward: &Feedforward,
         preview_ticks: u8,
         tick_s: f64,
         error_limit_mm: f64,
-    ) -> Result<Self, ScaleError> {
-        if !(tick_s > 0.0 && tick_s.is_finite()) {
-            return Err(ScaleError { quantity: "tick [s]", value: tick_s, expected: "a positive number" });
+    ) -> Self {
+        check.that(tick_s > 0.0 && is_finite(tick_s), "tick [s]", tick_s, "a positive number");
+        Self {
+            kp: gain(check, "kp [1/s]", gains.kp_per_s, error_limit_mm),
+            ki: gain(check, "ki [1/s²]", gains.ki_per_s2 * tick_s, error_limit_mm),
+            kd: gain(check, "kd [1]", gains.kd / tick_s, 2.0 * error_limit_mm),
+            feedforward: FeedforwardConfig::new(check, feedforward, preview_ticks, tick_s),
         }
-        let real = |quantity, value: f64, per_mm: f64| {
-            // With room for the sum of all the terms.
-            let fits = R::checked_from_f64(8.0 * libm::fabs(value) * per_mm).is_some();
-            R::checked_from_f64(value).filter(|_| value >= 0.0 && fits).ok_or(ScaleError {
-                quantity,
-                value,
-                expected: "a number within the kernel's range, not below 0",
-            })
-        };
-        Ok(Self {
-            kp: real("kp [1/s]", gains.kp_per_s, error_limit_mm)?,
-            ki: real("ki [1/s²]", gains.ki_per_s2 * tick_s, error_limit_mm)?,
-            kd: real("kd [1]", gains.kd / tick_s, 2.0 * error_limit_mm)?,
-            feedforward: FeedforwardConfig::new(feedforward, preview_ticks, tick_s)?,
-        })
     }
 
     /// One tick: the velocity command, cut at `limits` \[mm/s\].
@@ -131,15 +120,34 @@ impl<R: Real> Regulator<R> {
     }
 }
 
+/// A gain that what it is applied to takes to `per_mm` times itself at most.
+#[inline(never)]
+fn gain<R: Real>(check: &mut Check, quantity: &'static str, value: f64, per_mm: f64) -> R {
+    // With room for the sum of all the terms.
+    let fits = is_within(value, 0.0, f64::MAX) && fits::<R>(value) && fits::<R>(8.0 * value * per_mm);
+    check.that(fits, quantity, value, "a number within the kernel's range, not below 0");
+    R::from_f64(value)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::axis::ScaleError;
 
     const TICK_S: f64 = 0.0005;
     const WIDE: (f64, f64) = (-1e9, 1e9);
 
     fn regulator(gains: Gains, feedforward: Feedforward) -> Regulator<f64> {
-        Regulator::new(gains, &feedforward, 0, TICK_S, 1.0).expect("valid")
+        new(gains, feedforward, TICK_S, 1.0).expect("valid")
+    }
+
+    fn new<R: Real>(
+        gains: Gains,
+        feedforward: Feedforward,
+        tick_s: f64,
+        error_limit_mm: f64,
+    ) -> Result<Regulator<R>, ScaleError> {
+        Check::all(|check| Regulator::new(check, gains, &feedforward, 0, tick_s, error_limit_mm))
     }
 
     /// S4 (1) written out, on a random sequence of errors and set-points.
@@ -205,13 +213,11 @@ mod tests {
     #[test]
     fn refuses_gains_that_are_not_numbers() {
         let gains = Gains { kp_per_s: f64::NAN, ..Gains::default() };
-        assert!(Regulator::<f32>::new(gains, &Feedforward::default(), 0, TICK_S, 1.0).is_err());
-        assert!(Regulator::<f32>::new(Gains::default(), &Feedforward::default(), 0, 0.0, 1.0).is_err());
+        assert!(new::<f32>(gains, Feedforward::default(), TICK_S, 1.0).is_err());
+        assert!(new::<f32>(Gains::default(), Feedforward::default(), 0.0, 1.0).is_err());
         // 8·10⁷·100 mm/s do not fit 32.32 bits.
         let strong = Gains { kp_per_s: 1e7, ..Gains::default() };
-        assert!(
-            Regulator::<crate::num::Fixed>::new(strong, &Feedforward::default(), 0, TICK_S, 220.0).is_err()
-        );
-        assert!(Regulator::<f32>::new(strong, &Feedforward::default(), 0, TICK_S, 220.0).is_ok());
+        assert!(new::<crate::num::Fixed>(strong, Feedforward::default(), TICK_S, 220.0).is_err());
+        assert!(new::<f32>(strong, Feedforward::default(), TICK_S, 220.0).is_ok());
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! The only place where these meet. Configuration, made in the background from f64 figures.
 
-use crate::num::Real;
+use super::check::{Check, fits};
+use crate::num::{Real, whole};
 use crate::units::{Counts, DacCode, Position};
 
 /// A scale that can't be used.
@@ -38,21 +39,21 @@ impl EncoderScale {
     /// `mm_per_count` mm a count, positive counts in positive direction; negative for an encoder that
     /// counts the other way.
     ///
-    /// # Errors
-    /// |mm_per_count| is not from 10⁻⁸ to 0.5 mm, exclusive.
-    pub fn new(mm_per_count: f64) -> Result<Self, ScaleError> {
+    /// Refused unless |mm_per_count| is from 10⁻⁸ to 0.5 mm, exclusive.
+    pub(super) fn new(check: &mut Check, mm_per_count: f64) -> Self {
         let size = libm::fabs(mm_per_count);
-        if !(size > 1.0e-8 && size < 0.5) {
-            return Err(ScaleError {
-                quantity: "encoder resolution [mm/count]",
-                value: mm_per_count,
-                expected: "a magnitude between 1e-8 and 0.5",
-            });
-        }
-        let scaled = mm_per_count * 4_294_967_296.0;
-        let step_high = libm::floor(scaled);
-        let step_low = ((scaled - step_high) * 4_294_967_296.0) as u32;
-        Ok(Self { step_high: step_high as i32, step_low })
+        let expected = "a magnitude between 1e-8 and 0.5";
+        check.that(size > 1.0e-8 && size < 0.5, "encoder resolution [mm/count]", mm_per_count, expected);
+        let (upper, rest) = digits(size);
+        let (lower, rest) = digits(rest);
+        let step = (upper << 32 | lower).cast_signed();
+        // Rounded down: what is left of a negative one makes it the next lower.
+        let step = match (mm_per_count < 0.0, rest > 0.0) {
+            (false, _) => step,
+            (true, false) => step.wrapping_neg(),
+            (true, true) => !step,
+        };
+        Self { step_high: (step >> 32) as i32, step_low: step as u32 }
     }
 
     /// The position of `counts`. In the tick: four 32×32-bit products.
@@ -75,6 +76,13 @@ impl EncoderScale {
     }
 }
 
+/// The first 32 binary digits of a fraction, and what is behind them.
+fn digits(fraction: f64) -> (u64, f64) {
+    let scaled = fraction * 4_294_967_296.0;
+    let digits = whole(scaled);
+    (digits, scaled - f64::from(digits as u32))
+}
+
 /// Velocity command to converter code: gain, offset trim, limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutputScale<R> {
@@ -89,40 +97,28 @@ impl<R: Real> OutputScale<R> {
     /// `offset_v` is added to every output so that a command of 0 holds the drive still;
     /// `limit_v` bounds the output.
     ///
-    /// # Errors
-    /// The gain is 0, not finite or beyond the number type, the limit is not in (0, 10\] V, or the trim is not
-    /// below the limit.
-    pub fn new(mm_s_at_10_v: f64, offset_v: f64, limit_v: f64) -> Result<Self, ScaleError> {
+    /// Refused where the gain is 0, not finite or beyond the number type, the limit is not in (0, 10\] V, or the trim
+    /// is not below the limit.
+    pub(super) fn new(check: &mut Check, mm_s_at_10_v: f64, offset_v: f64, limit_v: f64) -> Self {
         let full = DacCode::FULL_SCALE_V;
-        if !(limit_v > 0.0 && limit_v <= full) {
-            return Err(ScaleError {
-                quantity: "output limit [V]",
-                value: limit_v,
-                expected: "more than 0 and at most 10",
-            });
-        }
-        if !(libm::fabs(offset_v) < limit_v) {
-            return Err(ScaleError {
-                quantity: "output offset [V]",
-                value: offset_v,
-                expected: "a magnitude below the output limit",
-            });
-        }
+        let is_limit = limit_v > 0.0 && limit_v <= full;
+        check.that(is_limit, "output limit [V]", limit_v, "more than 0 and at most 10");
+        let is_below = libm::fabs(offset_v) < limit_v;
+        check.that(is_below, "output offset [V]", offset_v, "a magnitude below the output limit");
         let volts_per_mm_s = full / mm_s_at_10_v;
-        let real = |value: f64| {
-            R::checked_from_f64(value).filter(|_| mm_s_at_10_v.is_finite()).ok_or(ScaleError {
-                quantity: "velocity at 10 V [mm/s]",
-                value: mm_s_at_10_v,
-                expected: "a number other than 0 within the kernel's range",
-            })
-        };
-        let (a, b) = ((-limit_v - offset_v) / volts_per_mm_s, (limit_v - offset_v) / volts_per_mm_s);
-        let (least, greatest) = if a < b { (a, b) } else { (b, a) };
-        Ok(Self {
-            codes_per_mm_s: real(volts_per_mm_s * DacCode::PER_VOLT)?,
-            offset_codes: real(offset_v * DacCode::PER_VOLT)?,
-            limits: (real(least)?, real(greatest)?),
-        })
+        let (codes_per_mm_s, offset_codes) =
+            (volts_per_mm_s * DacCode::PER_VOLT, offset_v * DacCode::PER_VOLT);
+        let (down, up) = ((limit_v + offset_v) / volts_per_mm_s, (limit_v - offset_v) / volts_per_mm_s);
+        // Where the gain is not finite, limits are not.
+        let fits = fits::<R>(codes_per_mm_s) && fits::<R>(offset_codes) && fits::<R>(down) && fits::<R>(up);
+        let expected = "a number other than 0 within the kernel's range";
+        check.that(fits, "velocity at 10 V [mm/s]", mm_s_at_10_v, expected);
+        let (a, b) = (-R::from_f64(down), R::from_f64(up));
+        Self {
+            codes_per_mm_s: R::from_f64(codes_per_mm_s),
+            offset_codes: R::from_f64(offset_codes),
+            limits: if a < b { (a, b) } else { (b, a) },
+        }
     }
 
     /// Least and greatest velocity command the output can express \[mm/s\].
@@ -144,7 +140,7 @@ mod tests {
     #[test]
     fn counts_to_position_is_exact_to_a_step_over_the_whole_range() {
         for mm_per_count in [1e-4, 5e-4, -1e-3, 1.0 / 4096.0, 1.27e-6] {
-            let scale = EncoderScale::new(mm_per_count).expect("valid");
+            let scale = Check::all(|check| EncoderScale::new(check, mm_per_count)).expect("valid");
             let mut counts = 1_i64;
             while counts < 1 << 31 {
                 for counts in [counts, -counts, counts * 3 / 2] {
@@ -159,24 +155,52 @@ mod tests {
         }
     }
 
+    /// Rounded down in steps of 2⁻⁶⁴ mm, as with the library's floor.
+    #[test]
+    fn a_count_is_rounded_down() {
+        let mut state = 19_u64;
+        for _ in 0..100_000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            // Of 25 binary orders, with few digits and with all.
+            let digits = state >> 12 >> (state % 53) << (state % 53);
+            let size = f64::from_bits((997 + (state >> 40) % 25) << 52 | digits);
+            for mm_per_count in [size, -size] {
+                let scaled = mm_per_count * 4_294_967_296.0;
+                let high = libm::floor(scaled);
+                let expected = EncoderScale {
+                    step_high: high as i32,
+                    step_low: ((scaled - high) * 4_294_967_296.0) as u32,
+                };
+                assert_eq!(
+                    Check::all(|check| EncoderScale::new(check, mm_per_count)),
+                    Ok(expected),
+                    "{size:e}"
+                );
+            }
+        }
+    }
+
     #[test]
     fn eighty_million_counts_are_eight_metres() {
-        let scale = EncoderScale::new(1e-4).expect("valid");
+        let scale = Check::all(|check| EncoderScale::new(check, 1e-4)).expect("valid");
         let error_mm = scale.position(Counts(80_000_000)).to_mm() - 8000.0;
         assert!(error_mm.abs() < 1e-9, "{error_mm:e}");
     }
 
     #[test]
     fn output_reaches_its_limits_and_trims() {
-        let output = OutputScale::<f32>::new(1000.0 / 3.0, 0.5, 10.0).expect("valid");
+        let new = |mm_s_at_10_v, offset_v, limit_v| {
+            Check::all(|check| OutputScale::<f32>::new(check, mm_s_at_10_v, offset_v, limit_v))
+        };
+        let output = new(1000.0 / 3.0, 0.5, 10.0).expect("valid");
         assert_eq!(output.code(0.0), DacCode(1638));
         assert_eq!(output.code(output.limits().1), DacCode(i16::MAX));
         assert_eq!(output.code(output.limits().0), DacCode(i16::MIN));
-        let reversed = OutputScale::<f32>::new(-100.0, 0.0, 5.0).expect("valid");
+        let reversed = new(-100.0, 0.0, 5.0).expect("valid");
         assert_eq!(reversed.code(50.0), DacCode(-16384));
-        assert!(OutputScale::<f32>::new(0.0, 0.0, 10.0).is_err());
-        assert!(OutputScale::<f32>::new(f64::INFINITY, 0.0, 10.0).is_err());
-        assert!(OutputScale::<f32>::new(100.0, 10.0, 10.0).is_err());
-        assert!(OutputScale::<f32>::new(100.0, 0.0, 10.1).is_err());
+        assert!(new(0.0, 0.0, 10.0).is_err());
+        assert!(new(f64::INFINITY, 0.0, 10.0).is_err());
+        assert!(new(100.0, 10.0, 10.0).is_err());
+        assert!(new(100.0, 0.0, 10.1).is_err());
     }
 }

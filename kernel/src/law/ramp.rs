@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::limits::Law;
-use super::shape::Shape;
+use super::shape::{ABOUT_WITHIN, Shape};
 use crate::num::{Root, Scalar};
 
 /// A ramp between two feeds (S1, section 1). A braking ramp is the accelerating one mirrored.
@@ -152,6 +152,35 @@ impl<R: Root> Ramp<R> {
             self.from_mm_s * rise_s
                 + length_scale * R::from_f64(Shape::END.length)
                 + held_s * (self.from_mm_s + curved + half * (gained - curved))
+        }
+    }
+
+    /// Two lengths between which [`length_to_feed_mm`](Self::length_to_feed_mm) lies \[mm\], at a fraction of its cost: they
+    /// are less than a thousandth of the ramp's length apart.
+    #[must_use]
+    pub fn about_length_to_feed_mm(&self, feed_mm_s: R) -> (R, R) {
+        let (rise_s, jerk) = (self.t1_s, self.peak_jerk_mm_s3);
+        let speed_scale = jerk * rise_s * rise_s;
+        let (gained, left) = (feed_mm_s - self.from_mm_s, self.to_mm_s - feed_mm_s);
+        let curved = speed_scale * R::from_f64(Shape::END.speed);
+        let near_start = gained <= curved;
+        if gained <= R::ZERO || left <= R::ZERO || !(near_start || left < curved) {
+            let length_mm = self.length_to_feed_mm(feed_mm_s);
+            return (length_mm, length_mm);
+        }
+        let near = if near_start { gained } else { left };
+        let (x, shape_length) = Shape::<R::Unit>::about_where_speed_is(near / speed_scale);
+        let [time_within, length_within] = ABOUT_WITHIN.map(R::from_f64);
+        let curve_mm = speed_scale * rise_s * shape_length;
+        if near_start {
+            let straight_mm = self.from_mm_s * (rise_s * x);
+            let slack_mm = straight_mm * time_within + curve_mm * length_within;
+            (straight_mm + curve_mm - slack_mm, straight_mm + curve_mm + slack_mm)
+        } else {
+            let straight_mm = self.to_mm_s * (rise_s * x);
+            let slack_mm = straight_mm * time_within + curve_mm * length_within;
+            let about_mm = self.length_mm() - (straight_mm - curve_mm);
+            (about_mm - slack_mm, about_mm + slack_mm)
         }
     }
 

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ramp::Ramp;
 use super::shape::Shape;
-use crate::num::{Real, Root, Unit};
+use crate::num::{Real, Root, Unit, is_within, rolled, whole};
 use crate::units::Position;
 
 pub use turn::TurnedRamp;
@@ -42,13 +42,14 @@ impl Ticks {
     #[must_use]
     pub fn from_seconds(seconds: f64, tick_s: f64) -> Option<Self> {
         let ticks = seconds / tick_s;
-        (0.0..=Self::LIMIT).contains(&ticks).then_some(Self((ticks * 4_294_967_296.0 + 0.5) as u64))
+        is_within(ticks, 0.0, Self::LIMIT).then(|| Self(whole(ticks * 4_294_967_296.0 + 0.5)))
     }
 
     /// The duration in ticks.
     #[must_use]
     pub fn to_f64(self) -> f64 {
-        self.0 as f64 / 4_294_967_296.0
+        // Halves are exact in f64, and their sum is rounded once.
+        f64::from((self.0 >> 32) as u32) + f64::from(self.0 as u32) / 4_294_967_296.0
     }
 
     /// Sum; saturates at 2³² ticks.
@@ -162,11 +163,12 @@ struct Clock {
 }
 
 impl Clock {
+    #[inline(never)]
     fn new(duration: Ticks) -> Self {
         let step = match duration.0 {
             0 => 0,
-            bits if bits > Ticks::ONE.0 => ((1_u128 << 96) / u128::from(bits)) as u64,
-            bits => u64::MAX / bits,
+            bits if bits > Ticks::ONE.0 => quotient(Ticks::ONE.0, 0, bits),
+            bits => quotient(0, u64::MAX, bits),
         };
         Self { duration, step }
     }
@@ -182,6 +184,20 @@ impl Clock {
             self.step.wrapping_mul(time.0)
         }
     }
+}
+
+/// (high·2⁶⁴ + low)/by, rounded down, for high < by ≤ 2⁶³. Bit by bit: it is for the background, and a division of 128
+/// bits takes a kilobyte of flash.
+fn quotient(high: u64, low: u64, by: u64) -> u64 {
+    (0..u64::BITS).fold([high, low], |digits, _| next_digit(digits, by))[1]
+}
+
+/// The next digit of a quotient, behind the others in the place of the dividend's digits that are used up.
+// A call, or the loop around it is unrolled.
+#[inline(never)]
+fn next_digit([remainder, quotient]: [u64; 2], by: u64) -> [u64; 2] {
+    let (remainder, quotient) = (remainder << 1 | quotient >> 63, quotient << 1);
+    if remainder >= by { [remainder - by, quotient | 1] } else { [remainder, quotient] }
 }
 
 /// a·b/2³² for b ≤ 2³².
@@ -267,76 +283,120 @@ impl<R: Real> FeedSegment<R> {
 
     fn new(ramp: &Ramp<f64>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
         let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by } = *ramp;
-        for (quantity, value) in [
-            ("entry feed [mm/s]", from_mm_s),
-            ("exit feed [mm/s]", to_mm_s),
-            ("peak jerk [mm/s³]", peak_jerk_mm_s3),
-            ("length [mm]", length.to_mm()),
-            ("t1 [s]", t1_s),
-            ("t2 − t1 [s]", t2_s - t1_s),
-            ("tick [s]", tick_s),
-        ] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(SegmentError::OutOfRange { quantity, value });
-            }
-        }
-        if t1_s <= 0.0 && from_mm_s != to_mm_s {
-            return Err(SegmentError::FeedStep { from_mm_s, to_mm_s });
-        }
-        let ticks = |quantity, value| {
-            Ticks::from_seconds(value, tick_s).ok_or(SegmentError::OutOfRange { quantity, value })
-        };
-        let rise_ticks = ticks("t1 [s]", t1_s)?;
         let hold_s = t2_s - t1_s;
-        let hold_ticks = ticks("t2 − t1 [s]", hold_s)?;
-        let bits = |quantity, mm: f64| {
-            Position::from_mm(mm)
-                .map(Position::to_bits)
-                .ok_or(SegmentError::OutOfRange { quantity, value: mm })
+        // The first reason why it can't be made. What follows goes on with what it has: a way out at each figure would
+        // take more flash than all that is computed.
+        let mut refused = None;
+        made(
+            &mut refused,
+            &[
+                "entry feed [mm/s]",
+                "exit feed [mm/s]",
+                "peak jerk [mm/s³]",
+                "length [mm]",
+                "t1 [s]",
+                "t2 − t1 [s]",
+                "tick [s]",
+            ],
+            [from_mm_s, to_mm_s, peak_jerk_mm_s3, length.to_mm(), t1_s, hold_s, tick_s],
+            |value| is_within(value, 0.0, f64::MAX).then_some(R::ZERO),
+        );
+        if t1_s <= 0.0 && from_mm_s != to_mm_s {
+            refused.get_or_insert(SegmentError::FeedStep { from_mm_s, to_mm_s });
+        }
+        let mut ticks = |quantity, value| {
+            Ticks::from_seconds(value, tick_s).unwrap_or_else(|| {
+                refused.get_or_insert(SegmentError::OutOfRange { quantity, value });
+                Ticks::ZERO
+            })
         };
+        let rise = Clock::new(ticks("t1 [s]", t1_s));
+        let hold = Clock::new(ticks("t2 − t1 [s]", hold_s));
         let jerk = ramp.signed_jerk_mm_s3();
-        let (accel, speed, length_scale) = (jerk * t1_s, jerk * t1_s * t1_s, jerk * t1_s * t1_s * t1_s);
+        let accel = jerk * t1_s;
+        let speed = accel * t1_s;
+        let length_scale = speed * t1_s;
         if !(libm::fabs(length_scale) <= R::RAMP_MM_MAX) {
-            return Err(SegmentError::OutOfRange {
-                quantity: "jerk · t1³ [mm]",
-                value: libm::fabs(length_scale),
-            });
+            let value = libm::fabs(length_scale);
+            refused.get_or_insert(SegmentError::OutOfRange { quantity: "jerk · t1³ [mm]", value });
         }
         let end = Shape::END;
         let (hold_a, hold_v) = (accel * end.accel, from_mm_s + speed * end.speed);
-        // A scale that a narrow type can't hold must be refused here, not overflow in a tick.
-        let real = |quantity, value: f64| {
-            R::checked_from_f64(value).ok_or(SegmentError::OutOfRange { quantity, value })
-        };
         let snap = if t1_s > 0.0 { PI * jerk / t1_s } else { 0.0 };
-        Ok(Self {
+        let of_ramp = &["entry feed [mm/s]", "exit feed [mm/s]", "peak jerk [mm/s³]", "t1 [s]", "t2 [s]"];
+        let figures = [from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s];
+        let ramp = made(&mut refused, of_ramp, figures, R::checked_from_f64);
+        let lengths = &[
+            "entry feed · t1 [mm]",
+            "exit feed · t1 [mm]",
+            "jerk · t1³/12 [mm]",
+            "length of the rise [mm]",
+            "feed · hold time [mm]",
+            "length gained in the hold [mm]",
+        ];
+        let bent = length_scale / (8.0 * PI * PI);
+        let lengths_mm = [
+            from_mm_s * t1_s - bent,
+            to_mm_s * t1_s + bent,
+            length_scale / 12.0,
+            from_mm_s * t1_s + length_scale * end.length,
+            hold_v * hold_s,
+            0.5 * hold_a * hold_s * hold_s,
+        ];
+        let lengths = made(&mut refused, lengths, lengths_mm, Position::from_mm);
+        let scales = &[
+            "feed at t1 [mm/s]",
+            "acceleration at t1 [mm/s²]",
+            "feed gained in the hold [mm/s]",
+            "peak jerk [mm/s³]",
+            "jerk · t1 [mm/s²]",
+            "jerk · t1² [mm/s]",
+            "jerk · t1³ [mm]",
+            "peak snap [mm/s⁴]",
+        ];
+        let sine = length_scale / (16.0 * PI * PI * PI);
+        // What a narrow type can't hold must be refused here, not overflow in a tick.
+        let scales = made(
+            &mut refused,
+            scales,
+            [hold_v, hold_a, hold_a * hold_s, jerk, accel, speed, sine, snap],
+            R::checked_from_f64,
+        );
+        let [from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s] = ramp;
+        let [rise_bits, fall_less_bits, cube_bits, hold_start_bits, hold_linear_bits, hold_square_bits] =
+            lengths.map(Position::to_bits);
+        let [
+            hold_v_mm_s,
+            hold_a_mm_s2,
+            hold_gain_mm_s,
+            jerk_mm_s3,
+            accel_mm_s2,
+            speed_mm_s,
+            sine_mm,
+            snap_mm_s4,
+        ] = scales;
+        let segment = Self {
             length,
-            ramp: Ramp {
-                from_mm_s: real("entry feed [mm/s]", from_mm_s)?,
-                to_mm_s: real("exit feed [mm/s]", to_mm_s)?,
-                peak_jerk_mm_s3: real("peak jerk [mm/s³]", peak_jerk_mm_s3)?,
-                t1_s: real("t1 [s]", t1_s)?,
-                t2_s: real("t2 [s]", t2_s)?,
-                limited_by,
-            },
-            rise: Clock::new(rise_ticks),
-            hold: Clock::new(hold_ticks),
+            ramp: Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by },
+            rise,
+            hold,
             turns_at: 0,
-            rise_bits: bits("entry feed · t1 [mm]", from_mm_s * t1_s - length_scale / (8.0 * PI * PI))?,
-            fall_bits: bits("exit feed · t1 [mm]", -to_mm_s * t1_s - length_scale / (8.0 * PI * PI))?,
-            cube_bits: bits("jerk · t1³/12 [mm]", length_scale / 12.0)?,
-            hold_start_bits: bits("length of the rise [mm]", from_mm_s * t1_s + length_scale * end.length)?,
-            hold_linear_bits: bits("feed · hold time [mm]", hold_v * hold_s)?,
-            hold_square_bits: bits("length gained in the hold [mm]", 0.5 * hold_a * hold_s * hold_s)?,
-            hold_v_mm_s: real("feed at t1 [mm/s]", hold_v)?,
-            hold_a_mm_s2: real("acceleration at t1 [mm/s²]", hold_a)?,
-            hold_gain_mm_s: real("feed gained in the hold [mm/s]", hold_a * hold_s)?,
-            jerk_mm_s3: real("peak jerk [mm/s³]", jerk)?,
-            accel_mm_s2: real("jerk · t1 [mm/s²]", accel)?,
-            speed_mm_s: real("jerk · t1² [mm/s]", speed)?,
-            sine_mm: real("jerk · t1³ [mm]", length_scale / (16.0 * PI * PI * PI))?,
-            snap_mm_s4: real("peak snap [mm/s⁴]", snap)?,
-        })
+            rise_bits,
+            fall_bits: -fall_less_bits,
+            cube_bits,
+            hold_start_bits,
+            hold_linear_bits,
+            hold_square_bits,
+            hold_v_mm_s,
+            hold_a_mm_s2,
+            hold_gain_mm_s,
+            jerk_mm_s3,
+            accel_mm_s2,
+            speed_mm_s,
+            sine_mm,
+            snap_mm_s4,
+        };
+        refused.map_or(Ok(segment), Err)
     }
 
     /// The length of path it covers.
@@ -450,6 +510,37 @@ impl<R: Real> FeedSegment<R> {
     }
 }
 
+/// Each of `values` made by `make`; the first that can't be is refused by its name.
+fn made<T: Copy + Default, const N: usize>(
+    refused: &mut Option<SegmentError>,
+    quantities: &[&'static str; N],
+    values: [f64; N],
+    make: fn(f64) -> Option<T>,
+) -> [T; N] {
+    let mut made = [T::default(); N];
+    make_each(refused, quantities, &values, make, &mut made);
+    made
+}
+
+#[inline(never)]
+fn make_each<T>(
+    refused: &mut Option<SegmentError>,
+    quantities: &[&'static str],
+    values: &[f64],
+    make: fn(f64) -> Option<T>,
+    places: &mut [T],
+) {
+    let (quantities, values, places) = rolled((quantities, values, places));
+    for ((place, &value), &quantity) in places.iter_mut().zip(values).zip(quantities) {
+        match make(value) {
+            Some(made) => *place = made,
+            None => {
+                refused.get_or_insert(SegmentError::OutOfRange { quantity, value });
+            }
+        }
+    }
+}
+
 /// The ramp in f64. Its peak jerk is what takes one feed to the other in its times, 2·|F − F₀|/(t₁·t₂): that
 /// of `P` carries the rounding of `P`, which would be a step of the feed in the middle.
 fn to_f64<P: Root>(ramp: &Ramp<P>) -> Ramp<f64> {
@@ -458,4 +549,61 @@ fn to_f64<P: Root>(ramp: &Ramp<P>) -> Ramp<f64> {
     let twice = 2.0 * libm::fabs(to_mm_s - from_mm_s);
     let peak_jerk_mm_s3 = if t1_s > 0.0 { twice / t2_s / t1_s } else { ramp.peak_jerk_mm_s3.to_f64() };
     Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by: ramp.limited_by }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against 128 bits: clocks of phases from 2⁻³² ticks to 2³¹.
+    #[test]
+    fn a_clocks_step_is_the_quotient() {
+        let mut state = 11_u64;
+        for index in 0..200_000_u32 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let random = (state ^ state >> 32) >> (1 + index % 63);
+            let power = 1_u64 << (index % 64);
+            for bits in [random.max(1), power, power.saturating_sub(1).max(1)] {
+                let bits = bits.min(1 << 63);
+                let by = u128::from(bits);
+                let expected = if bits > 1 << 32 { (1_u128 << 96) / by } else { u128::from(u64::MAX) / by };
+                assert_eq!(u128::from(Clock::new(Ticks(bits)).step), expected, "{bits}");
+            }
+        }
+        assert_eq!(Clock::new(Ticks::ZERO).step, 0);
+    }
+
+    #[test]
+    fn ticks_to_f64_is_rounded_once() {
+        let mut state = 13_u64;
+        for index in 0..200_000_u32 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let bits = (state ^ state >> 32) >> (index % 64);
+            assert_eq!(Ticks(bits).to_f64(), bits as f64 / 4_294_967_296.0, "{bits}");
+        }
+    }
+
+    /// Of several reasons the first is told, in the order of the figures.
+    #[test]
+    fn the_first_reason_is_told() {
+        let length = Position::from_mm(1.0).expect("in range");
+        let refusal = |ramp: Ramp<f64>, tick_s| match FeedSegment::<f32>::new(&ramp, length, tick_s) {
+            Err(SegmentError::OutOfRange { quantity, value }) => (quantity, value),
+            other => panic!("{other:?}"),
+        };
+        let good = Ramp::cruise(10.0, 0.1);
+        assert!(FeedSegment::<f32>::new(&good, length, 5e-4).is_ok());
+        assert_eq!(refusal(Ramp { from_mm_s: -1.0, t2_s: -2.0, ..good }, 0.0), ("entry feed [mm/s]", -1.0));
+        assert_eq!(refusal(Ramp { t2_s: -2.0, ..good }, -1.0), ("t2 − t1 [s]", -2.0));
+        assert_eq!(refusal(good, -1.0), ("tick [s]", -1.0));
+        assert_eq!(refusal(Ramp { t2_s: 1e9, ..good }, 1e-4), ("t2 − t1 [s]", 1e9));
+        assert_eq!(
+            refusal(Ramp { from_mm_s: 1e300, to_mm_s: 1e300, ..good }, 5e-4),
+            ("entry feed [mm/s]", 1e300)
+        );
+        assert_eq!(refusal(Ramp { t2_s: 1e6, ..good }, 1e-2), ("feed · hold time [mm]", 1e7));
+        let step = Ramp { to_mm_s: 11.0, ..good };
+        let error = FeedSegment::<f32>::new(&step, length, 5e-4);
+        assert_eq!(error, Err(SegmentError::FeedStep { from_mm_s: 10.0, to_mm_s: 11.0 }));
+    }
 }

@@ -25,11 +25,21 @@ pub mod sine;
 pub(crate) mod table;
 
 pub use fixed_point::Fixed;
+pub(crate) use float::{is_finite, is_within, whole};
 
 use core::fmt::Debug;
+use core::hint::black_box;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::law::shape::Coefficients;
+
+/// `slices` for a loop of the background that is not to be unrolled: the optimiser does not see how long they are. In
+/// software a few operations of f64 are a hundred bytes, and flash is worth more than the background's time. A loop
+/// that calls nothing is unrolled all the same, unless what it works on goes through here, too.
+#[inline(always)]
+pub(crate) fn rolled<T>(slices: T) -> T {
+    black_box(slices)
+}
 
 /// What every number of the kernel can do.
 pub trait Scalar:

@@ -6,5 +6,5 @@
 
 pub mod piece;
 
-pub(crate) use piece::Steepness;
 pub use piece::{Geometry, Piece, PieceError, Setpoint};
+pub(crate) use piece::{Steepness, magnitude};

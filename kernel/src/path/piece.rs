@@ -12,7 +12,7 @@
 //! ([`Real::PIECE_MM_MAX`]), so f32 offsets stay good to a hundredth of a 0.1 µm count.
 
 use crate::law::PathMotion;
-use crate::num::{Real, Scalar, Unit};
+use crate::num::{Real, Scalar, Unit, is_finite, rolled};
 use crate::units::Position;
 
 /// What one axis is asked to do in one tick.
@@ -135,12 +135,16 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         direction: [f64; AXES],
         length: Position,
     ) -> Result<Self, PieceError> {
-        if let Some(axis) = direction.iter().position(|d| !d.is_finite()) {
-            return Err(PieceError::NotFinite { axis });
+        let mut unit = [R::Unit::ZERO; AXES];
+        let (places, parts) = rolled((unit.as_mut_slice(), direction.as_slice()));
+        for (axis, (unit, &d)) in places.iter_mut().zip(parts).enumerate() {
+            if !is_finite(d) {
+                return Err(PieceError::NotFinite { axis });
+            }
+            // A component beyond 1 is refused with the tangent's magnitude; it must fit for that.
+            *unit = R::Unit::from_f64(d).max(R::Unit::from_f64(-2.0)).min(R::Unit::from_f64(2.0));
         }
-        // A component beyond 1 is refused with the tangent's magnitude; it must fit for that.
-        let direction = direction.map(|d| R::Unit::from_f64(d.clamp(-2.0, 2.0)));
-        Self::new(line, start, length, Geometry::Line { direction })
+        Self::new(line, start, length, Geometry::Line { direction: unit })
     }
 
     /// A polynomial piece of `length` from `start`; `coefficients` are q₁ … q₇ per axis over
@@ -159,14 +163,16 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         let out_of_range = PieceError::Length { length_mm, longest_mm: R::PIECE_MM_MAX };
         let per_mm = R::checked_from_f64(1.0 / length_mm).ok_or(out_of_range)?;
         let mut unit = [[R::Unit::ZERO; 7]; AXES];
-        for (axis, (unit, coefficients)) in unit.iter_mut().zip(&coefficients).enumerate() {
-            for (unit, &c) in unit.iter_mut().zip(coefficients) {
-                if !(libm::fabs(c) < 2.0) {
-                    return Err(PieceError::OutOfRange { axis, coefficient: c });
-                }
-                *unit = R::Unit::from_f64(c);
+        let (places, parts) = rolled((unit.as_flattened_mut(), coefficients.as_flattened()));
+        for (index, (unit, c)) in places.iter_mut().zip(parts).enumerate() {
+            let c = *rolled(c);
+            if !(libm::fabs(c) < 2.0) {
+                return Err(PieceError::OutOfRange { axis: index / 7, coefficient: c });
             }
-            if R::Unit::LIMIT.is_finite() {
+            *unit = R::Unit::from_f64(c);
+        }
+        if R::Unit::LIMIT.is_finite() {
+            for (axis, coefficients) in coefficients.iter().enumerate() {
                 // With all coefficients positive, every partial sum of Horner's scheme is at most its end, and
                 // greatest at u = 1.
                 let sum = derivatives(&coefficients.map(libm::fabs), 1.0).into_iter().fold(0.0, f64::max);
@@ -194,8 +200,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         for part in 0..=TANGENT_CHECKS {
             let s_mm = length.to_mm() * f64::from(part) / f64::from(TANGENT_CHECKS);
             let tangent = piece.tangent_at(R::from_f64(s_mm));
-            let square: f64 = tangent.iter().map(|t| t.to_f64() * t.to_f64()).sum();
-            let magnitude = libm::sqrt(square);
+            let magnitude = magnitude(&tangent.map(Scalar::to_f64));
             if !(libm::fabs(magnitude - 1.0) <= TANGENT_TOLERANCE) {
                 return Err(PieceError::NotArcLength { magnitude });
             }
@@ -298,6 +303,12 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
             }
         }
     }
+}
+
+/// Of a vector.
+#[inline(never)]
+pub(crate) fn magnitude<const AXES: usize>(vector: &[f64; AXES]) -> f64 {
+    libm::sqrt(vector.iter().map(|part| part * part).sum())
 }
 
 /// Bounds of what [`Piece::set`] multiplies a motion with, of any axis.

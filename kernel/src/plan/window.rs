@@ -6,18 +6,24 @@
 //! end of what is committed, where the feed rests (a = 0), and what was planned from there before is kept until there
 //! is a new plan: so there always is one, and motion could always come to rest within the window.
 //!
+//! Where no plan with ramps that span blocks is found, or none that there is room for, one pair of ramps a block is tried.
+//! From rest that always is a plan. From a feed it may not be one either: then motion goes on as planned before.
+//!
 //! A window of twice the stopping length loses little to a plan of the whole program; a shorter one is legal too, but
 //! keeps stopping. A plan is made each time the window is full: where half of it leaves each time, every block is
 //! planned about twice.
 
-use super::lookahead::{Block, PlanError};
-use super::spanning::{FeedSpan, Node, ROUNDING_MM, plan_spanning};
+use super::lookahead::{Block, BlockPlan, PlanError, plan};
+use super::spanning::{FeedSpan, Node, ROUNDING_MM, plan_spanning, spans_of};
 
 /// Blocks on their way to be spans.
 pub struct Window<'a> {
     blocks: &'a mut [Block<f64>],
     count: usize,
+    /// Blocks that have left it.
+    gone: usize,
     places: &'a mut [Node],
+    plans: &'a mut [BlockPlan<f64>],
     spans: &'a mut [FeedSpan],
     /// How many of them are provisional, and cover the blocks of the window from its start to a stop.
     planned: usize,
@@ -30,7 +36,7 @@ pub struct Window<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WindowError {
-    /// A block cannot be planned; counted from the window's start.
+    /// A block cannot be planned; counted from the first that was appended.
     Plan(PlanError),
     /// No plan was found for what is in the window, from the feed at its start \[mm/s\].
     NoPlan {
@@ -60,11 +66,23 @@ impl core::fmt::Display for WindowError {
 impl core::error::Error for WindowError {}
 
 impl<'a> Window<'a> {
-    /// A window that starts at rest, in the caller's memory: as many blocks as `blocks`,
+    /// A window that starts at rest, in the caller's memory: as many plans as `blocks`,
     /// [`nodes_for`](super::nodes_for) them nodes, and spans for two plans: four times as many as blocks are enough
-    /// for most.
-    pub fn new(blocks: &'a mut [Block<f64>], places: &'a mut [Node], spans: &'a mut [FeedSpan]) -> Self {
-        Self { blocks, count: 0, places, spans, planned: 0, start_mm: 0.0, feed_mm_s: 0.0 }
+    /// for most, six times as many for all.
+    pub fn new(
+        blocks: &'a mut [Block<f64>],
+        places: &'a mut [Node],
+        plans: &'a mut [BlockPlan<f64>],
+        spans: &'a mut [FeedSpan],
+    ) -> Self {
+        Self { blocks, count: 0, gone: 0, places, plans, spans, planned: 0, start_mm: 0.0, feed_mm_s: 0.0 }
+    }
+
+    /// The same, starting with a feed \[mm/s\], from 0 to the first block's ceiling, and without acceleration. Whether one can
+    /// stop from it within the window is seen when it is planned.
+    #[must_use]
+    pub fn starting_at(self, feed_mm_s: f64) -> Self {
+        Self { feed_mm_s, ..self }
     }
 
     /// Appends a block; commits spans, to `put`, if the window is full.
@@ -79,7 +97,7 @@ impl<'a> Window<'a> {
             self.plan(put)?;
             if self.planned == 0 {
                 // Blocks of no length: there is nothing to drive.
-                self.count = 0;
+                self.drop_blocks(self.count);
             }
             self.commit(put);
         }
@@ -97,7 +115,7 @@ impl<'a> Window<'a> {
     pub fn finish(&mut self, put: &mut impl FnMut(FeedSpan)) -> Result<(), WindowError> {
         self.plan(put)?;
         self.hand_on(self.planned, None, put);
-        self.count = 0;
+        self.drop_blocks(self.count);
         Ok(())
     }
 
@@ -123,25 +141,35 @@ impl<'a> Window<'a> {
     }
 
     fn plan_from_here(&mut self) -> Result<(), WindowError> {
-        let (mut made, kept) = (0, self.planned);
-        let places = self.spans.len().saturating_sub(kept);
-        let spans = self.spans.get_mut(kept..).unwrap_or(&mut []);
+        let kept = self.planned;
+        let mut room = Room { spans: self.spans.get_mut(kept..).unwrap_or(&mut []), made: 0 };
         let blocks = self.blocks.get(..self.count).unwrap_or(&[]);
-        let planned = plan_spanning(blocks, self.feed_mm_s, 0.0, self.places, &mut |span| {
-            if let Some(place) = spans.get_mut(made) {
-                *place = span;
+        let gone = self.gone;
+        let counted = |error| match error {
+            PlanError::Block { block, quantity, value, range } => {
+                WindowError::Plan(PlanError::Block { block: gone + block, quantity, value, range })
             }
-            made += 1;
-        });
-        match planned.map_err(WindowError::Plan)? {
-            None => Err(WindowError::NoPlan { feed_mm_s: self.feed_mm_s }),
-            Some(_) if made > places => Err(WindowError::Spans { places }),
-            Some(_) => {
-                self.spans.copy_within(kept..kept + made, 0);
-                self.planned = made;
-                Ok(())
+            error => WindowError::Plan(error),
+        };
+        let found = plan_spanning(blocks, self.feed_mm_s, 0.0, self.places, &mut |span| room.put(span));
+        if found.map_err(counted)?.is_none() || !room.is_enough() {
+            room.made = 0;
+            let plans = self.plans.get_mut(..self.count).unwrap_or(&mut []);
+            match plan(blocks, self.feed_mm_s, 0.0, plans) {
+                Err(PlanError::TooShortToBrake { .. }) => {
+                    return Err(WindowError::NoPlan { feed_mm_s: self.feed_mm_s });
+                }
+                planned => planned.map_err(counted)?,
             }
+            spans_of(blocks, plans, &mut |span| room.put(span));
         }
+        if !room.is_enough() {
+            return Err(WindowError::Spans { places: room.spans.len() });
+        }
+        let made = room.made;
+        self.spans.copy_within(kept..kept + made, 0);
+        self.planned = made;
+        Ok(())
     }
 
     /// Hands on what lies further from the window's end than a stop takes; a cruise is divided there. If that is nothing,
@@ -198,7 +226,32 @@ impl<'a> Window<'a> {
             }
             gone += 1;
         }
+        self.drop_blocks(gone);
+    }
+
+    fn drop_blocks(&mut self, gone: usize) {
         self.blocks.copy_within(gone..self.count, 0);
         self.count -= gone;
+        self.gone += gone;
+    }
+}
+
+/// Where the spans of a new plan go, behind those of the plan before.
+struct Room<'a> {
+    spans: &'a mut [FeedSpan],
+    /// How many there are, or would be.
+    made: usize,
+}
+
+impl Room<'_> {
+    fn put(&mut self, span: FeedSpan) {
+        if let Some(place) = self.spans.get_mut(self.made) {
+            *place = span;
+        }
+        self.made += 1;
+    }
+
+    fn is_enough(&self) -> bool {
+        self.made <= self.spans.len()
     }
 }

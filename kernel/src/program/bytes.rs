@@ -14,10 +14,9 @@
 
 use core::marker::PhantomData;
 
-use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 
-use super::Item;
+use super::{Item, wire};
 use crate::axis::AxisFigures;
 use crate::queue::PathRules;
 use crate::units::Position;
@@ -25,14 +24,54 @@ use crate::units::Position;
 const MAGIC: [u8; 4] = *b"MOTN";
 const VERSION: u8 = 3;
 const PREFIX: usize = MAGIC.len() + 2;
-const CHECKSUM: usize = 4;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 8;
 /// No header and no item of so many axes is longer.
 const ENTRY_MAX: usize = 4096;
 
-/// Without a table: a kilobyte of flash is worth more than the milliseconds.
-const CHECKSUMS: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+/// CRC-32 (ISO-HDLC) of what has been seen so far. Four bits at a time: a kilobyte of flash for a table of bytes is
+/// worth more than the milliseconds.
+struct Checksum(u32);
+
+impl Checksum {
+    const NONE: Self = Self(u32::MAX);
+    /// What four bits that leave make of the rest, by the polynomial with its least significant bit first.
+    // For a constant: an index beyond the table does not compile.
+    #[allow(clippy::indexing_slicing)]
+    const REST: [u32; 16] = {
+        let (mut rest, mut index) = ([0; 16], 0);
+        while index < 16 {
+            let (mut sum, mut bit) = (index as u32, 0);
+            while bit < 4 {
+                sum = sum >> 1 ^ ((sum & 1) * 0xEDB8_8320);
+                bit += 1;
+            }
+            rest[index] = sum;
+            index += 1;
+        }
+        rest
+    };
+
+    fn update(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.0 ^= u32::from(byte);
+            self.leave();
+            self.leave();
+        }
+    }
+
+    // A call, or the loop over bytes is unrolled.
+    #[inline(never)]
+    fn leave(&mut self) {
+        // The index is below the length.
+        let rest = Self::REST.get(self.0 as usize & 15).copied().unwrap_or_default();
+        self.0 = self.0 >> 4 ^ rest;
+    }
+
+    fn finish(self) -> u32 {
+        !self.0
+    }
+}
 
 /// What a program was planned for. A board executes it with this or not at all.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -109,9 +148,9 @@ pub fn write<'a, const AXES: usize>(
     if AXES > AXES_MAX {
         return Err(postcard::Error::SerializeBufferFull);
     }
-    let mut digest = CHECKSUMS.digest();
+    let mut sum = Checksum::NONE;
     let mut put = |bytes: &[u8]| {
-        digest.update(bytes);
+        sum.update(bytes);
         out.extend(bytes.iter().copied());
     };
     let mut entry = [0; ENTRY_MAX];
@@ -121,8 +160,7 @@ pub fn write<'a, const AXES: usize>(
     for item in items {
         put(postcard::to_slice(item, &mut entry)?);
     }
-    let checksum = digest.finalize();
-    out.extend(checksum.to_le_bytes());
+    out.extend(sum.finish().to_le_bytes());
     Ok(())
 }
 
@@ -148,11 +186,10 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
     /// # Errors
     /// Nothing but a whole, undamaged program for `AXES` axes is accepted.
     pub fn new(bytes: &'a [u8]) -> Result<Self, ProgramError> {
-        let (prefix, rest) = bytes.split_at_checked(PREFIX).ok_or(ProgramError::NotAProgram)?;
-        let body_length = rest.len().checked_sub(CHECKSUM).ok_or(ProgramError::NotAProgram)?;
-        let (body, checksum) = rest.split_at_checked(body_length).ok_or(ProgramError::NotAProgram)?;
-        let [m, o, t, n, version, axes] = *prefix else { return Err(ProgramError::NotAProgram) };
-        if [m, o, t, n] != MAGIC {
+        let (summed, checksum) = bytes.split_last_chunk().ok_or(ProgramError::NotAProgram)?;
+        let (magic, rest) = summed.split_first_chunk().ok_or(ProgramError::NotAProgram)?;
+        let (&[version, axes], body) = rest.split_first_chunk().ok_or(ProgramError::NotAProgram)?;
+        if *magic != MAGIC {
             return Err(ProgramError::NotAProgram);
         }
         if version != VERSION {
@@ -161,17 +198,15 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
         if usize::from(axes) != AXES {
             return Err(ProgramError::Axes { found: axes, expected: AXES });
         }
-        let expected = checksum.iter().rev().fold(0, |sum, &byte| sum << 8 | u32::from(byte));
-        let mut digest = CHECKSUMS.digest();
-        digest.update(prefix);
-        digest.update(body);
-        let found = digest.finalize();
+        let expected = u32::from_le_bytes(*checksum);
+        let mut sum = Checksum::NONE;
+        sum.update(summed);
+        let found = sum.finish();
         if found != expected {
             return Err(ProgramError::Checksum { found, expected });
         }
-        let (header, left) = postcard::take_from_bytes::<Header<AXES>>(body)
-            .map_err(|_| ProgramError::Malformed { at: PREFIX })?;
-        Ok(Self { header, items: Items { left, end: PREFIX + body.len(), items: PhantomData } })
+        let (header, left) = wire::take(body).ok_or(ProgramError::Malformed { at: PREFIX })?;
+        Ok(Self { header, items: Items { left, end: summed.len(), items: PhantomData } })
     }
 
     /// What the program was planned for.
@@ -193,12 +228,12 @@ impl<const AXES: usize> Iterator for Items<'_, AXES> {
             return None;
         }
         let at = self.end - self.left.len();
-        Some(match postcard::take_from_bytes(self.left) {
-            Ok((item, left)) => {
+        Some(match wire::take(self.left) {
+            Some((item, left)) => {
                 self.left = left;
                 Ok(item)
             }
-            Err(_) => {
+            None => {
                 self.left = &[];
                 Err(ProgramError::Malformed { at })
             }
@@ -287,6 +322,18 @@ mod tests {
         }
         assert!(longest::<8>(axis).is_ok_and(|bytes| bytes > 2000));
         assert_eq!(longest::<9>(axis), Err(postcard::Error::SerializeBufferFull));
+    }
+
+    /// The value that the catalogue of parametrised CRC algorithms gives for CRC-32/ISO-HDLC, in one part and in two.
+    #[test]
+    fn the_checksum_is_the_one_of_zip_and_ethernet() {
+        for split in 0..=9 {
+            let (first, second) = b"123456789".split_at(split);
+            let mut sum = Checksum::NONE;
+            sum.update(first);
+            sum.update(second);
+            assert_eq!(sum.finish(), 0xCBF4_3926);
+        }
     }
 
     /// Every single damaged byte, every shorter program, and every kind of stranger.

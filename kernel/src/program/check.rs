@@ -56,19 +56,17 @@ pub fn check<R: Real, const AXES: usize, E>(
     items: impl Iterator<Item = Result<Item<AXES>, E>>,
 ) -> Result<(), CheckError<E>> {
     for (axis, start) in header.start.iter().enumerate() {
-        let mm = start.to_mm();
-        if !(libm::fabs(mm) <= Position::LIMIT_MM) {
-            return Err(CheckError::Start { axis, mm });
+        if !start.is_within_limit() {
+            return Err(CheckError::Start { axis, mm: start.to_mm() });
         }
     }
     let mut accept = Acceptance::<R, AXES>::new(header.rules, header.start);
     let mut index: u32 = 0;
     for item in items {
-        let next = item
-            .map_err(SupplyError::Source)
+        item.map_err(SupplyError::Source)
             .and_then(|item| item.ready(header.tick_s))
-            .and_then(|ready| after(&accept, &ready));
-        accept = next.map_err(|cause| CheckError::Item { index, cause })?;
+            .and_then(|ready| take(&mut accept, &ready))
+            .map_err(|cause| CheckError::Item { index, cause })?;
         index = index.wrapping_add(1);
     }
     accept.at_rest().map_err(|_| CheckError::Unfinished)
@@ -76,17 +74,17 @@ pub fn check<R: Real, const AXES: usize, E>(
 
 // In a frame of its own: an item takes hundreds of bytes.
 #[inline(never)]
-fn after<R: Real, const AXES: usize, E>(
-    accept: &Acceptance<R, AXES>,
+fn take<R: Real, const AXES: usize, E>(
+    accept: &mut Acceptance<R, AXES>,
     ready: &Ready<R, AXES>,
-) -> Result<Acceptance<R, AXES>, SupplyError<E>> {
+) -> Result<(), SupplyError<E>> {
     match ready {
         Ready::Piece(piece) => accept.piece(piece),
         Ready::Segment(segment) => accept.segment(segment),
         Ready::EndOfStretch(end) => accept.end_of_stretch(*end),
         Ready::Dwell(duration) => accept.dwell(*duration),
-        Ready::Stop => accept.at_rest().map(|()| *accept),
-        Ready::Block => Ok(*accept),
+        Ready::Stop => accept.at_rest(),
+        Ready::Block => Ok(()),
     }
     .map_err(SupplyError::Rejected)
 }

@@ -12,6 +12,7 @@ mod array;
 pub mod bytes;
 pub mod check;
 pub mod supply;
+mod wire;
 
 pub use bytes::{Header, Items, ProgramError, Reader, write};
 pub use check::{CheckError, check};

@@ -59,6 +59,7 @@ impl<const AXES: usize> Item<AXES> {
     ///
     /// # Errors
     /// The number type does not hold it.
+    #[inline(never)]
     pub fn ready<R: Real, E>(&self, tick_s: f64) -> Result<Ready<R, AXES>, SupplyError<E>> {
         Ok(match *self {
             Self::Line { line, start, direction, length } => {
@@ -113,6 +114,7 @@ impl<R: Real, const AXES: usize, E: Clone, I: Iterator<Item = Result<Item<AXES>,
         self.fill_on(feeder).inspect_err(|error| self.error = Some(error.clone()))
     }
 
+    #[inline(never)]
     fn fill_on(&mut self, feeder: &mut Feeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
         loop {
             let ready = match self.pending.take() {

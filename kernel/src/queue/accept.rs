@@ -1,14 +1,14 @@
 //! What may follow what in the streams.
 //!
 //! Every check costs the producer a few operations and spares the tick from ever meeting an item it
-//! could not execute. Each method returns the state after the item, so that an item that finds its
-//! queue full leaves no trace.
+//! could not execute. Each method goes on to the state after the item; a copy does, where the item may find
+//! its queue full, and an item that is rejected leaves a state of no further use.
 
 use serde::{Deserialize, Serialize};
 
 use crate::law::{FeedSegment, Limits, Ticks};
-use crate::num::Real;
-use crate::path::{Piece, Steepness};
+use crate::num::{Real, Scalar, is_within, rolled};
+use crate::path::{Piece, Steepness, magnitude};
 use crate::units::Position;
 
 /// How many segments or dwells may end within one tick. Denser ones are rejected when they are offered.
@@ -148,37 +148,27 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         }
     }
 
-    pub(crate) fn piece(&self, piece: &Piece<R, AXES>) -> Result<Self, Rejection> {
+    pub(crate) fn piece(&mut self, piece: &Piece<R, AXES>) -> Result<(), Rejection> {
         self.continuous(&piece.start())?;
         if let Some(before) = self.tangent {
             let after = piece.tangent_at(R::ZERO);
-            let square: f64 = before
-                .iter()
-                .zip(&after)
-                .map(|(b, a)| {
-                    let difference = a.to_f64() - b.to_f64();
-                    difference * difference
-                })
-                .sum();
+            let mut chord = after.map(Scalar::to_f64);
+            for (after, before) in chord.iter_mut().zip(before) {
+                *after -= before.to_f64();
+            }
             // The chord between unit vectors is below the angle by a part in 24·angle².
-            let angle_rad = libm::sqrt(square);
+            let angle_rad = magnitude(&chord);
             let rounding = 4.0 * R::EPSILON;
             if !(angle_rad <= self.rules.joint_angle_rad + rounding) {
                 return Err(Rejection::Corner { angle_rad });
             }
         }
         let end = piece.end();
-        for position in &end {
+        for position in rolled(end.as_slice()) {
             within_range(*position)?;
         }
         let path_length = self.path_length + piece.length();
         within_range(path_length)?;
-        let mut next = Self {
-            position: end,
-            tangent: Some(piece.tangent_at(piece.length().to_offset())),
-            path_length,
-            ..*self
-        };
         if R::SETPOINT_MAX.is_some() {
             let steepness = piece.steepness();
             if self.path_length < self.feed_length {
@@ -186,14 +176,17 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
             }
             if steepness != Steepness::STRAIGHT {
                 let was_ahead = self.curved_until > self.feed_length;
-                next.steepness = if was_ahead { self.steepness.max(&steepness) } else { steepness };
-                next.curved_until = path_length;
+                self.steepness = if was_ahead { self.steepness.max(&steepness) } else { steepness };
+                self.curved_until = path_length;
             }
         }
-        Ok(next)
+        self.position = end;
+        self.tangent = Some(piece.tangent_at(piece.length().to_offset()));
+        self.path_length = path_length;
+        Ok(())
     }
 
-    pub(crate) fn segment(&self, segment: &FeedSegment<R>) -> Result<Self, Rejection> {
+    pub(crate) fn segment(&mut self, segment: &FeedSegment<R>) -> Result<(), Rejection> {
         let ramp = segment.as_ramp();
         let step = (ramp.from_mm_s - self.feed_mm_s).abs();
         if !(step <= R::from_f64(4.0 * R::EPSILON) * self.feed_mm_s) {
@@ -203,29 +196,30 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
             });
         }
         let limits = &self.rules.limits;
-        for (quantity, value, limit) in [
-            ("feed [mm/s]", ramp.from_mm_s.max(ramp.to_mm_s), self.rules.feed_mm_s),
-            ("acceleration [mm/s²]", segment.peak_accel_mm_s2(), limits.accel_mm_s2),
-            ("jerk [mm/s³]", ramp.peak_jerk_mm_s3, limits.jerk_mm_s3),
-            ("snap [mm/s⁴]", segment.peak_snap_mm_s4(), limits.snap_mm_s4),
-        ] {
-            let value = value.to_f64();
-            if !(value <= limit * (1.0 + 8.0 * R::EPSILON)) {
+        let quantities = ["feed [mm/s]", "acceleration [mm/s²]", "jerk [mm/s³]", "snap [mm/s⁴]"];
+        let feed_mm_s = ramp.from_mm_s.max(ramp.to_mm_s);
+        let values = [feed_mm_s, segment.peak_accel_mm_s2(), ramp.peak_jerk_mm_s3, segment.peak_snap_mm_s4()];
+        let most = [self.rules.feed_mm_s, limits.accel_mm_s2, limits.jerk_mm_s3, limits.snap_mm_s4];
+        let (quantities, values, most) = rolled((quantities.as_slice(), values.as_slice(), most.as_slice()));
+        for ((&quantity, value), &limit) in quantities.iter().zip(values).zip(most) {
+            let value = rolled(value).to_f64();
+            if !is_within(value, 0.0, limit * (1.0 + 8.0 * R::EPSILON)) {
                 return Err(Rejection::Limit { quantity, value, limit });
             }
         }
-        let recent = self.not_too_dense(segment.duration())?;
+        self.not_too_dense(segment.duration())?;
         let feed_length = self.feed_length + segment.length();
         within_range(feed_length)?;
-        let mut next = Self { feed_mm_s: ramp.to_mm_s, feed_length, recent, ..*self };
         if R::SETPOINT_MAX.is_some() {
             let v_mm_s = ramp.from_mm_s.max(ramp.to_mm_s).to_f64();
             let is_on_curve = self.feed_length < self.curved_until;
             self.fits(if is_on_curve { &self.steepness } else { &Steepness::STRAIGHT }, v_mm_s)?;
             let was_ahead = self.feed_length > self.path_length;
-            next.ahead_mm_s = if was_ahead { f64::max(self.ahead_mm_s, v_mm_s) } else { v_mm_s };
+            self.ahead_mm_s = if was_ahead { f64::max(self.ahead_mm_s, v_mm_s) } else { v_mm_s };
         }
-        Ok(next)
+        self.feed_mm_s = ramp.to_mm_s;
+        self.feed_length = feed_length;
+        Ok(())
     }
 
     /// Whether the number type holds what a feed of up to `v_mm_s` on a piece of this steepness asks of the axes,
@@ -253,15 +247,16 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
     }
 
     /// The end of the path of a stretch, whose feed is accepted in lists of its own.
-    pub(crate) fn end_of_path(&self, position: [Position; AXES]) -> Result<Self, Rejection> {
+    pub(crate) fn end_of_path(&mut self, position: [Position; AXES]) -> Result<(), Rejection> {
         self.continuous(&position)?;
         if self.path_length == Position::ZERO {
             return Err(Rejection::Empty);
         }
-        Ok(Self::new(self.rules, position))
+        *self = Self::new(self.rules, position);
+        Ok(())
     }
 
-    pub(crate) fn end_of_stretch(&self, position: [Position; AXES]) -> Result<Self, Rejection> {
+    pub(crate) fn end_of_stretch(&mut self, position: [Position; AXES]) -> Result<(), Rejection> {
         self.continuous(&position)?;
         if self.feed_mm_s > R::ZERO {
             return Err(Rejection::Moving { feed_mm_s: self.feed_mm_s.to_f64() });
@@ -275,12 +270,13 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
                 feed_mm: self.feed_length.to_mm(),
             });
         }
-        Ok(Self { recent: self.recent, ..Self::new(self.rules, position) })
+        *self = Self { recent: self.recent, ..Self::new(self.rules, position) };
+        Ok(())
     }
 
-    pub(crate) fn dwell(&self, duration: Ticks) -> Result<Self, Rejection> {
+    pub(crate) fn dwell(&mut self, duration: Ticks) -> Result<(), Rejection> {
         self.at_rest()?;
-        Ok(Self { recent: self.not_too_dense(duration)?, ..*self })
+        self.not_too_dense(duration)
     }
 
     /// How the feed's length of this stretch compares with the path's.
@@ -295,20 +291,23 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         Ok(())
     }
 
-    /// The latest durations with `newest` among them, if the executor can keep up with them.
-    fn not_too_dense(&self, newest: Ticks) -> Result<[Ticks; SEGMENTS_PER_TICK_MAX], Rejection> {
-        let mut recent = self.recent;
-        recent.rotate_right(1);
-        recent[0] = newest;
-        let together = recent.iter().fold(Ticks::ZERO, |sum, duration| sum.plus(*duration));
+    /// Puts `newest` among the latest durations, if the executor can keep up with them.
+    #[inline(never)]
+    fn not_too_dense(&mut self, newest: Ticks) -> Result<(), Rejection> {
+        let (mut next, mut together) = (newest, Ticks::ZERO);
+        for place in rolled(self.recent.as_mut_slice()) {
+            together = rolled(together.plus(next));
+            core::mem::swap(place, &mut next);
+        }
         if together < Ticks::ONE {
             return Err(Rejection::Dense { ticks: together.to_f64() });
         }
-        Ok(recent)
+        Ok(())
     }
 
     fn continuous(&self, start: &[Position; AXES]) -> Result<(), Rejection> {
-        for (axis, (here, start)) in self.position.iter().zip(start).enumerate() {
+        let (here, start) = rolled((self.position.as_slice(), start.as_slice()));
+        for (axis, (here, start)) in here.iter().zip(start).enumerate() {
             let gap_mm = (*start - *here).to_mm();
             if !(libm::fabs(gap_mm) <= self.rules.joint_gap_mm) {
                 return Err(Rejection::Gap { axis, gap_mm });
@@ -319,6 +318,5 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
 }
 
 fn within_range(position: Position) -> Result<(), Rejection> {
-    let mm = position.to_mm();
-    if libm::fabs(mm) <= Position::LIMIT_MM { Ok(()) } else { Err(Rejection::Range { mm }) }
+    if position.is_within_limit() { Ok(()) } else { Err(Rejection::Range { mm: position.to_mm() }) }
 }

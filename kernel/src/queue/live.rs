@@ -106,7 +106,8 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// # Errors
     /// The queue is full, or the piece does not continue its predecessor.
     pub fn piece(&mut self, piece: Piece<R, AXES>) -> Result<(), Refused<Piece<R, AXES>>> {
-        let next = self.path_accept.piece(&piece).map_err(Refused::Invalid)?;
+        let mut next = self.path_accept;
+        next.piece(&piece).map_err(Refused::Invalid)?;
         enter(&mut self.path, PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
         self.path_accept = next;
         count(&self.shared.path_entered);
@@ -118,7 +119,8 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// # Errors
     /// The queue is full, or the path does not end there.
     pub fn end_of_path(&mut self, position: [Position; AXES]) -> Result<(), Refused<[Position; AXES]>> {
-        let next = self.path_accept.end_of_path(position).map_err(Refused::Invalid)?;
+        let mut next = self.path_accept;
+        next.end_of_path(position).map_err(Refused::Invalid)?;
         enter(&mut self.path, PathItem::EndOfStretch(position)).map_err(|_| Refused::Full(position))?;
         self.path_accept = next;
         count(&self.shared.path_entered);
@@ -157,7 +159,8 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// # Errors
     /// The list is full, or the segment does not continue it or exceeds a limit.
     pub fn segment(&mut self, list: u8, segment: FeedSegment<R>) -> Result<(), Refused<FeedSegment<R>>> {
-        let next = self.feed_accept.segment(&segment).map_err(Refused::Invalid)?;
+        let mut next = self.feed_accept;
+        next.segment(&segment).map_err(Refused::Invalid)?;
         self.append(list, FeedItem::Segment(segment)).map_err(|_| Refused::Full(segment))?;
         self.feed_accept = next;
         Ok(())

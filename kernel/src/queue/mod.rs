@@ -107,6 +107,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
     }
 
     /// The two ends, for a machine that stands at `position`. What was queued before is dropped.
+    #[inline(never)]
     pub fn split(
         &mut self,
         rules: PathRules,
@@ -158,8 +159,10 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     ///
     /// # Errors
     /// The queue is full, or the piece does not continue its predecessor.
+    #[inline(never)]
     pub fn piece(&mut self, piece: Piece<R, AXES>) -> Result<(), Refused<Piece<R, AXES>>> {
-        let next = self.accept.piece(&piece).map_err(Refused::Invalid)?;
+        let mut next = self.accept;
+        next.piece(&piece).map_err(Refused::Invalid)?;
         enter(&mut self.path, PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
         self.accept = next;
         self.publish();
@@ -171,8 +174,10 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     ///
     /// # Errors
     /// The queue is full, or the segment does not continue its predecessor or exceeds a limit.
+    #[inline(never)]
     pub fn segment(&mut self, segment: FeedSegment<R>) -> Result<(), Refused<FeedSegment<R>>> {
-        let next = self.accept.segment(&segment).map_err(Refused::Invalid)?;
+        let mut next = self.accept;
+        next.segment(&segment).map_err(Refused::Invalid)?;
         enter(&mut self.feed, FeedItem::Segment(segment)).map_err(|_| Refused::Full(segment))?;
         self.accept = next;
         self.publish();
@@ -185,8 +190,10 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     /// # Errors
     /// A queue is full, the streams have measured different lengths, the feed is not 0, or the path
     /// does not end there.
+    #[inline(never)]
     pub fn end_stretch(&mut self, position: [Position; AXES]) -> Result<(), Refused<[Position; AXES]>> {
-        let next = self.accept.end_of_stretch(position).map_err(Refused::Invalid)?;
+        let mut next = self.accept;
+        next.end_of_stretch(position).map_err(Refused::Invalid)?;
         if !(has_room(&self.path) && has_room(&self.feed)) {
             return Err(Refused::Full(position));
         }
@@ -205,6 +212,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     /// Tells the intake which stream is ahead: behind the item that changes it, and before that is counted. A tick
     /// that comes in between finds what is said to be ahead in its queue, and that queue, which had room, not full yet.
     /// Counted first, a queue would be full while the other one was still said to cover it.
+    #[inline(never)]
     fn publish(&mut self) {
         let ahead = self.accept.feed_ahead_of_path();
         self.shared.feed_covers_path.store(ahead.is_ge(), Ordering::Release);
@@ -215,8 +223,10 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     ///
     /// # Errors
     /// The queue is full, or a stretch is under way.
+    #[inline(never)]
     pub fn dwell(&mut self, duration: Ticks) -> Result<(), Refused<Ticks>> {
-        let next = self.accept.dwell(duration).map_err(Refused::Invalid)?;
+        let mut next = self.accept;
+        next.dwell(duration).map_err(Refused::Invalid)?;
         enter(&mut self.feed, FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))?;
         count(&self.shared.feed_entered);
         self.accept = next;
@@ -243,7 +253,7 @@ fn has_places<T>(queue: &Producer<'_, T>) -> bool {
 }
 
 /// Enters an item; gives it back if the queue is full.
-#[inline]
+#[inline(never)]
 fn enter<T>(queue: &mut Producer<'_, T>, item: T) -> Result<(), T> {
     if has_places(queue) { queue.enqueue(item) } else { Err(item) }
 }

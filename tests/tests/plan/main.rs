@@ -4,6 +4,8 @@
 #![allow(clippy::float_cmp, reason = "exact values are the point")]
 
 mod cases;
+mod cost;
+mod executed;
 mod feasible;
 mod fixed;
 mod maximal;
@@ -12,6 +14,7 @@ mod segments;
 mod spanning;
 #[path = "../support/mod.rs"]
 mod support;
+mod window;
 
 use motion_kernel::law::{Law, Limits};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, plan};

@@ -27,7 +27,7 @@ struct Foreground {
     memory: InMemory<AXES>,
 }
 
-static FOREGROUND: Mutex<RefCell<Option<Foreground>>> = Mutex::new(RefCell::new(None));
+static FOREGROUND: Mutex<RefCell<Option<&'static mut Foreground>>> = Mutex::new(RefCell::new(None));
 /// Read, so that nothing of a tick is left out of the image.
 static CODES: AtomicU32 = AtomicU32::new(0);
 /// What the board tells the kernel next; written from outside.
@@ -53,8 +53,9 @@ fn run() -> Option<()> {
     let mut kernel = Kernel::new(&config, header.start, counts);
     kernel.enable(100);
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
+    let foreground = cortex_m::singleton!(: Foreground = Foreground { kernel, intake, memory })?;
     critical_section::with(|cs| {
-        *FOREGROUND.borrow(cs).try_borrow_mut().ok()? = Some(Foreground { kernel, intake, memory });
+        *FOREGROUND.borrow(cs).try_borrow_mut().ok()? = Some(foreground);
         Some(())
     })?;
     while supply.fill(&mut feeder).is_ok() {

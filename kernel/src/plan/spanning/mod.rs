@@ -17,7 +17,7 @@ pub use valleys::Node;
 
 use self::climb::Climb;
 use self::valleys::{Hump, Valleys};
-use super::lookahead::{Block, PlanError, check};
+use super::lookahead::{Block, BlockPlan, PlanError, check};
 use crate::law::{Law, Limits, Ramp, peak};
 
 /// A ramp or a cruise, with its place on the path.
@@ -72,7 +72,10 @@ pub fn plan_spanning(
     // Several kilobytes each: used for all humps.
     let (mut up, mut down) = (Climb::NONE, Climb::NONE);
     let fits = |valleys: &Valleys<'_>, hump: &Hump| match Sides::new(hump, valleys) {
-        Some(sides) => sides.fit(sides.lowest(), &mut up, &mut down).is_some_and(|left| left >= 0.0),
+        Some(sides) => {
+            sides.start(&mut up, &mut down);
+            sides.fit(sides.lowest(), &mut up, &mut down).is_some_and(|left| left >= 0.0)
+        }
         None => hump.enter_mm_s == hump.exit_mm_s,
     };
     if !valleys.settle(fits) {
@@ -86,6 +89,24 @@ pub fn plan_spanning(
         }
     }
     Ok(Some(out.time_s))
+}
+
+/// One pair of ramps a block, as [`plan`](super::plan()) found them.
+pub(super) fn spans_of(blocks: &[Block<f64>], plans: &[BlockPlan<f64>], put: &mut impl FnMut(FeedSpan)) {
+    let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
+    let mut end_mm = 0.0;
+    for (block, plan) in blocks.iter().zip(plans) {
+        end_mm += block.length_mm;
+        let rise = Ramp::new(&block.law, plan.enter_mm_s, plan.peak_mm_s);
+        let fall = Ramp::new(&block.law, plan.peak_mm_s, plan.exit_mm_s);
+        if !rise.is_cruise() {
+            out.ramp(&rise);
+        }
+        out.cruise(end_mm - fall.length_mm(), plan.peak_mm_s);
+        if !fall.is_cruise() {
+            out.ramp(&fall);
+        }
+    }
 }
 
 /// Where spans go.
@@ -124,7 +145,7 @@ struct Sides<'a> {
 impl<'a> Sides<'a> {
     /// `None` if the hump has no blocks.
     fn new(hump: &'a Hump, valleys: &'a Valleys<'a>) -> Option<Self> {
-        let mut laws = valleys.blocks_of(hump).map(|(_, _, law)| law);
+        let mut laws = valleys.laws_of(hump);
         let first = laws.next()?;
         let uniform = laws.all(|law| law == first).then_some(first);
         Some(Self { hump, valleys, uniform })
@@ -138,7 +159,7 @@ impl<'a> Sides<'a> {
     /// The highest top that is worth trying: the ceiling, or what acceleration alone would reach.
     fn highest(&self) -> f64 {
         let Hump { enter_mm_s, exit_mm_s, start_mm, end_mm, top_mm_s, .. } = *self.hump;
-        let accel = self.valleys.blocks_of(self.hump).map(|(_, _, law)| law.limits().accel_mm_s2);
+        let accel = self.valleys.laws_of(self.hump).map(|law| law.limits().accel_mm_s2);
         let squares = 0.5 * (enter_mm_s * enter_mm_s + exit_mm_s * exit_mm_s);
         let reached = libm::sqrt(squares + accel.fold(0.0, f64::max) * (end_mm - start_mm));
         top_mm_s.min(reached).max(self.lowest())
@@ -147,37 +168,35 @@ impl<'a> Sides<'a> {
     /// The least limits of the blocks between two positions; of a position by itself, of the block that comes next on
     /// the way on, or on the way back.
     fn limits(&self, low_mm: f64, high_mm: f64, is_back: bool) -> Limits<f64> {
-        if let Some(law) = self.uniform {
-            return law.limits();
+        match self.uniform {
+            Some(law) => law.limits(),
+            None => self.valleys.least(self.hump, low_mm, high_mm, is_back),
         }
-        let touched = |start: f64, end: f64| {
-            if is_back { end >= low_mm && start < high_mm } else { end > low_mm && start <= high_mm }
-        };
-        let blocks = || self.valleys.blocks_of(self.hump);
-        let limits = |(_, _, law): (f64, f64, Law<f64>)| law.limits();
-        let all = blocks().filter(|&(start, end, _)| touched(start, end)).map(limits);
-        // Beyond the hump's end, by rounding, those of all of it hold.
-        let least =
-            all.reduce(|a, b| a.least(&b)).or_else(|| blocks().map(limits).reduce(|a, b| a.least(&b)));
-        // A hump that is looked at has blocks.
-        least.unwrap_or(Limits { accel_mm_s2: 0.0, jerk_mm_s3: 0.0, snap_mm_s4: 0.0 })
+    }
+
+    /// Length of the hump, and a rounding: a ramp that was planned before to end just there still does.
+    fn room_mm(&self) -> f64 {
+        self.hump.end_mm - self.hump.start_mm + ROUNDING_MM
+    }
+
+    /// Puts both climbs before their stairs.
+    fn start(&self, up: &mut Climb, down: &mut Climb) {
+        up.start(&self.hump.rising, self.hump.enter_mm_s, self.room_mm());
+        down.start(&self.hump.falling, self.hump.exit_mm_s, self.room_mm());
     }
 
     /// Both sides up to `top`; returns what is left between them \[mm\], less than 0 if there is no room. `None` if there
     /// is none for one side by itself.
     fn fit(&self, top: f64, up: &mut Climb, down: &mut Climb) -> Option<f64> {
-        let Hump { start_mm, end_mm, enter_mm_s, exit_mm_s, rising, falling, .. } = self.hump;
-        // A ramp that was planned before to end just here still does.
-        let room_mm = end_mm - start_mm + ROUNDING_MM;
-        let on = |a: f64, b: f64| self.limits(start_mm + a, start_mm + b, false);
-        let back = |a: f64, b: f64| self.limits(end_mm - b, end_mm - a, true);
-        let up_mm = up.find(rising, *enter_mm_s, top, room_mm, on)?;
-        let down_mm = down.find(falling, *exit_mm_s, top, room_mm, back)?;
-        Some(room_mm - up_mm - down_mm)
+        let (start_mm, end_mm) = (self.hump.start_mm, self.hump.end_mm);
+        let up_mm = up.find(top, |a, b| self.limits(start_mm + a, start_mm + b, false))?;
+        let down_mm = down.find(top, |a, b| self.limits(end_mm - b, end_mm - a, true))?;
+        Some(self.room_mm() - up_mm - down_mm)
     }
 
     /// Up to the highest top there is room for, which is returned.
     fn best(&self, up: &mut Climb, down: &mut Climb) -> Option<f64> {
+        self.start(up, down);
         let (mut low, mut high) = (self.lowest(), self.highest());
         let room_mm = self.hump.end_mm - self.hump.start_mm;
         if let Some(law) =
@@ -191,7 +210,7 @@ impl<'a> Sides<'a> {
             None => f64::NEG_INFINITY,
         };
         let mut left_low = self.fit(low, up, down).filter(|&left| left >= 0.0)?;
-        let mut gap_mm = left_low;
+        let (mut gap_mm, mut last) = (left_low, low);
         // False position, with halving where that stands still; aimed a little short, so that there is room.
         let aim_mm = 0.5 * TOP_GAP * room_mm;
         for _ in 0..TOP_STEPS {
@@ -200,20 +219,23 @@ impl<'a> Sides<'a> {
             }
             let part = (left_low - aim_mm) / (left_low - left_high);
             let part = if part > 0.02 && part < 0.98 { part } else { 0.5 };
-            let middle = low + part * (high - low);
-            match self.fit(middle, up, down) {
+            last = low + part * (high - low);
+            match self.fit(last, up, down) {
                 Some(left) if left >= 0.0 => {
-                    (low, left_low, gap_mm) = (middle, left, left);
+                    (low, left_low, gap_mm) = (last, left, left);
                     left_high *= 0.5;
                 }
                 tried => {
-                    (high, left_high) = (middle, tried.unwrap_or(f64::NEG_INFINITY));
+                    (high, left_high) = (last, tried.unwrap_or(f64::NEG_INFINITY));
                     left_low *= 0.5;
                 }
             }
         }
-        // The last one tried may not be the best.
-        self.fit(low, up, down).map(|_| low)
+        // The last one tried may be too high: nothing below the best was.
+        if last > low {
+            self.fit(low, up, down)?;
+        }
+        Some(low)
     }
 }
 

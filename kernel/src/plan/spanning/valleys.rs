@@ -7,12 +7,14 @@
 //! The ceilings are looked at from the lowest up, in the tree of their minima: what lies beside a stair and is higher
 //! need not be looked at any more, so that the work is proportional to the number of ceilings.
 //!
+//! - `least`: the least limits between two positions;
 //! - `settle`: whether the valleys can be reached, and which of them are given up.
 
+mod least;
 mod settle;
 
 use super::climb::{Stair, Stairs};
-use crate::law::{Law, Ramp, peak};
+use crate::law::{Law, Limits, Ramp, peak};
 use crate::plan::Block;
 
 /// No node.
@@ -42,6 +44,8 @@ pub struct Node {
     ideal_s: f64,
     /// The block whose law it has.
     block: u32,
+    /// The least limits of some nodes up to this one: see `least`.
+    least: Limits<f64>,
     /// The lowest of the ceilings to its left, and to its right, that are not below it.
     left: u32,
     right: u32,
@@ -64,6 +68,7 @@ impl Node {
         feed_mm_s: 0.0,
         ideal_s: 0.0,
         block: 0,
+        least: least::NONE,
         left: NONE,
         right: NONE,
         link: NONE,
@@ -196,6 +201,7 @@ impl<'a> Valleys<'a> {
             }
             node.ideal_s = ideal_s;
         }
+        least::collect(nodes, blocks);
         let root = tree(nodes);
         let last = (count - 1) as u32;
         let mut valleys = Self { blocks, nodes, accel_mm_s2 };
@@ -421,14 +427,14 @@ impl<'a> Valleys<'a> {
         (rested - lag_s(bound.feed_mm_s, top) - waited_s).max(0.0)
     }
 
-    /// The block in which `s_mm` lies, for a hump: its law limits what happens there.
-    pub fn blocks_of(&self, hump: &Hump) -> impl Iterator<Item = (f64, f64, Law<f64>)> + Clone {
+    /// The laws of the blocks of a hump.
+    pub fn laws_of(&self, hump: &Hump) -> impl Iterator<Item = Law<f64>> {
         let nodes = self.nodes.get(hump.nodes.0..hump.nodes.1).unwrap_or(&[]);
         let blocks = self.blocks;
         nodes
             .iter()
             .filter(|node| node.end_mm > node.start_mm)
-            .filter_map(move |node| Some((node.start_mm, node.end_mm, blocks.get(node.block as usize)?.law)))
+            .filter_map(move |node| Some(blocks.get(node.block as usize)?.law))
     }
 }
 

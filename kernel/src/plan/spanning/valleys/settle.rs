@@ -3,10 +3,13 @@
 //! Consumes the roles of all nodes; gives up valleys that the law does not reach below the stairs beside them, and makes
 //! new ones in staircases that are too long to be climbed at once.
 
-use super::{Hump, NONE, Role, Stairs, Valleys};
+use super::{Hump, NONE, Node, Role, Stairs, Valleys};
 
 /// Joining stairs may lose so much of the time of a ramp over all of them; otherwise the staircase is divided.
 const DIVIDE_SHARE: f64 = 0.05;
+
+/// Of a chain of valleys given up one after the other as many are given up before looking again as it is long, over this.
+const CHAIN_LOOKED_AT: usize = 64;
 
 /// How often all nodes may be looked at to settle which valleys are reached; a list that takes more has no plan.
 const LOOKS_MAX: usize = 256;
@@ -17,6 +20,8 @@ impl Valleys<'_> {
     pub fn settle(&mut self, mut fits: impl FnMut(&Self, &Hump) -> bool) -> bool {
         let (mut left, mut right) = (0, self.next_valley(0));
         let mut looked_at = 0;
+        // Valleys given up since a hump could be driven.
+        let mut chain = 0;
         while right != NONE {
             // Valleys that are given up one after the other make ever longer humps.
             looked_at += (right - left) as usize;
@@ -32,21 +37,32 @@ impl Valleys<'_> {
                 if let Some(node) = self.node_mut(right) {
                     node.link = left;
                 }
-                (left, right) = (right, self.next_valley(right));
+                (left, right, chain) = (right, self.next_valley(right), 0);
                 continue;
             }
+            chain += 1;
             let last = self.nodes.len() - 1;
-            let top_mm_s = self.node(right).top_mm_s;
             if hump.enter_mm_s > hump.exit_mm_s && left != 0 {
                 // On the way down to the right one.
-                self.give_up(left, Role::Falling, left as usize + 1..right as usize);
-                left = self.node(left).link;
-            } else if hump.enter_mm_s <= hump.exit_mm_s && right as usize != last {
-                self.give_up(right, Role::Rising, left as usize + 1..right as usize);
-                if let Some(node) = self.node_mut(left) {
-                    node.top_mm_s = top_mm_s;
+                for _ in 0..1 + chain / CHAIN_LOOKED_AT {
+                    if left == 0 || self.node(left).feed_mm_s <= hump.exit_mm_s {
+                        break;
+                    }
+                    self.give_up(left, Role::Falling, left as usize + 1..right as usize);
+                    left = self.node(left).link;
                 }
-                right = self.next_valley(right);
+            } else if hump.enter_mm_s <= hump.exit_mm_s && right as usize != last {
+                for _ in 0..1 + chain / CHAIN_LOOKED_AT {
+                    if right as usize == last || self.node(right).feed_mm_s < hump.enter_mm_s {
+                        break;
+                    }
+                    let top_mm_s = self.node(right).top_mm_s;
+                    self.give_up(right, Role::Rising, left as usize + 1..right as usize);
+                    if let Some(node) = self.node_mut(left) {
+                        node.top_mm_s = top_mm_s;
+                    }
+                    right = self.next_valley(right);
+                }
             } else if hump.enter_mm_s > hump.exit_mm_s && right as usize != last {
                 // From the start, where the valley must be passed on the way down to a lower one: a ramp to a lower feed
                 // passes a feed earlier than one that ends at it.
@@ -96,16 +112,24 @@ impl Valleys<'_> {
         Some(middle)
     }
 
-    /// Makes a stair of a valley; what lies on the side where it is passed at its feed or below limits no more.
+    /// Makes a stair of a valley; what lies on the side where it is passed at its feed or below limits no more, up to the
+    /// next lower stair: beyond that there are only lower ones.
     fn give_up(&mut self, valley: u32, role: Role, passed: core::ops::Range<usize>) {
         let feed_mm_s = self.node(valley).feed_mm_s;
         if let Some(node) = self.node_mut(valley) {
             node.role = role;
         }
-        for node in self.nodes.get_mut(passed).unwrap_or(&mut []) {
-            if node.role != role || node.feed_mm_s >= feed_mm_s {
+        let nodes = self.nodes.get_mut(passed).unwrap_or(&mut []);
+        let free = |node: &mut Node| {
+            let is_lower = node.role == role && node.feed_mm_s < feed_mm_s;
+            if !is_lower {
                 node.role = Role::Free;
             }
-        }
+            is_lower
+        };
+        match role {
+            Role::Rising => nodes.iter_mut().rev().any(free),
+            _ => nodes.iter_mut().any(free),
+        };
     }
 }

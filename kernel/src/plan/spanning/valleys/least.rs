@@ -1,0 +1,73 @@
+//! The least limits of what lies between two positions.
+//!
+//! Consumes the nodes of a stretch; every node keeps the least limits of itself and of some before it: of as many as the
+//! lowest bit of its place, counted from 1, says (a Fenwick tree). Any range is a few of those: work goes with the square
+//! of the logarithm of its length.
+
+use super::{Hump, Node, Valleys};
+use crate::law::Limits;
+use crate::plan::Block;
+
+/// No limits.
+pub(super) const NONE: Limits<f64> =
+    Limits { accel_mm_s2: f64::INFINITY, jerk_mm_s3: f64::INFINITY, snap_mm_s4: f64::INFINITY };
+
+/// A joint has no limits of its own, nor has a block of no length.
+fn own(node: &Node, blocks: &[Block<f64>]) -> Limits<f64> {
+    let block = blocks.get(node.block as usize).filter(|_| node.end_mm > node.start_mm);
+    block.map_or(NONE, |block| block.law.limits())
+}
+
+/// How many nodes the one at `place`, counted from 1, stands for.
+fn reach(place: usize) -> usize {
+    place & place.wrapping_neg()
+}
+
+/// Gives every node the least limits of those it stands for.
+pub(super) fn collect(nodes: &mut [Node], blocks: &[Block<f64>]) {
+    for node in nodes.iter_mut() {
+        node.least = own(node, blocks);
+    }
+    for place in 1..=nodes.len() {
+        let Some(here) = nodes.get(place - 1).map(|node| node.least) else { break };
+        if let Some(above) = nodes.get_mut(place + reach(place) - 1) {
+            above.least = above.least.least(&here);
+        }
+    }
+}
+
+impl Valleys<'_> {
+    /// The least limits in a hump from `low_mm` to `high_mm`; of a position by itself, of the block that comes next on the
+    /// way on, or on the way back.
+    pub fn least(&self, hump: &Hump, low_mm: f64, high_mm: f64, is_back: bool) -> Limits<f64> {
+        let (first, last) = hump.nodes;
+        let nodes = self.nodes.get(first..last).unwrap_or(&[]);
+        let (from, to) = if is_back {
+            let from = nodes.partition_point(|node| node.end_mm < low_mm);
+            (from, nodes.partition_point(|node| node.start_mm < high_mm))
+        } else {
+            let from = nodes.partition_point(|node| node.end_mm <= low_mm);
+            (from, nodes.partition_point(|node| node.start_mm <= high_mm))
+        };
+        let least = self.least_of(first + from, first + to);
+        // Beyond the hump's end, by rounding, those of all of it hold.
+        if least == NONE { self.least_of(first, last) } else { least }
+    }
+
+    /// The least limits of the nodes from `first` to before `last`.
+    fn least_of(&self, first: usize, last: usize) -> Limits<f64> {
+        let (mut least, mut place) = (NONE, last);
+        while place > first {
+            let Some(node) = self.nodes.get(place - 1) else { break };
+            let all = reach(place);
+            if place - first >= all {
+                least = least.least(&node.least);
+                place -= all;
+            } else {
+                least = least.least(&own(node, self.blocks));
+                place -= 1;
+            }
+        }
+        least
+    }
+}
