@@ -535,8 +535,11 @@ fn a_check_finds_whatever_the_streams_would_refuse() {
 fn a_supply_stays_where_it_failed() {
     let header = Machine::reference().header();
     let mut items = executable(SHORT).items;
-    let Item::Line { direction, .. } = &mut items[0] else { panic!("{:?}", items[0]) };
-    direction[0] = f64::INFINITY;
+    let first = items.iter_mut().find_map(|item| match item {
+        Item::Line { direction, .. } => Some(direction),
+        _ => None,
+    });
+    first.expect("a line")[0] = f64::INFINITY;
     let mut streams = Box::new(Streams::<f32, 3, 64, 64>::new());
     let (mut feeder, mut intake) = streams.split(header.rules, header.start);
     let mut supply = Supply::new(items.into_iter().map(Ok::<_, Infallible>), header.tick_s);
