@@ -9,7 +9,8 @@
 //! within one kilometre of the origin on each axis. What is beyond is refused, with the line of the block.
 //!
 //! - [`program`]: steps to stretches: where motion must stop;
-//! - `ceilings`: ceilings of moves and blends, what each joint allows;
+//! - `blending`: which joints are blended: stretches to blocks;
+//! - `ceilings`: the ceiling of a move or a blend, what a joint allows;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
 //! - `lookahead`: the kernel's look-ahead, with ramps that span blocks or per block;
@@ -20,6 +21,7 @@
 //! - [`error`]: what is refused, with file and line.
 
 pub mod blocks;
+mod blending;
 mod ceilings;
 mod density;
 pub mod error;

@@ -1,6 +1,6 @@
 //! Steps of a program to stretches: where the motion must stop.
 
-use super::ceilings::blocks;
+use super::blending::blocks;
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
@@ -8,7 +8,7 @@ use super::{Item, Mode, Plan};
 use crate::gcode::{Feed, PathMode, Program, StepKind};
 use crate::machine::Machine;
 use crate::toolpath::Element;
-use crate::toolpath::smooth::{Move, smooth};
+use crate::toolpath::smooth::Move;
 
 /// Plans a whole program for a machine.
 ///
@@ -95,7 +95,7 @@ fn path_move(line: u32, element: Element, feed: Feed, mode: PathMode, machine: &
 /// Appends the stretches of moves that follow each other, smoothed.
 fn append(run: &mut Vec<Move>, plan: &mut Plan, machine: &Machine, mode: Mode) -> Result<(), (u32, Problem)> {
     let mut open: Vec<StretchBlock> = Vec::new();
-    for block in blocks(&smooth(run, &machine.limits().in_any_direction()), machine)? {
+    for block in blocks(run, machine)? {
         open.push(block);
         // Also after the last.
         if block.joint_mm_s <= 0.0 {
