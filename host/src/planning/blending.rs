@@ -374,12 +374,13 @@ mod tests {
         let rest_mm = both[2].element.length_mm();
         assert!((rest_mm - 0.1).abs() < 1e-12, "{rest_mm}");
         // 2° and 150°: the first wants more than the whole line, the second a third of it.
+        // Lines of one feed would be merged.
         let (sine, cosine) = libm::sincos(2.0_f64.to_radians());
         let turn = libm::sincos(152.0_f64.to_radians());
         let corner = [10.0 + cosine, sine];
         let end = [corner[0] + 10.0 * turn.1, corner[1] + 10.0 * turn.0];
         let blocks = blocks_of(&path(&[[0.0, 0.0], [10.0, 0.0], corner, end], 0.2, |line| {
-            0.05 + 1e-3 * f64::from(line)
+            0.05 + 1e-9 * f64::from(line)
         }));
         assert_eq!(blocks.len(), 5, "{:?}", kinds(&blocks));
         let way_mm = |index: usize, whole_mm: f64| whole_mm - blocks[index].element.length_mm();
