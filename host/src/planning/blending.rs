@@ -261,10 +261,17 @@ impl<'a> Joints<'a> {
             let (first_mm, last_mm) = (way_mm(index.checked_sub(1)), way_mm(Some(index)));
             let is_whole = first_mm == 0.0 && last_mm == 0.0;
             let element = if is_whole { step.element } else { step.element.trimmed(first_mm, last_mm) };
-            blocks.push(StretchBlock { line: step.line, element, ceiling, joint_mm_s: 0.0 });
+            let block = |element, ceiling, tolerance_share| StretchBlock {
+                line: step.line,
+                element,
+                ceiling,
+                joint_mm_s: 0.0,
+                tolerance_share,
+            };
+            blocks.push(block(element, ceiling, self.run.tolerance_share(index)));
             if let Some(Crossing { blend: Some((blend, _, ceiling)), .. }) = crossings.get(index) {
-                let (element, ceiling) = (blend.element, *ceiling);
-                blocks.push(StretchBlock { line: step.line, element, ceiling, joint_mm_s: 0.0 });
+                let share = self.run.tolerance_share_of(index, blend);
+                blocks.push(block(blend.element, *ceiling, share));
             }
         }
         for index in 1..blocks.len() {

@@ -20,6 +20,9 @@ pub struct StretchBlock {
     pub ceiling: Ceiling<f64>,
     /// Greatest feed through the joint at its end \[mm/s\].
     pub joint_mm_s: f64,
+    /// Greatest distance from the programmed path and of it from the block, over its tolerance: a bound, 0 where the
+    /// path is exact.
+    pub tolerance_share: f64,
 }
 
 impl StretchBlock {
@@ -66,6 +69,12 @@ impl Stretch {
         let planned = lookahead(&plan_blocks, &ends_mm, 0.0, 0.0, mode, tick_s).map_err(at_line)?;
         let profile = FeedProfile::new(&planned);
         Ok(Self { start_mm, blocks, ends_mm, planned, profile })
+    }
+
+    /// Its blocks, as look-ahead sees them.
+    #[must_use]
+    pub fn for_lookahead(&self) -> Vec<Block<f64>> {
+        self.blocks.iter().map(StretchBlock::for_lookahead).collect()
     }
 
     /// Its length \[mm\].

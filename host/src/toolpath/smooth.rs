@@ -80,6 +80,20 @@ impl Run {
         self.moves.len().saturating_sub(1)
     }
 
+    /// How far a move is from those that it stands for, over its tolerance.
+    #[must_use]
+    pub fn tolerance_share(&self, index: usize) -> f64 {
+        share(self.distances_mm[index], self.moves[index].tolerance_mm)
+    }
+
+    /// The same of a blend of a joint: what its moves are off adds to what it is off these.
+    #[must_use]
+    pub fn tolerance_share_of(&self, joint: usize, blend: &Blend) -> f64 {
+        let tolerance_mm = self.moves[joint].tolerance_mm.min(self.moves[joint + 1].tolerance_mm);
+        let distance_mm = self.distances_mm[joint].max(self.distances_mm[joint + 1]);
+        share(blend.distance_mm + distance_mm, tolerance_mm)
+    }
+
     /// The blend of a joint with at most `room_mm` of either move; none where nothing steps.
     #[must_use]
     pub fn blend(&self, joint: usize, room_mm: f64, limits: &Limits<f64>) -> Option<Blend> {
@@ -110,6 +124,10 @@ impl Run {
         };
         left_mm(joint, before_mm).min(left_mm(joint + 1, after_mm))
     }
+}
+
+fn share(distance_mm: f64, tolerance_mm: f64) -> f64 {
+    if distance_mm > 0.0 { distance_mm / tolerance_mm } else { 0.0 }
 }
 
 /// The moves, with fewer in place of runs of short lines, and each one's distance from the moves it stands for.
