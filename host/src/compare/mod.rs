@@ -111,7 +111,7 @@ fn on(program: &Program, path: Path) -> Program {
     let mode = match path {
         Path::Written => return program,
         Path::Exact => PathMode::ExactPath,
-        Path::Blended(tolerance_mm) => PathMode::Blend { tolerance_mm: Some(tolerance_mm) },
+        Path::Blended(tolerance_mm) => PathMode::Blend { tolerance_mm: Some(tolerance_mm), merging_mm: None },
     };
     for step in &mut program.steps {
         match &mut step.kind {

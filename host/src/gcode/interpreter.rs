@@ -59,7 +59,6 @@ impl Interpreter {
         self.note_accessories(block)?;
         self.dwell(block)?;
         self.modal.set(block)?;
-        self.note_path_mode(block);
         block.refuse_unused(self.modal.motion.is_some_and(Motion::is_arc))?;
         self.motion(block)?;
         match block.m(MGroup::Stop).map(|code| code.tenths) {
@@ -117,12 +116,6 @@ impl Interpreter {
             self.notice(NoticeKind::Coolant);
         }
         Ok(())
-    }
-
-    fn note_path_mode(&mut self, block: &Block<'_>) {
-        if block.is_blend() && block.letter(b'Q').is_some() {
-            self.notice(NoticeKind::Simplification);
-        }
     }
 
     fn dwell(&mut self, block: &Block<'_>) -> Result<(), Located> {
@@ -291,16 +284,19 @@ mod tests {
 
     #[test]
     fn path_modes_reach_the_moves() {
-        let modes: Vec<_> = steps("G0 X1\nG64 P0.1 X2\nG64 X3\nG61 X4\nG20 G64 P1 X5")
+        let modes: Vec<_> = steps("G0 X1\nG64 P0.1 X2\nG64 Q.2 X3\nG61 X4\nG20 G64 P1 Q0 X5")
             .iter()
             .map(|kind| match kind {
                 StepKind::Line(line) => line.mode,
                 other => panic!("a line, not {other:?}"),
             })
             .collect();
-        let blend = |tolerance_mm| PathMode::Blend { tolerance_mm };
+        let blend = |tolerance_mm, merging_mm| PathMode::Blend { tolerance_mm, merging_mm };
         let exact = PathMode::ExactPath;
-        assert_eq!(modes, [exact, blend(Some(0.1)), blend(None), exact, blend(Some(25.4))]);
+        assert_eq!(
+            modes,
+            [exact, blend(Some(0.1), None), blend(None, Some(0.2)), exact, blend(Some(25.4), Some(0.0)),]
+        );
     }
 
     #[test]
@@ -340,7 +336,6 @@ mod tests {
                 (NoticeKind::Spindle, 1, 2),
                 (NoticeKind::Coolant, 2, 2),
                 (NoticeKind::ToolChange, 3, 1),
-                (NoticeKind::Simplification, 5, 1),
                 (NoticeKind::RadiusEnlarged, 7, 1),
             ]
         );

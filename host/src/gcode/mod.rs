@@ -37,7 +37,7 @@
 //! | G4 P | dwell \[s\] |
 //! | G17 G18 G19 | arc plane XY, ZX, YZ; clockwise is seen from the positive end of the third axis |
 //! | G20 G21, G90 G91, G90.1 G91.1 | inch or mm; absolute or incremental end points; the same for arc centres |
-//! | G61, G64 \[P\] \[Q\] | exact path; corners blended within P \[mm or inch\], without P within the machine's own tolerance; Q yields a notice |
+//! | G61, G64 \[P\] \[Q\] | exact path; corners blended within P \[mm or inch\], without P within the machine's own tolerance; short lines of one feed made longer lines and arcs within Q, which comes on top of P, without Q within a part of P |
 //! | G40 G49 G54 G94 | accepted: they ask for what is always so (no compensation, first work offset, feed per minute) |
 //! | M0 M1, M2 M30 | stop (M1 too: there is no optional-stop switch), end |
 //! | M3–M9, S | accepted with a notice: there is no spindle, tool changer or coolant |

@@ -123,7 +123,7 @@ impl Modal {
         Ok(())
     }
 
-    /// Q is a length too, if one nothing comes of.
+    /// Both P and Q are lengths.
     fn blend(&self, block: &Block<'_>) -> Result<PathMode, Located> {
         let mut lengths_mm = [None; 2];
         for (length_mm, letter) in lengths_mm.iter_mut().zip([b'P', b'Q']) {
@@ -132,7 +132,8 @@ impl Modal {
                 *length_mm = Some(self.units.length(word)?.to_mm());
             }
         }
-        Ok(PathMode::Blend { tolerance_mm: lengths_mm[0] })
+        let [tolerance_mm, merging_mm] = lengths_mm;
+        Ok(PathMode::Blend { tolerance_mm, merging_mm })
     }
 }
 

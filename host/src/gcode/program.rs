@@ -99,6 +99,9 @@ pub enum PathMode {
     Blend {
         /// Greatest distance from the programmed path \[mm\], 0 or more; the machine's choice if absent.
         tolerance_mm: Option<f64>,
+        /// How far short lines may be from what stands for them \[mm\], 0 or more, on top of the tolerance; if absent,
+        /// a part of the tolerance.
+        merging_mm: Option<f64>,
     },
 }
 
@@ -169,8 +172,6 @@ pub enum NoticeKind {
     ToolChange,
     /// M7, M8, M9.
     Coolant,
-    /// Q of G64.
-    Simplification,
     /// F in a line that switches the units: controllers differ in which unit they take it.
     FeedInNewUnits,
     /// R a rounding error smaller than half the chord.
@@ -188,9 +189,6 @@ impl fmt::Display for Notice {
             NoticeKind::SpindleSpeed => "S is not acted on: there is no spindle",
             NoticeKind::ToolChange => "M6 is not acted on: there is no tool changer",
             NoticeKind::Coolant => "M7, M8, M9 are not acted on: there is no coolant",
-            NoticeKind::Simplification => {
-                "Q of G64 is not acted on: P alone says how far the path may be left"
-            }
             NoticeKind::FeedInNewUnits => "F in a line that switches the units is taken in the new unit",
             NoticeKind::RadiusEnlarged => {
                 "R falls short of half the chord by a rounding error: half circle made"

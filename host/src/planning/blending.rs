@@ -345,7 +345,7 @@ mod tests {
             .zip(1..)
             .map(|(pair, line)| {
                 let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
-                Move { line, element, feed_mm_s: feed_mm_s(line), tolerance_mm }
+                Move { line, element, feed_mm_s: feed_mm_s(line), tolerance_mm, merging_mm: None }
             })
             .collect()
     }

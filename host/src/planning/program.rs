@@ -85,11 +85,13 @@ fn path_move(line: u32, element: Element, feed: Feed, mode: PathMode, machine: &
         Feed::Rapid => f64::INFINITY,
         Feed::MmPerMin(feed) => feed / 60.0,
     };
-    let tolerance_mm = match mode {
-        PathMode::ExactPath => 0.0,
-        PathMode::Blend { tolerance_mm } => tolerance_mm.unwrap_or(machine.path.blend_tolerance_mm),
+    let (tolerance_mm, merging_mm) = match mode {
+        PathMode::ExactPath => (0.0, None),
+        PathMode::Blend { tolerance_mm, merging_mm } => {
+            (tolerance_mm.unwrap_or(machine.path.blend_tolerance_mm), merging_mm)
+        }
     };
-    Move { line, element, feed_mm_s, tolerance_mm }
+    Move { line, element, feed_mm_s, tolerance_mm, merging_mm }
 }
 
 /// Appends the stretches of moves that follow each other, smoothed.

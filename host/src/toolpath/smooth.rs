@@ -6,7 +6,9 @@
 //!
 //! **Short lines.** Where lines are shorter than the blends at their ends would be, three fifths of the tolerance are spent
 //! on making fewer lines and arcs of them, the rest on blends between these. One that stays alone among longer
-//! ones is made part of the line before it, if that can be led past their corner.
+//! ones is made part of the line before it, if that can be led past their corner. Where the program gives merging a
+//! tolerance of its own (Q of G64), all lines of one feed are merged within it, and the whole tolerance of blends counts
+//! from what they became.
 //!
 //! **Who gets the room.** Blends take at most nine tenths of an element together, and where motion starts or ends half of
 //! that: what the one at its other end does not need is a blend's own, else both get half. A tenth stays, so that the rest
@@ -41,6 +43,16 @@ pub struct Move {
     /// Greatest distance that the path may be led past the move and its ends \[mm\]; 0 for exact path. At a joint the
     /// smaller one of both moves holds.
     pub tolerance_mm: f64,
+    /// How far a line may be from what stands for it and others \[mm\], on top of the tolerance; without it, a part of
+    /// the tolerance.
+    pub merging_mm: Option<f64>,
+}
+
+impl Move {
+    /// What merging takes of the tolerance where it leaves the path by `distance_mm`.
+    fn spent_mm(&self, distance_mm: f64) -> f64 {
+        if self.merging_mm.is_some() { 0.0 } else { distance_mm }
+    }
 }
 
 /// A run of moves, its short lines merged, ready to be blended joint by joint. Joint `i` is that between the moves
@@ -83,15 +95,17 @@ impl Run {
     /// How far a move is from those that it stands for, over its tolerance.
     #[must_use]
     pub fn tolerance_share(&self, index: usize) -> f64 {
-        share(self.distances_mm[index], self.moves[index].tolerance_mm)
+        let Move { tolerance_mm, merging_mm, .. } = self.moves[index];
+        share(self.distances_mm[index], merging_mm.unwrap_or(tolerance_mm))
     }
 
     /// The same of a blend of a joint: what its moves are off adds to what it is off these.
     #[must_use]
     pub fn tolerance_share_of(&self, joint: usize, blend: &Blend) -> f64 {
-        let tolerance_mm = self.moves[joint].tolerance_mm.min(self.moves[joint + 1].tolerance_mm);
+        let [before, after] = [joint, joint + 1].map(|index| self.moves[index]);
+        let merging_mm = before.merging_mm.unwrap_or(0.0).max(after.merging_mm.unwrap_or(0.0));
         let distance_mm = self.distances_mm[joint].max(self.distances_mm[joint + 1]);
-        share(blend.distance_mm + distance_mm, tolerance_mm)
+        share(blend.distance_mm + distance_mm, before.tolerance_mm.min(after.tolerance_mm) + merging_mm)
     }
 
     /// The blend of a joint with at most `room_mm` of either move; none where nothing steps.
@@ -103,7 +117,9 @@ impl Run {
         }
         // A move of exact path is cut at neither end.
         let tolerance_mm = before.tolerance_mm.min(after.tolerance_mm);
-        let tolerance_mm = tolerance_mm - self.distances_mm[joint].max(self.distances_mm[joint + 1]);
+        let spent_mm =
+            before.spent_mm(self.distances_mm[joint]).max(after.spent_mm(self.distances_mm[joint + 1]));
+        let tolerance_mm = tolerance_mm - spent_mm;
         Blend::new(&before.element, &after.element, tolerance_mm, room_mm, limits)
     }
 
@@ -138,8 +154,11 @@ fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
         let count = rest.windows(2).take_while(|pair| is_same_run(&pair[0], &pair[1])).count() + 1;
         let (run, after) = rest.split_at(count);
         rest = after;
-        let tolerance_mm = MERGED_SHARE * first.tolerance_mm;
-        let rooms: Vec<Room> = (0..count).map(|index| Room::of(run, index)).collect();
+        let tolerance_mm = first.merging_mm.unwrap_or(MERGED_SHARE * first.tolerance_mm);
+        let rooms: Vec<Room> = match first.merging_mm {
+            None => (0..count).map(|index| Room::of(run, index)).collect(),
+            Some(_) => vec![Room::TooLittle; count],
+        };
         let mut done = 0;
         for same in rooms.chunk_by(|a, b| (*a == Room::Enough) == (*b == Room::Enough)) {
             let steps = &run[done..done + same.len()];
@@ -187,7 +206,8 @@ fn is_same_run(before: &Move, after: &Move) -> bool {
         && is_line(after)
         && before.feed_mm_s == after.feed_mm_s
         && before.tolerance_mm == after.tolerance_mm
-        && before.tolerance_mm > 0.0
+        && before.merging_mm == after.merging_mm
+        && before.merging_mm.unwrap_or(before.tolerance_mm) > 0.0
 }
 
 /// What a line has for blends at its ends.
@@ -240,7 +260,7 @@ mod tests {
             .zip(1..)
             .map(|(pair, line)| {
                 let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
-                Move { line, element, feed_mm_s: 10.0 * f64::from(line), tolerance_mm }
+                Move { line, element, feed_mm_s: 10.0 * f64::from(line), tolerance_mm, merging_mm: None }
             })
             .collect()
     }

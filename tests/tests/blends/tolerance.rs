@@ -126,3 +126,46 @@ fn merged_chords_keep_the_tolerance() {
         assert!(2 * merged < all && worst > 0.9, "{merged} of {all}, worst {worst}");
     }
 }
+
+/// With Q, lines of one feed are merged within it, and blends are within P of what they become. Q0 merges nothing.
+#[test]
+fn merging_has_a_tolerance_of_its_own() {
+    let machine = unhurried();
+    let mut failures = Vec::new();
+    let (mut worst, mut beyond, mut counts) = (0.0_f64, 0, [0; 3]);
+    for seed in seeds(CHAINS / 5) {
+        let mut random = Random::new(seed);
+        let tolerance = rounded(random.log_between(3e-3, 0.1));
+        let asked = chords(&mut random, tolerance);
+        let text = program(&asked, tolerance, FEED_MM_MIN);
+        let done = || -> Result<(), String> {
+            for (count, part) in counts.iter_mut().zip([0.0, 1.0, 3.0]) {
+                let merging = rounded(part * tolerance);
+                let mode = format!("G64 P{tolerance:.10}");
+                let plan = planned(&text.replace(&mode, &format!("{mode} Q{merging:.10}")), &machine)?;
+                let moves = plan.blocks.iter().filter(|block| block.kind != "blend").count();
+                *count += moves;
+                if part == 0.0 && moves != asked.len() {
+                    return Err(format!("{moves} moves of {}", asked.len()));
+                }
+                let stretches = compiled(&plan);
+                continuous(&stretches)?;
+                let distance = tolerance * distance(&asked, &stretches, tolerance, 24);
+                worst = worst.max(distance / (tolerance + merging));
+                beyond += u32::from(distance > 1.01 * tolerance);
+                if distance > (tolerance + merging) * (1.0 + 1e-6) {
+                    return Err(format!("{distance} mm, Q{merging}"));
+                }
+            }
+            Ok(())
+        }();
+        if let Err(error) = done {
+            failures.push(format!("MOTION_TEST_SEED={seed}: {error}\n{text}"));
+        }
+    }
+    println!("{counts:?} moves, worst {worst} of both tolerances, {beyond} times beyond P alone");
+    assert_none(&failures);
+    if check::from_env("MOTION_TEST_PROGRAMS").is_none() {
+        assert!(counts[0] > 3 * counts[1] && counts[1] > counts[2] && beyond > 5, "{counts:?}, {beyond}");
+    }
+}
