@@ -76,6 +76,8 @@ pub fn is_blended(program: &Program) -> bool {
     program.steps.iter().any(|step| match &step.kind {
         StepKind::Line(line) => line.mode != PathMode::ExactPath,
         StepKind::Arc(arc) => arc.mode != PathMode::ExactPath,
+        StepKind::Cubic(curve) => curve.mode != PathMode::ExactPath,
+        StepKind::Through(point) => point.mode != PathMode::ExactPath,
         StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => false,
     })
 }
@@ -117,6 +119,8 @@ fn on(program: &Program, path: Path) -> Program {
         match &mut step.kind {
             StepKind::Line(line) => line.mode = mode,
             StepKind::Arc(arc) => arc.mode = mode,
+            StepKind::Cubic(curve) => curve.mode = mode,
+            StepKind::Through(point) => point.mode = mode,
             StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => {}
         }
     }

@@ -28,6 +28,10 @@ pub enum StepKind {
     Line(LineMove),
     /// G2 or G3.
     Arc(ArcMove),
+    /// G5.
+    Cubic(CubicMove),
+    /// A point of G5.5.
+    Through(ThroughMove),
     /// G4: stand still.
     Dwell {
         /// How long \[s\], 0 or more.
@@ -77,6 +81,36 @@ pub struct ArcMove {
     /// Feed along the path, the height of a helix included.
     pub feed: Feed,
     /// How its ends are passed.
+    pub mode: PathMode,
+}
+
+/// A cubic Bézier curve in the XY plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CubicMove {
+    /// Start, X Y Z.
+    pub from: [Length; 3],
+    /// End, X Y Z; Z is that of the start.
+    pub to: [Length; 3],
+    /// X and Y of the first control point from the start, and of the second from the end \[mm\].
+    pub controls_mm: [[f64; 2]; 2],
+    /// Feed along the curve.
+    pub feed: Feed,
+    /// How its ends are passed.
+    pub mode: PathMode,
+}
+
+/// The way to the next point of a quintic spline, which goes through all points of moves that follow each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThroughMove {
+    /// The point before, X Y Z.
+    pub from: [Length; 3],
+    /// The point, X Y Z; differs from the one before.
+    pub to: [Length; 3],
+    /// Whether the spline begins with it, whatever was before.
+    pub begins: bool,
+    /// Feed along the spline up to the point.
+    pub feed: Feed,
+    /// How the spline's ends are passed.
     pub mode: PathMode,
 }
 

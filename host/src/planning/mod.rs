@@ -11,6 +11,7 @@
 //! - [`program`]: steps to stretches: where motion must stop;
 //! - `blending`: which joints are blended: stretches to blocks;
 //! - `ceilings`: the ceiling of a move or a blend, what a joint allows;
+//! - `curves`: programmed curves to moves;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
 //! - `lookahead`: the kernel's look-ahead, with ramps that span blocks or per block;
@@ -23,6 +24,7 @@
 pub mod blocks;
 mod blending;
 mod ceilings;
+mod curves;
 mod density;
 pub mod error;
 pub mod executable;
