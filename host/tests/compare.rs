@@ -94,13 +94,22 @@ fn the_times_of_the_samples_are_in_order() {
 /// In closed form and by ten thousand steps a block; dwells are part of both.
 #[test]
 fn the_least_time_is_that_of_small_steps() {
+    // Setting out and stopping over many lines, at feeds of their own.
+    let lines: Vec<String> = (0..60)
+        .map(|line| format!("F{} G1 X{}\n", 3000 + 700 * (line % 5), 0.5 * f64::from(line + 1)))
+        .collect();
+    let lines = format!("{}M2\n", lines.concat());
     for (name, mode) in [
         ("pockets.ngc", "G61"),
         ("pockets.ngc", "G64 P0.2"),
         ("thread_mill_helix.ngc", "G61"),
         ("stairs_incremental.ngc", "G64 P0.05"),
+        ("lines", "G61"),
     ] {
-        let text = std::fs::read_to_string(samples().join(name)).expect("a sample");
+        let text = match name {
+            "lines" => lines.clone(),
+            _ => std::fs::read_to_string(samples().join(name)).expect("a sample"),
+        };
         let text = text.replace("G61", mode).replace('%', "");
         let plan = plan(&format!("{mode}\n{text}"), Mode::Spanning);
         let stepped: f64 = plan
