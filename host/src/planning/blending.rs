@@ -10,8 +10,8 @@
 //! They are compared by the time that look-ahead takes over both moves and one more on either side, with what has
 //! been chosen for the joints beside. What is shortest is taken, but a joint without a blend has to gain
 //! a five-hundredth of it: G64 asks for smooth motion. Looking at one joint after the other does not find the best of
-//! all; in the end the run is planned with every blend at its longest and without any, too, and the best of these is taken.
-//! So blends cost at most that part of the time that the exact path takes.
+//! all; in the end the run is planned with every blend at its longest and as it was programmed, too, and the best of these is
+//! taken. So blends and merged lines cost at most that part of the time that the exact path takes.
 //!
 //! **Tangent joints** whose curvature jumps are treated alike: passed without a blend they fall under the
 //! acceleration-step limit as under G61, because a path of bounded jerk through them can take longer (on the arcs of a
@@ -89,18 +89,28 @@ impl Variants {
 /// program line.
 pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlock>> {
     let joints = Joints::new(Run::new(moves), machine)?;
-    let exact: Vec<Crossing> = (0..joints.run.joints()).map(|joint| joints.exact(joint)).collect();
-    let Some([longest, chosen]) = joints.choose(&exact)? else {
-        return Ok(joints.blocks(&exact));
+    let is_merged = joints.run.moves().len() < moves.len();
+    let merged = joints.exact();
+    let candidates = match joints.choose(&merged)? {
+        Some([longest, chosen]) => vec![joints.blocks(&chosen), joints.blocks(&longest)],
+        None if is_merged => vec![joints.blocks(&merged)],
+        None => return Ok(joints.blocks(&merged)),
     };
-    let candidates = [chosen, longest, exact].map(|crossings| joints.blocks(&crossings));
-    let times_s = candidates.each_ref().map(|blocks| run_time_s(blocks, machine.tick_s));
-    let [mut best, longest, exact] = candidates;
-    let mut best_s = times_s[0];
-    if times_s[1] < best_s {
-        (best, best_s) = (longest, times_s[1]);
+    let exact = if is_merged {
+        let joints = Joints::new(Run::exact(moves), machine)?;
+        joints.blocks(&joints.exact())
+    } else {
+        joints.blocks(&merged)
+    };
+    let mut best = exact;
+    let mut most_s = run_time_s(&best, machine.tick_s) / (1.0 - EXACT_GAIN_MIN);
+    for blocks in candidates {
+        let time_s = run_time_s(&blocks, machine.tick_s);
+        if time_s < most_s {
+            (best, most_s) = (blocks, time_s);
+        }
     }
-    Ok(if times_s[2] < (1.0 - EXACT_GAIN_MIN) * best_s { exact } else { best })
+    Ok(best)
 }
 
 /// The joints of a run.
@@ -176,8 +186,12 @@ impl<'a> Joints<'a> {
         self.run.room_mm(joint, [joint.checked_sub(1).map_or(0.0, way_mm), after_mm])
     }
 
-    /// As it is.
-    fn exact(&self, joint: usize) -> Crossing {
+    /// All as they are.
+    fn exact(&self) -> Vec<Crossing> {
+        (0..self.run.joints()).map(|joint| self.exact_at(joint)).collect()
+    }
+
+    fn exact_at(&self, joint: usize) -> Crossing {
         let [before, after] =
             [joint, joint + 1].map(|index| (&self.run.moves()[index], &self.ceilings[index]));
         let feed_mm_s = joint_feed(&before.0.element, &after.0.element, self.machine);

@@ -70,6 +70,16 @@ impl Run {
     #[must_use]
     pub fn new(moves: &[Move]) -> Self {
         let (moves, distances_mm) = merged(moves);
+        Self::of(moves, distances_mm)
+    }
+
+    /// The run of `moves` as they are, nothing merged.
+    #[must_use]
+    pub fn exact(moves: &[Move]) -> Self {
+        Self::of(moves.to_vec(), vec![0.0; moves.len()])
+    }
+
+    fn of(moves: Vec<Move>, distances_mm: Vec<f64>) -> Self {
         let lengths_mm = moves.iter().map(|step| step.element.length_mm()).collect();
         Self { moves, lengths_mm, distances_mm }
     }
