@@ -167,7 +167,8 @@ fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
         let tolerance_mm = first.merging_mm.unwrap_or(MERGED_SHARE * first.tolerance_mm);
         let rooms: Vec<Room> = match first.merging_mm {
             None => (0..count).map(|index| Room::of(run, index)).collect(),
-            Some(_) => vec![Room::TooLittle; count],
+            // A move by itself, which may be an arc, stays.
+            Some(_) => vec![if count > 1 { Room::TooLittle } else { Room::Unneeded }; count],
         };
         let mut done = 0;
         for same in rooms.chunk_by(|a, b| (*a == Room::Enough) == (*b == Room::Enough)) {

@@ -163,6 +163,18 @@ fn merging_has_a_tolerance_of_its_own() {
             failures.push(format!("MOTION_TEST_SEED={seed}: {error}\n{text}"));
         }
     }
+    // What is no line stays what it is, between lines that are merged.
+    for seed in seeds(CHAINS) {
+        let mut random = Random::new(seed);
+        let asked = corners(&mut random, 12, (0.1, 20.0), (1e-3, 2.8));
+        let (tolerance, merging) = (0.01, 0.03);
+        let text = program(&asked, tolerance, FEED_MM_MIN).replace(" F6", " Q0.03 F6");
+        let plan = planned(&text, &machine).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        let distance = tolerance * distance(&asked, &compiled(&plan), tolerance, 24);
+        if distance > (tolerance + merging) * (1.0 + 1e-6) {
+            failures.push(format!("MOTION_TEST_SEED={seed}: {distance} mm\n{text}"));
+        }
+    }
     println!("{counts:?} moves, worst {worst} of both tolerances, {beyond} times beyond P alone");
     assert_none(&failures);
     if check::from_env("MOTION_TEST_PROGRAMS").is_none() {
