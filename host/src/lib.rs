@@ -9,6 +9,7 @@
 //!   toolpath   moves ─► Element ─► Piece          arc length, septic polynomials
 //!   smoothness points, arcs ─► axis jerk          what the degree of a path does to the axes
 //!   planning   Program ─► Plan                    ceilings with reasons, feed over path
+//!   compare    Program ─► figures                times of its paths, beside the least there is
 //!   simulate   Plan ─► ticks                      the kernel against hal-sim
 //!   record     TickRecord, RunRecord              what a run leaves behind
 //!   drive      Machine ─► figures of its axes     step, harmonics, circles
@@ -25,6 +26,7 @@ pub mod points;
 pub mod toolpath;
 pub mod smoothness;
 pub mod planning;
+pub mod compare;
 pub mod simulate;
 pub mod record;
 pub mod drive;

@@ -52,6 +52,8 @@ fn read(name: &str, text: &str) -> Program {
 enum Expected {
     Line { to: [i128; 3], feed_mm_min: Option<f64> },
     Arc { to: [i128; 3], feed_mm_min: f64, clockwise: bool, axes: [usize; 2], shape: Shape },
+    Cubic { to: [i128; 3], feed_mm_min: f64, controls: [[i128; 2]; 2] },
+    Through { to: [i128; 3], feed_mm_min: f64, begins: bool },
     Dwell(f64),
     Stop,
     End,
@@ -102,6 +104,8 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
     let (mut position, mut feed_mm_min, mut inch) = ([0_i128; 3], f64::NAN, false);
     let (mut incremental, mut centre_absolute) = (false, false);
     let (mut motion, mut axes, mut begun) = (None, [0, 1], false);
+    // P and Q of the curve before, if that was the last thing done.
+    let mut before: Option<[i128; 2]> = None;
     for (line, number) in text.split(|&byte| byte == b'\n').zip(1_u32..) {
         if line.trim_ascii() == b"%" {
             if begun {
@@ -121,7 +125,7 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
         let (mut dwell, mut stop) = (false, None);
         for code in codes('G') {
             match code {
-                0 | 10 | 20 | 30 => motion = Some(code / 10),
+                0 | 10 | 20 | 30 | 50 | 55 => motion = Some(code),
                 40 => dwell = true,
                 170 => axes = [0, 1],
                 180 => axes = [2, 0],
@@ -153,6 +157,9 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
         if let Some(feed) = value('F') {
             feed_mm_min = feed as f64 / 1e10 * if inch { 25.4 } else { 1.0 };
         }
+        if dwell || motion != Some(50) {
+            before = None;
+        }
         if dwell {
             expected.push((number, Expected::Dwell(value('P').expect("a time") as f64 / 1e10)));
         }
@@ -167,14 +174,35 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
         let offsets = axes.map(|axis| length(['I', 'J', 'K'][axis]));
         let radius = length('R');
         let to = position;
-        if moves || offsets != [None, None] || radius.is_some() {
-            let clockwise = motion == Some(2);
+        // Of a curve, where they are not those of G64 or G4.
+        let ends = ['P', 'Q'].map(length);
+        let is_curve = motion == Some(50) && ends != [None, None] && !dwell && !codes('G').contains(&640);
+        if is_curve {
+            assert_eq!((axes, value('Z')), ([0, 1], None), "line {number}");
+            let end = ends.map(|offset| offset.expect("both"));
+            let start = match ['I', 'J'].map(length) {
+                [Some(i), Some(j)] => [i, j],
+                [None, None] => before.expect("a curve to continue").map(|offset| -offset),
+                _ => panic!("line {number}: I or J alone"),
+            };
+            let controls = [start, end];
+            if from != to || controls != [[0; 2]; 2] {
+                expected.push((number, Expected::Cubic { to, feed_mm_min, controls }));
+                before = Some(end);
+            }
+        } else if moves || offsets != [None, None] || radius.is_some() {
+            let clockwise = motion == Some(20);
             match motion.expect("a motion mode") {
                 0 if from != to => expected.push((number, Expected::Line { to, feed_mm_min: None })),
-                1 if from != to => {
+                10 if from != to => {
                     expected.push((number, Expected::Line { to, feed_mm_min: Some(feed_mm_min) }));
                 }
-                0 | 1 => {}
+                55 if from != to => {
+                    let begins = codes('G').contains(&55);
+                    expected.push((number, Expected::Through { to, feed_mm_min, begins }));
+                }
+                0 | 10 | 55 => {}
+                50 => panic!("line {number}: a curve without its end"),
                 _ => {
                     let shape = match radius {
                         Some(radius) => Shape::Radius(radius),
@@ -184,6 +212,9 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
                     expected.push((number, Expected::Arc { to, feed_mm_min, clockwise, axes, shape }));
                 }
             }
+        }
+        if stop.is_some() {
+            before = None;
         }
         let ends = matches!(stop, Some(Expected::End));
         expected.extend(stop.map(|stop| (number, stop)));
@@ -262,6 +293,20 @@ fn assert_same_step(step: &Step, expected: &Expected, position: &mut [i128; 3]) 
                     assert!(shorter == (radius_mm > 0.0) || (arc.sweep_rad.abs() - PI).abs() < 1e-12);
                 }
             }
+            *position = *to;
+        }
+        (StepKind::Cubic(curve), Expected::Cubic { to, feed_mm_min, controls }) => {
+            assert_eq!((units(curve.from), units(curve.to)), (*position, *to));
+            same_feed(curve.feed, Some(*feed_mm_min));
+            for (found, expected) in curve.controls_mm.iter().flatten().zip(controls.iter().flatten()) {
+                assert_near(*found, *expected as f64 / 1e10, 0.0, "control point");
+            }
+            *position = *to;
+        }
+        (StepKind::Through(point), Expected::Through { to, feed_mm_min, begins }) => {
+            assert_eq!((units(point.from), units(point.to)), (*position, *to));
+            same_feed(point.feed, Some(*feed_mm_min));
+            assert_eq!(point.begins, *begins);
             *position = *to;
         }
         (StepKind::Dwell { seconds }, Expected::Dwell(expected)) => {
@@ -380,7 +425,27 @@ fn random_line(random: &mut Random) -> String {
         [("G17", ['X', 'Y'], ['I', 'J']), ("G18", ['Z', 'X'], ['K', 'I']), ("G19", ['Y', 'Z'], ['J', 'K'])];
     let (plane, axes, offsets) = *random.pick(&planes);
     let direction = *random.pick(&["G2", "G3"]);
-    match random.below(9) {
+    match random.below(11) {
+        9 => {
+            let mut line = "G17 G5 ".to_owned();
+            for letter in ['X', 'I', 'Q', 'Y', 'J', 'P'] {
+                let text = number(random, 20, 6).1;
+                line += &written(random, letter, &text);
+            }
+            // Another one that continues it.
+            let words = ['P', 'X', 'Q'].map(|letter| {
+                let text = number(random, 9, 3).1;
+                written(random, letter, &text)
+            });
+            format!("{line}\n{}", words.concat())
+        }
+        10 => {
+            let [x, z] = ['X', 'Z'].map(|letter| {
+                let text = number(random, 20, 4).1;
+                written(random, letter, &text)
+            });
+            format!("G5.5 {x}\n{z}")
+        }
         0 => (*random.pick(&["G21", "G20", "G91.1", "G61", "G64 P0.1", "M3 S100", "", "(G5)", "; G5"]))
             .to_owned(),
         1 => format!("F{}", 1 + random.below(10_000)),

@@ -98,6 +98,12 @@ pub enum CliError {
     /// There is nothing to tune an axis by.
     #[error(transparent)]
     Tuning(#[from] TuningError),
+    /// Programs among several are refused.
+    #[error("{}", programs.join("\nmotion: "))]
+    Refused {
+        /// Why, one by one.
+        programs: Vec<String>,
+    },
     /// Arguments that are right one by one and don't fit together.
     #[error("found {found}, expected {expected}")]
     Arguments {

@@ -6,6 +6,7 @@
 //!
 //! - [`profile`]: one ramp of the feed law, in figures;
 //! - [`plan`]: the feed plan of a program or a block list;
+//! - [`compare`]: the times of programs, exact and blended, beside the least there is;
 //! - [`run`]: a program through plan, kernel and simulated machine;
 //! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
@@ -15,6 +16,7 @@
 //! - [`error`]: errors and exit statuses;
 //! - `input`, `table`, `trace`, `progress`: what the commands share.
 
+pub mod compare;
 pub mod compile;
 pub mod demo;
 pub mod drive;
@@ -42,6 +44,7 @@ Examples:
   motion                                         the built-in demonstration; writes stringer.html
   motion run part.ngc --report part.html         run a program, look at what the axes did
   motion plan part.ngc                           what limits the feed, block by block
+  motion compare parts/                          how long programs take, exact and blended
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
   motion spline points.csv --tolerance 0.01      a quintic spline close to points, and its run
   motion drive circle --report circle.html       the axes' circle test, with its pictures
@@ -65,6 +68,7 @@ pub struct Cli {
 enum Command {
     Run(run::RunArguments),
     Plan(plan::PlanArguments),
+    Compare(compare::CompareArguments),
     Profile(profile::ProfileArguments),
     Spline(spline::SplineArguments),
     Drive(drive::DriveArguments),
@@ -96,6 +100,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         None => demo::demonstrate(out),
         Some(Command::Run(arguments)) => run::run(arguments, out),
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
+        Some(Command::Compare(arguments)) => compare::compare(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),
         Some(Command::Spline(arguments)) => spline::run(arguments, out),
         Some(Command::Drive(arguments)) => drive::drive(arguments, out),

@@ -5,6 +5,7 @@
 
 use super::error::{Located, Problem};
 use super::lexer::{Word, Words};
+use super::modal::Motion;
 
 /// Letters that take a number of their own.
 const LETTERS: &[u8; 12] = b"FIJKNPQRSXYZ";
@@ -12,7 +13,7 @@ const LETTERS: &[u8; 12] = b"FIJKNPQRSXYZ";
 /// Modal groups of G words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GGroup {
-    /// G0 G1 G2 G3 G80.
+    /// G0 G1 G2 G3 G5 G5.5 G80.
     Motion,
     /// G17 G18 G19.
     Plane,
@@ -59,7 +60,7 @@ const M_GROUPS: usize = MGroup::CoolantOff as usize + 1;
 /// The group of a G word, by its number in tenths.
 fn g_group(tenths: i64) -> Option<GGroup> {
     Some(match tenths {
-        0 | 10 | 20 | 30 | 800 => GGroup::Motion,
+        0 | 10 | 20 | 30 | 50 | 55 | 800 => GGroup::Motion,
         170 | 180 | 190 => GGroup::Plane,
         200 | 210 => GGroup::Units,
         900 | 910 => GGroup::Distance,
@@ -166,15 +167,16 @@ impl<'a> Block<'a> {
         self.g(GGroup::PathMode).is_some_and(|code| code.tenths == 640)
     }
 
-    /// A word nothing in the line takes would be silently dropped. `takes_arc`: the motion mode in force is G2 or G3.
-    pub(super) fn refuse_unused(&self, takes_arc: bool) -> Result<(), Located> {
-        let blend = self.is_blend();
-        let takes_p = blend || self.g(GGroup::Dwell).is_some();
+    /// A word nothing in the line takes would be silently dropped. `motion` is the mode in force.
+    pub(super) fn refuse_unused(&self, motion: Option<Motion>) -> Result<(), Located> {
+        let takes_arc = motion.is_some_and(Motion::is_arc);
+        let takes_cubic = motion == Some(Motion::Cubic);
+        let takes_q = self.is_blend() || takes_cubic;
         let rules = [
-            (b'P', takes_p, "G4 or G64"),
-            (b'Q', blend, "G64"),
-            (b'I', takes_arc, "G2 or G3"),
-            (b'J', takes_arc, "G2 or G3"),
+            (b'P', takes_q || self.g(GGroup::Dwell).is_some(), "G4, G5 or G64"),
+            (b'Q', takes_q, "G5 or G64"),
+            (b'I', takes_arc || takes_cubic, "G2, G3 or G5"),
+            (b'J', takes_arc || takes_cubic, "G2, G3 or G5"),
             (b'K', takes_arc, "G2 or G3"),
             (b'R', takes_arc, "G2 or G3"),
         ];

@@ -77,7 +77,7 @@ pub enum Problem {
     #[error("found {word}, expected one of the words F G I J K M N P Q R S X Y Z")]
     UnsupportedLetter { word: String },
     #[error(
-        "found {word}, expected one of G0 G1 G2 G3 G4 G17 G18 G19 G20 G21 G40 G49 G54 G61 G64 G80 G90 G90.1 \
+        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.5 G17 G18 G19 G20 G21 G40 G49 G54 G61 G64 G80 G90 G90.1 \
          G91 G91.1 G94"
     )]
     UnsupportedG { word: String },
@@ -95,14 +95,16 @@ pub enum Problem {
     FeedMissing { motion: &'static str },
     #[error("found {word}, expected a number that is not negative")]
     Negative { word: String },
-    #[error("found {word} without a motion mode, expected G0, G1, G2 or G3 in this line or before it")]
+    #[error(
+        "found {word} without a motion mode, expected G0, G1, G2, G3, G5 or G5.5 in this line or before it"
+    )]
     AxisWithoutMotion { word: String },
     #[error("found {word} in a line without {needs}, expected no such word")]
     WordUnused { word: String, needs: &'static str },
     #[error("found G4 without a time, expected a P word in seconds")]
     DwellWithoutTime,
-    #[error("found {word} in a line with G4 and G64, expected them in two lines: both would take the P")]
-    WordShared { word: String },
+    #[error("found {word} in a line with {takers}, expected two lines: both would take it")]
+    WordShared { word: String, takers: &'static str },
     #[error("found {motion} without a centre or radius, expected {} or R", .plane.offset_letters())]
     ArcWithoutCentre { motion: &'static str, plane: Plane },
     #[error("found {word} in an arc of the {plane} plane, expected {} or R", .plane.offset_letters())]
@@ -127,6 +129,16 @@ pub enum Problem {
     #[error("found {word} for an arc that ends where it starts, expected {}: the radius leaves the centre open",
         .plane.offset_letters())]
     ArcWithoutChord { word: String, plane: Plane },
+    #[error("found G5 in the {plane} plane, expected it in the XY plane (G17)")]
+    SplinePlane { plane: Plane },
+    #[error("found {word} in a line of G5, expected X and Y only")]
+    SplineOutsidePlane { word: String },
+    #[error("found {word} alone in a line of G5, expected {first} and {second}")]
+    SplineControlIncomplete { word: String, first: char, second: char },
+    #[error("found a first G5 without I and J, expected the way from its start to its first control point")]
+    SplineWithoutStart,
+    #[error("found G5 without P and Q, expected the way from its end to its second control point")]
+    SplineWithoutEnd,
 }
 
 /// A byte as an error message shows it.

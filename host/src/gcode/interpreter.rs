@@ -6,7 +6,10 @@ use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::lexer::{Word, is_blank_line, is_percent_line};
 use super::modal::{Distance, Modal, Motion, Units};
-use super::program::{ArcMove, Feed, LineMove, Notice, NoticeKind, Program, Step, StepKind};
+use super::program::{
+    ArcMove, CubicMove, Feed, LineMove, Notice, NoticeKind, Program, Step, StepKind, ThroughMove,
+};
+use super::spline;
 
 /// State of a program being read: what it has asked for so far, and what is in force.
 #[derive(Debug, Default)]
@@ -14,6 +17,8 @@ pub(super) struct Interpreter {
     program: Program,
     modal: Modal,
     position: [Length; 3],
+    /// P and Q of the G5 that was the move before \[mm\].
+    cubic_before_mm: Option<[f64; 2]>,
     /// Line being read, from 1; the last with any text.
     line: u32,
     /// A word or a tape mark was read.
@@ -59,8 +64,10 @@ impl Interpreter {
         self.note_accessories(block)?;
         self.dwell(block)?;
         self.modal.set(block)?;
-        self.note_path_mode(block);
-        block.refuse_unused(self.modal.motion.is_some_and(Motion::is_arc))?;
+        block.refuse_unused(self.modal.motion)?;
+        if self.modal.motion != Some(Motion::Cubic) {
+            self.cubic_before_mm = None;
+        }
         self.motion(block)?;
         match block.m(MGroup::Stop).map(|code| code.tenths) {
             Some(0 | 10) => self.step(StepKind::Stop),
@@ -71,6 +78,10 @@ impl Interpreter {
     }
 
     fn step(&mut self, kind: StepKind) {
+        self.cubic_before_mm = match &kind {
+            StepKind::Cubic(cubic) => Some(cubic.controls_mm[1]),
+            _ => None,
+        };
         self.program.steps.push(Step { line: self.line, kind });
     }
 
@@ -119,19 +130,13 @@ impl Interpreter {
         Ok(())
     }
 
-    fn note_path_mode(&mut self, block: &Block<'_>) {
-        if block.is_blend() && block.letter(b'Q').is_some() {
-            self.notice(NoticeKind::Simplification);
-        }
-    }
-
     fn dwell(&mut self, block: &Block<'_>) -> Result<(), Located> {
         let Some(code) = block.g(GGroup::Dwell) else { return Ok(()) };
         let Some(time) = block.letter(b'P') else {
             return Err(Located::new(code.word.offset, Problem::DwellWithoutTime));
         };
         if block.is_blend() {
-            return Err(time.problem(|word| Problem::WordShared { word }));
+            return Err(time.problem(|word| Problem::WordShared { word, takers: "G4 and G64" }));
         }
         time.refuse_negative()?;
         self.step(StepKind::Dwell { seconds: time.number.to_f64() });
@@ -140,7 +145,11 @@ impl Interpreter {
 
     /// The move a line asks for by an axis word or, in the arc modes, an offset or radius.
     fn motion(&mut self, block: &Block<'_>) -> Result<(), Located> {
-        let words = block.axes().into_iter().chain(block.offsets()).chain([block.letter(b'R')]);
+        // P and Q alone belong to a G4 or G64 in the line.
+        let is_cubic = self.modal.motion == Some(Motion::Cubic);
+        let is_taken = block.is_blend() || block.g(GGroup::Dwell).is_some();
+        let ends = [b'P', b'Q'].map(|letter| block.letter(letter).filter(|_| is_cubic && !is_taken));
+        let words = block.axes().into_iter().chain(block.offsets()).chain([block.letter(b'R')]).chain(ends);
         let Some(first) = words.flatten().min_by_key(|word| word.offset) else { return Ok(()) };
         let Some(motion) = self.modal.motion else {
             return Err(first.problem(|word| Problem::AxisWithoutMotion { word }));
@@ -152,10 +161,25 @@ impl Interpreter {
             None => return Err(Located::new(offset, Problem::FeedMissing { motion: motion.word() })),
         };
         let (from, to, mode) = (self.position, self.end_point(block)?, self.modal.path);
+        if is_cubic && is_taken {
+            let word = block.letter(b'P').or(block.letter(b'Q')).unwrap_or(first);
+            return Err(word.problem(|word| Problem::WordShared { word, takers: "G5 and G4 or G64" }));
+        }
+        if is_cubic {
+            let controls_mm = spline::controls_mm(block, &self.modal, self.cubic_before_mm, offset)?;
+            self.position = to;
+            if from != to || controls_mm != [[0.0; 2]; 2] {
+                self.step(StepKind::Cubic(CubicMove { from, to, controls_mm, feed, mode }));
+            }
+            return Ok(());
+        }
         self.position = to;
         if motion.is_arc() {
             let arc = self.arc(block, motion, from, to, feed, offset)?;
             self.step(StepKind::Arc(arc));
+        } else if from != to && motion == Motion::Through {
+            let begins = block.g(GGroup::Motion).is_some();
+            self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }));
         } else if from != to {
             self.step(StepKind::Line(LineMove { from, to, feed, mode }));
         }
@@ -291,16 +315,19 @@ mod tests {
 
     #[test]
     fn path_modes_reach_the_moves() {
-        let modes: Vec<_> = steps("G0 X1\nG64 P0.1 X2\nG64 X3\nG61 X4\nG20 G64 P1 X5")
+        let modes: Vec<_> = steps("G0 X1\nG64 P0.1 X2\nG64 Q.2 X3\nG61 X4\nG20 G64 P1 Q0 X5")
             .iter()
             .map(|kind| match kind {
                 StepKind::Line(line) => line.mode,
                 other => panic!("a line, not {other:?}"),
             })
             .collect();
-        let blend = |tolerance_mm| PathMode::Blend { tolerance_mm };
+        let blend = |tolerance_mm, merging_mm| PathMode::Blend { tolerance_mm, merging_mm };
         let exact = PathMode::ExactPath;
-        assert_eq!(modes, [exact, blend(Some(0.1)), blend(None), exact, blend(Some(25.4))]);
+        assert_eq!(
+            modes,
+            [exact, blend(Some(0.1), None), blend(None, Some(0.2)), exact, blend(Some(25.4), Some(0.0)),]
+        );
     }
 
     #[test]
@@ -340,7 +367,6 @@ mod tests {
                 (NoticeKind::Spindle, 1, 2),
                 (NoticeKind::Coolant, 2, 2),
                 (NoticeKind::ToolChange, 3, 1),
-                (NoticeKind::Simplification, 5, 1),
                 (NoticeKind::RadiusEnlarged, 7, 1),
             ]
         );
@@ -358,11 +384,11 @@ mod tests {
             ("S-1", "1:1:", "found S-1"),
             ("G4", "1:1:", "found G4 without a time"),
             ("G4 P-1", "1:4:", "found P-1"),
-            ("G4 G64 P1", "1:8:", "both would take the P"),
-            ("G0 X1 P5", "1:7:", "in a line without G4 or G64"),
-            ("G61 P5", "1:5:", "in a line without G4 or G64"),
+            ("G4 G64 P1", "1:8:", "both would take it"),
+            ("G0 X1 P5", "1:7:", "in a line without G4, G5 or G64"),
+            ("G61 P5", "1:5:", "in a line without G4, G5 or G64"),
             ("G64 P-.1", "1:5:", "not negative"),
-            ("G1 F5 X1 I2", "1:10:", "in a line without G2 or G3"),
+            ("G1 F5 X1 I2", "1:10:", "in a line without G2, G3 or G5"),
             ("R5", "1:1:", "in a line without G2 or G3"),
             ("F5 G2 X1", "1:4:", "found G2 without a centre or radius, expected I and J or R"),
             ("F5 G2 X1 I1 K0", "1:13:", "found K0 in an arc of the XY plane"),
@@ -373,6 +399,18 @@ mod tests {
             ("F5 G2 X2.006 R1", "1:14:", "found R1 for two points 2.006000 mm apart"),
             ("F5 G2 X1 I0", "1:4:", "centre is its start point"),
             ("F5 G90.1 G2 X2 I1", "1:10:", "one coordinate only"),
+            ("F5 G5 X1 Y1 P0 Q-1", "1:4:", "found a first G5 without I and J"),
+            ("F5 G5 X1 I1 J0", "1:4:", "found G5 without P and Q"),
+            ("F5 G5 X1 I1 P0 Q1", "1:10:", "found I1 alone in a line of G5, expected I and J"),
+            ("F5 G5 X1 I1 J1 Q1", "1:16:", "found Q1 alone in a line of G5, expected P and Q"),
+            ("F5 G18 G5 X1 I1 J1 P1 Q1", "1:8:", "found G5 in the ZX plane"),
+            ("F5 G5 Z1 I1 J1 P1 Q1", "1:7:", "found Z1 in a line of G5"),
+            ("F5 G5 X1 K1 P1 Q1", "1:10:", "found K1 in a line without G2 or G3"),
+            ("F5 G5 X1 I1 J1 P1 Q1\nG1 X2\nG5 X3 P1 Q1", "3:1:", "found a first G5 without I and J"),
+            ("F5 G5 X1 I1 J1 G64 P1 Q1", "1:20:", "found P1 in a line with G5 and G4 or G64"),
+            ("G5 X1 I1 J1 P1 Q1", "1:1:", "found G5 without a feed"),
+            ("F5 G5.5 X1 P1", "1:12:", "found P1 in a line without G4, G5 or G64"),
+            ("G5.2 X1", "1:1:", "found G5.2"),
             ("G0 X1000000.1", "1:4:", "within ±1000000 mm"),
             ("G91 G0 X-999999\nX-2", "2:1:", "adds up beyond"),
             ("G20 G0 X.0000000001", "1:8:", "at most 9 decimals"),

@@ -25,7 +25,7 @@
 //!    and words this machine cannot obey are refused here, the leftmost first.
 //! 3. `interpreter`: the slots executed in the order RS-274 prescribes, whatever the order in the line:
 //!    feed, spindle and coolant; dwell; plane, units, path mode, distance modes; motion; stop or end.
-//! 4. `arc`: centre, radii and sweep of G2 and G3.
+//! 4. `arc`: centre, radii and sweep of G2 and G3; `spline`: control points of G5.
 //!
 //! # Dialect
 //!
@@ -33,11 +33,13 @@
 //! |---|---|
 //! | G0 G1 G2 G3, X Y Z | motion, modal; a line of axis words alone repeats it; G80 ends it |
 //! | I J K, R | centre of an arc (relative, or absolute after G90.1), or its radius (negative: more than half a turn) |
+//! | G5, X Y, \[I J\] P Q | cubic Bézier curve in XY: I J from its start to its first control point, P Q from its end to its second; modal. Without I J it continues the G5 before it, whose P Q are turned round. Control points that are no point of their own (I0 J0) or fold back make a curve that stands still, which is refused |
+//! | G5.5, X Y Z | quintic spline through points, one a line, from where the machine is; modal. At least five points; a line with the word G5.5 begins another spline |
 //! | F | feed \[mm/min or inch/min\], positive; kept as a speed when the units change |
 //! | G4 P | dwell \[s\] |
 //! | G17 G18 G19 | arc plane XY, ZX, YZ; clockwise is seen from the positive end of the third axis |
 //! | G20 G21, G90 G91, G90.1 G91.1 | inch or mm; absolute or incremental end points; the same for arc centres |
-//! | G61, G64 \[P\] \[Q\] | exact path; corners blended within P \[mm or inch\], without P within the machine's own tolerance; Q yields a notice |
+//! | G61, G64 \[P\] \[Q\] | exact path; corners blended within P \[mm or inch\], without P within the machine's own tolerance; short lines of one feed made longer lines and arcs within Q, which comes on top of P, without Q within a part of P |
 //! | G40 G49 G54 G94 | accepted: they ask for what is always so (no compensation, first work offset, feed per minute) |
 //! | M0 M1, M2 M30 | stop (M1 too: there is no optional-stop switch), end |
 //! | M3–M9, S | accepted with a notice: there is no spindle, tool changer or coolant |
@@ -67,12 +69,16 @@ mod interpreter;
 mod lexer;
 mod modal;
 mod program;
+mod spline;
 
 pub use arc::{RADIUS_MISMATCH_MAX_MM, RADIUS_MISMATCH_MIN_MM, RADIUS_MISMATCH_RATIO};
 pub use decimal::{Decimal, Length};
 pub(crate) use error::describe;
 pub use error::{GcodeError, Problem};
-pub use program::{ArcMove, Feed, LineMove, Notice, NoticeKind, PathMode, Plane, Program, Step, StepKind};
+pub use program::{
+    ArcMove, CubicMove, Feed, LineMove, Notice, NoticeKind, PathMode, Plane, Program, Step, StepKind,
+    ThroughMove,
+};
 
 /// Reads a whole program; `source_name` appears in errors only.
 ///

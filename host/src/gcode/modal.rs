@@ -17,6 +17,10 @@ pub(super) enum Motion {
     Clockwise,
     /// G3.
     CounterClockwise,
+    /// G5.
+    Cubic,
+    /// G5.5.
+    Through,
 }
 
 impl Motion {
@@ -27,6 +31,8 @@ impl Motion {
             Self::Feed => "G1",
             Self::Clockwise => "G2",
             Self::CounterClockwise => "G3",
+            Self::Cubic => "G5",
+            Self::Through => "G5.5",
         }
     }
 
@@ -58,7 +64,7 @@ pub(super) enum Distance {
 /// The modes in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Modal {
-    /// G0 G1 G2 G3; none after G80.
+    /// G0 G1 G2 G3 G5 G5.5; none after G80.
     pub(super) motion: Option<Motion>,
     /// G17 G18 G19.
     pub(super) plane: Plane,
@@ -117,13 +123,15 @@ impl Modal {
                 10 => Some(Motion::Feed),
                 20 => Some(Motion::Clockwise),
                 30 => Some(Motion::CounterClockwise),
+                50 => Some(Motion::Cubic),
+                55 => Some(Motion::Through),
                 _ => None,
             };
         }
         Ok(())
     }
 
-    /// Q is a length too, if one nothing comes of.
+    /// Both P and Q are lengths.
     fn blend(&self, block: &Block<'_>) -> Result<PathMode, Located> {
         let mut lengths_mm = [None; 2];
         for (length_mm, letter) in lengths_mm.iter_mut().zip([b'P', b'Q']) {
@@ -132,7 +140,8 @@ impl Modal {
                 *length_mm = Some(self.units.length(word)?.to_mm());
             }
         }
-        Ok(PathMode::Blend { tolerance_mm: lengths_mm[0] })
+        let [tolerance_mm, merging_mm] = lengths_mm;
+        Ok(PathMode::Blend { tolerance_mm, merging_mm })
     }
 }
 

@@ -28,6 +28,10 @@ pub enum StepKind {
     Line(LineMove),
     /// G2 or G3.
     Arc(ArcMove),
+    /// G5.
+    Cubic(CubicMove),
+    /// A point of G5.5.
+    Through(ThroughMove),
     /// G4: stand still.
     Dwell {
         /// How long \[s\], 0 or more.
@@ -80,6 +84,36 @@ pub struct ArcMove {
     pub mode: PathMode,
 }
 
+/// A cubic Bézier curve in the XY plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CubicMove {
+    /// Start, X Y Z.
+    pub from: [Length; 3],
+    /// End, X Y Z; Z is that of the start.
+    pub to: [Length; 3],
+    /// X and Y of the first control point from the start, and of the second from the end \[mm\].
+    pub controls_mm: [[f64; 2]; 2],
+    /// Feed along the curve.
+    pub feed: Feed,
+    /// How its ends are passed.
+    pub mode: PathMode,
+}
+
+/// The way to the next point of a quintic spline, which goes through all points of moves that follow each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThroughMove {
+    /// The point before, X Y Z.
+    pub from: [Length; 3],
+    /// The point, X Y Z; differs from the one before.
+    pub to: [Length; 3],
+    /// Whether the spline begins with it, whatever was before.
+    pub begins: bool,
+    /// Feed along the spline up to the point.
+    pub feed: Feed,
+    /// How the spline's ends are passed.
+    pub mode: PathMode,
+}
+
 /// Speed of a move along its path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Feed {
@@ -99,6 +133,9 @@ pub enum PathMode {
     Blend {
         /// Greatest distance from the programmed path \[mm\], 0 or more; the machine's choice if absent.
         tolerance_mm: Option<f64>,
+        /// How far short lines may be from what stands for them \[mm\], 0 or more, on top of the tolerance; if absent,
+        /// a part of the tolerance.
+        merging_mm: Option<f64>,
     },
 }
 
@@ -169,8 +206,6 @@ pub enum NoticeKind {
     ToolChange,
     /// M7, M8, M9.
     Coolant,
-    /// Q of G64.
-    Simplification,
     /// F in a line that switches the units: controllers differ in which unit they take it.
     FeedInNewUnits,
     /// R a rounding error smaller than half the chord.
@@ -188,9 +223,6 @@ impl fmt::Display for Notice {
             NoticeKind::SpindleSpeed => "S is not acted on: there is no spindle",
             NoticeKind::ToolChange => "M6 is not acted on: there is no tool changer",
             NoticeKind::Coolant => "M7, M8, M9 are not acted on: there is no coolant",
-            NoticeKind::Simplification => {
-                "Q of G64 is not acted on: P alone says how far the path may be left"
-            }
             NoticeKind::FeedInNewUnits => "F in a line that switches the units is taken in the new unit",
             NoticeKind::RadiusEnlarged => {
                 "R falls short of half the chord by a rounding error: half circle made"

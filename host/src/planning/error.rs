@@ -5,6 +5,7 @@ use motion_kernel::plan::PlanError;
 use motion_kernel::units::Position;
 
 use crate::toolpath::CompileError;
+use crate::toolpath::spline::SplineError;
 
 /// A place in a file, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +47,9 @@ pub enum Problem {
     /// The geometry has no executable form.
     #[error("found {0}")]
     Geometry(#[from] CompileError),
+    /// There is no spline through the points.
+    #[error("found {0}")]
+    Spline(#[from] SplineError),
     /// A limit that results for the block is unusable.
     #[error("found {} limit {}, expected a positive finite number", .0.quantity, .0.value)]
     Limit(#[from] LimitError),

@@ -46,7 +46,8 @@ pub(super) fn lookahead(
     })
 }
 
-fn time_s(segments: &[PlannedSegment]) -> f64 {
+/// How long they take \[s\].
+pub(super) fn time_s(segments: &[PlannedSegment]) -> f64 {
     segments.iter().map(|segment| segment.ramp.duration_s()).sum()
 }
 

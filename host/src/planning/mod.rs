@@ -9,7 +9,9 @@
 //! within one kilometre of the origin on each axis. What is beyond is refused, with the line of the block.
 //!
 //! - [`program`]: steps to stretches: where motion must stop;
-//! - `ceilings`: ceilings of moves and blends, what each joint allows;
+//! - `blending`: which joints are blended: stretches to blocks;
+//! - `ceilings`: the ceiling of a move or a blend, what a joint allows;
+//! - `curves`: programmed curves to moves;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
 //! - `lookahead`: the kernel's look-ahead, with ramps that span blocks or per block;
@@ -20,7 +22,9 @@
 //! - [`error`]: what is refused, with file and line.
 
 pub mod blocks;
+mod blending;
 mod ceilings;
+mod curves;
 mod density;
 pub mod error;
 pub mod executable;

@@ -1,6 +1,7 @@
 //! Steps of a program to stretches: where the motion must stop.
 
-use super::ceilings::blocks;
+use super::blending::blocks;
+use super::curves::{Point, cubic, through};
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
@@ -8,7 +9,7 @@ use super::{Item, Mode, Plan};
 use crate::gcode::{Feed, PathMode, Program, StepKind};
 use crate::machine::Machine;
 use crate::toolpath::Element;
-use crate::toolpath::smooth::{Move, smooth};
+use crate::toolpath::smooth::Move;
 
 /// Plans a whole program for a machine.
 ///
@@ -31,13 +32,30 @@ pub fn plan_program(
     let mut plan = Plan::empty(source_name, machine.tick_s);
     plan.notices = program.notices.iter().map(ToString::to_string).collect();
     let mut run: Vec<Move> = Vec::new();
+    // Where the spline begins whose points are being collected.
+    let (mut start, mut points) = ([0.0; 3], Vec::new());
     for step in &program.steps {
+        if !matches!(&step.kind, StepKind::Through(point) if !point.begins) {
+            let moves = through(start, &mut points, machine);
+            run.extend(moves.map_err(|(line, problem)| at(line)(problem))?);
+        }
         match &step.kind {
             StepKind::Line(line) => {
-                run.push(path_move(step.line, Element::line(line), line.feed, line.mode, machine));
+                run.push(path_move(step.line, Element::line(line), mm_s(line.feed), line.mode, machine));
             }
             StepKind::Arc(arc) => {
-                run.push(path_move(step.line, Element::arc(arc), arc.feed, arc.mode, machine));
+                run.push(path_move(step.line, Element::arc(arc), mm_s(arc.feed), arc.mode, machine));
+            }
+            StepKind::Cubic(curve) => {
+                let element = cubic(curve).map_err(at(step.line))?;
+                run.push(path_move(step.line, element, mm_s(curve.feed), curve.mode, machine));
+            }
+            StepKind::Through(point) => {
+                if points.is_empty() {
+                    start = point.from.map(|c| c.to_mm());
+                }
+                let (feed_mm_s, mode) = (mm_s(point.feed), point.mode);
+                points.push(Point { line: step.line, at: point.to.map(|c| c.to_mm()), feed_mm_s, mode });
             }
             StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => {
                 append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
@@ -53,6 +71,8 @@ pub fn plan_program(
             }
         }
     }
+    let moves = through(start, &mut points, machine);
+    run.extend(moves.map_err(|(line, problem)| at(line)(problem))?);
     append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
     // What the tick can't do is to be refused here, not on the machine.
     Executable::new::<f32>(&plan)?;
@@ -80,22 +100,34 @@ pub fn plan_moves(
     Ok(plan)
 }
 
-fn path_move(line: u32, element: Element, feed: Feed, mode: PathMode, machine: &Machine) -> Move {
-    let feed_mm_s = match feed {
+/// Infinite for a rapid.
+fn mm_s(feed: Feed) -> f64 {
+    match feed {
         Feed::Rapid => f64::INFINITY,
         Feed::MmPerMin(feed) => feed / 60.0,
+    }
+}
+
+pub(super) fn path_move(
+    line: u32,
+    element: Element,
+    feed_mm_s: f64,
+    mode: PathMode,
+    machine: &Machine,
+) -> Move {
+    let (tolerance_mm, merging_mm) = match mode {
+        PathMode::ExactPath => (0.0, None),
+        PathMode::Blend { tolerance_mm, merging_mm } => {
+            (tolerance_mm.unwrap_or(machine.path.blend_tolerance_mm), merging_mm)
+        }
     };
-    let tolerance_mm = match mode {
-        PathMode::ExactPath => 0.0,
-        PathMode::Blend { tolerance_mm } => tolerance_mm.unwrap_or(machine.path.blend_tolerance_mm),
-    };
-    Move { line, element, feed_mm_s, tolerance_mm }
+    Move { line, element, feed_mm_s, tolerance_mm, merging_mm }
 }
 
 /// Appends the stretches of moves that follow each other, smoothed.
 fn append(run: &mut Vec<Move>, plan: &mut Plan, machine: &Machine, mode: Mode) -> Result<(), (u32, Problem)> {
     let mut open: Vec<StretchBlock> = Vec::new();
-    for block in blocks(&smooth(run, &machine.limits().in_any_direction()), machine)? {
+    for block in blocks(run, machine)? {
         open.push(block);
         // Also after the last.
         if block.joint_mm_s <= 0.0 {

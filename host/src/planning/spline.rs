@@ -39,12 +39,14 @@ pub fn plan_spline(
         element: Element::Line { from: [0.0; 3], to: start },
         feed_mm_s: f64::INFINITY,
         tolerance_mm: 0.0,
+        merging_mm: None,
     };
     let spans = spline.elements().map(|(point, element)| Move {
         line: line(point),
         element,
         feed_mm_s,
         tolerance_mm: 0.0,
+        merging_mm: None,
     });
     let moves: Vec<Move> = (norm(start) > 0.0).then_some(approach).into_iter().chain(spans).collect();
     // Before the plan, which knows a cusp only as a limit of 0.

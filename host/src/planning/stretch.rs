@@ -24,6 +24,17 @@ pub struct StretchBlock {
     pub feed_mm_s: f64,
     /// Greatest feed through the joint at its end \[mm/s\].
     pub joint_mm_s: f64,
+    /// Greatest distance from the programmed path and of it from the block, over its tolerance: a bound, 0 where the
+    /// path is exact.
+    pub tolerance_share: f64,
+}
+
+impl StretchBlock {
+    /// What look-ahead needs of it.
+    pub(super) fn for_lookahead(&self) -> Block<f64> {
+        let Ceiling { feed_mm_s: cap_mm_s, law, .. } = self.ceiling;
+        Block { length_mm: self.element.length_mm(), cap_mm_s, joint_mm_s: self.joint_mm_s, law }
+    }
 }
 
 /// A planned stretch.
@@ -53,15 +64,10 @@ impl Stretch {
         let mut ends_mm = Vec::with_capacity(blocks.len());
         let mut plan_blocks = Vec::with_capacity(blocks.len());
         for block in &blocks {
-            let length_mm = block.element.length_mm();
-            end_mm += length_mm;
+            let block = block.for_lookahead();
+            end_mm += block.length_mm;
             ends_mm.push(end_mm);
-            plan_blocks.push(Block {
-                length_mm,
-                cap_mm_s: block.ceiling.feed_mm_s,
-                joint_mm_s: block.joint_mm_s,
-                law: block.ceiling.law,
-            });
+            plan_blocks.push(block);
         }
         let at_line = |(block, problem): (usize, Problem)| (blocks[block].line, problem);
         let planned = lookahead(&plan_blocks, &ends_mm, 0.0, 0.0, mode, tick_s).map_err(at_line)?;
@@ -72,6 +78,12 @@ impl Stretch {
     /// Path position of every block's end, from the stretch's start \[mm\].
     pub(super) fn ends_mm(&self) -> &[f64] {
         &self.ends_mm
+    }
+
+    /// Its blocks, as look-ahead sees them.
+    #[must_use]
+    pub fn for_lookahead(&self) -> Vec<Block<f64>> {
+        self.blocks.iter().map(StretchBlock::for_lookahead).collect()
     }
 
     /// Its length \[mm\].

@@ -9,7 +9,7 @@
 //! - [`involute`]: involutes of circles and their offsets;
 //! - [`spline`]: splines through points, or close to them;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
-//! - [`smooth`]: corners of a run of elements rounded within a tolerance, by
+//! - [`smooth`]: a run of elements with the blend of each of its joints, by
 //!   [`blend`]: one corner's septic blend, and [`merge`]: short lines to fewer lines and arcs;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`mod@compile`]: elements to pieces over exact path positions.

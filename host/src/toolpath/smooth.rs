@@ -1,16 +1,18 @@
-//! A run of moves with its corners blended.
+//! A run of moves made ready for blends.
 //!
 //! Consumes moves that follow each other without a stop, each with the tolerance that its ends may be rounded
-//! within; produces moves in the same order with a blend at every joint that would step otherwise, and the
-//! elements on both sides cut short. Background, in time linear in the moves.
+//! within; produces fewer moves where lines are short, and the blend of any joint within any length. Which joints are
+//! blended is up to planning. Background, in time linear in the moves.
 //!
 //! **Short lines.** Where lines are shorter than the blends at their ends would be, three fifths of the tolerance are spent
 //! on making fewer lines and arcs of them, the rest on blends between these. One that stays alone among longer
-//! ones is made part of the line before it, if that can be led past their corner.
+//! ones is made part of the line before it, if that can be led past their corner. Where the program gives merging a
+//! tolerance of its own (Q of G64), all lines of one feed are merged within it, and the whole tolerance of blends counts
+//! from what they became.
 //!
-//! **Who gets the room.** A blend takes at most nine tenths of an element, and two on the same element together:
-//! what the one does not need is the other's, else both get half, and half is all where motion starts or ends. A
-//! tenth stays, so that the rest of a short element still has a direction of its own.
+//! **Who gets the room.** Blends take at most nine tenths of an element together, and where motion starts or ends half of
+//! that: what the one at its other end does not need is a blend's own, else both get half. A tenth stays, so that the rest
+//! of a short element still has a direction of its own.
 
 use motion_kernel::law::Limits;
 
@@ -41,65 +43,117 @@ pub struct Move {
     /// Greatest distance that the path may be led past the move and its ends \[mm\]; 0 for exact path. At a joint the
     /// smaller one of both moves holds.
     pub tolerance_mm: f64,
+    /// How far a line may be from what stands for it and others \[mm\], on top of the tolerance; without it, a part of
+    /// the tolerance.
+    pub merging_mm: Option<f64>,
 }
 
-/// The moves with blends between them, as far as their tolerances allow. `limits` are those of the path, for
-/// blends in any direction.
-#[must_use]
-pub fn smooth(moves: &[Move], limits: &Limits<f64>) -> Vec<Move> {
-    let (moves, distances_mm) = merged(moves);
-    let lengths_mm: Vec<f64> = moves.iter().map(|step| step.element.length_mm()).collect();
-    let joint = |index: usize, room_mm: f64| -> Option<Blend> {
-        let (before, after) = (&moves[index], &moves[index + 1]);
+impl Move {
+    /// What merging takes of the tolerance where it leaves the path by `distance_mm`.
+    fn spent_mm(&self, distance_mm: f64) -> f64 {
+        if self.merging_mm.is_some() { 0.0 } else { distance_mm }
+    }
+}
+
+/// A run of moves, its short lines merged, ready to be blended joint by joint. Joint `i` is that between the moves
+/// `i` and `i + 1`.
+#[derive(Clone, Debug)]
+pub struct Run {
+    moves: Vec<Move>,
+    lengths_mm: Vec<f64>,
+    /// How far each move is from those that it stands for \[mm\].
+    distances_mm: Vec<f64>,
+}
+
+impl Run {
+    /// The run of `moves`, which follow each other without a stop.
+    #[must_use]
+    pub fn new(moves: &[Move]) -> Self {
+        let (moves, distances_mm) = merged(moves);
+        Self::of(moves, distances_mm)
+    }
+
+    /// The run of `moves` as they are, nothing merged.
+    #[must_use]
+    pub fn exact(moves: &[Move]) -> Self {
+        Self::of(moves.to_vec(), vec![0.0; moves.len()])
+    }
+
+    fn of(moves: Vec<Move>, distances_mm: Vec<f64>) -> Self {
+        let lengths_mm = moves.iter().map(|step| step.element.length_mm()).collect();
+        Self { moves, lengths_mm, distances_mm }
+    }
+
+    /// The moves.
+    #[must_use]
+    pub fn moves(&self) -> &[Move] {
+        &self.moves
+    }
+
+    /// Length of a move \[mm\].
+    #[must_use]
+    pub fn length_mm(&self, index: usize) -> f64 {
+        self.lengths_mm[index]
+    }
+
+    /// Number of joints.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.moves.len().saturating_sub(1)
+    }
+
+    /// How far a move is from those that it stands for, over its tolerance.
+    #[must_use]
+    pub fn tolerance_share(&self, index: usize) -> f64 {
+        let Move { tolerance_mm, merging_mm, .. } = self.moves[index];
+        share(self.distances_mm[index], merging_mm.unwrap_or(tolerance_mm))
+    }
+
+    /// The same of a blend of a joint: what its moves are off adds to what it is off these.
+    #[must_use]
+    pub fn tolerance_share_of(&self, joint: usize, blend: &Blend) -> f64 {
+        let [before, after] = [joint, joint + 1].map(|index| self.moves[index]);
+        let merging_mm = before.merging_mm.unwrap_or(0.0).max(after.merging_mm.unwrap_or(0.0));
+        let distance_mm = self.distances_mm[joint].max(self.distances_mm[joint + 1]);
+        share(blend.distance_mm + distance_mm, before.tolerance_mm.min(after.tolerance_mm) + merging_mm)
+    }
+
+    /// The blend of a joint with at most `room_mm` of either move; none where nothing steps.
+    #[must_use]
+    pub fn blend(&self, joint: usize, room_mm: f64, limits: &Limits<f64>) -> Option<Blend> {
+        let (before, after) = (&self.moves[joint], &self.moves[joint + 1]);
+        if is_smooth([&before.element, &after.element]) {
+            return None;
+        }
         // A move of exact path is cut at neither end.
         let tolerance_mm = before.tolerance_mm.min(after.tolerance_mm);
-        let tolerance_mm = tolerance_mm - distances_mm[index].max(distances_mm[index + 1]);
+        let spent_mm =
+            before.spent_mm(self.distances_mm[joint]).max(after.spent_mm(self.distances_mm[joint + 1]));
+        let tolerance_mm = tolerance_mm - spent_mm;
         Blend::new(&before.element, &after.element, tolerance_mm, room_mm, limits)
-    };
-    // At the start and the end of the run motion needs room of its own, to set out and to stop.
-    let last = moves.len().saturating_sub(1);
-    let share = |index: usize| if index == 0 || index == last { 0.5 * TAKEN_MAX } else { TAKEN_MAX };
-    // First as if each were alone, then those that touch within what the other leaves.
-    let alone: Vec<Option<Blend>> = (0..last)
-        .map(|index| {
-            let pair = [&moves[index].element, &moves[index + 1].element];
-            let taken_mm = |index: usize| share(index) * lengths_mm[index];
-            let room_mm = taken_mm(index).min(taken_mm(index + 1));
-            if is_smooth(pair) { None } else { joint(index, room_mm) }
-        })
-        .collect();
-    let way_mm = |index: Option<usize>| {
-        index.and_then(|index| alone.get(index)).and_then(Option::as_ref).map_or(0.0, |blend| blend.way_mm)
-    };
-    let left_mm = |element: usize, other: Option<usize>| {
-        let taken_mm = share(element) * lengths_mm[element];
-        (taken_mm - way_mm(other)).max(0.5 * TAKEN_MAX * lengths_mm[element])
-    };
-    let blends: Vec<Option<Blend>> = alone
-        .iter()
-        .enumerate()
-        .map(|(index, blend)| {
-            let room_mm = left_mm(index, index.checked_sub(1)).min(left_mm(index + 1, Some(index + 1)));
-            blend.and_then(|blend| if blend.way_mm <= room_mm { Some(blend) } else { joint(index, room_mm) })
-        })
-        .collect();
-    let mut smooth = Vec::with_capacity(2 * moves.len());
-    for (index, step) in moves.iter().enumerate() {
-        let first = index.checked_sub(1).and_then(|index| blends[index]);
-        let last = blends.get(index).copied().flatten();
-        let trimmed = |blend: Option<Blend>| blend.map_or(0.0, |blend| blend.way_mm);
-        let element = if first.is_none() && last.is_none() {
-            step.element
-        } else {
-            step.element.trimmed(trimmed(first), trimmed(last))
-        };
-        smooth.push(Move { element, ..*step });
-        if let Some(blend) = last {
-            let feed_mm_s = step.feed_mm_s.min(moves[index + 1].feed_mm_s);
-            smooth.push(Move { element: blend.element, feed_mm_s, ..*step });
-        }
     }
-    smooth
+
+    /// What blends may take of a move together \[mm\]. At the start and the end of the run motion needs room of its
+    /// own, to set out and to stop.
+    #[must_use]
+    pub fn taken_mm_max(&self, index: usize) -> f64 {
+        let is_end = index == 0 || index + 1 == self.moves.len();
+        self.lengths_mm[index] * if is_end { 0.5 * TAKEN_MAX } else { TAKEN_MAX }
+    }
+
+    /// What a blend may take of either move at its joint where those at the joints beside it take `ways_mm` \[mm\], at
+    /// least half of what is there.
+    #[must_use]
+    pub fn room_mm(&self, joint: usize, [before_mm, after_mm]: [f64; 2]) -> f64 {
+        let left_mm = |index: usize, other_mm: f64| {
+            (self.taken_mm_max(index) - other_mm).max(0.5 * TAKEN_MAX * self.lengths_mm[index])
+        };
+        left_mm(joint, before_mm).min(left_mm(joint + 1, after_mm))
+    }
+}
+
+fn share(distance_mm: f64, tolerance_mm: f64) -> f64 {
+    if distance_mm > 0.0 { distance_mm / tolerance_mm } else { 0.0 }
 }
 
 /// The moves, with fewer in place of runs of short lines, and each one's distance from the moves it stands for.
@@ -110,8 +164,12 @@ fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
         let count = rest.windows(2).take_while(|pair| is_same_run(&pair[0], &pair[1])).count() + 1;
         let (run, after) = rest.split_at(count);
         rest = after;
-        let tolerance_mm = MERGED_SHARE * first.tolerance_mm;
-        let rooms: Vec<Room> = (0..count).map(|index| Room::of(run, index)).collect();
+        let tolerance_mm = first.merging_mm.unwrap_or(MERGED_SHARE * first.tolerance_mm);
+        let rooms: Vec<Room> = match first.merging_mm {
+            None => (0..count).map(|index| Room::of(run, index)).collect(),
+            // A move by itself, which may be an arc, stays.
+            Some(_) => vec![if count > 1 { Room::TooLittle } else { Room::Unneeded }; count],
+        };
         let mut done = 0;
         for same in rooms.chunk_by(|a, b| (*a == Room::Enough) == (*b == Room::Enough)) {
             let steps = &run[done..done + same.len()];
@@ -159,7 +217,8 @@ fn is_same_run(before: &Move, after: &Move) -> bool {
         && is_line(after)
         && before.feed_mm_s == after.feed_mm_s
         && before.tolerance_mm == after.tolerance_mm
-        && before.tolerance_mm > 0.0
+        && before.merging_mm == after.merging_mm
+        && before.merging_mm.unwrap_or(before.tolerance_mm) > 0.0
 }
 
 /// What a line has for blends at its ends.
@@ -212,7 +271,7 @@ mod tests {
             .zip(1..)
             .map(|(pair, line)| {
                 let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
-                Move { line, element, feed_mm_s: 10.0 * f64::from(line), tolerance_mm }
+                Move { line, element, feed_mm_s: 10.0 * f64::from(line), tolerance_mm, merging_mm: None }
             })
             .collect()
     }
@@ -222,54 +281,23 @@ mod tests {
     }
 
     #[test]
-    fn blends_take_the_slower_feed_and_the_first_line() {
-        let moves = smooth(&path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [10.0, 20.0]], 0.05), &LIMITS);
-        assert_eq!(kinds(&moves), [(1, "line"), (1, "blend"), (2, "line"), (3, "line")]);
-        let feeds: Vec<_> = moves.iter().map(|step| step.feed_mm_s).collect();
-        assert_eq!(feeds, [10.0, 10.0, 20.0, 30.0]);
-        for pair in moves.windows(2) {
-            assert_eq!(pair[0].element.ends_mm().1, pair[1].element.ends_mm().0);
-        }
-    }
-
-    #[test]
     fn without_a_tolerance_nothing_changes() {
         let moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]], 0.0);
-        assert_eq!(smooth(&moves, &LIMITS), moves);
-        assert!(smooth(&[], &LIMITS).is_empty());
-    }
-
-    /// Between a small blend and a big one, the big one gets what the small one leaves; two big ones share.
-    #[test]
-    fn neighbours_share_a_short_element() {
-        let whole_mm = 1.0;
-        let rest_mm = |points: &[[f64; 2]]| {
-            let moves = smooth(&path(points, 0.2), &LIMITS);
-            assert_eq!(kinds(&moves)[2], (2, "line"));
-            moves[2].element.length_mm()
-        };
-        let both = rest_mm(&[[0.0, 0.0], [10.0, 0.0], [10.0, whole_mm], [20.0, whole_mm]]);
-        assert!((both - 0.1 * whole_mm).abs() < 1e-12, "{both}");
-        // 2° and 150°: the first wants more than the whole line, the second a third of it.
-        let (sine, cosine) = libm::sincos(2.0_f64.to_radians());
-        let turn = libm::sincos(152.0_f64.to_radians());
-        let corner = [10.0 + cosine, sine];
-        let end = [corner[0] + 10.0 * turn.1, corner[1] + 10.0 * turn.0];
-        let moves = smooth(&path(&[[0.0, 0.0], [10.0, 0.0], corner, end], 0.2), &LIMITS);
-        let way_mm = |index: usize, whole_mm: f64| whole_mm - moves[index].element.length_mm();
-        let (first, second) = (way_mm(0, 10.0), way_mm(4, 10.0));
-        assert!(first > 0.5 && second > 0.2 && (first + second - 0.9).abs() < 1e-9, "{first} {second}");
+        let run = Run::new(&moves);
+        assert_eq!(run.moves(), moves);
+        assert_eq!(run.blend(0, 1.0, &LIMITS), None);
+        assert_eq!(Run::new(&[]).joints(), 0);
     }
 
     /// A corner that was cut off by a micrometre is one corner.
     #[test]
     fn a_tiny_line_among_long_ones_joins_the_one_before() {
         let mut moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0007, 0.0007], [10.0007, 10.0]], 0.05);
-        assert_eq!(smooth(&moves, &LIMITS).len(), 5);
+        assert_eq!(Run::new(&moves).moves().len(), 3);
         moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
-        let smoothed = smooth(&moves, &LIMITS);
-        assert_eq!(kinds(&smoothed), [(1, "line"), (1, "blend"), (3, "line")]);
-        assert_eq!(smoothed[2].element.ends_mm().1, [10.0007, 10.0, 0.0]);
+        let run = Run::new(&moves);
+        assert_eq!(kinds(run.moves()), [(1, "line"), (3, "line")]);
+        assert_eq!(run.moves()[1].element.ends_mm().1, [10.0007, 10.0, 0.0]);
     }
 
     /// Merging is for lines of one feed, and spends part of the tolerance only.
@@ -283,11 +311,11 @@ mod tests {
             .collect();
         let mut moves = path(&points, 0.01);
         moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
-        assert_eq!(kinds(&smooth(&moves, &LIMITS)), [(1, "arc")]);
+        assert_eq!(kinds(Run::new(&moves).moves()), [(1, "arc")]);
         moves.iter_mut().for_each(|step| step.feed_mm_s = if step.line <= 40 { 50.0 } else { 60.0 });
-        assert_eq!(kinds(&smooth(&moves, &LIMITS)), [(1, "arc"), (41, "arc")]);
+        assert_eq!(kinds(Run::new(&moves).moves()), [(1, "arc"), (41, "arc")]);
         // The chords' sagitta, 0.125 µm, is more than a part of this tolerance.
         moves.iter_mut().for_each(|step| step.tolerance_mm = 1e-4);
-        assert!(smooth(&moves, &LIMITS).len() > 100);
+        assert_eq!(Run::new(&moves).moves().len(), 100);
     }
 }

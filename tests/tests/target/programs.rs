@@ -271,6 +271,7 @@ pub(crate) fn one_axis() -> Vec<u8> {
             Item::EndOfStretch(end) => Item::EndOfStretch([end[0]]),
             Item::Dwell(duration) => Item::Dwell(duration),
             Item::Stop => Item::Stop,
+            Item::Block(block) => Item::Block(block),
         })
         .collect();
     let mut bytes = Vec::new();

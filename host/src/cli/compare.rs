@@ -1,0 +1,222 @@
+//! `motion compare`: how long programs take, exact and blended, beside what acceleration alone would allow.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::progress::Progress;
+use super::table::{self, Align};
+use super::{csv_failure, input, write_json};
+use crate::compare::{Figures, Path, figures, is_blended};
+use crate::gcode::{self, Program};
+use crate::machine::Machine;
+
+const EXAMPLES: &str = "\
+Examples:
+  motion compare part.ngc                        exact path and blends, within the machine's own tolerance
+  motion compare parts/ --tolerance 0.01 --tolerance 0.05 --csv > times.csv
+      every .ngc file of a folder, with blends of two tolerances
+
+Columns: `per block` is the time with one pair of ramps per block; `least` is what the same path would take
+with no limit of jerk and snap, below which no plan of it can be; `tolerance` is the greatest part of it that the path
+may use; `feed` to `step` are the executed ticks over the limits of axes and path, `step` that of
+acceleration where a joint is passed without a blend. Programs that are refused are listed; then the exit
+status is 2.";
+
+/// Compare the times of programs: exact path, blends, plan per block, and the least there is.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct CompareArguments {
+    /// G-code (`-`: standard input), or folders of .ngc files.
+    #[arg(value_name = "PROGRAM|FOLDER", required = true)]
+    programs: Vec<PathBuf>,
+    /// Machine file (`motion machine` prints one); without it, the reference machine.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    /// Blend within this, from 0 to 10 mm; may be given several times. Without it, the machine's tolerance.
+    #[arg(long = "tolerance", value_name = "MM", value_parser = tolerance, allow_negative_numbers = true)]
+    tolerances: Vec<f64>,
+    /// Print JSON: rows, refused.
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+    /// Print CSV, a row per program and path.
+    #[arg(long)]
+    csv: bool,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=10.0).contains(&value) => Ok(value),
+        _ => Err(format!("found {text}, expected a number from 0 to 10")),
+    }
+}
+
+#[derive(Serialize)]
+struct Row {
+    program: String,
+    path: String,
+    blocks: usize,
+    blends: usize,
+    length_mm: f64,
+    time_s: f64,
+    per_block_s: f64,
+    least_s: f64,
+    tolerance_share: f64,
+    feed_ratio: f64,
+    accel_ratio: f64,
+    jerk_ratio: f64,
+    accel_step_ratio: f64,
+}
+
+impl Row {
+    fn new(program: &str, path: Path, figures: &Figures) -> Self {
+        let Figures { blocks, blends, length_mm, time_s, per_block_s, least_s, tolerance_share, ratios } =
+            *figures;
+        Self {
+            program: program.to_owned(),
+            path: path.to_string(),
+            blocks,
+            blends,
+            length_mm,
+            time_s,
+            per_block_s,
+            least_s,
+            tolerance_share,
+            feed_ratio: ratios.feed,
+            accel_ratio: ratios.accel,
+            jerk_ratio: ratios.jerk,
+            accel_step_ratio: ratios.accel_step,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct CompareJson<'a> {
+    rows: &'a [Row],
+    refused: &'a [String],
+}
+
+/// Compares and prints.
+///
+/// # Errors
+/// A program can't be read or is refused (after the others are printed), the machine file is refused, or `out` can't be
+/// written.
+pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let machine = input::machine(arguments.machine.as_ref())?;
+    let programs = programs(&arguments.programs)?;
+    let own = [machine.path.blend_tolerance_mm];
+    let tolerances_mm = if arguments.tolerances.is_empty() { &own[..] } else { &arguments.tolerances };
+    let (mut rows, mut refused) = (Vec::new(), Vec::new());
+    let mut progress = Progress::new(programs.len() as u64);
+    for path in &programs {
+        let source = input::read(path)?;
+        match gcode::read(&source.name, &source.text) {
+            Ok(program) => rows_of(&source.name, &program, tolerances_mm, &machine, &mut rows)
+                .unwrap_or_else(|error| refused.push(error.to_string())),
+            Err(error) => refused.push(error.to_string()),
+        }
+        progress.step();
+    }
+    progress.finish();
+    if arguments.csv {
+        write_csv(&rows, out)?;
+    } else if arguments.json {
+        write_json(&CompareJson { rows: &rows, refused: &refused }, out)?;
+    } else {
+        write_table(&rows, out).map_err(CliError::Output)?;
+    }
+    if refused.is_empty() { Ok(Outcome::Done) } else { Err(CliError::Refused { programs: refused }) }
+}
+
+/// The programs themselves, and those of folders in the order of their names.
+fn programs(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
+    let mut programs = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            programs.push(path.clone());
+            continue;
+        }
+        let failed = |source| CliError::Read { path: path.display().to_string(), source };
+        let entries: io::Result<Vec<PathBuf>> =
+            fs::read_dir(path).map_err(failed)?.map(|entry| entry.map(|entry| entry.path())).collect();
+        let mut files = entries.map_err(failed)?;
+        files.retain(|file| file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ngc")));
+        files.sort();
+        if files.is_empty() {
+            let found = format!("{} without a file that ends in .ngc", path.display());
+            return Err(CliError::Arguments { found, expected: "a folder of programs" });
+        }
+        programs.append(&mut files);
+    }
+    Ok(programs)
+}
+
+fn rows_of(
+    name: &str,
+    program: &Program,
+    tolerances_mm: &[f64],
+    machine: &Machine,
+    rows: &mut Vec<Row>,
+) -> Result<(), crate::compare::CompareError> {
+    let written = is_blended(program).then_some(Path::Written);
+    let blended = tolerances_mm.iter().map(|&tolerance_mm| Path::Blended(tolerance_mm));
+    let paths = [Path::Exact].into_iter().chain(blended).chain(written);
+    let mut new = Vec::new();
+    for path in paths {
+        new.push(Row::new(name, path, &figures(name, program, path, machine)?));
+    }
+    rows.append(&mut new);
+    Ok(())
+}
+
+fn write_csv(rows: &[Row], out: &mut dyn Write) -> Result<(), CliError> {
+    let mut csv = csv::Writer::from_writer(out);
+    for row in rows {
+        csv.serialize(row).map_err(|error| CliError::Output(csv_failure(error)))?;
+    }
+    csv.flush().map_err(CliError::Output)
+}
+
+fn write_table(rows: &[Row], out: &mut dyn Write) -> io::Result<()> {
+    let columns = [
+        ("program", "", Align::Left),
+        ("path", "", Align::Left),
+        ("blocks", "", Align::Right),
+        ("blends", "", Align::Right),
+        ("length", "mm", Align::Right),
+        ("time", "s", Align::Right),
+        ("per block", "s", Align::Right),
+        ("least", "s", Align::Right),
+        ("tolerance", "%", Align::Right),
+        ("feed", "%", Align::Right),
+        ("accel", "%", Align::Right),
+        ("jerk", "%", Align::Right),
+        ("step", "%", Align::Right),
+    ];
+    let percent = |ratio: f64| format!("{:.1}", 100.0 * ratio);
+    let cells: Vec<[String; 13]> = rows
+        .iter()
+        .map(|row| {
+            [
+                row.program.clone(),
+                row.path.clone(),
+                row.blocks.to_string(),
+                row.blends.to_string(),
+                format!("{:.3}", row.length_mm),
+                format!("{:.4}", row.time_s),
+                format!("{:.4}", row.per_block_s),
+                format!("{:.4}", row.least_s),
+                percent(row.tolerance_share),
+                percent(row.feed_ratio),
+                percent(row.accel_ratio),
+                percent(row.jerk_ratio),
+                percent(row.accel_step_ratio),
+            ]
+        })
+        .collect();
+    table::write(&columns, &cells, out)
+}

@@ -1,0 +1,136 @@
+//! How long a program takes, in ways that can be held against each other.
+//!
+//! Consumes a program and a machine; produces, for a path mode, the time of the plan, of S3's plan per block, and the
+//! least time that acceleration alone would allow on the same path, with what the path used of its tolerance and the
+//! executed ticks of the machine's limits. Background; two plans and one pass over all ticks.
+//!
+//! - [`bound`]: the least time;
+//! - [`ticks`]: the executed ticks against the limits.
+
+pub mod bound;
+pub mod ticks;
+
+use std::fmt;
+
+use self::ticks::{Ratios, TicksError};
+use crate::gcode::{PathMode, Program, StepKind};
+use crate::machine::Machine;
+use crate::planning::{Item, Mode, Plan, PlanningError, plan_program};
+
+/// Which path is driven.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Path {
+    /// As the program says.
+    Written,
+    /// G61 all over.
+    Exact,
+    /// G64 all over, within a tolerance \[mm\].
+    Blended(f64),
+}
+
+impl fmt::Display for Path {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Written => f.write_str("as written"),
+            Self::Exact => f.write_str("G61"),
+            Self::Blended(tolerance_mm) => write!(f, "G64 P{tolerance_mm}"),
+        }
+    }
+}
+
+/// What a program comes to on one path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figures {
+    /// Blocks, blends among them.
+    pub blocks: usize,
+    /// Blends.
+    pub blends: usize,
+    /// Length \[mm\].
+    pub length_mm: f64,
+    /// Time of the plan \[s\]; of all times, dwells are part and stops are not.
+    pub time_s: f64,
+    /// Time with one pair of ramps per block \[s\].
+    pub per_block_s: f64,
+    /// The least time \[s\]: [`bound::least_time_s`].
+    pub least_s: f64,
+    /// Greatest part of its tolerance that a block may use: the planner's bound, not a measurement.
+    pub tolerance_share: f64,
+    /// The executed ticks against the limits.
+    pub ratios: Ratios,
+}
+
+/// Why there are no figures.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// There is no plan.
+    #[error(transparent)]
+    Planning(#[from] PlanningError),
+    /// The plan can't be executed.
+    #[error(transparent)]
+    Ticks(#[from] TicksError),
+}
+
+/// Whether some move of the program may leave its path.
+#[must_use]
+pub fn is_blended(program: &Program) -> bool {
+    program.steps.iter().any(|step| match &step.kind {
+        StepKind::Line(line) => line.mode != PathMode::ExactPath,
+        StepKind::Arc(arc) => arc.mode != PathMode::ExactPath,
+        StepKind::Cubic(curve) => curve.mode != PathMode::ExactPath,
+        StepKind::Through(point) => point.mode != PathMode::ExactPath,
+        StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => false,
+    })
+}
+
+/// The figures of a program on a path.
+///
+/// # Errors
+/// There is no plan, or the kernel can't execute it.
+pub fn figures(
+    source_name: &str,
+    program: &Program,
+    path: Path,
+    machine: &Machine,
+) -> Result<Figures, CompareError> {
+    let program = on(program, path);
+    let plan = plan_program(source_name, &program, machine, Mode::Spanning)?;
+    let per_block = plan_program(source_name, &program, machine, Mode::PerBlock)?;
+    Ok(Figures {
+        blocks: plan.blocks.len(),
+        blends: plan.blocks.iter().filter(|block| block.kind == "blend").count(),
+        length_mm: plan.length_mm,
+        time_s: plan.time_s,
+        per_block_s: per_block.time_s,
+        least_s: bound::least_time_s(&plan),
+        tolerance_share: tolerance_share(&plan),
+        ratios: ticks::ratios(&plan, machine)?,
+    })
+}
+
+/// The program with a path mode of its own.
+fn on(program: &Program, path: Path) -> Program {
+    let mut program = program.clone();
+    let mode = match path {
+        Path::Written => return program,
+        Path::Exact => PathMode::ExactPath,
+        Path::Blended(tolerance_mm) => PathMode::Blend { tolerance_mm: Some(tolerance_mm), merging_mm: None },
+    };
+    for step in &mut program.steps {
+        match &mut step.kind {
+            StepKind::Line(line) => line.mode = mode,
+            StepKind::Arc(arc) => arc.mode = mode,
+            StepKind::Cubic(curve) => curve.mode = mode,
+            StepKind::Through(point) => point.mode = mode,
+            StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => {}
+        }
+    }
+    program
+}
+
+fn tolerance_share(plan: &Plan) -> f64 {
+    let stretches = plan.items.iter().filter_map(|item| match item {
+        Item::Stretch(stretch) => Some(stretch),
+        Item::Dwell { .. } | Item::Stop { .. } => None,
+    });
+    stretches.flat_map(|stretch| &stretch.blocks).map(|block| block.tolerance_share).fold(0.0, f64::max)
+}

@@ -1,0 +1,82 @@
+//! The ticks of a plan against the limits of its machine.
+//!
+//! Consumes a plan; executes it with the kernel's executor, in f64 and without axes; produces the greatest ratios of what
+//! was set to what is allowed.
+
+use core::convert::Infallible;
+
+use motion_kernel::exec::{ExecState, Executor};
+use motion_kernel::program::{Supply, SupplyError};
+use motion_kernel::queue::Streams;
+use motion_kernel::units::Position;
+
+use crate::machine::Machine;
+use crate::planning::{Executable, Plan, PlanningError};
+use crate::toolpath::{norm, subtract};
+
+/// Places in either stream.
+const QUEUED: usize = 64;
+
+/// The greatest of each over all ticks, over its limit: at most 1 but for rounding.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ratios {
+    /// Velocity of an axis.
+    pub feed: f64,
+    /// Acceleration, of an axis or as a vector.
+    pub accel: f64,
+    /// Jerk, of an axis or as a vector; what joints step is not in it.
+    pub jerk: f64,
+    /// Change of the acceleration vector from one tick to the next, beyond what jerk accounts for, over the
+    /// acceleration-step limit.
+    pub accel_step: f64,
+}
+
+/// Why a plan could not be executed.
+#[derive(Debug, thiserror::Error)]
+pub enum TicksError {
+    /// It is beyond what a tick can do.
+    #[error(transparent)]
+    Planning(#[from] PlanningError),
+    /// The kernel refused what the planner made.
+    #[error("the kernel rejects the plan: {0}")]
+    Rejected(SupplyError<Infallible>),
+    /// The executor stopped with a fault.
+    #[error("the executor stops: {0}")]
+    Fault(String),
+}
+
+/// The ratios of `plan` on `machine`.
+///
+/// # Errors
+/// The plan can't be executed.
+pub fn ratios(plan: &Plan, machine: &Machine) -> Result<Ratios, TicksError> {
+    let executable = Executable::new::<f64>(plan)?;
+    let start = [Position::ZERO; 3];
+    let mut streams = Streams::<f64, 3, QUEUED, QUEUED>::new();
+    let (mut feeder, mut intake) = streams.split(machine.rules(), start);
+    let mut executor = Executor::<f64, 3>::new(start);
+    let mut supply = Supply::new(executable.supplied(), executable.tick_s);
+    let path = &machine.path;
+    let (mut ratios, mut last_accel) = (Ratios::default(), [0.0; 3]);
+    loop {
+        supply.fill(&mut feeder).map_err(TicksError::Rejected)?;
+        let executed = executor.tick(&mut intake).map_err(|fault| TicksError::Fault(format!("{fault:?}")))?;
+        let (accel, jerk) =
+            (executed.setpoints.map(|set| set.accel_mm_s2), executed.setpoints.map(|set| set.jerk_mm_s3));
+        for (set, axis) in executed.setpoints.iter().zip(&machine.axes) {
+            ratios.feed = ratios.feed.max(set.velocity_mm_s.abs() / axis.feed_mm_s);
+            ratios.accel = ratios.accel.max(set.accel_mm_s2.abs() / axis.accel_mm_s2);
+            ratios.jerk = ratios.jerk.max(set.jerk_mm_s3.abs() / axis.jerk_mm_s3);
+        }
+        ratios.accel = ratios.accel.max(norm(accel) / path.accel_mm_s2);
+        ratios.jerk = ratios.jerk.max(norm(jerk) / path.jerk_mm_s3);
+        let step = norm(subtract(accel, last_accel)) - path.jerk_mm_s3 * plan.tick_s;
+        ratios.accel_step = ratios.accel_step.max(step / path.accel_step_mm_s2);
+        last_accel = accel;
+        match executed.state {
+            ExecState::Idle if supply.is_empty() => return Ok(ratios),
+            ExecState::Stopped => executor.resume(),
+            _ => {}
+        }
+    }
+}

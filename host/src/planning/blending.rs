@@ -1,0 +1,437 @@
+//! Which joints are blended, and over which length.
+//!
+//! Consumes a run of moves with their tolerances; produces blocks with ceiling, law and joint feed, ready for
+//! look-ahead. Background, a bounded number of plans of at most eleven blocks for each joint.
+//!
+//! **What pays.** Jerk and snap bound the way round a corner: within a small tolerance it may take longer than a stop
+//! on the corner, and between a slow and a fast move a blend keeps the fast one slow. So every joint is tried as
+//! it is (a stop, or what the acceleration-step limit lets pass) and with blends of some lengths, each once with
+//! [`BLEND_FEED_SHARE`], which leaves nothing for changing the feed on it, and once as a curve like any other.
+//! They are compared by the time that look-ahead takes over both moves and one more on either side, with what has
+//! been chosen for the joints beside. What is shortest is taken, but a joint without a blend has to gain
+//! a five-hundredth of it: G64 asks for smooth motion. Looking at one joint after the other does not find the best of
+//! all; in the end the run is planned with every blend at its longest and as it was programmed, too, and the best of these is
+//! taken. So blends and merged lines cost at most that part of the time that the exact path takes.
+//!
+//! **Tangent joints** whose curvature jumps are treated alike: passed without a blend they fall under the
+//! acceleration-step limit as under G61, because a path of bounded jerk through them can take longer (on the arcs of a
+//! few millimetres that a corner is rounded with, by a seventh). Where no such step is to be, the machine's limit
+//! says so: with a small one only the blend pays.
+
+use motion_kernel::law::Limits;
+use motion_kernel::plan::{
+    BLEND_FEED_SHARE, Block, BlockPlan, Ceiling, Node, PlanError, nodes_for, plan, plan_spanning,
+};
+
+use super::Mode;
+use super::ceilings::{Ceilings, ceilings, joint_feed};
+use super::error::Problem;
+use super::lookahead::{lookahead, time_s};
+use super::stretch::StretchBlock;
+use crate::machine::Machine;
+use crate::toolpath::blend::Blend;
+use crate::toolpath::smooth::{Move, Run};
+
+/// Part of the time that a joint without a blend has to gain over the best one.
+const EXACT_GAIN_MIN: f64 = 0.002;
+
+/// Lengths of blends that are tried, as parts of the longest one.
+const SIZES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+/// How often a joint is looked at at most.
+const SWEEPS: usize = 4;
+/// How many more moves are looked at on either side of those at a joint.
+const BESIDE: usize = 1;
+/// Blocks of that many moves and the blends between them.
+const BLOCKS: usize = 2 * (2 * BESIDE + 2) - 1;
+/// How often the feeds at the ends of a comparison are lowered until every variant can be planned.
+const LOWERINGS: usize = 8;
+/// Feeds that a plan has named as just possible, made a little less.
+const LESS: f64 = 1.0 - 1.0e-9;
+
+/// An error comes with the program line.
+type AtLine<T> = Result<T, (u32, Problem)>;
+
+/// How a joint is crossed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Crossing {
+    /// The blend with its length \[mm\] and its ceiling; none: as it is.
+    blend: Option<(Blend, f64, Ceilings)>,
+    /// The greatest feed \[mm/s\].
+    feed_mm_s: f64,
+}
+
+impl Crossing {
+    /// What it takes of either move \[mm\].
+    fn way_mm(&self) -> f64 {
+        self.blend.map_or(0.0, |(blend, ..)| blend.way_mm)
+    }
+}
+
+/// How a joint may be crossed; without a blend last.
+struct Variants {
+    /// What the blends may take of either move \[mm\].
+    room_mm: f64,
+    all: Vec<Crossing>,
+}
+
+impl Variants {
+    fn are_blends(&self) -> bool {
+        self.all.len() > 1
+    }
+
+    /// With the longest blend.
+    fn longest(&self) -> &[Crossing] {
+        if self.are_blends() { &self.all[..2] } else { &self.all }
+    }
+}
+
+/// The blocks of a run that starts and ends at rest; the joint feed of the last one is 0. An error comes with the
+/// program line.
+pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlock>> {
+    let joints = Joints::new(Run::new(moves), machine)?;
+    let is_merged = joints.run.moves().len() < moves.len();
+    let merged = joints.exact();
+    let candidates = match joints.choose(&merged)? {
+        Some([longest, chosen]) => vec![joints.blocks(&chosen), joints.blocks(&longest)],
+        None if is_merged => vec![joints.blocks(&merged)],
+        None => return Ok(joints.blocks(&merged)),
+    };
+    let exact = if is_merged {
+        let joints = Joints::new(Run::exact(moves), machine)?;
+        joints.blocks(&joints.exact())
+    } else {
+        joints.blocks(&merged)
+    };
+    let mut best = exact;
+    let mut most_s = run_time_s(&best, machine.tick_s) / (1.0 - EXACT_GAIN_MIN);
+    for blocks in candidates {
+        let time_s = run_time_s(&blocks, machine.tick_s);
+        if time_s < most_s {
+            (best, most_s) = (blocks, time_s);
+        }
+    }
+    Ok(best)
+}
+
+/// The joints of a run.
+struct Joints<'a> {
+    run: Run,
+    /// Of the moves.
+    ceilings: Vec<Ceilings>,
+    machine: &'a Machine,
+    /// Of the path in any direction.
+    limits: Limits<f64>,
+}
+
+impl<'a> Joints<'a> {
+    fn new(run: Run, machine: &'a Machine) -> AtLine<Self> {
+        let mut all = Vec::with_capacity(run.moves().len());
+        for step in run.moves() {
+            let greatest = step.element.greatest();
+            all.push(ceilings(step, &greatest, machine.path.curve_feed_share, machine)?);
+        }
+        Ok(Self { run, ceilings: all, machine, limits: machine.limits().in_any_direction() })
+    }
+
+    /// The crossings with all blends at their longest, and those that were found best one by one; none where there
+    /// is nothing to blend.
+    fn choose(&self, exact: &[Crossing]) -> AtLine<Option<[Vec<Crossing>; 2]>> {
+        // First as if each were alone, then those that touch within what the other leaves.
+        let alone_mm: Vec<f64> = (0..exact.len()).map(|joint| self.longest_mm(joint)).collect();
+        let mut variants = Vec::with_capacity(exact.len());
+        for (joint, &longest_mm) in alone_mm.iter().enumerate() {
+            let room_mm = self.room_mm(joint, |joint| alone_mm[joint]).min(longest_mm);
+            variants.push(self.variants(joint, room_mm, exact[joint])?);
+        }
+        if !variants.iter().any(Variants::are_blends) {
+            return Ok(None);
+        }
+        let mut chosen: Vec<Crossing> = variants.iter().map(|variants| variants.all[0]).collect();
+        for (joint, variants) in variants.iter().enumerate() {
+            chosen[joint] = self.best(joint, &chosen, variants.longest());
+        }
+        let longest = chosen.clone();
+        // Looked at again are those beside which something changed.
+        let mut is_open = vec![true; chosen.len()];
+        for _ in 0..SWEEPS {
+            for joint in 0..chosen.len() {
+                if !std::mem::take(&mut is_open[joint]) || !variants[joint].are_blends() {
+                    continue;
+                }
+                let room_mm = self.room_mm(joint, |joint| chosen[joint].way_mm()).min(alone_mm[joint]);
+                if room_mm != variants[joint].room_mm {
+                    variants[joint] = self.variants(joint, room_mm, exact[joint])?;
+                }
+                let best = self.best(joint, &chosen, &variants[joint].all);
+                if best != std::mem::replace(&mut chosen[joint], best) {
+                    let beside = joint.saturating_sub(BESIDE + 1)..chosen.len().min(joint + BESIDE + 2);
+                    is_open[beside].iter_mut().for_each(|is_open| *is_open = true);
+                    is_open[joint] = false;
+                }
+            }
+        }
+        Ok(Some([longest, chosen]))
+    }
+
+    /// The way of the longest blend of a joint, 0 if there is none \[mm\].
+    fn longest_mm(&self, joint: usize) -> f64 {
+        let room_mm = self.run.taken_mm_max(joint).min(self.run.taken_mm_max(joint + 1));
+        self.run.blend(joint, room_mm, &self.limits).map_or(0.0, |blend| blend.way_mm)
+    }
+
+    /// The room of a joint where the others take `way_mm`.
+    fn room_mm(&self, joint: usize, way_mm: impl Fn(usize) -> f64) -> f64 {
+        let after = joint + 1;
+        let after_mm = if after < self.run.joints() { way_mm(after) } else { 0.0 };
+        self.run.room_mm(joint, [joint.checked_sub(1).map_or(0.0, way_mm), after_mm])
+    }
+
+    /// All as they are.
+    fn exact(&self) -> Vec<Crossing> {
+        (0..self.run.joints()).map(|joint| self.exact_at(joint)).collect()
+    }
+
+    fn exact_at(&self, joint: usize) -> Crossing {
+        let [before, after] =
+            [joint, joint + 1].map(|index| (&self.run.moves()[index], &self.ceilings[index].programmed));
+        let feed_mm_s = joint_feed(&before.0.element, &after.0.element, self.machine);
+        Crossing { blend: None, feed_mm_s: feed_mm_s.min(before.1.feed_mm_s).min(after.1.feed_mm_s) }
+    }
+
+    fn variants(&self, joint: usize, room_mm: f64, exact: Crossing) -> AtLine<Variants> {
+        let [before, after] = [joint, joint + 1].map(|index| self.run.moves()[index]);
+        let mut all = Vec::with_capacity(2 * SIZES.len() + 1);
+        for size in SIZES {
+            let Some(blend) = self.run.blend(joint, size * room_mm, &self.limits) else { continue };
+            let feed_mm_s = before.feed_mm_s.min(after.feed_mm_s);
+            let step = Move { element: blend.element, feed_mm_s, ..before };
+            let length_mm = blend.element.length_mm();
+            // How a curve bends takes a search along it: once, whatever share it is then given.
+            let greatest = blend.element.greatest();
+            for share in [BLEND_FEED_SHARE, self.machine.path.curve_feed_share] {
+                let ceilings = ceilings(&step, &greatest, share, self.machine)?;
+                let blend = Some((blend, length_mm, ceilings));
+                all.push(Crossing { blend, feed_mm_s: ceilings.programmed.feed_mm_s });
+            }
+        }
+        all.push(exact);
+        Ok(Variants { room_mm, all })
+    }
+
+    /// The best of some crossings of a joint, the others being crossed as `chosen` says.
+    fn best(&self, joint: usize, chosen: &[Crossing], variants: &[Crossing]) -> Crossing {
+        let windows: Vec<Vec<Block<f64>>> =
+            variants.iter().map(|variant| self.window(joint, variant, chosen)).collect();
+        let (first, last) = self.beside(joint);
+        let feed =
+            |joint: Option<usize>| joint.and_then(|joint| chosen.get(joint)).map_or(0.0, |c| c.feed_mm_s);
+        let feeds = common_feeds(&windows, [feed(first.checked_sub(1)), feed(Some(last))]);
+        let mut best = (chosen[joint], f64::INFINITY);
+        for (variant, blocks) in variants.iter().zip(&windows) {
+            let gain = if variant.blend.is_none() { EXACT_GAIN_MIN } else { 0.0 };
+            let time_s = window_time_s(blocks, feeds);
+            if time_s < (1.0 - gain) * best.1 {
+                best = (*variant, time_s);
+            }
+        }
+        best.0
+    }
+
+    /// The first and the last move that are looked at for a joint.
+    fn beside(&self, joint: usize) -> (usize, usize) {
+        (joint.saturating_sub(BESIDE), (joint + 1 + BESIDE).min(self.ceilings.len() - 1))
+    }
+
+    /// What is looked at for a joint, crossed as `variant` says.
+    fn window(&self, changed: usize, variant: &Crossing, chosen: &[Crossing]) -> Vec<Block<f64>> {
+        let crossing = |joint: usize| if joint == changed { Some(variant) } else { chosen.get(joint) };
+        let way_mm = |joint: Option<usize>| joint.and_then(crossing).map_or(0.0, Crossing::way_mm);
+        let (first, last) = self.beside(changed);
+        let mut blocks = Vec::with_capacity(BLOCKS);
+        for index in first..=last {
+            let length_mm = self.run.length_mm(index) - way_mm(index.checked_sub(1)) - way_mm(Some(index));
+            let after = crossing(index).filter(|_| index < last);
+            let joint_mm_s = after.map_or(f64::INFINITY, |after| after.feed_mm_s);
+            let block = |length_mm, ceiling: &Ceiling<f64>, joint_mm_s| Block {
+                length_mm,
+                cap_mm_s: ceiling.feed_mm_s,
+                joint_mm_s,
+                law: ceiling.law,
+            };
+            blocks.push(block(length_mm, &self.ceilings[index].programmed, joint_mm_s));
+            if let Some(Crossing { blend: Some((_, length_mm, ceilings)), .. }) = after {
+                blocks.push(block(*length_mm, &ceilings.programmed, f64::INFINITY));
+            }
+        }
+        blocks
+    }
+
+    /// The blocks of the run.
+    fn blocks(&self, crossings: &[Crossing]) -> Vec<StretchBlock> {
+        let mut blocks: Vec<StretchBlock> = Vec::with_capacity(2 * self.ceilings.len());
+        let way_mm =
+            |joint: Option<usize>| joint.and_then(|joint| crossings.get(joint)).map_or(0.0, Crossing::way_mm);
+        for (index, (step, &ceilings)) in self.run.moves().iter().zip(&self.ceilings).enumerate() {
+            let (first_mm, last_mm) = (way_mm(index.checked_sub(1)), way_mm(Some(index)));
+            let is_whole = first_mm == 0.0 && last_mm == 0.0;
+            let element = if is_whole { step.element } else { step.element.trimmed(first_mm, last_mm) };
+            let block = |element, feed_mm_s, ceilings: Ceilings, tolerance_share| StretchBlock {
+                line: step.line,
+                element,
+                ceiling: ceilings.programmed,
+                greatest: ceilings.greatest,
+                feed_mm_s,
+                joint_mm_s: 0.0,
+                tolerance_share,
+            };
+            blocks.push(block(element, step.feed_mm_s, ceilings, self.run.tolerance_share(index)));
+            if let Some(Crossing { blend: Some((blend, _, ceilings)), .. }) = crossings.get(index) {
+                let share = self.run.tolerance_share_of(index, blend);
+                // As in the variant that it was chosen from.
+                let next = self.run.moves().get(index + 1).map_or(f64::INFINITY, |next| next.feed_mm_s);
+                blocks.push(block(blend.element, step.feed_mm_s.min(next), *ceilings, share));
+            }
+        }
+        for index in 1..blocks.len() {
+            blocks[index - 1].joint_mm_s =
+                joint_feed(&blocks[index - 1].element, &blocks[index].element, self.machine);
+        }
+        blocks
+    }
+}
+
+/// Feeds at both ends that all windows can be planned with, at most `feeds` \[mm/s\].
+fn common_feeds(windows: &[Vec<Block<f64>>], mut feeds: [f64; 2]) -> [f64; 2] {
+    for _ in 0..LOWERINGS {
+        let before = feeds;
+        for blocks in windows {
+            let mut plans = [BlockPlan::default(); BLOCKS];
+            match plan(blocks, feeds[0], feeds[1], &mut plans[..blocks.len()]) {
+                Ok(()) => {}
+                Err(PlanError::TooShortToBrake { greatest_mm_s, .. }) => feeds[0] = LESS * greatest_mm_s,
+                Err(PlanError::TooShortToAccelerate { greatest_mm_s, .. }) => feeds[1] = LESS * greatest_mm_s,
+                Err(PlanError::EndFeed { quantity, greatest_mm_s, .. }) => {
+                    feeds[usize::from(quantity == "end feed")] = greatest_mm_s;
+                }
+                Err(_) => return [0.0; 2],
+            }
+        }
+        if feeds == before {
+            return feeds;
+        }
+    }
+    [0.0; 2]
+}
+
+/// The time over some blocks, infinite if there is no plan \[s\].
+fn window_time_s(blocks: &[Block<f64>], [start_mm_s, end_mm_s]: [f64; 2]) -> f64 {
+    let mut nodes = [Node::EMPTY; nodes_for(BLOCKS)];
+    let spanning = plan_spanning(blocks, start_mm_s, end_mm_s, &mut nodes, &mut |_| ());
+    spanning.ok().flatten().unwrap_or(f64::INFINITY)
+}
+
+/// The time of a run, infinite if there is no plan \[s\].
+fn run_time_s(blocks: &[StretchBlock], tick_s: f64) -> f64 {
+    let stretches = blocks.split_inclusive(|block| block.joint_mm_s <= 0.0);
+    stretches.map(|stretch| stretch_time_s(stretch, tick_s).unwrap_or(f64::INFINITY)).sum()
+}
+
+fn stretch_time_s(stretch: &[StretchBlock], tick_s: f64) -> Option<f64> {
+    let blocks: Vec<Block<f64>> = stretch.iter().map(StretchBlock::for_lookahead).collect();
+    let mut end_mm = 0.0;
+    let ends_mm: Vec<f64> = blocks
+        .iter()
+        .map(|block| {
+            end_mm += block.length_mm;
+            end_mm
+        })
+        .collect();
+    let planned = lookahead(&blocks, &ends_mm, 0.0, 0.0, Mode::Spanning, tick_s).ok()?;
+    Some(time_s(&planned))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::toolpath::Element;
+
+    /// Lines between points, at so small a feed that blends pay.
+    fn path(points: &[[f64; 2]], tolerance_mm: f64, feed_mm_s: impl Fn(u32) -> f64) -> Vec<Move> {
+        let point = |[x, y]: [f64; 2]| [x, y, 0.0];
+        points
+            .windows(2)
+            .zip(1..)
+            .map(|(pair, line)| {
+                let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
+                Move { line, element, feed_mm_s: feed_mm_s(line), tolerance_mm, merging_mm: None }
+            })
+            .collect()
+    }
+
+    fn blocks_of(moves: &[Move]) -> Vec<StretchBlock> {
+        blocks(moves, &Machine::reference()).expect("a machine's limits")
+    }
+
+    fn kinds(blocks: &[StretchBlock]) -> Vec<(u32, &'static str)> {
+        blocks.iter().map(|block| (block.line, block.element.kind())).collect()
+    }
+
+    #[test]
+    fn blends_take_the_slower_feed_and_the_first_line() {
+        let moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [10.0, 20.0]], 0.05, f64::from);
+        let blocks = blocks_of(&moves);
+        assert_eq!(kinds(&blocks), [(1, "line"), (1, "blend"), (2, "line"), (3, "line")]);
+        let feeds: Vec<_> = blocks.iter().map(|block| block.ceiling.feed_mm_s).collect();
+        assert_eq!(feeds, [1.0, 1.0, 2.0, 3.0]);
+        for pair in blocks.windows(2) {
+            assert_eq!(pair[0].element.ends_mm().1, pair[1].element.ends_mm().0);
+            assert!(pair[0].joint_mm_s > 1e6, "{}", pair[0].joint_mm_s);
+        }
+        assert!(blocks_of(&[]).is_empty());
+    }
+
+    /// Between a small blend and a big one, the big one gets what the small one leaves; two big ones share.
+    #[test]
+    fn neighbours_share_a_short_element() {
+        let slow = |_: u32| 0.5;
+        let both = blocks_of(&path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 1.0], [20.0, 1.0]], 0.2, slow));
+        assert_eq!(kinds(&both)[2], (2, "line"), "{:?}", kinds(&both));
+        let rest_mm = both[2].element.length_mm();
+        assert!((rest_mm - 0.1).abs() < 1e-12, "{rest_mm}");
+        // 2° and 150°: the first wants more than the whole line, the second a third of it.
+        // Lines of one feed would be merged.
+        let (sine, cosine) = libm::sincos(2.0_f64.to_radians());
+        let turn = libm::sincos(152.0_f64.to_radians());
+        let corner = [10.0 + cosine, sine];
+        let end = [corner[0] + 10.0 * turn.1, corner[1] + 10.0 * turn.0];
+        let blocks = blocks_of(&path(&[[0.0, 0.0], [10.0, 0.0], corner, end], 0.2, |line| {
+            0.05 + 1e-9 * f64::from(line)
+        }));
+        assert_eq!(blocks.len(), 5, "{:?}", kinds(&blocks));
+        let way_mm = |index: usize, whole_mm: f64| whole_mm - blocks[index].element.length_mm();
+        let (first, second) = (way_mm(0, 10.0), way_mm(4, 10.0));
+        assert!(first > 0.5 && second > 0.2 && (first + second - 0.9).abs() < 1e-9, "{first} {second}");
+    }
+
+    /// From a small feed a right angle is rounded, from a high one stopping on it takes less time.
+    #[test]
+    fn a_corner_is_blended_where_that_is_faster() {
+        let corner = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]];
+        let blocks = |feed_mm_s: f64| blocks_of(&path(&corner, 0.01, |_| feed_mm_s));
+        assert_eq!(kinds(&blocks(1.0)), [(1, "line"), (1, "blend"), (2, "line")]);
+        assert_eq!(kinds(&blocks(50.0)), [(1, "line"), (2, "line")]);
+        assert_eq!(blocks(50.0)[0].joint_mm_s, 0.0);
+    }
+
+    /// A slow move beside a fast one: the blend is at the slow one's feed, and shorter than the tolerance would allow.
+    #[test]
+    fn beside_a_fast_move_a_slow_blend_is_short() {
+        let corner = [[0.0, 0.0], [10.0, 0.0], [19.8, 2.0]];
+        let blend_mm = |feed_mm_s: [f64; 2]| {
+            let blocks = blocks_of(&path(&corner, 0.5, |line| feed_mm_s[line as usize - 1]));
+            blocks.iter().find(|block| block.element.kind() == "blend").map(|block| block.element.length_mm())
+        };
+        let (even, uneven) = (blend_mm([5.0, 5.0]), blend_mm([5.0, 60.0]));
+        assert!(even > Some(3.0) && uneven < even.map(|mm| 0.6 * mm), "{even:?} {uneven:?}");
+    }
+}

@@ -1,0 +1,86 @@
+//! Corner blends against the programmed path: distance both ways, continuity, every tick's limits, and the time that
+//! they save.
+//!
+//! The oracle is the programmed geometry itself: distances from lines and arcs in closed form, polynomials of the
+//! compiled pieces evaluated here. `MOTION_TEST_SEED` is the first seed, `MOTION_TEST_PROGRAMS` how many.
+//!
+//! - `asked`: programmed moves, at random too, and what they mean;
+//! - `compiled`: the pieces of a plan, held against them;
+//! - `driven`: the executed ticks, held against the limits;
+//! - `tolerance`, `limits`, `time`, `modes`: the tests.
+
+mod asked;
+#[path = "../check/mod.rs"]
+#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
+mod check;
+mod compiled;
+mod driven;
+mod limits;
+mod modes;
+mod time;
+mod tolerance;
+
+use motion_host::gcode;
+use motion_host::machine::Machine;
+use motion_host::planning::{Mode, Plan, plan_program};
+
+type Vector = [f64; 3];
+
+/// The programs of the tests.
+const SAMPLES: [(&str, &str); 6] = [
+    ("modes", include_str!("../../programs/modes.ngc")),
+    ("nameplate", include_str!("../../programs/nameplate_inch.ngc")),
+    ("pockets", include_str!("../../programs/pockets.ngc")),
+    ("stairs", include_str!("../../programs/stairs_incremental.ngc")),
+    ("thread mill", include_str!("../../programs/thread_mill_helix.ngc")),
+    ("stringer", include_str!("../../../host/src/cli/stringer.ngc")),
+];
+
+fn subtract(a: Vector, b: Vector) -> Vector {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn along(a: Vector, direction: Vector, length: f64) -> Vector {
+    [a[0] + direction[0] * length, a[1] + direction[1] * length, a[2] + direction[2] * length]
+}
+
+fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn norm(a: Vector) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// To 10⁻¹⁰ mm, as G-code has them.
+fn rounded(mm: f64) -> f64 {
+    (mm * 1e10).round() / 1e10
+}
+
+/// A program without its words of path mode, and without tape marks, which have to be first.
+fn without_path_mode(text: &str) -> String {
+    let line = |line: &str| {
+        let mut words: Vec<&str> = line.split_whitespace().collect();
+        if words.iter().any(|word| word.eq_ignore_ascii_case("G64")) {
+            words.retain(|word| !word.starts_with(['P', 'p', 'Q', 'q']));
+        }
+        words.retain(|word| !["G61", "G64"].iter().any(|mode| word.eq_ignore_ascii_case(mode)));
+        words.join(" ") + "\n"
+    };
+    text.lines().filter(|line| !line.starts_with('%')).map(line).collect()
+}
+
+fn planned(text: &str, machine: &Machine) -> Result<Plan, String> {
+    let program = gcode::read("corners.ngc", text.as_bytes()).map_err(|error| error.to_string())?;
+    plan_program("corners.ngc", &program, machine, Mode::Spanning).map_err(|error| error.to_string())
+}
+
+fn seeds(count: u64) -> impl Iterator<Item = u64> {
+    let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
+    first..first + check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(count)
+}
+
+fn assert_none(failures: &[String]) {
+    let shown: Vec<_> = failures.iter().take(8).map(String::as_str).collect();
+    assert!(failures.is_empty(), "{} failed:\n{}", failures.len(), shown.join("\n"));
+}
