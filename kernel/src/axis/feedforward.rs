@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use super::check::{Check, fits};
 use super::preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX};
+use super::scale::ScaleError;
 use crate::num::{Fixed, Real, is_finite, whole};
 use crate::path::Setpoint;
 
@@ -470,11 +471,20 @@ impl<R: Real> Delay<R> {
 }
 
 impl<R: Real> FeedforwardConfig<R> {
+    /// Feedforward by itself, for a control tick of `tick_s` and position set-points that are delayed by
+    /// `preview_ticks`. Background.
+    ///
+    /// # Errors
+    /// The first figure that is out of its range or beyond the number type's.
+    pub fn new(feedforward: &Feedforward, preview_ticks: u8, tick_s: f64) -> Result<Self, ScaleError> {
+        Check::all(|check| Self::checked(check, feedforward, preview_ticks, tick_s))
+    }
+
     /// For a tick of `tick_s`, where position set-points are delayed by `preview_ticks` ticks.
     ///
     /// Refused where a figure is not finite, out of its range or beyond the number type's, or a lead longer than the
     /// preview.
-    pub(super) fn new(check: &mut Check, feedforward: &Feedforward, preview_ticks: u8, tick_s: f64) -> Self {
+    pub(super) fn checked(check: &mut Check, feedforward: &Feedforward, preview_ticks: u8, tick_s: f64) -> Self {
         let &Feedforward { velocity, accel_s, jerk_s2, lead_s, .. } = feedforward;
         let preview_s = f64::from(preview_ticks) * tick_s;
         let early_s = preview_s - lead_s;

@@ -87,7 +87,7 @@ impl<R: Real> Regulator<R> {
             kp: gain(check, "kp [1/s]", gains.kp_per_s, error_limit_mm),
             ki: gain(check, "ki [1/s²]", gains.ki_per_s2 * tick_s, error_limit_mm),
             kd: gain(check, "kd [1]", gains.kd / tick_s, 2.0 * error_limit_mm),
-            feedforward: FeedforwardConfig::new(check, feedforward, preview_ticks, tick_s),
+            feedforward: FeedforwardConfig::checked(check, feedforward, preview_ticks, tick_s),
         }
     }
 
