@@ -207,7 +207,7 @@ fn stages<const N: usize>(counter: &Counter, bytes: &[u8]) {
                     hprintln!("path {}", spent);
                 }
             }
-            Ready::EndOfStretch(_) | Ready::Dwell(_) | Ready::Stop => {}
+            Ready::EndOfStretch(_) | Ready::Dwell(_) | Ready::Stop | Ready::Block => {}
         }
     }
 }
