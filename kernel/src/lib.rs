@@ -88,6 +88,7 @@ pub mod law;
 pub mod path;
 pub mod queue;
 pub mod program;
+#[cfg(feature = "live")]
 pub mod live;
 pub mod exec;
 pub mod axis;

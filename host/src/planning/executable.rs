@@ -62,12 +62,14 @@ impl Executable {
         Ok(Self { items, tick_s: plan.tick_s })
     }
 
-    /// The program with the machine it was planned for, as bytes for a board.
+    /// The program with the machine it was planned for, as bytes for a board without live control: without blocks.
     #[must_use]
     pub fn to_bytes(&self, machine: &Machine) -> Vec<u8> {
         let mut bytes = Vec::new();
         // Entries of three axes fit the format.
-        write(&machine.header(), &self.items, &mut bytes).expect("three axes");
+        let items: Vec<_> =
+            self.items.iter().filter(|item| !matches!(item, Item::Block(_))).copied().collect();
+        write(&machine.header(), &items, &mut bytes).expect("three axes");
         bytes
     }
 
@@ -146,21 +148,17 @@ fn path_blocks(stretch: &Stretch, densest_mm_s: &[(Position, f64)]) -> Result<Ve
         // At least 0: a piece that begins before the block reaches into it.
         let within = within.start.saturating_sub(1)..within.end;
         let most_mm_s = densest_mm_s[within].iter().map(|&(_, feed)| feed).fold(f64::INFINITY, f64::min);
-        let next = PathBlock {
-            length: end - start,
-            feed_mm_s: block.feed_mm_s,
-            programmed: allowed(&block.ceiling, most_mm_s),
-            greatest: allowed(&block.greatest, most_mm_s),
-            joint_mm_s: block.joint_mm_s,
-        };
+        let next = PathBlock::new(
+            end - start,
+            block.feed_mm_s,
+            allowed(&block.ceiling, most_mm_s),
+            allowed(&block.greatest, most_mm_s),
+            block.joint_mm_s,
+        );
         start = end;
         match blocks.last_mut() {
-            Some(last)
-                if last.joint_mm_s >= last.greatest.cap_mm_s
-                    && PathBlock { length: next.length, joint_mm_s: next.joint_mm_s, ..*last } == next =>
-            {
-                last.length = last.length + next.length;
-                last.joint_mm_s = next.joint_mm_s;
+            Some(last) if last.joint_mm_s() >= last.greatest().cap_mm_s && last.holds_like(&next) => {
+                *last = last.with(&next);
             }
             _ => blocks.push(next),
         }

@@ -484,7 +484,12 @@ impl<R: Real> FeedforwardConfig<R> {
     ///
     /// Refused where a figure is not finite, out of its range or beyond the number type's, or a lead longer than the
     /// preview.
-    pub(super) fn checked(check: &mut Check, feedforward: &Feedforward, preview_ticks: u8, tick_s: f64) -> Self {
+    pub(super) fn checked(
+        check: &mut Check,
+        feedforward: &Feedforward,
+        preview_ticks: u8,
+        tick_s: f64,
+    ) -> Self {
         let &Feedforward { velocity, accel_s, jerk_s2, lead_s, .. } = feedforward;
         let preview_s = f64::from(preview_ticks) * tick_s;
         let early_s = preview_s - lead_s;

@@ -21,4 +21,6 @@ pub mod shape;
 pub use limits::{Law, LimitError, Limits};
 pub use ramp::{FeedState, LimitedBy, Ramp};
 pub use reach::{peak, reach};
-pub use segment::{FeedSegment, PathMotion, Phase, SegmentError, Ticks, TurnedRamp};
+#[cfg(feature = "live")]
+pub use segment::TurnedRamp;
+pub use segment::{FeedSegment, PathMotion, Phase, SegmentError, Ticks};

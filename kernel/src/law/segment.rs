@@ -11,6 +11,7 @@
 //! sine is fixed point times fractions, good to a few position steps and length·2⁻³² (1.9 nm over 8 m)
 //! whatever the number type; the sine's part, a five-hundredth of Jp·t₁³, is a `Real`.
 
+#[cfg(feature = "live")]
 mod turn;
 
 use core::f64::consts::PI;
@@ -22,6 +23,7 @@ use super::shape::Shape;
 use crate::num::{Real, Root, Unit, is_within, rolled, whole};
 use crate::units::Position;
 
+#[cfg(feature = "live")]
 pub use turn::TurnedRamp;
 
 /// A duration in control ticks, in steps of 2⁻³² tick.
@@ -229,7 +231,8 @@ pub struct FeedSegment<R> {
     ramp: Ramp<R>,
     rise: Clock,
     hold: Clock,
-    /// Where in the rise it turns, counted from 1 downwards in 2⁻⁶⁴; 0 if it does not, see [`FeedSegment::turned`].
+    /// Where in the rise it turns, counted from 1 downwards in 2⁻⁶⁴; 0 if it does not, see `turned`.
+    #[cfg(feature = "live")]
     turns_at: u64,
     /// F₀·t₁ and −F·t₁ less Jp·t₁³/(8π²), and Jp·t₁³/12, in position steps.
     rise_bits: i64,
@@ -380,6 +383,7 @@ impl<R: Real> FeedSegment<R> {
             ramp: Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by },
             rise,
             hold,
+            #[cfg(feature = "live")]
             turns_at: 0,
             rise_bits,
             fall_bits: -fall_less_bits,
@@ -430,12 +434,21 @@ impl<R: Real> FeedSegment<R> {
         self.clock(phase).duration
     }
 
+    /// Only live control turns ramps.
+    #[inline]
+    fn turns_at(&self) -> u64 {
+        #[cfg(feature = "live")]
+        return self.turns_at;
+        #[cfg(not(feature = "live"))]
+        0
+    }
+
     /// The normalised time with which `phase` begins, in 2⁻⁶⁴.
     #[inline]
     pub fn fraction_at_start(&self, phase: Phase) -> u64 {
         match phase {
             Phase::Rise => 0,
-            Phase::Hold | Phase::Fall => self.turns_at,
+            Phase::Hold | Phase::Fall => self.turns_at(),
         }
     }
 
@@ -444,7 +457,7 @@ impl<R: Real> FeedSegment<R> {
     #[inline]
     pub fn fraction_in(&self, phase: Phase, time: Ticks) -> u64 {
         let clock = self.clock(phase);
-        clock.part(time, clock.duration > Ticks::ONE || self.turns_at != 0)
+        clock.part(time, clock.duration > Ticks::ONE || self.turns_at() != 0)
     }
 
     /// The normalised time `elapsed` after the start of `phase`, in 2⁻⁶⁴.
@@ -467,10 +480,8 @@ impl<R: Real> FeedSegment<R> {
     /// end. In the tick.
     #[inline(always)]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
-        if phase == Phase::Hold {
-            if self.turns_at != 0 {
-                return self.at_turn(fraction);
-            }
+        let turns = phase == Phase::Hold && self.turns_at() != 0;
+        if phase == Phase::Hold && !turns {
             let x = (fraction >> 32) as u32;
             let s = self
                 .hold_start_bits
@@ -485,14 +496,29 @@ impl<R: Real> FeedSegment<R> {
                 snap_mm_s4: R::ZERO,
             };
         }
-        // The fall is the rise run backwards from the end: the same shape, once, for both.
+        // The fall is the rise run backwards from the end, and before the middle of a turn time counts towards it: the
+        // same shape, once, for all.
         let falling = phase == Phase::Fall;
-        let fraction = if falling { !fraction } else { fraction };
-        let shape = Shape::at(R::Unit::from_fraction(fraction));
+        let before = turns && fraction.cast_signed() < 0;
+        let fraction = match (falling, before) {
+            (true, _) => !fraction,
+            (false, true) => fraction.wrapping_neg(),
+            (false, false) => fraction,
+        };
+        let unit = R::Unit::from_fraction(fraction);
+        let shape = Shape::at(unit);
         let (gained, jerk) = (self.speed_mm_s.scaled(shape.speed), self.jerk_mm_s3.scaled(shape.jerk));
         let x = (fraction >> 32) as u32;
-        let cube = portion(self.cube_bits, times(times(x, x), x));
+        let square = times(x, x);
+        let cube = portion(self.cube_bits, times(square, x));
         let bent = Position::from_bits(cube) + Position::from_offset(self.sine_mm.scaled(shape.snap));
+        let (accel, snap) = (self.accel_mm_s2.scaled(shape.accel), self.snap_mm_s4.scaled(shape.snap));
+        #[cfg(feature = "live")]
+        if turns {
+            let rise =
+                PathMotion { s: bent, v_mm_s: gained, a_mm_s2: accel, j_mm_s3: jerk, snap_mm_s4: snap };
+            return self.at_turn(&rise, unit, x, before);
+        }
         let (s, v_mm_s, j_mm_s3) = if falling {
             let even = Position::from_bits(portion(self.fall_bits, x));
             (self.length + even, self.ramp.to_mm_s - gained, -jerk)
@@ -500,13 +526,7 @@ impl<R: Real> FeedSegment<R> {
             let even = Position::from_bits(portion(self.rise_bits, x));
             (even, self.ramp.from_mm_s + gained, jerk)
         };
-        PathMotion {
-            s: (s + bent).min(self.length),
-            v_mm_s,
-            a_mm_s2: self.accel_mm_s2.scaled(shape.accel),
-            j_mm_s3,
-            snap_mm_s4: self.snap_mm_s4.scaled(shape.snap),
-        }
+        PathMotion { s: (s + bent).min(self.length), v_mm_s, a_mm_s2: accel, j_mm_s3, snap_mm_s4: snap }
     }
 }
 

@@ -40,28 +40,28 @@ const LIMITS_STEPS: usize = 8;
 impl RoadBlock {
     /// The ceiling under a feed override, and the limits of ramps below it. Rapids are not faster for it.
     pub(super) fn allowed(&self, feed_override: f64) -> (f64, Limits<f64>) {
-        let PathBlock { feed_mm_s, greatest, .. } = &self.block;
+        let (feed_mm_s, most_mm_s) = (self.block.feed_mm_s(), self.block.greatest().cap_mm_s);
         let wanted_mm_s = if feed_mm_s.is_finite() {
             feed_mm_s * feed_override
         } else {
-            greatest.cap_mm_s * f64::min(feed_override, 1.0)
+            most_mm_s * f64::min(feed_override, 1.0)
         };
-        let cap_mm_s = f64::min(wanted_mm_s, greatest.cap_mm_s);
+        let cap_mm_s = f64::min(wanted_mm_s, most_mm_s);
         (cap_mm_s, self.limits_at(cap_mm_s))
     }
 
     fn limits_at(&self, feed_mm_s: f64) -> Limits<f64> {
-        let PathBlock { programmed, greatest, .. } = &self.block;
+        let programmed = self.block.programmed();
         if feed_mm_s <= programmed.cap_mm_s * (1.0 + FEED_ROUNDING) {
             programmed.limits
         } else {
-            greatest.limits
+            self.block.greatest().limits
         }
     }
 
     /// Greatest feed through the joint at its end \[mm/s\].
     pub(super) fn joint_mm_s(&self) -> f64 {
-        self.block.joint_mm_s
+        self.block.joint_mm_s()
     }
 }
 

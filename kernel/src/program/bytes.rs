@@ -3,7 +3,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MOTN` |
-//! | 1 | version of this format, 3 |
+//! | 1 | version of this format, 2 |
 //! | 1 | number of axes |
 //! | … | [`Header`], then [`Item`]s to the end, each in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
@@ -22,7 +22,7 @@ use crate::queue::PathRules;
 use crate::units::Position;
 
 const MAGIC: [u8; 4] = *b"MOTN";
-const VERSION: u8 = 3;
+const VERSION: u8 = 2;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 8;
@@ -96,7 +96,7 @@ pub enum ProgramError {
     NotAProgram,
     /// It is of another version of the format.
     Version {
-        /// Its version; 3 is expected.
+        /// Its version; 2 is expected.
         found: u8,
     },
     /// It is for a machine with another number of axes.

@@ -67,30 +67,90 @@ pub enum Item<const AXES: usize> {
     /// Rest until told to resume, between stretches.
     Stop,
     /// What the feed over the next length of path is held to; the path's blocks follow each other without a gap. What
-    /// live control makes other plans with.
+    /// live control makes other plans with; a kernel without it reads no programs with blocks.
+    #[cfg_attr(not(feature = "live"), serde(skip))]
     Block(PathBlock),
 }
 
-/// A length of path with what holds its feed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PathBlock {
-    /// Its length.
-    pub length: Position,
-    /// The program's feed \[mm/s\]; infinite for a rapid.
-    pub feed_mm_s: f64,
-    /// At up to the program's feed.
-    pub programmed: Allowed,
-    /// Whatever the program says.
-    pub greatest: Allowed,
-    /// Greatest feed through the joint at its end \[mm/s\]; 0 at the stretch's end.
-    pub joint_mm_s: f64,
-}
-
 /// What geometry and machine allow on a block.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allowed {
     /// Greatest feed \[mm/s\].
     pub cap_mm_s: f64,
     /// Limits of ramps up to that feed.
     pub limits: Limits<f64>,
+}
+
+/// A length of path with what holds its feed.
+// Figures of one kind: they take less flash to read than a struct of structs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PathBlock {
+    /// Its length.
+    pub length: Position,
+    /// The program's feed, then cap and limits at up to it, then cap and limits whatever it is, then the joint's feed.
+    #[serde(with = "array")]
+    figures: [f64; 10],
+}
+
+impl PathBlock {
+    /// A block of `length` with the program's feed \[mm/s\], infinite for a rapid; what is allowed at up to that feed,
+    /// and whatever it is.
+    #[must_use]
+    pub fn new(
+        length: Position,
+        feed_mm_s: f64,
+        programmed: Allowed,
+        greatest: Allowed,
+        joint_mm_s: f64,
+    ) -> Self {
+        let [p, g] = [programmed, greatest].map(|Allowed { cap_mm_s, limits }| {
+            [cap_mm_s, limits.accel_mm_s2, limits.jerk_mm_s3, limits.snap_mm_s4]
+        });
+        let figures = [feed_mm_s, p[0], p[1], p[2], p[3], g[0], g[1], g[2], g[3], joint_mm_s];
+        Self { length, figures }
+    }
+
+    /// Whether the feed on another block is held to the same figures, whatever their lengths and joints.
+    #[must_use]
+    pub fn holds_like(&self, other: &Self) -> bool {
+        let [held @ .., _] = self.figures;
+        let [other @ .., _] = other.figures;
+        held == other
+    }
+
+    /// The same block, longer by `next`, and with its end.
+    #[must_use]
+    pub fn with(self, next: &Self) -> Self {
+        let ([held @ .., _], [.., joint_mm_s]) = (self.figures, next.figures);
+        let [feed, a, b, c, d, e, f, g, h] = held;
+        Self { length: self.length + next.length, figures: [feed, a, b, c, d, e, f, g, h, joint_mm_s] }
+    }
+
+    /// Greatest feed through the joint at its end \[mm/s\]; 0 at the stretch's end.
+    #[must_use]
+    pub fn joint_mm_s(&self) -> f64 {
+        let [.., joint_mm_s] = self.figures;
+        joint_mm_s
+    }
+
+    /// The program's feed \[mm/s\]; infinite for a rapid.
+    #[must_use]
+    pub fn feed_mm_s(&self) -> f64 {
+        let [feed_mm_s, ..] = self.figures;
+        feed_mm_s
+    }
+
+    /// What is allowed at up to the program's feed.
+    #[must_use]
+    pub fn programmed(&self) -> Allowed {
+        let [_, cap_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, ..] = self.figures;
+        Allowed { cap_mm_s, limits: Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 } }
+    }
+
+    /// What is allowed whatever the program says.
+    #[must_use]
+    pub fn greatest(&self) -> Allowed {
+        let [.., cap_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, _] = self.figures;
+        Allowed { cap_mm_s, limits: Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 } }
+    }
 }

@@ -238,15 +238,18 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
     }
 
     /// For feed that goes on from here, at `feed_mm_s`, whatever was accepted before.
+    #[cfg(feature = "live")]
     pub(crate) fn feed_from(&self, feed_length: Position, feed_mm_s: R) -> Self {
         Self { feed_length, feed_mm_s, recent: [Ticks::ONE; SEGMENTS_PER_TICK_MAX], ..*self }
     }
 
+    #[cfg(feature = "live")]
     pub(crate) fn feed_mm_s(&self) -> R {
         self.feed_mm_s
     }
 
     /// The end of the path of a stretch, whose feed is accepted in lists of its own.
+    #[cfg(feature = "live")]
     pub(crate) fn end_of_path(&mut self, position: [Position; AXES]) -> Result<(), Rejection> {
         self.continuous(&position)?;
         if self.path_length == Position::ZERO {

@@ -251,6 +251,7 @@ impl<R: Real> Lists<'_, R> {
 
 impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// What the background asks for now; what it gave up goes.
+    #[inline(never)]
     pub(super) fn look_for_change(&mut self) {
         let Some(lists) = &mut self.lists else { return };
         let words = &self.shared.words;
@@ -267,7 +268,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
             words.asked().filter(|change| change.from == lists.current && lists.refused != Some(*change));
     }
 
-    #[inline]
+    #[inline(never)]
     pub(super) fn count_done(&mut self) {
         let Some(lists) = &mut self.lists else { return };
         lists.done = lists.done.wrapping_add(1);
@@ -297,6 +298,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
 
     /// Follows the change.
     #[cold]
+    #[inline(never)]
     pub(crate) fn take_over(&mut self) {
         let Some(lists) = &mut self.lists else { return };
         let Some(change) = lists.change.take() else { return };

@@ -10,7 +10,9 @@
 //! measured the same length.
 
 mod accept;
+#[cfg(feature = "live")]
 mod change;
+#[cfg(feature = "live")]
 mod live;
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -25,7 +27,9 @@ use crate::units::Position;
 
 pub(crate) use accept::Acceptance;
 pub use accept::{PathRules, Rejection, SEGMENTS_PER_TICK_MAX};
+#[cfg(feature = "live")]
 pub use change::{Change, LISTS, Progress};
+#[cfg(feature = "live")]
 pub use live::{LiveFeeder, LiveStreams};
 
 /// An item of the path stream.
@@ -83,6 +87,7 @@ struct Shared {
     /// And the pieces at least as much as the feed.
     path_covers_feed: AtomicBool,
     /// Where motion can be changed.
+    #[cfg(feature = "live")]
     words: change::Words,
 }
 
@@ -101,6 +106,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
                 feed_entered: AtomicU32::new(0),
                 feed_covers_path: AtomicBool::new(true),
                 path_covers_feed: AtomicBool::new(true),
+                #[cfg(feature = "live")]
                 words: change::Words::new(),
             },
         }
@@ -131,6 +137,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             finished,
             path_taken: path,
             feed_taken: feed,
+            #[cfg(feature = "live")]
             lists: None,
             correction: None,
         };
@@ -299,6 +306,7 @@ pub struct Intake<'a, R: Real, const AXES: usize> {
     finished: u32,
     path_taken: Taken,
     feed_taken: Taken,
+    #[cfg(feature = "live")]
     lists: Option<live::Lists<'a, R>>,
     correction: Option<Correction<'a, R, AXES>>,
 }
@@ -320,6 +328,7 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     pub(crate) fn start_tick(&mut self) {
         self.path_taken.before_tick = self.path_taken.so_far;
         self.feed_taken.before_tick = self.feed_taken.so_far;
+        #[cfg(feature = "live")]
         if self.lists.is_some() {
             self.look_for_change();
         }
@@ -336,6 +345,7 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     pub(crate) fn drop_feed(&mut self) {
         self.feed_taken.so_far = self.feed_taken.so_far.wrapping_add(1);
         self.feed.dequeue();
+        #[cfg(feature = "live")]
         if self.lists.is_some() {
             self.count_done();
         }
@@ -365,6 +375,7 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     /// no more of it can be had, and the other queue was full too or covers as much path.
     #[inline]
     pub(crate) fn may_start(&self) -> bool {
+        #[cfg(feature = "live")]
         if self.lists.is_some() {
             // What is handed over ends at rest on the path that is there.
             return true;

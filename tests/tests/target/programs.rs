@@ -262,6 +262,7 @@ pub(crate) fn one_axis() -> Vec<u8> {
     let items: Vec<Item<1>> = executable
         .items
         .into_iter()
+        .filter(|item| !matches!(item, Item::Block(_)))
         .map(|item| match item {
             Item::Line { line, start, direction, length } => {
                 Item::Line { line, start: [start[0]], direction: [direction[0]], length }
@@ -271,7 +272,7 @@ pub(crate) fn one_axis() -> Vec<u8> {
             Item::EndOfStretch(end) => Item::EndOfStretch([end[0]]),
             Item::Dwell(duration) => Item::Dwell(duration),
             Item::Stop => Item::Stop,
-            Item::Block(block) => Item::Block(block),
+            Item::Block(_) => unreachable!("left out"),
         })
         .collect();
     let mut bytes = Vec::new();

@@ -19,7 +19,7 @@ use core::f64::consts::PI;
 use super::{Clock, FeedSegment, PathMotion, SegmentError, Ticks, portion, times};
 use crate::law::ramp::Ramp;
 use crate::law::shape::Shape;
-use crate::num::{Real, Unit};
+use crate::num::Real;
 use crate::units::Position;
 
 /// A ramp that turns at `turn_s` of its rise, which is at most half of it.
@@ -120,35 +120,29 @@ impl<R: Real> FeedSegment<R> {
         Ok(segment)
     }
 
-    /// Between the turns; the fraction counts from the middle, in parts of t₁. In the tick.
-    pub(super) fn at_turn(&self, fraction: u64) -> PathMotion<R> {
+    /// Between the turns, at `x` parts of t₁ from the middle, of which a rise would have made `rise`: its bent length and
+    /// what it gained of each. In the tick.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn at_turn(&self, rise: &PathMotion<R>, unit: R::Unit, x: u32, before: bool) -> PathMotion<R> {
         /// 12/(8π²), in 2⁻³².
         const LINEAR: u32 = (12.0 / (8.0 * PI * PI) * 4_294_967_296.0) as u32;
-        let before = fraction.cast_signed() < 0;
-        let fraction = if before { fraction.wrapping_neg() } else { fraction };
-        let unit = R::Unit::from_fraction(fraction);
-        let shape = Shape::at(unit);
-        let x = (fraction >> 32) as u32;
-        let square = times(x, x);
-        let bent = portion(self.cube_bits, times(square, x))
-            .wrapping_sub(portion(portion(self.cube_bits, LINEAR), x));
-        let bent = Position::from_bits(bent) + Position::from_offset(self.sine_mm.scaled(shape.snap));
+        let bent = rise.s - Position::from_bits(portion(portion(self.cube_bits, LINEAR), x));
         let even = portion(self.hold_linear_bits, x);
-        let gained = self.hold_gain_mm_s.scaled(unit) - self.speed_mm_s.scaled(shape.speed);
-        let jerk = self.jerk_mm_s3.scaled(shape.jerk);
+        let gained = self.hold_gain_mm_s.scaled(unit) - rise.v_mm_s;
         let (even, v_mm_s, j_mm_s3) = if before {
-            (even.wrapping_neg(), self.hold_v_mm_s - gained, jerk)
+            (even.wrapping_neg(), self.hold_v_mm_s - gained, rise.j_mm_s3)
         } else {
-            (even, self.hold_v_mm_s + gained, -jerk)
+            (even, self.hold_v_mm_s + gained, -rise.j_mm_s3)
         };
-        let middle =
-            self.hold_start_bits.wrapping_add(even).wrapping_add(portion(self.hold_square_bits, square));
+        let square = portion(self.hold_square_bits, times(x, x));
+        let middle = self.hold_start_bits.wrapping_add(even).wrapping_add(square);
         PathMotion {
             s: (Position::from_bits(middle) - bent).min(self.length),
             v_mm_s,
-            a_mm_s2: self.hold_a_mm_s2 - self.accel_mm_s2.scaled(shape.accel),
+            a_mm_s2: self.hold_a_mm_s2 - rise.a_mm_s2,
             j_mm_s3,
-            snap_mm_s4: -self.snap_mm_s4.scaled(shape.snap),
+            snap_mm_s4: -rise.snap_mm_s4,
         }
     }
 }
