@@ -346,6 +346,56 @@ fn run_of_the_stringer() {
     }
 }
 
+/// Held and let go, driven at half the feed, given up: as the trace shows it.
+#[test]
+fn run_under_live_control() {
+    let desk = Desk::new("live");
+    desk.put("line.ngc", "G1 X60 F2400\nM2\n");
+    let run = |at: &str| {
+        let found = desk.json(&["run", "line.ngc", "--at", at, "--trace", "line.csv", "--json"]);
+        let trace = desk.read("line.csv");
+        let column = |name: &str| -> Vec<String> {
+            let index = trace.lines().next().expect("a header").split(',').position(|n| n == name);
+            let index = index.expect(name);
+            trace.lines().skip(1).map(|row| row.split(',').nth(index).expect(name).to_owned()).collect()
+        };
+        let numbers = |name: &str| -> Vec<f64> {
+            column(name).iter().map(|value| value.parse().expect("a number")).collect()
+        };
+        let (states, feeds) = (column("state"), numbers("v_mm_s"));
+        let last_mm = *numbers("X_set_mm").last().expect("a tick");
+        (found, states, feeds, last_mm)
+    };
+    let (plain, _, feeds, _) = run("1000000:hold");
+    let ticks = |found: &Value| number(&found["ticks"]);
+    let fastest = |feeds: &[f64]| feeds.iter().copied().fold(0.0, f64::max);
+    assert!((fastest(&feeds) - 40.0).abs() < 1e-6);
+
+    let (held, states, _, end_mm) = run("1000:hold,3000:resume");
+    let at_rest = states.iter().filter(|state| *state == "held").count();
+    assert!(at_rest > 1000 && at_rest < 2000, "{at_rest}");
+    assert!(ticks(&held) > ticks(&plain) + at_rest as f64 && (end_mm - 60.0).abs() < 1e-9);
+
+    let (slow, _, feeds, end_mm) = run("0:override=0.5");
+    assert!((fastest(&feeds) - 20.0).abs() < 1e-6 && (end_mm - 60.0).abs() < 1e-9);
+    // 60 mm at 20 mm/s, and a ramp up and one down.
+    assert!((ticks(&slow) * 0.0005 - 3.0).abs() < 0.3, "{slow}");
+
+    let (_, states, feeds, end_mm) = run("1000:abort");
+    assert!(
+        end_mm < 50.0 && feeds.last() == Some(&0.0) && states.last().is_some_and(|s| s == "held"),
+        "{end_mm}"
+    );
+
+    let output = desk.motion(&["run", "line.ngc", "--at", "10:stop"]);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{error}");
+    assert!(
+        error.contains("found the command `stop`, expected hold, resume, abort or override=SHARE"),
+        "{error}"
+    );
+}
+
 #[test]
 fn a_program_from_standard_input() {
     let desk = Desk::new("stdin");

@@ -14,6 +14,7 @@
 //!   path    lines and septic pieces              Piece ──────────────┤ the same path length
 //!                                                                    │
 //!   program both as data; keeps the queues full  Item ─► Feeder       │
+//!   live    hold, override, abort (optional)     feed lists           │
 //!   queue   bounded, checked on entry            Feeder ─► Intake ◄──┘
 //!   ─────── tick ──────────────────────────────────────────────────────
 //!   exec    feed law ─► s, v, a, j, snap         PathMotion

@@ -12,8 +12,13 @@ use check::totals::Totals;
 use check::{drive, machine, program};
 use motion_host::machine::Machine;
 use motion_host::planning::{Mode, Plan};
+use motion_kernel::exec::{ExecState, Executor};
+use motion_kernel::law::{FeedSegment, Law, Ramp, Ticks, TurnedRamp};
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
+use motion_kernel::path::Piece;
+use motion_kernel::queue::{Change, LiveStreams};
+use motion_kernel::units::Position;
 
 /// A machine, a program for it and its plan; none where planning refuses it or it is long.
 struct Case {
@@ -358,4 +363,49 @@ fn an_abort_ends_at_rest_on_the_path() {
         ran += 1;
     }
     assert!(ran > 60, "{ran}");
+}
+
+/// The tick has passed the place where a list would take over: it says so, and ends as it would have.
+#[test]
+fn a_change_that_comes_too_late_is_refused() {
+    let machine = Machine::reference();
+    let (tick_s, rules) = (machine.tick_s, machine.rules());
+    let at = |mm: f64| Position::from_mm(mm).expect("in range");
+    let law = Law::new(rules.limits).expect("limits");
+    let up = Ramp::new(&law, 0.0, 20.0);
+    let length = at(up.length_mm());
+    let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+    let (mut feeder, mut intake) = streams.split(rules, [at(0.0)]);
+    let mut executor = Executor::<f64, 1>::new([at(0.0)]);
+    feeder.piece(Piece::line(1, [at(0.0)], [1.0], length + length).expect("a line")).expect("room");
+    feeder.end_of_path([length + length]).expect("room");
+    let list = feeder.begin(at(0.0), 0.0).expect("a list");
+    for ramp in [up, up.reversed()] {
+        feeder.segment(list, FeedSegment::ramp(&ramp, length, tick_s).expect("a segment")).expect("room");
+    }
+    feeder.end_of_feed(list).expect("room");
+    feeder.change(Change { from: 0, to: list, after: 0, within: false });
+    for _ in 0..100 {
+        executor.tick(&mut intake).expect("no fault");
+    }
+    let progress = feeder.progress();
+    assert_eq!((progress.tick, progress.list, progress.done), (100, list, 0));
+    // The same ramp, turned where it was 50 ticks ago, and to rest.
+    let turned = TurnedRamp { ramp: up, turn_s: 50.0 * tick_s };
+    let other = feeder.begin(at(0.0), 0.0).expect("a list");
+    let turn_at = Ticks::from_seconds(50.0, 1.0).expect("in range");
+    let first = FeedSegment::turned(&up, turn_at, at(turned.length_mm()), tick_s).expect("a segment");
+    feeder.segment(other, first).expect("room");
+    let stop = Ramp::new(&law, turned.to_mm_s(), 0.0);
+    feeder
+        .segment(other, FeedSegment::ramp(&stop, at(stop.length_mm()), tick_s).expect("a segment"))
+        .expect("room");
+    feeder.change(Change { from: list, to: other, after: 0, within: true });
+    assert!(!feeder.is_refused());
+    executor.tick(&mut intake).expect("no fault");
+    assert!(feeder.is_refused());
+    let executed = std::iter::repeat_with(|| executor.tick(&mut intake).expect("no fault"))
+        .find(|executed| executed.state == ExecState::Idle)
+        .expect("endless");
+    assert_eq!(executed.setpoints[0].position, length + length);
 }
