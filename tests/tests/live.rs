@@ -6,7 +6,7 @@ mod check;
 use check::bounds::Number;
 use check::live::{Command, Run, Seen, execute};
 use check::path::Path;
-use check::program::Generated;
+use check::program::{Asked, Generated};
 use check::random::Random;
 use check::totals::Totals;
 use check::{drive, machine, program};
@@ -352,7 +352,7 @@ fn an_override_that_never_rests_keeps_the_limits() {
 /// An abort comes to rest on the path, and nothing of the program is left.
 #[test]
 fn an_abort_ends_at_rest_on_the_path() {
-    let mut ran = 0;
+    let (mut ran, mut early) = (0, 0);
     for seed in 1..200 {
         let Some(case) = Case::random(seed, 4_000.0) else { continue };
         let ticks = case.plan.time_s / case.machine.tick_s;
@@ -360,9 +360,60 @@ fn an_abort_ends_at_rest_on_the_path() {
         let run = case.run::<f64>(seed, 1.0, &mut |seen| (seen.ticks == at).then_some(Command::Abort));
         let run = run.unwrap_or_else(|error| panic!("MOTION_TEST_SEED={seed}: {error}"));
         assert_eq!(run.state, State::Aborted, "seed {seed}");
+        assert!(run.ticks >= at, "seed {seed}");
+        // Most of them are given up on the way.
+        early += usize::from(run.s_mm < case.plan.length_mm - 1e-6);
         ran += 1;
     }
-    assert!(ran > 60, "{ran}");
+    assert!(ran > 60 && early > ran / 2, "{early} of {ran}");
+}
+
+/// Held in a dwell it does not go on behind it, whatever the list under way holds, until it is told to; nor with an
+/// override of 0, nor when it is to be given up.
+#[test]
+fn held_in_a_dwell_it_stays() {
+    let line = |x: f64| {
+        Asked::Move(check::geometry::Move {
+            from: [((x - 5.0) * check::geometry::UNITS_PER_MM).round() as i64, 0, 0],
+            to: [(x * check::geometry::UNITS_PER_MM).round() as i64, 0, 0],
+            arc: None,
+            feed_mm_min: 1200.0,
+        })
+    };
+    let text = "G1 X5 F1200\nG4 P0.5\nX10\nG4 P0.5\nX15\n".to_owned();
+    let asked = vec![line(5.0), Asked::Dwell(0.5), line(10.0), Asked::Dwell(0.5), line(15.0)];
+    let case = Case::of(&Generated { text, asked }, Machine::reference(), 20_000.0).expect("a program");
+    for (stop, go) in [
+        (Command::Hold, Some(Command::Resume)),
+        (Command::Override(0.0), Some(Command::Override(1.0))),
+        (Command::Abort, None),
+    ] {
+        let (mut dwelt, mut stopped_at, mut gone, mut moved) = (0, None, false, 0);
+        let run = case.run::<f64>(0, 1.0, &mut |seen| {
+            dwelt += u64::from(seen.executed.state == ExecState::Dwell);
+            match stopped_at {
+                None if dwelt == 300 => {
+                    stopped_at = Some(seen.ticks);
+                    return Some(stop);
+                }
+                // 700 ticks of the dwell are left.
+                Some(at) if seen.ticks < at + 4000 => {
+                    moved += u64::from(seen.executed.state == ExecState::Moving);
+                }
+                Some(_) if !gone => {
+                    gone = true;
+                    return go;
+                }
+                _ => {}
+            }
+            None
+        });
+        let run = run.unwrap_or_else(|error| panic!("{stop:?}: {error}"));
+        assert_eq!(moved, 0, "{stop:?}");
+        let (state, end_mm) = if go.is_some() { (State::Done, 15.0) } else { (State::Aborted, 5.0) };
+        assert_eq!(run.state, state, "{stop:?}");
+        assert!((run.s_mm - end_mm).abs() < 1e-6, "{stop:?}: {} mm", run.s_mm);
+    }
 }
 
 /// The tick has passed the place where a list would take over: it says so, and ends as it would have.
@@ -377,7 +428,7 @@ fn a_change_that_comes_too_late_is_refused() {
     let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
     let (mut feeder, mut intake) = streams.split(rules, [at(0.0)]);
     let mut executor = Executor::<f64, 1>::new([at(0.0)]);
-    feeder.piece(Piece::line(1, [at(0.0)], [1.0], length + length).expect("a line")).expect("room");
+    feeder.piece(Piece::line(1, [at(0.0)], [1.0], length + length).expect("a line"), 20.0).expect("room");
     feeder.end_of_path([length + length]).expect("room");
     let list = feeder.begin(at(0.0), 0.0).expect("a list");
     for ramp in [up, up.reversed()] {

@@ -62,14 +62,18 @@ impl Executable {
         Ok(Self { items, tick_s: plan.tick_s })
     }
 
+    /// What a board without live control is given.
+    #[must_use]
+    pub fn without_blocks(&self) -> Vec<Item<3>> {
+        self.items.iter().filter(|item| !matches!(item, Item::Block(_))).copied().collect()
+    }
+
     /// The program with the machine it was planned for, as bytes for a board without live control: without blocks.
     #[must_use]
     pub fn to_bytes(&self, machine: &Machine) -> Vec<u8> {
         let mut bytes = Vec::new();
         // Entries of three axes fit the format.
-        let items: Vec<_> =
-            self.items.iter().filter(|item| !matches!(item, Item::Block(_))).copied().collect();
-        write(&machine.header(), &items, &mut bytes).expect("three axes");
+        write(&machine.header(), &self.without_blocks(), &mut bytes).expect("three axes");
         bytes
     }
 

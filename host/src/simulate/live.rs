@@ -5,7 +5,7 @@
 
 use std::str::FromStr;
 
-use motion_kernel::live::OVERRIDE_MAX;
+use motion_kernel::live::{OVERRIDE_MAX, OVERRIDE_MIN};
 
 /// What is commanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +54,7 @@ pub enum ScriptError {
     #[error("found the command `{0}`, expected hold, resume, abort or override=SHARE")]
     Command(String),
     /// An override is not a number within its range.
-    #[error("found an override of `{0}`, expected a number from 0 to {OVERRIDE_MAX}")]
+    #[error("found an override of `{0}`, expected 0 or a number from {OVERRIDE_MIN} to {OVERRIDE_MAX}")]
     Override(String),
     /// A tick comes before the one in front of it.
     #[error("found tick {0} behind tick {1}, expected ticks in their order")]
@@ -80,7 +80,8 @@ impl FromStr for Script {
                         .strip_prefix("override=")
                         .ok_or_else(|| ScriptError::Command(other.to_owned()))?;
                     let value: Option<f64> = share.trim().parse().ok();
-                    let value = value.filter(|value| (0.0..=OVERRIDE_MAX).contains(value));
+                    let value =
+                        value.filter(|&value| value == 0.0 || (OVERRIDE_MIN..=OVERRIDE_MAX).contains(&value));
                     Command::Override(value.ok_or_else(|| ScriptError::Override(share.to_owned()))?)
                 }
             };
@@ -110,8 +111,8 @@ mod tests {
             ("", "found ``, expected TICK:COMMAND such as 2000:hold"),
             ("-1:hold", "found `-1:hold`, expected TICK:COMMAND such as 2000:hold"),
             ("1:stop", "found the command `stop`, expected hold, resume, abort or override=SHARE"),
-            ("1:override=2.5", "found an override of `2.5`, expected a number from 0 to 2"),
-            ("1:override=nan", "found an override of `nan`, expected a number from 0 to 2"),
+            ("1:override=2.5", "found an override of `2.5`, expected 0 or a number from 0.001 to 2"),
+            ("1:override=nan", "found an override of `nan`, expected 0 or a number from 0.001 to 2"),
             ("7:hold,6:resume", "found tick 6 behind tick 7, expected ticks in their order"),
         ] {
             assert_eq!(text.parse::<Script>().expect_err(text).to_string(), message);

@@ -169,10 +169,13 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         executed.state = self.state();
         executed.stretches = self.stretches;
         #[cfg(feature = "live")]
-        intake.publish(match &self.activity {
-            Activity::Moving(moving) => Some(moving.inside()),
-            _ => None,
-        });
+        intake.publish(
+            match &self.activity {
+                Activity::Moving(moving) => Some(moving.inside()),
+                _ => None,
+            },
+            matches!(self.activity, Activity::Dwell { .. } | Activity::Stopped),
+        );
         Ok(())
     }
 

@@ -94,6 +94,11 @@ where
                 continue;
             }
             if junction.feed_mm_s <= 0.0 {
+                // At rest, perhaps in a dwell: what follows in this list must not.
+                let is_here = progress.inside.is_none() && place.driven() == progress.done as usize;
+                if is_here && place.driven() < self.current.list.len() {
+                    return self.rest_here(place.driven(), feeder);
+                }
                 break;
             }
             let (path_end, _) = self.path_of(junction.stretch);
@@ -103,7 +108,8 @@ where
             list.push(Item::Feed { ramp, length });
             list.leave = list.len();
             let end = list.end();
-            self.hand_over(list, place.change, feeder)?;
+            self.hand_over(list, place.change, self.driven_override, feeder)?;
+            self.replan_through(end.stretch);
             self.take_back_from(place.driven());
             self.replan_from(end);
             return Ok(());
@@ -127,8 +133,12 @@ where
         for place in &self.places(progress) {
             let mut list = place.list(self.tick_s);
             let heads = list.len();
-            let is_at_rest = heads == 0 && place.start.feed_mm_s <= 0.0;
-            if is_at_rest {
+            if heads == 0 && place.start.feed_mm_s <= 0.0 {
+                // At rest it goes on from here as from any stop.
+                let is_here = progress.inside.is_none() && place.driven() == progress.done as usize;
+                if is_here && place.driven() < self.current.list.len() {
+                    return self.rest_here(place.driven(), feeder);
+                }
                 break;
             }
             if heads > 0 && !self.is_worth_cutting(progress, place, &list.end()) {
@@ -141,8 +151,7 @@ where
                 && list.leave >= heads
             {
                 let ahead = list.after(list.leave);
-                self.driven_override = self.feed_override;
-                self.hand_over(list, place.change, feeder)?;
+                self.hand_over(list, place.change, self.feed_override, feeder)?;
                 self.take_back_from(place.driven());
                 self.replan_from(ahead);
                 return Ok(());

@@ -27,6 +27,8 @@ pub enum State {
     Aborted,
     /// Everything is done.
     Done,
+    /// An item can't be executed; at rest behind what came before it.
+    Failed,
 }
 
 /// What a command asks of the motion under way, until a list for it has been handed over.
@@ -45,6 +47,10 @@ pub(super) struct Handed {
     pub(super) list: List,
     /// Items that it takes back from the list before it, at the front of the course.
     taken_back: usize,
+    /// What it was made for, if that was a command.
+    command: Option<Wanted>,
+    /// The override of the motion before it.
+    before_override: f64,
 }
 
 /// The background of live control, with room for `PLACES` blocks and as many planned ramps.
@@ -82,6 +88,8 @@ pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
 
 /// The greatest feed override.
 pub const OVERRIDE_MAX: f64 = 2.0;
+/// The least that is not 0.
+pub const OVERRIDE_MIN: f64 = 1.0e-3;
 /// A ramp is given up at most so many ticks ahead.
 const LEAD_TICKS_MAX: u64 = 64;
 
@@ -91,9 +99,11 @@ where
     E: Clone,
     I: Iterator<Item = Result<Item<AXES>, E>>,
 {
-    /// All of `items` still to do, at rest, for ticks of `tick_s`; with freshly split streams. Where ticks come while the
+    /// All of `items` still to do, at rest, for ticks of `tick_s`; with freshly split streams. What has no more items for
+    /// now must wait: the first `None` is their end. Where ticks come while the
     /// background works, `lead_ticks` is how far ahead of what it saw it may change a ramp: as many as may pass meanwhile.
     pub fn new(items: I, tick_s: f64, lead_ticks: u32) -> Self {
+        const { assert!(PLACES >= 4 * LIST_ITEMS, "places for what lies ahead, and for a list that is given up") };
         let start = Junction { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
         Self {
             items,
@@ -108,7 +118,13 @@ where
             course: Deque::new(),
             ahead: start,
             replanned: None,
-            current: Handed { id: 0, list: List::new(start, tick_s), taken_back: 0 },
+            current: Handed {
+                id: 0,
+                list: List::new(start, tick_s),
+                taken_back: 0,
+                command: None,
+                before_override: 1.0,
+            },
             next: None,
             feed_override: 1.0,
             driven_override: 1.0,
@@ -132,7 +148,7 @@ where
         if self.is_held && !self.is_aborted {
             self.is_held = false;
             // A stop that is not handed over yet is not made; the override may be another one by now.
-            self.wanted = self.wanted.map(|_| Wanted::Respeed);
+            self.wanted = self.wanted.map(|_| self.wanted_by_override());
         }
     }
 
@@ -142,19 +158,23 @@ where
         self.is_aborted = true;
     }
 
-    /// Drives at `feed_override` times the program's feed, from 0 to [`OVERRIDE_MAX`], under all ceilings; 0 is a hold of
-    /// its own.
+    fn wanted_by_override(&self) -> Wanted {
+        if self.feed_override > 0.0 { Wanted::Respeed } else { Wanted::Stop }
+    }
+
+    /// Drives at `feed_override` times the program's feed, from [`OVERRIDE_MIN`] to [`OVERRIDE_MAX`], under all ceilings;
+    /// 0 is a hold of its own.
     ///
     /// # Errors
     /// It is not within that range; the value.
     pub fn set_override(&mut self, feed_override: f64) -> Result<(), f64> {
-        if !(0.0..=OVERRIDE_MAX).contains(&feed_override) {
+        if feed_override != 0.0 && !(OVERRIDE_MIN..=OVERRIDE_MAX).contains(&feed_override) {
             return Err(feed_override);
         }
         if feed_override != self.feed_override {
             self.feed_override = feed_override;
             if !self.is_held {
-                self.wanted = Some(if feed_override > 0.0 { Wanted::Respeed } else { Wanted::Stop });
+                self.wanted = Some(self.wanted_by_override());
             }
         }
         Ok(())
@@ -176,6 +196,7 @@ where
         progress.list == self.current.id
             && self.next.is_none()
             && progress.inside.is_none()
+            && !progress.waits
             && progress.done as usize >= self.current.list.len()
             && self.wanted.is_none()
     }
@@ -184,6 +205,9 @@ where
     pub fn state(&self, feeder: &LiveFeeder<'_, R, AXES>) -> State {
         let rests = self.rests(feeder);
         let is_read = self.is_at_end && self.pending.is_none() && self.course.is_empty();
+        if rests && self.error.is_some() {
+            return State::Failed;
+        }
         match (self.is_aborted, self.is_held) {
             (true, _) if rests => State::Aborted,
             (true, _) => State::Aborting,
@@ -197,26 +221,32 @@ where
     /// One turn of the background: reads what there is room for, obeys what was commanded, hands over what follows.
     ///
     /// # Errors
-    /// An item can't be executed. What is under way ends as it would have; every later call returns the same error.
+    /// An item can't be executed. Nothing is read any more, every later call returns the same error, and what was handed
+    /// over ends at rest; a hold or an abort is still obeyed.
     pub fn turn(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
-        if let Some(error) = &self.error {
-            return Err(error.clone());
+        self.turn_on(feeder).unwrap_or_else(|error| {
+            self.error.get_or_insert(error);
+        });
+        match &self.error {
+            None => Ok(()),
+            Some(error) => Err(error.clone()),
         }
-        self.turn_on(feeder).inspect_err(|error| self.error = Some(error.clone()))
     }
 
     fn turn_on(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
         if feeder.is_refused() {
-            // The tick had passed the place: further ahead the next time.
+            // The tick had passed the place: once more, further ahead.
             if self.lead.to_bits() < LEAD_TICKS_MAX << 32 {
                 self.lead = self.lead.plus(Ticks::ONE);
             }
+            let command = self.next.as_ref().and_then(|next| next.command);
             self.take_back_next(feeder);
+            self.wanted = self.wanted.or(command);
         }
         let progress = self.follow(feeder);
         let place = self.current.list.after(progress.done as usize);
         self.road.pass(place.stretch, place.at);
-        self.read(feeder)?;
+        let read = if self.error.is_none() { self.read(feeder) } else { Ok(()) };
         if let Some(wanted) = self.wanted
             && feeder.has_free_list()
         {
@@ -228,10 +258,14 @@ where
                     Wanted::Respeed => self.respeed(&progress, feeder)?,
                 }
                 self.wanted = None;
+                if let Some(next) = &mut self.next {
+                    next.command = Some(wanted);
+                }
             }
         }
+        read?;
         self.note_starvation(feeder);
-        let is_to_rest = self.is_held || self.feed_override <= 0.0;
+        let is_to_rest = self.is_held || self.feed_override <= 0.0 || self.error.is_some();
         if self.next.is_none() && !is_to_rest && self.wanted.is_none() && feeder.has_free_list() {
             self.go_on(feeder)?;
         }
@@ -252,8 +286,9 @@ where
     fn take_back_next(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Progress {
         feeder.no_change();
         let progress = self.follow(feeder);
-        if let Some(Handed { id, list, taken_back }) = self.next.take() {
+        if let Some(Handed { id, list, taken_back, before_override, .. }) = self.next.take() {
             feeder.give_up(id);
+            self.driven_override = before_override;
             for _ in 0..taken_back {
                 self.course.pop_front();
             }
@@ -280,11 +315,16 @@ where
     fn read(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
         loop {
             let answer = match &self.pending {
-                Some(Ready::Piece(piece)) => is_taken(feeder.piece(*piece)).inspect(|&taken| {
-                    if taken {
-                        self.path_end = self.path_end + piece.length();
-                    }
-                }),
+                Some(Ready::Piece(piece)) => {
+                    let end = self.path_end + piece.length();
+                    let fastest_mm_s = self.road.fastest_mm_s(self.reading, self.path_end, end);
+                    let fastest_mm_s = fastest_mm_s.ok_or(SupplyError::Rejected(Rejection::NoBlock))?;
+                    is_taken(feeder.piece(*piece, fastest_mm_s)).inspect(|&taken| {
+                        if taken {
+                            self.path_end = end;
+                        }
+                    })
+                }
                 Some(Ready::EndOfStretch(end)) => is_taken(feeder.end_of_path(*end)).inspect(|&taken| {
                     if taken {
                         let _ = self.course.push_back(ListItem::End);
@@ -385,9 +425,8 @@ where
         let is_found =
             if is_replanned { self.gather_under_override(&mut list, true) } else { self.gather(&mut list) };
         if is_found && self.end_in_a_stop(&mut list, feed_override) {
-            self.driven_override = feed_override;
             let change = self.change_after(self.current.list.leave);
-            self.hand_over(list, change, feeder)
+            self.hand_over(list, change, feed_override, feeder)
         } else {
             self.put_back(&list, 0, 0);
             // At rest with no room for more path: the program's feed needs more of it to stop than there will be.
@@ -403,11 +442,12 @@ where
         Change { from: self.current.id, to: self.current.id, after: count as u32, within: false }
     }
 
-    /// Fills a list, of which there is a free one, and asks for the change to it.
+    /// Fills a list, of which there is a free one, with motion under `feed_override`, and asks for the change to it.
     pub(super) fn hand_over(
         &mut self,
         list: List,
         change: Change,
+        feed_override: f64,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
         // A list that can't be begun or filled is a machine that was put together wrongly.
@@ -434,17 +474,19 @@ where
         }
         feeder.change(Change { to: id, ..change });
         self.ahead = list.after(list.leave);
-        self.next = Some(Handed { id, list, taken_back: 0 });
+        let before_override = core::mem::replace(&mut self.driven_override, feed_override);
+        self.next = Some(Handed { id, list, taken_back: 0, command: None, before_override });
         Ok(())
     }
 
     /// The list that follows takes the place of the items of the one under way from `from` on: what ends their stretch,
-    /// and what comes behind it, is ahead again.
+    /// and what comes behind it, is ahead again; of a stretch that is not planned anew, its feed too.
     pub(super) fn take_back_from(&mut self, from: usize) {
         let mut count = 0;
         let list = &self.current.list;
+        let keeps_feed = !self.replans(list.start.stretch);
         for item in list.back_to(from).skip(list.len() - list.leave.min(list.len())) {
-            if !item.is_feed() {
+            if keeps_feed || !item.is_feed() {
                 let _ = self.course.push_front(*item);
                 count += 1;
             }
@@ -452,5 +494,19 @@ where
         if let Some(next) = &mut self.next {
             next.taken_back = count;
         }
+    }
+
+    /// Hands over a list without anything: at rest, nothing of the list under way is to follow. All of it is ahead again.
+    pub(super) fn rest_here(
+        &mut self,
+        done: usize,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        let place = self.current.list.after(done);
+        let change = self.change_after(done);
+        self.hand_over(List::new(place, self.tick_s), change, self.driven_override, feeder)?;
+        self.take_back_from(done);
+        self.ahead = place;
+        Ok(())
     }
 }

@@ -69,6 +69,15 @@ where
     /// is room. False if there is none.
     fn gather_replanned(&mut self, list: &mut List, to_its_end: bool) -> bool {
         let from = list.end();
+        // Rests in front of the stretch.
+        while from.at == Position::ZERO
+            && let Some(&item) = self.course.front()
+            && matches!(item, Item::Dwell(_) | Item::Stop)
+            && list.len() + 1 < LIST_ITEMS
+        {
+            self.course.pop_front();
+            list.push(item);
+        }
         let (path_end, is_whole) = self.path_of(from.stretch);
         let is_all = if path_end > from.at {
             replan(&self.road, &from, self.feed_override, path_end, self.tick_s, list)

@@ -16,7 +16,7 @@
 //! end of a ramp that brakes, because ceilings ahead may need all of it. From there on it brakes to rest or to another
 //! feed under the ceilings and limits of all the blocks it crosses; where a ceiling ahead does not let it begin, at the
 //! next junction that does. What follows a stop or an override is planned anew, to the end of the stretch; a stretch
-//! that nothing was changed in is driven by the program's own plan, to the bit.
+//! that nothing was changed in is driven by the program's own plan.
 //!
 //! - `road`: blocks ahead, and how to brake on them;
 //! - `replan`: a plan from a junction on;
@@ -32,5 +32,5 @@ mod list;
 mod replan;
 mod road;
 
-pub use director::{Director, OVERRIDE_MAX, State};
+pub use director::{Director, OVERRIDE_MAX, OVERRIDE_MIN, State};
 pub use list::LIST_ITEMS;

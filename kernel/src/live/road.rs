@@ -112,6 +112,17 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
         self.blocks.iter().rev().find(|block| block.stretch == stretch).map(|block| block.end)
     }
 
+    /// The greatest feed \[mm/s\] on the path of `stretch` from `start` to `end`; `None` if there are no blocks as far as
+    /// that.
+    pub(super) fn fastest_mm_s(&self, stretch: u32, start: Position, end: Position) -> Option<f64> {
+        let known = self.end_of(stretch).is_some_and(|known| known + SLIVER >= end);
+        let here = |block: &&RoadBlock| {
+            block.stretch == stretch && block.start + SLIVER < end && start + SLIVER < block.end
+        };
+        let caps = self.blocks.iter().filter(here).map(|block| block.block.greatest().cap_mm_s);
+        known.then(|| caps.fold(0.0, f64::max))
+    }
+
     /// The fastest braking from a junction of motion under `feed_override` to `to_mm_s` that keeps the ceilings, joints
     /// and limits of all the blocks that it crosses, before `end`, with the length it is driven over; `None` if there is
     /// none.

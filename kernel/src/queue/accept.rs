@@ -81,6 +81,8 @@ pub enum Rejection {
     Empty,
     /// Dwells and stops belong between stretches.
     InsideStretch,
+    /// Path that no block says the feed of: live control could not brake on it.
+    NoBlock,
     /// The stretch is longer, or a position farther out, than the kernel's range.
     Range {
         /// The length or coordinate \[mm\].
@@ -105,6 +107,7 @@ impl core::fmt::Display for Rejection {
                 write!(f, "{path_mm} mm of path, {feed_mm} mm of feed: expected equal lengths")
             }
             Self::Empty => write!(f, "a stretch without any length"),
+            Self::NoBlock => write!(f, "path without a block, expected one that says what holds its feed"),
             Self::InsideStretch => write!(f, "dwell or stop inside a stretch"),
             Self::Range { mm } => write!(f, "{mm} mm: expected at most ±{} mm", Position::LIMIT_MM),
         }
@@ -240,7 +243,27 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
     /// For feed that goes on from here, at `feed_mm_s`, whatever was accepted before.
     #[cfg(feature = "live")]
     pub(crate) fn feed_from(&self, feed_length: Position, feed_mm_s: R) -> Self {
-        Self { feed_length, feed_mm_s, recent: [Ticks::ONE; SEGMENTS_PER_TICK_MAX], ..*self }
+        Self {
+            feed_length,
+            feed_mm_s,
+            recent: [Ticks::ONE; SEGMENTS_PER_TICK_MAX],
+            // What the curves ask for is checked where they enter.
+            steepness: Steepness::STRAIGHT,
+            curved_until: Position::ZERO,
+            ..*self
+        }
+    }
+
+    /// Whether the number type holds what a piece asks of the axes at up to `fastest_mm_s`.
+    #[cfg(feature = "live")]
+    pub(crate) fn fits_at(&self, piece: &Piece<R, AXES>, fastest_mm_s: f64) -> Result<(), Rejection> {
+        if R::SETPOINT_MAX.is_some() { self.fits(&piece.steepness(), fastest_mm_s) } else { Ok(()) }
+    }
+
+    /// Whether the feed of a list is between stretches.
+    #[cfg(feature = "live")]
+    pub(crate) fn feed_at_rest(&self) -> Result<(), Rejection> {
+        if self.feed_length > Position::ZERO { Err(Rejection::InsideStretch) } else { Ok(()) }
     }
 
     #[cfg(feature = "live")]

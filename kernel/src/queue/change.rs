@@ -29,20 +29,23 @@ pub struct Change {
 }
 
 impl Change {
-    const AFTER_BITS: u32 = 27;
+    /// More than a list has items.
+    const AFTER_BITS: u32 = 8;
     /// No change is asked for.
     const NONE: u32 = u32::MAX;
 
-    fn to_word(self) -> u32 {
+    /// As the word of the `number`th change: no two that the tick may compare are equal.
+    fn to_word(self, number: u32) -> u32 {
         u32::from(self.from) << 30
             | u32::from(self.to) << 28
-            | u32::from(self.within) << Self::AFTER_BITS
+            | u32::from(self.within) << 27
+            | (number & 0x7_FFFF) << Self::AFTER_BITS
             | self.after & ((1 << Self::AFTER_BITS) - 1)
     }
 
     fn from_word(word: u32) -> Option<Self> {
         let (from, to) = ((word >> 30) as u8, (word >> 28 & 3) as u8);
-        let within = word >> Self::AFTER_BITS & 1 == 1;
+        let within = word >> 27 & 1 == 1;
         (from < LISTS && to < LISTS).then_some(Self {
             from,
             to,
@@ -63,6 +66,8 @@ pub struct Progress {
     pub done: u32,
     /// Inside a segment: its phase, and how long that still takes.
     pub inside: Option<(Phase, Ticks)>,
+    /// Inside a dwell or a program stop, which are done as soon as they begin.
+    pub waits: bool,
 }
 
 /// The words between the two.
@@ -108,8 +113,9 @@ impl Words {
     }
 
     /// The background asks for a change, in place of one that has not come about.
-    pub(super) fn ask(&self, change: Option<Change>) {
-        self.change.store(change.map_or(Change::NONE, Change::to_word), Ordering::Release);
+    pub(super) fn ask(&self, change: Option<Change>, number: u32) {
+        let word = change.map_or(Change::NONE, |change| change.to_word(number));
+        self.change.store(word, Ordering::Release);
     }
 
     /// Whether the change that was asked for last came too late.
@@ -149,21 +155,22 @@ impl Words {
         Progress {
             tick,
             list: (place >> 30) as u8,
-            done: place & ((1 << 28) - 1),
+            done: place & ((1 << 27) - 1),
+            waits: place >> 27 & 1 == 1,
             inside: phase.map(|phase| (phase, left)),
         }
     }
 
     /// The tick says where it is.
     #[inline]
-    pub(super) fn publish(&self, list: u8, done: u32, inside: Option<(Phase, Ticks)>) {
+    pub(super) fn publish(&self, list: u8, done: u32, inside: Option<(Phase, Ticks)>, waits: bool) {
         let (phase, left) = match inside {
             None => (0, Ticks::ZERO),
             Some((Phase::Rise, left)) => (1, left),
             Some((Phase::Hold, left)) => (2, left),
             Some((Phase::Fall, left)) => (3, left),
         };
-        let place = u32::from(list) << 30 | phase << 28 | done & ((1 << 28) - 1);
+        let place = u32::from(list) << 30 | phase << 28 | u32::from(waits) << 27 | done & ((1 << 27) - 1);
         self.place.store(place, Ordering::Relaxed);
         let bits = left.to_bits();
         self.left_high.store((bits >> 32) as u32, Ordering::Relaxed);
@@ -171,9 +178,11 @@ impl Words {
         self.tick.store(self.tick.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
     }
 
+    /// What is asked for, with its word.
     #[inline]
-    pub(super) fn asked(&self) -> Option<Change> {
-        Change::from_word(self.change.load(Ordering::Acquire))
+    pub(super) fn asked(&self) -> Option<(u32, Change)> {
+        let word = self.change.load(Ordering::Acquire);
+        Change::from_word(word).map(|change| (word, change))
     }
 
     #[inline]
@@ -181,7 +190,7 @@ impl Words {
         self.claimed.load(Ordering::Acquire) >> list & 1 == 1
     }
 
-    pub(super) fn refuse(&self, change: Change) {
-        self.refused.store(change.to_word(), Ordering::Release);
+    pub(super) fn refuse(&self, word: u32) {
+        self.refused.store(word, Ordering::Release);
     }
 }

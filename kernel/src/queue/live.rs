@@ -11,6 +11,7 @@ use super::{
     FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept, count, enter,
 };
 use crate::law::{FeedSegment, Phase, Ticks};
+use crate::live::LIST_ITEMS;
 use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
@@ -43,6 +44,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
         rules: PathRules,
         position: [Position; AXES],
     ) -> (LiveFeeder<'_, R, AXES>, Intake<'_, R, AXES>) {
+        const { assert!(SEGMENTS > LIST_ITEMS, "a list has room for what live control makes") };
         while self.second.dequeue().is_some() {}
         while self.third.dequeue().is_some() {}
         let Streams { path, feed, shared } = &mut self.first;
@@ -61,6 +63,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             shared,
             path_accept: acceptance,
             feed_accept: acceptance,
+            changes: 0,
         };
         let intake = Intake {
             path: path_out,
@@ -98,16 +101,20 @@ pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
     path_accept: accept::Acceptance<R, AXES>,
     /// Of the list being filled.
     feed_accept: accept::Acceptance<R, AXES>,
+    /// Changes asked for so far.
+    changes: u32,
 }
 
 impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
-    /// Enters a piece of path.
+    /// Enters a piece of path that is driven at `fastest_mm_s` at most.
     ///
     /// # Errors
-    /// The queue is full, or the piece does not continue its predecessor.
-    pub fn piece(&mut self, piece: Piece<R, AXES>) -> Result<(), Refused<Piece<R, AXES>>> {
+    /// The queue is full, the piece does not continue its predecessor, or at that feed it asks an axis for more than the
+    /// number type holds.
+    pub fn piece(&mut self, piece: Piece<R, AXES>, fastest_mm_s: f64) -> Result<(), Refused<Piece<R, AXES>>> {
         let mut next = self.path_accept;
         next.piece(&piece).map_err(Refused::Invalid)?;
+        next.fits_at(&piece, fastest_mm_s).map_err(Refused::Invalid)?;
         enter(&mut self.path, PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
         self.path_accept = next;
         count(&self.shared.path_entered);
@@ -175,22 +182,26 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         if feed_mm_s > R::ZERO {
             return Err(Refused::Invalid(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() }));
         }
-        self.append(list, FeedItem::EndOfStretch).map_err(|_| Refused::Full(()))
+        self.append(list, FeedItem::EndOfStretch).map_err(|_| Refused::Full(()))?;
+        self.feed_accept = self.feed_accept.feed_from(Position::ZERO, R::ZERO);
+        Ok(())
     }
 
     /// Appends a rest, between stretches.
     ///
     /// # Errors
-    /// The list is full.
+    /// The list is full, or a stretch is under way.
     pub fn dwell(&mut self, list: u8, duration: Ticks) -> Result<(), Refused<Ticks>> {
+        self.feed_accept.feed_at_rest().map_err(Refused::Invalid)?;
         self.append(list, FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))
     }
 
     /// Appends a rest until told to resume, between stretches.
     ///
     /// # Errors
-    /// The list is full.
+    /// The list is full, or a stretch is under way.
     pub fn program_stop(&mut self, list: u8) -> Result<(), Refused<()>> {
+        self.feed_accept.feed_at_rest().map_err(Refused::Invalid)?;
         self.append(list, FeedItem::ProgramStop).map_err(|_| Refused::Full(()))
     }
 
@@ -209,12 +220,13 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
 
     /// Asks for a change to a list that is complete, in place of one that was asked for before.
     pub fn change(&mut self, change: Change) {
-        self.shared.words.ask(Some(change));
+        self.changes = self.changes.wrapping_add(1);
+        self.shared.words.ask(Some(change), self.changes);
     }
 
     /// Takes back what was asked for. The tick may have followed it already.
     pub fn no_change(&mut self) {
-        self.shared.words.ask(None);
+        self.shared.words.ask(None, 0);
     }
 
     /// Whether the change asked for came too late.
@@ -235,17 +247,17 @@ pub(super) struct Lists<'a, R: Real> {
     others: [(u8, Consumer<'a, FeedItem<R>>); LISTS as usize - 1],
     /// Items of the current list that are done.
     done: u32,
-    /// What is asked for, as of the tick's start.
-    change: Option<Change>,
-    /// What came too late.
-    refused: Option<Change>,
+    /// What is asked for, as of the tick's start, with its word.
+    change: Option<(u32, Change)>,
+    /// The word that came too late last.
+    refused: Option<u32>,
 }
 
 impl<R: Real> Lists<'_, R> {
     /// Whether the change is due where no segment is under way.
     #[inline]
     fn is_due(&self) -> bool {
-        self.change.is_some_and(|change| change.after == self.done)
+        self.change.is_some_and(|(_, change)| change.after == self.done)
     }
 }
 
@@ -264,15 +276,16 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
                 }
             }
         }
-        lists.change =
-            words.asked().filter(|change| change.from == lists.current && lists.refused != Some(*change));
+        lists.change = words
+            .asked()
+            .filter(|(word, change)| change.from == lists.current && lists.refused != Some(*word));
     }
 
     #[inline(never)]
     pub(super) fn count_done(&mut self) {
         let Some(lists) = &mut self.lists else { return };
         lists.done = lists.done.wrapping_add(1);
-        if lists.is_due() && lists.change.is_some_and(|change| !change.within) {
+        if lists.is_due() && lists.change.is_some_and(|(_, change)| !change.within) {
             self.take_over();
         }
     }
@@ -281,13 +294,15 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// way.
     #[inline]
     pub(crate) fn is_change_due(&self) -> bool {
-        self.lists.as_ref().is_some_and(|lists| lists.change.is_some_and(|change| change.after <= lists.done))
+        self.lists
+            .as_ref()
+            .is_some_and(|lists| lists.change.is_some_and(|(_, change)| change.after <= lists.done))
     }
 
     /// The first item of the list that is asked for, if the place where it takes over lies within the item under way.
     pub(crate) fn feed_after_change(&self) -> Option<&FeedItem<R>> {
         let lists = self.lists.as_ref()?;
-        let change = lists.change.filter(|change| change.within && change.after == lists.done)?;
+        let (_, change) = lists.change.filter(|(_, change)| change.within && change.after == lists.done)?;
         lists.others.iter().find(|(list, _)| *list == change.to)?.1.peek()
     }
 
@@ -301,7 +316,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     #[inline(never)]
     pub(crate) fn take_over(&mut self) {
         let Some(lists) = &mut self.lists else { return };
-        let Some(change) = lists.change.take() else { return };
+        let Some((_, change)) = lists.change.take() else { return };
         for (list, queue) in &mut lists.others {
             if *list == change.to {
                 core::mem::swap(list, &mut lists.current);
@@ -316,17 +331,17 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     #[cold]
     pub(crate) fn refuse(&mut self) {
         let Some(lists) = &mut self.lists else { return };
-        if let Some(change) = lists.change.take() {
-            lists.refused = Some(change);
-            self.shared.words.refuse(change);
+        if let Some((word, _)) = lists.change.take() {
+            lists.refused = Some(word);
+            self.shared.words.refuse(word);
         }
     }
 
     /// Where the executor is at the end of a tick.
     #[inline]
-    pub(crate) fn publish(&self, inside: Option<(Phase, Ticks)>) {
+    pub(crate) fn publish(&self, inside: Option<(Phase, Ticks)>, waits: bool) {
         if let Some(lists) = &self.lists {
-            self.shared.words.publish(lists.current, lists.done, inside);
+            self.shared.words.publish(lists.current, lists.done, inside, waits);
         }
     }
 }

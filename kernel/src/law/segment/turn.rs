@@ -1,7 +1,7 @@
 //! A ramp that is given up while its acceleration still rises: the jerk goes back the way it came.
 //!
 //! Consumes a ramp under way and where in its rise it is to turn; produces a [`FeedSegment`] whose rise is that ramp's,
-//! bit for bit, up to there. With x = t/t₁, and a turn at x₁ ≤ 1/2, the jerk Jp·sin²πx runs up to x₁, back to 0, and the
+//! but for rounding, up to there. With x = t/t₁, and a turn at x₁ ≤ 1/2, the jerk Jp·sin²πx runs up to x₁, back to 0, and the
 //! whole mirrored: the change of feed is symmetric about its middle like any ramp's, 4·x₁·t₁ long, and its limits are the
 //! ramp's, because jerk and snap only take values that they have in it. Snap steps where it turns.
 //!
@@ -73,6 +73,8 @@ impl<R: Real> FeedSegment<R> {
         length: Position,
         tick_s: f64,
     ) -> Result<Self, SegmentError> {
+        // As for the whole ramp: what is rounded here would be a step there.
+        let ramp = &super::to_f64(ramp);
         let turned = TurnedRamp { ramp: *ramp, turn_s: turn_at.to_f64() * tick_s };
         let TurnedRamp { turn_s, .. } = turned;
         let rise_ticks = ramp.t1_s / tick_s;
