@@ -563,7 +563,7 @@ fn make_each<T>(
 
 /// The ramp in f64. Its peak jerk is what takes one feed to the other in its times, 2·|F − F₀|/(t₁·t₂): that
 /// of `P` carries the rounding of `P`, which would be a step of the feed in the middle.
-fn to_f64<P: Root>(ramp: &Ramp<P>) -> Ramp<f64> {
+pub(crate) fn to_f64<P: Root>(ramp: &Ramp<P>) -> Ramp<f64> {
     let (from_mm_s, to_mm_s) = (ramp.from_mm_s.to_f64(), ramp.to_mm_s.to_f64());
     let (t1_s, t2_s) = (ramp.t1_s.to_f64(), ramp.t2_s.to_f64());
     let twice = 2.0 * libm::fabs(to_mm_s - from_mm_s);

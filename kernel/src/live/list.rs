@@ -3,8 +3,11 @@
 use heapless::Vec;
 
 use super::road::Junction;
-use crate::law::{Phase, Ramp, Ticks, TurnedRamp};
+use crate::law::{Phase, Ramp, Ticks, TurnedRamp, segment};
 use crate::units::Position;
+
+/// Feeds that are found by different ways differ by rounding: of 1 mm/s, and of themselves.
+const FEED_ROUNDING_MM_S: f64 = 1.0e-12;
 
 /// The most items of a feed list: its queue needs one place more.
 pub const LIST_ITEMS: usize = 15;
@@ -50,7 +53,9 @@ impl Item {
     /// The same item, given up `elapsed` after the start of `phase`: the shortest with that beginning that ends at a
     /// feed that does not change. `None` where it can only be finished.
     pub(super) fn cut(&self, phase: Phase, elapsed: Ticks, tick_s: f64) -> Option<Self> {
-        let &Self::Feed { ramp, .. } = self else { return None };
+        let Self::Feed { ramp, .. } = self else { return None };
+        // As its segment was made.
+        let ramp = segment::to_f64(ramp);
         let elapsed_s = elapsed.to_f64() * tick_s;
         let length = |mm: f64| Position::from_mm(mm);
         match phase {
@@ -108,9 +113,18 @@ impl List {
         self.items.len()
     }
 
-    /// Appends an item; there is room.
-    pub(super) fn push(&mut self, item: Item) {
-        let _ = self.items.push((self.end(), item));
+    /// Appends an item; there is room. Its feed continues the list's but for rounding, which is taken off.
+    pub(super) fn push(&mut self, mut item: Item) {
+        let end = self.end();
+        if let Item::Feed { ramp, .. } = &mut item
+            && libm::fabs(ramp.from_mm_s - end.feed_mm_s) <= FEED_ROUNDING_MM_S * (1.0 + end.feed_mm_s)
+        {
+            if ramp.is_cruise() {
+                ramp.to_mm_s = end.feed_mm_s;
+            }
+            ramp.from_mm_s = end.feed_mm_s;
+        }
+        let _ = self.items.push((end, item));
     }
 
     pub(super) fn contains(&self, item: &Item) -> bool {

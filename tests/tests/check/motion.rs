@@ -131,7 +131,9 @@ impl<'a> Checker<'a> {
     fn limits(&mut self, &[_, v, a, j, snap]: &Along) -> Result<(), String> {
         let path = &self.machine.path;
         let rounding = 1.0 + bounds::LIMIT_SHARE + bounds::LIMIT_ROUNDING * self.epsilon;
-        if v < 0.0 {
+        // A ramp that turns at less than a step of fixed point may end one below 0.
+        let least = if self.live.is_some() { -self.step } else { 0.0 };
+        if v < least {
             return Err(format!("feed {v} mm/s"));
         }
         self.bound("feed limit", v, path.feed_mm_s * rounding)?;
