@@ -353,20 +353,7 @@ fn stretch_time_s(stretch: &[StretchBlock], tick_s: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::toolpath::Element;
-
-    /// Lines between points, at so small a feed that blends pay.
-    fn path(points: &[[f64; 2]], tolerance_mm: f64, feed_mm_s: impl Fn(u32) -> f64) -> Vec<Move> {
-        let point = |[x, y]: [f64; 2]| [x, y, 0.0];
-        points
-            .windows(2)
-            .zip(1..)
-            .map(|(pair, line)| {
-                let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
-                Move { line, element, feed_mm_s: feed_mm_s(line), tolerance_mm, merging_mm: None }
-            })
-            .collect()
-    }
+    use crate::toolpath::smooth::tests::path;
 
     fn blocks_of(moves: &[Move]) -> Vec<StretchBlock> {
         blocks(moves, &Machine::reference()).expect("a machine's limits")

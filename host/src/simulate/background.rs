@@ -21,9 +21,9 @@ const LIVE_SEGMENTS: usize = 16;
 const PLACES: usize = 256;
 
 /// The memory of the streams.
-pub(super) enum Storage<R: Real> {
+pub(super) enum Storage<'script, R: Real> {
     Plain(Box<Streams<R, AXES, PIECES, SEGMENTS>>),
-    Live(Box<LiveStreams<R, AXES, LIVE_PIECES, LIVE_SEGMENTS>>),
+    Live(Box<LiveStreams<R, AXES, LIVE_PIECES, LIVE_SEGMENTS>>, &'script Script),
 }
 
 /// What fills them.
@@ -41,11 +41,12 @@ pub(super) struct Live<'a, R: Real, I> {
     given: usize,
 }
 
-impl<R: Real> Storage<R> {
-    pub(super) fn new(script: Option<&Script>) -> Self {
+impl<'script, R: Real> Storage<'script, R> {
+    /// For a run under live control, if there is a script.
+    pub(super) fn new(script: Option<&'script Script>) -> Self {
         match script {
             None => Self::Plain(Box::default()),
-            Some(_) => Self::Live(Box::default()),
+            Some(script) => Self::Live(Box::default(), script),
         }
     }
 
@@ -56,18 +57,15 @@ impl<R: Real> Storage<R> {
         start: [Position; AXES],
         items: I,
         tick_s: f64,
-        script: Option<&'a Script>,
     ) -> (Background<'a, R, I>, Intake<'a, R, AXES>) {
         match self {
             Self::Plain(streams) => {
                 let (feeder, intake) = streams.split(rules, start);
                 (Background::Plain(Box::new((feeder, Supply::new(items, tick_s)))), intake)
             }
-            Self::Live(streams) => {
+            Self::Live(streams, script) => {
                 let (feeder, intake) = streams.split(rules, start);
-                let director = Director::new(items, tick_s, 0);
-                const NONE: &Script = &Script::NONE;
-                let live = Live { feeder, director, script: script.unwrap_or(NONE), given: 0 };
+                let live = Live { feeder, director: Director::new(items, tick_s, 0), script, given: 0 };
                 (Background::Live(Box::new(live)), intake)
             }
         }

@@ -34,9 +34,6 @@ pub struct Timed {
 pub struct Script(Vec<Timed>);
 
 impl Script {
-    /// Without a command.
-    pub const NONE: Self = Self(Vec::new());
-
     /// The commands.
     #[must_use]
     pub fn commands(&self) -> &[Timed] {

@@ -259,21 +259,26 @@ fn is_smooth([before, after]: [&Element; 2]) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
 
-    fn path(points: &[[f64; 2]], tolerance_mm: f64) -> Vec<Move> {
+    /// Lines between points, each with its feed.
+    pub(crate) fn path(points: &[[f64; 2]], tolerance_mm: f64, feed_mm_s: impl Fn(u32) -> f64) -> Vec<Move> {
         let point = |[x, y]: [f64; 2]| [x, y, 0.0];
         points
             .windows(2)
             .zip(1..)
             .map(|(pair, line)| {
                 let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
-                Move { line, element, feed_mm_s: 10.0 * f64::from(line), tolerance_mm, merging_mm: None }
+                Move { line, element, feed_mm_s: feed_mm_s(line), tolerance_mm, merging_mm: None }
             })
             .collect()
+    }
+
+    fn own_feed(line: u32) -> f64 {
+        10.0 * f64::from(line)
     }
 
     fn kinds(moves: &[Move]) -> Vec<(u32, &'static str)> {
@@ -282,7 +287,7 @@ mod tests {
 
     #[test]
     fn without_a_tolerance_nothing_changes() {
-        let moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]], 0.0);
+        let moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]], 0.0, own_feed);
         let run = Run::new(&moves);
         assert_eq!(run.moves(), moves);
         assert_eq!(run.blend(0, 1.0, &LIMITS), None);
@@ -292,7 +297,7 @@ mod tests {
     /// A corner that was cut off by a micrometre is one corner.
     #[test]
     fn a_tiny_line_among_long_ones_joins_the_one_before() {
-        let mut moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0007, 0.0007], [10.0007, 10.0]], 0.05);
+        let mut moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0007, 0.0007], [10.0007, 10.0]], 0.05, own_feed);
         assert_eq!(Run::new(&moves).moves().len(), 3);
         moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
         let run = Run::new(&moves);
@@ -309,7 +314,7 @@ mod tests {
                 [10.0 * cosine, 10.0 * sine]
             })
             .collect();
-        let mut moves = path(&points, 0.01);
+        let mut moves = path(&points, 0.01, own_feed);
         moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
         assert_eq!(kinds(Run::new(&moves).moves()), [(1, "arc")]);
         moves.iter_mut().for_each(|step| step.feed_mm_s = if step.line <= 40 { 50.0 } else { 60.0 });

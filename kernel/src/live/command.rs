@@ -94,9 +94,8 @@ where
                 continue;
             }
             if junction.feed_mm_s <= 0.0 {
-                // At rest, perhaps in a dwell: what follows in this list must not.
-                let is_here = progress.inside.is_none() && place.driven() == progress.done as usize;
-                if is_here && place.driven() < self.current.list.len() {
+                // What follows in this list must not.
+                if self.rests_before_more(place, progress) {
                     return self.rest_here(place.driven(), feeder);
                 }
                 break;
@@ -134,9 +133,8 @@ where
             let mut list = place.list(self.tick_s);
             let heads = list.len();
             if heads == 0 && place.start.feed_mm_s <= 0.0 {
-                // At rest it goes on from here as from any stop.
-                let is_here = progress.inside.is_none() && place.driven() == progress.done as usize;
-                if is_here && place.driven() < self.current.list.len() {
+                // It goes on from here as from any stop.
+                if self.rests_before_more(place, progress) {
                     return self.rest_here(place.driven(), feeder);
                 }
                 break;
@@ -161,6 +159,12 @@ where
             self.replan_from(self.ahead);
         }
         Ok(())
+    }
+
+    /// Whether the machine is at rest at a place, perhaps in a dwell, and more of the list under way would follow.
+    fn rests_before_more(&self, place: &Place, progress: &Progress) -> bool {
+        let is_here = progress.inside.is_none() && place.driven() == progress.done as usize;
+        is_here && place.driven() < self.current.list.len()
     }
 
     /// Whether the item under way does not change the feed, or takes it to where the override does not allow it.

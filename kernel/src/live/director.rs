@@ -45,6 +45,12 @@ pub(super) enum Wanted {
 pub(super) struct Handed {
     id: u8,
     pub(super) list: List,
+}
+
+/// A list that follows.
+#[derive(Debug)]
+struct Next {
+    handed: Handed,
     /// Items that it takes back from the list before it, at the front of the course.
     taken_back: usize,
     /// What it was made for, if that was a command.
@@ -74,7 +80,7 @@ pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
     /// The last stretch that is planned anew; those before it are, too, as far as they are still ahead.
     replanned: Option<u32>,
     pub(super) current: Handed,
-    next: Option<Handed>,
+    next: Option<Next>,
     pub(super) feed_override: f64,
     /// The one of the motion that was handed over last.
     pub(super) driven_override: f64,
@@ -90,6 +96,8 @@ pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
 pub const OVERRIDE_MAX: f64 = 2.0;
 /// The least that is not 0.
 pub const OVERRIDE_MIN: f64 = 1.0e-3;
+/// A list that can't be begun or filled is a machine that was put together wrongly.
+const TOO_SMALL: Rejection = Rejection::Empty;
 /// A ramp is given up at most so many ticks ahead.
 const LEAD_TICKS_MAX: u64 = 64;
 
@@ -100,8 +108,8 @@ where
     I: Iterator<Item = Result<Item<AXES>, E>>,
 {
     /// All of `items` still to do, at rest, for ticks of `tick_s`; with freshly split streams. What has no more items for
-    /// now must wait: the first `None` is their end. Where ticks come while the
-    /// background works, `lead_ticks` is how far ahead of what it saw it may change a ramp: as many as may pass meanwhile.
+    /// now must wait: the first `None` is their end. Where ticks come while the background works, `lead_ticks` is how far
+    /// ahead of what it saw it may change a ramp: as many as may pass meanwhile.
     pub fn new(items: I, tick_s: f64, lead_ticks: u32) -> Self {
         const { assert!(PLACES >= 4 * LIST_ITEMS, "places for what lies ahead, and for a list that is given up") };
         let start = Junction { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
@@ -118,13 +126,7 @@ where
             course: Deque::new(),
             ahead: start,
             replanned: None,
-            current: Handed {
-                id: 0,
-                list: List::new(start, tick_s),
-                taken_back: 0,
-                command: None,
-                before_override: 1.0,
-            },
+            current: Handed { id: 0, list: List::new(start, tick_s) },
             next: None,
             feed_override: 1.0,
             driven_override: 1.0,
@@ -275,9 +277,9 @@ where
     /// Where the tick is; the list that follows is the one under way as soon as it is on it.
     fn follow(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Progress {
         let progress = feeder.progress();
-        if let Some(next) = self.next.take_if(|next| next.id == progress.list) {
+        if let Some(next) = self.next.take_if(|next| next.handed.id == progress.list) {
             feeder.give_up(self.current.id);
-            self.current = next;
+            self.current = next.handed;
         }
         progress
     }
@@ -286,7 +288,8 @@ where
     fn take_back_next(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Progress {
         feeder.no_change();
         let progress = self.follow(feeder);
-        if let Some(Handed { id, list, taken_back, before_override, .. }) = self.next.take() {
+        if let Some(Next { handed: Handed { id, list }, taken_back, before_override, .. }) = self.next.take()
+        {
             feeder.give_up(id);
             self.driven_override = before_override;
             for _ in 0..taken_back {
@@ -402,7 +405,7 @@ where
     /// Where data came too late the list under way is in its stop: what follows begins there.
     fn note_starvation(&mut self, feeder: &LiveFeeder<'_, R, AXES>) {
         let progress = feeder.progress();
-        let Handed { id, list, .. } = &mut self.current;
+        let Handed { id, list } = &mut self.current;
         let done = progress.done as usize;
         let is_in_stop = done > list.leave || done == list.leave && progress.inside.is_some();
         if self.next.is_none() && progress.list == *id && is_in_stop && list.leave < list.len() {
@@ -450,10 +453,20 @@ where
         feed_override: f64,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
-        // A list that can't be begun or filled is a machine that was put together wrongly.
-        const TOO_SMALL: Rejection = Rejection::Empty;
         let from = R::from_f64(list.start.feed_mm_s);
         let id = feeder.begin(list.start.at, from).ok_or(SupplyError::Rejected(TOO_SMALL))?;
+        if let Err(error) = self.fill(&list, id, feeder) {
+            feeder.give_up(id);
+            return Err(error);
+        }
+        feeder.change(Change { to: id, ..change });
+        self.ahead = list.after(list.leave);
+        let before_override = core::mem::replace(&mut self.driven_override, feed_override);
+        self.next = Some(Next { handed: Handed { id, list }, taken_back: 0, command: None, before_override });
+        Ok(())
+    }
+
+    fn fill(&self, list: &List, id: u8, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
         for item in list.items() {
             let is_taken = match *item {
                 ListItem::Feed { ramp, length } => {
@@ -472,10 +485,6 @@ where
                 return Err(SupplyError::Rejected(TOO_SMALL));
             }
         }
-        feeder.change(Change { to: id, ..change });
-        self.ahead = list.after(list.leave);
-        let before_override = core::mem::replace(&mut self.driven_override, feed_override);
-        self.next = Some(Handed { id, list, taken_back: 0, command: None, before_override });
         Ok(())
     }
 

@@ -69,14 +69,8 @@ where
     /// is room. False if there is none.
     fn gather_replanned(&mut self, list: &mut List, to_its_end: bool) -> bool {
         let from = list.end();
-        // Rests in front of the stretch.
-        while from.at == Position::ZERO
-            && let Some(&item) = self.course.front()
-            && matches!(item, Item::Dwell(_) | Item::Stop)
-            && list.len() + 1 < LIST_ITEMS
-        {
-            self.course.pop_front();
-            list.push(item);
+        if from.at == Position::ZERO {
+            self.gather_rests(list);
         }
         let (path_end, is_whole) = self.path_of(from.stretch);
         let is_all = if path_end > from.at {
@@ -86,18 +80,22 @@ where
             (is_whole && from.feed_mm_s <= 0.0).then_some(true)
         };
         let Some(is_all) = is_all else { return false };
-        if to_its_end && is_all && is_whole && self.course.front() == Some(&Item::End) {
-            // And the rests behind it.
-            while let Some(&item) = self.course.front()
-                && matches!(item, Item::End | Item::Dwell(_) | Item::Stop)
-                && !(item == Item::End && list.contains(&Item::End))
-                && !list.is_full()
-            {
-                self.course.pop_front();
-                list.push(item);
-            }
+        if to_its_end && is_all && is_whole && !list.is_full() && self.course.front() == Some(&Item::End) {
+            self.course.pop_front();
+            list.push(Item::End);
+            self.gather_rests(list);
         }
         list.len() > 0
+    }
+
+    /// The dwells and stops that come first in the course.
+    fn gather_rests(&mut self, list: &mut List) {
+        while let Some(&item @ (Item::Dwell(_) | Item::Stop)) = self.course.front()
+            && !list.is_full()
+        {
+            self.course.pop_front();
+            list.push(item);
+        }
     }
 
     /// A plan from where the list ends; where that is too fast for the override, behind a ramp down to it.

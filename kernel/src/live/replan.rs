@@ -7,8 +7,8 @@ use heapless::Vec;
 
 use super::list::{Item, List};
 use super::road::{Junction, LENGTH_ROUNDING_MM, Road, SLIVER};
-use crate::law::{Law, Limits};
-use crate::plan::{Block, BlockPlan, plan, segments};
+use crate::law::Law;
+use crate::plan::{Block, BlockPlan, merge_equal, plan, segments};
 use crate::units::Position;
 
 /// The first items of a plan from `from` to rest at `end`, into `list`, as many as it has room for; whether that is all
@@ -23,32 +23,26 @@ pub(super) fn replan<const BLOCKS: usize>(
 ) -> Option<bool> {
     let mut blocks: Vec<Block<f64>, BLOCKS> = Vec::new();
     let mut ends: Vec<Position, BLOCKS> = Vec::new();
-    let mut limits: Option<Limits<f64>> = None;
     // A sliver of a block belongs to the one behind it.
     let mut start = from.at;
     for block in road.from(from).take_while(|block| block.start < end) {
-        let (cap_mm_s, of_block) = block.allowed(feed_override);
+        let (cap_mm_s, limits) = block.allowed(feed_override);
         let block_end = block.end.min(end);
         if block_end - start <= SLIVER && block_end < end {
             continue;
         }
-        let length_mm = (block_end - start).to_mm();
+        let (length_mm, joint_mm_s) = ((block_end - start).to_mm(), block.joint_mm_s());
+        let next = Block { length_mm, cap_mm_s, joint_mm_s, law: Law::new(limits).ok()? };
         start = block_end;
-        let joint_mm_s = block.joint_mm_s();
-        match (blocks.last_mut(), ends.last_mut()) {
-            (Some(last), Some(last_end))
-                if last.cap_mm_s == cap_mm_s && limits == Some(of_block) && last.joint_mm_s >= cap_mm_s =>
-            {
-                (last.length_mm, last.joint_mm_s, *last_end) =
-                    (last.length_mm + length_mm, joint_mm_s, block_end);
-            }
-            _ => {
-                let law = Law::new(of_block).ok()?;
-                limits = Some(of_block);
-                blocks.push(Block { length_mm, cap_mm_s, joint_mm_s, law }).ok()?;
-                ends.push(block_end).ok()?;
+        if let (Some(last), Some(last_end)) = (blocks.last_mut(), ends.last_mut()) {
+            let mut pair = [*last, next];
+            if merge_equal(&mut pair) == 1 {
+                ([*last, _], *last_end) = (pair, block_end);
+                continue;
             }
         }
+        blocks.push(next).ok()?;
+        ends.push(block_end).ok()?;
     }
     let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
     plans.resize(blocks.len(), BlockPlan::default()).ok()?;

@@ -160,17 +160,31 @@ impl<'a> Checker<'a> {
         let m: Along = core::array::from_fn(|k| now[k] + then[k]);
         let predicted =
             [h * (m[1] / 2.0 - h * d[2] / 12.0), h * (m[2] / 2.0 - h * d[3] / 12.0), h * m[3] / 2.0, 0.0];
-        let sizes = [gained, path.feed_mm_s, accel, jerk];
-        let c = bounds::CONTINUITY_ROUNDING;
+        let errors = core::array::from_fn(|k| HERMITE_LIVE[k] * snap * h.powi(4 - k as i32));
+        let span_mm = 2.0_f64.powi(-31) * self.plan.length_mm + ramp_mm;
+        self.fits(now, &predicted, &errors, &[gained, path.feed_mm_s, accel, jerk, snap], span_mm)
+    }
+
+    /// Whether the changes since the tick before are those predicted, within the rule's errors and rounding: of `sizes`,
+    /// which end with the rate of change of the last that is checked, and of the length `span_mm`.
+    fn fits(
+        &mut self,
+        now: &Along,
+        predicted: &[f64; 4],
+        errors: &[f64; 4],
+        sizes: &[f64],
+        span_mm: f64,
+    ) -> Result<(), String> {
+        let (then, h, c) = (self.before, self.machine.tick_s, bounds::CONTINUITY_ROUNDING);
         for (k, name) in ["fit of s", "fit of v", "fit of a", "fit of j"].into_iter().enumerate() {
-            let rounded: f64 = (k..4).map(|of| sizes[of] * h.powi((of - k) as i32)).sum();
-            let mut bound = HERMITE_LIVE[k] * snap * h.powi(4 - k as i32)
-                + c * self.epsilon * rounded
-                + c * h * sizes.get(k + 1).unwrap_or(&snap) * 2.0_f64.powi(-32);
+            let rates = sizes.len() - 1;
+            let rounded: f64 = (k..rates).map(|of| sizes[of] * h.powi((of - k) as i32)).sum();
+            let mut bound = errors[k] + c * self.epsilon * rounded + c * h * sizes[k + 1] * 2.0_f64.powi(-32);
             if k == 0 {
-                bound += bounds::LENGTH_ROUNDING_MM + 2.0_f64.powi(-31) * self.plan.length_mm + ramp_mm;
+                // 2⁻³² of a length is what its products resolve.
+                bound += bounds::LENGTH_ROUNDING_MM + span_mm;
             }
-            let fits = self.bound(name, (d[k] - predicted[k]).abs(), bound);
+            let fits = self.bound(name, (now[k] - then[k] - predicted[k]).abs(), bound);
             fits.map_err(|error| format!("{error}; from {then:?} to {now:?}"))?;
         }
         Ok(())
@@ -216,20 +230,8 @@ impl<'a> Checker<'a> {
         ];
         // Sizes of what is rounded; time itself is in steps of 2⁻³² tick.
         let sizes = [gained, feed, accel, jerk, snap, crackle];
-        let c = bounds::CONTINUITY_ROUNDING;
-        for (k, name) in ["fit of s", "fit of v", "fit of a", "fit of j"].into_iter().enumerate() {
-            let rounded: f64 = (k..5).map(|of| sizes[of] * h.powi((of - k) as i32)).sum();
-            let mut bound = HERMITE[k] * crackle * h.powi(4 - k as i32 + 1)
-                + c * self.epsilon * rounded
-                + c * h * sizes[k + 1] * 2.0_f64.powi(-32);
-            if k == 0 {
-                // 2⁻³² of a segment's length is what its products resolve.
-                bound += bounds::LENGTH_ROUNDING_MM + 2.0_f64.powi(-31) * span;
-            }
-            let fits = self.bound(name, (d[k] - predicted[k]).abs(), bound);
-            fits.map_err(|error| format!("{error}; from {then:?} to {now:?}"))?;
-        }
-        Ok(())
+        let errors = core::array::from_fn(|k| HERMITE[k] * crackle * h.powi(4 - k as i32 + 1));
+        self.fits(now, &predicted, &errors, &sizes, 2.0_f64.powi(-31) * span)
     }
 
     /// The feed against the ceiling of the block it is in, planned and programmed.
