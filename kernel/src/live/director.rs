@@ -255,14 +255,7 @@ where
             let progress = self.take_back_next(feeder);
             // What was taken back may have been the last free one.
             if feeder.has_free_list() {
-                match wanted {
-                    Wanted::Stop => self.stop(&progress, feeder)?,
-                    Wanted::Respeed => self.respeed(&progress, feeder)?,
-                }
-                self.wanted = None;
-                if let Some(next) = &mut self.next {
-                    next.command = Some(wanted);
-                }
+                self.obey(wanted, &progress, feeder)?;
             }
         }
         read?;
@@ -270,6 +263,24 @@ where
         let is_to_rest = self.is_held || self.feed_override <= 0.0 || self.error.is_some();
         if self.next.is_none() && !is_to_rest && self.wanted.is_none() && feeder.has_free_list() {
             self.go_on(feeder)?;
+        }
+        Ok(())
+    }
+
+    /// Hands over what is wanted of motion that is as far as `progress` says.
+    fn obey(
+        &mut self,
+        wanted: Wanted,
+        progress: &Progress,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        match wanted {
+            Wanted::Stop => self.stop(progress, feeder)?,
+            Wanted::Respeed => self.respeed(progress, feeder)?,
+        }
+        self.wanted = None;
+        if let Some(next) = &mut self.next {
+            next.command = Some(wanted);
         }
         Ok(())
     }
@@ -517,5 +528,70 @@ where
         self.take_back_from(done);
         self.ahead = place;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::convert::Infallible;
+
+    use super::*;
+    use crate::exec::Executor;
+    use crate::law::{Law, Limits, Ramp};
+    use crate::program::{Allowed, PathBlock};
+    use crate::queue::{LiveStreams, PathRules};
+
+    const TICK_S: f64 = 0.0005;
+
+    fn at(mm: f64) -> Position {
+        Position::from_mm(mm).expect("in range")
+    }
+
+    /// Ticks that come between the background's look and its word make it too late: the command is made again, from where
+    /// motion is by then.
+    #[test]
+    fn a_refused_command_is_made_again() {
+        let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+        let rules = PathRules { limits, feed_mm_s: 20.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+        let up = Ramp::new(&Law::new(limits).expect("limits"), 0.0, 20.0);
+        let (ramp, cruise) = (at(up.length_mm()), at(100.0));
+        let whole = ramp + cruise + ramp;
+        let allowed = Allowed { cap_mm_s: 20.0, limits };
+        let line = Item::Line { line: 1, start: [Position::ZERO], direction: [1.0], length: whole };
+        let items = [
+            Item::Block(PathBlock::new(whole, 20.0, allowed, allowed, 0.0)),
+            line,
+            Item::Feed { ramp: up, length: ramp },
+            Item::Feed { ramp: Ramp::cruise(20.0, 5.0), length: cruise },
+            Item::Feed { ramp: up.reversed(), length: ramp },
+            Item::EndOfStretch([whole]),
+        ];
+        // In the rise, the hold of a cruise, and just before a ramp ends.
+        for seen in [50, 2000, (up.duration_s() / TICK_S) as u32 - 2] {
+            let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+            let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
+            let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
+            let mut director =
+                Director::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
+            for _ in 0..seen {
+                director.turn(&mut feeder).expect("items");
+                executor.tick(&mut intake).expect("no fault");
+            }
+            let progress = feeder.progress();
+            for _ in 0..5 {
+                executor.tick(&mut intake).expect("no fault");
+            }
+            director.hold();
+            director.obey(Wanted::Stop, &progress, &mut feeder).expect("a stop");
+            let mut ticks = 0;
+            while director.state(&feeder) != State::Held && ticks < 20_000 {
+                executor.tick(&mut intake).expect("no fault");
+                director.turn(&mut feeder).expect("items");
+                ticks += 1;
+            }
+            // A ramp to the end and another to rest, not 5 s of cruise.
+            assert!(ticks < 1200, "seen at tick {seen}: {ticks} ticks to rest");
+            assert_eq!(director.starvations(), 0, "seen at tick {seen}");
+        }
     }
 }
