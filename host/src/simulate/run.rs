@@ -139,7 +139,7 @@ fn run_in<R: Real>(
     let (mut background, mut intake) =
         storage.split(machine.rules(), start, executable.supplied(), executable.tick_s);
     if let Some(&StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
-        intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?);
+        intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?)?;
     }
 
     let mut summary = RunSummary {

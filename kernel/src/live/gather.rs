@@ -6,9 +6,9 @@ use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
 use super::replan::replan;
 use super::road::Junction;
+use super::source::Source;
 use crate::law::Ramp;
 use crate::num::Real;
-use crate::program;
 use crate::units::Position;
 
 /// How many blocks ahead are looked at for a feed to go on with under a lower override.
@@ -21,7 +21,7 @@ impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PL
 where
     R: Real,
     E: Clone,
-    I: Iterator<Item = Result<program::Item<AXES>, E>>,
+    I: Source<AXES, Error = E>,
 {
     /// The program's own feed, as far as a list and the path reach. False if there is none.
     pub(super) fn gather(&mut self, list: &mut List) -> bool {
@@ -71,6 +71,7 @@ where
         let from = list.end();
         if from.at == Position::ZERO {
             self.gather_rests(list);
+            self.drop_feed();
         }
         let (path_end, is_whole) = self.path_of(from.stretch);
         let is_all = if path_end > from.at {
