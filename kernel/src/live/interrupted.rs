@@ -146,6 +146,7 @@ impl Rig<'_> {
 fn ticks_between_any_two_operations_of_a_turn() {
     let (mut ticks, mut inside, mut starvations, mut commands) = (0, 0_u64, 0, 0_u64);
     for seed in 0..150 {
+        println!("seed {seed}");
         let random = Random(Cell::new(seed));
         let (mut items, mut stretches, mut from) = (Vec::new(), Vec::new(), Position::ZERO);
         for _ in 0..1 + (random.unit() * 3.0) as usize {

@@ -19,7 +19,7 @@ mod stalls;
 mod stops;
 
 use check::bounds::Number;
-use check::live::{Command, Run, Seen, Setup, execute};
+use check::live::{Command, Run, Seen, Setup, execute, execute_from};
 use check::path::Path;
 use check::program::{Asked, Generated};
 use check::random::Random;
@@ -30,6 +30,7 @@ use motion_host::planning::{Executable, Mode, Plan};
 use motion_kernel::exec::ExecState;
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
+use stalls::{Late, Stalls};
 
 /// A machine, a program for it and its plan; none where planning refuses it or it is long.
 struct Case {
@@ -154,12 +155,12 @@ fn without_commands_it_is_the_plan() {
     assert!(ran > 100 && replanned < ran / 4, "{replanned} of {ran}");
 }
 
-/// Any command before any tick, and a background that is late for some.
+/// Any command before any tick; a background that is late for some, and items that are for some.
 fn random_commands<R: Number>(case: &Case, seed: u64) -> Result<Run, String> {
     let mut random = Random::new(seed ^ 0xC0_FFEE);
     let often = random.log_between(2e-3, 0.5);
     let most = if random.chance(0.5) { 1.0 } else { 2.0 };
-    let is_late = random.chance(0.3);
+    let (is_late, has_late_items) = (random.chance(0.3), random.chance(0.3));
     let is_given_up = random.chance(0.1);
     let mut late = 0_u64;
     let mut decide = |state: State| {
@@ -186,10 +187,16 @@ fn random_commands<R: Number>(case: &Case, seed: u64) -> Result<Run, String> {
     };
     // In the end everything is let go.
     let let_go = 60_000;
-    case.run::<R>(seed, &mut |seen| match seen.ticks {
-        ..60_000 => decide(seen.state),
-        ticks if ticks == let_go => Some(Command::Override(1.0)),
-        _ => Some(Command::Resume),
+    let executable = Executable::new::<R>(&case.plan).map_err(|error| error.to_string())?;
+    let stalls = Stalls::new(seed, has_late_items.then_some((1e-3, 0.1)));
+    let source = Late { items: executable.supplied(), stalls: &stalls };
+    execute_from::<R, _>(&case.setup(seed), source, &mut |seen| {
+        stalls.tick(seen.executed.state);
+        match seen.ticks {
+            ..60_000 => decide(seen.state),
+            ticks if ticks == let_go => Some(Command::Override(1.0)),
+            _ => Some(Command::Resume),
+        }
     })
 }
 

@@ -46,7 +46,7 @@ fn a_late_background_is_waited_for_at_rest() {
 }
 
 /// Stalls of a producer, as the ticks see them.
-struct Stalls {
+pub(super) struct Stalls {
     /// Ticks until items come again; [`Stalls::UNTIL_REST`] for as long as motion lasts, and some.
     left: Cell<u64>,
     count: Cell<u64>,
@@ -59,9 +59,9 @@ struct Stalls {
 impl Stalls {
     const UNTIL_REST: u64 = u64::MAX;
 
-    fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64, often: Option<(f64, f64)>) -> Self {
         let mut random = Random::new(seed ^ 0x17E45);
-        let often = random.log_between(1e-2, 0.7);
+        let often = often.map_or(0.0, |(least, most)| random.log_between(least, most));
         let zero = Cell::new(0);
         Self { left: zero.clone(), count: zero.clone(), at_rest: zero, often, random: random.into() }
     }
@@ -81,7 +81,7 @@ impl Stalls {
         self.left.get() == 0
     }
 
-    fn tick(&self, state: ExecState) {
+    pub(super) fn tick(&self, state: ExecState) {
         let left = self.left.get();
         let is_at_rest = matches!(state, ExecState::Idle | ExecState::Held);
         if left == Self::UNTIL_REST {
@@ -96,9 +96,9 @@ impl Stalls {
 }
 
 /// Items that come late.
-struct Late<'a, I> {
-    items: I,
-    stalls: &'a Stalls,
+pub(super) struct Late<'a, I> {
+    pub(super) items: I,
+    pub(super) stalls: &'a Stalls,
 }
 
 impl<I: Iterator<Item = Result<Item<3>, Infallible>>> Source<3> for Late<'_, I> {
@@ -131,7 +131,7 @@ fn late_items_are_waited_for_on_the_path() {
             shortest_mm = shortest_mm.min(placed.element.length_mm);
             longest_mm = longest_mm.max(placed.element.length_mm);
         }
-        let stalls = Stalls::new(seed);
+        let stalls = Stalls::new(seed, Some((1e-2, 0.7)));
         let run = match seed % 3 {
             0 => with_stalls::<f32>(&case, seed, &stalls),
             1 => with_stalls::<f64>(&case, seed, &stalls),
