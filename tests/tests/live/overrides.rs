@@ -217,6 +217,38 @@ fn feed_and_time_are_those_of_the_override() {
     runs.print_and_assert();
 }
 
+/// Dwells and stops before and behind all motion keep no override from holding, and are not waited for.
+#[test]
+fn an_override_holds_between_rests() {
+    let to = [(8.0 * UNITS_PER_MM) as i64, 0, 0];
+    let asked = vec![
+        Asked::Dwell(0.05),
+        Asked::Stop,
+        Asked::Dwell(0.01),
+        Asked::Move(Move { from: [0; 3], to, arc: None, feed_mm_min: 1200.0 }),
+        Asked::Dwell(0.05),
+        Asked::Stop,
+    ];
+    let text = "G4 P0.05\nM0\nG4 P0.01\nG1 X8 F1200\nG4 P0.05\nM0\n".to_owned();
+    let case = Case::of(&Generated { text, asked }, Machine::reference(), 10_000.0).expect("a program");
+    let mut runs = Runs::default();
+    // From the start, in the first dwell, in motion, in the last dwell.
+    for at in [0, 40, 600, 1300] {
+        let mut fastest_mm_s = 0.0_f64;
+        let run = case.run::<f64>(at, &mut |seen| {
+            fastest_mm_s = fastest_mm_s.max(seen.executed.motion.v_mm_s);
+            (seen.ticks == at).then_some(Command::Override(0.5))
+        });
+        runs.add(at, run);
+        // Motion begins behind 60 ms of dwells, and half a second is more than a ramp to 20 mm/s takes.
+        let is_before = at < 100;
+        let expected_mm_s = if is_before { 10.0 } else { 20.0 };
+        assert!((fastest_mm_s - expected_mm_s).abs() < 1e-9, "override at {at}: {fastest_mm_s} mm/s");
+    }
+    runs.print_and_assert();
+    assert_eq!(runs.ran, 4);
+}
+
 /// The override changed every 10 ms, whatever is under way.
 #[test]
 fn an_override_that_never_rests_keeps_the_limits() {
