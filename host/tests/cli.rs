@@ -396,6 +396,66 @@ fn run_under_live_control() {
     );
 }
 
+/// A run with commands, and one that ends in a fault: recorded, and once more from the recording alone.
+#[test]
+fn replay_of_a_recorded_run() {
+    let desk = Desk::new("replay");
+    desk.put("part.ngc", STRINGER);
+    let file = desk.stdout(&["machine"]);
+    let strict = file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.003");
+    desk.put("machine.toml", &file);
+    desk.put("strict.toml", &strict);
+    for (machine, status) in [("machine.toml", 0), ("strict.toml", 1)] {
+        let run = |arguments: &[&str]| {
+            let output = desk.motion(arguments);
+            (output.status.code(), String::from_utf8(output.stdout).expect("UTF-8"))
+        };
+        let at = "100:override=0.7,900:hold,1500:resume";
+        let recorded = run(&[
+            "run",
+            "part.ngc",
+            "--machine",
+            machine,
+            "--at",
+            at,
+            "--record",
+            "part.mrec",
+            "--trace",
+            "run.csv",
+            "--report",
+            "run.html",
+            "--json",
+        ]);
+        assert_eq!(recorded.0, Some(status));
+        // Whatever the machine and the program are by now.
+        desk.put("part.ngc", "M2\n");
+        let replayed =
+            run(&["replay", "part.mrec", "--trace", "replay.csv", "--report", "replay.html", "--json"]);
+        assert_eq!(replayed.0, Some(0));
+        assert!(desk.read("run.csv") == desk.read("replay.csv"), "the traces differ");
+        assert!(desk.read("run.html") == desk.read("replay.html"), "the reports differ");
+        let json = |text: &str| serde_json::from_str::<Value>(text).expect("JSON");
+        let (recorded, mut replayed) = (json(&recorded.1), json(&replayed.1));
+        let replay = replayed.as_object_mut().expect("an object").remove("replay").expect("a replay");
+        assert_eq!(replayed, recorded);
+        assert_eq!((&replay["identical"], &replay["difference"]), (&Value::Bool(true), &Value::Null));
+        assert!(number(&replay["ticks"]) > number(&recorded["ticks"]));
+        assert_eq!(recorded["faults"].as_array().expect("a list").len(), status as usize);
+        assert!(run(&["replay", "part.mrec"]).1.contains("\n  identical over "));
+        desk.put("part.ngc", STRINGER);
+    }
+
+    let mut bytes = fs::read(desk.0.join("part.mrec")).expect("a recording");
+    let half = bytes.len() / 2;
+    bytes[half] ^= 4;
+    fs::write(desk.0.join("damaged.mrec"), &bytes).expect("a file");
+    let refusal = desk.refusal(&["replay", "damaged.mrec", "--trace", "none.csv"]);
+    assert!(refusal.starts_with("damaged.mrec: found checksum "), "{refusal}");
+    assert!(!desk.0.join("none.csv").exists());
+    let refusal = desk.refusal(&["replay", "part.ngc"]);
+    assert!(refusal.ends_with("at its start, expected a recording, which begins with MREC"), "{refusal}");
+}
+
 #[test]
 fn a_program_from_standard_input() {
     let desk = Desk::new("stdin");

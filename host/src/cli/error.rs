@@ -10,6 +10,7 @@ use crate::gcode::GcodeError;
 use crate::machine::{AxisError, MachineError};
 use crate::planning::PlanningError;
 use crate::points::PointsError;
+use crate::recording::RecordingError;
 use crate::simulate::RunError;
 use crate::toolpath::spline::SplineError;
 use crate::tuning::TuningError;
@@ -91,6 +92,14 @@ pub enum CliError {
         program: String,
         /// Why.
         source: RunError,
+    },
+    /// The file is no recording.
+    #[error("{path}: {source}")]
+    Recording {
+        /// As the user gave it.
+        path: String,
+        /// Why.
+        source: RecordingError,
     },
     /// The drive experiment can't be made, or a fault ended it.
     #[error(transparent)]

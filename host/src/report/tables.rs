@@ -178,10 +178,10 @@ pub(super) fn blocks(record: &RunRecord) -> String {
             "<tr><th scope=\"row\">{}</th><td class=\"word\">{}</td><td>{}</td><td>{}</td><td class=\"word\">{}</td>\
              <td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             block.line,
-            escape(block.kind),
+            escape(&block.kind),
             fixed(block.length_mm, 3),
             fixed(block.cap_mm_s, 2),
-            escape(block.cap_reason),
+            escape(&block.cap_reason),
             fixed(block.enter_mm_s, 2),
             fixed(block.peak_mm_s, 2),
             fixed(block.exit_mm_s, 2),

@@ -67,11 +67,11 @@ fn sample(tick_s: f64, with_z: bool) -> RunRecord {
     {
         record.blocks.push(BlockRecord {
             line,
-            kind,
+            kind: kind.into(),
             start_mm,
             length_mm,
             cap_mm_s,
-            cap_reason,
+            cap_reason: cap_reason.into(),
             enter_mm_s,
             peak_mm_s,
             exit_mm_s,

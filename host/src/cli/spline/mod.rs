@@ -9,8 +9,8 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
-use super::input::{self, Output};
-use super::run::{self, RunJson};
+use super::input;
+use super::run::{self, Outputs, RunJson};
 use super::write_json;
 use crate::planning::plan_spline;
 use crate::planning::spline::Pieces;
@@ -137,9 +137,8 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
     let (mut plan, pieces) = plan_spline(&source.name, &spline, &points.lines, feed_mm_s, &machine)?;
     let figures = SplineFigures::of(&spline, points.points.len(), &pieces, feed_mm_s);
     plan.notices.extend(figures.words());
-    let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
-    let report = arguments.report.as_deref().map(Output::create).transpose()?;
-    let summary = run::execute(&RunOptions::default(), &plan, &machine, trace, report)?;
+    let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
+    let summary = run::execute(&RunOptions::default(), &plan, &machine, outputs, None)?;
     if arguments.json {
         write_json(&SplineJson { run: run::json(&summary), spline: figures }, out)?;
     } else {

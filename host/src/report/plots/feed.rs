@@ -50,15 +50,15 @@ pub(in crate::report) fn is_crowded(record: &RunRecord, summary: &Summary) -> bo
 
 /// What set a block's ceiling. A block that is too short to reach it names what keeps the feed below instead; what
 /// set its ceiling is then not known, and does not matter.
-fn reason(block: &BlockRecord) -> &'static str {
-    match block.cap_reason {
+fn reason(block: &BlockRecord) -> &str {
+    match &*block.cap_reason {
         "accelerating" | "braking" => NOT_REACHED,
         reason => reason,
     }
 }
 
 /// Reasons of the ceilings up to `top_mm_s`, in the order of their appearance.
-pub(in crate::report) fn reasons(blocks: &[BlockRecord], top_mm_s: f64) -> Vec<&'static str> {
+pub(in crate::report) fn reasons(blocks: &[BlockRecord], top_mm_s: f64) -> Vec<&str> {
     let mut known = Vec::new();
     for block in blocks.iter().filter(|block| block.cap_mm_s <= top_mm_s) {
         if !known.contains(&reason(block)) {
@@ -261,11 +261,11 @@ mod tests {
     ) -> BlockRecord {
         BlockRecord {
             line,
-            kind: "line",
+            kind: "line".into(),
             start_mm,
             length_mm,
             cap_mm_s,
-            cap_reason,
+            cap_reason: cap_reason.into(),
             enter_mm_s: 0.0,
             peak_mm_s: 0.0,
             exit_mm_s: 0.0,
