@@ -11,7 +11,7 @@ use motion_host::record::{AXES, TickRecord};
 use motion_host::recording::{Recorder, Recording, replay};
 use motion_host::simulate::live::Script;
 use motion_host::simulate::{self, Hardware, Job, Number, RunOptions, RunSummary, StretchCorrection};
-use motion_kernel::hal::{DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
@@ -23,6 +23,10 @@ enum Breakage {
     Encoders { for_good: bool },
     /// One encoder jumps.
     Jump { axis: usize, counts: i64 },
+    /// The digital inputs can't be read.
+    Inputs,
+    /// They report something.
+    Reports(MachineInputs<AXES>),
     /// The converter's bus.
     Bus,
     /// The drives' enable, at the first tick of all.
@@ -67,6 +71,17 @@ impl<H: Hardware> Encoder<AXES> for Breaking<'_, H> {
                 Ok(counts)
             }
             _ => Ok(counts),
+        }
+    }
+}
+
+impl<H: Hardware> Inputs<AXES> for Breaking<'_, H> {
+    type Error = Broken;
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Broken> {
+        match self.now() {
+            Some(Breakage::Inputs) => Err(Broken),
+            Some(Breakage::Reports(inputs)) => Ok(inputs),
+            _ => self.hardware.read_inputs().map_err(|_| Broken),
         }
     }
 }
@@ -144,12 +159,18 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
         knots_mm_s: (0..8).map(|_| [0; AXES].map(|_| random.between(-0.5, 0.5))).collect(),
         bound_mm_s: 1.0,
     });
-    let breakage = match random.below(8) {
+    let breakage = match random.below(10) {
         0 => Some(Breakage::Encoders { for_good: false }),
         1 => Some(Breakage::Encoders { for_good: true }),
         2 => Some(Breakage::Jump { axis: random.below(AXES), counts: 20_000 }),
         3 => Some(Breakage::Bus),
         4 => Some(Breakage::Enable),
+        5 => Some(Breakage::Inputs),
+        6 => {
+            let mut inputs = MachineInputs { emergency_stop: random.chance(0.5), ..MachineInputs::HEALTHY };
+            inputs.axes[random.below(AXES)] = AxisInputs::HEALTHY.with_fault(true).with_home(true);
+            Some(Breakage::Reports(inputs))
+        }
         _ => None,
     };
     let at = random.next() % (ticks + 1);
@@ -185,7 +206,7 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
 #[test]
 fn a_recorded_run_replays_to_the_bit() {
     let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
-    let programs = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(150);
+    let programs = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(250);
     let (mut runs, mut ticks, mut bytes) = (0, 0, 0);
     let mut faults = std::collections::BTreeMap::<String, u32>::new();
     for seed in first..first + programs {
@@ -194,9 +215,11 @@ fn a_recorded_run_replays_to_the_bit() {
         *faults.entry(fault.unwrap_or_else(|| "none".to_owned())).or_default() += 1;
     }
     println!("{runs} runs, {ticks} ticks, {bytes} bytes; faults: {faults:?}");
-    if programs >= 150 {
+    if programs >= 250 {
         assert!(runs > 50, "{runs}");
-        for fault in ["none", "encoder", "output", "enable", "following error"] {
+        for fault in
+            ["none", "encoder", "inputs", "output", "enable", "following error", "drive", "emergency stop"]
+        {
             assert!(faults.contains_key(fault), "{fault} is not among {faults:?}");
         }
     }

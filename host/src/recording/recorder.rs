@@ -1,6 +1,6 @@
 //! Hardware that writes down what it answers.
 
-use motion_kernel::hal::{DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
@@ -61,6 +61,16 @@ impl<H: Hardware> Encoder<AXES> for Recorder<'_, H> {
         let latched = self.hardware.latch();
         self.answers.counts = latched.as_ref().ok().copied();
         latched
+    }
+}
+
+impl<H: Hardware> Inputs<AXES> for Recorder<'_, H> {
+    type Error = <H as Inputs<AXES>>::Error;
+
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Self::Error> {
+        let read = self.hardware.read_inputs();
+        self.answers.inputs = read.as_ref().ok().copied();
+        read
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use motion_kernel::hal::{DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
@@ -144,6 +144,14 @@ impl Encoder<AXES> for Player<'_> {
     fn latch(&mut self) -> Result<[Counts; AXES], RecordedFailure> {
         self.answers = self.tape.next();
         self.answers.and_then(|(answers, _)| answers.counts).ok_or(RecordedFailure)
+    }
+}
+
+impl Inputs<AXES> for Player<'_> {
+    type Error = RecordedFailure;
+
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, RecordedFailure> {
+        self.answers.and_then(|(answers, _)| answers.inputs).ok_or(RecordedFailure)
     }
 }
 

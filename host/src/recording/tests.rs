@@ -1,5 +1,6 @@
 //! Recordings that are not what they were.
 
+use motion_kernel::hal::{AxisInputs, MachineInputs};
 use motion_kernel::program::ProgramError;
 
 use super::tape::{Answers, TapeWriter};
@@ -69,13 +70,23 @@ fn one_count_off_is_found_in_its_tick() {
 }
 
 #[test]
-fn what_the_drives_were_told_is_compared() {
+fn what_the_drives_were_told_and_inputs_are_compared() {
     let recording = recorded(Number::F32);
     let at = |tick: u64, told| tampered(&recording, tick, |answers| answers.told = told);
     let found = |recording: &Recording| replayed(recording).difference;
     assert_eq!(found(&at(0, None)), Some(Difference::Tick { tick: 0 }));
     assert_eq!(found(&at(0, Some((false, true)))), Some(Difference::Tick { tick: 0 }));
     assert_eq!(found(&at(5, Some((true, true)))), Some(Difference::Tick { tick: 5 }));
+    // The emergency stop is a fault in its tick, whatever the check bytes say.
+    let stopped = tampered(&recording, 200, |answers| {
+        answers.inputs.as_mut().expect("read").emergency_stop = true;
+    });
+    let stopped = replayed(&stopped);
+    assert_eq!(stopped.difference, Some(Difference::Tick { tick: 200 }));
+    assert_eq!(
+        (stopped.summary.faults[0].fault.as_str(), stopped.summary.faults[0].tick),
+        ("emergency stop", 200)
+    );
     // Drives that do not obey are a fault, which the run had not.
     let fault = replayed(&at(0, Some((true, false))));
     assert_eq!(fault.difference, Some(Difference::Tick { tick: 0 }));
@@ -113,15 +124,17 @@ fn a_replay_that_is_longer_or_shorter_says_so() {
 #[test]
 fn a_tape_reads_what_was_written() {
     let ends = [0, 1, -1, i64::MAX, i64::MIN, 1 << 40];
+    let stopped = MachineInputs { emergency_stop: true, ..MachineInputs::HEALTHY };
+    let mut reached = MachineInputs::HEALTHY;
+    reached.axes = [0, 31, 5].map(AxisInputs::from_bits);
+    let inputs = [Some(MachineInputs::HEALTHY), None, Some(stopped), Some(stopped), Some(reached)];
+    let tellings = [None, Some((true, true)), Some((true, false)), Some((false, true)), Some((false, false))];
     let mut all = Vec::new();
     for (a, b) in ends.iter().flat_map(|a| ends.map(|b| (*a, b))) {
-        for is_written in [false, true] {
-            for told in
-                [None, Some((true, true)), Some((true, false)), Some((false, true)), Some((false, false))]
-            {
-                all.push(Answers { counts: Some([Counts(a), Counts(b), Counts(a ^ b)]), is_written, told });
-                all.push(Answers { counts: None, is_written, told });
-            }
+        for (is_written, told) in [false, true].into_iter().flat_map(|is| tellings.map(|told| (is, told))) {
+            let counts = (all.len() % 3 != 0).then_some([Counts(a), Counts(b), Counts(a ^ b)]);
+            let inputs = inputs[all.len() * 7 / 3 % inputs.len()];
+            all.push(Answers { counts, inputs, is_written, told });
         }
     }
     let start = [Counts(i64::MIN), Counts(5), Counts(i64::MAX)];

@@ -1,4 +1,4 @@
-//! The simulated machine as the kernel's hardware: encoders and enable from hal-sim, the velocity
+//! The simulated machine as the kernel's hardware: encoders, inputs and enable from hal-sim, the velocity
 //! outputs through the converter's adapter and real SPI frames.
 //!
 //! [`Hardware`] is what a run asks of any machine.
@@ -6,7 +6,9 @@
 use core::convert::Infallible;
 
 use hal_sim::{Ad5754Chip, ChipError, SimMachine};
-use motion_kernel::hal::{Ad5754Error, Ad5754Output, DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::hal::{
+    Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel,
+};
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
@@ -15,7 +17,7 @@ use crate::machine::DEAD_TIME_CELLS;
 use crate::record::AXES;
 
 /// A machine to run a program on: what the kernel asks of a board, and the time between two ticks.
-pub trait Hardware: Encoder<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> {
+pub trait Hardware: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> {
     /// What the encoders read before the first tick.
     fn start_counts(&mut self) -> [Counts; AXES];
 
@@ -60,6 +62,14 @@ impl Encoder<AXES> for Rig<'_> {
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         self.machine.latch()
+    }
+}
+
+impl Inputs<AXES> for Rig<'_> {
+    type Error = Infallible;
+
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
+        self.machine.read_inputs()
     }
 }
 
