@@ -5,9 +5,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use hal_sim::closed_loop::InMemory;
 use motion_host::machine::Machine;
+use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Fixed;
 use motion_kernel::program::{Reader, check};
+use motion_kernel::queue::Streams;
+use motion_kernel::recorder::{Recorder, frame_max};
+use motion_kernel::units::{Counts, DacCode, Position};
 use serde_json::Value;
 
 /// A directory of a test's own, removed afterwards.
@@ -454,6 +459,50 @@ fn replay_of_a_recorded_run() {
     assert!(!desk.0.join("none.csv").exists());
     let refusal = desk.refusal(&["replay", "part.ngc"]);
     assert!(refusal.ends_with("at its start, expected a recording, which begins with MREC"), "{refusal}");
+}
+
+/// The ticks around a fault, as a board's log has them.
+#[test]
+fn flight_of_a_boards_log() {
+    let desk = Desk::new("flight");
+    let mut log = String::from("0 INFO ready: press the blue button to start\n");
+    let mut recorder = Recorder::<f32, 3, 16, 4>::new();
+    let machine = Machine::reference();
+    let config = machine.axes_config().expect("axes");
+    let start = [Position::ZERO; 3];
+    let mut kernel = Kernel::<f32, 3>::new(&config, start, [Counts(0); 3]);
+    let mut streams = Streams::<f32, 3, 4, 4>::new();
+    let (_, mut intake) = streams.split(machine.rules(), start);
+    kernel.enable(0);
+    for tick in 0..60 {
+        // The encoder of Y jumps by 2 mm.
+        let counts = [0, if tick < 40 { 0 } else { 20_000 }, 0].map(Counts);
+        let mut board = InMemory { counts, codes: [DacCode::ZERO; 3], enabled: None };
+        recorder.add(kernel.tick(&mut intake, &mut board));
+    }
+    assert!(recorder.is_frozen());
+    for row in recorder.rows() {
+        let mut buffer = [0; frame_max(3)];
+        let bytes: Vec<_> =
+            row.to_frame(&mut buffer).expect("room").iter().map(|b| format!("{b:02x}")).collect();
+        log += &format!("{} INFO  flight [{}]\n", row.tick, bytes.join(", "));
+    }
+    desk.put("board.log", &log);
+    let said = desk.stdout(&["flight", "board.log", "--trace", "flight.csv", "--report", "flight.html"]);
+    for part in
+        ["ticks 29 to 44, 16 rows", "fault latched in tick 40", "of axis Y at most -2.0000 mm, limit 1 mm"]
+    {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let trace = desk.read("flight.csv");
+    assert_eq!(trace.lines().count(), 17);
+    assert!(trace.lines().last().expect("a row").starts_with("44,0.022000000,"), "{trace}");
+    assert!(desk.read("flight.html").contains("fault latched"));
+    desk.put("short.log", log.lines().next().expect("a line"));
+    assert_eq!(
+        desk.refusal(&["flight", "short.log"]),
+        "short.log: found no frame, expected lines with `flight […]`"
+    );
 }
 
 #[test]

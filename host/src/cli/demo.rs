@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::error::{CliError, Outcome};
-use super::run::Outputs;
+use super::outputs::Outputs;
 use super::{plan, run};
 use crate::gcode;
 use crate::machine::Machine;

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use thiserror::Error;
 
 use crate::drive::DriveError;
+use crate::flight::FlightError;
 use crate::gcode::GcodeError;
 use crate::machine::{AxisError, MachineError};
 use crate::planning::PlanningError;
@@ -100,6 +101,14 @@ pub enum CliError {
         path: String,
         /// Why.
         source: RecordingError,
+    },
+    /// The log has no good frames of a flight recorder.
+    #[error("{path}{source}")]
+    Flight {
+        /// As the user gave it.
+        path: String,
+        /// Why.
+        source: FlightError,
     },
     /// The drive experiment can't be made, or a fault ended it.
     #[error(transparent)]

@@ -9,19 +9,21 @@
 //! - [`compare`]: the times of programs, exact and blended, beside the least there is;
 //! - [`run`]: a program through plan, kernel and simulated machine;
 //! - [`replay`]: a recorded run once more;
+//! - [`flight`]: the ticks around a fault, from a board's log;
 //! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
 //! - [`machine`]: the reference machine's file, and what its keys mean;
 //! - [`demo`]: what `motion` alone does;
 //! - [`error`]: errors and exit statuses;
-//! - `input`, `table`, `trace`, `progress`: what the commands share.
+//! - `input`, `outputs`, `table`, `trace`, `progress`: what the commands share.
 
 pub mod compare;
 pub mod compile;
 pub mod demo;
 pub mod drive;
 pub mod error;
+pub mod flight;
 pub mod machine;
 pub mod plan;
 pub mod profile;
@@ -30,6 +32,7 @@ pub mod run;
 pub mod spline;
 
 mod input;
+mod outputs;
 mod progress;
 mod table;
 mod trace;
@@ -71,6 +74,7 @@ pub struct Cli {
 enum Command {
     Run(run::RunArguments),
     Replay(replay::ReplayArguments),
+    Flight(flight::FlightArguments),
     Plan(plan::PlanArguments),
     Compare(compare::CompareArguments),
     Profile(profile::ProfileArguments),
@@ -104,6 +108,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         None => demo::demonstrate(out),
         Some(Command::Run(arguments)) => run::run(arguments, out),
         Some(Command::Replay(arguments)) => replay::replay(arguments, out),
+        Some(Command::Flight(arguments)) => flight::flight(arguments, out),
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
         Some(Command::Compare(arguments)) => compare::compare(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),

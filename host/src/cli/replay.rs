@@ -7,7 +7,8 @@ use clap::Args;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
-use super::run::{self, Outputs, RunJson};
+use super::outputs::{self, Outputs};
+use super::run::{self, RunJson};
 use super::{input, write_json};
 use crate::recording::{self, Difference, Recording};
 
@@ -52,9 +53,8 @@ pub fn replay(arguments: &ReplayArguments, out: &mut dyn Write) -> Result<Outcom
     let recording = Recording::from_bytes(&source.text).map_err(refused)?;
     let job = recording.job().map_err(refused)?;
     let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
-    let replayed = run::observed(
+    let replayed = outputs.of_run(
         &job,
-        outputs,
         |observe| recording::replay(&recording, &job, observe),
         |replayed| &replayed.summary,
     )?;
@@ -74,11 +74,7 @@ pub fn replay(arguments: &ReplayArguments, out: &mut dyn Write) -> Result<Outcom
             Some(difference) => format!("NOT IDENTICAL: the replay {difference}"),
         };
         writeln!(out, "\n  {verdict}").map_err(CliError::Output)?;
-        for (what, path) in [("trace", &arguments.trace), ("report", &arguments.report)] {
-            if let Some(path) = path {
-                writeln!(out, "  {what} written to {}", path.display()).map_err(CliError::Output)?;
-            }
-        }
+        outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
     }
     Ok(if difference.is_none() { Outcome::Done } else { Outcome::Failed })
 }

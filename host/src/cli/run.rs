@@ -8,16 +8,14 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::input::{self, Output};
-use super::progress::Progress;
+use super::outputs::{self, Outputs};
 use super::table::{self, Align};
-use super::trace::TraceWriter;
 use super::write_json;
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
-use crate::record::{CommandRecord, FaultRecord, RunRecord, TickRecord};
+use crate::record::{CommandRecord, FaultRecord};
 use crate::recording::Recorder;
-use crate::report;
 use crate::simulate::live::Script;
 use crate::simulate::{self, AxisSummary, Job, RunError, RunOptions, RunSummary};
 
@@ -73,7 +71,6 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let source = input::read(&arguments.program)?;
     let program = gcode::read(&source.name, &source.text)?;
     let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;
-    // Opened before the run: a wrong path should not cost the user a long one.
     let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
     let record = arguments.record.as_deref().map(Output::create).transpose()?;
     let options = RunOptions { script: arguments.at.as_ref(), ..RunOptions::default() };
@@ -82,30 +79,11 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
         write_json(&json(&summary), out)?;
     } else {
         write_summary(&summary, out).map_err(CliError::Output)?;
-        let written =
+        let files =
             [("trace", &arguments.trace), ("report", &arguments.report), ("recording", &arguments.record)];
-        for (what, path) in written {
-            if let Some(path) = path {
-                writeln!(out, "  {what} written to {}", path.display()).map_err(CliError::Output)?;
-            }
-        }
+        outputs::say_written(&files, out)?;
     }
     Ok(if summary.faults.is_empty() { Outcome::Done } else { Outcome::Failed })
-}
-
-/// Files about a run.
-#[derive(Default)]
-pub(super) struct Outputs {
-    trace: Option<Output>,
-    report: Option<Output>,
-}
-
-impl Outputs {
-    /// Creates those that are asked for.
-    pub(super) fn create(trace: &Option<PathBuf>, report: &Option<PathBuf>) -> Result<Self, CliError> {
-        let create = |path: &Option<PathBuf>| path.as_deref().map(Output::create).transpose();
-        Ok(Self { trace: create(trace)?, report: create(report)? })
-    }
 }
 
 /// Runs a plan; writes the trace as it goes, report and recording afterwards.
@@ -122,7 +100,7 @@ pub(super) fn execute(
         let run = |observe: &mut simulate::Observer<'_>| {
             simulate::on_simulated(machine, |rig| simulate::run_on(&job, rig, observe))
         };
-        return observed(&job, outputs, run, |summary| summary);
+        return outputs.of_run(&job, run, |summary| summary);
     };
     let run = |observe: &mut simulate::Observer<'_>| {
         simulate::on_simulated(machine, |rig| {
@@ -131,72 +109,10 @@ pub(super) fn execute(
             Ok((summary, recorder.finish(&job)))
         })
     };
-    let (summary, recording) = observed(&job, outputs, run, |(summary, _)| summary)?;
+    let (summary, recording) = outputs.of_run(&job, run, |(summary, _)| summary)?;
     let written = record.file.write_all(&recording.to_bytes()).and_then(|()| record.file.flush());
     written.map_err(|source| CliError::Write { path: record.name, source })?;
     Ok(summary)
-}
-
-/// What `run` makes of a job, with its trace written as it goes, and a report of its summary afterwards.
-pub(super) fn observed<T>(
-    job: &Job,
-    outputs: Outputs,
-    run: impl FnOnce(&mut simulate::Observer<'_>) -> Result<T, RunError>,
-    summary_of: impl Fn(&T) -> &RunSummary,
-) -> Result<T, CliError> {
-    let unwritten = |path: &str| {
-        let path = path.to_owned();
-        move |source| CliError::Write { path, source }
-    };
-    let Outputs { trace, report } = outputs;
-    let trace_name = trace.as_ref().map_or_else(String::new, |output| output.name.clone());
-    let mut trace = match trace {
-        Some(output) => Some(TraceWriter::new(output.file, &job.sheet).map_err(unwritten(&trace_name))?),
-        None => None,
-    };
-    // Only a report needs all the ticks at once.
-    let mut ticks: Vec<TickRecord> = Vec::new();
-    let mut progress = Progress::new((job.sheet.planned_time_s / job.sheet.tick_s) as u64);
-    let ran = run(&mut |tick| {
-        if let Some(trace) = &mut trace {
-            trace.add(tick);
-        }
-        if report.is_some() {
-            ticks.push(*tick);
-        }
-        progress.tick();
-    });
-    progress.finish();
-    if let Some(trace) = trace {
-        trace.finish().map_err(unwritten(&trace_name))?;
-    }
-    let ran = ran.map_err(|source| CliError::Run { program: job.sheet.program.clone(), source })?;
-    if let Some(mut output) = report {
-        let record = record(job, summary_of(&ran), ticks);
-        report::write_html(&record, &mut output.file)
-            .and_then(|()| output.file.flush())
-            .map_err(unwritten(&output.name))?;
-    }
-    Ok(ran)
-}
-
-fn record(job: &Job, summary: &RunSummary, ticks: Vec<TickRecord>) -> RunRecord {
-    let Job { header, sheet, .. } = job;
-    RunRecord {
-        program: sheet.program.clone(),
-        machine: sheet.machine.clone(),
-        tick_s: sheet.tick_s,
-        limits: sheet.limits,
-        axis_names: sheet.axes.each_ref().map(|axis| axis.name.clone()),
-        following_error_limit_um: header.axes.each_ref().map(|axis| axis.following_error_limit_mm * 1e3),
-        end_error_counts: summary.axes.each_ref().map(|axis| axis.end_error_counts),
-        blocks: sheet.blocks.clone(),
-        ticks,
-        planned_time_s: sheet.planned_time_s,
-        commands: summary.commands.clone(),
-        faults: summary.faults.clone(),
-        notices: summary.notices.clone(),
-    }
 }
 
 #[derive(Serialize)]

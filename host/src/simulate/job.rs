@@ -12,7 +12,7 @@ use super::live::Script;
 use super::run::{Number, RunError, RunOptions, StretchCorrection};
 use crate::machine::{AxisError, Machine};
 use crate::planning::{Executable, Item as PlanItem, Plan};
-use crate::record::{AXES, BlockRecord, PathLimits};
+use crate::record::{AXES, BlockRecord, PathLimits, RunRecord};
 
 /// A program with its machine, and with what is commanded on the way.
 #[derive(Clone, Debug)]
@@ -88,6 +88,21 @@ impl Sheet {
                 jerk_mm_s3: axis.jerk_mm_s3,
             }),
             ..Self::default()
+        }
+    }
+
+    /// A record with what the sheet has for it, and no tick.
+    #[must_use]
+    pub fn record(&self) -> RunRecord {
+        RunRecord {
+            program: self.program.clone(),
+            machine: self.machine.clone(),
+            tick_s: self.tick_s,
+            limits: self.limits,
+            axis_names: self.axes.each_ref().map(|axis| axis.name.clone()),
+            blocks: self.blocks.clone(),
+            planned_time_s: self.planned_time_s,
+            ..RunRecord::default()
         }
     }
 

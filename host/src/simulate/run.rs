@@ -257,18 +257,19 @@ fn tick_record<R: Real>(trace: &Trace<R, AXES>, start_mm: f64, contour: &mut Con
         a_mm_s2: motion.a_mm_s2.to_f64(),
         j_mm_s3: motion.j_mm_s3.to_f64(),
         snap_mm_s4: motion.snap_mm_s4.to_f64(),
-        state: state_name(trace),
+        state: state_name(executed.state, trace.fault.is_some()),
         line: executed.line,
         contour_um: contour.error_um(&axes),
         axes,
     }
 }
 
-fn state_name<R: Real>(trace: &Trace<R, AXES>) -> &'static str {
-    if trace.fault.is_some() {
+/// What records call a state.
+pub(crate) fn state_name(state: ExecState, is_faulted: bool) -> &'static str {
+    if is_faulted {
         return "fault";
     }
-    match trace.executed.state {
+    match state {
         ExecState::Idle => "idle",
         ExecState::Moving => "moving",
         ExecState::Dwell => "dwell",

@@ -2,7 +2,7 @@
 
 mod experiment;
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -10,7 +10,8 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::input;
-use super::run::{self, Outputs, RunJson};
+use super::outputs::{self, Outputs};
+use super::run::{self, RunJson};
 use super::write_json;
 use crate::planning::plan_spline;
 use crate::planning::spline::Pieces;
@@ -142,7 +143,8 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
     if arguments.json {
         write_json(&SplineJson { run: run::json(&summary), spline: figures }, out)?;
     } else {
-        run::write_summary(&summary, out).and_then(|()| files(arguments, out)).map_err(CliError::Output)?;
+        run::write_summary(&summary, out).map_err(CliError::Output)?;
+        outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
     }
     Ok(if summary.faults.is_empty() { Outcome::Done } else { Outcome::Failed })
 }
@@ -153,16 +155,6 @@ fn fit(points: &Points, arguments: &SplineArguments) -> Result<Spline, SplineErr
         None => spline::chord_lengths(&points.points)?,
     };
     spline::fit(&points.points, &parameters, arguments.degree.degree(), arguments.tolerance)
-}
-
-/// Says where files were written.
-fn files(arguments: &SplineArguments, out: &mut dyn Write) -> io::Result<()> {
-    for (what, path) in [("trace", &arguments.trace), ("report", &arguments.report)] {
-        if let Some(path) = path {
-            writeln!(out, "  {what} written to {}", path.display())?;
-        }
-    }
-    Ok(())
 }
 
 #[derive(Serialize)]
