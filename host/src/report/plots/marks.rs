@@ -13,7 +13,7 @@ use crate::report::palette::{self, Ink};
 pub(in crate::report) const COMMAND_MARKS_MAX: usize = 60;
 
 /// Rows of words above a plot. A word that fits into none is left out; its line stays.
-const ROWS_MAX: usize = 4;
+const ROWS_MAX: usize = 6;
 
 /// An upright line with a word to it.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,12 +122,12 @@ impl Words {
         y: (f64, f64),
         top: u32,
     ) -> Drawn {
+        for mark in &self.marks {
+            let style = mark.ink().rgb().stroke_width(6);
+            chart.draw_series([PathElement::new([(mark.at, y.0), (mark.at, y.1)], style)])?;
+        }
+        // On top of all lines.
         for (mark, place) in self.marks.iter().zip(&self.places) {
-            let ink = mark.ink();
-            chart.draw_series([PathElement::new(
-                [(mark.at, y.0), (mark.at, y.1)],
-                ink.rgb().stroke_width(6),
-            )])?;
             let Some(Place { row, is_left }) = place else { continue };
             let (left, _) = area.get_base_pixel();
             let (x, _) = chart.backend_coord(&(mark.at, y.0));
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(rows(&close), [Some((0, false)), Some((1, false)), Some((0, false)), Some((0, true))]);
         assert_eq!(close.height(&WIDE), 2 * Words::row_height(&WIDE));
         // Beyond the rows, and beyond the axis, lines have no word.
-        let crowd = words(&[2.0; 7], &NARROW);
+        let crowd = words(&[2.0; 9], &NARROW);
         assert_eq!(rows(&crowd).iter().filter(|row| row.is_some()).count(), ROWS_MAX);
         assert_eq!(rows(&words(&[11.0], &WIDE)), [None]);
         assert_eq!(words(&[], &WIDE).height(&WIDE), 0);
