@@ -24,6 +24,7 @@ pub(crate) enum Command {
     Resume,
     Override(f64),
     Abort,
+    SingleBlock(bool),
     /// The background does not get its turn.
     Stall,
 }
@@ -73,6 +74,7 @@ pub(crate) fn execute<R: Number>(
             Some(Command::Resume) => director.resume(),
             Some(Command::Override(share)) => director.set_override(share).expect("within range"),
             Some(Command::Abort) => director.abort(),
+            Some(Command::SingleBlock(is_single)) => director.set_single_block(is_single),
         }
         if command != Some(Command::Stall) {
             director.turn(&mut feeder).map_err(|error| format!("tick {ticks}: rejected: {error}"))?;
