@@ -10,7 +10,9 @@ use core::convert::Infallible;
 
 use motion_kernel::axis::{AxesConfig, AxesError, Correction, CorrectionError};
 use motion_kernel::exec::ExecState;
-use motion_kernel::hal::{Ad5754Error, Ad5754Output, DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::hal::{
+    Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel,
+};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Real;
 use motion_kernel::program::{Header, Items, ProgramError, Reader, Supply, SupplyError};
@@ -58,6 +60,16 @@ impl<const AXES: usize> Encoder<AXES> for InMemory<AXES> {
     #[inline]
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         Ok(self.counts)
+    }
+}
+
+/// Without inputs.
+impl<const AXES: usize> Inputs<AXES> for InMemory<AXES> {
+    type Error = Infallible;
+
+    #[inline]
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
+        Ok(MachineInputs::HEALTHY)
     }
 }
 

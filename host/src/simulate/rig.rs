@@ -1,10 +1,12 @@
-//! The simulated machine as the kernel's hardware: encoders and enable from hal-sim, the velocity
+//! The simulated machine as the kernel's hardware: encoders, inputs and enable from hal-sim, the velocity
 //! outputs through the converter's adapter and real SPI frames.
 
 use core::convert::Infallible;
 
 use hal_sim::{Ad5754Chip, ChipError, SimMachine};
-use motion_kernel::hal::{Ad5754Error, Ad5754Output, DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::hal::{
+    Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel,
+};
 use motion_kernel::units::{Counts, DacCode};
 
 use crate::machine::DEAD_TIME_CELLS;
@@ -35,6 +37,14 @@ impl Encoder<AXES> for Rig<'_> {
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         self.machine.latch()
+    }
+}
+
+impl Inputs<AXES> for Rig<'_> {
+    type Error = Infallible;
+
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
+        self.machine.read_inputs()
     }
 }
 

@@ -261,6 +261,7 @@ fn fault_record<R: Real>(fault: &Fault<R>, machine: &Machine) -> FaultRecord {
             (Some(settings.name.clone()), "following error", detail)
         }
         FaultKind::Encoder => (None, "encoder", "the encoders could not be read".to_owned()),
+        FaultKind::Inputs => (None, "inputs", "the digital inputs could not be read".to_owned()),
         FaultKind::Output => (None, "output", "the converter could not be written".to_owned()),
         FaultKind::Enable => (None, "enable", "the drives could not be switched".to_owned()),
         FaultKind::EmergencyStop => (None, "emergency stop", "the emergency stop is open".to_owned()),
