@@ -4,6 +4,7 @@
 //! [`TickRecord`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter and
 //! the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
+//! - [`home`]: homing, and motion behind it;
 //! - [`live`]: commands before given ticks;
 //! - `background`: what fills the streams, with commands or without;
 //! - [`rig`]: the simulated machine as the kernel's hardware;
@@ -15,6 +16,7 @@
 mod background;
 pub(crate) mod contour;
 mod limit_share;
+pub mod home;
 pub mod live;
 pub mod rig;
 pub mod run;

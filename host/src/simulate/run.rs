@@ -209,7 +209,11 @@ fn run_in<R: Real>(
     Ok(summary)
 }
 
-fn tick_record<R: Real>(trace: &Trace<R, AXES>, start_mm: f64, contour: &mut Contour) -> TickRecord {
+pub(super) fn tick_record<R: Real>(
+    trace: &Trace<R, AXES>,
+    start_mm: f64,
+    contour: &mut Contour,
+) -> TickRecord {
     let executed = &trace.executed;
     let motion = &executed.motion;
     let axes = core::array::from_fn(|index| {
@@ -251,7 +255,7 @@ fn state_name<R: Real>(trace: &Trace<R, AXES>) -> &'static str {
     }
 }
 
-fn fault_record<R: Real>(fault: &Fault<R>, machine: &Machine) -> FaultRecord {
+pub(super) fn fault_record<R: Real>(fault: &Fault<R>, machine: &Machine) -> FaultRecord {
     let (axis, name, detail) = match fault.kind {
         FaultKind::Executor(fault) => (None, "executor", format!("{fault:?}")),
         FaultKind::FollowingError { axis, error_mm } => {
