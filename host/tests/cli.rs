@@ -396,9 +396,53 @@ fn run_under_live_control() {
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{error}");
     assert!(
-        error.contains("found the command `stop`, expected hold, resume, abort or override=SHARE"),
+        error.contains(
+            "found the command `stop`, expected hold, resume, abort, override=SHARE, single or continuous"
+        ),
         "{error}"
     );
+
+    // At rest at the end of the first line, and after the resume to the end.
+    desk.put("line.ngc", "G1 X20 F2400\nX60\nM2\n");
+    let (_, states, _, end_mm) = run("0:single");
+    assert!(states.last().is_some_and(|state| state == "held") && (end_mm - 20.0).abs() < 1e-9, "{end_mm}");
+    let (_, states, _, end_mm) = run("0:single,6000:resume");
+    let at_rest = states.iter().filter(|state| *state == "held").count();
+    assert!(at_rest > 1000 && (end_mm - 60.0).abs() < 1e-9, "{at_rest} {end_mm}");
+}
+
+/// The machine file's homing in use: the reference is the index behind the switch; what is not found is named.
+#[test]
+fn home_finds_the_reference() {
+    let desk = Desk::new("home");
+    let file = desk.stdout(&["machine"]);
+    desk.put("none.toml", &file);
+    assert_eq!(
+        desk.refusal(&["home", "--machine", "none.toml"]),
+        "none.toml: found no [axis.homing], expected one for each axis that is to be homed"
+    );
+    let (before, homing) = file.split_once("#[axis.homing]").expect("homing");
+    let (homing, after) = homing.split_once("\n\n").expect("its end");
+    let homing = format!("[axis.homing]{homing}").replace("\n#", "\n").replace("\n ", "\n# ");
+    let with = |homing: &str| [before, homing, "\n\n", after].concat();
+    desk.put("home.toml", &with(&homing));
+    let axes = desk.json(&["home", "--machine", "home.toml", "--trace", "home.csv", "--json"]);
+    let [axis] = &axes.as_array().expect("a list")[..] else { panic!("{axes}") };
+    assert_has(axis, &["axis", "counts", "index_counts", "time_s", "position_mm", "true_mm"]);
+    // The index at 4.2 − 19·10 mm is the first behind -180 mm.
+    assert_eq!((axis["axis"].as_str(), number(&axis["counts"])), (Some("X"), -1_858_000.0));
+    assert!((number(&axis["true_mm"]) - (250.0 - 185.8)).abs() < 2e-3, "{axis}");
+    assert_eq!(number(&axis["position_mm"]), 0.0);
+    let ticks = desk.read("home.csv").lines().count() - 1;
+    assert!((ticks as f64 * 0.0005 - number(&axis["time_s"])).abs() < 1e-9, "{ticks} {axis}");
+    assert!(desk.stdout(&["home", "--machine", "home.toml"]).contains("-1858000"));
+
+    desk.put("short.toml", &with(&homing.replace("travel_mm = 600.0", "travel_mm = 100.0")));
+    let output = desk.motion(&["home", "--machine", "short.toml"]);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    let expected = "short.toml: axis X: no home switch within 100 mm: expected it to close there";
+    assert!(error.contains(expected), "{error}");
 }
 
 /// A run with commands, and one that ends in a fault: recorded, and once more from the recording alone.

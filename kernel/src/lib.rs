@@ -15,6 +15,7 @@
 //!                                                                    │
 //!   program both as data; keeps the queues full  Item ─► Feeder       │
 //!   live    hold, override, abort (optional)     feed lists           │
+//!   jog, homing   single axes (optional)         Item ─► live         │
 //!   queue   bounded, checked on entry            Feeder ─► Intake ◄──┘
 //!   ─────── tick ──────────────────────────────────────────────────────
 //!   exec    feed law ─► s, v, a, j, snap         PathMotion
@@ -98,3 +99,7 @@ pub mod fault;
 pub mod trace;
 pub mod recorder;
 pub mod kernel;
+#[cfg(feature = "live")]
+pub mod jog;
+#[cfg(feature = "live")]
+pub mod homing;

@@ -13,6 +13,7 @@ use crate::planning::PlanningError;
 use crate::points::PointsError;
 use crate::recording::RecordingError;
 use crate::simulate::RunError;
+use crate::simulate::home::HomeError;
 use crate::toolpath::spline::SplineError;
 use crate::tuning::TuningError;
 
@@ -110,6 +111,14 @@ pub enum CliError {
         /// Why.
         source: FlightError,
     },
+    /// The machine is not homed.
+    #[error("{machine}: {source}")]
+    Home {
+        /// Its file.
+        machine: String,
+        /// Why.
+        source: HomeError,
+    },
     /// The drive experiment can't be made, or a fault ended it.
     #[error(transparent)]
     Drive(#[from] DriveError),
@@ -133,14 +142,16 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// 2, but for output that failed, for a plan that the kernel refuses for an experiment that ended in a fault or
-    /// found nothing to measure, and for one that found too little to tune by: these are not the user's input.
+    /// 2, but for output that failed, for a plan that the kernel refuses, for an experiment that ended in a fault or
+    /// found nothing to measure, for one that found too little to tune by, and for an axis that found no reference: these
+    /// are not the user's input.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Output(_) | Self::Tuning(_) | Self::Run { source: RunError::Rejected(_), .. } => {
                 ExitCode::FAILURE
             }
+            Self::Home { source: HomeError::Axis { .. } | HomeError::Fault(_), .. } => ExitCode::FAILURE,
             Self::Drive(
                 DriveError::Fault { .. }
                 | DriveError::NotSteady { .. }

@@ -13,6 +13,7 @@
 //! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
+//! - [`home`]: the simulated axes find their references;
 //! - [`machine`]: the reference machine's file, and what its keys mean;
 //! - [`demo`]: what `motion` alone does;
 //! - [`error`]: errors and exit statuses;
@@ -24,6 +25,7 @@ pub mod demo;
 pub mod drive;
 pub mod error;
 pub mod flight;
+pub mod home;
 pub mod machine;
 pub mod plan;
 pub mod profile;
@@ -55,6 +57,7 @@ Examples:
   motion spline points.csv --tolerance 0.01      a quintic spline close to points, and its run
   motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
+  motion home --machine mine.toml                the axes find their references
   motion machine > mine.toml                     a machine file to start from
   motion machine --explain                       what every key of it means
 
@@ -81,6 +84,7 @@ enum Command {
     Spline(spline::SplineArguments),
     Drive(drive::DriveArguments),
     Compile(compile::CompileArguments),
+    Home(home::HomeArguments),
     Machine(machine::MachineArguments),
 }
 
@@ -115,6 +119,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Spline(arguments)) => spline::run(arguments, out),
         Some(Command::Drive(arguments)) => drive::drive(arguments, out),
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),
+        Some(Command::Home(arguments)) => home::run(arguments, out),
         Some(Command::Machine(arguments)) => machine::print(arguments, out),
     }
 }

@@ -53,8 +53,9 @@ pub struct RunArguments {
     record: Option<PathBuf>,
     /// Live control: commands before given ticks, such as `2000:hold,2600:resume,3000:override=0.5`.
     ///
-    /// A command is `hold` (come to rest on the path), `resume`, `abort` (come to rest and give up the rest) or
-    /// `override=SHARE` (drive at so many times the program's feed, from 0 to 2, never above what the machine allows).
+    /// A command is `hold` (come to rest on the path), `resume`, `abort` (come to rest and give up the rest),
+    /// `override=SHARE` (drive at so many times the program's feed, from 0 to 2, never above what the machine allows),
+    /// `single` (come to rest at the end of every program line and wait there for a resume) or `continuous` (no more).
     #[arg(long, value_name = "TICK:COMMAND,…")]
     at: Option<Script>,
     /// Print JSON: ticks, times, maxima along the path, share of it on which a limit is active, errors of the axes, faults.

@@ -90,6 +90,7 @@ fn asks_for_rest(command: Command) -> bool {
     match command {
         Command::Hold | Command::Abort => true,
         Command::Override(share) => share <= 0.0,
+        Command::SingleBlock(is_single) => is_single,
         Command::Resume => false,
     }
 }
@@ -97,7 +98,7 @@ fn asks_for_rest(command: Command) -> bool {
 /// Whether `command` is what the rest that `waiting` asked for ends with.
 fn is_ended_by(waiting: Command, command: Command) -> bool {
     match (waiting, command) {
-        (Command::Hold, Command::Resume) => true,
+        (Command::Hold | Command::SingleBlock(_), Command::Resume) => true,
         (Command::Override(_), Command::Override(share)) => share > 0.0,
         _ => false,
     }

@@ -5,6 +5,7 @@
 //! the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
 //! - [`job`]: what is executed, and what its records call it by;
+//! - [`home`]: homing, and motion behind it;
 //! - [`live`]: commands before given ticks;
 //! - `background`: what fills the streams, with commands or without;
 //! - [`rig`]: the simulated machine as the kernel's hardware;
@@ -19,6 +20,7 @@ mod commands;
 pub(crate) mod contour;
 pub mod job;
 mod limit_share;
+pub mod home;
 pub mod live;
 pub mod rig;
 pub mod run;

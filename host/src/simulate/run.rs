@@ -10,7 +10,7 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
-use motion_kernel::program::SupplyError;
+use motion_kernel::program::{Header, SupplyError};
 use motion_kernel::trace::Trace;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ use super::Observer;
 use super::background::Storage;
 use super::commands::Commands;
 use super::contour::Contour;
-use super::job::Job;
+use super::job::{Job, Sheet};
 use super::limit_share::LimitShare;
 use super::live::Script;
 use super::rig::{Hardware, Rig, Simulated};
@@ -188,7 +188,7 @@ fn run_in<R: Real>(
         commands.add(&record);
         observe(&record);
         if let Some(fault) = trace.fault {
-            summary.faults.push(fault_record(&fault, job));
+            summary.faults.push(fault_record(&fault, &job.header, &job.sheet));
             break;
         }
         if let Some(reason) = ended {
@@ -235,7 +235,11 @@ fn run_in<R: Real>(
     Ok(summary)
 }
 
-fn tick_record<R: Real>(trace: &Trace<R, AXES>, start_mm: f64, contour: &mut Contour) -> TickRecord {
+pub(super) fn tick_record<R: Real>(
+    trace: &Trace<R, AXES>,
+    start_mm: f64,
+    contour: &mut Contour,
+) -> TickRecord {
     let executed = &trace.executed;
     let motion = &executed.motion;
     let axes = core::array::from_fn(|index| {
@@ -278,12 +282,12 @@ pub(crate) fn state_name(state: ExecState, is_faulted: bool) -> &'static str {
     }
 }
 
-fn fault_record<R: Real>(fault: &Fault<R>, job: &Job) -> FaultRecord {
-    let name_of = |axis: usize| Some(job.sheet.axes[axis].name.clone());
+pub(super) fn fault_record<R: Real>(fault: &Fault<R>, header: &Header<AXES>, sheet: &Sheet) -> FaultRecord {
+    let name_of = |axis: usize| Some(sheet.axes[axis].name.clone());
     let (axis, name, detail) = match fault.kind {
         FaultKind::Executor(fault) => (None, "executor", format!("{fault:?}")),
         FaultKind::FollowingError { axis, error_mm } => {
-            let limit_mm = job.header.axes[axis].following_error_limit_mm;
+            let limit_mm = header.axes[axis].following_error_limit_mm;
             let detail = format!("{:.3} mm, limit {limit_mm} mm", error_mm.to_f64());
             (name_of(axis), "following error", detail)
         }
