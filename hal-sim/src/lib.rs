@@ -24,6 +24,7 @@
 //! ```
 //!
 //! [`closed_loop`] runs a compiled program on it, the same way on a PC and inside an emulated board.
+//! [`Injector`] breaks it on demand.
 //! [`SimMachine`] holds one chip and up to four such axes and advances them one control tick at a time.
 //!
 //! # Example
@@ -77,6 +78,7 @@ mod dead_time;
 mod drive;
 mod drive_parameters;
 mod encoder;
+mod injection;
 mod machine;
 mod noise;
 mod parameter;
@@ -87,6 +89,7 @@ pub use dac_frame::OutputRange;
 pub use drive::{DriveModel, DriveState, SUBSTEPS_MAX};
 pub use drive_parameters::{BedMode, DriveParameters, REFERENCE_X, REFERENCE_Y, REFERENCE_Z};
 pub use encoder::{EncoderNoise, EncoderParameters, REFERENCE_ENCODER, SimEncoder, TimerBits};
+pub use injection::{Injection, Injector};
 pub use machine::{
     AxisTruth, MachineError, MachineParameters, REFERENCE_LINE, REFERENCE_SUBSTEPS, REFERENCE_TICK_S,
     SimMachine,

@@ -95,5 +95,6 @@ pub mod exec;
 pub mod axis;
 pub mod hal;
 pub mod fault;
+pub mod tick_monitor;
 pub mod trace;
 pub mod kernel;

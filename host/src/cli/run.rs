@@ -17,6 +17,7 @@ use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
 use crate::record::{FaultRecord, PathLimits, RunRecord, TickRecord};
 use crate::report;
+use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
 use crate::simulate::{self, AxisSummary, RunOptions, RunSummary};
 
@@ -54,6 +55,14 @@ pub struct RunArguments {
     /// `override=SHARE` (drive at so many times the program's feed, from 0 to 2, never above what the machine allows).
     #[arg(long, value_name = "TICK:COMMAND,…")]
     at: Option<Script>,
+    /// Break the simulated machine before given ticks, such as `2000:encoder-lost=X`.
+    ///
+    /// What can break: `encoder-lost=AXIS`, `encoder-jump=AXIS:COUNTS`, `encoder-reversed=AXIS`, `drive-reversed=AXIS`,
+    /// `overload=AXIS:ACCELERATION` (what is left of the drive's, in mm/s²), `drive-not-ready=AXIS`, `drive-fault=AXIS`,
+    /// `limit-low=AXIS:POSITION` and `limit-high=AXIS:POSITION` (a limit switch up to or from there, in mm), and
+    /// `emergency-stop`.
+    #[arg(long, value_name = "TICK:FAULT,…")]
+    inject: Option<Injections>,
     /// Print JSON: ticks, times, maxima along the path, share of it on which a limit is active, errors of the axes, faults.
     #[arg(long)]
     json: bool,
@@ -71,7 +80,11 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     // Opened before the run: a wrong path should not cost the user a long one.
     let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
     let report = arguments.report.as_deref().map(Output::create).transpose()?;
-    let options = RunOptions { script: arguments.at.as_ref(), ..RunOptions::default() };
+    let options = RunOptions {
+        script: arguments.at.as_ref(),
+        injections: arguments.inject.as_ref(),
+        ..RunOptions::default()
+    };
     let summary = execute(&options, &plan, &machine, trace, report)?;
     if arguments.json {
         write_json(&json(&summary), out)?;

@@ -4,6 +4,8 @@
 //! [`TickRecord`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter and
 //! the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
+//! - [`faults`]: names and table of faults;
+//! - [`inject`]: what breaks before given ticks;
 //! - [`live`]: commands before given ticks;
 //! - `background`: what fills the streams, with commands or without;
 //! - [`rig`]: the simulated machine as the kernel's hardware;
@@ -14,6 +16,8 @@
 
 mod background;
 pub(crate) mod contour;
+pub mod faults;
+pub mod inject;
 mod limit_share;
 pub mod live;
 pub mod rig;

@@ -3,7 +3,7 @@
 
 use core::convert::Infallible;
 
-use hal_sim::{Ad5754Chip, ChipError, SimMachine};
+use hal_sim::{Ad5754Chip, ChipError, Injection, Injector, SimMachine};
 use motion_kernel::hal::{
     Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel,
 };
@@ -19,6 +19,8 @@ pub type Simulated = SimMachine<AXES, DEAD_TIME_CELLS>;
 pub struct Rig<'a> {
     machine: &'a Simulated,
     outputs: Ad5754Output<&'a Ad5754Chip, AXES>,
+    /// What is broken.
+    pub injector: Injector<AXES>,
 }
 
 impl<'a> Rig<'a> {
@@ -28,7 +30,12 @@ impl<'a> Rig<'a> {
     /// The converter does not take its configuration.
     pub fn new(machine: &'a Simulated) -> Result<Self, Ad5754Error<ChipError>> {
         let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())?;
-        Ok(Self { machine, outputs })
+        Ok(Self { machine, outputs, injector: Injector::new() })
+    }
+
+    /// Breaks something of an axis, from 0.
+    pub fn inject(&mut self, axis: usize, injection: Injection) {
+        self.injector.inject(self.machine, axis, injection);
     }
 }
 
@@ -36,7 +43,8 @@ impl Encoder<AXES> for Rig<'_> {
     type Error = Infallible;
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
-        self.machine.latch()
+        let Ok(counts) = self.machine.latch();
+        Ok(self.injector.counts(counts))
     }
 }
 
@@ -44,7 +52,7 @@ impl Inputs<AXES> for Rig<'_> {
     type Error = Infallible;
 
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
-        self.machine.read_inputs()
+        Ok(self.injector.inputs(self.machine))
     }
 }
 

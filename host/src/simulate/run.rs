@@ -4,7 +4,6 @@ use core::convert::Infallible;
 
 use motion_kernel::axis::{Correction, CorrectionError};
 use motion_kernel::exec::ExecState;
-use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
@@ -15,13 +14,15 @@ use motion_kernel::units::Position;
 use super::Observer;
 use super::background::Storage;
 use super::contour::Contour;
+use super::faults;
+use super::inject::{InjectionError, Injections};
 use super::limit_share::LimitShare;
 use super::live::Script;
 use super::rig::{Rig, Simulated};
 use super::summary::{Collector, RunSummary};
 use crate::machine::{AxisError, Machine};
 use crate::planning::{Executable, Item as PlanItem, Plan, PlanningError};
-use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
+use crate::record::{AXES, AxisTick, TickRecord};
 
 /// How long the machine is given to settle before its end position is read \[s\].
 const SETTLE_S: f64 = 0.2;
@@ -60,6 +61,8 @@ pub struct RunOptions<'a> {
     pub correction: Option<&'a StretchCorrection>,
     /// Live control.
     pub script: Option<&'a Script>,
+    /// What breaks.
+    pub injections: Option<&'a Injections>,
 }
 
 /// Why a run could not be made.
@@ -74,6 +77,9 @@ pub enum RunError {
     /// The simulated machine can't be built.
     #[error("simulated machine: {0}")]
     Simulation(String),
+    /// What is to break is not there.
+    #[error(transparent)]
+    Injection(#[from] InjectionError),
     /// The correction can't be used.
     #[error("correction: {0}")]
     Correction(#[from] CorrectionError),
@@ -113,7 +119,10 @@ fn run_in<R: Real>(
     machine: &Machine,
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
-    let &RunOptions { correction, script, .. } = options;
+    let &RunOptions { correction, script, injections, .. } = options;
+    if let Some(injections) = injections {
+        injections.check(machine)?;
+    }
     let executable = Executable::new::<R>(plan)?;
     let starts: Vec<f64> = plan
         .items
@@ -128,7 +137,8 @@ fn run_in<R: Real>(
     let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
     let Ok(counts) = rig.latch();
     let start = [Position::ZERO; AXES];
-    let mut kernel = Kernel::<R, AXES>::new(&machine.axes_config()?, start, counts);
+    let config = machine.axes_config()?;
+    let mut kernel = Kernel::<R, AXES>::new(&config, start, counts);
     kernel.enable(0);
     let knots_mm_s: Vec<[R; AXES]> = correction
         .iter()
@@ -154,7 +164,13 @@ fn run_in<R: Real>(
     let mut limit_share = LimitShare::new(plan, machine);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     loop {
+        if kernel.wants_hold() {
+            background.hold();
+        }
         background.turn(collector.ticks()).map_err(RunError::Rejected)?;
+        if let Some(injections) = injections {
+            injections.apply(collector.ticks(), machine, &mut rig);
+        }
         let trace = *kernel.tick(&mut intake, &mut rig);
         simulated.advance();
         let state = trace.executed.state;
@@ -167,8 +183,16 @@ fn run_in<R: Real>(
         limit_share.add(&record);
         observe(&record);
         if let Some(fault) = trace.fault {
-            summary.faults.push(fault_record(&fault, machine));
-            break;
+            if summary.faults.is_empty() {
+                let motion = config.axes.iter().zip(&trace.executed.setpoints);
+                let mut limits_mm = motion.map(|(axis, setpoint)| axis.following_error_limit_mm_in(setpoint));
+                let limits_mm = [(); AXES].map(|()| limits_mm.next().unwrap_or(R::ZERO));
+                summary.faults.push(faults::record(&fault, machine, limits_mm));
+            }
+            if kernel.is_off() {
+                break;
+            }
+            continue;
         }
         if let Some(reason) = ended {
             summary.notices.extend(reason.map(str::to_owned));
@@ -249,25 +273,4 @@ fn state_name<R: Real>(trace: &Trace<R, AXES>) -> &'static str {
         ExecState::Stopped => "stopped",
         ExecState::Held => "held",
     }
-}
-
-fn fault_record<R: Real>(fault: &Fault<R>, machine: &Machine) -> FaultRecord {
-    let (axis, name, detail) = match fault.kind {
-        FaultKind::Executor(fault) => (None, "executor", format!("{fault:?}")),
-        FaultKind::FollowingError { axis, error_mm } => {
-            let settings = &machine.axes[axis];
-            let detail =
-                format!("{:.3} mm, limit {} mm", error_mm.to_f64(), settings.following_error_limit_mm);
-            (Some(settings.name.clone()), "following error", detail)
-        }
-        FaultKind::Encoder => (None, "encoder", "the encoders could not be read".to_owned()),
-        FaultKind::Inputs => (None, "inputs", "the digital inputs could not be read".to_owned()),
-        FaultKind::Output => (None, "output", "the converter could not be written".to_owned()),
-        FaultKind::Enable => (None, "enable", "the drives could not be switched".to_owned()),
-        FaultKind::EmergencyStop => (None, "emergency stop", "the emergency stop is open".to_owned()),
-        FaultKind::Drive { axis } => {
-            (Some(machine.axes[axis].name.clone()), "drive", "the drive reports a fault".to_owned())
-        }
-    };
-    FaultRecord { tick: fault.tick, axis, fault: name.to_owned(), detail }
 }
