@@ -78,6 +78,8 @@ pub(super) struct Words {
     refused: AtomicU32,
     /// A bit for each list that the background fills or has filled; the tick empties the others.
     claimed: AtomicU32,
+    /// Counts what the background writes of the words above, so that the tick looks at one where there is nothing new.
+    news: AtomicU32,
     tick: AtomicU32,
     /// List, phase and count of items done.
     place: AtomicU32,
@@ -94,6 +96,7 @@ impl Words {
             change: AtomicU32::new(Change::NONE),
             refused: AtomicU32::new(Change::NONE),
             claimed: AtomicU32::new(1),
+            news: AtomicU32::new(0),
             tick: AtomicU32::new(0),
             place: AtomicU32::new(0),
             left_high: AtomicU32::new(0),
@@ -107,7 +110,7 @@ impl Words {
             word.store(Change::NONE, Ordering::Relaxed);
         }
         self.claimed.store(1, Ordering::Relaxed);
-        for word in [&self.tick, &self.place, &self.left_high, &self.left_low] {
+        for word in [&self.news, &self.tick, &self.place, &self.left_high, &self.left_low] {
             word.store(0, Ordering::Relaxed);
         }
     }
@@ -116,6 +119,7 @@ impl Words {
     pub(super) fn ask(&self, change: Option<Change>, number: u32) {
         let word = change.map_or(Change::NONE, |change| change.to_word(number));
         self.change.store(word, Ordering::Release);
+        super::count(&self.news);
     }
 
     /// Whether the change that was asked for last came too late.
@@ -127,6 +131,13 @@ impl Words {
     pub(super) fn claim(&self, list: u8, claimed: bool) {
         let (bits, bit) = (self.claimed.load(Ordering::Relaxed), 1 << list);
         self.claimed.store(if claimed { bits | bit } else { bits & !bit }, Ordering::Release);
+        super::count(&self.news);
+    }
+
+    /// Another number than before if the background has written.
+    #[inline]
+    pub(super) fn news(&self) -> u32 {
+        self.news.load(Ordering::Acquire)
     }
 
     /// Where the executor is, as far as the background can know.
@@ -164,12 +175,7 @@ impl Words {
     /// The tick says where it is.
     #[inline]
     pub(super) fn publish(&self, list: u8, done: u32, inside: Option<(Phase, Ticks)>, waits: bool) {
-        let (phase, left) = match inside {
-            None => (0, Ticks::ZERO),
-            Some((Phase::Rise, left)) => (1, left),
-            Some((Phase::Hold, left)) => (2, left),
-            Some((Phase::Fall, left)) => (3, left),
-        };
+        let (phase, left) = inside.map_or((0, Ticks::ZERO), |(phase, left)| (phase as u32 + 1, left));
         let place = u32::from(list) << 30 | phase << 28 | u32::from(waits) << 27 | done & ((1 << 27) - 1);
         self.place.store(place, Ordering::Relaxed);
         let bits = left.to_bits();

@@ -6,7 +6,7 @@
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use super::change::{Change, LISTS, Progress};
+use super::change::{Change, LISTS, Progress, Words};
 use super::{
     FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept, count, enter,
 };
@@ -16,9 +16,9 @@ use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
 
-/// The most items of a list that is not needed any more that go in one tick. A list is empty a tick after it was given
-/// up if it has no more places.
-const DROPPED_PER_TICK: usize = 16;
+/// The most items of a list that is not needed any more that go in one tick. Each costs some twenty instructions; a list
+/// of sixteen places is empty four ticks after it was given up.
+const DROPPED_PER_TICK: usize = 4;
 
 /// Storage of a path and three feed lists: `PIECES` − 1 pieces, `SEGMENTS` − 1 items a list.
 #[derive(Debug)]
@@ -76,6 +76,8 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
                 current: 0,
                 others: [(1, second_out), (2, third_out)],
                 done: 0,
+                seen: shared.words.news(),
+                due_after: u32::MAX,
                 change: None,
                 refused: None,
             }),
@@ -247,6 +249,10 @@ pub(super) struct Lists<'a, R: Real> {
     others: [(u8, Consumer<'a, FeedItem<R>>); LISTS as usize - 1],
     /// Items of the current list that are done.
     done: u32,
+    /// The news that have been dealt with.
+    seen: u32,
+    /// After so many items of the current list a change is due; never reached if none is asked for.
+    due_after: u32,
     /// What is asked for, as of the tick's start, with its word.
     change: Option<(u32, Change)>,
     /// The word that came too late last.
@@ -254,38 +260,47 @@ pub(super) struct Lists<'a, R: Real> {
 }
 
 impl<R: Real> Lists<'_, R> {
-    /// Whether the change is due where no segment is under way.
-    #[inline]
-    fn is_due(&self) -> bool {
-        self.change.is_some_and(|(_, change)| change.after == self.done)
+    /// Deals with news, in as many ticks as it takes to empty what was given up.
+    #[cold]
+    #[inline(never)]
+    fn look(&mut self, words: &Words, news: u32) {
+        self.change =
+            words.asked().filter(|(word, change)| change.from == self.current && self.refused != Some(*word));
+        self.due_after = self.change.map_or(u32::MAX, |(_, change)| change.after);
+        for _ in 0..DROPPED_PER_TICK {
+            let given_up = self.others.iter_mut().filter(|(list, _)| !words.is_claimed(*list));
+            // One item of one of them, while there is any.
+            if given_up.map(|(_, queue)| queue.dequeue()).all(|item| item.is_none()) {
+                self.seen = news;
+                break;
+            }
+        }
+    }
+
+    /// What is asked for no longer is.
+    fn forget(&mut self) -> Option<(u32, Change)> {
+        self.due_after = u32::MAX;
+        self.change.take()
     }
 }
 
 impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// What the background asks for now; what it gave up goes.
-    #[inline(never)]
+    #[inline]
     pub(super) fn look_for_change(&mut self) {
-        let Some(lists) = &mut self.lists else { return };
-        let words = &self.shared.words;
-        for (list, queue) in &mut lists.others {
-            if !words.is_claimed(*list) {
-                for _ in 0..DROPPED_PER_TICK {
-                    if queue.dequeue().is_none() {
-                        break;
-                    }
-                }
+        if let Some(lists) = &mut self.lists {
+            let news = self.shared.words.news();
+            if lists.seen != news {
+                lists.look(&self.shared.words, news);
             }
         }
-        lists.change = words
-            .asked()
-            .filter(|(word, change)| change.from == lists.current && lists.refused != Some(*word));
     }
 
     #[inline(never)]
     pub(super) fn count_done(&mut self) {
         let Some(lists) = &mut self.lists else { return };
         lists.done = lists.done.wrapping_add(1);
-        if lists.is_due() && lists.change.is_some_and(|(_, change)| !change.within) {
+        if lists.due_after == lists.done && lists.change.is_some_and(|(_, change)| !change.within) {
             self.take_over();
         }
     }
@@ -294,9 +309,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// way.
     #[inline]
     pub(crate) fn is_change_due(&self) -> bool {
-        self.lists
-            .as_ref()
-            .is_some_and(|lists| lists.change.is_some_and(|(_, change)| change.after <= lists.done))
+        self.lists.as_ref().is_some_and(|lists| lists.due_after <= lists.done)
     }
 
     /// The first item of the list that is asked for, if the place where it takes over lies within the item under way.
@@ -308,7 +321,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
 
     /// Whether the change that is due takes over where no segment is under way.
     pub(crate) fn takes_over_between_items(&self) -> bool {
-        self.lists.as_ref().is_some_and(Lists::is_due)
+        self.lists.as_ref().is_some_and(|lists| lists.due_after == lists.done)
     }
 
     /// Follows the change.
@@ -316,12 +329,14 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     #[inline(never)]
     pub(crate) fn take_over(&mut self) {
         let Some(lists) = &mut self.lists else { return };
-        let Some((_, change)) = lists.change.take() else { return };
+        let Some((_, change)) = lists.forget() else { return };
         for (list, queue) in &mut lists.others {
             if *list == change.to {
                 core::mem::swap(list, &mut lists.current);
                 core::mem::swap(queue, &mut self.feed);
                 lists.done = 0;
+                // What is given up already is emptied from the next tick on.
+                lists.seen = lists.seen.wrapping_sub(1);
                 return;
             }
         }
@@ -331,7 +346,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     #[cold]
     pub(crate) fn refuse(&mut self) {
         let Some(lists) = &mut self.lists else { return };
-        if let Some((word, _)) = lists.change.take() {
+        if let Some((word, _)) = lists.forget() {
             lists.refused = Some(word);
             self.shared.words.refuse(word);
         }

@@ -338,9 +338,7 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
         self.path_taken.before_tick = self.path_taken.so_far;
         self.feed_taken.before_tick = self.feed_taken.so_far;
         #[cfg(feature = "live")]
-        if self.lists.is_some() {
-            self.look_for_change();
-        }
+        self.look_for_change();
     }
 
     /// The first item of the feed stream: the one under way, or the next.
