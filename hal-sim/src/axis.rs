@@ -82,6 +82,16 @@ impl<const LINE: usize> SimAxis<LINE> {
         self.model.tick(&mut self.state, command_mm_s);
     }
 
+    /// See [`SimMachine::reverse_drive`](crate::SimMachine::reverse_drive).
+    pub(crate) fn reverse_drive(&mut self) {
+        self.mm_s_per_volt = -self.mm_s_per_volt;
+    }
+
+    /// See [`SimMachine::limit_drive`](crate::SimMachine::limit_drive).
+    pub(crate) fn limit_drive(&mut self, accel_limit_mm_s2: f64) {
+        self.model.limit(accel_limit_mm_s2);
+    }
+
     /// Reads the encoder.
     pub fn latch(&mut self) -> Counts {
         self.encoder.latch(self.state.position_mm())

@@ -117,6 +117,11 @@ impl DriveModel {
         &self.parameters
     }
 
+    /// Another current limit \[mm/s²\], > 0.
+    pub(crate) fn limit(&mut self, accel_limit_mm_s2: f64) {
+        self.parameters.accel_limit_mm_s2 = accel_limit_mm_s2;
+    }
+
     /// Advances `state` by one tick with `command_mm_s` held over it.
     ///
     /// A command that is not a number is the caller's error and stays in the state; a converter

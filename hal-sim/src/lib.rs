@@ -24,6 +24,7 @@
 //! ```
 //!
 //! [`closed_loop`] runs a compiled program on it, the same way on a PC and inside an emulated board.
+//! [`Injector`] breaks it on demand.
 //! [`SimMachine`] holds one chip and up to four such axes and advances them one control tick at a time.
 //!
 //! # Example
@@ -78,6 +79,7 @@ mod drive;
 mod drive_parameters;
 mod encoder;
 mod home;
+mod injection;
 mod machine;
 mod noise;
 mod parameter;
@@ -89,6 +91,7 @@ pub use drive::{DriveModel, DriveState, SUBSTEPS_MAX};
 pub use drive_parameters::{BedMode, DriveParameters, REFERENCE_X, REFERENCE_Y, REFERENCE_Z};
 pub use encoder::{EncoderNoise, EncoderParameters, REFERENCE_ENCODER, SimEncoder, TimerBits};
 pub use home::{HomeParameters, IndexParameters, SimHome, SwitchParameters};
+pub use injection::{Injection, Injector};
 pub use machine::{
     AxisTruth, MachineError, MachineParameters, REFERENCE_LINE, REFERENCE_SUBSTEPS, REFERENCE_TICK_S,
     SimMachine,

@@ -148,6 +148,20 @@ impl<const AXES: usize, const LINE: usize> SimMachine<AXES, LINE> {
         self.is_enabled.get()
     }
 
+    /// Turns the drive of an axis the other way; again, and it is as before.
+    pub fn reverse_drive(&self, axis: usize) {
+        if let Some(axis) = self.axes.borrow_mut().get_mut(axis) {
+            axis.reverse_drive();
+        }
+    }
+
+    /// The drive of an axis has another current limit from now on \[mm/s²\], > 0.
+    pub fn limit_drive(&self, axis: usize, accel_limit_mm_s2: f64) {
+        if let Some(axis) = self.axes.borrow_mut().get_mut(axis) {
+            axis.limit_drive(accel_limit_mm_s2);
+        }
+    }
+
     /// What no encoder shows, for tests and records.
     #[must_use]
     pub fn truth(&self) -> [AxisTruth; AXES] {

@@ -1,6 +1,8 @@
-//! What can go wrong on the machine: typed, with its tick and its figures.
+//! What can go wrong on the machine: typed, with its tick and its figures, and how it ends.
 //!
 //! Rejections of bad input are another matter: [`crate::queue::Rejection`].
+
+use serde::{Deserialize, Serialize};
 
 use crate::exec::ExecFault;
 
@@ -27,6 +29,45 @@ pub enum FaultKind<R> {
         /// Set-point − actual \[mm\].
         error_mm: R,
     },
+    /// The encoder of an axis does not count where the axis is commanded to move.
+    EncoderLost {
+        /// The axis, from 0.
+        axis: usize,
+    },
+    /// The encoder of an axis counted what no motor moves in a tick.
+    EncoderJump {
+        /// The axis, from 0.
+        axis: usize,
+        /// By how much \[mm\].
+        jump_mm: R,
+    },
+    /// An axis moves against its command.
+    Runaway {
+        /// The axis, from 0.
+        axis: usize,
+    },
+    /// The output of an axis is at its limit for too long.
+    Saturated {
+        /// The axis, from 0.
+        axis: usize,
+    },
+    /// The set position of an axis is beyond its travel.
+    SoftLimit {
+        /// The axis, from 0.
+        axis: usize,
+    },
+    /// The set position of an axis jumped: a piece or segment is corrupted.
+    SetpointJump {
+        /// The axis, from 0.
+        axis: usize,
+        /// By how much \[mm\].
+        jump_mm: R,
+    },
+    /// A set value or the command of an axis is not a number.
+    NotFinite {
+        /// The axis, from 0.
+        axis: usize,
+    },
     /// The encoders could not be read.
     Encoder,
     /// The digital inputs could not be read.
@@ -42,4 +83,80 @@ pub enum FaultKind<R> {
         /// The axis, from 0.
         axis: usize,
     },
+    /// A drive is not ready, although it is enabled and has had its time to settle.
+    DriveNotReady {
+        /// The axis, from 0.
+        axis: usize,
+    },
+    /// A limit switch was reached, or motion is towards one that is.
+    LimitSwitch {
+        /// The axis, from 0.
+        axis: usize,
+    },
+    /// A tick took longer than its period. Reported by the board, see [`TickMonitor`](crate::tick_monitor::TickMonitor).
+    TickOverrun,
+    /// Ticks did not come. Reported by the board.
+    TickMissed {
+        /// How many.
+        ticks: u32,
+    },
+}
+
+/// How a fault ends. The greater one is the more urgent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Reaction {
+    /// A stop on the path, regulated, then drives off. Where nothing can hold the motion, or it does not come to rest in
+    /// time, the outputs are ramped.
+    Stop,
+    /// Outputs to 0 V over some time, then drives off. Nothing is regulated.
+    Ramp,
+    /// Outputs at 0 V and drives off in the same tick.
+    Immediate,
+}
+
+/// What a machine says of its reactions.
+#[cfg(feature = "guards")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reactions {
+    /// Ticks in which the outputs go to 0 V; 0 makes every reaction an immediate one.
+    pub ramp_ticks: u16,
+    /// Ticks after which a stop on the path is given up.
+    pub stop_ticks: u32,
+    /// The emergency stop's.
+    pub emergency_stop: Reaction,
+}
+
+#[cfg(feature = "guards")]
+impl Reactions {
+    /// Every reaction is an immediate one.
+    pub const IMMEDIATE: Self = Self { ramp_ticks: 0, stop_ticks: 0, emergency_stop: Reaction::Immediate };
+}
+
+impl<R> FaultKind<R> {
+    /// How it ends; the emergency stop as the machine says.
+    #[must_use]
+    pub const fn reaction(&self, emergency_stop: Reaction) -> Reaction {
+        match self {
+            Self::EmergencyStop => emergency_stop,
+            // Feedback, drives and set-points are good.
+            Self::Saturated { .. } | Self::SoftLimit { .. } | Self::TickOverrun | Self::TickMissed { .. } => {
+                Reaction::Stop
+            }
+            // The drives obey, but set-points or feedback are not to be trusted, or the path is left already.
+            Self::Executor(_)
+            | Self::FollowingError { .. }
+            | Self::EncoderJump { .. }
+            | Self::SetpointJump { .. }
+            | Self::NotFinite { .. }
+            | Self::Inputs
+            | Self::Drive { .. }
+            | Self::DriveNotReady { .. }
+            | Self::LimitSwitch { .. } => Reaction::Ramp,
+            // Nobody knows what a drive does, or no voltage reaches it.
+            Self::EncoderLost { .. } | Self::Runaway { .. } | Self::Encoder | Self::Output | Self::Enable => {
+                Reaction::Immediate
+            }
+        }
+    }
 }

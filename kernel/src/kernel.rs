@@ -10,17 +10,25 @@
 //! A fault ends in one defined way: it is latched with the tick it was found in, every output goes to
 //! the voltage of standing still (0 V plus trim), the drives are disabled, and both stay so until
 //! [`Kernel::clear_fault`]. A fault that is found in writing the outputs shows in them from the next tick on.
+//! How outputs come to 0 V is the fault's [`Reaction`]: with the feature `guards` and where the machine gives it time, on
+//! the path or along a ramp; else at once. The first fault stays, but a later one may ask for a more urgent end.
 
 #[cfg(feature = "live")]
 mod reference;
 
 use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Preview};
+#[cfg(feature = "guards")]
+use crate::axis::{Found, LOOK_TICKS};
 use crate::exec::{ExecState, Executor};
 use crate::fault::{Fault, FaultKind};
-use crate::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+#[cfg(feature = "guards")]
+use crate::fault::{Reaction, Reactions};
+use crate::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use crate::num::Real;
 use crate::queue::Intake;
 use crate::trace::Trace;
+#[cfg(feature = "guards")]
+use crate::units::DacCode;
 use crate::units::{Counts, Position};
 
 /// Whether the drives may move.
@@ -32,6 +40,40 @@ enum Power {
         ticks_left: u32,
     },
     On,
+    /// In a fault, coming to rest on the path; at rest, until the preview has passed.
+    #[cfg(feature = "guards")]
+    Stopping {
+        ticks_left: u32,
+        is_at_rest: bool,
+    },
+    /// In a fault, outputs on their way to 0 V, drives enabled.
+    #[cfg(feature = "guards")]
+    Ramping {
+        ticks_left: u16,
+    },
+}
+
+impl Power {
+    /// The executor goes on.
+    #[inline]
+    fn executes(self) -> bool {
+        match self {
+            Self::On => true,
+            #[cfg(feature = "guards")]
+            Self::Stopping { is_at_rest, .. } => !is_at_rest,
+            _ => false,
+        }
+    }
+
+    /// The axes are regulated.
+    #[inline]
+    fn regulates(self) -> bool {
+        #[cfg(feature = "guards")]
+        if matches!(self, Self::Ramping { .. }) {
+            return false;
+        }
+        self != Self::Off
+    }
 }
 
 /// The real-time motion kernel of a machine with `AXES` axes.
@@ -48,13 +90,30 @@ pub struct Kernel<R: Real, const AXES: usize> {
     axes: [AxisState<R>; AXES],
     config: [AxisConfig<R>; AXES],
     preview: Preview<AXES>,
+    #[cfg(feature = "guards")]
+    guards: Guards<AXES>,
+}
+
+/// What the kernel remembers of guards and reactions.
+#[cfg(feature = "guards")]
+#[derive(Clone, Copy, Debug)]
+struct Guards<const AXES: usize> {
+    reactions: Reactions,
+    /// What was put out last.
+    written: [DacCode; AXES],
+    /// What was put out when the ramp began.
+    ramp_from: [DacCode; AXES],
+    /// Place in the round of looks at the axes.
+    look_ticks: u8,
 }
 
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// A kernel at rest at `position`, where the encoders read `counts`, drives disabled.
     #[must_use]
     pub fn new(config: &AxesConfig<R, AXES>, position: [Position; AXES], counts: [Counts; AXES]) -> Self {
-        let &AxesConfig { axes: ref config, preview_ticks } = config;
+        #[cfg(feature = "guards")]
+        let reactions = config.reactions;
+        let &AxesConfig { axes: ref config, preview_ticks, .. } = config;
         let (mut axes, mut outputs) = ([AxisState::default(); AXES], [AxisOutput::default(); AXES]);
         let of_axes = axes.iter_mut().zip(&mut outputs).zip(config).zip(counts.iter().zip(&position));
         for (((axis, output), config), (&counts, &position)) in of_axes {
@@ -74,6 +133,13 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             power: Power::Off,
             told: None,
             trace,
+            #[cfg(feature = "guards")]
+            guards: Guards {
+                reactions,
+                written: [DacCode::ZERO; AXES],
+                ramp_from: [DacCode::ZERO; AXES],
+                look_ticks: 0,
+            },
         }
     }
 
@@ -85,6 +151,10 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         if self.trace.fault.is_none() && self.power == Power::Off {
             if !self.executor.is_at_rest() {
                 self.stand_here();
+            }
+            #[cfg(feature = "guards")]
+            for axis in &mut self.axes {
+                axis.restart_guard();
             }
             self.power = Power::Starting { ticks_left: settle_ticks };
         }
@@ -119,16 +189,21 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
         match hal.read_inputs() {
             Ok(inputs) => {
-                self.trace.inputs = inputs;
+                let before = core::mem::replace(&mut self.trace.inputs, inputs);
                 if !inputs.is_healthy() {
-                    self.judge_inputs();
+                    self.judge_inputs(&before);
                 }
             }
             Err(_) => self.latch_fault(FaultKind::Inputs),
         }
         self.execute(intake);
         self.regulate(intake);
-        if hal.write(&self.trace.axes.each_ref().map(|axis| axis.code)).is_err() {
+        let codes = self.trace.axes.each_ref().map(|axis| axis.code);
+        #[cfg(feature = "guards")]
+        {
+            self.guards.written = codes;
+        }
+        if hal.write(&codes).is_err() {
             self.latch_fault(FaultKind::Output);
         }
         // Repeated until the drives have taken it, above all when they are to be disabled.
@@ -149,11 +224,17 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             Power::Starting { ticks_left: 0 } => self.power = Power::On,
             Power::Starting { ticks_left } => *ticks_left -= 1,
             Power::On => {}
+            #[cfg(feature = "guards")]
+            Power::Stopping { .. } | Power::Ramping { .. } => {}
         }
-        if self.power == Power::On
+        if self.power.executes()
             && let Err(fault) = self.executor.tick_into(intake, &mut self.trace.executed)
         {
             self.latch_fault(FaultKind::Executor(fault));
+        }
+        #[cfg(feature = "guards")]
+        if let Power::Stopping { .. } = self.power {
+            self.go_on_stopping(intake);
         }
     }
 
@@ -162,7 +243,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     #[inline]
     fn regulate(&mut self, intake: &mut Intake<'_, R, AXES>) {
         let Trace { executed, axes: outputs, .. } = &mut self.trace;
-        if self.power != Power::Off {
+        if self.power.regulates() {
             if let Some(correction) = intake.correction() {
                 let is_moving = executed.state == ExecState::Moving;
                 let corrections = correction.next(is_moving.then_some(executed.stretches));
@@ -180,30 +261,53 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             if is_lost {
                 self.lose();
             }
+            #[cfg(feature = "guards")]
+            self.look();
         }
-        if self.power == Power::Off {
+        if !self.power.regulates() {
             self.stand_still();
+            #[cfg(feature = "guards")]
+            self.ramp();
         }
     }
 
     /// Latches what the inputs report.
     #[cold]
-    fn judge_inputs(&mut self) {
-        let inputs = &self.trace.inputs;
-        let faulty = inputs.axes.iter().position(|axis| axis.is_fault());
+    fn judge_inputs(&mut self, before: &MachineInputs<AXES>) {
+        let inputs = self.trace.inputs;
         if inputs.emergency_stop {
-            self.latch_fault(FaultKind::EmergencyStop);
-        } else if let Some(axis) = faulty {
-            self.latch_fault(FaultKind::Drive { axis });
+            return self.latch_fault(FaultKind::EmergencyStop);
+        }
+        if let Some(axis) = inputs.axes.iter().position(|axis| axis.is_fault()) {
+            return self.latch_fault(FaultKind::Drive { axis });
+        }
+        // Drives that are off, or have not settled, need not be ready, and stand still wherever they are.
+        if !self.power.executes() {
+            return;
+        }
+        if let Some(axis) = inputs.axes.iter().position(|axis| !axis.is_ready()) {
+            return self.latch_fault(FaultKind::DriveNotReady { axis });
+        }
+        // One can drive off a switch, not farther onto it.
+        let moves = self.trace.executed.setpoints.iter().map(|setpoint| setpoint.velocity_mm_s);
+        let is_driven_on = |((now, before), velocity_mm_s): ((&AxisInputs, &AxisInputs), R)| {
+            now.is_limit_low() && (velocity_mm_s < R::ZERO || !before.is_limit_low())
+                || now.is_limit_high() && (velocity_mm_s > R::ZERO || !before.is_limit_high())
+        };
+        if let Some(axis) = inputs.axes.iter().zip(&before.axes).zip(moves).position(is_driven_on) {
+            self.latch_fault(FaultKind::LimitSwitch { axis });
         }
     }
 
-    /// Latches the first axis that is beyond its limit.
+    /// Latches the first axis that is lost.
     #[cold]
     fn lose(&mut self) {
         let lost = self.trace.axes.iter().enumerate().find(|(_, output)| output.lost);
         if let Some((axis, &AxisOutput { following_error_mm: error_mm, .. })) = lost {
+            #[cfg(not(feature = "guards"))]
             self.latch_fault(FaultKind::FollowingError { axis, error_mm });
+            #[cfg(feature = "guards")]
+            self.judge(axis, error_mm);
         }
     }
 
@@ -263,9 +367,129 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     }
 
     fn latch_fault_in(&mut self, tick: u64, kind: FaultKind<R>) {
-        self.power = Power::Off;
+        #[cfg(not(feature = "guards"))]
+        {
+            self.power = Power::Off;
+        }
+        #[cfg(feature = "guards")]
+        self.react(kind.reaction(self.guards.reactions.emergency_stop));
         if self.trace.fault.is_none() {
             self.trace.fault = Some(Fault { tick, kind });
         }
+    }
+}
+
+/// Guards of the axes, and how faults end.
+#[cfg(feature = "guards")]
+impl<R: Real, const AXES: usize> Kernel<R, AXES> {
+    /// Ticks of a round of looks at the axes.
+    const ROUND_TICKS: u8 = {
+        assert!(AXES * (LOOK_TICKS as usize) < 256, "a round of looks is counted in a byte");
+        LOOK_TICKS * AXES as u8
+    };
+
+    /// Whether a fault asks for a stop on the path: the background holds the motion then, as on a command.
+    pub fn wants_hold(&self) -> bool {
+        matches!(self.power, Power::Stopping { is_at_rest: false, .. })
+    }
+
+    /// Whether the drives are told to be off, or will be in the next tick: the end of every fault.
+    pub fn is_off(&self) -> bool {
+        self.power == Power::Off
+    }
+
+    /// Looks at one axis in every [`LOOK_TICKS`] ticks.
+    #[inline]
+    fn look(&mut self) {
+        self.guards.look_ticks += 1;
+        if self.guards.look_ticks.is_multiple_of(LOOK_TICKS) {
+            self.look_at(usize::from(self.guards.look_ticks / LOOK_TICKS) - 1);
+        }
+    }
+
+    #[inline(never)]
+    fn look_at(&mut self, axis: usize) {
+        if self.guards.look_ticks >= Self::ROUND_TICKS {
+            self.guards.look_ticks = 0;
+        }
+        let parts = self.axes.get_mut(axis).zip(self.config.get(axis));
+        let ticks = self.trace.executed.setpoints.get(axis).zip(self.trace.axes.get(axis));
+        if let Some(((state, config), (setpoint, output))) = parts.zip(ticks)
+            && !output.lost
+            && let Some(found) = state.look(config, setpoint, output, Self::ROUND_TICKS)
+        {
+            self.latch_fault(kind_of(axis, found));
+        }
+    }
+
+    /// Latches what broke in an axis that is lost.
+    fn judge(&mut self, axis: usize, error_mm: R) {
+        // Since its place in the round, or in the round before.
+        let place = LOOK_TICKS.saturating_mul(axis as u8 + 1);
+        let now = self.guards.look_ticks + 1;
+        let since = if now > place { now - place } else { now + Self::ROUND_TICKS - place };
+        let parts = self.axes.get(axis).zip(self.config.get(axis));
+        let found = match parts.zip(self.trace.executed.setpoints.get(axis)) {
+            Some(((state, config), setpoint)) => state.judge(config, setpoint, since),
+            None => Found::FollowingError { error_mm },
+        };
+        self.latch_fault(kind_of(axis, found));
+    }
+
+    /// Begins a reaction, unless one as urgent is under way.
+    fn react(&mut self, reaction: Reaction) {
+        let Reactions { ramp_ticks, stop_ticks, .. } = self.guards.reactions;
+        let reaction = if ramp_ticks == 0 { Reaction::Immediate } else { reaction };
+        self.power = match (self.power, reaction) {
+            (Power::Off, _) | (_, Reaction::Immediate) => Power::Off,
+            (Power::Ramping { .. }, _) | (Power::Stopping { .. }, Reaction::Stop) => self.power,
+            (Power::On, Reaction::Stop) => Power::Stopping { ticks_left: stop_ticks, is_at_rest: false },
+            (Power::On | Power::Starting { .. } | Power::Stopping { .. }, _) => {
+                self.guards.ramp_from = self.guards.written;
+                Power::Ramping { ticks_left: ramp_ticks }
+            }
+        };
+    }
+
+    /// A tick of a stop on the path, after the executor's.
+    #[cold]
+    fn go_on_stopping(&mut self, intake: &Intake<'_, R, AXES>) {
+        let Power::Stopping { ticks_left, is_at_rest } = self.power else { return };
+        let has_come_to_rest = !is_at_rest && self.trace.executed.state != ExecState::Moving;
+        if has_come_to_rest {
+            self.power = Power::Stopping { ticks_left: u32::from(self.preview.ticks()), is_at_rest: true };
+        } else if ticks_left > 0 && (is_at_rest || intake.can_hold()) {
+            self.power = Power::Stopping { ticks_left: ticks_left - 1, is_at_rest };
+        } else {
+            self.react(if is_at_rest { Reaction::Immediate } else { Reaction::Ramp });
+        }
+    }
+
+    /// The outputs of a ramp to 0 V; its last tick is the first one with the drives off.
+    #[cold]
+    fn ramp(&mut self) {
+        let Power::Ramping { ticks_left } = self.power else { return };
+        let (left, all) = (i32::from(ticks_left) - 1, i32::from(self.guards.reactions.ramp_ticks));
+        for (output, &DacCode(from)) in self.trace.axes.iter_mut().zip(&self.guards.ramp_from) {
+            let DacCode(still) = output.code;
+            let above = (i32::from(from) - i32::from(still)) * left;
+            output.code = DacCode(still.wrapping_add(above.checked_div(all).unwrap_or(0) as i16));
+        }
+        self.power = if left == 0 { Power::Off } else { Power::Ramping { ticks_left: ticks_left - 1 } };
+    }
+}
+
+/// What was found of an axis, as a fault.
+#[cfg(feature = "guards")]
+fn kind_of<R>(axis: usize, found: Found<R>) -> FaultKind<R> {
+    match found {
+        Found::FollowingError { error_mm } => FaultKind::FollowingError { axis, error_mm },
+        Found::EncoderLost => FaultKind::EncoderLost { axis },
+        Found::EncoderJump { jump_mm } => FaultKind::EncoderJump { axis, jump_mm },
+        Found::Runaway => FaultKind::Runaway { axis },
+        Found::Saturated => FaultKind::Saturated { axis },
+        Found::SoftLimit => FaultKind::SoftLimit { axis },
+        Found::SetpointJump { jump_mm } => FaultKind::SetpointJump { axis, jump_mm },
+        Found::NotFinite => FaultKind::NotFinite { axis },
     }
 }

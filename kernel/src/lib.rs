@@ -96,6 +96,7 @@ pub mod exec;
 pub mod axis;
 pub mod hal;
 pub mod fault;
+pub mod tick_monitor;
 pub mod trace;
 pub mod recorder;
 pub mod kernel;

@@ -174,10 +174,11 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
         _ => None,
     };
     let at = random.next() % (ticks + 1);
-    let options = RunOptions { number, correction: correction.as_ref(), script: script.as_ref() };
+    let options =
+        RunOptions { number, correction: correction.as_ref(), script: script.as_ref(), injections: None };
     let job = Job::new(&options, &plan, &machine).expect("a job");
     let mut ticks = Vec::new();
-    let (summary, recording) = simulate::on_simulated(&machine, |rig| {
+    let (summary, recording) = simulate::on_simulated(&machine, None, |rig| {
         let mut breaking = Breaking { hardware: rig, breakage, at, tick: 0 };
         let mut recorder = Recorder::new(&mut breaking);
         let summary = simulate::run_on(&job, &mut recorder, &mut |tick| ticks.push(words(tick)))?;

@@ -16,6 +16,7 @@ use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
 use crate::record::{CommandRecord, FaultRecord};
 use crate::recording::Recorder;
+use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
 use crate::simulate::{self, AxisSummary, Job, RunError, RunOptions, RunSummary};
 
@@ -58,6 +59,14 @@ pub struct RunArguments {
     /// `single` (come to rest at the end of every program line and wait there for a resume) or `continuous` (no more).
     #[arg(long, value_name = "TICK:COMMAND,…")]
     at: Option<Script>,
+    /// Break the simulated machine before given ticks, such as `2000:encoder-lost=X`.
+    ///
+    /// What can break: `encoder-lost=AXIS`, `encoder-jump=AXIS:COUNTS`, `encoder-reversed=AXIS`, `drive-reversed=AXIS`,
+    /// `overload=AXIS:ACCELERATION` (what is left of the drive's, in mm/s²), `drive-not-ready=AXIS`, `drive-fault=AXIS`,
+    /// `limit-low=AXIS:POSITION` and `limit-high=AXIS:POSITION` (a limit switch up to or from there, in mm), and
+    /// `emergency-stop`.
+    #[arg(long, value_name = "TICK:FAULT,…")]
+    inject: Option<Injections>,
     /// Print JSON: ticks, times, maxima along the path, share of it on which a limit is active, errors of the axes, faults.
     #[arg(long)]
     json: bool,
@@ -74,7 +83,11 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;
     let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
     let record = arguments.record.as_deref().map(Output::create).transpose()?;
-    let options = RunOptions { script: arguments.at.as_ref(), ..RunOptions::default() };
+    let options = RunOptions {
+        script: arguments.at.as_ref(),
+        injections: arguments.inject.as_ref(),
+        ..RunOptions::default()
+    };
     let summary = execute(&options, &plan, &machine, outputs, record)?;
     if arguments.json {
         write_json(&json(&summary), out)?;
@@ -99,12 +112,12 @@ pub(super) fn execute(
     let job = Job::new(options, plan, machine).map_err(refused)?;
     let Some(mut record) = record else {
         let run = |observe: &mut simulate::Observer<'_>| {
-            simulate::on_simulated(machine, |rig| simulate::run_on(&job, rig, observe))
+            simulate::on_simulated(machine, options.injections, |rig| simulate::run_on(&job, rig, observe))
         };
         return outputs.of_run(&job, run, |summary| summary);
     };
     let run = |observe: &mut simulate::Observer<'_>| {
-        simulate::on_simulated(machine, |rig| {
+        simulate::on_simulated(machine, options.injections, |rig| {
             let mut recorder = Recorder::new(rig);
             let summary = simulate::run_on(&job, &mut recorder, observe)?;
             Ok((summary, recorder.finish(&job)))

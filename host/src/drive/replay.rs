@@ -45,10 +45,14 @@ enum Regulator<'a> {
 impl<'a> Regulator<'a> {
     fn new(law: &'a Law, machine: &Machine) -> Result<Self, RunError> {
         Ok(match law {
-            Law::Kernel => Self::Kernel(Box::new((machine.axes_config()?, [AxisState::default(); AXES]))),
-            Law::Peer(gains) => {
-                Self::Peer(Box::new(machine.axes_config()?), gains, [PeerRegulator::default(); AXES])
+            Law::Kernel => {
+                Self::Kernel(Box::new((machine.unguarded_axes_config()?, [AxisState::default(); AXES])))
             }
+            Law::Peer(gains) => Self::Peer(
+                Box::new(machine.unguarded_axes_config()?),
+                gains,
+                [PeerRegulator::default(); AXES],
+            ),
         })
     }
 

@@ -6,9 +6,10 @@ use hal_sim::{
     BedMode, DriveParameters, EncoderNoise, HomeParameters, IndexParameters, SwitchParameters, TimerBits,
 };
 use motion_kernel::axis::{
-    AxesConfig, BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, Gains, LEAD_ROUNDING_TICKS,
-    PREVIEW_TICKS_MAX, TABLE_POINTS, Table, Tables,
+    AxesConfig, BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, Gains, GuardFigures,
+    LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX, TABLE_POINTS, Table, Tables,
 };
+use motion_kernel::fault::Reaction;
 use motion_kernel::homing::HomingConfig;
 use motion_kernel::jog::Direction;
 use motion_kernel::units::{Counts, Position};
@@ -18,12 +19,15 @@ use toml::Spanned;
 
 use super::error::{MachineError, quote};
 use super::range::{
-    AXIS_NAME, BlendTolerance, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction,
-    Gain, Inertia, IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Length, LengthOrNone, Limit,
-    MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset,
-    Place, Positive, Resolution, Reversal, TIMER_BITS, TablePoint, Tick, Velocity, Within,
+    AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
+    FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, JointAngle, Jump,
+    Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS,
+    NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, Place, Positive, Ramp, Resolution, Reversal,
+    StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch, Within,
 };
-use super::settings::{AxisSettings, BLEND_TOLERANCE_MM, HomingSettings, Machine, PathSettings};
+use super::settings::{
+    AxisSettings, BLEND_TOLERANCE_MM, FaultSettings, HomingSettings, Machine, PathSettings,
+};
 
 /// Seconds per minute: feeds in mm/min exist in this file only.
 const S_PER_MIN: f64 = 60.0;
@@ -105,9 +109,18 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
             return Err(refuse(at.clone(), expected));
         }
     }
+    for (places, axis) in &axes {
+        if let (Some(at), Some([low_mm, high_mm])) = (&places.low_mm, axis.travel_mm)
+            && low_mm >= high_mm
+        {
+            return Err(refuse(at.clone(), format!("less than high_mm = {high_mm}")));
+        }
+    }
     // What only the kernel's numbers can't hold has no key of its own: it stands at the axis.
     let figures = [0, 1, 2].map(|index: usize| axes[index].1.figures());
-    if let Err(error) = AxesConfig::<f32, 3>::new(&figures, tick_s) {
+    let guards = [0, 1, 2].map(|index: usize| axes[index].1.guard_figures(tick_s));
+    let config = AxesConfig::<f32, 3>::new(&figures, tick_s).and_then(|axes| axes.guarded(&guards, tick_s));
+    if let Err(error) = config {
         let (places, axis) = &axes[error.axis];
         let cause = error.cause;
         let problem = format!(
@@ -116,7 +129,13 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
         );
         return Err(MachineError::new(source_name, text, &places.name, problem));
     }
-    Ok(Machine { name: file.name, tick_s, path: file.path.settings(), axes: axes.map(|(_, axis)| axis) })
+    Ok(Machine {
+        name: file.name,
+        tick_s,
+        path: file.path.settings(),
+        axes: axes.map(|(_, axis)| axis),
+        faults: file.faults.map_or_else(FaultSettings::default, |faults| faults.settings()),
+    })
 }
 
 /// Where an axis has the keys that rules of several keys are about.
@@ -128,6 +147,7 @@ struct Places {
     lead_s: Option<Range<usize>>,
     inverse_integral_time_s: Option<Range<usize>>,
     inverse_bed_hz: Option<Range<usize>>,
+    low_mm: Option<Range<usize>>,
     homing: Option<HomingPlaces>,
 }
 
@@ -143,6 +163,7 @@ struct MachineFile {
     name: String,
     tick_s: Within<Tick>,
     path: PathTable,
+    faults: Option<FaultsTable>,
     #[serde(deserialize_with = "three_axes")]
     axis: [AxisTable; 3],
 }
@@ -169,11 +190,41 @@ struct AxisTable {
     jerk_mm_s3: Within<Limit>,
     snap_mm_s4: Within<Limit>,
     following_error_limit_mm: Within<FollowingError>,
+    travel: Option<TravelTable>,
+    guard: Option<GuardTable>,
     encoder: EncoderTable,
     output: OutputTable,
     regulator: RegulatorTable,
     homing: Option<HomingTable>,
     drive: DriveTable,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FaultsTable {
+    ramp_s: Option<Within<Ramp>>,
+    stop_s: Option<Within<StopTime>>,
+    emergency_stop: Option<EmergencyStop>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TravelTable {
+    low_mm: Spanned<Within<Coordinate>>,
+    high_mm: Within<Coordinate>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GuardTable {
+    following_error_at_rest_mm: Within<FollowingError>,
+    following_error_per_velocity_s: Within<ErrorGrowth>,
+    following_error_per_accel_s2: Within<ErrorGrowth>,
+    jump_mm: Within<Jump>,
+    moving_mm_s: Within<Limit>,
+    response_s: Within<Watch>,
+    load_accel_mm_s2: Within<Load>,
+    saturation_s: Within<Watch>,
 }
 
 #[derive(Deserialize)]
@@ -238,6 +289,35 @@ struct InverseBedTable {
     frequency_hz: Spanned<Within<Positive>>,
     damping_ratio: Within<Damping>,
     mass_ratio: Within<MassRatio>,
+}
+
+impl FaultsTable {
+    fn settings(&self) -> FaultSettings {
+        let default = FaultSettings::default();
+        FaultSettings {
+            ramp_s: self.ramp_s.as_ref().map_or(default.ramp_s, |time| time.0),
+            stop_s: self.stop_s.as_ref().map_or(default.stop_s, |time| time.0),
+            emergency_stop: self.emergency_stop.as_ref().map_or(default.emergency_stop, |stop| stop.0),
+        }
+    }
+}
+
+impl GuardTable {
+    fn figures(&self) -> GuardFigures {
+        GuardFigures {
+            following_error_at_rest_mm: self.following_error_at_rest_mm.0,
+            following_error_per_velocity_s: self.following_error_per_velocity_s.0,
+            following_error_per_accel_s2: self.following_error_per_accel_s2.0,
+            jump_mm: self.jump_mm.0,
+            moving_mm_s: self.moving_mm_s.0,
+            response_s: self.response_s.0,
+            load_accel_mm_s2: self.load_accel_mm_s2.0,
+            saturation_s: self.saturation_s.0,
+            // The axis' own.
+            noise_counts: 0,
+            travel_mm: None,
+        }
+    }
 }
 
 impl TableTable {
@@ -388,6 +468,7 @@ impl AxisTable {
             feed_mm_s: self.feed_mm_s.span(),
             offset_v: self.output.offset_v.span(),
             mm_per_count: self.encoder.mm_per_count.span(),
+            low_mm: self.travel.as_ref().map(|travel| travel.low_mm.span()),
         }
     }
 
@@ -404,6 +485,8 @@ impl AxisTable {
             jerk_mm_s3: self.jerk_mm_s3.0,
             snap_mm_s4: self.snap_mm_s4.0,
             following_error_limit_mm: self.following_error_limit_mm.0,
+            guard: self.guard.as_ref().map(GuardTable::figures),
+            travel_mm: self.travel.as_ref().map(|travel| [travel.low_mm.get_ref().0, travel.high_mm.0]),
             mm_per_count,
             timer: self.encoder.timer_bits.0,
             noise,
@@ -472,6 +555,21 @@ impl<'de> Deserialize<'de> for AxisName {
             Ok(Self(name))
         } else {
             Err(D::Error::custom(format!("name {name:?}, expected {AXIS_NAME}")))
+        }
+    }
+}
+
+/// What the emergency stop does.
+struct EmergencyStop(Reaction);
+
+impl<'de> Deserialize<'de> for EmergencyStop {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = toml::Value::deserialize(deserializer)?;
+        match value.as_str() {
+            Some("immediate") => Ok(Self(Reaction::Immediate)),
+            Some("ramp") => Ok(Self(Reaction::Ramp)),
+            Some("stop") => Ok(Self(Reaction::Stop)),
+            _ => Err(D::Error::custom(format!("emergency_stop = {value}, expected {EMERGENCY_STOP}"))),
         }
     }
 }

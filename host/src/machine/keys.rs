@@ -6,10 +6,11 @@
 use motion_kernel::axis::TABLE_POINTS;
 
 use super::range::{
-    AXIS_NAME, BlendTolerance, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction,
-    Gain, Inertia, IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Length, LengthOrNone, Limit,
-    MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit, OutputOffset, Place, Positive, Range, Resolution,
-    Reversal, TIMER_BITS, TablePoint, Tick, Velocity,
+    AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
+    FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, JointAngle, Jump,
+    Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit,
+    OutputOffset, Place, Positive, Ramp, Range, Resolution, Reversal, StopTime, TIMER_BITS, TablePoint, Tick,
+    Velocity, Watch,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -116,6 +117,34 @@ pub const KEY_TABLES: &[KeyTable] = &[
             .or("0.01"),
         ],
     ),
+    optional(
+        "faults",
+        "How faults end.",
+        &[
+            Key::new(
+                "ramp_s",
+                "s",
+                Ramp::EXPECTED,
+                "Time in which outputs go to 0 V before drives are disabled; 0: at once, whatever the fault.",
+            )
+            .or("0.1"),
+            Key::new(
+                "stop_s",
+                "s",
+                StopTime::EXPECTED,
+                "Time after which a stop on the path is given up, and outputs go to 0 V.",
+            )
+            .or("2"),
+            Key::new(
+                "emergency_stop",
+                "",
+                EMERGENCY_STOP,
+                "What the emergency stop does: outputs to 0 V and drives off at once, outputs ramped, or a stop on the \
+                 path.",
+            )
+            .or("\"immediate\""),
+        ],
+    ),
     table(
         "axis",
         "An axis; exactly three [[axis]] tables, moved by the words X, Y and Z.",
@@ -134,8 +163,62 @@ pub const KEY_TABLES: &[KeyTable] = &[
                 "following_error_limit_mm",
                 "mm",
                 FollowingError::EXPECTED,
-                "Following error (set-point − actual position) at which the axis faults.",
+                "Following error (set-point − actual position) at which the axis faults, in whatever motion.",
             ),
+        ],
+    ),
+    optional(
+        "axis.travel",
+        "Where the axis may go: soft limits for programs and jogging.",
+        &[
+            Key::new("low_mm", "mm", Coordinate::EXPECTED, "Least position; below high_mm."),
+            Key::new("high_mm", "mm", Coordinate::EXPECTED, "Greatest position."),
+        ],
+    ),
+    optional(
+        "axis.guard",
+        "What is watched of the axis; without it, figures that follow from [axis.drive] and [axis.regulator].",
+        &[
+            Key::new(
+                "following_error_at_rest_mm",
+                "mm",
+                FollowingError::EXPECTED,
+                "Following error at which the axis faults at rest.",
+            ),
+            Key::new(
+                "following_error_per_velocity_s",
+                "s",
+                ErrorGrowth::EXPECTED,
+                "Added to it, times the set velocity in mm/s.",
+            ),
+            Key::new(
+                "following_error_per_accel_s2",
+                "s²",
+                ErrorGrowth::EXPECTED,
+                "Added to it, times the set acceleration in mm/s².",
+            ),
+            Key::new(
+                "jump_mm",
+                "mm",
+                Jump::EXPECTED,
+                "Greatest second difference of the following error from tick to tick; more is a jump of the encoder or \
+                 of the set-point.",
+            ),
+            Key::new(
+                "moving_mm_s",
+                "mm/s",
+                Limit::EXPECTED,
+                "Velocity command above which the encoder has to count.",
+            ),
+            Key::new("response_s", "s", Watch::EXPECTED, "After so long at the latest."),
+            Key::new(
+                "load_accel_mm_s2",
+                "mm/s²",
+                Load::EXPECTED,
+                "Greatest acceleration by friction and load; what accelerates the axis away from its command by more runs \
+                 away.",
+            ),
+            Key::new("saturation_s", "s", Watch::EXPECTED, "How long the output may be at its limit."),
         ],
     ),
     table(

@@ -27,6 +27,8 @@ pub(super) const TIMER_BITS: &str = "16 or 32";
 pub(super) const NOISE_COUNTS: &str = "a whole number from 0 to 1000";
 /// The greatest of them.
 pub(super) const NOISE_COUNTS_MAX: u16 = 1000;
+/// What an emergency stop may do.
+pub(super) const EMERGENCY_STOP: &str = "\"immediate\", \"ramp\" or \"stop\"";
 /// Seeds of an encoder's noise.
 pub(super) const NOISE_SEED: &str = "a whole number, 0 or more";
 
@@ -53,6 +55,13 @@ ranges! {
     JointAngle: "a number from 0 to 30", |value| (0.0..=30.0).contains(&value);
     CurveShare: "a number from 0.1 to 0.85", |value| (0.1..=CURVE_FEED_SHARE_MAX).contains(&value);
     BlendTolerance: "a number from 0 to 10", |value| (0.0..=10.0).contains(&value);
+    Ramp: "a number from 0 to 1", |value| (0.0..=1.0).contains(&value);
+    StopTime: "a number from 0 to 60", |value| (0.0..=60.0).contains(&value);
+    ErrorGrowth: "a number from 0 to 10", |value| (0.0..=10.0).contains(&value);
+    Jump: "a number from 1e-6 to 1000", |value| (1e-6..=1000.0).contains(&value);
+    Watch: "a number from 0.00002 to 10", |value| (2e-5..=10.0).contains(&value);
+    Load: "a number from 0.001 to 1e9", |value| (1e-3..=1e9).contains(&value);
+    Coordinate: "a number from -1e6 to 1e6", |value| value.abs() <= 1e6;
     FollowingError: "a number from 0.0001 to 1000", |value| (0.0001..=1000.0).contains(&value);
     Resolution: "a number above 1e-8 and below 0.5", |value| value > 1e-8 && value < 0.5;
     Velocity: "a number of magnitude 0.001 to 1e9", |value| (0.001..=1e9).contains(&value.abs());
@@ -140,6 +149,13 @@ mod tests {
         words_are_the_range::<JointAngle>();
         words_are_the_range::<CurveShare>();
         words_are_the_range::<FollowingError>();
+        words_are_the_range::<Ramp>();
+        words_are_the_range::<StopTime>();
+        words_are_the_range::<ErrorGrowth>();
+        words_are_the_range::<Jump>();
+        words_are_the_range::<Watch>();
+        words_are_the_range::<Load>();
+        words_are_the_range::<Coordinate>();
         words_are_the_range::<Resolution>();
         words_are_the_range::<Velocity>();
         words_are_the_range::<OutputLimit>();

@@ -4,7 +4,8 @@ use hal_sim::{
     AxisParameters, DriveParameters, EncoderNoise, EncoderParameters, HomeParameters, MachineParameters,
     REFERENCE_TICK_S, REFERENCE_X, REFERENCE_Y, REFERENCE_Z, SUBSTEPS_MAX, TimerBits,
 };
-use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
+use motion_kernel::axis::{AxesConfig, AxesError, AxisFigures, Feedforward, Gains, GuardFigures};
+use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::homing::HomingConfig;
 use motion_kernel::law::Limits;
 use motion_kernel::num::Real;
@@ -12,6 +13,7 @@ use motion_kernel::plan::{AxisLimits, CURVE_FEED_SHARE, MachineLimits};
 use motion_kernel::program::Header;
 use motion_kernel::queue::PathRules;
 use motion_kernel::units::{DacCode, Position};
+use serde::{Deserialize, Serialize};
 
 use super::error::{AxisError, MachineError};
 use super::file;
@@ -43,6 +45,25 @@ pub struct Machine {
     pub path: PathSettings,
     /// The axes X, Y, Z of G-code, under their own names.
     pub axes: [AxisSettings; 3],
+    /// How faults end.
+    pub faults: FaultSettings,
+}
+
+/// How faults end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaultSettings {
+    /// Time in which outputs go to 0 V \[s\], 0 to 1; 0 for at once, whatever the fault.
+    pub ramp_s: f64,
+    /// Time after which a stop on the path is given up \[s\], 0 to 60.
+    pub stop_s: f64,
+    /// What the emergency stop does.
+    pub emergency_stop: Reaction,
+}
+
+impl Default for FaultSettings {
+    fn default() -> Self {
+        Self { ramp_s: 0.1, stop_s: 2.0, emergency_stop: Reaction::Immediate }
+    }
 }
 
 /// Limits along the path, and rules for its joints. The four limits are from 0.001 to 10¹².
@@ -80,8 +101,13 @@ pub struct AxisSettings {
     pub jerk_mm_s3: f64,
     /// Greatest snap \[mm/s⁴\].
     pub snap_mm_s4: f64,
-    /// Following error at which the axis faults \[mm\], 0.0001 to 1000.
+    /// Greatest following error at which the axis faults \[mm\], 0.0001 to 1000.
     pub following_error_limit_mm: f64,
+    /// What else is watched; `None` for figures of the drive, see [`AxisSettings::guard_figures`]. Noise and travel are the
+    /// axis' own.
+    pub guard: Option<GuardFigures>,
+    /// Least and greatest position \[mm\], if it is bounded.
+    pub travel_mm: Option<[f64; 2]>,
     /// Travel per encoder count \[mm\], between 10⁻⁸ and 0.5; so much that a tick at twice `feed_mm_s` is less than
     /// half the register of `timer`.
     pub mm_per_count: f64,
@@ -114,6 +140,30 @@ pub struct HomingSettings {
     pub simulated: HomeParameters,
 }
 
+/// How faults of the axes are told and end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Guards {
+    /// Of each axis.
+    pub axes: [GuardFigures; 3],
+    /// How faults end.
+    pub reactions: Reactions,
+}
+
+impl Guards {
+    /// The kernel's axes for a control tick of `tick_s`, guarded.
+    ///
+    /// # Errors
+    /// The first axis with a figure that the kernel can't use.
+    pub fn of_axes<R: Real>(
+        &self,
+        figures: &[AxisFigures; 3],
+        tick_s: f64,
+    ) -> Result<AxesConfig<R, 3>, AxesError> {
+        let axes = AxesConfig::new(figures, tick_s)?.guarded(&self.axes, tick_s)?;
+        Ok(AxesConfig { reactions: self.reactions, ..axes })
+    }
+}
+
 impl Machine {
     /// The reference machine: S4's axes X and Y, a Z like X, S1's limits. The same as
     /// [`REFERENCE_TOML`](super::REFERENCE_TOML).
@@ -137,6 +187,7 @@ impl Machine {
                 AxisSettings::reference("Y", REFERENCE_Y),
                 AxisSettings::reference("Z", REFERENCE_Z),
             ],
+            faults: FaultSettings::default(),
         }
     }
 
@@ -177,13 +228,31 @@ impl Machine {
         }
     }
 
-    /// The kernel's axes.
+    /// The kernel's axes, guarded.
     ///
     /// # Errors
     /// The first axis with a value that the kernel can't use.
     pub fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, 3>, AxisError> {
-        let figures = self.axes.each_ref().map(AxisSettings::figures);
-        AxesConfig::new(&figures, self.tick_s)
+        self.guards()
+            .of_axes(&self.axes.each_ref().map(AxisSettings::figures), self.tick_s)
+            .map_err(|error| AxisError { axis: self.axes[error.axis].name.clone(), source: error.cause })
+    }
+
+    /// How faults are told and end.
+    #[must_use]
+    pub fn guards(&self) -> Guards {
+        Guards {
+            axes: self.axes.each_ref().map(|axis| axis.guard_figures(self.tick_s)),
+            reactions: self.faults.reactions(self.tick_s),
+        }
+    }
+
+    /// The kernel's axes without guards but the greatest following error.
+    ///
+    /// # Errors
+    /// The first axis with a value that the kernel can't use.
+    pub fn unguarded_axes_config<R: Real>(&self) -> Result<AxesConfig<R, 3>, AxisError> {
+        AxesConfig::new(&self.axes.each_ref().map(AxisSettings::figures), self.tick_s)
             .map_err(|error| AxisError { axis: self.axes[error.axis].name.clone(), source: error.cause })
     }
 
@@ -212,6 +281,16 @@ impl Machine {
     }
 }
 
+impl FaultSettings {
+    fn reactions(&self, tick_s: f64) -> Reactions {
+        Reactions {
+            ramp_ticks: (self.ramp_s / tick_s).round() as u16,
+            stop_ticks: (self.stop_s / tick_s).round() as u32,
+            emergency_stop: self.emergency_stop,
+        }
+    }
+}
+
 impl PathSettings {
     /// Acceleration, jerk and snap along the path.
     #[must_use]
@@ -229,6 +308,8 @@ impl AxisSettings {
             jerk_mm_s3: 5e3,
             snap_mm_s4: 4e5,
             following_error_limit_mm: 1.0,
+            guard: None,
+            travel_mm: None,
             mm_per_count: 1e-4,
             timer: TimerBits::ThirtyTwo,
             noise: None,
@@ -267,6 +348,44 @@ impl AxisSettings {
             feedforward: self.feedforward,
             following_error_limit_mm: self.following_error_limit_mm,
         }
+    }
+
+    /// What is watched of the axis with ticks of `tick_s`: what the file says, or what follows from drive and regulator.
+    ///
+    /// With the drive's response T = dead time + filter + current lag + 3 time constants of its velocity controller,
+    /// feedforward that is off by a tenth, and loads of a tenth of its torque:
+    ///
+    /// - following error: at rest a quarter of the limit; (|1 − F_V| + 0.1)/kp for velocity, T/kp for acceleration;
+    /// - jump: twice (axis' + drive's acceleration)·tick² + (2 + 4·noise) counts;
+    /// - moving: a hundredth of the feed, or twice what friction holds or noise commands; within T and 2 more time constants;
+    /// - load: a tenth of the drive's acceleration, or twice the axis' or friction.
+    #[must_use]
+    pub fn guard_figures(&self, tick_s: f64) -> GuardFigures {
+        let noise_counts = self.noise.map_or(0, |noise| noise.amplitude_counts);
+        let (drive, kp_per_s) = (&self.drive, self.gains.kp_per_s);
+        let constant_s = (1.0 + drive.load_inertia_ratio) / drive.velocity_gain_per_s;
+        let response_s = drive.dead_time_s + drive.command_filter_s + drive.current_lag_s + 3.0 * constant_s;
+        let counts_mm = self.mm_per_count * (2.0 + 4.0 * f64::from(noise_counts));
+        let accel_mm_s2 = drive.accel_limit_mm_s2 / (1.0 + drive.load_inertia_ratio);
+        let is_closed = kp_per_s > 0.0;
+        let per_kp = |value: f64| if is_closed { value / kp_per_s } else { 0.0 };
+        let derived = GuardFigures {
+            following_error_at_rest_mm: self.following_error_limit_mm * if is_closed { 0.25 } else { 1.0 },
+            following_error_per_velocity_s: per_kp((1.0 - self.feedforward.velocity).abs() + 0.1),
+            following_error_per_accel_s2: per_kp(response_s),
+            jump_mm: 2.0 * ((self.accel_mm_s2 + accel_mm_s2) * tick_s * tick_s + counts_mm),
+            moving_mm_s: (0.01 * self.feed_mm_s)
+                .max(2.0 * drive.coulomb_friction_mm_s2 * constant_s)
+                .max(kp_per_s * counts_mm),
+            response_s: response_s + 2.0 * constant_s,
+            load_accel_mm_s2: (0.1 * accel_mm_s2)
+                .max(2.0 * self.accel_mm_s2)
+                .max(2.0 * drive.coulomb_friction_mm_s2),
+            noise_counts,
+            saturation_s: 0.1,
+            travel_mm: None,
+        };
+        GuardFigures { noise_counts, travel_mm: self.travel_mm, ..self.guard.unwrap_or(derived) }
     }
 
     fn simulated(&self) -> AxisParameters {

@@ -32,6 +32,7 @@ use motion_kernel::units::Counts;
 use serde::{Deserialize, Serialize};
 
 use self::tape::Tape;
+use crate::machine::Guards;
 use crate::record::AXES;
 use crate::simulate::live::Script;
 use crate::simulate::{Job, Number, Sheet, StretchCorrection};
@@ -45,6 +46,7 @@ pub struct Recording {
     number: Number,
     /// A compiled program, blocks included.
     program: Vec<u8>,
+    guards: Guards,
     correction: Option<StretchCorrection>,
     script: Option<Script>,
     sheet: Sheet,
@@ -94,8 +96,8 @@ impl Recording {
         let mut program = Vec::new();
         // Entries of three axes fit the format.
         program::write(&job.header, &job.items, &mut program).expect("three axes");
-        let Job { number, correction, script, sheet, .. } = job.clone();
-        Self { number, program, correction, script, sheet, start, tape }
+        let Job { number, guards, correction, script, sheet, .. } = job.clone();
+        Self { number, program, guards, correction, script, sheet, start, tape }
     }
 
     /// The recording as bytes.
@@ -160,6 +162,7 @@ impl Recording {
         Ok(Job {
             number: self.number,
             header: *reader.header(),
+            guards: self.guards,
             items: reader.items().collect::<Result<_, _>>()?,
             correction: self.correction.clone(),
             script: self.script.clone(),

@@ -20,7 +20,7 @@ fn recorded(number: Number) -> Recording {
     let script: Script = "300:hold,700:resume,900:override=0.5".parse().expect("a script");
     let options = RunOptions { number, script: Some(&script), ..RunOptions::default() };
     let job = Job::new(&options, &plan, &machine).expect("a job");
-    simulate::on_simulated(&machine, |rig| {
+    simulate::on_simulated(&machine, None, |rig| {
         let mut recorder = Recorder::new(rig);
         simulate::run_on(&job, &mut recorder, &mut |_: &TickRecord| ())?;
         Ok(recorder.finish(&job))

@@ -21,9 +21,10 @@ use motion_kernel::units::{Counts, DacCode, Position};
 
 use super::Observer;
 use super::contour::Contour;
+use super::faults;
 use super::job::Sheet;
 use super::rig::{Rig, Simulated};
-use super::run::{RunError, fault_record, tick_record};
+use super::run::{RunError, tick_record};
 use crate::machine::{AxisSettings, HomingSettings, Machine};
 use crate::record::{AXES, FaultRecord};
 
@@ -274,11 +275,10 @@ impl<'a, R: Real> Session<'a, R> {
             self.ticks += 1;
             observe(&tick_record(&trace, 0.0, &mut self.contour));
             if let Some(fault) = trace.fault {
-                return Err(HomeError::Fault(fault_record(
-                    &fault,
-                    &self.machine.header(),
-                    &Sheet::of_machine(self.machine),
-                )));
+                let job = (&self.machine.header(), &Sheet::of_machine(self.machine));
+                let config = self.machine.axes_config().map_err(RunError::from)?;
+                let setpoints = &trace.executed.setpoints;
+                return Err(HomeError::Fault(faults::record(&fault, job, &config, setpoints)));
             }
             match look(&trace, &mut self.rig, director.state(&feeder))? {
                 Then::GoOn => {}

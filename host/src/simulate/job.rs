@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::live::Script;
 use super::run::{Number, RunError, RunOptions, StretchCorrection};
-use crate::machine::{AxisError, Machine};
+use crate::machine::{AxisError, Guards, Machine};
 use crate::planning::{Executable, Item as PlanItem, Plan};
 use crate::record::{AXES, BlockRecord, PathLimits, RunRecord};
 
@@ -21,6 +21,8 @@ pub struct Job {
     pub number: Number,
     /// The machine, as the kernel has to know it.
     pub header: Header<AXES>,
+    /// How its faults are told and end.
+    pub guards: Guards,
     /// The program, with the blocks of its path.
     pub items: Vec<Item<AXES>>,
     /// What was learnt of one of its stretches.
@@ -137,6 +139,7 @@ impl Job {
         Ok(Self {
             number: options.number,
             header: machine.header(),
+            guards: machine.guards(),
             items: executable.items,
             correction: options.correction.cloned(),
             script: options.script.cloned(),
@@ -146,7 +149,7 @@ impl Job {
 
     /// The kernel's axes.
     pub(super) fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, AXES>, AxisError> {
-        AxesConfig::new(&self.header.axes, self.header.tick_s).map_err(|error| AxisError {
+        self.guards.of_axes(&self.header.axes, self.header.tick_s).map_err(|error| AxisError {
             axis: self.sheet.axes[error.axis].name.clone(),
             source: error.cause,
         })

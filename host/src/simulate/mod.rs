@@ -6,6 +6,8 @@
 //!
 //! - [`job`]: what is executed, and what its records call it by;
 //! - [`home`]: homing, and motion behind it;
+//! - [`faults`]: names and table of faults;
+//! - [`inject`]: what breaks before given ticks;
 //! - [`live`]: commands before given ticks;
 //! - `background`: what fills the streams, with commands or without;
 //! - [`rig`]: the simulated machine as the kernel's hardware;
@@ -19,6 +21,8 @@ mod background;
 mod commands;
 pub(crate) mod contour;
 pub mod job;
+pub mod faults;
+pub mod inject;
 mod limit_share;
 pub mod home;
 pub mod live;

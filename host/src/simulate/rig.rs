@@ -5,7 +5,7 @@
 
 use core::convert::Infallible;
 
-use hal_sim::{Ad5754Chip, ChipError, SimMachine};
+use hal_sim::{Ad5754Chip, ChipError, Injection, Injector, SimMachine};
 use motion_kernel::hal::{
     Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel,
 };
@@ -13,6 +13,7 @@ use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
 
+use super::inject::Break;
 use crate::machine::DEAD_TIME_CELLS;
 use crate::record::AXES;
 
@@ -32,6 +33,12 @@ pub type Simulated = SimMachine<AXES, DEAD_TIME_CELLS>;
 pub struct Rig<'a> {
     machine: &'a Simulated,
     outputs: Ad5754Output<&'a Ad5754Chip, AXES>,
+    /// What is broken.
+    pub injector: Injector<AXES>,
+    /// What will break.
+    pub(super) breaks: Vec<Break>,
+    /// Ticks so far.
+    ticks: u64,
 }
 
 impl<'a> Rig<'a> {
@@ -41,18 +48,38 @@ impl<'a> Rig<'a> {
     /// The converter does not take its configuration.
     pub fn new(machine: &'a Simulated) -> Result<Self, Ad5754Error<ChipError>> {
         let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())?;
-        Ok(Self { machine, outputs })
+        Ok(Self { machine, outputs, injector: Injector::new(), breaks: Vec::new(), ticks: 0 })
+    }
+
+    /// Breaks something of an axis, from 0.
+    pub fn inject(&mut self, axis: usize, injection: Injection) {
+        self.injector.inject(self.machine, axis, injection);
+    }
+
+    /// Breaks what is to break before the next tick.
+    fn break_now(&mut self) {
+        for index in 0..self.breaks.len() {
+            let Break { tick, of_axis } = self.breaks[index];
+            match of_axis {
+                _ if tick != self.ticks => {}
+                Some((axis, injection)) => self.inject(axis, injection),
+                None => self.injector.emergency_stop = true,
+            }
+        }
     }
 }
 
 impl Hardware for Rig<'_> {
     fn start_counts(&mut self) -> [Counts; AXES] {
         let Ok(counts) = self.latch();
+        self.break_now();
         counts
     }
 
     fn advance<R: Scalar>(&mut self, _: &Trace<R, AXES>) -> bool {
         self.machine.advance();
+        self.ticks += 1;
+        self.break_now();
         true
     }
 }
@@ -61,7 +88,8 @@ impl Encoder<AXES> for Rig<'_> {
     type Error = Infallible;
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
-        self.machine.latch()
+        let Ok(counts) = self.machine.latch();
+        Ok(self.injector.counts(counts))
     }
 }
 
@@ -69,7 +97,7 @@ impl Inputs<AXES> for Rig<'_> {
     type Error = Infallible;
 
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
-        self.machine.read_inputs()
+        Ok(self.injector.inputs(self.machine))
     }
 }
 

@@ -7,10 +7,9 @@ use core::convert::Infallible;
 
 use motion_kernel::axis::{Correction, CorrectionError};
 use motion_kernel::exec::ExecState;
-use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
-use motion_kernel::program::{Header, SupplyError};
+use motion_kernel::program::SupplyError;
 use motion_kernel::trace::Trace;
 use serde::{Deserialize, Serialize};
 
@@ -18,14 +17,16 @@ use super::Observer;
 use super::background::Storage;
 use super::commands::Commands;
 use super::contour::Contour;
-use super::job::{Job, Sheet};
+use super::faults;
+use super::inject::{InjectionError, Injections};
+use super::job::Job;
 use super::limit_share::LimitShare;
 use super::live::Script;
 use super::rig::{Hardware, Rig, Simulated};
 use super::summary::{Collector, RunSummary};
 use crate::machine::{AxisError, Machine};
 use crate::planning::{Plan, PlanningError};
-use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
+use crate::record::{AXES, AxisTick, TickRecord};
 
 /// How long the machine is given to settle before its end position is read \[s\].
 const SETTLE_S: f64 = 0.2;
@@ -64,6 +65,8 @@ pub struct RunOptions<'a> {
     pub correction: Option<&'a StretchCorrection>,
     /// Live control.
     pub script: Option<&'a Script>,
+    /// What breaks.
+    pub injections: Option<&'a Injections>,
 }
 
 /// Why a run could not be made.
@@ -78,6 +81,9 @@ pub enum RunError {
     /// The simulated machine can't be built.
     #[error("simulated machine: {0}")]
     Simulation(String),
+    /// What is to break is not there.
+    #[error(transparent)]
+    Injection(#[from] InjectionError),
     /// The correction can't be used.
     #[error("correction: {0}")]
     Correction(#[from] CorrectionError),
@@ -105,20 +111,24 @@ pub fn run_with(
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
     let job = Job::new(options, plan, machine)?;
-    on_simulated(machine, |rig| run_on(&job, rig, observe))
+    on_simulated(machine, options.injections, |rig| run_on(&job, rig, observe))
 }
 
-/// What `work` does with the simulated machine, at rest at the origin.
+/// What `work` does with the simulated machine, at rest at the origin, which breaks as `injections` say.
 ///
 /// # Errors
-/// The machine can't be simulated; and those of `work`.
+/// The machine can't be simulated, or has no such axis; and those of `work`.
 pub fn on_simulated<T>(
     machine: &Machine,
+    injections: Option<&Injections>,
     work: impl FnOnce(&mut Rig<'_>) -> Result<T, RunError>,
 ) -> Result<T, RunError> {
     let simulated =
         Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))?;
     let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
+    if let Some(injections) = injections {
+        rig.breaks = injections.of(machine)?;
+    }
     work(&mut rig)
 }
 
@@ -145,7 +155,8 @@ fn run_in<R: Real>(
 ) -> Result<RunSummary, RunError> {
     let Job { header, sheet, correction, script, .. } = job;
     let tick_s = header.tick_s;
-    let mut kernel = Kernel::<R, AXES>::new(&job.axes_config()?, header.start, hardware.start_counts());
+    let config = job.axes_config()?;
+    let mut kernel = Kernel::<R, AXES>::new(&config, header.start, hardware.start_counts());
     kernel.enable(0);
     let knots_mm_s: Vec<[R; AXES]> = correction
         .iter()
@@ -173,6 +184,9 @@ fn run_in<R: Real>(
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     let mut goes_on = true;
     while goes_on {
+        if kernel.wants_hold() {
+            background.hold();
+        }
         background.turn(collector.ticks()).map_err(RunError::Rejected)?;
         let trace = *kernel.tick(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
@@ -188,8 +202,14 @@ fn run_in<R: Real>(
         commands.add(&record);
         observe(&record);
         if let Some(fault) = trace.fault {
-            summary.faults.push(fault_record(&fault, &job.header, &job.sheet));
-            break;
+            if summary.faults.is_empty() {
+                let setpoints = &trace.executed.setpoints;
+                summary.faults.push(faults::record(&fault, (header, sheet), &config, setpoints));
+            }
+            if kernel.is_off() {
+                break;
+            }
+            continue;
         }
         if let Some(reason) = ended {
             summary.notices.extend(reason.map(str::to_owned));
@@ -280,23 +300,4 @@ pub(crate) fn state_name(state: ExecState, is_faulted: bool) -> &'static str {
         ExecState::Stopped => "stopped",
         ExecState::Held => "held",
     }
-}
-
-pub(super) fn fault_record<R: Real>(fault: &Fault<R>, header: &Header<AXES>, sheet: &Sheet) -> FaultRecord {
-    let name_of = |axis: usize| Some(sheet.axes[axis].name.clone());
-    let (axis, name, detail) = match fault.kind {
-        FaultKind::Executor(fault) => (None, "executor", format!("{fault:?}")),
-        FaultKind::FollowingError { axis, error_mm } => {
-            let limit_mm = header.axes[axis].following_error_limit_mm;
-            let detail = format!("{:.3} mm, limit {limit_mm} mm", error_mm.to_f64());
-            (name_of(axis), "following error", detail)
-        }
-        FaultKind::Encoder => (None, "encoder", "the encoders could not be read".to_owned()),
-        FaultKind::Inputs => (None, "inputs", "the digital inputs could not be read".to_owned()),
-        FaultKind::Output => (None, "output", "the converter could not be written".to_owned()),
-        FaultKind::Enable => (None, "enable", "the drives could not be switched".to_owned()),
-        FaultKind::EmergencyStop => (None, "emergency stop", "the emergency stop is open".to_owned()),
-        FaultKind::Drive { axis } => (name_of(axis), "drive", "the drive reports a fault".to_owned()),
-    };
-    FaultRecord { tick: fault.tick, axis, fault: name.to_owned(), detail }
 }

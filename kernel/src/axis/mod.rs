@@ -7,7 +7,8 @@
 //! - [`preview`]: position set-points delayed, so that feedforward comes early;
 //! - [`feedforward`]: F_V, F_a, F_J of S4 (1), and the inverse of the drive;
 //! - [`regulator`]: S4 (1), P(ID) on the following error plus feedforward, with saturation and anti-windup;
-//! - [`correction`]: what was learnt of a stretch, added to feedforward.
+//! - [`correction`]: what was learnt of a stretch, added to feedforward;
+//! - `guard`: whether encoder, drive and set-point make sense together (feature `guards`).
 //!
 //! Configuration ([`AxesConfig`], [`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so gains can
 //! change without a bump.
@@ -15,6 +16,8 @@
 mod check;
 pub mod correction;
 pub mod feedforward;
+#[cfg(feature = "guards")]
+mod guard;
 pub mod preview;
 pub mod regulator;
 pub mod scale;
@@ -23,6 +26,8 @@ pub use correction::{Correction, CorrectionError};
 pub use feedforward::{
     BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, TABLE_POINTS, Table, Tables,
 };
+#[cfg(feature = "guards")]
+pub use guard::{GuardFigures, LOOK_TICKS};
 pub use preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX, Preview};
 pub use regulator::{Command, Gains, Regulator, RegulatorState};
 pub use scale::{EncoderScale, OutputScale, ScaleError};
@@ -30,7 +35,13 @@ pub use scale::{EncoderScale, OutputScale, ScaleError};
 use serde::{Deserialize, Serialize};
 
 use check::{Check, fits};
+#[cfg(feature = "guards")]
+pub(crate) use guard::Found;
+#[cfg(feature = "guards")]
+use guard::{Guard, GuardConfig};
 
+#[cfg(feature = "guards")]
+use crate::fault::Reactions;
 use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, DacCode, Position};
@@ -64,8 +75,10 @@ pub struct AxisConfig<R> {
     pub output: OutputScale<R>,
     /// The regulator.
     pub regulator: Regulator<R>,
-    /// Following error at which the axis faults \[mm\].
+    /// Greatest following error at which the axis faults \[mm\].
     pub following_error_limit_mm: R,
+    #[cfg(feature = "guards")]
+    guard: GuardConfig<R>,
 }
 
 /// What is fixed about all axes of a machine while they run.
@@ -75,6 +88,9 @@ pub struct AxesConfig<R, const AXES: usize> {
     pub axes: [AxisConfig<R>; AXES],
     /// By how many ticks position set-points are delayed.
     pub preview_ticks: u8,
+    /// How faults end.
+    #[cfg(feature = "guards")]
+    pub reactions: Reactions,
 }
 
 /// An axis that can't be used.
@@ -98,7 +114,7 @@ impl core::error::Error for AxesError {}
 impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
     const ONE_AT_LEAST: () = assert!(AXES > 0, "a machine has an axis");
 
-    /// The axes for a control tick of `tick_s`. Background.
+    /// The axes for a control tick of `tick_s`, guarded by the limits of their following errors alone. Background.
     ///
     /// # Errors
     /// The first figure that is out of its range or beyond the number type's.
@@ -112,7 +128,29 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
             config
         });
         // The axes before it are those without a refusal.
-        check.refused.map_or(Ok(Self { axes, preview_ticks }), |cause| Err(AxesError { axis, cause }))
+        let made = Self {
+            axes,
+            preview_ticks,
+            #[cfg(feature = "guards")]
+            reactions: Reactions::IMMEDIATE,
+        };
+        check.refused.map_or(Ok(made), |cause| Err(AxesError { axis, cause }))
+    }
+
+    /// The same axes for a control tick of `tick_s`, guarded by all of `guards`. Background.
+    ///
+    /// # Errors
+    /// The first figure that is out of its range or beyond the number type's.
+    #[cfg(feature = "guards")]
+    pub fn guarded(mut self, guards: &[GuardFigures; AXES], tick_s: f64) -> Result<Self, AxesError> {
+        let look_ticks = u32::from(LOOK_TICKS) * AXES as u32;
+        for (axis, (config, figures)) in self.axes.iter_mut().zip(guards).enumerate() {
+            let mm_per_count = config.encoder.mm_per_count();
+            config.guard =
+                Check::all(|check| GuardConfig::new(check, figures, mm_per_count, look_ticks, tick_s))
+                    .map_err(|cause| AxesError { axis, cause })?;
+        }
+        Ok(self)
     }
 
     /// By how many ticks these axes need their position set-points delayed: as the longest lead asks for.
@@ -151,7 +189,15 @@ impl<R: Real> AxisConfig<R> {
                 limit_mm,
             ),
             following_error_limit_mm: R::from_f64(limit_mm),
+            #[cfg(feature = "guards")]
+            guard: GuardConfig::limit_only(limit_mm),
         }
+    }
+
+    /// The following error at which the axis faults in a motion \[mm\].
+    #[cfg(feature = "guards")]
+    pub fn following_error_limit_mm_in(&self, setpoint: &Setpoint<R>) -> R {
+        self.guard.limit_mm(self.following_error_limit_mm, setpoint)
     }
 }
 
@@ -164,6 +210,8 @@ pub struct AxisState<R> {
     pub regulator: RegulatorState<R>,
     /// Largest |following error| since it was last cleared \[mm\].
     pub peak_following_error_mm: R,
+    #[cfg(feature = "guards")]
+    guard: Guard<R>,
 }
 
 /// The outcome of one tick of an axis.
@@ -181,7 +229,8 @@ pub struct AxisOutput<R> {
     pub code: DacCode,
     /// The output reached the limit.
     pub saturated: bool,
-    /// The following error is beyond its limit. Then no gain is applied to it: the output is that of standing still.
+    /// The following error is beyond its limit, or another guard found the axis broken. Then no gain is applied to it: the
+    /// output is that of standing still.
     pub lost: bool,
 }
 
@@ -189,6 +238,10 @@ impl<R: Real> AxisState<R> {
     /// Declares the encoder's present reading to be `position`.
     pub fn set_position(&mut self, config: &AxisConfig<R>, counts: Counts, position: Position) {
         self.offset = position - config.encoder.position(counts);
+        #[cfg(feature = "guards")]
+        {
+            self.guard = Guard::at(counts);
+        }
     }
 
     /// The actual position at the encoder's reading.
@@ -202,6 +255,8 @@ impl<R: Real> AxisState<R> {
     pub(crate) fn stand_here(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) -> Position {
         output.set = self.position(config, output.counts);
         self.regulator = RegulatorState::default();
+        #[cfg(feature = "guards")]
+        self.guard.stand_here();
         output.set
     }
 
@@ -209,6 +264,15 @@ impl<R: Real> AxisState<R> {
     /// [`AxisState::tick`].
     #[inline]
     pub fn stand_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) {
+        let error_mm = self.hold_still(config, output);
+        #[cfg(feature = "guards")]
+        self.guard.watch(error_mm - self.regulator.last_error_mm(), output.counts);
+        self.regulator.watch(error_mm);
+    }
+
+    /// The output of [`AxisState::stand_still`]; returns the error that the regulator is to remember.
+    #[inline]
+    fn hold_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) -> R {
         let AxisOutput { counts, set, .. } = *output;
         let actual = self.position(config, counts);
         *output = AxisOutput {
@@ -222,7 +286,7 @@ impl<R: Real> AxisState<R> {
         };
         // No change from here to the next tick is beyond what the gains were accepted for.
         let limit_mm = config.following_error_limit_mm;
-        self.regulator.watch(output.following_error_mm.max(-limit_mm).min(limit_mm));
+        output.following_error_mm.max(-limit_mm).min(limit_mm)
     }
 
     /// One control tick: `setpoint` is the present one, of which feedforward is made; `output` comes with what the
@@ -239,18 +303,57 @@ impl<R: Real> AxisState<R> {
         let size_mm = following_error_mm.abs();
         self.peak_following_error_mm = self.peak_following_error_mm.max(size_mm);
         // Written so that what is not a number counts as lost.
-        if !(size_mm <= config.following_error_limit_mm) {
-            self.stand_still(config, output);
-            output.lost = true;
-            return;
+        #[cfg(not(feature = "guards"))]
+        let is_lost = !(size_mm <= config.following_error_limit_mm);
+        #[cfg(feature = "guards")]
+        let is_lost = {
+            let last_error_mm = self.regulator.last_error_mm();
+            !self.guard.allows(config, following_error_mm, last_error_mm, output.counts, setpoint)
+        };
+        if is_lost {
+            return self.lose(config, output);
         }
         let command =
             config.regulator.tick(&mut self.regulator, following_error_mm, setpoint, config.output.limits());
+        #[cfg(feature = "guards")]
+        if !self.guard.allows_command(command.velocity_mm_s, config.output.limits().1) {
+            return self.lose(config, output);
+        }
         output.actual = actual;
         output.following_error_mm = following_error_mm;
         output.code = config.output.code(command.velocity_mm_s);
         output.saturated = command.saturated;
         output.lost = false;
+    }
+
+    fn lose(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) {
+        let error_mm = self.hold_still(config, output);
+        self.regulator.watch(error_mm);
+        output.lost = true;
+    }
+
+    /// Forgets what was seen of the axis before its drive was enabled.
+    #[cfg(feature = "guards")]
+    pub(crate) fn restart_guard(&mut self) {
+        self.guard.restart();
+    }
+
+    /// What broke in an axis that is lost, `since` ticks after it was looked at.
+    #[cfg(feature = "guards")]
+    pub(crate) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> Found<R> {
+        self.guard.judge(config, setpoint, since)
+    }
+
+    /// A look at an axis that was regulated in this tick; the next one comes `ticks` later.
+    #[cfg(feature = "guards")]
+    pub(crate) fn look(
+        &mut self,
+        config: &AxisConfig<R>,
+        setpoint: &Setpoint<R>,
+        output: &AxisOutput<R>,
+        ticks: u8,
+    ) -> Option<Found<R>> {
+        self.guard.look(config, setpoint, output, ticks)
     }
 }
 

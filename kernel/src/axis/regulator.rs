@@ -66,6 +66,13 @@ impl<R: Real> RegulatorState<R> {
     pub fn watch(&mut self, error_mm: R) {
         self.last_error_mm = error_mm;
     }
+
+    /// ε of the tick before \[mm\].
+    #[cfg(feature = "guards")]
+    #[inline]
+    pub(super) fn last_error_mm(&self) -> R {
+        self.last_error_mm
+    }
 }
 
 impl<R: Real> Regulator<R> {

@@ -334,6 +334,15 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
         self.correction.as_mut()
     }
 
+    /// Whether the motion can be held: under live control.
+    #[cfg(feature = "guards")]
+    pub(crate) fn can_hold(&self) -> bool {
+        #[cfg(feature = "live")]
+        return self.lists.is_some();
+        #[cfg(not(feature = "live"))]
+        false
+    }
+
     /// A new tick: the producer has had its turn.
     #[inline]
     pub(crate) fn start_tick(&mut self) {

@@ -1,10 +1,7 @@
 //! Faults of the kernel: typed, latched, the first one stays, outputs 0 V, drives disabled, and a defined
 //! way back.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
-use check::bench::{LIMITS, RULES, line, mm, point, ramp, rest_to_rest};
+use crate::check::bench::{LIMITS, RULES, line, mm, point, ramp, rest_to_rest};
 use hal_sim::{AxisParameters, MachineParameters, SimMachine};
 use motion_host::machine::Machine;
 use motion_host::simulate::rig::Rig;

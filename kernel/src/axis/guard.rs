@@ -1,0 +1,453 @@
+//! What is watched of an axis: whether encoder, drive and set-point make sense together.
+//!
+//! In the tick, behind the feature `guards`. Two comparisons an axis and tick; what they find suspicious is judged in a
+//! path of its own, as is one axis in every [`LOOK_TICKS`] ticks. No loop, no failure: a fault is reported.
+//!
+//! With the following error ε, the set velocity v and acceleration a of the tick, the drive's greatest acceleration a_d,
+//! the axis' greatest A, and a noise of n counts of the size q:
+//!
+//! - **following error**: |ε| ≤ min(limit, rest + τv·|v| + τa·|a|). A drive that follows its command T_d late gives
+//!   ε = ((1 − F_V)·v + (T_d − F_a)·a)/kp, so τv is some part of 1/kp and τa some part of T_d/kp;
+//! - **jump**: |Δ²ε| ≤ 2·((A + a_d)·T² + (2 + 4n)·q). No motor and no accepted set-point can do more than half of it, so
+//!   more than half of it in the counts is the encoder's, and otherwise the set-point is what jumped;
+//! - **encoder lost**: no counts while the command is above `moving_mm_s`, over `response_s`;
+//! - **runaway**: the axis loses velocity towards its command at more than `load_accel_mm_s2`, which no load does, or
+//!   moves against its command without braking for longer than `response_s`;
+//! - **saturation**: the output at its limit at every look over `saturation_s`;
+//! - **soft limit**: the set position beyond the travel, and on its way farther out.
+//!
+//! Comparisons are written so that what is not a number is a fault.
+
+use serde::{Deserialize, Serialize};
+
+use super::check::{Check, fits};
+use super::{AxisConfig, AxisOutput};
+use crate::num::Real;
+use crate::path::Setpoint;
+use crate::units::{Counts, Position};
+
+/// From one look at an axis to the next one at another axis \[ticks\].
+pub const LOOK_TICKS: u8 = 8;
+/// Beyond the travel by so little is no fault \[mm\]: positions are rounded.
+const TRAVEL_ROUNDING_MM: f64 = 1.0e-3;
+/// Least of figures that are not 0.
+const LEAST: f64 = 1.0e-9;
+/// Commanded to move by so many counts in a tick, an axis that stands still for two has lost its encoder.
+const COUNTS_A_TICK: i32 = 4;
+
+/// What is watched, in figures of any number type.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GuardFigures {
+    /// Greatest following error at rest \[mm\], > 0.
+    pub following_error_at_rest_mm: f64,
+    /// What it may be greater for velocity \[mm per mm/s\], 0 or more.
+    pub following_error_per_velocity_s: f64,
+    /// What it may be greater for acceleration \[mm per mm/s²\], 0 or more.
+    pub following_error_per_accel_s2: f64,
+    /// Greatest second difference of the following error from tick to tick \[mm\], > 0.
+    pub jump_mm: f64,
+    /// The axis has to move where it is commanded to at this velocity \[mm/s\], > 0.
+    pub moving_mm_s: f64,
+    /// After so long at the latest \[s\], > 0.
+    pub response_s: f64,
+    /// Friction and load change the axis' velocity by less \[mm/s²\], > 0.
+    pub load_accel_mm_s2: f64,
+    /// Encoder's noise in either direction \[counts\].
+    pub noise_counts: u16,
+    /// How long the output may be at its limit \[s\], > 0.
+    pub saturation_s: f64,
+    /// Least and greatest set position \[mm\].
+    pub travel_mm: Option<[f64; 2]>,
+}
+
+/// What is fixed while the axis runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GuardConfig<R> {
+    at_rest_mm: R,
+    per_velocity_s: R,
+    per_accel_s2: R,
+    jump_mm: R,
+    tick_s: R,
+    moving_mm_s: R,
+    /// Change of velocity by load in a tick \[mm per tick²\].
+    load_mm: R,
+    /// What noise makes of the distance over two ticks \[mm\].
+    noise_mm: R,
+    noise_counts: i32,
+    /// In looks at this axis; 0: not watched.
+    response_looks: u16,
+    saturation_looks: u16,
+    travel: Option<[Position; 2]>,
+}
+
+impl<R: Real> GuardConfig<R> {
+    /// Nothing but the limit of the following error, whatever the axis does.
+    pub(super) fn limit_only(limit_mm: f64) -> Self {
+        Self {
+            at_rest_mm: R::from_f64(limit_mm),
+            per_velocity_s: R::ZERO,
+            per_accel_s2: R::ZERO,
+            jump_mm: R::from_f64(f64::MAX),
+            tick_s: R::ZERO,
+            moving_mm_s: R::ZERO,
+            load_mm: R::ZERO,
+            noise_mm: R::ZERO,
+            noise_counts: 0,
+            response_looks: 0,
+            saturation_looks: 0,
+            travel: None,
+        }
+    }
+
+    /// For an axis that is looked at every `look_ticks` ticks of `tick_s`. Background.
+    pub(super) fn new(
+        check: &mut Check,
+        figures: &GuardFigures,
+        mm_per_count: f64,
+        look_ticks: u32,
+        tick_s: f64,
+    ) -> Self {
+        let mut figure = |quantity, value: f64, least: f64| {
+            let expected = "a positive number within the kernel's range, or 0 where that means nothing";
+            check.that(value >= least && fits::<R>(value), quantity, value, expected);
+            R::from_f64(value)
+        };
+        let least = LEAST;
+        let &GuardFigures { response_s, saturation_s, noise_counts, .. } = figures;
+        let look_s = f64::from(look_ticks) * tick_s;
+        let looks = |s: f64| libm::ceil(s / look_s) as u16;
+        let at_rest_mm = figure("following error at rest [mm]", figures.following_error_at_rest_mm, least);
+        let per_velocity_s =
+            figure("following error per velocity [s]", figures.following_error_per_velocity_s, 0.0);
+        let per_accel_s2 =
+            figure("following error per acceleration [s²]", figures.following_error_per_accel_s2, 0.0);
+        let jump_mm = figure("jump [mm]", figures.jump_mm, least);
+        let moving_mm_s = figure("least velocity of a moving axis [mm/s]", figures.moving_mm_s, least);
+        figure("acceleration by load [mm/s²]", figures.load_accel_mm_s2, least);
+        figure("response [s]", response_s, least);
+        figure("saturation [s]", saturation_s, least);
+        let travel = figures.travel_mm.map(|[low_mm, high_mm]| {
+            let expected = "a travel within the kernel's range, its lower end first";
+            let ends = [low_mm - TRAVEL_ROUNDING_MM, high_mm + TRAVEL_ROUNDING_MM].map(Position::from_mm);
+            let [Some(low), Some(high)] = ends else {
+                check.that(false, "travel [mm]", high_mm - low_mm, expected);
+                return [Position::ZERO; 2];
+            };
+            check.that(low_mm < high_mm, "travel [mm]", high_mm - low_mm, expected);
+            [low, high]
+        });
+        // Two readings, each off by half a count and the noise.
+        let noise_mm = libm::fabs(mm_per_count) * (1.0 + 2.0 * f64::from(noise_counts));
+        Self {
+            at_rest_mm,
+            per_velocity_s,
+            per_accel_s2,
+            jump_mm,
+            tick_s: R::from_f64(tick_s),
+            moving_mm_s,
+            load_mm: R::from_f64(figures.load_accel_mm_s2 * tick_s * tick_s),
+            noise_mm: R::from_f64(2.0 * noise_mm),
+            noise_counts: 2 * i32::from(noise_counts),
+            // One more: the first look may come just before there is something to see.
+            response_looks: looks(response_s).saturating_add(1),
+            saturation_looks: looks(saturation_s).saturating_add(1),
+            travel,
+        }
+    }
+
+    /// The limit of the following error in a motion.
+    pub(super) fn limit_mm(&self, most_mm: R, setpoint: &Setpoint<R>) -> R {
+        let grown_mm = self.at_rest_mm
+            + self.per_velocity_s * setpoint.velocity_mm_s.abs()
+            + self.per_accel_s2 * setpoint.accel_mm_s2.abs();
+        grown_mm.min(most_mm)
+    }
+}
+
+/// What was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Found<R> {
+    FollowingError { error_mm: R },
+    EncoderLost,
+    EncoderJump { jump_mm: R },
+    Runaway,
+    Saturated,
+    SoftLimit,
+    SetpointJump { jump_mm: R },
+    NotFinite,
+}
+
+/// Why an axis may not go on, before it is clear what broke.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Alarm<R> {
+    #[default]
+    None,
+    Error {
+        error_mm: R,
+    },
+    Jump {
+        jump_mm: R,
+    },
+    NotFinite,
+}
+
+/// What an axis was like when it was looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Look {
+    /// There was one since the axis was enabled.
+    is_taken: bool,
+    counts: i32,
+    /// Counts over the two ticks before.
+    speed: i32,
+    /// The command's direction; 0 below the least velocity.
+    commanded: i8,
+}
+
+/// What changes from tick to tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Guard<R> {
+    /// Of the following error \[mm\].
+    change_mm: R,
+    /// The velocity command of the tick before \[mm/s\].
+    command_mm_s: R,
+    /// The lower halves of the last three readings, the latest first.
+    counts: [i32; 3],
+    alarm: Alarm<R>,
+    last: Look,
+    still_looks: u16,
+    against_looks: u16,
+    saturated_looks: u16,
+    /// The next jump is that of a machine that was moving where it was told to stand.
+    is_excused: bool,
+}
+
+impl<R: Real> Guard<R> {
+    /// An axis whose encoder reads `counts`.
+    pub(super) fn at(counts: Counts) -> Self {
+        Self { counts: [counts.0 as i32; 3], ..Self::default() }
+    }
+
+    /// The actual position has become the set position.
+    pub(super) fn stand_here(&mut self) {
+        *self = Self { counts: self.counts, is_excused: true, ..Self::default() };
+    }
+
+    /// What was seen before the drives were off says nothing.
+    pub(super) fn restart(&mut self) {
+        (self.last, self.still_looks, self.against_looks, self.saturated_looks) = (Look::default(), 0, 0, 0);
+        self.command_mm_s = R::ZERO;
+    }
+
+    #[inline]
+    fn read(&mut self, counts: Counts) {
+        let [latest, before, _] = self.counts;
+        self.counts = [counts.0 as i32, latest, before];
+    }
+
+    /// A tick without a command.
+    #[inline]
+    pub(super) fn watch(&mut self, change_mm: R, counts: Counts) {
+        self.read(counts);
+        self.change_mm = change_mm;
+        self.command_mm_s = R::ZERO;
+    }
+
+    /// Whether the axis may be regulated: its following error and how it changed, which is asked for only where the
+    /// error is within `most_mm`.
+    #[inline]
+    pub(super) fn allows(
+        &mut self,
+        config: &AxisConfig<R>,
+        error_mm: R,
+        last_error_mm: R,
+        counts: Counts,
+        setpoint: &Setpoint<R>,
+    ) -> bool {
+        self.read(counts);
+        if !(error_mm.abs() <= config.guard.at_rest_mm)
+            && !self.allows_error(config, error_mm, last_error_mm, setpoint)
+        {
+            return false;
+        }
+        let change_mm = error_mm - last_error_mm;
+        let jump_mm = change_mm - self.change_mm;
+        self.change_mm = change_mm;
+        if !(jump_mm.abs() <= config.guard.jump_mm) {
+            return self.allows_jump(jump_mm);
+        }
+        true
+    }
+
+    #[cold]
+    fn allows_error(
+        &mut self,
+        config: &AxisConfig<R>,
+        error_mm: R,
+        last_error_mm: R,
+        setpoint: &Setpoint<R>,
+    ) -> bool {
+        let most_mm = config.following_error_limit_mm;
+        let is_allowed = error_mm.abs() <= config.guard.limit_mm(most_mm, setpoint);
+        if !is_allowed {
+            // What is farther than twice the limit need not be told apart, and may be beyond the number type.
+            let far_mm = most_mm + most_mm;
+            let jump_mm = error_mm.max(-far_mm).min(far_mm) - last_error_mm - self.change_mm;
+            let is_jump = !(jump_mm.abs() <= config.guard.jump_mm);
+            self.alarm = if is_jump { Alarm::Jump { jump_mm } } else { Alarm::Error { error_mm } };
+        }
+        is_allowed
+    }
+
+    #[cold]
+    fn allows_jump(&mut self, jump_mm: R) -> bool {
+        if !core::mem::take(&mut self.is_excused) {
+            self.alarm = Alarm::Jump { jump_mm };
+            return false;
+        }
+        true
+    }
+
+    /// Whether a command may be put out.
+    #[inline]
+    pub(super) fn allows_command(&mut self, command_mm_s: R, most_mm_s: R) -> bool {
+        self.command_mm_s = command_mm_s;
+        let is_number = command_mm_s <= most_mm_s;
+        if !is_number {
+            self.alarm = Alarm::NotFinite;
+        }
+        is_number
+    }
+
+    /// What broke in an axis that was not allowed to go on, `since` ticks after it was looked at.
+    #[cold]
+    pub(super) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> Found<R> {
+        let &Setpoint { velocity_mm_s, accel_mm_s2, jerk_mm_s3, .. } = setpoint;
+        // What is not finite times 0 is not 0.
+        let is_number = |value: R| value * R::ZERO == R::ZERO;
+        if ![velocity_mm_s, accel_mm_s2, jerk_mm_s3].into_iter().all(is_number) {
+            return Found::NotFinite;
+        }
+        match self.alarm {
+            Alarm::Jump { jump_mm } => self.judge_jump(config, jump_mm),
+            Alarm::Error { error_mm } => {
+                if self.has_stopped_counting(config) {
+                    Found::EncoderLost
+                } else if self.runs_away(config, since) {
+                    Found::Runaway
+                } else {
+                    Found::FollowingError { error_mm }
+                }
+            }
+            Alarm::None | Alarm::NotFinite => Found::NotFinite,
+        }
+    }
+
+    fn judge_jump(&self, config: &AxisConfig<R>, jump_mm: R) -> Found<R> {
+        let [latest, before, first] = self.counts;
+        let (step, step_before) = (latest.wrapping_sub(before), before.wrapping_sub(first));
+        let [step_mm, before_mm] = [step, step_before].map(|counts| mm(config, counts));
+        let most_mm = config.guard.jump_mm;
+        let is_more = |change_mm: R| (change_mm + change_mm).abs() > most_mm;
+        if !is_more(step_mm - before_mm) {
+            Found::SetpointJump { jump_mm }
+        } else if step == 0 {
+            Found::EncoderLost
+        } else if !is_more(step_mm + before_mm) {
+            // It counts the other way, as fast.
+            Found::Runaway
+        } else {
+            Found::EncoderJump { jump_mm: step_mm - before_mm }
+        }
+    }
+
+    fn has_stopped_counting(&self, config: &AxisConfig<R>) -> bool {
+        let [latest, before, first] = self.counts;
+        let least_mm = mm(config, COUNTS_A_TICK).abs();
+        latest == before && before == first && self.command_mm_s.abs() * config.guard.tick_s >= least_mm
+            || self.last.is_taken && self.still_looks > 0 && self.is_still(config)
+    }
+
+    fn is_still(&self, config: &AxisConfig<R>) -> bool {
+        let moved = self.counts[0].wrapping_sub(self.last.counts);
+        (-config.guard.noise_counts..=config.guard.noise_counts).contains(&moved)
+    }
+
+    /// Whether the axis has lost velocity towards its command faster than by load.
+    fn runs_away(&self, config: &AxisConfig<R>, since: u8) -> bool {
+        if !self.last.is_taken {
+            return false;
+        }
+        let guard = &config.guard;
+        let now_mm = mm(config, self.speed());
+        // Over two ticks, as the speeds.
+        let wanted_mm = (self.command_mm_s + self.command_mm_s) * guard.tick_s - now_mm;
+        let gained_mm = now_mm - mm(config, self.last.speed);
+        let lost_mm = if wanted_mm < R::ZERO { gained_mm } else { -gained_mm };
+        let by_load_mm = (guard.load_mm + guard.load_mm) * R::from_q32(i64::from(since) << 32);
+        lost_mm > by_load_mm + guard.noise_mm + guard.noise_mm
+    }
+
+    /// Counts over the last two ticks.
+    fn speed(&self) -> i32 {
+        let [latest, _, first] = self.counts;
+        latest.wrapping_sub(first)
+    }
+
+    /// One look at an axis that was regulated in this tick, the next one `ticks` later.
+    #[inline(never)]
+    pub(super) fn look(
+        &mut self,
+        config: &AxisConfig<R>,
+        setpoint: &Setpoint<R>,
+        output: &AxisOutput<R>,
+        ticks: u8,
+    ) -> Option<Found<R>> {
+        let guard = &config.guard;
+        self.is_excused = false;
+        // One can drive back.
+        let is_beyond = |[low, high]: [Position; 2]| {
+            output.set < low && setpoint.velocity_mm_s < R::ZERO
+                || output.set > high && setpoint.velocity_mm_s > R::ZERO
+        };
+        if guard.travel.is_some_and(is_beyond) {
+            return Some(Found::SoftLimit);
+        }
+        if guard.response_looks == 0 {
+            return None;
+        }
+        let commanded = match self.command_mm_s {
+            command_mm_s if command_mm_s >= guard.moving_mm_s => 1,
+            command_mm_s if command_mm_s <= -guard.moving_mm_s => -1,
+            _ => 0,
+        };
+        let speed = self.speed();
+        let moved_mm = mm(config, speed);
+        let moving_mm = guard.moving_mm_s * guard.tick_s + guard.noise_mm;
+        let is_against = commanded > 0 && moved_mm < -moving_mm || commanded < 0 && moved_mm > moving_mm;
+        // A load that is too great brakes slowly, but brakes.
+        let brakes_mm = mm::<R>(config, self.last.speed).abs() - moved_mm.abs();
+        let is_against = is_against && brakes_mm <= guard.noise_mm;
+        let goes_on = self.last.is_taken && commanded != 0 && commanded == self.last.commanded;
+        let count = |looks: u16, again: bool| if again { looks.saturating_add(1) } else { 0 };
+        let is_still = self.is_still(config);
+        let runs_away = self.runs_away(config, ticks);
+        self.still_looks = count(self.still_looks, goes_on && is_still);
+        self.against_looks = count(self.against_looks, goes_on && is_against);
+        self.saturated_looks = count(self.saturated_looks, output.saturated);
+        self.last = Look { is_taken: true, counts: self.counts[0], speed, commanded };
+        if runs_away || self.against_looks >= guard.response_looks {
+            Some(Found::Runaway)
+        } else if self.still_looks >= guard.response_looks {
+            Some(Found::EncoderLost)
+        } else if self.saturated_looks >= guard.saturation_looks {
+            Some(Found::Saturated)
+        } else {
+            None
+        }
+    }
+}
+
+/// The distance of a number of counts \[mm\].
+fn mm<R: Real>(config: &AxisConfig<R>, counts: i32) -> R {
+    config.encoder.position(Counts(i64::from(counts))).to_offset()
+}

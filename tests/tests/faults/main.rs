@@ -1,0 +1,30 @@
+//! Faults of the kernel: each one found in its time and as itself, with its reaction, its latch and a way back; and none
+//! where nothing is broken.
+//!
+//! - `provoked`: one by one on a bench that follows perfectly;
+//! - `machine`: the simulated machine with programs of random motion, under live control;
+//! - `injected`: everything that can break, at random ticks of random motion;
+//! - `reactions`: stops, ramps and what is more urgent;
+//! - `calm`: nothing breaks, under noise;
+//! - `corrupted`: set-points and configuration;
+//! - `table`: the table in the documents.
+//!
+//! `MOTION_TEST_SEED` is the first seed; `MOTION_TEST_FAULTS` how often each fault is injected, `MOTION_TEST_TICKS` how many
+//! ticks are calm.
+
+mod calm;
+#[path = "../check/mod.rs"]
+#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
+mod check;
+mod injected;
+mod machine;
+mod provoked;
+mod reactions;
+mod table;
+
+/// A number from the environment.
+fn setting(name: &str, default: u64) -> u64 {
+    let value = std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default);
+    println!("{name}={value}");
+    value
+}
