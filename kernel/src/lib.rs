@@ -98,3 +98,6 @@ pub mod fault;
 pub mod tick_monitor;
 pub mod trace;
 pub mod kernel;
+
+#[cfg(all(test, feature = "guards"))]
+mod corrupted;

@@ -147,7 +147,7 @@ fn run_in<R: Real>(
         .collect();
     let mut storage = Storage::<R>::new(script);
     let (mut background, mut intake) =
-        storage.split(machine.rules(), start, executable.supplied(), executable.tick_s);
+        storage.split(machine.rules(), (start, machine.travel()), executable.supplied(), executable.tick_s);
     if let Some(&StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
         intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?);
     }
