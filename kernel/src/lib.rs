@@ -104,3 +104,6 @@ pub mod kernel;
 pub mod jog;
 #[cfg(feature = "live")]
 pub mod homing;
+
+#[cfg(all(test, feature = "guards"))]
+mod corrupted;

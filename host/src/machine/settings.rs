@@ -9,6 +9,7 @@ use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::homing::HomingConfig;
 use motion_kernel::law::Limits;
 use motion_kernel::num::Real;
+use motion_kernel::path::Travel;
 use motion_kernel::plan::{AxisLimits, CURVE_FEED_SHARE, MachineLimits};
 use motion_kernel::program::Header;
 use motion_kernel::queue::PathRules;
@@ -150,6 +151,15 @@ pub struct Guards {
 }
 
 impl Guards {
+    /// Where the axes may go; an end beyond the kernel's range bounds nothing.
+    #[must_use]
+    pub fn travel(&self) -> Travel<3> {
+        self.axes.each_ref().map(|axis| {
+            let [low, high] = axis.travel_mm?.map(Position::from_mm);
+            Some([low?, high?])
+        })
+    }
+
     /// The kernel's axes for a control tick of `tick_s`, guarded.
     ///
     /// # Errors
@@ -215,6 +225,12 @@ impl Machine {
                 },
             }),
         }
+    }
+
+    /// Where the axes may go; an end beyond the kernel's range bounds nothing.
+    #[must_use]
+    pub fn travel(&self) -> Travel<3> {
+        self.guards().travel()
     }
 
     /// What the kernel's queues hold the streams to.
@@ -357,7 +373,7 @@ impl AxisSettings {
     ///
     /// - following error: at rest a quarter of the limit; (|1 − F_V| + 0.1)/kp for velocity, T/kp for acceleration;
     /// - jump: twice (axis' + drive's acceleration)·tick² + (2 + 4·noise) counts;
-    /// - moving: a hundredth of the feed, or twice what friction holds or noise commands; within T and 2 more time constants;
+    /// - moving: a hundredth of the feed, twice what friction holds and what noise commands, together; within T and 2 more time constants;
     /// - load: a tenth of the drive's acceleration, or twice the axis' or friction.
     #[must_use]
     pub fn guard_figures(&self, tick_s: f64) -> GuardFigures {
@@ -374,9 +390,9 @@ impl AxisSettings {
             following_error_per_velocity_s: per_kp((1.0 - self.feedforward.velocity).abs() + 0.1),
             following_error_per_accel_s2: per_kp(response_s),
             jump_mm: 2.0 * ((self.accel_mm_s2 + accel_mm_s2) * tick_s * tick_s + counts_mm),
-            moving_mm_s: (0.01 * self.feed_mm_s)
-                .max(2.0 * drive.coulomb_friction_mm_s2 * constant_s)
-                .max(kp_per_s * counts_mm),
+            moving_mm_s: 0.01 * self.feed_mm_s
+                + 2.0 * drive.coulomb_friction_mm_s2 * constant_s
+                + kp_per_s * counts_mm,
             response_s: response_s + 2.0 * constant_s,
             load_accel_mm_s2: (0.1 * accel_mm_s2)
                 .max(2.0 * self.accel_mm_s2)

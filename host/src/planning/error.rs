@@ -64,6 +64,18 @@ pub enum Problem {
         /// The tick \[s\].
         tick_s: f64,
     },
+    /// A move leaves the travel of an axis.
+    #[error("found {axis} at {found_mm:.4} mm, expected its travel, {low_mm} to {high_mm} mm")]
+    Travel {
+        /// Its name.
+        axis: String,
+        /// Where it would be \[mm\].
+        found_mm: f64,
+        /// Its least position \[mm\].
+        low_mm: f64,
+        /// Its greatest position \[mm\].
+        high_mm: f64,
+    },
     /// More pieces than the tick handles.
     #[error(
         "found {pieces} pieces over {length_mm:.6} mm, which {feed_mm_s:.3} mm/s pass within one tick of \

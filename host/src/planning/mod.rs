@@ -33,6 +33,7 @@ pub mod profile;
 pub mod program;
 pub mod spline;
 pub mod stretch;
+mod travel;
 
 pub use blocks::plan_blocks;
 pub use error::{Place, PlanningError, Problem};

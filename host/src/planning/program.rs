@@ -5,7 +5,7 @@ use super::curves::{Point, cubic, through};
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
-use super::{Item, Mode, Plan};
+use super::{Item, Mode, Plan, travel};
 use crate::gcode::{Feed, PathMode, Program, StepKind};
 use crate::machine::Machine;
 use crate::toolpath::Element;
@@ -75,7 +75,7 @@ pub fn plan_program(
     run.extend(moves.map_err(|(line, problem)| at(line)(problem))?);
     append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
     // What the tick can't do is to be refused here, not on the machine.
-    Executable::new::<f32>(&plan)?;
+    travel::check(source_name, &Executable::new::<f32>(&plan)?, machine)?;
     Ok(plan)
 }
 
@@ -96,7 +96,7 @@ pub fn plan_moves(
         problem,
     })?;
     // As for a program.
-    Executable::new::<f32>(&plan)?;
+    travel::check(source_name, &Executable::new::<f32>(&plan)?, machine)?;
     Ok(plan)
 }
 

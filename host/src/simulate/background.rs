@@ -5,6 +5,7 @@ use core::convert::Infallible;
 use motion_kernel::exec::ExecState;
 use motion_kernel::live::{Director, State};
 use motion_kernel::num::Real;
+use motion_kernel::path::Travel;
 use motion_kernel::program::{Item, Supply, SupplyError};
 use motion_kernel::queue::{Feeder, Intake, LiveFeeder, LiveStreams, PathRules, Streams};
 use motion_kernel::units::Position;
@@ -50,21 +51,23 @@ impl<'script, R: Real> Storage<'script, R> {
         }
     }
 
-    /// The two ends, at `start`.
+    /// The two ends, at `start` and within the travel.
     pub(super) fn split<'a, I: Iterator<Item = Result<Item<AXES>, Infallible>>>(
         &'a mut self,
         rules: PathRules,
-        start: [Position; AXES],
+        (start, travel): ([Position; AXES], Travel<AXES>),
         items: I,
         tick_s: f64,
     ) -> (Background<'a, R, I>, Intake<'a, R, AXES>) {
         match self {
             Self::Plain(streams) => {
-                let (feeder, intake) = streams.split(rules, start);
+                let (mut feeder, intake) = streams.split(rules, start);
+                feeder.bound(travel);
                 (Background::Plain(Box::new((feeder, Supply::new(items, tick_s)))), intake)
             }
             Self::Live(streams, script) => {
-                let (feeder, intake) = streams.split(rules, start);
+                let (mut feeder, intake) = streams.split(rules, start);
+                feeder.bound(travel);
                 let live = Live { feeder, director: Director::new(items, tick_s, 0), script, given: 0 };
                 (Background::Live(Box::new(live)), intake)
             }

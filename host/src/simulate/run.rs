@@ -165,7 +165,8 @@ fn run_in<R: Real>(
         .collect();
     let mut storage = Storage::<R>::new(script.as_ref());
     let items = job.items.iter().map(|&item| Ok(item));
-    let (mut background, mut intake) = storage.split(header.rules, header.start, items, tick_s);
+    let (mut background, mut intake) =
+        storage.split(header.rules, (header.start, job.guards.travel()), items, tick_s);
     if let &Some(StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
         intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?)?;
     }

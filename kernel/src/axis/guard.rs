@@ -29,7 +29,7 @@ use crate::units::{Counts, Position};
 /// From one look at an axis to the next one at another axis \[ticks\].
 pub const LOOK_TICKS: u8 = 8;
 /// Beyond the travel by so little is no fault \[mm\]: positions are rounded.
-const TRAVEL_ROUNDING_MM: f64 = 1.0e-3;
+const TRAVEL_ROUNDING_MM: f64 = 2.0e-3;
 /// Least of figures that are not 0.
 const LEAST: f64 = 1.0e-9;
 /// Commanded to move by so many counts in a tick, an axis that stands still for two has lost its encoder.
@@ -374,7 +374,9 @@ impl<R: Real> Guard<R> {
 
     /// Whether the axis has lost velocity towards its command faster than by load.
     fn runs_away(&self, config: &AxisConfig<R>, since: u8) -> bool {
-        if !self.last.is_taken {
+        let [latest, before, first] = self.counts;
+        // Counts that stand still are another fault's.
+        if !self.last.is_taken || latest == before && before == first {
             return false;
         }
         let guard = &config.guard;

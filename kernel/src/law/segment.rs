@@ -253,6 +253,41 @@ pub struct FeedSegment<R> {
     snap_mm_s4: R,
 }
 
+/// What memory may do to a segment.
+#[cfg(all(test, feature = "guards"))]
+impl FeedSegment<f32> {
+    /// With one bit of one of its figures another one.
+    pub(crate) fn with_flipped_bit(mut self, bit: u32) -> Self {
+        let mut wide = [
+            &mut self.rise_bits,
+            &mut self.fall_bits,
+            &mut self.cube_bits,
+            &mut self.hold_start_bits,
+            &mut self.hold_linear_bits,
+            &mut self.hold_square_bits,
+        ];
+        let mut narrow = [
+            &mut self.hold_v_mm_s,
+            &mut self.hold_a_mm_s2,
+            &mut self.hold_gain_mm_s,
+            &mut self.jerk_mm_s3,
+            &mut self.accel_mm_s2,
+            &mut self.speed_mm_s,
+            &mut self.sine_mm,
+            &mut self.snap_mm_s4,
+        ];
+        let figure = (bit >> 8) as usize % (wide.len() + narrow.len() + 1);
+        if let Some(wide) = wide.get_mut(figure) {
+            **wide ^= 1 << (bit % 64);
+        } else if let Some(narrow) = narrow.get_mut(figure - 6) {
+            **narrow = f32::from_bits(narrow.to_bits() ^ 1 << (bit % 32));
+        } else {
+            self.length = Position::from_bits(self.length.to_bits() ^ 1 << (bit % 64));
+        }
+        self
+    }
+}
+
 /// How far a ramp's own length may be from the path it covers \[mm\]: rounding of both ends to
 /// position steps, and of the ramp's figures in f64 at a kilometre.
 const LENGTH_TOLERANCE_MM: f64 = 1.0e-8;

@@ -305,6 +305,30 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     }
 }
 
+/// What memory may do to a piece.
+#[cfg(all(test, feature = "guards"))]
+impl<const AXES: usize> Piece<f32, AXES> {
+    /// Of a line, with one bit of start, length or direction another one.
+    pub(crate) fn with_flipped_bit(mut self, bit: u32) -> Self {
+        let Geometry::Line { direction } = &mut self.geometry else { return self };
+        let axis = (bit >> 16) as usize % AXES;
+        match bit % 160 {
+            bit @ 0..64 => self.start[axis] = Position::from_bits(self.start[axis].to_bits() ^ 1 << bit),
+            bit @ 64..128 => self.length = Position::from_bits(self.length.to_bits() ^ 1 << (bit - 64)),
+            bit => direction[axis] = f32::from_bits(direction[axis].to_bits() ^ 1 << (bit - 128)),
+        }
+        self
+    }
+
+    /// Of a line, with another part of its direction.
+    pub(crate) fn with_direction(mut self, axis: usize, value: f32) -> Self {
+        if let Geometry::Line { direction } = &mut self.geometry {
+            direction[axis] = value;
+        }
+        self
+    }
+}
+
 /// Of a vector.
 #[inline(never)]
 pub(crate) fn magnitude<const AXES: usize>(vector: &[f64; AXES]) -> f64 {
@@ -325,6 +349,12 @@ pub(crate) struct Steepness {
 impl Steepness {
     /// Of a line.
     pub(crate) const STRAIGHT: Self = Self { per_mm: 0.0, slope: 1.0, bend_per_mm: 0.0, twist_per_mm2: 0.0 };
+
+    /// Of |x''| by arc length \[1/mm\].
+    #[cfg(feature = "guards")]
+    pub(crate) fn bend_per_mm(&self) -> f64 {
+        self.bend_per_mm
+    }
 
     /// Of two pieces.
     pub(crate) fn max(&self, other: &Self) -> Self {

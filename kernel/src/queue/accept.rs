@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::law::{FeedSegment, Limits, Ticks};
 use crate::num::{Real, Scalar, is_within, rolled};
+#[cfg(feature = "guards")]
+use crate::path::Travel;
 use crate::path::{Piece, Steepness, magnitude};
 use crate::units::Position;
 
@@ -77,6 +79,13 @@ pub enum Rejection {
         /// The segments' \[mm\].
         feed_mm: f64,
     },
+    /// A piece leaves the travel of an axis.
+    Travel {
+        /// The axis, from 0.
+        axis: usize,
+        /// Where it is beyond \[mm\].
+        mm: f64,
+    },
     /// A stretch without any length.
     Empty,
     /// Dwells and stops belong between stretches.
@@ -117,6 +126,7 @@ impl core::fmt::Display for Rejection {
             Self::Lengths { path_mm, feed_mm } => {
                 write!(f, "{path_mm} mm of path, {feed_mm} mm of feed: expected equal lengths")
             }
+            Self::Travel { axis, mm } => write!(f, "position {mm} mm of axis {axis}: expected its travel"),
             Self::Empty => write!(f, "a stretch without any length"),
             Self::NoBlock => write!(f, "path without a block, expected one that says what holds its feed"),
             #[cfg(feature = "live")]
@@ -179,6 +189,8 @@ pub(crate) struct Acceptance<R: Real, const AXES: usize> {
     steepness: Steepness,
     curved_until: Position,
     ahead_mm_s: f64,
+    #[cfg(feature = "guards")]
+    travel: Travel<AXES>,
 }
 
 impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
@@ -194,6 +206,22 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
             steepness: Steepness::STRAIGHT,
             curved_until: Position::ZERO,
             ahead_mm_s: 0.0,
+            #[cfg(feature = "guards")]
+            travel: [None; AXES],
+        }
+    }
+
+    #[cfg(feature = "guards")]
+    pub(crate) fn bound(&mut self, travel: Travel<AXES>) {
+        self.travel = travel;
+    }
+
+    /// Between stretches, at `position`.
+    fn restarted(&self, position: [Position; AXES]) -> Self {
+        Self {
+            #[cfg(feature = "guards")]
+            travel: self.travel,
+            ..Self::new(self.rules, position)
         }
     }
 
@@ -211,6 +239,10 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
             if !(angle_rad <= self.rules.joint_angle_rad + rounding) {
                 return Err(Rejection::Corner { angle_rad });
             }
+        }
+        #[cfg(feature = "guards")]
+        if let Some((axis, mm)) = piece.beyond(&self.travel) {
+            return Err(Rejection::Travel { axis, mm });
         }
         let end = piece.end();
         for position in rolled(end.as_slice()) {
@@ -336,7 +368,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         if self.path_length == Position::ZERO {
             return Err(Rejection::Empty);
         }
-        *self = Self::new(self.rules, position);
+        *self = self.restarted(position);
         Ok(())
     }
 
@@ -354,7 +386,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
                 feed_mm: self.feed_length.to_mm(),
             });
         }
-        *self = Self { density: self.density, ..Self::new(self.rules, position) };
+        *self = Self { density: self.density, ..self.restarted(position) };
         Ok(())
     }
 

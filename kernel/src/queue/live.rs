@@ -125,6 +125,12 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         }
     }
 
+    /// Refuses pieces that leave `travel` from now on, all of each, not only its ends.
+    #[cfg(feature = "guards")]
+    pub fn bound(&mut self, travel: crate::path::Travel<AXES>) {
+        self.path_accept.bound(travel);
+    }
+
     /// Enters a piece of path that is driven at `fastest_mm_s` at most.
     ///
     /// # Errors

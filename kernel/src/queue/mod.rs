@@ -23,6 +23,8 @@ use crate::axis::{Correction, CorrectionError};
 use crate::law::{FeedSegment, Ticks};
 use crate::num::Real;
 use crate::path::Piece;
+#[cfg(feature = "guards")]
+use crate::path::Travel;
 use crate::units::Position;
 
 pub(crate) use accept::Acceptance;
@@ -163,7 +165,35 @@ pub struct Feeder<'a, R: Real, const AXES: usize> {
     accept: accept::Acceptance<R, AXES>,
 }
 
+/// Into the queues without any check, as if memory had changed behind it.
+#[cfg(all(test, feature = "guards"))]
 impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
+    pub(crate) fn piece_unchecked(&mut self, piece: Piece<R, AXES>) {
+        assert!(self.path.enqueue(PathItem::Piece(piece)).is_ok());
+        count(&self.shared.path_entered);
+    }
+
+    pub(crate) fn segment_unchecked(&mut self, segment: FeedSegment<R>) {
+        assert!(self.feed.enqueue(FeedItem::Segment(segment)).is_ok());
+        count(&self.shared.feed_entered);
+    }
+
+    pub(crate) fn end_unchecked(&mut self, at: [Position; AXES]) {
+        assert!(self.path.enqueue(PathItem::EndOfStretch(at)).is_ok());
+        assert!(self.feed.enqueue(FeedItem::EndOfStretch).is_ok());
+        count(&self.shared.path_entered);
+        count(&self.shared.feed_entered);
+        count(&self.shared.stretches);
+    }
+}
+
+impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
+    /// Refuses pieces that leave `travel` from now on, all of each, not only its ends.
+    #[cfg(feature = "guards")]
+    pub fn bound(&mut self, travel: Travel<AXES>) {
+        self.accept.bound(travel);
+    }
+
     /// Enters a piece of path.
     ///
     /// # Errors

@@ -16,8 +16,6 @@ use crate::check::random::Random;
 use crate::machine::{Next, Seen, random_plan, run};
 use crate::setting;
 
-/// Of the reference machine's guards, see `AxisSettings::guard_figures`.
-const MOVING_MM_S: f64 = 3.0;
 /// A round of looks at three axes [ticks].
 const ROUND_TICKS: u64 = 24;
 /// response_s in rounds, and two.
@@ -36,7 +34,7 @@ struct Case {
 enum Within {
     /// In the tick itself.
     TheTick,
-    /// So many ticks of a command beyond ±`MOVING_MM_S` that keeps its sign.
+    /// So many ticks of a command beyond ±moving_mm_s that keeps its sign.
     Commanded(u64),
     /// So many ticks of an output at its limit.
     Saturated(u64),
@@ -109,6 +107,7 @@ fn inject<R: Real>(case: &Case, machine: &Machine, seed: u64, longest_ticks: f64
     let mut from: Option<([i16; 3], u64)> = None;
     let mut before = [0; 3];
     let mut sign = 0.0;
+    let moving_mm_s = machine.axes[axis].guard_figures(machine.tick_s).moving_mm_s;
     let ramp_ticks = (machine.faults.ramp_s / machine.tick_s).round() as i64;
     let mut end = |problem: String| {
         error = Some(problem);
@@ -130,7 +129,7 @@ fn inject<R: Real>(case: &Case, machine: &Machine, seed: u64, longest_ticks: f64
                 let limit_mm_s = machine.axes[axis].reachable_mm_s() - 0.1;
                 let counts = match case.within {
                     Within::TheTick => return end("not found in its tick".to_owned()),
-                    Within::Commanded(_) => mm_s.abs() > MOVING_MM_S + 0.1,
+                    Within::Commanded(_) => mm_s.abs() > moving_mm_s + 0.1,
                     Within::Saturated(_) => mm_s.abs() > limit_mm_s,
                 };
                 let goes_on = counts && mm_s * sign > 0.0;

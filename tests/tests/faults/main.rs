@@ -6,7 +6,7 @@
 //! - `injected`: everything that can break, at random ticks of random motion;
 //! - `reactions`: stops, ramps and what is more urgent;
 //! - `calm`: nothing breaks, under noise;
-//! - `corrupted`: set-points and configuration;
+//! - `run`: what a run reports;
 //! - `table`: the table in the documents.
 //!
 //! `MOTION_TEST_SEED` is the first seed; `MOTION_TEST_FAULTS` how often each fault is injected, `MOTION_TEST_TICKS` how many
@@ -20,6 +20,7 @@ mod injected;
 mod machine;
 mod provoked;
 mod reactions;
+mod run;
 mod table;
 
 /// A number from the environment.

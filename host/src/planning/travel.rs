@@ -1,0 +1,78 @@
+//! Whether a program stays within the travel of the axes.
+//!
+//! Consumes the pieces that would be executed; fails with the line of the first one that leaves the travel.
+
+use motion_kernel::path::Piece;
+use motion_kernel::program::Item;
+
+use super::error::{PlanningError, Problem};
+use super::executable::Executable;
+use crate::machine::Machine;
+
+/// # Errors
+/// A piece leaves the travel of an axis, at its ends or between them.
+pub(super) fn check(
+    source_name: &str,
+    executable: &Executable,
+    machine: &Machine,
+) -> Result<(), PlanningError> {
+    let travel = machine.travel();
+    for item in executable.supplied() {
+        let Ok(item) = item;
+        let (line, piece) = match item {
+            Item::Line { line, start, direction, length } => {
+                (line, Piece::<f64, 3>::line(line, start, direction, length))
+            }
+            Item::Septic { line, start, coefficients, length } => {
+                (line, Piece::<f64, 3>::septic(line, start, coefficients, length))
+            }
+            _ => continue,
+        };
+        // What is no piece was refused before.
+        let Ok(piece) = piece else { continue };
+        let Some((axis, found_mm)) = piece.beyond(&travel) else { continue };
+        let axis = &machine.axes[axis];
+        let [low_mm, high_mm] = axis.travel_mm.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let problem = Problem::Travel { axis: axis.name.clone(), found_mm, low_mm, high_mm };
+        return Err(PlanningError { source_name: source_name.to_owned(), place: line.into(), problem });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::gcode;
+    use crate::machine::Machine;
+    use crate::planning::{Mode, plan_program};
+
+    fn planned(text: &str, travel_mm: [Option<[f64; 2]>; 3]) -> Result<(), String> {
+        let mut machine = Machine::reference();
+        for (axis, travel_mm) in machine.axes.iter_mut().zip(travel_mm) {
+            axis.travel_mm = travel_mm;
+        }
+        let program = gcode::read("part.ngc", text.as_bytes()).expect("a program");
+        let plan = plan_program("part.ngc", &program, &machine, Mode::Spanning);
+        plan.map(|_| ()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn what_leaves_the_travel_is_refused_with_its_line_and_axis() {
+        let box_mm = [Some([-5.0, 50.0]), Some([0.0, 30.0]), None];
+        assert_eq!(planned("G21 G90\nG1 X50 Y30 F1000\nX-5 Y0 Z-900\n", box_mm), Ok(()));
+        let refused = planned("G21 G90\nG1 X50 Y30 F1000\nX-5.01\n", box_mm).expect_err("beyond");
+        assert!(refused.starts_with("part.ngc:3: found X at -5.0"), "{refused}");
+        assert!(refused.ends_with("mm, expected its travel, -5 to 50 mm"), "{refused}");
+        let refused = planned("G21 G90\nG1 X1 Y-0.1 F1000\n", box_mm).expect_err("beyond");
+        assert!(refused.starts_with("part.ngc:2: found Y at -0."), "{refused}");
+    }
+
+    /// An arc from within to within over the travel's end: its top is beyond, or just not.
+    #[test]
+    fn an_arc_that_bulges_beyond_is_refused() {
+        let arc = "G21 G90 G61\nG1 Y10 F1000\nG2 X40 Y10 I20\n";
+        let top = |mm: f64| planned(arc, [None, Some([-1.0, mm]), None]);
+        assert_eq!(top(30.002), Ok(()));
+        let refused = top(29.99).expect_err("its top is at 30 mm");
+        assert!(refused.starts_with("part.ngc:3: found Y at 29.99"), "{refused}");
+    }
+}

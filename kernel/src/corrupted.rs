@@ -1,0 +1,255 @@
+//! Tests: pieces and segments whose bits were changed after they were accepted.
+//!
+//! Whatever comes of them, a set-point that jumps is a fault in the tick it jumps in, and outputs are ramped; what is not a
+//! number never reaches a converter.
+
+use core::convert::Infallible;
+
+use crate::axis::{AxesConfig, AxisFigures, Feedforward, Gains, GuardFigures};
+use crate::exec::ExecState;
+use crate::fault::{FaultKind, Reaction, Reactions};
+use crate::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+use crate::kernel::Kernel;
+use crate::law::{FeedSegment, Law, Limits, Ramp};
+use crate::num::Real;
+use crate::path::Piece;
+use crate::queue::{PathRules, Streams};
+use crate::units::{Counts, DacCode, Position};
+
+const TICK_S: f64 = 5e-4;
+const MM_PER_COUNT: f64 = 1e-4;
+const JUMP_MM: f64 = 0.0068;
+const RAMP_TICKS: u16 = 20;
+
+/// What a drive changes the distance of a tick by from one tick to the next [mm].
+const DRIVE_MM: f64 = 0.003;
+
+/// Axes that do what they are told, as far as a drive can.
+#[derive(Default)]
+struct Follower {
+    counts: [Counts; 2],
+    codes: [DacCode; 2],
+    at_mm: [f64; 2],
+    step_mm: [f64; 2],
+}
+
+impl Follower {
+    fn advance(&mut self) {
+        for ((at_mm, step_mm), (DacCode(code), counts)) in
+            self.at_mm.iter_mut().zip(&mut self.step_mm).zip(self.codes.into_iter().zip(&mut self.counts))
+        {
+            let commanded_mm = f64::from(code) / 32768.0 * 1000.0 / 3.0 * TICK_S;
+            *step_mm = commanded_mm.clamp(*step_mm - DRIVE_MM, *step_mm + DRIVE_MM);
+            *at_mm += *step_mm;
+            *counts = Counts((*at_mm / MM_PER_COUNT).round() as i64);
+        }
+    }
+}
+
+impl Encoder<2> for Follower {
+    type Error = Infallible;
+    fn latch(&mut self) -> Result<[Counts; 2], Infallible> {
+        Ok(self.counts)
+    }
+}
+
+impl Inputs<2> for Follower {
+    type Error = Infallible;
+    fn read_inputs(&mut self) -> Result<MachineInputs<2>, Infallible> {
+        Ok(MachineInputs::HEALTHY)
+    }
+}
+
+impl VelocityChannel<2> for Follower {
+    type Error = Infallible;
+    fn write(&mut self, codes: &[DacCode; 2]) -> Result<(), Infallible> {
+        self.codes = *codes;
+        Ok(())
+    }
+}
+
+impl DriveEnable<2> for Follower {
+    type Error = Infallible;
+    fn set_enabled(&mut self, _: bool) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+fn config<R: Real>() -> AxesConfig<R, 2> {
+    let figures = AxisFigures {
+        mm_per_count: MM_PER_COUNT,
+        mm_s_at_10_v: 1000.0 / 3.0,
+        output_offset_v: 0.0,
+        output_limit_v: 10.0,
+        gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
+        feedforward: Feedforward { velocity: 1.0, ..Feedforward::default() },
+        following_error_limit_mm: 1.0,
+    };
+    let guard = GuardFigures {
+        following_error_at_rest_mm: 0.25,
+        following_error_per_velocity_s: 0.1 / 230.0,
+        following_error_per_accel_s2: 4e-5,
+        jump_mm: JUMP_MM,
+        moving_mm_s: 3.0,
+        response_s: 0.013,
+        load_accel_mm_s2: 1230.0,
+        noise_counts: 0,
+        saturation_s: 0.1,
+        travel_mm: None,
+    };
+    let reactions = Reactions { ramp_ticks: RAMP_TICKS, stop_ticks: 4000, emergency_stop: Reaction::Ramp };
+    let config = AxesConfig::new(&[figures; 2], TICK_S).and_then(|axes| axes.guarded(&[guard; 2], TICK_S));
+    AxesConfig { reactions, ..config.expect("axes") }
+}
+
+fn at(mm: f64) -> Position {
+    Position::from_mm(mm).expect("in range")
+}
+
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+}
+
+/// What came of a run: a fault, and the greatest jump of a set-point that was none [mm].
+struct Came {
+    fault: Option<FaultKind<f32>>,
+    missed_mm: f64,
+}
+
+/// 40 mm along a diagonal, with one piece or segment corrupted on its way into the queue.
+fn run(
+    piece: impl Fn(usize, Piece<f32, 2>) -> Piece<f32, 2>,
+    segment: impl Fn(usize, FeedSegment<f32>) -> FeedSegment<f32>,
+) -> Came {
+    let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+    let rules = PathRules { limits, feed_mm_s: 300.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+    let mut streams = Streams::<f32, 2, 8, 8>::new();
+    let (mut feeder, mut intake) = streams.split(rules, [at(0.0); 2]);
+    for index in 0..4 {
+        let start = [at(6.0 * index as f64), at(8.0 * index as f64)];
+        let made = Piece::line(1, start, [0.6, 0.8], at(10.0)).expect("a piece");
+        feeder.piece_unchecked(piece(index, made));
+    }
+    let up = Ramp::new(&Law::new(limits).expect("limits"), 0.0, 60.0);
+    let rise = at(up.length_mm());
+    let cruise = at(40.0) - rise - rise;
+    let made = [(up, rise), (Ramp::cruise(60.0, cruise.to_mm() / 60.0), cruise), (up.reversed(), rise)];
+    for (index, (ramp, length)) in made.into_iter().enumerate() {
+        let made = FeedSegment::ramp(&ramp, length, TICK_S).expect("a segment");
+        feeder.segment_unchecked(segment(index, made));
+    }
+    feeder.end_unchecked([at(24.0), at(32.0)]);
+    let mut kernel = Kernel::<f32, 2>::new(&config(), [at(0.0); 2], [Counts(0); 2]);
+    kernel.enable(10);
+    let mut bench = Follower::default();
+    // The last three set positions that were followed.
+    let mut set_mm = [[0.0; 3]; 2];
+    let mut missed_mm = 0.0_f64;
+    let mut before = [DacCode::ZERO; 2];
+    for _ in 0..4000 {
+        let trace = *kernel.tick(&mut intake, &mut bench);
+        if let Some(fault) = trace.fault {
+            // The ramp's first tick, from what was put out before; then all of it.
+            assert_eq!(fault.tick, trace.tick);
+            if !is_corruption(&fault.kind) {
+                // A feed that does not fit its position does not jump: the axis does not follow.
+                for (output, past) in trace.axes.iter().zip(&set_mm) {
+                    let jump_mm = output.set.to_mm() - 2.0 * past[2] + past[1];
+                    assert!(jump_mm.abs() <= JUMP_MM, "{fault:?}: {jump_mm} mm");
+                }
+                return Came { fault: Some(fault.kind), missed_mm };
+            }
+            let mut left = i32::from(RAMP_TICKS) - 1;
+            let mut codes = bench.codes;
+            loop {
+                for (DacCode(code), DacCode(from)) in codes.into_iter().zip(before) {
+                    assert_eq!(i32::from(code), i32::from(from) * left / i32::from(RAMP_TICKS), "{fault:?}");
+                }
+                if left == 0 {
+                    assert!(kernel.is_off());
+                    return Came { fault: Some(fault.kind), missed_mm };
+                }
+                left -= 1;
+                kernel.tick(&mut intake, &mut bench);
+                codes = bench.codes;
+            }
+        }
+        for (output, past) in trace.axes.iter().zip(&mut set_mm) {
+            *past = [past[1], past[2], output.set.to_mm()];
+            let jump_mm = (past[2] - 2.0 * past[1] + past[0]).abs();
+            missed_mm = missed_mm.max(jump_mm);
+        }
+        before = bench.codes;
+        bench.advance();
+        if trace.executed.stretches == 1 && trace.executed.state == ExecState::Idle {
+            break;
+        }
+    }
+    Came { fault: None, missed_mm }
+}
+
+#[test]
+fn what_is_not_corrupted_is_no_fault() {
+    let came = run(|_, piece| piece, |_, segment| segment);
+    assert!(came.fault.is_none() && came.missed_mm < 2e-4, "{}", came.missed_mm);
+}
+
+fn is_corruption(kind: &FaultKind<f32>) -> bool {
+    matches!(kind, FaultKind::SetpointJump { .. } | FaultKind::NotFinite { .. } | FaultKind::Executor(_))
+}
+
+/// One bit of a piece or segment is another one. What jumps is found in its tick, and as nothing else.
+#[test]
+fn a_corrupted_piece_or_segment_is_found_where_the_set_point_jumps() {
+    let (mut found, mut not_followed, mut harmless) = (0, 0, 0);
+    for seed in 0..3000_u64 {
+        let mut random = Random(seed);
+        let (which, bit) = (random.next() as usize, random.next() as u32);
+        let came = if seed % 2 == 0 {
+            let corrupt = |index, piece: Piece<f32, 2>| {
+                if index == which % 4 { piece.with_flipped_bit(bit) } else { piece }
+            };
+            run(corrupt, |_, segment| segment)
+        } else {
+            let corrupt = |index, segment: FeedSegment<f32>| {
+                if index == which % 3 { segment.with_flipped_bit(bit) } else { segment }
+            };
+            run(|_, piece| piece, corrupt)
+        };
+        match came.fault {
+            Some(kind) if is_corruption(&kind) => found += 1,
+            Some(_) => not_followed += 1,
+            None => harmless += 1,
+        }
+        // What the axis does in the same tick may take from the jump.
+        assert!(
+            came.missed_mm <= 2.0 * JUMP_MM,
+            "seed {seed}: missed {} mm, {:?}",
+            came.missed_mm,
+            came.fault
+        );
+    }
+    println!("{found} found, {not_followed} not followed, {harmless} of no consequence");
+    assert!(found > 500 && not_followed < found / 10, "{found} {not_followed}");
+}
+
+/// What is not a number in a piece's direction, at any of its axes.
+#[test]
+fn what_is_not_a_number_is_a_fault_of_its_own() {
+    for value in [f32::NAN, f32::INFINITY] {
+        for axis in 0..2 {
+            let corrupt = |index, piece: Piece<f32, 2>| {
+                if index == 2 { piece.with_direction(axis, value) } else { piece }
+            };
+            let came = run(corrupt, |_, segment| segment);
+            assert_eq!(came.fault, Some(FaultKind::NotFinite { axis }), "{value}");
+        }
+    }
+}
