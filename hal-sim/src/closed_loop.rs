@@ -199,8 +199,7 @@ impl<'a, R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'a, R, AXES, 
     /// # Errors
     /// A knot is above 4 mm/s.
     pub fn correct(&mut self, knots_mm_s: &'a [[R; AXES]]) -> Result<(), CorrectionError> {
-        self.intake.correct(Correction::new(1, knots_mm_s, 40, 4.0)?);
-        Ok(())
+        self.intake.correct(Correction::new(1, knots_mm_s, 40, 4.0)?)
     }
 
     /// One tick of the kernel and of the machine. A program stop is resumed at once.

@@ -13,6 +13,7 @@ use super::trace::TraceWriter;
 use super::write_json;
 use crate::machine::Machine;
 use crate::simulate::home::{HomedAxis, home};
+use crate::simulate::job::Sheet;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -60,8 +61,10 @@ pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
     let name = trace.as_ref().map_or_else(String::new, |output| output.name.clone());
     let unwritten = |source| CliError::Write { path: name.clone(), source };
-    let mut trace =
-        trace.map(|output| TraceWriter::new(output.file, &machine)).transpose().map_err(unwritten)?;
+    let mut trace = trace
+        .map(|output| TraceWriter::new(output.file, &Sheet::of_machine(&machine)))
+        .transpose()
+        .map_err(unwritten)?;
     let mut homed = Vec::new();
     let ended = home(&machine, &mut homed, &mut |tick| {
         if let Some(trace) = &mut trace {

@@ -21,6 +21,7 @@ use motion_kernel::units::{Counts, DacCode, Position};
 
 use super::Observer;
 use super::contour::Contour;
+use super::job::Sheet;
 use super::rig::{Rig, Simulated};
 use super::run::{RunError, fault_record, tick_record};
 use crate::machine::{AxisSettings, HomingSettings, Machine};
@@ -273,7 +274,11 @@ impl<'a, R: Real> Session<'a, R> {
             self.ticks += 1;
             observe(&tick_record(&trace, 0.0, &mut self.contour));
             if let Some(fault) = trace.fault {
-                return Err(HomeError::Fault(fault_record(&fault, self.machine)));
+                return Err(HomeError::Fault(fault_record(
+                    &fault,
+                    &self.machine.header(),
+                    &Sheet::of_machine(self.machine),
+                )));
             }
             match look(&trace, &mut self.rig, director.state(&feeder))? {
                 Then::GoOn => {}

@@ -5,9 +5,10 @@ use heapless::Vec;
 use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
 use super::road::Junction;
+use super::source::Source;
 use crate::law::{Phase, Ticks};
 use crate::num::Real;
-use crate::program::{self, SupplyError};
+use crate::program::SupplyError;
 use crate::queue::{Change, LiveFeeder, Progress};
 use crate::units::Position;
 
@@ -16,7 +17,7 @@ pub(super) type Places = Vec<Place, { LIST_ITEMS + 1 }>;
 
 /// Where a command may take over.
 pub(super) struct Place {
-    change: Change,
+    pub(super) change: Change,
     /// Where the list begins that takes over.
     pub(super) start: Junction,
     /// The item under way with another end, if it is inside one.
@@ -48,7 +49,7 @@ impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PL
 where
     R: Real,
     E: Clone,
-    I: Iterator<Item = Result<program::Item<AXES>, E>>,
+    I: Source<AXES, Error = E>,
 {
     /// In the order of time: here or within the item under way, and behind each item that is to be driven.
     pub(super) fn places(&self, progress: &Progress) -> Places {
@@ -113,6 +114,9 @@ where
                 continue;
             };
             list.push(Item::Feed { ramp, length });
+            if !self.keeps_up(&list, &place.change) {
+                continue;
+            }
             return self.rest_at_end_of(list, place, feeder);
         }
         let list = &mut self.current.list;
@@ -186,6 +190,7 @@ where
             if self.gather_under_override(&mut list, false)
                 && self.end_in_a_stop(&mut list, self.feed_override)
                 && list.leave >= heads
+                && self.keeps_up(&list, &place.change)
             {
                 let ahead = list.after(list.leave);
                 self.hand_over(list, place.change, self.feed_override, feeder)?;

@@ -23,6 +23,7 @@
 //! - `replan`: a plan from a junction on;
 //! - `list`: a feed list as the background sees it;
 //! - `gather`: what goes into the next list;
+//! - [`Source`]: where items come from, perhaps later;
 //! - `command`: what takes over from the motion under way, and where;
 //! - [`director`]: what follows what.
 
@@ -30,10 +31,14 @@ mod block_ends;
 mod command;
 pub mod director;
 mod gather;
+#[cfg(test)]
+mod interrupted;
 mod list;
 mod replan;
 mod road;
+mod source;
 mod single;
 
 pub use director::{Director, OVERRIDE_MAX, OVERRIDE_MIN, State};
 pub use list::LIST_ITEMS;
+pub use source::Source;

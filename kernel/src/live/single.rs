@@ -8,9 +8,10 @@ use super::command::Places;
 use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
 use super::road::{Junction, SLIVER};
+use super::source::Source;
 use crate::law::Ramp;
 use crate::num::Real;
-use crate::program::{self, SupplyError};
+use crate::program::SupplyError;
 use crate::queue::{LiveFeeder, Progress};
 use crate::units::Position;
 
@@ -24,7 +25,7 @@ impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PL
 where
     R: Real,
     E: Clone,
-    I: Iterator<Item = Result<program::Item<AXES>, E>>,
+    I: Source<AXES, Error = E>,
 {
     /// Single block: comes to rest exactly at the end of the program block under way (what has the same program line; a
     /// dwell or a stop is one too), or of the next one that it can still stop at, and is held there until
@@ -196,7 +197,10 @@ where
         for place in places {
             let mut list = place.list(self.tick_s);
             let junction = list.end();
-            if junction.feed_mm_s < place.start.feed_mm_s || !self.brake_at_block_end(&mut list) {
+            if junction.feed_mm_s < place.start.feed_mm_s
+                || !self.brake_at_block_end(&mut list)
+                || !self.keeps_up(&list, &place.change)
+            {
                 continue;
             }
             list.ends_block = true;

@@ -31,6 +31,8 @@ pub struct Change {
 impl Change {
     /// More than a list has items.
     const AFTER_BITS: u32 = 8;
+    /// The greatest [`Change::after`].
+    pub const AFTER_MAX: u32 = (1 << Self::AFTER_BITS) - 1;
     /// No change is asked for.
     const NONE: u32 = u32::MAX;
 
@@ -40,18 +42,13 @@ impl Change {
             | u32::from(self.to) << 28
             | u32::from(self.within) << 27
             | (number & 0x7_FFFF) << Self::AFTER_BITS
-            | self.after & ((1 << Self::AFTER_BITS) - 1)
+            | self.after & Self::AFTER_MAX
     }
 
     fn from_word(word: u32) -> Option<Self> {
         let (from, to) = ((word >> 30) as u8, (word >> 28 & 3) as u8);
         let within = word >> 27 & 1 == 1;
-        (from < LISTS && to < LISTS).then_some(Self {
-            from,
-            to,
-            after: word & ((1 << Self::AFTER_BITS) - 1),
-            within,
-        })
+        (from < LISTS && to < LISTS).then_some(Self { from, to, after: word & Self::AFTER_MAX, within })
     }
 }
 

@@ -8,7 +8,8 @@ use heapless::spsc::{Consumer, Producer, Queue};
 
 use super::change::{Change, LISTS, Progress, Words};
 use super::{
-    FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept, count, enter,
+    Density, FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept,
+    count, enter,
 };
 use crate::law::{FeedSegment, Phase, Ticks};
 use crate::live::LIST_ITEMS;
@@ -63,7 +64,10 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             shared,
             path_accept: acceptance,
             feed_accept: acceptance,
+            filled: None,
             changes: 0,
+            #[cfg(test)]
+            between: None,
         };
         let intake = Intake {
             path: path_out,
@@ -103,17 +107,31 @@ pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
     path_accept: accept::Acceptance<R, AXES>,
     /// Of the list being filled.
     feed_accept: accept::Acceptance<R, AXES>,
+    filled: Option<u8>,
     /// Changes asked for so far.
     changes: u32,
+    /// What happens between any two operations of a turn: ticks.
+    #[cfg(test)]
+    pub(crate) between: Option<&'a dyn Fn()>,
 }
 
 impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
+    /// Ticks may come before any operation, in tests.
+    #[inline]
+    fn interruptible(&self) {
+        #[cfg(test)]
+        if let Some(between) = self.between {
+            between();
+        }
+    }
+
     /// Enters a piece of path that is driven at `fastest_mm_s` at most.
     ///
     /// # Errors
     /// The queue is full, the piece does not continue its predecessor, or at that feed it asks an axis for more than the
     /// number type holds.
     pub fn piece(&mut self, piece: Piece<R, AXES>, fastest_mm_s: f64) -> Result<(), Refused<Piece<R, AXES>>> {
+        self.interruptible();
         let mut next = self.path_accept;
         next.piece(&piece).map_err(Refused::Invalid)?;
         next.fits_at(&piece, fastest_mm_s).map_err(Refused::Invalid)?;
@@ -128,6 +146,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// # Errors
     /// The queue is full, or the path does not end there.
     pub fn end_of_path(&mut self, position: [Position; AXES]) -> Result<(), Refused<[Position; AXES]>> {
+        self.interruptible();
         let mut next = self.path_accept;
         next.end_of_path(position).map_err(Refused::Invalid)?;
         enter(&mut self.path, PathItem::EndOfStretch(position)).map_err(|_| Refused::Full(position))?;
@@ -145,6 +164,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Where the executor is.
     #[must_use]
     pub fn progress(&self) -> Progress {
+        self.interruptible();
         self.shared.words.progress()
     }
 
@@ -155,17 +175,19 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     }
 
     fn free_list(&self) -> Option<u8> {
+        self.interruptible();
         let is_free =
             |(list, queue): &(u8, &Producer<'_, _>)| !self.shared.words.is_claimed(*list) && queue.is_empty();
         (0..LISTS).zip(&self.lists).find(is_free).map(|(list, _)| list)
     }
 
     /// A list that is empty and not under way nor asked for, claimed for what goes on from path position `start` at
-    /// `feed_mm_s`; `None` if there is none now.
-    pub fn begin(&mut self, start: Position, feed_mm_s: R) -> Option<u8> {
+    /// `feed_mm_s`, behind what `density` says; `None` if there is none now.
+    pub fn begin(&mut self, start: Position, feed_mm_s: R, density: Density) -> Option<u8> {
         let free = self.free_list()?;
         self.shared.words.claim(free, true);
-        self.feed_accept = self.path_accept.feed_from(start, feed_mm_s);
+        self.feed_accept = self.path_accept.feed_from(start, feed_mm_s, density);
+        self.filled = Some(free);
         Some(free)
     }
 
@@ -191,17 +213,20 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
             return Err(Refused::Invalid(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() }));
         }
         self.append(list, FeedItem::EndOfStretch).map_err(|_| Refused::Full(()))?;
-        self.feed_accept = self.feed_accept.feed_from(Position::ZERO, R::ZERO);
+        self.feed_accept = self.feed_accept.feed_after_stretch();
         Ok(())
     }
 
     /// Appends a rest, between stretches.
     ///
     /// # Errors
-    /// The list is full, or a stretch is under way.
+    /// The list is full, a stretch is under way, or too much would fall into one tick.
     pub fn dwell(&mut self, list: u8, duration: Ticks) -> Result<(), Refused<Ticks>> {
-        self.feed_accept.feed_at_rest().map_err(Refused::Invalid)?;
-        self.append(list, FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))
+        let mut next = self.feed_accept;
+        next.feed_dwell(duration).map_err(Refused::Invalid)?;
+        self.append(list, FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))?;
+        self.feed_accept = next;
+        Ok(())
     }
 
     /// Appends a rest until told to resume, between stretches.
@@ -214,6 +239,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     }
 
     fn append(&mut self, list: u8, item: FeedItem<R>) -> Result<(), FeedItem<R>> {
+        self.interruptible();
         match self.lists.get_mut(usize::from(list)) {
             Some(queue) => enter(queue, item),
             None => Err(item),
@@ -226,25 +252,42 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         self.lists.get(usize::from(list)).map_or(0, |queue| queue.capacity().saturating_sub(queue.len()))
     }
 
-    /// Asks for a change to a list that is complete, in place of one that was asked for before.
-    pub fn change(&mut self, change: Change) {
+    /// Asks for a change to the list that was begun last, in place of one that was asked for before. That it begins where
+    /// it takes over, and that its path is queued, is what who filled it answers for.
+    ///
+    /// # Errors
+    /// The list is another one, or does not end at rest. Nothing is asked for then.
+    pub fn change(&mut self, change: Change) -> Result<(), Rejection> {
+        self.interruptible();
+        let Change { from, to, after, .. } = change;
+        if self.filled != Some(to) || from == to || from >= LISTS || after > Change::AFTER_MAX {
+            return Err(Rejection::NoChange { from, to, after });
+        }
+        let feed_mm_s = self.feed_accept.feed_mm_s();
+        if feed_mm_s > R::ZERO {
+            return Err(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() });
+        }
         self.changes = self.changes.wrapping_add(1);
         self.shared.words.ask(Some(change), self.changes);
+        Ok(())
     }
 
     /// Takes back what was asked for. The tick may have followed it already.
     pub fn no_change(&mut self) {
+        self.interruptible();
         self.shared.words.ask(None, 0);
     }
 
     /// Whether the change asked for came too late.
     #[must_use]
     pub fn is_refused(&self) -> bool {
+        self.interruptible();
         self.shared.words.is_refused()
     }
 
     /// Gives up a list: the tick empties it.
     pub fn give_up(&mut self, list: u8) {
+        self.interruptible();
         self.shared.words.claim(list, false);
     }
 }
