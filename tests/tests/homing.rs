@@ -120,6 +120,8 @@ fn homed<R: Real>(
 ) -> Result<HomedAxis, HomingError> {
     let mut machine = Machine::reference();
     machine.axes[AXIS].homing = Some(settings);
+    // Position set-points that are delayed get the new position, too.
+    machine.axes[1].feedforward.lead_s = 12.0 * machine.tick_s;
     let simulated = Simulated::new(&machine.simulated()).expect("a machine");
     let mut session = Session::<R>::new(&machine, &simulated).expect("a session");
     let mut watch = Watch::new(&machine);
