@@ -77,6 +77,7 @@ mod dead_time;
 mod drive;
 mod drive_parameters;
 mod encoder;
+mod home;
 mod machine;
 mod noise;
 mod parameter;
@@ -87,6 +88,7 @@ pub use dac_frame::OutputRange;
 pub use drive::{DriveModel, DriveState, SUBSTEPS_MAX};
 pub use drive_parameters::{BedMode, DriveParameters, REFERENCE_X, REFERENCE_Y, REFERENCE_Z};
 pub use encoder::{EncoderNoise, EncoderParameters, REFERENCE_ENCODER, SimEncoder, TimerBits};
+pub use home::{HomeParameters, IndexParameters, SimHome, SwitchParameters};
 pub use machine::{
     AxisTruth, MachineError, MachineParameters, REFERENCE_LINE, REFERENCE_SUBSTEPS, REFERENCE_TICK_S,
     SimMachine,

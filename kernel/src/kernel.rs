@@ -11,6 +11,9 @@
 //! the voltage of standing still (0 V plus trim), the drives are disabled, and both stay so until
 //! [`Kernel::clear_fault`]. A fault that is found in writing the outputs shows in them from the next tick on.
 
+#[cfg(feature = "live")]
+mod reference;
+
 use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Preview};
 use crate::exec::{ExecState, Executor};
 use crate::fault::{Fault, FaultKind};

@@ -6,11 +6,14 @@ use std::process::ExitCode;
 use thiserror::Error;
 
 use crate::drive::DriveError;
+use crate::flight::FlightError;
 use crate::gcode::GcodeError;
 use crate::machine::{AxisError, MachineError};
 use crate::planning::PlanningError;
 use crate::points::PointsError;
+use crate::recording::RecordingError;
 use crate::simulate::RunError;
+use crate::simulate::home::HomeError;
 use crate::toolpath::spline::SplineError;
 use crate::tuning::TuningError;
 
@@ -92,6 +95,30 @@ pub enum CliError {
         /// Why.
         source: RunError,
     },
+    /// The file is no recording.
+    #[error("{path}: {source}")]
+    Recording {
+        /// As the user gave it.
+        path: String,
+        /// Why.
+        source: RecordingError,
+    },
+    /// The log has no good frames of a flight recorder.
+    #[error("{path}{source}")]
+    Flight {
+        /// As the user gave it.
+        path: String,
+        /// Why.
+        source: FlightError,
+    },
+    /// The machine is not homed.
+    #[error("{machine}: {source}")]
+    Home {
+        /// Its file.
+        machine: String,
+        /// Why.
+        source: HomeError,
+    },
     /// The drive experiment can't be made, or a fault ended it.
     #[error(transparent)]
     Drive(#[from] DriveError),
@@ -115,14 +142,16 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// 2, but for output that failed, for a plan that the kernel refuses for an experiment that ended in a fault or
-    /// found nothing to measure, and for one that found too little to tune by: these are not the user's input.
+    /// 2, but for output that failed, for a plan that the kernel refuses, for an experiment that ended in a fault or
+    /// found nothing to measure, for one that found too little to tune by, and for an axis that found no reference: these
+    /// are not the user's input.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Output(_) | Self::Tuning(_) | Self::Run { source: RunError::Rejected(_), .. } => {
                 ExitCode::FAILURE
             }
+            Self::Home { source: HomeError::Axis { .. } | HomeError::Fault(_), .. } => ExitCode::FAILURE,
             Self::Drive(
                 DriveError::Fault { .. }
                 | DriveError::NotSteady { .. }

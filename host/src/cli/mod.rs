@@ -8,26 +8,33 @@
 //! - [`plan`]: the feed plan of a program or a block list;
 //! - [`compare`]: the times of programs, exact and blended, beside the least there is;
 //! - [`run`]: a program through plan, kernel and simulated machine;
+//! - [`replay`]: a recorded run once more;
+//! - [`flight`]: the ticks around a fault, from a board's log;
 //! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
+//! - [`home`]: the simulated axes find their references;
 //! - [`machine`]: the reference machine's file, and what its keys mean;
 //! - [`demo`]: what `motion` alone does;
 //! - [`error`]: errors and exit statuses;
-//! - `input`, `table`, `trace`, `progress`: what the commands share.
+//! - `input`, `outputs`, `table`, `trace`, `progress`: what the commands share.
 
 pub mod compare;
 pub mod compile;
 pub mod demo;
 pub mod drive;
 pub mod error;
+pub mod flight;
+pub mod home;
 pub mod machine;
 pub mod plan;
 pub mod profile;
+pub mod replay;
 pub mod run;
 pub mod spline;
 
 mod input;
+mod outputs;
 mod progress;
 mod table;
 mod trace;
@@ -43,12 +50,14 @@ const EXAMPLES: &str = "\
 Examples:
   motion                                         the built-in demonstration; writes stringer.html
   motion run part.ngc --report part.html         run a program, look at what the axes did
+  motion replay part.mrec                        a recorded run once more, to the same bits
   motion plan part.ngc                           what limits the feed, block by block
   motion compare parts/                          how long programs take, exact and blended
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
   motion spline points.csv --tolerance 0.01      a quintic spline close to points, and its run
   motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
+  motion home --machine mine.toml                the axes find their references
   motion machine > mine.toml                     a machine file to start from
   motion machine --explain                       what every key of it means
 
@@ -67,12 +76,15 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(run::RunArguments),
+    Replay(replay::ReplayArguments),
+    Flight(flight::FlightArguments),
     Plan(plan::PlanArguments),
     Compare(compare::CompareArguments),
     Profile(profile::ProfileArguments),
     Spline(spline::SplineArguments),
     Drive(drive::DriveArguments),
     Compile(compile::CompileArguments),
+    Home(home::HomeArguments),
     Machine(machine::MachineArguments),
 }
 
@@ -99,12 +111,15 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
     match &cli.command {
         None => demo::demonstrate(out),
         Some(Command::Run(arguments)) => run::run(arguments, out),
+        Some(Command::Replay(arguments)) => replay::replay(arguments, out),
+        Some(Command::Flight(arguments)) => flight::flight(arguments, out),
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
         Some(Command::Compare(arguments)) => compare::compare(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),
         Some(Command::Spline(arguments)) => spline::run(arguments, out),
         Some(Command::Drive(arguments)) => drive::drive(arguments, out),
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),
+        Some(Command::Home(arguments)) => home::run(arguments, out),
         Some(Command::Machine(arguments)) => machine::print(arguments, out),
     }
 }

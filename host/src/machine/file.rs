@@ -2,11 +2,16 @@
 
 use std::ops::Range;
 
-use hal_sim::{BedMode, DriveParameters, EncoderNoise, TimerBits};
+use hal_sim::{
+    BedMode, DriveParameters, EncoderNoise, HomeParameters, IndexParameters, SwitchParameters, TimerBits,
+};
 use motion_kernel::axis::{
     AxesConfig, BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, Gains, LEAD_ROUNDING_TICKS,
     PREVIEW_TICKS_MAX, TABLE_POINTS, Table, Tables,
 };
+use motion_kernel::homing::HomingConfig;
+use motion_kernel::jog::Direction;
+use motion_kernel::units::{Counts, Position};
 use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
 use toml::Spanned;
@@ -14,11 +19,11 @@ use toml::Spanned;
 use super::error::{MachineError, quote};
 use super::range::{
     AXIS_NAME, BlendTolerance, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction,
-    Gain, Inertia, IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio,
-    NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, Positive,
-    Resolution, Reversal, TIMER_BITS, TablePoint, Tick, Velocity, Within,
+    Gain, Inertia, IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Length, LengthOrNone, Limit,
+    MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset,
+    Place, Positive, Resolution, Reversal, TIMER_BITS, TablePoint, Tick, Velocity, Within,
 };
-use super::settings::{AxisSettings, BLEND_TOLERANCE_MM, Machine, PathSettings};
+use super::settings::{AxisSettings, BLEND_TOLERANCE_MM, HomingSettings, Machine, PathSettings};
 
 /// Seconds per minute: feeds in mm/min exist in this file only.
 const S_PER_MIN: f64 = 60.0;
@@ -67,6 +72,26 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
             let expected = format!("at most {most_s}, {PREVIEW_TICKS_MAX} ticks of tick_s = {tick_s}");
             return Err(refuse(at.clone(), expected));
         }
+        if let (Some(places), Some(HomingSettings { config, .. })) = (&places.homing, axis.homing) {
+            let feed_mm_s = axis.feed_mm_s.min(file.path.feed_mm_s.0);
+            for (at, homing_mm_s) in
+                [(&places.search_mm_s, config.fast_mm_s), (&places.approach_mm_s, config.slow_mm_s)]
+            {
+                if homing_mm_s > feed_mm_s {
+                    return Err(refuse(
+                        at.clone(),
+                        format!("a magnitude of at most feed_mm_s = {feed_mm_s}"),
+                    ));
+                }
+            }
+            if let Some((every_mm, at)) = &places.index_every_mm
+                && *every_mm > 0.0
+                && *every_mm < axis.mm_per_count
+            {
+                let expected = format!("0, or at least mm_per_count = {}", axis.mm_per_count);
+                return Err(refuse(at.clone(), expected));
+            }
+        }
         if let (Some(at), Some(drive)) = (&places.inverse_integral_time_s, drive)
             && drive.integral_time_s < tick_s
         {
@@ -103,6 +128,13 @@ struct Places {
     lead_s: Option<Range<usize>>,
     inverse_integral_time_s: Option<Range<usize>>,
     inverse_bed_hz: Option<Range<usize>>,
+    homing: Option<HomingPlaces>,
+}
+
+struct HomingPlaces {
+    search_mm_s: Range<usize>,
+    approach_mm_s: Range<usize>,
+    index_every_mm: Option<(f64, Range<usize>)>,
 }
 
 #[derive(Deserialize)]
@@ -140,6 +172,7 @@ struct AxisTable {
     encoder: EncoderTable,
     output: OutputTable,
     regulator: RegulatorTable,
+    homing: Option<HomingTable>,
     drive: DriveTable,
 }
 
@@ -233,6 +266,68 @@ impl InverseTable {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct HomingTable {
+    search_mm_s: Spanned<Within<Velocity>>,
+    approach_mm_s: Spanned<Within<Limit>>,
+    travel_mm: Within<Length>,
+    back_off_mm: Within<Length>,
+    index_mm: Option<Within<LengthOrNone>>,
+    position_mm: Within<Place>,
+    park_mm: Within<Place>,
+    simulated: Option<SimulatedHomeTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SimulatedHomeTable {
+    closes_mm: Within<Place>,
+    length_mm: Within<Length>,
+    hysteresis_mm: Within<LengthOrNone>,
+    index_every_mm: Option<Spanned<Within<LengthOrNone>>>,
+    index_at_mm: Option<Within<Place>>,
+}
+
+impl HomingTable {
+    fn settings(&self, mm_per_count: f64) -> HomingSettings {
+        let search_mm_s = self.search_mm_s.get_ref().0;
+        let direction = if search_mm_s > 0.0 { Direction::Positive } else { Direction::Negative };
+        // Ranges of lengths and places are those of positions.
+        let position = |place: &Within<Place>| Position::from_mm(place.0).unwrap_or_default();
+        let config = HomingConfig {
+            direction,
+            fast_mm_s: search_mm_s.abs(),
+            slow_mm_s: self.approach_mm_s.get_ref().0,
+            travel_mm: self.travel_mm.0,
+            back_off_mm: self.back_off_mm.0,
+            index_mm: self.index_mm.as_ref().map(|index_mm| index_mm.0).filter(|&index_mm| index_mm > 0.0),
+            position: position(&self.position_mm),
+            park: Some(position(&self.park_mm)),
+        };
+        let simulated = self.simulated.as_ref();
+        let simulated = simulated.map(|simulated| simulated.parameters(direction, mm_per_count));
+        HomingSettings { config, simulated: simulated.unwrap_or_default() }
+    }
+}
+
+impl SimulatedHomeTable {
+    fn parameters(&self, direction: Direction, mm_per_count: f64) -> HomeParameters {
+        let (closes_mm, length_mm) = (self.closes_mm.0, self.length_mm.0);
+        let closes_mm = match direction {
+            Direction::Positive => (closes_mm, closes_mm + length_mm),
+            Direction::Negative => (closes_mm - length_mm, closes_mm),
+        };
+        let counts = |mm: f64| (mm / mm_per_count).round() as i64;
+        let every = counts(self.index_every_mm.as_ref().map_or(0.0, |every_mm| every_mm.get_ref().0));
+        let at = counts(self.index_at_mm.as_ref().map_or(0.0, |at_mm| at_mm.0));
+        HomeParameters {
+            switch: Some(SwitchParameters { closes_mm, hysteresis_mm: self.hysteresis_mm.0 }),
+            index: (every > 0).then_some(IndexParameters { counts: every, at: Counts(at) }),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct DriveTable {
     velocity_gain_per_s: Within<Positive>,
     integral_time_s: Within<Positive>,
@@ -276,7 +371,16 @@ impl AxisTable {
     fn places(&self) -> Places {
         let inverse = self.regulator.inverse.as_ref();
         let bed = inverse.and_then(|inverse| inverse.bed.as_ref());
+        let homing = self.homing.as_ref().map(|homing| HomingPlaces {
+            search_mm_s: homing.search_mm_s.span(),
+            approach_mm_s: homing.approach_mm_s.span(),
+            index_every_mm: homing.simulated.as_ref().and_then(|simulated| {
+                let every_mm = simulated.index_every_mm.as_ref()?;
+                Some((every_mm.get_ref().0, every_mm.span()))
+            }),
+        });
         Places {
+            homing,
             lead_s: self.regulator.feedforward_lead_s.as_ref().map(Spanned::span),
             inverse_integral_time_s: inverse.map(|inverse| inverse.integral_time_s.span()),
             inverse_bed_hz: bed.map(|bed| bed.frequency_hz.span()),
@@ -292,6 +396,7 @@ impl AxisTable {
             0 => None,
             amplitude_counts => Some(EncoderNoise { amplitude_counts, seed: self.encoder.noise_seed.0 }),
         };
+        let mm_per_count = self.encoder.mm_per_count.into_inner().0;
         AxisSettings {
             name: self.name.into_inner().0,
             feed_mm_s: self.feed_mm_s.into_inner().0,
@@ -299,7 +404,7 @@ impl AxisTable {
             jerk_mm_s3: self.jerk_mm_s3.0,
             snap_mm_s4: self.snap_mm_s4.0,
             following_error_limit_mm: self.following_error_limit_mm.0,
-            mm_per_count: self.encoder.mm_per_count.into_inner().0,
+            mm_per_count,
             timer: self.encoder.timer_bits.0,
             noise,
             mm_s_at_10_v: self.output.mm_min_at_10_v.0 / S_PER_MIN,
@@ -322,6 +427,7 @@ impl AxisTable {
                 },
                 drive: self.regulator.inverse.as_ref().map(InverseTable::drive),
             },
+            homing: self.homing.as_ref().map(|homing| homing.settings(mm_per_count)),
             drive: self.drive.parameters(),
         }
     }

@@ -7,9 +7,9 @@ use motion_kernel::axis::TABLE_POINTS;
 
 use super::range::{
     AXIS_NAME, BlendTolerance, CurveShare, Damping, DeadTime, FeedforwardGain, FollowingError, Friction,
-    Gain, Inertia, IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Limit, MassRatio, NOISE_COUNTS,
-    NOISE_SEED, OutputLimit, OutputOffset, Positive, Range, Resolution, Reversal, TIMER_BITS, TablePoint,
-    Tick, Velocity,
+    Gain, Inertia, IntegralTime, InverseGain, JointAngle, Lag, LeadTime, Length, LengthOrNone, Limit,
+    MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit, OutputOffset, Place, Positive, Range, Resolution,
+    Reversal, TIMER_BITS, TablePoint, Tick, Velocity,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -276,6 +276,58 @@ pub const KEY_TABLES: &[KeyTable] = &[
             ),
             Key::new("damping_ratio", "1", Damping::EXPECTED, "Fraction of critical damping."),
             Key::new("mass_ratio", "1", MassRatio::EXPECTED, "Moving mass over the bed's modal mass."),
+        ],
+    ),
+    optional(
+        "axis.homing",
+        "How the axis finds its reference, `motion home`: a home switch, and an index pulse where there is one.",
+        &[
+            Key::new(
+                "search_mm_s",
+                "mm/s",
+                Velocity::EXPECTED,
+                "Velocity of the search, its sign towards the switch; backing off at the same feed. At most the axis' \
+                 feed and the path's.",
+            ),
+            Key::new(
+                "approach_mm_s",
+                "mm/s",
+                Limit::EXPECTED,
+                "Feed at which the switch is approached for the reference. At most the axis' feed and the path's.",
+            ),
+            Key::new("travel_mm", "mm", Length::EXPECTED, "Greatest length of the search."),
+            Key::new(
+                "back_off_mm",
+                "mm",
+                Length::EXPECTED,
+                "Greatest length of backing off until the switch opens, and of the approach after it.",
+            ),
+            Key::new(
+                "index_mm",
+                "mm",
+                LengthOrNone::EXPECTED,
+                "Greatest length from where the switch closes to the index; 0: the switch is the reference.",
+            )
+            .or("0"),
+            Key::new("position_mm", "mm", Place::EXPECTED, "Position of the reference."),
+            Key::new("park_mm", "mm", Place::EXPECTED, "Where the axis goes afterwards."),
+        ],
+    ),
+    optional(
+        "axis.homing.simulated",
+        "Switch and index of the simulated axis; positions from where it stands when it is switched on.",
+        &[
+            Key::new("closes_mm", "mm", Place::EXPECTED, "Where the switch closes in the direction of the search."),
+            Key::new("length_mm", "mm", Length::EXPECTED, "How long it stays closed from there on."),
+            Key::new("hysteresis_mm", "mm", LengthOrNone::EXPECTED, "How far outside of that it opens."),
+            Key::new(
+                "index_every_mm",
+                "mm",
+                LengthOrNone::EXPECTED,
+                "Distance from index to index, at least mm_per_count; 0 for none.",
+            )
+            .or("0"),
+            Key::new("index_at_mm", "mm", Place::EXPECTED, "Where one of them is.").or("0"),
         ],
     ),
     table(

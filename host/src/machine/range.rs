@@ -70,6 +70,9 @@ ranges! {
     Friction: "a number from 0 to 1e6", |value| (0.0..=1e6).contains(&value);
     Reversal: "a number from 0.001 to 1e6", |value| (1e-3..=1e6).contains(&value);
     Damping: "a number from 0.001 to 1", |value| (1e-3..=1.0).contains(&value);
+    Length: "a number from 0.001 to 100000", |value| (0.001..=1e5).contains(&value);
+    LengthOrNone: "a number from 0 to 100000", |value| (0.0..=1e5).contains(&value);
+    Place: "a number from -100000 to 100000", |value| value.abs() <= 1e5;
     MassRatio: "a number from 1e-6 to 100", |value| (1e-6..=100.0).contains(&value);
     Inertia: "a number above -1, at most 1000", |value| value > -1.0 && value <= 1000.0;
 }
@@ -153,6 +156,9 @@ mod tests {
         words_are_the_range::<Friction>();
         words_are_the_range::<Reversal>();
         words_are_the_range::<Damping>();
+        words_are_the_range::<Length>();
+        words_are_the_range::<LengthOrNone>();
+        words_are_the_range::<Place>();
         words_are_the_range::<MassRatio>();
         words_are_the_range::<Inertia>();
     }

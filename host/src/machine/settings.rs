@@ -1,10 +1,11 @@
 //! The machine's values, and what each stage makes of them.
 
 use hal_sim::{
-    AxisParameters, DriveParameters, EncoderNoise, EncoderParameters, MachineParameters, REFERENCE_TICK_S,
-    REFERENCE_X, REFERENCE_Y, REFERENCE_Z, SUBSTEPS_MAX, TimerBits,
+    AxisParameters, DriveParameters, EncoderNoise, EncoderParameters, HomeParameters, MachineParameters,
+    REFERENCE_TICK_S, REFERENCE_X, REFERENCE_Y, REFERENCE_Z, SUBSTEPS_MAX, TimerBits,
 };
 use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
+use motion_kernel::homing::HomingConfig;
 use motion_kernel::law::Limits;
 use motion_kernel::num::Real;
 use motion_kernel::plan::{AxisLimits, CURVE_FEED_SHARE, MachineLimits};
@@ -98,8 +99,19 @@ pub struct AxisSettings {
     pub gains: Gains,
     /// Feedforward gains, within ±1000.
     pub feedforward: Feedforward,
+    /// How it is homed, if it is.
+    pub homing: Option<HomingSettings>,
     /// The simulated drive and its mechanics.
     pub drive: DriveParameters,
+}
+
+/// How an axis is homed, and what the simulated one has for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HomingSettings {
+    /// Feeds, lengths and positions.
+    pub config: HomingConfig,
+    /// Switch and index.
+    pub simulated: HomeParameters,
 }
 
 impl Machine {
@@ -231,6 +243,7 @@ impl AxisSettings {
                 jerk_s2: 2.231_850_25e-5,
                 ..Feedforward::default()
             },
+            homing: None,
             drive,
         }
     }

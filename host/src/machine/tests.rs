@@ -1,6 +1,9 @@
 //! The machine file against the built-in machine, and every refusal.
 
+use hal_sim::{HomeParameters, IndexParameters, SwitchParameters};
 use motion_kernel::axis::{AxesConfig, PREVIEW_TICKS_MAX};
+use motion_kernel::jog::Direction;
+use motion_kernel::units::{Counts, Position};
 
 use super::keys::{KEY_TABLES, KeyTable};
 use super::{Machine, REFERENCE_TOML};
@@ -203,6 +206,14 @@ fn optional_keys_are_read() {
     assert_eq!((drive.current_lag_s, drive.viscous_friction_per_s), (0.000_37, 0.08));
     assert_eq!((drive.coulomb_friction_mm_s2, drive.reversal_mm_s), (85.0, 0.5));
     assert_eq!((bed.frequency_hz, bed.damping_ratio, bed.mass_ratio), (13.4, 0.03, 0.06));
+    let homing = machine.axes[0].homing.expect("homing");
+    let config = &homing.config;
+    assert_eq!((config.direction, config.fast_mm_s, config.slow_mm_s), (Direction::Negative, 50.0, 2.0));
+    assert_eq!((config.travel_mm, config.back_off_mm, config.index_mm), (600.0, 60.0, Some(11.0)));
+    assert_eq!((config.position.to_mm(), config.park.map(Position::to_mm)), (-250.0, Some(0.0)));
+    let switch = Some(SwitchParameters { closes_mm: (-220.0, -180.0), hysteresis_mm: 0.2 });
+    let index = Some(IndexParameters { counts: 100_000, at: Counts(42_000) });
+    assert_eq!(homing.simulated, HomeParameters { switch, index });
     // The others stay what they are.
     assert_eq!(machine.axes[1..], Machine::reference().axes[1..]);
     // Tables stand alone, and so does the inverse without its bed.
@@ -330,6 +341,18 @@ fn ranges_of_optional_keys_are_kept() {
         ("axis.regulator.inverse.bed", "frequency_hz", &["0", "-13", "2e9"]),
         ("axis.regulator.inverse.bed", "damping_ratio", &["0", "0.0009", "1.1"]),
         ("axis.regulator.inverse.bed", "mass_ratio", &["0", "-0.06", "101"]),
+        ("axis.homing", "search_mm_s", &["0", "0.0009", "-2e9"]),
+        ("axis.homing", "approach_mm_s", &["0", "-2"]),
+        ("axis.homing", "travel_mm", &["0", "-600", "100001"]),
+        ("axis.homing", "back_off_mm", &["0", "-60", "100001"]),
+        ("axis.homing", "index_mm", &["-0.001", "100001"]),
+        ("axis.homing", "position_mm", &["-100001", "100001"]),
+        ("axis.homing", "park_mm", &["-100001", "100001"]),
+        ("axis.homing.simulated", "closes_mm", &["-100001", "100001"]),
+        ("axis.homing.simulated", "length_mm", &["0", "-1", "100001"]),
+        ("axis.homing.simulated", "hysteresis_mm", &["-0.1", "100001"]),
+        ("axis.homing.simulated", "index_every_mm", &["-10", "100001"]),
+        ("axis.homing.simulated", "index_at_mm", &["-100001", "100001"]),
     ];
     for (table, key, values) in cases {
         let table = KEY_TABLES.iter().find(|known| known.name == *table).expect("known");
@@ -360,4 +383,13 @@ fn rules_that_join_optional_keys() {
     let (found, place) = change("axis.regulator.inverse.bed", "frequency_hz", "500");
     assert_eq!(found, Err(format!("{place}below 500, a quarter of the frequency of tick_s = 0.0005")));
     assert!(change("axis.regulator.inverse.bed", "frequency_hz", "499").0.is_ok());
+    for (key, fast, slow) in [("search_mm_s", "-301", "300"), ("approach_mm_s", "300.5", "300")] {
+        let (found, place) = change("axis.homing", key, fast);
+        assert_eq!(found, Err(format!("{place}a magnitude of at most feed_mm_s = 300")));
+        assert!(change("axis.homing", key, slow).0.is_ok());
+    }
+    let (found, place) = change("axis.homing.simulated", "index_every_mm", "0.00009");
+    assert_eq!(found, Err(format!("{place}0, or at least mm_per_count = 0.0001")));
+    let homing = change("axis.homing.simulated", "index_every_mm", "0").0.expect("valid").axes[0].homing;
+    assert_eq!(homing.expect("homing").simulated.index, None);
 }

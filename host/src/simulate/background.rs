@@ -15,10 +15,10 @@ use crate::record::AXES;
 /// Capacities of the two streams, as a board has them.
 const PIECES: usize = 64;
 const SEGMENTS: usize = 64;
-/// Of a stream with live control: path enough to stop on, short feed lists, blocks ahead.
+/// Of a stream with live control: path enough to stop on, short feed lists, as many blocks ahead as pieces.
 const LIVE_PIECES: usize = 1024;
 const LIVE_SEGMENTS: usize = 16;
-const PLACES: usize = 256;
+const PLACES: usize = LIVE_PIECES;
 
 /// The memory of the streams.
 pub(super) enum Storage<'script, R: Real> {
@@ -91,6 +91,7 @@ impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_,
                         Command::Abort => director.abort(),
                         // A script holds none beyond the range.
                         Command::Override(share) => director.set_override(share).unwrap_or_default(),
+                        Command::SingleBlock(is_single) => director.set_single_block(is_single),
                     }
                     *given += 1;
                     // Each by itself, as if time passed between them.

@@ -1,11 +1,13 @@
 //! Live control of a run: commands before given ticks.
 //!
-//! As text `TICK:COMMAND,TICK:COMMAND,…`, in the order of their ticks; commands are `hold`, `resume`, `abort` and
-//! `override=SHARE`.
+//! As text `TICK:COMMAND,TICK:COMMAND,…`, in the order of their ticks; commands are `hold`, `resume`, `abort`,
+//! `override=SHARE`, `single` and `continuous`. A script displays as the text it is read from.
 
+use std::fmt;
 use std::str::FromStr;
 
 use motion_kernel::live::{OVERRIDE_MAX, OVERRIDE_MIN};
+use serde::{Deserialize, Serialize};
 
 /// What is commanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +20,8 @@ pub enum Command {
     Abort,
     /// Drive at so many times the program's feed, from 0 to 2.
     Override(f64),
+    /// Come to rest at the end of every program block and wait there for a resume, or do so no more.
+    SingleBlock(bool),
 }
 
 /// A command with the tick before which it is given.
@@ -30,7 +34,8 @@ pub struct Timed {
 }
 
 /// Commands in the order of their ticks.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
 pub struct Script(Vec<Timed>);
 
 impl Script {
@@ -41,6 +46,45 @@ impl Script {
     }
 }
 
+impl fmt::Display for Command {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Hold => f.write_str("hold"),
+            Self::Resume => f.write_str("resume"),
+            Self::Abort => f.write_str("abort"),
+            // All the digits that the number has.
+            Self::Override(share) => write!(f, "override={share}"),
+            Self::SingleBlock(true) => f.write_str("single"),
+            Self::SingleBlock(false) => f.write_str("continuous"),
+        }
+    }
+}
+
+impl fmt::Display for Script {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, Timed { tick, command }) in self.0.iter().enumerate() {
+            let comma = if index > 0 { "," } else { "" };
+            write!(f, "{comma}{tick}:{command}")?;
+        }
+        Ok(())
+    }
+}
+
+impl From<Script> for String {
+    fn from(script: Script) -> Self {
+        script.to_string()
+    }
+}
+
+/// As [`Script::from_str`]; an empty text is a script without commands.
+impl TryFrom<String> for Script {
+    type Error = ScriptError;
+
+    fn try_from(text: String) -> Result<Self, ScriptError> {
+        if text.is_empty() { Ok(Self::default()) } else { text.parse() }
+    }
+}
+
 /// Why a text is not a script. Displays as "found …, expected …".
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ScriptError {
@@ -48,7 +92,7 @@ pub enum ScriptError {
     #[error("found `{0}`, expected TICK:COMMAND such as 2000:hold")]
     Tick(String),
     /// A command is not known.
-    #[error("found the command `{0}`, expected hold, resume, abort or override=SHARE")]
+    #[error("found the command `{0}`, expected hold, resume, abort, override=SHARE, single or continuous")]
     Command(String),
     /// An override is not a number within its range.
     #[error("found an override of `{0}`, expected 0 or a number from {OVERRIDE_MIN} to {OVERRIDE_MAX}")]
@@ -72,6 +116,8 @@ impl FromStr for Script {
                 "hold" => Command::Hold,
                 "resume" => Command::Resume,
                 "abort" => Command::Abort,
+                "single" => Command::SingleBlock(true),
+                "continuous" => Command::SingleBlock(false),
                 other => {
                     let share = other
                         .strip_prefix("override=")
@@ -97,17 +143,32 @@ mod tests {
 
     #[test]
     fn a_script_is_read_or_says_what_is_wrong() {
-        let script: Script = "0:override=0.5, 10:hold,10:resume,20:abort".parse().expect("a script");
+        let script: Script =
+            "0:override=0.5, 10:hold,10:resume,11:single,12:continuous,20:abort".parse().expect("a script");
         let commands: Vec<_> = script.commands().iter().map(|timed| (timed.tick, timed.command)).collect();
         assert_eq!(
             commands,
-            [(0, Command::Override(0.5)), (10, Command::Hold), (10, Command::Resume), (20, Command::Abort)]
+            [
+                (0, Command::Override(0.5)),
+                (10, Command::Hold),
+                (10, Command::Resume),
+                (11, Command::SingleBlock(true)),
+                (12, Command::SingleBlock(false)),
+                (20, Command::Abort)
+            ]
         );
+        let third: Script = "7:override=0.3333333333333333".parse().expect("a script");
+        for script in [script, third, Script::default()] {
+            assert_eq!(Script::try_from(script.to_string()), Ok(script));
+        }
         for (text, message) in [
             ("hold", "found `hold`, expected TICK:COMMAND such as 2000:hold"),
             ("", "found ``, expected TICK:COMMAND such as 2000:hold"),
             ("-1:hold", "found `-1:hold`, expected TICK:COMMAND such as 2000:hold"),
-            ("1:stop", "found the command `stop`, expected hold, resume, abort or override=SHARE"),
+            (
+                "1:stop",
+                "found the command `stop`, expected hold, resume, abort, override=SHARE, single or continuous",
+            ),
             ("1:override=2.5", "found an override of `2.5`, expected 0 or a number from 0.001 to 2"),
             ("1:override=nan", "found an override of `nan`, expected 0 or a number from 0.001 to 2"),
             ("7:hold,6:resume", "found tick 6 behind tick 7, expected ticks in their order"),

@@ -1,5 +1,7 @@
 //! The simulated machine as the kernel's hardware: encoders, inputs and enable from hal-sim, the velocity
 //! outputs through the converter's adapter and real SPI frames.
+//!
+//! [`Hardware`] is what a run asks of any machine.
 
 use core::convert::Infallible;
 
@@ -7,10 +9,21 @@ use hal_sim::{Ad5754Chip, ChipError, SimMachine};
 use motion_kernel::hal::{
     Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel,
 };
+use motion_kernel::num::Scalar;
+use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
 
 use crate::machine::DEAD_TIME_CELLS;
 use crate::record::AXES;
+
+/// A machine to run a program on: what the kernel asks of a board, and the time between two ticks.
+pub trait Hardware: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> {
+    /// What the encoders read before the first tick.
+    fn start_counts(&mut self) -> [Counts; AXES];
+
+    /// Lets the time from one tick to the next pass; `trace` is what the tick did. False ends the run there.
+    fn advance<R: Scalar>(&mut self, trace: &Trace<R, AXES>) -> bool;
+}
 
 /// The simulated machine, with room for every dead time a machine file may ask for.
 pub type Simulated = SimMachine<AXES, DEAD_TIME_CELLS>;
@@ -29,6 +42,18 @@ impl<'a> Rig<'a> {
     pub fn new(machine: &'a Simulated) -> Result<Self, Ad5754Error<ChipError>> {
         let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())?;
         Ok(Self { machine, outputs })
+    }
+}
+
+impl Hardware for Rig<'_> {
+    fn start_counts(&mut self) -> [Counts; AXES] {
+        let Ok(counts) = self.latch();
+        counts
+    }
+
+    fn advance<R: Scalar>(&mut self, _: &Trace<R, AXES>) -> bool {
+        self.machine.advance();
+        true
     }
 }
 

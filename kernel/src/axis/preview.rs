@@ -68,6 +68,14 @@ impl<const AXES: usize> Preview<AXES> {
         self.next = 0;
     }
 
+    /// Moves all positions of an axis by `shift`.
+    #[cfg(feature = "live")]
+    pub(crate) fn shift(&mut self, axis: usize, shift: Position) {
+        for past in self.past.iter_mut().filter_map(|past| past.get_mut(axis)) {
+            *past = *past + shift;
+        }
+    }
+
     /// The positions of `ticks` ago, into `set`; remembers those of now.
     #[inline]
     pub(crate) fn delay<'a, R: 'a>(

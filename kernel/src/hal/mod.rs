@@ -7,10 +7,12 @@
 
 mod ad5754;
 mod extend;
+mod index;
 mod inputs;
 
 pub use ad5754::{Ad5754Error, Ad5754Frame, Ad5754Output, POWER_UP_TIME_US};
 pub use extend::{CountExtender, TimerWidth};
+pub use index::IndexLatch;
 pub use inputs::{AxisInputs, Inputs, MachineInputs};
 
 use crate::units::{Counts, DacCode};

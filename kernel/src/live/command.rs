@@ -12,18 +12,26 @@ use crate::program::SupplyError;
 use crate::queue::{Change, LiveFeeder, Progress};
 use crate::units::Position;
 
+/// Where a command may take over, in the order of time.
+pub(super) type Places = Vec<Place, { LIST_ITEMS + 1 }>;
+
 /// Where a command may take over.
-struct Place {
-    change: Change,
+pub(super) struct Place {
+    pub(super) change: Change,
     /// Where the list begins that takes over.
-    start: Junction,
+    pub(super) start: Junction,
     /// The item under way with another end, if it is inside one.
     head: Option<Item>,
 }
 
 impl Place {
+    /// Where it takes over.
+    pub(super) fn junction(&self, tick_s: f64) -> Junction {
+        self.list(tick_s).end()
+    }
+
     /// A list for it that holds nothing but the item under way.
-    fn list(&self, tick_s: f64) -> List {
+    pub(super) fn list(&self, tick_s: f64) -> List {
         let mut list = List::new(self.start, tick_s);
         if let Some(head) = self.head {
             list.push(head);
@@ -44,7 +52,7 @@ where
     I: Source<AXES, Error = E>,
 {
     /// In the order of time: here or within the item under way, and behind each item that is to be driven.
-    fn places(&self, progress: &Progress) -> Vec<Place, { LIST_ITEMS + 1 }> {
+    pub(super) fn places(&self, progress: &Progress) -> Places {
         let mut places = Vec::new();
         let list = &self.current.list;
         let done = progress.done as usize;
@@ -97,7 +105,7 @@ where
             if junction.feed_mm_s <= 0.0 {
                 // What follows in this list must not.
                 if self.rests_before_more(place, progress) {
-                    return self.rest_here(place.driven(), feeder);
+                    return self.rest_behind(place.driven(), false, feeder);
                 }
                 break;
             }
@@ -109,13 +117,7 @@ where
             if !self.keeps_up(&list, &place.change) {
                 continue;
             }
-            list.leave = list.len();
-            let end = list.end();
-            self.hand_over(list, place.change, self.driven_override, feeder)?;
-            self.replan_through(end.stretch);
-            self.take_back_from(place.driven());
-            self.replan_from(end);
-            return Ok(());
+            return self.rest_at_end_of(list, place, feeder);
         }
         let list = &mut self.current.list;
         if list.leave < list.len() {
@@ -126,24 +128,61 @@ where
         Ok(())
     }
 
-    /// Goes on under another override from the first place that allows it; if there is none, from where the list under
-    /// way is left.
+    /// Hands over a list that ends at rest; what comes behind it is planned anew.
+    pub(super) fn rest_at_end_of(
+        &mut self,
+        mut list: List,
+        place: &Place,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        list.leave = list.len();
+        let end = list.end();
+        self.hand_over(list, place.change, self.driven_override, feeder)?;
+        self.replan_through(end.stretch);
+        self.take_back_from(place.driven());
+        self.replan_from(end);
+        Ok(())
+    }
+
+    /// Goes on under another override, or to the end of a block, from the first place that allows it; if there is none, from
+    /// where the list under way is left.
     pub(super) fn respeed(
         &mut self,
         progress: &Progress,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
-        for place in &self.places(progress) {
+        self.block_end = None;
+        let places = self.places(progress);
+        let is_found = self.is_single && self.respeed_to_block_end(&places, progress, feeder)?
+            || self.respeed_from(&places, progress, false, feeder)?;
+        if !is_found && self.ahead.at > Position::ZERO {
+            self.replan_from(self.ahead);
+        }
+        Ok(())
+    }
+
+    /// Goes on under the override from the first of `places` that allows it; false if there is none. A ramp that
+    /// accelerates is given up only where it is too fast for the override, or always.
+    pub(super) fn respeed_from(
+        &mut self,
+        places: &Places,
+        progress: &Progress,
+        gives_up: bool,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<bool, SupplyError<E>> {
+        for place in places {
             let mut list = place.list(self.tick_s);
             let heads = list.len();
             if heads == 0 && place.start.feed_mm_s <= 0.0 {
                 // It goes on from here as from any stop.
                 if self.rests_before_more(place, progress) {
-                    return self.rest_here(place.driven(), feeder);
+                    return self.rest_behind(place.driven(), false, feeder).map(|()| true);
                 }
                 break;
             }
-            if heads > 0 && !self.is_worth_cutting(progress, place, &list.end()) {
+            let cut = list.end();
+            let accelerates = cut.feed_mm_s >= place.start.feed_mm_s;
+            if heads > 0 && !(gives_up && accelerates || self.is_worth_cutting(progress, place, &cut)) {
                 continue;
             }
             // Whatever comes of it: what is ahead of this stretch is planned anew from here on.
@@ -157,13 +196,10 @@ where
                 self.hand_over(list, place.change, self.feed_override, feeder)?;
                 self.take_back_from(place.driven());
                 self.replan_from(ahead);
-                return Ok(());
+                return Ok(true);
             }
         }
-        if self.ahead.at > Position::ZERO {
-            self.replan_from(self.ahead);
-        }
-        Ok(())
+        Ok(false)
     }
 
     /// Whether the machine is at rest at a place, perhaps in a dwell, and more of the list under way would follow.

@@ -4,6 +4,7 @@ use core::task::Poll;
 
 use heapless::Deque;
 
+use super::block_ends::{BlockEnd, BlockEnds};
 use super::list::{Item as ListItem, LIST_ITEMS, List};
 use super::road::{Junction, Road, is_before};
 use super::source::Source;
@@ -78,6 +79,7 @@ pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
     reading: u32,
     path_end: Position,
     pub(super) road: Road<PLACES>,
+    pub(super) ends: BlockEnds<PLACES>,
     /// The program's own feed from `ahead` on; of a stretch that is planned anew only its end.
     pub(super) course: Deque<ListItem, PLACES>,
     /// Where the next list begins.
@@ -89,8 +91,13 @@ pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
     pub(super) feed_override: f64,
     /// The one of the motion that was handed over last.
     pub(super) driven_override: f64,
-    is_held: bool,
+    pub(super) is_held: bool,
     is_aborted: bool,
+    pub(super) is_single: bool,
+    /// Where single block is to come to rest within a stretch; no plan goes beyond it.
+    pub(super) block_end: Option<BlockEnd>,
+    /// Where it was held last.
+    pub(super) held_at: Option<Junction>,
     wanted: Option<Wanted>,
     /// How far ahead of where the tick was seen a ramp is given up.
     pub(super) lead: Ticks,
@@ -127,6 +134,7 @@ where
             reading: 0,
             path_end: Position::ZERO,
             road: Road::new(),
+            ends: BlockEnds::new(),
             course: Deque::new(),
             ahead: start,
             replanned: None,
@@ -136,6 +144,9 @@ where
             driven_override: 1.0,
             is_held: false,
             is_aborted: false,
+            is_single: false,
+            block_end: None,
+            held_at: None,
             wanted: None,
             lead: Ticks::from_bits(u64::from(lead_ticks) << 32),
             starvations: 0,
@@ -179,11 +190,16 @@ where
         }
         if feed_override != self.feed_override {
             self.feed_override = feed_override;
-            if !self.is_held {
-                self.wanted = Some(self.wanted_by_override());
-            }
+            self.go_on_anew();
         }
         Ok(())
+    }
+
+    /// What motion goes on to is another, if it goes on.
+    pub(super) fn go_on_anew(&mut self) {
+        if !self.is_held {
+            self.wanted = Some(self.wanted_by_override());
+        }
     }
 
     /// How often motion had to stop because data came too late.
@@ -197,7 +213,7 @@ where
     }
 
     /// Whether all that was handed over has been driven, and nothing is wanted of it.
-    fn rests(&self, feeder: &LiveFeeder<'_, R, AXES>) -> bool {
+    pub(super) fn rests(&self, feeder: &LiveFeeder<'_, R, AXES>) -> bool {
         let progress = feeder.progress();
         progress.list == self.current.id
             && self.next.is_none()
@@ -207,10 +223,14 @@ where
             && self.wanted.is_none()
     }
 
+    /// Whether there is nothing more to come.
+    pub(super) fn is_read(&self) -> bool {
+        self.is_at_end && self.pending.is_none() && self.course.is_empty()
+    }
+
     /// What it is doing.
     pub fn state(&self, feeder: &LiveFeeder<'_, R, AXES>) -> State {
         let rests = self.rests(feeder);
-        let is_read = self.is_at_end && self.pending.is_none() && self.course.is_empty();
         if rests && self.error.is_some() {
             return State::Failed;
         }
@@ -219,7 +239,7 @@ where
             (true, _) => State::Aborting,
             (false, true) if rests => State::Held,
             (false, true) => State::Holding,
-            (false, false) if rests && is_read && self.ahead.at == Position::ZERO => State::Done,
+            (false, false) if rests && self.is_read() && self.ahead.at == Position::ZERO => State::Done,
             (false, false) => State::Running,
         }
     }
@@ -252,6 +272,7 @@ where
         let progress = self.follow(feeder);
         let place = self.current.list.after(progress.done as usize);
         self.road.pass(place.stretch, place.at);
+        self.ends.pass(feeder.path_queued());
         let read = if self.error.is_none() { self.read(feeder) } else { Ok(()) };
         if let Some(wanted) = self.wanted
             && feeder.has_free_list()
@@ -265,7 +286,12 @@ where
         read?;
         self.note_starvation(feeder);
         let is_to_rest = self.is_held || self.feed_override <= 0.0 || self.error.is_some();
-        if self.next.is_none() && !is_to_rest && self.wanted.is_none() && feeder.has_free_list() {
+        if self.next.is_none()
+            && !is_to_rest
+            && self.wanted.is_none()
+            && feeder.has_free_list()
+            && !self.waits_behind_block(feeder)
+        {
             self.go_on(feeder)?;
         }
         Ok(())
@@ -340,6 +366,7 @@ where
                     let fastest_mm_s = fastest_mm_s.ok_or(SupplyError::Rejected(Rejection::NoBlock))?;
                     is_taken(feeder.piece(*piece, fastest_mm_s)).inspect(|&taken| {
                         if taken {
+                            self.ends.piece(self.reading, self.path_end, piece.program_line());
                             self.path_end = end;
                         }
                     })
@@ -347,6 +374,7 @@ where
                 Some(Ready::EndOfStretch(end)) => is_taken(feeder.end_of_path(*end)).inspect(|&taken| {
                     if taken {
                         let _ = self.course.push_back(ListItem::End);
+                        self.ends.end_of_stretch();
                         (self.reading, self.path_end) = (self.reading.wrapping_add(1), Position::ZERO);
                     }
                 }),
@@ -357,7 +385,8 @@ where
                 return Ok(());
             }
             self.pending = None;
-            self.is_full = self.course.len() + 2 * LIST_ITEMS >= PLACES || self.road.is_full();
+            self.is_full =
+                self.course.len() + 2 * LIST_ITEMS >= PLACES || self.road.is_full() || self.ends.is_full();
             if self.is_full || self.is_aborted || self.is_at_end {
                 return Ok(());
             }
@@ -388,9 +417,11 @@ where
         Ok(())
     }
 
-    /// How far the path of a stretch is queued, and whether that is all of it.
+    /// How far the path of a stretch is queued, and whether that is all of it; not beyond the block end to rest at.
     pub(super) fn path_of(&self, stretch: u32) -> (Position, bool) {
-        if stretch == self.reading {
+        if let Some(BlockEnd { at, .. }) = self.block_end.filter(|end| end.stretch == stretch) {
+            (at, false)
+        } else if stretch == self.reading {
             (self.path_end, false)
         } else {
             (self.road.end_of(stretch).unwrap_or(Position::ZERO), true)
@@ -443,15 +474,25 @@ where
 
     /// Hands over the list that follows the one under way.
     fn go_on(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+        self.block_end = None;
         let begins = self.ahead.at == Position::ZERO && !self.course.is_empty();
-        if begins && self.feed_override != 1.0 {
+        if begins && (self.is_single || self.feed_override != 1.0) {
             self.replan_from(self.ahead);
         }
         let is_replanned = self.replans(self.ahead.stretch);
         let mut list = List::new(self.ahead, self.tick_s);
         let feed_override = if is_replanned { self.feed_override } else { 1.0 };
-        let is_found =
-            if is_replanned { self.gather_under_override(&mut list, true) } else { self.gather(&mut list) };
+        let is_found = if self.is_single && begins && self.course.front().is_some_and(ListItem::is_rest) {
+            // By itself: it is a block.
+            self.gather_rests(&mut list);
+            true
+        } else if is_replanned && self.is_single {
+            self.gather_block(&mut list)
+        } else if is_replanned {
+            self.gather_under_override(&mut list, true)
+        } else {
+            self.gather(&mut list)
+        };
         let change = self.change_after(self.current.list.leave);
         let is_ended = is_found && self.end_in_a_stop(&mut list, feed_override);
         // From rest there is no other place to begin: what is too dense then is refused.
@@ -556,15 +597,19 @@ where
         }
     }
 
-    /// Hands over a list without anything: at rest, nothing of the list under way is to follow. All of it is ahead again.
-    pub(super) fn rest_here(
+    /// Hands over a list without anything: at rest behind so many items of the list under way, nothing more of it is to
+    /// follow. It is ahead again.
+    pub(super) fn rest_behind(
         &mut self,
         done: usize,
+        ends_block: bool,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
         let place = self.current.list.after(done);
         let change = self.change_after(done);
-        self.hand_over(List::new(place, self.tick_s), change, self.driven_override, feeder)?;
+        let mut list = List::new(place, self.tick_s);
+        list.ends_block = ends_block;
+        self.hand_over(list, change, self.driven_override, feeder)?;
         self.take_back_from(done);
         self.ahead = place;
         Ok(())

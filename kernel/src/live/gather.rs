@@ -86,18 +86,23 @@ where
         if to_its_end && is_all && is_whole && !list.is_full() && self.course.front() == Some(&Item::End) {
             self.course.pop_front();
             list.push(Item::End);
-            self.gather_rests(list);
+            if !self.is_single {
+                self.gather_rests(list);
+            }
         }
         list.len() > 0
     }
 
-    /// The dwells and stops that come first in the course.
-    fn gather_rests(&mut self, list: &mut List) {
-        while let Some(&item @ (Item::Dwell(_) | Item::Stop)) = self.course.front()
+    /// The dwells and stops that come first in the course; one of them in single block.
+    pub(super) fn gather_rests(&mut self, list: &mut List) {
+        while let Some(&item) = self.course.front().filter(|item| item.is_rest())
             && !list.is_full()
         {
             self.course.pop_front();
             list.push(item);
+            if self.is_single {
+                break;
+            }
         }
     }
 
@@ -136,13 +141,19 @@ where
     pub(super) fn end_in_a_stop(&mut self, list: &mut List, feed_override: f64) -> bool {
         if list.contains(&Item::End) {
             list.leave = list.len();
+            list.ends_block = true;
+            return true;
+        }
+        if self.is_block_end(&list.end()) {
+            list.leave = list.len();
+            list.ends_block = true;
             return true;
         }
         let (path_end, _) = self.path_of(list.start.stretch);
         for leave in (1..=list.len().min(LIST_ITEMS - 1)).rev() {
             let place = list.after(leave);
             let is_at_rest = place.feed_mm_s <= 0.0;
-            let waits = matches!(list.get(leave - 1), Some((_, Item::Dwell(_) | Item::Stop)));
+            let waits = list.get(leave - 1).is_some_and(|(_, item)| item.is_rest());
             if is_at_rest && !waits {
                 // A stop where the known path ends: there will be more of it.
                 continue;
@@ -152,6 +163,7 @@ where
                 self.put_back(list, 0, leave);
                 list.truncate(leave);
                 list.leave = leave;
+                list.ends_block = waits;
                 if let Some((ramp, length)) = stop {
                     list.push(Item::Feed { ramp, length });
                 }

@@ -33,6 +33,11 @@ impl Item {
         matches!(self, Self::Feed { .. } | Self::Turned { .. })
     }
 
+    /// Whether it is a rest between stretches.
+    pub(super) fn is_rest(&self) -> bool {
+        matches!(self, Self::Dwell(_) | Self::Stop)
+    }
+
     /// The junction at its end, if it begins at `start`.
     pub(super) fn end(&self, start: &Junction, tick_s: f64) -> Junction {
         match *self {
@@ -111,11 +116,13 @@ pub(super) struct List {
     items: Vec<(Junction, Item), LIST_ITEMS>,
     /// What follows takes over after so many of them; the others are a stop, should nothing follow in time.
     pub(super) leave: usize,
+    /// It ends with a program block: in single block motion is held there.
+    pub(super) ends_block: bool,
 }
 
 impl List {
     pub(super) fn new(start: Junction, tick_s: f64) -> Self {
-        Self { start, tick_s, items: Vec::new(), leave: 0 }
+        Self { start, tick_s, items: Vec::new(), leave: 0, ends_block: false }
     }
 
     pub(super) fn is_full(&self) -> bool {

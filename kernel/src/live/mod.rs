@@ -18,6 +18,7 @@
 //! next junction that does. What follows a stop or an override is planned anew, to the end of the stretch; a stretch
 //! that nothing was changed in is driven by the program's own plan.
 //!
+//! - `block_ends`, `single`: a rest at the end of every program block;
 //! - `road`: blocks ahead, and how to brake on them;
 //! - `replan`: a plan from a junction on;
 //! - `list`: a feed list as the background sees it;
@@ -26,6 +27,7 @@
 //! - `command`: what takes over from the motion under way, and where;
 //! - [`director`]: what follows what.
 
+mod block_ends;
 mod command;
 pub mod director;
 mod gather;
@@ -35,6 +37,7 @@ mod list;
 mod replan;
 mod road;
 mod source;
+mod single;
 
 pub use director::{Director, OVERRIDE_MAX, OVERRIDE_MIN, State};
 pub use list::LIST_ITEMS;

@@ -164,6 +164,16 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
         None
     }
 
+    /// Whether the feed of a junction may be kept as far as `end` under `feed_override`.
+    pub(super) fn may_keep(&self, from: &Junction, end: Position, feed_override: f64) -> bool {
+        let mut joint_mm_s = f64::INFINITY;
+        self.from(from).take_while(|block| block.start < end).all(|block| {
+            let most_mm_s = f64::min(block.allowed(feed_override).0, joint_mm_s);
+            joint_mm_s = block.joint_mm_s();
+            from.feed_mm_s <= most_mm_s * (1.0 + FEED_ROUNDING)
+        })
+    }
+
     /// Whether a braking ramp is slow enough wherever a block begins.
     fn is_below_ceilings(&self, from: &Junction, ramp: &Ramp<f64>, feed_override: f64) -> bool {
         let rising = ramp.reversed();

@@ -155,6 +155,12 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         Ok(())
     }
 
+    /// Pieces and ends of stretch that are queued, with the one under way.
+    #[must_use]
+    pub fn path_queued(&self) -> usize {
+        self.path.len()
+    }
+
     /// Where the executor is.
     #[must_use]
     pub fn progress(&self) -> Progress {

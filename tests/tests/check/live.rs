@@ -26,6 +26,7 @@ pub(crate) enum Command {
     Resume,
     Override(f64),
     Abort,
+    SingleBlock(bool),
     /// The background does not get its turn.
     Stall,
 }
@@ -126,6 +127,7 @@ where
                 feed_override = share;
             }
             Some(Command::Abort) => director.abort(),
+            Some(Command::SingleBlock(is_single)) => director.set_single_block(is_single),
         }
         if command != Some(Command::Stall) {
             director.turn(&mut feeder).map_err(|error| format!("tick {ticks}: rejected: {error}"))?;

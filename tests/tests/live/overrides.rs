@@ -266,3 +266,30 @@ fn an_override_that_never_rests_keeps_the_limits() {
     runs.print_and_assert();
     assert!(runs.ran > 60, "{}", runs.ran);
 }
+
+/// An override holds behind a dwell too, however the list before it is filled.
+#[test]
+fn an_override_holds_behind_a_dwell() {
+    for blocks in 1..=40 {
+        let (mut text, mut asked, mut from) = (String::new(), Vec::new(), [0; 3]);
+        for index in 0..=blocks {
+            let feed_mm_min = if index % 2 == 0 { 1200.0 } else { 600.0 };
+            let to = [from[0] + 2 * UNITS_PER_MM as i64, 0, 0];
+            text += &format!("G1 X{} F{feed_mm_min}\n", 2 * (index + 1));
+            asked.push(Asked::Move(Move { from, to, arc: None, feed_mm_min }));
+            from = to;
+            if index + 1 == blocks {
+                text += "G4 P0.05\n";
+                asked.push(Asked::Dwell(0.05));
+            }
+        }
+        let case = Case::of(&Generated { text, asked }, Machine::reference(), 50_000.0).expect("a program");
+        let mut fastest_mm_s = 0.0_f64;
+        let run = case.run::<f64>(blocks as u64, &mut |seen| {
+            fastest_mm_s = fastest_mm_s.max(seen.executed.motion.v_mm_s);
+            (seen.ticks == 0).then_some(Command::Override(0.3))
+        });
+        run.unwrap_or_else(|error| panic!("{blocks} blocks: {error}"));
+        assert!(fastest_mm_s <= 0.3 * 20.0 * (1.0 + 1e-9), "{blocks} blocks: {fastest_mm_s} mm/s");
+    }
+}

@@ -1,0 +1,140 @@
+//! Home switch and index pulse of a simulated axis.
+//!
+//! Consumes, once a tick, the axis' true position and its count; produces the state of the switch, and the count at the first
+//! index since the latch was armed. Constant cost, cannot fail.
+
+use motion_kernel::units::Counts;
+
+/// A switch that is closed over a length of the travel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SwitchParameters {
+    /// Where it closes, from either side \[mm\]: the lesser position first.
+    pub closes_mm: (f64, f64),
+    /// How far outside of that it opens \[mm\], 0 or more.
+    pub hysteresis_mm: f64,
+}
+
+/// An index pulse every so many counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IndexParameters {
+    /// Counts a revolution, above 0.
+    pub counts: i64,
+    /// Where one of them is.
+    pub at: Counts,
+}
+
+/// Switch and index of an axis; what is broken is not there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HomeParameters {
+    /// The switch; without it the input stays open.
+    pub switch: Option<SwitchParameters>,
+    /// The index; without it nothing is latched.
+    pub index: Option<IndexParameters>,
+}
+
+/// Both in the course of time.
+#[derive(Clone, Debug)]
+pub struct SimHome {
+    parameters: HomeParameters,
+    is_closed: bool,
+    counts: Counts,
+    is_armed: bool,
+    latched: Option<Counts>,
+}
+
+impl SimHome {
+    /// An axis that stands at `position_mm`, where its encoder reads `counts`.
+    #[must_use]
+    pub fn new(parameters: HomeParameters, position_mm: f64, counts: Counts) -> Self {
+        let mut home = Self { parameters, is_closed: false, counts, is_armed: false, latched: None };
+        home.advance(position_mm, counts);
+        home
+    }
+
+    /// A tick that ended at `position_mm`, where the encoder reads `counts`.
+    pub fn advance(&mut self, position_mm: f64, counts: Counts) {
+        if let Some(SwitchParameters { closes_mm: (least, greatest), hysteresis_mm }) = self.parameters.switch
+        {
+            let margin_mm = if self.is_closed { hysteresis_mm } else { 0.0 };
+            self.is_closed = position_mm >= least - margin_mm && position_mm <= greatest + margin_mm;
+        }
+        if let Some(IndexParameters { counts: revolution, at }) = self.parameters.index
+            && let Some(index) = first_index(self.counts, counts, revolution, at)
+            && self.is_armed
+        {
+            (self.is_armed, self.latched) = (false, Some(index));
+        }
+        self.counts = counts;
+    }
+
+    /// Whether the switch is closed.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        self.is_closed
+    }
+
+    /// Waits for the next index.
+    pub fn arm(&mut self) {
+        (self.is_armed, self.latched) = (true, None);
+    }
+
+    /// The count at the first index since the latch was armed.
+    #[must_use]
+    pub fn latched(&self) -> Option<Counts> {
+        self.latched
+    }
+}
+
+/// The first index that was reached between two counts: the same count from either side.
+fn first_index(Counts(before): Counts, Counts(now): Counts, revolution: i64, at: Counts) -> Option<Counts> {
+    let revolutions = |counts: i64| (counts - at.0).div_euclid(revolution);
+    if now > before {
+        let next = (revolutions(before) + 1) * revolution + at.0;
+        (next <= now).then_some(Counts(next))
+    } else {
+        // The last one below `before`.
+        let last = revolutions(before - 1) * revolution + at.0;
+        (now < before && last >= now).then_some(Counts(last))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_index_from_either_side() {
+        let at = |before, now| first_index(Counts(before), Counts(now), 100, Counts(7)).map(|Counts(at)| at);
+        // Against looking at every count.
+        for before in -250_i64..250 {
+            for now in -250..250 {
+                let is_index = |counts: &i64| (counts - 7) % 100 == 0;
+                let expected = if now >= before {
+                    (before + 1..=now).find(is_index)
+                } else {
+                    (now..before).rev().find(is_index)
+                };
+                assert_eq!(at(before, now), expected, "{before} to {now}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_switch_opens_further_out_than_it_closes() {
+        let switch = Some(SwitchParameters { closes_mm: (10.0, 12.0), hysteresis_mm: 0.5 });
+        let mut home = SimHome::new(HomeParameters { switch, index: None }, 0.0, Counts(0));
+        let way = [(9.9, false), (10.0, true), (9.6, true), (9.4, false), (9.9, false), (12.4, false)];
+        for (position_mm, is_closed) in way.into_iter().chain([(11.0, true), (12.4, true), (12.6, false)]) {
+            home.advance(position_mm, Counts(0));
+            assert_eq!(home.is_closed(), is_closed, "{position_mm} mm");
+        }
+        let index = Some(IndexParameters { counts: 100, at: Counts(30) });
+        let mut home = SimHome::new(HomeParameters { switch: None, index }, 11.0, Counts(0));
+        home.advance(11.0, Counts(50));
+        assert_eq!((home.is_closed(), home.latched()), (false, None));
+        home.arm();
+        home.advance(11.0, Counts(250));
+        home.advance(11.0, Counts(450));
+        assert_eq!(home.latched(), Some(Counts(130)));
+    }
+}

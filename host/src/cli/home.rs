@@ -1,0 +1,123 @@
+//! `motion home`: the axes of the simulated machine find their references.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::input::{self, Output};
+use super::table::{self, Align};
+use super::trace::TraceWriter;
+use super::write_json;
+use crate::machine::Machine;
+use crate::simulate::home::{HomedAxis, home};
+use crate::simulate::job::Sheet;
+
+const EXAMPLES: &str = "\
+Examples:
+  motion machine > mine.toml          then take away the # in front of the keys of [axis.homing]
+  motion home --machine mine.toml
+  motion home --machine mine.toml --trace home.csv
+                                      every tick of every axis, for a spreadsheet
+
+JSON: list of {axis, counts, index_counts (how far the index was behind the switch; null: the switch is the reference),
+time_s, position_mm (where the axis stands now), true_mm (the same from where it was switched on)}.
+
+Exit status 1: an axis was not homed; those before it are printed.";
+
+/// Home the axes that have [axis.homing] in the machine file, one after the other: search the switch, back off, approach.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct HomeArguments {
+    /// Machine file; `motion machine` prints one, with the keys of homing behind a `#`.
+    #[arg(long, value_name = "FILE")]
+    machine: PathBuf,
+    /// Write every tick as a row of CSV; an existing file is replaced.
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct AxisJson<'a> {
+    axis: &'a str,
+    counts: i64,
+    index_counts: Option<i64>,
+    time_s: f64,
+    position_mm: f64,
+    true_mm: f64,
+}
+
+/// Homes and prints.
+///
+/// # Errors
+/// The machine file is refused or homes no axis, or a file can't be written.
+pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let machine = input::machine(Some(&arguments.machine))?;
+    let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
+    let name = trace.as_ref().map_or_else(String::new, |output| output.name.clone());
+    let unwritten = |source| CliError::Write { path: name.clone(), source };
+    let mut trace = trace
+        .map(|output| TraceWriter::new(output.file, &Sheet::of_machine(&machine)))
+        .transpose()
+        .map_err(unwritten)?;
+    let mut homed = Vec::new();
+    let ended = home(&machine, &mut homed, &mut |tick| {
+        if let Some(trace) = &mut trace {
+            trace.add(tick);
+        }
+    });
+    if let Some(trace) = trace {
+        trace.finish().map_err(unwritten)?;
+    }
+    // What was homed is shown, whatever became of the next axis.
+    if arguments.json {
+        let axes: Vec<AxisJson<'_>> = homed.iter().map(|axis| axis_json(axis, &machine)).collect();
+        write_json(&axes, out)?;
+    } else if !homed.is_empty() {
+        write_table(&homed, &machine, out).map_err(CliError::Output)?;
+    }
+    let machine = arguments.machine.display().to_string();
+    ended.map(|()| Outcome::Done).map_err(|source| CliError::Home { machine, source })
+}
+
+fn axis_json<'a>(axis: &'a HomedAxis, machine: &Machine) -> AxisJson<'a> {
+    let HomedAxis { name, homed, ticks, position_mm, true_mm } = axis;
+    AxisJson {
+        axis: name,
+        counts: homed.counts.0,
+        index_counts: homed.index_counts,
+        time_s: *ticks as f64 * machine.tick_s,
+        position_mm: *position_mm,
+        true_mm: *true_mm,
+    }
+}
+
+fn write_table(homed: &[HomedAxis], machine: &Machine, out: &mut dyn Write) -> io::Result<()> {
+    let columns = [
+        ("axis", "", Align::Left),
+        ("reference", "counts", Align::Right),
+        ("index behind", "counts", Align::Right),
+        ("time", "s", Align::Right),
+        ("stands at", "mm", Align::Right),
+        ("from switching on", "mm", Align::Right),
+    ];
+    let rows: Vec<[String; 6]> = homed
+        .iter()
+        .map(|axis| {
+            [
+                axis.name.clone(),
+                axis.homed.counts.0.to_string(),
+                axis.homed.index_counts.map_or_else(|| "-".to_owned(), |counts| counts.to_string()),
+                format!("{:.4}", axis.ticks as f64 * machine.tick_s),
+                format!("{:.4}", axis.position_mm),
+                format!("{:.4}", axis.true_mm),
+            ]
+        })
+        .collect();
+    table::write(&columns, &rows, out)
+}

@@ -1,0 +1,453 @@
+//! Homing of an axis: switch and, where there is one, index pulse, at two speeds.
+//!
+//! Consumes, once a turn of the background, what the tick has seen of the axis ([`Seen`]); produces what is to be done next
+//! ([`Step`]): jogs, which are jerk-limited, and stops, which are controlled. The reference is where the switch closes on the
+//! slow approach, or the first index behind that: its count is latched, so that however late the stop is the position is
+//! exact.
+//!
+//! ```text
+//!              on already ┌──────────────────────┐
+//!   start ───────────────►│ back off, fast       │ off, at rest ┌────────────────┐ closes, index or end at rest
+//!     │ off               │ until it opens       ├─────────────►│ approach, slow ├─────────► reference ─► park
+//!     └─► seek, fast ────►│                      │              └────────────────┘
+//!          closes, at rest└──────────────────────┘
+//! ```
+//!
+//! Without an index the reference is as good as the moment when the switch is seen: the slow feed times the time between
+//! two turns, and the switch itself. With one it is the same count from wherever homing starts, as long as the index does not
+//! lie where the switch closes: [`Homed::index_counts`] says how far behind it was found.
+//!
+//! Every stage is bounded by a length; what is not found within it is a [`HomingError`], which comes at rest.
+
+use crate::jog::{Direction, Jog, JogAxis, JogError, Way};
+use crate::live::State;
+use crate::units::{Counts, Position};
+
+/// How an axis is homed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HomingConfig {
+    /// Where the switch is.
+    pub direction: Direction,
+    /// Feed of the search \[mm/s\].
+    pub fast_mm_s: f64,
+    /// Feed at which the switch is approached \[mm/s\].
+    pub slow_mm_s: f64,
+    /// Greatest length of the search \[mm\].
+    pub travel_mm: f64,
+    /// Greatest length of backing off, and of the approach after it \[mm\]: the switch's length and hysteresis, and the
+    /// way to stop at the fast feed, twice.
+    pub back_off_mm: f64,
+    /// Greatest length from where the switch closes to the index \[mm\], a little more than a revolution; without it the
+    /// switch is the reference.
+    pub index_mm: Option<f64>,
+    /// Position of the reference.
+    pub position: Position,
+    /// Where the axis goes afterwards.
+    pub park: Option<Position>,
+}
+
+/// What a tick has shown of the axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<const AXES: usize> {
+    /// Set positions of all axes.
+    pub set: [Position; AXES],
+    /// What its encoder read.
+    pub counts: Counts,
+    /// Its home switch, as read in the same tick.
+    pub is_home: bool,
+    /// What its index latch holds ([`IndexLatch`](crate::hal::IndexLatch)).
+    pub index: Option<Counts>,
+    /// What becomes of the move that was asked for last; anything before the first one.
+    pub state: State,
+}
+
+/// What is to be done.
+#[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "there is no heap to put a jog on")]
+pub enum Step<const AXES: usize> {
+    /// Nothing.
+    Wait,
+    /// Rest here, split the streams and drive this with a new director.
+    Move(Jog<AXES>),
+    /// Abort the move.
+    Stop,
+    /// Arm the axis' index latch.
+    ArmIndex,
+    /// At rest: the axis was at this position where its encoder read these counts
+    /// ([`Kernel::reference`](crate::kernel::Kernel::reference)). Split the streams anew.
+    Reference(Counts, Position),
+    /// The axis is homed, and at rest.
+    Done(Homed),
+}
+
+/// What was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Homed {
+    /// The encoder's counts at the reference.
+    pub counts: Counts,
+    /// How many counts behind where the switch was seen closing the index was latched.
+    pub index_counts: Option<i64>,
+}
+
+/// Why an axis is not homed. It is at rest, and has the position that it had before, but on the way to where it is parked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HomingError {
+    /// A move is refused: a feed, a length or an axis is out of range.
+    Move(JogError),
+    /// The switch did not close in the search.
+    NoSwitch {
+        /// Within this length \[mm\].
+        travel_mm: f64,
+    },
+    /// The switch did not open again.
+    StuckSwitch {
+        /// Within this length \[mm\].
+        back_off_mm: f64,
+    },
+    /// The switch did not close again in the slow approach.
+    LostSwitch {
+        /// Within this length \[mm\].
+        back_off_mm: f64,
+    },
+    /// No index was latched.
+    NoIndex {
+        /// Within this length behind the switch \[mm\].
+        index_mm: f64,
+    },
+    /// It was given up.
+    Aborted,
+    /// The move could not be executed.
+    Failed,
+}
+
+impl core::fmt::Display for HomingError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Move(error) => error.fmt(f),
+            Self::NoSwitch { travel_mm } => {
+                write!(f, "no home switch within {travel_mm} mm: expected it to close there")
+            }
+            Self::StuckSwitch { back_off_mm } => {
+                write!(f, "home switch closed over {back_off_mm} mm: expected it to open when backing off")
+            }
+            Self::LostSwitch { back_off_mm } => {
+                write!(f, "home switch open over {back_off_mm} mm: expected it to close in the slow approach")
+            }
+            Self::NoIndex { index_mm } => {
+                write!(f, "no index within {index_mm} mm of the home switch: expected one a revolution")
+            }
+            Self::Aborted => f.write_str("homing was given up"),
+            Self::Failed => f.write_str("a move of homing can't be executed"),
+        }
+    }
+}
+
+impl core::error::Error for HomingError {}
+
+/// What is under way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Start,
+    Seek,
+    /// Over a switch that has been seen closed, or is still to be.
+    BackOff {
+        was_home: bool,
+    },
+    Approach,
+    /// Behind the place where the switch closed, at which the encoder read so much.
+    Index {
+        edge: Position,
+        counts: Counts,
+    },
+    /// Coming to rest; then this.
+    Stopping(After),
+    /// At rest, with its new position.
+    Referenced(Homed),
+    Park(Homed),
+    Ended,
+}
+
+/// What follows a stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum After {
+    BackOff,
+    Approach,
+    Reference(Homed),
+    Error(HomingError),
+}
+
+/// Homing of one axis.
+#[derive(Clone, Debug)]
+pub struct Homing {
+    config: HomingConfig,
+    jog: JogAxis,
+    axis: usize,
+    tick_s: f64,
+    stage: Stage,
+    /// Where the stage's move began.
+    from: Position,
+    is_aborted: bool,
+}
+
+impl Homing {
+    /// Homing of `axis`, which may do what `jog` says; its soft limits do not count, it does not know yet where it is.
+    #[must_use]
+    pub fn new(config: HomingConfig, jog: &JogAxis, axis: usize, tick_s: f64) -> Self {
+        let jog = JogAxis { travel: None, ..*jog };
+        Self { config, jog, axis, tick_s, stage: Stage::Start, from: Position::ZERO, is_aborted: false }
+    }
+
+    /// Gives up: comes to rest, and then is [`HomingError::Aborted`].
+    pub fn abort(&mut self) {
+        self.is_aborted = true;
+    }
+
+    /// One turn, after a tick: what is to be done before the next.
+    ///
+    /// # Errors
+    /// The axis is not homed; it is at rest.
+    pub fn turn<const AXES: usize>(&mut self, seen: &Seen<AXES>) -> Result<Step<AXES>, HomingError> {
+        let step = self.step(seen);
+        if matches!(step, Err(_) | Ok(Step::Done(_))) {
+            self.stage = Stage::Ended;
+        }
+        step
+    }
+
+    fn step<const AXES: usize>(&mut self, seen: &Seen<AXES>) -> Result<Step<AXES>, HomingError> {
+        let here = self.here(seen)?;
+        let is_at_rest = matches!(seen.state, State::Done | State::Aborted);
+        match self.stage {
+            Stage::Ended => return Ok(Step::Wait),
+            Stage::Start if self.is_aborted => return Err(HomingError::Aborted),
+            Stage::Start => {}
+            _ if seen.state == State::Failed => return Err(HomingError::Failed),
+            _ if core::mem::take(&mut self.is_aborted) => {
+                return Ok(self.stop(After::Error(HomingError::Aborted)));
+            }
+            _ => {}
+        }
+        let HomingConfig { travel_mm, back_off_mm, index_mm, .. } = self.config;
+        match self.stage {
+            Stage::Start if seen.is_home => self.go(Stage::BackOff { was_home: true }, seen),
+            Stage::Start => self.go(Stage::Seek, seen),
+            Stage::Seek if seen.is_home => Ok(self.stop(After::BackOff)),
+            Stage::Seek if is_at_rest => Err(HomingError::NoSwitch { travel_mm }),
+            Stage::BackOff { was_home: true } if !seen.is_home => Ok(self.stop(After::Approach)),
+            Stage::BackOff { was_home: true } if is_at_rest => Err(HomingError::StuckSwitch { back_off_mm }),
+            Stage::BackOff { was_home: false } if is_at_rest => Err(HomingError::LostSwitch { back_off_mm }),
+            Stage::BackOff { was_home } => {
+                self.stage = Stage::BackOff { was_home: was_home || seen.is_home };
+                Ok(Step::Wait)
+            }
+            Stage::Approach if seen.is_home => {
+                if index_mm.is_some() {
+                    self.stage = Stage::Index { edge: here, counts: seen.counts };
+                    Ok(Step::ArmIndex)
+                } else {
+                    Ok(self.stop(After::Reference(Homed { counts: seen.counts, index_counts: None })))
+                }
+            }
+            Stage::Approach if is_at_rest || self.distance_mm(self.from, here) > back_off_mm => {
+                Ok(self.stop(After::Error(HomingError::LostSwitch { back_off_mm })))
+            }
+            Stage::Index { edge, counts: Counts(at_edge) } => {
+                let index_mm = index_mm.unwrap_or_default();
+                match seen.index {
+                    Some(counts) => {
+                        let behind = counts.0.wrapping_sub(at_edge);
+                        Ok(self.stop(After::Reference(Homed { counts, index_counts: Some(behind) })))
+                    }
+                    None if is_at_rest || self.distance_mm(edge, here) > index_mm => {
+                        Ok(self.stop(After::Error(HomingError::NoIndex { index_mm })))
+                    }
+                    None => Ok(Step::Wait),
+                }
+            }
+            Stage::Stopping(after) if is_at_rest => self.after(after, seen),
+            Stage::Referenced(homed) => match self.config.park {
+                Some(park) if park != here => {
+                    self.stage = Stage::Park(homed);
+                    self.jog(Way::By(park - here), self.config.fast_mm_s, seen)
+                }
+                _ => Ok(Step::Done(homed)),
+            },
+            Stage::Park(homed) if is_at_rest => Ok(Step::Done(homed)),
+            Stage::Seek | Stage::Approach | Stage::Stopping(_) | Stage::Park(_) | Stage::Ended => {
+                Ok(Step::Wait)
+            }
+        }
+    }
+
+    fn after<const AXES: usize>(
+        &mut self,
+        after: After,
+        seen: &Seen<AXES>,
+    ) -> Result<Step<AXES>, HomingError> {
+        match after {
+            // A short switch may have been passed.
+            After::BackOff => self.go(Stage::BackOff { was_home: seen.is_home }, seen),
+            // A switch that bounces.
+            After::Approach if seen.is_home => self.go(Stage::BackOff { was_home: true }, seen),
+            After::Approach => self.go(Stage::Approach, seen),
+            After::Reference(homed) => {
+                self.stage = Stage::Referenced(homed);
+                Ok(Step::Reference(homed.counts, self.config.position))
+            }
+            After::Error(error) => Err(error),
+        }
+    }
+
+    fn here<const AXES: usize>(&self, seen: &Seen<AXES>) -> Result<Position, HomingError> {
+        let here = seen.set.get(self.axis).copied();
+        here.ok_or(HomingError::Move(JogError::Axis { axis: self.axis, axes: AXES }))
+    }
+
+    /// How far `to` is from `from` in the direction of homing \[mm\].
+    fn distance_mm(&self, from: Position, to: Position) -> f64 {
+        match self.config.direction {
+            Direction::Positive => (to - from).to_mm(),
+            Direction::Negative => (from - to).to_mm(),
+        }
+    }
+
+    fn stop<const AXES: usize>(&mut self, after: After) -> Step<AXES> {
+        self.stage = Stage::Stopping(after);
+        Step::Stop
+    }
+
+    /// The move of a stage.
+    fn go<const AXES: usize>(&mut self, stage: Stage, seen: &Seen<AXES>) -> Result<Step<AXES>, HomingError> {
+        let HomingConfig { direction, fast_mm_s, slow_mm_s, travel_mm, back_off_mm, index_mm, .. } =
+            self.config;
+        let (direction, length_mm, feed_mm_s) = match stage {
+            Stage::BackOff { .. } => (direction.reversed(), back_off_mm, fast_mm_s),
+            Stage::Approach => (direction, back_off_mm + index_mm.unwrap_or_default(), slow_mm_s),
+            _ => (direction, travel_mm, fast_mm_s),
+        };
+        let signed_mm = if direction == Direction::Positive { length_mm } else { -length_mm };
+        let by =
+            Position::from_mm(signed_mm).ok_or(HomingError::Move(JogError::End { end_mm: signed_mm }))?;
+        (self.stage, self.from) = (stage, self.here(seen)?);
+        self.jog(Way::By(by), feed_mm_s, seen)
+    }
+
+    fn jog<const AXES: usize>(
+        &self,
+        way: Way,
+        feed_mm_s: f64,
+        seen: &Seen<AXES>,
+    ) -> Result<Step<AXES>, HomingError> {
+        let jog = Jog::new(&self.jog, self.axis, seen.set, way, feed_mm_s, self.tick_s);
+        jog.map(Step::Move).map_err(HomingError::Move)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Limits;
+
+    fn at(mm: f64) -> Position {
+        Position::from_mm(mm).expect("in range")
+    }
+
+    const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+
+    fn homing() -> Homing {
+        let config = HomingConfig {
+            direction: Direction::Negative,
+            fast_mm_s: 20.0,
+            slow_mm_s: 1.0,
+            travel_mm: 100.0,
+            back_off_mm: 10.0,
+            index_mm: Some(5.0),
+            position: at(-3.0),
+            park: Some(at(0.0)),
+        };
+        let jog = JogAxis { feed_mm_s: 50.0, limits: LIMITS, travel: None };
+        Homing::new(config, &jog, 0, 5e-4)
+    }
+
+    /// What a machine does that rests after every stop, and moves a millimetre a turn.
+    struct Machine {
+        seen: Seen<1>,
+        direction: f64,
+        end: Position,
+    }
+
+    impl Machine {
+        fn new() -> Self {
+            let seen =
+                Seen { set: [at(0.0)], counts: Counts(0), is_home: false, index: None, state: State::Done };
+            Self { seen, direction: 0.0, end: at(0.0) }
+        }
+
+        /// The switch is closed below -20 mm, an index lies at -22 mm.
+        fn turn(&mut self, homing: &mut Homing) -> Result<Step<1>, HomingError> {
+            let step = homing.turn(&self.seen);
+            match &step {
+                Ok(Step::Move(jog)) => {
+                    [self.end] = jog.end();
+                    let way = self.end - self.seen.set[0];
+                    (self.direction, self.seen.state) = (way.to_mm().signum(), State::Running);
+                }
+                Ok(Step::Stop) => (self.direction, self.seen.state) = (0.0, State::Aborted),
+                _ => {}
+            }
+            let Seen { set: [set], counts, is_home, index, state } = &mut self.seen;
+            *set = *set + at(self.direction);
+            if *state == State::Running && *set == self.end {
+                (self.direction, *state) = (0.0, State::Done);
+            }
+            counts.0 = set.to_mm() as i64 * 10;
+            *is_home = *set <= at(-20.0);
+            *index = (*set <= at(-22.0)).then_some(Counts(-220));
+            step
+        }
+    }
+
+    #[test]
+    fn it_can_be_given_up_in_every_turn() {
+        let steps = |given_up: usize| {
+            let (mut homing, mut machine) = (homing(), Machine::new());
+            let mut steps = 0;
+            loop {
+                if steps == given_up {
+                    homing.abort();
+                }
+                match machine.turn(&mut homing) {
+                    Ok(Step::Done(homed)) => {
+                        assert_eq!(homed, Homed { counts: Counts(-220), index_counts: Some(-20) });
+                        return Ok(steps);
+                    }
+                    Ok(Step::Reference(counts, position)) => {
+                        assert_eq!((counts, position), (Counts(-220), at(-3.0)));
+                        // From here on it is elsewhere.
+                        machine.seen.set = [at(-5.0)];
+                    }
+                    Err(error) => {
+                        assert_eq!(machine.direction, 0.0, "moves in {:?}", homing.stage);
+                        return Err(error);
+                    }
+                    Ok(_) => {}
+                }
+                steps += 1;
+                assert!(steps < 1000, "no end in {:?}", homing.stage);
+            }
+        };
+        let whole = steps(usize::MAX).expect("homed");
+        assert!(whole > 25, "{whole}");
+        for given_up in 0..whole {
+            assert_eq!(steps(given_up), Err(HomingError::Aborted), "in turn {given_up}");
+        }
+    }
+
+    #[test]
+    fn an_axis_that_is_not_there_is_refused() {
+        let mut homing = Homing { axis: 1, ..homing() };
+        let error = Machine::new().turn(&mut homing).expect_err("refused");
+        assert_eq!(error, HomingError::Move(JogError::Axis { axis: 1, axes: 1 }));
+    }
+}

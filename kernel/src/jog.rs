@@ -1,0 +1,346 @@
+//! Jog: one axis straight on, as far as an increment or to the soft limit.
+//!
+//! Consumes where the machine stands, an axis and a feed; produces the items of a program of one straight stretch, which
+//! the [`Director`](crate::live::Director) drives as any other. So a jog is jerk-limited, and stops exactly at the
+//! increment's end or at the soft limit, by construction. Releasing the key is
+//! [`Director::abort`](crate::live::Director::abort), another feed [`Director::set_override`](crate::live::Director::set_override),
+//! both at any tick; what was not driven is then dropped, and the next jog begins from where the axis stands
+//! ([`Kernel::rest_here`](crate::kernel::Kernel::rest_here)).
+//!
+//! Background; an item at a time, no memory for the path. Bad requests are a [`JogError`], and nothing moves.
+//!
+//! ```
+//! use motion_kernel::exec::Executor;
+//! use motion_kernel::jog::{Direction, Jog, JogAxis, Travel, Way};
+//! use motion_kernel::law::Limits;
+//! use motion_kernel::live::{Director, State};
+//! use motion_kernel::queue::{LiveStreams, PathRules};
+//! use motion_kernel::units::Position;
+//!
+//! let at = |mm| Position::from_mm(mm).unwrap();
+//! let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+//! let rules = PathRules { limits, feed_mm_s: 100.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+//! let travel = Some(Travel { least: at(-200.0), greatest: at(300.0) });
+//! let axis = JogAxis { feed_mm_s: 100.0, limits, travel };
+//! let tick_s = 0.0005;
+//!
+//! // A key of the first of two axes is pressed, and released after 400 ticks.
+//! let start = [at(0.0), at(5.0)];
+//! let jog = Jog::new(&axis, 0, start, Way::Continuous(Direction::Positive), 20.0, tick_s).unwrap();
+//! let mut streams = LiveStreams::<f32, 2, 32, 16>::new();
+//! let (mut feeder, mut intake) = streams.split(rules, start);
+//! let mut director = Director::<f32, 2, _, _, 64>::new(jog, tick_s, 0);
+//! let mut executor = Executor::new(start);
+//! let mut rest = start;
+//! for tick in 0.. {
+//!     if tick == 400 {
+//!         director.abort();
+//!     }
+//!     director.turn(&mut feeder).unwrap();
+//!     rest = executor.tick(&mut intake).unwrap().setpoints.map(|axis| axis.position);
+//!     if director.state(&feeder) == State::Aborted {
+//!         break;
+//!     }
+//! }
+//! assert!(rest[0] > start[0] && rest[1] == start[1]);
+//! // The next jog begins at `rest`: the streams are split anew for it.
+//! ```
+
+use core::convert::Infallible;
+
+use crate::law::{Law, LimitError, Limits, Ramp, SegmentError};
+use crate::plan::{Block, BlockPlan, plan, segments};
+use crate::program::{Allowed, Item, PathBlock};
+use crate::units::Position;
+
+/// Pieces of path are at most so long, in every number type.
+const PIECE: Position = Position::from_bits(16 << 32);
+
+/// Which way along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Direction {
+    /// To greater positions.
+    Positive,
+    /// To lesser positions.
+    Negative,
+}
+
+impl Direction {
+    /// The other one.
+    #[must_use]
+    pub fn reversed(self) -> Self {
+        match self {
+            Self::Positive => Self::Negative,
+            Self::Negative => Self::Positive,
+        }
+    }
+
+    fn sign(self) -> f64 {
+        match self {
+            Self::Positive => 1.0,
+            Self::Negative => -1.0,
+        }
+    }
+
+    /// The position `length` further on.
+    fn ahead(self, from: Position, length: Position) -> Position {
+        match self {
+            Self::Positive => from + length,
+            Self::Negative => from - length,
+        }
+    }
+
+    /// How far `to` is ahead of `from`; negative if it lies behind.
+    fn distance(self, from: Position, to: Position) -> Position {
+        match self {
+            Self::Positive => to - from,
+            Self::Negative => from - to,
+        }
+    }
+}
+
+/// The soft limits of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Travel {
+    /// Least position.
+    pub least: Position,
+    /// Greatest position, above the least.
+    pub greatest: Position,
+}
+
+/// What an axis may do in a jog.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JogAxis {
+    /// Greatest feed \[mm/s\], of the jog and under any override; above 0, at most the queue's
+    /// ([`PathRules`](crate::queue::PathRules)).
+    pub feed_mm_s: f64,
+    /// Limits of its ramps; at most the queue's.
+    pub limits: Limits<f64>,
+    /// Its soft limits; `None` as long as the axis does not know where it is.
+    pub travel: Option<Travel>,
+}
+
+/// How far a jog goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// As far as the soft limit, or until it is aborted.
+    Continuous(Direction),
+    /// By a signed distance, not 0; at most to the soft limit ([`Jog::ends_at_limit`]).
+    By(Position),
+}
+
+/// Why a jog is refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JogError {
+    /// There is no such axis.
+    Axis {
+        /// The axis, from 0.
+        axis: usize,
+        /// How many there are.
+        axes: usize,
+    },
+    /// A feed is not above 0 and at most the axis' \[mm/s\].
+    Feed {
+        /// The feed.
+        feed_mm_s: f64,
+        /// The axis' greatest.
+        most_mm_s: f64,
+    },
+    /// A limit of the axis is not a positive number.
+    Limit(LimitError),
+    /// The soft limits are not in their order.
+    Travel(Travel),
+    /// The distance is 0.
+    NoDistance,
+    /// Without an end: the axis has no soft limits.
+    NoTravel,
+    /// The axis stands at the soft limit or beyond it: it goes inwards only.
+    AtLimit {
+        /// Where it stands.
+        position: Position,
+        /// The soft limit.
+        limit: Position,
+    },
+    /// The end is beyond what positions hold \[mm\].
+    End {
+        /// The end.
+        end_mm: f64,
+    },
+    /// There is no motion of the law over that distance.
+    Segment(SegmentError),
+}
+
+impl core::fmt::Display for JogError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Axis { axis, axes } => write!(f, "axis {axis}: expected one of {axes}, from 0"),
+            Self::Feed { feed_mm_s, most_mm_s } => {
+                write!(f, "feed {feed_mm_s} mm/s: expected above 0, at most {most_mm_s}")
+            }
+            Self::Limit(error) => error.fmt(f),
+            Self::Travel(Travel { least, greatest }) => {
+                let (least_mm, greatest_mm) = (least.to_mm(), greatest.to_mm());
+                write!(f, "soft limits {least_mm} and {greatest_mm} mm: expected the lesser one first")
+            }
+            Self::NoDistance => f.write_str("a distance of 0: expected a way to go"),
+            Self::NoTravel => {
+                f.write_str("a jog without an end: expected soft limits, which the axis does not know yet")
+            }
+            Self::AtLimit { position, limit } => {
+                let (position_mm, limit_mm) = (position.to_mm(), limit.to_mm());
+                write!(
+                    f,
+                    "at {position_mm} mm outwards: expected inwards only from the soft limit {limit_mm} mm"
+                )
+            }
+            Self::End { end_mm } => {
+                write!(f, "an end at {end_mm} mm: expected within {} mm", Position::LIMIT_MM)
+            }
+            Self::Segment(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for JogError {}
+
+/// The items of a jog.
+#[derive(Clone, Debug)]
+pub struct Jog<const AXES: usize> {
+    axis: usize,
+    direction: Direction,
+    start: [Position; AXES],
+    length: Position,
+    ends_at_limit: bool,
+    block: Option<PathBlock>,
+    /// How far pieces and feed are given out.
+    path: Position,
+    feed: Position,
+    ramps: [Option<(Ramp<f64>, Position)>; 3],
+    is_ended: bool,
+}
+
+impl<const AXES: usize> Jog<AXES> {
+    /// A jog of `axis` from rest at `start`, at `feed_mm_s`, for ticks of `tick_s`.
+    ///
+    /// # Errors
+    /// The request is refused; nothing else fails once it is made.
+    pub fn new(
+        config: &JogAxis,
+        axis: usize,
+        start: [Position; AXES],
+        way: Way,
+        feed_mm_s: f64,
+        tick_s: f64,
+    ) -> Result<Self, JogError> {
+        let &JogAxis { feed_mm_s: most_mm_s, limits, travel } = config;
+        let &from = start.get(axis).ok_or(JogError::Axis { axis, axes: AXES })?;
+        // Written so that what is not a number is refused.
+        if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s && most_mm_s.is_finite()) {
+            return Err(JogError::Feed { feed_mm_s, most_mm_s });
+        }
+        let law = Law::new(limits).map_err(JogError::Limit)?;
+        let (direction, wanted) = match way {
+            Way::Continuous(direction) => (direction, None),
+            Way::By(by) if by > Position::ZERO => (Direction::Positive, Some(by)),
+            Way::By(by) if by < Position::ZERO => (Direction::Negative, Some(-by)),
+            Way::By(_) => return Err(JogError::NoDistance),
+        };
+        let room = travel.map(|travel| room(from, direction, travel)).transpose()?;
+        let length = match (wanted, room) {
+            (None, None) => return Err(JogError::NoTravel),
+            (Some(length), None) | (None, Some(length)) => length,
+            (Some(wanted), Some(room)) => wanted.min(room),
+        };
+        let end_mm = from.to_mm() + direction.sign() * length.to_mm();
+        if !direction.ahead(from, length).is_within_limit() || libm::fabs(end_mm) > Position::LIMIT_MM {
+            return Err(JogError::End { end_mm });
+        }
+        let block = Block { length_mm: length.to_mm(), cap_mm_s: feed_mm_s, joint_mm_s: 0.0, law };
+        let mut plans = [BlockPlan::default()];
+        // From rest to rest there always is a plan.
+        let _ = plan(&[block], 0.0, 0.0, &mut plans);
+        let [planned] = plans;
+        let made = segments::<f64, f64>(&block, &planned, Position::ZERO, length, tick_s);
+        let ramps = made.map_err(JogError::Segment)?.map(|segment| {
+            let segment = segment?;
+            Some((*segment.as_ramp(), segment.length()))
+        });
+        let allowed = |cap_mm_s| Allowed { cap_mm_s, limits };
+        Ok(Self {
+            axis,
+            direction,
+            start,
+            length,
+            ends_at_limit: room == Some(length),
+            block: Some(PathBlock::new(length, feed_mm_s, allowed(feed_mm_s), allowed(most_mm_s), 0.0)),
+            path: Position::ZERO,
+            feed: Position::ZERO,
+            ramps,
+            is_ended: false,
+        })
+    }
+
+    /// Where it ends if it is not aborted.
+    #[must_use]
+    pub fn end(&self) -> [Position; AXES] {
+        self.after(self.length)
+    }
+
+    /// Whether it ends at the soft limit.
+    #[must_use]
+    pub fn ends_at_limit(&self) -> bool {
+        self.ends_at_limit
+    }
+
+    fn after(&self, length: Position) -> [Position; AXES] {
+        let mut position = self.start;
+        if let Some(position) = position.get_mut(self.axis) {
+            *position = self.direction.ahead(*position, length);
+        }
+        position
+    }
+}
+
+/// How far it is from `from` to the soft limit ahead.
+fn room(from: Position, direction: Direction, travel: Travel) -> Result<Position, JogError> {
+    let Travel { least, greatest } = travel;
+    if least >= greatest {
+        return Err(JogError::Travel(travel));
+    }
+    let limit = match direction {
+        Direction::Positive => greatest,
+        Direction::Negative => least,
+    };
+    let room = direction.distance(from, limit);
+    if room > Position::ZERO { Ok(room) } else { Err(JogError::AtLimit { position: from, limit }) }
+}
+
+impl<const AXES: usize> Iterator for Jog<AXES> {
+    type Item = Result<Item<AXES>, Infallible>;
+
+    /// Path and feed in the order of where they start, so that whichever queue is full, the other one is as far.
+    fn next(&mut self) -> Option<Self::Item> {
+        if let Some(block) = self.block.take() {
+            return Some(Ok(Item::Block(block)));
+        }
+        if self.path < self.length && self.path <= self.feed {
+            let length = PIECE.min(self.length - self.path);
+            let start = self.after(self.path);
+            let mut direction = [0.0; AXES];
+            if let Some(direction) = direction.get_mut(self.axis) {
+                *direction = self.direction.sign();
+            }
+            self.path = self.path + length;
+            return Some(Ok(Item::Line { line: 0, start, direction, length }));
+        }
+        if let Some((ramp, length)) = self.ramps.iter_mut().find_map(Option::take) {
+            self.feed = self.feed + length;
+            return Some(Ok(Item::Feed { ramp, length }));
+        }
+        if core::mem::replace(&mut self.is_ended, true) {
+            return None;
+        }
+        Some(Ok(Item::EndOfStretch(self.end())))
+    }
+}

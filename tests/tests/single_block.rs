@@ -1,0 +1,260 @@
+//! Single block: every program block ends at rest, exactly at its end, and none is left out; at any tick, among all other
+//! commands, every tick keeps every limit.
+
+#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
+mod check;
+
+use check::bounds::Number;
+use check::live::{Command, Run, Seen, Setup, execute};
+use check::path::Path;
+use check::program::{Asked, Generated};
+use check::random::Random;
+use check::totals::Totals;
+use check::{drive, machine, program};
+use motion_host::machine::Machine;
+use motion_host::planning::{Mode, Plan};
+use motion_kernel::live::State;
+use motion_kernel::num::Fixed;
+
+/// Ends of blocks are rounded to position steps of 2⁻³² mm, here and in the plan.
+const END_MM: f64 = 1e-8;
+
+/// Where a rest is: stretches done, and the path position in the next.
+type Rest = (usize, f64);
+
+struct Case {
+    machine: Machine,
+    path: Path,
+    plan: Plan,
+    /// Where each block of the program ends.
+    ends: Vec<Rest>,
+}
+
+impl Case {
+    fn random(seed: u64, longest_ticks: f64) -> Option<Self> {
+        let mut random = Random::new(seed);
+        let machine = machine::any(&mut random);
+        let fragments = 1 + random.below(8);
+        let program = program::generate(&mut random, fragments, machine.path.feed_mm_s);
+        Self::of(&program, machine, longest_ticks)
+    }
+
+    fn of(program: &Generated, machine: Machine, longest_ticks: f64) -> Option<Self> {
+        let path = Path::new(program, &machine);
+        let plan = drive::plan(&program.text, &machine, Mode::Spanning, &mut Totals::default()).ok()??;
+        let is_short = plan.time_s / machine.tick_s <= longest_ticks;
+        let ends = block_ends(program, &path);
+        (!path.is_ambiguous && is_short && plan.length_mm > 0.0).then_some(Self { machine, path, plan, ends })
+    }
+
+    fn run<R: Number>(
+        &self,
+        seed: u64,
+        script: &mut dyn FnMut(&Seen<'_, R>) -> Option<Command>,
+    ) -> Result<Run, String> {
+        // Of the feed, the greatest override that was asked for is what holds: a rest at a block's end may be far.
+        let (plan, path, machine) = (&self.plan, &self.path, &self.machine);
+        execute::<R>(&Setup { plan, path, machine, seed, response_ticks: u64::MAX }, script)
+    }
+
+    fn is_end(&self, rest: Rest) -> bool {
+        self.ends.iter().any(|&end| is_at(rest, end))
+    }
+
+    /// Where the path of a stretch begins, from the program's start [mm].
+    fn before_mm(&self, stretch: usize) -> f64 {
+        self.path.stretches[..stretch].iter().map(|stretch| stretch.length_mm).sum()
+    }
+}
+
+fn is_at((stretch, s_mm): Rest, end: Rest) -> bool {
+    stretch == end.0 && (s_mm - end.1).abs() <= END_MM
+}
+
+fn block_ends(program: &Generated, path: &Path) -> Vec<Rest> {
+    let mut moves = path.stretches.iter().enumerate().flat_map(|(index, stretch)| {
+        stretch.moves.iter().map(move |placed| {
+            let end_mm = placed.start_mm + placed.element.length_mm;
+            let is_last = placed.block == stretch.moves[stretch.moves.len() - 1].block;
+            if is_last { (index + 1, 0.0) } else { (index, end_mm) }
+        })
+    });
+    let mut at = (0, 0.0);
+    let end = |asked: &Asked| {
+        if let Asked::Move(_) = asked {
+            at = moves.next().expect("as many moves as are asked for");
+        }
+        at
+    };
+    program.asked.iter().map(end).collect()
+}
+
+fn rest_of<R: Number>(seen: &Seen<'_, R>) -> Rest {
+    (seen.executed.stretches as usize, seen.executed.motion.s.to_mm())
+}
+
+/// In the number type of a seed.
+macro_rules! in_number {
+    ($seed:expr, $case:expr, $script:expr) => {
+        match $seed % 3 {
+            0 => $case.run::<f32>($seed, &mut |seen| $script(seen.ticks, seen.state, rest_of(seen))),
+            1 => $case.run::<f64>($seed, &mut |seen| $script(seen.ticks, seen.state, rest_of(seen))),
+            _ => $case.run::<Fixed>($seed, &mut |seen| $script(seen.ticks, seen.state, rest_of(seen))),
+        }
+    };
+}
+
+fn seeds(programs: u64) -> std::ops::Range<u64> {
+    let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
+    first..first + check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(programs)
+}
+
+/// A run, or none where only fixed point's range, which has tests of its own, is in its way.
+fn driven(seed: u64, run: Result<Run, String>) -> Option<Run> {
+    match run {
+        Ok(run) => Some(run),
+        Err(error) if error.contains("the kernel's number type") => None,
+        Err(error) => panic!("MOTION_TEST_SEED={seed}: {error}"),
+    }
+}
+
+#[test]
+fn every_block_ends_at_rest() {
+    let (mut ran, mut blocks, mut starvations, mut totals) = (0, 0, 0, Totals::default());
+    for seed in seeds(250) {
+        let Some(case) = Case::random(seed, 3_000.0) else { continue };
+        let mut rests: Vec<Rest> = Vec::new();
+        let mut waited = 0_u64;
+        let mut script = |ticks: u64, state: State, at: Rest| {
+            if ticks == 0 {
+                return Some(Command::SingleBlock(true));
+            }
+            if state != State::Held {
+                waited = 0;
+                return None;
+            }
+            // It stays until it is told to.
+            waited += 1;
+            (waited == 1 + seed % 3).then(|| {
+                rests.push(at);
+                Command::Resume
+            })
+        };
+        let run = in_number!(seed, case, script);
+        let Some(run) = driven(seed, run) else { continue };
+        assert_eq!(run.state, State::Done, "seed {seed}");
+        let (last, waited_at) = case.ends.split_last().expect("a program has blocks");
+        assert_eq!(rests.len(), waited_at.len(), "seed {seed}: {rests:?} for {waited_at:?}, then {last:?}");
+        for (index, (&rest, &end)) in rests.iter().zip(waited_at).enumerate() {
+            assert!(is_at(rest, end), "seed {seed}: block {index} ends at {rest:?}, programmed {end:?}");
+        }
+        totals.add(&run.totals);
+        blocks += case.ends.len();
+        starvations += run.starvations;
+        ran += 1;
+    }
+    println!("{ran} programs, {blocks} blocks, {starvations} stops for want of a plan; {totals}");
+    assert!(ran > 0);
+}
+
+/// Switched on before any tick, it comes to rest at the first block end behind the place that a hold in the same tick comes
+/// to rest at, or before that, if ramps ahead let it; at most one end further, where ceilings ask for it.
+#[test]
+fn it_stops_at_the_first_end_in_reach() {
+    let (mut ran, mut earlier, mut later, mut at_the_end) = (0, 0, 0, 0);
+    for seed in seeds(400) {
+        let Some(case) = Case::random(seed, 4_000.0) else { continue };
+        let ticks = case.plan.time_s / case.machine.tick_s;
+        let at = 1 + (Random::new(seed ^ 0x51_6E).unit() * ticks) as u64;
+        let hold = |ticks: u64, _, _| (ticks == at).then_some(Command::Abort);
+        let Some(held) = driven(seed, in_number!(seed, case, hold)) else { continue };
+        let mut rest = None;
+        let mut single = |ticks: u64, state: State, here: Rest| {
+            if ticks == at {
+                return Some(Command::SingleBlock(true));
+            }
+            (state == State::Held).then(|| {
+                rest = Some(here);
+                Command::Abort
+            })
+        };
+        let Some(run) = driven(seed, in_number!(seed, case, single)) else { continue };
+        ran += 1;
+        let Some(rest) = rest else {
+            // The program's last block.
+            assert_eq!(run.state, State::Done, "seed {seed}");
+            at_the_end += 1;
+            continue;
+        };
+        assert!(case.is_end(rest), "seed {seed}: at rest at {rest:?}, no block's end of {:?}", case.ends);
+        let from_start = |(stretch, s_mm): Rest| case.before_mm(stretch) + s_mm;
+        if from_start(rest) < held.s_mm - END_MM {
+            earlier += 1;
+            continue;
+        }
+        let mut in_reach: Vec<f64> = case.ends.iter().map(|&end| from_start(end)).collect();
+        in_reach.retain(|&end_mm| end_mm >= held.s_mm - END_MM);
+        in_reach.dedup_by(|a, b| (*a - *b).abs() <= END_MM);
+        let index = in_reach.iter().position(|&end_mm| (end_mm - from_start(rest)).abs() <= END_MM);
+        let index = index.unwrap_or_else(|| panic!("seed {seed}: {rest:?} is no end"));
+        if index > 0 {
+            later += 1;
+            println!("seed {seed}: at {rest:?}, {index} behind the first in reach, held at {} mm", held.s_mm);
+        }
+        assert!(index <= 1, "seed {seed}: {index} block ends were passed");
+    }
+    println!(
+        "{ran} runs, {at_the_end} in the last block; {earlier} before a hold's rest, {later} an end further"
+    );
+    assert!(ran > 0 && later * 20 <= ran, "{later} of {ran}");
+}
+
+/// Switched on and off before any tick, among holds, resumes and overrides. Where nothing is held by a command, motion
+/// waits at ends of blocks only.
+#[test]
+fn among_all_other_commands() {
+    let (mut ran, mut waits, mut totals) = (0, 0_u64, Totals::default());
+    for seed in seeds(300) {
+        let Some(case) = Case::random(seed, 3_000.0) else { continue };
+        let mut random = Random::new(seed ^ 0xB10C);
+        let often = random.log_between(2e-3, 0.3);
+        let most = if random.chance(0.5) { 1.0 } else { 2.0 };
+        let (mut is_held, mut was_single) = (false, false);
+        let mut script = |ticks: u64, state: State, at: Rest| {
+            if state == State::Held && !is_held {
+                waits += 1;
+                assert!(was_single, "seed {seed}: held by nothing");
+                assert!(case.is_end(at), "seed {seed}: waits at {at:?}, no block's end of {:?}", case.ends);
+            }
+            let command = match ticks {
+                ..40_000 if !random.chance(often) => None,
+                ..40_000 => Some(match random.below(10) {
+                    0 => Command::Hold,
+                    1..=3 => Command::Resume,
+                    4 => Command::Override(1.0),
+                    5 => Command::Override(random.between(0.05, most)),
+                    6 if random.chance(0.1) => Command::Override(0.0),
+                    7 => Command::SingleBlock(false),
+                    _ => Command::SingleBlock(true),
+                }),
+                // In the end everything is let go.
+                40_000 => Some(Command::Override(1.0)),
+                40_001 => Some(Command::SingleBlock(false)),
+                _ => Some(Command::Resume),
+            };
+            match command {
+                Some(Command::Hold) => is_held |= state != State::Held,
+                Some(Command::Resume) => is_held = false,
+                Some(Command::SingleBlock(is_single)) => was_single |= is_single,
+                _ => {}
+            }
+            command
+        };
+        let Some(run) = driven(seed, in_number!(seed, case, script)) else { continue };
+        assert_eq!(run.state, State::Done, "seed {seed}");
+        totals.add(&run.totals);
+        ran += 1;
+    }
+    println!("{ran} runs, waited in {waits} ticks; {totals}");
+    assert!(ran > 0 && waits > 0);
+}
