@@ -273,3 +273,34 @@ fn choice_of_jerk_and_times() {
     check::<f64>(&mut random);
     check::<f32>(&mut random);
 }
+
+/// Where one limit takes over from another, rounded times decide which one: peaks are beyond their limits by rounding
+/// only, which is less than the streams allow for.
+#[test]
+fn peaks_keep_their_limits_but_for_rounding() {
+    let mut random = Random::new(11);
+    let mut worst = [0.0_f64; 3];
+    for _ in 0..400_000 {
+        let accel = random.log(1.0, 2e4);
+        let snap = accel * random.log(30.0, 3e5);
+        // At times out of reach, so that acceleration takes over from snap.
+        let jerk = if random.once_in(2) { 1e9 } else { accel * random.log(3.0, 300.0) };
+        let law = Law::new(limits((accel, jerk, snap))).expect("limits");
+        let peak = jerk.min((2.0 * accel * snap / std::f64::consts::PI).sqrt());
+        let snap_s = std::f64::consts::PI * peak / snap;
+        let border =
+            if random.once_in(2) { 2.0 * accel * accel / peak } else { 0.5 * peak * snap_s * snap_s };
+        let near = (random.unit() - 0.5) * 2.0_f64.powi(-(random.below(10) as i32) - 42);
+        let ramp = Ramp::new(&law, 0.0, border * (1.0 + near));
+        let peaks = [
+            ramp.peak_accel_mm_s2() / accel,
+            ramp.peak_jerk_mm_s3 / jerk,
+            std::f64::consts::PI * ramp.peak_jerk_mm_s3 / ramp.t1_s / snap,
+        ];
+        for (worst, peak) in worst.iter_mut().zip(peaks) {
+            *worst = worst.max((peak - 1.0) / f64::EPSILON);
+        }
+    }
+    println!("beyond acceleration, jerk and snap by at most {worst:?} times the rounding of 1");
+    assert!(worst.iter().all(|&worst| worst <= 8.0), "{worst:?}");
+}

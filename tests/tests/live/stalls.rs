@@ -120,7 +120,7 @@ fn with_stalls<R: Number>(case: &Case, seed: u64, stalls: &Stalls) -> Result<Run
 
 /// Items, from pieces of a micrometre to moves of a metre, that come late at random, half of them not before motion has
 /// come to rest: each stall ends in a legal stop on the path or before motion had to brake, and motion goes on smoothly;
-/// nothing is lost, nothing repeated. The long form is `MOTION_TEST_PROGRAMS=6000`: more than 10⁵ stalls.
+/// nothing is lost, nothing repeated. The long form is `MOTION_TEST_PROGRAMS=9000`: more than 10⁵ stalls.
 #[test]
 fn late_items_are_waited_for_on_the_path() {
     let (mut runs, mut count, mut at_rest) = (Runs::default(), 0, 0);
