@@ -111,16 +111,18 @@ impl<H: Hardware> DriveEnable<AXES> for Breaking<'_, H> {
 fn script(random: &mut Random, ticks: u64) -> Script {
     let mut at: Vec<u64> = (0..1 + random.below(12)).map(|_| random.next() % ticks.max(1)).collect();
     at.sort_unstable();
-    let command = |random: &mut Random| match random.below(8) {
+    let command = |random: &mut Random| match random.below(9) {
         0 | 1 => "hold".to_owned(),
         2..=4 => "resume".to_owned(),
+        8 => if random.chance(0.5) { "single" } else { "continuous" }.to_owned(),
         5 if random.chance(0.2) => "abort".to_owned(),
         6 if random.chance(0.2) => "override=0".to_owned(),
         _ => format!("override={}", random.between(0.1, 2.0)),
     };
     let text: Vec<String> = at.iter().map(|tick| format!("{tick}:{}", command(random))).collect();
     // Whatever was held goes on in the end.
-    format!("{},{}:override=1,{}:resume", text.join(","), 2 * ticks, 2 * ticks).parse().expect("a script")
+    let last = 2 * ticks;
+    format!("{},{last}:override=1,{last}:continuous,{last}:resume", text.join(",")).parse().expect("a script")
 }
 
 /// A run as far as anybody can see it.

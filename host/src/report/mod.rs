@@ -285,6 +285,9 @@ fn feed_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> 
             "Ceilings above {top} mm/s are out of reach and not drawn; the table of blocks has them. "
         );
     }
+    if record.commands.iter().any(|command| command.feed_override.is_some_and(|share| share > 1.0)) {
+        words += "Under an override above 100 % the feed may pass a programmed ceiling, and no other. ";
+    }
     if tables::full_stops(record) > STOPS_TOLD_APART {
         words += "Where the curve fills an area, the feed falls to 0 and rises again more often than the picture resolves. ";
     }

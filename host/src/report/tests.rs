@@ -395,6 +395,7 @@ fn commands_are_marked_and_listed() {
         "feed override</li>",
         "command</li>",
         "rests by command",
+        "Under an override above 100 %",
         "&lt;b&gt;abort",
     ] {
         assert!(whole.contains(part), "{part}");

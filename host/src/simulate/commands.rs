@@ -99,6 +99,7 @@ fn asks_for_rest(command: Command) -> bool {
 fn is_ended_by(waiting: Command, command: Command) -> bool {
     match (waiting, command) {
         (Command::Hold | Command::SingleBlock(_), Command::Resume) => true,
+        (Command::SingleBlock(true), Command::SingleBlock(false)) => true,
         (Command::Override(_), Command::Override(share)) => share > 0.0,
         _ => false,
     }
@@ -164,6 +165,9 @@ mod tests {
             stops(&records("1:override=0,2:resume,4:override=1", &feeds)),
             [Some((3, 3, 0.2)), None, None]
         );
+        // Without single block again before a block's end, the program's last rest is not its.
+        assert_eq!(stops(&records("1:single,2:continuous", &feeds)), [None, None]);
+        assert_eq!(stops(&records("1:single,5:resume", &feeds)), [Some((3, 3, 0.2)), None]);
         assert_eq!(stops(&records("2:abort,2:resume", &feeds)), [Some((3, 2, 0.1)), None]);
         // What comes behind the last tick was not given.
         assert!(records("6:hold", &feeds).is_empty());
