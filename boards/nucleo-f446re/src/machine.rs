@@ -6,12 +6,17 @@
 //! not suit the board, or holds an item anywhere that could not be executed is refused before anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
+use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::program::{CheckError, Header, ProgramError, Reader, check};
 
-use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
+use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, RAMP_TICKS, TICK_S};
 
 /// Number of axes: X, Y, Z.
 pub const AXES: usize = 3;
+
+/// How faults end: nothing holds the motion of this board, so a stop on the path is a ramp.
+const REACTIONS: Reactions =
+    Reactions { ramp_ticks: RAMP_TICKS, stop_ticks: 0, emergency_stop: Reaction::Immediate };
 
 /// The program in flash: `program/stringer.bin`, the host's `stringer.ngc` for the reference machine, or what
 /// `MOTION_PROGRAM` named when this was built.
@@ -74,6 +79,7 @@ impl Machine {
             }
         }
         let axes = AxesConfig::new(axes, TICK_S).map_err(MachineError::Axes)?;
+        let axes = AxesConfig { reactions: REACTIONS, ..axes };
         check::<f32, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
         Ok(Self { program, axes })
     }

@@ -39,7 +39,8 @@ mod app {
     use cortex_m::peripheral::DWT;
     use motion_kernel::exec::ExecState;
     use motion_kernel::kernel::Kernel;
-    use nucleo_f446re::design_parameters::TICK_PRIORITY;
+    use motion_kernel::tick_monitor::TickMonitor;
+    use nucleo_f446re::design_parameters::{TICK_CYCLES, TICK_PRIORITY};
     use nucleo_f446re::liveness::Liveness;
     use nucleo_f446re::machine::{AXES, Machine, PROGRAM};
     use nucleo_f446re::tick_log::TickLog;
@@ -65,6 +66,7 @@ mod app {
         tick_timer: TickTimer,
         watchdog: IndependentWatchdog,
         liveness: Liveness,
+        monitor: TickMonitor,
         scope: PA10<Output>,
         button: PC13<Input>,
         streams: &'static mut Streams,
@@ -100,6 +102,7 @@ mod app {
             tick_timer,
             watchdog,
             liveness: Liveness::new(),
+            monitor: defmt::unwrap!(TickMonitor::new(32, TICK_CYCLES)),
             scope,
             button,
             streams: cx.local.storage,
@@ -114,7 +117,7 @@ mod app {
     #[task(
         binds = TIM7,
         priority = 16,
-        local = [hardware, tick_timer, watchdog, liveness, scope],
+        local = [hardware, tick_timer, watchdog, liveness, monitor, scope],
         shared = [control]
     )]
     fn tick(mut cx: tick::Context) {
@@ -125,7 +128,7 @@ mod app {
         cx.shared.control.lock(|control| {
             let Control { kernel, intake, flight, .. } = control;
             let fault = hardware.drives.check();
-            if let Some(kind) = fault {
+            for kind in fault.into_iter().chain(cx.local.monitor.began(begin)) {
                 kernel.trip(kind);
             }
             let trace = kernel.tick(intake, hardware);
@@ -135,6 +138,9 @@ mod app {
             control.position = trace.executed.setpoints.map(|setpoint| setpoint.position);
             if cx.local.liveness.may_feed(TURNS.load(Ordering::Relaxed)) {
                 cx.local.watchdog.feed();
+            }
+            if let Some(kind) = cx.local.monitor.ended(DWT::cycle_count()) {
+                kernel.trip(kind);
             }
             let overrun = cx.local.tick_timer.due_again();
             control.log.add(DWT::cycle_count().wrapping_sub(begin), latency_cycles, overrun);
