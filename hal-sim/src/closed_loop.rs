@@ -4,19 +4,25 @@
 //! is driven after the tick, from memory, so that a tick alone can be measured and a loop's cost is the
 //! kernel's: [`InMemory`] is what a board's interrupt would exchange with its peripherals.
 //!
-//! [`Producer::fill`] is the background's part, [`ClosedLoop::tick`] the interrupt's.
+//! [`Producer::fill`] is the background's part, [`ClosedLoop::tick`] the interrupt's. [`live`] has another background:
+//! the same program under live control.
+
+#[cfg(feature = "live")]
+pub mod live;
 
 use core::convert::Infallible;
 
 use motion_kernel::axis::{AxesConfig, AxesError, Correction, CorrectionError};
 use motion_kernel::exec::ExecState;
-use motion_kernel::hal::{Ad5754Error, Ad5754Output, DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::hal::{
+    Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel,
+};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Real;
 use motion_kernel::program::{Header, Items, ProgramError, Reader, Supply, SupplyError};
 use motion_kernel::queue::{Feeder, Intake, Streams};
 use motion_kernel::trace::Trace;
-use motion_kernel::units::{Counts, DacCode};
+use motion_kernel::units::{Counts, DacCode, Position};
 
 use crate::axis::AxisParameters;
 use crate::dac_chip::{Ad5754Chip, ChipError};
@@ -58,6 +64,16 @@ impl<const AXES: usize> Encoder<AXES> for InMemory<AXES> {
     #[inline]
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         Ok(self.counts)
+    }
+}
+
+/// Without inputs.
+impl<const AXES: usize> Inputs<AXES> for InMemory<AXES> {
+    type Error = Infallible;
+
+    #[inline]
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
+        Ok(MachineInputs::HEALTHY)
     }
 }
 
@@ -143,14 +159,9 @@ pub fn close<
     let config = &regulated(program.header());
     let config = config.as_ref().map_err(|error| *error)?;
     let &Header { tick_s, rules, start, .. } = program.header();
-    let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
-    let Ok(counts) = (&*machine).latch();
     let (feeder, intake) = streams.split(rules, start);
     let supply = Supply::new(program.items(), tick_s);
-    let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
-    let mut kernel = Kernel::new(config, start, counts);
-    kernel.enable(0);
-    Ok((Producer { feeder, supply }, ClosedLoop { kernel, intake, machine, outputs, memory }))
+    Ok((Producer { feeder, supply }, ClosedLoop::new(config, start, intake, machine)?))
 }
 
 #[inline(never)]
@@ -166,13 +177,29 @@ pub fn some_knots<R: Real, const AXES: usize>() -> [[R; AXES]; 4] {
 }
 
 impl<'a, R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'a, R, AXES, LINE> {
+    /// Over `machine`, at rest at `start`, drives enabled.
+    #[inline]
+    fn new(
+        config: &AxesConfig<R, AXES>,
+        start: [Position; AXES],
+        intake: Intake<'a, R, AXES>,
+        machine: &'a SimMachine<AXES, LINE>,
+    ) -> Result<Self, LoopError> {
+        let outputs =
+            Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
+        let Ok(counts) = (&*machine).latch();
+        let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
+        let mut kernel = Kernel::new(config, start, counts);
+        kernel.enable(0);
+        Ok(Self { kernel, intake, machine, outputs, memory })
+    }
+
     /// Corrects the second stretch by `knots`, 40 ticks from one to the next.
     ///
     /// # Errors
     /// A knot is above 4 mm/s.
     pub fn correct(&mut self, knots_mm_s: &'a [[R; AXES]]) -> Result<(), CorrectionError> {
-        self.intake.correct(Correction::new(1, knots_mm_s, 40, 4.0)?);
-        Ok(())
+        self.intake.correct(Correction::new(1, knots_mm_s, 40, 4.0)?)
     }
 
     /// One tick of the kernel and of the machine. A program stop is resumed at once.

@@ -10,7 +10,7 @@
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
 
-use motion_kernel::hal::{DriveEnable, Encoder};
+use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs};
 use motion_kernel::units::Counts;
 
 use crate::axis::{AxisParameters, SimAxis};
@@ -170,6 +170,14 @@ impl<const AXES: usize, const LINE: usize> Encoder<AXES> for &SimMachine<AXES, L
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         let mut axes = self.axes.borrow_mut();
         Ok(core::array::from_fn(|axis| axes[axis].latch()))
+    }
+}
+
+impl<const AXES: usize, const LINE: usize> Inputs<AXES> for &SimMachine<AXES, LINE> {
+    type Error = Infallible;
+
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
+        Ok(MachineInputs::HEALTHY)
     }
 }
 

@@ -11,6 +11,8 @@
 //!   planning   Program ─► Plan                    ceilings with reasons, feed over path
 //!   compare    Program ─► figures                times of its paths, beside the least there is
 //!   simulate   Plan ─► ticks                      the kernel against hal-sim
+//!   recording  a run ─► bytes ─► the same run    replay from what the kernel was told
+//!   flight     a board's log ─► TickRecord       the ticks around a fault
 //!   record     TickRecord, RunRecord              what a run leaves behind
 //!   drive      Machine ─► figures of its axes     step, harmonics, circles
 //!   identify   recordings ─► drive parameters     what an axis is, from its runs
@@ -28,6 +30,8 @@ pub mod smoothness;
 pub mod planning;
 pub mod compare;
 pub mod simulate;
+pub mod recording;
+pub mod flight;
 pub mod record;
 pub mod drive;
 pub mod identify;

@@ -2,6 +2,10 @@
 //!
 //! Filled by the simulation, read by the summary, the trace file and the report.
 
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+
 /// Axes of the machine.
 pub const AXES: usize = 3;
 
@@ -28,6 +32,8 @@ pub struct RunRecord {
     pub ticks: Vec<TickRecord>,
     /// Duration of the plan, dwells included \[s\].
     pub planned_time_s: f64,
+    /// Commands of live control, in order.
+    pub commands: Vec<CommandRecord>,
     /// Faults, in order.
     pub faults: Vec<FaultRecord>,
     /// What was accepted and not acted on, and other remarks for the reader.
@@ -35,7 +41,7 @@ pub struct RunRecord {
 }
 
 /// What the machine allows along the path. A limit of 0 is not known.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PathLimits {
     /// Greatest acceleration \[mm/s²\].
     pub accel_mm_s2: f64,
@@ -46,12 +52,12 @@ pub struct PathLimits {
 }
 
 /// One block of the plan.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlockRecord {
     /// G-code line, from 1.
     pub line: u32,
     /// "line", "arc", "helix", "blend" or "spline".
-    pub kind: &'static str,
+    pub kind: Cow<'static, str>,
     /// Where the block starts, from the program's start along the path \[mm\].
     pub start_mm: f64,
     /// Path length \[mm\].
@@ -60,7 +66,7 @@ pub struct BlockRecord {
     pub cap_mm_s: f64,
     /// What holds the feed down: what set the ceiling, or "accelerating" or "braking" where the block is too short
     /// for the feed to reach it.
-    pub cap_reason: &'static str,
+    pub cap_reason: Cow<'static, str>,
     /// Feed at the start \[mm/s\].
     pub enter_mm_s: f64,
     /// Highest feed inside \[mm/s\].
@@ -116,7 +122,7 @@ pub struct AxisTick {
 }
 
 /// A fault as recorded.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FaultRecord {
     /// Tick in which it was latched.
     pub tick: u64,
@@ -126,4 +132,30 @@ pub struct FaultRecord {
     pub fault: String,
     /// Figures.
     pub detail: String,
+}
+
+/// A command of live control as it was given, and what became of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CommandRecord {
+    /// Tick before which it was given.
+    pub tick: u64,
+    /// As in a script: "hold", "override=0.5".
+    pub command: String,
+    /// The feed override from here on, if it is one: times the program's feed.
+    pub feed_override: Option<f64>,
+    /// Path position where it was given \[mm\].
+    pub s_mm: f64,
+    /// The rest that it asked for, if that was reached before a command to go on.
+    pub stop: Option<StopRecord>,
+}
+
+/// How motion came to rest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StopRecord {
+    /// The first tick that ended at rest.
+    pub tick: u64,
+    /// From the command to the end of that tick; 0 if it was at rest already \[s\].
+    pub time_s: f64,
+    /// Along the path \[mm\].
+    pub length_mm: f64,
 }

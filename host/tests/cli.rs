@@ -5,9 +5,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use hal_sim::closed_loop::InMemory;
 use motion_host::machine::Machine;
+use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Fixed;
 use motion_kernel::program::{Reader, check};
+use motion_kernel::queue::Streams;
+use motion_kernel::recorder::{Recorder, frame_max};
+use motion_kernel::units::{Counts, DacCode, Position};
 use serde_json::Value;
 
 /// A directory of a test's own, removed afterwards.
@@ -393,6 +398,110 @@ fn run_under_live_control() {
     assert!(
         error.contains("found the command `stop`, expected hold, resume, abort or override=SHARE"),
         "{error}"
+    );
+}
+
+/// A run with commands, and one that ends in a fault: recorded, and once more from the recording alone.
+#[test]
+fn replay_of_a_recorded_run() {
+    let desk = Desk::new("replay");
+    desk.put("part.ngc", STRINGER);
+    let file = desk.stdout(&["machine"]);
+    let strict = file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.003");
+    desk.put("machine.toml", &file);
+    desk.put("strict.toml", &strict);
+    for (machine, status) in [("machine.toml", 0), ("strict.toml", 1)] {
+        let run = |arguments: &[&str]| {
+            let output = desk.motion(arguments);
+            (output.status.code(), String::from_utf8(output.stdout).expect("UTF-8"))
+        };
+        let at = "100:override=0.7,900:hold,1500:resume";
+        let recorded = run(&[
+            "run",
+            "part.ngc",
+            "--machine",
+            machine,
+            "--at",
+            at,
+            "--record",
+            "part.mrec",
+            "--trace",
+            "run.csv",
+            "--report",
+            "run.html",
+            "--json",
+        ]);
+        assert_eq!(recorded.0, Some(status));
+        // Whatever the machine and the program are by now.
+        desk.put("part.ngc", "M2\n");
+        let replayed =
+            run(&["replay", "part.mrec", "--trace", "replay.csv", "--report", "replay.html", "--json"]);
+        assert_eq!(replayed.0, Some(0));
+        assert!(desk.read("run.csv") == desk.read("replay.csv"), "the traces differ");
+        assert!(desk.read("run.html") == desk.read("replay.html"), "the reports differ");
+        let json = |text: &str| serde_json::from_str::<Value>(text).expect("JSON");
+        let (recorded, mut replayed) = (json(&recorded.1), json(&replayed.1));
+        let replay = replayed.as_object_mut().expect("an object").remove("replay").expect("a replay");
+        assert_eq!(replayed, recorded);
+        assert_eq!((&replay["identical"], &replay["difference"]), (&Value::Bool(true), &Value::Null));
+        assert!(number(&replay["ticks"]) > number(&recorded["ticks"]));
+        assert_eq!(recorded["faults"].as_array().expect("a list").len(), status as usize);
+        assert!(run(&["replay", "part.mrec"]).1.contains("\n  identical over "));
+        desk.put("part.ngc", STRINGER);
+    }
+
+    let mut bytes = fs::read(desk.0.join("part.mrec")).expect("a recording");
+    let half = bytes.len() / 2;
+    bytes[half] ^= 4;
+    fs::write(desk.0.join("damaged.mrec"), &bytes).expect("a file");
+    let refusal = desk.refusal(&["replay", "damaged.mrec", "--trace", "none.csv"]);
+    assert!(refusal.starts_with("damaged.mrec: found checksum "), "{refusal}");
+    assert!(!desk.0.join("none.csv").exists());
+    let refusal = desk.refusal(&["replay", "part.ngc"]);
+    assert!(refusal.ends_with("at its start, expected a recording, which begins with MREC"), "{refusal}");
+}
+
+/// The ticks around a fault, as a board's log has them.
+#[test]
+fn flight_of_a_boards_log() {
+    let desk = Desk::new("flight");
+    let mut log = String::from("0 INFO ready: press the blue button to start\n");
+    let mut recorder = Recorder::<f32, 3, 16, 4>::new();
+    let machine = Machine::reference();
+    let config = machine.axes_config().expect("axes");
+    let start = [Position::ZERO; 3];
+    let mut kernel = Kernel::<f32, 3>::new(&config, start, [Counts(0); 3]);
+    let mut streams = Streams::<f32, 3, 4, 4>::new();
+    let (_, mut intake) = streams.split(machine.rules(), start);
+    kernel.enable(0);
+    for tick in 0..60 {
+        // The encoder of Y jumps by 2 mm.
+        let counts = [0, if tick < 40 { 0 } else { 20_000 }, 0].map(Counts);
+        let mut board = InMemory { counts, codes: [DacCode::ZERO; 3], enabled: None };
+        recorder.add(kernel.tick(&mut intake, &mut board));
+    }
+    assert!(recorder.is_frozen());
+    for row in recorder.rows() {
+        let mut buffer = [0; frame_max(3)];
+        let bytes: Vec<_> =
+            row.to_frame(&mut buffer).expect("room").iter().map(|b| format!("{b:02x}")).collect();
+        log += &format!("{} INFO  flight [{}]\n", row.tick, bytes.join(", "));
+    }
+    desk.put("board.log", &log);
+    let said = desk.stdout(&["flight", "board.log", "--trace", "flight.csv", "--report", "flight.html"]);
+    for part in
+        ["ticks 29 to 44, 16 rows", "fault latched in tick 40", "of axis Y at most -2.0000 mm, limit 1 mm"]
+    {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let trace = desk.read("flight.csv");
+    assert_eq!(trace.lines().count(), 17);
+    assert!(trace.lines().last().expect("a row").starts_with("44,0.022000000,"), "{trace}");
+    assert!(desk.read("flight.html").contains("fault latched"));
+    desk.put("short.log", log.lines().next().expect("a line"));
+    assert_eq!(
+        desk.refusal(&["flight", "short.log"]),
+        "short.log: found no frame, expected lines with `flight […]`"
     );
 }
 

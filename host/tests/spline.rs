@@ -496,7 +496,7 @@ fn a_spline_runs_as_it_was_programmed() {
     assert!(pieces.count >= spline.spans().len());
     assert!(pieces.deviation.position_mm <= 1.25 * POSITION_TOLERANCE_MM);
     assert!(pieces.deviation.feed <= 1.25 * FEED_TOLERANCE);
-    assert_eq!((plan.blocks[0].kind, plan.blocks[0].line), ("spline", 5));
+    assert_eq!((&*plan.blocks[0].kind, plan.blocks[0].line), ("spline", 5));
     assert_eq!(plan.blocks.last().map(|block| block.line), Some(25));
     // One stretch: no knot is a stop.
     assert_eq!(plan.items.len(), 1);
@@ -520,7 +520,7 @@ fn a_spline_runs_as_it_was_programmed() {
     let moved: Vec<Vector> = points.iter().map(|&point| plus(point, [5.0, 6.0, 0.0])).collect();
     let spline = fit(&moved, &parameters, Degree::Quintic, 0.0).expect("a spline");
     let (plan, _) = plan_spline("points", &spline, &lines, 20.0, &machine).expect("a plan");
-    assert_eq!((plan.blocks[0].kind, plan.blocks[0].line), ("line", 2));
+    assert_eq!((&*plan.blocks[0].kind, plan.blocks[0].line), ("line", 2));
     let summary = simulate::run(&plan, &machine, &mut |_| ()).expect("a run");
     assert!(summary.faults.is_empty(), "{:?}", summary.faults);
 }

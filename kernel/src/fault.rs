@@ -29,13 +29,15 @@ pub enum FaultKind<R> {
     },
     /// The encoders could not be read.
     Encoder,
+    /// The digital inputs could not be read.
+    Inputs,
     /// The converter could not be written.
     Output,
     /// The drives could not be enabled or disabled.
     Enable,
-    /// The emergency stop is open. Reported by the board, see [`Kernel::trip`](crate::kernel::Kernel::trip).
+    /// The emergency stop is open.
     EmergencyStop,
-    /// A drive reports a fault. Reported by the board.
+    /// A drive reports a fault.
     Drive {
         /// The axis, from 0.
         axis: usize,

@@ -1,7 +1,7 @@
 //! The rooms assembled: one call a tick.
 //!
 //! ```text
-//! encoders ─► latch ─► executor ─► axis regulators ─► converter codes ─► outputs
+//! encoders, inputs ─► latch ─► executor ─► axis regulators ─► converter codes ─► outputs
 //! ```
 //!
 //! The kernel starts disabled and does nothing to the drives until [`Kernel::enable`]; then it holds the
@@ -14,7 +14,7 @@
 use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Preview};
 use crate::exec::{ExecState, Executor};
 use crate::fault::{Fault, FaultKind};
-use crate::hal::{DriveEnable, Encoder, VelocityChannel};
+use crate::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use crate::num::Real;
 use crate::queue::Intake;
 use crate::trace::Trace;
@@ -60,7 +60,9 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
         let executor = Executor::new(position);
         // The first tick is number 0.
-        let trace = Trace { tick: u64::MAX, executed: executor.resting(), axes: outputs, fault: None };
+        let executed = executor.resting();
+        let trace =
+            Trace { tick: u64::MAX, executed, axes: outputs, inputs: MachineInputs::HEALTHY, fault: None };
         Self {
             config: *config,
             executor,
@@ -97,11 +99,11 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.latch_fault_in(self.trace.tick.wrapping_add(1), kind);
     }
 
-    /// One control tick: reads the encoders, executes the streams, regulates every axis, writes the
+    /// One control tick: reads the encoders and inputs, executes the streams, regulates every axis, writes the
     /// outputs. Call it from the tick's interrupt and nowhere else. What it did stays readable until the next.
     pub fn tick<H>(&mut self, intake: &mut Intake<'_, R, AXES>, hal: &mut H) -> &Trace<R, AXES>
     where
-        H: Encoder<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
+        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
     {
         self.trace.tick = self.trace.tick.wrapping_add(1);
         match hal.latch() {
@@ -111,6 +113,15 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
                 }
             }
             Err(_) => self.latch_fault(FaultKind::Encoder),
+        }
+        match hal.read_inputs() {
+            Ok(inputs) => {
+                self.trace.inputs = inputs;
+                if !inputs.is_healthy() {
+                    self.judge_inputs();
+                }
+            }
+            Err(_) => self.latch_fault(FaultKind::Inputs),
         }
         self.execute(intake);
         self.regulate(intake);
@@ -169,6 +180,18 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
         if self.power == Power::Off {
             self.stand_still();
+        }
+    }
+
+    /// Latches what the inputs report.
+    #[cold]
+    fn judge_inputs(&mut self) {
+        let inputs = &self.trace.inputs;
+        let faulty = inputs.axes.iter().position(|axis| axis.is_fault());
+        if inputs.emergency_stop {
+            self.latch_fault(FaultKind::EmergencyStop);
+        } else if let Some(axis) = faulty {
+            self.latch_fault(FaultKind::Drive { axis });
         }
     }
 

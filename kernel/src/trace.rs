@@ -4,6 +4,7 @@ use crate::axis::AxisOutput;
 use crate::exec::ExecState;
 use crate::exec::Executed;
 use crate::fault::Fault;
+use crate::hal::MachineInputs;
 use crate::num::Scalar;
 
 /// One tick of the whole kernel.
@@ -15,6 +16,8 @@ pub struct Trace<R, const AXES: usize> {
     pub executed: Executed<R, AXES>,
     /// What the encoders read, actual values and outputs. In a fault the outputs are 0 V.
     pub axes: [AxisOutput<R>; AXES],
+    /// The digital inputs as the tick read them.
+    pub inputs: MachineInputs<AXES>,
     /// The latched fault, if there is one.
     pub fault: Option<Fault<R>>,
 }

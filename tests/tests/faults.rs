@@ -11,7 +11,7 @@ use motion_host::simulate::rig::Rig;
 use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::{ExecFault, ExecState};
 use motion_kernel::fault::FaultKind;
-use motion_kernel::hal::{DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::queue::{Feeder, Intake, Streams};
 use motion_kernel::units::{Counts, DacCode, Position};
@@ -22,6 +22,8 @@ struct Bench {
     counts: [Counts; 2],
     written: [DacCode; 2],
     is_enabled: bool,
+    inputs: MachineInputs<2>,
+    inputs_fail: bool,
     encoder_fails: bool,
     output_fails: bool,
     enable_fails: bool,
@@ -33,6 +35,13 @@ impl Encoder<2> for Bench {
     type Error = Failure;
     fn latch(&mut self) -> Result<[Counts; 2], Failure> {
         if self.encoder_fails { Err(Failure) } else { Ok(self.counts) }
+    }
+}
+
+impl Inputs<2> for Bench {
+    type Error = Failure;
+    fn read_inputs(&mut self) -> Result<MachineInputs<2>, Failure> {
+        if self.inputs_fail { Err(Failure) } else { Ok(self.inputs) }
     }
 }
 
@@ -195,6 +204,29 @@ fn encoder() {
 #[test]
 fn output() {
     provoke(|b| b.output_fails = true, |b| b.output_fails = false, |k| matches!(k, FaultKind::Output));
+}
+
+#[test]
+fn inputs() {
+    provoke(|b| b.inputs_fail = true, |b| b.inputs_fail = false, |k| matches!(k, FaultKind::Inputs));
+}
+
+#[test]
+fn emergency_stop() {
+    provoke(
+        |b| b.inputs.emergency_stop = true,
+        |b| b.inputs.emergency_stop = false,
+        |k| matches!(k, FaultKind::EmergencyStop),
+    );
+}
+
+#[test]
+fn drive_fault() {
+    provoke(
+        |b| b.inputs.axes[1] = AxisInputs::HEALTHY.with_fault(true),
+        |b| b.inputs.axes[1] = AxisInputs::HEALTHY,
+        |k| matches!(k, FaultKind::Drive { axis: 1 }),
+    );
 }
 
 /// The first tick can't enable the drives: no motion with them off.

@@ -74,7 +74,7 @@ fn planned(machine: &Machine) -> Plan {
 fn reasons_are_the_papers() {
     let machine = Machine::reference();
     let plan = planned(&machine);
-    let reasons: Vec<_> = plan.blocks.iter().map(|block| block.cap_reason).collect();
+    let reasons: Vec<_> = plan.blocks.iter().map(|block| &*block.cap_reason).collect();
     assert_eq!(reasons, ["programmed", "jerk", "acceleration", "jerk", "braking"]);
     // Every ceiling but the last block's is reached, the arcs' at both ends of N2 and N4.
     for block in &plan.blocks[..4] {

@@ -1,6 +1,7 @@
 //! The background: start button, streams, log.
 //!
-//! Consumes the button and what the tick has left in [`Control`]; produces items for the streams. Runs in what
+//! Consumes the button and what the tick has left in [`Control`]; produces items for the streams, and in a fault what
+//! the flight recorder kept, into the log. Runs in what
 //! the ticks leave of the processor, one turn after each tick, for ever.
 //!
 //! Its turn begins right behind a tick, with what keeps interrupts off: taking figures out of [`Control`], at
@@ -17,8 +18,11 @@ use defmt::{error, info, warn};
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Fault;
 use motion_kernel::queue::Feeder;
+use motion_kernel::recorder::frame_max;
 use motion_kernel::units::Position;
-use nucleo_f446re::design_parameters::{BUTTON_TICKS, REPORT_TICKS, SETTLE_TICKS, SYSCLK_HZ};
+use nucleo_f446re::design_parameters::{
+    BUTTON_TICKS, FLIGHT_LINE_TICKS, REPORT_TICKS, SETTLE_TICKS, SYSCLK_HZ,
+};
 use nucleo_f446re::machine::{AXES, Machine};
 use nucleo_f446re::program::{Run, RunError};
 use nucleo_f446re::tick_log::TickLog;
@@ -67,6 +71,7 @@ pub(crate) fn run(
     let mut phase = Phase::Ready(streams);
     let mut press = Press::default();
     let mut report = Report::default();
+    let mut dump = Dump::default();
     info!("ready: press the blue button to start");
     loop {
         wait_for_tick();
@@ -83,7 +88,9 @@ pub(crate) fn run(
         let before = core::mem::discriminant(&phase);
         phase = turn(phase, seen, pressed, machine, &mut control);
         // A change of phase has had its line.
-        if core::mem::discriminant(&phase) == before && !pressed {
+        let may_log = core::mem::discriminant(&phase) == before && !pressed;
+        let is_stopped = matches!(phase, Phase::Stopped);
+        if may_log && !(is_stopped && dump.line(&mut control)) {
             report.line(&mut control);
         }
         phase = feed(phase, &mut control);
@@ -147,7 +154,10 @@ fn start(
         return Phase::Ready(streams);
     }
     // With the faults of a machine that was not ready yet.
-    let here = control.lock(|control| control.kernel.clear_fault());
+    let here = control.lock(|control| {
+        control.flight.clear();
+        control.kernel.clear_fault()
+    });
     let (feeder, intake) = streams.split(machine.header().rules, here);
     control.lock(|control| {
         control.intake = intake;
@@ -201,6 +211,33 @@ impl Press {
     fn is_new(&mut self, down: bool) -> bool {
         self.ticks = if down { self.ticks.saturating_add(1) } else { 0 };
         self.ticks == BUTTON_TICKS
+    }
+}
+
+/// What the flight recorder kept of a fault, into the log, a row a line.
+#[derive(Default)]
+struct Dump {
+    rows: usize,
+    ticks: u32,
+}
+
+impl Dump {
+    /// Whether it has logged a line. Once a turn.
+    fn line(&mut self, control: &mut impl Mutex<T = Control>) -> bool {
+        self.ticks = self.ticks.saturating_add(1);
+        if self.ticks < FLIGHT_LINE_TICKS {
+            return false;
+        }
+        self.ticks = 0;
+        let row = control.lock(|control| {
+            let flight = &control.flight;
+            if flight.is_frozen() { flight.row(self.rows).copied() } else { None }
+        });
+        let mut buffer = [0; frame_max(AXES)];
+        let Some(frame) = row.as_ref().and_then(|row| row.to_frame(&mut buffer)) else { return false };
+        self.rows += 1;
+        info!("flight {=[u8]:02x}", frame);
+        true
     }
 }
 

@@ -6,12 +6,17 @@
 use motion_kernel::exec::ExecState;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::queue::Intake;
+use motion_kernel::recorder::Recorder;
 use motion_kernel::units::Position;
+use nucleo_f446re::design_parameters::{FLIGHT_AFTER, FLIGHT_ROWS};
 use nucleo_f446re::machine::AXES;
 use nucleo_f446re::tick_log::TickLog;
 
 /// The streams: 63 pieces and 63 segments, 17 KiB.
 pub(crate) type Streams = motion_kernel::queue::Streams<f32, AXES, 64, 64>;
+
+/// The last ticks, and some behind a fault.
+pub(crate) type Flight = Recorder<f32, AXES, FLIGHT_ROWS, FLIGHT_AFTER>;
 
 /// Shared by tick and background. `pub` because RTIC makes a public proxy of it.
 pub struct Control {
@@ -25,4 +30,5 @@ pub struct Control {
     /// The inputs allow a start.
     pub(crate) healthy: bool,
     pub(crate) log: TickLog,
+    pub(crate) flight: &'static mut Flight,
 }

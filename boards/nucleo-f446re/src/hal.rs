@@ -1,10 +1,10 @@
-//! The kernel's three traits on this board's hardware.
+//! The kernel's four traits on this board's hardware.
 //!
-//! In the tick. Encoders and enables can't fail; the converter fails with its bus.
+//! In the tick. Encoders and enables can't fail, inputs it has none; the converter fails with its bus.
 
 use core::convert::Infallible;
 
-use motion_kernel::hal::{DriveEnable, Encoder, VelocityChannel};
+use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::units::{Counts, DacCode};
 use nucleo_f446re::machine::AXES;
 
@@ -24,6 +24,14 @@ impl Encoder<AXES> for Hardware {
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         Ok(self.encoders.latch())
+    }
+}
+
+impl Inputs<AXES> for Hardware {
+    type Error = Infallible;
+
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
+        Ok(MachineInputs::HEALTHY)
     }
 }
 

@@ -48,7 +48,7 @@ mod app {
 
     use crate::background::{self, TICKS, TURNS};
     use crate::board::Board;
-    use crate::control::{Control, Streams};
+    use crate::control::{Control, Flight, Streams};
     use crate::hal::Hardware;
     use crate::tick_timer::TickTimer;
 
@@ -73,6 +73,7 @@ mod app {
 
     #[init(local = [
         storage: Streams = Streams::new(),
+        flight: Flight = Flight::new(),
         // Nothing ever enters it: what the kernel looks at until there is a program.
         empty: motion_kernel::queue::Streams<f32, AXES, 2, 2> = motion_kernel::queue::Streams::new(),
     ])]
@@ -91,6 +92,7 @@ mod app {
             position: start,
             healthy: false,
             log: TickLog::new(),
+            flight: cx.local.flight,
         };
         Board::start(&mut tick_timer, &mut watchdog);
         let local = Local {
@@ -121,12 +123,13 @@ mod app {
         let hardware = cx.local.hardware;
         cx.local.scope.set_high();
         cx.shared.control.lock(|control| {
-            let Control { kernel, intake, .. } = control;
+            let Control { kernel, intake, flight, .. } = control;
             let fault = hardware.drives.check();
             if let Some(kind) = fault {
                 kernel.trip(kind);
             }
             let trace = kernel.tick(intake, hardware);
+            flight.add(trace);
             control.healthy = fault.is_none();
             control.state = trace.executed.state;
             control.position = trace.executed.setpoints.map(|setpoint| setpoint.position);

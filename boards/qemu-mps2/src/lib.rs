@@ -8,9 +8,13 @@
 //! | thumbv7em-none-eabihf | mps2-an386 (M4F), mps2-an500 (M7) | f32 |
 //! | thumbv7m-none-eabi | mps2-an385 (M3) | fixed point, or f32 in software (feature `soft-float`) |
 //! | thumbv6m-none-eabi | microbit (M0) | fixed point |
+//!
+//! Feature `live` adds live control, which the microbit has no room for.
 #![no_std]
 
 pub mod count;
+#[cfg(feature = "live")]
+pub mod live;
 pub mod programs;
 pub mod stack;
 

@@ -1,10 +1,9 @@
 //! `motion` alone: the stringer flange through plan, kernel and simulated machine.
 
 use std::io::Write;
-use std::path::Path;
 
 use super::error::{CliError, Outcome};
-use super::input::Output;
+use super::outputs::Outputs;
 use super::{plan, run};
 use crate::gcode;
 use crate::machine::Machine;
@@ -25,7 +24,7 @@ pub fn demonstrate(out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = Machine::reference();
     let program = gcode::read(STRINGER_NAME, STRINGER.as_bytes())?;
     let plan = plan_program(STRINGER_NAME, &program, &machine, Mode::Spanning)?;
-    let report = Output::create(Path::new(REPORT))?;
+    let outputs = Outputs::create(&None, &Some(REPORT.into()))?;
     let mut say = |text: &str| writeln!(out, "{text}").map_err(CliError::Output);
     say("Demonstration: a stringer flange, 5000 mm/min, on the reference machine.\n")?;
     for line in STRINGER.lines() {
@@ -33,7 +32,7 @@ pub fn demonstrate(out: &mut dyn Write) -> Result<Outcome, CliError> {
     }
     say("\nPlan: what limits the feed\n")?;
     plan::write_plan(&plan, out).map_err(CliError::Output)?;
-    let summary = run::execute(&RunOptions::default(), &plan, &machine, None, Some(report))?;
+    let summary = run::execute(&RunOptions::default(), &plan, &machine, outputs, None)?;
     let mut say = |text: &str| writeln!(out, "{text}").map_err(CliError::Output);
     say("\nRun: the real-time kernel on simulated axes\n")?;
     run::write_summary(&summary, out).map_err(CliError::Output)?;

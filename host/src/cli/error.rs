@@ -6,10 +6,12 @@ use std::process::ExitCode;
 use thiserror::Error;
 
 use crate::drive::DriveError;
+use crate::flight::FlightError;
 use crate::gcode::GcodeError;
 use crate::machine::{AxisError, MachineError};
 use crate::planning::PlanningError;
 use crate::points::PointsError;
+use crate::recording::RecordingError;
 use crate::simulate::RunError;
 use crate::toolpath::spline::SplineError;
 use crate::tuning::TuningError;
@@ -91,6 +93,22 @@ pub enum CliError {
         program: String,
         /// Why.
         source: RunError,
+    },
+    /// The file is no recording.
+    #[error("{path}: {source}")]
+    Recording {
+        /// As the user gave it.
+        path: String,
+        /// Why.
+        source: RecordingError,
+    },
+    /// The log has no good frames of a flight recorder.
+    #[error("{path}{source}")]
+    Flight {
+        /// As the user gave it.
+        path: String,
+        /// Why.
+        source: FlightError,
     },
     /// The drive experiment can't be made, or a fault ended it.
     #[error(transparent)]

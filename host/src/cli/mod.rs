@@ -8,26 +8,31 @@
 //! - [`plan`]: the feed plan of a program or a block list;
 //! - [`compare`]: the times of programs, exact and blended, beside the least there is;
 //! - [`run`]: a program through plan, kernel and simulated machine;
+//! - [`replay`]: a recorded run once more;
+//! - [`flight`]: the ticks around a fault, from a board's log;
 //! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
 //! - [`machine`]: the reference machine's file, and what its keys mean;
 //! - [`demo`]: what `motion` alone does;
 //! - [`error`]: errors and exit statuses;
-//! - `input`, `table`, `trace`, `progress`: what the commands share.
+//! - `input`, `outputs`, `table`, `trace`, `progress`: what the commands share.
 
 pub mod compare;
 pub mod compile;
 pub mod demo;
 pub mod drive;
 pub mod error;
+pub mod flight;
 pub mod machine;
 pub mod plan;
 pub mod profile;
+pub mod replay;
 pub mod run;
 pub mod spline;
 
 mod input;
+mod outputs;
 mod progress;
 mod table;
 mod trace;
@@ -43,6 +48,7 @@ const EXAMPLES: &str = "\
 Examples:
   motion                                         the built-in demonstration; writes stringer.html
   motion run part.ngc --report part.html         run a program, look at what the axes did
+  motion replay part.mrec                        a recorded run once more, to the same bits
   motion plan part.ngc                           what limits the feed, block by block
   motion compare parts/                          how long programs take, exact and blended
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
@@ -67,6 +73,8 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(run::RunArguments),
+    Replay(replay::ReplayArguments),
+    Flight(flight::FlightArguments),
     Plan(plan::PlanArguments),
     Compare(compare::CompareArguments),
     Profile(profile::ProfileArguments),
@@ -99,6 +107,8 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
     match &cli.command {
         None => demo::demonstrate(out),
         Some(Command::Run(arguments)) => run::run(arguments, out),
+        Some(Command::Replay(arguments)) => replay::replay(arguments, out),
+        Some(Command::Flight(arguments)) => flight::flight(arguments, out),
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
         Some(Command::Compare(arguments)) => compare::compare(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),

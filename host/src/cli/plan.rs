@@ -48,19 +48,19 @@ pub struct PlanArguments {
 struct PlanJson<'plan> {
     time_s: f64,
     length_mm: f64,
-    blocks: Vec<BlockJson>,
+    blocks: Vec<BlockJson<'plan>>,
     feed: Vec<FeedJson>,
     notices: &'plan [String],
 }
 
 #[derive(Serialize)]
-struct BlockJson {
+struct BlockJson<'plan> {
     line: u32,
-    kind: &'static str,
+    kind: &'plan str,
     start_mm: f64,
     length_mm: f64,
     cap_mm_s: f64,
-    cap_reason: &'static str,
+    cap_reason: &'plan str,
     enter_mm_s: f64,
     peak_mm_s: f64,
     exit_mm_s: f64,
@@ -106,14 +106,14 @@ pub fn plan(arguments: &PlanArguments, out: &mut dyn Write) -> Result<Outcome, C
     Ok(Outcome::Done)
 }
 
-fn json(plan: &Plan) -> PlanJson<'_> {
-    let block = |block: &BlockRecord| BlockJson {
+fn json<'plan>(plan: &'plan Plan) -> PlanJson<'plan> {
+    let block = |block: &'plan BlockRecord| BlockJson {
         line: block.line,
-        kind: block.kind,
+        kind: &block.kind,
         start_mm: block.start_mm,
         length_mm: block.length_mm,
         cap_mm_s: block.cap_mm_s,
-        cap_reason: block.cap_reason,
+        cap_reason: &block.cap_reason,
         enter_mm_s: block.enter_mm_s,
         peak_mm_s: block.peak_mm_s,
         exit_mm_s: block.exit_mm_s,
@@ -157,10 +157,10 @@ pub(super) fn write_plan(plan: &Plan, out: &mut dyn Write) -> io::Result<()> {
         [
             (index + 1).to_string(),
             if block.line == 0 { "–".to_owned() } else { block.line.to_string() },
-            block.kind.to_owned(),
+            block.kind.to_string(),
             format!("{:.4}", block.length_mm),
             format!("{:.3}", block.cap_mm_s),
-            block.cap_reason.to_owned(),
+            block.cap_reason.to_string(),
             format!("{:.3}", block.enter_mm_s),
             format!("{:.3}", block.peak_mm_s),
             format!("{:.3}", block.exit_mm_s),

@@ -8,17 +8,16 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::input::{self, Output};
-use super::progress::Progress;
+use super::outputs::{self, Outputs};
 use super::table::{self, Align};
-use super::trace::TraceWriter;
 use super::write_json;
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
-use crate::record::{FaultRecord, PathLimits, RunRecord, TickRecord};
-use crate::report;
+use crate::record::{CommandRecord, FaultRecord};
+use crate::recording::Recorder;
 use crate::simulate::live::Script;
-use crate::simulate::{self, AxisSummary, RunOptions, RunSummary};
+use crate::simulate::{self, AxisSummary, Job, RunError, RunOptions, RunSummary};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -28,6 +27,7 @@ Examples:
                                                      every tick of every axis, for a spreadsheet
   motion run part.ngc --at 2000:hold,2600:resume,3000:override=0.5
                                                      with commands given before those ticks
+  motion run part.ngc --record part.mrec             and everything that `motion replay` needs to run it again
   generate-part | motion run - --json                for a script
 
 Exit status 1: the run ended in a fault; the summary, the trace and the report are written all the same.";
@@ -48,6 +48,9 @@ pub struct RunArguments {
     /// Write a self-contained HTML page about the run; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    /// Write what the kernel was told, tick by tick, for `motion replay`; an existing file is replaced.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
     /// Live control: commands before given ticks, such as `2000:hold,2600:resume,3000:override=0.5`.
     ///
     /// A command is `hold` (come to rest on the path), `resume`, `abort` (come to rest and give up the rest) or
@@ -68,86 +71,48 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let source = input::read(&arguments.program)?;
     let program = gcode::read(&source.name, &source.text)?;
     let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;
-    // Opened before the run: a wrong path should not cost the user a long one.
-    let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
-    let report = arguments.report.as_deref().map(Output::create).transpose()?;
+    let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
+    let record = arguments.record.as_deref().map(Output::create).transpose()?;
     let options = RunOptions { script: arguments.at.as_ref(), ..RunOptions::default() };
-    let summary = execute(&options, &plan, &machine, trace, report)?;
+    let summary = execute(&options, &plan, &machine, outputs, record)?;
     if arguments.json {
         write_json(&json(&summary), out)?;
     } else {
         write_summary(&summary, out).map_err(CliError::Output)?;
-        for (what, path) in [("trace", &arguments.trace), ("report", &arguments.report)] {
-            if let Some(path) = path {
-                writeln!(out, "  {what} written to {}", path.display()).map_err(CliError::Output)?;
-            }
-        }
+        let files =
+            [("trace", &arguments.trace), ("report", &arguments.report), ("recording", &arguments.record)];
+        outputs::say_written(&files, out)?;
     }
     Ok(if summary.faults.is_empty() { Outcome::Done } else { Outcome::Failed })
 }
 
-/// Runs a plan; writes the trace as it goes and the report afterwards.
+/// Runs a plan; writes the trace as it goes, report and recording afterwards.
 pub(super) fn execute(
     options: &RunOptions<'_>,
     plan: &Plan,
     machine: &Machine,
-    trace: Option<Output>,
-    report: Option<Output>,
+    outputs: Outputs,
+    record: Option<Output>,
 ) -> Result<RunSummary, CliError> {
-    let unwritten = |path: &str| {
-        let path = path.to_owned();
-        move |source| CliError::Write { path, source }
+    let refused = |source: RunError| CliError::Run { program: plan.source.clone(), source };
+    let job = Job::new(options, plan, machine).map_err(refused)?;
+    let Some(mut record) = record else {
+        let run = |observe: &mut simulate::Observer<'_>| {
+            simulate::on_simulated(machine, |rig| simulate::run_on(&job, rig, observe))
+        };
+        return outputs.of_run(&job, run, |summary| summary);
     };
-    let trace_name = trace.as_ref().map_or_else(String::new, |output| output.name.clone());
-    let mut trace = match trace {
-        Some(output) => Some(TraceWriter::new(output.file, machine).map_err(unwritten(&trace_name))?),
-        None => None,
+    let run = |observe: &mut simulate::Observer<'_>| {
+        simulate::on_simulated(machine, |rig| {
+            let mut recorder = Recorder::new(rig);
+            let summary = simulate::run_on(&job, &mut recorder, observe)?;
+            Ok((summary, recorder.finish(&job)))
+        })
     };
-    // Only a report needs all the ticks at once.
-    let mut ticks: Vec<TickRecord> = Vec::new();
-    let mut progress = Progress::new((plan.time_s / machine.tick_s) as u64);
-    let ran = simulate::run_with(options, plan, machine, &mut |tick| {
-        if let Some(trace) = &mut trace {
-            trace.add(tick);
-        }
-        if report.is_some() {
-            ticks.push(*tick);
-        }
-        progress.tick();
-    });
-    progress.finish();
-    if let Some(trace) = trace {
-        trace.finish().map_err(unwritten(&trace_name))?;
-    }
-    let summary = ran.map_err(|source| CliError::Run { program: plan.source.clone(), source })?;
-    if let Some(mut output) = report {
-        let record = record(plan, machine, &summary, ticks);
-        report::write_html(&record, &mut output.file)
-            .and_then(|()| output.file.flush())
-            .map_err(unwritten(&output.name))?;
-    }
+    let (summary, recording) = outputs.of_run(&job, run, |(summary, _)| summary)?;
+    let written = record.file.write_all(&recording.to_bytes()).and_then(|()| record.file.flush());
+    written.map_err(|source| CliError::Write { path: record.name, source })?;
     Ok(summary)
-}
-
-fn record(plan: &Plan, machine: &Machine, summary: &RunSummary, ticks: Vec<TickRecord>) -> RunRecord {
-    RunRecord {
-        program: plan.source.clone(),
-        machine: machine.name.clone(),
-        tick_s: machine.tick_s,
-        limits: PathLimits {
-            accel_mm_s2: machine.path.accel_mm_s2,
-            jerk_mm_s3: machine.path.jerk_mm_s3,
-            snap_mm_s4: machine.path.snap_mm_s4,
-        },
-        axis_names: machine.axes.each_ref().map(|axis| axis.name.clone()),
-        following_error_limit_um: machine.axes.each_ref().map(|axis| axis.following_error_limit_mm * 1e3),
-        end_error_counts: summary.axes.each_ref().map(|axis| axis.end_error_counts),
-        blocks: plan.blocks.clone(),
-        ticks,
-        planned_time_s: plan.time_s,
-        faults: summary.faults.clone(),
-        notices: summary.notices.clone(),
-    }
 }
 
 #[derive(Serialize)]
@@ -161,6 +126,7 @@ pub(super) struct RunJson<'run> {
     limit_active_share: f64,
     axes: Vec<AxisJson<'run>>,
     contour_error_um_max: f64,
+    commands: &'run [CommandRecord],
     faults: Vec<FaultJson<'run>>,
     notices: &'run [String],
 }
@@ -219,6 +185,7 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         limit_active_share: summary.limit_active_share,
         axes: summary.axes.iter().map(axis).collect(),
         contour_error_um_max: summary.contour_error_um_max,
+        commands: &summary.commands,
         faults: summary.faults.iter().map(fault).collect(),
         notices: &summary.notices,
     }
@@ -264,8 +231,15 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
         })
         .collect();
     table::write(&columns, &rows, out)?;
-    if !(summary.faults.is_empty() && summary.notices.is_empty()) {
+    if !(summary.commands.is_empty() && summary.faults.is_empty() && summary.notices.is_empty()) {
         writeln!(out)?;
+    }
+    for CommandRecord { tick, command, s_mm, stop, .. } in &summary.commands {
+        write!(out, "  {command} before tick {tick} ({:.4} s, {s_mm:.4} mm)", *tick as f64 * tick_s)?;
+        match stop {
+            Some(stop) => writeln!(out, ": at rest after {:.4} s and {:.4} mm", stop.time_s, stop.length_mm)?,
+            None => writeln!(out)?,
+        }
     }
     for FaultRecord { tick, axis, fault, detail } in &summary.faults {
         let axis = axis.as_ref().map_or_else(String::new, |name| format!(" of axis {name}"));

@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 
 use super::csv_failure;
-use crate::machine::Machine;
 use crate::record::TickRecord;
+use crate::simulate::Sheet;
 
 /// Columns of the path, then seven of each axis.
 const PATH_COLUMNS: [&str; 8] = ["tick", "t_s", "s_mm", "v_mm_s", "a_mm_s2", "j_mm_s3", "state", "line"];
@@ -31,18 +31,18 @@ pub(super) struct TraceWriter<W: Write> {
 
 impl<W: Write> TraceWriter<W> {
     /// Writes the header.
-    pub(super) fn new(out: W, machine: &Machine) -> io::Result<Self> {
+    pub(super) fn new(out: W, sheet: &Sheet) -> io::Result<Self> {
         let mut csv = csv::Writer::from_writer(out);
         for column in PATH_COLUMNS {
             csv.write_field(column).map_err(csv_failure)?;
         }
-        for axis in &machine.axes {
+        for axis in &sheet.axes {
             for column in AXIS_COLUMNS {
                 csv.write_field(format!("{}_{column}", axis.name)).map_err(csv_failure)?;
             }
         }
         csv.write_record(None::<&[u8]>).map_err(csv_failure)?;
-        Ok(Self { csv, tick_s: machine.tick_s, field: Vec::new(), failure: None })
+        Ok(Self { csv, tick_s: sheet.tick_s, field: Vec::new(), failure: None })
     }
 
     /// Adds a row. A failure is kept for [`Self::finish`]: a run is not stopped for it.
@@ -95,12 +95,14 @@ impl<W: Write> TraceWriter<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::Machine;
     use crate::record::{AXES, AxisTick};
 
     #[test]
     fn header_and_row() {
         let mut text = Vec::new();
-        let mut trace = TraceWriter::new(&mut text, &Machine::reference()).expect("memory");
+        let mut trace =
+            TraceWriter::new(&mut text, &Sheet::of_machine(&Machine::reference())).expect("memory");
         let axis = AxisTick { set_mm: 7_999.999_999_999_8, act_mm: -0.1, ..AxisTick::default() };
         trace.add(&TickRecord {
             tick: 3,

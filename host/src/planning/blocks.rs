@@ -113,11 +113,11 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
         let (plan, time_s) = profile.over(start_mm, end_mm);
         records.push(BlockRecord {
             line: 0,
-            kind: "block",
+            kind: "block".into(),
             start_mm,
             length_mm: block.length_mm,
             cap_mm_s: block.cap_mm_s,
-            cap_reason: plan.reason(block, Reason::Programmed).name(),
+            cap_reason: plan.reason(block, Reason::Programmed).name().into(),
             enter_mm_s: plan.enter_mm_s,
             peak_mm_s: plan.peak_mm_s,
             exit_mm_s: plan.exit_mm_s,

@@ -71,16 +71,26 @@ impl Executable {
     /// The program with the machine it was planned for, as bytes for a board without live control: without blocks.
     #[must_use]
     pub fn to_bytes(&self, machine: &Machine) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        // Entries of three axes fit the format.
-        write(&machine.header(), &self.without_blocks(), &mut bytes).expect("three axes");
-        bytes
+        bytes(machine, &self.without_blocks())
+    }
+
+    /// The same for a board with live control.
+    #[must_use]
+    pub fn to_live_bytes(&self, machine: &Machine) -> Vec<u8> {
+        bytes(machine, &self.items)
     }
 
     /// The items, as the kernel's [`Supply`](motion_kernel::program::Supply) takes them.
     pub fn supplied(&self) -> impl Iterator<Item = Result<Item<3>, Infallible>> + '_ {
         self.items.iter().map(|&item| Ok(item))
     }
+}
+
+fn bytes(machine: &Machine, items: &[Item<3>]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // Entries of three axes fit the format.
+    write(&machine.header(), items, &mut bytes).expect("three axes");
+    bytes
 }
 
 fn stretch_items<R: Real>(

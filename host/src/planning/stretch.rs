@@ -102,11 +102,11 @@ impl Stretch {
             let (plan, time_s) = self.profile.over(start_mm, end_mm);
             records.push(BlockRecord {
                 line: block.line,
-                kind: block.element.kind(),
+                kind: block.element.kind().into(),
                 start_mm: self.start_mm + start_mm,
                 length_mm: end_mm - start_mm,
                 cap_mm_s,
-                cap_reason: plan.reason(&view, block.ceiling.reason).name(),
+                cap_reason: plan.reason(&view, block.ceiling.reason).name().into(),
                 enter_mm_s: plan.enter_mm_s,
                 peak_mm_s: plan.peak_mm_s,
                 exit_mm_s: plan.exit_mm_s,

@@ -19,7 +19,7 @@ use std::io::{self, Write};
 use self::format::{counted, duration, escape, figure, share};
 use self::palette::Ink;
 use self::plots::path::View;
-use self::plots::{Caption, contour, feed, path, time};
+use self::plots::{Caption, contour, feed, marks, path, time};
 use self::summary::{Outcome, Span, Summary};
 use crate::record::{AXES, FaultRecord, RunRecord};
 
@@ -111,7 +111,7 @@ fn header(
         Outcome::Faulted => "faulted",
     };
     writeln!(out, "<p class=\"result {class}\">{}</p></header>", result(record, summary))?;
-    writeln!(out, "{}", tables::faults(record))?;
+    writeln!(out, "{}{}", tables::faults(record), tables::commands(record))?;
     notices(record, summary, out)?;
     writeln!(out, "<h2>Key figures</h2>\n{}", tables::key_figures(record, summary))?;
     writeln!(out, "{}", tables::axes(record, summary, names))
@@ -270,6 +270,7 @@ fn feed_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> 
     legend.extend(
         reasons.iter().map(|reason| (palette::ceiling(reason, &reasons), format!("ceiling: {reason}"))),
     );
+    legend.extend(command_key(record));
     legend.extend(fault_key(record));
     let mut words = String::new();
     if feed::has_line_numbers(record, summary) {
@@ -291,7 +292,7 @@ fn feed_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> 
         words += "Where many blocks share a column, a band spans their ceilings; its lower edge is the lowest of them.";
     }
     writeln!(out, "<section><h2>Feed along the path</h2>")?;
-    figure_html(&feed::draw(record, summary, &faults_mm(record), &caption)?, &legend, &words, out)?;
+    figure_html(&feed::draw(record, summary, &caption)?, &legend, &words, out)?;
     writeln!(out, "</section>")
 }
 
@@ -333,13 +334,15 @@ fn limits_beyond<'a>(limits: impl Iterator<Item = (&'a str, Span, f64, &'a str)>
 }
 
 /// What shaded stretches of a plot over time are; nothing if there are none.
-fn rests_key(summary: &Summary) -> &'static str {
-    let has = |state| summary.rests.iter().any(|rest| rest.state == state);
-    match (has("dwell"), has("stopped")) {
-        (true, true) => "Shaded: dwells and program stops.",
-        (true, false) => "Shaded: dwells.",
-        (false, true) => "Shaded: program stops.",
-        (false, false) => "",
+fn rests_key(summary: &Summary) -> String {
+    let kinds =
+        [("dwell", "dwells"), ("stopped", "program stops"), ("held", "rests by command or for lack of data")];
+    let has = |state: &str| summary.rests.iter().any(|rest| rest.state == state);
+    let there: Vec<&str> = kinds.iter().filter(|(state, _)| has(state)).map(|(_, words)| *words).collect();
+    match there[..] {
+        [] => String::new(),
+        [ref first @ .., last] if !first.is_empty() => format!("Shaded: {} and {last}.", first.join(", ")),
+        _ => format!("Shaded: {}.", there.concat()),
     }
 }
 
@@ -366,8 +369,12 @@ fn time_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> 
     if limits.iter().any(|(_, span, limit, _)| time::shows_limit(*span, *limit)) {
         legend.push((palette::LIMIT, "limit".to_string()));
     }
+    if !record.commands.is_empty() {
+        legend.push((palette::OVERRIDE, "feed override".to_string()));
+    }
+    legend.extend(command_key(record));
     legend.extend(fault_key(record));
-    let words = limits_beyond(limits.into_iter()) + rests_key(summary);
+    let words = limits_beyond(limits.into_iter()) + &rests_key(summary);
     writeln!(out, "<section><h2>Motion along the path over time</h2>")?;
     figure_html(&time::along_path(record, summary, &caption)?, &legend, &words, out)?;
     writeln!(out, "</section>")
@@ -410,10 +417,21 @@ fn axes_section(
         legend.extend(fault_key(record));
         let beyond = limits_beyond([("following error", figures.err_um, limit_um, "µm")].into_iter());
         writeln!(out, "<div class=\"axis\"><h3>{}</h3>", escape(name))?;
-        figure_html(&drawing, &legend, &(beyond + rests_key(summary)), out)?;
+        figure_html(&drawing, &legend, &(beyond + &rests_key(summary)), out)?;
         writeln!(out, "</div>")?;
     }
     writeln!(out, "</section>")
+}
+
+/// Legend of the commands' lines, where there are any.
+fn command_key(record: &RunRecord) -> Option<(Ink, String)> {
+    let number = record.commands.len();
+    let words = if number > marks::COMMAND_MARKS_MAX {
+        format!("command, the first {} of {number}", marks::COMMAND_MARKS_MAX)
+    } else {
+        "command".to_string()
+    };
+    (number > 0).then_some((palette::COMMAND, words))
 }
 
 /// Legend of the fault lines, where there are any.

@@ -49,6 +49,10 @@ pub(super) const REST: Ink = solid(0xF7EBCB, 0x38301C);
 pub(super) const LIMIT: Ink = dashed(0x59636F, 0x9AA6B3, "16 12");
 /// Faults.
 pub(super) const FAULT: Ink = dashed(0xC4162A, 0xFF6B6B, "20 12");
+/// Commands of live control.
+pub(super) const COMMAND: Ink = dashed(0x2F4A6B, 0xA9C3E6, "8 8");
+/// The feed override.
+pub(super) const OVERRIDE: Ink = solid(0x6B4E00, 0xDDBB55);
 /// Feed.
 pub(super) const FEED: Ink = solid(0x1F66B0, 0x6BB1F5);
 /// Acceleration, and ceilings set by it.
@@ -125,7 +129,7 @@ pub(super) fn series(index: usize) -> Ink {
 }
 
 /// Inks that stand alone.
-const SINGLE: [Ink; 15] = [
+const SINGLE: [Ink; 17] = [
     TEXT,
     AXIS,
     GRID,
@@ -133,6 +137,8 @@ const SINGLE: [Ink; 15] = [
     REST,
     LIMIT,
     FAULT,
+    COMMAND,
+    OVERRIDE,
     FEED,
     ACCELERATION,
     JERK,
@@ -193,7 +199,21 @@ mod tests {
 
     #[test]
     fn every_line_stands_out_from_its_paper() {
-        let lines = [AXIS, LIMIT, FAULT, FEED, ACCELERATION, JERK, SNAP, ERROR, CONTOUR, VOLTS, UNREACHED];
+        let lines = [
+            AXIS,
+            LIMIT,
+            FAULT,
+            COMMAND,
+            OVERRIDE,
+            FEED,
+            ACCELERATION,
+            JERK,
+            SNAP,
+            ERROR,
+            CONTOUR,
+            VOLTS,
+            UNREACHED,
+        ];
         for ink in lines.iter().chain(&CEILINGS).chain(&CLASSES).chain(&SERIES) {
             let hex = ink.hex();
             assert!(contrast(ink.light, LIGHT_PAPER) >= 3.0, "{hex} {}", contrast(ink.light, LIGHT_PAPER));

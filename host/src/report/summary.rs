@@ -64,10 +64,10 @@ impl Span {
     }
 }
 
-/// A stretch of time in which the program lets the machine stand.
+/// A stretch of time in which the program, or a command, lets the machine stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rest {
-    /// "dwell" or "stopped".
+    /// "dwell", "stopped" or "held".
     pub(super) state: &'static str,
     /// Begin \[s\].
     pub(super) from_s: f64,
@@ -197,12 +197,12 @@ impl Summary {
     }
 }
 
-/// Dwells and program stops: ticks that follow each other in one of these states.
+/// Dwells, program stops and holds: ticks that follow each other in one of these states.
 fn rests(record: &RunRecord) -> Vec<Rest> {
     let mut rests = Vec::new();
     for ticks in record.ticks.chunk_by(|a, b| a.state == b.state) {
         let [first, ..] = ticks else { continue };
-        if ["dwell", "stopped"].contains(&first.state) {
+        if ["dwell", "stopped", "held"].contains(&first.state) {
             let from_s = first.tick as f64 * record.tick_s;
             let to_s = from_s + ticks.len() as f64 * record.tick_s;
             rests.push(Rest { state: first.state, from_s, to_s });

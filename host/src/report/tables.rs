@@ -1,8 +1,9 @@
-//! The tables: key figures, axes, faults, blocks.
+//! The tables: key figures, axes, faults, commands, blocks.
 
 use std::fmt::Write as _;
 
 use super::format::{count, counted, duration, escape, figure, fixed, share};
+use super::plots::marks;
 use super::summary::{Span, Summary};
 use crate::record::{AXES, RunRecord};
 
@@ -169,6 +170,44 @@ pub(super) fn faults(record: &RunRecord) -> String {
     table + &left_out
 }
 
+/// A row per command; nothing if there was none.
+pub(super) fn commands(record: &RunRecord) -> String {
+    if record.commands.is_empty() {
+        return String::new();
+    }
+    let mut body = String::new();
+    for command in record.commands.iter().take(ROWS_MAX) {
+        let stop = command.stop.as_ref().map_or_else(
+            || "<td>–</td>".repeat(3),
+            |stop| {
+                let (time, length) = (fixed(stop.time_s * 1e3, 1), fixed(stop.length_mm, 3));
+                format!("<td>{}</td><td>{time}</td><td>{length}</td>", stop.tick)
+            },
+        );
+        let _ = writeln!(
+            body,
+            "<tr><td>{}</td><td>{:.4}</td><td class=\"word\">{}</td><td>{}</td>{stop}</tr>",
+            command.tick,
+            command.tick as f64 * record.tick_s,
+            escape(&marks::word(command)),
+            fixed(command.s_mm, 3),
+        );
+    }
+    let left_out = LeftOut::of(record.commands.len()).map_or(String::new(), LeftOut::remark);
+    let head = [
+        "Before tick",
+        "Time [s]",
+        "*Command",
+        "Path position [mm]",
+        "At rest in tick",
+        "Stop time [ms]",
+        "Stop length [mm]",
+    ];
+    let mut table = String::from("<h2>Commands</h2>\n");
+    table.push_str(&wrapped("Commands", &head, &body));
+    table + &left_out
+}
+
 /// A row per block.
 pub(super) fn blocks(record: &RunRecord) -> String {
     let mut body = String::new();
@@ -178,10 +217,10 @@ pub(super) fn blocks(record: &RunRecord) -> String {
             "<tr><th scope=\"row\">{}</th><td class=\"word\">{}</td><td>{}</td><td>{}</td><td class=\"word\">{}</td>\
              <td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             block.line,
-            escape(block.kind),
+            escape(&block.kind),
             fixed(block.length_mm, 3),
             fixed(block.cap_mm_s, 2),
-            escape(block.cap_reason),
+            escape(&block.cap_reason),
             fixed(block.enter_mm_s, 2),
             fixed(block.peak_mm_s, 2),
             fixed(block.exit_mm_s, 2),

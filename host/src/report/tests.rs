@@ -1,7 +1,7 @@
 //! The page as a whole, on made-up runs.
 
 use super::*;
-use crate::record::{AxisTick, BlockRecord, PathLimits, TickRecord};
+use crate::record::{AxisTick, BlockRecord, CommandRecord, PathLimits, StopRecord, TickRecord};
 
 /// Ramps and cruises of the sample: duration \[s\], feed at both ends \[mm/s\]. A ramp is a raised cosine in
 /// acceleration.
@@ -67,11 +67,11 @@ fn sample(tick_s: f64, with_z: bool) -> RunRecord {
     {
         record.blocks.push(BlockRecord {
             line,
-            kind,
+            kind: kind.into(),
             start_mm,
             length_mm,
             cap_mm_s,
-            cap_reason,
+            cap_reason: cap_reason.into(),
             enter_mm_s,
             peak_mm_s,
             exit_mm_s,
@@ -363,4 +363,53 @@ fn sample_pages() {
         let path = std::env::temp_dir().join(name).with_extension("html");
         std::fs::write(path, page(&record)).expect("temporary file");
     }
+}
+
+#[test]
+fn commands_are_marked_and_listed() {
+    let mut record = sample(1e-3, false);
+    assert!(!page(&record).contains("Feed override") && !page(&record).contains("<h2>Commands"));
+    let command = |tick, command: &str, feed_override, stop| CommandRecord {
+        tick,
+        command: command.to_string(),
+        feed_override,
+        s_mm: 12.5,
+        stop,
+    };
+    let stop = StopRecord { tick: 700, time_s: 0.1234, length_mm: 3.25 };
+    record.commands = vec![
+        command(300, "override=0.5", Some(0.5), None),
+        command(577, "hold", None, Some(stop)),
+        command(900, "resume", None, None),
+        command(1000, "override=1.333", Some(1.333), None),
+        command(1500, "<b>abort", None, None),
+    ];
+    record.ticks[750].state = "held";
+    let whole = page(&record);
+    for part in [
+        "<h2>Commands</h2>",
+        "Feed override [%]",
+        "override 50 %",
+        "override 133.3 %",
+        "<td>577</td><td>0.5770</td><td class=\"word\">hold</td><td>12.500</td><td>700</td><td>123.4</td><td>3.250</td>",
+        "feed override</li>",
+        "command</li>",
+        "rests by command",
+        "&lt;b&gt;abort",
+    ] {
+        assert!(whole.contains(part), "{part}");
+    }
+    // On the feed plot and on the override's, each for two widths.
+    assert_eq!(whole.matches("\nhold\n").count(), 4);
+    assert_eq!(whole.matches("\nfault\n").count(), 0);
+    record.faults =
+        vec![FaultRecord { tick: 1600, axis: None, fault: "output".to_string(), detail: String::new() }];
+    // And on the path's, which says so with its own mark.
+    assert_eq!(page(&record).matches("\nfault\n").count(), 4 + 2);
+
+    // Ten thousand of them are counted, and do not hide the curve.
+    record.commands = (0..10_000).map(|tick| command(tick / 6, "override=0.9", Some(0.9), None)).collect();
+    let crowd = page(&record);
+    assert!(crowd.contains("command, the first 60 of 10"));
+    assert!(crowd.len() < 3 * whole.len(), "{} {}", crowd.len(), whole.len());
 }

@@ -1,11 +1,13 @@
 //! Live control of a run: commands before given ticks.
 //!
 //! As text `TICK:COMMAND,TICK:COMMAND,…`, in the order of their ticks; commands are `hold`, `resume`, `abort` and
-//! `override=SHARE`.
+//! `override=SHARE`. A script displays as the text it is read from.
 
+use std::fmt;
 use std::str::FromStr;
 
 use motion_kernel::live::{OVERRIDE_MAX, OVERRIDE_MIN};
+use serde::{Deserialize, Serialize};
 
 /// What is commanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +32,8 @@ pub struct Timed {
 }
 
 /// Commands in the order of their ticks.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
 pub struct Script(Vec<Timed>);
 
 impl Script {
@@ -38,6 +41,43 @@ impl Script {
     #[must_use]
     pub fn commands(&self) -> &[Timed] {
         &self.0
+    }
+}
+
+impl fmt::Display for Command {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Hold => f.write_str("hold"),
+            Self::Resume => f.write_str("resume"),
+            Self::Abort => f.write_str("abort"),
+            // All the digits that the number has.
+            Self::Override(share) => write!(f, "override={share}"),
+        }
+    }
+}
+
+impl fmt::Display for Script {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, Timed { tick, command }) in self.0.iter().enumerate() {
+            let comma = if index > 0 { "," } else { "" };
+            write!(f, "{comma}{tick}:{command}")?;
+        }
+        Ok(())
+    }
+}
+
+impl From<Script> for String {
+    fn from(script: Script) -> Self {
+        script.to_string()
+    }
+}
+
+/// As [`Script::from_str`]; an empty text is a script without commands.
+impl TryFrom<String> for Script {
+    type Error = ScriptError;
+
+    fn try_from(text: String) -> Result<Self, ScriptError> {
+        if text.is_empty() { Ok(Self::default()) } else { text.parse() }
     }
 }
 
@@ -103,6 +143,10 @@ mod tests {
             commands,
             [(0, Command::Override(0.5)), (10, Command::Hold), (10, Command::Resume), (20, Command::Abort)]
         );
+        let third: Script = "7:override=0.3333333333333333".parse().expect("a script");
+        for script in [script, third, Script::default()] {
+            assert_eq!(Script::try_from(script.to_string()), Ok(script));
+        }
         for (text, message) in [
             ("hold", "found `hold`, expected TICK:COMMAND such as 2000:hold"),
             ("", "found ``, expected TICK:COMMAND such as 2000:hold"),

@@ -1,26 +1,32 @@
 //! A plan executed by the kernel on the simulated machine, tick by tick.
 //!
-//! Consumes a [`Plan`](crate::planning::Plan) and a [`Machine`](crate::machine::Machine); produces one
+//! Consumes a [`Plan`](crate::planning::Plan) and a [`Machine`](crate::machine::Machine), as a [`Job`]; produces one
 //! [`TickRecord`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter and
 //! the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
+//! - [`job`]: what is executed, and what its records call it by;
 //! - [`live`]: commands before given ticks;
 //! - `background`: what fills the streams, with commands or without;
 //! - [`rig`]: the simulated machine as the kernel's hardware;
+//! - `commands`: what became of them;
 //! - `contour`: how far the machine is beside its path;
 //! - `limit_share`: on how much of the path a limit is active;
 //! - [`run`](mod@run): the ticks;
 //! - [`summary`]: maxima, following and contour error.
 
 mod background;
+mod commands;
 pub(crate) mod contour;
+pub mod job;
 mod limit_share;
 pub mod live;
 pub mod rig;
 pub mod run;
 pub mod summary;
 
-pub use run::{Number, RunError, RunOptions, StretchCorrection, run, run_with};
+pub use job::{Job, Sheet};
+pub use rig::Hardware;
+pub use run::{Number, RunError, RunOptions, StretchCorrection, on_simulated, run, run_on, run_with};
 pub use summary::{AxisSummary, RunSummary};
 
 use crate::record::TickRecord;

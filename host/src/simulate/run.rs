@@ -1,33 +1,37 @@
 //! The ticks of a run.
+//!
+//! Consumes a [`Job`] and [`Hardware`]; whatever the hardware is, kernel, streams and background are the same, and so
+//! is what they do, to the bit, as long as the hardware's answers are.
 
 use core::convert::Infallible;
 
 use motion_kernel::axis::{Correction, CorrectionError};
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
-use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::program::SupplyError;
 use motion_kernel::trace::Trace;
-use motion_kernel::units::Position;
+use serde::{Deserialize, Serialize};
 
 use super::Observer;
 use super::background::Storage;
+use super::commands::Commands;
 use super::contour::Contour;
+use super::job::Job;
 use super::limit_share::LimitShare;
 use super::live::Script;
-use super::rig::{Rig, Simulated};
+use super::rig::{Hardware, Rig, Simulated};
 use super::summary::{Collector, RunSummary};
 use crate::machine::{AxisError, Machine};
-use crate::planning::{Executable, Item as PlanItem, Plan, PlanningError};
+use crate::planning::{Plan, PlanningError};
 use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
 
 /// How long the machine is given to settle before its end position is read \[s\].
 const SETTLE_S: f64 = 0.2;
 
 /// The number type of the kernel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Number {
     /// As on a board with a single-precision FPU.
     #[default]
@@ -39,7 +43,7 @@ pub enum Number {
 }
 
 /// A correction of one stretch of a program, for the kernel's [`Correction`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StretchCorrection {
     /// Which stretch, from 0.
     pub stretch: u32,
@@ -100,74 +104,91 @@ pub fn run_with(
     machine: &Machine,
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
-    match options.number {
-        Number::F32 => run_in::<f32>(options, plan, machine, observe),
-        Number::F64 => run_in::<f64>(options, plan, machine, observe),
-        Number::Fixed => run_in::<Fixed>(options, plan, machine, observe),
+    let job = Job::new(options, plan, machine)?;
+    on_simulated(machine, |rig| run_on(&job, rig, observe))
+}
+
+/// What `work` does with the simulated machine, at rest at the origin.
+///
+/// # Errors
+/// The machine can't be simulated; and those of `work`.
+pub fn on_simulated<T>(
+    machine: &Machine,
+    work: impl FnOnce(&mut Rig<'_>) -> Result<T, RunError>,
+) -> Result<T, RunError> {
+    let simulated =
+        Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))?;
+    let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
+    work(&mut rig)
+}
+
+/// Runs `job` on `hardware`.
+///
+/// # Errors
+/// The job can't be executed. Faults of the run itself are in the summary.
+pub fn run_on(
+    job: &Job,
+    hardware: &mut impl Hardware,
+    observe: &mut Observer<'_>,
+) -> Result<RunSummary, RunError> {
+    match job.number {
+        Number::F32 => run_in::<f32>(job, hardware, observe),
+        Number::F64 => run_in::<f64>(job, hardware, observe),
+        Number::Fixed => run_in::<Fixed>(job, hardware, observe),
     }
 }
 
 fn run_in<R: Real>(
-    options: &RunOptions<'_>,
-    plan: &Plan,
-    machine: &Machine,
+    job: &Job,
+    hardware: &mut impl Hardware,
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
-    let &RunOptions { correction, script, .. } = options;
-    let executable = Executable::new::<R>(plan)?;
-    let starts: Vec<f64> = plan
-        .items
-        .iter()
-        .filter_map(|item| match item {
-            PlanItem::Stretch(stretch) => Some(stretch.start_mm),
-            PlanItem::Dwell { .. } | PlanItem::Stop { .. } => None,
-        })
-        .collect();
-    let simulated =
-        Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))?;
-    let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
-    let Ok(counts) = rig.latch();
-    let start = [Position::ZERO; AXES];
-    let mut kernel = Kernel::<R, AXES>::new(&machine.axes_config()?, start, counts);
+    let Job { header, sheet, correction, script, .. } = job;
+    let tick_s = header.tick_s;
+    let mut kernel = Kernel::<R, AXES>::new(&job.axes_config()?, header.start, hardware.start_counts());
     kernel.enable(0);
     let knots_mm_s: Vec<[R; AXES]> = correction
         .iter()
         .flat_map(|correction| &correction.knots_mm_s)
         .map(|knot| knot.map(R::from_f64))
         .collect();
-    let mut storage = Storage::<R>::new(script);
-    let (mut background, mut intake) =
-        storage.split(machine.rules(), start, executable.supplied(), executable.tick_s);
-    if let Some(&StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
-        intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?);
+    let mut storage = Storage::<R>::new(script.as_ref());
+    let items = job.items.iter().map(|&item| Ok(item));
+    let (mut background, mut intake) = storage.split(header.rules, header.start, items, tick_s);
+    if let &Some(StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
+        intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?)?;
     }
 
     let mut summary = RunSummary {
-        tick_s: machine.tick_s,
-        planned_time_s: plan.time_s,
-        path_length_mm: plan.length_mm,
-        notices: plan.notices.clone(),
+        tick_s,
+        planned_time_s: sheet.planned_time_s,
+        path_length_mm: sheet.path_length_mm,
+        notices: sheet.notices.clone(),
         ..RunSummary::default()
     };
     let mut collector = Collector::default();
     let mut contour = Contour::default();
-    let mut limit_share = LimitShare::new(plan, machine);
+    let mut limit_share = LimitShare::new(sheet);
+    let mut commands = Commands::new(script.as_ref(), tick_s);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
-    loop {
+    let mut goes_on = true;
+    while goes_on {
         background.turn(collector.ticks()).map_err(RunError::Rejected)?;
-        let trace = *kernel.tick(&mut intake, &mut rig);
-        simulated.advance();
+        let trace = *kernel.tick(&mut intake, hardware);
+        goes_on = hardware.advance(&trace);
         let state = trace.executed.state;
         // What is idle after the last item is no longer part of the program, but for the tick in which
         // it ended.
         let ended = background.ended(state);
-        let start_mm = starts.get(trace.executed.stretches as usize).copied().unwrap_or(plan.length_mm);
+        let start_mm = sheet.starts_mm.get(trace.executed.stretches as usize).copied();
+        let start_mm = start_mm.unwrap_or(sheet.path_length_mm);
         let record = tick_record(&trace, start_mm, &mut contour);
         collector.add(&record);
         limit_share.add(&record);
+        commands.add(&record);
         observe(&record);
         if let Some(fault) = trace.fault {
-            summary.faults.push(fault_record(&fault, machine));
+            summary.faults.push(fault_record(&fault, job));
             break;
         }
         if let Some(reason) = ended {
@@ -186,8 +207,9 @@ fn run_in<R: Real>(
         1 => summary.notices.push("1 stop on the path because data came too late".to_owned()),
         more => summary.notices.push(format!("{more} stops on the path because data came too late")),
     }
+    summary.commands = commands.finish();
     summary.limit_active_share = limit_share.share();
-    summary.time_s = (summary.ticks - stopped_ticks) as f64 * machine.tick_s;
+    summary.time_s = (summary.ticks - stopped_ticks) as f64 * tick_s;
     if stops > 0 {
         summary.notices.push(match stops {
             1 => "1 program stop: resumed at once".to_owned(),
@@ -195,15 +217,19 @@ fn run_in<R: Real>(
         });
     }
     let mut last = None;
-    for _ in 0..(SETTLE_S / machine.tick_s) as u64 {
-        last = Some(*kernel.tick(&mut intake, &mut rig));
-        simulated.advance();
+    for _ in 0..(SETTLE_S / tick_s) as u64 {
+        if !goes_on {
+            break;
+        }
+        let trace = *kernel.tick(&mut intake, hardware);
+        goes_on = hardware.advance(&trace);
+        last = Some(trace);
     }
-    for (index, (axis, settings)) in summary.axes.iter_mut().zip(&machine.axes).enumerate() {
-        axis.name.clone_from(&settings.name);
+    for (index, axis) in summary.axes.iter_mut().enumerate() {
+        axis.name.clone_from(&sheet.axes[index].name);
         if let Some(trace) = &last {
             let error_mm = trace.axes[index].following_error_mm.to_f64();
-            axis.end_error_counts = (error_mm / settings.mm_per_count.abs()).round() as i64;
+            axis.end_error_counts = (error_mm / header.axes[index].mm_per_count.abs()).round() as i64;
         }
     }
     Ok(summary)
@@ -231,18 +257,19 @@ fn tick_record<R: Real>(trace: &Trace<R, AXES>, start_mm: f64, contour: &mut Con
         a_mm_s2: motion.a_mm_s2.to_f64(),
         j_mm_s3: motion.j_mm_s3.to_f64(),
         snap_mm_s4: motion.snap_mm_s4.to_f64(),
-        state: state_name(trace),
+        state: state_name(executed.state, trace.fault.is_some()),
         line: executed.line,
         contour_um: contour.error_um(&axes),
         axes,
     }
 }
 
-fn state_name<R: Real>(trace: &Trace<R, AXES>) -> &'static str {
-    if trace.fault.is_some() {
+/// What records call a state.
+pub(crate) fn state_name(state: ExecState, is_faulted: bool) -> &'static str {
+    if is_faulted {
         return "fault";
     }
-    match trace.executed.state {
+    match state {
         ExecState::Idle => "idle",
         ExecState::Moving => "moving",
         ExecState::Dwell => "dwell",
@@ -251,22 +278,21 @@ fn state_name<R: Real>(trace: &Trace<R, AXES>) -> &'static str {
     }
 }
 
-fn fault_record<R: Real>(fault: &Fault<R>, machine: &Machine) -> FaultRecord {
+fn fault_record<R: Real>(fault: &Fault<R>, job: &Job) -> FaultRecord {
+    let name_of = |axis: usize| Some(job.sheet.axes[axis].name.clone());
     let (axis, name, detail) = match fault.kind {
         FaultKind::Executor(fault) => (None, "executor", format!("{fault:?}")),
         FaultKind::FollowingError { axis, error_mm } => {
-            let settings = &machine.axes[axis];
-            let detail =
-                format!("{:.3} mm, limit {} mm", error_mm.to_f64(), settings.following_error_limit_mm);
-            (Some(settings.name.clone()), "following error", detail)
+            let limit_mm = job.header.axes[axis].following_error_limit_mm;
+            let detail = format!("{:.3} mm, limit {limit_mm} mm", error_mm.to_f64());
+            (name_of(axis), "following error", detail)
         }
         FaultKind::Encoder => (None, "encoder", "the encoders could not be read".to_owned()),
+        FaultKind::Inputs => (None, "inputs", "the digital inputs could not be read".to_owned()),
         FaultKind::Output => (None, "output", "the converter could not be written".to_owned()),
         FaultKind::Enable => (None, "enable", "the drives could not be switched".to_owned()),
         FaultKind::EmergencyStop => (None, "emergency stop", "the emergency stop is open".to_owned()),
-        FaultKind::Drive { axis } => {
-            (Some(machine.axes[axis].name.clone()), "drive", "the drive reports a fault".to_owned())
-        }
+        FaultKind::Drive { axis } => (name_of(axis), "drive", "the drive reports a fault".to_owned()),
     };
     FaultRecord { tick: fault.tick, axis, fault: name.to_owned(), detail }
 }

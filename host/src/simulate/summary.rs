@@ -1,6 +1,6 @@
 //! Figures of a run, collected tick by tick.
 
-use crate::record::{AXES, FaultRecord, TickRecord};
+use crate::record::{AXES, CommandRecord, FaultRecord, TickRecord};
 
 /// The figures of a run.
 #[derive(Clone, Debug, Default)]
@@ -30,6 +30,8 @@ pub struct RunSummary {
     pub axes: [AxisSummary; AXES],
     /// Greatest distance of the actual position from the programmed path \[µm\].
     pub contour_error_um_max: f64,
+    /// Commands of live control that were given, in order.
+    pub commands: Vec<CommandRecord>,
     /// Faults, in order.
     pub faults: Vec<FaultRecord>,
     /// What was accepted and not acted on, and how the run was made.

@@ -11,6 +11,8 @@
 mod motion;
 mod walk;
 
+use serde::{Deserialize, Serialize};
+
 use crate::law::{PathMotion, Ticks};
 use crate::num::Real;
 use crate::path::Setpoint;
@@ -27,7 +29,7 @@ pub use walk::PIECES_PER_TICK_MAX;
 pub const STEPS_PER_TICK_MAX: usize = 4 * (SEGMENTS_PER_TICK_MAX + 1) + 1;
 
 /// What the executor is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ExecState {
     /// At rest, nothing to do.

@@ -1,4 +1,4 @@
-//! What the kernel asks of a board: a velocity output, an encoder and a drive enable for all axes
+//! What the kernel asks of a board: a velocity output, an encoder, digital inputs and a drive enable for all axes
 //! at once.
 //!
 //! All axes at once, because they have to be sampled and latched in the same instant: a circle is
@@ -7,9 +7,11 @@
 
 mod ad5754;
 mod extend;
+mod inputs;
 
 pub use ad5754::{Ad5754Error, Ad5754Frame, Ad5754Output, POWER_UP_TIME_US};
 pub use extend::{CountExtender, TimerWidth};
+pub use inputs::{AxisInputs, Inputs, MachineInputs};
 
 use crate::units::{Counts, DacCode};
 

@@ -95,7 +95,7 @@ pub enum Phase {
 }
 
 /// The motion along the path in one tick; the position is counted from the stretch's start.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PathMotion<R> {
     /// Path position.
     pub s: Position,

@@ -5,9 +5,10 @@ use heapless::Vec;
 use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
 use super::road::Junction;
+use super::source::Source;
 use crate::law::{Phase, Ticks};
 use crate::num::Real;
-use crate::program::{self, SupplyError};
+use crate::program::SupplyError;
 use crate::queue::{Change, LiveFeeder, Progress};
 use crate::units::Position;
 
@@ -40,7 +41,7 @@ impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PL
 where
     R: Real,
     E: Clone,
-    I: Iterator<Item = Result<program::Item<AXES>, E>>,
+    I: Source<AXES, Error = E>,
 {
     /// In the order of time: here or within the item under way, and behind each item that is to be driven.
     fn places(&self, progress: &Progress) -> Vec<Place, { LIST_ITEMS + 1 }> {
@@ -105,6 +106,9 @@ where
                 continue;
             };
             list.push(Item::Feed { ramp, length });
+            if !self.keeps_up(&list, &place.change) {
+                continue;
+            }
             list.leave = list.len();
             let end = list.end();
             self.hand_over(list, place.change, self.driven_override, feeder)?;
@@ -147,6 +151,7 @@ where
             if self.gather_under_override(&mut list, false)
                 && self.end_in_a_stop(&mut list, self.feed_override)
                 && list.leave >= heads
+                && self.keeps_up(&list, &place.change)
             {
                 let ahead = list.after(list.leave);
                 self.hand_over(list, place.change, self.feed_override, feeder)?;

@@ -1,14 +1,17 @@
 //! What follows what: reads items, obeys commands, makes lists and hands them over.
 
+use core::task::Poll;
+
 use heapless::Deque;
 
 use super::list::{Item as ListItem, LIST_ITEMS, List};
 use super::road::{Junction, Road, is_before};
+use super::source::Source;
 use crate::law::{FeedSegment, Ticks};
 use crate::num::Real;
 use crate::program::supply::{Ready, is_taken};
 use crate::program::{Item, SupplyError};
-use crate::queue::{Change, LiveFeeder, Progress, Rejection};
+use crate::queue::{Change, Density, LiveFeeder, Progress, Rejection};
 use crate::units::Position;
 
 /// What the director is doing.
@@ -45,6 +48,8 @@ pub(super) enum Wanted {
 pub(super) struct Handed {
     id: u8,
     pub(super) list: List,
+    /// Of what is driven before it.
+    before: Density,
 }
 
 /// A list that follows.
@@ -105,11 +110,10 @@ impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PL
 where
     R: Real,
     E: Clone,
-    I: Iterator<Item = Result<Item<AXES>, E>>,
+    I: Source<AXES, Error = E>,
 {
-    /// All of `items` still to do, at rest, for ticks of `tick_s`; with freshly split streams. What has no more items for
-    /// now must wait: the first `None` is their end. Where ticks come while the background works, `lead_ticks` is how far
-    /// ahead of what it saw it may change a ramp: as many as may pass meanwhile.
+    /// All of `items` still to do, at rest, for ticks of `tick_s`; with freshly split streams. Where ticks come while the
+    /// background works, `lead_ticks` is how far ahead of what it saw it may change a ramp: as many as may pass meanwhile.
     pub fn new(items: I, tick_s: f64, lead_ticks: u32) -> Self {
         const { assert!(PLACES >= 4 * LIST_ITEMS, "places for what lies ahead, and for a list that is given up") };
         let start = Junction { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
@@ -126,7 +130,7 @@ where
             course: Deque::new(),
             ahead: start,
             replanned: None,
-            current: Handed { id: 0, list: List::new(start, tick_s) },
+            current: Handed { id: 0, list: List::new(start, tick_s), before: Density::NONE },
             next: None,
             feed_override: 1.0,
             driven_override: 1.0,
@@ -299,7 +303,8 @@ where
     fn take_back_next(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Progress {
         feeder.no_change();
         let progress = self.follow(feeder);
-        if let Some(Next { handed: Handed { id, list }, taken_back, before_override, .. }) = self.next.take()
+        if let Some(Next { handed: Handed { id, list, .. }, taken_back, before_override, .. }) =
+            self.next.take()
         {
             feeder.give_up(id);
             self.driven_override = before_override;
@@ -353,14 +358,14 @@ where
             }
             self.pending = None;
             self.is_full = self.course.len() + 2 * LIST_ITEMS >= PLACES || self.road.is_full();
-            if self.is_full || self.is_aborted {
+            if self.is_full || self.is_aborted || self.is_at_end {
                 return Ok(());
             }
-            let Some(item) = self.items.next() else {
-                self.is_at_end = true;
-                return Ok(());
-            };
-            self.take(item.map_err(SupplyError::Source)?)?;
+            match self.items.poll_next() {
+                Poll::Ready(Some(item)) => self.take(item.map_err(SupplyError::Source)?)?,
+                Poll::Ready(None) => self.is_at_end = true,
+                Poll::Pending => return Ok(()),
+            }
         }
     }
 
@@ -408,28 +413,37 @@ where
     pub(super) fn replan_from(&mut self, ahead: Junction) {
         self.ahead = ahead;
         self.replan_through(ahead.stretch);
+        self.drop_feed();
+    }
+
+    /// What comes first in the course is planned anew.
+    pub(super) fn drop_feed(&mut self) {
         while self.course.front().is_some_and(ListItem::is_feed) {
             self.course.pop_front();
         }
     }
 
-    /// Where data came too late the list under way is in its stop: what follows begins there.
+    /// Where data came too late the list under way is in its stop: what follows begins there. A stop where the stretch ends
+    /// is none: motion was to end there.
     fn note_starvation(&mut self, feeder: &LiveFeeder<'_, R, AXES>) {
         let progress = feeder.progress();
-        let Handed { id, list } = &mut self.current;
+        let Handed { id, list, .. } = &mut self.current;
         let done = progress.done as usize;
         let is_in_stop = done > list.leave || done == list.leave && progress.inside.is_some();
         if self.next.is_none() && progress.list == *id && is_in_stop && list.leave < list.len() {
             list.leave = list.len();
             let end = list.end();
-            self.starvations = self.starvations.wrapping_add(1);
+            let (path_end, is_whole) = self.path_of(end.stretch);
+            if !(is_whole && end.at == path_end) {
+                self.starvations = self.starvations.wrapping_add(1);
+            }
             self.replan_from(end);
         }
     }
 
     /// Hands over the list that follows the one under way.
     fn go_on(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
-        let begins = self.ahead.at == Position::ZERO && self.course.front().is_some_and(ListItem::is_feed);
+        let begins = self.ahead.at == Position::ZERO && !self.course.is_empty();
         if begins && self.feed_override != 1.0 {
             self.replan_from(self.ahead);
         }
@@ -438,11 +452,14 @@ where
         let feed_override = if is_replanned { self.feed_override } else { 1.0 };
         let is_found =
             if is_replanned { self.gather_under_override(&mut list, true) } else { self.gather(&mut list) };
-        if is_found && self.end_in_a_stop(&mut list, feed_override) {
-            let change = self.change_after(self.current.list.leave);
+        let change = self.change_after(self.current.list.leave);
+        let is_ended = is_found && self.end_in_a_stop(&mut list, feed_override);
+        // From rest there is no other place to begin: what is too dense then is refused.
+        if is_ended && (self.ahead.feed_mm_s <= 0.0 || self.keeps_up(&list, &change)) {
             self.hand_over(list, change, feed_override, feeder)
         } else {
-            self.put_back(&list, 0, 0);
+            let stop = if is_ended { list.len() - list.leave } else { 0 };
+            self.put_back(&list, stop, 0);
             // At rest with no room for more path: the program's feed needs more of it to stop than there will be.
             if self.is_full && self.ahead.feed_mm_s <= 0.0 && !is_replanned {
                 self.replan_from(self.ahead);
@@ -456,6 +473,26 @@ where
         Change { from: self.current.id, to: self.current.id, after: count as u32, within: false }
     }
 
+    /// The density of the list under way up to a change.
+    fn density_before(&self, change: &Change) -> Density {
+        let Handed { list, before, .. } = &self.current;
+        let mut density = *before;
+        for item in list.items().take(change.after as usize) {
+            if let Some(duration) = item.duration(self.tick_s) {
+                // It has been accepted.
+                let _ = density.follow(duration);
+            }
+        }
+        density
+    }
+
+    /// Whether the executor keeps up with a list that takes over there.
+    pub(super) fn keeps_up(&self, list: &List, change: &Change) -> bool {
+        let mut density = self.density_before(change);
+        let mut durations = list.items().filter_map(|item| item.duration(self.tick_s));
+        durations.all(|duration| density.follow(duration).is_ok())
+    }
+
     /// Fills a list, of which there is a free one, with motion under `feed_override`, and asks for the change to it.
     pub(super) fn hand_over(
         &mut self,
@@ -464,16 +501,19 @@ where
         feed_override: f64,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
-        let from = R::from_f64(list.start.feed_mm_s);
-        let id = feeder.begin(list.start.at, from).ok_or(SupplyError::Rejected(TOO_SMALL))?;
-        if let Err(error) = self.fill(&list, id, feeder) {
+        let (from, before) = (R::from_f64(list.start.feed_mm_s), self.density_before(&change));
+        let id = feeder.begin(list.start.at, from, before).ok_or(SupplyError::Rejected(TOO_SMALL))?;
+        let change = Change { to: id, ..change };
+        let is_asked =
+            self.fill(&list, id, feeder).and_then(|()| feeder.change(change).map_err(SupplyError::Rejected));
+        if let Err(error) = is_asked {
             feeder.give_up(id);
             return Err(error);
         }
-        feeder.change(Change { to: id, ..change });
         self.ahead = list.after(list.leave);
         let before_override = core::mem::replace(&mut self.driven_override, feed_override);
-        self.next = Some(Next { handed: Handed { id, list }, taken_back: 0, command: None, before_override });
+        let handed = Handed { id, list, before };
+        self.next = Some(Next { handed, taken_back: 0, command: None, before_override });
         Ok(())
     }
 

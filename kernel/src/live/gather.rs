@@ -6,9 +6,9 @@ use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
 use super::replan::replan;
 use super::road::Junction;
+use super::source::Source;
 use crate::law::Ramp;
 use crate::num::Real;
-use crate::program;
 use crate::units::Position;
 
 /// How many blocks ahead are looked at for a feed to go on with under a lower override.
@@ -21,7 +21,7 @@ impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PL
 where
     R: Real,
     E: Clone,
-    I: Iterator<Item = Result<program::Item<AXES>, E>>,
+    I: Source<AXES, Error = E>,
 {
     /// The program's own feed, as far as a list and the path reach. False if there is none.
     pub(super) fn gather(&mut self, list: &mut List) -> bool {
@@ -65,13 +65,15 @@ where
         list.push(Item::Feed { ramp: cruise(part), length: part });
     }
 
-    /// A plan from where the list ends; to the end of its stretch, and what comes behind it, if that is wanted and there
-    /// is room. False if there is none.
+    /// The rests that come first, and a plan from where the list ends; to the end of its stretch, and what comes behind it,
+    /// if that is wanted and there is room. False if there is neither.
     fn gather_replanned(&mut self, list: &mut List, to_its_end: bool) -> bool {
-        let from = list.end();
+        let (from, heads) = (list.end(), list.len());
         if from.at == Position::ZERO {
             self.gather_rests(list);
+            self.drop_feed();
         }
+        let rests = list.len() > heads;
         let (path_end, is_whole) = self.path_of(from.stretch);
         let is_all = if path_end > from.at {
             replan(&self.road, &from, self.feed_override, path_end, self.tick_s, list)
@@ -79,7 +81,8 @@ where
             // The end of the stretch, or of what is known of it.
             (is_whole && from.feed_mm_s <= 0.0).then_some(true)
         };
-        let Some(is_all) = is_all else { return false };
+        // They need no path behind them.
+        let Some(is_all) = is_all else { return rests };
         if to_its_end && is_all && is_whole && !list.is_full() && self.course.front() == Some(&Item::End) {
             self.course.pop_front();
             list.push(Item::End);

@@ -50,6 +50,19 @@ impl Item {
         }
     }
 
+    /// How long it takes; `None` of what takes no place in time.
+    pub(super) fn duration(&self, tick_s: f64) -> Option<Ticks> {
+        match *self {
+            Self::Feed { ramp, .. } => Ticks::from_seconds(ramp.duration_s(), tick_s),
+            Self::Turned { ramp, at, .. } => {
+                let turned = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
+                Ticks::from_seconds(turned.duration_s(), tick_s)
+            }
+            Self::Dwell(duration) => Some(duration),
+            Self::End | Self::Stop => None,
+        }
+    }
+
     /// The same item, given up `elapsed` after the start of `phase`: the shortest with that beginning that ends at a
     /// feed that does not change. `None` where it can only be finished.
     pub(super) fn cut(&self, phase: Phase, elapsed: Ticks, tick_s: f64) -> Option<Self> {

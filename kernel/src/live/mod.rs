@@ -22,15 +22,20 @@
 //! - `replan`: a plan from a junction on;
 //! - `list`: a feed list as the background sees it;
 //! - `gather`: what goes into the next list;
+//! - [`Source`]: where items come from, perhaps later;
 //! - `command`: what takes over from the motion under way, and where;
 //! - [`director`]: what follows what.
 
 mod command;
 pub mod director;
 mod gather;
+#[cfg(test)]
+mod interrupted;
 mod list;
 mod replan;
 mod road;
+mod source;
 
 pub use director::{Director, OVERRIDE_MAX, OVERRIDE_MIN, State};
 pub use list::LIST_ITEMS;
+pub use source::Source;

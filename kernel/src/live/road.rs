@@ -69,11 +69,13 @@ impl RoadBlock {
 #[derive(Debug, Default)]
 pub(super) struct Road<const BLOCKS: usize> {
     blocks: Deque<RoadBlock, BLOCKS>,
+    /// The stretch and the end of the last block that was appended, which may have been passed since.
+    last: (u32, Position),
 }
 
 impl<const BLOCKS: usize> Road<BLOCKS> {
     pub(super) const fn new() -> Self {
-        Self { blocks: Deque::new() }
+        Self { blocks: Deque::new(), last: (0, Position::ZERO) }
     }
 
     pub(super) fn is_full(&self) -> bool {
@@ -85,8 +87,9 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
         if block.length <= Position::ZERO {
             return;
         }
-        let last = self.blocks.back().filter(|last| last.stretch == stretch);
-        let start = last.map_or(Position::ZERO, |last| last.end);
+        let (last, end) = self.last;
+        let start = if last == stretch { end } else { Position::ZERO };
+        self.last = (stretch, start + block.length);
         // There was room.
         let _ = self.blocks.push_back(RoadBlock { stretch, start, end: start + block.length, block });
     }
@@ -109,6 +112,10 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
 
     /// Where the blocks of `stretch` end, as far as they are known.
     pub(super) fn end_of(&self, stretch: u32) -> Option<Position> {
+        let (last, end) = self.last;
+        if last == stretch {
+            return Some(end);
+        }
         self.blocks.iter().rev().find(|block| block.stretch == stretch).map(|block| block.end)
     }
 

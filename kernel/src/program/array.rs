@@ -7,7 +7,7 @@ use core::marker::PhantomData;
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 
-pub(super) fn serialize<T: Serialize, S: Serializer, const N: usize>(
+pub(crate) fn serialize<T: Serialize, S: Serializer, const N: usize>(
     array: &[T; N],
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
@@ -18,7 +18,7 @@ pub(super) fn serialize<T: Serialize, S: Serializer, const N: usize>(
     tuple.end()
 }
 
-pub(super) fn deserialize<'de, T: Copy + Deserialize<'de>, D: Deserializer<'de>, const N: usize>(
+pub(crate) fn deserialize<'de, T: Copy + Deserialize<'de>, D: Deserializer<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<[T; N], D::Error> {
     deserializer.deserialize_tuple(N, Elements(PhantomData))

@@ -16,6 +16,7 @@ use core::marker::PhantomData;
 
 use serde::{Deserialize, Serialize};
 
+use super::checksum::Checksum;
 use super::{Item, wire};
 use crate::axis::AxisFigures;
 use crate::queue::PathRules;
@@ -28,50 +29,6 @@ const PREFIX: usize = MAGIC.len() + 2;
 const AXES_MAX: usize = 8;
 /// No header and no item of so many axes is longer.
 const ENTRY_MAX: usize = 4096;
-
-/// CRC-32 (ISO-HDLC) of what has been seen so far. Four bits at a time: a kilobyte of flash for a table of bytes is
-/// worth more than the milliseconds.
-struct Checksum(u32);
-
-impl Checksum {
-    const NONE: Self = Self(u32::MAX);
-    /// What four bits that leave make of the rest, by the polynomial with its least significant bit first.
-    // For a constant: an index beyond the table does not compile.
-    #[allow(clippy::indexing_slicing)]
-    const REST: [u32; 16] = {
-        let (mut rest, mut index) = ([0; 16], 0);
-        while index < 16 {
-            let (mut sum, mut bit) = (index as u32, 0);
-            while bit < 4 {
-                sum = sum >> 1 ^ ((sum & 1) * 0xEDB8_8320);
-                bit += 1;
-            }
-            rest[index] = sum;
-            index += 1;
-        }
-        rest
-    };
-
-    fn update(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.0 ^= u32::from(byte);
-            self.leave();
-            self.leave();
-        }
-    }
-
-    // A call, or the loop over bytes is unrolled.
-    #[inline(never)]
-    fn leave(&mut self) {
-        // The index is below the length.
-        let rest = Self::REST.get(self.0 as usize & 15).copied().unwrap_or_default();
-        self.0 = self.0 >> 4 ^ rest;
-    }
-
-    fn finish(self) -> u32 {
-        !self.0
-    }
-}
 
 /// What a program was planned for. A board executes it with this or not at all.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -322,18 +279,6 @@ mod tests {
         }
         assert!(longest::<8>(axis).is_ok_and(|bytes| bytes > 2000));
         assert_eq!(longest::<9>(axis), Err(postcard::Error::SerializeBufferFull));
-    }
-
-    /// The value that the catalogue of parametrised CRC algorithms gives for CRC-32/ISO-HDLC, in one part and in two.
-    #[test]
-    fn the_checksum_is_the_one_of_zip_and_ethernet() {
-        for split in 0..=9 {
-            let (first, second) = b"123456789".split_at(split);
-            let mut sum = Checksum::NONE;
-            sum.update(first);
-            sum.update(second);
-            assert_eq!(sum.finish(), 0xCBF4_3926);
-        }
     }
 
     /// Every single damaged byte, every shorter program, and every kind of stranger.

@@ -8,14 +8,16 @@
 //! - [`mod@check`]: whether all of a program can be executed, before any of it is;
 //! - [`mod@bytes`]: a program as bytes, with the machine it is for.
 
-mod array;
+pub(crate) mod array;
 pub mod bytes;
 pub mod check;
+mod checksum;
 pub mod supply;
 mod wire;
 
 pub use bytes::{Header, Items, ProgramError, Reader, write};
 pub use check::{CheckError, check};
+pub use checksum::Checksum;
 pub use supply::{Supply, SupplyError};
 
 use serde::{Deserialize, Serialize};

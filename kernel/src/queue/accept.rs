@@ -83,6 +83,17 @@ pub enum Rejection {
     InsideStretch,
     /// Path that no block says the feed of: live control could not brake on it.
     NoBlock,
+    /// A change to or from a feed list that is not the one it may be: to the one that was filled last, from another,
+    /// after fewer items than that word holds.
+    #[cfg(feature = "live")]
+    NoChange {
+        /// The list under way.
+        from: u8,
+        /// The list asked for.
+        to: u8,
+        /// Items of `from` that are driven before.
+        after: u32,
+    },
     /// The stretch is longer, or a position farther out, than the kernel's range.
     Range {
         /// The length or coordinate \[mm\].
@@ -108,6 +119,13 @@ impl core::fmt::Display for Rejection {
             }
             Self::Empty => write!(f, "a stretch without any length"),
             Self::NoBlock => write!(f, "path without a block, expected one that says what holds its feed"),
+            #[cfg(feature = "live")]
+            Self::NoChange { from, to, after } => {
+                write!(
+                    f,
+                    "change to list {to} after {after} items of list {from}: expected the one filled last"
+                )
+            }
             Self::InsideStretch => write!(f, "dwell or stop inside a stretch"),
             Self::Range { mm } => write!(f, "{mm} mm: expected at most ±{} mm", Position::LIMIT_MM),
         }
@@ -115,6 +133,35 @@ impl core::fmt::Display for Rejection {
 }
 
 impl core::error::Error for Rejection {}
+
+/// How close segments and dwells follow each other.
+#[derive(Clone, Copy, Debug)]
+pub struct Density {
+    /// Durations of the latest, the newest first.
+    recent: [Ticks; SEGMENTS_PER_TICK_MAX],
+}
+
+impl Density {
+    /// After a rest.
+    pub const NONE: Self = Self { recent: [Ticks::ONE; SEGMENTS_PER_TICK_MAX] };
+
+    /// One more, that takes `newest`.
+    ///
+    /// # Errors
+    /// The executor can't keep up with it and those before it.
+    #[inline(never)]
+    pub fn follow(&mut self, newest: Ticks) -> Result<(), Rejection> {
+        let (mut next, mut together) = (newest, Ticks::ZERO);
+        for place in rolled(self.recent.as_mut_slice()) {
+            together = rolled(together.plus(next));
+            core::mem::swap(place, &mut next);
+        }
+        if together < Ticks::ONE {
+            return Err(Rejection::Dense { ticks: together.to_f64() });
+        }
+        Ok(())
+    }
+}
 
 /// Where the streams stand.
 #[derive(Clone, Copy, Debug)]
@@ -126,8 +173,7 @@ pub(crate) struct Acceptance<R: Real, const AXES: usize> {
     path_length: Position,
     feed_length: Position,
     feed_mm_s: R,
-    /// Durations of the latest segments, the newest first.
-    recent: [Ticks; SEGMENTS_PER_TICK_MAX],
+    density: Density,
     /// Of what one stream has beyond the other's end: the steepest of its curves and where the last of them ends, the
     /// greatest feed. A fast ramp may follow a sharp curve, but must not be on it.
     steepness: Steepness,
@@ -144,7 +190,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
             path_length: Position::ZERO,
             feed_length: Position::ZERO,
             feed_mm_s: R::ZERO,
-            recent: [Ticks::ONE; SEGMENTS_PER_TICK_MAX],
+            density: Density::NONE,
             steepness: Steepness::STRAIGHT,
             curved_until: Position::ZERO,
             ahead_mm_s: 0.0,
@@ -210,7 +256,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
                 return Err(Rejection::Limit { quantity, value, limit });
             }
         }
-        self.not_too_dense(segment.duration())?;
+        self.density.follow(segment.duration())?;
         let feed_length = self.feed_length + segment.length();
         within_range(feed_length)?;
         if R::SETPOINT_MAX.is_some() {
@@ -240,13 +286,13 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         Ok(())
     }
 
-    /// For feed that goes on from here, at `feed_mm_s`, whatever was accepted before.
+    /// For feed that goes on from here, at `feed_mm_s` and behind what `density` says, whatever was accepted before.
     #[cfg(feature = "live")]
-    pub(crate) fn feed_from(&self, feed_length: Position, feed_mm_s: R) -> Self {
+    pub(crate) fn feed_from(&self, feed_length: Position, feed_mm_s: R, density: Density) -> Self {
         Self {
             feed_length,
             feed_mm_s,
-            recent: [Ticks::ONE; SEGMENTS_PER_TICK_MAX],
+            density,
             // What the curves ask for is checked where they enter.
             steepness: Steepness::STRAIGHT,
             curved_until: Position::ZERO,
@@ -258,6 +304,18 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
     #[cfg(feature = "live")]
     pub(crate) fn fits_at(&self, piece: &Piece<R, AXES>, fastest_mm_s: f64) -> Result<(), Rejection> {
         if R::SETPOINT_MAX.is_some() { self.fits(&piece.steepness(), fastest_mm_s) } else { Ok(()) }
+    }
+
+    /// Behind the end of a stretch's feed.
+    #[cfg(feature = "live")]
+    pub(crate) fn feed_after_stretch(&self) -> Self {
+        self.feed_from(Position::ZERO, R::ZERO, self.density)
+    }
+
+    #[cfg(feature = "live")]
+    pub(crate) fn feed_dwell(&mut self, duration: Ticks) -> Result<(), Rejection> {
+        self.feed_at_rest()?;
+        self.density.follow(duration)
     }
 
     /// Whether the feed of a list is between stretches.
@@ -296,13 +354,13 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
                 feed_mm: self.feed_length.to_mm(),
             });
         }
-        *self = Self { recent: self.recent, ..Self::new(self.rules, position) };
+        *self = Self { density: self.density, ..Self::new(self.rules, position) };
         Ok(())
     }
 
     pub(crate) fn dwell(&mut self, duration: Ticks) -> Result<(), Rejection> {
         self.at_rest()?;
-        self.not_too_dense(duration)
+        self.density.follow(duration)
     }
 
     /// How the feed's length of this stretch compares with the path's.
@@ -313,20 +371,6 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
     pub(crate) fn at_rest(&self) -> Result<(), Rejection> {
         if self.tangent.is_some() || self.feed_length > Position::ZERO {
             return Err(Rejection::InsideStretch);
-        }
-        Ok(())
-    }
-
-    /// Puts `newest` among the latest durations, if the executor can keep up with them.
-    #[inline(never)]
-    fn not_too_dense(&mut self, newest: Ticks) -> Result<(), Rejection> {
-        let (mut next, mut together) = (newest, Ticks::ZERO);
-        for place in rolled(self.recent.as_mut_slice()) {
-            together = rolled(together.plus(next));
-            core::mem::swap(place, &mut next);
-        }
-        if together < Ticks::ONE {
-            return Err(Rejection::Dense { ticks: together.to_f64() });
         }
         Ok(())
     }

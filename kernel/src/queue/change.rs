@@ -31,6 +31,8 @@ pub struct Change {
 impl Change {
     /// More than a list has items.
     const AFTER_BITS: u32 = 8;
+    /// The greatest [`Change::after`].
+    pub const AFTER_MAX: u32 = (1 << Self::AFTER_BITS) - 1;
     /// No change is asked for.
     const NONE: u32 = u32::MAX;
 
@@ -40,18 +42,13 @@ impl Change {
             | u32::from(self.to) << 28
             | u32::from(self.within) << 27
             | (number & 0x7_FFFF) << Self::AFTER_BITS
-            | self.after & ((1 << Self::AFTER_BITS) - 1)
+            | self.after & Self::AFTER_MAX
     }
 
     fn from_word(word: u32) -> Option<Self> {
         let (from, to) = ((word >> 30) as u8, (word >> 28 & 3) as u8);
         let within = word >> 27 & 1 == 1;
-        (from < LISTS && to < LISTS).then_some(Self {
-            from,
-            to,
-            after: word & ((1 << Self::AFTER_BITS) - 1),
-            within,
-        })
+        (from < LISTS && to < LISTS).then_some(Self { from, to, after: word & Self::AFTER_MAX, within })
     }
 }
 
@@ -78,6 +75,8 @@ pub(super) struct Words {
     refused: AtomicU32,
     /// A bit for each list that the background fills or has filled; the tick empties the others.
     claimed: AtomicU32,
+    /// Counts what the background writes of the words above, so that the tick looks at one where there is nothing new.
+    news: AtomicU32,
     tick: AtomicU32,
     /// List, phase and count of items done.
     place: AtomicU32,
@@ -94,6 +93,7 @@ impl Words {
             change: AtomicU32::new(Change::NONE),
             refused: AtomicU32::new(Change::NONE),
             claimed: AtomicU32::new(1),
+            news: AtomicU32::new(0),
             tick: AtomicU32::new(0),
             place: AtomicU32::new(0),
             left_high: AtomicU32::new(0),
@@ -107,7 +107,7 @@ impl Words {
             word.store(Change::NONE, Ordering::Relaxed);
         }
         self.claimed.store(1, Ordering::Relaxed);
-        for word in [&self.tick, &self.place, &self.left_high, &self.left_low] {
+        for word in [&self.news, &self.tick, &self.place, &self.left_high, &self.left_low] {
             word.store(0, Ordering::Relaxed);
         }
     }
@@ -116,6 +116,7 @@ impl Words {
     pub(super) fn ask(&self, change: Option<Change>, number: u32) {
         let word = change.map_or(Change::NONE, |change| change.to_word(number));
         self.change.store(word, Ordering::Release);
+        super::count(&self.news);
     }
 
     /// Whether the change that was asked for last came too late.
@@ -127,6 +128,13 @@ impl Words {
     pub(super) fn claim(&self, list: u8, claimed: bool) {
         let (bits, bit) = (self.claimed.load(Ordering::Relaxed), 1 << list);
         self.claimed.store(if claimed { bits | bit } else { bits & !bit }, Ordering::Release);
+        super::count(&self.news);
+    }
+
+    /// Another number than before if the background has written.
+    #[inline]
+    pub(super) fn news(&self) -> u32 {
+        self.news.load(Ordering::Acquire)
     }
 
     /// Where the executor is, as far as the background can know.
@@ -164,12 +172,7 @@ impl Words {
     /// The tick says where it is.
     #[inline]
     pub(super) fn publish(&self, list: u8, done: u32, inside: Option<(Phase, Ticks)>, waits: bool) {
-        let (phase, left) = match inside {
-            None => (0, Ticks::ZERO),
-            Some((Phase::Rise, left)) => (1, left),
-            Some((Phase::Hold, left)) => (2, left),
-            Some((Phase::Fall, left)) => (3, left),
-        };
+        let (phase, left) = inside.map_or((0, Ticks::ZERO), |(phase, left)| (phase as u32 + 1, left));
         let place = u32::from(list) << 30 | phase << 28 | u32::from(waits) << 27 | done & ((1 << 27) - 1);
         self.place.store(place, Ordering::Relaxed);
         let bits = left.to_bits();

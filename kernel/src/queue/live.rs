@@ -6,9 +6,10 @@
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use super::change::{Change, LISTS, Progress};
+use super::change::{Change, LISTS, Progress, Words};
 use super::{
-    FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept, count, enter,
+    Density, FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept,
+    count, enter,
 };
 use crate::law::{FeedSegment, Phase, Ticks};
 use crate::live::LIST_ITEMS;
@@ -16,9 +17,9 @@ use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
 
-/// The most items of a list that is not needed any more that go in one tick. A list is empty a tick after it was given
-/// up if it has no more places.
-const DROPPED_PER_TICK: usize = 16;
+/// The most items of a list that is not needed any more that go in one tick. Each costs some twenty instructions; a list
+/// of sixteen places is empty four ticks after it was given up.
+const DROPPED_PER_TICK: usize = 4;
 
 /// Storage of a path and three feed lists: `PIECES` − 1 pieces, `SEGMENTS` − 1 items a list.
 #[derive(Debug)]
@@ -63,7 +64,10 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             shared,
             path_accept: acceptance,
             feed_accept: acceptance,
+            filled: None,
             changes: 0,
+            #[cfg(test)]
+            between: None,
         };
         let intake = Intake {
             path: path_out,
@@ -76,6 +80,8 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
                 current: 0,
                 others: [(1, second_out), (2, third_out)],
                 done: 0,
+                seen: shared.words.news(),
+                due_after: u32::MAX,
                 change: None,
                 refused: None,
             }),
@@ -101,17 +107,31 @@ pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
     path_accept: accept::Acceptance<R, AXES>,
     /// Of the list being filled.
     feed_accept: accept::Acceptance<R, AXES>,
+    filled: Option<u8>,
     /// Changes asked for so far.
     changes: u32,
+    /// What happens between any two operations of a turn: ticks.
+    #[cfg(test)]
+    pub(crate) between: Option<&'a dyn Fn()>,
 }
 
 impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
+    /// Ticks may come before any operation, in tests.
+    #[inline]
+    fn interruptible(&self) {
+        #[cfg(test)]
+        if let Some(between) = self.between {
+            between();
+        }
+    }
+
     /// Enters a piece of path that is driven at `fastest_mm_s` at most.
     ///
     /// # Errors
     /// The queue is full, the piece does not continue its predecessor, or at that feed it asks an axis for more than the
     /// number type holds.
     pub fn piece(&mut self, piece: Piece<R, AXES>, fastest_mm_s: f64) -> Result<(), Refused<Piece<R, AXES>>> {
+        self.interruptible();
         let mut next = self.path_accept;
         next.piece(&piece).map_err(Refused::Invalid)?;
         next.fits_at(&piece, fastest_mm_s).map_err(Refused::Invalid)?;
@@ -126,6 +146,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// # Errors
     /// The queue is full, or the path does not end there.
     pub fn end_of_path(&mut self, position: [Position; AXES]) -> Result<(), Refused<[Position; AXES]>> {
+        self.interruptible();
         let mut next = self.path_accept;
         next.end_of_path(position).map_err(Refused::Invalid)?;
         enter(&mut self.path, PathItem::EndOfStretch(position)).map_err(|_| Refused::Full(position))?;
@@ -137,6 +158,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Where the executor is.
     #[must_use]
     pub fn progress(&self) -> Progress {
+        self.interruptible();
         self.shared.words.progress()
     }
 
@@ -147,17 +169,19 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     }
 
     fn free_list(&self) -> Option<u8> {
+        self.interruptible();
         let is_free =
             |(list, queue): &(u8, &Producer<'_, _>)| !self.shared.words.is_claimed(*list) && queue.is_empty();
         (0..LISTS).zip(&self.lists).find(is_free).map(|(list, _)| list)
     }
 
     /// A list that is empty and not under way nor asked for, claimed for what goes on from path position `start` at
-    /// `feed_mm_s`; `None` if there is none now.
-    pub fn begin(&mut self, start: Position, feed_mm_s: R) -> Option<u8> {
+    /// `feed_mm_s`, behind what `density` says; `None` if there is none now.
+    pub fn begin(&mut self, start: Position, feed_mm_s: R, density: Density) -> Option<u8> {
         let free = self.free_list()?;
         self.shared.words.claim(free, true);
-        self.feed_accept = self.path_accept.feed_from(start, feed_mm_s);
+        self.feed_accept = self.path_accept.feed_from(start, feed_mm_s, density);
+        self.filled = Some(free);
         Some(free)
     }
 
@@ -183,17 +207,20 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
             return Err(Refused::Invalid(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() }));
         }
         self.append(list, FeedItem::EndOfStretch).map_err(|_| Refused::Full(()))?;
-        self.feed_accept = self.feed_accept.feed_from(Position::ZERO, R::ZERO);
+        self.feed_accept = self.feed_accept.feed_after_stretch();
         Ok(())
     }
 
     /// Appends a rest, between stretches.
     ///
     /// # Errors
-    /// The list is full, or a stretch is under way.
+    /// The list is full, a stretch is under way, or too much would fall into one tick.
     pub fn dwell(&mut self, list: u8, duration: Ticks) -> Result<(), Refused<Ticks>> {
-        self.feed_accept.feed_at_rest().map_err(Refused::Invalid)?;
-        self.append(list, FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))
+        let mut next = self.feed_accept;
+        next.feed_dwell(duration).map_err(Refused::Invalid)?;
+        self.append(list, FeedItem::Dwell(duration)).map_err(|_| Refused::Full(duration))?;
+        self.feed_accept = next;
+        Ok(())
     }
 
     /// Appends a rest until told to resume, between stretches.
@@ -206,6 +233,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     }
 
     fn append(&mut self, list: u8, item: FeedItem<R>) -> Result<(), FeedItem<R>> {
+        self.interruptible();
         match self.lists.get_mut(usize::from(list)) {
             Some(queue) => enter(queue, item),
             None => Err(item),
@@ -218,25 +246,42 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         self.lists.get(usize::from(list)).map_or(0, |queue| queue.capacity().saturating_sub(queue.len()))
     }
 
-    /// Asks for a change to a list that is complete, in place of one that was asked for before.
-    pub fn change(&mut self, change: Change) {
+    /// Asks for a change to the list that was begun last, in place of one that was asked for before. That it begins where
+    /// it takes over, and that its path is queued, is what who filled it answers for.
+    ///
+    /// # Errors
+    /// The list is another one, or does not end at rest. Nothing is asked for then.
+    pub fn change(&mut self, change: Change) -> Result<(), Rejection> {
+        self.interruptible();
+        let Change { from, to, after, .. } = change;
+        if self.filled != Some(to) || from == to || from >= LISTS || after > Change::AFTER_MAX {
+            return Err(Rejection::NoChange { from, to, after });
+        }
+        let feed_mm_s = self.feed_accept.feed_mm_s();
+        if feed_mm_s > R::ZERO {
+            return Err(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() });
+        }
         self.changes = self.changes.wrapping_add(1);
         self.shared.words.ask(Some(change), self.changes);
+        Ok(())
     }
 
     /// Takes back what was asked for. The tick may have followed it already.
     pub fn no_change(&mut self) {
+        self.interruptible();
         self.shared.words.ask(None, 0);
     }
 
     /// Whether the change asked for came too late.
     #[must_use]
     pub fn is_refused(&self) -> bool {
+        self.interruptible();
         self.shared.words.is_refused()
     }
 
     /// Gives up a list: the tick empties it.
     pub fn give_up(&mut self, list: u8) {
+        self.interruptible();
         self.shared.words.claim(list, false);
     }
 }
@@ -247,6 +292,10 @@ pub(super) struct Lists<'a, R: Real> {
     others: [(u8, Consumer<'a, FeedItem<R>>); LISTS as usize - 1],
     /// Items of the current list that are done.
     done: u32,
+    /// The news that have been dealt with.
+    seen: u32,
+    /// After so many items of the current list a change is due; never reached if none is asked for.
+    due_after: u32,
     /// What is asked for, as of the tick's start, with its word.
     change: Option<(u32, Change)>,
     /// The word that came too late last.
@@ -254,38 +303,47 @@ pub(super) struct Lists<'a, R: Real> {
 }
 
 impl<R: Real> Lists<'_, R> {
-    /// Whether the change is due where no segment is under way.
-    #[inline]
-    fn is_due(&self) -> bool {
-        self.change.is_some_and(|(_, change)| change.after == self.done)
+    /// Deals with news, in as many ticks as it takes to empty what was given up.
+    #[cold]
+    #[inline(never)]
+    fn look(&mut self, words: &Words, news: u32) {
+        self.change =
+            words.asked().filter(|(word, change)| change.from == self.current && self.refused != Some(*word));
+        self.due_after = self.change.map_or(u32::MAX, |(_, change)| change.after);
+        for _ in 0..DROPPED_PER_TICK {
+            let given_up = self.others.iter_mut().filter(|(list, _)| !words.is_claimed(*list));
+            // One item of one of them, while there is any.
+            if given_up.map(|(_, queue)| queue.dequeue()).all(|item| item.is_none()) {
+                self.seen = news;
+                break;
+            }
+        }
+    }
+
+    /// What is asked for no longer is.
+    fn forget(&mut self) -> Option<(u32, Change)> {
+        self.due_after = u32::MAX;
+        self.change.take()
     }
 }
 
 impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// What the background asks for now; what it gave up goes.
-    #[inline(never)]
+    #[inline]
     pub(super) fn look_for_change(&mut self) {
-        let Some(lists) = &mut self.lists else { return };
-        let words = &self.shared.words;
-        for (list, queue) in &mut lists.others {
-            if !words.is_claimed(*list) {
-                for _ in 0..DROPPED_PER_TICK {
-                    if queue.dequeue().is_none() {
-                        break;
-                    }
-                }
+        if let Some(lists) = &mut self.lists {
+            let news = self.shared.words.news();
+            if lists.seen != news {
+                lists.look(&self.shared.words, news);
             }
         }
-        lists.change = words
-            .asked()
-            .filter(|(word, change)| change.from == lists.current && lists.refused != Some(*word));
     }
 
     #[inline(never)]
     pub(super) fn count_done(&mut self) {
         let Some(lists) = &mut self.lists else { return };
         lists.done = lists.done.wrapping_add(1);
-        if lists.is_due() && lists.change.is_some_and(|(_, change)| !change.within) {
+        if lists.due_after == lists.done && lists.change.is_some_and(|(_, change)| !change.within) {
             self.take_over();
         }
     }
@@ -294,9 +352,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// way.
     #[inline]
     pub(crate) fn is_change_due(&self) -> bool {
-        self.lists
-            .as_ref()
-            .is_some_and(|lists| lists.change.is_some_and(|(_, change)| change.after <= lists.done))
+        self.lists.as_ref().is_some_and(|lists| lists.due_after <= lists.done)
     }
 
     /// The first item of the list that is asked for, if the place where it takes over lies within the item under way.
@@ -308,7 +364,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
 
     /// Whether the change that is due takes over where no segment is under way.
     pub(crate) fn takes_over_between_items(&self) -> bool {
-        self.lists.as_ref().is_some_and(Lists::is_due)
+        self.lists.as_ref().is_some_and(|lists| lists.due_after == lists.done)
     }
 
     /// Follows the change.
@@ -316,12 +372,14 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     #[inline(never)]
     pub(crate) fn take_over(&mut self) {
         let Some(lists) = &mut self.lists else { return };
-        let Some((_, change)) = lists.change.take() else { return };
+        let Some((_, change)) = lists.forget() else { return };
         for (list, queue) in &mut lists.others {
             if *list == change.to {
                 core::mem::swap(list, &mut lists.current);
                 core::mem::swap(queue, &mut self.feed);
                 lists.done = 0;
+                // What is given up already is emptied from the next tick on.
+                lists.seen = lists.seen.wrapping_sub(1);
                 return;
             }
         }
@@ -331,7 +389,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     #[cold]
     pub(crate) fn refuse(&mut self) {
         let Some(lists) = &mut self.lists else { return };
-        if let Some((word, _)) = lists.change.take() {
+        if let Some((word, _)) = lists.forget() {
             lists.refused = Some(word);
             self.shared.words.refuse(word);
         }

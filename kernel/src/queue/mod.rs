@@ -19,13 +19,15 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use crate::axis::Correction;
+use crate::axis::{Correction, CorrectionError};
 use crate::law::{FeedSegment, Ticks};
 use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
 
 pub(crate) use accept::Acceptance;
+#[cfg(feature = "live")]
+pub use accept::Density;
 pub use accept::{PathRules, Rejection, SEGMENTS_PER_TICK_MAX};
 #[cfg(feature = "live")]
 pub use change::{Change, LISTS, Progress};
@@ -314,8 +316,17 @@ pub struct Intake<'a, R: Real, const AXES: usize> {
 impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     /// What was learnt of a stretch to come. Another one replaces it; there is no way back to none but one without
     /// knots.
-    pub fn correct(&mut self, correction: Correction<'a, R, AXES>) {
+    ///
+    /// # Errors
+    /// Under live control, where motion keeps no times that could have been learnt. Never without.
+    #[inline]
+    pub fn correct(&mut self, correction: Correction<'a, R, AXES>) -> Result<(), CorrectionError> {
+        #[cfg(feature = "live")]
+        if self.lists.is_some() {
+            return Err(CorrectionError::LiveControl);
+        }
         self.correction = Some(correction);
+        Ok(())
     }
 
     #[inline]
@@ -329,9 +340,7 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
         self.path_taken.before_tick = self.path_taken.so_far;
         self.feed_taken.before_tick = self.feed_taken.so_far;
         #[cfg(feature = "live")]
-        if self.lists.is_some() {
-            self.look_for_change();
-        }
+        self.look_for_change();
     }
 
     /// The first item of the feed stream: the one under way, or the next.

@@ -11,7 +11,7 @@ fn exact_path_stops_at_corners_only() {
     let machine = Machine::reference();
     let text = "G61 F120\nG1 X10\nX20\nY10\nG64 P0.05\nX30\nX30 Y20\nG61\nX40\nY30\nM2\n";
     let plan = planned(text, &machine).expect("a plan");
-    let kinds: Vec<_> = plan.blocks.iter().map(|block| (block.line, block.kind)).collect();
+    let kinds: Vec<_> = plan.blocks.iter().map(|block| (block.line, &*block.kind)).collect();
     let blended = [(6, "line"), (6, "blend"), (7, "line"), (9, "line")];
     let mut expected = vec![(2, "line"), (3, "line"), (4, "line")];
     expected.extend(blended);

@@ -57,6 +57,8 @@ pub(crate) struct PathPoint {
     pub(crate) tangent: Vector,
     pub(crate) second: Vector,
     pub(crate) third: Vector,
+    /// Magnitudes of the three derivatives, of a polynomial of the terms that they are sums of.
+    pub(crate) sizes: [f64; 3],
 }
 
 /// A move made ready to be evaluated.
@@ -72,24 +74,38 @@ pub(crate) struct Element {
     onward: Vector,
     /// Of a line the direction, of an arc the rise.
     axial: Vector,
+    /// Of a polynomial, per axis those of u, u², …, as parts of the length.
+    coefficients: Option<[[f64; 7]; 3]>,
 }
 
 impl Element {
+    /// A line as compiled.
+    pub(crate) fn line(from: Vector, direction: Vector, length_mm: f64) -> Self {
+        Self {
+            length_mm,
+            from,
+            radius_mm: 0.0,
+            grows_mm: 0.0,
+            sweep_rad: 0.0,
+            outward: [0.0; 3],
+            onward: [0.0; 3],
+            axial: direction,
+            coefficients: None,
+        }
+    }
+
+    /// A curve as compiled. It has no radius of its own.
+    pub(crate) fn polynomial(from: Vector, coefficients: [[f64; 7]; 3], length_mm: f64) -> Self {
+        let line = Self::line(from, [0.0; 3], length_mm);
+        Self { radius_mm: f64::INFINITY, coefficients: Some(coefficients), ..line }
+    }
+
     pub(crate) fn new(step: &Move) -> Self {
         let from = step.from.map(mm);
         let whole: Vector = core::array::from_fn(|axis| mm(step.to[axis] - step.from[axis]));
         let Some(arc) = step.arc else {
             let length_mm = norm(whole);
-            return Self {
-                length_mm,
-                from,
-                radius_mm: 0.0,
-                grows_mm: 0.0,
-                sweep_rad: 0.0,
-                outward: [0.0; 3],
-                onward: [0.0; 3],
-                axial: whole.map(|c| c / length_mm),
-            };
+            return Self::line(from, whole.map(|c| c / length_mm), length_mm);
         };
         let [first, second, normal] = arc.axes;
         let start = arc.offset.map(|units| -units);
@@ -115,22 +131,27 @@ impl Element {
         let mut axial = [0.0; 3];
         axial[normal] = whole[normal] / length_mm;
         let grows_mm = mm(end[0]).hypot(mm(end[1])) - radius_mm;
-        Self { length_mm, from, radius_mm, grows_mm, sweep_rad, outward, onward, axial }
+        Self { radius_mm, grows_mm, sweep_rad, outward, onward, ..Self::line(from, axial, length_mm) }
     }
 
     /// `s_mm` from its start.
     pub(crate) fn at(&self, s_mm: f64) -> PathPoint {
         let still = [0.0; 3];
+        if let Some(coefficients) = &self.coefficients {
+            return self.on_polynomial(coefficients, s_mm / self.length_mm);
+        }
         if self.radius_mm <= 0.0 {
             let at = core::array::from_fn(|axis| self.from[axis] + self.axial[axis] * s_mm);
-            return PathPoint { at, tangent: self.axial, second: still, third: still };
+            let sizes = [1.0, 0.0, 0.0];
+            return PathPoint { at, tangent: self.axial, second: still, third: still, sizes };
         }
         let part = s_mm / self.length_mm;
         let (sine, cosine) = (self.sweep_rad * part).sin_cos();
         let half = (0.5 * self.sweep_rad * part).sin();
         let turn = self.sweep_rad / self.length_mm;
         let planar = self.radius_mm * turn;
-        let mut point = PathPoint { at: self.from, tangent: still, second: still, third: still };
+        let mut point =
+            PathPoint { at: self.from, tangent: still, second: still, third: still, sizes: [1.0; 3] };
         for axis in 0..3 {
             let (o, n) = (self.outward[axis], self.onward[axis]);
             let (here, ahead) = (o * cosine + n * sine, n * cosine - o * sine);
@@ -141,7 +162,30 @@ impl Element {
             point.second[axis] = -planar * turn * here;
             point.third[axis] = -planar * turn * turn * ahead;
         }
+        point.sizes = [1.0, norm(point.second), norm(point.third)];
         point
+    }
+
+    fn on_polynomial(&self, coefficients: &[[f64; 7]; 3], u: f64) -> PathPoint {
+        let mut derived = [self.from, [0.0; 3], [0.0; 3], [0.0; 3]];
+        let mut sizes = [0.0; 4];
+        for (order, (derived, size)) in derived.iter_mut().zip(&mut sizes).enumerate() {
+            let scale = self.length_mm.powi(1 - order as i32);
+            for (axis, coefficients) in coefficients.iter().enumerate() {
+                let mut terms = 0.0;
+                for (index, &c) in coefficients.iter().enumerate().skip(order.max(1) - 1) {
+                    let power = index + 1;
+                    let factor: f64 = (power + 1 - order..=power).map(|k| k as f64).product();
+                    let term = c * factor * scale * u.powi((power - order) as i32);
+                    derived[axis] += term;
+                    terms += term.abs();
+                }
+                *size = f64::max(*size, terms);
+            }
+        }
+        let [at, tangent, second, third] = derived;
+        let [_, sizes @ ..] = sizes;
+        PathPoint { at, tangent, second, third, sizes: [sizes[0].max(1.0), sizes[1], sizes[2]] }
     }
 }
 

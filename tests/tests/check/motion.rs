@@ -53,7 +53,8 @@ pub(crate) struct Checker<'a> {
     block: usize,
     /// First record of the feed plan that may still matter.
     feed: usize,
-    /// Under live control, the greatest feed override: motion is not the plan's any more, but keeps the limits.
+    /// Under live control, the greatest feed override that the feed may still be of: motion is not the plan's any more,
+    /// but keeps the limits.
     live: Option<f64>,
     pub(crate) totals: Totals,
 }
@@ -79,6 +80,11 @@ impl<'a> Checker<'a> {
     /// The same for motion under live control, with feed overrides up to `feed_override`.
     pub(crate) fn live(self, feed_override: f64) -> Self {
         Self { live: Some(feed_override), ..self }
+    }
+
+    /// From now on the feed may be of an override up to `feed_override`.
+    pub(crate) fn override_up_to(&mut self, feed_override: f64) {
+        self.live = Some(feed_override);
     }
 
     /// How far the machine has come, from the program's start [mm].
@@ -244,9 +250,13 @@ impl<'a> Checker<'a> {
             cap = cap.max(planned(placed.block));
             asked = asked.max(placed.feed_mm_s);
         }
-        let most = self.live.unwrap_or(1.0).max(1.0);
+        let most = self.live.unwrap_or(1.0);
         if most <= 1.0 {
             self.bound("planned ceiling", v, cap * rounding)?;
+        }
+        // A rapid has no feed of its own.
+        if asked.is_infinite() {
+            return Ok(());
         }
         self.bound("programmed feed", v, asked * most * rounding)
     }
@@ -291,11 +301,16 @@ impl<'a> Checker<'a> {
                 core::array::from_fn(|i| n[i] * v * v + t[i] * a),
                 core::array::from_fn(|i| o[i] * v * v * v + 3.0 * n[i] * v * a + t[i] * j),
             ];
-            let (bend, twist) = (norm(n), norm(o));
-            let sizes = [v, bend * v * v + a.abs(), twist * v * v * v + 3.0 * bend * v * a.abs() + j.abs()];
+            let bend = norm(n);
+            let [along, curve, twist] = point.sizes;
+            let sizes = [
+                along * v,
+                curve * v * v + along * a.abs(),
+                twist * v * v * v + 3.0 * curve * v * a.abs() + along * j.abs(),
+            ];
             let mut found = [(norm(minus(position, point.at)), self.position_mm); 4];
             let piece_mm = placed.element.length_mm.min(0.39 * placed.element.radius_mm).min(16.0);
-            let steps = bounds::axis_steps([v, a, j], bend, twist, piece_mm);
+            let steps = bounds::axis_steps([v, a, j], curve, twist, piece_mm);
             for k in 0..3 {
                 let bound = bounds::AXIS_SHARES[k] * sizes[k] + steps[k] * self.step + 1e-300;
                 found[k + 1] = (norm(minus(derived[k], exact[k])), bound);

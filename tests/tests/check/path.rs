@@ -3,6 +3,9 @@
 use super::geometry::{Element, PathPoint, joint, position_bits};
 use super::program::{Asked, Generated};
 use motion_host::machine::Machine;
+use motion_host::planning::{Executable, Item as PlanItem, Plan};
+use motion_kernel::program::Item;
+use motion_kernel::units::Position;
 
 /// A move on its stretch.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +33,7 @@ pub(crate) struct Stretch {
 pub(crate) struct Path {
     pub(crate) stretches: Vec<Stretch>,
     pub(crate) dwell_s: f64,
+    pub(crate) dwells: u64,
     pub(crate) stops: u64,
     /// A joint's angle is so close to the machine's that rounding decides whether it stops there.
     pub(crate) is_ambiguous: bool,
@@ -46,6 +50,7 @@ impl Path {
                 Asked::Dwell(seconds) => {
                     path.close(&mut open);
                     path.dwell_s += seconds;
+                    path.dwells += 1;
                     continue;
                 }
                 Asked::Stop => {
@@ -79,6 +84,68 @@ impl Path {
             block += 1;
         }
         path.close(&mut open);
+        path
+    }
+
+    /// The path of a plan as compiled, where what is programmed is not what is driven: with blends. Those are held
+    /// against the program elsewhere.
+    pub(crate) fn compiled(plan: &Plan, executable: &Executable) -> Self {
+        let mut path = Self::default();
+        let mut items = executable.items.iter();
+        let mut first = 0;
+        for item in &plan.items {
+            let stretch = match item {
+                PlanItem::Stretch(stretch) => stretch,
+                PlanItem::Dwell { seconds, .. } => {
+                    path.dwell_s += seconds;
+                    path.dwells += 1;
+                    continue;
+                }
+                PlanItem::Stop { .. } => {
+                    path.stops += 1;
+                    continue;
+                }
+            };
+            let mut open = Stretch::default();
+            let ends: Vec<f64> = (stretch.blocks.iter())
+                .scan(0.0, |end, block| {
+                    *end += block.element.length_mm();
+                    Some(*end)
+                })
+                .collect();
+            let mut last = None;
+            for item in items.by_ref() {
+                let element = match *item {
+                    Item::Line { start, direction, length, .. } => {
+                        Element::line(start.map(Position::to_mm), direction, length.to_mm())
+                    }
+                    Item::Septic { start, coefficients, length, .. } => {
+                        Element::polynomial(start.map(Position::to_mm), coefficients, length.to_mm())
+                    }
+                    Item::EndOfStretch(end) => {
+                        open.end_bits = end.map(Position::to_bits);
+                        break;
+                    }
+                    _ => continue,
+                };
+                let middle_mm = open.length_mm + 0.5 * element.length_mm;
+                let block = ends.partition_point(|&end| end < middle_mm).min(ends.len() - 1);
+                // Within a block pieces join as the curve does.
+                let passed = (open.moves.last()).filter(|_| last != Some(block));
+                let joint = passed.map(|before: &Placed| joint(&before.element, &element));
+                last = Some(block);
+                open.moves.push(Placed {
+                    element,
+                    start_mm: open.length_mm,
+                    feed_mm_s: stretch.blocks[block].feed_mm_s,
+                    block: first + block,
+                    joint,
+                });
+                open.length_mm += element.length_mm;
+            }
+            first += stretch.blocks.len();
+            path.stretches.push(open);
+        }
         path
     }
 

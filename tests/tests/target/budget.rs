@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use motion_tests::figures::{Table, hold};
 
 use crate::programs;
-use crate::tools::{BOARDS, Board, Clock, M0, M3, M3_SOFT, M4F, M7, Tools};
+use crate::tools::{BOARDS, Board, Clock, LIVE_BOARDS, M0, M3, M3_SOFT, M4F, M7, Tools};
 
 /// Growth that fails.
 pub(crate) const GROWTH: f64 = 0.02;
@@ -91,6 +91,19 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
                 "{}: {most} instructions of what may be accepted at most, promised {bound}",
                 board.core
             ));
+        }
+    }
+    for board in LIVE_BOARDS {
+        let [reference, inverted] = programs::worst_live_ticks().map(|programs| {
+            let printed = tools.run(board, "live_budget", &programs, Clock::Counting);
+            printed.map(|printed| by_name(&printed))
+        });
+        let (reference, inverted) = (reference?, inverted?);
+        let most = row(&mut table, board, "3 axes, live control", &reference["tick"])[3];
+        let inverted = row(&mut table, board, "3 axes, live control, drives inverted", &inverted["tick"])[3];
+        row(&mut stages, board, "background's turn under live control", &reference["turn"]);
+        if board.number == "f32" && most.max(inverted) > 1500 {
+            return Err(format!("{}: {most} and {inverted} under live control, promised 1500", board.core));
         }
     }
     tools.accept_compiler()?;

@@ -1,15 +1,15 @@
 //! One digest over everything that a run sets, reads and puts out: equal on the PC and on every core.
 
 use hal_sim::SimMachine;
-use hal_sim::closed_loop::{close, reference_machine, some_knots};
+use hal_sim::closed_loop::{close, live, reference_machine, some_knots};
 use motion_kernel::exec::ExecState;
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::program::Reader;
-use motion_kernel::queue::Streams;
+use motion_kernel::queue::{LiveStreams, Streams};
 use motion_kernel::trace::Digest;
 
 use crate::programs;
-use crate::tools::{BOARDS, Board, Clock, M0, M3, M4F, M7, Tools};
+use crate::tools::{BOARDS, Board, Clock, LIVE_BOARDS, M0, M3, M4F, M7, Tools};
 
 /// As the boards simulate (`boards/qemu-mps2/src/lib.rs`).
 const LINE: usize = 16;
@@ -17,6 +17,11 @@ const SUBSTEPS: u32 = 4;
 const GENERATED: usize = 50;
 /// So many of the runs must have a stretch that is corrected.
 const CORRECTED_MIN: u32 = 10;
+/// Under live control.
+const LIVE_GENERATED: usize = 20;
+/// As the boards have room (`boards/qemu-mps2/src/live.rs`).
+const LIVE_SEGMENTS: usize = 16;
+const PLACES: usize = 64;
 /// How many ticks must have come in the middle of a fill.
 const INSIDE_MIN: u32 = 20;
 
@@ -55,6 +60,26 @@ fn on_the_pc(board: Board, bytes: &[u8], correct: Correct) -> String {
         on_the_pc_in::<f32>(bytes, correct)
     } else {
         on_the_pc_in::<Fixed>(bytes, correct)
+    }
+}
+
+/// The same under live control with the commands of `seed`.
+fn live_on_the_pc_in<R: Real>(bytes: &[u8], seed: u64) -> String {
+    let program = Reader::<3>::new(bytes).expect("a program");
+    let parameters = reference_machine(program.header(), SUBSTEPS);
+    let machine = SimMachine::<3, LINE>::new(&parameters).expect("a machine");
+    let mut streams = LiveStreams::<R, 3, 64, LIVE_SEGMENTS>::new();
+    let (mut producer, mut closed_loop) =
+        live::close::<_, _, _, _, PLACES, _>(&program, &mut streams, &machine, seed).expect("a loop");
+    let (mut digest, mut ticks) = (Digest::new(), 0);
+    loop {
+        producer.turn().expect("accepted");
+        let trace = closed_loop.tick();
+        digest.add(&trace);
+        ticks += 1;
+        if trace.fault.is_some() || producer.is_over(trace.executed.state) {
+            return format!("{ticks} ticks digest {:016x} fault {}", digest.value(), trace.fault.is_some());
+        }
     }
 }
 
@@ -105,6 +130,31 @@ pub(crate) fn the_same_bits_on_every_core(tools: &Tools) -> Result<(), String> {
     // Programs of one stretch have nothing to correct.
     if corrected < CORRECTED_MIN {
         return Err(format!("{corrected} runs with a correction, expected {CORRECTED_MIN}"));
+    }
+    Ok(())
+}
+
+/// Held, resumed, overridden, given up and kept waiting at random: what live control plans anew on a core is what it plans
+/// on the PC.
+pub(crate) fn the_same_bits_under_live_control(tools: &Tools) -> Result<(), String> {
+    let programs = programs::live(LIVE_GENERATED);
+    for board in LIVE_BOARDS {
+        for bundle in bundles(board, &programs) {
+            let printed = tools.run(board, "live", &bundle, Clock::Free)?;
+            if printed.lines().count() != bundle.len() {
+                return Err(format!("{}: {printed}, {} runs expected", board.core, bundle.len()));
+            }
+            for ((seed, bytes), line) in (0..).zip(&bundle).zip(printed.lines()) {
+                let expected = if board.number == "f32" {
+                    live_on_the_pc_in::<f32>(bytes, seed)
+                } else {
+                    live_on_the_pc_in::<Fixed>(bytes, seed)
+                };
+                if line != expected || !line.ends_with("fault false") {
+                    return Err(format!("{}, program {seed}: {line}, on the PC {expected}", board.core));
+                }
+            }
+        }
     }
     Ok(())
 }

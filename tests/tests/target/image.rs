@@ -5,7 +5,7 @@ use object::{Object, ObjectSection, ObjectSymbol};
 
 use crate::budget::{GROWTH, by_name};
 use crate::programs;
-use crate::tools::{BOARDS, Board, Clock, M4F, Tools};
+use crate::tools::{BOARDS, Board, Clock, LIVE_BOARDS, M4F, Tools};
 
 /// Whatever a panic needs. The handler's own symbol is in every image in which one is reachable.
 const PANIC: [&str; 5] = ["panic", "unwrap_failed", "expect_failed", "slice_index", "_fail"];
@@ -21,7 +21,7 @@ fn file(tools: &Tools, board: Board, name: &str) -> Result<Vec<u8>, String> {
 }
 
 pub(crate) fn nothing_can_panic(tools: &Tools) -> Result<(), String> {
-    for board in BOARDS {
+    for board in BOARDS.into_iter().chain(LIVE_BOARDS) {
         let symbols = |name: &str| -> Result<Vec<String>, String> {
             let bytes = file(tools, board, name)?;
             let object = object::File::parse(&*bytes).map_err(|error| error.to_string())?;
@@ -71,6 +71,16 @@ pub(crate) fn sizes(tools: &Tools) -> Result<(), String> {
                 "{flash} bytes of flash, {stack} of stack; promised {FLASH_MAX}, {STACK_MAX}"
             ));
         }
+    }
+    for board in LIVE_BOARDS {
+        let flash = flash(tools, board, "kernel_only")? - flash(tools, board, "empty")?;
+        let [reference, _] = programs::worst_live_ticks();
+        let figures = by_name(&tools.run(board, "live_budget", &reference, Clock::Counting)?);
+        let greatest = |name: &str| figures.get(name).and_then(|sorted| sorted.last().copied()).unwrap_or(0);
+        let number = format!("{}, live control", board.number);
+        let cells = [flash.to_string(), greatest("ram").to_string(), "64, 3 × 16".to_owned()];
+        let stack = greatest("stack").to_string();
+        table.row(&[&[board.core.to_owned(), number], &cells[..], &[stack]].concat());
     }
     tools.accept_compiler()?;
     hold("sizes", &table, GROWTH)

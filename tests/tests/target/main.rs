@@ -32,9 +32,10 @@ use tools::Tools;
 type Test = fn(&Tools) -> Result<(), String>;
 
 /// Name, whether it holds figures that depend on the compiler, and the test.
-const TESTS: [(&str, bool, Test); 8] = [
+const TESTS: [(&str, bool, Test); 9] = [
     ("the_same_bits_on_every_core", false, digest::the_same_bits_on_every_core),
     ("the_same_bits_from_an_interrupt", false, digest::the_same_bits_from_an_interrupt),
+    ("the_same_bits_under_live_control", false, digest::the_same_bits_under_live_control),
     ("one_last_place_is_seen", false, digest::one_last_place_is_seen),
     ("nothing_can_panic", false, image::nothing_can_panic),
     ("instructions_of_a_tick", true, budget::instructions_of_a_tick),

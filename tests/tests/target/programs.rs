@@ -35,6 +35,11 @@ fn bytes(text: &str, machine: &Machine, mode: Mode) -> Vec<u8> {
     executable(&plan(text, machine, mode)).expect("within fixed point").to_bytes(machine)
 }
 
+/// With the blocks that live control plans with.
+fn live_bytes(text: &str, machine: &Machine, mode: Mode) -> Vec<u8> {
+    executable(&plan(text, machine, mode)).expect("within fixed point").to_live_bytes(machine)
+}
+
 /// The stringer on the reference machine.
 pub(crate) fn stringer() -> Vec<u8> {
     bytes(STRINGER, &Machine::reference(), Mode::Spanning)
@@ -98,8 +103,29 @@ pub(crate) fn stringer_off_by_a_last_place() -> Vec<u8> {
     executable.to_bytes(&machine)
 }
 
+/// The stringer and facets for live control, on the reference machine and with every drive inverted.
+pub(crate) fn worst_live_ticks() -> [Vec<Vec<u8>>; 2] {
+    [Machine::reference(), inverting()].map(|machine| {
+        vec![
+            live_bytes(STRINGER, &machine, Mode::Spanning),
+            live_bytes(&facets_text(), &machine, Mode::PerBlock),
+        ]
+    })
+}
+
+/// Those and random programs.
+pub(crate) fn live(generated: usize) -> Vec<Vec<u8>> {
+    let mut programs = worst_live_ticks().concat();
+    programs.extend(generated_by(generated, Executable::to_live_bytes).into_iter().map(|(_, bytes)| bytes));
+    programs
+}
+
 /// So many random programs that the boards have time and room for, by seed.
 pub(crate) fn generated(count: usize) -> Vec<(u64, Vec<u8>)> {
+    generated_by(count, Executable::to_bytes)
+}
+
+fn generated_by(count: usize, to_bytes: fn(&Executable, &Machine) -> Vec<u8>) -> Vec<(u64, Vec<u8>)> {
     let mut programs = Vec::new();
     for seed in 1.. {
         let mut random = Random::new(seed);
@@ -111,7 +137,9 @@ pub(crate) fn generated(count: usize) -> Vec<(u64, Vec<u8>)> {
         if plan.time_s > TIME_MAX_S {
             continue;
         }
-        let Some(bytes) = executable(&plan).map(|executable| executable.to_bytes(&machine)) else { continue };
+        let Some(bytes) = executable(&plan).map(|executable| to_bytes(&executable, &machine)) else {
+            continue;
+        };
         if bytes.len() <= BYTES_MAX {
             programs.push((seed, bytes));
         }

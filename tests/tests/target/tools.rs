@@ -50,6 +50,10 @@ pub(crate) const M0: Board = Board {
 /// Every core with the number type that is meant for it.
 pub(crate) const BOARDS: [Board; 4] = [M4F, M7, M3, M0];
 
+/// The cores with room for live control, with it.
+pub(crate) const LIVE_BOARDS: [Board; 3] =
+    [Board { features: "live", ..M4F }, Board { features: "live", ..M7 }, Board { features: "live", ..M3 }];
+
 /// How instructions become time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Clock {

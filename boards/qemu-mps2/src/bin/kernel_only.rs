@@ -14,11 +14,71 @@ use motion_kernel::axis::{AxesConfig, Correction};
 use motion_kernel::fault::FaultKind;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Scalar;
-use motion_kernel::program::{Reader, Supply};
-use motion_kernel::queue::{Intake, Streams};
+use motion_kernel::program::{Items, ProgramError, Reader};
+use motion_kernel::queue::Intake;
 use motion_kernel::units::{Counts, DacCode};
 use qemu_boards::programs::programs;
-use qemu_boards::{AXES, Number, PIECES, SEGMENTS};
+use qemu_boards::{AXES, Number};
+
+#[cfg(feature = "live")]
+use live::{Background, Feeder, Queues, background, turn};
+#[cfg(not(feature = "live"))]
+use plain::{Background, Feeder, Queues, background, turn};
+
+/// The program's own plan fills the streams.
+#[cfg(not(feature = "live"))]
+mod plain {
+    use motion_kernel::program::Supply;
+    use motion_kernel::queue::Streams;
+    use qemu_boards::{PIECES, SEGMENTS};
+
+    use super::{AXES, Items, Number, ProgramError};
+
+    pub(super) type Queues = Streams<Number, AXES, PIECES, SEGMENTS>;
+    pub(super) type Feeder<'a> = motion_kernel::queue::Feeder<'a, Number, AXES>;
+    pub(super) type Background<'a> = Supply<Number, AXES, Items<'a, AXES>, ProgramError>;
+
+    pub(super) fn background(items: Items<'_, AXES>, tick_s: f64) -> Background<'_> {
+        Supply::new(items, tick_s)
+    }
+
+    pub(super) fn turn(supply: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {
+        supply.fill(feeder).is_ok()
+    }
+}
+
+/// Live control fills the streams.
+#[cfg(feature = "live")]
+mod live {
+    use core::sync::atomic::Ordering;
+
+    use motion_kernel::live::Director;
+    use motion_kernel::queue::LiveFeeder;
+    use qemu_boards::live::{PLACES, Streams};
+
+    use super::{AXES, COMMAND, Items, Number, ProgramError};
+
+    pub(super) type Queues = Streams;
+    pub(super) type Feeder<'a> = LiveFeeder<'a, Number, AXES>;
+    pub(super) type Background<'a> = Director<Number, AXES, Items<'a, AXES>, ProgramError, PLACES>;
+
+    pub(super) fn background(items: Items<'_, AXES>, tick_s: f64) -> Background<'_> {
+        Director::new(items, tick_s, 2)
+    }
+
+    pub(super) fn turn(director: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {
+        match COMMAND.load(Ordering::Relaxed) {
+            20 => director.hold(),
+            21 => director.resume(),
+            22 => director.abort(),
+            eighths @ 32..49 => {
+                director.set_override(0.125 * f64::from(eighths - 32)).unwrap_or_default();
+            }
+            _ => {}
+        }
+        director.turn(feeder).is_ok()
+    }
+}
 
 /// What the tick owns.
 struct Foreground {
@@ -45,9 +105,9 @@ fn main() -> ! {
 fn run() -> Option<()> {
     let program = Reader::<AXES>::new(programs().next()?).ok()?;
     let header = program.header();
-    let streams = cortex_m::singleton!(: Streams<Number, AXES, PIECES, SEGMENTS> = Streams::new())?;
+    let streams = cortex_m::singleton!(: Queues = Queues::new())?;
     let (mut feeder, intake) = streams.split(header.rules, header.start);
-    let mut supply = Supply::new(program.items(), header.tick_s);
+    let mut background: Background<'_> = background(program.items(), header.tick_s);
     let config = AxesConfig::<Number, AXES>::new(&header.axes, header.tick_s).ok()?;
     let counts = [Counts(0); AXES];
     let mut kernel = Kernel::new(&config, header.start, counts);
@@ -58,10 +118,14 @@ fn run() -> Option<()> {
         *FOREGROUND.borrow(cs).try_borrow_mut().ok()? = Some(foreground);
         Some(())
     })?;
-    while supply.fill(&mut feeder).is_ok() {
+    go_on(&mut background, &mut feeder);
+    None
+}
+
+fn go_on(background: &mut Background<'_>, feeder: &mut Feeder<'_>) {
+    while turn(background, feeder) {
         cortex_m::asm::wfi();
     }
-    None
 }
 
 #[exception]
@@ -101,7 +165,8 @@ fn kernel_command(
         }
         6 => {
             if let Ok(correction) = Correction::new(0, &KNOTS, 2, 1.0) {
-                intake.correct(correction);
+                // Refused under live control only.
+                let _ = intake.correct(correction);
             }
         }
         7 => kernel.enable(100),

@@ -6,9 +6,10 @@ use serde::Serialize;
 
 use super::super::error::{CliError, Outcome};
 use super::super::input::Output;
+use super::super::outputs;
 use super::super::table::{self, Align};
 use super::super::{csv_failure, write_json};
-use super::{SplineArguments, files};
+use super::SplineArguments;
 use crate::report;
 use crate::smoothness::evaluators::WAYS;
 use crate::smoothness::{self, AxisTicks, Course, Evaluator, FEED_MM_S, Figures, TABLE_2_S, TICK_S};
@@ -36,8 +37,8 @@ pub(super) fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Ou
     } else {
         write_tables(&paths, out)
             .and_then(|()| write_evaluators(&evaluated, out))
-            .and_then(|()| files(arguments, out))
             .map_err(CliError::Output)?;
+        outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
     }
     Ok(Outcome::Done)
 }

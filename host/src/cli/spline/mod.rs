@@ -2,14 +2,15 @@
 
 mod experiment;
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
-use super::input::{self, Output};
+use super::input;
+use super::outputs::{self, Outputs};
 use super::run::{self, RunJson};
 use super::write_json;
 use crate::planning::plan_spline;
@@ -137,13 +138,13 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
     let (mut plan, pieces) = plan_spline(&source.name, &spline, &points.lines, feed_mm_s, &machine)?;
     let figures = SplineFigures::of(&spline, points.points.len(), &pieces, feed_mm_s);
     plan.notices.extend(figures.words());
-    let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
-    let report = arguments.report.as_deref().map(Output::create).transpose()?;
-    let summary = run::execute(&RunOptions::default(), &plan, &machine, trace, report)?;
+    let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
+    let summary = run::execute(&RunOptions::default(), &plan, &machine, outputs, None)?;
     if arguments.json {
         write_json(&SplineJson { run: run::json(&summary), spline: figures }, out)?;
     } else {
-        run::write_summary(&summary, out).and_then(|()| files(arguments, out)).map_err(CliError::Output)?;
+        run::write_summary(&summary, out).map_err(CliError::Output)?;
+        outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
     }
     Ok(if summary.faults.is_empty() { Outcome::Done } else { Outcome::Failed })
 }
@@ -154,16 +155,6 @@ fn fit(points: &Points, arguments: &SplineArguments) -> Result<Spline, SplineErr
         None => spline::chord_lengths(&points.points)?,
     };
     spline::fit(&points.points, &parameters, arguments.degree.degree(), arguments.tolerance)
-}
-
-/// Says where files were written.
-fn files(arguments: &SplineArguments, out: &mut dyn Write) -> io::Result<()> {
-    for (what, path) in [("trace", &arguments.trace), ("report", &arguments.report)] {
-        if let Some(path) = path {
-            writeln!(out, "  {what} written to {}", path.display())?;
-        }
-    }
-    Ok(())
 }
 
 #[derive(Serialize)]

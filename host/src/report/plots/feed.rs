@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::{
-    Area, Caption, Chart, Drawn, NARROW, Panel, Sheet, UNITS_PER_PX, WIDE, curve, ends_over, fault_marks,
+    Area, Caption, Chart, Drawn, NARROW, Panel, Sheet, UNITS_PER_PX, WIDE, curve, ends_over, marks,
     on_both_sheets,
 };
 use crate::record::{BlockRecord, RunRecord};
@@ -50,15 +50,15 @@ pub(in crate::report) fn is_crowded(record: &RunRecord, summary: &Summary) -> bo
 
 /// What set a block's ceiling. A block that is too short to reach it names what keeps the feed below instead; what
 /// set its ceiling is then not known, and does not matter.
-fn reason(block: &BlockRecord) -> &'static str {
-    match block.cap_reason {
+fn reason(block: &BlockRecord) -> &str {
+    match &*block.cap_reason {
         "accelerating" | "braking" => NOT_REACHED,
         reason => reason,
     }
 }
 
 /// Reasons of the ceilings up to `top_mm_s`, in the order of their appearance.
-pub(in crate::report) fn reasons(blocks: &[BlockRecord], top_mm_s: f64) -> Vec<&'static str> {
+pub(in crate::report) fn reasons(blocks: &[BlockRecord], top_mm_s: f64) -> Vec<&str> {
     let mut known = Vec::new();
     for block in blocks.iter().filter(|block| block.cap_mm_s <= top_mm_s) {
         if !known.contains(&reason(block)) {
@@ -170,15 +170,16 @@ fn lines(blocks: &[BlockRecord]) -> Vec<(u32, f64, f64)> {
     lines
 }
 
-/// Draws feed and ceilings. `faults_mm` is where on the path a fault was latched.
+/// Draws feed and ceilings, with commands and faults where on the path they came.
 pub(in crate::report) fn draw(
     record: &RunRecord,
     summary: &Summary,
-    faults_mm: &[f64],
     caption: &Caption<'_>,
 ) -> io::Result<String> {
-    let height = |sheet: &Sheet| sheet.panel_height * 2 + sheet.axis_height();
-    on_both_sheets(caption, height, |area, sheet| draw_on(area, sheet, record, summary, faults_mm))
+    let x = ends_over(0.0, length_shown(summary));
+    let words = |sheet: &Sheet| marks::Words::new(marks::over_path(record), sheet, x, sheet.left);
+    let height = |sheet: &Sheet| sheet.panel_height * 2 + sheet.axis_height() + words(sheet).height(sheet);
+    on_both_sheets(caption, height, |area, sheet| draw_on(area, sheet, record, summary, &words(sheet)))
 }
 
 fn draw_on(
@@ -186,22 +187,24 @@ fn draw_on(
     sheet: &Sheet,
     record: &RunRecord,
     summary: &Summary,
-    faults_mm: &[f64],
+    words: &marks::Words,
 ) -> Drawn {
     let (top_mm_s, _) = top(record, summary);
     let length_mm = length_shown(summary);
+    // Room above the highest ceiling for the line numbers, and above these for the words.
+    let numbered_mm_s = 1.14 * top_mm_s;
+    let plot = f64::from(sheet.panel_height * 2 - sheet.title_height());
     let panel = Panel {
         title: "Feed [mm/s]",
         x: ends_over(0.0, length_mm),
-        // Room above the highest ceiling for the line numbers.
-        y: (0.0, 1.14 * top_mm_s),
+        y: (0.0, numbered_mm_s * (1.0 + f64::from(words.height(sheet)) / plot)),
         x_name: Some("path length [mm]"),
         right: sheet.left,
         is_logarithmic: false,
         shade: &[],
     };
     let mut chart = panel.draw(area, sheet)?;
-    line_numbers(&mut chart, sheet, &record.blocks, length_mm, (1.09 * top_mm_s, panel.y.1))?;
+    line_numbers(&mut chart, sheet, &record.blocks, length_mm, (1.09 * top_mm_s, numbered_mm_s))?;
 
     let known = reasons(&record.blocks, top_mm_s);
     for step in steps(&record.blocks, top_mm_s, length_mm, sheet.columns) {
@@ -217,8 +220,7 @@ fn draw_on(
 
     let feed = record.ticks.iter().map(|tick| (tick.s_mm, tick.v_mm_s));
     curve(&mut chart, decimate::by_column(feed, panel.x, sheet.columns), palette::FEED, sheet.stroke)?;
-    // Below the line numbers.
-    fault_marks(&mut chart, faults_mm, panel.x, (0.0, 1.04 * top_mm_s))?;
+    words.draw(&mut chart, area, sheet, panel.y, sheet.title_height())?;
     per_minute(area, sheet, &panel)
 }
 
@@ -261,11 +263,11 @@ mod tests {
     ) -> BlockRecord {
         BlockRecord {
             line,
-            kind: "line",
+            kind: "line".into(),
             start_mm,
             length_mm,
             cap_mm_s,
-            cap_reason,
+            cap_reason: cap_reason.into(),
             enter_mm_s: 0.0,
             peak_mm_s: 0.0,
             exit_mm_s: 0.0,

@@ -7,6 +7,7 @@
 pub(super) mod contour;
 pub(super) mod feed;
 pub(super) mod graph;
+pub(super) mod marks;
 pub(super) mod path;
 pub(super) mod polar;
 pub(super) mod time;
@@ -284,6 +285,14 @@ pub(super) fn curve(chart: &mut Chart<'_>, points: Vec<(f64, f64)>, ink: Ink, st
 pub(super) fn fault_marks(chart: &mut Chart<'_>, at: &[f64], x: (f64, f64), y: (f64, f64)) -> Drawn {
     let inside = at.iter().filter(|at| (x.0..=x.1).contains(*at)).take(FAULT_MARKS_MAX);
     let style = palette::FAULT.rgb().stroke_width(6);
+    chart.draw_series(inside.map(|&x| PathElement::new([(x, y.0), (x, y.1)], style)))?;
+    Ok(())
+}
+
+/// The same where a command was given.
+pub(super) fn command_marks(chart: &mut Chart<'_>, at: &[f64], x: (f64, f64), y: (f64, f64)) -> Drawn {
+    let inside = at.iter().filter(|at| (x.0..=x.1).contains(*at)).take(marks::COMMAND_MARKS_MAX);
+    let style = palette::COMMAND.rgb().stroke_width(4);
     chart.draw_series(inside.map(|&x| PathElement::new([(x, y.0), (x, y.1)], style)))?;
     Ok(())
 }

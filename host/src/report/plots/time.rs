@@ -5,7 +5,10 @@ use std::io;
 use plotters::element::PathElement;
 use plotters::style::Color as _;
 
-use super::{Caption, Panel, Sheet, curve, ends_over, ends_with_zero, fault_marks, on_both_sheets};
+use super::{
+    Area, Caption, Drawn, Panel, Sheet, command_marks, curve, ends_over, ends_with_zero, fault_marks, marks,
+    on_both_sheets,
+};
 use crate::record::{RunRecord, TickRecord};
 use crate::report::decimate;
 use crate::report::format::figure;
@@ -100,7 +103,7 @@ pub(in crate::report) fn along_path(
         curve("Jerk [mm/s³]", summary.jerk_mm_s3, limits.jerk_mm_s3, palette::JERK, |tick| tick.j_mm_s3),
         curve("Snap [mm/s⁴]", summary.snap_mm_s4, limits.snap_mm_s4, palette::SNAP, |tick| tick.snap_mm_s4),
     ];
-    stack(record, summary, &curves, caption)
+    stack(record, summary, &curves, caption, !record.commands.is_empty())
 }
 
 /// Following error and output of one axis.
@@ -129,7 +132,59 @@ pub(in crate::report) fn of_axis(
         },
         Curve { title: "Output [V]", span: output, limit: 0.0, ink: palette::VOLTS, value: Box::new(volts) },
     ];
-    stack(record, summary, &curves, caption)
+    stack(record, summary, &curves, caption, false)
+}
+
+/// The commands of a run, and the override that they make.
+struct LiveControl {
+    x: (f64, f64),
+    words: marks::Words,
+    /// Time \[s\], override \[%\]: a stair.
+    course: Vec<(f64, f64)>,
+}
+
+impl LiveControl {
+    fn new(record: &RunRecord, sheet: &Sheet, x: (f64, f64)) -> Self {
+        let mut course = vec![(x.0, 100.0)];
+        let mut present = 100.0;
+        for command in &record.commands {
+            if let Some(share) = command.feed_override {
+                let at = (command.tick as f64 * record.tick_s).clamp(x.0, x.1);
+                course.extend([(at, present), (at, 100.0 * share)]);
+                present = 100.0 * share;
+            }
+        }
+        course.push((x.1, present));
+        Self { x, words: marks::Words::new(marks::over_time(record), sheet, x, sheet.right), course }
+    }
+
+    /// Without words.
+    fn plot_height(sheet: &Sheet) -> u32 {
+        sheet.panel_height * 4 / 5
+    }
+
+    fn height(&self, sheet: &Sheet) -> u32 {
+        Self::plot_height(sheet) + self.words.height(sheet)
+    }
+
+    fn draw(&self, area: &Area<'_>, sheet: &Sheet, shade: &[(f64, f64)]) -> Drawn {
+        let highest = self.course.iter().map(|point| point.1).fold(100.0, f64::max);
+        let plot = f64::from(Self::plot_height(sheet) - sheet.title_height() - sheet.text / 2);
+        let top = 1.1 * highest * (1.0 + f64::from(self.words.height(sheet)) / plot);
+        let panel = Panel {
+            title: "Feed override [%]",
+            x: self.x,
+            y: (0.0, top),
+            x_name: None,
+            right: sheet.right,
+            is_logarithmic: false,
+            shade,
+        };
+        let mut chart = panel.draw(area, sheet)?;
+        let points = decimate::by_column(self.course.iter().copied(), self.x, sheet.columns);
+        curve(&mut chart, points, palette::OVERRIDE, sheet.stroke)?;
+        self.words.draw(&mut chart, area, sheet, panel.y, sheet.title_height())
+    }
 }
 
 fn stack<V: Fn(&TickRecord) -> f64>(
@@ -137,12 +192,26 @@ fn stack<V: Fn(&TickRecord) -> f64>(
     summary: &Summary,
     curves: &[Curve<V>],
     caption: &Caption<'_>,
+    has_commands: bool,
 ) -> io::Result<String> {
-    let height = |sheet: &Sheet| curves.len() as u32 * sheet.panel_height + sheet.axis_height();
-    let faults_s: Vec<f64> = record.faults.iter().map(|fault| fault.tick as f64 * record.tick_s).collect();
     let x = ends_over(summary.time_s.0, summary.time_s.1);
+    let live = |sheet: &Sheet| has_commands.then(|| LiveControl::new(record, sheet, x));
+    let height = |sheet: &Sheet| {
+        let live = live(sheet).map_or(0, |live| live.height(sheet));
+        live + curves.len() as u32 * sheet.panel_height + sheet.axis_height()
+    };
+    let faults_s: Vec<f64> = record.faults.iter().map(|fault| fault.tick as f64 * record.tick_s).collect();
+    let commands_s: Vec<f64> = match has_commands {
+        true => record.commands.iter().map(|command| command.tick as f64 * record.tick_s).collect(),
+        false => Vec::new(),
+    };
     on_both_sheets(caption, height, |area, sheet| {
         let mut rest = area.clone();
+        if let Some(live) = live(sheet) {
+            let (upper, lower) = rest.split_vertically(live.height(sheet));
+            live.draw(&upper, sheet, &shades(&summary.rests, x, sheet.columns))?;
+            rest = lower;
+        }
         for (index, shown) in curves.iter().enumerate() {
             let last = index + 1 == curves.len();
             let (upper, lower) = rest.split_vertically(sheet.panel_height);
@@ -164,6 +233,7 @@ fn stack<V: Fn(&TickRecord) -> f64>(
             let points =
                 record.ticks.iter().map(|tick| (tick.tick as f64 * record.tick_s, (shown.value)(tick)));
             curve(&mut chart, decimate::by_column(points, x, sheet.columns), shown.ink, sheet.stroke)?;
+            command_marks(&mut chart, &commands_s, panel.x, panel.y)?;
             fault_marks(&mut chart, &faults_s, panel.x, panel.y)?;
             rest = lower;
         }

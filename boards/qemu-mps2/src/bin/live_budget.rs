@@ -1,0 +1,57 @@
+//! Counts the instructions of every tick of every program of the bundle under live control, and of every turn of the
+//! background between them; says how much memory both take.
+//!
+//! One line a figure, as `budget` prints them.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use cortex_m_semihosting::hprintln;
+use hal_sim::closed_loop::InMemory;
+use motion_kernel::kernel::Kernel;
+use motion_kernel::queue::Intake;
+use motion_kernel::trace::Trace;
+use qemu_boards::count::Counter;
+use qemu_boards::live::{self, Producer, Streams};
+use qemu_boards::programs::programs;
+use qemu_boards::{AXES, Number, exit, fail, stack};
+
+#[entry]
+fn main() -> ! {
+    let core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
+    let counter = Counter::new(core.SYST);
+    let kernel = size_of::<Kernel<Number, AXES>>();
+    hprintln!("ram {}", kernel + size_of::<Streams>() + size_of::<Producer<'_>>());
+    let mut deepest = 0;
+    for (seed, bytes) in (0..).zip(programs()) {
+        let is_fault = live::run(bytes, seed, |producer, closed| {
+            let (turned, turn) = counter.count(|| producer.turn());
+            turned.unwrap_or_else(|error| fail(&error));
+            let mut spent = 0;
+            let trace = closed.tick_by(|kernel, intake, memory| {
+                let top = stack::paint();
+                let (trace, instructions) = counter.count(|| budgeted_tick(kernel, intake, memory));
+                deepest = deepest.max(stack::depth(top));
+                spent = instructions;
+                *trace
+            });
+            hprintln!("turn {}\ntick {}", turn, spent);
+            trace
+        });
+        if is_fault {
+            fail(&"a fault");
+        }
+    }
+    hprintln!("stack {}", deepest);
+    exit(true)
+}
+
+/// The whole tick of the kernel, as a board's interrupt calls it.
+#[inline(never)]
+fn budgeted_tick<'a>(
+    kernel: &'a mut Kernel<Number, AXES>,
+    intake: &mut Intake<'_, Number, AXES>,
+    memory: &mut InMemory<AXES>,
+) -> &'a Trace<Number, AXES> {
+    kernel.tick(intake, memory)
+}

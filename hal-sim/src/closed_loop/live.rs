@@ -1,0 +1,167 @@
+//! A compiled program under live control in closed loop: the background obeys commands that a seed makes.
+//!
+//! The same seed gives the same commands on a PC and inside an emulated board.
+
+use motion_kernel::exec::ExecState;
+use motion_kernel::live::{Director, State};
+use motion_kernel::num::Real;
+use motion_kernel::program::{Items, ProgramError, Reader, SupplyError};
+use motion_kernel::queue::{LiveFeeder, LiveStreams};
+
+use super::{ClosedLoop, LoopError, regulated};
+use crate::machine::SimMachine;
+use crate::noise::SplitMix64;
+
+/// What is commanded before a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Command {
+    Hold,
+    Resume,
+    Abort,
+    Override(f64),
+}
+
+/// Commands that no operator would give: in any order, one every hundred ticks, with times between them in which the
+/// background gets no turn.
+#[derive(Clone, Debug)]
+struct Commands {
+    random: SplitMix64,
+    turns_left: u32,
+    /// Turns that the background still loses.
+    lost: u32,
+}
+
+/// So many turns have commands; then the program is let go on to its end.
+const COMMANDED_TURNS: u32 = 8000;
+/// In the share of 2⁻³² of all turns.
+const ONE_IN_100: u32 = u32::MAX / 100;
+const ONE_IN_400: u32 = u32::MAX / 400;
+/// A turn is late by less than so many ticks.
+const LATE_TICKS: u32 = 256;
+
+impl Commands {
+    /// What is commanded in this turn; `None` if the background does not get it.
+    fn next(&mut self) -> Option<Option<Command>> {
+        if self.turns_left == 0 {
+            return Some(None);
+        }
+        self.turns_left -= 1;
+        if self.lost > 0 {
+            self.lost -= 1;
+            return None;
+        }
+        // Two halves of one number, and its lowest bits, which the halves' comparisons don't look at.
+        let bits = self.random.next();
+        let (upper, lower) = ((bits >> 32) as u32, bits as u32);
+        if upper < ONE_IN_400 {
+            self.lost = lower % LATE_TICKS;
+            return None;
+        }
+        Some((upper > u32::MAX - ONE_IN_100).then(|| match lower % 64 {
+            0 => Command::Abort,
+            1..16 => Command::Hold,
+            16..40 => Command::Resume,
+            // 0 to 2 in eighths.
+            _ => Command::Override(0.125 * f64::from(lower >> 8 & 15)),
+        }))
+    }
+
+    fn are_over(&self) -> bool {
+        self.turns_left == 0
+    }
+}
+
+/// The background under live control: keeps the streams full and obeys. `PLACES` as of [`Director`].
+pub struct LiveProducer<'a, R: Real, const AXES: usize, const PLACES: usize> {
+    feeder: LiveFeeder<'a, R, AXES>,
+    director: Director<R, AXES, Items<'a, AXES>, ProgramError, PLACES>,
+    commands: Commands,
+}
+
+impl<R: Real, const AXES: usize, const PLACES: usize> LiveProducer<'_, R, AXES, PLACES> {
+    /// The background's part before a tick.
+    ///
+    /// # Errors
+    /// The program holds an item that can't be executed.
+    #[inline(never)]
+    pub fn turn(&mut self) -> Result<(), SupplyError<ProgramError>> {
+        let Some(command) = self.commands.next() else { return Ok(()) };
+        match command {
+            None => {}
+            Some(Command::Hold) => self.director.hold(),
+            Some(Command::Resume) => self.director.resume(),
+            Some(Command::Abort) => self.director.abort(),
+            // All of these are within the range.
+            Some(Command::Override(share)) => self.director.set_override(share).unwrap_or_default(),
+        }
+        if self.commands.are_over() {
+            self.director.resume();
+            self.director.set_override(1.0).unwrap_or_default();
+        }
+        self.director.turn(&mut self.feeder)
+    }
+
+    /// Whether nothing is left to do for a tick that ended in `state`.
+    pub fn is_over(&self, state: ExecState) -> bool {
+        state == ExecState::Idle && self.director.state(&self.feeder) == State::Done
+            || self.director.state(&self.feeder) == State::Aborted
+    }
+}
+
+/// Both parts of a loop under live control.
+pub type LiveClosed<'a, R, const AXES: usize, const PLACES: usize, const LINE: usize> =
+    (LiveProducer<'a, R, AXES, PLACES>, ClosedLoop<'a, R, AXES, LINE>);
+
+/// Closes the loop of a program with blocks over `machine`, drives enabled, with the commands of `seed`.
+///
+/// # Errors
+/// The program's machine can't be regulated or simulated.
+#[inline(never)]
+pub fn close<
+    'a,
+    R: Real,
+    const AXES: usize,
+    const PIECES: usize,
+    const SEGMENTS: usize,
+    const PLACES: usize,
+    const LINE: usize,
+>(
+    program: &Reader<'a, AXES>,
+    streams: &'a mut LiveStreams<R, AXES, PIECES, SEGMENTS>,
+    machine: &'a SimMachine<AXES, LINE>,
+    seed: u64,
+) -> Result<LiveClosed<'a, R, AXES, PLACES, LINE>, LoopError> {
+    let header = program.header();
+    let (feeder, intake) = streams.split(header.rules, header.start);
+    let closed = ClosedLoop::new(&regulated(header)?, header.start, intake, machine)?;
+    let director = Director::new(program.items(), header.tick_s, 0);
+    let commands = Commands { random: SplitMix64::new(seed), turns_left: COMMANDED_TURNS, lost: 0 };
+    Ok((LiveProducer { feeder, director, commands }, closed))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_of_every_kind_come_and_end() {
+        let mut commands = Commands { random: SplitMix64::new(3), turns_left: COMMANDED_TURNS, lost: 0 };
+        let mut kinds = [0_u32; 4];
+        let mut lost = 0;
+        for _ in 0..COMMANDED_TURNS {
+            match commands.next() {
+                None => lost += 1,
+                Some(None) => {}
+                Some(Some(Command::Hold)) => kinds[0] += 1,
+                Some(Some(Command::Resume)) => kinds[1] += 1,
+                Some(Some(Command::Abort)) => kinds[2] += 1,
+                Some(Some(Command::Override(share))) => {
+                    assert!((0.0..2.0).contains(&share));
+                    kinds[3] += 1;
+                }
+            }
+        }
+        assert!(kinds.iter().all(|&kind| kind > 0) && lost > 100, "{kinds:?} {lost}");
+        assert!(commands.are_over() && commands.next() == Some(None));
+    }
+}

@@ -1,0 +1,72 @@
+//! `motion flight`: what a board's flight recorder kept, from the board's log.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::error::{CliError, Outcome};
+use super::input;
+use super::outputs::{self, Outputs};
+use crate::flight;
+use crate::record::{FaultRecord, RunRecord};
+use crate::simulate::Sheet;
+
+const EXAMPLES: &str = "\
+Examples:
+  probe-rs run … | tee board.log                     a board's log, with a fault in it
+  motion flight board.log --machine mine.toml --report flight.html
+                                                     the ticks around the fault, as pictures
+
+A board writes the last ticks before a fault, and some behind it, into its log, one in a line, as `flight [01, 03, …]`. The
+path position counts from the start of each stretch.";
+
+/// Read the ticks around a fault from a board's log.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct FlightArguments {
+    /// The log (`-`: standard input).
+    #[arg(value_name = "LOG")]
+    log: PathBuf,
+    /// Machine file, for the tick and the axes' names; without it, the reference machine.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    /// Write every tick as a row of CSV; an existing file is replaced.
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+    /// Write a self-contained HTML page; an existing file is replaced.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+}
+
+/// Reads and shows.
+///
+/// # Errors
+/// The log has no frame or a damaged one, or a file can't be read or written.
+pub fn flight(arguments: &FlightArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let machine = input::machine(arguments.machine.as_ref())?;
+    let source = input::read(&arguments.log)?;
+    let rows = flight::read(&String::from_utf8_lossy(&source.text))
+        .map_err(|error| CliError::Flight { path: source.name.clone(), source: error })?;
+    let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
+    let sheet = Sheet { program: source.name, ..Sheet::of_machine(&machine) };
+    let faults = rows.iter().find(|row| row.is_faulted).map(|row| FaultRecord {
+        tick: row.tick,
+        axis: None,
+        fault: "fault latched".to_owned(),
+        detail: "what it was stands in the log".to_owned(),
+    });
+    let record = RunRecord {
+        faults: faults.into_iter().collect(),
+        notices: flight::words(&rows, &machine),
+        following_error_limit_um: machine.axes.each_ref().map(|axis| axis.following_error_limit_mm * 1e3),
+        ticks: flight::ticks(&rows),
+        ..sheet.record()
+    };
+    outputs.of_record(&sheet, &record)?;
+    for line in &record.notices {
+        writeln!(out, "  {line}").map_err(CliError::Output)?;
+    }
+    outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,95 @@
+//! `motion replay`: a recorded run once more, from the recording alone.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::outputs::{self, Outputs};
+use super::run::{self, RunJson};
+use super::{input, write_json};
+use crate::recording::{self, Difference, Recording};
+
+const EXAMPLES: &str = "\
+Examples:
+  motion run part.ngc --record part.mrec             record a run, with its faults and commands
+  motion replay part.mrec                            run it again and compare every tick
+  motion replay part.mrec --trace part.csv --report part.html
+                                                     with what was not written at the time
+
+The kernel gets the recorded program, machine, commands and answers of the hardware; nothing is simulated. Trace and
+report are those of the run.
+
+Exit status: 0 identical, be it to a fault; 1 a tick differs; 2 the file is no recording, or damaged.
+JSON: that of `motion run`, and replay: identical, ticks (those of settling included), digest, difference.";
+
+/// Replay a recorded run: the same kernel on what it was told then, compared tick by tick.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct ReplayArguments {
+    /// A file that `motion run --record` wrote (`-`: standard input).
+    #[arg(value_name = "FILE")]
+    recording: PathBuf,
+    /// Write every tick as a row of CSV; an existing file is replaced.
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+    /// Write a self-contained HTML page about the run; an existing file is replaced.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Reads, runs again, compares.
+///
+/// # Errors
+/// The file is no recording, what it holds can't be executed, or a file can't be written.
+pub fn replay(arguments: &ReplayArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let source = input::read(&arguments.recording)?;
+    let refused = |error| CliError::Recording { path: source.name.clone(), source: error };
+    let recording = Recording::from_bytes(&source.text).map_err(refused)?;
+    let job = recording.job().map_err(refused)?;
+    let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
+    let replayed = outputs.of_run(
+        &job,
+        |observe| recording::replay(&recording, &job, observe),
+        |replayed| &replayed.summary,
+    )?;
+    let recording::Replay { summary, ticks, difference } = &replayed;
+    if arguments.json {
+        let figures = ReplayJson {
+            identical: difference.is_none(),
+            ticks: *ticks,
+            digest: format!("{:016x}", recording.digest()),
+            difference: difference.as_ref().map(Difference::to_string),
+        };
+        write_json(&Json { run: run::json(summary), replay: figures }, out)?;
+    } else {
+        run::write_summary(summary, out).map_err(CliError::Output)?;
+        let verdict = match difference {
+            None => format!("identical over {ticks} ticks, digest {:016x}", recording.digest()),
+            Some(difference) => format!("NOT IDENTICAL: the replay {difference}"),
+        };
+        writeln!(out, "\n  {verdict}").map_err(CliError::Output)?;
+        outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
+    }
+    Ok(if difference.is_none() { Outcome::Done } else { Outcome::Failed })
+}
+
+#[derive(Serialize)]
+struct Json<'run> {
+    #[serde(flatten)]
+    run: RunJson<'run>,
+    replay: ReplayJson,
+}
+
+#[derive(Serialize)]
+struct ReplayJson {
+    identical: bool,
+    ticks: u64,
+    digest: String,
+    difference: Option<String>,
+}

@@ -1,0 +1,197 @@
+//! A run as bytes: everything that the kernel consumed, from which it runs again to the same bits.
+//!
+//! Consumes a [`Job`] and what the [`Recorder`] saw of the hardware; produces bytes, and of bytes the run once more.
+//! Nothing of it depends on the simulated machine: [`Player`] answers in the hardware's place.
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 4 | `MREC` |
+//! | 1 | version of this format, 1 |
+//! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
+//! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
+//!
+//! Inside it the program is a compiled program with the blocks of its path ([`motion_kernel::program`]), the commands
+//! are the text of a script, and each tick is an entry of some eight bytes ([`tape`]).
+//!
+//! - [`tape`]: what the hardware answered, tick by tick;
+//! - [`recorder`]: hardware that writes it down;
+//! - [`replay`](mod@replay): hardware that answers from it, and the comparison.
+//!
+//! [`Player`]: replay::Player
+
+pub mod recorder;
+pub mod replay;
+pub mod tape;
+
+pub use recorder::Recorder;
+pub use replay::{Difference, Replay, replay};
+
+use motion_kernel::num::{Fixed, Real};
+use motion_kernel::program::{self, CheckError, Checksum, ProgramError, Reader, SupplyError};
+use motion_kernel::units::Counts;
+use serde::{Deserialize, Serialize};
+
+use self::tape::Tape;
+use crate::record::AXES;
+use crate::simulate::live::Script;
+use crate::simulate::{Job, Number, Sheet, StretchCorrection};
+
+const MAGIC: [u8; 4] = *b"MREC";
+const VERSION: u8 = 1;
+
+/// A recorded run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Recording {
+    number: Number,
+    /// A compiled program, blocks included.
+    program: Vec<u8>,
+    correction: Option<StretchCorrection>,
+    script: Option<Script>,
+    sheet: Sheet,
+    /// What the encoders read before the first tick.
+    start: [Counts; AXES],
+    tape: Tape,
+}
+
+/// Why bytes are not a recording. Displays as "found …, expected …".
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RecordingError {
+    /// They do not begin as one.
+    #[error("found {found}, expected a recording, which begins with MREC")]
+    NotARecording {
+        /// What they begin with, for people.
+        found: String,
+    },
+    /// They are of another version of the format.
+    #[error("found a recording of format {found}, expected format {VERSION}")]
+    Version {
+        /// Theirs.
+        found: u8,
+    },
+    /// They have been damaged, or end too early.
+    #[error("found checksum {found:08x}, expected {expected:08x}: the recording is damaged or not whole")]
+    Checksum {
+        /// Of the bytes as they are.
+        found: u32,
+        /// As written.
+        expected: u32,
+    },
+    /// Behind an intact checksum something is not as it is written.
+    #[error("found no recording behind an intact checksum: {0}")]
+    Malformed(String),
+    /// The program in it is not one for this kernel.
+    #[error("program in the recording: found {0}")]
+    Program(#[from] ProgramError),
+    /// The kernel does not accept the program in it.
+    #[error("program in the recording: found {0}, expected what this kernel accepts")]
+    Check(CheckError<ProgramError>),
+}
+
+impl Recording {
+    /// Of a job, with what a [`Recorder`] has seen of it.
+    #[must_use]
+    pub(self) fn new(job: &Job, start: [Counts; AXES], tape: Tape) -> Self {
+        let mut program = Vec::new();
+        // Entries of three axes fit the format.
+        program::write(&job.header, &job.items, &mut program).expect("three axes");
+        let Job { number, correction, script, sheet, .. } = job.clone();
+        Self { number, program, correction, script, sheet, start, tape }
+    }
+
+    /// The recording as bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = [&MAGIC[..], &[VERSION]].concat();
+        // Only what is endless, or of unknown length, can't be written.
+        bytes.extend(postcard::to_stdvec(self).expect("figures, texts and lists"));
+        bytes.extend(checksum(&bytes).to_le_bytes());
+        bytes
+    }
+
+    /// The recording in `bytes`, which end with it.
+    ///
+    /// # Errors
+    /// Nothing but a whole, undamaged recording of a program that the kernel accepts.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, RecordingError> {
+        let Some(rest) = bytes.strip_prefix(&MAGIC) else {
+            return Err(RecordingError::NotARecording { found: beginning(bytes) });
+        };
+        let [version, rest @ ..] = rest else {
+            return Err(RecordingError::NotARecording { found: "its first four bytes alone".to_owned() });
+        };
+        if *version != VERSION {
+            return Err(RecordingError::Version { found: *version });
+        }
+        let Some((body, &sum)) = rest.split_last_chunk() else {
+            return Err(RecordingError::Malformed(format!("{} bytes in all", bytes.len())));
+        };
+        let (found, expected) = (checksum(&bytes[..bytes.len() - sum.len()]), u32::from_le_bytes(sum));
+        if found != expected {
+            return Err(RecordingError::Checksum { found, expected });
+        }
+        let (recording, left) = postcard::take_from_bytes::<Self>(body)
+            .map_err(|error| RecordingError::Malformed(error.to_string()))?;
+        if !left.is_empty() {
+            return Err(RecordingError::Malformed(format!("{} bytes too many", left.len())));
+        }
+        recording.tape.check()?;
+        match recording.number {
+            Number::F32 => recording.check::<f32>(),
+            Number::F64 => recording.check::<f64>(),
+            Number::Fixed => recording.check::<Fixed>(),
+        }?;
+        Ok(recording)
+    }
+
+    fn check<R: Real>(&self) -> Result<(), RecordingError> {
+        let reader = Reader::<AXES>::new(&self.program)?;
+        program::check::<R, AXES, _>(reader.header(), reader.items()).map_err(|error| match error {
+            CheckError::Item { cause: SupplyError::Source(error), .. } => error.into(),
+            error => RecordingError::Check(error),
+        })
+    }
+
+    /// What was run.
+    ///
+    /// # Errors
+    /// The program in it can't be read.
+    pub fn job(&self) -> Result<Job, RecordingError> {
+        let reader = Reader::new(&self.program)?;
+        Ok(Job {
+            number: self.number,
+            header: *reader.header(),
+            items: reader.items().collect::<Result<_, _>>()?,
+            correction: self.correction.clone(),
+            script: self.script.clone(),
+            sheet: self.sheet.clone(),
+        })
+    }
+
+    /// Ticks in it, those included in which the machine settled after the program's end.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.tape.ticks
+    }
+
+    /// The digest of all its ticks.
+    #[must_use]
+    pub fn digest(&self) -> u64 {
+        self.tape.digest
+    }
+}
+
+fn checksum(bytes: &[u8]) -> u32 {
+    let mut sum = Checksum::NONE;
+    sum.update(bytes);
+    sum.finish()
+}
+
+/// What a file begins with, so that its owner knows it again.
+fn beginning(bytes: &[u8]) -> String {
+    const SHOWN: usize = 16;
+    let text: String = bytes.iter().take(SHOWN).map(|byte| byte.escape_ascii().to_string()).collect();
+    if bytes.is_empty() { "nothing".to_owned() } else { format!("\"{text}\" at its start") }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,170 @@
+//! What became of the commands of a run.
+//!
+//! Consumes a script and the executed ticks; produces a [`CommandRecord`] for each command that was given, with the rest
+//! that it led to.
+
+use super::live::{Command, Script, Timed};
+use crate::record::{CommandRecord, StopRecord, TickRecord};
+
+/// Follows the ticks.
+#[derive(Debug, Default)]
+pub(super) struct Commands<'run> {
+    ahead: &'run [Timed],
+    records: Vec<CommandRecord>,
+    /// Commands that wait for a rest, with their index in the records.
+    waiting: Vec<(usize, Command)>,
+    /// The rest under way: its first tick, and where.
+    rest: Option<(u64, f64)>,
+    /// Feed and path position at the end of the latest tick.
+    latest: (f64, f64),
+    tick_s: f64,
+}
+
+impl<'run> Commands<'run> {
+    pub(super) fn new(script: Option<&'run Script>, tick_s: f64) -> Self {
+        Self { ahead: script.map_or(&[], Script::commands), tick_s, ..Self::default() }
+    }
+
+    pub(super) fn add(&mut self, tick: &TickRecord) {
+        while let [next, ahead @ ..] = self.ahead
+            && next.tick <= tick.tick
+        {
+            self.ahead = ahead;
+            self.give(next);
+        }
+        self.latest = (tick.v_mm_s, tick.s_mm);
+        if tick.v_mm_s > 0.0 {
+            self.rest = None;
+        } else if self.rest.is_none() {
+            self.rest = Some((tick.tick, tick.s_mm));
+        }
+    }
+
+    fn give(&mut self, &Timed { tick, command }: &Timed) {
+        self.settle(|waiting| is_ended_by(waiting, command));
+        if asks_for_rest(command) {
+            self.waiting.push((self.records.len(), command));
+        }
+        let feed_override = match command {
+            Command::Override(share) => Some(share),
+            _ => None,
+        };
+        let (_, s_mm) = self.latest;
+        self.records.push(CommandRecord {
+            tick,
+            command: command.to_string(),
+            feed_override,
+            s_mm,
+            stop: None,
+        });
+    }
+
+    /// Gives the rest under way, if there is one, to those that wait for one and do so no longer.
+    fn settle(&mut self, is_ended: impl Fn(Command) -> bool) {
+        let Self { rest, records, tick_s, .. } = self;
+        self.waiting.retain(|&(index, command)| {
+            let record = &mut records[index];
+            if is_ended(command)
+                && let Some((tick, s_mm)) = *rest
+            {
+                // At rest before it was given: no time.
+                let ticks = (tick + 1).saturating_sub(record.tick);
+                record.stop = Some(StopRecord {
+                    tick: tick.max(record.tick),
+                    time_s: ticks as f64 * *tick_s,
+                    length_mm: (s_mm - record.s_mm).max(0.0),
+                });
+            }
+            !is_ended(command)
+        });
+    }
+
+    /// Of all commands that were given.
+    pub(super) fn finish(mut self) -> Vec<CommandRecord> {
+        self.settle(|_| true);
+        self.records
+    }
+}
+
+fn asks_for_rest(command: Command) -> bool {
+    match command {
+        Command::Hold | Command::Abort => true,
+        Command::Override(share) => share <= 0.0,
+        Command::Resume => false,
+    }
+}
+
+/// Whether `command` is what the rest that `waiting` asked for ends with.
+fn is_ended_by(waiting: Command, command: Command) -> bool {
+    match (waiting, command) {
+        (Command::Hold, Command::Resume) => true,
+        (Command::Override(_), Command::Override(share)) => share > 0.0,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{AXES, AxisTick};
+
+    /// Ticks of 1 ms with these feeds; the path grows by a hundredth of the feed.
+    fn records(script: &str, feeds_mm_s: &[f64]) -> Vec<CommandRecord> {
+        let script: Script = script.parse().expect("a script");
+        let mut commands = Commands::new(Some(&script), 1e-3);
+        let mut s_mm = 0.0;
+        for (tick, &v_mm_s) in feeds_mm_s.iter().enumerate() {
+            s_mm += 0.01 * v_mm_s;
+            commands.add(&TickRecord {
+                tick: tick as u64,
+                s_mm,
+                v_mm_s,
+                a_mm_s2: 0.0,
+                j_mm_s3: 0.0,
+                snap_mm_s4: 0.0,
+                state: "moving",
+                line: 0,
+                contour_um: 0.0,
+                axes: [AxisTick::default(); AXES],
+            });
+        }
+        commands.finish()
+    }
+
+    fn stops(records: &[CommandRecord]) -> Vec<Option<(u64, u32, f64)>> {
+        let stop = |stop: &StopRecord| {
+            (stop.tick, (stop.time_s * 1e3).round() as u32, (stop.length_mm * 1e6).round() / 1e6)
+        };
+        records.iter().map(|record| record.stop.as_ref().map(stop)).collect()
+    }
+
+    #[test]
+    fn a_hold_is_answered_by_the_rest_before_its_resume() {
+        let found = records("2:hold,6:resume", &[10.0, 10.0, 10.0, 5.0, 0.0, 0.0, 5.0, 10.0]);
+        assert_eq!(stops(&found), [Some((4, 3, 0.15)), None]);
+        assert!((found[0].s_mm - 0.2).abs() < 1e-12);
+        // Resumed on the way: no rest, not even a later one.
+        assert_eq!(stops(&records("2:hold,3:resume", &[10.0, 10.0, 10.0, 10.0, 0.0])), [None, None]);
+        // The program passed a stop on the way: the rest is the one that lasted.
+        assert_eq!(stops(&records("1:hold", &[10.0, 0.0, 5.0, 0.0, 0.0])), [Some((3, 3, 0.05))]);
+        // At rest already.
+        assert_eq!(stops(&records("2:hold", &[10.0, 0.0, 0.0, 0.0])), [Some((2, 0, 0.0))]);
+    }
+
+    #[test]
+    fn each_command_waits_for_what_ends_it() {
+        // An override does not end a hold, nor a resume an override of 0 or an abort.
+        let feeds = [10.0, 10.0, 10.0, 0.0, 0.0, 0.0];
+        let found = records("1:hold,2:override=0.5,5:resume", &feeds);
+        assert_eq!(stops(&found), [Some((3, 3, 0.2)), None, None]);
+        let shares: Vec<_> = found.iter().map(|record| record.feed_override).collect();
+        assert_eq!(shares, [None, Some(0.5), None]);
+        assert_eq!(
+            stops(&records("1:override=0,2:resume,4:override=1", &feeds)),
+            [Some((3, 3, 0.2)), None, None]
+        );
+        assert_eq!(stops(&records("2:abort,2:resume", &feeds)), [Some((3, 2, 0.1)), None]);
+        // What comes behind the last tick was not given.
+        assert!(records("6:hold", &feeds).is_empty());
+    }
+}

@@ -1,0 +1,154 @@
+//! What a run executes, and what its records call it by.
+//!
+//! Consumes a [`Plan`] and a [`Machine`]; produces a [`Job`]: everything that the kernel of a run consumes but the
+//! answers of its hardware. Fails where the plan or the machine can't be executed in the number type.
+
+use motion_kernel::axis::AxesConfig;
+use motion_kernel::num::{Fixed, Real};
+use motion_kernel::program::{Header, Item};
+use serde::{Deserialize, Serialize};
+
+use super::live::Script;
+use super::run::{Number, RunError, RunOptions, StretchCorrection};
+use crate::machine::{AxisError, Machine};
+use crate::planning::{Executable, Item as PlanItem, Plan};
+use crate::record::{AXES, BlockRecord, PathLimits, RunRecord};
+
+/// A program with its machine, and with what is commanded on the way.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// The kernel's number type.
+    pub number: Number,
+    /// The machine, as the kernel has to know it.
+    pub header: Header<AXES>,
+    /// The program, with the blocks of its path.
+    pub items: Vec<Item<AXES>>,
+    /// What was learnt of one of its stretches.
+    pub correction: Option<StretchCorrection>,
+    /// Live control.
+    pub script: Option<Script>,
+    /// For records.
+    pub sheet: Sheet,
+}
+
+/// What records say of a run beside its ticks. The kernel has nothing of it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sheet {
+    /// The program's name.
+    pub program: String,
+    /// The machine's.
+    pub machine: String,
+    /// Control tick \[s\].
+    pub tick_s: f64,
+    /// Limits along the path.
+    pub limits: PathLimits,
+    /// The axes.
+    pub axes: [SheetAxis; AXES],
+    /// Blocks of the plan, in path order.
+    pub blocks: Vec<BlockRecord>,
+    /// Where each stretch starts, from the program's start along the path \[mm\].
+    pub starts_mm: Vec<f64>,
+    /// Path length of the plan \[mm\].
+    pub path_length_mm: f64,
+    /// Duration of the plan, dwells included, stops not \[s\].
+    pub planned_time_s: f64,
+    /// What was accepted and not acted on.
+    pub notices: Vec<String>,
+}
+
+/// An axis' name and limits.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SheetAxis {
+    /// Name.
+    pub name: String,
+    /// Greatest velocity \[mm/s\].
+    pub feed_mm_s: f64,
+    /// Greatest acceleration \[mm/s²\].
+    pub accel_mm_s2: f64,
+    /// Greatest jerk \[mm/s³\].
+    pub jerk_mm_s3: f64,
+}
+
+impl Sheet {
+    /// Of a machine, without a program.
+    #[must_use]
+    pub fn of_machine(machine: &Machine) -> Self {
+        Self {
+            machine: machine.name.clone(),
+            tick_s: machine.tick_s,
+            limits: PathLimits {
+                accel_mm_s2: machine.path.accel_mm_s2,
+                jerk_mm_s3: machine.path.jerk_mm_s3,
+                snap_mm_s4: machine.path.snap_mm_s4,
+            },
+            axes: machine.axes.each_ref().map(|axis| SheetAxis {
+                name: axis.name.clone(),
+                feed_mm_s: axis.feed_mm_s,
+                accel_mm_s2: axis.accel_mm_s2,
+                jerk_mm_s3: axis.jerk_mm_s3,
+            }),
+            ..Self::default()
+        }
+    }
+
+    /// A record with what the sheet has for it, and no tick.
+    #[must_use]
+    pub fn record(&self) -> RunRecord {
+        RunRecord {
+            program: self.program.clone(),
+            machine: self.machine.clone(),
+            tick_s: self.tick_s,
+            limits: self.limits,
+            axis_names: self.axes.each_ref().map(|axis| axis.name.clone()),
+            blocks: self.blocks.clone(),
+            planned_time_s: self.planned_time_s,
+            ..RunRecord::default()
+        }
+    }
+
+    fn new(plan: &Plan, machine: &Machine) -> Self {
+        let start_mm = |item: &PlanItem| match item {
+            PlanItem::Stretch(stretch) => Some(stretch.start_mm),
+            PlanItem::Dwell { .. } | PlanItem::Stop { .. } => None,
+        };
+        Self {
+            program: plan.source.clone(),
+            blocks: plan.blocks.clone(),
+            starts_mm: plan.items.iter().filter_map(start_mm).collect(),
+            path_length_mm: plan.length_mm,
+            planned_time_s: plan.time_s,
+            notices: plan.notices.clone(),
+            ..Self::of_machine(machine)
+        }
+    }
+}
+
+impl Job {
+    /// `plan` on `machine`, as `options` say.
+    ///
+    /// # Errors
+    /// The plan can't be executed in the number type.
+    pub fn new(options: &RunOptions<'_>, plan: &Plan, machine: &Machine) -> Result<Self, RunError> {
+        let executable = match options.number {
+            Number::F32 => Executable::new::<f32>(plan),
+            Number::F64 => Executable::new::<f64>(plan),
+            Number::Fixed => Executable::new::<Fixed>(plan),
+        }?;
+        Ok(Self {
+            number: options.number,
+            header: machine.header(),
+            items: executable.items,
+            correction: options.correction.cloned(),
+            script: options.script.cloned(),
+            sheet: Sheet::new(plan, machine),
+        })
+    }
+
+    /// The kernel's axes.
+    pub(super) fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, AXES>, AxisError> {
+        AxesConfig::new(&self.header.axes, self.header.tick_s).map_err(|error| AxisError {
+            axis: self.sheet.axes[error.axis].name.clone(),
+            source: error.cause,
+        })
+    }
+}

@@ -1,0 +1,215 @@
+//! Ticks that come between any two operations of a turn of the background, under any commands.
+
+use core::cell::{Cell, RefCell};
+use core::convert::Infallible;
+
+use super::{Director, State};
+use crate::exec::{ExecState, Executor};
+use crate::law::{Law, Limits, PathMotion};
+use crate::plan::{Block, BlockPlan, plan, segments};
+use crate::program::{Allowed, Item, PathBlock};
+use crate::queue::{Intake, LiveStreams, PathRules};
+use crate::units::Position;
+
+const TICK_S: f64 = 0.0005;
+const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 4e5 };
+/// Longer ones are cut \[mm\].
+const PIECE_MM: f64 = 4.0;
+
+/// SplitMix64.
+struct Random(Cell<u64>);
+
+impl Random {
+    fn unit(&self) -> f64 {
+        self.0.set(self.0.get().wrapping_add(0x9E37_79B9_7F4A_7C15));
+        let z = self.0.get();
+        let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn chance(&self, probability: f64) -> bool {
+        self.unit() < probability
+    }
+
+    fn log(&self, least: f64, greatest: f64) -> f64 {
+        least * (greatest / least).powf(self.unit())
+    }
+}
+
+/// Blocks straight on, with a ceiling each, from rest to rest: their ends with their ceilings, and the items of their plan.
+fn stretch(random: &Random, from: Position, items: &mut Vec<Item<1>>) -> Vec<(Position, f64)> {
+    let law = Law::new(LIMITS).expect("limits");
+    let count = 1 + (random.unit() * 8.0) as usize;
+    let blocks: Vec<Block<f64>> = (0..count)
+        .map(|_| {
+            let length_mm = Position::from_mm(random.log(0.02, 20.0)).expect("in range").to_mm();
+            Block { length_mm, cap_mm_s: random.log(2.0, 80.0), joint_mm_s: f64::INFINITY, law }
+        })
+        .collect();
+    let mut plans = vec![BlockPlan::default(); count];
+    plan(&blocks, 0.0, 0.0, &mut plans).expect("a plan");
+    let mut placed: Vec<(Position, Item<1>)> = Vec::new();
+    let (mut start, mut caps) = (Position::ZERO, Vec::new());
+    for (block, plan) in blocks.iter().zip(&plans) {
+        let length = Position::from_mm(block.length_mm).expect("in range");
+        let (end, cap_mm_s) = (start + length, block.cap_mm_s);
+        let allowed = Allowed { cap_mm_s, limits: LIMITS };
+        placed.push((start, Item::Block(PathBlock::new(length, cap_mm_s, allowed, allowed, 1e6))));
+        let mut at = start;
+        while at < end {
+            let part = Position::from_mm(PIECE_MM).expect("in range").min(end - at);
+            placed.push((at, Item::Line { line: 1, start: [from + at], direction: [1.0], length: part }));
+            at = at + part;
+        }
+        let mut at = start;
+        for segment in
+            segments::<f64, f64>(block, plan, start, end, TICK_S).expect("segments").iter().flatten()
+        {
+            placed.push((at, Item::Feed { ramp: *segment.as_ramp(), length: segment.length() }));
+            at = at + segment.length();
+        }
+        start = end;
+        caps.push((end, cap_mm_s));
+    }
+    placed.sort_by_key(|&(at, _)| at);
+    items.extend(placed.into_iter().map(|(_, item)| item));
+    items.push(Item::EndOfStretch([from + start]));
+    caps
+}
+
+/// What ticks, and holds each tick against the one before.
+struct Rig<'a> {
+    executor: Executor<f64, 1>,
+    intake: Intake<'a, f64, 1>,
+    /// Where each stretch begins, and its ceilings.
+    stretches: Vec<(Position, Vec<(Position, f64)>)>,
+    before: PathMotion<f64>,
+    stretch: usize,
+    state: ExecState,
+    ticks: u64,
+}
+
+impl Rig<'_> {
+    fn tick(&mut self) {
+        let executed = self.executor.tick(&mut self.intake).expect("no fault");
+        (self.ticks, self.state) = (self.ticks + 1, executed.state);
+        let (now, h) = (executed.motion, TICK_S);
+        let rounding = 1.0 + 1e-9;
+        for (value, limit) in [
+            (now.a_mm_s2, LIMITS.accel_mm_s2),
+            (now.j_mm_s3, LIMITS.jerk_mm_s3),
+            (now.snap_mm_s4, LIMITS.snap_mm_s4),
+        ] {
+            assert!(value.abs() <= limit * rounding, "tick {}: {now:?}", self.ticks);
+        }
+        let stretch = executed.stretches as usize;
+        let mut then = self.before;
+        if stretch != self.stretch {
+            // It has ended in this tick, and perhaps the next one has begun: lengths go on.
+            assert_eq!(stretch, self.stretch + 1, "one at a time");
+            let (_, caps) = &self.stretches[self.stretch];
+            then.s = then.s - caps[caps.len() - 1].0;
+            self.stretch = stretch;
+        }
+        // Hermite's rules, with snap that may step within its limit.
+        let snap = LIMITS.snap_mm_s4;
+        let d = (now.s - then.s).to_mm() - h * ((now.v_mm_s + then.v_mm_s) / 2.0)
+            + h * h * (now.a_mm_s2 - then.a_mm_s2) / 12.0;
+        assert!(d.abs() <= 8.1e-3 * snap * h.powi(4) + 2e-8, "tick {}: {d} mm, {then:?} {now:?}", self.ticks);
+        let d = now.v_mm_s - then.v_mm_s - h * (now.a_mm_s2 + then.a_mm_s2) / 2.0
+            + h * h * (now.j_mm_s3 - then.j_mm_s3) / 12.0;
+        assert!(
+            d.abs() <= 3.3e-2 * snap * h.powi(3) + 1e-9,
+            "tick {}: {d} mm/s, {then:?} {now:?}",
+            self.ticks
+        );
+        let d = now.j_mm_s3 - then.j_mm_s3;
+        assert!(d.abs() <= snap * h * rounding, "tick {}: {d} mm/s³, {then:?} {now:?}", self.ticks);
+        self.before = now;
+        let at = executed.setpoints[0].position;
+        let Some((start, caps)) = self.stretches.get(stretch) else {
+            let (start, caps) = &self.stretches[stretch - 1];
+            assert_eq!(at, *start + caps[caps.len() - 1].0, "the end is exact");
+            return;
+        };
+        assert!((at - (*start + now.s)).to_bits().abs() <= 2, "tick {}: off the path", self.ticks);
+        let near = Position::from_bits(64);
+        let cap = |at: Position| caps.iter().find(|&&(end, _)| at <= end).map_or(0.0, |&(_, cap)| cap);
+        let most_mm_s = cap(now.s + near).max(cap(now.s - near));
+        assert!(now.v_mm_s <= most_mm_s * rounding, "tick {}: {now:?} above {most_mm_s}", self.ticks);
+    }
+}
+
+/// A refused word or a late one costs time, never a limit: what is handed over is legal whenever the tick finds it.
+#[test]
+fn ticks_between_any_two_operations_of_a_turn() {
+    let (mut ticks, mut inside, mut starvations, mut commands) = (0, 0_u64, 0, 0_u64);
+    for seed in 0..150 {
+        println!("seed {seed}");
+        let random = Random(Cell::new(seed));
+        let (mut items, mut stretches, mut from) = (Vec::new(), Vec::new(), Position::ZERO);
+        for _ in 0..1 + (random.unit() * 3.0) as usize {
+            let caps = stretch(&random, from, &mut items);
+            let end = from + caps[caps.len() - 1].0;
+            stretches.push((from, caps));
+            from = end;
+        }
+        let rules = PathRules { limits: LIMITS, feed_mm_s: 100.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+        let mut streams = LiveStreams::<f64, 1, 64, 16>::new();
+        let (mut feeder, intake) = streams.split(rules, [Position::ZERO]);
+        let rig = RefCell::new(Rig {
+            executor: Executor::new([Position::ZERO]),
+            intake,
+            stretches,
+            before: PathMotion::default(),
+            stretch: 0,
+            state: ExecState::Idle,
+            ticks: 0,
+        });
+        let (often, interrupts) = (random.log(1e-3, 0.5), random.log(1e-3, 0.7));
+        let count = Cell::new(0_u64);
+        let between = || {
+            if random.chance(interrupts) {
+                count.set(count.get() + 1);
+                rig.borrow_mut().tick();
+            }
+        };
+        feeder.between = Some(&between);
+        let lead_ticks = (random.unit() * 6.0) as u32;
+        let items = items.into_iter().map(Ok);
+        let mut director = Director::<f64, 1, _, Infallible, 64>::new(items, TICK_S, lead_ticks);
+        loop {
+            let ticks = rig.borrow().ticks;
+            assert!(ticks < 400_000, "seed {seed}: no end, {:?}", director.state(&feeder));
+            // In the end everything is let go.
+            if ticks > 60_000 {
+                director.resume();
+                director.set_override(1.0).expect("in range");
+            } else if random.chance(often) {
+                commands += 1;
+                match (random.unit() * 4.0) as usize {
+                    0 => director.hold(),
+                    1 => director.resume(),
+                    2 => director.set_override(1.0).expect("in range"),
+                    _ => director.set_override(random.log(0.05, 2.0)).expect("in range"),
+                }
+            }
+            director.turn(&mut feeder).unwrap_or_else(|error| panic!("seed {seed}: {error:?}"));
+            rig.borrow_mut().tick();
+            if director.state(&feeder) == State::Done {
+                break;
+            }
+        }
+        let rig = rig.borrow();
+        assert_eq!(rig.stretch, rig.stretches.len(), "seed {seed}");
+        assert_eq!(rig.state, ExecState::Idle, "seed {seed}");
+        ticks += rig.ticks;
+        inside += count.get();
+        starvations += director.starvations();
+    }
+    println!(
+        "{ticks} ticks, {inside} of them in a turn; {commands} commands, {starvations} stops for want of data"
+    );
+    assert!(inside > 10_000 && commands > 5_000, "{inside} {commands}");
+}

@@ -1,0 +1,323 @@
+//! Flight recorder: the last ticks, kept when a fault comes.
+//!
+//! Consumes each tick's [`Trace`], in the tick: one [`Row`] is copied, and nothing else depends on how many there are. A
+//! fault freezes it: `AFTER` ticks behind the fault's are kept still, so that one sees how the machine came to rest, and
+//! then nothing is written until [`Recorder::clear`]. Read from the background, oldest first.
+//!
+//! A row leaves a board as a frame of bytes of its own, so that a frame that is lost on the way costs one row:
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 1 | version of this format, 1 |
+//! | 1 | number of axes |
+//! | … | [`Row`] of f64, whatever the kernel's number type, in the [postcard](https://postcard.jamesmunns.com) wire format |
+//! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
+//!
+//! Memory is that of the rows: 168 bytes each for three axes in f32.
+
+use heapless::Deque;
+use serde::{Deserialize, Serialize};
+
+use crate::exec::ExecState;
+use crate::fault::Fault;
+use crate::law::PathMotion;
+use crate::num::{Real, Scalar};
+use crate::program::{Checksum, array};
+use crate::trace::Trace;
+use crate::units::{Counts, DacCode, Position};
+
+const VERSION: u8 = 1;
+const PREFIX: usize = 2;
+const CHECKSUM: usize = 4;
+
+/// A frame of a row of `axes` axes is no longer \[bytes\].
+#[must_use]
+pub const fn frame_max(axes: usize) -> usize {
+    // Numbers of 64 bits take ten bytes at most, of 32 five, of 16 three, figures eight.
+    PREFIX + 10 + (10 + 4 * 8) + 5 + 5 + 1 + 1 + 1 + axes * (10 + 10 + 4 * 8 + 3 + 1 + 1) + CHECKSUM
+}
+
+/// What is kept of a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row<R, const AXES: usize> {
+    /// Tick number since the start.
+    pub tick: u64,
+    /// The motion along the path; `s` counts from the stretch's start.
+    pub motion: PathMotion<R>,
+    /// Stretches finished since the start.
+    pub stretches: u32,
+    /// Program line of the current piece; 0 at rest.
+    pub line: u32,
+    /// What the executor was doing.
+    pub state: ExecState,
+    /// The emergency stop was open.
+    pub emergency_stop: bool,
+    /// A fault was latched.
+    pub is_faulted: bool,
+    /// Each axis.
+    #[serde(with = "array", bound(serialize = "R: Serialize", deserialize = "R: Copy + Deserialize<'de>"))]
+    pub axes: [AxisRow<R>; AXES],
+}
+
+/// What is kept of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisRow<R> {
+    /// What the encoder read at the start of the tick.
+    pub counts: Counts,
+    /// The position set-point that was regulated to.
+    pub set: Position,
+    /// Set velocity \[mm/s\].
+    pub velocity_mm_s: R,
+    /// Set acceleration \[mm/s²\].
+    pub accel_mm_s2: R,
+    /// Set jerk \[mm/s³\].
+    pub jerk_mm_s3: R,
+    /// Following error: set − actual \[mm\].
+    pub following_error_mm: R,
+    /// What the converter was to put out.
+    pub code: DacCode,
+    /// The output reached the limit.
+    pub saturated: bool,
+    /// The digital inputs, as [`AxisInputs::to_bits`](crate::hal::AxisInputs::to_bits).
+    pub inputs: u8,
+}
+
+impl<R: Scalar, const AXES: usize> Row<R, AXES> {
+    /// Of a tick.
+    #[must_use]
+    #[inline]
+    pub fn new(trace: &Trace<R, AXES>) -> Self {
+        let Trace { tick, ref executed, ref axes, ref inputs, ref fault } = *trace;
+        let empty = AxisRow {
+            counts: Counts(0),
+            set: Position::ZERO,
+            velocity_mm_s: R::ZERO,
+            accel_mm_s2: R::ZERO,
+            jerk_mm_s3: R::ZERO,
+            following_error_mm: R::ZERO,
+            code: DacCode::ZERO,
+            saturated: false,
+            inputs: 0,
+        };
+        let mut rows = [empty; AXES];
+        let of_axes = rows.iter_mut().zip(axes).zip(executed.setpoints.iter().zip(&inputs.axes));
+        for ((row, output), (setpoint, inputs)) in of_axes {
+            *row = AxisRow {
+                counts: output.counts,
+                set: output.set,
+                velocity_mm_s: setpoint.velocity_mm_s,
+                accel_mm_s2: setpoint.accel_mm_s2,
+                jerk_mm_s3: setpoint.jerk_mm_s3,
+                following_error_mm: output.following_error_mm,
+                code: output.code,
+                saturated: output.saturated,
+                inputs: inputs.to_bits(),
+            };
+        }
+        Self {
+            tick,
+            motion: executed.motion,
+            stretches: executed.stretches,
+            line: executed.line,
+            state: executed.state,
+            emergency_stop: inputs.emergency_stop,
+            is_faulted: fault.is_some(),
+            axes: rows,
+        }
+    }
+
+    /// The same in f64: exactly for floats, to the nearest for fixed point.
+    #[must_use]
+    pub fn to_f64(&self) -> Row<f64, AXES> {
+        let Self { tick, motion, stretches, line, state, emergency_stop, is_faulted, .. } = *self;
+        Row {
+            tick,
+            motion: PathMotion {
+                s: motion.s,
+                v_mm_s: motion.v_mm_s.to_f64(),
+                a_mm_s2: motion.a_mm_s2.to_f64(),
+                j_mm_s3: motion.j_mm_s3.to_f64(),
+                snap_mm_s4: motion.snap_mm_s4.to_f64(),
+            },
+            stretches,
+            line,
+            state,
+            emergency_stop,
+            is_faulted,
+            axes: self.axes.map(|axis| AxisRow {
+                counts: axis.counts,
+                set: axis.set,
+                velocity_mm_s: axis.velocity_mm_s.to_f64(),
+                accel_mm_s2: axis.accel_mm_s2.to_f64(),
+                jerk_mm_s3: axis.jerk_mm_s3.to_f64(),
+                following_error_mm: axis.following_error_mm.to_f64(),
+                code: axis.code,
+                saturated: axis.saturated,
+                inputs: axis.inputs,
+            }),
+        }
+    }
+
+    /// The row as a frame, at the start of `buffer`; none if that is shorter than the frame, which is at most
+    /// [`frame_max`] long. Background.
+    pub fn to_frame<'a>(&self, buffer: &'a mut [u8]) -> Option<&'a [u8]> {
+        let (prefix, rest) = buffer.split_first_chunk_mut()?;
+        *prefix = [VERSION, u8::try_from(AXES).ok()?];
+        let length = PREFIX + postcard::to_slice(&self.to_f64(), rest).ok()?.len();
+        let (content, rest) = buffer.split_at_mut_checked(length)?;
+        let (sum, _) = rest.split_first_chunk_mut()?;
+        *sum = checksum(content).to_le_bytes();
+        buffer.get(..length + CHECKSUM)
+    }
+}
+
+fn checksum(bytes: &[u8]) -> u32 {
+    let mut sum = Checksum::NONE;
+    sum.update(bytes);
+    sum.finish()
+}
+
+/// Why bytes are no frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameError {
+    /// It is shorter than the shortest.
+    Short,
+    /// It is of another version of the format.
+    Version {
+        /// Its version; 1 is expected.
+        found: u8,
+    },
+    /// It is of a machine with another number of axes.
+    Axes {
+        /// The frame's.
+        found: u8,
+        /// The reader's.
+        expected: usize,
+    },
+    /// It has been damaged.
+    Checksum {
+        /// Of the bytes as they are.
+        found: u32,
+        /// As written.
+        expected: u32,
+    },
+    /// Behind an intact checksum there is no row.
+    Malformed,
+}
+
+impl core::fmt::Display for FrameError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Short => write!(f, "a few bytes, expected a frame of the flight recorder"),
+            Self::Version { found } => write!(f, "a frame of format {found}, expected {VERSION}"),
+            Self::Axes { found, expected } => write!(f, "a frame of {found} axes, expected {expected}"),
+            Self::Checksum { found, expected } => {
+                write!(f, "a damaged frame: checksum {found:08x}, expected {expected:08x}")
+            }
+            Self::Malformed => write!(f, "a frame that holds no row"),
+        }
+    }
+}
+
+impl core::error::Error for FrameError {}
+
+impl<const AXES: usize> Row<f64, AXES> {
+    /// The row in `frame`.
+    ///
+    /// # Errors
+    /// Nothing but a whole, undamaged frame of `AXES` axes is accepted.
+    pub fn from_frame(frame: &[u8]) -> Result<Self, FrameError> {
+        let (content, sum) = frame.split_last_chunk().ok_or(FrameError::Short)?;
+        let (&[version, axes], body) = content.split_first_chunk().ok_or(FrameError::Short)?;
+        let (found, expected) = (checksum(content), u32::from_le_bytes(*sum));
+        if version != VERSION {
+            return Err(FrameError::Version { found: version });
+        }
+        if usize::from(axes) != AXES {
+            return Err(FrameError::Axes { found: axes, expected: AXES });
+        }
+        if found != expected {
+            return Err(FrameError::Checksum { found, expected });
+        }
+        match postcard::take_from_bytes(body) {
+            Ok((row, [])) => Ok(row),
+            _ => Err(FrameError::Malformed),
+        }
+    }
+}
+
+/// The last `ROWS` ticks, of which `AFTER` behind that of a fault.
+#[derive(Debug)]
+pub struct Recorder<R, const AXES: usize, const ROWS: usize, const AFTER: usize> {
+    rows: Deque<Row<R, AXES>, ROWS>,
+    /// The fault that freezes it, and how many ticks are to be kept still.
+    fault: Option<(Fault<R>, usize)>,
+}
+
+impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> Recorder<R, AXES, ROWS, AFTER> {
+    const HAS_ROOM: () = assert!(AFTER < ROWS, "no room for the tick of the fault");
+
+    /// Without a tick.
+    #[must_use]
+    pub const fn new() -> Self {
+        let () = Self::HAS_ROOM;
+        Self { rows: Deque::new(), fault: None }
+    }
+
+    /// Adds a tick, unless it is frozen. Call it in the tick.
+    #[inline]
+    pub fn add(&mut self, trace: &Trace<R, AXES>) {
+        match (&mut self.fault, &trace.fault) {
+            (None, None) => {}
+            (None, Some(fault)) => self.fault = Some((*fault, AFTER)),
+            (Some((_, 0)), _) => return,
+            (Some((_, left)), _) => *left -= 1,
+        }
+        if self.rows.is_full() {
+            self.rows.pop_front();
+        }
+        // There is room.
+        let _ = self.rows.push_back(Row::new(trace));
+    }
+
+    /// Whether a fault has frozen it: nothing is added any more.
+    #[must_use]
+    pub fn is_frozen(&self) -> bool {
+        matches!(self.fault, Some((_, 0)))
+    }
+
+    /// The fault that freezes it, from its tick on.
+    #[must_use]
+    pub fn fault(&self) -> Option<Fault<R>> {
+        self.fault.map(|(fault, _)| fault)
+    }
+
+    /// The row so many behind the oldest.
+    #[must_use]
+    pub fn row(&self, index: usize) -> Option<&Row<R, AXES>> {
+        self.rows.get(index)
+    }
+
+    /// All rows, oldest first.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = &Row<R, AXES>> {
+        self.rows.iter()
+    }
+
+    /// Forgets everything, and records again. Clear the kernel's fault first: one that is still latched freezes the
+    /// recorder once more.
+    pub fn clear(&mut self) {
+        self.rows.clear();
+        self.fault = None;
+    }
+}
+
+impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> Default
+    for Recorder<R, AXES, ROWS, AFTER>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests;

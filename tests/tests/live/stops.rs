@@ -1,0 +1,194 @@
+//! How long a stop takes.
+//!
+//! The long form, `MOTION_TEST_HOLDS=100000`, is what the table of the documents is made of; `MOTION_ACCEPT=1` writes it.
+
+use motion_host::machine::Machine;
+use motion_kernel::live::State;
+use motion_tests::figures::{Table, hold};
+
+use super::Case;
+use super::check::geometry::{Move, UNITS_PER_MM};
+use super::check::live::{Command, Run};
+use super::check::program::{Asked, Generated};
+use super::check::random::Random;
+use super::check::{from_env, machine};
+
+/// The time that stopping takes at least with limits of acceleration and jerk alone, from a feed and an acceleration
+/// (the optimum of a velocity interface without a limit of snap).
+fn shortest_stop_s(v: f64, a: f64, accel: f64, jerk: f64) -> f64 {
+    // Where the feed would end if the acceleration went to 0 at once.
+    let left = v + a * a.abs() / (2.0 * jerk);
+    let (v, a) = if left < 0.0 { (-v, -a) } else { (v, a) };
+    let peak = (jerk * v + 0.5 * a * a).max(0.0).sqrt();
+    if peak <= accel {
+        (a + peak) / jerk + peak / jerk
+    } else {
+        let falling = (a + accel) / jerk;
+        let lost = v + 0.5 * a * a / jerk - accel * accel / jerk;
+        falling + lost / accel + accel / jerk
+    }
+}
+
+/// A machine whose path's limits are the only ones, and lines straight on, each at a feed of its own, with room to reach it
+/// and to stop.
+fn straight(random: &mut Random) -> Option<Case> {
+    let mut machine = machine::any(random);
+    for axis in &mut machine.axes {
+        axis.feed_mm_s = machine.path.feed_mm_s;
+        (axis.accel_mm_s2, axis.jerk_mm_s3, axis.snap_mm_s4) =
+            (machine.path.accel_mm_s2, machine.path.jerk_mm_s3, machine.path.snap_mm_s4);
+    }
+    let (most_mm_s, room_s) =
+        (machine.path.feed_mm_s, machine.path.feed_mm_s / machine.path.accel_mm_s2 + 2.0 * rise_s(&machine));
+    let (mut x_mm, mut text, mut asked, mut from) = (0.0, String::new(), Vec::new(), [0; 3]);
+    for _ in 0..12 {
+        let feed_mm_min = format!("{:.4}", 60.0 * most_mm_s * random.log_between(0.02, 1.0));
+        x_mm += most_mm_s * room_s * random.between(1.5, 3.0);
+        let to = [(x_mm * UNITS_PER_MM).round() as i64, 0, 0];
+        text.push_str(&format!("G1 X{:.10} F{feed_mm_min}\n", to[0] as f64 / UNITS_PER_MM));
+        let feed_mm_min = feed_mm_min.parse().expect("a number");
+        asked.push(Asked::Move(Move { from, to, arc: None, feed_mm_min }));
+        from = to;
+    }
+    if x_mm > 7000.0 {
+        return None;
+    }
+    Case::of(&Generated { text, asked }, machine, 200_000.0)
+}
+
+/// The jerk that snap leaves the law \[mm/s³\].
+fn peak_jerk(machine: &Machine) -> f64 {
+    let path = &machine.path;
+    path.jerk_mm_s3.min((2.0 * path.accel_mm_s2 * path.snap_mm_s4 / std::f64::consts::PI).sqrt())
+}
+
+/// The law's longest rise \[s\].
+fn rise_s(machine: &Machine) -> f64 {
+    2.0 * machine.path.accel_mm_s2 / peak_jerk(machine)
+}
+
+/// A stop from any state of the law, over the shortest without a limit of snap.
+#[derive(Clone, Copy, Debug)]
+struct Stop {
+    /// All of it, over 1.5 times the shortest and π·J/DJ.
+    of_goal: f64,
+    /// What two rises do not account for; where snap leaves the law all its jerk.
+    plain: Option<f64>,
+    /// The same, of any law.
+    beyond: f64,
+    /// The same, over the shortest with the jerk that snap leaves.
+    with_its_jerk: f64,
+}
+
+impl Stop {
+    fn new(machine: &Machine, [v, a]: [f64; 2], ticks: u64) -> Option<Self> {
+        let path = &machine.path;
+        let (jerk, peak) = (path.jerk_mm_s3, peak_jerk(machine));
+        let shortest_s = |jerk: f64| shortest_stop_s(v, a, path.accel_mm_s2, jerk);
+        if shortest_s(jerk) <= 0.0 {
+            return None;
+        }
+        // A tick until it begins, and one until it is seen to be over.
+        let stop_s = (ticks as f64 - 2.0) * machine.tick_s;
+        let more_s = stop_s - 2.0 * rise_s(machine);
+        let goal_s = 1.5 * shortest_s(jerk) + std::f64::consts::PI * jerk / path.snap_mm_s4;
+        Some(Self {
+            of_goal: stop_s / goal_s,
+            plain: (peak >= jerk).then_some(more_s / shortest_s(jerk)),
+            beyond: more_s / shortest_s(jerk),
+            with_its_jerk: more_s / shortest_s(peak),
+        })
+    }
+}
+
+/// Held at random times, again and again.
+fn stops(seed: u64, found: &mut Vec<Stop>) -> Option<Result<Run, String>> {
+    let mut random = Random::new(seed);
+    let case = straight(&mut random)?;
+    let (mut held, mut last_rest) = (None, 0);
+    Some(case.run::<f64>(seed, &mut |seen| match held {
+        None if seen.ticks > last_rest + 20 && random.chance(0.01) => {
+            let motion = &seen.executed.motion;
+            held = Some((seen.ticks, [motion.v_mm_s, motion.a_mm_s2]));
+            Some(Command::Hold)
+        }
+        Some((at, state)) if seen.state == State::Held => {
+            found.extend(Stop::new(&case.machine, state, seen.ticks - at));
+            (held, last_rest) = (None, seen.ticks);
+            Some(Command::Resume)
+        }
+        _ => None,
+    }))
+}
+
+/// What is published; a short form's stops are the first of the long form's.
+const PUBLISHED: &str = include_str!("../../expected/stops.md");
+const LONG: usize = 100_000;
+
+/// From any state of the law a hold takes at most 2.2 times the shortest stop without a limit of snap, and twice the
+/// law's longest rise.
+#[test]
+fn a_stop_is_not_much_longer_than_the_shortest() {
+    let holds = from_env("MOTION_TEST_HOLDS").unwrap_or(3000) as usize;
+    let mut found = Vec::new();
+    for seed in 1.. {
+        if found.len() >= holds {
+            break;
+        }
+        if let Some(Err(error)) = stops(seed, &mut found) {
+            panic!("MOTION_TEST_SEED={seed}: {error}");
+        }
+    }
+    found.truncate(holds);
+    let sorted = |figure: &dyn Fn(&Stop) -> Option<f64>| {
+        let mut all: Vec<f64> = found.iter().filter_map(figure).collect();
+        all.sort_by(f64::total_cmp);
+        all
+    };
+    let plain = sorted(&|stop| stop.plain);
+    let columns = [
+        sorted(&|stop| Some(stop.of_goal)),
+        plain.clone(),
+        sorted(&|stop| Some(stop.with_its_jerk)),
+        sorted(&|stop| Some(stop.beyond)),
+    ];
+    let mut table = Table::new(&[
+        "share of stops",
+        "time over 1.5 times the shortest and π·J/DJ",
+        "less two rises, snap leaving all jerk",
+        "less two rises, over the shortest with the jerk that snap leaves",
+        "less two rises, over the shortest with all jerk",
+    ]);
+    for (name, share) in [("50 %", 0.5), ("90 %", 0.9), ("99 %", 0.99), ("99.9 %", 0.999), ("all", 1.0)] {
+        let at = |all: &Vec<f64>| format!("{:.2}", all[((all.len() - 1) as f64 * share) as usize]);
+        let mut row = vec![name.to_owned()];
+        row.extend(columns.iter().map(at));
+        table.row(&row);
+    }
+    let above = |all: &[f64], figure: f64| {
+        100.0 * all.iter().filter(|&&value| value > figure).count() as f64 / all.len() as f64
+    };
+    println!(
+        "{}{} stops, {} of them where snap leaves all jerk; {:.2} % above 1.5 times the shortest and pi J/DJ, {:.3} % \
+         above 2.2 times the shortest with all jerk and two rises",
+        table.to_markdown(),
+        found.len(),
+        plain.len(),
+        above(&columns[0], 1.0),
+        above(&columns[3], 2.2),
+    );
+    let greatest = |all: &Vec<f64>| all[all.len() - 1];
+    assert!(plain.len() > found.len() / 10 && greatest(&plain) <= 2.2, "{}", greatest(&plain));
+    assert!(greatest(&columns[2]) <= 2.2, "{}", greatest(&columns[2]));
+    if found.len() == LONG {
+        hold("stops", &table, 0.0).unwrap_or_else(|error| panic!("{error}"));
+    } else if found.len() < LONG {
+        let last = PUBLISHED.lines().last().expect("rows");
+        let published = last.split('|').filter_map(|cell| cell.trim().parse::<f64>().ok());
+        assert_eq!(published.clone().count(), columns.len(), "{last}");
+        for (all, published) in columns.iter().zip(published) {
+            // As printed.
+            assert!(greatest(all) <= published + 0.005, "{} of the published {published}", greatest(all));
+        }
+    }
+}
