@@ -71,6 +71,12 @@ impl<R: Root> Limits<R> {
         }
         Ok(())
     }
+
+    /// J' = min(J_max, √(2·A_max·DJ_max/π)): the peak jerk of every ramp large enough for it; the first two terms of
+    /// (22) \[mm/s³\].
+    pub(super) fn peak_jerk_mm_s3(&self) -> R {
+        self.jerk_mm_s3.min(self.accel_mm_s2.sqrt_product(self.snap_mm_s4 * R::from_f64(2.0 / PI)))
+    }
 }
 
 /// The law for one set of limits. Symbols of S1 in the fields' docs.
@@ -101,41 +107,23 @@ impl<R: Root> Law<R> {
     /// A limit is not positive and finite, or beyond [`Root::LIMITS`]: from 1 to 10⁹ in fixed point.
     pub fn new(limits: Limits<R>) -> Result<Self, LimitError> {
         limits.check()?;
-        Ok(Self::with_root(limits, (limits.snap_mm_s4 / R::from_f64(TAU)).cbrt()))
-    }
-
-    /// The same law with less acceleration; with no less it is itself. As [`new`](Self::new) makes it.
-    ///
-    /// # Errors
-    /// The acceleration is not a positive finite number, or beyond [`Root::LIMITS`].
-    pub fn softened(&self, accel_mm_s2: R) -> Result<Self, LimitError> {
-        if accel_mm_s2 >= self.limits.accel_mm_s2 {
-            return Ok(*self);
-        }
-        let limits = Limits { accel_mm_s2, ..self.limits };
-        limits.check()?;
-        Ok(Self::with_root(limits, self.snap_root))
-    }
-
-    /// With (DJ/2π)^⅓, the dearest of the roots.
-    fn with_root(limits: Limits<R>, snap_root: R) -> Self {
-        let Limits { accel_mm_s2: accel, jerk_mm_s3: jerk, snap_mm_s4: snap } = limits;
+        let Limits { accel_mm_s2: accel, jerk_mm_s3: _, snap_mm_s4: snap } = limits;
         let constant = R::from_f64;
         let (pi, two) = (constant(PI), constant(2.0));
-        let peak = jerk.min(accel.sqrt_product(snap * constant(2.0 / PI)));
+        let peak = limits.peak_jerk_mm_s3();
         let snap_time_s = pi.times_per(peak, snap);
         let accel_time_s = two.times_per(accel, peak);
-        Self {
+        Ok(Self {
             limits,
             jerk_mm_s3: peak,
             // The first product is below A.
             snap_limited_to_mm_s: (snap_time_s * (peak / two)).times_per(snap_time_s, R::ONE),
             accel_limited_from_mm_s: accel_time_s.times_per(accel, R::ONE),
-            snap_root,
+            snap_root: (snap / constant(TAU)).cbrt(),
             jerk_root: (peak / two).sqrt(),
             snap_time_s,
             accel_time_s,
-        }
+        })
     }
 
     /// The limits this law keeps.

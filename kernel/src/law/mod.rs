@@ -5,6 +5,7 @@
 //! - [`limits`]: acceleration, jerk and snap limits, and what follows from them once;
 //! - [`shape`]: the law in normalised time, the same for every ramp, evaluated in the tick;
 //! - [`ramp`]: one change of feed: choice of peak jerk and times, S1 (22) and (23);
+//! - [`passing`]: about where a ramp passes a feed, for the planner;
 //! - [`mod@reach`]: the inverse problems, background only: highest feed reachable in a length, and
 //!   highest peak between two feeds;
 //! - [`segment`]: a ramp or a cruise made ready for the tick: no division is left to do.
@@ -13,12 +14,14 @@
 
 pub mod limits;
 pub mod ramp;
+pub mod passing;
 pub mod reach;
 pub mod segment;
 
 pub mod shape;
 
 pub use limits::{Law, LimitError, Limits};
+pub use passing::Passing;
 pub use ramp::{FeedState, LimitedBy, Ramp};
 pub use reach::{peak, reach};
 #[cfg(feature = "live")]

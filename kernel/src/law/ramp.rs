@@ -5,8 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::limits::Law;
-use super::shape::{ABOUT_WITHIN, Shape};
+use super::limits::{Law, Limits};
+use super::shape::Shape;
 use crate::num::{Root, Scalar};
 
 /// A ramp between two feeds (S1, section 1). A braking ramp is the accelerating one mirrored.
@@ -81,6 +81,37 @@ impl<R: Root> Ramp<R> {
         Self { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by }
     }
 
+    /// As [`new`](Self::new) for the law of `limits` > 0, but for rounding: cheaper than making that law for one ramp, above
+    /// all where acceleration fixes it.
+    #[must_use]
+    pub fn within(limits: &Limits<R>, from_mm_s: R, to_mm_s: R) -> Self {
+        let change = (to_mm_s - from_mm_s).abs();
+        let (accel, snap) = (limits.accel_mm_s2, limits.snap_mm_s4);
+        let (pi, two) = (R::from_f64(core::f64::consts::PI), R::from_f64(2.0));
+        let jerk = limits.peak_jerk_mm_s3();
+        let (rise_s, fall_start_s) = (two.times_per(accel, jerk), change / accel);
+        if fall_start_s >= rise_s {
+            return Self {
+                from_mm_s,
+                to_mm_s,
+                peak_jerk_mm_s3: jerk,
+                t1_s: rise_s + R::MARGIN,
+                t2_s: fall_start_s + R::MARGIN,
+                limited_by: LimitedBy::Acceleration,
+            };
+        }
+        let by_jerk_s = change.sqrt() / (jerk / two).sqrt();
+        let (rise_s, peak_jerk_mm_s3, limited_by) = if change <= R::ZERO {
+            (R::ZERO, R::ZERO, LimitedBy::Snap)
+        } else if by_jerk_s <= pi.times_per(jerk, snap) {
+            let rise_s = change.times_per(pi + pi, snap).cbrt() + R::MARGIN;
+            (rise_s, (change.times_per(two, rise_s) / rise_s).min(jerk), LimitedBy::Snap)
+        } else {
+            (by_jerk_s + R::MARGIN, jerk, LimitedBy::Jerk)
+        };
+        Self { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s: rise_s, t2_s: rise_s, limited_by }
+    }
+
     /// No change of feed for `time_s`.
     #[must_use]
     pub fn cruise(feed_mm_s: R, time_s: R) -> Self {
@@ -152,35 +183,6 @@ impl<R: Root> Ramp<R> {
             self.from_mm_s * rise_s
                 + length_scale * R::from_f64(Shape::END.length)
                 + held_s * (self.from_mm_s + curved + half * (gained - curved))
-        }
-    }
-
-    /// Two lengths between which [`length_to_feed_mm`](Self::length_to_feed_mm) lies \[mm\], at a fraction of its cost: they
-    /// are less than a thousandth of the ramp's length apart.
-    #[must_use]
-    pub fn about_length_to_feed_mm(&self, feed_mm_s: R) -> (R, R) {
-        let (rise_s, jerk) = (self.t1_s, self.peak_jerk_mm_s3);
-        let speed_scale = jerk * rise_s * rise_s;
-        let (gained, left) = (feed_mm_s - self.from_mm_s, self.to_mm_s - feed_mm_s);
-        let curved = speed_scale * R::from_f64(Shape::END.speed);
-        let near_start = gained <= curved;
-        if gained <= R::ZERO || left <= R::ZERO || !(near_start || left < curved) {
-            let length_mm = self.length_to_feed_mm(feed_mm_s);
-            return (length_mm, length_mm);
-        }
-        let near = if near_start { gained } else { left };
-        let (x, shape_length) = Shape::<R::Unit>::about_where_speed_is(near / speed_scale);
-        let [time_within, length_within] = ABOUT_WITHIN.map(R::from_f64);
-        let curve_mm = speed_scale * rise_s * shape_length;
-        if near_start {
-            let straight_mm = self.from_mm_s * (rise_s * x);
-            let slack_mm = straight_mm * time_within + curve_mm * length_within;
-            (straight_mm + curve_mm - slack_mm, straight_mm + curve_mm + slack_mm)
-        } else {
-            let straight_mm = self.to_mm_s * (rise_s * x);
-            let slack_mm = straight_mm * time_within + curve_mm * length_within;
-            let about_mm = self.length_mm() - (straight_mm - curve_mm);
-            (about_mm - slack_mm, about_mm + slack_mm)
         }
     }
 

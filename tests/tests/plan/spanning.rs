@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use motion_kernel::law::{Law, Limits, Ramp};
+use motion_kernel::law::{Law, Limits, Passing, Ramp};
 use motion_kernel::plan::{Block, FeedSpan, Node, PlanError, merge_equal, nodes_for, plan_spanning};
 
 use crate::support::Random;
@@ -397,25 +397,38 @@ fn a_ramp_passes_its_feeds_where_it_says() {
             (found - state.s_mm).abs() <= 1e-9 * ramp.length_mm() + slack,
             "{ramp:?} {t}: {found} {state:?}"
         );
-        let (low, high) = ramp.about_length_to_feed_mm(state.v_mm_s);
+        let (low, high) = Passing::new(&ramp).length_to_feed_mm(state.v_mm_s);
         assert!(low <= found && found <= high, "{ramp:?} {t}: {low} {found} {high}");
         assert!(high - low <= 1e-3 * ramp.length_mm(), "{ramp:?} {t}: {low} {high}");
     }
 }
 
-/// A softened law is the one with that acceleration.
+/// A ramp within limits is that of their law, whatever fixes it.
 #[test]
-fn a_softened_law_is_a_law() {
+fn a_ramp_within_limits_is_that_of_their_law() {
     let mut random = Random::new(38);
-    for _ in 0..10_000 {
+    let mut fixed_by = [0; 3];
+    for _ in 0..30_000 {
         let mut any = || random.log(1.0, 1e7);
         let limits = Limits { accel_mm_s2: any(), jerk_mm_s3: any(), snap_mm_s4: any() };
         let law = Law::new(limits).expect("positive");
-        let accel_mm_s2 = any();
-        let least = Limits { accel_mm_s2: accel_mm_s2.min(limits.accel_mm_s2), ..limits };
-        assert_eq!(law.softened(accel_mm_s2), Law::new(least));
+        let (from, to) =
+            (random.log(1e-3, 1e3), if random.once_in(20) { 0.0 } else { random.log(1e-3, 1e3) });
+        let (within, ramp) = (Ramp::within(&limits, from, to), Ramp::new(&law, from, to));
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-14 * b;
+        assert!(
+            (within.from_mm_s, within.to_mm_s) == (from, to)
+                && close(within.peak_jerk_mm_s3, ramp.peak_jerk_mm_s3)
+                && close(within.t1_s, ramp.t1_s)
+                && close(within.t2_s, ramp.t2_s),
+            "{limits:?}: {within:?}, {ramp:?}"
+        );
+        fixed_by[ramp.limited_by as usize] += 1;
     }
-    assert!(reference().softened(0.0).is_err() && reference().softened(f64::NAN).is_err());
+    println!("{fixed_by:?} by acceleration, jerk, snap");
+    assert!(fixed_by.iter().all(|&count| count > 1000), "{fixed_by:?}");
+    let still = Ramp::within(&reference().limits(), 5.0, 5.0);
+    assert!(still.is_cruise() && still.duration_s() == 0.0, "{still:?}");
 }
 
 /// Backwards the same plan, whatever law each block has.

@@ -10,7 +10,7 @@
 mod jump;
 
 use self::jump::{Jump, Way};
-use crate::law::{Law, Limits, Ramp};
+use crate::law::{Limits, Ramp};
 
 /// Stairs that are looked at one by one; of more, those are joined that lose the least by it.
 pub const STAIRS_MAX: usize = 48;
@@ -136,8 +136,6 @@ pub struct Climb {
     /// What was asked for last.
     top: Reached,
     room_mm: f64,
-    /// The law of the last limits that were looked at.
-    law: Option<Law<f64>>,
     legs: [u8; LEGS_MAX],
 }
 
@@ -149,7 +147,6 @@ impl Climb {
         known: 0,
         top: Reached::NOT,
         room_mm: 0.0,
-        law: None,
         legs: [0; LEGS_MAX],
     };
 
@@ -220,26 +217,22 @@ impl Climb {
             return None;
         }
         let start_mm = start.length_mm.max(start.ready_mm);
-        let start_limits = limits(start_mm, start_mm);
-        let law = match self.law.filter(|law| law.limits() == start_limits) {
-            Some(law) => law,
-            None => *self.law.insert(Law::new(start_limits).ok()?),
-        };
         let rested_s = |from_mm: f64, to_mm: f64| {
             if to_mm > from_mm { (to_mm - from_mm) / start.feed_mm_s } else { 0.0 }
         };
         let waited_s = rested_s(start.length_mm, start_mm);
         // What is lost before the ramp, as seen from the target.
         let before_s = start.time_s + waited_s - start_mm / target.feed_mm_s;
-        let jump = Jump {
+        let mut jump = Jump {
             start_mm,
             from_mm_s: start.feed_mm_s,
             to_mm_s: target.feed_mm_s,
             room_mm: self.room_mm,
             wait_s_mm: 1.0 / start.feed_mm_s - 1.0 / target.feed_mm_s,
             between: self.reached.get(from + 1..=below)?,
-            law,
+            within: limits(start_mm, start_mm),
             limits,
+            hinders: 0,
         };
         let (leg, way) = jump.best(target.lag_s - before_s)?;
         let held_s = rested_s(start_mm, leg.start_mm);
@@ -250,6 +243,22 @@ impl Climb {
             *target = Reached { length_mm, time_s, lag_s, from, leg: Some(leg), ..*target };
         }
         Some(way)
+    }
+
+    /// The time that the chain takes that was found last \[s\].
+    pub fn time_s(&self) -> f64 {
+        self.top.time_s
+    }
+
+    /// The feed of the last stair that the chain found last rests in, if it does \[mm/s\].
+    pub fn rested_mm_s(&self) -> Option<f64> {
+        let leg = self.top.leg.as_ref()?;
+        (self.top.from > 0).then_some(leg.ramp.from_mm_s)
+    }
+
+    /// The last ramp of the chain that was found last.
+    pub fn last_leg(&self) -> Option<&Leg> {
+        self.top.leg.as_ref()
     }
 
     /// The ramps of the chain that was found last, in order.

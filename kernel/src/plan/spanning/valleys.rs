@@ -305,8 +305,13 @@ impl<'a> Valleys<'a> {
         let can_fall = root.feed_mm_s >= right.feed_mm_s;
         let lost_left = self.lost(root, &left, &before, all_before, root.left, can_rise);
         let lost_right = self.lost(root, &right, &after, all_after, root.right, can_fall);
-        let rises = can_rise && lost_left <= self.broken(root, &left, &before, &right, &after, root.right);
-        let falls = can_fall && lost_right <= self.broken(root, &right, &after, &left, &before, root.left);
+        // Nothing is lost by it: no need to know what resting in it would.
+        let rises = can_rise
+            && (lost_left <= 0.0
+                || lost_left <= self.broken(root, &left, &before, &right, &after, root.right));
+        let falls = can_fall
+            && (lost_right <= 0.0
+                || lost_right <= self.broken(root, &right, &after, &left, &before, root.left));
         match (rises, falls) {
             (true, true) if lost_left <= 0.0 && lost_right <= 0.0 => Seen::Top,
             (true, true) if lost_left <= lost_right => Seen::Limits(Role::Rising),
@@ -410,8 +415,19 @@ impl<'a> Valleys<'a> {
     fn broken(&self, root: &Node, bound: &Node, gap: &Gap, other: &Node, beyond: &Gap, next: u32) -> f64 {
         let Some(law) = self.law(next).filter(|_| next != NONE) else { return 0.0 };
         let feed = root.feed_mm_s;
-        let most = peak(&law, feed, other.feed_mm_s, beyond.length_mm);
-        let top = most.min(beyond.length_mm / beyond.ideal_s);
+        let mean_mm_s = beyond.length_mm / beyond.ideal_s;
+        if !(mean_mm_s > feed) {
+            return 0.0;
+        }
+        // The highest there is room for, if that is below the mean of the ceilings.
+        let is_reached = mean_mm_s > other.feed_mm_s
+            && law.ramp_length_mm(feed, mean_mm_s) + law.ramp_length_mm(other.feed_mm_s, mean_mm_s)
+                < beyond.length_mm;
+        let top = if is_reached {
+            mean_mm_s
+        } else {
+            peak(&law, feed, other.feed_mm_s, beyond.length_mm).min(mean_mm_s)
+        };
         if !(top > feed) {
             return 0.0;
         }
