@@ -453,3 +453,97 @@ impl<R: Real> Guard<R> {
 fn mm<R: Real>(config: &AxisConfig<R>, counts: i32) -> R {
     config.encoder.position(Counts(i64::from(counts))).to_offset()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::{AxesConfig, AxisFigures, AxisState, Feedforward, Gains};
+
+    const COUNT_MM: f64 = 1e-4;
+
+    fn config() -> AxisConfig<f32> {
+        let figures = AxisFigures {
+            mm_per_count: COUNT_MM,
+            mm_s_at_10_v: 1000.0 / 3.0,
+            output_offset_v: 0.0,
+            output_limit_v: 10.0,
+            gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
+            feedforward: Feedforward { velocity: 1.0, ..Feedforward::default() },
+            following_error_limit_mm: 1.0,
+        };
+        let guard = GuardFigures {
+            following_error_at_rest_mm: 0.25,
+            following_error_per_velocity_s: 1e-3,
+            following_error_per_accel_s2: 1e-4,
+            jump_mm: 0.007,
+            moving_mm_s: 3.0,
+            response_s: 0.013,
+            load_accel_mm_s2: 1230.0,
+            noise_counts: 0,
+            saturation_s: 0.1,
+            travel_mm: None,
+        };
+        let axes = AxesConfig::new(&[figures], 5e-4).and_then(|axes| axes.guarded(&[guard], 5e-4));
+        axes.expect("an axis").axes[0]
+    }
+
+    /// Ticks of an axis that is set at 0 and reads `counts`; the first one in which it is lost.
+    fn lost(counts: impl Fn(i64) -> i64, setpoint: &Setpoint<f32>) -> Option<(i64, Found<f32>)> {
+        let (config, mut axis) = (config(), AxisState::default());
+        (0..200).find_map(|tick| {
+            let mut output = AxisOutput { counts: Counts(counts(tick)), ..AxisOutput::default() };
+            axis.tick(&config, setpoint, &mut output);
+            output.lost.then(|| (tick, axis.judge(&config, setpoint, 1)))
+        })
+    }
+
+    /// 20 µm a tick are 40 mm/s, not a jump; the same once and no more is one.
+    #[test]
+    fn a_jump_is_a_change_of_velocity_not_velocity() {
+        let at_rest = Setpoint::default();
+        // It begins gently.
+        let ramp = |tick: i64| if tick < 4 { tick * tick * 25 } else { 225 + (tick - 3) * 175 };
+        let found = lost(ramp, &at_rest).expect("beyond its limit in the end");
+        assert!(matches!(found.1, Found::FollowingError { .. }) && ramp(found.0) > 2500, "{found:?}");
+        let jump = |tick: i64| if tick < 50 { 0 } else { 200 };
+        assert!(
+            matches!(lost(jump, &at_rest), Some((50, Found::EncoderJump { .. }))),
+            "{:?}",
+            lost(jump, &at_rest)
+        );
+        // Half of what a motor does is none.
+        assert_eq!(lost(|tick| if tick < 50 { 0 } else { 35 }, &at_rest), None);
+    }
+
+    /// The limit grows with velocity and acceleration, up to the greatest.
+    #[test]
+    fn the_limit_grows_with_the_motion() {
+        for (velocity_mm_s, accel_mm_s2, limit_mm) in
+            [(0.0, 0.0, 0.25), (-100.0, 0.0, 0.35), (100.0, -500.0, 0.4), (2000.0, 0.0, 1.0)]
+        {
+            let setpoint = Setpoint { velocity_mm_s, accel_mm_s2, ..Setpoint::default() };
+            let (tick, found) = lost(|tick| tick * 65, &setpoint).expect("beyond");
+            let error_mm = COUNT_MM * 65.0 * tick as f64;
+            let is_first = error_mm > limit_mm && error_mm <= limit_mm + 65.5 * COUNT_MM;
+            assert!(
+                is_first && matches!(found, Found::FollowingError { .. }),
+                "{limit_mm}: {error_mm} {found:?}"
+            );
+        }
+    }
+
+    /// Position and error are good, the feedforward's values are not.
+    #[test]
+    fn a_command_that_is_not_a_number_is_never_put_out() {
+        for velocity_mm_s in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let setpoint = Setpoint { velocity_mm_s, ..Setpoint::default() };
+            let (config, mut axis) = (config(), AxisState::default());
+            let mut output = AxisOutput::default();
+            axis.tick(&config, &setpoint, &mut output);
+            let is_cut = velocity_mm_s.is_infinite();
+            // Infinity is cut at the output's limit, as any command.
+            assert_eq!((output.lost, output.saturated), (!is_cut, is_cut), "{velocity_mm_s}");
+            assert!(is_cut || axis.judge(&config, &setpoint, 1) == Found::NotFinite);
+        }
+    }
+}
