@@ -9,7 +9,7 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use super::change::{Change, LISTS, Progress, Words};
 use super::{
     Density, FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept,
-    count, enter,
+    count, enter, length,
 };
 use crate::law::{FeedSegment, Phase, Ticks};
 use crate::live::LIST_ITEMS;
@@ -164,7 +164,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Pieces and ends of stretch that are queued, with the one under way.
     #[must_use]
     pub fn path_queued(&self) -> usize {
-        self.path.len()
+        length(&self.path)
     }
 
     /// Where the executor is.
@@ -182,8 +182,9 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
 
     fn free_list(&self) -> Option<u8> {
         self.interruptible();
-        let is_free =
-            |(list, queue): &(u8, &Producer<'_, _>)| !self.shared.words.is_claimed(*list) && queue.is_empty();
+        let is_free = |(list, queue): &(u8, &Producer<'_, _>)| {
+            !self.shared.words.is_claimed(*list) && length(queue) == 0
+        };
         (0..LISTS).zip(&self.lists).find(is_free).map(|(list, _)| list)
     }
 
@@ -255,7 +256,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// How many more items a list takes.
     #[must_use]
     pub fn room(&self, list: u8) -> usize {
-        self.lists.get(usize::from(list)).map_or(0, |queue| queue.capacity().saturating_sub(queue.len()))
+        self.lists.get(usize::from(list)).map_or(0, |queue| queue.capacity().saturating_sub(length(queue)))
     }
 
     /// Asks for a change to the list that was begun last, in place of one that was asked for before. That it begins where

@@ -302,6 +302,12 @@ fn has_room<T>(queue: &Producer<'_, T>) -> bool {
     has_places(queue) && queue.ready()
 }
 
+/// How many items are queued.
+#[cfg(feature = "live")]
+fn length<T>(queue: &Producer<'_, T>) -> usize {
+    if has_places(queue) { queue.len() } else { 0 }
+}
+
 /// One more. There is a single writer, so that cores without read-modify-write instructions count too.
 fn count(counter: &AtomicU32) {
     counter.store(counter.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
