@@ -221,7 +221,7 @@ fn a_recorded_run_replays_to_the_bit() {
     if programs >= 250 {
         assert!(runs > 50, "{runs}");
         for fault in
-            ["none", "encoder", "inputs", "output", "enable", "following error", "drive", "emergency stop"]
+            ["none", "encoder", "inputs", "output", "enable", "encoder jump", "drive", "emergency stop"]
         {
             assert!(faults.contains_key(fault), "{fault} is not among {faults:?}");
         }
