@@ -22,7 +22,7 @@ use motion_kernel::num::Real;
 use motion_kernel::program::{Header, Items, ProgramError, Reader, Supply, SupplyError};
 use motion_kernel::queue::{Feeder, Intake, Streams};
 use motion_kernel::trace::Trace;
-use motion_kernel::units::{Counts, DacCode, Position};
+use motion_kernel::units::{Counts, DacCode};
 
 use crate::axis::AxisParameters;
 use crate::dac_chip::{Ad5754Chip, ChipError};
@@ -159,9 +159,14 @@ pub fn close<
     let config = &regulated(program.header());
     let config = config.as_ref().map_err(|error| *error)?;
     let &Header { tick_s, rules, start, .. } = program.header();
+    let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
+    let Ok(counts) = (&*machine).latch();
     let (feeder, intake) = streams.split(rules, start);
     let supply = Supply::new(program.items(), tick_s);
-    Ok((Producer { feeder, supply }, ClosedLoop::new(config, start, intake, machine)?))
+    let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
+    let mut kernel = Kernel::new(config, start, counts);
+    kernel.enable(0);
+    Ok((Producer { feeder, supply }, ClosedLoop { kernel, intake, machine, outputs, memory }))
 }
 
 #[inline(never)]
@@ -177,23 +182,6 @@ pub fn some_knots<R: Real, const AXES: usize>() -> [[R; AXES]; 4] {
 }
 
 impl<'a, R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'a, R, AXES, LINE> {
-    /// Over `machine`, at rest at `start`, drives enabled.
-    #[inline]
-    fn new(
-        config: &AxesConfig<R, AXES>,
-        start: [Position; AXES],
-        intake: Intake<'a, R, AXES>,
-        machine: &'a SimMachine<AXES, LINE>,
-    ) -> Result<Self, LoopError> {
-        let outputs =
-            Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
-        let Ok(counts) = (&*machine).latch();
-        let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
-        let mut kernel = Kernel::new(config, start, counts);
-        kernel.enable(0);
-        Ok(Self { kernel, intake, machine, outputs, memory })
-    }
-
     /// Corrects the second stretch by `knots`, 40 ticks from one to the next.
     ///
     /// # Errors

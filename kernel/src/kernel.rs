@@ -122,9 +122,14 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
         let executor = Executor::new(position);
         // The first tick is number 0.
-        let executed = executor.resting();
-        let trace =
-            Trace { tick: u64::MAX, executed, axes: outputs, inputs: MachineInputs::HEALTHY, fault: None };
+        // In one: 16 KiB hold no copy of what it rests with.
+        let trace = Trace {
+            tick: u64::MAX,
+            executed: executor.resting(),
+            axes: outputs,
+            inputs: MachineInputs::HEALTHY,
+            fault: None,
+        };
         Self {
             config: *config,
             executor,
@@ -219,17 +224,21 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
     #[inline]
     fn execute(&mut self, intake: &mut Intake<'_, R, AXES>) {
-        match &mut self.power {
-            Power::Off => {}
-            Power::Starting { ticks_left: 0 } => self.power = Power::On,
-            Power::Starting { ticks_left } => *ticks_left -= 1,
-            Power::On => {}
+        let executes = match &mut self.power {
+            Power::Off => false,
+            Power::Starting { ticks_left: 0 } => {
+                self.power = Power::On;
+                true
+            }
+            Power::Starting { ticks_left } => {
+                *ticks_left -= 1;
+                false
+            }
+            Power::On => true,
             #[cfg(feature = "guards")]
-            Power::Stopping { .. } | Power::Ramping { .. } => {}
-        }
-        if self.power.executes()
-            && let Err(fault) = self.executor.tick_into(intake, &mut self.trace.executed)
-        {
+            Power::Stopping { .. } | Power::Ramping { .. } => self.power.executes(),
+        };
+        if executes && let Err(fault) = self.executor.tick_into(intake, &mut self.trace.executed) {
             self.latch_fault(FaultKind::Executor(fault));
         }
         #[cfg(feature = "guards")]

@@ -3,12 +3,15 @@
 //! The same seed gives the same commands on a PC and inside an emulated board.
 
 use motion_kernel::exec::ExecState;
+use motion_kernel::hal::{Ad5754Output, Encoder};
+use motion_kernel::kernel::Kernel;
 use motion_kernel::live::{Director, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Items, ProgramError, Reader, SupplyError};
 use motion_kernel::queue::{LiveFeeder, LiveStreams};
+use motion_kernel::units::DacCode;
 
-use super::{ClosedLoop, LoopError, regulated};
+use super::{ClosedLoop, InMemory, LoopError, regulated};
 use crate::machine::SimMachine;
 use crate::noise::SplitMix64;
 
@@ -133,10 +136,15 @@ pub fn close<
 ) -> Result<LiveClosed<'a, R, AXES, PLACES, LINE>, LoopError> {
     let header = program.header();
     let (feeder, intake) = streams.split(header.rules, header.start);
-    let closed = ClosedLoop::new(&regulated(header)?, header.start, intake, machine)?;
+    let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
+    let Ok(counts) = (&*machine).latch();
+    let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
+    let mut kernel = Kernel::new(&regulated(header)?, header.start, counts);
+    kernel.enable(0);
     let director = Director::new(program.items(), header.tick_s, 0);
     let commands = Commands { random: SplitMix64::new(seed), turns_left: COMMANDED_TURNS, lost: 0 };
-    Ok((LiveProducer { feeder, director, commands }, closed))
+    let producer = LiveProducer { feeder, director, commands };
+    Ok((producer, ClosedLoop { kernel, intake, machine, outputs, memory }))
 }
 
 #[cfg(test)]
