@@ -194,9 +194,12 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
         match hal.read_inputs() {
             Ok(inputs) => {
-                let before = core::mem::replace(&mut self.trace.inputs, inputs);
-                if !inputs.is_healthy() {
-                    self.judge_inputs(&before);
+                // Without guards, what is healthy is not worth the instructions.
+                if cfg!(feature = "guards") || !inputs.is_healthy() {
+                    let before = core::mem::replace(&mut self.trace.inputs, inputs);
+                    if !inputs.is_healthy() {
+                        self.judge_inputs(&before);
+                    }
                 }
             }
             Err(_) => self.latch_fault(FaultKind::Inputs),
@@ -224,21 +227,17 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
     #[inline]
     fn execute(&mut self, intake: &mut Intake<'_, R, AXES>) {
-        let executes = match &mut self.power {
-            Power::Off => false,
-            Power::Starting { ticks_left: 0 } => {
-                self.power = Power::On;
-                true
-            }
-            Power::Starting { ticks_left } => {
-                *ticks_left -= 1;
-                false
-            }
-            Power::On => true,
+        match &mut self.power {
+            Power::Off => {}
+            Power::Starting { ticks_left: 0 } => self.power = Power::On,
+            Power::Starting { ticks_left } => *ticks_left -= 1,
+            Power::On => {}
             #[cfg(feature = "guards")]
-            Power::Stopping { .. } | Power::Ramping { .. } => self.power.executes(),
-        };
-        if executes && let Err(fault) = self.executor.tick_into(intake, &mut self.trace.executed) {
+            Power::Stopping { .. } | Power::Ramping { .. } => {}
+        }
+        if self.power.executes()
+            && let Err(fault) = self.executor.tick_into(intake, &mut self.trace.executed)
+        {
             self.latch_fault(FaultKind::Executor(fault));
         }
         #[cfg(feature = "guards")]
