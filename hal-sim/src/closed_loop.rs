@@ -4,7 +4,7 @@
 //! is driven after the tick, from memory, so that a tick alone can be measured and a loop's cost is the
 //! kernel's: [`InMemory`] is what a board's interrupt would exchange with its peripherals.
 //!
-//! [`Producer::fill`] is the background's part, [`ClosedLoop::tick`] the interrupt's. [`live`] has another background:
+//! [`Producer::fill`] is the background's part, [`ClosedLoop::tick`] the interrupt's. The module `live` has another background:
 //! the same program under live control.
 
 #[cfg(feature = "live")]

@@ -18,8 +18,8 @@ use crate::path::Piece;
 use crate::units::Position;
 
 /// The most items of a list that is not needed any more that go in one tick. Each costs some twenty instructions; a list
-/// of sixteen places is empty four ticks after it was given up.
-const DROPPED_PER_TICK: usize = 4;
+/// of sixteen places is empty eight ticks after it was given up.
+const DROPPED_PER_TICK: usize = 2;
 
 /// Storage of a path and three feed lists: `PIECES` − 1 pieces, `SEGMENTS` − 1 items a list.
 #[derive(Debug)]

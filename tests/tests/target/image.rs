@@ -77,7 +77,7 @@ pub(crate) fn sizes(tools: &Tools) -> Result<(), String> {
         let [reference, _] = programs::worst_live_ticks();
         let figures = by_name(&tools.run(board, "live_budget", &reference, Clock::Counting)?);
         let greatest = |name: &str| figures.get(name).and_then(|sorted| sorted.last().copied()).unwrap_or(0);
-        let number = format!("{}, live control", board.number);
+        let number = format!("{}, live control and guards", board.number);
         let cells = [flash.to_string(), greatest("ram").to_string(), "64, 3 × 16".to_owned()];
         let stack = greatest("stack").to_string();
         table.row(&[&[board.core.to_owned(), number], &cells[..], &[stack]].concat());
