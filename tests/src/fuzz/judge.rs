@@ -1,0 +1,72 @@
+//! What must hold at every tick, whatever the bytes.
+
+use motion_kernel::exec::ExecState;
+use motion_kernel::fault::Fault;
+use motion_kernel::num::Real;
+use motion_kernel::trace::Trace;
+
+use super::items::{LIMITS, RULES, TICK_S};
+
+/// A part of itself by which a limit may be exceeded: that of the tangent, twice.
+const SHARE: f64 = 3e-5;
+/// Steps of fixed point in a quantity that is a product of three.
+const STEPS: f64 = 1e-6;
+/// A set position is rounded, and pieces may lie apart by so much \[mm\], sixteen of them in a tick.
+const GAPS_MM: f64 = 17.0 * RULES.joint_gap_mm + 1e-4;
+
+/// The tick before.
+struct Before<R> {
+    v_mm_s: f64,
+    set_mm: [f64; 2],
+    fault: Option<Fault<R>>,
+}
+
+/// Looks at one tick after the other.
+pub(super) struct Judge<R> {
+    before: Option<Before<R>>,
+}
+
+impl<R: Real> Judge<R> {
+    pub(super) fn new() -> Self {
+        Self { before: None }
+    }
+
+    /// The machine was told to stand where it is: what came before does not count.
+    pub(super) fn anew(&mut self) {
+        self.before = None;
+    }
+
+    /// Panics where a promise is broken.
+    pub(super) fn tick(&mut self, trace: &Trace<R, 2>) {
+        let motion = &trace.executed.motion;
+        let [v, a, j, snap] =
+            [motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(|value| value.to_f64());
+        let quantities = [
+            ("feed", v, RULES.feed_mm_s),
+            ("acceleration", a, LIMITS.accel_mm_s2),
+            ("jerk", j, LIMITS.jerk_mm_s3),
+            ("snap", snap, LIMITS.snap_mm_s4),
+        ];
+        for (name, value, limit) in quantities {
+            // Written so that what is not a number fails.
+            assert!(value.abs() <= limit * (1.0 + SHARE) + STEPS, "{name} {value}, limit {limit}: {trace:?}");
+        }
+        assert!(v >= 0.0, "backwards: {trace:?}");
+        let rests = trace.executed.state != ExecState::Moving;
+        assert!(trace.fault.is_some() || !rests || v == 0.0, "at rest with a feed: {trace:?}");
+        let set_mm = trace.executed.setpoints.map(|axis| axis.position.to_mm());
+        if let Some(before) = &self.before {
+            let (limit, step) = (LIMITS.accel_mm_s2 * TICK_S, v - before.v_mm_s);
+            // What ends inside a tick and rests begins anew after it: from one side only.
+            assert!(step.abs() <= limit * (1.0 + SHARE) + STEPS, "feed steps by {step}: {trace:?}");
+            for (now, then) in set_mm.iter().zip(before.set_mm) {
+                let (limit, step) = (RULES.feed_mm_s * TICK_S * (1.0 + SHARE) + GAPS_MM, now - then);
+                assert!(step.abs() <= limit, "set position jumps by {step} mm: {trace:?}");
+            }
+            if let Some(fault) = before.fault {
+                assert_eq!(trace.fault, Some(fault), "a fault stays");
+            }
+        }
+        self.before = Some(Before { v_mm_s: v, set_mm, fault: trace.fault });
+    }
+}

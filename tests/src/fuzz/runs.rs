@@ -1,0 +1,244 @@
+//! A program through the streams, or through live control, with what comes between two ticks.
+
+use core::convert::Infallible;
+use core::task::Poll;
+use std::cell::Cell;
+
+use arbitrary::{Result, Unstructured};
+use motion_kernel::exec::ExecState;
+use motion_kernel::fault::FaultKind;
+use motion_kernel::kernel::Kernel;
+use motion_kernel::live::{Director, Source, State};
+use motion_kernel::num::Real;
+use motion_kernel::program::{Item, Supply};
+use motion_kernel::queue::{Intake, LiveStreams, Streams};
+use motion_kernel::units::{Counts, DacCode, Position};
+
+use super::bench::{Bench, axes};
+use super::items::{Program, RULES, TICK_S};
+use super::judge::Judge;
+
+/// Of the queues, small enough to be full at times.
+const PIECES: usize = 16;
+const SEGMENTS: usize = 12;
+const LIVE_SEGMENTS: usize = 16;
+const PLACES: usize = 64;
+/// What takes longer is not driven to its end \[ticks\].
+const TICKS_MAX: f64 = 6000.0;
+/// Drives take so many ticks to be ready.
+const SETTLE_TICKS: u32 = 3;
+/// Switching the drives off takes so many ticks at most.
+const OFF_TICKS: u32 = 4000;
+
+/// The machine's side of a run.
+struct Machine<R: Real> {
+    kernel: Kernel<R, 2>,
+    bench: Bench,
+    judge: Judge<R>,
+    /// Where it was set by the latest tick.
+    set: [Position; 2],
+    /// Ticks since the fault.
+    faulty: u32,
+    /// A command has given up motion.
+    is_given_up: bool,
+}
+
+impl<R: Real> Machine<R> {
+    fn new() -> Self {
+        let mut kernel = Kernel::new(&axes::<R>(), [Position::ZERO; 2], [Counts(0); 2]);
+        kernel.enable(SETTLE_TICKS);
+        let set = [Position::ZERO; 2];
+        Self { kernel, bench: Bench::default(), judge: Judge::new(), set, faulty: 0, is_given_up: false }
+    }
+
+    /// A command of the board, or something that goes wrong.
+    fn event(&mut self, input: &mut Unstructured<'_>) -> Result<()> {
+        match input.int_in_range(0..=9)? {
+            0 => self.kernel.disable(),
+            1 => self.kernel.enable(input.int_in_range(0..=20)?),
+            2 => {
+                self.kernel.clear_fault();
+                self.judge.anew();
+            }
+            3 => {
+                self.kernel.stand_here();
+                self.judge.anew();
+            }
+            4 => self.kernel.trip(FaultKind::Drive { axis: input.choose_index(2)? }),
+            5 => {
+                self.bench.mend();
+                return Ok(());
+            }
+            _ => return self.bench.upset(input),
+        }
+        self.is_given_up = true;
+        Ok(())
+    }
+
+    fn tick(&mut self, intake: &mut Intake<'_, R, 2>) -> ExecState {
+        let trace = *self.kernel.tick(intake, &mut self.bench);
+        // Enabled anew in the middle of a stretch the machine stands where it is.
+        if self.is_given_up {
+            self.judge.anew();
+        }
+        self.judge.tick(&trace);
+        self.set = trace.executed.setpoints.map(|axis| axis.position);
+        if trace.fault.is_some() {
+            self.faulty += 1;
+        } else {
+            self.faulty = 0;
+            if !self.bench.is_hostile {
+                self.bench.follow(&trace);
+            }
+        }
+        if self.faulty > OFF_TICKS {
+            let trim = DacCode::from_volts(0.1_f64);
+            assert!(trace.axes.iter().all(|axis| axis.code.0.abs_diff(trim.0) <= 1), "{trace:?}");
+            self.bench.mend();
+        }
+        if trace.executed.state == ExecState::Stopped {
+            self.kernel.resume();
+        }
+        trace.executed.state
+    }
+
+    /// Nothing has kept the program from being driven to its end.
+    fn is_undisturbed(&self) -> bool {
+        !self.bench.is_hostile && !self.is_given_up
+    }
+}
+
+/// As a board without live control does it.
+pub(super) fn of_streams<R: Real>(input: &mut Unstructured<'_>) -> Result<()> {
+    let program = Program::read(input)?;
+    let mut streams = Streams::<R, 2, PIECES, SEGMENTS>::new();
+    let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO; 2]);
+    let items = program.items.iter().map(|&item| Ok::<_, Infallible>(item));
+    let mut supply = Supply::new(items, TICK_S);
+    let mut machine = Machine::<R>::new();
+    let mut has_turn = true;
+    while !input.is_empty() {
+        match input.int_in_range(0..=15)? {
+            0 => machine.event(input)?,
+            1 => has_turn = !has_turn,
+            _ => {}
+        }
+        for _ in 0..input.arbitrary::<u8>()? {
+            if has_turn {
+                let _ = supply.fill(&mut feeder);
+            }
+            machine.tick(&mut intake);
+        }
+    }
+    // A background that comes too late is a fault without live control.
+    let was_late = machine.kernel.fault().is_some();
+    if program.is_whole && machine.is_undisturbed() && program.ticks < TICKS_MAX && !was_late {
+        let mut idle_ticks = 0;
+        for _ in 0..2 * program.ticks as u64 + 1000 {
+            supply.fill(&mut feeder).expect("a whole program");
+            let idles = machine.tick(&mut intake) == ExecState::Idle && supply.is_empty();
+            idle_ticks = if idles { idle_ticks + 1 } else { 0 };
+            // Drives that are being switched on stand still, too.
+            if idle_ticks > SETTLE_TICKS {
+                assert_eq!(machine.set, program.end);
+                return Ok(());
+            }
+        }
+        panic!("a whole program has no end: {:?}", machine.kernel.fault());
+    }
+    Ok(())
+}
+
+/// Items that come when they are told to.
+struct Arriving<'a> {
+    items: core::slice::Iter<'a, Item<2>>,
+    /// So many more are there.
+    there: &'a Cell<usize>,
+}
+
+impl Source<2> for Arriving<'_> {
+    type Error = Infallible;
+
+    fn poll_next(&mut self) -> Poll<Option<core::result::Result<Item<2>, Infallible>>> {
+        if self.items.len() == 0 {
+            return Poll::Ready(None);
+        }
+        match self.there.get().checked_sub(1) {
+            None => Poll::Pending,
+            Some(left) => {
+                self.there.set(left);
+                Poll::Ready(self.items.next().map(|&item| Ok(item)))
+            }
+        }
+    }
+}
+
+/// Held, resumed, overridden, given up; items and turns come late.
+pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Result<()> {
+    let program = Program::read(input)?;
+    let mut streams = LiveStreams::<R, 2, PIECES, LIVE_SEGMENTS>::new();
+    let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO; 2]);
+    let there = Cell::new(0);
+    let source = Arriving { items: program.items.iter(), there: &there };
+    let mut director = Director::<R, 2, _, _, PLACES>::new(source, TICK_S, input.int_in_range(0..=3)?);
+    let mut machine = Machine::<R>::new();
+    let (mut has_turn, mut is_aborted) = (true, false);
+    while !input.is_empty() {
+        match input.int_in_range(0..=15)? {
+            0 => machine.event(input)?,
+            1 => has_turn = !has_turn,
+            2 => director.hold(),
+            3 => director.set_single_block(input.arbitrary()?),
+            4 | 5 => director.resume(),
+            6 => {
+                let share: f64 = input.arbitrary()?;
+                // Refused, or taken as it is.
+                let _ = director.set_override(share);
+            }
+            7 | 8 => {
+                let eighths: u8 = input.int_in_range(0..=16)?;
+                director.set_override(f64::from(eighths) / 8.0).expect("within the range");
+            }
+            9 if input.ratio(1, 8)? => {
+                director.abort();
+                is_aborted = true;
+            }
+            _ => there.set(there.get() + usize::from(input.arbitrary::<u8>()?)),
+        }
+        for _ in 0..input.arbitrary::<u8>()? {
+            if machine.kernel.wants_hold() {
+                director.hold();
+            }
+            if has_turn {
+                let _ = director.turn(&mut feeder);
+            }
+            machine.tick(&mut intake);
+        }
+    }
+    there.set(usize::MAX);
+    let fault = machine.kernel.fault();
+    // What fills the lists must never be the reason, unless path, blocks and feed contradict each other.
+    assert!(
+        !program.is_whole || machine.bench.is_hostile || machine.is_given_up || fault.is_none(),
+        "no fault of the machine: {fault:?}"
+    );
+    if program.is_whole && machine.is_undisturbed() && program.ticks < TICKS_MAX {
+        director.set_single_block(false);
+        director.resume();
+        director.set_override(1.0).expect("within the range");
+        for _ in 0..20 * program.ticks as u64 + 40_000 {
+            director.turn(&mut feeder).expect("a whole program");
+            let state = machine.tick(&mut intake);
+            match director.state(&feeder) {
+                State::Done if state == ExecState::Idle => {
+                    assert_eq!(machine.set, program.end);
+                    return Ok(());
+                }
+                State::Aborted if is_aborted => return Ok(()),
+                _ => {}
+            }
+        }
+        panic!("a whole program has no end: {:?}, {:?}", director.state(&feeder), machine.kernel.fault());
+    }
+    Ok(())
+}
