@@ -1,20 +1,16 @@
 //! Single block: every program block ends at rest, exactly at its end, and none is left out; at any tick, among all other
 //! commands, every tick keeps every limit.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
-use check::bounds::Number;
-use check::live::{Command, Run, Seen, Setup, execute};
-use check::path::Path;
-use check::program::{Asked, Generated};
-use check::random::Random;
-use check::totals::Totals;
-use check::{drive, machine, program};
-use motion_host::machine::Machine;
-use motion_host::planning::{Mode, Plan};
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
+
+use super::check::bounds::Number;
+use super::check::live::{Command, Run, Seen, Setup, execute};
+use super::check::path::Path;
+use super::check::program::{Asked, Generated};
+use super::check::random::Random;
+use super::check::totals::Totals;
+use super::{Case, generated, is_out_of_range, seeds};
 
 /// Ends of blocks are rounded to position steps of 2⁻³² mm, here and in the plan.
 const END_MM: f64 = 1e-8;
@@ -22,39 +18,36 @@ const END_MM: f64 = 1e-8;
 /// Where a rest is: stretches done, and the path position in the next.
 type Rest = (usize, f64);
 
-struct Case {
-    machine: Machine,
-    path: Path,
-    plan: Plan,
+/// A case with the ends of its blocks.
+struct Blocks {
+    case: Case,
     /// Where each block of the program ends.
     ends: Vec<Rest>,
 }
 
-impl Case {
+impl Blocks {
     fn random(seed: u64, longest_ticks: f64) -> Option<Self> {
-        let mut random = Random::new(seed);
-        let machine = machine::any(&mut random);
-        let fragments = 1 + random.below(8);
-        let program = program::generate(&mut random, fragments, machine.path.feed_mm_s);
-        Self::of(&program, machine, longest_ticks)
+        let (machine, program) = generated(&mut Random::new(seed));
+        let case = Case::of(&program, machine, longest_ticks)?;
+        let ends = block_ends(&program, &case.path);
+        Some(Self { case, ends })
     }
 
-    fn of(program: &Generated, machine: Machine, longest_ticks: f64) -> Option<Self> {
-        let path = Path::new(program, &machine);
-        let plan = drive::plan(&program.text, &machine, Mode::Spanning, &mut Totals::default()).ok()??;
-        let is_short = plan.time_s / machine.tick_s <= longest_ticks;
-        let ends = block_ends(program, &path);
-        (!path.is_ambiguous && is_short && plan.length_mm > 0.0).then_some(Self { machine, path, plan, ends })
-    }
-
-    fn run<R: Number>(
-        &self,
-        seed: u64,
-        script: &mut dyn FnMut(&Seen<'_, R>) -> Option<Command>,
-    ) -> Result<Run, String> {
+    /// A run in the number type of the seed; `script` sees ticks, state and place. None where the program is out of fixed
+    /// point's range.
+    fn run(&self, seed: u64, script: &mut dyn FnMut(u64, State, Rest) -> Option<Command>) -> Option<Run> {
         // Of the feed, the greatest override that was asked for is what holds: a rest at a block's end may be far.
-        let (plan, path, machine) = (&self.plan, &self.path, &self.machine);
-        execute::<R>(&Setup { plan, path, machine, seed, response_ticks: u64::MAX }, script)
+        let setup = Setup { response_ticks: u64::MAX, ..self.case.setup(seed) };
+        let run = match seed % 3 {
+            0 => execute::<f32>(&setup, &mut |seen| script(seen.ticks, seen.state, rest_of(seen))),
+            1 => execute::<f64>(&setup, &mut |seen| script(seen.ticks, seen.state, rest_of(seen))),
+            _ => execute::<Fixed>(&setup, &mut |seen| script(seen.ticks, seen.state, rest_of(seen))),
+        };
+        match run {
+            Ok(run) => Some(run),
+            Err(error) if is_out_of_range(&error) => None,
+            Err(error) => panic!("MOTION_TEST_SEED={seed}: {error}"),
+        }
     }
 
     fn is_end(&self, rest: Rest) -> bool {
@@ -63,7 +56,7 @@ impl Case {
 
     /// Where the path of a stretch begins, from the program's start [mm].
     fn before_mm(&self, stretch: usize) -> f64 {
-        self.path.stretches[..stretch].iter().map(|stretch| stretch.length_mm).sum()
+        self.case.path.stretches[..stretch].iter().map(|stretch| stretch.length_mm).sum()
     }
 }
 
@@ -93,36 +86,11 @@ fn rest_of<R: Number>(seen: &Seen<'_, R>) -> Rest {
     (seen.executed.stretches as usize, seen.executed.motion.s.to_mm())
 }
 
-/// In the number type of a seed.
-macro_rules! in_number {
-    ($seed:expr, $case:expr, $script:expr) => {
-        match $seed % 3 {
-            0 => $case.run::<f32>($seed, &mut |seen| $script(seen.ticks, seen.state, rest_of(seen))),
-            1 => $case.run::<f64>($seed, &mut |seen| $script(seen.ticks, seen.state, rest_of(seen))),
-            _ => $case.run::<Fixed>($seed, &mut |seen| $script(seen.ticks, seen.state, rest_of(seen))),
-        }
-    };
-}
-
-fn seeds(programs: u64) -> std::ops::Range<u64> {
-    let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
-    first..first + check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(programs)
-}
-
-/// A run, or none where only fixed point's range, which has tests of its own, is in its way.
-fn driven(seed: u64, run: Result<Run, String>) -> Option<Run> {
-    match run {
-        Ok(run) => Some(run),
-        Err(error) if error.contains("the kernel's number type") => None,
-        Err(error) => panic!("MOTION_TEST_SEED={seed}: {error}"),
-    }
-}
-
 #[test]
 fn every_block_ends_at_rest() {
-    let (mut ran, mut blocks, mut starvations, mut totals) = (0, 0, 0, Totals::default());
+    let (mut ran, mut ends, mut starvations, mut totals) = (0, 0, 0, Totals::default());
     for seed in seeds(250) {
-        let Some(case) = Case::random(seed, 3_000.0) else { continue };
+        let Some(blocks) = Blocks::random(seed, 3_000.0) else { continue };
         let mut rests: Vec<Rest> = Vec::new();
         let mut waited = 0_u64;
         let mut script = |ticks: u64, state: State, at: Rest| {
@@ -140,20 +108,19 @@ fn every_block_ends_at_rest() {
                 Command::Resume
             })
         };
-        let run = in_number!(seed, case, script);
-        let Some(run) = driven(seed, run) else { continue };
+        let Some(run) = blocks.run(seed, &mut script) else { continue };
         assert_eq!(run.state, State::Done, "seed {seed}");
-        let (last, waited_at) = case.ends.split_last().expect("a program has blocks");
+        let (last, waited_at) = blocks.ends.split_last().expect("a program has blocks");
         assert_eq!(rests.len(), waited_at.len(), "seed {seed}: {rests:?} for {waited_at:?}, then {last:?}");
         for (index, (&rest, &end)) in rests.iter().zip(waited_at).enumerate() {
             assert!(is_at(rest, end), "seed {seed}: block {index} ends at {rest:?}, programmed {end:?}");
         }
         totals.add(&run.totals);
-        blocks += case.ends.len();
+        ends += blocks.ends.len();
         starvations += run.starvations;
         ran += 1;
     }
-    println!("{ran} programs, {blocks} blocks, {starvations} stops for want of a plan; {totals}");
+    println!("{ran} programs, {ends} blocks, {starvations} stops for want of a plan; {totals}");
     assert!(ran > 0);
 }
 
@@ -163,11 +130,11 @@ fn every_block_ends_at_rest() {
 fn it_stops_at_the_first_end_in_reach() {
     let (mut ran, mut earlier, mut later, mut at_the_end) = (0, 0, 0, 0);
     for seed in seeds(400) {
-        let Some(case) = Case::random(seed, 4_000.0) else { continue };
-        let ticks = case.plan.time_s / case.machine.tick_s;
+        let Some(blocks) = Blocks::random(seed, 4_000.0) else { continue };
+        let ticks = blocks.case.plan.time_s / blocks.case.machine.tick_s;
         let at = 1 + (Random::new(seed ^ 0x51_6E).unit() * ticks) as u64;
-        let hold = |ticks: u64, _, _| (ticks == at).then_some(Command::Abort);
-        let Some(held) = driven(seed, in_number!(seed, case, hold)) else { continue };
+        let mut hold = |ticks: u64, _, _| (ticks == at).then_some(Command::Abort);
+        let Some(held) = blocks.run(seed, &mut hold) else { continue };
         let mut rest = None;
         let mut single = |ticks: u64, state: State, here: Rest| {
             if ticks == at {
@@ -178,7 +145,7 @@ fn it_stops_at_the_first_end_in_reach() {
                 Command::Abort
             })
         };
-        let Some(run) = driven(seed, in_number!(seed, case, single)) else { continue };
+        let Some(run) = blocks.run(seed, &mut single) else { continue };
         ran += 1;
         let Some(rest) = rest else {
             // The program's last block.
@@ -186,13 +153,13 @@ fn it_stops_at_the_first_end_in_reach() {
             at_the_end += 1;
             continue;
         };
-        assert!(case.is_end(rest), "seed {seed}: at rest at {rest:?}, no block's end of {:?}", case.ends);
-        let from_start = |(stretch, s_mm): Rest| case.before_mm(stretch) + s_mm;
+        assert!(blocks.is_end(rest), "seed {seed}: at rest at {rest:?}, no block's end of {:?}", blocks.ends);
+        let from_start = |(stretch, s_mm): Rest| blocks.before_mm(stretch) + s_mm;
         if from_start(rest) < held.s_mm - END_MM {
             earlier += 1;
             continue;
         }
-        let mut in_reach: Vec<f64> = case.ends.iter().map(|&end| from_start(end)).collect();
+        let mut in_reach: Vec<f64> = blocks.ends.iter().map(|&end| from_start(end)).collect();
         in_reach.retain(|&end_mm| end_mm >= held.s_mm - END_MM);
         in_reach.dedup_by(|a, b| (*a - *b).abs() <= END_MM);
         let index = in_reach.iter().position(|&end_mm| (end_mm - from_start(rest)).abs() <= END_MM);
@@ -215,7 +182,7 @@ fn it_stops_at_the_first_end_in_reach() {
 fn among_all_other_commands() {
     let (mut ran, mut waits, mut totals) = (0, 0_u64, Totals::default());
     for seed in seeds(300) {
-        let Some(case) = Case::random(seed, 3_000.0) else { continue };
+        let Some(blocks) = Blocks::random(seed, 3_000.0) else { continue };
         let mut random = Random::new(seed ^ 0xB10C);
         let often = random.log_between(2e-3, 0.3);
         let most = if random.chance(0.5) { 1.0 } else { 2.0 };
@@ -224,7 +191,11 @@ fn among_all_other_commands() {
             if state == State::Held && !is_held {
                 waits += 1;
                 assert!(was_single, "seed {seed}: held by nothing");
-                assert!(case.is_end(at), "seed {seed}: waits at {at:?}, no block's end of {:?}", case.ends);
+                assert!(
+                    blocks.is_end(at),
+                    "seed {seed}: waits at {at:?}, no block's end of {:?}",
+                    blocks.ends
+                );
             }
             let command = match ticks {
                 ..40_000 if !random.chance(often) => None,
@@ -250,7 +221,7 @@ fn among_all_other_commands() {
             }
             command
         };
-        let Some(run) = driven(seed, in_number!(seed, case, script)) else { continue };
+        let Some(run) = blocks.run(seed, &mut script) else { continue };
         assert_eq!(run.state, State::Done, "seed {seed}");
         totals.add(&run.totals);
         ran += 1;
