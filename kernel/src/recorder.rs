@@ -166,15 +166,9 @@ impl<R: Scalar, const AXES: usize> Row<R, AXES> {
         let length = PREFIX + postcard::to_slice(&self.to_f64(), rest).ok()?.len();
         let (content, rest) = buffer.split_at_mut_checked(length)?;
         let (sum, _) = rest.split_first_chunk_mut()?;
-        *sum = checksum(content).to_le_bytes();
+        *sum = Checksum::of(content).to_le_bytes();
         buffer.get(..length + CHECKSUM)
     }
-}
-
-fn checksum(bytes: &[u8]) -> u32 {
-    let mut sum = Checksum::NONE;
-    sum.update(bytes);
-    sum.finish()
 }
 
 /// Why bytes are no frame.
@@ -229,7 +223,7 @@ impl<const AXES: usize> Row<f64, AXES> {
     pub fn from_frame(frame: &[u8]) -> Result<Self, FrameError> {
         let (content, sum) = frame.split_last_chunk().ok_or(FrameError::Short)?;
         let (&[version, axes], body) = content.split_first_chunk().ok_or(FrameError::Short)?;
-        let (found, expected) = (checksum(content), u32::from_le_bytes(*sum));
+        let (found, expected) = (Checksum::of(content), u32::from_le_bytes(*sum));
         if version != VERSION {
             return Err(FrameError::Version { found: version });
         }

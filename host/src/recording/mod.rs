@@ -106,7 +106,7 @@ impl Recording {
         let mut bytes = [&MAGIC[..], &[VERSION]].concat();
         // Only what is endless, or of unknown length, can't be written.
         bytes.extend(postcard::to_stdvec(self).expect("figures, texts and lists"));
-        bytes.extend(checksum(&bytes).to_le_bytes());
+        bytes.extend(Checksum::of(&bytes).to_le_bytes());
         bytes
     }
 
@@ -127,7 +127,7 @@ impl Recording {
         let Some((body, &sum)) = rest.split_last_chunk() else {
             return Err(RecordingError::Malformed(format!("{} bytes in all", bytes.len())));
         };
-        let (found, expected) = (checksum(&bytes[..bytes.len() - sum.len()]), u32::from_le_bytes(sum));
+        let (found, expected) = (Checksum::of(&bytes[..bytes.len() - sum.len()]), u32::from_le_bytes(sum));
         if found != expected {
             return Err(RecordingError::Checksum { found, expected });
         }
@@ -181,12 +181,6 @@ impl Recording {
     pub fn digest(&self) -> u64 {
         self.tape.digest
     }
-}
-
-fn checksum(bytes: &[u8]) -> u32 {
-    let mut sum = Checksum::NONE;
-    sum.update(bytes);
-    sum.finish()
 }
 
 /// What a file begins with, so that its owner knows it again.

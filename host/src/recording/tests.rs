@@ -175,6 +175,6 @@ fn strangers_are_named() {
     let mut trailing = recording.to_bytes();
     trailing.truncate(trailing.len() - 4);
     trailing.push(0);
-    trailing.extend(checksum(&trailing).to_le_bytes());
+    trailing.extend(Checksum::of(&trailing).to_le_bytes());
     assert!(message(&trailing).contains("1 bytes too many"), "{}", message(&trailing));
 }

@@ -155,10 +155,7 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
         if usize::from(axes) != AXES {
             return Err(ProgramError::Axes { found: axes, expected: AXES });
         }
-        let expected = u32::from_le_bytes(*checksum);
-        let mut sum = Checksum::NONE;
-        sum.update(summed);
-        let found = sum.finish();
+        let (found, expected) = (Checksum::of(summed), u32::from_le_bytes(*checksum));
         if found != expected {
             return Err(ProgramError::Checksum { found, expected });
         }

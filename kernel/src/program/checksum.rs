@@ -25,6 +25,14 @@ impl Checksum {
         rest
     };
 
+    /// The 32 bits of all of `bytes`.
+    #[must_use]
+    pub fn of(bytes: &[u8]) -> u32 {
+        let mut sum = Self::NONE;
+        sum.update(bytes);
+        sum.finish()
+    }
+
     /// Adds bytes.
     pub fn update(&mut self, bytes: &[u8]) {
         for &byte in bytes {
@@ -63,5 +71,6 @@ mod tests {
             sum.update(second);
             assert_eq!(sum.finish(), 0xCBF4_3926);
         }
+        assert_eq!(Checksum::of(b"123456789"), 0xCBF4_3926);
     }
 }
