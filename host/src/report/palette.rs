@@ -199,22 +199,8 @@ mod tests {
 
     #[test]
     fn every_line_stands_out_from_its_paper() {
-        let lines = [
-            AXIS,
-            LIMIT,
-            FAULT,
-            COMMAND,
-            OVERRIDE,
-            FEED,
-            ACCELERATION,
-            JERK,
-            SNAP,
-            ERROR,
-            CONTOUR,
-            VOLTS,
-            UNREACHED,
-        ];
-        for ink in lines.iter().chain(&CEILINGS).chain(&CLASSES).chain(&SERIES) {
+        let no_lines = [TEXT, GRID, RULE, REST].map(|ink| ink.light);
+        for ink in inks().filter(|ink| !no_lines.contains(&ink.light)) {
             let hex = ink.hex();
             assert!(contrast(ink.light, LIGHT_PAPER) >= 3.0, "{hex} {}", contrast(ink.light, LIGHT_PAPER));
             assert!(contrast(ink.dark, DARK_PAPER) >= 3.0, "{hex} {}", contrast(ink.dark, DARK_PAPER));
@@ -232,8 +218,7 @@ mod tests {
 
     #[test]
     fn a_colour_names_one_ink() {
-        let mut seen: Vec<u32> =
-            SINGLE.iter().chain(&CEILINGS).chain(&CLASSES).chain(&SERIES).map(|ink| ink.light).collect();
+        let mut seen: Vec<u32> = inks().map(|ink| ink.light).collect();
         let number = seen.len();
         seen.sort_unstable();
         seen.dedup();
