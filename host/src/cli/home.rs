@@ -7,10 +7,9 @@ use clap::Args;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
-use super::input::{self, Output};
+use super::outputs::Outputs;
 use super::table::{self, Align};
-use super::trace::TraceWriter;
-use super::write_json;
+use super::{input, write_json};
 use crate::machine::Machine;
 use crate::simulate::home::{HomedAxis, home};
 use crate::simulate::job::Sheet;
@@ -58,22 +57,10 @@ struct AxisJson<'a> {
 /// The machine file is refused or homes no axis, or a file can't be written.
 pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(Some(&arguments.machine))?;
-    let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
-    let name = trace.as_ref().map_or_else(String::new, |output| output.name.clone());
-    let unwritten = |source| CliError::Write { path: name.clone(), source };
-    let mut trace = trace
-        .map(|output| TraceWriter::new(output.file, &Sheet::of_machine(&machine)))
-        .transpose()
-        .map_err(unwritten)?;
+    let outputs = Outputs::create(&arguments.trace, &None)?;
     let mut homed = Vec::new();
-    let ended = home(&machine, &mut homed, &mut |tick| {
-        if let Some(trace) = &mut trace {
-            trace.add(tick);
-        }
-    });
-    if let Some(trace) = trace {
-        trace.finish().map_err(unwritten)?;
-    }
+    let (ended, _) =
+        outputs.of_ticks(&Sheet::of_machine(&machine), |observe| home(&machine, &mut homed, observe))?;
     // What was homed is shown, whatever became of the next axis.
     if arguments.json {
         let axes: Vec<AxisJson<'_>> = homed.iter().map(|axis| axis_json(axis, &machine)).collect();

@@ -31,15 +31,15 @@ impl Outputs {
         run: impl FnOnce(&mut Observer<'_>) -> Result<T, RunError>,
         summary_of: impl Fn(&T) -> &RunSummary,
     ) -> Result<T, CliError> {
-        let mut files = Files::new(self, &job.sheet)?;
-        let mut progress = Progress::new((job.sheet.planned_time_s / job.sheet.tick_s) as u64);
-        let ran = run(&mut |tick| {
-            files.add(tick);
-            progress.tick();
-        });
-        progress.finish();
-        // What was traced of a run that failed stays.
-        let report = files.finish_trace()?;
+        let (ran, report) = self.of_ticks(&job.sheet, |observe| {
+            let mut progress = Progress::new((job.sheet.planned_time_s / job.sheet.tick_s) as u64);
+            let ran = run(&mut |tick| {
+                observe(tick);
+                progress.tick();
+            });
+            progress.finish();
+            ran
+        })?;
         let ran = ran.map_err(|source| CliError::Run { program: job.sheet.program.clone(), source })?;
         report.write(|ticks| record(job, summary_of(&ran), ticks))?;
         Ok(ran)
@@ -47,9 +47,20 @@ impl Outputs {
 
     /// The files about a record that was not made by a run of now.
     pub(super) fn of_record(self, sheet: &Sheet, record: &RunRecord) -> Result<(), CliError> {
+        let ((), report) = self.of_ticks(sheet, |observe| record.ticks.iter().for_each(observe))?;
+        report.write(|ticks| RunRecord { ticks, ..record.clone() })
+    }
+
+    /// What `run` returns, its ticks traced, and the report that is to be written of them.
+    pub(super) fn of_ticks<T>(
+        self,
+        sheet: &Sheet,
+        run: impl FnOnce(&mut Observer<'_>) -> T,
+    ) -> Result<(T, Report), CliError> {
         let mut files = Files::new(self, sheet)?;
-        record.ticks.iter().for_each(|tick| files.add(tick));
-        files.finish_trace()?.write(|ticks| RunRecord { ticks, ..record.clone() })
+        let ran = run(&mut |tick| files.add(tick));
+        // What was traced of a run that failed stays.
+        Ok((ran, files.finish_trace()?))
     }
 }
 
@@ -60,7 +71,7 @@ struct Files {
 }
 
 /// Only a report needs all the ticks at once.
-struct Report {
+pub(super) struct Report {
     output: Option<Output>,
     ticks: Vec<TickRecord>,
 }
