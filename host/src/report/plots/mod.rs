@@ -283,16 +283,24 @@ pub(super) fn curve(chart: &mut Chart<'_>, points: Vec<(f64, f64)>, ink: Ink, st
 
 /// An upright dashed line, as high as `y`, at each place within `x` where a fault was latched.
 pub(super) fn fault_marks(chart: &mut Chart<'_>, at: &[f64], x: (f64, f64), y: (f64, f64)) -> Drawn {
-    let inside = at.iter().filter(|at| (x.0..=x.1).contains(*at)).take(FAULT_MARKS_MAX);
-    let style = palette::FAULT.rgb().stroke_width(6);
-    chart.draw_series(inside.map(|&x| PathElement::new([(x, y.0), (x, y.1)], style)))?;
-    Ok(())
+    uprights(chart, at, x, y, FAULT_MARKS_MAX, palette::FAULT.rgb().stroke_width(6))
 }
 
 /// The same where a command was given.
 pub(super) fn command_marks(chart: &mut Chart<'_>, at: &[f64], x: (f64, f64), y: (f64, f64)) -> Drawn {
-    let inside = at.iter().filter(|at| (x.0..=x.1).contains(*at)).take(marks::COMMAND_MARKS_MAX);
-    let style = palette::COMMAND.rgb().stroke_width(4);
+    uprights(chart, at, x, y, marks::COMMAND_MARKS_MAX, palette::COMMAND.rgb().stroke_width(4))
+}
+
+/// Upright lines, as high as `y`, at the first `most` places within `x`.
+fn uprights(
+    chart: &mut Chart<'_>,
+    at: &[f64],
+    x: (f64, f64),
+    y: (f64, f64),
+    most: usize,
+    style: ShapeStyle,
+) -> Drawn {
+    let inside = at.iter().filter(|at| (x.0..=x.1).contains(*at)).take(most);
     chart.draw_series(inside.map(|&x| PathElement::new([(x, y.0), (x, y.1)], style)))?;
     Ok(())
 }

@@ -9,7 +9,7 @@ use super::{
     Area, Caption, Drawn, Panel, Sheet, command_marks, curve, ends_over, ends_with_zero, fault_marks, marks,
     on_both_sheets,
 };
-use crate::record::{RunRecord, TickRecord};
+use crate::record::{CommandRecord, RunRecord, TickRecord};
 use crate::report::decimate;
 use crate::report::format::figure;
 use crate::report::palette::{self, Ink};
@@ -103,7 +103,7 @@ pub(in crate::report) fn along_path(
         curve("Jerk [mm/s³]", summary.jerk_mm_s3, limits.jerk_mm_s3, palette::JERK, |tick| tick.j_mm_s3),
         curve("Snap [mm/s⁴]", summary.snap_mm_s4, limits.snap_mm_s4, palette::SNAP, |tick| tick.snap_mm_s4),
     ];
-    stack(record, summary, &curves, caption, !record.commands.is_empty())
+    stack(record, summary, &curves, caption, &record.commands)
 }
 
 /// Following error and output of one axis.
@@ -132,7 +132,7 @@ pub(in crate::report) fn of_axis(
         },
         Curve { title: "Output [V]", span: output, limit: 0.0, ink: palette::VOLTS, value: Box::new(volts) },
     ];
-    stack(record, summary, &curves, caption, false)
+    stack(record, summary, &curves, caption, &[])
 }
 
 /// The commands of a run, and the override that they make.
@@ -192,19 +192,16 @@ fn stack<V: Fn(&TickRecord) -> f64>(
     summary: &Summary,
     curves: &[Curve<V>],
     caption: &Caption<'_>,
-    has_commands: bool,
+    commands: &[CommandRecord],
 ) -> io::Result<String> {
     let x = ends_over(summary.time_s.0, summary.time_s.1);
-    let live = |sheet: &Sheet| has_commands.then(|| LiveControl::new(record, sheet, x));
+    let live = |sheet: &Sheet| (!commands.is_empty()).then(|| LiveControl::new(record, sheet, x));
     let height = |sheet: &Sheet| {
         let live = live(sheet).map_or(0, |live| live.height(sheet));
         live + curves.len() as u32 * sheet.panel_height + sheet.axis_height()
     };
     let faults_s: Vec<f64> = record.faults.iter().map(|fault| fault.tick as f64 * record.tick_s).collect();
-    let commands_s: Vec<f64> = match has_commands {
-        true => record.commands.iter().map(|command| command.tick as f64 * record.tick_s).collect(),
-        false => Vec::new(),
-    };
+    let commands_s: Vec<f64> = commands.iter().map(|command| command.tick as f64 * record.tick_s).collect();
     on_both_sheets(caption, height, |area, sheet| {
         let mut rest = area.clone();
         if let Some(live) = live(sheet) {
