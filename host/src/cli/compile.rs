@@ -69,7 +69,7 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
         out,
         "{}: {} items, {} bytes; {:.3} mm in {:.3} s at {} ticks/s, on machine \"{}\"",
         arguments.output.display(),
-        executable.without_blocks().len(),
+        executable.without_blocks().count(),
         bytes.len(),
         plan.length_mm,
         plan.time_s,

@@ -63,15 +63,14 @@ impl Executable {
     }
 
     /// What a board without live control is given.
-    #[must_use]
-    pub fn without_blocks(&self) -> Vec<Item<3>> {
-        self.items.iter().filter(|item| !matches!(item, Item::Block(_))).copied().collect()
+    pub fn without_blocks(&self) -> impl Iterator<Item = &Item<3>> {
+        self.items.iter().filter(|item| !matches!(item, Item::Block(_)))
     }
 
     /// The program with the machine it was planned for, as bytes for a board without live control: without blocks.
     #[must_use]
     pub fn to_bytes(&self, machine: &Machine) -> Vec<u8> {
-        bytes(machine, &self.without_blocks())
+        bytes(machine, self.without_blocks())
     }
 
     /// The same for a board with live control.
@@ -86,7 +85,7 @@ impl Executable {
     }
 }
 
-fn bytes(machine: &Machine, items: &[Item<3>]) -> Vec<u8> {
+fn bytes<'a>(machine: &Machine, items: impl IntoIterator<Item = &'a Item<3>>) -> Vec<u8> {
     let mut bytes = Vec::new();
     // Entries of three axes fit the format.
     write(&machine.header(), items, &mut bytes).expect("three axes");
