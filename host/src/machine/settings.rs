@@ -249,9 +249,7 @@ impl Machine {
     /// # Errors
     /// The first axis with a value that the kernel can't use.
     pub fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, 3>, AxisError> {
-        self.guards()
-            .of_axes(&self.axes.each_ref().map(AxisSettings::figures), self.tick_s)
-            .map_err(|error| AxisError { axis: self.axes[error.axis].name.clone(), source: error.cause })
+        self.guards().of_axes(&self.figures(), self.tick_s).map_err(|error| self.at_axis(error))
     }
 
     /// How faults are told and end.
@@ -268,20 +266,22 @@ impl Machine {
     /// # Errors
     /// The first axis with a value that the kernel can't use.
     pub fn unguarded_axes_config<R: Real>(&self) -> Result<AxesConfig<R, 3>, AxisError> {
-        AxesConfig::new(&self.axes.each_ref().map(AxisSettings::figures), self.tick_s)
-            .map_err(|error| AxisError { axis: self.axes[error.axis].name.clone(), source: error.cause })
+        AxesConfig::new(&self.figures(), self.tick_s).map_err(|error| self.at_axis(error))
+    }
+
+    fn figures(&self) -> [AxisFigures; 3] {
+        self.axes.each_ref().map(AxisSettings::figures)
+    }
+
+    fn at_axis(&self, error: AxesError) -> AxisError {
+        AxisError { axis: self.axes[error.axis].name.clone(), source: error.cause }
     }
 
     /// What a compiled program carries: everything that the kernel has to know of the machine, which stands at
     /// the origin when the program starts.
     #[must_use]
     pub fn header(&self) -> Header<3> {
-        Header {
-            tick_s: self.tick_s,
-            rules: self.rules(),
-            axes: self.axes.each_ref().map(AxisSettings::figures),
-            start: [Position::ZERO; 3],
-        }
+        Header { tick_s: self.tick_s, rules: self.rules(), axes: self.figures(), start: [Position::ZERO; 3] }
     }
 
     /// The simulated machine: the same drives, encoders and scales, at rest at the origin. Its dead times
