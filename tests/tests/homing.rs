@@ -3,6 +3,7 @@
 #[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
 mod check;
 
+use check::bench::mm;
 use check::random::Random;
 use hal_sim::{HomeParameters, IndexParameters, SwitchParameters};
 use motion_host::gcode;
@@ -20,10 +21,6 @@ const AXIS: usize = 0;
 const MM_PER_COUNT: f64 = 1e-4;
 /// A revolution.
 const INDEX_MM: f64 = 10.0;
-
-fn at(mm: f64) -> Position {
-    Position::from_mm(mm).expect("in range")
-}
 
 /// Where things are in the direction of homing, from where the axis stands when it is switched on.
 #[derive(Clone, Copy, Debug)]
@@ -65,8 +62,8 @@ fn config(direction: Direction, has_index: bool) -> HomingConfig {
         travel_mm: 300.0,
         back_off_mm: 80.0,
         index_mm: has_index.then_some(1.1 * INDEX_MM),
-        position: at(-250.0),
-        park: Some(at(0.0)),
+        position: mm(-250.0),
+        park: Some(mm(0.0)),
     }
 }
 
@@ -253,10 +250,10 @@ fn programs_go_on_from_the_new_position() {
             let executable = Executable::new::<R>(&plan).expect("executable");
             for _ in 0..2 {
                 session.run(executable.supplied(), &mut |tick| watch.look(tick)).expect("a run");
-                assert_eq!(session.position(), [7.0, 0.0, 0.0].map(at));
+                assert_eq!(session.position(), [7.0, 0.0, 0.0].map(mm));
                 let moved_mm = simulated.truth()[AXIS].position_mm - origin_mm;
                 assert!((moved_mm - 7.0).abs() < 0.01, "{moved_mm}");
-                let back = Way::By(at(-7.0));
+                let back = Way::By(mm(-7.0));
                 let jog = Jog::new(&jog_axis(&machine), AXIS, session.position(), back, 30.0, machine.tick_s);
                 session.run(jog.expect("a jog"), &mut |tick| watch.look(tick)).expect("a run");
                 assert_eq!(session.position(), [Position::ZERO; 3]);

@@ -3,6 +3,7 @@
 #[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
 mod check;
 
+use check::bench::mm;
 use check::random::Random;
 use motion_kernel::exec::{ExecState, Executed, Executor};
 use motion_kernel::jog::{Direction, Jog, JogAxis, JogError, Travel, Way};
@@ -14,10 +15,6 @@ use motion_kernel::units::Position;
 
 const AXES: usize = 3;
 type Place = [Position; AXES];
-
-fn at(mm: f64) -> Position {
-    Position::from_mm(mm).expect("in range")
-}
 
 /// A machine of equal axes.
 #[derive(Clone, Copy, Debug)]
@@ -33,8 +30,8 @@ impl Machine {
         let jerk_mm_s3 = accel_mm_s2 * random.log_between(5.0, 100.0);
         let snap_mm_s4 = jerk_mm_s3 * random.log_between(20.0, 500.0);
         let limits = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 };
-        let least = at(-random.log_between(0.1, 300.0));
-        let travel = Travel { least, greatest: least + at(random.log_between(0.2, 600.0)) };
+        let least = mm(-random.log_between(0.1, 300.0));
+        let travel = Travel { least, greatest: least + mm(random.log_between(0.2, 600.0)) };
         let feed_mm_s = random.log_between(5.0, 300.0);
         Self { axis: JogAxis { feed_mm_s, limits, travel: Some(travel) }, travel, tick_s: 5e-4 }
     }
@@ -160,11 +157,11 @@ fn presses<R: Real>(seed: u64, rounding_mm: f64) -> Result<[usize; 4], String> {
     let mut random = Random::new(seed);
     let machine = Machine::random(&mut random);
     let Travel { least, greatest } = machine.travel;
-    let inside = |random: &mut Random| least + at(random.unit() * (greatest - least).to_mm());
+    let inside = |random: &mut Random| least + mm(random.unit() * (greatest - least).to_mm());
     let mut place: Place = core::array::from_fn(|_| inside(&mut random));
     // Outside of the travel, as after a change of the soft limits.
     if random.chance(0.2) {
-        place[0] = greatest + at(random.log_between(0.01, 20.0));
+        place[0] = greatest + mm(random.log_between(0.01, 20.0));
     }
     let [mut arrived, mut at_limit, mut released, mut refused] = [0; 4];
     for _ in 0..12 {
@@ -173,7 +170,7 @@ fn presses<R: Real>(seed: u64, rounding_mm: f64) -> Result<[usize; 4], String> {
         let way = if random.chance(0.5) {
             Way::Continuous(if positive { Direction::Positive } else { Direction::Negative })
         } else {
-            let by = at(random.log_between(1e-4, 50.0));
+            let by = mm(random.log_between(1e-4, 50.0));
             Way::By(if positive { by } else { -by })
         };
         let feed_mm_s = machine.axis.feed_mm_s * random.log_between(0.01, 1.0);
@@ -236,11 +233,11 @@ fn keys_at_random() {
 #[test]
 fn what_can_not_be_jogged_is_refused() {
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
-    let travel = Travel { least: at(-10.0), greatest: at(20.0) };
+    let travel = Travel { least: mm(-10.0), greatest: mm(20.0) };
     let axis = JogAxis { feed_mm_s: 50.0, limits, travel: Some(travel) };
     let up = Way::Continuous(Direction::Positive);
     let jog = |config: &JogAxis, axis, from: f64, way, feed| {
-        Jog::new(config, axis, [at(0.0), at(from)], way, feed, 5e-4)
+        Jog::new(config, axis, [mm(0.0), mm(from)], way, feed, 5e-4)
             .map(|_| ())
             .map_err(|error| error.to_string())
     };
@@ -256,14 +253,14 @@ fn what_can_not_be_jogged_is_refused() {
     assert_eq!(refused(&axis, 1, 5.0, Way::By(Position::ZERO), 5.0), "a distance of 0: expected a way to go");
     let outwards = |mm: f64| format!("at {mm} mm outwards: expected inwards only from the soft limit 20 mm");
     assert_eq!(refused(&axis, 1, 20.0, up, 5.0), outwards(20.0));
-    assert_eq!(refused(&axis, 1, 21.5, Way::By(at(1.0)), 5.0), outwards(21.5));
-    assert_eq!(jog(&axis, 1, 21.5, Way::By(at(-1.0)), 5.0), Ok(()));
+    assert_eq!(refused(&axis, 1, 21.5, Way::By(mm(1.0)), 5.0), outwards(21.5));
+    assert_eq!(jog(&axis, 1, 21.5, Way::By(mm(-1.0)), 5.0), Ok(()));
     let unknown = JogAxis { travel: None, ..axis };
     assert!(refused(&unknown, 1, 5.0, up, 5.0).starts_with("a jog without an end: expected soft limits"));
-    assert_eq!(jog(&unknown, 1, 5.0, Way::By(at(100.0)), 5.0), Ok(()));
+    assert_eq!(jog(&unknown, 1, 5.0, Way::By(mm(100.0)), 5.0), Ok(()));
     let end = "an end at 1000001 mm: expected within 1000000 mm";
-    assert_eq!(refused(&unknown, 1, 2.0, Way::By(at(999_999.0)), 5.0), end);
-    let swapped = JogAxis { travel: Some(Travel { least: at(20.0), greatest: at(-10.0) }), ..axis };
+    assert_eq!(refused(&unknown, 1, 2.0, Way::By(mm(999_999.0)), 5.0), end);
+    let swapped = JogAxis { travel: Some(Travel { least: mm(20.0), greatest: mm(-10.0) }), ..axis };
     let order = "soft limits 20 and -10 mm: expected the lesser one first";
     assert_eq!(refused(&swapped, 1, 5.0, up, 5.0), order);
     let stiff = JogAxis { limits: Limits { jerk_mm_s3: 0.0, ..limits }, ..axis };

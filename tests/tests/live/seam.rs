@@ -6,17 +6,14 @@ use motion_kernel::exec::{ExecState, Executor};
 use motion_kernel::law::{FeedSegment, Law, Ramp, Ticks, TurnedRamp};
 use motion_kernel::path::Piece;
 use motion_kernel::queue::{Change, Density, LiveStreams, Refused, Rejection, SEGMENTS_PER_TICK_MAX};
-use motion_kernel::units::Position;
 
-fn at(mm: f64) -> Position {
-    Position::from_mm(mm).expect("in range")
-}
+use super::check::bench::mm;
 
 /// What one list ends with and the next begins with counts together, and so do the rests of a list.
 #[test]
 fn lists_are_not_denser_together_than_a_tick_allows() {
     let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
-    let (mut feeder, _intake) = streams.split(Machine::reference().rules(), [at(0.0)]);
+    let (mut feeder, _intake) = streams.split(Machine::reference().rules(), [mm(0.0)]);
     // A tenth of a tick each, and their density.
     let tenth = Ticks::from_seconds(0.1, 1.0).expect("in range");
     let mut density = Density::NONE;
@@ -34,10 +31,10 @@ fn lists_are_not_denser_together_than_a_tick_allows() {
         feeder.give_up(list);
         taken
     };
-    let list = feeder.begin(at(0.0), 0.0, Density::NONE);
+    let list = feeder.begin(mm(0.0), 0.0, Density::NONE);
     assert_eq!(fits(list, &mut feeder), SEGMENTS_PER_TICK_MAX - 1);
     // The first list is not empty any more.
-    let list = feeder.begin(at(0.0), 0.0, density);
+    let list = feeder.begin(mm(0.0), 0.0, density);
     assert_eq!(fits(list, &mut feeder), SEGMENTS_PER_TICK_MAX - 1 - 5);
 }
 
@@ -46,22 +43,22 @@ fn lists_are_not_denser_together_than_a_tick_allows() {
 fn a_change_to_anything_else_is_refused() {
     let machine = Machine::reference();
     let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
-    let (mut feeder, mut intake) = streams.split(machine.rules(), [at(0.0)]);
+    let (mut feeder, mut intake) = streams.split(machine.rules(), [mm(0.0)]);
     let change = |from: u8, to: u8, after: u32| Change { from, to, after, within: false };
     let refused = |from: u8, to: u8, after: u32| Err(Rejection::NoChange { from, to, after });
     assert_eq!(feeder.change(change(0, 1, 0)), refused(0, 1, 0));
-    let list = feeder.begin(at(0.0), 0.0, Density::NONE).expect("a list");
+    let list = feeder.begin(mm(0.0), 0.0, Density::NONE).expect("a list");
     assert_eq!(list, 1);
     for (from, to, after) in [(0, 2, 0), (0, 0, 0), (1, 1, 0), (3, 1, 0), (0, 1, Change::AFTER_MAX + 1)] {
         assert_eq!(feeder.change(change(from, to, after)), refused(from, to, after));
     }
     let up = Ramp::new(&Law::new(machine.rules().limits).expect("limits"), 0.0, 20.0);
-    let length = at(up.length_mm());
+    let length = mm(up.length_mm());
     let segment = FeedSegment::ramp(&up, length, machine.tick_s).expect("a segment");
     feeder.segment(list, segment).expect("room");
     assert_eq!(feeder.change(change(0, 1, 0)), Err(Rejection::Moving { feed_mm_s: 20.0 }));
     // Nothing was asked for.
-    let mut executor = Executor::<f64, 1>::new([at(0.0)]);
+    let mut executor = Executor::<f64, 1>::new([mm(0.0)]);
     for _ in 0..3 {
         assert_eq!(executor.tick(&mut intake).expect("no fault").state, ExecState::Idle);
     }
@@ -71,7 +68,7 @@ fn a_change_to_anything_else_is_refused() {
 #[test]
 fn a_learnt_correction_is_refused() {
     let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
-    let (_feeder, mut intake) = streams.split(Machine::reference().rules(), [at(0.0)]);
+    let (_feeder, mut intake) = streams.split(Machine::reference().rules(), [mm(0.0)]);
     let knots = [[0.1], [0.2]];
     let correction = Correction::new(0, &knots, 40, 1.0).expect("a correction");
     assert_eq!(intake.correct(correction), Err(CorrectionError::LiveControl));
@@ -84,13 +81,13 @@ fn a_change_that_comes_too_late_is_refused() {
     let (tick_s, rules) = (machine.tick_s, machine.rules());
     let law = Law::new(rules.limits).expect("limits");
     let up = Ramp::new(&law, 0.0, 20.0);
-    let length = at(up.length_mm());
+    let length = mm(up.length_mm());
     let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
-    let (mut feeder, mut intake) = streams.split(rules, [at(0.0)]);
-    let mut executor = Executor::<f64, 1>::new([at(0.0)]);
-    feeder.piece(Piece::line(1, [at(0.0)], [1.0], length + length).expect("a line"), 20.0).expect("room");
+    let (mut feeder, mut intake) = streams.split(rules, [mm(0.0)]);
+    let mut executor = Executor::<f64, 1>::new([mm(0.0)]);
+    feeder.piece(Piece::line(1, [mm(0.0)], [1.0], length + length).expect("a line"), 20.0).expect("room");
     feeder.end_of_path([length + length]).expect("room");
-    let list = feeder.begin(at(0.0), 0.0, Density::NONE).expect("a list");
+    let list = feeder.begin(mm(0.0), 0.0, Density::NONE).expect("a list");
     for ramp in [up, up.reversed()] {
         feeder.segment(list, FeedSegment::ramp(&ramp, length, tick_s).expect("a segment")).expect("room");
     }
@@ -103,13 +100,13 @@ fn a_change_that_comes_too_late_is_refused() {
     assert_eq!((progress.tick, progress.list, progress.done), (100, list, 0));
     // The same ramp, turned where it was 50 ticks ago, and to rest.
     let turned = TurnedRamp { ramp: up, turn_s: 50.0 * tick_s };
-    let other = feeder.begin(at(0.0), 0.0, Density::NONE).expect("a list");
+    let other = feeder.begin(mm(0.0), 0.0, Density::NONE).expect("a list");
     let turn_at = Ticks::from_seconds(50.0, 1.0).expect("in range");
-    let first = FeedSegment::turned(&up, turn_at, at(turned.length_mm()), tick_s).expect("a segment");
+    let first = FeedSegment::turned(&up, turn_at, mm(turned.length_mm()), tick_s).expect("a segment");
     feeder.segment(other, first).expect("room");
     let stop = Ramp::new(&law, turned.to_mm_s(), 0.0);
     feeder
-        .segment(other, FeedSegment::ramp(&stop, at(stop.length_mm()), tick_s).expect("a segment"))
+        .segment(other, FeedSegment::ramp(&stop, mm(stop.length_mm()), tick_s).expect("a segment"))
         .expect("room");
     feeder.change(Change { from: list, to: other, after: 0, within: true }).expect("a list");
     assert!(!feeder.is_refused());
