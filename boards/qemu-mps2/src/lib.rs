@@ -46,6 +46,24 @@ pub const LINE: usize = 16;
 /// Sub-steps of a simulated tick: the dead time of 1.42 ms fits the cells.
 pub const SUBSTEPS: u32 = 4;
 
+/// Defines `budgeted_tick`, the whole tick of the kernel, outlined under this name: by it a trace of executed instructions
+/// is cut. In the image's own crate: in a function of the library other parts of the tick are inlined, and the counts are
+/// others.
+#[macro_export]
+macro_rules! budgeted_tick {
+    () => {
+        #[unsafe(no_mangle)]
+        #[inline(never)]
+        fn budgeted_tick<'a>(
+            kernel: &'a mut motion_kernel::kernel::Kernel<$crate::Number, { $crate::AXES }>,
+            intake: &mut motion_kernel::queue::Intake<'_, $crate::Number, { $crate::AXES }>,
+            memory: &mut hal_sim::closed_loop::InMemory<{ $crate::AXES }>,
+        ) -> &'a motion_kernel::trace::Trace<$crate::Number, { $crate::AXES }> {
+            kernel.tick(intake, memory)
+        }
+    };
+}
+
 /// Ends the emulation with a status.
 pub fn exit(is_good: bool) -> ! {
     debug::exit(if is_good { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });

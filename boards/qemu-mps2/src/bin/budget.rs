@@ -63,16 +63,7 @@ fn refusal(bytes: &[u8]) -> Option<ProgramError> {
     Reader::<AXES>::new(bytes).err()
 }
 
-/// The whole tick of the kernel. Outlined under this name, by which a trace of executed instructions is cut.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn budgeted_tick<'a>(
-    kernel: &'a mut Kernel<Number, AXES>,
-    intake: &mut Intake<'_, Number, AXES>,
-    memory: &mut InMemory<AXES>,
-) -> &'a Trace<Number, AXES> {
-    kernel.tick(intake, memory)
-}
+qemu_boards::budgeted_tick!();
 
 #[inline(never)]
 fn measure<const N: usize>(counter: &Counter, bytes: &[u8], streams: &mut Queues<N>, tick: Tick<N>) {

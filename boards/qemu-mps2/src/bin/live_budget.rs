@@ -7,10 +7,7 @@
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use hal_sim::closed_loop::InMemory;
 use motion_kernel::kernel::Kernel;
-use motion_kernel::queue::Intake;
-use motion_kernel::trace::Trace;
 use qemu_boards::count::Counter;
 use qemu_boards::live::{self, Producer, Streams};
 use qemu_boards::programs::programs;
@@ -46,12 +43,4 @@ fn main() -> ! {
     exit(true)
 }
 
-/// The whole tick of the kernel, as a board's interrupt calls it.
-#[inline(never)]
-fn budgeted_tick<'a>(
-    kernel: &'a mut Kernel<Number, AXES>,
-    intake: &mut Intake<'_, Number, AXES>,
-    memory: &mut InMemory<AXES>,
-) -> &'a Trace<Number, AXES> {
-    kernel.tick(intake, memory)
-}
+qemu_boards::budgeted_tick!();

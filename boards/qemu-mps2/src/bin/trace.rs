@@ -9,8 +9,7 @@ use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::ExecState;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::program::{Header, Reader, Supply};
-use motion_kernel::queue::{Intake, Streams};
-use motion_kernel::trace::Trace;
+use motion_kernel::queue::Streams;
 use motion_kernel::units::{Counts, DacCode};
 use qemu_boards::programs::programs;
 use qemu_boards::{AXES, Number, PIECES, SEGMENTS, exit, fail};
@@ -44,13 +43,4 @@ fn main() -> ! {
     }
 }
 
-/// The whole tick of the kernel, under the name by which the trace is cut.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn budgeted_tick<'a>(
-    kernel: &'a mut Kernel<Number, AXES>,
-    intake: &mut Intake<'_, Number, AXES>,
-    memory: &mut InMemory<AXES>,
-) -> &'a Trace<Number, AXES> {
-    kernel.tick(intake, memory)
-}
+qemu_boards::budgeted_tick!();
