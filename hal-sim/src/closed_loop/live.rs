@@ -134,6 +134,8 @@ pub fn close<
     machine: &'a SimMachine<AXES, LINE>,
     seed: u64,
 ) -> Result<LiveClosed<'a, R, AXES, PLACES, LINE>, LoopError> {
+    // As the other `close`, line by line: a constructor for both costs copies of the kernel, and a board with 16 KiB has no
+    // room for them.
     let header = program.header();
     let (feeder, intake) = streams.split(header.rules, header.start);
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
