@@ -107,3 +107,5 @@ pub mod homing;
 
 #[cfg(all(test, feature = "guards"))]
 mod corrupted;
+#[cfg(test)]
+mod random;

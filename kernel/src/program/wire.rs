@@ -223,23 +223,11 @@ mod tests {
     use super::*;
     use crate::axis::{BedInverse, DriveInverse, Table};
     use crate::program::{Header, Item};
+    use crate::random::Random;
 
     fn bytes_of<T: serde::Serialize>(value: &T) -> Vec<u8> {
         let mut buffer = [0; 4096];
         postcard::to_slice(value, &mut buffer).expect("short").to_vec()
-    }
-
-    struct Random(u64);
-
-    impl Random {
-        fn next(&mut self) -> u64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            self.0 ^ self.0 >> 29
-        }
-
-        fn below(&mut self, bound: usize) -> usize {
-            (self.next() >> 11) as usize % bound
-        }
     }
 
     /// As `postcard` reads it: the same value, down to the bits, and the same rest, or none.
@@ -264,7 +252,7 @@ mod tests {
                     let byte = random.next() as u8;
                     let long = if random.below(4) > 0 { byte | 0x80 } else { byte & 0x7F };
                     let small = byte & 1;
-                    bytes.push([byte, long, small, 0xFF][random.below(4)]);
+                    bytes.push([byte, long, small, 0xFF][random.below(4) as usize]);
                 }
                 let is_accepted = [
                     is_postcards::<Item<2>>(&bytes),

@@ -5,19 +5,9 @@ use crate::fault::FaultKind;
 use crate::hal::{AxisInputs, MachineInputs};
 use crate::num::Fixed;
 use crate::path::Setpoint;
-
-struct Random(u64);
+use crate::random::Random;
 
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        self.0 ^ self.0 >> 29
-    }
-
-    fn below(&mut self, bound: u64) -> u64 {
-        (self.next() >> 11) % bound
-    }
-
     fn real<R: Real>(&mut self) -> R {
         R::from_f64(self.next().cast_signed() as f64 * 1e-12)
     }
