@@ -3,12 +3,10 @@
 //! Whatever comes of them, a set-point that jumps is a fault in the tick it jumps in, and outputs are ramped; what is not a
 //! number never reaches a converter.
 
-use core::convert::Infallible;
-
-use crate::axis::{AxesConfig, AxisFigures, Feedforward, Gains, GuardFigures};
+use crate::axis::fixture::{Follower, GUARD, TICK_S, figures, guarded};
+use crate::axis::{AxesConfig, GuardFigures};
 use crate::exec::ExecState;
 use crate::fault::{FaultKind, Reaction, Reactions};
-use crate::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use crate::kernel::Kernel;
 use crate::law::{FeedSegment, Law, Limits, Ramp};
 use crate::num::Real;
@@ -16,90 +14,18 @@ use crate::path::Piece;
 use crate::queue::{PathRules, Streams};
 use crate::units::{Counts, DacCode, Position};
 
-const TICK_S: f64 = 5e-4;
-const MM_PER_COUNT: f64 = 1e-4;
 const JUMP_MM: f64 = 0.0068;
 const RAMP_TICKS: u16 = 20;
 
-/// What a drive changes the distance of a tick by from one tick to the next [mm].
-const DRIVE_MM: f64 = 0.003;
-
-/// Axes that do what they are told, as far as a drive can.
-#[derive(Default)]
-struct Follower {
-    counts: [Counts; 2],
-    codes: [DacCode; 2],
-    at_mm: [f64; 2],
-    step_mm: [f64; 2],
-}
-
-impl Follower {
-    fn advance(&mut self) {
-        for ((at_mm, step_mm), (DacCode(code), counts)) in
-            self.at_mm.iter_mut().zip(&mut self.step_mm).zip(self.codes.into_iter().zip(&mut self.counts))
-        {
-            let commanded_mm = f64::from(code) / 32768.0 * 1000.0 / 3.0 * TICK_S;
-            *step_mm = commanded_mm.clamp(*step_mm - DRIVE_MM, *step_mm + DRIVE_MM);
-            *at_mm += *step_mm;
-            *counts = Counts((*at_mm / MM_PER_COUNT).round() as i64);
-        }
-    }
-}
-
-impl Encoder<2> for Follower {
-    type Error = Infallible;
-    fn latch(&mut self) -> Result<[Counts; 2], Infallible> {
-        Ok(self.counts)
-    }
-}
-
-impl Inputs<2> for Follower {
-    type Error = Infallible;
-    fn read_inputs(&mut self) -> Result<MachineInputs<2>, Infallible> {
-        Ok(MachineInputs::HEALTHY)
-    }
-}
-
-impl VelocityChannel<2> for Follower {
-    type Error = Infallible;
-    fn write(&mut self, codes: &[DacCode; 2]) -> Result<(), Infallible> {
-        self.codes = *codes;
-        Ok(())
-    }
-}
-
-impl DriveEnable<2> for Follower {
-    type Error = Infallible;
-    fn set_enabled(&mut self, _: bool) -> Result<(), Infallible> {
-        Ok(())
-    }
-}
-
 fn config<R: Real>() -> AxesConfig<R, 2> {
-    let figures = AxisFigures {
-        mm_per_count: MM_PER_COUNT,
-        mm_s_at_10_v: 1000.0 / 3.0,
-        output_offset_v: 0.0,
-        output_limit_v: 10.0,
-        gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
-        feedforward: Feedforward { velocity: 1.0, ..Feedforward::default() },
-        following_error_limit_mm: 1.0,
-    };
     let guard = GuardFigures {
-        following_error_at_rest_mm: 0.25,
         following_error_per_velocity_s: 0.1 / 230.0,
         following_error_per_accel_s2: 4e-5,
         jump_mm: JUMP_MM,
-        moving_mm_s: 3.0,
-        response_s: 0.013,
-        load_accel_mm_s2: 1230.0,
-        noise_counts: 0,
-        saturation_s: 0.1,
-        travel_mm: None,
+        ..GUARD
     };
     let reactions = Reactions { ramp_ticks: RAMP_TICKS, stop_ticks: 4000, emergency_stop: Reaction::Ramp };
-    let config = AxesConfig::new(&[figures; 2], TICK_S).and_then(|axes| axes.guarded(&[guard; 2], TICK_S));
-    AxesConfig { reactions, ..config.expect("axes") }
+    AxesConfig { reactions, ..guarded(figures(), guard) }
 }
 
 fn at(mm: f64) -> Position {
@@ -148,7 +74,7 @@ fn run(
     feeder.end_unchecked([at(24.0), at(32.0)]);
     let mut kernel = Kernel::<f32, 2>::new(&config(), [at(0.0); 2], [Counts(0); 2]);
     kernel.enable(10);
-    let mut bench = Follower::default();
+    let mut bench = Follower::<2>::default();
     // The last three set positions that were followed.
     let mut set_mm = [[0.0; 3]; 2];
     let mut missed_mm = 0.0_f64;
@@ -173,7 +99,7 @@ fn run(
                     assert_eq!(i32::from(code), i32::from(from) * left / i32::from(RAMP_TICKS), "{fault:?}");
                 }
                 if left == 0 {
-                    assert!(kernel.is_off());
+                    assert_eq!(kernel.reaction(), Some(Reaction::Immediate));
                     return Came { fault: Some(fault.kind), missed_mm };
                 }
                 left -= 1;

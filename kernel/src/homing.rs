@@ -105,7 +105,7 @@ pub enum HomingError {
         /// Within this length \[mm\].
         back_off_mm: f64,
     },
-    /// The switch did not close again in the slow approach.
+    /// The switch, which was seen closed, did not close again: in the slow approach, or where it was passed at the fast feed.
     LostSwitch {
         /// Within this length \[mm\].
         back_off_mm: f64,
@@ -132,7 +132,7 @@ impl core::fmt::Display for HomingError {
                 write!(f, "home switch closed over {back_off_mm} mm: expected it to open when backing off")
             }
             Self::LostSwitch { back_off_mm } => {
-                write!(f, "home switch open over {back_off_mm} mm: expected it to close in the slow approach")
+                write!(f, "home switch open over {back_off_mm} mm: expected it to close again")
             }
             Self::NoIndex { index_mm } => {
                 write!(f, "no index within {index_mm} mm of the home switch: expected one a revolution")

@@ -11,8 +11,11 @@
 //! the voltage of standing still (0 V plus trim), the drives are disabled, and both stay so until
 //! [`Kernel::clear_fault`]. A fault that is found in writing the outputs shows in them from the next tick on.
 //! How outputs come to 0 V is the fault's [`Reaction`]: with the feature `guards` and where the
-//! machine gives it time, on the path or along a ramp; else at once. The first fault stays, but a later one may ask for a more urgent end.
+//! machine gives it time, on the path or along a ramp; else at once. The first fault stays, but a later one
+//! may ask for a more urgent end.
 
+#[cfg(all(test, feature = "guards"))]
+mod endings;
 #[cfg(feature = "live")]
 mod reference;
 
@@ -284,7 +287,8 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     fn judge_inputs(&mut self, before: &MachineInputs<AXES>) {
         let inputs = self.trace.inputs;
         if inputs.emergency_stop {
-            return self.latch_fault(FaultKind::EmergencyStop);
+            // Not the last word where it is a stop: the others may be more urgent.
+            self.latch_fault(FaultKind::EmergencyStop);
         }
         if let Some(axis) = inputs.axes.iter().position(|axis| axis.is_fault()) {
             return self.latch_fault(FaultKind::Drive { axis });
@@ -335,15 +339,20 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.trace.fault
     }
 
-    /// Clears the fault and stands at the actual position, as [`Kernel::stand_here`], which it returns.
-    /// The drives stay disabled until [`Kernel::enable`].
-    pub fn clear_fault(&mut self) -> [Position; AXES] {
+    /// Clears the fault, if there is one, and stands at the actual position, as [`Kernel::stand_here`], which it returns.
+    /// The drives stay disabled until [`Kernel::enable`]. `None` while the reaction to a fault is under way: nothing cuts it
+    /// short but a more urgent one, [`Kernel::disable`] and [`Kernel::stand_here`].
+    pub fn clear_fault(&mut self) -> Option<[Position; AXES]> {
+        #[cfg(feature = "guards")]
+        if self.reaction().is_some_and(|reaction| reaction < Reaction::Immediate) {
+            return None;
+        }
         self.trace.fault = None;
-        self.stand_here()
+        Some(self.stand_here())
     }
 
     /// Gives up the motion that is under way or queued and takes the actual position for the set
-    /// position; the drives are disabled. Returns the position: split the streams anew for it, which
+    /// position; the drives are disabled at once. Returns the position: split the streams anew for it, which
     /// drops what is queued.
     pub fn stand_here(&mut self) -> [Position; AXES] {
         self.power = Power::Off;
@@ -396,14 +405,15 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         LOOK_TICKS * AXES as u8
     };
 
-    /// Whether a fault asks for a stop on the path: the background holds the motion then, as on a command.
-    pub fn wants_hold(&self) -> bool {
-        matches!(self.power, Power::Stopping { is_at_rest: false, .. })
-    }
-
-    /// Whether the drives are told to be off, or will be in the next tick: the end of every fault.
-    pub fn is_off(&self) -> bool {
-        self.power == Power::Off
+    /// How the fault is ending, in the order of urgency: on the path, along a ramp, or with the drives off, which is the end
+    /// of every fault. `None` without a fault.
+    pub fn reaction(&self) -> Option<Reaction> {
+        self.trace.fault.map(|_| match self.power {
+            Power::Stopping { .. } => Reaction::Stop,
+            Power::Ramping { .. } => Reaction::Ramp,
+            // A fault leaves no other.
+            _ => Reaction::Immediate,
+        })
     }
 
     /// Looks at one axis in every [`LOOK_TICKS`] ticks.
@@ -435,7 +445,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         // Since its place in the round, or in the round before.
         let place = LOOK_TICKS.saturating_mul(axis as u8 + 1);
         let now = self.guards.look_ticks + 1;
-        let since = if now > place { now - place } else { now + Self::ROUND_TICKS - place };
+        let since = if now > place { now - place } else { now + (Self::ROUND_TICKS - place) };
         let parts = self.axes.get(axis).zip(self.config.get(axis));
         let found = match parts.zip(self.trace.executed.setpoints.get(axis)) {
             Some(((state, config), setpoint)) => state.judge(config, setpoint, since),
@@ -466,7 +476,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         let has_come_to_rest = !is_at_rest && self.trace.executed.state != ExecState::Moving;
         if has_come_to_rest {
             self.power = Power::Stopping { ticks_left: u32::from(self.preview.ticks()), is_at_rest: true };
-        } else if ticks_left > 0 && (is_at_rest || intake.can_hold()) {
+        } else if ticks_left > 0 && (is_at_rest || intake.want_stop()) {
             self.power = Power::Stopping { ticks_left: ticks_left - 1, is_at_rest };
         } else {
             self.react(if is_at_rest { Reaction::Immediate } else { Reaction::Ramp });
@@ -477,10 +487,10 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     #[cold]
     fn ramp(&mut self) {
         let Power::Ramping { ticks_left } = self.power else { return };
-        let (left, all) = (i32::from(ticks_left) - 1, i32::from(self.guards.reactions.ramp_ticks));
+        let (left, all) = (i64::from(ticks_left) - 1, i64::from(self.guards.reactions.ramp_ticks));
         for (output, &DacCode(from)) in self.trace.axes.iter_mut().zip(&self.guards.ramp_from) {
             let DacCode(still) = output.code;
-            let above = (i32::from(from) - i32::from(still)) * left;
+            let above = (i64::from(from) - i64::from(still)) * left;
             output.code = DacCode(still.wrapping_add(above.checked_div(all).unwrap_or(0) as i16));
         }
         self.power = if left == 0 { Power::Off } else { Power::Ramping { ticks_left: ticks_left - 1 } };

@@ -102,7 +102,7 @@ pub mod recorder;
 pub mod kernel;
 #[cfg(feature = "live")]
 pub mod jog;
-#[cfg(feature = "live")]
+#[cfg(all(feature = "live", feature = "guards"))]
 pub mod homing;
 
 #[cfg(all(test, feature = "guards"))]

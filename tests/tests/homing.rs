@@ -5,7 +5,7 @@ mod check;
 
 use check::bench::mm;
 use check::random::Random;
-use hal_sim::{HomeParameters, IndexParameters, SwitchParameters};
+use hal_sim::{EncoderNoise, HomeParameters, IndexParameters, SwitchParameters};
 use motion_host::gcode;
 use motion_host::machine::{HomingSettings, Machine};
 use motion_host::planning::{Executable, Mode, plan_program};
@@ -113,10 +113,11 @@ impl Watch {
 /// Homes an axis of the reference machine, and hands over the session.
 fn homed<R: Real>(
     settings: HomingSettings,
+    noise: Option<EncoderNoise>,
     behind: &mut dyn FnMut(&mut Session<'_, R>, &Simulated, &mut Watch),
 ) -> Result<HomedAxis, HomingError> {
     let mut machine = Machine::reference();
-    machine.axes[AXIS].homing = Some(settings);
+    (machine.axes[AXIS].homing, machine.axes[AXIS].noise) = (Some(settings), noise);
     // Position set-points that are delayed get the new position, too.
     machine.axes[1].feedforward.lead_s = 12.0 * machine.tick_s;
     let simulated = Simulated::new(&machine.simulated()).expect("a machine");
@@ -139,9 +140,9 @@ fn homed<R: Real>(
 
 fn homed_in(seed: u64, settings: HomingSettings) -> Result<HomedAxis, HomingError> {
     match seed % 3 {
-        0 => homed::<f32>(settings, &mut |_, _, _| {}),
-        1 => homed::<f64>(settings, &mut |_, _, _| {}),
-        _ => homed::<Fixed>(settings, &mut |_, _, _| {}),
+        0 => homed::<f32>(settings, None, &mut |_, _, _| {}),
+        1 => homed::<f64>(settings, None, &mut |_, _, _| {}),
+        _ => homed::<Fixed>(settings, None, &mut |_, _, _| {}),
     }
 }
 
@@ -205,6 +206,22 @@ fn with_a_switch_alone_it_is_as_good_as_a_tick() {
     println!("the switch was seen {least} to {most} mm late");
 }
 
+/// Guards look at an axis every 24 ticks; whenever its position gets another name, none of them takes that for motion.
+#[test]
+fn a_reference_is_no_motion_for_the_guards() {
+    for tick in 0..48_u32 {
+        for direction in [Direction::Positive, Direction::Negative] {
+            // At the slow feed the switch closes a tick later.
+            let switch_mm = 20.0 + f64::from(tick) * 1e-3;
+            let place = Place { direction, switch_mm, switch_length_mm: 35.0, index_mm: 23.0 };
+            let settings = HomingSettings { config: config(direction, false), simulated: place.simulated() };
+            let noise = EncoderNoise { amplitude_counts: 1, seed: tick.into() };
+            let found = homed::<f32>(settings, Some(noise), &mut |_, _, _| {});
+            assert!(found.is_ok(), "{place:?}: {found:?}");
+        }
+    }
+}
+
 #[test]
 fn what_is_broken_is_named() {
     for direction in [Direction::Positive, Direction::Negative] {
@@ -240,7 +257,7 @@ fn programs_go_on_from_the_new_position() {
     fn driven<R: Real>(direction: Direction) {
         let place = Place { direction, switch_mm: 25.0, switch_length_mm: 35.0, index_mm: 28.5 };
         let settings = HomingSettings { config: config(direction, true), simulated: place.simulated() };
-        homed::<R>(settings, &mut |session, simulated, watch| {
+        homed::<R>(settings, None, &mut |session, simulated, watch| {
             assert_eq!(session.position(), [Position::ZERO; 3]);
             let origin_mm = simulated.truth()[AXIS].position_mm;
             let machine = watch.machine.clone();

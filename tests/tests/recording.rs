@@ -176,8 +176,12 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
         _ => None,
     };
     let at = random.next() % (ticks + 1);
-    let options =
-        RunOptions { number, correction: correction.as_ref(), script: script.as_ref(), injections: None };
+    let options = RunOptions {
+        number,
+        correction: correction.as_ref(),
+        script: script.as_ref(),
+        ..RunOptions::default()
+    };
     let job = Job::new(&options, &plan, &machine).expect("a job");
     let mut ticks = Vec::new();
     let (summary, recording) = simulate::on_simulated(&machine, None, |rig| {

@@ -276,7 +276,7 @@ impl Recording {
         Self::with(&RunOptions::default(), experiment, program, machine, feed_mm_s)
     }
 
-    /// [`Recording::of`], run as `options` say.
+    /// [`Recording::of`], run as `options` say, but unguarded: the axis is to be seen beyond what its guards take for sound.
     ///
     /// # Errors
     /// As there, and a correction that can't be used.
@@ -290,7 +290,8 @@ impl Recording {
         let program = gcode::read(&experiment, program.as_bytes())?;
         let plan = plan_program(&experiment, &program, &machine, Mode::Spanning)?;
         let mut ticks = Vec::with_capacity((plan.time_s / machine.tick_s) as usize + 2);
-        let summary = simulate::run_with(options, &plan, &machine, &mut |tick| ticks.push(*tick))?;
+        let options = RunOptions { is_unguarded: true, ..*options };
+        let summary = simulate::run_with(&options, &plan, &machine, &mut |tick| ticks.push(*tick))?;
         match summary.faults.into_iter().next() {
             Some(fault) => Err(DriveError::Fault { experiment, fault }),
             None => Ok(Self { experiment, machine, feed_mm_s, ticks }),

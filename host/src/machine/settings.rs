@@ -144,20 +144,27 @@ pub struct HomingSettings {
 /// How faults of the axes are told and end.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Guards {
-    /// Of each axis.
-    pub axes: [GuardFigures; 3],
+    /// Of each axis; `None` to watch nothing but the limits of their following errors.
+    pub axes: Option<[GuardFigures; 3]>,
     /// How faults end.
     pub reactions: Reactions,
 }
 
 impl Guards {
+    /// The same reactions to fewer faults.
+    #[must_use]
+    pub fn limits_only(self) -> Self {
+        Self { axes: None, ..self }
+    }
+
     /// Where the axes may go; an end beyond the kernel's range bounds nothing.
     #[must_use]
     pub fn travel(&self) -> Travel<3> {
-        self.axes.each_ref().map(|axis| {
+        let of_axis = |axis: GuardFigures| {
             let [low, high] = axis.travel_mm?.map(Position::from_mm);
             Some([low?, high?])
-        })
+        };
+        self.axes.map_or([None; 3], |axes| axes.map(of_axis))
     }
 
     /// The kernel's axes for a control tick of `tick_s`, guarded.
@@ -169,7 +176,11 @@ impl Guards {
         figures: &[AxisFigures; 3],
         tick_s: f64,
     ) -> Result<AxesConfig<R, 3>, AxesError> {
-        let axes = AxesConfig::new(figures, tick_s)?.guarded(&self.axes, tick_s)?;
+        let axes = AxesConfig::new(figures, tick_s)?;
+        let axes = match &self.axes {
+            Some(guards) => axes.guarded(guards, tick_s)?,
+            None => axes,
+        };
         Ok(AxesConfig { reactions: self.reactions, ..axes })
     }
 }
@@ -256,7 +267,7 @@ impl Machine {
     #[must_use]
     pub fn guards(&self) -> Guards {
         Guards {
-            axes: self.axes.each_ref().map(|axis| axis.guard_figures(self.tick_s)),
+            axes: Some(self.axes.each_ref().map(|axis| axis.guard_figures(self.tick_s))),
             reactions: self.faults.reactions(self.tick_s),
         }
     }

@@ -38,7 +38,7 @@ use crate::simulate::live::Script;
 use crate::simulate::{Job, Number, Sheet, StretchCorrection};
 
 const MAGIC: [u8; 4] = *b"MREC";
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 /// A recorded run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

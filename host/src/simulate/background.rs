@@ -105,13 +105,6 @@ impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_,
         }
     }
 
-    /// Brings the motion to rest on the path, if it can be held.
-    pub(super) fn hold(&mut self) {
-        if let Self::Live(live) = self {
-            live.director.hold();
-        }
-    }
-
     /// Whether the run ends with a tick that ended in `state`: nothing is left, or nothing will let it go on. Why, if
     /// that is not the program's end.
     pub(super) fn ended(&self, state: ExecState) -> Option<Option<&'static str>> {

@@ -139,7 +139,7 @@ impl Job {
         Ok(Self {
             number: options.number,
             header: machine.header(),
-            guards: machine.guards(),
+            guards: if options.is_unguarded { machine.guards().limits_only() } else { machine.guards() },
             items: executable.items,
             correction: options.correction.cloned(),
             script: options.script.cloned(),

@@ -7,6 +7,7 @@ use core::convert::Infallible;
 
 use motion_kernel::axis::{Correction, CorrectionError};
 use motion_kernel::exec::ExecState;
+use motion_kernel::fault::Reaction;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::program::SupplyError;
@@ -67,6 +68,8 @@ pub struct RunOptions<'a> {
     pub script: Option<&'a Script>,
     /// What breaks.
     pub injections: Option<&'a Injections>,
+    /// An experiment that may drive axes as no program does: nothing but the limits of their following errors is watched.
+    pub is_unguarded: bool,
 }
 
 /// Why a run could not be made.
@@ -185,9 +188,6 @@ fn run_in<R: Real>(
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     let mut goes_on = true;
     while goes_on {
-        if kernel.wants_hold() {
-            background.hold();
-        }
         background.turn(collector.ticks()).map_err(RunError::Rejected)?;
         let trace = *kernel.tick(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
@@ -207,7 +207,7 @@ fn run_in<R: Real>(
                 let setpoints = &trace.executed.setpoints;
                 summary.faults.push(faults::record(&fault, (header, sheet), &config, setpoints));
             }
-            if kernel.is_off() {
+            if kernel.reaction() == Some(Reaction::Immediate) {
                 break;
             }
             continue;

@@ -38,7 +38,7 @@ const COUNTS_A_TICK: i32 = 4;
 /// What is watched, in figures of any number type.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GuardFigures {
-    /// Greatest following error at rest \[mm\], > 0.
+    /// Greatest following error at rest \[mm\], > 0, at most the axis' limit.
     pub following_error_at_rest_mm: f64,
     /// What it may be greater for velocity \[mm per mm/s\], 0 or more.
     pub following_error_per_velocity_s: f64,
@@ -103,7 +103,7 @@ impl<R: Real> GuardConfig<R> {
     pub(super) fn new(
         check: &mut Check,
         figures: &GuardFigures,
-        mm_per_count: f64,
+        config: &AxisConfig<R>,
         look_ticks: u32,
         tick_s: f64,
     ) -> Self {
@@ -126,6 +126,10 @@ impl<R: Real> GuardConfig<R> {
         figure("acceleration by load [mm/s²]", figures.load_accel_mm_s2, least);
         figure("response [s]", response_s, least);
         figure("saturation [s]", saturation_s, least);
+        // The tick looks at the limit in motion only beyond the one at rest.
+        let is_within = at_rest_mm <= config.following_error_limit_mm;
+        let expected = "at most the limit of the following error";
+        check.that(is_within, "following error at rest [mm]", figures.following_error_at_rest_mm, expected);
         let travel = figures.travel_mm.map(|[low_mm, high_mm]| {
             let expected = "a travel within the kernel's range, its lower end first";
             let ends = [low_mm - TRAVEL_ROUNDING_MM, high_mm + TRAVEL_ROUNDING_MM].map(Position::from_mm);
@@ -137,7 +141,7 @@ impl<R: Real> GuardConfig<R> {
             [low, high]
         });
         // Two readings, each off by half a count and the noise.
-        let noise_mm = libm::fabs(mm_per_count) * (1.0 + 2.0 * f64::from(noise_counts));
+        let noise_mm = libm::fabs(config.encoder.mm_per_count()) * (1.0 + 2.0 * f64::from(noise_counts));
         Self {
             at_rest_mm,
             per_velocity_s,
@@ -155,7 +159,7 @@ impl<R: Real> GuardConfig<R> {
         }
     }
 
-    /// The limit of the following error in a motion.
+    /// The limit of the following error in a motion; not a number where the motion is none.
     pub(super) fn limit_mm(&self, most_mm: R, setpoint: &Setpoint<R>) -> R {
         let grown_mm = self.at_rest_mm
             + self.per_velocity_s * setpoint.velocity_mm_s.abs()
@@ -406,14 +410,6 @@ impl<R: Real> Guard<R> {
     ) -> Option<Found<R>> {
         let guard = &config.guard;
         self.is_excused = false;
-        // One can drive back.
-        let is_beyond = |[low, high]: [Position; 2]| {
-            output.set < low && setpoint.velocity_mm_s < R::ZERO
-                || output.set > high && setpoint.velocity_mm_s > R::ZERO
-        };
-        if guard.travel.is_some_and(is_beyond) {
-            return Some(Found::SoftLimit);
-        }
         if guard.response_looks == 0 {
             return None;
         }
@@ -443,10 +439,19 @@ impl<R: Real> Guard<R> {
             Some(Found::EncoderLost)
         } else if self.saturated_looks >= guard.saturation_looks {
             Some(Found::Saturated)
+        } else if guard.travel.is_some_and(|travel| drives_out(travel, setpoint, output)) {
+            // The least urgent, so the last.
+            Some(Found::SoftLimit)
         } else {
             None
         }
     }
+}
+
+/// Whether an axis is beyond its travel and goes on: one can drive back.
+fn drives_out<R: Real>([low, high]: [Position; 2], setpoint: &Setpoint<R>, output: &AxisOutput<R>) -> bool {
+    output.set < low && setpoint.velocity_mm_s < R::ZERO
+        || output.set > high && setpoint.velocity_mm_s > R::ZERO
 }
 
 /// The distance of a number of counts \[mm\].
@@ -457,34 +462,11 @@ fn mm<R: Real>(config: &AxisConfig<R>, counts: i32) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::{AxesConfig, AxisFigures, AxisState, Feedforward, Gains};
-
-    const COUNT_MM: f64 = 1e-4;
+    use crate::axis::fixture::{GUARD, MM_PER_COUNT, TICK_S, figures, guarded};
+    use crate::axis::{AxesConfig, AxisState};
 
     fn config() -> AxisConfig<f32> {
-        let figures = AxisFigures {
-            mm_per_count: COUNT_MM,
-            mm_s_at_10_v: 1000.0 / 3.0,
-            output_offset_v: 0.0,
-            output_limit_v: 10.0,
-            gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
-            feedforward: Feedforward { velocity: 1.0, ..Feedforward::default() },
-            following_error_limit_mm: 1.0,
-        };
-        let guard = GuardFigures {
-            following_error_at_rest_mm: 0.25,
-            following_error_per_velocity_s: 1e-3,
-            following_error_per_accel_s2: 1e-4,
-            jump_mm: 0.007,
-            moving_mm_s: 3.0,
-            response_s: 0.013,
-            load_accel_mm_s2: 1230.0,
-            noise_counts: 0,
-            saturation_s: 0.1,
-            travel_mm: None,
-        };
-        let axes = AxesConfig::new(&[figures], 5e-4).and_then(|axes| axes.guarded(&[guard], 5e-4));
-        axes.expect("an axis").axes[0]
+        guarded::<f32, 1>(figures(), GUARD).axes[0]
     }
 
     /// Ticks of an axis that is set at 0 and reads `counts`; the first one in which it is lost.
@@ -523,8 +505,8 @@ mod tests {
         {
             let setpoint = Setpoint { velocity_mm_s, accel_mm_s2, ..Setpoint::default() };
             let (tick, found) = lost(|tick| tick * 65, &setpoint).expect("beyond");
-            let error_mm = COUNT_MM * 65.0 * tick as f64;
-            let is_first = error_mm > limit_mm && error_mm <= limit_mm + 65.5 * COUNT_MM;
+            let error_mm = MM_PER_COUNT * 65.0 * tick as f64;
+            let is_first = error_mm > limit_mm && error_mm <= limit_mm + 65.5 * MM_PER_COUNT;
             assert!(
                 is_first && matches!(found, Found::FollowingError { .. }),
                 "{limit_mm}: {error_mm} {found:?}"
@@ -545,5 +527,56 @@ mod tests {
             assert_eq!((output.lost, output.saturated), (!is_cut, is_cut), "{velocity_mm_s}");
             assert!(is_cut || axis.judge(&config, &setpoint, 1) == Found::NotFinite);
         }
+    }
+
+    /// A limit that is not a number allows nothing, least of all the greatest error.
+    #[test]
+    fn a_limit_that_is_not_a_number_allows_nothing() {
+        for velocity_mm_s in [0.0, f32::NAN] {
+            let setpoint = Setpoint { velocity_mm_s, ..Setpoint::default() };
+            let (config, mut guard) = (config(), Guard::default());
+            // Between the limit at rest and the greatest one.
+            let is_allowed = guard.allows(&config, 0.5, 0.499, Counts(-5000), &setpoint);
+            assert!(!is_allowed && matches!(guard.alarm, Alarm::Error { .. }), "{velocity_mm_s}");
+        }
+    }
+
+    /// The tick looks at the limit at rest first, so no other may be less.
+    #[test]
+    fn a_limit_at_rest_above_the_greatest_is_refused() {
+        let refused = |at_rest_mm: f64| {
+            let guard = GuardFigures { following_error_at_rest_mm: at_rest_mm, ..GUARD };
+            let axes = AxesConfig::<f32, 1>::new(&[figures()], TICK_S).expect("axes");
+            axes.guarded(&[guard], TICK_S).err().map(|error| error.cause.quantity)
+        };
+        assert_eq!(refused(1.0), None);
+        assert_eq!(refused(1.0001), Some("following error at rest [mm]"));
+        assert_eq!(refused(f64::NAN), Some("following error at rest [mm]"));
+    }
+
+    /// Beyond its travel an axis is watched as anywhere: what is more urgent is found.
+    #[test]
+    fn a_soft_limit_hides_nothing() {
+        let guard = GuardFigures { travel_mm: Some([-1.0, 1.0]), ..GUARD };
+        let config = guarded::<f32, 1>(figures(), guard).axes[0];
+        let setpoint = Setpoint { velocity_mm_s: 20.0, ..Setpoint::default() };
+        let found = |step: i64| {
+            let mut axis = AxisState::default();
+            (0..400_i64).fold(Vec::new(), |mut found, tick| {
+                let set = Position::from_mm(2.0).expect("in range");
+                let counts = Counts(20_000 + step * tick);
+                let mut output = AxisOutput { counts, set, ..AxisOutput::default() };
+                axis.tick(&config, &setpoint, &mut output);
+                if !output.lost && tick % 8 == 7 {
+                    found.extend(
+                        axis.look(&config, &setpoint, &output, 8).filter(|new| found.last() != Some(new)),
+                    );
+                }
+                found
+            })
+        };
+        assert_eq!(found(0), [Found::SoftLimit, Found::EncoderLost]);
+        assert_eq!(found(-20), [Found::SoftLimit, Found::Runaway]);
+        assert_eq!(found(5), [Found::SoftLimit]);
     }
 }

@@ -16,6 +16,8 @@
 mod check;
 pub mod correction;
 pub mod feedforward;
+#[cfg(all(test, feature = "guards"))]
+pub(crate) mod fixture;
 #[cfg(feature = "guards")]
 mod guard;
 pub mod preview;
@@ -145,10 +147,8 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
     pub fn guarded(mut self, guards: &[GuardFigures; AXES], tick_s: f64) -> Result<Self, AxesError> {
         let look_ticks = u32::from(LOOK_TICKS) * AXES as u32;
         for (axis, (config, figures)) in self.axes.iter_mut().zip(guards).enumerate() {
-            let mm_per_count = config.encoder.mm_per_count();
-            config.guard =
-                Check::all(|check| GuardConfig::new(check, figures, mm_per_count, look_ticks, tick_s))
-                    .map_err(|cause| AxesError { axis, cause })?;
+            config.guard = Check::all(|check| GuardConfig::new(check, figures, config, look_ticks, tick_s))
+                .map_err(|cause| AxesError { axis, cause })?;
         }
         Ok(self)
     }
@@ -237,11 +237,17 @@ pub struct AxisOutput<R> {
 impl<R: Real> AxisState<R> {
     /// Declares the encoder's present reading to be `position`.
     pub fn set_position(&mut self, config: &AxisConfig<R>, counts: Counts, position: Position) {
-        self.offset = position - config.encoder.position(counts);
+        self.refer(config, counts, position);
         #[cfg(feature = "guards")]
         {
             self.guard = Guard::at(counts);
         }
+    }
+
+    /// Declares a reading of the encoder, not the present one, to be `position`. What guards remember are counts, and stays.
+    #[inline]
+    pub(crate) fn refer(&mut self, config: &AxisConfig<R>, counts: Counts, position: Position) {
+        self.offset = position - config.encoder.position(counts);
     }
 
     /// The actual position at the encoder's reading.

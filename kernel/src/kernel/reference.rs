@@ -28,7 +28,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             return None;
         }
         let before = state.offset;
-        state.set_position(config, counts, position);
+        state.refer(config, counts, position);
         let shift = state.offset - before;
         let (set_of_axis, output) = (set.get_mut(axis)?, self.trace.axes.get_mut(axis)?);
         *set_of_axis = *set_of_axis + shift;

@@ -244,7 +244,8 @@ where
         }
     }
 
-    /// One turn of the background: reads what there is room for, obeys what was commanded, hands over what follows.
+    /// One turn of the background: reads what there is room for, obeys what was commanded, hands over what follows. A fault
+    /// that ends in a stop on the path is obeyed as a hold that is not resumed.
     ///
     /// # Errors
     /// An item can't be executed. Nothing is read any more, every later call returns the same error, and what was handed
@@ -260,6 +261,9 @@ where
     }
 
     fn turn_on(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+        if feeder.is_stop_wanted() {
+            self.hold();
+        }
         if feeder.is_refused() {
             // The tick had passed the place: once more, further ahead.
             if self.lead.to_bits() < LEAD_TICKS_MAX << 32 {
@@ -405,6 +409,9 @@ where
                 return Ok(());
             }
             Item::Line { .. } | Item::Septic { .. } | Item::EndOfStretch(_) => {
+                if let Item::EndOfStretch(_) = item {
+                    self.check_blocks()?;
+                }
                 self.pending = Some(item.ready(self.tick_s)?);
                 return Ok(());
             }
@@ -415,6 +422,16 @@ where
         };
         let _ = self.course.push_back(planned);
         Ok(())
+    }
+
+    /// The blocks of the stretch that has been read end where its path does: plans go by the blocks.
+    fn check_blocks(&self) -> Result<(), SupplyError<E>> {
+        let (path, blocks) = (self.path_end, self.road.end_of(self.reading).unwrap_or(Position::ZERO));
+        if blocks == path {
+            return Ok(());
+        }
+        let (blocks_mm, path_mm) = (blocks.to_mm(), path.to_mm());
+        Err(SupplyError::Rejected(Rejection::Blocks { blocks_mm, path_mm }))
     }
 
     /// How far the path of a stretch is queued, and whether that is all of it; not beyond the block end to rest at.
@@ -632,29 +649,37 @@ mod tests {
         Position::from_mm(mm).expect("in range")
     }
 
-    /// Ticks that come between the background's look and its word make it too late: the command is made again, from where
-    /// motion is by then.
-    #[test]
-    fn a_refused_command_is_made_again() {
-        let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
-        let rules = PathRules { limits, feed_mm_s: 20.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
-        let up = Ramp::new(&Law::new(limits).expect("limits"), 0.0, 20.0);
+    const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+    const RULES: PathRules =
+        PathRules { limits: LIMITS, feed_mm_s: 20.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+
+    /// A hundred millimetres of cruise between two ramps, on a block that is so much longer.
+    fn line(longer: Position) -> [Item<1>; 6] {
+        let up = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, 20.0);
         let (ramp, cruise) = (at(up.length_mm()), at(100.0));
         let whole = ramp + cruise + ramp;
-        let allowed = Allowed { cap_mm_s: 20.0, limits };
+        let allowed = Allowed { cap_mm_s: 20.0, limits: LIMITS };
         let line = Item::Line { line: 1, start: [Position::ZERO], direction: [1.0], length: whole };
-        let items = [
-            Item::Block(PathBlock::new(whole, 20.0, allowed, allowed, 0.0)),
+        [
+            Item::Block(PathBlock::new(whole + longer, 20.0, allowed, allowed, 0.0)),
             line,
             Item::Feed { ramp: up, length: ramp },
             Item::Feed { ramp: Ramp::cruise(20.0, 5.0), length: cruise },
             Item::Feed { ramp: up.reversed(), length: ramp },
             Item::EndOfStretch([whole]),
-        ];
+        ]
+    }
+
+    /// Ticks that come between the background's look and its word make it too late: the command is made again, from where
+    /// motion is by then.
+    #[test]
+    fn a_refused_command_is_made_again() {
+        let items = line(Position::ZERO);
+        let ramp_s = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, 20.0).duration_s();
         // In the rise, the hold of a cruise, and just before a ramp ends.
-        for seen in [50, 2000, (up.duration_s() / TICK_S) as u32 - 2] {
+        for seen in [50, 2000, (ramp_s / TICK_S) as u32 - 2] {
             let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
-            let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
+            let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
             let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
             let mut director =
                 Director::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
@@ -677,6 +702,27 @@ mod tests {
             // A ramp to the end and another to rest, not 5 s of cruise.
             assert!(ticks < 1200, "seen at tick {seen}: {ticks} ticks to rest");
             assert_eq!(director.starvations(), 0, "seen at tick {seen}");
+        }
+    }
+
+    /// A block that is a step longer or shorter than its path: what was handed over ends at rest, and the rest is refused.
+    #[test]
+    fn blocks_that_contradict_their_path_are_refused() {
+        for steps in [-1, 1, 1 << 30] {
+            let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+            let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
+            let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
+            let items = line(Position::from_bits(steps));
+            let mut director =
+                Director::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
+            let mut refused = 0;
+            for _ in 0..20_000 {
+                let turned = director.turn(&mut feeder);
+                refused +=
+                    usize::from(matches!(turned, Err(SupplyError::Rejected(Rejection::Blocks { .. }))));
+                executor.tick(&mut intake).expect("no fault");
+            }
+            assert_eq!((refused, director.state(&feeder)), (20_000, State::Failed), "{steps}");
         }
     }
 }

@@ -90,7 +90,7 @@ impl Item {
             Phase::Rise | Phase::Hold => {
                 let t2_s = if phase == Phase::Rise { ramp.t1_s } else { ramp.t1_s + elapsed_s };
                 let change_mm_s = (ramp.to_mm_s - ramp.from_mm_s) * (t2_s / ramp.t2_s);
-                let ramp = Ramp { to_mm_s: ramp.from_mm_s + change_mm_s, t2_s, ..ramp };
+                let ramp = Ramp { to_mm_s: changed(ramp.from_mm_s, change_mm_s), t2_s, ..ramp };
                 Some(Self::Feed { ramp, length: length(ramp.length_mm())? })
             }
             Phase::Fall => None,
@@ -105,6 +105,17 @@ impl Item {
             Phase::Hold => ramp.t2_s - ramp.t1_s,
         };
         Ticks::from_seconds(seconds, tick_s)
+    }
+}
+
+/// A feed changed by no more than `change_mm_s`, however it is rounded: where feeds are great and their change is small, what
+/// is rounded up asks for an acceleration beyond the limit.
+fn changed(from_mm_s: f64, change_mm_s: f64) -> f64 {
+    let to_mm_s = from_mm_s + change_mm_s;
+    match to_mm_s - from_mm_s {
+        rounded if rounded > change_mm_s && change_mm_s > 0.0 => to_mm_s.next_down(),
+        rounded if rounded < change_mm_s && change_mm_s < 0.0 => to_mm_s.next_up(),
+        _ => to_mm_s,
     }
 }
 
@@ -179,5 +190,48 @@ impl List {
             Some((start, _)) => *start,
             None => self.end(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Limits;
+
+    /// However great the feeds are beside their change.
+    #[test]
+    fn a_ramp_that_is_given_up_asks_for_no_more_than_the_whole() {
+        let mut state = 1_u64;
+        let mut unit = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let tick_s = 5e-4;
+        let mut cuts = 0;
+        for seed in 0..10_000 {
+            let limits = Limits { accel_mm_s2: 50.0 + 500.0 * unit(), jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+            let from_mm_s = 1000.0 * unit();
+            let to_mm_s = libm::fabs(from_mm_s + 100.0 * (unit() - 0.5));
+            let ramp = Ramp::within(&limits, from_mm_s, to_mm_s);
+            let item = Item::Feed { ramp, length: Position::from_mm(ramp.length_mm()).expect("in range") };
+            let held_s = ramp.t2_s - ramp.t1_s;
+            let elapsed = Ticks::from_seconds(held_s * unit(), tick_s).expect("in range");
+            for (phase, elapsed) in
+                [(Phase::Rise, Ticks::from_seconds(ramp.t1_s, tick_s)), (Phase::Hold, Some(elapsed))]
+            {
+                let Some(Item::Feed { ramp: cut, .. }) = item.cut(phase, elapsed.expect("in range"), tick_s)
+                else {
+                    continue;
+                };
+                cuts += 1;
+                let accel_mm_s2 = 0.5 * segment::to_f64(&cut).peak_jerk_mm_s3 * cut.t1_s;
+                let most_mm_s2 = limits.accel_mm_s2 * (1.0 + 8.0 * f64::EPSILON);
+                assert!(
+                    accel_mm_s2 <= most_mm_s2,
+                    "seed {seed}: {accel_mm_s2} of {most_mm_s2}, {ramp:?} {cut:?}"
+                );
+            }
+        }
+        assert!(cuts > 10_000, "{cuts}");
     }
 }

@@ -90,6 +90,14 @@ pub enum Rejection {
     Empty,
     /// Dwells and stops belong between stretches.
     InsideStretch,
+    /// The blocks of a stretch are longer or shorter than its path.
+    #[cfg(feature = "live")]
+    Blocks {
+        /// The blocks' \[mm\].
+        blocks_mm: f64,
+        /// The pieces' \[mm\].
+        path_mm: f64,
+    },
     /// Path that no block says the feed of: live control could not brake on it.
     NoBlock,
     /// A change to or from a feed list that is not the one it may be: to the one that was filled last, from another,
@@ -128,6 +136,10 @@ impl core::fmt::Display for Rejection {
             }
             Self::Travel { axis, mm } => write!(f, "position {mm} mm of axis {axis}: expected its travel"),
             Self::Empty => write!(f, "a stretch without any length"),
+            #[cfg(feature = "live")]
+            Self::Blocks { blocks_mm, path_mm } => {
+                write!(f, "{blocks_mm} mm of blocks, {path_mm} mm of path: expected equal lengths")
+            }
             Self::NoBlock => write!(f, "path without a block, expected one that says what holds its feed"),
             #[cfg(feature = "live")]
             Self::NoChange { from, to, after } => {

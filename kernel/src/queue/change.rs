@@ -6,7 +6,7 @@
 //! finds it, or refuses it if it has passed the place; until then it is on a motion that ends at rest. So the background
 //! may take as long as it likes.
 //!
-//! The other way go a count of ticks and where the executor is ([`Progress`]).
+//! The other way go a count of ticks, where the executor is ([`Progress`]), and whether a fault asks for a stop.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -77,6 +77,9 @@ pub(super) struct Words {
     claimed: AtomicU32,
     /// Counts what the background writes of the words above, so that the tick looks at one where there is nothing new.
     news: AtomicU32,
+    /// The tick asks for a stop on the path: 1.
+    #[cfg(feature = "guards")]
+    stop_wanted: AtomicU32,
     tick: AtomicU32,
     /// List, phase and count of items done.
     place: AtomicU32,
@@ -94,6 +97,8 @@ impl Words {
             refused: AtomicU32::new(Change::NONE),
             claimed: AtomicU32::new(1),
             news: AtomicU32::new(0),
+            #[cfg(feature = "guards")]
+            stop_wanted: AtomicU32::new(0),
             tick: AtomicU32::new(0),
             place: AtomicU32::new(0),
             left_high: AtomicU32::new(0),
@@ -110,6 +115,20 @@ impl Words {
         for word in [&self.news, &self.tick, &self.place, &self.left_high, &self.left_low] {
             word.store(0, Ordering::Relaxed);
         }
+        #[cfg(feature = "guards")]
+        self.stop_wanted.store(0, Ordering::Relaxed);
+    }
+
+    /// The tick asks for a stop, until the streams are split anew.
+    #[cfg(feature = "guards")]
+    pub(super) fn want_stop(&self) {
+        self.stop_wanted.store(1, Ordering::Release);
+    }
+
+    /// Whether the tick asks for a stop.
+    #[cfg(feature = "guards")]
+    pub(super) fn is_stop_wanted(&self) -> bool {
+        self.stop_wanted.load(Ordering::Acquire) != 0
     }
 
     /// The background asks for a change, in place of one that has not come about.

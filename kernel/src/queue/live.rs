@@ -292,6 +292,15 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         self.shared.words.is_refused()
     }
 
+    /// Whether a fault asks for a stop on the path; never again after the streams are split anew.
+    #[must_use]
+    pub fn is_stop_wanted(&self) -> bool {
+        #[cfg(feature = "guards")]
+        return self.shared.words.is_stop_wanted();
+        #[cfg(not(feature = "guards"))]
+        false
+    }
+
     /// Gives up a list: the tick empties it.
     pub fn give_up(&mut self, list: u8) {
         self.interruptible();

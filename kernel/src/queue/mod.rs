@@ -370,12 +370,14 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
         self.correction.as_mut()
     }
 
-    /// Whether the motion can be held: under live control.
+    /// Asks the background for a stop on the path; whether it can make one, under live control.
     #[cfg(feature = "guards")]
-    pub(crate) fn can_hold(&self) -> bool {
+    pub(crate) fn want_stop(&self) -> bool {
         #[cfg(feature = "live")]
-        return self.lists.is_some();
-        #[cfg(not(feature = "live"))]
+        if self.lists.is_some() {
+            self.shared.words.want_stop();
+            return true;
+        }
         false
     }
 

@@ -6,11 +6,13 @@ use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::num::Real;
 use motion_kernel::trace::Trace;
-use motion_kernel::units::{Counts, DacCode};
+use motion_kernel::units::{Counts, DacCode, Position};
 
 use super::items::TICK_S;
 
 const MM_PER_COUNT: f64 = 1e-4;
+/// What is put out at rest \[V\].
+pub(super) const TRIM_V: f64 = 0.1;
 
 /// What the axes are guarded by, alike, for a machine whose encoders read a tick later what was set.
 const GUARD: GuardFigures = GuardFigures {
@@ -26,7 +28,8 @@ const GUARD: GuardFigures = GuardFigures {
     travel_mm: Some([-900.0, 900.0]),
 };
 /// How faults end.
-const REACTIONS: Reactions = Reactions { ramp_ticks: 50, stop_ticks: 2000, emergency_stop: Reaction::Ramp };
+pub(super) const REACTIONS: Reactions =
+    Reactions { ramp_ticks: 50, stop_ticks: 2000, emergency_stop: Reaction::Stop };
 
 /// The axes, alike.
 pub(super) fn axes<R: Real>() -> AxesConfig<R, 2> {
@@ -34,7 +37,7 @@ pub(super) fn axes<R: Real>() -> AxesConfig<R, 2> {
         mm_per_count: MM_PER_COUNT,
         // Above the greatest feed, and what regulation adds to it.
         mm_s_at_10_v: 500.0,
-        output_offset_v: 0.1,
+        output_offset_v: TRIM_V,
         output_limit_v: 9.0,
         gains: Gains { kp_per_s: 100.0, ki_per_s2: 10.0, kd: 0.001 },
         feedforward: Feedforward { velocity: 1.0, accel_s: 1e-3, jerk_s2: 1e-6, ..Feedforward::default() },
@@ -53,6 +56,8 @@ pub(super) struct Bench {
     fails: [bool; 4],
     pub(super) written: [DacCode; 2],
     pub(super) is_enabled: bool,
+    /// What the encoders read where the machine is at 0.
+    origin: [i64; 2],
     /// Has answered other than it should.
     pub(super) is_hostile: bool,
 }
@@ -82,17 +87,25 @@ impl Bench {
         (self.fails, self.inputs) = ([false; 4], MachineInputs::HEALTHY);
     }
 
+    /// An axis has got another position by so much.
+    pub(super) fn shift(&mut self, axis: usize, by: Position) {
+        self.origin[axis] -= counts(by);
+    }
+
     /// The axes are where they were set.
     pub(super) fn follow<R: Real>(&mut self, trace: &Trace<R, 2>) {
-        self.counts = trace
-            .executed
-            .setpoints
-            .map(|axis| Counts((axis.position.to_mm() / MM_PER_COUNT).round_ties_even() as i64));
+        let set = trace.executed.setpoints.each_ref().map(|axis| axis.position);
+        self.counts = core::array::from_fn(|axis| Counts(self.origin[axis] + counts(set[axis])));
     }
 
     fn answer<T>(&self, call: usize, value: T) -> core::result::Result<T, Failure> {
         if self.fails[call] { Err(Failure) } else { Ok(value) }
     }
+}
+
+/// A distance in counts.
+fn counts(at: Position) -> i64 {
+    (at.to_mm() / MM_PER_COUNT).round_ties_even() as i64
 }
 
 /// What every call may answer.

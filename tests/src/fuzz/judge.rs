@@ -1,9 +1,12 @@
 //! What must hold at every tick, whatever the bytes.
 
 use motion_kernel::exec::ExecState;
-use motion_kernel::fault::Fault;
+use motion_kernel::fault::{Fault, Reaction};
 use motion_kernel::num::Real;
 use motion_kernel::trace::Trace;
+use motion_kernel::units::DacCode;
+
+use super::bench::TRIM_V;
 
 use super::items::{LIMITS, RULES, TICK_S};
 
@@ -19,6 +22,9 @@ struct Before<R> {
     v_mm_s: f64,
     set_mm: [f64; 2],
     fault: Option<Fault<R>>,
+    /// How it ends.
+    reaction: Option<Reaction>,
+    codes: [DacCode; 2],
 }
 
 /// Looks at one tick after the other.
@@ -36,8 +42,8 @@ impl<R: Real> Judge<R> {
         self.before = None;
     }
 
-    /// Panics where a promise is broken.
-    pub(super) fn tick(&mut self, trace: &Trace<R, 2>) {
+    /// Panics where a promise is broken. `reaction` is the one after the tick.
+    pub(super) fn tick(&mut self, trace: &Trace<R, 2>, reaction: Option<Reaction>) {
         let motion = &trace.executed.motion;
         let [v, a, j, snap] =
             [motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(|value| value.to_f64());
@@ -55,6 +61,7 @@ impl<R: Real> Judge<R> {
         let rests = trace.executed.state != ExecState::Moving;
         assert!(trace.fault.is_some() || !rests || v == 0.0, "at rest with a feed: {trace:?}");
         let set_mm = trace.executed.setpoints.map(|axis| axis.position.to_mm());
+        let codes = trace.axes.each_ref().map(|axis| axis.code);
         if let Some(before) = &self.before {
             let (limit, step) = (LIMITS.accel_mm_s2 * TICK_S, v - before.v_mm_s);
             // What ends inside a tick and rests begins anew after it: from one side only.
@@ -65,8 +72,25 @@ impl<R: Real> Judge<R> {
             }
             if let Some(fault) = before.fault {
                 assert_eq!(trace.fault, Some(fault), "a fault stays");
+                assert!(reaction >= before.reaction, "{reaction:?} after {:?}: {trace:?}", before.reaction);
             }
+            falls(before, &codes, reaction);
         }
-        self.before = Some(Before { v_mm_s: v, set_mm, fault: trace.fault });
+        self.before = Some(Before { v_mm_s: v, set_mm, fault: trace.fault, reaction, codes });
+    }
+}
+
+/// Outputs of a ramp only come nearer to the voltage of standing still, and stay there once the drives are off.
+fn falls<R>(before: &Before<R>, codes: &[DacCode; 2], reaction: Option<Reaction>) {
+    let DacCode(still) = DacCode::from_volts(TRIM_V);
+    for (&DacCode(then), &DacCode(now)) in before.codes.iter().zip(codes) {
+        let [then, now] = [then, now].map(|code| i32::from(code) - i32::from(still));
+        match (before.reaction, reaction) {
+            (Some(Reaction::Ramp), Some(Reaction::Ramp)) => {
+                assert!(now.abs() <= then.abs() && now * then >= 0, "a ramp from {then} to {now}");
+            }
+            (Some(Reaction::Immediate), Some(_)) => assert!(now.abs() <= 1, "{now} with the drives off"),
+            _ => {}
+        }
     }
 }

@@ -5,7 +5,8 @@
 //!
 //! - nothing panics, overflows or goes on for ever;
 //! - along the path feed, acceleration, jerk and snap keep the limits at every tick, and nothing jumps;
-//! - a fault is latched, switches the drives off, and stays until it is cleared;
+//! - a fault is latched, and stays until it is cleared; its end only grows more urgent, a ramp only falls, and the drives
+//!   are off in time;
 //! - a whole program on a machine that follows is driven to its exact end.
 //!
 //! ```text

@@ -6,15 +6,15 @@ use std::cell::Cell;
 
 use arbitrary::{Result, Unstructured};
 use motion_kernel::exec::ExecState;
-use motion_kernel::fault::FaultKind;
+use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::live::{Director, Source, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::{Intake, LiveStreams, Streams};
-use motion_kernel::units::{Counts, DacCode, Position};
+use motion_kernel::units::{Counts, Position};
 
-use super::bench::{Bench, axes};
+use super::bench::{Bench, REACTIONS, axes};
 use super::items::{Program, RULES, TICK_S};
 use super::judge::Judge;
 
@@ -27,8 +27,8 @@ const PLACES: usize = 64;
 const TICKS_MAX: f64 = 6000.0;
 /// Drives take so many ticks to be ready.
 const SETTLE_TICKS: u32 = 3;
-/// Switching the drives off takes so many ticks at most.
-const OFF_TICKS: u32 = 4000;
+/// Switching the drives off takes so many ticks at most: a stop that is given up for a ramp.
+const OFF_TICKS: u32 = REACTIONS.stop_ticks + REACTIONS.ramp_ticks as u32 + 2;
 
 /// The machine's side of a run.
 struct Machine<R: Real> {
@@ -53,25 +53,50 @@ impl<R: Real> Machine<R> {
 
     /// A command of the board, or something that goes wrong.
     fn event(&mut self, input: &mut Unstructured<'_>) -> Result<()> {
-        match input.int_in_range(0..=9)? {
+        match input.int_in_range(0..=11)? {
             0 => self.kernel.disable(),
             1 => self.kernel.enable(input.int_in_range(0..=20)?),
             2 => {
-                self.kernel.clear_fault();
+                if self.kernel.clear_fault().is_none() {
+                    return Ok(());
+                }
                 self.judge.anew();
             }
             3 => {
                 self.kernel.stand_here();
                 self.judge.anew();
             }
-            4 => self.kernel.trip(FaultKind::Drive { axis: input.choose_index(2)? }),
+            // On the path, in a ramp, at once.
+            4 => self.kernel.trip(match input.int_in_range(0..=2)? {
+                0 => FaultKind::TickMissed { ticks: 1 },
+                1 => FaultKind::Drive { axis: input.choose_index(2)? },
+                _ => FaultKind::Encoder,
+            }),
             5 => {
                 self.bench.mend();
                 return Ok(());
             }
+            6 => {
+                self.kernel.rest_here();
+            }
+            7 => self.refer(input)?,
             _ => return self.bench.upset(input),
         }
         self.is_given_up = true;
+        Ok(())
+    }
+
+    /// An axis gets another position, if it is at rest.
+    fn refer(&mut self, input: &mut Unstructured<'_>) -> Result<()> {
+        let (axis, behind) = (input.choose_index(2)?, input.arbitrary::<i16>()?);
+        let mm = f64::from(input.arbitrary::<i16>()?) / 64.0;
+        let position = Position::from_mm(mm).expect("within half a metre");
+        let Counts(now) = self.bench.counts[axis];
+        let counts = Counts(now.wrapping_sub(i64::from(behind)));
+        let before = self.set[axis];
+        if let Some(set) = self.kernel.reference(axis, counts, position) {
+            self.bench.shift(axis, set[axis] - before);
+        }
         Ok(())
     }
 
@@ -81,7 +106,7 @@ impl<R: Real> Machine<R> {
         if self.is_given_up {
             self.judge.anew();
         }
-        self.judge.tick(&trace);
+        self.judge.tick(&trace, self.kernel.reaction());
         self.set = trace.executed.setpoints.map(|axis| axis.position);
         if trace.fault.is_some() {
             self.faulty += 1;
@@ -92,8 +117,7 @@ impl<R: Real> Machine<R> {
             }
         }
         if self.faulty > OFF_TICKS {
-            let trim = DacCode::from_volts(0.1_f64);
-            assert!(trace.axes.iter().all(|axis| axis.code.0.abs_diff(trim.0) <= 1), "{trace:?}");
+            assert_eq!(self.kernel.reaction(), Some(Reaction::Immediate), "{trace:?}");
             self.bench.mend();
         }
         if trace.executed.state == ExecState::Stopped {
@@ -206,9 +230,6 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
             _ => there.set(there.get() + usize::from(input.arbitrary::<u8>()?)),
         }
         for _ in 0..input.arbitrary::<u8>()? {
-            if machine.kernel.wants_hold() {
-                director.hold();
-            }
             if has_turn {
                 let _ = director.turn(&mut feeder);
             }
@@ -217,9 +238,9 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
     }
     there.set(usize::MAX);
     let fault = machine.kernel.fault();
-    // What fills the lists must never be the reason, unless path, blocks and feed contradict each other.
+    // What fills the lists is never the reason: what can't be executed is refused.
     assert!(
-        !program.is_whole || machine.bench.is_hostile || machine.is_given_up || fault.is_none(),
+        machine.bench.is_hostile || machine.is_given_up || fault.is_none(),
         "no fault of the machine: {fault:?}"
     );
     if program.is_whole && machine.is_undisturbed() && program.ticks < TICKS_MAX {

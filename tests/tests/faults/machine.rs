@@ -4,6 +4,7 @@ use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan};
 use motion_host::simulate::rig::{Rig, Simulated};
 use motion_kernel::exec::ExecState;
+use motion_kernel::fault::Reaction;
 use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::live::{Director, State};
@@ -98,9 +99,6 @@ pub(crate) fn run<R: Real>(plan: &Plan, machine: &Machine, between: &mut Between
                 return tick;
             }
         }
-        if kernel.wants_hold() {
-            director.hold();
-        }
         director.turn(&mut feeder).expect("items");
         let trace = *kernel.tick(&mut intake, &mut rig);
         simulated.advance();
@@ -110,7 +108,7 @@ pub(crate) fn run<R: Real>(plan: &Plan, machine: &Machine, between: &mut Between
         last = Some(Seen {
             trace,
             is_enabled: simulated.is_enabled(),
-            is_off: kernel.is_off(),
+            is_off: kernel.reaction() == Some(Reaction::Immediate),
             position_mm: simulated.truth().map(|axis| axis.position_mm),
         });
         let is_done = director.state(&feeder) == State::Done && trace.executed.state == ExecState::Idle;
@@ -143,7 +141,7 @@ fn recover<R: Real>(
             assert!(!simulated.is_enabled());
         }
     }
-    let mut here = kernel.clear_fault();
+    let mut here = kernel.clear_fault().expect("off");
     assert_eq!(kernel.fault(), None);
     let (mut feeder, mut intake) = streams.split(machine.rules(), here);
     kernel.enable(SETTLE_TICKS);

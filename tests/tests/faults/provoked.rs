@@ -150,7 +150,7 @@ fn provoke(
     assert_eq!(kernel.fault(), Some(latched));
     assert!(!bench.is_enabled && bench.written == [DacCode::ZERO; 2], "{bench:?}");
     // The way back: cleared, at rest where the axes are, with new streams.
-    let stands = kernel.clear_fault();
+    let stands = kernel.clear_fault().expect("off");
     assert_eq!(kernel.fault(), None);
     let here = bench.counts.map(|Counts(counts)| counts as f64 * MM_PER_COUNT);
     for (found, here) in stands.iter().zip(here) {

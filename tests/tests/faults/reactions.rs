@@ -167,6 +167,39 @@ fn what_the_machine_says_of_its_reactions_is_done() {
     }
 }
 
+/// An emergency stop that is a stop on the path hides nothing that breaks on the way, and nothing is cleared before the end.
+#[test]
+fn an_open_emergency_stop_hides_nothing() {
+    let mut machine = Machine::reference();
+    machine.faults.emergency_stop = Reaction::Stop;
+    let plan = plan("G21 G90\nG1 X200 F9000\n", &machine);
+    let breaks = [Injection::DriveNotReady, Injection::DriveFault, Injection::LimitHigh { at_mm: -1.0 }];
+    for then in breaks {
+        let mut reactions = Vec::new();
+        run::<f32>(&plan, &machine, &mut |tick, rig, kernel, seen| {
+            rig.injector.emergency_stop = tick >= 1000;
+            if tick == 1010 {
+                rig.inject(0, then);
+            }
+            let Some(seen) = seen else { return Next::GoOn };
+            if let Some(reaction) = kernel.reaction() {
+                assert_eq!(seen.trace.fault.map(|fault| fault.kind), Some(FaultKind::EmergencyStop));
+                reactions.push(reaction);
+            }
+            if seen.is_off {
+                return Next::End;
+            }
+            assert!(kernel.fault().is_none() || kernel.clear_fault().is_none(), "{then:?} in tick {tick}");
+            Next::GoOn
+        });
+        // In the tick it breaks in.
+        let stop = reactions.iter().filter(|&&reaction| reaction == Reaction::Stop).count();
+        let ramp = reactions.iter().filter(|&&reaction| reaction == Reaction::Ramp).count();
+        assert_eq!((stop, ramp, reactions.len()), (10, 199, 210), "{then:?}");
+        assert!(reactions.is_sorted(), "{then:?}");
+    }
+}
+
 /// A switch that is reached is a fault when it is reached and where motion is towards it; one can drive off it.
 #[test]
 fn a_limit_switch_is_driven_off_but_not_onto() {

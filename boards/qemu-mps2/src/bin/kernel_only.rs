@@ -154,7 +154,7 @@ fn kernel_command(
     match command {
         1 => kernel.trip(FaultKind::Encoder),
         2 => CODES.store(
-            kernel.clear_fault().iter().fold(0, |sum, at| sum ^ at.to_bits() as u32),
+            kernel.clear_fault().iter().flatten().fold(0, |sum, at| sum ^ at.to_bits() as u32),
             Ordering::Relaxed,
         ),
         3 => kernel.disable(),

@@ -1,0 +1,65 @@
+//! Tests: how faults end, at the ends of what numbers hold.
+
+use super::Kernel;
+use crate::axis::AxesConfig;
+use crate::axis::fixture::{Follower, GUARD, figures, guarded};
+use crate::fault::{FaultKind, Reaction, Reactions};
+use crate::law::Limits;
+use crate::queue::{PathRules, Streams};
+use crate::units::{Counts, DacCode, Position};
+
+const RULES: PathRules = PathRules {
+    limits: Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 },
+    feed_mm_s: 300.0,
+    joint_angle_rad: 0.01,
+    joint_gap_mm: 5e-6,
+};
+
+/// The longest ramp there is, from one end of the converter's range to a trim near the other.
+#[test]
+fn the_longest_ramp_falls_in_every_tick() {
+    let figures = crate::axis::AxisFigures { output_offset_v: 9.9, ..figures() };
+    let reactions = Reactions { ramp_ticks: u16::MAX, stop_ticks: 0, emergency_stop: Reaction::Immediate };
+    let config = AxesConfig { reactions, ..guarded::<f32, 1>(figures, GUARD) };
+    let mut kernel = Kernel::<f32, 1>::new(&config, [Position::ZERO], [Counts(0)]);
+    let mut streams = Streams::<f32, 1, 2, 2>::new();
+    let (_, mut intake) = streams.split(RULES, [Position::ZERO]);
+    let mut bench = Follower::<1>::default();
+    kernel.enable(0);
+    kernel.tick(&mut intake, &mut bench);
+    let still = bench.codes[0].0;
+    kernel.guards.written = [DacCode(i16::MIN)];
+    kernel.trip(FaultKind::Drive { axis: 0 });
+    let mut last = i16::MIN;
+    for tick in 1..=u32::from(u16::MAX) {
+        assert_eq!((kernel.reaction(), kernel.clear_fault()), (Some(Reaction::Ramp), None), "tick {tick}");
+        kernel.tick(&mut intake, &mut bench);
+        let code = bench.codes[0].0;
+        assert!((last..=still).contains(&code), "tick {tick}: {last} {code} {still}");
+        last = code;
+    }
+    assert_eq!((last, kernel.reaction()), (still, Some(Reaction::Immediate)));
+    assert!(kernel.clear_fault().is_some() && kernel.reaction().is_none());
+}
+
+/// As many axes as a round of looks has places for, each of them lost at every place of the round.
+#[test]
+fn any_of_many_axes_is_judged() {
+    const AXES: usize = 31;
+    for lost in 0..AXES {
+        for wait in 0..AXES * usize::from(super::LOOK_TICKS) {
+            let config = guarded::<f32, AXES>(figures(), GUARD);
+            let mut kernel = Kernel::<f32, AXES>::new(&config, [Position::ZERO; AXES], [Counts(0); AXES]);
+            let mut streams = Streams::<f32, AXES, 2, 2>::new();
+            let (_, mut intake) = streams.split(RULES, [Position::ZERO; AXES]);
+            let mut bench = Follower::<AXES>::default();
+            kernel.enable(0);
+            kernel.tick(&mut intake, &mut bench);
+            kernel.guards.look_ticks = wait as u8;
+            bench.counts[lost] = Counts(123_456_789);
+            let fault = kernel.tick(&mut intake, &mut bench).fault.expect("lost");
+            let is_it = matches!(fault.kind, FaultKind::EncoderJump { axis, .. } if axis == lost);
+            assert!(is_it, "axis {lost} at {wait}: {fault:?}");
+        }
+    }
+}
