@@ -102,6 +102,9 @@ impl<const AXES: usize> DriveEnable<AXES> for InMemory<AXES> {
 pub enum LoopError {
     /// An axis can't be regulated.
     Axes(AxesError),
+    /// What the program says of its guards can't be read.
+    #[cfg(feature = "live")]
+    Program(ProgramError),
     /// The converter refused its configuration.
     Converter(Ad5754Error<ChipError>),
 }
@@ -156,7 +159,7 @@ pub fn close<
     streams: &'a mut Streams<R, AXES, PIECES, SEGMENTS>,
     machine: &'a SimMachine<AXES, LINE>,
 ) -> Result<Closed<'a, R, AXES, LINE>, LoopError> {
-    let config = &regulated(program.header());
+    let config = &regulated(program);
     let config = config.as_ref().map_err(|error| *error)?;
     let &Header { tick_s, rules, start, .. } = program.header();
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
@@ -170,8 +173,17 @@ pub fn close<
 }
 
 #[inline(never)]
-fn regulated<R: Real, const AXES: usize>(header: &Header<AXES>) -> Result<AxesConfig<R, AXES>, LoopError> {
-    AxesConfig::new(&header.axes, header.tick_s).map_err(LoopError::Axes)
+fn regulated<R: Real, const AXES: usize>(
+    program: &Reader<'_, AXES>,
+) -> Result<AxesConfig<R, AXES>, LoopError> {
+    let &Header { ref axes, tick_s, .. } = program.header();
+    let axes = AxesConfig::new(axes, tick_s);
+    #[cfg(feature = "live")]
+    let axes = match program.guards().map_err(LoopError::Program)? {
+        Some(guards) => axes.and_then(|axes| axes.guarded(&guards, tick_s)),
+        None => axes,
+    };
+    axes.map_err(LoopError::Axes)
 }
 
 /// Knots of a correction that no learning has made: for runs that are compared with one another \[mm/s\].

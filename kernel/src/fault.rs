@@ -115,8 +115,7 @@ pub enum Reaction {
     Immediate,
 }
 
-/// What a machine says of its reactions.
-#[cfg(feature = "guards")]
+/// What a machine says of its reactions; without the feature `guards` they all are immediate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reactions {
     /// Ticks in which the outputs go to 0 V; 0 makes every reaction an immediate one.
@@ -127,7 +126,6 @@ pub struct Reactions {
     pub emergency_stop: Reaction,
 }
 
-#[cfg(feature = "guards")]
 impl Reactions {
     /// Every reaction is an immediate one.
     pub const IMMEDIATE: Self = Self { ramp_ticks: 0, stop_ticks: 0, emergency_stop: Reaction::Immediate };

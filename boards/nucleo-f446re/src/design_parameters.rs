@@ -123,8 +123,6 @@ const _: () = assert!(
 
 /// How long the machine is held still after the drives are enabled \[ticks\]: 0.2 s for their relays and brakes.
 pub const SETTLE_TICKS: u32 = TICK_HZ / 5;
-/// In how many ticks outputs go to 0 V after a fault that leaves the drives to be trusted: 0.1 s.
-pub const RAMP_TICKS: u16 = (TICK_HZ / 10) as u16;
 /// How long the button must be held to count \[ticks\]: 20 ms, longer than its contacts bounce.
 pub const BUTTON_TICKS: u32 = TICK_HZ / 50;
 /// How often the background reports \[ticks\]: once a second.

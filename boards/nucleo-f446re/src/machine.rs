@@ -1,22 +1,17 @@
 //! The machine that the board drives: the one that its program was compiled for.
 //!
-//! Consumes the program in flash, which `motion compile` wrote with the machine's scales, gains and limits;
-//! produces the kernel's configuration, once, before the first tick. So there is one description of the
+//! Consumes the program in flash, which `motion compile` wrote with the machine's scales, gains, limits
+//! and guards; produces the kernel's configuration, once, before the first tick. So there is one description of the
 //! machine, its file on the PC, and the board checks here what only it can know. A program that is damaged, does
 //! not suit the board, or holds an item anywhere that could not be executed is refused before anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
-use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::program::{CheckError, Header, ProgramError, Reader, check};
 
-use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, RAMP_TICKS, TICK_S};
+use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
 
 /// Number of axes: X, Y, Z.
 pub const AXES: usize = 3;
-
-/// How faults end: nothing holds the motion of this board, so a stop on the path is a ramp.
-const REACTIONS: Reactions =
-    Reactions { ramp_ticks: RAMP_TICKS, stop_ticks: 0, emergency_stop: Reaction::Immediate };
 
 /// The program in flash: `program/stringer.bin`, the host's `stringer.ngc` for the reference machine, or what
 /// `MOTION_PROGRAM` named when this was built.
@@ -44,6 +39,8 @@ pub enum MachineError {
         /// What passes \[1/s\].
         limit: f64,
     },
+    /// It does not say how faults are told and end.
+    Unguarded,
     /// A figure of an axis is out of its range.
     Axes(AxesError),
     /// An item can't be executed, or the program starts or ends where it can't.
@@ -78,8 +75,10 @@ impl Machine {
                 return Err(MachineError::CountRate { axis, counts_per_s, limit });
             }
         }
-        let axes = AxesConfig::new(axes, TICK_S).map_err(MachineError::Axes)?;
-        let axes = AxesConfig { reactions: REACTIONS, ..axes };
+        // Nothing holds the motion of this board: where a fault asks for a stop on the path, outputs are ramped.
+        let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
+        let axes = AxesConfig::new(axes, TICK_S).and_then(|axes| axes.guarded(&guards, TICK_S));
+        let axes = axes.map_err(MachineError::Axes)?;
         check::<f32, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
         Ok(Self { program, axes })
     }
@@ -93,23 +92,53 @@ impl Machine {
 
 #[cfg(test)]
 mod tests {
+    use motion_kernel::axis::{GuardFigures, Guards};
     use motion_kernel::program::{Item, SupplyError, write};
     use motion_kernel::units::Position;
 
     use super::*;
 
+    fn guards() -> Guards<AXES> {
+        Machine::new(PROGRAM).expect("suits").program.guards().expect("guards").expect("guarded")
+    }
+
+    fn of(
+        header: &Header<AXES>,
+        guards: Option<&Guards<AXES>>,
+        items: &[Item<AXES>],
+    ) -> Result<Machine, MachineError> {
+        let mut bytes = Vec::new();
+        write(header, guards, items, &mut bytes).expect("short");
+        Machine::new(bytes.leak())
+    }
+
     /// The machine of the program with a changed header.
     fn with(change: impl Fn(&mut Header<AXES>)) -> Result<Machine, MachineError> {
         let mut header = *Machine::new(PROGRAM).expect("suits").header();
         change(&mut header);
-        let mut bytes = Vec::new();
-        write(&header, &[], &mut bytes).expect("short");
-        Machine::new(bytes.leak())
+        of(&header, Some(&guards()), &[])
+    }
+
+    /// Its axes are guarded as the machine's file says, and its faults end so.
+    #[test]
+    fn the_program_in_flash_suits() {
+        let machine = Machine::new(PROGRAM).expect("suits");
+        let axes = AxesConfig::<f32, AXES>::new(&machine.header().axes, TICK_S).expect("axes");
+        assert_ne!(machine.axes, axes);
+        assert_eq!(machine.axes, axes.guarded(&guards(), TICK_S).expect("guarded"));
+        assert!(guards().axes.iter().all(Option::is_some));
+        // 0.1 s.
+        assert_eq!(guards().reactions.ramp_ticks, 200);
     }
 
     #[test]
-    fn the_program_in_flash_suits() {
-        Machine::new(PROGRAM).expect("suits");
+    fn guards_that_are_not_there_or_none_are_refused() {
+        let header = *Machine::new(PROGRAM).expect("suits").header();
+        assert_eq!(of(&header, None, &[]).map(|_| ()), Err(MachineError::Unguarded));
+        let mut none = guards();
+        none.axes[2] = none.axes[2].map(|figures| GuardFigures { jump_mm: 0.0, ..figures });
+        let refused = of(&header, Some(&none), &[]).map(|_| ());
+        assert!(matches!(refused, Err(MachineError::Axes(AxesError { axis: 2, .. }))), "{refused:?}");
     }
 
     /// The last item but one is damaged, behind a checksum that is right: nothing of the program starts.
@@ -122,9 +151,7 @@ mod tests {
         if let Item::Line { direction, .. } = &mut items[at] {
             direction[0] = f64::NAN;
         }
-        let mut bytes = Vec::new();
-        write(&header, &items, &mut bytes).expect("short");
-        let refused = Machine::new(bytes.leak()).map(|_| ());
+        let refused = of(&header, Some(&guards()), &items).map(|_| ());
         assert!(
             matches!(refused, Err(MachineError::Items(CheckError::Item { index, cause: SupplyError::Piece(_) }))
                 if index as usize == at),

@@ -6,7 +6,7 @@ use hal_sim::{
     BedMode, DriveParameters, EncoderNoise, HomeParameters, IndexParameters, SwitchParameters, TimerBits,
 };
 use motion_kernel::axis::{
-    AxesConfig, BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, Gains, GuardFigures,
+    AxesConfig, BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, Gains, GuardFigures, Guards,
     LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX, TABLE_POINTS, Table, Tables,
 };
 use motion_kernel::fault::Reaction;
@@ -118,7 +118,11 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
     }
     // What only the kernel's numbers can't hold has no key of its own: it stands at the axis.
     let figures = [0, 1, 2].map(|index: usize| axes[index].1.figures());
-    let guards = [0, 1, 2].map(|index: usize| axes[index].1.guard_figures(tick_s));
+    let faults = file.faults.map_or_else(FaultSettings::default, |faults| faults.settings());
+    let guards = Guards {
+        axes: [0, 1, 2].map(|index: usize| Some(axes[index].1.guard_figures(tick_s))),
+        reactions: faults.reactions(tick_s),
+    };
     let config = AxesConfig::<f32, 3>::new(&figures, tick_s).and_then(|axes| axes.guarded(&guards, tick_s));
     if let Err(error) = config {
         let (places, axis) = &axes[error.axis];
@@ -134,7 +138,7 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
         tick_s,
         path: file.path.settings(),
         axes: axes.map(|(_, axis)| axis),
-        faults: file.faults.map_or_else(FaultSettings::default, |faults| faults.settings()),
+        faults,
     })
 }
 

@@ -36,9 +36,7 @@ mod tests;
 
 pub use edit::{AxisEdit, edited};
 pub use error::{AxisError, MachineError};
-pub use settings::{
-    AxisSettings, DEAD_TIME_CELLS, FaultSettings, Guards, HomingSettings, Machine, PathSettings,
-};
+pub use settings::{AxisSettings, DEAD_TIME_CELLS, FaultSettings, HomingSettings, Machine, PathSettings};
 
 /// The reference machine's file, with every key explained.
 pub const REFERENCE_TOML: &str = include_str!("reference.toml");

@@ -4,7 +4,7 @@ use hal_sim::{
     AxisParameters, DriveParameters, EncoderNoise, EncoderParameters, HomeParameters, MachineParameters,
     REFERENCE_TICK_S, REFERENCE_X, REFERENCE_Y, REFERENCE_Z, SUBSTEPS_MAX, TimerBits,
 };
-use motion_kernel::axis::{AxesConfig, AxesError, AxisFigures, Feedforward, Gains, GuardFigures};
+use motion_kernel::axis::{AxesConfig, AxesError, AxisFigures, Feedforward, Gains, GuardFigures, Guards};
 use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::homing::HomingConfig;
 use motion_kernel::law::Limits;
@@ -14,7 +14,6 @@ use motion_kernel::plan::{AxisLimits, CURVE_FEED_SHARE, MachineLimits};
 use motion_kernel::program::Header;
 use motion_kernel::queue::PathRules;
 use motion_kernel::units::{DacCode, Position};
-use serde::{Deserialize, Serialize};
 
 use super::error::{AxisError, MachineError};
 use super::file;
@@ -141,50 +140,6 @@ pub struct HomingSettings {
     pub simulated: HomeParameters,
 }
 
-/// How faults of the axes are told and end.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Guards {
-    /// Of each axis; `None` to watch nothing but the limits of their following errors.
-    pub axes: Option<[GuardFigures; 3]>,
-    /// How faults end.
-    pub reactions: Reactions,
-}
-
-impl Guards {
-    /// The same reactions to fewer faults.
-    #[must_use]
-    pub fn limits_only(self) -> Self {
-        Self { axes: None, ..self }
-    }
-
-    /// Where the axes may go; an end beyond the kernel's range bounds nothing.
-    #[must_use]
-    pub fn travel(&self) -> Travel<3> {
-        let of_axis = |axis: GuardFigures| {
-            let [low, high] = axis.travel_mm?.map(Position::from_mm);
-            Some([low?, high?])
-        };
-        self.axes.map_or([None; 3], |axes| axes.map(of_axis))
-    }
-
-    /// The kernel's axes for a control tick of `tick_s`, guarded.
-    ///
-    /// # Errors
-    /// The first axis with a figure that the kernel can't use.
-    pub fn of_axes<R: Real>(
-        &self,
-        figures: &[AxisFigures; 3],
-        tick_s: f64,
-    ) -> Result<AxesConfig<R, 3>, AxesError> {
-        let axes = AxesConfig::new(figures, tick_s)?;
-        let axes = match &self.axes {
-            Some(guards) => axes.guarded(guards, tick_s)?,
-            None => axes,
-        };
-        Ok(AxesConfig { reactions: self.reactions, ..axes })
-    }
-}
-
 impl Machine {
     /// The reference machine: S4's axes X and Y, a Z like X, S1's limits. The same as
     /// [`REFERENCE_TOML`](super::REFERENCE_TOML).
@@ -260,14 +215,16 @@ impl Machine {
     /// # Errors
     /// The first axis with a value that the kernel can't use.
     pub fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, 3>, AxisError> {
-        self.guards().of_axes(&self.figures(), self.tick_s).map_err(|error| self.at_axis(error))
+        AxesConfig::new(&self.figures(), self.tick_s)
+            .and_then(|axes| axes.guarded(&self.guards(), self.tick_s))
+            .map_err(|error| self.at_axis(error))
     }
 
     /// How faults are told and end.
     #[must_use]
-    pub fn guards(&self) -> Guards {
+    pub fn guards(&self) -> Guards<3> {
         Guards {
-            axes: Some(self.axes.each_ref().map(|axis| axis.guard_figures(self.tick_s))),
+            axes: self.axes.each_ref().map(|axis| Some(axis.guard_figures(self.tick_s))),
             reactions: self.faults.reactions(self.tick_s),
         }
     }
@@ -309,7 +266,7 @@ impl Machine {
 }
 
 impl FaultSettings {
-    fn reactions(&self, tick_s: f64) -> Reactions {
+    pub(super) fn reactions(&self, tick_s: f64) -> Reactions {
         Reactions {
             ramp_ticks: (self.ramp_s / tick_s).round() as u16,
             stop_ticks: (self.stop_s / tick_s).round() as u32,

@@ -88,7 +88,7 @@ impl Executable {
 fn bytes<'a>(machine: &Machine, items: impl IntoIterator<Item = &'a Item<3>>) -> Vec<u8> {
     let mut bytes = Vec::new();
     // Entries of three axes fit the format.
-    write(&machine.header(), items, &mut bytes).expect("three axes");
+    write(&machine.header(), Some(&machine.guards()), items, &mut bytes).expect("three axes");
     bytes
 }
 

@@ -32,7 +32,6 @@ use motion_kernel::units::Counts;
 use serde::{Deserialize, Serialize};
 
 use self::tape::Tape;
-use crate::machine::Guards;
 use crate::record::AXES;
 use crate::simulate::live::Script;
 use crate::simulate::{Job, Number, Sheet, StretchCorrection};
@@ -44,9 +43,8 @@ const VERSION: u8 = 2;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Recording {
     number: Number,
-    /// A compiled program, blocks included.
+    /// A compiled program, blocks and guards included.
     program: Vec<u8>,
-    guards: Guards,
     correction: Option<StretchCorrection>,
     script: Option<Script>,
     sheet: Sheet,
@@ -84,6 +82,9 @@ pub enum RecordingError {
     /// The program in it is not one for this kernel.
     #[error("program in the recording: found {0}")]
     Program(#[from] ProgramError),
+    /// The program in it does not say how its faults end.
+    #[error("program in the recording: found no guards, expected how its faults are told and end")]
+    Unguarded,
     /// The kernel does not accept the program in it.
     #[error("program in the recording: found {0}, expected what this kernel accepts")]
     Check(CheckError<ProgramError>),
@@ -95,9 +96,9 @@ impl Recording {
     pub(self) fn new(job: &Job, start: [Counts; AXES], tape: Tape) -> Self {
         let mut program = Vec::new();
         // Entries of three axes fit the format.
-        program::write(&job.header, &job.items, &mut program).expect("three axes");
-        let Job { number, guards, correction, script, sheet, .. } = job.clone();
-        Self { number, program, guards, correction, script, sheet, start, tape }
+        program::write(&job.header, Some(&job.guards), &job.items, &mut program).expect("three axes");
+        let Job { number, correction, script, sheet, .. } = job.clone();
+        Self { number, program, correction, script, sheet, start, tape }
     }
 
     /// The recording as bytes.
@@ -147,6 +148,7 @@ impl Recording {
 
     fn check<R: Real>(&self) -> Result<(), RecordingError> {
         let reader = Reader::<AXES>::new(&self.program)?;
+        reader.guards()?.ok_or(RecordingError::Unguarded)?;
         program::check::<R, AXES, _>(reader.header(), reader.items()).map_err(|error| match error {
             CheckError::Item { cause: SupplyError::Source(error), .. } => error.into(),
             error => RecordingError::Check(error),
@@ -162,7 +164,7 @@ impl Recording {
         Ok(Job {
             number: self.number,
             header: *reader.header(),
-            guards: self.guards,
+            guards: reader.guards()?.ok_or(RecordingError::Unguarded)?,
             items: reader.items().collect::<Result<_, _>>()?,
             correction: self.correction.clone(),
             script: self.script.clone(),

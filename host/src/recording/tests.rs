@@ -160,7 +160,7 @@ fn strangers_are_named() {
     );
     let mut newer = bytes.clone();
     newer[4] = 9;
-    assert_eq!(message(&newer), "found a recording of format 9, expected format 1");
+    assert_eq!(message(&newer), "found a recording of format 9, expected format 2");
     assert!(message(&bytes[..bytes.len() - 1]).contains("damaged or not whole"));
 
     // With a checksum that fits.
@@ -169,6 +169,11 @@ fn strangers_are_named() {
     let mut foreign = recording.clone();
     foreign.program[4] = 9;
     assert_eq!(sealed(&foreign), RecordingError::Program(ProgramError::Version { found: 9 }));
+    let job = recording.job().expect("a job");
+    let mut unguarded = recording.clone();
+    unguarded.program.clear();
+    program::write(&job.header, None, &job.items, &mut unguarded.program).expect("three axes");
+    assert_eq!(sealed(&unguarded), RecordingError::Unguarded);
     let mut missing = recording.clone();
     missing.tape.ticks += 1;
     assert!(matches!(sealed(&missing), RecordingError::Malformed(_)));

@@ -3,14 +3,14 @@
 //! Consumes a [`Plan`] and a [`Machine`]; produces a [`Job`]: everything that the kernel of a run consumes but the
 //! answers of its hardware. Fails where the plan or the machine can't be executed in the number type.
 
-use motion_kernel::axis::AxesConfig;
+use motion_kernel::axis::{AxesConfig, Guards};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::program::{Header, Item};
 use serde::{Deserialize, Serialize};
 
 use super::live::Script;
 use super::run::{Number, RunError, RunOptions, StretchCorrection};
-use crate::machine::{AxisError, Guards, Machine};
+use crate::machine::{AxisError, Machine};
 use crate::planning::{Executable, Item as PlanItem, Plan};
 use crate::record::{AXES, BlockRecord, PathLimits, RunRecord};
 
@@ -22,7 +22,7 @@ pub struct Job {
     /// The machine, as the kernel has to know it.
     pub header: Header<AXES>,
     /// How its faults are told and end.
-    pub guards: Guards,
+    pub guards: Guards<AXES>,
     /// The program, with the blocks of its path.
     pub items: Vec<Item<AXES>>,
     /// What was learnt of one of its stretches.
@@ -149,7 +149,9 @@ impl Job {
 
     /// The kernel's axes.
     pub(super) fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, AXES>, AxisError> {
-        self.guards.of_axes(&self.header.axes, self.header.tick_s).map_err(|error| AxisError {
+        let tick_s = self.header.tick_s;
+        let axes = AxesConfig::new(&self.header.axes, tick_s);
+        axes.and_then(|axes| axes.guarded(&self.guards, tick_s)).map_err(|error| AxisError {
             axis: self.sheet.axes[error.axis].name.clone(),
             source: error.cause,
         })

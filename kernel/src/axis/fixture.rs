@@ -2,7 +2,8 @@
 
 use core::convert::Infallible;
 
-use super::{AxesConfig, AxisFigures, Feedforward, Gains, GuardFigures};
+use super::{AxesConfig, AxisFigures, Feedforward, Gains, GuardFigures, Guards};
+use crate::fault::Reactions;
 use crate::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use crate::num::Real;
 use crate::units::{Counts, DacCode};
@@ -40,8 +41,8 @@ pub(crate) fn guarded<R: Real, const AXES: usize>(
     figures: AxisFigures,
     guard: GuardFigures,
 ) -> AxesConfig<R, AXES> {
-    let axes =
-        AxesConfig::new(&[figures; AXES], TICK_S).and_then(|axes| axes.guarded(&[guard; AXES], TICK_S));
+    let guards = Guards { axes: [Some(guard); AXES], reactions: Reactions::IMMEDIATE };
+    let axes = AxesConfig::new(&[figures; AXES], TICK_S).and_then(|axes| axes.guarded(&guards, TICK_S));
     axes.expect("axes")
 }
 

@@ -18,10 +18,8 @@
 //!
 //! Comparisons are written so that what is not a number is a fault.
 
-use serde::{Deserialize, Serialize};
-
 use super::check::{Check, fits};
-use super::{AxisConfig, AxisOutput};
+use super::{AxisConfig, AxisOutput, GuardFigures};
 use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, Position};
@@ -34,31 +32,6 @@ const TRAVEL_ROUNDING_MM: f64 = 2.0e-3;
 const LEAST: f64 = 1.0e-9;
 /// Commanded to move by so many counts in a tick, an axis that stands still for two has lost its encoder.
 const COUNTS_A_TICK: i32 = 4;
-
-/// What is watched, in figures of any number type.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GuardFigures {
-    /// Greatest following error at rest \[mm\], > 0, at most the axis' limit.
-    pub following_error_at_rest_mm: f64,
-    /// What it may be greater for velocity \[mm per mm/s\], 0 or more.
-    pub following_error_per_velocity_s: f64,
-    /// What it may be greater for acceleration \[mm per mm/s²\], 0 or more.
-    pub following_error_per_accel_s2: f64,
-    /// Greatest second difference of the following error from tick to tick \[mm\], > 0.
-    pub jump_mm: f64,
-    /// The axis has to move where it is commanded to at this velocity \[mm/s\], > 0.
-    pub moving_mm_s: f64,
-    /// After so long at the latest \[s\], > 0.
-    pub response_s: f64,
-    /// Friction and load change the axis' velocity by less \[mm/s²\], > 0.
-    pub load_accel_mm_s2: f64,
-    /// Encoder's noise in either direction \[counts\].
-    pub noise_counts: u16,
-    /// How long the output may be at its limit \[s\], > 0.
-    pub saturation_s: f64,
-    /// Least and greatest set position \[mm\].
-    pub travel_mm: Option<[f64; 2]>,
-}
 
 /// What is fixed while the axis runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -463,7 +436,8 @@ fn mm<R: Real>(config: &AxisConfig<R>, counts: i32) -> R {
 mod tests {
     use super::*;
     use crate::axis::fixture::{GUARD, MM_PER_COUNT, TICK_S, figures, guarded};
-    use crate::axis::{AxesConfig, AxisState};
+    use crate::axis::{AxesConfig, AxisState, Guards};
+    use crate::fault::Reactions;
 
     fn config() -> AxisConfig<f32> {
         guarded::<f32, 1>(figures(), GUARD).axes[0]
@@ -547,7 +521,8 @@ mod tests {
         let refused = |at_rest_mm: f64| {
             let guard = GuardFigures { following_error_at_rest_mm: at_rest_mm, ..GUARD };
             let axes = AxesConfig::<f32, 1>::new(&[figures()], TICK_S).expect("axes");
-            axes.guarded(&[guard], TICK_S).err().map(|error| error.cause.quantity)
+            let guards = Guards { axes: [Some(guard)], reactions: Reactions::IMMEDIATE };
+            axes.guarded(&guards, TICK_S).err().map(|error| error.cause.quantity)
         };
         assert_eq!(refused(1.0), None);
         assert_eq!(refused(1.0001), Some("following error at rest [mm]"));

@@ -20,6 +20,7 @@ pub mod feedforward;
 pub(crate) mod fixture;
 #[cfg(feature = "guards")]
 mod guard;
+mod guards;
 pub mod preview;
 pub mod regulator;
 pub mod scale;
@@ -29,7 +30,8 @@ pub use feedforward::{
     BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, TABLE_POINTS, Table, Tables,
 };
 #[cfg(feature = "guards")]
-pub use guard::{GuardFigures, LOOK_TICKS};
+pub use guard::LOOK_TICKS;
+pub use guards::{GuardFigures, Guards};
 pub use preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX, Preview};
 pub use regulator::{Command, Gains, Regulator, RegulatorState};
 pub use scale::{EncoderScale, OutputScale, ScaleError};
@@ -139,14 +141,16 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
         check.refused.map_or(Ok(made), |cause| Err(AxesError { axis, cause }))
     }
 
-    /// The same axes for a control tick of `tick_s`, guarded by all of `guards`. Background.
+    /// The same axes for a control tick of `tick_s`, guarded by all of `guards`, with its reactions. Background.
     ///
     /// # Errors
     /// The first figure that is out of its range or beyond the number type's.
     #[cfg(feature = "guards")]
-    pub fn guarded(mut self, guards: &[GuardFigures; AXES], tick_s: f64) -> Result<Self, AxesError> {
+    pub fn guarded(mut self, guards: &Guards<AXES>, tick_s: f64) -> Result<Self, AxesError> {
         let look_ticks = u32::from(LOOK_TICKS) * AXES as u32;
-        for (axis, (config, figures)) in self.axes.iter_mut().zip(guards).enumerate() {
+        self.reactions = guards.reactions;
+        for (axis, (config, figures)) in self.axes.iter_mut().zip(&guards.axes).enumerate() {
+            let Some(figures) = figures else { continue };
             config.guard = Check::all(|check| GuardConfig::new(check, figures, config, look_ticks, tick_s))
                 .map_err(|cause| AxesError { axis, cause })?;
         }

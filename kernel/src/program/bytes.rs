@@ -3,9 +3,12 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MOTN` |
-//! | 1 | version of this format, 2 |
+//! | 1 | version of this format, 3 |
 //! | 1 | number of axes |
-//! | … | [`Header`], then [`Item`]s to the end, each in the [postcard](https://postcard.jamesmunns.com) wire format |
+//! | … | [`Header`] in the [postcard](https://postcard.jamesmunns.com) wire format |
+//! | 2 | length of the guards, least significant byte first; 0 for none |
+//! | … | [`Guards`] in the same format; a kernel without guards skips them |
+//! | … | [`Item`]s to the end, each in the same format |
 //! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
 //!
 //! A [`Reader`] is made of a whole and undamaged program only; whether its items can be executed is what
@@ -18,12 +21,12 @@ use serde::{Deserialize, Serialize};
 
 use super::checksum::Checksum;
 use super::{Item, wire};
-use crate::axis::AxisFigures;
+use crate::axis::{AxisFigures, Guards};
 use crate::queue::PathRules;
 use crate::units::Position;
 
 const MAGIC: [u8; 4] = *b"MOTN";
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 8;
@@ -53,7 +56,7 @@ pub enum ProgramError {
     NotAProgram,
     /// It is of another version of the format.
     Version {
-        /// Its version; 2 is expected.
+        /// Its version; 3 is expected.
         found: u8,
     },
     /// It is for a machine with another number of axes.
@@ -70,7 +73,7 @@ pub enum ProgramError {
         /// As written.
         expected: u32,
     },
-    /// Behind an intact checksum there is no header or item where one should be.
+    /// Behind an intact checksum there is no header, guards or item where one should be.
     Malformed {
         /// Bytes from the start of the program.
         at: usize,
@@ -86,7 +89,7 @@ impl core::fmt::Display for ProgramError {
             Self::Checksum { found, expected } => {
                 write!(f, "damaged: checksum {found:08x}, expected {expected:08x}")
             }
-            Self::Malformed { at } => write!(f, "no header or item at byte {at}"),
+            Self::Malformed { at } => write!(f, "no header, guards or item at byte {at}"),
         }
     }
 }
@@ -99,6 +102,7 @@ impl core::error::Error for ProgramError {}
 /// There are more axes than eight, for which an entry may be longer than the format's bound.
 pub fn write<'a, const AXES: usize>(
     header: &Header<AXES>,
+    guards: Option<&Guards<AXES>>,
     items: impl IntoIterator<Item = &'a Item<AXES>>,
     out: &mut impl Extend<u8>,
 ) -> Result<(), postcard::Error> {
@@ -114,6 +118,13 @@ pub fn write<'a, const AXES: usize>(
     put(&MAGIC);
     put(&[VERSION, AXES as u8]);
     put(postcard::to_slice(header, &mut entry)?);
+    let guards = match guards {
+        Some(guards) => &*postcard::to_slice(guards, &mut entry)?,
+        None => &[],
+    };
+    // An entry is shorter than 2¹⁶ bytes.
+    put(&(guards.len() as u16).to_le_bytes());
+    put(guards);
     for item in items {
         put(postcard::to_slice(item, &mut entry)?);
     }
@@ -125,6 +136,8 @@ pub fn write<'a, const AXES: usize>(
 #[derive(Clone, Copy, Debug)]
 pub struct Reader<'a, const AXES: usize> {
     header: Header<AXES>,
+    #[cfg(feature = "guards")]
+    guards: &'a [u8],
     items: Items<'a, AXES>,
 }
 
@@ -160,12 +173,40 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
             return Err(ProgramError::Checksum { found, expected });
         }
         let (header, left) = wire::take(body).ok_or(ProgramError::Malformed { at: PREFIX })?;
-        Ok(Self { header, items: Items { left, end: summed.len(), items: PhantomData } })
+        let Some((_guards, left)) = left
+            .split_first_chunk()
+            .and_then(|(&length, left)| left.split_at_checked(u16::from_le_bytes(length).into()))
+        else {
+            return Err(ProgramError::Malformed { at: summed.len() - left.len() });
+        };
+        Ok(Self {
+            header,
+            #[cfg(feature = "guards")]
+            guards: _guards,
+            items: Items { left, end: summed.len(), items: PhantomData },
+        })
     }
 
     /// What the program was planned for.
     pub fn header(&self) -> &Header<AXES> {
         &self.header
+    }
+
+    /// What the machine's axes are guarded by, and how its faults end; none where the program does not say.
+    ///
+    /// # Errors
+    /// There is something else in their place.
+    #[cfg(feature = "guards")]
+    pub fn guards(&self) -> Result<Option<Guards<AXES>>, ProgramError> {
+        if self.guards.is_empty() {
+            return Ok(None);
+        }
+        match wire::take(self.guards) {
+            Some((guards, [])) => Ok(Some(guards)),
+            _ => Err(ProgramError::Malformed {
+                at: self.items.end - self.items.left.len() - self.guards.len(),
+            }),
+        }
     }
 
     /// All of its items.
@@ -198,7 +239,8 @@ impl<const AXES: usize> Iterator for Items<'_, AXES> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::{Feedforward, Gains};
+    use crate::axis::{Feedforward, Gains, GuardFigures};
+    use crate::fault::{Reaction, Reactions};
     use crate::law::{Limits, Ticks};
 
     fn header() -> Header<2> {
@@ -225,6 +267,23 @@ mod tests {
         }
     }
 
+    fn guards() -> Guards<2> {
+        let figures = GuardFigures {
+            following_error_at_rest_mm: 0.25,
+            following_error_per_velocity_s: 1e-3,
+            following_error_per_accel_s2: 1e-4,
+            jump_mm: 0.007,
+            moving_mm_s: 3.0,
+            response_s: 0.013,
+            load_accel_mm_s2: 1230.0,
+            noise_counts: 300,
+            saturation_s: 0.1,
+            travel_mm: Some([-10.0, 250.5]),
+        };
+        let reactions = Reactions { ramp_ticks: 200, stop_ticks: 4000, emergency_stop: Reaction::Ramp };
+        Guards { axes: [None, Some(figures)], reactions }
+    }
+
     fn program() -> (Vec<Item<2>>, Vec<u8>) {
         let at = [Position::from_bits(i64::MIN), Position::from_bits(i64::MAX)];
         let items = vec![
@@ -235,7 +294,7 @@ mod tests {
             Item::Stop,
         ];
         let mut bytes = Vec::new();
-        write(&header(), &items, &mut bytes).expect("short entries");
+        write(&header(), Some(&guards()), &items, &mut bytes).expect("short entries");
         (items, bytes)
     }
 
@@ -244,6 +303,8 @@ mod tests {
         let (items, bytes) = program();
         let reader = Reader::<2>::new(&bytes).expect("a program");
         assert_eq!(*reader.header(), header());
+        #[cfg(feature = "guards")]
+        assert_eq!(reader.guards(), Ok(Some(guards())));
         assert_eq!(reader.items().collect::<Result<Vec<_>, _>>(), Ok(items));
     }
 
@@ -269,13 +330,35 @@ mod tests {
             let Header { tick_s, rules, .. } = header();
             let far = [Position::from_bits(i64::MIN); AXES];
             let header = Header { tick_s, rules, axes: [axis; AXES], start: far };
+            let figures = GuardFigures { noise_counts: u16::MAX, ..guards().axes[1].expect("figures") };
+            let reactions = Reactions { ramp_ticks: u16::MAX, stop_ticks: u32::MAX, ..guards().reactions };
+            let guards = Guards { axes: [Some(figures); AXES], reactions };
             let item =
                 Item::Septic { line: u32::MAX, start: far, coefficients: [[1.0; 7]; AXES], length: far[0] };
             let mut bytes = Vec::new();
-            write(&header, &[item], &mut bytes).map(|()| bytes.len())
+            write(&header, Some(&guards), &[item], &mut bytes).map(|()| bytes.len())
         }
         assert!(longest::<8>(axis).is_ok_and(|bytes| bytes > 2000));
         assert_eq!(longest::<9>(axis), Err(postcard::Error::SerializeBufferFull));
+    }
+
+    /// What is behind a good checksum and is none: guards of another length than said.
+    #[cfg(feature = "guards")]
+    #[test]
+    fn guards_are_whole_or_refused() {
+        let (_, bytes) = program();
+        let mut without = Vec::new();
+        write(&header(), None, &[], &mut without).expect("short entries");
+        let at = without.len() - 6;
+        assert_eq!(Reader::<2>::new(&without).expect("a program").guards(), Ok(None));
+        for length in [1, 20, u16::from_le_bytes([bytes[at], bytes[at + 1]]) - 1, u16::MAX] {
+            let mut bytes = bytes[..bytes.len() - 4].to_vec();
+            bytes[at..at + 2].copy_from_slice(&length.to_le_bytes());
+            bytes.extend(Checksum::of(&bytes).to_le_bytes());
+            let found = Reader::<2>::new(&bytes).and_then(|program| program.guards().map(|_| ()));
+            let expected = if length == u16::MAX { at } else { at + 2 };
+            assert_eq!(found, Err(ProgramError::Malformed { at: expected }), "{length}");
+        }
     }
 
     /// Every single damaged byte, every shorter program, and every kind of stranger.

@@ -108,6 +108,12 @@ impl<'de> Deserializer<'de> for &mut Wire<'de> {
         visitor.visit_i64(self.signed(64))
     }
 
+    fn deserialize_u16<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Malformed> {
+        // Of 16 bits, or unsound.
+        #[allow(clippy::cast_possible_truncation)]
+        visitor.visit_u16(self.unsigned(16) as u16)
+    }
+
     fn deserialize_u32<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Malformed> {
         // Of 32 bits, or unsound.
         #[allow(clippy::cast_possible_truncation)]
@@ -162,7 +168,7 @@ impl<'de> Deserializer<'de> for &mut Wire<'de> {
 
     // What no program has.
     serde::forward_to_deserialize_any! {
-        bool i8 i32 i128 u8 u16 u128 f32 char str string bytes byte_buf unit unit_struct seq tuple_struct map
+        bool i8 i32 i128 u8 u128 f32 char str string bytes byte_buf unit unit_struct seq tuple_struct map
         identifier ignored_any
     }
 }

@@ -28,7 +28,6 @@ use crate::path::Travel;
 use crate::units::Position;
 
 pub(crate) use accept::Acceptance;
-#[cfg(feature = "live")]
 pub use accept::Density;
 pub use accept::{PathRules, Rejection, SEGMENTS_PER_TICK_MAX};
 #[cfg(feature = "live")]

@@ -1,7 +1,7 @@
 //! What the machine answers: as it should, or as it likes.
 
 use arbitrary::{Result, Unstructured};
-use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains, GuardFigures};
+use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains, GuardFigures, Guards};
 use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::num::Real;
@@ -43,8 +43,8 @@ pub(super) fn axes<R: Real>() -> AxesConfig<R, 2> {
         feedforward: Feedforward { velocity: 1.0, accel_s: 1e-3, jerk_s2: 1e-6, ..Feedforward::default() },
         following_error_limit_mm: 1.0,
     };
-    let axes = AxesConfig::new(&[axis; 2], TICK_S).and_then(|axes| axes.guarded(&[GUARD; 2], TICK_S));
-    AxesConfig { reactions: REACTIONS, ..axes.expect("axes") }
+    let guards = Guards { axes: [Some(GUARD); 2], reactions: REACTIONS };
+    AxesConfig::new(&[axis; 2], TICK_S).and_then(|axes| axes.guarded(&guards, TICK_S)).expect("axes")
 }
 
 /// A machine whose encoders read what was set, until they are told otherwise.

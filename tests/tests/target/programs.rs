@@ -271,7 +271,7 @@ pub(crate) fn utmost<const AXES: usize>() -> Vec<u8> {
     items.extend(pieces.map(|(_, piece)| piece));
     items.push(Item::EndOfStretch([length(along * Position::from_bits(start).to_mm()); AXES]));
     let mut bytes = Vec::new();
-    write(&header, &items, &mut bytes).expect("few axes");
+    write(&header, None, &items, &mut bytes).expect("few axes");
     bytes
 }
 
@@ -304,6 +304,6 @@ pub(crate) fn one_axis() -> Vec<u8> {
         })
         .collect();
     let mut bytes = Vec::new();
-    write(&header, &items, &mut bytes).expect("one axis");
+    write(&header, None, &items, &mut bytes).expect("one axis");
     bytes
 }
