@@ -20,12 +20,19 @@ pub fn segments<R: Real, P: Root>(
     end: Position,
     tick_s: f64,
 ) -> Result<[Option<FeedSegment<R>>; 3], SegmentError> {
-    let rise = Ramp::new(&block.law, plan.enter_mm_s, plan.peak_mm_s);
-    let fall = Ramp::new(&block.law, plan.peak_mm_s, plan.exit_mm_s);
     let rounded = |ramp: &Ramp<P>| {
         let mm = ramp.length_mm().to_f64();
         Position::from_mm(mm).ok_or(SegmentError::OutOfRange { quantity: "ramp length [mm]", value: mm })
     };
+    let &BlockPlan { enter_mm_s, mut peak_mm_s, exit_mm_s, .. } = plan;
+    // A ramp that is shorter than a position step is none, and must leave no step of the feed where it was.
+    for end_mm_s in [exit_mm_s, enter_mm_s] {
+        if rounded(&Ramp::new(&block.law, end_mm_s, peak_mm_s))? == Position::ZERO {
+            peak_mm_s = end_mm_s;
+        }
+    }
+    let rise = Ramp::new(&block.law, enter_mm_s, peak_mm_s);
+    let fall = Ramp::new(&block.law, peak_mm_s, exit_mm_s);
     let top = start + rounded(&rise)?;
     let brake = end - rounded(&fall)?;
     // With no room to cruise the two ramps meet but for rounding: they are made to meet.
@@ -37,7 +44,7 @@ pub fn segments<R: Real, P: Root>(
         (true, false, true) => (start, start),
         (false, _, _) | (true, false, false) => (top, brake),
     };
-    let feed_mm_s = plan.peak_mm_s.to_f64();
+    let feed_mm_s = peak_mm_s.to_f64();
     let made = |ramp: &Ramp<P>, length: Position| {
         if length == Position::ZERO { Ok(None) } else { FeedSegment::ramp(ramp, length, tick_s).map(Some) }
     };
@@ -47,3 +54,48 @@ pub fn segments<R: Real, P: Root>(
 
 /// Less than this between two ramps is rounding \[mm\].
 const GAP_MM: f64 = 4.0e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::super::lookahead::plan;
+    use super::*;
+    use crate::law::{Law, Limits};
+
+    /// Whatever the length, down to a position step: feeds meet to the bit, and lengths to the step. Blocks are driven from
+    /// a feed to rest, as when a stop begins where hardly any path is left.
+    #[test]
+    fn nothing_is_lost_in_ramps_without_a_step() {
+        let law = Law::new(Limits { accel_mm_s2: 2000.0, jerk_mm_s3: 5e4, snap_mm_s4: 4e6 }).expect("limits");
+        let mut seed = 7_u64;
+        let mut unit = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let (mut made_up, mut short) = (0, 0);
+        for number in 0..20_000 {
+            let enter_mm_s = 1e-6 * libm::pow(1e8, unit());
+            let stop = Ramp::new(&law, enter_mm_s, 0.0);
+            // The way to rest, and up to a few steps more.
+            let end = Position::from_mm(stop.length_mm()).expect("in range")
+                + Position::from_bits((unit() * 6.0) as i64);
+            if end == Position::ZERO {
+                continue;
+            }
+            let block = Block { length_mm: end.to_mm(), cap_mm_s: 200.0, joint_mm_s: 200.0, law };
+            let mut plans = [BlockPlan::default()];
+            if plan(&[block], enter_mm_s, 0.0, &mut plans).is_err() {
+                continue;
+            }
+            let made = segments::<f64, f64>(&block, &plans[0], Position::ZERO, end, 5e-4).expect("segments");
+            let (mut at, mut feed_mm_s) = (Position::ZERO, enter_mm_s);
+            for segment in made.iter().flatten() {
+                assert_eq!(segment.as_ramp().from_mm_s, feed_mm_s, "block {number}: {plans:?}");
+                (at, feed_mm_s) = (at + segment.length(), segment.as_ramp().to_mm_s);
+            }
+            assert_eq!((at, feed_mm_s), (end, 0.0), "block {number}");
+            made_up += 1;
+            short += usize::from(plans[0].peak_mm_s > enter_mm_s && made[0].is_none());
+        }
+        assert!(made_up > 5000 && short > 100, "{made_up} {short}");
+    }
+}
