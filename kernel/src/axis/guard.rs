@@ -193,6 +193,8 @@ pub(super) struct Guard<R> {
     last: Look,
     still_looks: u16,
     against_looks: u16,
+    /// The speed at the look before the first of them.
+    against_from: i32,
     saturated_looks: u16,
     /// The next jump is that of a machine that was moving where it was told to stand.
     is_excused: bool,
@@ -395,8 +397,11 @@ impl<R: Real> Guard<R> {
         let moved_mm = mm(config, speed);
         let moving_mm = guard.moving_mm_s * guard.tick_s + guard.noise_mm;
         let is_against = commanded > 0 && moved_mm < -moving_mm || commanded < 0 && moved_mm > moving_mm;
-        // A load that is too great brakes slowly, but brakes.
-        let brakes_mm = mm::<R>(config, self.last.speed).abs() - moved_mm.abs();
+        // A load that is too great brakes slowly, but brakes: if it doesn't show from one look to the next, then over some.
+        if self.against_looks == 0 {
+            self.against_from = self.last.speed;
+        }
+        let brakes_mm = mm::<R>(config, self.against_from).abs() - moved_mm.abs();
         let is_against = is_against && brakes_mm <= guard.noise_mm;
         let goes_on = self.last.is_taken && commanded != 0 && commanded == self.last.commanded;
         let count = |looks: u16, again: bool| if again { looks.saturating_add(1) } else { 0 };
@@ -553,5 +558,26 @@ mod tests {
         assert_eq!(found(0), [Found::SoftLimit, Found::EncoderLost]);
         assert_eq!(found(-20), [Found::SoftLimit, Found::Runaway]);
         assert_eq!(found(5), [Found::SoftLimit]);
+    }
+
+    /// Thrown back by a load, an axis brakes by less than a look can see, but by more than some of them; one that does not
+    /// brake at all runs away.
+    #[test]
+    fn what_brakes_slowly_does_not_run_away() {
+        let found = |brake_mm_s2: f64| {
+            let (config, mut axis) = (config(), AxisState::default());
+            let setpoint = Setpoint { velocity_mm_s: 10.0, ..Setpoint::default() };
+            (0..80_i64).find_map(|tick| {
+                let t_s = TICK_S * tick as f64;
+                let back_mm = 5.0 * t_s - 0.5 * brake_mm_s2 * t_s * t_s;
+                let counts = Counts((-back_mm / MM_PER_COUNT).round() as i64);
+                let mut output = AxisOutput { counts, ..AxisOutput::default() };
+                axis.tick(&config, &setpoint, &mut output);
+                assert!(!output.lost, "{brake_mm_s2} tick {tick}");
+                if tick % 8 == 7 { axis.look(&config, &setpoint, &output, 8) } else { None }
+            })
+        };
+        assert_eq!(found(0.0), Some(Found::Runaway));
+        assert_eq!(found(20.0), None);
     }
 }
