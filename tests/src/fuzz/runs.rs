@@ -60,6 +60,7 @@ impl<R: Real> Machine<R> {
                 if self.kernel.clear_fault().is_none() {
                     return Ok(());
                 }
+                self.faulty = 0;
                 self.judge.anew();
             }
             3 => {
