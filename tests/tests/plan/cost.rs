@@ -6,8 +6,8 @@ use std::time::Instant;
 use motion_kernel::law::{Law, Limits, Ramp};
 use motion_kernel::plan::{Block, Node, nodes_for, plan_spanning};
 
+use crate::lists::{block, lists, reference};
 use crate::support::Random;
-use crate::{block, reference};
 
 /// What the caller provides for a list of blocks, a block \[bytes\].
 const MEMORY_MAX: usize = 300;
@@ -58,50 +58,9 @@ fn ramps(blocks: &[Block<f64>]) -> f64 {
 
 #[test]
 fn a_block_costs_some_ramps() {
-    let mut random = Random::new(52);
-    let count = 10_000;
-    let mut walk = |length_mm: f64| {
-        let mut feed: f64 = 50.0;
-        let mut list = Vec::new();
-        for _ in 0..count {
-            feed = (feed * random.log(0.8, 1.25)).clamp(5.0, 90.0);
-            list.push(block(length_mm, feed));
-        }
-        list
-    };
-    let walks = [0.1, 1.0, 10.0].map(&mut walk);
-    let [walk_short, walk_middle, walk_long] = walks;
-    let mut feeds = |length_mm: f64| -> Vec<Block<f64>> {
-        (0..count).map(|_| block(length_mm, 20.0 + 60.0 * random.log(0.01, 1.0))).collect()
-    };
-    let [feeds_short, feeds_middle, feeds_long] = [0.1, 1.0, 3.0].map(&mut feeds);
-    let saw: Vec<_> = (0..count).map(|n| block(5.0, 5.0 + 8.0 * (n % 10) as f64)).collect();
-    // Every block with limits of its own.
-    let mut mixed = |blocks: &[Block<f64>]| -> Vec<Block<f64>> {
-        let mut limit = |least: f64| least * (1.0 + random.unit());
-        let mut law = || Limits { accel_mm_s2: limit(500.0), jerk_mm_s3: limit(5e3), snap_mm_s4: limit(4e5) };
-        blocks.iter().map(|block| Block { law: Law::new(law()).expect("positive"), ..*block }).collect()
-    };
-    let [mixed_feeds, mixed_walk, mixed_saw] = [&feeds_middle, &walk_middle, &saw].map(|list| mixed(list));
-    let lists = [
-        ("equal", vec![block(0.1, 80.0); count]),
-        ("alternating", (0..count).map(|n| block(0.1, [80.0, 40.0][n % 2])).collect()),
-        ("saw-tooth 0.5 mm", (0..count).map(|n| block(0.5, 5.0 + 8.0 * (n % 10) as f64)).collect()),
-        ("saw-tooth 5 mm", saw),
-        ("stairs", (0..count).map(|n| block(1.0, 20.0 + 0.36 * (n % 500) as f64)).collect()),
-        ("stairs up", (0..count).map(|n| block(1.0, 1.0 + 79.0 * n as f64 / count as f64)).collect()),
-        ("random feeds 0.1 mm", feeds_short),
-        ("random feeds 1 mm", feeds_middle),
-        ("random feeds 3 mm", feeds_long),
-        ("random walk 0.1 mm", walk_short),
-        ("random walk 1 mm", walk_middle),
-        ("random walk 10 mm", walk_long),
-        ("random feeds 1 mm, mixed laws", mixed_feeds),
-        ("random walk 1 mm, mixed laws", mixed_walk),
-        ("saw-tooth 5 mm, mixed laws", mixed_saw),
-    ];
-    let costs = lists.map(|(name, blocks)| (name, ramps(&blocks) / blocks.len() as f64));
-    for (name, ramps) in costs {
+    let costs: Vec<(&str, f64)> =
+        lists(10_000).iter().map(|(name, blocks)| (*name, ramps(blocks) / blocks.len() as f64)).collect();
+    for (name, ramps) in &costs {
         println!("{name}: {ramps:.1} ramps a block");
     }
     let (name, worst) =

@@ -8,6 +8,7 @@ mod cost;
 mod executed;
 mod feasible;
 mod fixed;
+mod lists;
 mod maximal;
 mod refusals;
 mod segments;
@@ -16,6 +17,7 @@ mod spanning;
 mod support;
 mod window;
 
+use lists::{block, reference};
 use motion_kernel::law::{Law, Limits};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, plan};
 use support::Random;
@@ -23,11 +25,6 @@ use support::Random;
 /// The law for acceleration, jerk and snap limits.
 fn law(accel_mm_s2: f64, jerk_mm_s3: f64, snap_mm_s4: f64) -> Law<f64> {
     Law::new(Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }).expect("positive")
-}
-
-/// S1's limits.
-fn reference() -> Law<f64> {
-    law(500.0, 5e3, 4e5)
 }
 
 fn laws() -> [Law<f64>; 6] {
@@ -39,10 +36,6 @@ fn laws() -> [Law<f64>; 6] {
         law(100.0, 100.0, 1e4),
         law(1.0, 1e4, 1e8),
     ]
-}
-
-fn block(length_mm: f64, cap_mm_s: f64) -> Block<f64> {
-    Block { length_mm, cap_mm_s, joint_mm_s: f64::INFINITY, law: reference() }
 }
 
 /// The plan from rest to rest, or between the feeds.

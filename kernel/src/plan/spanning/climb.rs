@@ -106,6 +106,8 @@ struct Reached {
     time_s: f64,
     /// That time less what the length takes at this feed: less is better.
     lag_s: f64,
+    /// What a ramp from it may use where it starts, if one was asked for.
+    within: Option<Limits<f64>>,
     /// The feed before, and the ramp from there.
     from: usize,
     leg: Option<Leg>,
@@ -118,6 +120,7 @@ impl Reached {
         length_mm: 0.0,
         time_s: 0.0,
         lag_s: f64::INFINITY,
+        within: None,
         from: 0,
         leg: None,
     };
@@ -212,11 +215,13 @@ impl Climb {
         below: usize,
         limits: &impl Fn(f64, f64) -> Limits<f64>,
     ) -> Option<Way> {
-        let start = self.reached.get(from)?;
+        let start = self.reached.get_mut(from)?;
         if !(start.lag_s < f64::INFINITY) {
             return None;
         }
         let start_mm = start.length_mm.max(start.ready_mm);
+        let within = *start.within.get_or_insert_with(|| limits(start_mm, start_mm));
+        let start = self.reached.get(from)?;
         let rested_s = |from_mm: f64, to_mm: f64| {
             if to_mm > from_mm { (to_mm - from_mm) / start.feed_mm_s } else { 0.0 }
         };
@@ -230,7 +235,7 @@ impl Climb {
             room_mm: self.room_mm,
             wait_s_mm: 1.0 / start.feed_mm_s - 1.0 / target.feed_mm_s,
             between: self.reached.get(from + 1..=below)?,
-            within: limits(start_mm, start_mm),
+            within,
             limits,
             hinders: 0,
         };

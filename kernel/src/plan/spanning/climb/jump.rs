@@ -69,11 +69,11 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
             Tried::TooHard => {}
         }
         // The softest that might lose little enough: by itself a ramp loses its time × change/(2·to), and it takes no less
-        // than change/acceleration.
+        // than change/acceleration. If the hardest is one to be beaten, the stair that makes it wait says what softer ones lose.
         let change = self.to_mm_s - self.from_mm_s;
-        if best.is_none() && self.is_hopeless(&hard, change * change / (2.0 * self.to_mm_s * most_s), most_s)
-        {
-            return None;
+        let known = best.map_or(hard, |(leg, _): (Leg, Way)| leg.ramp);
+        if self.is_hopeless(&known, change * change / (2.0 * self.to_mm_s * most_s), most_s) {
+            return best;
         }
         let all_s = most_s;
         // Softer by steps, from what the ramp would reach, as long as it helps.
@@ -100,7 +100,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
                 break;
             }
         }
-        if good_s == f64::INFINITY && self.is_hopeless(&hard, hardest / SOFTER, all_s) {
+        if good_s == f64::INFINITY && self.is_hopeless(&known, hardest / SOFTER, all_s) {
             return best;
         }
         // Golden section around the best of them.
@@ -161,7 +161,8 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
 
     /// Whether no ramp between `hard` and the one with so much acceleration loses less than `most_s`, as far as one stair
     /// can tell: what a ramp loses by itself and where it passes the stair both grow with its time, nearly in
-    /// proportion, so that between two that lose too much because of the same stair there is none that does not.
+    /// proportion, so that between two that lose too much because of the same stair there is none that does not. That goes
+    /// on as it does where the stair hinders no more: what is lost is never less than that.
     fn is_hopeless(&self, hard: &Ramp<f64>, accel_mm_s2: f64, most_s: f64) -> bool {
         if !(accel_mm_s2 > 0.0) {
             return false;
@@ -169,12 +170,11 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
         let soft = Ramp::within(&self.softened(accel_mm_s2), self.from_mm_s, self.to_mm_s);
         let ends = [hard, &soft].map(|ramp| {
             let own_s = ramp.duration_s() - ramp.length_mm() / self.to_mm_s;
-            let wait_most_mm = if own_s < most_s { (most_s - own_s) / self.wait_s_mm } else { 0.0 };
-            (Passing::new(ramp), self.start_mm + wait_most_mm)
+            (Passing::new(ramp), self.start_mm + (most_s - own_s) / self.wait_s_mm)
         });
         let is_late = |stair: &Reached| {
             ends.iter().all(|(passing, latest_mm)| {
-                stair.ready_mm - passing.length_to_feed_mm(stair.feed_mm_s).1 >= *latest_mm
+                stair.ready_mm - passing.length_to_feed_mm(stair.feed_mm_s).0 >= *latest_mm
             })
         };
         self.between.get(self.hinders).is_some_and(is_late) || self.between.iter().any(is_late)
