@@ -44,12 +44,15 @@ impl<'a> Sides<'a> {
         self.hump.enter_mm_s.max(self.hump.exit_mm_s)
     }
 
-    /// The highest top that is worth trying: the ceiling, or what acceleration alone would reach.
+    /// The highest top that is worth trying: the ceiling, or what the law would reach without stairs, or with several laws,
+    /// that of the greatest limits.
     fn highest(&self) -> f64 {
         let Hump { enter_mm_s, exit_mm_s, start_mm, end_mm, top_mm_s, .. } = *self.hump;
         let accel = self.valleys.laws_of(self.hump).map(|law| law.limits().accel_mm_s2);
         let squares = 0.5 * (enter_mm_s * enter_mm_s + exit_mm_s * exit_mm_s);
-        let reached = libm::sqrt(squares + accel.fold(0.0, f64::max) * (end_mm - start_mm));
+        let bound = libm::sqrt(squares + accel.fold(0.0, f64::max) * (end_mm - start_mm));
+        let reached =
+            self.uniform.map_or(bound, |law| bound.min(peak(&law, enter_mm_s, exit_mm_s, end_mm - start_mm)));
         top_mm_s.min(reached).max(self.lowest())
     }
 
@@ -87,10 +90,6 @@ impl<'a> Sides<'a> {
         self.start(up, down);
         let (mut low, mut high) = (self.lowest(), self.highest());
         let room_mm = self.hump.end_mm - self.hump.start_mm;
-        if let Some(law) = self.uniform {
-            // Stairs in the way only make it lower.
-            high = high.min(peak(&law, self.hump.enter_mm_s, self.hump.exit_mm_s, room_mm)).max(low);
-        }
         let mut left_high = match self.fit(high, up, down) {
             Some(left) if left >= 0.0 => return Some(high),
             Some(left) => left,
@@ -161,11 +160,16 @@ fn top_by_legs(up: &Climb, down: &Climb, top_mm_s: f64, room_mm: f64) -> Option<
                 return None;
             }
             let accel = ramp.peak_accel_mm_s2();
-            let (time_s, time_slope) = if ramp.limited_by == LimitedBy::Acceleration {
-                (ramp.t1_s + change / accel, 1.0 / accel)
-            } else {
-                let time_s = 2.0 * libm::sqrt(2.0 * change / ramp.peak_jerk_mm_s3);
-                (time_s, 0.5 * time_s / change)
+            let (time_s, time_slope) = match ramp.limited_by {
+                LimitedBy::Acceleration => (ramp.t1_s + change / accel, 1.0 / accel),
+                LimitedBy::Jerk => {
+                    let time_s = 2.0 * libm::sqrt(2.0 * change / ramp.peak_jerk_mm_s3);
+                    (time_s, 0.5 * time_s / change)
+                }
+                LimitedBy::Snap => {
+                    let time_s = ramp.duration_s() * libm::cbrt(change / (ramp.to_mm_s - ramp.from_mm_s));
+                    (time_s, time_s / (3.0 * change))
+                }
             };
             let mean_mm_s = 0.5 * (ramp.from_mm_s + top);
             length_mm += leg.start_mm + mean_mm_s * time_s;
