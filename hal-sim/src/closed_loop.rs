@@ -159,7 +159,7 @@ pub fn close<
     streams: &'a mut Streams<R, AXES, PIECES, SEGMENTS>,
     machine: &'a SimMachine<AXES, LINE>,
 ) -> Result<Closed<'a, R, AXES, LINE>, LoopError> {
-    let config = &regulated(program);
+    let config = &regulated(program.header());
     let config = config.as_ref().map_err(|error| *error)?;
     let &Header { tick_s, rules, start, .. } = program.header();
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
@@ -173,17 +173,8 @@ pub fn close<
 }
 
 #[inline(never)]
-fn regulated<R: Real, const AXES: usize>(
-    program: &Reader<'_, AXES>,
-) -> Result<AxesConfig<R, AXES>, LoopError> {
-    let &Header { ref axes, tick_s, .. } = program.header();
-    let axes = AxesConfig::new(axes, tick_s);
-    #[cfg(feature = "live")]
-    let axes = match program.guards().map_err(LoopError::Program)? {
-        Some(guards) => axes.and_then(|axes| axes.guarded(&guards, tick_s)),
-        None => axes,
-    };
-    axes.map_err(LoopError::Axes)
+fn regulated<R: Real, const AXES: usize>(header: &Header<AXES>) -> Result<AxesConfig<R, AXES>, LoopError> {
+    AxesConfig::new(&header.axes, header.tick_s).map_err(LoopError::Axes)
 }
 
 /// Knots of a correction that no learning has made: for runs that are compared with one another \[mm/s\].

@@ -141,7 +141,12 @@ pub fn close<
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
     let Ok(counts) = (&*machine).latch();
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
-    let mut kernel = Kernel::new(&regulated(program)?, header.start, counts);
+    let axes = regulated(header)?;
+    let axes = match program.guards().map_err(LoopError::Program)? {
+        Some(guards) => axes.guarded(&guards, header.tick_s).map_err(LoopError::Axes)?,
+        None => axes,
+    };
+    let mut kernel = Kernel::new(&axes, header.start, counts);
     kernel.enable(0);
     let director = Director::new(program.items(), header.tick_s, 0);
     let commands = Commands { random: SplitMix64::new(seed), turns_left: COMMANDED_TURNS, lost: 0 };
