@@ -461,12 +461,21 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.power = match (self.power, reaction) {
             (Power::Off, _) | (_, Reaction::Immediate) => Power::Off,
             (Power::Ramping { .. }, _) | (Power::Stopping { .. }, Reaction::Stop) => self.power,
-            (Power::On, Reaction::Stop) => Power::Stopping { ticks_left: stop_ticks, is_at_rest: false },
+            (Power::On, Reaction::Stop) if self.trace.executed.state == ExecState::Moving => {
+                Power::Stopping { ticks_left: stop_ticks, is_at_rest: false }
+            }
+            // What rests does not begin to move.
+            (Power::On, Reaction::Stop) => self.at_rest(),
             (Power::On | Power::Starting { .. } | Power::Stopping { .. }, _) => {
                 self.guards.ramp_from = self.guards.written;
                 Power::Ramping { ticks_left: ramp_ticks }
             }
         };
+    }
+
+    /// The end of a stop: what is delayed is still to come.
+    fn at_rest(&self) -> Power {
+        Power::Stopping { ticks_left: u32::from(self.preview.ticks()), is_at_rest: true }
     }
 
     /// A tick of a stop on the path, after the executor's.
@@ -475,7 +484,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         let Power::Stopping { ticks_left, is_at_rest } = self.power else { return };
         let has_come_to_rest = !is_at_rest && self.trace.executed.state != ExecState::Moving;
         if has_come_to_rest {
-            self.power = Power::Stopping { ticks_left: u32::from(self.preview.ticks()), is_at_rest: true };
+            self.power = self.at_rest();
         } else if ticks_left > 0 && (is_at_rest || intake.want_stop()) {
             self.power = Power::Stopping { ticks_left: ticks_left - 1, is_at_rest };
         } else {

@@ -158,6 +158,8 @@ fn start(
         control.flight.clear();
         control.kernel.clear_fault()
     });
+    // Nothing has been enabled yet, so no reaction can be under way.
+    let Some(here) = here else { return Phase::Ready(streams) };
     let (feeder, intake) = streams.split(machine.header().rules, here);
     control.lock(|control| {
         control.intake = intake;

@@ -39,8 +39,10 @@ struct Machine<R: Real> {
     set: [Position; 2],
     /// Ticks since the fault.
     faulty: u32,
-    /// A command has given up motion.
+    /// A command has given up motion, or something was made to go wrong.
     is_given_up: bool,
+    /// A command has just put the machine elsewhere, or let it stand where it is: what came before says nothing.
+    is_moved: bool,
 }
 
 impl<R: Real> Machine<R> {
@@ -48,12 +50,21 @@ impl<R: Real> Machine<R> {
         let mut kernel = Kernel::new(&axes::<R>(), [Position::ZERO; 2], [Counts(0); 2]);
         kernel.enable(SETTLE_TICKS);
         let set = [Position::ZERO; 2];
-        Self { kernel, bench: Bench::default(), judge: Judge::new(), set, faulty: 0, is_given_up: false }
+        Self {
+            kernel,
+            bench: Bench::default(),
+            judge: Judge::new(),
+            set,
+            faulty: 0,
+            is_given_up: false,
+            is_moved: false,
+        }
     }
 
     /// A command of the board, or something that goes wrong.
     fn event(&mut self, input: &mut Unstructured<'_>) -> Result<()> {
-        match input.int_in_range(0..=11)? {
+        let event = input.int_in_range(0..=11)?;
+        match event {
             0 => self.kernel.disable(),
             1 => self.kernel.enable(input.int_in_range(0..=20)?),
             2 => {
@@ -61,11 +72,9 @@ impl<R: Real> Machine<R> {
                     return Ok(());
                 }
                 self.faulty = 0;
-                self.judge.anew();
             }
             3 => {
                 self.kernel.stand_here();
-                self.judge.anew();
             }
             // On the path, in a ramp, at once.
             4 => self.kernel.trip(match input.int_in_range(0..=2)? {
@@ -83,6 +92,8 @@ impl<R: Real> Machine<R> {
             7 => self.refer(input)?,
             _ => return self.bench.upset(input),
         }
+        // A trip must be followed as any other fault is.
+        self.is_moved |= event != 4;
         self.is_given_up = true;
         Ok(())
     }
@@ -104,7 +115,7 @@ impl<R: Real> Machine<R> {
     fn tick(&mut self, intake: &mut Intake<'_, R, 2>) -> ExecState {
         let trace = *self.kernel.tick(intake, &mut self.bench);
         // Enabled anew in the middle of a stretch the machine stands where it is.
-        if self.is_given_up {
+        if core::mem::take(&mut self.is_moved) {
             self.judge.anew();
         }
         self.judge.tick(&trace, self.kernel.reaction());

@@ -3,6 +3,7 @@
 use hal_sim::Injection;
 use motion_host::machine::Machine;
 use motion_host::planning::Plan;
+use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
 
@@ -165,6 +166,36 @@ fn what_the_machine_says_of_its_reactions_is_done() {
             off + 1
         );
     }
+}
+
+/// Between two stretches, whatever is about to begin: what rests when a fault asks for a stop does not begin to move.
+#[test]
+fn what_rests_does_not_begin_to_move() {
+    let machine = Machine::reference();
+    let plan = plan("G21 G90\nG1 X2 F3000\nG4 P0.02\nG1 X4\nG1 Y3\n", &machine);
+    let (mut resting, mut moving) = (0, 0);
+    for at in 100..1200 {
+        let (mut rests, mut last) = (false, [0.0; 3]);
+        run::<f32>(&plan, &machine, &mut |tick, _, kernel, seen| {
+            if let Some(seen) = seen {
+                let set_mm = seen.trace.axes.map(|axis| axis.set.to_mm());
+                if tick == at {
+                    rests = seen.trace.executed.state != ExecState::Moving;
+                    kernel.trip(FaultKind::TickMissed { ticks: 1 });
+                } else if tick > at {
+                    assert!(!rests || set_mm == last, "tripped in {at}, moves in {tick}");
+                    assert!(!rests || tick < at + 3 || seen.is_off, "tripped in {at}, not off in {tick}");
+                    if seen.is_off {
+                        return Next::End;
+                    }
+                }
+                last = set_mm;
+            }
+            Next::GoOn
+        });
+        (resting, moving) = (resting + u32::from(rests), moving + u32::from(!rests));
+    }
+    assert!(resting > 20 && moving > 20, "{resting} at rest, {moving} in motion");
 }
 
 /// An emergency stop that is a stop on the path hides nothing that breaks on the way, and nothing is cleared before the end.
