@@ -30,16 +30,18 @@ struct Before<R> {
 /// Looks at one tick after the other.
 pub(super) struct Judge<R> {
     before: Option<Before<R>>,
+    /// The machine was told to be elsewhere than its streams, which a board would split anew: they may jump.
+    is_torn: bool,
 }
 
 impl<R: Real> Judge<R> {
     pub(super) fn new() -> Self {
-        Self { before: None }
+        Self { before: None, is_torn: false }
     }
 
-    /// The machine was told to stand where it is: what came before does not count.
+    /// The machine was told to stand where it is, and what was faulty is not: what came before does not count.
     pub(super) fn anew(&mut self) {
-        self.before = None;
+        (self.before, self.is_torn) = (None, true);
     }
 
     /// Panics where a promise is broken. `reaction` is the one after the tick.
@@ -63,12 +65,8 @@ impl<R: Real> Judge<R> {
         let set_mm = trace.executed.setpoints.map(|axis| axis.position.to_mm());
         let codes = trace.axes.each_ref().map(|axis| axis.code);
         if let Some(before) = &self.before {
-            let (limit, step) = (LIMITS.accel_mm_s2 * TICK_S, v - before.v_mm_s);
-            // What ends inside a tick and rests begins anew after it: from one side only.
-            assert!(step.abs() <= limit * (1.0 + SHARE) + STEPS, "feed steps by {step}: {trace:?}");
-            for (now, then) in set_mm.iter().zip(before.set_mm) {
-                let (limit, step) = (RULES.feed_mm_s * TICK_S * (1.0 + SHARE) + GAPS_MM, now - then);
-                assert!(step.abs() <= limit, "set position jumps by {step} mm: {trace:?}");
+            if !self.is_torn {
+                goes_on(before, trace, v, &set_mm);
             }
             if let Some(fault) = before.fault {
                 assert_eq!(trace.fault, Some(fault), "a fault stays");
@@ -77,6 +75,17 @@ impl<R: Real> Judge<R> {
             falls(before, &codes, reaction);
         }
         self.before = Some(Before { v_mm_s: v, set_mm, fault: trace.fault, reaction, codes });
+    }
+}
+
+/// Neither the feed nor the set position steps.
+fn goes_on<R: Real>(before: &Before<R>, trace: &Trace<R, 2>, v_mm_s: f64, set_mm: &[f64; 2]) {
+    let (limit, step) = (LIMITS.accel_mm_s2 * TICK_S, v_mm_s - before.v_mm_s);
+    // What ends inside a tick and rests begins anew after it: from one side only.
+    assert!(step.abs() <= limit * (1.0 + SHARE) + STEPS, "feed steps by {step}: {trace:?}");
+    for (now, then) in set_mm.iter().zip(before.set_mm) {
+        let (limit, step) = (RULES.feed_mm_s * TICK_S * (1.0 + SHARE) + GAPS_MM, now - then);
+        assert!(step.abs() <= limit, "set position jumps by {step} mm: {trace:?}");
     }
 }
 
