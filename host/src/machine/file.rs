@@ -116,7 +116,7 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
             return Err(refuse(at.clone(), format!("less than high_mm = {high_mm}")));
         }
     }
-    // What only the kernel's numbers can't hold has no key of its own: it stands at the axis.
+    // What only the kernel's numbers can't hold, or does not go together, has no key of its own: it stands at the axis.
     let figures = [0, 1, 2].map(|index: usize| axes[index].1.figures());
     let faults = file.faults.map_or_else(FaultSettings::default, |faults| faults.settings());
     let guards = Guards {

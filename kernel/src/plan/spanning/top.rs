@@ -45,7 +45,7 @@ impl<'a> Sides<'a> {
     }
 
     /// The highest top that is worth trying: the ceiling, or what the law would reach without stairs, or with several laws,
-    /// that of the greatest limits.
+    /// what their greatest acceleration alone would.
     fn highest(&self) -> f64 {
         let Hump { enter_mm_s, exit_mm_s, start_mm, end_mm, top_mm_s, .. } = *self.hump;
         let accel = self.valleys.laws_of(self.hump).map(|law| law.limits().accel_mm_s2);
