@@ -20,21 +20,28 @@ pub fn segments<R: Real, P: Root>(
     end: Position,
     tick_s: f64,
 ) -> Result<[Option<FeedSegment<R>>; 3], SegmentError> {
-    let rounded = |ramp: &Ramp<P>| {
+    let ramp = |from_mm_s: P, to_mm_s: P| {
+        let ramp = Ramp::new(&block.law, from_mm_s, to_mm_s);
         let mm = ramp.length_mm().to_f64();
-        Position::from_mm(mm).ok_or(SegmentError::OutOfRange { quantity: "ramp length [mm]", value: mm })
+        let length = Position::from_mm(mm);
+        length
+            .map(|length| (ramp, length))
+            .ok_or(SegmentError::OutOfRange { quantity: "ramp length [mm]", value: mm })
     };
     let &BlockPlan { enter_mm_s, mut peak_mm_s, exit_mm_s, .. } = plan;
     // A ramp that is shorter than a position step is none, and must leave no step of the feed where it was.
-    for end_mm_s in [exit_mm_s, enter_mm_s] {
-        if rounded(&Ramp::new(&block.law, end_mm_s, peak_mm_s))? == Position::ZERO {
-            peak_mm_s = end_mm_s;
-        }
+    let mut fall = ramp(peak_mm_s, exit_mm_s)?;
+    if fall.1 == Position::ZERO && peak_mm_s != exit_mm_s {
+        peak_mm_s = exit_mm_s;
+        fall = ramp(exit_mm_s, exit_mm_s)?;
     }
-    let rise = Ramp::new(&block.law, enter_mm_s, peak_mm_s);
-    let fall = Ramp::new(&block.law, peak_mm_s, exit_mm_s);
-    let top = start + rounded(&rise)?;
-    let brake = end - rounded(&fall)?;
+    let mut rise = ramp(enter_mm_s, peak_mm_s)?;
+    if rise.1 == Position::ZERO && peak_mm_s != enter_mm_s {
+        peak_mm_s = enter_mm_s;
+        (rise, fall) = (ramp(enter_mm_s, enter_mm_s)?, ramp(enter_mm_s, exit_mm_s)?);
+    }
+    let ((rise, rise_length), (fall, fall_length)) = (rise, fall);
+    let (top, brake) = (start + rise_length, end - fall_length);
     // With no room to cruise the two ramps meet but for rounding: they are made to meet.
     let rounding_mm = block.length_mm.spacing().to_f64();
     let meets = (brake - top).to_mm() <= GAP_MM + 16.0 * rounding_mm;
