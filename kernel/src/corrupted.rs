@@ -12,6 +12,7 @@ use crate::law::{FeedSegment, Law, Limits, Ramp};
 use crate::num::Real;
 use crate::path::Piece;
 use crate::queue::{PathRules, Streams};
+use crate::random::Random;
 use crate::units::{Counts, DacCode, Position};
 
 const JUMP_MM: f64 = 0.0068;
@@ -30,17 +31,6 @@ fn config<R: Real>() -> AxesConfig<R, 2> {
 
 fn at(mm: f64) -> Position {
     Position::from_mm(mm).expect("in range")
-}
-
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
 }
 
 /// What came of a run: a fault, and the greatest jump of a set-point that was none [mm].
@@ -136,7 +126,7 @@ fn is_corruption(kind: &FaultKind<f32>) -> bool {
 fn a_corrupted_piece_or_segment_is_found_where_the_set_point_jumps() {
     let (mut found, mut not_followed, mut harmless) = (0, 0, 0);
     for seed in 0..3000_u64 {
-        let mut random = Random(seed);
+        let random = Random::new(seed);
         let (which, bit) = (random.next() as usize, random.next() as u32);
         let came = if seed % 2 == 0 {
             let corrupt = |index, piece: Piece<f32, 2>| {

@@ -66,6 +66,7 @@ impl TickMonitor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     type Kind = FaultKind<f32>;
 
@@ -73,26 +74,22 @@ mod tests {
     /// told. The oracle counts in 64 bits.
     #[test]
     fn ticks_are_told_late_missed_and_too_long_across_every_wrap() {
-        let mut state = 0x5eed_u64;
-        let mut random = |below: u64| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) % below
-        };
+        let random = Random::new(0x5EED);
         for bits in [8, 12, 16, 24, 31, 32] {
             let range = 1_u64 << bits;
             let period = (range / 40).clamp(4, 90_000);
             let mut monitor = TickMonitor::new(bits, period as u32).expect("a period");
-            let (mut due, mut before) = (random(range), None);
+            let (mut due, mut before) = (random.below(range), None);
             let now = |counts: u64| (counts % range) as u32;
             for _ in 0..20_000 {
-                let missed = if random(5) == 0 { random(20) } else { 0 };
+                let missed = if random.below(5) == 0 { random.below(20) } else { 0 };
                 due += missed * period;
-                let begins = due + random(period / 4);
+                let begins = due + random.below(period / 4);
                 let found: Option<Kind> = monitor.began(now(begins));
                 let told = before.map_or(0, |before| (begins - before + period / 2) / period - 1);
                 assert_eq!(found, (told > 0).then_some(Kind::TickMissed { ticks: told as u32 }));
                 assert!(before.is_none() || told == missed, "{bits} bits");
-                let took = random(2 * period);
+                let took = random.below(2 * period);
                 let found: Option<Kind> = monitor.ended(now(begins + took));
                 assert_eq!(found, (took >= period).then_some(Kind::TickOverrun), "{bits} bits");
                 before = Some(begins);

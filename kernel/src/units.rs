@@ -153,18 +153,15 @@ impl DacCode {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// Against the conversions of `fixed`, over all sizes and signs, halves of a step, and both ends.
     #[test]
     fn converts_as_fixed_does() {
         let ends = [0.0, -0.0, 1.0e6, 1.0e6_f64.next_up(), f64::NAN, f64::INFINITY, f64::MIN_POSITIVE];
-        let mut state = 5_u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            state ^ state >> 31
-        };
+        let random = Random::new(5);
         for index in 0..1_000_000 {
-            let bits = random().cast_signed() >> (random() % 64);
+            let bits = random.of_any_size();
             assert_eq!(
                 Position::from_bits(bits).to_mm().to_bits(),
                 I32F32::from_bits(bits).to_num::<f64>().to_bits()
@@ -178,7 +175,7 @@ mod tests {
             let mm = ends.get(index).copied().unwrap_or(if index % 2 == 0 {
                 near
             } else {
-                f64::from_bits(random())
+                f64::from_bits(random.next())
             });
             for mm in [mm, -mm] {
                 let expected =

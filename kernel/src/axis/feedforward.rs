@@ -538,6 +538,7 @@ impl<R: Real> More<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// At both ends of the reach, between them and beyond, every number type gives the table's value.
     #[test]
@@ -577,12 +578,11 @@ mod tests {
     /// Halved until it is at most 1, as often as to 2³¹.
     #[test]
     fn a_reach_is_brought_to_one() {
-        let mut state = 17_u64;
+        let random = Random::new(17);
         for index in 0..100_000_i32 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let power = 2.0_f64.powi(index % 40 - 5);
-            let random = power * (1.0 + (state >> 12) as f64 / 4_503_599_627_370_496.0);
-            for reach in [power, power.next_up(), power.next_down(), random] {
+            let between = power * (1.0 + random.unit());
+            for reach in [power, power.next_up(), power.next_down(), between] {
                 let mut scale = 1.0;
                 for _ in 0..31 {
                     if scale * reach > 1.0 {

@@ -140,6 +140,7 @@ fn gain<R: Real>(check: &mut Check, quantity: &'static str, value: f64, per_mm: 
 mod tests {
     use super::*;
     use crate::axis::ScaleError;
+    use crate::random::Random;
 
     const TICK_S: f64 = 0.0005;
     const WIDE: (f64, f64) = (-1e9, 1e9);
@@ -165,12 +166,9 @@ mod tests {
             Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.2e-5, ..Feedforward::default() };
         let regulator = regulator(gains, feedforward);
         let mut state = RegulatorState::default();
-        let (mut random, mut errors) = (7_u64, Vec::new());
+        let (random, mut errors) = (Random::new(7), Vec::new());
         for _ in 0..1000 {
-            let mut unit = || {
-                random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                (random >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-            };
+            let unit = || 2.0 * random.unit() - 1.0;
             let setpoint = Setpoint {
                 velocity_mm_s: 300.0 * unit(),
                 accel_mm_s2: 5e3 * unit(),

@@ -136,6 +136,7 @@ impl<R: Real> OutputScale<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     #[test]
     fn counts_to_position_is_exact_to_a_step_over_the_whole_range() {
@@ -158,12 +159,12 @@ mod tests {
     /// Rounded down in steps of 2⁻⁶⁴ mm, as with the library's floor.
     #[test]
     fn a_count_is_rounded_down() {
-        let mut state = 19_u64;
+        let random = Random::new(19);
         for _ in 0..100_000 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             // Of 25 binary orders, with few digits and with all.
-            let digits = state >> 12 >> (state % 53) << (state % 53);
-            let size = f64::from_bits((997 + (state >> 40) % 25) << 52 | digits);
+            let zeros = random.below(53);
+            let digits = random.next() >> 12 >> zeros << zeros;
+            let size = f64::from_bits((997 + random.below(25)) << 52 | digits);
             for mm_per_count in [size, -size] {
                 let scaled = mm_per_count * 4_294_967_296.0;
                 let high = libm::floor(scaled);

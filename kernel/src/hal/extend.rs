@@ -57,15 +57,15 @@ impl<W: TimerWidth> CountExtender<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     #[test]
     fn follows_any_motion_below_half_the_range() {
-        let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+        let random = Random::new(1);
         let (mut narrow, mut wide) = (CountExtender::new(0_u16), CountExtender::new(0_u32));
         let mut position = 0_i64;
         for _ in 0..100_000 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            position += ((state >> 33) as i64 % 32_767) - 16_383;
+            position += random.below(32_767).cast_signed() - 16_383;
             assert_eq!(narrow.extend(position as u16), Counts(position));
             assert_eq!(wide.extend(position as u32), Counts(position));
         }

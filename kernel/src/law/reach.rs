@@ -174,6 +174,7 @@ fn leg<R: Root>(lower: R, change: R, (time, time_slope): (R, R), by_y: R) -> (R,
 mod tests {
     use super::*;
     use crate::law::Limits;
+    use crate::random::Random;
 
     fn laws() -> [Law<f64>; 4] {
         [(500.0, 5e3, 4e5), (5e3, 1e5, 5e6), (12_500.0, 1e6, 1e8), (500.0, 1e5, 4e5)].map(|(a, j, d)| {
@@ -181,28 +182,18 @@ mod tests {
         })
     }
 
-    struct Random(u64);
-
-    impl Random {
-        fn unit(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-        }
-        fn log(&mut self, from: f64, to: f64) -> f64 {
-            from * (to / from).powf(self.unit())
-        }
-        fn feed(&mut self) -> f64 {
-            if self.unit() < 0.1 { 0.0 } else { self.log(1e-2, 1e3) }
-        }
+    /// Rest, or a feed of any size \[mm/s\].
+    fn feed(random: &Random) -> f64 {
+        if random.chance(0.1) { 0.0 } else { random.log(1e-2, 1e3) }
     }
 
     #[test]
     fn reach_takes_just_the_length() {
-        let mut random = Random(1);
+        let random = Random::new(1);
         let mut worst = 0.0_f64;
         for _ in 0..200_000 {
             for law in &laws() {
-                let (lower, length) = (random.feed(), random.log(1e-3, 2e3));
+                let (lower, length) = (feed(&random), random.log(1e-3, 2e3));
                 let higher = reach(law, lower, length);
                 // The change of feed is what the length depends on: compare lengths for it.
                 let change = change_within(law, lower, length);
@@ -217,12 +208,12 @@ mod tests {
 
     #[test]
     fn peak_takes_just_the_length() {
-        let mut random = Random(2);
+        let random = Random::new(2);
         let mut worst = 0.0_f64;
         let mut solved = 0;
         for _ in 0..200_000 {
             for law in &laws() {
-                let (from, to, length) = (random.feed(), random.feed(), random.log(1e-3, 2e3));
+                let (from, to, length) = (feed(&random), feed(&random), random.log(1e-3, 2e3));
                 let peak = peak(law, from, to, length);
                 let taken = law.ramp_length_mm(from, peak) + law.ramp_length_mm(peak, to);
                 if law.ramp_length_mm(from, to) >= length {

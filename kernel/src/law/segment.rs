@@ -609,16 +609,16 @@ pub(crate) fn to_f64<P: Root>(ramp: &Ramp<P>) -> Ramp<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// Against 128 bits: clocks of phases from 2⁻³² ticks to 2³¹.
     #[test]
     fn a_clocks_step_is_the_quotient() {
-        let mut state = 11_u64;
+        let random = Random::new(11);
         for index in 0..200_000_u32 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let random = (state ^ state >> 32) >> (1 + index % 63);
+            let any = random.next() >> (1 + index % 63);
             let power = 1_u64 << (index % 64);
-            for bits in [random.max(1), power, power.saturating_sub(1).max(1)] {
+            for bits in [any.max(1), power, power.saturating_sub(1).max(1)] {
                 let bits = bits.min(1 << 63);
                 let by = u128::from(bits);
                 let expected = if bits > 1 << 32 { (1_u128 << 96) / by } else { u128::from(u64::MAX) / by };
@@ -630,10 +630,9 @@ mod tests {
 
     #[test]
     fn ticks_to_f64_is_rounded_once() {
-        let mut state = 13_u64;
+        let random = Random::new(13);
         for index in 0..200_000_u32 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let bits = (state ^ state >> 32) >> (index % 64);
+            let bits = random.next() >> (index % 64);
             assert_eq!(Ticks(bits).to_f64(), bits as f64 / 4_294_967_296.0, "{bits}");
         }
     }

@@ -9,33 +9,13 @@ use crate::law::{Law, Limits, PathMotion};
 use crate::plan::{Block, BlockPlan, plan, segments};
 use crate::program::{Allowed, Item, PathBlock};
 use crate::queue::{Intake, LiveStreams, PathRules};
+use crate::random::Random;
 use crate::units::Position;
 
 const TICK_S: f64 = 0.0005;
 const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 4e5 };
 /// Longer ones are cut \[mm\].
 const PIECE_MM: f64 = 4.0;
-
-/// SplitMix64.
-struct Random(Cell<u64>);
-
-impl Random {
-    fn unit(&self) -> f64 {
-        self.0.set(self.0.get().wrapping_add(0x9E37_79B9_7F4A_7C15));
-        let z = self.0.get();
-        let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn chance(&self, probability: f64) -> bool {
-        self.unit() < probability
-    }
-
-    fn log(&self, least: f64, greatest: f64) -> f64 {
-        least * (greatest / least).powf(self.unit())
-    }
-}
 
 /// Blocks straight on, with a ceiling each, from rest to rest: their ends with their ceilings, and the items of their plan.
 fn stretch(random: &Random, from: Position, items: &mut Vec<Item<1>>) -> Vec<(Position, f64)> {
@@ -147,7 +127,7 @@ fn ticks_between_any_two_operations_of_a_turn() {
     let (mut ticks, mut inside, mut starvations, mut commands) = (0, 0_u64, 0, 0_u64);
     for seed in 0..150 {
         println!("seed {seed}");
-        let random = Random(Cell::new(seed));
+        let random = Random::new(seed);
         let (mut items, mut stretches, mut from) = (Vec::new(), Vec::new(), Position::ZERO);
         for _ in 0..1 + (random.unit() * 3.0) as usize {
             let caps = stretch(&random, from, &mut items);

@@ -197,25 +197,23 @@ impl List {
 mod tests {
     use super::*;
     use crate::law::Limits;
+    use crate::random::Random;
 
     /// However great the feeds are beside their change.
     #[test]
     fn a_ramp_that_is_given_up_asks_for_no_more_than_the_whole() {
-        let mut state = 1_u64;
-        let mut unit = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
+        let random = Random::new(1);
         let tick_s = 5e-4;
         let mut cuts = 0;
         for seed in 0..10_000 {
-            let limits = Limits { accel_mm_s2: 50.0 + 500.0 * unit(), jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
-            let from_mm_s = 1000.0 * unit();
-            let to_mm_s = libm::fabs(from_mm_s + 100.0 * (unit() - 0.5));
+            let limits =
+                Limits { accel_mm_s2: 50.0 + 500.0 * random.unit(), jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+            let from_mm_s = 1000.0 * random.unit();
+            let to_mm_s = libm::fabs(from_mm_s + 100.0 * (random.unit() - 0.5));
             let ramp = Ramp::within(&limits, from_mm_s, to_mm_s);
             let item = Item::Feed { ramp, length: Position::from_mm(ramp.length_mm()).expect("in range") };
             let held_s = ramp.t2_s - ramp.t1_s;
-            let elapsed = Ticks::from_seconds(held_s * unit(), tick_s).expect("in range");
+            let elapsed = Ticks::from_seconds(held_s * random.unit(), tick_s).expect("in range");
             for (phase, elapsed) in
                 [(Phase::Rise, Ticks::from_seconds(ramp.t1_s, tick_s)), (Phase::Hold, Some(elapsed))]
             {

@@ -310,20 +310,16 @@ impl Unit for I3F29 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn random(state: &mut u64) -> u64 {
-        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        *state ^ (*state >> 29)
-    }
+    use crate::random::Random;
 
     /// Against the exact product in 128 bits, rounded down, for every product that fits.
     #[test]
     fn products_are_the_exact_ones_rounded_down() {
-        let mut state = 3;
+        let random = Random::new(3);
         let mut fitting = 0;
         for _ in 0..1_000_000 {
-            let a = random(&mut state).cast_signed() >> (random(&mut state) % 64);
-            let b = random(&mut state).cast_signed() >> (random(&mut state) % 64);
+            let a = random.of_any_size();
+            let b = random.of_any_size();
             let exact = (i128::from(a) * i128::from(b)) >> 32;
             if let Ok(exact) = i64::try_from(exact) {
                 fitting += 1;
@@ -340,9 +336,9 @@ mod tests {
 
     #[test]
     fn roots_are_the_greatest_below() {
-        let mut state = 5;
+        let random = Random::new(5);
         for _ in 0..20_000 {
-            let bits = (random(&mut state) >> 1 >> (random(&mut state) % 60)).cast_signed();
+            let bits = (random.next() >> 1 >> random.below(60)).cast_signed();
             let value = Fixed::from_bits(bits);
             let root = u128::from(value.sqrt().to_bits().unsigned_abs());
             let square = u128::from(bits.unsigned_abs()) << 32;
@@ -357,8 +353,8 @@ mod tests {
     /// What keeps a product whole: within half a step and a step of the exact value, whatever the sizes.
     #[test]
     fn whole_products_round_once_and_saturate() {
-        let mut state = 7;
-        let mut wide = || random(&mut state).cast_signed() >> (random(&mut state) % 64);
+        let random = Random::new(7);
+        let wide = || random.of_any_size();
         for _ in 0..200_000 {
             let [a, b, c] = [wide(), wide(), wide()];
             let [x, y, z] = [a, b, c].map(Fixed::from_bits);

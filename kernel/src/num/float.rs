@@ -192,14 +192,14 @@ fn f64_to_q32(x: f64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// Positions of all sizes and signs: rounded once below half a millimetre, within one last place above it.
     #[test]
     fn f32_from_q32_is_the_plain_conversion_to_a_last_place() {
-        let mut state = 1_u64;
+        let random = Random::new(1);
         for _ in 0..10_000_000 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let bits = state.cast_signed() >> ((state >> 7) % 63);
+            let bits = random.of_any_size();
             let (found, plain) = (f32_from_q32(bits), bits as f32 * (1.0 / 4_294_967_296.0));
             if i32::try_from(bits).is_ok() {
                 assert_eq!(found.to_bits(), plain.to_bits(), "{bits}");
@@ -224,15 +224,14 @@ mod tests {
     /// Against the language's own, over all exponents and both signs.
     #[test]
     fn whole_and_finite_are_the_languages() {
-        let mut state = 3_u64;
+        let random = Random::new(3);
         for _ in 0..1_000_000 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let any = f64::from_bits(state ^ state >> 33);
+            let any = f64::from_bits(random.next());
             assert_eq!(is_finite(any), any.is_finite(), "{any:e}");
             assert_eq!(is_within(any, -1e3, 1e9), (-1e3..=1e9).contains(&any), "{any:e}");
             // Exponents from 2⁻¹¹ to 2⁶³.
-            let exponent = 1012 + (state >> 40) % 75;
-            let x = f64::from_bits(exponent << 52 | state >> 12);
+            let exponent = 1012 + random.below(75);
+            let x = f64::from_bits(exponent << 52 | random.next() >> 12);
             assert_eq!(whole(x), x as u64, "{x:e}");
         }
         for x in

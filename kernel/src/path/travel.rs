@@ -46,6 +46,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     fn at(mm: f64) -> Position {
         Position::from_mm(mm).expect("in range")
@@ -54,16 +55,12 @@ mod tests {
     /// Random cubic-like pieces by arc length are hard to make by hand: arcs are not. Their top is known.
     #[test]
     fn an_arc_that_bulges_beyond_is_seen_between_its_ends() {
-        let mut state = 7_u64;
-        let mut unit = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
+        let random = Random::new(7);
         let (mut refused, mut accepted) = (0, 0);
         for _ in 0..2000 {
-            let radius_mm = 5.0 + 100.0 * unit();
+            let radius_mm = 5.0 + 100.0 * random.unit();
             // Symmetric about its top: its angle is ±half, and its polynomial the sine's and cosine's series.
-            let half = 0.02 + 0.15 * unit();
+            let half = 0.02 + 0.15 * random.unit();
             let length_mm = 2.0 * half * radius_mm;
             if length_mm > 16.0 {
                 continue;
@@ -89,7 +86,7 @@ mod tests {
                 Piece::<f64, 2>::septic(1, [at(0.0); 2], coefficients, at(length_mm)).expect("a piece");
             let top_mm = radius_mm * (1.0 - half.cos());
             // Around the top, on both sides, but for what is rounded.
-            let limit_mm = top_mm + 0.02 * (unit() - 0.5);
+            let limit_mm = top_mm + 0.02 * (random.unit() - 0.5);
             if (limit_mm - top_mm).abs() < 3e-3 {
                 continue;
             }

@@ -67,24 +67,21 @@ mod tests {
     use super::super::lookahead::plan;
     use super::*;
     use crate::law::{Law, Limits};
+    use crate::random::Random;
 
     /// Whatever the length, down to a position step: feeds meet to the bit, and lengths to the step. Blocks are driven from
     /// a feed to rest, as when a stop begins where hardly any path is left.
     #[test]
     fn nothing_is_lost_in_ramps_without_a_step() {
         let law = Law::new(Limits { accel_mm_s2: 2000.0, jerk_mm_s3: 5e4, snap_mm_s4: 4e6 }).expect("limits");
-        let mut seed = 7_u64;
-        let mut unit = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1_u64 << 53) as f64
-        };
+        let random = Random::new(7);
         let (mut made_up, mut short) = (0, 0);
         for number in 0..20_000 {
-            let enter_mm_s = 1e-6 * libm::pow(1e8, unit());
+            let enter_mm_s = random.log(1e-6, 100.0);
             let stop = Ramp::new(&law, enter_mm_s, 0.0);
             // The way to rest, and up to a few steps more.
             let end = Position::from_mm(stop.length_mm()).expect("in range")
-                + Position::from_bits((unit() * 6.0) as i64);
+                + Position::from_bits(random.below(6).cast_signed());
             if end == Position::ZERO {
                 continue;
             }

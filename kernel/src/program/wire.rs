@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn reads_what_postcard_reads_and_nothing_else() {
         for seed in 1..=20 {
-            let mut random = Random(seed);
+            let random = Random::new(seed);
             let (mut accepted, mut refused) = (0, 0);
             for _ in 0..20_000 {
                 let mut bytes = vec![random.below(8) as u8];

@@ -18,7 +18,7 @@ pub mod valleys;
 pub use valleys::Node;
 
 use self::climb::Climb;
-use self::top::Sides;
+use self::top::{Sides, lowest_fits};
 use self::valleys::{Hump, Valleys};
 use super::lookahead::{Block, BlockPlan, PlanError, check};
 use crate::law::Ramp;
@@ -69,14 +69,7 @@ pub fn plan_spanning(
     };
     // Several kilobytes each: used for all humps.
     let (mut up, mut down) = (Climb::NONE, Climb::NONE);
-    let fits = |valleys: &Valleys<'_>, hump: &Hump| match Sides::new(hump, valleys) {
-        Some(sides) => {
-            sides.start(&mut up, &mut down);
-            sides.fit(sides.lowest(), &mut up, &mut down).is_some_and(|left| left >= 0.0)
-        }
-        None => hump.enter_mm_s == hump.exit_mm_s,
-    };
-    if !valleys.settle(fits) {
+    if !valleys.settle(|valleys, hump| lowest_fits(hump, valleys, &mut up, &mut down)) {
         return Ok(None);
     }
     let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
