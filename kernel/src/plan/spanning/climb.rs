@@ -255,12 +255,6 @@ impl Climb {
         self.top.time_s
     }
 
-    /// The feed of the last stair that the chain found last rests in, if it does \[mm/s\].
-    pub fn rested_mm_s(&self) -> Option<f64> {
-        let leg = self.top.leg.as_ref()?;
-        (self.top.from > 0).then_some(leg.ramp.from_mm_s)
-    }
-
     /// The last ramp of the chain that was found last.
     pub fn last_leg(&self) -> Option<&Leg> {
         self.top.leg.as_ref()

@@ -15,10 +15,6 @@ const LEG_STEPS: usize = 4;
 const LEGS_STEPS: usize = 6;
 /// No more steps once another could gain so small a part of the time.
 const TOP_GAIN: f64 = 2.0e-5;
-/// Where between the best top and the first that did not fit another one is tried.
-const TOP_ABOVE: f64 = 0.33;
-/// That is worth it if the last stair rested in is above this part of the top.
-const TOP_CLOSE: f64 = 0.75;
 /// No more steps once so small a part of the hump is left to cruise at its top.
 const TOP_GAP: f64 = 1.0e-3;
 
@@ -97,29 +93,16 @@ impl<'a> Sides<'a> {
         };
         // That the lowest one fits is known.
         let (mut left_low, mut gap_mm, mut last) = (room_mm, room_mm, high);
-        // The best need not be the highest that fits: just above a stair a chain may lose more than its top gains. Nor need what
-        // is above one that does not fit: a softer chain that does not rest in that stair may be shorter.
+        // The best need not be the highest that fits: just above a stair a chain may lose more than its top gains.
         let (mut best, mut best_s) = (low, f64::INFINITY);
-        let mut above =
-            (!self.hump.rising.is_empty() || !self.hump.falling.is_empty()).then_some((high, left_high));
         // False position, with halving where that stands still; aimed a little short, so that there is room.
         let aim_mm = 0.5 * TOP_GAP * room_mm;
         for step in 0..TOP_STEPS {
             let gains = best_s == f64::INFINITY || gap_mm * (high - low) > TOP_GAIN * best_s * high * low;
-            let is_above = gap_mm < TOP_GAP * room_mm || !gains;
-            let by_legs = if is_above {
-                let is_close =
-                    |climb: &Climb| climb.rested_mm_s().is_some_and(|feed| feed > TOP_CLOSE * last);
-                let Some((highest, left)) = above.take().filter(|_| is_close(up) || is_close(down)) else {
-                    break;
-                };
-                (high, left_high) = (highest, left);
-                Some(best + TOP_ABOVE * (highest - best))
-            } else if step < LEG_STEPS {
-                top_by_legs(up, down, last, room_mm - aim_mm)
-            } else {
-                None
-            };
+            if gap_mm < TOP_GAP * room_mm || !gains {
+                break;
+            }
+            let by_legs = if step < LEG_STEPS { top_by_legs(up, down, last, room_mm - aim_mm) } else { None };
             let part = (left_low - aim_mm) / (left_low - left_high);
             let part = if part > 0.02 && part < 0.98 { part } else { 0.5 };
             last = by_legs.filter(|&top| low < top && top < high).unwrap_or(low + part * (high - low));
@@ -132,7 +115,6 @@ impl<'a> Sides<'a> {
                         (best, best_s) = (last, time_s);
                     }
                 }
-                _ if is_above => break,
                 tried => {
                     (high, left_high) = (last, tried.unwrap_or(f64::NEG_INFINITY));
                     left_low *= 0.5;
