@@ -3,15 +3,15 @@
 //! Whatever comes of them, a set-point that jumps is a fault in the tick it jumps in, and outputs are ramped; what is not a
 //! number never reaches a converter.
 
-use crate::axis::fixture::{Follower, GUARD, TICK_S, figures, guarded};
 use crate::axis::{AxesConfig, GuardFigures};
 use crate::exec::ExecState;
 use crate::fault::{FaultKind, Reaction, Reactions};
+use crate::fixture::{Follower, GUARD, LIMITS, RULES, TICK_S, figures, guarded};
 use crate::kernel::Kernel;
-use crate::law::{FeedSegment, Law, Limits, Ramp};
+use crate::law::{FeedSegment, Law, Ramp};
 use crate::num::Real;
 use crate::path::Piece;
-use crate::queue::{PathRules, Streams};
+use crate::queue::Streams;
 use crate::random::Random;
 use crate::units::{Counts, DacCode, Position};
 
@@ -44,16 +44,14 @@ fn run(
     piece: impl Fn(usize, Piece<f32, 2>) -> Piece<f32, 2>,
     segment: impl Fn(usize, FeedSegment<f32>) -> FeedSegment<f32>,
 ) -> Came {
-    let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
-    let rules = PathRules { limits, feed_mm_s: 300.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
     let mut streams = Streams::<f32, 2, 8, 8>::new();
-    let (mut feeder, mut intake) = streams.split(rules, [at(0.0); 2]);
+    let (mut feeder, mut intake) = streams.split(RULES, [at(0.0); 2]);
     for index in 0..4 {
         let start = [at(6.0 * index as f64), at(8.0 * index as f64)];
         let made = Piece::line(1, start, [0.6, 0.8], at(10.0)).expect("a piece");
         feeder.piece_unchecked(piece(index, made));
     }
-    let up = Ramp::new(&Law::new(limits).expect("limits"), 0.0, 60.0);
+    let up = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, 60.0);
     let rise = at(up.length_mm());
     let cruise = at(40.0) - rise - rise;
     let made = [(up, rise), (Ramp::cruise(60.0, cruise.to_mm() / 60.0), cruise), (up.reversed(), rise)];

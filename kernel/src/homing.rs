@@ -347,13 +347,11 @@ impl Homing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::Limits;
+    use crate::fixture::LIMITS;
 
     fn at(mm: f64) -> Position {
         Position::from_mm(mm).expect("in range")
     }
-
-    const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
 
     fn homing() -> Homing {
         let config = HomingConfig {

@@ -109,4 +109,6 @@ pub mod homing;
 #[cfg(all(test, feature = "guards"))]
 mod corrupted;
 #[cfg(test)]
+mod fixture;
+#[cfg(test)]
 mod random;

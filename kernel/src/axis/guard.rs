@@ -440,9 +440,9 @@ fn mm<R: Real>(config: &AxisConfig<R>, counts: i32) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::fixture::{GUARD, MM_PER_COUNT, TICK_S, figures, guarded};
     use crate::axis::{AxesConfig, AxisState, Guards};
     use crate::fault::Reactions;
+    use crate::fixture::{GUARD, MM_PER_COUNT, TICK_S, figures, guarded};
 
     fn config() -> AxisConfig<f32> {
         guarded::<f32, 1>(figures(), GUARD).axes[0]

@@ -16,8 +16,6 @@
 mod check;
 pub mod correction;
 pub mod feedforward;
-#[cfg(all(test, feature = "guards"))]
-pub(crate) mod fixture;
 #[cfg(feature = "guards")]
 mod guard;
 mod guards;

@@ -2,18 +2,10 @@
 
 use super::Kernel;
 use crate::axis::AxesConfig;
-use crate::axis::fixture::{Follower, GUARD, figures, guarded};
 use crate::fault::{FaultKind, Reaction, Reactions};
-use crate::law::Limits;
-use crate::queue::{PathRules, Streams};
+use crate::fixture::{Follower, GUARD, RULES, figures, guarded};
+use crate::queue::Streams;
 use crate::units::{Counts, DacCode, Position};
-
-const RULES: PathRules = PathRules {
-    limits: Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 },
-    feed_mm_s: 300.0,
-    joint_angle_rad: 0.01,
-    joint_gap_mm: 5e-6,
-};
 
 /// The longest ramp there is, from one end of the converter's range to a trim near the other.
 #[test]

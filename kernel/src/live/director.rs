@@ -639,7 +639,8 @@ mod tests {
 
     use super::*;
     use crate::exec::Executor;
-    use crate::law::{Law, Limits, Ramp};
+    use crate::fixture::{self, LIMITS};
+    use crate::law::{Law, Ramp};
     use crate::program::{Allowed, PathBlock};
     use crate::queue::{LiveStreams, PathRules};
 
@@ -649,9 +650,7 @@ mod tests {
         Position::from_mm(mm).expect("in range")
     }
 
-    const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
-    const RULES: PathRules =
-        PathRules { limits: LIMITS, feed_mm_s: 20.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+    const RULES: PathRules = PathRules { feed_mm_s: 20.0, ..fixture::RULES };
 
     /// A hundred millimetres of cruise between two ramps, on a block that is so much longer.
     fn line(longer: Position) -> [Item<1>; 6] {

@@ -254,12 +254,10 @@ fn least<R: Root>(a: &Limits<R>, b: &Limits<R>, component: R) -> Limits<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixture::LIMITS;
 
     fn machine() -> MachineLimits<f64, 3> {
-        let all = AxisLimits {
-            feed_mm_s: 300.0,
-            limits: Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 },
-        };
+        let all = AxisLimits { feed_mm_s: 300.0, limits: LIMITS };
         MachineLimits { path: all, axes: [all; 3], curve_feed_share: CURVE_FEED_SHARE }
     }
 

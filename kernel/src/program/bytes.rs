@@ -235,47 +235,24 @@ impl<const AXES: usize> Iterator for Items<'_, AXES> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::{Feedforward, Gains, GuardFigures};
+    use crate::axis::{Feedforward, GuardFigures};
     use crate::fault::{Reaction, Reactions};
-    use crate::law::{Limits, Ticks};
+    use crate::fixture::{GUARD, RULES, figures};
+    use crate::law::Ticks;
 
     fn header() -> Header<2> {
-        let axis = AxisFigures {
-            mm_per_count: 1e-4,
-            mm_s_at_10_v: 1000.0 / 3.0,
-            output_offset_v: 0.0,
-            output_limit_v: 10.0,
-            gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
-            feedforward: Feedforward {
-                velocity: 1.0,
-                accel_s: 1.675e-3,
-                jerk_s2: 2.2e-5,
-                ..Feedforward::default()
-            },
-            following_error_limit_mm: 1.0,
-        };
-        let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+        let feedforward =
+            Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.2e-5, ..Feedforward::default() };
         Header {
             tick_s: 0.0005,
-            rules: PathRules { limits, feed_mm_s: 300.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 },
-            axes: [axis; 2],
+            rules: RULES,
+            axes: [AxisFigures { feedforward, ..figures() }; 2],
             start: [Position::ZERO, Position::from_bits(-7)],
         }
     }
 
     fn guards() -> Guards<2> {
-        let figures = GuardFigures {
-            following_error_at_rest_mm: 0.25,
-            following_error_per_velocity_s: 1e-3,
-            following_error_per_accel_s2: 1e-4,
-            jump_mm: 0.007,
-            moving_mm_s: 3.0,
-            response_s: 0.013,
-            load_accel_mm_s2: 1230.0,
-            noise_counts: 300,
-            saturation_s: 0.1,
-            travel_mm: Some([-10.0, 250.5]),
-        };
+        let figures = GuardFigures { noise_counts: 300, travel_mm: Some([-10.0, 250.5]), ..GUARD };
         let reactions = Reactions { ramp_ticks: 200, stop_ticks: 4000, emergency_stop: Reaction::Ramp };
         Guards { axes: [None, Some(figures)], reactions }
     }

@@ -63,8 +63,7 @@ impl<R: Real> Machine<R> {
 
     /// A command of the board, or something that goes wrong.
     fn event(&mut self, input: &mut Unstructured<'_>) -> Result<()> {
-        let event = input.int_in_range(0..=11)?;
-        match event {
+        match input.int_in_range(0..=11)? {
             0 => self.kernel.disable(),
             1 => self.kernel.enable(input.int_in_range(0..=20)?),
             2 => {
@@ -76,12 +75,7 @@ impl<R: Real> Machine<R> {
             3 => {
                 self.kernel.stand_here();
             }
-            // On the path, in a ramp, at once.
-            4 => self.kernel.trip(match input.int_in_range(0..=2)? {
-                0 => FaultKind::TickMissed { ticks: 1 },
-                1 => FaultKind::Drive { axis: input.choose_index(2)? },
-                _ => FaultKind::Encoder,
-            }),
+            4 => return self.trip(input),
             5 => {
                 self.bench.mend();
                 return Ok(());
@@ -92,8 +86,18 @@ impl<R: Real> Machine<R> {
             7 => self.refer(input)?,
             _ => return self.bench.upset(input),
         }
-        // A trip must be followed as any other fault is.
-        self.is_moved |= event != 4;
+        (self.is_moved, self.is_given_up) = (true, true);
+        Ok(())
+    }
+
+    /// A fault that the board has seen. It must be followed as any other one is: what was driven goes on in its stop.
+    fn trip(&mut self, input: &mut Unstructured<'_>) -> Result<()> {
+        self.kernel.trip(match input.int_in_range(0..=2)? {
+            // Ends on the path, in a ramp, at once.
+            0 => FaultKind::TickMissed { ticks: 1 },
+            1 => FaultKind::Drive { axis: input.choose_index(2)? },
+            _ => FaultKind::Encoder,
+        });
         self.is_given_up = true;
         Ok(())
     }
