@@ -48,13 +48,10 @@
 
 use core::convert::Infallible;
 
-use crate::law::{Law, LimitError, Limits, Ramp, SegmentError};
-use crate::plan::{Block, BlockPlan, plan, segments};
-use crate::program::{Allowed, Item, PathBlock};
+use crate::law::Limits;
+use crate::program::Item;
+use crate::straight::{Straight, StraightError};
 use crate::units::Position;
-
-/// Pieces of path are at most so long, in every number type.
-const PIECE: Position = Position::from_bits(16 << 32);
 
 /// Which way along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,8 +144,6 @@ pub enum JogError {
         /// The axis' greatest.
         most_mm_s: f64,
     },
-    /// A limit of the axis is not a positive number.
-    Limit(LimitError),
     /// The soft limits are not in their order.
     Travel(Travel),
     /// The distance is 0.
@@ -168,7 +163,7 @@ pub enum JogError {
         end_mm: f64,
     },
     /// There is no motion of the law over that distance.
-    Segment(SegmentError),
+    Way(StraightError),
 }
 
 impl core::fmt::Display for JogError {
@@ -178,7 +173,6 @@ impl core::fmt::Display for JogError {
             Self::Feed { feed_mm_s, most_mm_s } => {
                 write!(f, "feed {feed_mm_s} mm/s: expected above 0, at most {most_mm_s}")
             }
-            Self::Limit(error) => error.fmt(f),
             Self::Travel(Travel { least, greatest }) => {
                 let (least_mm, greatest_mm) = (least.to_mm(), greatest.to_mm());
                 write!(f, "soft limits {least_mm} and {greatest_mm} mm: expected the lesser one first")
@@ -197,7 +191,7 @@ impl core::fmt::Display for JogError {
             Self::End { end_mm } => {
                 write!(f, "an end at {end_mm} mm: expected within {} mm", Position::LIMIT_MM)
             }
-            Self::Segment(error) => error.fmt(f),
+            Self::Way(error) => error.fmt(f),
         }
     }
 }
@@ -207,17 +201,8 @@ impl core::error::Error for JogError {}
 /// The items of a jog.
 #[derive(Clone, Debug)]
 pub struct Jog<const AXES: usize> {
-    axis: usize,
-    direction: Direction,
-    start: [Position; AXES],
-    length: Position,
+    way: Straight<AXES>,
     ends_at_limit: bool,
-    block: Option<PathBlock>,
-    /// How far pieces and feed are given out.
-    path: Position,
-    feed: Position,
-    ramps: [Option<(Ramp<f64>, Position)>; 3],
-    is_ended: bool,
 }
 
 impl<const AXES: usize> Jog<AXES> {
@@ -239,7 +224,6 @@ impl<const AXES: usize> Jog<AXES> {
         if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s && most_mm_s.is_finite()) {
             return Err(JogError::Feed { feed_mm_s, most_mm_s });
         }
-        let law = Law::new(limits).map_err(JogError::Limit)?;
         let (direction, wanted) = match way {
             Way::Continuous(direction) => (direction, None),
             Way::By(by) if by > Position::ZERO => (Direction::Positive, Some(by)),
@@ -253,52 +237,27 @@ impl<const AXES: usize> Jog<AXES> {
             (Some(wanted), Some(room)) => wanted.min(room),
         };
         let end_mm = from.to_mm() + direction.sign() * length.to_mm();
+        let mut end = start;
+        if let Some(end) = end.get_mut(axis) {
+            *end = direction.ahead(from, length);
+        }
         if !direction.ahead(from, length).is_within_limit() || libm::fabs(end_mm) > Position::LIMIT_MM {
             return Err(JogError::End { end_mm });
         }
-        let block = Block { length_mm: length.to_mm(), cap_mm_s: feed_mm_s, joint_mm_s: 0.0, law };
-        let mut plans = [BlockPlan::default()];
-        // From rest to rest there always is a plan.
-        let _ = plan(&[block], 0.0, 0.0, &mut plans);
-        let [planned] = plans;
-        let made = segments::<f64, f64>(&block, &planned, Position::ZERO, length, tick_s);
-        let ramps = made.map_err(JogError::Segment)?.map(|segment| {
-            let segment = segment?;
-            Some((*segment.as_ramp(), segment.length()))
-        });
-        let allowed = |cap_mm_s| Allowed { cap_mm_s, limits };
-        Ok(Self {
-            axis,
-            direction,
-            start,
-            length,
-            ends_at_limit: room == Some(length),
-            block: Some(PathBlock::new(length, feed_mm_s, allowed(feed_mm_s), allowed(most_mm_s), 0.0)),
-            path: Position::ZERO,
-            feed: Position::ZERO,
-            ramps,
-            is_ended: false,
-        })
+        let way = Straight::new(start, end, limits, [feed_mm_s, most_mm_s], tick_s).map_err(JogError::Way)?;
+        Ok(Self { way, ends_at_limit: room == Some(length) })
     }
 
     /// Where it ends if it is not aborted.
     #[must_use]
     pub fn end(&self) -> [Position; AXES] {
-        self.after(self.length)
+        self.way.end()
     }
 
     /// Whether it ends at the soft limit.
     #[must_use]
     pub fn ends_at_limit(&self) -> bool {
         self.ends_at_limit
-    }
-
-    fn after(&self, length: Position) -> [Position; AXES] {
-        let mut position = self.start;
-        if let Some(position) = position.get_mut(self.axis) {
-            *position = self.direction.ahead(*position, length);
-        }
-        position
     }
 }
 
@@ -319,28 +278,7 @@ fn room(from: Position, direction: Direction, travel: Travel) -> Result<Position
 impl<const AXES: usize> Iterator for Jog<AXES> {
     type Item = Result<Item<AXES>, Infallible>;
 
-    /// Path and feed in the order of where they start, so that whichever queue is full, the other one is as far.
     fn next(&mut self) -> Option<Self::Item> {
-        if let Some(block) = self.block.take() {
-            return Some(Ok(Item::Block(block)));
-        }
-        if self.path < self.length && self.path <= self.feed {
-            let length = PIECE.min(self.length - self.path);
-            let start = self.after(self.path);
-            let mut direction = [0.0; AXES];
-            if let Some(direction) = direction.get_mut(self.axis) {
-                *direction = self.direction.sign();
-            }
-            self.path = self.path + length;
-            return Some(Ok(Item::Line { line: 0, start, direction, length }));
-        }
-        if let Some((ramp, length)) = self.ramps.iter_mut().find_map(Option::take) {
-            self.feed = self.feed + length;
-            return Some(Ok(Item::Feed { ramp, length }));
-        }
-        if core::mem::replace(&mut self.is_ended, true) {
-            return None;
-        }
-        Some(Ok(Item::EndOfStretch(self.end())))
+        self.way.next()
     }
 }

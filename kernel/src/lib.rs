@@ -101,6 +101,8 @@ pub mod trace;
 pub mod recorder;
 pub mod kernel;
 #[cfg(feature = "live")]
+pub mod straight;
+#[cfg(feature = "live")]
 pub mod jog;
 // Without guards a tick does not keep the inputs of a healthy machine, so nobody would see the switch.
 #[cfg(all(feature = "live", feature = "guards"))]

@@ -29,6 +29,8 @@ pub enum State {
     Aborting,
     /// Given up, at rest: stand here and split the streams anew.
     Aborted,
+    /// Everything that came so far is done, at rest; the source has no more for now.
+    Waiting,
     /// Everything is done.
     Done,
     /// An item can't be executed; at rest behind what came before it.
@@ -74,6 +76,8 @@ pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
     /// There is no room for the next item.
     is_full: bool,
     is_at_end: bool,
+    /// The source had nothing when it was asked last.
+    is_late: bool,
     error: Option<SupplyError<E>>,
     /// The stretch being read, and the path of it that is queued.
     reading: u32,
@@ -130,6 +134,7 @@ where
             pending: None,
             is_full: false,
             is_at_end: false,
+            is_late: false,
             error: None,
             reading: 0,
             path_end: Position::ZERO,
@@ -202,6 +207,11 @@ where
         }
     }
 
+    /// Where items come from, for a source that is to be told something. What was read of it is under way.
+    pub fn source_mut(&mut self) -> &mut I {
+        &mut self.items
+    }
+
     /// How often motion had to stop because data came too late.
     pub fn starvations(&self) -> u32 {
         self.starvations
@@ -228,6 +238,15 @@ where
         self.is_at_end && self.pending.is_none() && self.course.is_empty()
     }
 
+    /// Whether nothing is left of what came, up to the end of a stretch.
+    fn is_waiting(&self) -> bool {
+        self.is_late
+            && self.pending.is_none()
+            && self.course.is_empty()
+            && self.ahead.at == Position::ZERO
+            && self.path_end == Position::ZERO
+    }
+
     /// What it is doing.
     pub fn state(&self, feeder: &LiveFeeder<'_, R, AXES>) -> State {
         let rests = self.rests(feeder);
@@ -240,6 +259,7 @@ where
             (false, true) if rests => State::Held,
             (false, true) => State::Holding,
             (false, false) if rests && self.is_read() && self.ahead.at == Position::ZERO => State::Done,
+            (false, false) if rests && self.is_waiting() => State::Waiting,
             (false, false) => State::Running,
         }
     }
@@ -394,7 +414,9 @@ where
             if self.is_full || self.is_aborted || self.is_at_end {
                 return Ok(());
             }
-            match self.items.poll_next() {
+            let polled = self.items.poll_next();
+            self.is_late = polled.is_pending();
+            match polled {
                 Poll::Ready(Some(item)) => self.take(item.map_err(SupplyError::Source)?)?,
                 Poll::Ready(None) => self.is_at_end = true,
                 Poll::Pending => return Ok(()),
@@ -702,6 +724,50 @@ mod tests {
             assert!(ticks < 1200, "seen at tick {seen}: {ticks} ticks to rest");
             assert_eq!(director.starvations(), 0, "seen at tick {seen}");
         }
+    }
+
+    /// Two programs from one source, which has nothing for a while before, between and behind them.
+    #[test]
+    fn a_source_may_go_on_later() {
+        struct Late {
+            items: std::vec::IntoIter<Item<1>>,
+        }
+        impl Source<1> for Late {
+            type Error = Infallible;
+            fn poll_next(&mut self) -> Poll<Option<Result<Item<1>, Infallible>>> {
+                self.items.next().map_or(Poll::Pending, |item| Poll::Ready(Some(Ok(item))))
+            }
+        }
+        let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+        let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
+        let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
+        let none = std::vec::Vec::new().into_iter();
+        let mut director = Director::<f64, 1, _, Infallible, 64>::new(Late { items: none }, TICK_S, 0);
+        let mut start = Position::ZERO;
+        for _ in 0..3 {
+            for _ in 0..100 {
+                director.turn(&mut feeder).expect("items");
+                let executed = executor.tick(&mut intake).expect("no fault");
+                assert_eq!(executed.setpoints[0].position, start);
+                assert_eq!(director.state(&feeder), State::Waiting);
+            }
+            let mut items = line(Position::ZERO).to_vec();
+            let Item::EndOfStretch([length]) = items[5] else { panic!("{:?}", items[5]) };
+            items[1] = Item::Line { line: 1, start: [start], direction: [1.0], length };
+            start = start + length;
+            items[5] = Item::EndOfStretch([start]);
+            director.source_mut().items = items.into_iter();
+            for tick in 0.. {
+                director.turn(&mut feeder).expect("items");
+                if director.state(&feeder) == State::Waiting {
+                    break;
+                }
+                assert_eq!(director.state(&feeder), State::Running);
+                executor.tick(&mut intake).expect("no fault");
+                assert!(tick < 12_000, "it never ends");
+            }
+        }
+        assert_eq!(director.starvations(), 0);
     }
 
     /// A block that is a step longer or shorter than its path: what was handed over ends at rest, and the rest is refused.
