@@ -14,10 +14,10 @@ fn the_flashed_stringer_is_what_compile_writes() {
     let text = include_bytes!("../../host/src/cli/stringer.ngc");
     let program = gcode::read("stringer.ngc", text).expect("a program");
     let plan = plan_program("stringer.ngc", &program, &machine, Mode::Spanning).expect("a plan");
-    let made = Executable::new::<f32>(&plan).expect("executable").to_bytes(&machine);
+    let made = Executable::new::<f32>(&plan).expect("executable").to_live_bytes(&machine);
     let found = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(STRINGER)).expect("a file");
     assert!(
         made == found,
-        "cargo run --release -- compile host/src/cli/stringer.ngc -o boards/nucleo-f446re/program/stringer.bin"
+        "cargo run --release -- compile host/src/cli/stringer.ngc --live -o boards/nucleo-f446re/program/stringer.bin"
     );
 }

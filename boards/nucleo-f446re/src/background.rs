@@ -9,7 +9,7 @@
 //! tick, so neither delays any. Then come planning and filling, which may take several ticks and keep
 //! nothing off.
 //!
-//! Fails by disabling the drives and saying why.
+//! Fails by bringing the machine to rest, disabling the drives and saying why.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -17,14 +17,15 @@ use cortex_m::peripheral::DWT;
 use defmt::{error, info, warn};
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Fault;
-use motion_kernel::queue::Feeder;
+use motion_kernel::live::State;
+use motion_kernel::program::{ProgramError, SupplyError};
 use motion_kernel::recorder::frame_max;
 use motion_kernel::units::Position;
 use nucleo_f446re::design_parameters::{
     BUTTON_TICKS, FLIGHT_LINE_TICKS, REPORT_TICKS, SETTLE_TICKS, SYSCLK_HZ,
 };
 use nucleo_f446re::machine::{AXES, Machine};
-use nucleo_f446re::program::{Run, RunError};
+use nucleo_f446re::program::Run;
 use nucleo_f446re::tick_log::TickLog;
 use rtic::Mutex;
 use stm32f4xx_hal::gpio::{Input, PC13};
@@ -37,18 +38,19 @@ pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
 pub(crate) static TURNS: AtomicU32 = AtomicU32::new(0);
 
 /// Where the machine is in its day.
-#[allow(clippy::large_enum_variant, reason = "there is one of it, and no heap to put a part of it on")]
+#[derive(Clone, Copy, PartialEq)]
 enum Phase {
-    /// Drives off, streams empty, never started. They can be split once, so this is the only phase in which
-    /// the machine may be found at another place than the program expects.
-    Ready(&'static mut Streams),
-    /// The program is entering the streams.
-    Feeding { feeder: Feeder<'static, f32, AXES>, run: Run },
-    /// The program has entered; `ticks_left` until the last of it can be told from never begun.
-    Finishing { feeder: Feeder<'static, f32, AXES>, ticks_left: u32 },
+    /// Drives off, never started.
+    Ready,
+    /// The program is under way.
+    Running,
+    /// Told to hold, or held.
+    Held,
     /// The program is done, the machine is held at its end.
-    Done { feeder: Feeder<'static, f32, AXES> },
-    /// Drives off until reset.
+    Done,
+    /// An item of the program is refused; what came before it ends at rest.
+    Refused,
+    /// Drives off until reset, or on the way there in a fault.
     Stopped,
 }
 
@@ -68,7 +70,7 @@ pub(crate) fn run(
     machine: &Machine,
     button: &PC13<Input>,
 ) -> ! {
-    let mut phase = Phase::Ready(streams);
+    let mut work = Work { phase: Phase::Ready, streams: Some(streams), run: None, refused: None };
     let mut press = Press::default();
     let mut report = Report::default();
     let mut dump = Dump::default();
@@ -85,15 +87,17 @@ pub(crate) fn run(
             healthy: control.healthy,
         });
         let pressed = press.is_new(button.is_low());
-        let before = core::mem::discriminant(&phase);
-        phase = turn(phase, seen, pressed, machine, &mut control);
+        let before = work.phase;
+        work.turn(seen, pressed, machine, &mut control);
         // A change of phase has had its line.
-        let may_log = core::mem::discriminant(&phase) == before && !pressed;
-        let is_stopped = matches!(phase, Phase::Stopped);
-        if may_log && !(is_stopped && dump.line(&mut control)) {
-            report.line(&mut control);
+        let may_log = work.phase == before && !pressed;
+        if may_log && !(work.phase == Phase::Stopped && dump.line(&mut control)) {
+            report.line(&mut control, work.run.as_ref().map_or(0, Run::starvations));
         }
-        phase = feed(phase, &mut control);
+        // Also in a fault: it may end in a stop on the path.
+        if let Some(run) = &mut work.run {
+            work.refused = run.turn().err();
+        }
 
         report.longest_turn_cycles = report.longest_turn_cycles.max(DWT::cycle_count().wrapping_sub(begin));
     }
@@ -107,99 +111,100 @@ fn wait_for_tick() {
     }
 }
 
-/// What follows from what the tick has left, and from the button. At most one line of log.
-fn turn(
+/// What the button has started.
+struct Work {
     phase: Phase,
-    seen: Seen,
-    pressed: bool,
-    machine: &Machine,
-    control: &mut impl Mutex<T = Control>,
-) -> Phase {
-    match phase {
-        Phase::Stopped => Phase::Stopped,
-        Phase::Ready(streams) if pressed => start(streams, seen.healthy, machine, control),
-        Phase::Ready(streams) => Phase::Ready(streams),
-        Phase::Feeding { .. } | Phase::Finishing { .. } | Phase::Done { .. } if seen.fault.is_some() => {
-            error!("stopped: {}; reset the board to go on", seen.fault);
-            Phase::Stopped
-        }
-        Phase::Feeding { .. } | Phase::Finishing { .. } if pressed && seen.state == ExecState::Stopped => {
-            control.lock(|control| control.kernel.resume());
-            info!("program stop ended");
-            phase
-        }
-        Phase::Feeding { .. } => phase,
-        Phase::Finishing { feeder, ticks_left: 0 } if seen.state == ExecState::Idle => {
-            info!("done: press the blue button to run again");
-            Phase::Done { feeder }
-        }
-        Phase::Finishing { feeder, ticks_left } => {
-            Phase::Finishing { feeder, ticks_left: ticks_left.saturating_sub(1) }
-        }
-        // At rest the set position is exactly where the streams ended.
-        Phase::Done { feeder } if pressed => run_program(feeder, seen.position, machine, control),
-        Phase::Done { .. } => phase,
-    }
+    /// Until the first start.
+    streams: Option<&'static mut Streams>,
+    run: Option<Run<'static>>,
+    /// Why it can't go on.
+    refused: Option<SupplyError<ProgramError>>,
 }
 
-/// The first start: takes the actual position, gives the streams to the tick, enables the drives.
-fn start(
-    streams: &'static mut Streams,
-    healthy: bool,
-    machine: &Machine,
-    control: &mut impl Mutex<T = Control>,
-) -> Phase {
-    if !healthy {
-        warn!("not started: the emergency stop is open or a drive is not ready");
-        return Phase::Ready(streams);
-    }
-    // With the faults of a machine that was not ready yet.
-    let here = control.lock(|control| {
-        control.flight.clear();
-        control.kernel.clear_fault()
-    });
-    // Nothing has been enabled yet, so no reaction can be under way.
-    let Some(here) = here else { return Phase::Ready(streams) };
-    let (feeder, intake) = streams.split(machine.header().rules, here);
-    control.lock(|control| {
-        control.intake = intake;
-        control.kernel.enable(SETTLE_TICKS);
-    });
-    run_program(feeder, here, machine, control)
-}
-
-/// Begins a run of the program from `here`.
-fn run_program(
-    feeder: Feeder<'static, f32, AXES>,
-    here: [Position; AXES],
-    machine: &Machine,
-    control: &mut impl Mutex<T = Control>,
-) -> Phase {
-    match Run::new(machine, here) {
-        Ok(run) => {
-            info!("started: from {=[?]} mm", here.map(Position::to_mm));
-            Phase::Feeding { feeder, run }
+impl Work {
+    /// What follows from what the tick has left, and from the button. At most one line of log.
+    fn turn(&mut self, seen: Seen, pressed: bool, machine: &Machine, control: &mut impl Mutex<T = Control>) {
+        let Some(run) = &mut self.run else {
+            if pressed {
+                self.first_start(seen.healthy, machine, control);
+            }
+            return;
+        };
+        match (self.phase, self.refused) {
+            (Phase::Ready | Phase::Stopped, _) => {}
+            _ if seen.fault.is_some() => {
+                error!("stopped: {}; reset the board to go on", seen.fault);
+                self.phase = Phase::Stopped;
+            }
+            (Phase::Running | Phase::Held, Some(error)) => {
+                error!("program refused: {}; what came before it is driven to its end", error);
+                self.phase = Phase::Refused;
+            }
+            (Phase::Running, _) if pressed && seen.state == ExecState::Stopped => {
+                control.lock(|control| control.kernel.resume());
+                info!("program stop ended");
+            }
+            (Phase::Running, _) if pressed => {
+                run.hold();
+                info!("held: press the blue button to go on");
+                self.phase = Phase::Held;
+            }
+            (Phase::Running, _) if run.state() == State::Waiting && seen.state == ExecState::Idle => {
+                info!("done: press the blue button to run again");
+                self.phase = Phase::Done;
+            }
+            (Phase::Held, _) if pressed => {
+                run.resume();
+                info!("goes on");
+                self.phase = Phase::Running;
+            }
+            // At rest the set position is exactly where the streams ended.
+            (Phase::Done, _) if pressed => self.start(seen.position, control),
+            (Phase::Refused, _) if run.state() == State::Failed => {
+                control.lock(|control| control.kernel.disable());
+                warn!("at rest, drives off; reset the board to go on");
+                self.phase = Phase::Stopped;
+            }
+            _ => {}
         }
-        Err(error) => refused(error, control),
     }
-}
 
-/// Fills the streams as far as they have room.
-fn feed(phase: Phase, control: &mut impl Mutex<T = Control>) -> Phase {
-    let Phase::Feeding { mut feeder, mut run } = phase else { return phase };
-    match run.fill(&mut feeder) {
-        Ok(false) => Phase::Feeding { feeder, run },
-        // Idle means done only when the drives have settled and a tick has seen the last item.
-        Ok(true) => Phase::Finishing { feeder, ticks_left: SETTLE_TICKS + 2 },
-        Err(error) => refused(error, control),
+    /// Takes the actual position, gives the streams to the tick, enables the drives, starts.
+    fn first_start(&mut self, healthy: bool, machine: &Machine, control: &mut impl Mutex<T = Control>) {
+        if !healthy {
+            return warn!("not started: the emergency stop is open or a drive is not ready");
+        }
+        // With the faults of a machine that was not ready yet.
+        let here = control.lock(|control| {
+            control.flight.clear();
+            control.kernel.clear_fault()
+        });
+        // Nothing has been enabled yet, so no reaction can be under way.
+        let Some((here, streams)) = here.zip(self.streams.take()) else { return };
+        let (feeder, intake) = streams.split(machine.header().rules, here);
+        control.lock(|control| {
+            control.intake = intake;
+            control.kernel.enable(SETTLE_TICKS);
+        });
+        self.run = Some(Run::new(machine.program, feeder));
+        self.start(here, control);
     }
-}
 
-/// The program can't go on: nothing of it may.
-fn refused(error: RunError, control: &mut impl Mutex<T = Control>) -> Phase {
-    control.lock(|control| control.kernel.disable());
-    error!("program refused: {}", error);
-    Phase::Stopped
+    /// Starts a run from `here`.
+    fn start(&mut self, here: [Position; AXES], control: &mut impl Mutex<T = Control>) {
+        let Some(run) = &mut self.run else { return };
+        match run.start(here) {
+            Ok(()) => {
+                info!("started: from {=[?]} mm", here.map(Position::to_mm));
+                self.phase = Phase::Running;
+            }
+            Err(error) => {
+                control.lock(|control| control.kernel.disable());
+                error!("no way to the program's start: {}", error);
+                self.phase = Phase::Stopped;
+            }
+        }
+    }
 }
 
 /// The button, debounced.
@@ -253,7 +258,7 @@ struct Report {
 }
 
 impl Report {
-    fn line(&mut self, control: &mut impl Mutex<T = Control>) {
+    fn line(&mut self, control: &mut impl Mutex<T = Control>, starvations: u32) {
         match self.step {
             0 => {
                 let ticks = TICKS.load(Ordering::Relaxed);
@@ -271,7 +276,7 @@ impl Report {
             }
             _ => {
                 let us = core::mem::take(&mut self.longest_turn_cycles) / (SYSCLK_HZ / 1_000_000);
-                info!("longest background turn {=u32} us", us);
+                info!("longest background turn {=u32} us, {=u32} stops for want of data", us, starvations);
             }
         }
         self.step = (self.step + 1) % 3;

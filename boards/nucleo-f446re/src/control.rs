@@ -12,8 +12,8 @@ use nucleo_f446re::design_parameters::{FLIGHT_AFTER, FLIGHT_ROWS};
 use nucleo_f446re::machine::AXES;
 use nucleo_f446re::tick_log::TickLog;
 
-/// The streams: 63 pieces and 63 segments, 17 KiB.
-pub(crate) type Streams = motion_kernel::queue::Streams<f32, AXES, 64, 64>;
+/// The streams: 63 pieces, and three lists of 15 ramps.
+pub(crate) type Streams = motion_kernel::queue::LiveStreams<f32, AXES, 64, 16>;
 
 /// The last ticks, and some behind a fault.
 pub(crate) type Flight = Recorder<f32, AXES, FLIGHT_ROWS, FLIGHT_AFTER>;

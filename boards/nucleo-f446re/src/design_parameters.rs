@@ -108,16 +108,24 @@ pub const ITEM_CYCLES: u32 = 20_000;
 /// What a tick takes from the background \[cycles\]: twice what is estimated for one with slow memory.
 pub const TICK_CYCLES_TAKEN: u32 = 4_000;
 /// Items that the background sustains \[1/s\]: 8000, four a tick. What the streams accept at most is 16 pieces and 8
-/// segments a tick, 48 000; beyond this the streams run dry, which is a fault.
+/// segments a tick, 48 000; beyond what it sustains motion brakes to rest on the path, and goes on when there is more.
 pub const ITEMS_PER_S: u32 = (SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) / ITEM_CYCLES;
-/// The items of both streams.
-pub const ITEMS_QUEUED_MAX: u32 = 2 * 63;
-/// For so long the background may be silent before the tick stops feeding the watchdog \[ticks\]: 0.1 s. Its
-/// longest turn refills both streams, in 16 ms.
+/// Blocks and ramps that live control knows ahead, each.
+pub const PLACES: usize = 64;
+/// The longest turn of the background \[cycles\]: 2.5 million for the items of full streams, and as much for a plan anew,
+/// of which 2.4 million instructions were counted on an emulated Cortex-M4F.
+pub const TURN_CYCLES_MAX: u32 = 5_000_000;
+/// The same in ticks, which take their part of the processor: 32 ms.
+pub const TURN_TICKS_MAX: u32 = (TURN_CYCLES_MAX as u64 * TICK_HZ as u64)
+    .div_ceil((SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) as u64) as u32;
+/// So far ahead of what it saw the background changes a ramp \[ticks\]: 4 ms, what an ordinary turn with a plan takes. Where
+/// that was too late, live control tries again further ahead.
+pub const LEAD_TICKS: u32 = 8;
+/// For so long the background may be silent before the tick stops feeding the watchdog \[ticks\]: 0.1 s.
 pub const BACKGROUND_SILENT_TICKS_MAX: u32 = TICK_HZ / 10;
 
 const _: () = assert!(
-    4 * ITEMS_QUEUED_MAX * TICK_HZ < BACKGROUND_SILENT_TICKS_MAX * ITEMS_PER_S,
+    3 * TURN_TICKS_MAX < BACKGROUND_SILENT_TICKS_MAX,
     "the longest turn is close to what the watchdog takes for silence"
 );
 

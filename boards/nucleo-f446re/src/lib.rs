@@ -3,7 +3,7 @@
 //! - [`design_parameters`]: every number of the firmware with its derivation;
 //! - [`pins`]: which signal is on which pin;
 //! - [`machine`]: the program in flash and the axes it is for;
-//! - [`travel`] and [`program`]: what the start button runs;
+//! - [`program`]: what the start button runs;
 //! - [`tick_log`] and [`liveness`]: what the tick keeps about itself.
 //!
 //! The firmware itself is `main.rs` and the modules beside it. From the board's folder:
@@ -22,7 +22,6 @@
 pub mod design_parameters;
 pub mod pins;
 pub mod machine;
-pub mod travel;
 pub mod program;
 pub mod tick_log;
 pub mod liveness;

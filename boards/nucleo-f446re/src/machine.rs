@@ -6,7 +6,7 @@
 //! not suit the board, or holds an item anywhere that could not be executed is refused before anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
-use motion_kernel::program::{CheckError, Header, ProgramError, Reader, check};
+use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check};
 
 use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
 
@@ -41,6 +41,8 @@ pub enum MachineError {
     },
     /// It does not say how faults are told and end.
     Unguarded,
+    /// It does not say what holds its feed, which live control makes plans with: `motion compile --live` does.
+    NotLive,
     /// A figure of an axis is out of its range.
     Axes(AxesError),
     /// An item can't be executed, or the program starts or ends where it can't.
@@ -75,10 +77,15 @@ impl Machine {
                 return Err(MachineError::CountRate { axis, counts_per_s, limit });
             }
         }
-        // Nothing holds the motion of this board: where a fault asks for a stop on the path, outputs are ramped.
         let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
         let axes = AxesConfig::new(axes, TICK_S).and_then(|axes| axes.guarded(&guards, TICK_S));
         let axes = axes.map_err(MachineError::Axes)?;
+        let mut items = program.items();
+        let is_live = items.any(|item| matches!(item, Ok(Item::Block(_))));
+        if !is_live && program.items().any(|item| matches!(item, Ok(Item::Line { .. } | Item::Septic { .. })))
+        {
+            return Err(MachineError::NotLive);
+        }
         check::<f32, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
         Ok(Self { program, axes })
     }
@@ -93,7 +100,7 @@ impl Machine {
 #[cfg(test)]
 mod tests {
     use motion_kernel::axis::{GuardFigures, Guards};
-    use motion_kernel::program::{Item, SupplyError, write};
+    use motion_kernel::program::{SupplyError, write};
     use motion_kernel::units::Position;
 
     use super::*;

@@ -1,103 +1,230 @@
-//! What the start button runs: from where the machine stands to the program's start, then the program.
+//! What the start button runs, under live control: from where the machine stands to the program's start, then the program;
+//! and once more with every start.
 //!
-//! Consumes the machine's position and the items in flash; offers both to the streams. Background.
+//! Consumes the machine's position, the items in flash and the button's commands; keeps the streams filled. Background.
 
-use motion_kernel::program::{Items, ProgramError, Supply, SupplyError};
-use motion_kernel::queue::Feeder;
+use core::task::Poll;
+
+use motion_kernel::live::{Director, Source, State};
+use motion_kernel::program::{Item, Items, ProgramError, Reader, SupplyError};
+use motion_kernel::queue::LiveFeeder;
+use motion_kernel::straight::{Straight, StraightError};
 use motion_kernel::units::Position;
 
-use crate::design_parameters::TICK_S;
-use crate::machine::{AXES, Machine};
-use crate::travel::{Travel, TravelError};
+use crate::design_parameters::{LEAD_TICKS, PLACES, TICK_S};
+use crate::machine::AXES;
 
 /// How fast the machine goes to the program's start, at most \[mm/s\]: slowly, it may come from anywhere.
 const TO_START_MM_S: f64 = 20.0;
 
-/// Why a run ends before its end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(target_arch = "arm", derive(defmt::Format))]
-pub enum RunError {
-    /// On the way to the program's start.
-    Travel(TravelError),
-    /// In the program.
-    Program(SupplyError<ProgramError>),
-}
-
-/// A run of the program and how much of it is in the streams.
+/// The items of one run after the other; none for now where no run has been started.
 #[derive(Debug)]
-pub struct Run {
-    to_start: Travel,
-    program: Supply<f32, AXES, Items<'static, AXES>, ProgramError>,
+struct Runs {
+    program: Reader<'static, AXES>,
+    to_start: Option<Straight<AXES>>,
+    items: Option<Items<'static, AXES>>,
 }
 
-impl Run {
-    /// A run on a machine that stands at `here`.
-    ///
-    /// # Errors
-    /// The way to the start can't be planned.
-    pub fn new(machine: &Machine, here: [Position; AXES]) -> Result<Self, RunError> {
-        let header = machine.header();
-        let feed_mm_s = TO_START_MM_S.min(header.rules.feed_mm_s);
-        let to_start = Travel::new(header.rules.limits, here, header.start, feed_mm_s);
-        Ok(Self {
-            to_start: to_start.map_err(RunError::Travel)?,
-            program: Supply::new(machine.program.items(), TICK_S),
-        })
+impl Source<AXES> for Runs {
+    type Error = ProgramError;
+
+    fn poll_next(&mut self) -> Poll<Option<Result<Item<AXES>, ProgramError>>> {
+        if let Some(item) = self.to_start.as_mut().and_then(Iterator::next) {
+            return Poll::Ready(Some(item.map_err(|never| match never {})));
+        }
+        match self.items.as_mut().and_then(Iterator::next) {
+            Some(item) => Poll::Ready(Some(item)),
+            None => Poll::Pending,
+        }
+    }
+}
+
+/// The program's runs, and how much of them is in the streams.
+pub struct Run<'a> {
+    feeder: LiveFeeder<'a, f32, AXES>,
+    director: Director<f32, AXES, Runs, ProgramError, PLACES>,
+}
+
+impl<'a> Run<'a> {
+    /// No run yet, for streams that were split where the machine stands.
+    #[must_use]
+    pub fn new(program: Reader<'static, AXES>, feeder: LiveFeeder<'a, f32, AXES>) -> Self {
+        let runs = Runs { program, to_start: None, items: None };
+        Self { feeder, director: Director::new(runs, TICK_S, LEAD_TICKS) }
     }
 
-    /// Offers what is left to the streams until they are full; whether all of it has entered.
+    /// Starts a run on a machine that stands at `here`, where the streams were split or the run before it ended.
     ///
     /// # Errors
-    /// An item can't be had or is refused. What has entered before it is in the streams.
-    pub fn fill(&mut self, feeder: &mut Feeder<'_, f32, AXES>) -> Result<bool, RunError> {
-        if !self.to_start.fill(feeder).map_err(RunError::Travel)? {
-            return Ok(false);
-        }
-        self.program.fill(feeder).map_err(RunError::Program)?;
-        Ok(self.program.is_empty())
+    /// There is no way to the program's start.
+    pub fn start(&mut self, here: [Position; AXES]) -> Result<(), StraightError> {
+        let runs = self.director.source_mut();
+        let header = runs.program.header();
+        let feed_mm_s = TO_START_MM_S.min(header.rules.feed_mm_s);
+        let to_start = Straight::new(here, header.start, header.rules.limits, [feed_mm_s; 2], TICK_S)?;
+        runs.to_start = Some(to_start);
+        runs.items = Some(runs.program.items());
+        Ok(())
+    }
+
+    /// Feed hold: comes to rest on the path.
+    pub fn hold(&mut self) {
+        self.director.hold();
+    }
+
+    /// Goes on after a hold.
+    pub fn resume(&mut self) {
+        self.director.resume();
+    }
+
+    /// Reads and plans what there is room for. Ticks may come meanwhile, and do: it may take many of them.
+    ///
+    /// # Errors
+    /// An item can't be executed, as from now on. What has entered before it ends at rest ([`State::Failed`]).
+    pub fn turn(&mut self) -> Result<(), SupplyError<ProgramError>> {
+        self.director.turn(&mut self.feeder)
+    }
+
+    /// What it is doing; [`State::Waiting`] before, between and behind runs.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.director.state(&self.feeder)
+    }
+
+    /// How often motion had to stop because the background was too slow.
+    #[must_use]
+    pub fn starvations(&self) -> u32 {
+        self.director.starvations()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use motion_kernel::exec::{ExecState, Executor};
-    use motion_kernel::queue::Streams;
+    use motion_kernel::exec::Executor;
+    use motion_kernel::queue::LiveStreams;
 
     use super::*;
-    use crate::machine::PROGRAM;
+    use crate::design_parameters::TURN_TICKS_MAX;
+    use crate::machine::{Machine, PROGRAM};
 
-    /// Runs the program as the board does, one fill and one tick in turn, from each of two places: at its
-    /// start, and where it ends. The ticks of each run and where it ended.
-    fn two_runs() -> [(u32, [Position; AXES]); 2] {
+    /// Runs the program as the board does, twice: from its start, and from where it ended. The background's turns come
+    /// every so many ticks; before each tick of a run, `command` may say something. The ticks of each run, where it ended,
+    /// and how often it had to stop for want of data.
+    fn two_runs(
+        turn_ticks: u32,
+        mut command: impl FnMut(u32, &mut Run<'_>),
+    ) -> ([(u32, [Position; AXES]); 2], u32) {
         let machine = Machine::new(PROGRAM).expect("suits");
-        let mut here = machine.header().start;
-        let mut streams = Streams::<f32, AXES, 64, 64>::new();
-        let (mut feeder, mut intake) = streams.split(machine.header().rules, here);
-        let mut executor = Executor::new(here);
-        core::array::from_fn(|_| {
-            let mut run = Run::new(&machine, here).expect("plannable");
-            for tick in 1..1_000_000 {
-                let filled = run.fill(&mut feeder).expect("accepted");
-                let executed = executor.tick(&mut intake).expect("no fault");
-                if filled && executed.state == ExecState::Idle {
-                    here = executed.setpoints.map(|setpoint| setpoint.position);
-                    return (tick, here);
+        let start = machine.header().start;
+        let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+        let (feeder, mut intake) = streams.split(machine.header().rules, start);
+        let mut run = Run::new(machine.program, feeder);
+        let mut executor = Executor::new(start);
+        let mut here = start;
+        let runs = core::array::from_fn(|_| {
+            run.start(here).expect("a way");
+            for tick in 0..1_000_000 {
+                command(tick, &mut run);
+                if tick % turn_ticks == 0 {
+                    run.turn().expect("accepted");
+                    if run.state() == State::Waiting {
+                        return (tick, here);
+                    }
                 }
+                let executed = executor.tick(&mut intake).expect("no fault");
+                here = executed.setpoints.map(|setpoint| setpoint.position);
             }
             panic!("it never ends");
-        })
+        });
+        (runs, run.starvations())
+    }
+
+    /// As `motion compile` prints: 2.320 s to (102.045923136, 0, 0).
+    const STRINGER_TICKS: u32 = 4640;
+    const END_MM: [f64; AXES] = [102.045_923_136, 0.0, 0.0];
+
+    fn end() -> [Position; AXES] {
+        END_MM.map(|mm| Position::from_mm(mm).expect("in range"))
+    }
+
+    /// And back at 20 mm/s before the second: with a ramp's time 2·√(2·20/5000) s on top.
+    fn back_ticks() -> u32 {
+        let back_s = END_MM[0] / TO_START_MM_S + 2.0 * (2.0 * TO_START_MM_S / 5.0e3).sqrt();
+        (back_s / TICK_S) as u32
     }
 
     #[test]
     fn runs_the_stringer_and_again() {
-        let [(first_ticks, first_end), (second_ticks, second_end)] = two_runs();
-        // As `motion compile` prints: 2.320 s to (102.045923136, 0, 0).
-        assert!(first_ticks.abs_diff(4640) <= 2, "{first_ticks}");
-        let end = [102.045_923_136, 0.0, 0.0].map(|mm| Position::from_mm(mm).expect("in range"));
-        assert_eq!((first_end, second_end), (end, end));
-        // And back at 20 mm/s before the second: with a ramp's time 2·√(2·20/5000) s on top.
-        let back_s = 102.045_923_136 / TO_START_MM_S + 2.0 * (2.0 * TO_START_MM_S / 5.0e3).sqrt();
-        let expected = first_ticks + (back_s / TICK_S) as u32;
+        let ([(first_ticks, first_end), (second_ticks, second_end)], starvations) = two_runs(1, |_, _| {});
+        assert!(first_ticks.abs_diff(STRINGER_TICKS) <= 4, "{first_ticks}");
+        assert_eq!((first_end, second_end), (end(), end()));
+        let expected = first_ticks + back_ticks();
         assert!(second_ticks.abs_diff(expected) <= 4, "{second_ticks} {expected}");
+        assert_eq!(starvations, 0);
+    }
+
+    /// Turns as long as the longest there is: the program is no slower for it, but where it begins.
+    #[test]
+    fn a_slow_background_costs_no_stop() {
+        let (runs, starvations) = two_runs(TURN_TICKS_MAX, |_, _| {});
+        let most_ticks = [STRINGER_TICKS, STRINGER_TICKS + back_ticks()];
+        for ((ticks, at), most) in runs.into_iter().zip(most_ticks) {
+            assert_eq!(at, end());
+            assert!(ticks <= most + 4 * TURN_TICKS_MAX, "{ticks} {most}");
+        }
+        assert_eq!(starvations, 0);
+    }
+
+    /// The button at any tick of both runs, and again.
+    #[test]
+    fn held_anywhere_it_ends_where_it_should() {
+        for every in (100..3000).step_by(97) {
+            let mut held = 0;
+            let (runs, starvations) = two_runs(1, |tick, run| {
+                if tick % every == every - 1 {
+                    run.hold();
+                }
+                if run.state() == State::Held {
+                    run.resume();
+                    held += 1;
+                }
+            });
+            assert_eq!(runs.map(|(_, at)| at), [end(); 2], "every {every}");
+            assert!(runs[0].0 > STRINGER_TICKS && held > 2, "every {every}: {held}");
+            assert_eq!(starvations, 0, "every {every}");
+        }
+    }
+
+    /// From one encoder count to the whole machine, longer than the streams hold, in any direction, at the feed there is.
+    #[test]
+    fn the_way_to_the_start_is_any() {
+        let machine = Machine::new(PROGRAM).expect("suits");
+        let rules = machine.header().rules;
+        for mm in [0.0, 1e-4, 2e-4, 1e-3, 0.01, 1.0, 15.999, 16.0, 16.001, 100.0, 3000.0] {
+            for direction in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.48, -0.64, 0.6]] {
+                let here = direction.map(|part| Position::from_mm(part * mm).expect("in range"));
+                let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+                let (feeder, mut intake) = streams.split(rules, here);
+                let mut run = Run::new(machine.program, feeder);
+                let mut executor = Executor::new(here);
+                run.start(here).expect("a way");
+                run.director.source_mut().items = None;
+                let (mut ticks, mut at) = (0_u32, here);
+                loop {
+                    run.turn().expect("accepted");
+                    if run.state() == State::Waiting {
+                        break;
+                    }
+                    let executed = executor.tick(&mut intake).expect("no fault");
+                    at = executed.setpoints.map(|setpoint| setpoint.position);
+                    let length = |v: [f32; AXES]| v.iter().map(|v| v * v).sum::<f32>().sqrt();
+                    let feed = length(executed.setpoints.map(|setpoint| setpoint.velocity_mm_s));
+                    assert!(f64::from(feed) <= TO_START_MM_S * (1.0 + 1e-6));
+                    ticks += 1;
+                    assert!(ticks < 1_000_000, "it never arrives");
+                }
+                assert_eq!(at, machine.header().start, "{mm} {direction:?}");
+            }
+        }
     }
 }

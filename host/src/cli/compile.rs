@@ -15,6 +15,7 @@ use crate::planning::{Executable, Mode, Plan, plan_program};
 const EXAMPLES: &str = "\
 Examples:
   motion compile part.ngc --machine mine.toml --output part.bin
+  motion compile part.ngc --live --output part.bin            for a board with live control, as the NUCLEO
   motion compile part.ngc --number fixed --output part.bin    for a board without an FPU
 
 The file holds the machine's scales, gains and path limits, every piece of path and every ramp, and a checksum.
@@ -38,6 +39,9 @@ pub struct CompileArguments {
     /// One pair of ramps per block; without it, ramps may span blocks.
     #[arg(long)]
     per_block: bool,
+    /// For a board with live control: with what holds the feed along the path, to plan anew by.
+    #[arg(long)]
+    live: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -60,7 +64,8 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
         Number::F32 => executable::<f32>(&plan, &machine),
         Number::Fixed => executable::<Fixed>(&plan, &machine),
     }?;
-    let bytes = executable.to_bytes(&machine);
+    let bytes =
+        if arguments.live { executable.to_live_bytes(&machine) } else { executable.to_bytes(&machine) };
     write(&arguments.output, &bytes)?;
     for notice in &plan.notices {
         writeln!(out, "note: {notice}").map_err(CliError::Output)?;

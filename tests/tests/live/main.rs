@@ -181,7 +181,7 @@ fn random_commands<R: Number>(case: &Case, seed: u64) -> Result<Run, String> {
             return None;
         }
         Some(match random.below(8) {
-            0..=2 if state == State::Running => Command::Hold,
+            0..=2 if matches!(state, State::Running | State::Waiting) => Command::Hold,
             0..=3 => Command::Resume,
             4 if is_late => {
                 late = random.log_between(1.0, 1000.0) as u64;
