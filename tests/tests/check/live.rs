@@ -45,7 +45,8 @@ pub(crate) struct Setup<'a> {
     pub(crate) path: &'a Path,
     pub(crate) machine: &'a Machine,
     pub(crate) seed: u64,
-    /// After so many ticks the feed is that of no earlier override, where that is known; the greatest one otherwise.
+    /// After so many ticks with a background the feed is that of no earlier override, where that is known; the greatest one
+    /// otherwise.
     pub(crate) response_ticks: u64,
 }
 
@@ -67,7 +68,7 @@ pub(crate) struct Run {
 /// The greatest of the latest values.
 struct Greatest {
     ticks: u64,
-    /// Those that no later one is above, with the last tick that each was in force.
+    /// Those that no later one is above, with the last tick with a background that each was in force.
     falling: VecDeque<(u64, f64)>,
 }
 
@@ -111,7 +112,7 @@ where
     let mut director = Director::<R, 3, _, _, PLACES>::new(source, machine.tick_s, 0);
     let mut checker = Checker::new::<R>(machine, plan, path, seed).live(1.0);
     let mut greatest = Greatest { ticks: response_ticks, falling: VecDeque::new() };
-    let (mut ticks, mut stretches, mut feed_override) = (0_u64, 0_usize, 1.0);
+    let (mut ticks, mut turns, mut stretches, mut feed_override) = (0_u64, 0_u64, 0_usize, 1.0);
     let (mut rests, mut commands, mut stops, mut dwelt) = (0_u64, 0_u64, 0_u64, 0_u64);
     let mut executed = executor.tick(&mut intake).map_err(|fault| format!("{fault:?}"))?;
     loop {
@@ -131,13 +132,15 @@ where
         }
         if command != Some(Command::Stall) {
             director.turn(&mut feeder).map_err(|error| format!("tick {ticks}: rejected: {error}"))?;
+            turns += 1;
         }
         let before = (executed.motion, executed.state);
         executed = executor.tick(&mut intake).map_err(|fault| {
             let length_mm = path.stretches.get(stretches).map(|stretch| stretch.length_mm);
             format!("tick {ticks}: {fault:?} after {before:?} on {length_mm:?} mm of stretch {stretches}")
         })?;
-        checker.override_up_to(greatest.of(ticks, feed_override));
+        // What was commanded just before the background lost its turns may be obeyed behind them.
+        checker.override_up_to(greatest.of(turns, feed_override));
         checker.tick(&executed).map_err(|error| format!("tick {ticks}: {error}"))?;
         ticks += 1;
         rests += u64::from(before.1 == ExecState::Moving && executed.state != ExecState::Moving);
