@@ -115,6 +115,12 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
         {
             return Err(refuse(at.clone(), format!("less than high_mm = {high_mm}")));
         }
+        let limit_mm = axis.following_error_limit_mm;
+        if let (Some(at), Some(guard)) = (&places.error_at_rest_mm, axis.guard)
+            && guard.following_error_at_rest_mm > limit_mm
+        {
+            return Err(refuse(at.clone(), format!("at most following_error_limit_mm = {limit_mm}")));
+        }
     }
     // What only the kernel's numbers can't hold, or does not go together, has no key of its own: it stands at the axis.
     let figures = [0, 1, 2].map(|index: usize| axes[index].1.figures());
@@ -153,6 +159,7 @@ struct Places {
     inverse_bed_hz: Option<Range<usize>>,
     low_mm: Option<Range<usize>>,
     homing: Option<HomingPlaces>,
+    error_at_rest_mm: Option<Range<usize>>,
 }
 
 struct HomingPlaces {
@@ -221,7 +228,7 @@ struct TravelTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GuardTable {
-    following_error_at_rest_mm: Within<FollowingError>,
+    following_error_at_rest_mm: Spanned<Within<FollowingError>>,
     following_error_per_velocity_s: Within<ErrorGrowth>,
     following_error_per_accel_s2: Within<ErrorGrowth>,
     jump_mm: Within<Jump>,
@@ -309,7 +316,7 @@ impl FaultsTable {
 impl GuardTable {
     fn figures(&self) -> GuardFigures {
         GuardFigures {
-            following_error_at_rest_mm: self.following_error_at_rest_mm.0,
+            following_error_at_rest_mm: self.following_error_at_rest_mm.get_ref().0,
             following_error_per_velocity_s: self.following_error_per_velocity_s.0,
             following_error_per_accel_s2: self.following_error_per_accel_s2.0,
             jump_mm: self.jump_mm.0,
@@ -473,6 +480,7 @@ impl AxisTable {
             offset_v: self.output.offset_v.span(),
             mm_per_count: self.encoder.mm_per_count.span(),
             low_mm: self.travel.as_ref().map(|travel| travel.low_mm.span()),
+            error_at_rest_mm: self.guard.as_ref().map(|guard| guard.following_error_at_rest_mm.span()),
         }
     }
 

@@ -388,6 +388,11 @@ fn rules_that_join_optional_keys() {
         assert_eq!(found, Err(format!("{place}a magnitude of at most feed_mm_s = 300")));
         assert!(change("axis.homing", key, slow).0.is_ok());
     }
+    let (found, place) = change("axis.travel", "low_mm", "700");
+    assert_eq!(found.map(|_| ()), Err(format!("{place}less than high_mm = 400")));
+    let (found, place) = change("axis.guard", "following_error_at_rest_mm", "1.01");
+    assert_eq!(found.map(|_| ()), Err(format!("{place}at most following_error_limit_mm = 1")));
+    assert!(change("axis.guard", "following_error_at_rest_mm", "1").0.is_ok());
     let (found, place) = change("axis.homing.simulated", "index_every_mm", "0.00009");
     assert_eq!(found, Err(format!("{place}0, or at least mm_per_count = 0.0001")));
     let homing = change("axis.homing.simulated", "index_every_mm", "0").0.expect("valid").axes[0].homing;
