@@ -427,7 +427,7 @@ where
     fn take(&mut self, item: Item<AXES>) -> Result<(), SupplyError<E>> {
         let planned = match item {
             Item::Block(block) => {
-                self.road.push(self.reading, block);
+                self.road.push(self.reading, block.within_range::<R>());
                 return Ok(());
             }
             Item::Line { .. } | Item::Septic { .. } | Item::EndOfStretch(_) => {
@@ -662,9 +662,11 @@ mod tests {
     use super::*;
     use crate::exec::Executor;
     use crate::fixture::{self, LIMITS};
-    use crate::law::{Law, Ramp};
+    use crate::law::{Law, Limits, Ramp};
+    use crate::num::Fixed;
     use crate::program::{Allowed, PathBlock};
     use crate::queue::{LiveStreams, PathRules};
+    use crate::straight::Straight;
 
     const TICK_S: f64 = 0.0005;
 
@@ -768,6 +770,33 @@ mod tests {
             }
         }
         assert_eq!(director.starvations(), 0);
+    }
+
+    /// Limits beyond fixed point's range: the program's ramps are soft enough, and so is a stop.
+    #[test]
+    fn a_stop_asks_for_no_more_than_the_number_type_holds() {
+        let hard = Limits { accel_mm_s2: 1e4, jerk_mm_s3: 1e9, snap_mm_s4: 4e9 };
+        let soft = Straight::new([Position::ZERO], [at(100.0)], LIMITS, [20.0; 2], TICK_S).expect("a way");
+        let allowed = Allowed { cap_mm_s: 20.0, limits: hard };
+        let items = soft.map(|item| match item {
+            Ok(Item::Block(block)) => {
+                Ok(Item::Block(PathBlock::new(block.length, 20.0, allowed, allowed, 0.0)))
+            }
+            item => item,
+        });
+        let rules = PathRules { limits: hard, ..RULES };
+        let mut streams = LiveStreams::<Fixed, 1, 8, 16>::new();
+        let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
+        let mut executor = Executor::<Fixed, 1>::new([Position::ZERO]);
+        let mut director = Director::<Fixed, 1, _, Infallible, 64>::new(items, TICK_S, 0);
+        for tick in 0..2100 {
+            if tick == 2000 {
+                director.hold();
+            }
+            director.turn(&mut feeder).expect("a stop");
+            executor.tick(&mut intake).expect("no fault");
+        }
+        assert_eq!(director.state(&feeder), State::Held);
     }
 
     /// A block that is a step longer or shorter than its path: what was handed over ends at rest, and the rest is refused.

@@ -23,6 +23,8 @@ pub use supply::{Supply, SupplyError};
 use serde::{Deserialize, Serialize};
 
 use crate::law::{Limits, Ramp, Ticks};
+#[cfg(feature = "live")]
+use crate::num::Real;
 use crate::units::Position;
 
 /// One thing for the streams. Within a stretch, pieces and ramps come in the order of the path positions
@@ -126,6 +128,19 @@ impl PathBlock {
         let ([held @ .., _], [.., joint_mm_s]) = (self.figures, next.figures);
         let [feed, a, b, c, d, e, f, g, h] = held;
         Self { length: self.length + next.length, figures: [feed, a, b, c, d, e, f, g, h, joint_mm_s] }
+    }
+
+    /// The same block with limits as far as the number type holds them, for plans that are driven in it.
+    #[cfg(feature = "live")]
+    #[must_use]
+    pub(crate) fn within_range<R: Real>(self) -> Self {
+        // A peak that reaches its limit may be rounded up.
+        let most = R::from_f64(f64::MAX).to_f64() * (1.0 - 1.0e-6);
+        let [feed, cap, a, j, s, greatest_cap, greatest_a, greatest_j, greatest_s, joint] = self.figures;
+        let [a, j, s, greatest_a, greatest_j, greatest_s] =
+            [a, j, s, greatest_a, greatest_j, greatest_s].map(|limit| limit.min(most));
+        let figures = [feed, cap, a, j, s, greatest_cap, greatest_a, greatest_j, greatest_s, joint];
+        Self { figures, ..self }
     }
 
     /// Greatest feed through the joint at its end \[mm/s\]; 0 at the stretch's end.
