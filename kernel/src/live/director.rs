@@ -598,7 +598,7 @@ where
     }
 
     fn fill(&self, list: &List, id: u8, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
-        for item in list.items() {
+        for (start, item) in list.placed() {
             let is_taken = match *item {
                 ListItem::Feed { ramp, length } => {
                     let segment = FeedSegment::ramp(&ramp, length, self.tick_s);
@@ -608,7 +608,11 @@ where
                     let segment = FeedSegment::turned(&ramp, at, length, self.tick_s);
                     is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
                 }
-                ListItem::End => is_taken(feeder.end_of_feed(id)),
+                ListItem::End => {
+                    // Where all its blocks have been passed, its end has.
+                    let path = self.road.end_of(start.stretch).unwrap_or(start.at);
+                    is_taken(feeder.end_of_feed(id, path))
+                }
                 ListItem::Dwell(duration) => is_taken(feeder.dwell(id, duration)),
                 ListItem::Stop => is_taken(feeder.program_stop(id)),
             };

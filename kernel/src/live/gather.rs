@@ -69,7 +69,8 @@ where
     /// if that is wanted and there is room. False if there is neither.
     fn gather_replanned(&mut self, list: &mut List, to_its_end: bool) -> bool {
         let (from, heads) = (list.end(), list.len());
-        if from.at == Position::ZERO {
+        // What takes over from a list under way is not at the front of the course, even where it has hardly begun.
+        if to_its_end && from.at == Position::ZERO {
             self.gather_rests(list);
             self.drop_feed();
         }

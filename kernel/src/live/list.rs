@@ -170,6 +170,11 @@ impl List {
         self.items.iter().map(|(_, item)| item)
     }
 
+    /// The items with where they start.
+    pub(super) fn placed(&self) -> impl Iterator<Item = &(Junction, Item)> {
+        self.items.iter()
+    }
+
     pub(super) fn get(&self, index: usize) -> Option<&(Junction, Item)> {
         self.items.get(index)
     }

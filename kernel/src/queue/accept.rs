@@ -386,19 +386,23 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
 
     pub(crate) fn end_of_stretch(&mut self, position: [Position; AXES]) -> Result<(), Rejection> {
         self.continuous(&position)?;
-        if self.feed_mm_s > R::ZERO {
-            return Err(Rejection::Moving { feed_mm_s: self.feed_mm_s.to_f64() });
-        }
         if self.path_length == Position::ZERO {
             return Err(Rejection::Empty);
         }
-        if self.path_length != self.feed_length {
-            return Err(Rejection::Lengths {
-                path_mm: self.path_length.to_mm(),
-                feed_mm: self.feed_length.to_mm(),
-            });
-        }
+        self.feed_ends(self.path_length)?;
         *self = Self { density: self.density, ..self.restarted(position) };
+        Ok(())
+    }
+
+    /// Whether the feed has come to rest where its path, `path` long, ends.
+    pub(crate) fn feed_ends(&self, path: Position) -> Result<(), Rejection> {
+        if self.feed_mm_s > R::ZERO {
+            return Err(Rejection::Moving { feed_mm_s: self.feed_mm_s.to_f64() });
+        }
+        if path != self.feed_length {
+            let (path_mm, feed_mm) = (path.to_mm(), self.feed_length.to_mm());
+            return Err(Rejection::Lengths { path_mm, feed_mm });
+        }
         Ok(())
     }
 

@@ -210,15 +210,12 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         Ok(())
     }
 
-    /// Appends the end of the stretch. Its path is complete in the queue.
+    /// Appends the end of the stretch, whose path is `path` long and complete in the queue.
     ///
     /// # Errors
-    /// The list is full, or the feed is not 0.
-    pub fn end_of_feed(&mut self, list: u8) -> Result<(), Refused<()>> {
-        let feed_mm_s = self.feed_accept.feed_mm_s();
-        if feed_mm_s > R::ZERO {
-            return Err(Refused::Invalid(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() }));
-        }
+    /// The list is full, the feed is not 0, or it has come to another length.
+    pub fn end_of_feed(&mut self, list: u8, path: Position) -> Result<(), Refused<()>> {
+        self.feed_accept.feed_ends(path).map_err(Refused::Invalid)?;
         self.append(list, FeedItem::EndOfStretch).map_err(|_| Refused::Full(()))?;
         self.feed_accept = self.feed_accept.feed_after_stretch();
         Ok(())

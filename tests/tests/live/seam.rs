@@ -91,7 +91,7 @@ fn a_change_that_comes_too_late_is_refused() {
     for ramp in [up, up.reversed()] {
         feeder.segment(list, FeedSegment::ramp(&ramp, length, tick_s).expect("a segment")).expect("room");
     }
-    feeder.end_of_feed(list).expect("room");
+    feeder.end_of_feed(list, length + length).expect("room");
     feeder.change(Change { from: 0, to: list, after: 0, within: false }).expect("a list");
     for _ in 0..100 {
         executor.tick(&mut intake).expect("no fault");
