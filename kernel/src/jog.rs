@@ -137,13 +137,6 @@ pub enum JogError {
         /// How many there are.
         axes: usize,
     },
-    /// A feed is not above 0 and at most the axis' \[mm/s\].
-    Feed {
-        /// The feed.
-        feed_mm_s: f64,
-        /// The axis' greatest.
-        most_mm_s: f64,
-    },
     /// The soft limits are not in their order.
     Travel(Travel),
     /// The distance is 0.
@@ -162,17 +155,14 @@ pub enum JogError {
         /// The end.
         end_mm: f64,
     },
-    /// There is no motion of the law over that distance.
-    Way(StraightError),
+    /// There is no straight stretch for it.
+    Straight(StraightError),
 }
 
 impl core::fmt::Display for JogError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Axis { axis, axes } => write!(f, "axis {axis}: expected one of {axes}, from 0"),
-            Self::Feed { feed_mm_s, most_mm_s } => {
-                write!(f, "feed {feed_mm_s} mm/s: expected above 0, at most {most_mm_s}")
-            }
             Self::Travel(Travel { least, greatest }) => {
                 let (least_mm, greatest_mm) = (least.to_mm(), greatest.to_mm());
                 write!(f, "soft limits {least_mm} and {greatest_mm} mm: expected the lesser one first")
@@ -191,7 +181,7 @@ impl core::fmt::Display for JogError {
             Self::End { end_mm } => {
                 write!(f, "an end at {end_mm} mm: expected within {} mm", Position::LIMIT_MM)
             }
-            Self::Way(error) => error.fmt(f),
+            Self::Straight(error) => error.fmt(f),
         }
     }
 }
@@ -220,10 +210,6 @@ impl<const AXES: usize> Jog<AXES> {
     ) -> Result<Self, JogError> {
         let &JogAxis { feed_mm_s: most_mm_s, limits, travel } = config;
         let &from = start.get(axis).ok_or(JogError::Axis { axis, axes: AXES })?;
-        // Written so that what is not a number is refused.
-        if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s && most_mm_s.is_finite()) {
-            return Err(JogError::Feed { feed_mm_s, most_mm_s });
-        }
         let (direction, wanted) = match way {
             Way::Continuous(direction) => (direction, None),
             Way::By(by) if by > Position::ZERO => (Direction::Positive, Some(by)),
@@ -244,7 +230,8 @@ impl<const AXES: usize> Jog<AXES> {
         if !direction.ahead(from, length).is_within_limit() || libm::fabs(end_mm) > Position::LIMIT_MM {
             return Err(JogError::End { end_mm });
         }
-        let way = Straight::new(start, end, limits, [feed_mm_s, most_mm_s], tick_s).map_err(JogError::Way)?;
+        let way =
+            Straight::new(start, end, limits, [feed_mm_s, most_mm_s], tick_s).map_err(JogError::Straight)?;
         Ok(Self { way, ends_at_limit: room == Some(length) })
     }
 

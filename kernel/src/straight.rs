@@ -20,6 +20,13 @@ const PIECE: Position = Position::from_bits(16 << 32);
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StraightError {
+    /// The feed is not above 0, finite and at most the greatest one \[mm/s\].
+    Feed {
+        /// The feed.
+        feed_mm_s: f64,
+        /// The greatest under an override.
+        most_mm_s: f64,
+    },
     /// A limit is not a positive number.
     Limit(LimitError),
     /// It is longer than the kernel's range \[mm\].
@@ -34,6 +41,9 @@ pub enum StraightError {
 impl core::fmt::Display for StraightError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
+            Self::Feed { feed_mm_s, most_mm_s } => {
+                write!(f, "feed {feed_mm_s} mm/s: expected above 0, at most {most_mm_s}")
+            }
             Self::Limit(error) => error.fmt(f),
             Self::Length { length_mm } => {
                 write!(f, "a straight of {length_mm} mm: expected at most {} mm", Position::LIMIT_MM)
@@ -73,6 +83,10 @@ impl<const AXES: usize> Straight<AXES> {
         [feed_mm_s, most_mm_s]: [f64; 2],
         tick_s: f64,
     ) -> Result<Self, StraightError> {
+        // Written so that what is not a number is refused.
+        if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s && most_mm_s.is_finite()) {
+            return Err(StraightError::Feed { feed_mm_s, most_mm_s });
+        }
         let mut way_mm = [0.0; AXES];
         for ((way_mm, &start), &end) in way_mm.iter_mut().zip(&start).zip(&end) {
             *way_mm = (end - start).to_mm();
@@ -149,5 +163,83 @@ impl<const AXES: usize> Iterator for Straight<AXES> {
             return None;
         }
         Some(Ok(Item::EndOfStretch(self.end)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::float_cmp, reason = "exact values are the point")]
+
+    use std::format;
+
+    use super::*;
+    use crate::exec::Executor;
+    use crate::fixture::{LIMITS, RULES};
+    use crate::live::{Director, State};
+    use crate::queue::LiveStreams;
+    use crate::random::Random;
+
+    const TICK_S: f64 = 5e-4;
+
+    fn at(mm: f64) -> Position {
+        Position::from_mm(mm).expect("in range")
+    }
+
+    /// From anywhere to anywhere, from a step to metres: ends exactly, within its feed, in the time of its plan.
+    #[test]
+    fn any_way_is_driven_in_its_time() {
+        let random = Random::new(1);
+        for number in 0..200 {
+            let axis = || at(2000.0 * random.unit() - 1000.0);
+            let start = [axis(), axis(), axis()];
+            let length_mm = random.log(1e-7, 3000.0);
+            let lots = [(); 3].map(|()| if random.chance(0.3) { 0.0 } else { 2.0 * random.unit() - 1.0 });
+            let size = lots.iter().map(|part| part * part).sum::<f64>().sqrt().max(1e-3);
+            let mut end = start;
+            for (end, part) in end.iter_mut().zip(lots) {
+                *end = *end + at(part / size * length_mm);
+            }
+            let feed_mm_s = random.log(1.0, RULES.feed_mm_s);
+            let way = Straight::new(start, end, LIMITS, [feed_mm_s; 2], TICK_S).expect("a way");
+            let ramps = way.ramps.iter().flatten();
+            let planned_s = ramps.map(|(ramp, _)| ramp.duration_s()).sum::<f64>();
+            let mut streams = LiveStreams::<f64, 3, 64, 16>::new();
+            let (mut feeder, mut intake) = streams.split(RULES, start);
+            let mut executor = Executor::new(start);
+            let mut director = Director::<f64, 3, _, Infallible, 64>::new(way, TICK_S, 0);
+            let (mut ticks, mut place) = (0_u32, start);
+            loop {
+                director.turn(&mut feeder).expect("accepted");
+                if director.state(&feeder) == State::Done {
+                    break;
+                }
+                let executed = executor.tick(&mut intake).expect("no fault");
+                place = executed.setpoints.map(|setpoint| setpoint.position);
+                let squares = executed.setpoints.map(|setpoint| setpoint.velocity_mm_s.powi(2));
+                assert!(squares.iter().sum::<f64>().sqrt() <= feed_mm_s * (1.0 + 1e-9), "{number}");
+                ticks += 1;
+            }
+            assert_eq!(place, end, "{number}");
+            // It begins with a tick and ends in one.
+            let planned_ticks = planned_s / TICK_S;
+            let more = f64::from(ticks) - planned_ticks;
+            assert!((0.0..=2.0).contains(&more), "{number}: {ticks} ticks, planned {planned_ticks}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_way_is_refused() {
+        let way = |end_mm: f64, limits, feeds_mm_s| {
+            let made = Straight::new([at(-6e5)], [at(end_mm)], limits, feeds_mm_s, TICK_S);
+            made.map(|way| way.count()).map_err(|error| format!("{error}"))
+        };
+        assert_eq!(way(-6e5, LIMITS, [10.0; 2]), Ok(0));
+        for feed_mm_s in [0.0, -1.0, 50.5, f64::NAN] {
+            let expected = format!("feed {feed_mm_s} mm/s: expected above 0, at most 50");
+            assert_eq!(way(0.0, LIMITS, [feed_mm_s, 50.0]), Err(expected));
+        }
+        let long = way(6e5, LIMITS, [10.0; 2]);
+        assert_eq!(long, Err("a straight of 1200000 mm: expected at most 1000000 mm".into()));
+        assert!(way(0.0, Limits { jerk_mm_s3: 0.0, ..LIMITS }, [10.0; 2]).is_err());
     }
 }

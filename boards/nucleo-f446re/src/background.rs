@@ -2,14 +2,14 @@
 //!
 //! Consumes the button and what the tick has left in [`Control`]; produces items for the streams, and in a fault what
 //! the flight recorder kept, into the log. Runs in what
-//! the ticks leave of the processor, one turn after each tick, for ever.
+//! the ticks leave of the processor, a turn behind the first tick that ends after the turn before, for ever.
 //!
 //! Its turn begins right behind a tick, with what keeps interrupts off: taking figures out of [`Control`], at
 //! most one line of log (defmt encodes it with interrupts masked). Both are over long before the next
 //! tick, so neither delays any. Then come planning and filling, which may take several ticks and keep
 //! nothing off.
 //!
-//! Fails by bringing the machine to rest, disabling the drives and saying why.
+//! Fails by bringing the machine to rest and saying why; in a fault, with drives off.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -20,6 +20,7 @@ use motion_kernel::fault::Fault;
 use motion_kernel::live::State;
 use motion_kernel::program::{ProgramError, SupplyError};
 use motion_kernel::recorder::frame_max;
+use motion_kernel::straight::StraightError;
 use motion_kernel::units::Position;
 use nucleo_f446re::design_parameters::{
     BUTTON_TICKS, FLIGHT_LINE_TICKS, REPORT_TICKS, SETTLE_TICKS, SYSCLK_HZ,
@@ -48,7 +49,7 @@ enum Phase {
     Held,
     /// The program is done, the machine is held at its end.
     Done,
-    /// An item of the program is refused; what came before it ends at rest.
+    /// An item of the program is refused; motion under way ends at rest, and is held there until reset.
     Refused,
     /// Drives off until reset, or on the way there in a fault.
     Stopped,
@@ -70,7 +71,14 @@ pub(crate) fn run(
     machine: &Machine,
     button: &PC13<Input>,
 ) -> ! {
-    let mut work = Work { phase: Phase::Ready, streams: Some(streams), run: None, refused: None };
+    let mut work = Work {
+        phase: Phase::Ready,
+        streams: Some(streams),
+        run: None,
+        from: None,
+        no_way: None,
+        refused: None,
+    };
     let mut press = Press::default();
     let mut report = Report::default();
     let mut dump = Dump::default();
@@ -86,18 +94,16 @@ pub(crate) fn run(
             fault: control.kernel.fault(),
             healthy: control.healthy,
         });
-        let pressed = press.is_new(button.is_low());
+        let now = TICKS.load(Ordering::Relaxed);
+        let pressed = press.is_new(button.is_low(), now);
         let before = work.phase;
         work.turn(seen, pressed, machine, &mut control);
         // A change of phase has had its line.
         let may_log = work.phase == before && !pressed;
-        if may_log && !(work.phase == Phase::Stopped && dump.line(&mut control)) {
+        if may_log && !(work.phase == Phase::Stopped && dump.line(now, &mut control)) {
             report.line(&mut control, work.run.as_ref().map_or(0, Run::starvations));
         }
-        // Also in a fault: it may end in a stop on the path.
-        if let Some(run) = &mut work.run {
-            work.refused = run.turn().err();
-        }
+        work.plan();
 
         report.longest_turn_cycles = report.longest_turn_cycles.max(DWT::cycle_count().wrapping_sub(begin));
     }
@@ -117,6 +123,10 @@ struct Work {
     /// Until the first start.
     streams: Option<&'static mut Streams>,
     run: Option<Run<'static>>,
+    /// Where the next run is to start from.
+    from: Option<[Position; AXES]>,
+    /// Why there is no way to the program's start.
+    no_way: Option<StraightError>,
     /// Why it can't go on.
     refused: Option<SupplyError<ProgramError>>,
 }
@@ -130,6 +140,11 @@ impl Work {
             }
             return;
         };
+        if let Some(error) = self.no_way.take() {
+            error!("no way to the program's start: {}; reset the board to go on", error);
+            self.phase = Phase::Refused;
+            return;
+        }
         match (self.phase, self.refused) {
             (Phase::Ready | Phase::Stopped, _) => {}
             _ if seen.fault.is_some() => {
@@ -137,7 +152,7 @@ impl Work {
                 self.phase = Phase::Stopped;
             }
             (Phase::Running | Phase::Held, Some(error)) => {
-                error!("program refused: {}; what came before it is driven to its end", error);
+                error!("program refused: {}; motion ends at rest; reset the board to go on", error);
                 self.phase = Phase::Refused;
             }
             (Phase::Running, _) if pressed && seen.state == ExecState::Stopped => {
@@ -146,7 +161,7 @@ impl Work {
             }
             (Phase::Running, _) if pressed => {
                 run.hold();
-                info!("held: press the blue button to go on");
+                info!("comes to rest: press the blue button to go on");
                 self.phase = Phase::Held;
             }
             (Phase::Running, _) if run.state() == State::Waiting && seen.state == ExecState::Idle => {
@@ -154,17 +169,14 @@ impl Work {
                 self.phase = Phase::Done;
             }
             (Phase::Held, _) if pressed => {
+                // It may have come to rest at a program stop instead.
+                control.lock(|control| control.kernel.resume());
                 run.resume();
                 info!("goes on");
                 self.phase = Phase::Running;
             }
             // At rest the set position is exactly where the streams ended.
-            (Phase::Done, _) if pressed => self.start(seen.position, control),
-            (Phase::Refused, _) if run.state() == State::Failed => {
-                control.lock(|control| control.kernel.disable());
-                warn!("at rest, drives off; reset the board to go on");
-                self.phase = Phase::Stopped;
-            }
+            (Phase::Done, _) if pressed => self.start(seen.position),
             _ => {}
         }
     }
@@ -187,37 +199,45 @@ impl Work {
             control.kernel.enable(SETTLE_TICKS);
         });
         self.run = Some(Run::new(machine.program, feeder));
-        self.start(here, control);
+        self.start(here);
     }
 
-    /// Starts a run from `here`.
-    fn start(&mut self, here: [Position; AXES], control: &mut impl Mutex<T = Control>) {
+    /// Starts a run from `here`, as soon as that is logged.
+    fn start(&mut self, here: [Position; AXES]) {
+        info!("started: from {=[?]} mm", here.map(Position::to_mm));
+        (self.from, self.phase) = (Some(here), Phase::Running);
+    }
+
+    /// What takes several ticks. Also in a fault: it may end in a stop on the path.
+    fn plan(&mut self) {
         let Some(run) = &mut self.run else { return };
-        match run.start(here) {
-            Ok(()) => {
-                info!("started: from {=[?]} mm", here.map(Position::to_mm));
-                self.phase = Phase::Running;
-            }
-            Err(error) => {
-                control.lock(|control| control.kernel.disable());
-                error!("no way to the program's start: {}", error);
-                self.phase = Phase::Stopped;
-            }
+        if let Some(here) = self.from.take() {
+            self.no_way = run.start(here).err();
         }
+        self.refused = run.turn().err();
     }
 }
 
 /// The button, debounced.
 #[derive(Default)]
 struct Press {
-    ticks: u32,
+    /// Since when it is held, until that was long enough.
+    since: Option<u32>,
+    is_counted: bool,
 }
 
 impl Press {
-    /// Whether it has just been held for long enough. Once a turn.
-    fn is_new(&mut self, down: bool) -> bool {
-        self.ticks = if down { self.ticks.saturating_add(1) } else { 0 };
-        self.ticks == BUTTON_TICKS
+    /// Whether it has just been held for long enough at tick `now`, as far as turns have seen.
+    fn is_new(&mut self, down: bool, now: u32) -> bool {
+        if !down {
+            *self = Self::default();
+            return false;
+        }
+        let since = *self.since.get_or_insert(now);
+        !self.is_counted && {
+            self.is_counted = now.wrapping_sub(since) >= BUTTON_TICKS;
+            self.is_counted
+        }
     }
 }
 
@@ -225,17 +245,16 @@ impl Press {
 #[derive(Default)]
 struct Dump {
     rows: usize,
-    ticks: u32,
+    last_ticks: u32,
 }
 
 impl Dump {
-    /// Whether it has logged a line. Once a turn.
-    fn line(&mut self, control: &mut impl Mutex<T = Control>) -> bool {
-        self.ticks = self.ticks.saturating_add(1);
-        if self.ticks < FLIGHT_LINE_TICKS {
+    /// Whether it has logged a line, at tick `now`.
+    fn line(&mut self, now: u32, control: &mut impl Mutex<T = Control>) -> bool {
+        if now.wrapping_sub(self.last_ticks) < FLIGHT_LINE_TICKS {
             return false;
         }
-        self.ticks = 0;
+        self.last_ticks = now;
         let row = control.lock(|control| {
             let flight = &control.flight;
             if flight.is_frozen() { flight.row(self.rows).copied() } else { None }

@@ -55,3 +55,21 @@ fn any_of_many_axes_is_judged() {
         }
     }
 }
+
+/// What goes wrong between the order to enable the drives and the tick that would do it.
+#[test]
+fn drives_that_are_not_on_are_not_enabled_for_a_ramp() {
+    let reactions = Reactions { ramp_ticks: 20, stop_ticks: 40, emergency_stop: Reaction::Ramp };
+    for kind in [FaultKind::Drive { axis: 0 }, FaultKind::EmergencyStop, FaultKind::TickMissed { ticks: 1 }] {
+        let config = AxesConfig { reactions, ..guarded::<f32, 1>(figures(), GUARD) };
+        let mut kernel = Kernel::<f32, 1>::new(&config, [Position::ZERO], [Counts(0)]);
+        let mut streams = Streams::<f32, 1, 2, 2>::new();
+        let (_, mut intake) = streams.split(RULES, [Position::ZERO]);
+        let mut bench = Follower::<1>::default();
+        kernel.tick(&mut intake, &mut bench);
+        kernel.enable(100);
+        kernel.trip(kind);
+        kernel.tick(&mut intake, &mut bench);
+        assert_eq!((kernel.told, kernel.reaction()), (Some(false), Some(Reaction::Immediate)), "{kind:?}");
+    }
+}

@@ -29,7 +29,7 @@ pub enum State {
     Aborting,
     /// Given up, at rest: stand here and split the streams anew.
     Aborted,
-    /// Everything that came so far is done, at rest; the source has no more for now.
+    /// Everything that came so far is done, at rest and between two stretches; the source has no more for now.
     Waiting,
     /// Everything is done.
     Done,
@@ -245,6 +245,7 @@ where
             && self.course.is_empty()
             && self.ahead.at == Position::ZERO
             && self.path_end == Position::ZERO
+            && self.road.end_of(self.reading).is_none_or(|end| end == Position::ZERO)
     }
 
     /// What it is doing.
@@ -328,11 +329,13 @@ where
         progress: &Progress,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
-        match wanted {
-            Wanted::Stop => self.stop(progress, feeder)?,
-            Wanted::Respeed => self.respeed(progress, feeder)?,
-        }
+        let obeyed = match wanted {
+            Wanted::Stop => self.stop(progress, feeder),
+            Wanted::Respeed => self.respeed(progress, feeder),
+        };
+        // What can't be done now can't be done in the next turn either: motion ends at rest without.
         self.wanted = None;
+        obeyed?;
         if let Some(next) = &mut self.next {
             next.command = Some(wanted);
         }
@@ -732,7 +735,7 @@ mod tests {
         }
     }
 
-    /// Two programs from one source, which has nothing for a while before, between and behind them.
+    /// Three programs from one source, which has nothing for a while before, between and behind them.
     #[test]
     fn a_source_may_go_on_later() {
         struct Late {
