@@ -9,7 +9,7 @@ use hal_sim::closed_loop::InMemory;
 use motion_host::machine::Machine;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Fixed;
-use motion_kernel::program::{Reader, check};
+use motion_kernel::program::{Item, Reader, check};
 use motion_kernel::queue::Streams;
 use motion_kernel::recorder::{Recorder, frame_max};
 use motion_kernel::units::{Counts, DacCode, Position};
@@ -978,6 +978,19 @@ fn compile_writes_a_program_or_says_why_not() {
         assert_eq!(check::<f32, 3, _>(program.header(), program.items()), Ok(()));
         assert_eq!(check::<Fixed, 3, _>(program.header(), program.items()), Ok(()));
         assert!(said.contains(&format!(" {} items", program.items().count())), "{said}");
+        let blocks = |program: &Reader<'_, 3>| {
+            program.items().filter(|item| matches!(item, Ok(Item::Block(_)))).count()
+        };
+        assert_eq!(blocks(&program), 0);
+        let compile = ["compile", "part.ngc", "--live", "--number", number, "--output", "part.bin"];
+        let (said, bytes) = (desk.stdout(&compile), fs::read(desk.0.join("part.bin")).expect("a file"));
+        let program = Reader::<3>::new(&bytes).expect("a program");
+        // Two stretches.
+        assert!(blocks(&program) >= 2);
+        assert!(
+            said.contains(&format!(" {} items, {} bytes", program.items().count(), bytes.len())),
+            "{said}"
+        );
         fs::remove_file(desk.0.join("part.bin")).expect("it is there");
     }
     desk.put("wrong.ngc", "G1 X10 F3000\nG1 X2O\nM2\n");

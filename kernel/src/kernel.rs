@@ -10,7 +10,7 @@
 //! A fault ends in one defined way: it is latched with the tick it was found in, every output goes to
 //! the voltage of standing still (0 V plus trim), the drives are disabled, and both stay so until
 //! [`Kernel::clear_fault`]. A fault that is found in writing the outputs shows in them from the next tick on.
-//! How outputs come to 0 V is the fault's [`Reaction`](crate::fault::Reaction): with the feature `guards` and where the
+//! How outputs come to 0 V is the fault's [reaction](crate::fault::Reaction): with the feature `guards` and where the
 //! machine gives it time, on the path or along a ramp; else at once. The first fault stays, but a later one
 //! may ask for a more urgent end.
 

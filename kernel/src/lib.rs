@@ -15,7 +15,7 @@
 //!                                                                    │
 //!   program both as data; keeps the queues full  Item ─► Feeder       │
 //!   live    hold, override, abort (optional)     feed lists           │
-//!   jog, homing   single axes (optional)         Item ─► live         │
+//!   straight, jog, homing (optional)             Item ─► live         │
 //!   queue   bounded, checked on entry            Feeder ─► Intake ◄──┘
 //!   ─────── tick ──────────────────────────────────────────────────────
 //!   exec    feed law ─► s, v, a, j, snap         PathMotion

@@ -7,6 +7,7 @@
 
 use motion_kernel::axis::{AxesConfig, AxesError};
 use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check};
+use motion_kernel::units::Position;
 
 use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
 
@@ -80,13 +81,10 @@ impl Machine {
         let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
         let axes = AxesConfig::new(axes, TICK_S).and_then(|axes| axes.guarded(&guards, TICK_S));
         let axes = axes.map_err(MachineError::Axes)?;
-        let mut items = program.items();
-        let is_live = items.any(|item| matches!(item, Ok(Item::Block(_))));
-        if !is_live && program.items().any(|item| matches!(item, Ok(Item::Line { .. } | Item::Septic { .. })))
-        {
+        check::<f32, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
+        if !is_live(&program) {
             return Err(MachineError::NotLive);
         }
-        check::<f32, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
         Ok(Self { program, axes })
     }
 
@@ -97,11 +95,31 @@ impl Machine {
     }
 }
 
+/// Whether blocks come before the path that they hold the feed of, and end with it, in every stretch.
+fn is_live(program: &Reader<'_, AXES>) -> bool {
+    let (mut path, mut blocks) = (Position::ZERO, Position::ZERO);
+    program.items().flatten().all(|item| match item {
+        Item::Block(block) => {
+            blocks = blocks + block.length;
+            true
+        }
+        Item::Line { length, .. } | Item::Septic { length, .. } => {
+            path = path + length;
+            path <= blocks
+        }
+        Item::EndOfStretch(_) => {
+            let is_whole = path == blocks;
+            (path, blocks) = (Position::ZERO, Position::ZERO);
+            is_whole
+        }
+        Item::Feed { .. } | Item::Dwell(_) | Item::Stop => true,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use motion_kernel::axis::{GuardFigures, Guards};
     use motion_kernel::program::{SupplyError, write};
-    use motion_kernel::units::Position;
 
     use super::*;
 
@@ -166,6 +184,26 @@ mod tests {
         );
         let far = with(|header| header.start[1] = Position::from_bits(i64::MAX)).map(|_| ());
         assert!(matches!(far, Err(MachineError::Items(CheckError::Start { axis: 1, .. }))), "{far:?}");
+    }
+
+    /// Without any of its blocks, without its last one, and with one that is longer.
+    #[test]
+    fn a_program_that_does_not_hold_its_feed_is_refused() {
+        let good = Machine::new(PROGRAM).expect("suits").program;
+        let items: Vec<Item<AXES>> = good.items().map(|item| item.expect("an item")).collect();
+        let is_block = |item: &Item<AXES>| matches!(item, Item::Block(_));
+        let last = items.iter().rposition(is_block).expect("blocks");
+        let mut longer = items.clone();
+        if let Item::Block(block) = &mut longer[last] {
+            block.length = block.length + Position::from_bits(1);
+        }
+        let without: Vec<_> = items.iter().filter(|item| !is_block(item)).copied().collect();
+        let but_last = [&items[..last], &items[last + 1..]].concat();
+        assert!(of(good.header(), Some(&guards()), &items).is_ok());
+        for items in [without, but_last, longer] {
+            let refused = of(good.header(), Some(&guards()), &items).map(|_| ());
+            assert_eq!(refused, Err(MachineError::NotLive));
+        }
     }
 
     #[test]

@@ -18,7 +18,8 @@ Examples:
   motion compile part.ngc --live --output part.bin            for a board with live control, as the NUCLEO
   motion compile part.ngc --number fixed --output part.bin    for a board without an FPU
 
-The file holds the machine's scales, gains and path limits, every piece of path and every ramp, and a checksum.
+The file holds the machine's scales, gains, guards and path limits, every piece of path and every ramp, with --live
+what holds the feed along the path, and a checksum.
 Its format is documented with motion_kernel::program.";
 
 /// Plan a program and write it for a board, with the machine it is for.
@@ -64,8 +65,11 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
         Number::F32 => executable::<f32>(&plan, &machine),
         Number::Fixed => executable::<Fixed>(&plan, &machine),
     }?;
-    let bytes =
-        if arguments.live { executable.to_live_bytes(&machine) } else { executable.to_bytes(&machine) };
+    let (count, bytes) = if arguments.live {
+        (executable.items.len(), executable.to_live_bytes(&machine))
+    } else {
+        (executable.without_blocks().count(), executable.to_bytes(&machine))
+    };
     write(&arguments.output, &bytes)?;
     for notice in &plan.notices {
         writeln!(out, "note: {notice}").map_err(CliError::Output)?;
@@ -74,7 +78,7 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
         out,
         "{}: {} items, {} bytes; {:.3} mm in {:.3} s at {} ticks/s, on machine \"{}\"",
         arguments.output.display(),
-        executable.without_blocks().count(),
+        count,
         bytes.len(),
         plan.length_mm,
         plan.time_s,
