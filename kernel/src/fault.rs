@@ -111,7 +111,7 @@ pub enum Reaction {
     Stop,
     /// Outputs to 0 V over some time, then drives off. Nothing is regulated.
     Ramp,
-    /// Outputs at 0 V and drives off in the same tick.
+    /// Outputs at 0 V and drives off in the same tick. So ends every fault before the drives have been told to be on.
     Immediate,
 }
 

@@ -199,7 +199,7 @@ impl<const AXES: usize> Jog<AXES> {
     /// A jog of `axis` from rest at `start`, at `feed_mm_s`, for ticks of `tick_s`.
     ///
     /// # Errors
-    /// The request is refused; nothing else fails once it is made.
+    /// The request is refused; nothing else fails once it is made, in a number type that holds its limits.
     pub fn new(
         config: &JogAxis,
         axis: usize,

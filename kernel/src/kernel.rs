@@ -461,7 +461,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.power = match (self.power, reaction) {
             (Power::Off, _) | (_, Reaction::Immediate) => Power::Off,
             // Drives that have not been told to be on are not enabled for a ramp.
-            (Power::Starting { .. }, _) if self.told != Some(true) => Power::Off,
+            _ if self.told != Some(true) => Power::Off,
             (Power::Ramping { .. }, _) | (Power::Stopping { .. }, Reaction::Stop) => self.power,
             (Power::On, Reaction::Stop) if self.trace.executed.state == ExecState::Moving => {
                 Power::Stopping { ticks_left: stop_ticks, is_at_rest: false }

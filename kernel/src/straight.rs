@@ -75,7 +75,7 @@ impl<const AXES: usize> Straight<AXES> {
     /// `most_mm_s` under an override, for ticks of `tick_s`.
     ///
     /// # Errors
-    /// It can't be driven; nothing else fails once it is made.
+    /// It can't be driven; nothing else fails once it is made, in a number type that holds its limits.
     pub fn new(
         start: [Position; AXES],
         end: [Position; AXES],

@@ -223,8 +223,12 @@ impl Work {
 struct Press {
     /// Since when it is held, until that was long enough.
     since: Option<u32>,
+    samples: u8,
     is_counted: bool,
 }
+
+/// So many samples at least make a press, however long turns take: one may be a bounce.
+const PRESS_SAMPLES: u8 = 3;
 
 impl Press {
     /// Whether it has just been held for long enough at tick `now`, as far as turns have seen.
@@ -234,10 +238,9 @@ impl Press {
             return false;
         }
         let since = *self.since.get_or_insert(now);
-        !self.is_counted && {
-            self.is_counted = now.wrapping_sub(since) >= BUTTON_TICKS;
-            self.is_counted
-        }
+        self.samples = self.samples.saturating_add(1);
+        let is_press = now.wrapping_sub(since) >= BUTTON_TICKS && self.samples >= PRESS_SAMPLES;
+        is_press && !core::mem::replace(&mut self.is_counted, true)
     }
 }
 

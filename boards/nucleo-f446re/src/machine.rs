@@ -98,10 +98,10 @@ impl Machine {
 /// Whether blocks come before the path that they hold the feed of, and end with it, in every stretch.
 fn is_live(program: &Reader<'_, AXES>) -> bool {
     let (mut path, mut blocks) = (Position::ZERO, Position::ZERO);
-    program.items().flatten().all(|item| match item {
+    let is_held = program.items().flatten().all(|item| match item {
         Item::Block(block) => {
             blocks = blocks + block.length;
-            true
+            block.length >= Position::ZERO
         }
         Item::Line { length, .. } | Item::Septic { length, .. } => {
             path = path + length;
@@ -113,7 +113,8 @@ fn is_live(program: &Reader<'_, AXES>) -> bool {
             is_whole
         }
         Item::Feed { .. } | Item::Dwell(_) | Item::Stop => true,
-    })
+    });
+    is_held && blocks == Position::ZERO
 }
 
 #[cfg(test)]
@@ -186,7 +187,7 @@ mod tests {
         assert!(matches!(far, Err(MachineError::Items(CheckError::Start { axis: 1, .. }))), "{far:?}");
     }
 
-    /// Without any of its blocks, without its last one, and with one that is longer.
+    /// Without any of its blocks, without its last one, with one that is longer, and with one behind its end.
     #[test]
     fn a_program_that_does_not_hold_its_feed_is_refused() {
         let good = Machine::new(PROGRAM).expect("suits").program;
@@ -199,8 +200,9 @@ mod tests {
         }
         let without: Vec<_> = items.iter().filter(|item| !is_block(item)).copied().collect();
         let but_last = [&items[..last], &items[last + 1..]].concat();
+        let behind = [&items[..], &[items[last]]].concat();
         assert!(of(good.header(), Some(&guards()), &items).is_ok());
-        for items in [without, but_last, longer] {
+        for items in [without, but_last, longer, behind] {
             let refused = of(good.header(), Some(&guards()), &items).map(|_| ());
             assert_eq!(refused, Err(MachineError::NotLive));
         }

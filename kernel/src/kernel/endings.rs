@@ -66,10 +66,19 @@ fn drives_that_are_not_on_are_not_enabled_for_a_ramp() {
         let mut streams = Streams::<f32, 1, 2, 2>::new();
         let (_, mut intake) = streams.split(RULES, [Position::ZERO]);
         let mut bench = Follower::<1>::default();
+        for settle_ticks in [0, 100] {
+            kernel.tick(&mut intake, &mut bench);
+            kernel.enable(settle_ticks);
+            kernel.trip(kind);
+            kernel.tick(&mut intake, &mut bench);
+            let is_off = (Some(false), Some(Reaction::Immediate));
+            assert_eq!((kernel.told, kernel.reaction()), is_off, "{kind:?}");
+            assert!(kernel.clear_fault().is_some());
+        }
+        // In the tick itself.
+        kernel.enable(0);
+        bench.counts[0] = Counts(1_000_000);
         kernel.tick(&mut intake, &mut bench);
-        kernel.enable(100);
-        kernel.trip(kind);
-        kernel.tick(&mut intake, &mut bench);
-        assert_eq!((kernel.told, kernel.reaction()), (Some(false), Some(Reaction::Immediate)), "{kind:?}");
+        assert!(kernel.fault().is_some() && kernel.told == Some(false), "{:?}", kernel.fault());
     }
 }

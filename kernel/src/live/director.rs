@@ -270,7 +270,7 @@ where
     ///
     /// # Errors
     /// An item can't be executed. Nothing is read any more, every later call returns the same error, and what was handed
-    /// over ends at rest; a hold or an abort is still obeyed.
+    /// over ends at rest; a hold or an abort is still obeyed, but for one that itself can't be.
     pub fn turn(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
         self.turn_on(feeder).unwrap_or_else(|error| {
             self.error.get_or_insert(error);
