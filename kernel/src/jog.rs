@@ -223,12 +223,13 @@ impl<const AXES: usize> Jog<AXES> {
             (Some(wanted), Some(room)) => wanted.min(room),
         };
         let end_mm = from.to_mm() + direction.sign() * length.to_mm();
+        let ahead = direction.ahead(from, length);
+        if !ahead.is_within_limit() || libm::fabs(end_mm) > Position::LIMIT_MM {
+            return Err(JogError::End { end_mm });
+        }
         let mut end = start;
         if let Some(end) = end.get_mut(axis) {
-            *end = direction.ahead(from, length);
-        }
-        if !direction.ahead(from, length).is_within_limit() || libm::fabs(end_mm) > Position::LIMIT_MM {
-            return Err(JogError::End { end_mm });
+            *end = ahead;
         }
         let way =
             Straight::new(start, end, limits, [feed_mm_s, most_mm_s], tick_s).map_err(JogError::Straight)?;

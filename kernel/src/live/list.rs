@@ -167,7 +167,7 @@ impl List {
     }
 
     pub(super) fn items(&self) -> impl Iterator<Item = &Item> {
-        self.items.iter().map(|(_, item)| item)
+        self.placed().map(|(_, item)| item)
     }
 
     /// The items with where they start.

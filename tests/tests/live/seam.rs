@@ -91,6 +91,11 @@ fn a_change_that_comes_too_late_is_refused() {
     for ramp in [up, up.reversed()] {
         feeder.segment(list, FeedSegment::ramp(&ramp, length, tick_s).expect("a segment")).expect("room");
     }
+    // A list ends where its path does, and nowhere else.
+    for other in [length, length + length + length] {
+        let refused = feeder.end_of_feed(list, other);
+        assert!(matches!(refused, Err(Refused::Invalid(Rejection::Lengths { .. }))), "{refused:?}");
+    }
     feeder.end_of_feed(list, length + length).expect("room");
     feeder.change(Change { from: 0, to: list, after: 0, within: false }).expect("a list");
     for _ in 0..100 {
