@@ -9,11 +9,8 @@ use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
 use super::element::Element;
-use super::septic::{FitError, Septic, fit};
+use super::septic::{FitError, Septic};
 use super::{Vector, add, scale, subtract};
-
-/// Widest piece of an arc or an involute \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off.
-const WIDEST_RAD: f64 = core::f64::consts::FRAC_PI_4;
 
 /// The shortest piece that is sure to advance the path position, which goes in steps of 2⁻³² mm and is
 /// added up in f64 to a kilometre: two steps, rounded up \[mm\].
@@ -106,14 +103,7 @@ fn longest_mm<R: Real>() -> f64 {
 /// # Errors
 /// The element is not smooth.
 pub fn septics<R: Real>(element: &Element) -> Result<Vec<Septic>, FitError> {
-    let Some((curve, end)) = element.curve() else {
-        return Ok(Vec::new());
-    };
-    let widest = match element {
-        Element::Polynomial { .. } => end,
-        _ => WIDEST_RAD,
-    };
-    fit(curve, 0.0, end, widest, longest_mm::<R>())
+    element.septics(longest_mm::<R>())
 }
 
 /// Appends the pieces of `element`, which starts at `start_mm` of the stretch, to `pieces`, cut for the number

@@ -4,10 +4,16 @@
 use motion_kernel::plan::Bend;
 
 use super::curve::{Curve, Spiral, by_arc_length};
+use super::greatest::Greatest;
 use super::involute::Involute;
-use super::polynomial::{Greatest, Polynomial};
+use super::polynomial::Polynomial;
+use super::septic::{FitError, Septic, fit};
 use super::{Vector, add, cross, norm, scale, subtract};
 use crate::gcode::{ArcMove, LineMove};
+
+/// Widest piece of an arc or an involute \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off, and their third
+/// derivative 2·10⁻⁵ of itself.
+const WIDEST_RAD: f64 = core::f64::consts::FRAC_PI_4;
 
 /// A block's geometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -216,7 +222,23 @@ impl Element {
         }
     }
 
-    /// How it bends at its tightest, and which axes take part.
+    /// The curved pieces that it is driven as, none longer than `longest_mm`, with how far each is from the curve;
+    /// none of a line.
+    ///
+    /// # Errors
+    /// It is not smooth.
+    pub fn septics(&self, longest_mm: f64) -> Result<Vec<Septic>, FitError> {
+        let Some((curve, end)) = self.curve() else {
+            return Ok(Vec::new());
+        };
+        let widest = match self {
+            Self::Polynomial { .. } => end,
+            _ => WIDEST_RAD,
+        };
+        fit(curve, 0.0, end, widest, longest_mm)
+    }
+
+    /// How it bends at its tightest, itself and the pieces that it is driven as, and which axes take part.
     #[must_use]
     pub fn greatest(&self) -> Greatest {
         match self {
@@ -238,8 +260,13 @@ impl Element {
                     curved: part.map(|part| part > 0.0),
                 }
             }
-            Self::Polynomial { shape, .. } => shape.greatest(),
-            Self::Involute { shape, .. } => shape.greatest(),
+            Self::Polynomial { shape, .. } => self.driven(shape.greatest()),
+            Self::Involute { shape, .. } => self.driven(shape.greatest()),
         }
+    }
+
+    /// That of its pieces, too, where they are longest. What can't be made into pieces is refused elsewhere.
+    fn driven(&self, curve: Greatest) -> Greatest {
+        curve.driven_as(&self.septics(f64::INFINITY).unwrap_or_default())
     }
 }

@@ -16,7 +16,7 @@
 use motion_kernel::plan::Bend;
 
 use super::curve::Curve;
-use super::polynomial::Greatest;
+use super::greatest::Greatest;
 use super::{Vector, add, cross, dot, norm, scale, subtract};
 
 /// The least angle that an involute may reach \[rad\]: a radius of curvature of a thousandth of its base circle's.

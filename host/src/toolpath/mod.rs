@@ -12,12 +12,14 @@
 //! - [`smooth`]: a run of elements with the blend of each of its joints, by
 //!   [`blend`]: one corner's septic blend, and [`merge`]: short lines to fewer lines and arcs;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
+//! - [`greatest`]: how curves and their pieces bend at their tightest;
 //! - [`mod@compile`]: elements to pieces over exact path positions.
 
 pub mod blend;
 pub mod compile;
 pub mod curve;
 pub mod element;
+pub mod greatest;
 pub mod involute;
 pub mod merge;
 pub mod polynomial;
@@ -27,8 +29,9 @@ pub mod spline;
 
 pub use compile::{CompileError, Placed, compile, exact, on_path, septics};
 pub use element::{Element, Role};
+pub use greatest::Greatest;
 pub use involute::Involute;
-pub use polynomial::{Greatest, Polynomial};
+pub use polynomial::Polynomial;
 
 /// A point or a vector, X Y Z \[mm\].
 pub type Vector = [f64; 3];

@@ -2,13 +2,11 @@
 //!
 //! A curve of degree seven at most in a parameter u from 0 to 1, kept relative to its start, so that a blend of
 //! a micrometre a kilometre out is as precise as one at the origin. Consumes control points or coefficients \[mm\];
-//! produces what every [`Curve`] has, parts of itself, and the greatest derivatives by arc length, from which
-//! ceilings are made. Any finite coefficients are accepted; a curve that stands still somewhere (|r'| = 0)
+//! produces what every [`Curve`] has, parts of itself, and its greatest derivatives by arc length. Any finite coefficients are accepted; a curve that stands still somewhere (|r'| = 0)
 //! has no tangent there and is refused when it is made into pieces.
 
-use motion_kernel::plan::Bend;
-
 use super::curve::{Curve, by_arc_length, fourth_by_arc_length};
+use super::greatest::{Greatest, Peak, bend};
 use super::{Vector, add, norm, scale};
 
 /// Highest power.
@@ -30,17 +28,6 @@ const STRAIGHT: f64 = 1.0e-9;
 pub struct Polynomial {
     /// c₁ … c₇ \[mm\].
     coefficients: [Vector; DEGREE],
-}
-
-/// The greatest derivatives by arc length, each where it is greatest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Greatest {
-    /// Of κ, |r'''| and |r''''|.
-    pub bend: Bend<f64>,
-    /// |component| of the tangent on each axis, at most 1.
-    pub tangent: Vector,
-    /// Whether the axis takes part in the bend.
-    pub curved: [bool; 3],
 }
 
 impl Polynomial {
@@ -95,8 +82,7 @@ impl Polynomial {
         [c1, scale(c2, 2.0), scale(c3, 6.0), scale(c4, 24.0)]
     }
 
-    /// The greatest derivatives by arc length, from 64 parts. Between two points of these a smooth
-    /// function rises above both by an eighth of its second difference; twice that is added.
+    /// The greatest derivatives by arc length of the curve itself, from 64 parts.
     #[must_use]
     pub fn greatest(&self) -> Greatest {
         self.greatest_of(BEND_PARTS)
@@ -120,14 +106,13 @@ impl Polynomial {
                 curvatures[axis] = curvatures[axis].max(second[axis].abs());
             }
         }
-        let [second, third, fourth] = norms.map(|peak| peak.greatest);
-        let bend = Bend {
-            curvature_per_mm: second,
-            third_root_per_mm: third.sqrt(),
-            fourth_root_per_mm: libm::cbrt(fourth),
-        };
-        let tangent = tangents.map(|peak| peak.greatest.min(1.0));
-        Greatest { bend, tangent, curved: curvatures.map(|curvature| curvature > STRAIGHT * second) }
+        let norms = norms.map(Peak::greatest);
+        let tangent = tangents.map(|peak| peak.greatest().min(1.0));
+        Greatest {
+            bend: bend(norms),
+            tangent,
+            curved: curvatures.map(|curvature| curvature > STRAIGHT * norms[0]),
+        }
     }
 
     /// The coefficients of the same curve in u − `origin`, relative to the point at `origin`.
@@ -180,28 +165,6 @@ impl Curve for Polynomial {
 
     fn length(&self, a: f64, b: f64) -> f64 {
         self.refined(a, b, super::curve::gauss(a, b, |u| self.speed(u)), 0)
-    }
-}
-
-/// The greatest value of a sampled function, between its samples too.
-#[derive(Clone, Copy, Debug, Default)]
-struct Peak {
-    greatest: f64,
-    before: [Option<f64>; 2],
-}
-
-impl Peak {
-    fn next(&mut self, value: f64) {
-        let bulge = match self.before {
-            [Some(first), Some(second)] => 0.25 * (first - 2.0 * second + value).abs(),
-            _ => 0.0,
-        };
-        let highest = self.before.iter().flatten().fold(value, |highest, &before| highest.max(before));
-        // What is not a number must not be overlooked.
-        if !(highest + bulge <= self.greatest) {
-            self.greatest = highest + bulge;
-        }
-        self.before = [self.before[1], Some(value)];
     }
 }
 

@@ -250,4 +250,24 @@ impl Septic {
         let both: [(f64, f64); 3] = core::array::from_fn(horner);
         (both.map(|(value, _)| value), both.map(|(_, slope)| slope / self.length_mm))
     }
+
+    /// Second to fourth derivative by arc length at u = s/length.
+    #[must_use]
+    pub fn second_to_fourth(&self, u: f64) -> [Vector; 3] {
+        // k·(k − 1), then times k − 2, then times k − 3.
+        const FACTORS: [[f64; 7]; 3] = [
+            [0.0, 2.0, 6.0, 12.0, 20.0, 30.0, 42.0],
+            [0.0, 0.0, 6.0, 24.0, 60.0, 120.0, 210.0],
+            [0.0, 0.0, 0.0, 24.0, 120.0, 360.0, 840.0],
+        ];
+        core::array::from_fn(|index| {
+            let order = index + 2;
+            let power = libm::pow(self.length_mm, order as f64);
+            let of_axis = |axis: &[f64; 7]| {
+                let terms = axis.iter().zip(&FACTORS[index]).skip(order - 1);
+                terms.rev().fold(0.0, |sum, (c, factor)| sum * u + c * factor) / power
+            };
+            core::array::from_fn(|axis| of_axis(&self.coefficients[axis]))
+        })
+    }
 }

@@ -1,6 +1,7 @@
 //! The pieces of a plan, evaluated here: how they join, and how far they are from the programmed path.
 
 use motion_host::planning::{Executable, Plan};
+use motion_host::toolpath::septic::Septic;
 use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
@@ -16,9 +17,15 @@ pub(super) struct Compiled {
 }
 
 impl Compiled {
-    /// Position and its first three derivatives by arc length.
-    pub(super) fn at(&self, u: f64) -> [Vector; 4] {
-        let mut found = [[0.0; 3]; 4];
+    /// Of an element that starts at the origin.
+    pub(super) fn of(septic: &Septic) -> Self {
+        let coefficients = septic.coefficients.map(|axis| axis.map(|mm| mm / septic.length_mm));
+        Self { start: septic.start, length: septic.length_mm, coefficients }
+    }
+
+    /// Position and its first four derivatives by arc length.
+    pub(super) fn at(&self, u: f64) -> [Vector; 5] {
+        let mut found = [[0.0; 3]; 5];
         for axis in 0..3 {
             for (index, &c) in self.coefficients[axis].iter().enumerate() {
                 let mut factor = c * self.length;

@@ -1,14 +1,16 @@
 //! Every tick keeps the limits, and they are made use of.
 
 use motion_host::machine::Machine;
-use motion_kernel::num::Fixed;
+use motion_host::toolpath::blend::Blend;
+use motion_host::toolpath::{Element, Involute, Polynomial, Role};
+use motion_kernel::num::{Fixed, Real};
 
 use super::asked::{Asked, corners, line, program};
 use super::check::random::Random;
-use super::compiled::{compiled, continuous, distance};
+use super::compiled::{Compiled, compiled, continuous, distance};
 use super::driven::{Worst, driven};
 use super::tolerance::CHAINS;
-use super::{SAMPLES, assert_none, planned, rounded, seeds, without_path_mode};
+use super::{SAMPLES, assert_none, norm, planned, rounded, seeds, without_path_mode};
 
 /// Many moves one after the other, on machines whose axes differ: every tick within every limit, jerk without a
 /// step, the tolerance kept over the whole path.
@@ -51,6 +53,73 @@ fn every_tick_of_blended_programs_keeps_the_limits() {
         }
     }
     println!("{worst:?}, worst distance {worst_distance} of the tolerance");
+    assert_none(&failures);
+}
+
+/// A blend, a curve with random control points or an involute.
+fn curved(random: &mut Random) -> Option<Element> {
+    let size_mm = random.log_between(1e-3, 100.0);
+    let unit = |turn: f64| [turn.cos(), turn.sin(), 0.0];
+    match random.below(3) {
+        0 => {
+            let direction = unit(random.log_between(1e-3, 2.9));
+            let room_mm = size_mm * random.log_between(0.05, 1.0);
+            let before = Element::Line { from: [-size_mm, 0.0, 0.0], to: [0.0; 3] };
+            let after = Element::Line { from: [0.0; 3], to: direction.map(|part| part * size_mm) };
+            let limits = Machine::reference().limits().in_any_direction();
+            let tolerance_mm = random.log_between(1e-5, 1.0);
+            Blend::new(&before, &after, tolerance_mm, room_mm, &limits).map(|blend| blend.element)
+        }
+        1 => {
+            let mut next =
+                |index: usize| [index as f64, random.between(-2.0, 2.0), random.between(-2.0, 2.0)];
+            let points = core::array::from_fn(|index| next(index).map(|mm| mm * size_mm));
+            Some(Element::polynomial([0.0; 3], Polynomial::bezier(points), Role::Spline))
+        }
+        _ => {
+            let angles = (random.log_between(1e-2, 10.0), random.log_between(1e-2, 10.0));
+            let frame = (unit(1.0), unit(1.0 + core::f64::consts::FRAC_PI_2));
+            Involute::new(frame, size_mm, angles).ok().map(|shape| Element::involute([0.0; 3], shape))
+        }
+    }
+}
+
+/// What ceilings are made from are the greatest derivatives of what is driven, and not far above: no point of a
+/// curve's pieces is beyond them, whatever number type it is cut for, and one of them or of the curve is near.
+#[test]
+fn no_piece_bends_more_than_its_curve_is_said_to() {
+    let (mut curves, mut worst, mut failures) = (0, [0.0_f64; 3], Vec::new());
+    for seed in seeds(4000) {
+        let mut random = Random::new(seed);
+        let Some(element) = curved(&mut random) else { continue };
+        let bend = element.greatest().bend;
+        let said = [bend.curvature_per_mm, bend.third_root_per_mm.powi(2), bend.fourth_root_per_mm.powi(3)];
+        for longest_mm in [f64::PIECE_MM_MAX, f32::PIECE_MM_MAX, Fixed::PIECE_MM_MAX] {
+            // A cusp is refused.
+            let Ok(septics) = element.septics(longest_mm) else { continue };
+            let mut found = [0.0_f64; 3];
+            for piece in septics.iter().map(Compiled::of) {
+                for part in 0..=101 {
+                    let [_, _, derivatives @ ..] = piece.at(f64::from(part) / 101.0);
+                    for (found, derivative) in found.iter_mut().zip(derivatives) {
+                        *found = found.max(norm(derivative));
+                    }
+                }
+            }
+            curves += 1;
+            let ratios: [f64; 3] = core::array::from_fn(|order| found[order] / said[order]);
+            worst = core::array::from_fn(|order| worst[order].max(ratios[order]));
+            if ratios.iter().any(|&ratio| !(ratio <= 1.0 + 1e-9)) {
+                failures.push(format!(
+                    "MOTION_TEST_SEED={seed}: {ratios:?} of {}, pieces to {longest_mm} mm",
+                    element.kind()
+                ));
+            }
+        }
+    }
+    println!("{curves} curves, at most {worst:?} of what is said");
+    assert!(curves > 2 || curves > 10_000, "{curves}");
+    assert!(curves < 100 || worst.iter().all(|&ratio| ratio > 0.999), "{worst:?}");
     assert_none(&failures);
 }
 

@@ -1,0 +1,89 @@
+//! The greatest derivatives of a curve by arc length, from which ceilings are made.
+//!
+//! What is driven are the pieces of a curve. They are within a millionth of a millimetre of it, which says little about
+//! the third and fourth derivative of a curve that is short: the third is up to a seventh greater than the curve's on
+//! corner blends, the fourth up to two thirds. So both are looked at, the curve and its pieces.
+
+use motion_kernel::plan::Bend;
+
+use super::septic::Septic;
+use super::{Vector, norm};
+
+/// In how many parts a piece is cut: the square of its second derivative has eight extremes at most.
+const PIECE_PARTS: usize = 16;
+
+/// The greatest derivatives by arc length, each where it is greatest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Greatest {
+    /// Of κ, |r'''| and |r''''|.
+    pub bend: Bend<f64>,
+    /// |component| of the tangent on each axis, at most 1.
+    pub tangent: Vector,
+    /// Whether the axis takes part in the bend.
+    pub curved: [bool; 3],
+}
+
+impl Greatest {
+    /// Of a curve with these figures that is driven as `pieces`. Their tangents are unit vectors to a millionth.
+    #[must_use]
+    pub fn driven_as(self, pieces: &[Septic]) -> Self {
+        let mut norms = [0.0_f64; 3];
+        for piece in pieces {
+            for (greatest, of_piece) in norms.iter_mut().zip(of_piece(piece)) {
+                *greatest = greatest.max(of_piece);
+            }
+        }
+        let (curve, pieces) = (self.bend, bend(norms));
+        let bend = Bend {
+            curvature_per_mm: curve.curvature_per_mm.max(pieces.curvature_per_mm),
+            third_root_per_mm: curve.third_root_per_mm.max(pieces.third_root_per_mm),
+            fourth_root_per_mm: curve.fourth_root_per_mm.max(pieces.fourth_root_per_mm),
+        };
+        Self { bend, ..self }
+    }
+}
+
+/// |r''|, |r'''| and |r''''| of a piece, each where it is greatest.
+fn of_piece(piece: &Septic) -> [f64; 3] {
+    let mut peaks = [Peak::default(); 3];
+    for part in 0..=PIECE_PARTS {
+        let derivatives = piece.second_to_fourth(part as f64 / PIECE_PARTS as f64);
+        for (peak, derivative) in peaks.iter_mut().zip(derivatives) {
+            peak.next(norm(derivative));
+        }
+    }
+    peaks.map(Peak::greatest)
+}
+
+/// The bend of which |r''|, |r'''| and |r''''| are `norms` at their greatest.
+pub(super) fn bend([second, third, fourth]: [f64; 3]) -> Bend<f64> {
+    Bend { curvature_per_mm: second, third_root_per_mm: third.sqrt(), fourth_root_per_mm: libm::cbrt(fourth) }
+}
+
+/// The greatest value of a sampled function, between its samples too: between two of them a smooth function rises
+/// above both by an eighth of its second difference; twice that is added.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Peak {
+    greatest: f64,
+    before: [Option<f64>; 2],
+}
+
+impl Peak {
+    /// The next sample, at the same distance as those before.
+    pub(super) fn next(&mut self, value: f64) {
+        let bulge = match self.before {
+            [Some(first), Some(second)] => 0.25 * (first - 2.0 * second + value).abs(),
+            _ => 0.0,
+        };
+        let highest = self.before.iter().flatten().fold(value, |highest, &before| highest.max(before));
+        // What is not a number must not be overlooked.
+        if !(highest + bulge <= self.greatest) {
+            self.greatest = highest + bulge;
+        }
+        self.before = [self.before[1], Some(value)];
+    }
+
+    pub(super) fn greatest(self) -> f64 {
+        self.greatest
+    }
+}
