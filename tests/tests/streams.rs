@@ -530,6 +530,46 @@ fn a_check_finds_whatever_the_streams_would_refuse() {
     assert!(matches!(found(&far, &good.items), Err(CheckError::Start { axis: 1, .. })));
 }
 
+/// For live control blocks have to hold the whole path and nothing else: without any of them, without the last one, with
+/// one that is longer, with one behind the end, and with one that comes after what it holds.
+#[test]
+fn a_check_for_live_control_finds_path_that_is_not_held() {
+    let good = executable(SHORT).items;
+    let header = Machine::reference().header();
+    let found = |items: &[Item<3>]| {
+        program::check_live::<f32, 3, Infallible>(&header, items.iter().map(|&item| Ok(item)))
+    };
+    assert_eq!(found(&good), Ok(()));
+    let is_block = |item: &Item<3>| matches!(item, Item::Block(_));
+    let last = good.iter().rposition(is_block).expect("blocks");
+    let end = good.iter().rposition(|item| matches!(item, Item::EndOfStretch(_))).expect("an end");
+    let is_piece = |item: &Item<3>| matches!(item, Item::Line { .. } | Item::Septic { .. });
+    let piece = last + good[last..].iter().position(is_piece).expect("pieces");
+    let mut longer = good.clone();
+    if let Item::Block(block) = &mut longer[last] {
+        block.length = block.length + Position::from_bits(1);
+    }
+    let mut late = good.clone();
+    late[last..=piece].rotate_left(1);
+    let without: Vec<_> = good.iter().filter(|item| !is_block(item)).copied().collect();
+    let first_piece = without.iter().position(is_piece).expect("pieces");
+    let but_last = [&good[..last], &good[last + 1..]].concat();
+    let behind = [&good[..], &[good[last]]].concat();
+    let cases = [
+        (without, first_piece),
+        (but_last, piece - 1),
+        (longer, end),
+        (late, piece - 1),
+        (behind, good.len() + 1),
+    ];
+    for (case, (items, index)) in cases.into_iter().enumerate() {
+        assert_eq!(found(&items), Err(CheckError::NotHeld { index: index as u32 }), "{case}");
+        // Without live control blocks mean nothing.
+        let plain = items.iter().map(|&item| Ok(item));
+        assert_eq!(program::check::<f32, 3, Infallible>(&header, plain), Ok(()), "{case}");
+    }
+}
+
 /// What follows an item that was refused would not continue what is queued.
 #[test]
 fn a_supply_stays_where_it_failed() {

@@ -6,8 +6,7 @@
 //! not suit the board, or holds an item anywhere that could not be executed is refused before anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
-use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check};
-use motion_kernel::units::Position;
+use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check_live};
 
 use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
 
@@ -42,11 +41,10 @@ pub enum MachineError {
     },
     /// It does not say how faults are told and end.
     Unguarded,
-    /// It does not say what holds its feed, which live control makes plans with: `motion compile --live` does.
-    NotLive,
     /// A figure of an axis is out of its range.
     Axes(AxesError),
-    /// An item can't be executed, or the program starts or ends where it can't.
+    /// An item can't be executed, the program starts or ends where it can't, or it does not say what holds its feed, which
+    /// live control makes plans with: `motion compile --live` does.
     Items(CheckError<ProgramError>),
 }
 
@@ -81,10 +79,7 @@ impl Machine {
         let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
         let axes = AxesConfig::new(axes, TICK_S).and_then(|axes| axes.guarded(&guards, TICK_S));
         let axes = axes.map_err(MachineError::Axes)?;
-        check::<f32, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
-        if !is_live(&program) {
-            return Err(MachineError::NotLive);
-        }
+        check_live::<f32, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
         Ok(Self { program, axes })
     }
 
@@ -95,32 +90,11 @@ impl Machine {
     }
 }
 
-/// Whether blocks come before the path that they hold the feed of, and end with it, in every stretch.
-fn is_live(program: &Reader<'_, AXES>) -> bool {
-    let (mut path, mut blocks) = (Position::ZERO, Position::ZERO);
-    let is_held = program.items().flatten().all(|item| match item {
-        Item::Block(block) => {
-            blocks = blocks + block.length;
-            block.length >= Position::ZERO
-        }
-        Item::Line { length, .. } | Item::Septic { length, .. } => {
-            path = path + length;
-            path <= blocks
-        }
-        Item::EndOfStretch(_) => {
-            let is_whole = path == blocks;
-            (path, blocks) = (Position::ZERO, Position::ZERO);
-            is_whole
-        }
-        Item::Feed { .. } | Item::Dwell(_) | Item::Stop => true,
-    });
-    is_held && blocks == Position::ZERO
-}
-
 #[cfg(test)]
 mod tests {
     use motion_kernel::axis::{GuardFigures, Guards};
     use motion_kernel::program::{SupplyError, write};
+    use motion_kernel::units::Position;
 
     use super::*;
 
@@ -204,7 +178,8 @@ mod tests {
         assert!(of(good.header(), Some(&guards()), &items).is_ok());
         for items in [without, but_last, longer, behind] {
             let refused = of(good.header(), Some(&guards()), &items).map(|_| ());
-            assert_eq!(refused, Err(MachineError::NotLive));
+            let is_found = matches!(refused, Err(MachineError::Items(CheckError::NotHeld { .. })));
+            assert!(is_found, "{refused:?}");
         }
     }
 

@@ -1,4 +1,5 @@
-//! A whole program against all that the streams would refuse, without streams.
+//! A whole program against all that the streams would refuse, without streams; for live control also against what it
+//! needs to plan with.
 //!
 //! Consumes items; produces nothing but the first refusal. Background: as much work as filling the streams, and
 //! nothing is kept. What it accepts, [`Supply`](super::Supply) hands over without an error. What only time tells is
@@ -29,6 +30,12 @@ pub enum CheckError<E> {
         /// Why.
         cause: SupplyError<E>,
     },
+    /// Up to an item, or behind the last one, path is not held by blocks, or blocks hold what is no path.
+    #[cfg(feature = "live")]
+    NotHeld {
+        /// The item, from 0.
+        index: u32,
+    },
     /// It ends inside a stretch.
     Unfinished,
 }
@@ -40,6 +47,13 @@ impl<E: core::fmt::Display> core::fmt::Display for CheckError<E> {
                 write!(f, "start of axis {axis} at {mm} mm: expected at most ±{} mm", Position::LIMIT_MM)
             }
             Self::Item { index, cause } => write!(f, "item {index}: {cause}"),
+            #[cfg(feature = "live")]
+            Self::NotHeld { index } => {
+                write!(
+                    f,
+                    "item {index}: path and blocks differ, expected blocks before the path that they hold the feed of"
+                )
+            }
             Self::Unfinished => write!(f, "no end of the last stretch"),
         }
     }
@@ -55,6 +69,32 @@ pub fn check<R: Real, const AXES: usize, E>(
     header: &Header<AXES>,
     items: impl Iterator<Item = Result<Item<AXES>, E>>,
 ) -> Result<(), CheckError<E>> {
+    each::<R, AXES, E>(header, items, |_, _| Ok(()))
+}
+
+/// The same for a kernel under live control: in every stretch blocks come before the path that they hold the feed of, and end
+/// with it.
+///
+/// # Errors
+/// The first thing that is wrong.
+#[cfg(feature = "live")]
+pub fn check_live<R: Real, const AXES: usize, E>(
+    header: &Header<AXES>,
+    items: impl Iterator<Item = Result<Item<AXES>, E>>,
+) -> Result<(), CheckError<E>> {
+    let (mut held, mut count) = (Held::default(), 0);
+    each::<R, AXES, E>(header, items, |index, item| {
+        count = index.wrapping_add(1);
+        if held.goes_on(item) { Ok(()) } else { Err(CheckError::NotHeld { index }) }
+    })?;
+    if held.is_whole() { Ok(()) } else { Err(CheckError::NotHeld { index: count }) }
+}
+
+fn each<R: Real, const AXES: usize, E>(
+    header: &Header<AXES>,
+    items: impl Iterator<Item = Result<Item<AXES>, E>>,
+    mut and: impl FnMut(u32, &Item<AXES>) -> Result<(), CheckError<E>>,
+) -> Result<(), CheckError<E>> {
     for (axis, start) in header.start.iter().enumerate() {
         if !start.is_within_limit() {
             return Err(CheckError::Start { axis, mm: start.to_mm() });
@@ -63,13 +103,48 @@ pub fn check<R: Real, const AXES: usize, E>(
     let mut accept = Acceptance::<R, AXES>::new(header.rules, header.start);
     let mut index: u32 = 0;
     for item in items {
-        item.map_err(SupplyError::Source)
-            .and_then(|item| item.ready(header.tick_s))
-            .and_then(|ready| take(&mut accept, &ready))
-            .map_err(|cause| CheckError::Item { index, cause })?;
+        let at_item = |cause| CheckError::Item { index, cause };
+        let item = item.map_err(SupplyError::Source).map_err(at_item)?;
+        let ready = item.ready(header.tick_s).map_err(at_item)?;
+        take(&mut accept, &ready).map_err(at_item)?;
+        and(index, &item)?;
         index = index.wrapping_add(1);
     }
     accept.at_rest().map_err(|_| CheckError::Unfinished)
+}
+
+/// How much of a stretch there is, and how much of it is held by blocks.
+#[cfg(feature = "live")]
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    path: Position,
+    blocks: Position,
+}
+
+#[cfg(feature = "live")]
+impl Held {
+    fn goes_on<const AXES: usize>(&mut self, item: &Item<AXES>) -> bool {
+        match item {
+            Item::Block(block) => {
+                self.blocks = self.blocks + block.length;
+                block.length >= Position::ZERO
+            }
+            Item::Line { length, .. } | Item::Septic { length, .. } => {
+                self.path = self.path + *length;
+                self.path <= self.blocks
+            }
+            Item::EndOfStretch(_) => {
+                let is_whole = self.is_whole();
+                *self = Self::default();
+                is_whole
+            }
+            Item::Feed { .. } | Item::Dwell(_) | Item::Stop => true,
+        }
+    }
+
+    fn is_whole(&self) -> bool {
+        self.path == self.blocks
+    }
 }
 
 // In a frame of its own: an item takes hundreds of bytes.

@@ -16,6 +16,8 @@ pub mod supply;
 mod wire;
 
 pub use bytes::{Header, Items, ProgramError, Reader, write};
+#[cfg(feature = "live")]
+pub use check::check_live;
 pub use check::{CheckError, check};
 pub use checksum::Checksum;
 pub use supply::{Supply, SupplyError};
