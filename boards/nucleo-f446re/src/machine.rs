@@ -6,7 +6,7 @@
 //! not suit the board, or holds an item anywhere that could not be executed is refused before anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
-use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check_live};
+use motion_kernel::program::{CheckError, Header, ProgramError, Reader, check_live};
 
 use crate::design_parameters::{ENCODER_COUNTS_PER_S_MAX, TICK_S};
 
@@ -93,7 +93,7 @@ impl Machine {
 #[cfg(test)]
 mod tests {
     use motion_kernel::axis::{GuardFigures, Guards};
-    use motion_kernel::program::{SupplyError, write};
+    use motion_kernel::program::{Item, SupplyError, write};
     use motion_kernel::units::Position;
 
     use super::*;
