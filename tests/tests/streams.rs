@@ -490,6 +490,29 @@ fn a_program_too_dense_for_a_tick_is_refused_with_its_line_and_the_feed_that_wou
     assert!(executed.len() > 100);
 }
 
+/// Under live control lines that are too dense for their machine's feed are driven slower, and only those: not the long
+/// line behind them.
+#[test]
+fn only_what_is_dense_is_driven_slower_for_it() {
+    let fast = |item: &Item<3>| match item {
+        Item::Block(block) => Some((block.length.to_mm(), block.greatest().cap_mm_s)),
+        _ => None,
+    };
+    let text: String = short_lines(10.0).lines().take(100).map(|line| format!("{line}\n")).collect();
+    let items = executable(&format!("{text}X100 F3000\nM2\n")).items;
+    let blocks: Vec<(f64, f64)> = items.iter().filter_map(fast).collect();
+    let alone = executable("G91\nG1 X100 F3000\nM2\n").items;
+    let &[(_, most_mm_s)] = &alone.iter().filter_map(fast).collect::<Vec<_>>()[..] else {
+        panic!("one block")
+    };
+    let dense_mm_s = PIECES_PER_TICK_MAX as f64 * 0.001 / TICK_S;
+    assert!(dense_mm_s < 0.5 * most_mm_s);
+    let (last, dense) = blocks.split_last().expect("blocks");
+    assert_eq!((last.0, last.1), (100.0, most_mm_s));
+    let (_, lines) = dense.split_last().expect("lines");
+    assert!(lines.iter().all(|&(_, cap_mm_s)| (cap_mm_s / dense_mm_s - 1.0).abs() < 1e-6), "{blocks:?}");
+}
+
 /// The same refusals as while it runs, before it does.
 #[test]
 fn a_check_finds_whatever_the_streams_would_refuse() {

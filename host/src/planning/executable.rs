@@ -117,7 +117,7 @@ fn stretch_items<R: Real>(
         segment_pace.next(segment.duration()).map_err(at_line)?;
         feed.push(Placed { length, item: Item::Feed { ramp, length } });
     }
-    let blocks = path_blocks(stretch, &densest_mm_s(&pieces, tick_s))?;
+    let blocks = path_blocks(stretch, &Dense::of(&pieces, tick_s))?;
     in_order_of_start(&blocks, &pieces, &feed, items);
     let last_line = stretch.blocks.last().map_or(0, |block| block.line);
     let end = exact(end).map_err(|error| (last_line, error.into()))?;
@@ -125,29 +125,44 @@ fn stretch_items<R: Real>(
     Ok(())
 }
 
-/// For every piece where it starts, and the greatest feed \[mm/s\] at which no more pieces end in a tick around it than
-/// the executor's bound.
-fn densest_mm_s(pieces: &[Placed], tick_s: f64) -> Vec<(Position, f64)> {
-    let mut starts = Vec::with_capacity(pieces.len() + 1);
-    let mut start = Position::ZERO;
-    for piece in pieces {
-        starts.push(start);
-        start = start + piece.length;
-    }
-    starts.push(start);
-    let mut densest: Vec<(Position, f64)> =
-        starts[..pieces.len()].iter().map(|&start| (start, f64::INFINITY)).collect();
-    for (first, ends) in starts.windows(PIECES_PER_TICK_MAX + 1).enumerate() {
-        let feed_mm_s = (ends[PIECES_PER_TICK_MAX] - ends[0]).to_mm() / tick_s;
-        for (_, most) in &mut densest[first..first + PIECES_PER_TICK_MAX] {
-            *most = most.min(feed_mm_s);
+/// A piece's place on the path, and the greatest feed \[mm/s\] at which no more pieces end in a tick around it than the
+/// executor's bound.
+struct Dense {
+    start: Position,
+    end: Position,
+    most_mm_s: f64,
+}
+
+impl Dense {
+    fn of(pieces: &[Placed], tick_s: f64) -> Vec<Self> {
+        let mut end = Position::ZERO;
+        let place = |piece: &Placed| {
+            let start = end;
+            end = end + piece.length;
+            Self { start, end, most_mm_s: f64::INFINITY }
+        };
+        let mut all: Vec<Self> = pieces.iter().map(place).collect();
+        for first in 0..all.len().saturating_sub(PIECES_PER_TICK_MAX - 1) {
+            let together = &mut all[first..first + PIECES_PER_TICK_MAX];
+            let length = together[PIECES_PER_TICK_MAX - 1].end - together[0].start;
+            let feed_mm_s = length.to_mm() / tick_s;
+            for piece in together {
+                piece.most_mm_s = piece.most_mm_s.min(feed_mm_s);
+            }
         }
+        all
     }
-    densest
+
+    /// The greatest feed on the path from `start` to `end`.
+    fn most_mm_s(all: &[Self], start: Position, end: Position) -> f64 {
+        let within =
+            all.partition_point(|piece| piece.end <= start)..all.partition_point(|piece| piece.start < end);
+        all[within].iter().map(|piece| piece.most_mm_s).fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// What holds the feed, along the path; neighbours that are held alike are one.
-fn path_blocks(stretch: &Stretch, densest_mm_s: &[(Position, f64)]) -> Result<Vec<Placed>, (u32, Problem)> {
+fn path_blocks(stretch: &Stretch, dense: &[Dense]) -> Result<Vec<Placed>, (u32, Problem)> {
     let allowed = |ceiling: &Ceiling<f64>, most_mm_s: f64| Allowed {
         cap_mm_s: ceiling.feed_mm_s.min(most_mm_s),
         limits: ceiling.law.limits(),
@@ -156,11 +171,7 @@ fn path_blocks(stretch: &Stretch, densest_mm_s: &[(Position, f64)]) -> Result<Ve
     let mut start = Position::ZERO;
     for (block, &end_mm) in stretch.blocks.iter().zip(stretch.ends_mm()) {
         let end = on_path(end_mm).map_err(|error| (block.line, error.into()))?;
-        let within = densest_mm_s.partition_point(|&(at, _)| at < start)
-            ..densest_mm_s.partition_point(|&(at, _)| at < end);
-        // At least 0: a piece that begins before the block reaches into it.
-        let within = within.start.saturating_sub(1)..within.end;
-        let most_mm_s = densest_mm_s[within].iter().map(|&(_, feed)| feed).fold(f64::INFINITY, f64::min);
+        let most_mm_s = Dense::most_mm_s(dense, start, end);
         let next = PathBlock::new(
             end - start,
             block.feed_mm_s,

@@ -264,8 +264,10 @@ impl<'a> Checker<'a> {
     /// The steps at the joints passed since the tick before.
     fn joints(&mut self, now: &Along, from: usize, to: usize) -> Result<(), String> {
         let tick_s = self.machine.tick_s;
-        // At least this feed, wherever in the tick the joint lay.
-        let change = 0.5 * tick_s * now[2].abs().max(self.before[2].abs());
+        // At least this feed, wherever in the tick the joint lay: where a ramp ends and another begins in one tick, its
+        // feed sinks below both ends by an eighth of what jerk makes of it.
+        let most = |order: usize| now[order].abs().max(self.before[order].abs());
+        let change = 0.5 * tick_s * most(2) + 0.125 * tick_s * tick_s * most(3);
         let v = (now[1].min(self.before[1]) - change).max(0.0);
         let passed = self.cursor.neighbours().iter().filter(|p| p.block > from && p.block <= to);
         let steps: Vec<_> = passed.filter_map(|placed| placed.joint).collect();
