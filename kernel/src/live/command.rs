@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
+use super::replan::Ramps;
 use super::road::Junction;
 use super::source::Source;
 use crate::law::{Phase, Ticks};
@@ -187,16 +188,19 @@ where
             }
             // Whatever comes of it: what is ahead of this stretch is planned anew from here on.
             self.replan_through(place.start.stretch);
-            if self.gather_under_override(&mut list, false)
-                && self.end_in_a_stop(&mut list, self.feed_override)
-                && list.leave >= heads
-                && self.keeps_up(&list, &place.change)
-            {
-                let ahead = list.after(list.leave);
-                self.hand_over(list, place.change, self.feed_override, feeder)?;
-                self.take_back_from(place.driven());
-                self.replan_from(ahead);
-                return Ok(true);
+            for ramps in Ramps::IN_ORDER {
+                list.truncate(heads);
+                if self.gather_under_override(&mut list, false, ramps)
+                    && self.end_in_a_stop(&mut list, self.feed_override)
+                    && list.leave >= heads
+                    && self.keeps_up(&list, &place.change)
+                {
+                    let ahead = list.after(list.leave);
+                    self.hand_over(list, place.change, self.feed_override, feeder)?;
+                    self.take_back_from(place.driven());
+                    self.replan_from(ahead);
+                    return Ok(true);
+                }
             }
         }
         Ok(false)

@@ -6,6 +6,7 @@ use heapless::Deque;
 
 use super::block_ends::{BlockEnd, BlockEnds};
 use super::list::{Item as ListItem, LIST_ITEMS, List};
+use super::replan::Ramps;
 use super::road::{Junction, Road, is_before};
 use super::source::Source;
 use crate::law::{FeedSegment, Ticks};
@@ -521,34 +522,61 @@ where
         if begins && (self.is_single || self.feed_override != 1.0) {
             self.replan_from(self.ahead);
         }
-        let is_replanned = self.replans(self.ahead.stretch);
+        if self.replans(self.ahead.stretch) {
+            for ramps in Ramps::IN_ORDER {
+                if self.go_on_replanned(ramps, begins, feeder)? {
+                    return Ok(());
+                }
+            }
+            return Ok(());
+        }
         let mut list = List::new(self.ahead, self.tick_s);
-        let feed_override = if is_replanned { self.feed_override } else { 1.0 };
+        let is_found = self.gather(&mut list);
+        // At rest with no room for more path: the program's feed needs more of it to stop than there will be.
+        if !self.hand_over_ended(list, is_found, 1.0, feeder)? && self.is_full && self.ahead.feed_mm_s <= 0.0
+        {
+            self.replan_from(self.ahead);
+        }
+        Ok(())
+    }
+
+    /// Hands over the list that follows, planned anew; false if there is none.
+    fn go_on_replanned(
+        &mut self,
+        ramps: Ramps,
+        begins: bool,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<bool, SupplyError<E>> {
+        let mut list = List::new(self.ahead, self.tick_s);
         let is_found = if self.is_single && begins && self.course.front().is_some_and(ListItem::is_rest) {
             // By itself: it is a block.
             self.gather_rests(&mut list);
             true
-        } else if is_replanned && self.is_single {
-            self.gather_block(&mut list)
-        } else if is_replanned {
-            self.gather_under_override(&mut list, true)
+        } else if self.is_single {
+            self.gather_block(&mut list, ramps)
         } else {
-            self.gather(&mut list)
+            self.gather_under_override(&mut list, true, ramps)
         };
+        self.hand_over_ended(list, is_found, self.feed_override, feeder)
+    }
+
+    /// Hands over a list that was found, ended at rest, behind the one under way; otherwise what it holds is ahead again.
+    fn hand_over_ended(
+        &mut self,
+        mut list: List,
+        is_found: bool,
+        feed_override: f64,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<bool, SupplyError<E>> {
         let change = self.change_after(self.current.list.leave);
         let is_ended = is_found && self.end_in_a_stop(&mut list, feed_override);
         // From rest there is no other place to begin: what is too dense then is refused.
         if is_ended && (self.ahead.feed_mm_s <= 0.0 || self.keeps_up(&list, &change)) {
-            self.hand_over(list, change, feed_override, feeder)
-        } else {
-            let stop = if is_ended { list.len() - list.leave } else { 0 };
-            self.put_back(&list, stop, 0);
-            // At rest with no room for more path: the program's feed needs more of it to stop than there will be.
-            if self.is_full && self.ahead.feed_mm_s <= 0.0 && !is_replanned {
-                self.replan_from(self.ahead);
-            }
-            Ok(())
+            return self.hand_over(list, change, feed_override, feeder).map(|()| true);
         }
+        let stop = if is_ended { list.len() - list.leave } else { 0 };
+        self.put_back(&list, stop, 0);
+        Ok(false)
     }
 
     /// A change after so many items of the list under way.

@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
-use super::replan::replan;
+use super::replan::{Ramps, replan};
 use super::road::Junction;
 use super::source::Source;
 use crate::law::Ramp;
@@ -67,7 +67,7 @@ where
 
     /// The rests that come first, and a plan from where the list ends; to the end of its stretch, and what comes behind it,
     /// if that is wanted and there is room. False if there is neither.
-    fn gather_replanned(&mut self, list: &mut List, to_its_end: bool) -> bool {
+    fn gather_replanned(&mut self, list: &mut List, to_its_end: bool, ramps: Ramps) -> bool {
         let (from, heads) = (list.end(), list.len());
         // What takes over from a list under way is not at the front of the course, even where it has hardly begun.
         if to_its_end && from.at == Position::ZERO {
@@ -77,7 +77,7 @@ where
         let rests = list.len() > heads;
         let (path_end, is_whole) = self.path_of(from.stretch);
         let is_all = if path_end > from.at {
-            replan(&self.road, &from, self.feed_override, path_end, self.tick_s, list)
+            replan(&self.road, &from, self.feed_override, path_end, ramps, self.tick_s, list)
         } else {
             // The end of the stretch, or of what is known of it.
             (is_whole && from.feed_mm_s <= 0.0).then_some(true)
@@ -108,8 +108,8 @@ where
     }
 
     /// A plan from where the list ends; where that is too fast for the override, behind a ramp down to it.
-    pub(super) fn gather_under_override(&mut self, list: &mut List, to_its_end: bool) -> bool {
-        if self.gather_replanned(list, to_its_end) {
+    pub(super) fn gather_under_override(&mut self, list: &mut List, to_its_end: bool, ramps: Ramps) -> bool {
+        if self.gather_replanned(list, to_its_end, ramps) {
             return true;
         }
         let (heads, from) = (list.len(), list.end());
@@ -129,7 +129,7 @@ where
                 continue;
             };
             list.push(Item::Feed { ramp, length });
-            if self.gather_replanned(list, to_its_end) {
+            if self.gather_replanned(list, to_its_end, ramps) {
                 return true;
             }
             list.truncate(heads);

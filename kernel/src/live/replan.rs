@@ -1,15 +1,33 @@
 //! The feed from a junction on, planned anew over the blocks that are known.
 //!
 //! Consumes a junction, a feed override and the [`Road`]; produces ramps and cruises to rest where the known path ends.
-//! Background. Two stages and one pair of ramps for equal neighbours together, as [`plan`].
+//! Background. Two stages and one pair of ramps for equal neighbours together, as [`plan`]; over the blocks that come
+//! first with ramps that span them, where that is faster, to the feed that the plan behind them begins with.
 
 use heapless::Vec;
 
-use super::list::{Item, List};
+use super::list::{Item, LIST_ITEMS, List};
 use super::road::{Junction, LENGTH_ROUNDING_MM, Road, SLIVER};
-use crate::law::Law;
-use crate::plan::{Block, BlockPlan, merge_equal, plan, segments};
+use crate::law::{FeedSegment, Law, Ramp};
+use crate::plan::{Block, BlockPlan, FeedSpan, Node, merge_equal, nodes_for, plan, plan_spanning, segments};
 use crate::units::Position;
+
+/// Over so many blocks ramps may span: a list seldom reaches farther, and what they need goes with it.
+const SPANNED: usize = 16;
+
+/// How a stretch is planned anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ramps {
+    /// A ramp may span blocks where that is faster.
+    Spanning,
+    /// One pair a block.
+    PerBlock,
+}
+
+impl Ramps {
+    /// In the order in which they are tried: one without a place to stop from does not rule out the other.
+    pub(super) const IN_ORDER: [Self; 2] = [Self::Spanning, Self::PerBlock];
+}
 
 /// The first items of a plan from `from` to rest at `end`, into `list`, as many as it has room for; whether that is all
 /// of it. `None` if there is no plan: the feed is above the ceiling, or the path too short to brake.
@@ -18,6 +36,7 @@ pub(super) fn replan<const BLOCKS: usize>(
     from: &Junction,
     feed_override: f64,
     end: Position,
+    ramps: Ramps,
     tick_s: f64,
     list: &mut List,
 ) -> Option<bool> {
@@ -50,6 +69,14 @@ pub(super) fn replan<const BLOCKS: usize>(
         // Where one has to brake at once the feed may be a rounding too high for the length.
         blocks.first_mut()?.length_mm += LENGTH_ROUNDING_MM;
         plan(&blocks, from.feed_mm_s, 0.0, &mut plans).ok()?;
+    } else if ramps == Ramps::Spanning && blocks.len() > 1 {
+        let count = blocks.len().min(SPANNED);
+        let (first, plans, ends) = (blocks.get(..count)?, plans.get(..count)?, ends.get(..count)?);
+        let heads = list.len();
+        if let Some(is_whole) = span(first, plans, from, *ends.last()?, tick_s, list) {
+            return Some(is_whole && count == blocks.len());
+        }
+        list.truncate(heads);
     }
     let mut start = from.at;
     for ((block, plan), &block_end) in blocks.iter().zip(&plans).zip(&ends) {
@@ -63,4 +90,61 @@ pub(super) fn replan<const BLOCKS: usize>(
         start = block_end;
     }
     Some(true)
+}
+
+/// The same over `blocks`, to the feed and the position that their `plans` end with, by ramps that may span them. `None` where
+/// that is not faster.
+// In a frame of its own: what it works with takes many kilobytes.
+#[inline(never)]
+fn span(
+    blocks: &[Block<f64>],
+    plans: &[BlockPlan<f64>],
+    from: &Junction,
+    end: Position,
+    tick_s: f64,
+    list: &mut List,
+) -> Option<bool> {
+    let mut nodes = [Node::EMPTY; nodes_for(SPANNED)];
+    let mut spans: Vec<FeedSpan, { LIST_ITEMS + 1 }> = Vec::new();
+    let mut is_cut = false;
+    let to_mm_s = plans.last()?.exit_mm_s;
+    let time_s = plan_spanning(blocks, from.feed_mm_s, to_mm_s, &mut nodes, &mut |span| {
+        is_cut |= spans.push(span).is_err();
+    });
+    let per_block_s: f64 = blocks.iter().zip(plans).map(|(block, plan)| time_of_s(block, plan)).sum();
+    if !(time_s.ok()?? < per_block_s) {
+        return None;
+    }
+    let (mut start, mut rest) = (from.at, &spans[..]);
+    while let [span, next @ ..] = rest {
+        if list.is_full() {
+            return Some(false);
+        }
+        let span_end = match next.first() {
+            Some(next) => from.at + Position::from_mm(next.start_mm)?,
+            // What was cut off behind it is gone, and with it where it ends.
+            None if is_cut => return Some(false),
+            None => end,
+        };
+        let length = span_end - start;
+        if !(span.ramp.is_cruise() && length <= Position::ZERO) {
+            let made = if span.ramp.is_cruise() {
+                FeedSegment::<f64>::cruise(span.ramp.from_mm_s, length, tick_s)
+            } else {
+                FeedSegment::<f64>::ramp(&span.ramp, length, tick_s)
+            };
+            list.push(Item::Feed { ramp: *made.ok()?.as_ramp(), length });
+        }
+        (start, rest) = (span_end, next);
+    }
+    Some(true)
+}
+
+/// How long a pair of ramps takes, with the cruise between them.
+fn time_of_s(block: &Block<f64>, plan: &BlockPlan<f64>) -> f64 {
+    let [rise, fall] =
+        [plan.enter_mm_s, plan.exit_mm_s].map(|feed_mm_s| Ramp::new(&block.law, feed_mm_s, plan.peak_mm_s));
+    let cruise_mm = f64::max(block.length_mm - rise.length_mm() - fall.length_mm(), 0.0);
+    let cruise_s = if cruise_mm > 0.0 { cruise_mm / plan.peak_mm_s } else { 0.0 };
+    rise.duration_s() + cruise_s + fall.duration_s()
 }

@@ -7,6 +7,7 @@ use super::block_ends::BlockEnd;
 use super::command::Places;
 use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
+use super::replan::Ramps;
 use super::road::{Junction, SLIVER};
 use super::source::Source;
 use crate::law::Ramp;
@@ -118,7 +119,7 @@ where
 
     /// A plan from `ahead` to the first block end that can be stopped at, or else to the end of the stretch or of what is
     /// known of it.
-    pub(super) fn gather_block(&mut self, list: &mut List) -> bool {
+    pub(super) fn gather_block(&mut self, list: &mut List, ramps: Ramps) -> bool {
         let ahead = self.ahead;
         if let Some((nearest, brake)) = self.nearest_rest(&ahead) {
             // At rest, not what it rests at.
@@ -126,7 +127,7 @@ where
             let ends = self.block_ends(ahead.stretch, nearest);
             for end in ends.into_iter().flatten() {
                 self.block_end = Some(end);
-                if self.gather_under_override(list, true) {
+                if self.gather_under_override(list, true, ramps) {
                     return true;
                 }
                 list.truncate(0);
@@ -140,7 +141,7 @@ where
             }
         }
         self.block_end = None;
-        self.gather_under_override(list, true)
+        self.gather_under_override(list, true, ramps)
     }
 
     /// Goes on to the first block end that can be stopped at from within the list under way; false if there is none.

@@ -4,6 +4,7 @@ use super::geometry::{Element, PathPoint, joint, position_bits};
 use super::program::{Asked, Generated};
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Item as PlanItem, Plan};
+use motion_host::toolpath::smooth::TANGENT_ROUNDING_RAD;
 use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
@@ -63,7 +64,8 @@ impl Path {
             let mut passed = None;
             if let Some(last) = open.moves.last() {
                 let (angle_rad, bend) = joint(&last.element, &element);
-                let limit_rad = machine.path.joint_angle_rad;
+                // What is less is no angle to any machine.
+                let limit_rad = machine.path.joint_angle_rad.max(TANGENT_ROUNDING_RAD);
                 let is_close = (angle_rad - limit_rad).abs() <= 1e-6 * limit_rad + 1e-9;
                 path.is_ambiguous |= is_close;
                 if angle_rad > limit_rad {
