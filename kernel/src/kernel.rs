@@ -30,9 +30,7 @@ use crate::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, Veloci
 use crate::num::Real;
 use crate::queue::Intake;
 use crate::trace::Trace;
-#[cfg(feature = "guards")]
-use crate::units::DacCode;
-use crate::units::{Counts, Position};
+use crate::units::{Counts, DacCode, Position};
 
 /// Whether the drives may move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -209,12 +207,14 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
         self.execute(intake);
         self.regulate(intake);
-        let codes = self.trace.axes.each_ref().map(|axis| axis.code);
+        #[cfg(not(feature = "guards"))]
+        let codes = &mut [DacCode::ZERO; AXES];
         #[cfg(feature = "guards")]
-        {
-            self.guards.written = codes;
+        let codes = &mut self.guards.written;
+        for (code, axis) in codes.iter_mut().zip(&self.trace.axes) {
+            *code = axis.code;
         }
-        if hal.write(&codes).is_err() {
+        if hal.write(codes).is_err() {
             self.latch_fault(FaultKind::Output);
         }
         // Repeated until the drives have taken it, above all when they are to be disabled.
@@ -434,7 +434,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         let ticks = self.trace.executed.setpoints.get(axis).zip(self.trace.axes.get(axis));
         if let Some(((state, config), (setpoint, output))) = parts.zip(ticks)
             && !output.lost
-            && let Some(found) = state.look(config, setpoint, output, Self::ROUND_TICKS)
+            && let Some(found) = state.look(config, setpoint, output)
         {
             self.latch_fault(kind_of(axis, found));
         }

@@ -42,8 +42,9 @@ pub(super) struct GuardConfig<R> {
     jump_mm: R,
     tick_s: R,
     moving_mm_s: R,
-    /// Change of velocity by load in a tick \[mm per tick²\].
+    /// Change of the distance over two ticks by load, in a tick and from look to look \[mm\].
     load_mm: R,
+    load_look_mm: R,
     /// What noise makes of the distance over two ticks \[mm\].
     noise_mm: R,
     noise_counts: i32,
@@ -64,6 +65,7 @@ impl<R: Real> GuardConfig<R> {
             tick_s: R::ZERO,
             moving_mm_s: R::ZERO,
             load_mm: R::ZERO,
+            load_look_mm: R::ZERO,
             noise_mm: R::ZERO,
             noise_counts: 0,
             response_looks: 0,
@@ -88,6 +90,7 @@ impl<R: Real> GuardConfig<R> {
         let least = LEAST;
         let &GuardFigures { response_s, saturation_s, noise_counts, .. } = figures;
         let look_s = f64::from(look_ticks) * tick_s;
+        let load_mm = 2.0 * figures.load_accel_mm_s2 * tick_s * tick_s;
         let looks = |s: f64| libm::ceil(s / look_s) as u16;
         let at_rest_mm = figure("following error at rest [mm]", figures.following_error_at_rest_mm, least);
         let per_velocity_s =
@@ -122,7 +125,8 @@ impl<R: Real> GuardConfig<R> {
             jump_mm,
             tick_s: R::from_f64(tick_s),
             moving_mm_s,
-            load_mm: R::from_f64(figures.load_accel_mm_s2 * tick_s * tick_s),
+            load_mm: R::from_f64(load_mm),
+            load_look_mm: R::from_f64(load_mm * f64::from(look_ticks)),
             noise_mm: R::from_f64(2.0 * noise_mm),
             noise_counts: 2 * i32::from(noise_counts),
             // One more: the first look may come just before there is something to see.
@@ -170,12 +174,12 @@ enum Alarm<R> {
 
 /// What an axis was like when it was looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Look {
+struct Look<R> {
     /// There was one since the axis was enabled.
     is_taken: bool,
     counts: i32,
-    /// Counts over the two ticks before.
-    speed: i32,
+    /// Over the two ticks before \[mm\].
+    moved_mm: R,
     /// The command's direction; 0 below the least velocity.
     commanded: i8,
 }
@@ -190,11 +194,11 @@ pub(super) struct Guard<R> {
     /// The lower halves of the last three readings, the latest first.
     counts: [i32; 3],
     alarm: Alarm<R>,
-    last: Look,
+    last: Look<R>,
     still_looks: u16,
     against_looks: u16,
-    /// The speed at the look before the first of them.
-    against_from: i32,
+    /// What it moved by at the look before the first of them \[mm\].
+    against_from_mm: R,
     saturated_looks: u16,
     /// The next jump is that of a machine that was moving where it was told to stand.
     is_excused: bool,
@@ -311,7 +315,7 @@ impl<R: Real> Guard<R> {
             Alarm::Error { error_mm } => {
                 if self.has_stopped_counting(config) {
                     Found::EncoderLost
-                } else if self.runs_away(config, since) {
+                } else if self.runs_away(config, self.moved_mm(config), self.by_load_mm(config, since)) {
                     Found::Runaway
                 } else {
                     Found::FollowingError { error_mm }
@@ -351,37 +355,40 @@ impl<R: Real> Guard<R> {
         (-config.guard.noise_counts..=config.guard.noise_counts).contains(&moved)
     }
 
-    /// Whether the axis has lost velocity towards its command faster than by load.
-    fn runs_away(&self, config: &AxisConfig<R>, since: u8) -> bool {
+    /// Whether the axis, which moved by `now_mm` over two ticks, has since the last look lost velocity towards its command
+    /// faster than by load.
+    fn runs_away(&self, config: &AxisConfig<R>, now_mm: R, by_load_mm: R) -> bool {
         let [latest, before, first] = self.counts;
         // Counts that stand still are another fault's.
         if !self.last.is_taken || latest == before && before == first {
             return false;
         }
         let guard = &config.guard;
-        let now_mm = mm(config, self.speed());
-        // Over two ticks, as the speeds.
+        // Over two ticks, as what it moved by.
         let wanted_mm = (self.command_mm_s + self.command_mm_s) * guard.tick_s - now_mm;
-        let gained_mm = now_mm - mm(config, self.last.speed);
+        let gained_mm = now_mm - self.last.moved_mm;
         let lost_mm = if wanted_mm < R::ZERO { gained_mm } else { -gained_mm };
-        let by_load_mm = (guard.load_mm + guard.load_mm) * R::from_q32(i64::from(since) << 32);
         lost_mm > by_load_mm + guard.noise_mm + guard.noise_mm
     }
 
-    /// Counts over the last two ticks.
-    fn speed(&self) -> i32 {
-        let [latest, _, first] = self.counts;
-        latest.wrapping_sub(first)
+    /// What load changes in `since` ticks, of the distance over two \[mm\].
+    fn by_load_mm(&self, config: &AxisConfig<R>, since: u8) -> R {
+        config.guard.load_mm * R::from_q32(i64::from(since) << 32)
     }
 
-    /// One look at an axis that was regulated in this tick, the next one `ticks` later.
+    /// Over the last two ticks \[mm\].
+    fn moved_mm(&self, config: &AxisConfig<R>) -> R {
+        let [latest, _, first] = self.counts;
+        mm(config, latest.wrapping_sub(first))
+    }
+
+    /// One look at an axis that was regulated in this tick.
     #[inline(never)]
     pub(super) fn look(
         &mut self,
         config: &AxisConfig<R>,
         setpoint: &Setpoint<R>,
         output: &AxisOutput<R>,
-        ticks: u8,
     ) -> Option<Found<R>> {
         let guard = &config.guard;
         self.is_excused = false;
@@ -393,24 +400,23 @@ impl<R: Real> Guard<R> {
             command_mm_s if command_mm_s <= -guard.moving_mm_s => -1,
             _ => 0,
         };
-        let speed = self.speed();
-        let moved_mm = mm(config, speed);
+        let moved_mm = self.moved_mm(config);
         let moving_mm = guard.moving_mm_s * guard.tick_s + guard.noise_mm;
         let is_against = commanded > 0 && moved_mm < -moving_mm || commanded < 0 && moved_mm > moving_mm;
         // A load that is too great brakes slowly, but brakes: if it doesn't show from one look to the next, then over some.
         if self.against_looks == 0 {
-            self.against_from = self.last.speed;
+            self.against_from_mm = self.last.moved_mm;
         }
-        let brakes_mm = mm::<R>(config, self.against_from).abs() - moved_mm.abs();
+        let brakes_mm = self.against_from_mm.abs() - moved_mm.abs();
         let is_against = is_against && brakes_mm <= guard.noise_mm;
         let goes_on = self.last.is_taken && commanded != 0 && commanded == self.last.commanded;
         let count = |looks: u16, again: bool| if again { looks.saturating_add(1) } else { 0 };
         let is_still = self.is_still(config);
-        let runs_away = self.runs_away(config, ticks);
+        let runs_away = self.runs_away(config, moved_mm, guard.load_look_mm);
         self.still_looks = count(self.still_looks, goes_on && is_still);
         self.against_looks = count(self.against_looks, goes_on && is_against);
         self.saturated_looks = count(self.saturated_looks, output.saturated);
-        self.last = Look { is_taken: true, counts: self.counts[0], speed, commanded };
+        self.last = Look { is_taken: true, counts: self.counts[0], moved_mm, commanded };
         if runs_away || self.against_looks >= guard.response_looks {
             Some(Found::Runaway)
         } else if self.still_looks >= guard.response_looks {
@@ -549,7 +555,7 @@ mod tests {
                 axis.tick(&config, &setpoint, &mut output);
                 if !output.lost && tick % 8 == 7 {
                     found.extend(
-                        axis.look(&config, &setpoint, &output, 8).filter(|new| found.last() != Some(new)),
+                        axis.look(&config, &setpoint, &output).filter(|new| found.last() != Some(new)),
                     );
                 }
                 found
@@ -574,7 +580,7 @@ mod tests {
                 let mut output = AxisOutput { counts, ..AxisOutput::default() };
                 axis.tick(&config, &setpoint, &mut output);
                 assert!(!output.lost, "{brake_mm_s2} tick {tick}");
-                if tick % 8 == 7 { axis.look(&config, &setpoint, &output, 8) } else { None }
+                if tick % 8 == 7 { axis.look(&config, &setpoint, &output) } else { None }
             })
         };
         assert_eq!(found(0.0), Some(Found::Runaway));

@@ -352,16 +352,15 @@ impl<R: Real> AxisState<R> {
         self.guard.judge(config, setpoint, since)
     }
 
-    /// A look at an axis that was regulated in this tick; the next one comes `ticks` later.
+    /// A look at an axis that was regulated in this tick.
     #[cfg(feature = "guards")]
     pub(crate) fn look(
         &mut self,
         config: &AxisConfig<R>,
         setpoint: &Setpoint<R>,
         output: &AxisOutput<R>,
-        ticks: u8,
     ) -> Option<Found<R>> {
-        self.guard.look(config, setpoint, output, ticks)
+        self.guard.look(config, setpoint, output)
     }
 }
 

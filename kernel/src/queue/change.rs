@@ -67,6 +67,34 @@ pub struct Progress {
     pub waits: bool,
 }
 
+/// A list, and how many items of it are done, as one number that goes up with them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct ListPlace(u32);
+
+impl ListPlace {
+    /// No list has so many items.
+    pub(super) const NEVER: Self = Self(u32::MAX);
+    const LIST_BIT: u32 = 30;
+    const DONE_BITS: u32 = 27;
+
+    pub(super) fn new(list: u8, done: u32) -> Self {
+        Self(u32::from(list) << Self::LIST_BIT | done)
+    }
+
+    pub(super) fn list(self) -> u8 {
+        (self.0 >> Self::LIST_BIT) as u8
+    }
+
+    fn done(self) -> u32 {
+        self.0 & ((1 << Self::DONE_BITS) - 1)
+    }
+
+    /// One more is done. A list holds far fewer than there is room for.
+    pub(super) fn next(self) -> Self {
+        Self(self.0.wrapping_add(1))
+    }
+}
+
 /// The words between the two.
 #[derive(Debug)]
 pub(super) struct Words {
@@ -81,7 +109,7 @@ pub(super) struct Words {
     #[cfg(feature = "guards")]
     stop_wanted: AtomicU32,
     tick: AtomicU32,
-    /// List, phase and count of items done.
+    /// A [`ListPlace`] with the phase, and whether it waits, in the bits that it leaves.
     place: AtomicU32,
     left_high: AtomicU32,
     left_low: AtomicU32,
@@ -91,6 +119,9 @@ pub(super) struct Words {
 const LOOKS: usize = 4;
 
 impl Words {
+    const WAITS_BIT: u32 = ListPlace::DONE_BITS;
+    const PHASE_BIT: u32 = Self::WAITS_BIT + 1;
+
     pub(super) const fn new() -> Self {
         Self {
             change: AtomicU32::new(Change::NONE),
@@ -173,7 +204,7 @@ impl Words {
         let place = self.place.load(Ordering::Acquire);
         let (high, low) = (self.left_high.load(Ordering::Acquire), self.left_low.load(Ordering::Acquire));
         let left = Ticks::from_bits(u64::from(high) << 32 | u64::from(low));
-        let phase = match place >> 28 & 3 {
+        let phase = match place >> Self::PHASE_BIT & 3 {
             1 => Some(Phase::Rise),
             2 => Some(Phase::Hold),
             3 => Some(Phase::Fall),
@@ -181,18 +212,18 @@ impl Words {
         };
         Progress {
             tick,
-            list: (place >> 30) as u8,
-            done: place & ((1 << 27) - 1),
-            waits: place >> 27 & 1 == 1,
+            list: ListPlace(place).list(),
+            done: ListPlace(place).done(),
+            waits: place >> Self::WAITS_BIT & 1 == 1,
             inside: phase.map(|phase| (phase, left)),
         }
     }
 
     /// The tick says where it is.
     #[inline]
-    pub(super) fn publish(&self, list: u8, done: u32, inside: Option<(Phase, Ticks)>, waits: bool) {
+    pub(super) fn publish(&self, ListPlace(place): ListPlace, inside: Option<(Phase, Ticks)>, waits: bool) {
         let (phase, left) = inside.map_or((0, Ticks::ZERO), |(phase, left)| (phase as u32 + 1, left));
-        let place = u32::from(list) << 30 | phase << 28 | u32::from(waits) << 27 | done & ((1 << 27) - 1);
+        let place = place | phase << Self::PHASE_BIT | u32::from(waits) << Self::WAITS_BIT;
         self.place.store(place, Ordering::Relaxed);
         let bits = left.to_bits();
         self.left_high.store((bits >> 32) as u32, Ordering::Relaxed);

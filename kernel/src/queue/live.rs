@@ -6,7 +6,7 @@
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use super::change::{Change, LISTS, Progress, Words};
+use super::change::{Change, LISTS, ListPlace, Progress, Words};
 use super::{
     Density, FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept,
     count, enter, length,
@@ -77,11 +77,10 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             path_taken: Taken::new(&shared.path_entered, PIECES - 1),
             feed_taken: Taken::new(&shared.feed_entered, SEGMENTS - 1),
             lists: Some(Lists {
-                current: 0,
+                place: ListPlace::new(0, 0),
                 others: [(1, second_out), (2, third_out)],
-                done: 0,
                 seen: shared.words.news(),
-                due_after: u32::MAX,
+                due: ListPlace::NEVER,
                 change: None,
                 refused: None,
             }),
@@ -307,14 +306,13 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
 
 /// The tick's end of the lists; the one under way is the intake's feed.
 pub(super) struct Lists<'a, R: Real> {
-    current: u8,
+    /// The current list, and how many items of it are done.
+    place: ListPlace,
     others: [(u8, Consumer<'a, FeedItem<R>>); LISTS as usize - 1],
-    /// Items of the current list that are done.
-    done: u32,
     /// The news that have been dealt with.
     seen: u32,
-    /// After so many items of the current list a change is due; never reached if none is asked for.
-    due_after: u32,
+    /// From here on a change is due; never reached if none is asked for.
+    due: ListPlace,
     /// What is asked for, as of the tick's start, with its word.
     change: Option<(u32, Change)>,
     /// The word that came too late last.
@@ -326,9 +324,11 @@ impl<R: Real> Lists<'_, R> {
     #[cold]
     #[inline(never)]
     fn look(&mut self, words: &Words, news: u32) {
-        self.change =
-            words.asked().filter(|(word, change)| change.from == self.current && self.refused != Some(*word));
-        self.due_after = self.change.map_or(u32::MAX, |(_, change)| change.after);
+        self.change = words
+            .asked()
+            .filter(|(word, change)| change.from == self.place.list() && self.refused != Some(*word));
+        self.due =
+            self.change.map_or(ListPlace::NEVER, |(_, change)| ListPlace::new(change.from, change.after));
         for _ in 0..DROPPED_PER_TICK {
             let given_up = self.others.iter_mut().filter(|(list, _)| !words.is_claimed(*list));
             // One item of one of them, while there is any.
@@ -341,7 +341,7 @@ impl<R: Real> Lists<'_, R> {
 
     /// What is asked for no longer is.
     fn forget(&mut self) -> Option<(u32, Change)> {
-        self.due_after = u32::MAX;
+        self.due = ListPlace::NEVER;
         self.change.take()
     }
 }
@@ -361,8 +361,8 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     #[inline(never)]
     pub(super) fn count_done(&mut self) {
         let Some(lists) = &mut self.lists else { return };
-        lists.done = lists.done.wrapping_add(1);
-        if lists.due_after == lists.done && lists.change.is_some_and(|(_, change)| !change.within) {
+        lists.place = lists.place.next();
+        if lists.due == lists.place && lists.change.is_some_and(|(_, change)| !change.within) {
             self.take_over();
         }
     }
@@ -371,19 +371,19 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// way.
     #[inline]
     pub(crate) fn is_change_due(&self) -> bool {
-        self.lists.as_ref().is_some_and(|lists| lists.due_after <= lists.done)
+        self.lists.as_ref().is_some_and(|lists| lists.due <= lists.place)
     }
 
     /// The first item of the list that is asked for, if the place where it takes over lies within the item under way.
     pub(crate) fn feed_after_change(&self) -> Option<&FeedItem<R>> {
         let lists = self.lists.as_ref()?;
-        let (_, change) = lists.change.filter(|(_, change)| change.within && change.after == lists.done)?;
+        let (_, change) = lists.change.filter(|(_, change)| change.within && lists.due == lists.place)?;
         lists.others.iter().find(|(list, _)| *list == change.to)?.1.peek()
     }
 
     /// Whether the change that is due takes over where no segment is under way.
     pub(crate) fn takes_over_between_items(&self) -> bool {
-        self.lists.as_ref().is_some_and(|lists| lists.due_after == lists.done)
+        self.lists.as_ref().is_some_and(|lists| lists.due == lists.place)
     }
 
     /// Follows the change.
@@ -394,9 +394,9 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         let Some((_, change)) = lists.forget() else { return };
         for (list, queue) in &mut lists.others {
             if *list == change.to {
-                core::mem::swap(list, &mut lists.current);
+                *list = lists.place.list();
+                lists.place = ListPlace::new(change.to, 0);
                 core::mem::swap(queue, &mut self.feed);
-                lists.done = 0;
                 // What is given up already is emptied from the next tick on.
                 lists.seen = lists.seen.wrapping_sub(1);
                 return;
@@ -418,7 +418,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     #[inline]
     pub(crate) fn publish(&self, inside: Option<(Phase, Ticks)>, waits: bool) {
         if let Some(lists) = &self.lists {
-            self.shared.words.publish(lists.current, lists.done, inside, waits);
+            self.shared.words.publish(lists.place, inside, waits);
         }
     }
 }
