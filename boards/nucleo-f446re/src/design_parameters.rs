@@ -138,8 +138,8 @@ pub const BUTTON_TICKS: u32 = TICK_HZ / 50;
 /// How often the background reports \[ticks\]: once a second.
 pub const REPORT_TICKS: u32 = TICK_HZ;
 
-/// Ticks that the flight recorder keeps: an eighth of a second, 42 KB.
-pub const FLIGHT_ROWS: usize = TICK_HZ as usize / 8;
+/// Ticks that the flight recorder keeps: a twelfth of a second, 28 KB. What it takes, the stack has less.
+pub const FLIGHT_ROWS: usize = TICK_HZ as usize / 12;
 /// Of these, behind that of the fault: 25 ms, in which one sees the axes coast.
 pub const FLIGHT_AFTER: usize = TICK_HZ as usize / 40;
 /// From one of its lines in the log to the next \[ticks\]: 10 ms, for some 250 bytes that the probe has to read.

@@ -90,6 +90,24 @@ where
         })
     }
 
+    /// The places for another override: a ramp that would go beyond it is not given up at once, but where it gets to the
+    /// feed that is allowed. So an override that keeps falling by little does not hold up an acceleration.
+    fn places_for_override(&self, progress: &Progress) -> Places {
+        let mut places = self.places(progress);
+        if let Some(first) = places.first_mut().filter(|first| first.change.within)
+            && let Some((start, item)) = self.current.list.get(progress.done as usize)
+        {
+            let cut = first.junction(self.tick_s);
+            let whole_mm_s = item.end(start, self.tick_s).feed_mm_s;
+            let cap_mm_s =
+                self.road.from(&cut).next().map_or(0.0, |block| block.allowed(self.feed_override).0);
+            if cut.feed_mm_s < cap_mm_s && cap_mm_s < whole_mm_s {
+                first.head = item.cut_to(cap_mm_s, self.tick_s).or(first.head);
+            }
+        }
+        places
+    }
+
     /// Brakes to rest from the first place that allows it; if there is none, the list under way ends at rest.
     pub(super) fn stop(
         &mut self,
@@ -155,7 +173,7 @@ where
         self.block_end = None;
         let places = self.places(progress);
         let is_found = self.is_single && self.respeed_to_block_end(&places, progress, feeder)?
-            || self.respeed_from(&places, progress, false, feeder)?;
+            || self.respeed_from(&self.places_for_override(progress), progress, false, feeder)?;
         if !is_found && self.ahead.at > Position::ZERO {
             self.replan_from(self.ahead);
         }

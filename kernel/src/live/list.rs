@@ -9,6 +9,9 @@ use crate::units::Position;
 /// Feeds that are found by different ways differ by rounding: of 1 mm/s, and of themselves.
 const FEED_ROUNDING_MM_S: f64 = 1.0e-12;
 
+/// Halvings that find the place to turn at: to a millionth of a millionth.
+const TURN_STEPS: usize = 40;
+
 /// The most items of a feed list: its queue needs one place more.
 pub const LIST_ITEMS: usize = 15;
 
@@ -71,11 +74,17 @@ impl Item {
     /// The same item, given up `elapsed` after the start of `phase`: the shortest with that beginning that ends at a
     /// feed that does not change. `None` where it can only be finished.
     pub(super) fn cut(&self, phase: Phase, elapsed: Ticks, tick_s: f64) -> Option<Self> {
-        let Self::Feed { ramp, .. } = self else { return None };
-        // As its segment was made.
-        let ramp = segment::to_f64(ramp);
-        let elapsed_s = elapsed.to_f64() * tick_s;
         let length = |mm: f64| Position::from_mm(mm);
+        let elapsed_s = elapsed.to_f64() * tick_s;
+        let ramp = match self {
+            // As its segment was made.
+            Self::Feed { ramp, .. } => segment::to_f64(ramp),
+            &Self::Turned { ramp, .. } if phase == Phase::Rise => {
+                let turned = TurnedRamp { ramp, turn_s: elapsed_s };
+                return Some(Self::Turned { ramp, at: elapsed, length: length(turned.length_mm())? });
+            }
+            _ => return None,
+        };
         match phase {
             Phase::Hold if ramp.is_cruise() => {
                 let ramp = Ramp::cruise(ramp.from_mm_s, elapsed_s);
@@ -97,9 +106,38 @@ impl Item {
         }
     }
 
+    /// The same item, given up where that makes it end at `feed_mm_s`, which lies between those of its ends. The later it
+    /// is given up, the farther it gets.
+    pub(super) fn cut_to(&self, feed_mm_s: f64, tick_s: f64) -> Option<Self> {
+        let (ramp, most_s) = match *self {
+            Self::Feed { ramp, .. } => {
+                let ramp = segment::to_f64(&ramp);
+                let share = (feed_mm_s - ramp.from_mm_s) / (ramp.to_mm_s - ramp.from_mm_s);
+                let held_s = ramp.t2_s * share - ramp.t1_s;
+                if held_s >= 0.0 {
+                    return self.cut(Phase::Hold, Ticks::from_seconds(held_s, tick_s)?, tick_s);
+                }
+                (ramp, 0.5 * ramp.t1_s)
+            }
+            Self::Turned { ramp, at, .. } => (ramp, at.to_f64() * tick_s),
+            _ => return None,
+        };
+        let (mut low_s, mut high_s) = (0.0, most_s);
+        for _ in 0..TURN_STEPS {
+            let turned = TurnedRamp { ramp, turn_s: 0.5 * (low_s + high_s) };
+            let is_below = (turned.to_mm_s() > feed_mm_s) == (ramp.to_mm_s < ramp.from_mm_s);
+            *(if is_below { &mut low_s } else { &mut high_s }) = turned.turn_s;
+        }
+        self.cut(Phase::Rise, Ticks::from_seconds(low_s, tick_s)?, tick_s)
+    }
+
     /// The duration of a phase of its [`FeedSegment`](crate::law::FeedSegment), of an item that can be cut.
     pub(super) fn phase_duration(&self, phase: Phase, tick_s: f64) -> Option<Ticks> {
-        let Self::Feed { ramp, .. } = self else { return None };
+        let ramp = match self {
+            Self::Feed { ramp, .. } => ramp,
+            Self::Turned { at, .. } if phase == Phase::Rise => return Some(*at),
+            _ => return None,
+        };
         let seconds = match phase {
             Phase::Rise | Phase::Fall => ramp.t1_s,
             Phase::Hold => ramp.t2_s - ramp.t1_s,
@@ -203,6 +241,34 @@ mod tests {
     use super::*;
     use crate::law::Limits;
     use crate::random::Random;
+
+    /// Wherever a ramp is to end, it can be given up so that it does, whole or turned already, and never beyond.
+    #[test]
+    fn a_ramp_is_given_up_where_it_gets_to_a_feed() {
+        let random = Random::new(2);
+        let tick_s = 5e-4;
+        let mut turned = 0;
+        for number in 0..10_000 {
+            let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+            let (from_mm_s, change_mm_s) = (200.0 * random.unit(), random.log(0.1, 200.0));
+            let ramp = Ramp::within(&limits, from_mm_s, from_mm_s + change_mm_s);
+            let length = Position::from_mm(ramp.length_mm()).expect("in range");
+            let start = Junction { stretch: 0, at: Position::ZERO, feed_mm_s: from_mm_s };
+            let mut item = Item::Feed { ramp, length };
+            // Once, and then once more.
+            for _ in 0..2 {
+                let whole_mm_s = item.end(&start, tick_s).feed_mm_s;
+                let feed_mm_s = from_mm_s + (whole_mm_s - from_mm_s) * (0.05 + 0.9 * random.unit());
+                let cut = item.cut_to(feed_mm_s, tick_s).expect("a ramp that lasts");
+                let found_mm_s = cut.end(&start, tick_s).feed_mm_s;
+                let is_close = found_mm_s <= feed_mm_s * (1.0 + 1e-9) && found_mm_s >= feed_mm_s - 1e-5;
+                assert!(is_close, "{number}: {found_mm_s}, expected {feed_mm_s}, {ramp:?}");
+                turned += usize::from(matches!(cut, Item::Turned { .. }));
+                item = cut;
+            }
+        }
+        assert!(turned > 5_000, "{turned}");
+    }
 
     /// However great the feeds are beside their change.
     #[test]

@@ -267,6 +267,32 @@ fn an_override_that_never_rests_keeps_the_limits() {
     assert!(runs.ran > 60, "{}", runs.ran);
 }
 
+/// The reading of a knob that is turned back slowly, or trembles, while the machine speeds up: it gets to the feed as soon as
+/// without.
+#[test]
+fn an_override_that_trembles_does_not_hold_up_an_acceleration() {
+    let to = [(200.0 * UNITS_PER_MM) as i64, 0, 0];
+    let asked = vec![Asked::Move(Move { from: [0; 3], to, arc: None, feed_mm_min: 3000.0 })];
+    let text = "G1 X200 F3000\n".to_owned();
+    let case = Case::of(&Generated { text, asked }, Machine::reference(), 20_000.0).expect("a program");
+    let reaches = |share: &dyn Fn(u64) -> f64| {
+        let mut reached = None;
+        let run = case.run::<f64>(1, &mut |seen| {
+            if reached.is_none() && seen.executed.motion.v_mm_s >= 0.9 * 50.0 {
+                reached = Some(seen.ticks);
+            }
+            (seen.ticks % 20 == 0).then(|| Command::Override(share(seen.ticks / 20)))
+        });
+        run.expect("legal");
+        reached.expect("nine tenths of the feed")
+    };
+    let free = reaches(&|_| 1.0);
+    let falling = reaches(&|step| (1.0 - 0.002 * step as f64).max(0.91));
+    let trembling = reaches(&|step| 1.0 - 0.02 * Random::new(step).unit());
+    println!("{free}, falling {falling}, trembling {trembling} ticks");
+    assert!(falling < free + free / 4 && trembling < free + free / 4, "{free}: {falling}, {trembling}");
+}
+
 /// An override holds behind a dwell too, however the list before it is filled.
 #[test]
 fn an_override_holds_behind_a_dwell() {
