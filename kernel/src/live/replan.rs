@@ -8,12 +8,14 @@ use heapless::Vec;
 
 use super::list::{Item, LIST_ITEMS, List};
 use super::road::{Junction, LENGTH_ROUNDING_MM, Road, SLIVER};
-use crate::law::{FeedSegment, Law, Ramp};
-use crate::plan::{Block, BlockPlan, FeedSpan, Node, merge_equal, nodes_for, plan, plan_spanning, segments};
+use crate::law::{FeedSegment, Law, Limits, Ramp};
+use crate::plan::{Block, BlockPlan, FeedSpan, Node, nodes_for, plan, plan_spanning, segments};
 use crate::units::Position;
 
 /// Over so many blocks ramps may span: a list seldom reaches farther, and what they need goes with it.
 const SPANNED: usize = 16;
+/// By such a part limits may differ within a block: those of chords of an arc do, and many blocks are much slower than one.
+const ALIKE: f64 = 0.02;
 
 /// How a stretch is planned anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,56 +42,114 @@ pub(super) fn replan<const BLOCKS: usize>(
     tick_s: f64,
     list: &mut List,
 ) -> Option<bool> {
-    let mut blocks: Vec<Block<f64>, BLOCKS> = Vec::new();
-    let mut ends: Vec<Position, BLOCKS> = Vec::new();
-    // A sliver of a block belongs to the one behind it.
-    let mut start = from.at;
-    for block in road.from(from).take_while(|block| block.start < end) {
-        let (cap_mm_s, limits) = block.allowed(feed_override);
-        let block_end = block.end.min(end);
-        if block_end - start <= SLIVER && block_end < end {
-            continue;
-        }
-        let (length_mm, joint_mm_s) = ((block_end - start).to_mm(), block.joint_mm_s());
-        let next = Block { length_mm, cap_mm_s, joint_mm_s, law: Law::new(limits).ok()? };
-        start = block_end;
-        if let (Some(last), Some(last_end)) = (blocks.last_mut(), ends.last_mut()) {
-            let mut pair = [*last, next];
-            if merge_equal(&mut pair) == 1 {
-                ([*last, _], *last_end) = (pair, block_end);
+    let heads = list.len();
+    // What is alike may be too soft where one has to brake at once.
+    [ALIKE, 0.0].into_iter().find_map(|alike| {
+        list.truncate(heads);
+        let mut blocks = Blocks::<BLOCKS>::new(road, from, feed_override, end, alike)?;
+        blocks.plan(from, ramps, tick_s, list)
+    })
+}
+
+/// The blocks that a plan is made for.
+struct Blocks<const BLOCKS: usize> {
+    blocks: Vec<Block<f64>, BLOCKS>,
+    ends: Vec<Position, BLOCKS>,
+}
+
+impl<const BLOCKS: usize> Blocks<BLOCKS> {
+    /// Those from a junction to `end`. Neighbours with one ceiling are one block, with the least limits of all of them, if
+    /// none of these are `alike` parts below another's.
+    #[inline(never)]
+    fn new(
+        road: &Road<BLOCKS>,
+        from: &Junction,
+        feed_override: f64,
+        end: Position,
+        alike: f64,
+    ) -> Option<Self> {
+        let mut found = Self { blocks: Vec::new(), ends: Vec::new() };
+        // A sliver of a block belongs to the one behind it.
+        let (mut start, mut most) = (from.at, None);
+        for block in road.from(from).take_while(|block| block.start < end) {
+            let (cap_mm_s, limits) = block.allowed(feed_override);
+            let block_end = block.end.min(end);
+            if block_end - start <= SLIVER && block_end < end {
                 continue;
             }
-        }
-        blocks.push(next).ok()?;
-        ends.push(block_end).ok()?;
-    }
-    let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
-    plans.resize(blocks.len(), BlockPlan::default()).ok()?;
-    if plan(&blocks, from.feed_mm_s, 0.0, &mut plans).is_err() {
-        // Where one has to brake at once the feed may be a rounding too high for the length.
-        blocks.first_mut()?.length_mm += LENGTH_ROUNDING_MM;
-        plan(&blocks, from.feed_mm_s, 0.0, &mut plans).ok()?;
-    } else if ramps == Ramps::Spanning && blocks.len() > 1 {
-        let count = blocks.len().min(SPANNED);
-        let (first, plans, ends) = (blocks.get(..count)?, plans.get(..count)?, ends.get(..count)?);
-        let heads = list.len();
-        if let Some(is_whole) = span(first, plans, from, *ends.last()?, tick_s, list) {
-            return Some(is_whole && count == blocks.len());
-        }
-        list.truncate(heads);
-    }
-    let mut start = from.at;
-    for ((block, plan), &block_end) in blocks.iter().zip(&plans).zip(&ends) {
-        let made = segments::<f64, f64>(block, plan, start, block_end, tick_s).ok()?;
-        for segment in made.iter().flatten() {
-            if list.is_full() {
-                return Some(false);
+            let length_mm = (block_end - start).to_mm();
+            start = block_end;
+            if let (Some(last), Some(last_end), Some(group)) =
+                (found.blocks.last_mut(), found.ends.last_mut(), most)
+            {
+                let least = last.law.limits().least(&limits);
+                let greatest = greatest(&group, &limits);
+                let is_joined = last.cap_mm_s == cap_mm_s && last.joint_mm_s >= cap_mm_s;
+                if is_joined && is_alike(&least, &greatest, alike) {
+                    (*last_end, most) = (block_end, Some(greatest));
+                    last.length_mm += length_mm;
+                    last.joint_mm_s = block.joint_mm_s();
+                    last.law = Law::new(least).ok()?;
+                    continue;
+                }
             }
-            list.push(Item::Feed { ramp: *segment.as_ramp(), length: segment.length() });
+            let law = Law::new(limits).ok()?;
+            let next = Block { length_mm, cap_mm_s, joint_mm_s: block.joint_mm_s(), law };
+            found.blocks.push(next).ok()?;
+            found.ends.push(block_end).ok()?;
+            most = Some(limits);
         }
-        start = block_end;
+        Some(found)
     }
-    Some(true)
+
+    /// See [`replan`].
+    #[inline(never)]
+    fn plan(&mut self, from: &Junction, ramps: Ramps, tick_s: f64, list: &mut List) -> Option<bool> {
+        let (blocks, ends) = (&mut self.blocks, &self.ends);
+        let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
+        plans.resize(blocks.len(), BlockPlan::default()).ok()?;
+        if plan(blocks, from.feed_mm_s, 0.0, &mut plans).is_err() {
+            // Where one has to brake at once the feed may be a rounding too high for the length.
+            blocks.first_mut()?.length_mm += LENGTH_ROUNDING_MM;
+            plan(blocks, from.feed_mm_s, 0.0, &mut plans).ok()?;
+        } else if ramps == Ramps::Spanning && blocks.len() > 1 {
+            let count = blocks.len().min(SPANNED);
+            let (first, plans, ends) = (blocks.get(..count)?, plans.get(..count)?, ends.get(..count)?);
+            let heads = list.len();
+            if let Some(is_whole) = span(first, plans, from, *ends.last()?, tick_s, list) {
+                return Some(is_whole && count == blocks.len());
+            }
+            list.truncate(heads);
+        }
+        let mut start = from.at;
+        for ((block, plan), &block_end) in blocks.iter().zip(&plans).zip(ends) {
+            let made = segments::<f64, f64>(block, plan, start, block_end, tick_s).ok()?;
+            for segment in made.iter().flatten() {
+                if list.is_full() {
+                    return Some(false);
+                }
+                list.push(Item::Feed { ramp: *segment.as_ramp(), length: segment.length() });
+            }
+            start = block_end;
+        }
+        Some(true)
+    }
+}
+
+/// The greater of each.
+fn greatest(limits: &Limits<f64>, other: &Limits<f64>) -> Limits<f64> {
+    Limits {
+        accel_mm_s2: limits.accel_mm_s2.max(other.accel_mm_s2),
+        jerk_mm_s3: limits.jerk_mm_s3.max(other.jerk_mm_s3),
+        snap_mm_s4: limits.snap_mm_s4.max(other.snap_mm_s4),
+    }
+}
+
+fn is_alike(least: &Limits<f64>, greatest: &Limits<f64>, alike: f64) -> bool {
+    let is_near = |least: f64, greatest: f64| least >= greatest * (1.0 - alike);
+    is_near(least.accel_mm_s2, greatest.accel_mm_s2)
+        && is_near(least.jerk_mm_s3, greatest.jerk_mm_s3)
+        && is_near(least.snap_mm_s4, greatest.snap_mm_s4)
 }
 
 /// The same over `blocks`, to the feed and the position that their `plans` end with, by ramps that may span them. `None` where
