@@ -157,7 +157,7 @@ impl Dense {
     fn most_mm_s(all: &[Self], start: Position, end: Position) -> f64 {
         let within =
             all.partition_point(|piece| piece.end <= start)..all.partition_point(|piece| piece.start < end);
-        all[within].iter().map(|piece| piece.most_mm_s).fold(f64::INFINITY, f64::min)
+        all.get(within).unwrap_or(&[]).iter().map(|piece| piece.most_mm_s).fold(f64::INFINITY, f64::min)
     }
 }
 

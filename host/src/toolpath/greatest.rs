@@ -30,17 +30,22 @@ impl Greatest {
         let mut norms = [0.0_f64; 3];
         for piece in pieces {
             for (greatest, of_piece) in norms.iter_mut().zip(of_piece(piece)) {
-                *greatest = greatest.max(of_piece);
+                *greatest = greater(*greatest, of_piece);
             }
         }
         let (curve, pieces) = (self.bend, bend(norms));
         let bend = Bend {
-            curvature_per_mm: curve.curvature_per_mm.max(pieces.curvature_per_mm),
-            third_root_per_mm: curve.third_root_per_mm.max(pieces.third_root_per_mm),
-            fourth_root_per_mm: curve.fourth_root_per_mm.max(pieces.fourth_root_per_mm),
+            curvature_per_mm: greater(curve.curvature_per_mm, pieces.curvature_per_mm),
+            third_root_per_mm: greater(curve.third_root_per_mm, pieces.third_root_per_mm),
+            fourth_root_per_mm: greater(curve.fourth_root_per_mm, pieces.fourth_root_per_mm),
         };
         Self { bend, ..self }
     }
+}
+
+/// What is not a number is greater than any.
+fn greater(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a >= b { a } else { b }
 }
 
 /// |r''|, |r'''| and |r''''| of a piece, each where it is greatest.
@@ -75,11 +80,8 @@ impl Peak {
             [Some(first), Some(second)] => 0.25 * (first - 2.0 * second + value).abs(),
             _ => 0.0,
         };
-        let highest = self.before.iter().flatten().fold(value, |highest, &before| highest.max(before));
-        // What is not a number must not be overlooked.
-        if !(highest + bulge <= self.greatest) {
-            self.greatest = highest + bulge;
-        }
+        let highest = self.before.iter().flatten().fold(value, |highest, &before| greater(highest, before));
+        self.greatest = greater(self.greatest, highest + bulge);
         self.before = [self.before[1], Some(value)];
     }
 

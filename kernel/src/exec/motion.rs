@@ -68,6 +68,10 @@ impl Moving {
         let fraction = match self.phase {
             // As long a phase in both, but for where it ends.
             Phase::Rise => self.fraction,
+            // The turn that the other one was to make has been passed.
+            Phase::Hold if before.phase_duration(Phase::Rise) != segment.phase_duration(Phase::Rise) => {
+                return None;
+            }
             Phase::Hold => segment.fraction_after(Phase::Hold, elapsed),
             // What falls back can't be ended earlier.
             Phase::Fall => return None,

@@ -14,7 +14,7 @@ use crate::queue::{Change, LiveFeeder, Progress};
 use crate::units::Position;
 
 /// Where a command may take over, in the order of time.
-pub(super) type Places = Vec<Place, { LIST_ITEMS + 1 }>;
+pub(super) type Places = Vec<Place, { LIST_ITEMS + 2 }>;
 
 /// Where a command may take over.
 pub(super) struct Place {
@@ -90,22 +90,32 @@ where
         })
     }
 
-    /// The places for another override: a ramp that would go beyond it is not given up at once, but where it gets to the
-    /// feed that is allowed. So an override that keeps falling by little does not hold up an acceleration.
+    /// The places for another override: a ramp that would go beyond it is given up where it gets to the feed that is allowed,
+    /// or else at once. So an override that keeps falling by little does not hold up an acceleration.
     fn places_for_override(&self, progress: &Progress) -> Places {
         let mut places = self.places(progress);
-        if let Some(first) = places.first_mut().filter(|first| first.change.within)
+        if let Some(first) = places.first().filter(|first| first.change.within)
             && let Some((start, item)) = self.current.list.get(progress.done as usize)
         {
-            let cut = first.junction(self.tick_s);
-            let whole_mm_s = item.end(start, self.tick_s).feed_mm_s;
-            let cap_mm_s =
-                self.road.from(&cut).next().map_or(0.0, |block| block.allowed(self.feed_override).0);
-            if cut.feed_mm_s < cap_mm_s && cap_mm_s < whole_mm_s {
-                first.head = item.cut_to(cap_mm_s, self.tick_s).or(first.head);
+            let cut_mm_s = first.junction(self.tick_s).feed_mm_s;
+            let cap_mm_s = self.least_cap_mm_s(start, item);
+            if cut_mm_s < cap_mm_s
+                && cap_mm_s < item.end(start, self.tick_s).feed_mm_s
+                && let Some(head) = item.cut_to(cap_mm_s, self.tick_s)
+            {
+                let later = Place { head: Some(head), ..*first };
+                let _ = places.insert(0, later);
             }
         }
         places
+    }
+
+    /// The least feed \[mm/s\] that is allowed anywhere on an item's path.
+    fn least_cap_mm_s(&self, start: &Junction, item: &Item) -> f64 {
+        let end = item.end(start, self.tick_s).at;
+        let crossed = self.road.from(start).take_while(|block| block.start < end);
+        let caps_mm_s = crossed.map(|block| block.allowed(self.feed_override).0);
+        caps_mm_s.reduce(f64::min).unwrap_or(0.0)
     }
 
     /// Brakes to rest from the first place that allows it; if there is none, the list under way ends at rest.
@@ -190,7 +200,7 @@ where
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<bool, SupplyError<E>> {
         for place in places {
-            let mut list = place.list(self.tick_s);
+            let list = place.list(self.tick_s);
             let heads = list.len();
             if heads == 0 && place.start.feed_mm_s <= 0.0 {
                 // It goes on from here as from any stop.
@@ -207,9 +217,11 @@ where
             // Whatever comes of it: what is ahead of this stretch is planned anew from here on.
             self.replan_through(place.start.stretch);
             for ramps in Ramps::IN_ORDER {
-                list.truncate(heads);
-                if self.gather_under_override(&mut list, false, ramps)
-                    && self.end_in_a_stop(&mut list, self.feed_override)
+                let mut list = place.list(self.tick_s);
+                if !self.gather_under_override(&mut list, false, ramps) {
+                    break;
+                }
+                if self.end_in_a_stop(&mut list, self.feed_override)
                     && list.leave >= heads
                     && self.keeps_up(&list, &place.change)
                 {
@@ -234,7 +246,7 @@ where
     fn is_worth_cutting(&self, progress: &Progress, place: &Place, cut: &Junction) -> bool {
         let Some((start, item)) = self.current.list.get(progress.done as usize) else { return false };
         let whole_mm_s = item.end(start, self.tick_s).feed_mm_s;
-        let cap_mm_s = self.road.from(cut).next().map_or(0.0, |block| block.allowed(self.feed_override).0);
+        let cap_mm_s = self.least_cap_mm_s(start, item);
         cut.feed_mm_s == place.start.feed_mm_s || whole_mm_s > start.feed_mm_s && whole_mm_s > cap_mm_s
     }
 }

@@ -523,12 +523,7 @@ where
             self.replan_from(self.ahead);
         }
         if self.replans(self.ahead.stretch) {
-            for ramps in Ramps::IN_ORDER {
-                if self.go_on_replanned(ramps, begins, feeder)? {
-                    return Ok(());
-                }
-            }
-            return Ok(());
+            return self.go_on_replanned(begins, feeder);
         }
         let mut list = List::new(self.ahead, self.tick_s);
         let is_found = self.gather(&mut list);
@@ -540,24 +535,29 @@ where
         Ok(())
     }
 
-    /// Hands over the list that follows, planned anew; false if there is none.
+    /// Hands over the list that follows, planned anew, if there is one.
     fn go_on_replanned(
         &mut self,
-        ramps: Ramps,
         begins: bool,
         feeder: &mut LiveFeeder<'_, R, AXES>,
-    ) -> Result<bool, SupplyError<E>> {
-        let mut list = List::new(self.ahead, self.tick_s);
-        let is_found = if self.is_single && begins && self.course.front().is_some_and(ListItem::is_rest) {
-            // By itself: it is a block.
-            self.gather_rests(&mut list);
-            true
-        } else if self.is_single {
-            self.gather_block(&mut list, ramps)
-        } else {
-            self.gather_under_override(&mut list, true, ramps)
-        };
-        self.hand_over_ended(list, is_found, self.feed_override, feeder)
+    ) -> Result<(), SupplyError<E>> {
+        for ramps in Ramps::IN_ORDER {
+            self.block_end = None;
+            let mut list = List::new(self.ahead, self.tick_s);
+            let is_found = if self.is_single && begins && self.course.front().is_some_and(ListItem::is_rest) {
+                // By itself: it is a block.
+                self.gather_rests(&mut list);
+                true
+            } else if self.is_single {
+                self.gather_block(&mut list, ramps)
+            } else {
+                self.gather_under_override(&mut list, true, ramps)
+            };
+            if self.hand_over_ended(list, is_found, self.feed_override, feeder)? || !is_found {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// Hands over a list that was found, ended at rest, behind the one under way; otherwise what it holds is ahead again.

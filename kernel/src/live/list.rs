@@ -109,13 +109,16 @@ impl Item {
     /// The same item, given up where that makes it end at `feed_mm_s`, which lies between those of its ends. The later it
     /// is given up, the farther it gets.
     pub(super) fn cut_to(&self, feed_mm_s: f64, tick_s: f64) -> Option<Self> {
+        // Never beyond that feed: times are rounded to their steps.
+        let step = Ticks::from_bits(1);
+        let before = |s: f64| Ticks::from_seconds(s, tick_s).map(|at| at.minus(step).unwrap_or(Ticks::ZERO));
         let (ramp, most_s) = match *self {
             Self::Feed { ramp, .. } => {
                 let ramp = segment::to_f64(&ramp);
                 let share = (feed_mm_s - ramp.from_mm_s) / (ramp.to_mm_s - ramp.from_mm_s);
                 let held_s = ramp.t2_s * share - ramp.t1_s;
                 if held_s >= 0.0 {
-                    return self.cut(Phase::Hold, Ticks::from_seconds(held_s, tick_s)?, tick_s);
+                    return self.cut(Phase::Hold, before(held_s)?, tick_s);
                 }
                 (ramp, 0.5 * ramp.t1_s)
             }
@@ -128,7 +131,7 @@ impl Item {
             let is_below = (turned.to_mm_s() > feed_mm_s) == (ramp.to_mm_s < ramp.from_mm_s);
             *(if is_below { &mut low_s } else { &mut high_s }) = turned.turn_s;
         }
-        self.cut(Phase::Rise, Ticks::from_seconds(low_s, tick_s)?, tick_s)
+        self.cut(Phase::Rise, before(low_s)?, tick_s)
     }
 
     /// The duration of a phase of its [`FeedSegment`](crate::law::FeedSegment), of an item that can be cut.
@@ -261,7 +264,7 @@ mod tests {
                 let feed_mm_s = from_mm_s + (whole_mm_s - from_mm_s) * (0.05 + 0.9 * random.unit());
                 let cut = item.cut_to(feed_mm_s, tick_s).expect("a ramp that lasts");
                 let found_mm_s = cut.end(&start, tick_s).feed_mm_s;
-                let is_close = found_mm_s <= feed_mm_s * (1.0 + 1e-9) && found_mm_s >= feed_mm_s - 1e-5;
+                let is_close = found_mm_s <= feed_mm_s && found_mm_s >= feed_mm_s - 1e-5;
                 assert!(is_close, "{number}: {found_mm_s}, expected {feed_mm_s}, {ramp:?}");
                 turned += usize::from(matches!(cut, Item::Turned { .. }));
                 item = cut;

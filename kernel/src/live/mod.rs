@@ -12,8 +12,8 @@
 //! however long it takes, and where it takes too long, the list under way ends in a stop on the path.
 //!
 //! A command is a list that begins at the next **junction**, a place where the feed does not change: anywhere in a
-//! cruise; a little later in a ramp that accelerates, which is given up by the shortest way (`Item::cut`); at the
-//! end of a ramp that brakes, because ceilings ahead may need all of it. From there on it brakes to rest or to another
+//! cruise; a little later in a ramp that accelerates, which is given up by the shortest way (`Item::cut`), or for an
+//! override where it gets to the feed that this allows (`Item::cut_to`); at the end of a ramp that brakes, because ceilings ahead may need all of it. From there on it brakes to rest or to another
 //! feed under the ceilings and limits of all the blocks it crosses; where a ceiling ahead does not let it begin, at the
 //! next junction that does. What follows a stop or an override is planned anew, to the end of the stretch; a stretch
 //! that nothing was changed in is driven by the program's own plan.

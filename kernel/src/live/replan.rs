@@ -1,7 +1,7 @@
 //! The feed from a junction on, planned anew over the blocks that are known.
 //!
 //! Consumes a junction, a feed override and the [`Road`]; produces ramps and cruises to rest where the known path ends.
-//! Background. Two stages and one pair of ramps for equal neighbours together, as [`plan`]; over the blocks that come
+//! Background. Two stages and one pair of ramps for neighbours that are alike, as [`plan`]; over the blocks that come
 //! first with ramps that span them, where that is faster, to the feed that the plan behind them begins with.
 
 use heapless::Vec;
@@ -44,17 +44,26 @@ pub(super) fn replan<const BLOCKS: usize>(
 ) -> Option<bool> {
     let heads = list.len();
     // What is alike may be too soft where one has to brake at once.
-    [ALIKE, 0.0].into_iter().find_map(|alike| {
-        list.truncate(heads);
+    for alike in [ALIKE, 0.0] {
         let mut blocks = Blocks::<BLOCKS>::new(road, from, feed_override, end, alike)?;
-        blocks.plan(from, ramps, tick_s, list)
-    })
+        let planned = blocks.plan(from, ramps, tick_s, list);
+        if planned.is_some() {
+            return planned;
+        }
+        list.truncate(heads);
+        if !blocks.are_softer {
+            break;
+        }
+    }
+    None
 }
 
 /// The blocks that a plan is made for.
 struct Blocks<const BLOCKS: usize> {
     blocks: Vec<Block<f64>, BLOCKS>,
     ends: Vec<Position, BLOCKS>,
+    /// One of them has limits below its own.
+    are_softer: bool,
 }
 
 impl<const BLOCKS: usize> Blocks<BLOCKS> {
@@ -68,7 +77,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
         end: Position,
         alike: f64,
     ) -> Option<Self> {
-        let mut found = Self { blocks: Vec::new(), ends: Vec::new() };
+        let mut found = Self { blocks: Vec::new(), ends: Vec::new(), are_softer: false };
         // A sliver of a block belongs to the one behind it.
         let (mut start, mut most) = (from.at, None);
         for block in road.from(from).take_while(|block| block.start < end) {
@@ -87,6 +96,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
                 let is_joined = last.cap_mm_s == cap_mm_s && last.joint_mm_s >= cap_mm_s;
                 if is_joined && is_alike(&least, &greatest, alike) {
                     (*last_end, most) = (block_end, Some(greatest));
+                    found.are_softer |= least != greatest;
                     last.length_mm += length_mm;
                     last.joint_mm_s = block.joint_mm_s();
                     last.law = Law::new(least).ok()?;

@@ -87,7 +87,7 @@ where
     }
 
     /// Keeps the feed at the list's end as long as possible and brakes, to rest at the block end; false where that is not
-    /// legal. A ramp crosses short blocks where a plan would have to end one with each of them.
+    /// legal. A ramp crosses blocks that a plan has no ramps for.
     fn brake_at_block_end(&self, list: &mut List) -> bool {
         let from = list.end();
         if from.feed_mm_s <= 0.0 {
