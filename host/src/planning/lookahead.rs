@@ -1,6 +1,6 @@
 //! The kernel's look-ahead over a list of blocks, and the result on exact path positions.
 
-use motion_kernel::law::{FeedSegment, Ramp};
+use motion_kernel::law::Ramp;
 use motion_kernel::plan::{
     Block, BlockPlan, FeedSpan, Node, PlanError, merge_equal, nodes_for, plan, plan_spanning, segments,
 };
@@ -125,17 +125,10 @@ fn spanning(
         };
         let length = end - start;
         start = end;
-        let is_cruise = span.ramp.is_cruise();
-        if is_cruise && length <= Position::ZERO {
-            continue;
+        let segment = span.segment::<f64>(length, tick_s);
+        if let Some(segment) = segment.map_err(|error| (block, Problem::Segment { error, tick_s }))? {
+            planned.push(PlannedSegment { ramp: *segment.as_ramp(), length, block });
         }
-        let made = if is_cruise {
-            FeedSegment::<f64>::cruise(span.ramp.from_mm_s, length, tick_s)
-        } else {
-            FeedSegment::<f64>::ramp(&span.ramp, length, tick_s)
-        };
-        let segment = made.map_err(|error| (block, Problem::Segment { error, tick_s }))?;
-        planned.push(PlannedSegment { ramp: *segment.as_ramp(), length, block });
     }
     Ok(Some(planned))
 }

@@ -2,8 +2,9 @@
 //!
 //! A curve of degree seven at most in a parameter u from 0 to 1, kept relative to its start, so that a blend of
 //! a micrometre a kilometre out is as precise as one at the origin. Consumes control points or coefficients \[mm\];
-//! produces what every [`Curve`] has, parts of itself, and its greatest derivatives by arc length. Any finite coefficients are accepted; a curve that stands still somewhere (|r'| = 0)
-//! has no tangent there and is refused when it is made into pieces.
+//! produces what every [`Curve`] has, parts of itself, and its greatest derivatives by arc length. Any finite
+//! coefficients are accepted; a curve that stands still somewhere (|r'| = 0) has no tangent there and is refused when
+//! it is made into pieces.
 
 use super::curve::{Curve, by_arc_length, fourth_by_arc_length};
 use super::greatest::{Greatest, Peak, bend};

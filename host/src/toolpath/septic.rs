@@ -15,6 +15,12 @@ pub const FEED_TOLERANCE: f64 = 1.0e-6;
 /// The greatest sum of k(k−1)(k−2)·|cₖ| as a part of the length, so that every number type's unit (below 4) holds
 /// the third derivative, and with it the lower ones.
 const STEEPNESS_MAX: f64 = 3.9;
+/// Of the k-th power in the second to fourth derivative: k·(k − 1), then times k − 2, then times k − 3.
+const FACTORS: [[f64; 7]; 3] = [
+    [0.0, 2.0, 6.0, 12.0, 20.0, 30.0, 42.0],
+    [0.0, 0.0, 6.0, 24.0, 60.0, 120.0, 210.0],
+    [0.0, 0.0, 0.0, 24.0, 120.0, 360.0, 840.0],
+];
 /// Halvings of one part after which a curve is given up.
 pub const HALVINGS_MAX: u32 = 16;
 /// Halvings of one part for the sake of the deviation, not of the length, after which a curve is given up.
@@ -230,9 +236,9 @@ fn deviation(curve: &(impl Curve + ?Sized), piece: &Septic) -> Deviation {
 impl Septic {
     /// The greatest sum over an axis of |third derivative|'s terms, in parts of the length.
     fn steepness(&self) -> f64 {
-        const FACTORS: [f64; 7] = [0.0, 0.0, 6.0, 24.0, 60.0, 120.0, 210.0];
+        let [_, factors, _] = FACTORS;
         let of_axis =
-            |axis: &[f64; 7]| axis.iter().zip(FACTORS).map(|(c, factor)| factor * c.abs()).sum::<f64>();
+            |axis: &[f64; 7]| axis.iter().zip(factors).map(|(c, factor)| factor * c.abs()).sum::<f64>();
         self.coefficients.iter().map(of_axis).fold(0.0, f64::max) / self.length_mm
     }
 
@@ -254,12 +260,6 @@ impl Septic {
     /// Second to fourth derivative by arc length at u = s/length.
     #[must_use]
     pub fn second_to_fourth(&self, u: f64) -> [Vector; 3] {
-        // k·(k − 1), then times k − 2, then times k − 3.
-        const FACTORS: [[f64; 7]; 3] = [
-            [0.0, 2.0, 6.0, 12.0, 20.0, 30.0, 42.0],
-            [0.0, 0.0, 6.0, 24.0, 60.0, 120.0, 210.0],
-            [0.0, 0.0, 0.0, 24.0, 120.0, 360.0, 840.0],
-        ];
         core::array::from_fn(|index| {
             let order = index + 2;
             let power = libm::pow(self.length_mm, order as f64);

@@ -55,6 +55,16 @@ impl<R: Root> Limits<R> {
         }
     }
 
+    /// The greater of each.
+    #[must_use]
+    pub fn greatest(&self, other: &Self) -> Self {
+        Self {
+            accel_mm_s2: self.accel_mm_s2.max(other.accel_mm_s2),
+            jerk_mm_s3: self.jerk_mm_s3.max(other.jerk_mm_s3),
+            snap_mm_s4: self.snap_mm_s4.max(other.snap_mm_s4),
+        }
+    }
+
     /// Whether plans can be made with them.
     ///
     /// # Errors

@@ -181,8 +181,8 @@ where
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
         self.block_end = None;
-        let places = self.places(progress);
-        let is_found = self.is_single && self.respeed_to_block_end(&places, progress, feeder)?
+        let is_found = self.is_single
+            && self.respeed_to_block_end(&self.places(progress), progress, feeder)?
             || self.respeed_from(&self.places_for_override(progress), progress, false, feeder)?;
         if !is_found && self.ahead.at > Position::ZERO {
             self.replan_from(self.ahead);

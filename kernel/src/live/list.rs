@@ -106,8 +106,8 @@ impl Item {
         }
     }
 
-    /// The same item, given up where that makes it end at `feed_mm_s`, which lies between those of its ends. The later it
-    /// is given up, the farther it gets.
+    /// The same item, which accelerates, given up where that makes it end at `feed_mm_s`, which lies between the feeds of its
+    /// ends: the later it is given up, the faster it gets.
     pub(super) fn cut_to(&self, feed_mm_s: f64, tick_s: f64) -> Option<Self> {
         // Never beyond that feed: times are rounded to their steps.
         let step = Ticks::from_bits(1);
@@ -128,8 +128,8 @@ impl Item {
         let (mut low_s, mut high_s) = (0.0, most_s);
         for _ in 0..TURN_STEPS {
             let turned = TurnedRamp { ramp, turn_s: 0.5 * (low_s + high_s) };
-            let is_below = (turned.to_mm_s() > feed_mm_s) == (ramp.to_mm_s < ramp.from_mm_s);
-            *(if is_below { &mut low_s } else { &mut high_s }) = turned.turn_s;
+            let end_s = if turned.to_mm_s() > feed_mm_s { &mut high_s } else { &mut low_s };
+            *end_s = turned.turn_s;
         }
         self.cut(Phase::Rise, before(low_s)?, tick_s)
     }

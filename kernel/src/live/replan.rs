@@ -8,7 +8,8 @@ use heapless::Vec;
 
 use super::list::{Item, LIST_ITEMS, List};
 use super::road::{Junction, LENGTH_ROUNDING_MM, Road, SLIVER};
-use crate::law::{FeedSegment, Law, Limits, Ramp};
+use crate::law::{Law, Limits};
+use crate::plan::spanning::spans_of;
 use crate::plan::{Block, BlockPlan, FeedSpan, Node, nodes_for, plan, plan_spanning, segments};
 use crate::units::Position;
 
@@ -79,7 +80,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
     ) -> Option<Self> {
         let mut found = Self { blocks: Vec::new(), ends: Vec::new(), are_softer: false };
         // A sliver of a block belongs to the one behind it.
-        let (mut start, mut most) = (from.at, None);
+        let (mut start, mut most) = (from.at, None::<Limits<f64>>);
         for block in road.from(from).take_while(|block| block.start < end) {
             let (cap_mm_s, limits) = block.allowed(feed_override);
             let block_end = block.end.min(end);
@@ -92,7 +93,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
                 (found.blocks.last_mut(), found.ends.last_mut(), most)
             {
                 let least = last.law.limits().least(&limits);
-                let greatest = greatest(&group, &limits);
+                let greatest = group.greatest(&limits);
                 let is_joined = last.cap_mm_s == cap_mm_s && last.joint_mm_s >= cap_mm_s;
                 if is_joined && is_alike(&least, &greatest, alike) {
                     (*last_end, most) = (block_end, Some(greatest));
@@ -146,15 +147,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
     }
 }
 
-/// The greater of each.
-fn greatest(limits: &Limits<f64>, other: &Limits<f64>) -> Limits<f64> {
-    Limits {
-        accel_mm_s2: limits.accel_mm_s2.max(other.accel_mm_s2),
-        jerk_mm_s3: limits.jerk_mm_s3.max(other.jerk_mm_s3),
-        snap_mm_s4: limits.snap_mm_s4.max(other.snap_mm_s4),
-    }
-}
-
+/// Whether none is `alike` parts below the other.
 fn is_alike(least: &Limits<f64>, greatest: &Limits<f64>, alike: f64) -> bool {
     let is_near = |least: f64, greatest: f64| least >= greatest * (1.0 - alike);
     is_near(least.accel_mm_s2, greatest.accel_mm_s2)
@@ -181,8 +174,7 @@ fn span(
     let time_s = plan_spanning(blocks, from.feed_mm_s, to_mm_s, &mut nodes, &mut |span| {
         is_cut |= spans.push(span).is_err();
     });
-    let per_block_s: f64 = blocks.iter().zip(plans).map(|(block, plan)| time_of_s(block, plan)).sum();
-    if !(time_s.ok()?? < per_block_s) {
+    if !(time_s.ok()?? < spans_of(blocks, plans, &mut |_| {})) {
         return None;
     }
     let (mut start, mut rest) = (from.at, &spans[..]);
@@ -197,24 +189,10 @@ fn span(
             None => end,
         };
         let length = span_end - start;
-        if !(span.ramp.is_cruise() && length <= Position::ZERO) {
-            let made = if span.ramp.is_cruise() {
-                FeedSegment::<f64>::cruise(span.ramp.from_mm_s, length, tick_s)
-            } else {
-                FeedSegment::<f64>::ramp(&span.ramp, length, tick_s)
-            };
-            list.push(Item::Feed { ramp: *made.ok()?.as_ramp(), length });
+        if let Some(segment) = span.segment::<f64>(length, tick_s).ok()? {
+            list.push(Item::Feed { ramp: *segment.as_ramp(), length });
         }
         (start, rest) = (span_end, next);
     }
     Some(true)
-}
-
-/// How long a pair of ramps takes, with the cruise between them.
-fn time_of_s(block: &Block<f64>, plan: &BlockPlan<f64>) -> f64 {
-    let [rise, fall] =
-        [plan.enter_mm_s, plan.exit_mm_s].map(|feed_mm_s| Ramp::new(&block.law, feed_mm_s, plan.peak_mm_s));
-    let cruise_mm = f64::max(block.length_mm - rise.length_mm() - fall.length_mm(), 0.0);
-    let cruise_s = if cruise_mm > 0.0 { cruise_mm / plan.peak_mm_s } else { 0.0 };
-    rise.duration_s() + cruise_s + fall.duration_s()
 }

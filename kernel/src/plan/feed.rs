@@ -4,6 +4,7 @@
 //! that fill it without a gap of a single position step: accelerate, cruise, brake.
 
 use super::lookahead::{Block, BlockPlan};
+use super::spanning::FeedSpan;
 use crate::law::{FeedSegment, Ramp, SegmentError};
 use crate::num::{Real, Root};
 use crate::units::Position;
@@ -57,6 +58,24 @@ pub fn segments<R: Real, P: Root>(
     };
     let cruise = if brake > top { Some(FeedSegment::cruise(feed_mm_s, brake - top, tick_s)?) } else { None };
     Ok([made(&rise, top - start)?, cruise, made(&fall, end - brake)?])
+}
+
+impl FeedSpan {
+    /// Its segment over an exact `length` of path; `None` of a cruise that rounding leaves no length.
+    ///
+    /// # Errors
+    /// The length is not the ramp's, or a figure is beyond the tick's range.
+    pub fn segment<R: Real>(
+        &self,
+        length: Position,
+        tick_s: f64,
+    ) -> Result<Option<FeedSegment<R>>, SegmentError> {
+        match self.ramp.is_cruise() {
+            true if length <= Position::ZERO => Ok(None),
+            true => FeedSegment::cruise(self.ramp.from_mm_s, length, tick_s).map(Some),
+            false => FeedSegment::ramp(&self.ramp, length, tick_s).map(Some),
+        }
+    }
 }
 
 /// Less than this between two ramps is rounding \[mm\].

@@ -82,8 +82,12 @@ pub fn plan_spanning(
     Ok(Some(out.time_s))
 }
 
-/// One pair of ramps a block, as [`plan`](super::plan()) found them.
-pub(super) fn spans_of(blocks: &[Block<f64>], plans: &[BlockPlan<f64>], put: &mut impl FnMut(FeedSpan)) {
+/// One pair of ramps a block, as [`plan`](super::plan()) found them; returns the time they take \[s\].
+pub(crate) fn spans_of(
+    blocks: &[Block<f64>],
+    plans: &[BlockPlan<f64>],
+    put: &mut impl FnMut(FeedSpan),
+) -> f64 {
     let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
     let mut end_mm = 0.0;
     for (block, plan) in blocks.iter().zip(plans) {
@@ -98,6 +102,7 @@ pub(super) fn spans_of(blocks: &[Block<f64>], plans: &[BlockPlan<f64>], put: &mu
             out.ramp(&fall);
         }
     }
+    out.time_s
 }
 
 /// Where spans go.
