@@ -445,6 +445,62 @@ fn home_finds_the_reference() {
     assert!(error.contains(expected), "{error}");
 }
 
+/// Keys pressed one after the other: by a distance, to the soft limit, released on the way; and what is refused.
+#[test]
+fn jog_goes_as_far_as_its_key_says() {
+    let desk = Desk::new("jog");
+    let file = desk.stdout(&["machine"]);
+    let bounded = file.replace("#[axis.travel]", "[axis.travel]");
+    let bounded = bounded.replace("#low_mm = -400", "low_mm = -40").replace("#high_mm = 400", "high_mm = 30");
+    desk.put("machine.toml", &bounded);
+    let keys = ["X+20", "Y-2.5", "X+", "X-@400", "X+1@5000"];
+    let rest = ["--machine", "machine.toml", "--feed", "50", "--trace", "jog.csv", "--json"];
+    let presses = desk.json(&[&["jog"][..], &keys, &rest].concat());
+    let presses = presses.as_array().expect("a list");
+    let ended: Vec<_> = presses.iter().map(|press| press["ended"].as_str().expect("a text")).collect();
+    assert_eq!(ended, ["distance", "distance", "soft limit", "released", "distance"]);
+    let [first, second, third, fourth, fifth] = &presses[..] else { panic!("{presses:?}") };
+    let has = ["press", "from_mm", "to_mm", "time_s", "feed_mm_s", "ended", "stop_s", "stop_mm"];
+    for (press, key) in presses.iter().zip(keys) {
+        assert_has(press, &has);
+        assert_eq!(press["press"].as_str(), Some(key));
+        assert!(number(&press["feed_mm_s"]) <= 50.0, "{press}");
+    }
+    assert_eq!((number(&first["from_mm"]), number(&first["to_mm"])), (0.0, 20.0));
+    assert!((number(&first["feed_mm_s"]) - 50.0).abs() < 1e-3, "{first}");
+    assert_eq!((number(&second["from_mm"]), number(&second["to_mm"])), (0.0, -2.5));
+    assert_eq!((number(&third["from_mm"]), number(&third["to_mm"])), (20.0, 30.0));
+    // 0.2 s until it is released, then a stop that is no longer than from the greatest feed.
+    let (stop_s, stop_mm) = (number(&fourth["stop_s"]), number(&fourth["stop_mm"]));
+    assert!((number(&fourth["time_s"]) - stop_s - 0.2).abs() < 1e-9, "{fourth}");
+    let gone_mm = number(&fourth["from_mm"]) - number(&fourth["to_mm"]);
+    assert!(stop_mm > 1.0 && stop_mm < gone_mm && gone_mm < 20.0 && stop_s < 0.6, "{fourth}");
+    // Where the key is released behind the end, the end is the distance's.
+    let gone_mm = number(&fifth["to_mm"]) - number(&fifth["from_mm"]);
+    assert!((gone_mm - 1.0).abs() < 1e-9 && fifth["stop_s"].is_null(), "{fifth}");
+    let ticks = desk.read("jog.csv").lines().count() - 1;
+    let time_s: f64 = presses.iter().map(|press| number(&press["time_s"])).sum();
+    assert!((ticks as f64 * 0.0005 - time_s).abs() < 1e-9, "{ticks} {time_s}");
+
+    // What came before is printed, though the last key asks for more than there is room for.
+    let output = desk.motion(&["jog", "X-", "X-1", "--machine", "machine.toml"]);
+    let (shown, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(2), "{error}");
+    assert!(shown.contains("-40.0000") && shown.contains("soft limit"), "{shown}");
+    assert!(error.contains("X-1: at -40 mm outwards: expected inwards only"), "{error}");
+    for (arguments, expected) in [
+        (
+            &["jog", "X+"][..],
+            "X+: found no [axis.travel] for its axis, expected one to go on to, or a distance",
+        ),
+        (&["jog", "X+1", "Q+1"], "Q+1: found no such axis, expected one of X, Y, Z"),
+        (&["jog", "X+1", "--feed", "301"], "X+1: feed 301 mm/s: expected above 0, at most 300"),
+        (&["jog", "X+0"], "X+0: a distance of 0: expected a way to go"),
+    ] {
+        assert_eq!(desk.refusal(arguments), expected);
+    }
+}
+
 /// A run with commands, and one that ends in a fault: recorded, and once more from the recording alone.
 #[test]
 fn replay_of_a_recorded_run() {

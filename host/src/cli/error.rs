@@ -14,6 +14,8 @@ use crate::points::PointsError;
 use crate::recording::RecordingError;
 use crate::simulate::RunError;
 use crate::simulate::home::HomeError;
+use crate::simulate::jog::JogError;
+use crate::simulate::session::SessionError;
 use crate::toolpath::spline::SplineError;
 use crate::tuning::TuningError;
 
@@ -119,6 +121,9 @@ pub enum CliError {
         /// Why.
         source: HomeError,
     },
+    /// The machine did not jog as asked.
+    #[error(transparent)]
+    Jog(#[from] JogError),
     /// The drive experiment can't be made, or a fault ended it.
     #[error(transparent)]
     Drive(#[from] DriveError),
@@ -143,15 +148,17 @@ pub enum CliError {
 
 impl CliError {
     /// 2, but for output that failed, for a plan that the kernel refuses, for an experiment that ended in a fault or
-    /// found nothing to measure, for one that found too little to tune by, and for an axis that found no reference: these
-    /// are not the user's input.
+    /// found nothing to measure, for one that found too little to tune by, for an axis that found no reference, and for a
+    /// jog that ended in a fault: these are not the user's input.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Output(_) | Self::Tuning(_) | Self::Run { source: RunError::Rejected(_), .. } => {
                 ExitCode::FAILURE
             }
-            Self::Home { source: HomeError::Axis { .. } | HomeError::Fault(_), .. } => ExitCode::FAILURE,
+            Self::Home { source: HomeError::Axis { .. }, .. } => ExitCode::FAILURE,
+            Self::Home { source: HomeError::Session(ended), .. }
+            | Self::Jog(JogError::Session { source: ended, .. }) => ended_badly(ended),
             Self::Drive(
                 DriveError::Fault { .. }
                 | DriveError::NotSteady { .. }
@@ -161,5 +168,13 @@ impl CliError {
             ) => ExitCode::FAILURE,
             _ => ExitCode::from(2),
         }
+    }
+}
+
+/// A fault, or motion that the kernel refuses, is not the user's input.
+fn ended_badly(error: &SessionError) -> ExitCode {
+    match error {
+        SessionError::Fault(_) | SessionError::Run(RunError::Rejected(_)) => ExitCode::FAILURE,
+        SessionError::Run(_) => ExitCode::from(2),
     }
 }

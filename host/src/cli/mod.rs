@@ -14,6 +14,7 @@
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
 //! - [`home`]: the simulated axes find their references;
+//! - [`jog`]: keys of the simulated machine pressed and released;
 //! - [`machine`]: the reference machine's file, and what its keys mean;
 //! - [`demo`]: what `motion` alone does;
 //! - [`error`]: errors and exit statuses;
@@ -26,6 +27,7 @@ pub mod drive;
 pub mod error;
 pub mod flight;
 pub mod home;
+pub mod jog;
 pub mod machine;
 pub mod plan;
 pub mod profile;
@@ -58,6 +60,7 @@ Examples:
   motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
   motion home --machine mine.toml                the axes find their references
+  motion jog X+20 Y-2.5@300 --feed 50            keys pressed, and one released after 300 ticks
   motion machine > mine.toml                     a machine file to start from
   motion machine --explain                       what every key of it means
 
@@ -85,6 +88,7 @@ enum Command {
     Drive(drive::DriveArguments),
     Compile(compile::CompileArguments),
     Home(home::HomeArguments),
+    Jog(jog::JogArguments),
     Machine(machine::MachineArguments),
 }
 
@@ -120,6 +124,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Drive(arguments)) => drive::drive(arguments, out),
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),
         Some(Command::Home(arguments)) => home::run(arguments, out),
+        Some(Command::Jog(arguments)) => jog::run(arguments, out),
         Some(Command::Machine(arguments)) => machine::print(arguments, out),
     }
 }

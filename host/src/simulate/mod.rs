@@ -5,7 +5,6 @@
 //! the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
 //! - [`job`]: what is executed, and what its records call it by;
-//! - [`home`]: homing, and motion behind it;
 //! - [`faults`]: names and table of faults;
 //! - [`inject`]: what breaks before given ticks;
 //! - [`live`]: commands before given ticks;
@@ -15,7 +14,11 @@
 //! - `contour`: how far the machine is beside its path;
 //! - `limit_share`: on how much of the path a limit is active;
 //! - [`run`](mod@run): the ticks;
-//! - [`summary`]: maxima, following and contour error.
+//! - [`summary`]: maxima, following and contour error;
+//! - `home_rig`: the rig with home switches and index latches;
+//! - [`session`]: one motion after the other, without a plan;
+//! - [`home`]: axes find their references;
+//! - [`jog`]: keys pressed and released.
 
 mod background;
 mod commands;
@@ -24,11 +27,14 @@ pub mod job;
 pub mod faults;
 pub mod inject;
 mod limit_share;
-pub mod home;
 pub mod live;
 pub mod rig;
 pub mod run;
 pub mod summary;
+mod home_rig;
+pub mod session;
+pub mod home;
+pub mod jog;
 
 pub use job::{Job, Sheet};
 pub use rig::Hardware;

@@ -1,0 +1,133 @@
+//! `motion jog`: keys of the simulated machine pressed and released.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::outputs::Outputs;
+use super::table::{self, Align};
+use super::{input, write_json};
+use crate::simulate::job::Sheet;
+use crate::simulate::jog::{Ended, Jogged, Press, jog};
+
+const EXAMPLES: &str = "\
+Examples:
+  motion jog X+20 Y-2.5               by an increment [mm]
+  motion jog X+20@300 --feed 50       the key is released after 300 ticks
+  motion jog X+ X- --machine mine.toml
+                                      from one soft limit, [axis.travel], to the other
+  motion jog X+20 --trace jog.csv     every tick, for a spreadsheet
+
+JSON: list of {press, from_mm, to_mm, time_s, feed_mm_s (the greatest), ended (\"distance\", \"soft limit\" or \"released\"),
+stop_s, stop_mm (from the key's release to rest; null where it was not released on the way)}.
+
+Exit status: 1 where a fault ended a jog, 2 where a key is refused; what came before is printed.";
+
+/// Jog axes of the simulated machine from where it is switched on: one key after the other, each until it rests.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct JogArguments {
+    /// Keys: axis, + or -, a distance in mm or none for the soft limit, and @TICKS until it is released.
+    #[arg(value_name = "KEY", required = true)]
+    presses: Vec<Press>,
+    /// Feed in mm/s; otherwise the axis' greatest.
+    #[arg(long, value_name = "MM_S")]
+    feed: Option<f64>,
+    /// Machine file; otherwise the built-in reference machine.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    /// Write every tick as a row of CSV; an existing file is replaced.
+    #[arg(long, value_name = "FILE.csv")]
+    trace: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct PressJson {
+    press: String,
+    from_mm: f64,
+    to_mm: f64,
+    time_s: f64,
+    feed_mm_s: f64,
+    ended: &'static str,
+    stop_s: Option<f64>,
+    stop_mm: Option<f64>,
+}
+
+impl PressJson {
+    fn new(jogged: &Jogged, tick_s: f64) -> Self {
+        let &Jogged { ref press, from_mm, to_mm, ticks, feed_mm_s, ended } = jogged;
+        let (ended, stop) = match ended {
+            Ended::Distance => ("distance", None),
+            Ended::SoftLimit => ("soft limit", None),
+            Ended::Released { ticks, length_mm } => ("released", Some((ticks as f64 * tick_s, length_mm))),
+        };
+        Self {
+            press: press.to_string(),
+            from_mm,
+            to_mm,
+            time_s: ticks as f64 * tick_s,
+            feed_mm_s,
+            ended,
+            stop_s: stop.map(|(time_s, _)| time_s),
+            stop_mm: stop.map(|(_, length_mm)| length_mm),
+        }
+    }
+}
+
+/// Jogs and prints.
+///
+/// # Errors
+/// The machine file or a key is refused, a fault ended a jog, or a file can't be written.
+pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let machine = input::machine(arguments.machine.as_ref())?;
+    let outputs = Outputs::create(&arguments.trace, &None)?;
+    let mut jogged = Vec::new();
+    let (ended, _) = outputs.of_ticks(&Sheet::of_machine(&machine), |observe| {
+        jog(&machine, &arguments.presses, arguments.feed, &mut jogged, observe)
+    })?;
+    // What was jogged is shown, whatever became of the next key.
+    let presses: Vec<PressJson> =
+        jogged.iter().map(|jogged| PressJson::new(jogged, machine.tick_s)).collect();
+    if arguments.json {
+        write_json(&presses, out)?;
+    } else if !presses.is_empty() {
+        write_table(&presses, out).map_err(CliError::Output)?;
+    }
+    ended.map(|()| Outcome::Done).map_err(CliError::Jog)
+}
+
+fn write_table(presses: &[PressJson], out: &mut dyn Write) -> io::Result<()> {
+    let columns = [
+        ("key", "", Align::Left),
+        ("from", "mm", Align::Right),
+        ("to", "mm", Align::Right),
+        ("time", "s", Align::Right),
+        ("feed", "mm/s", Align::Right),
+        ("ended by", "", Align::Left),
+        ("stop", "s", Align::Right),
+        ("stop", "mm", Align::Right),
+    ];
+    let stop = |figure: Option<f64>| figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.4}"));
+    let rows: Vec<[String; 8]> = presses
+        .iter()
+        .map(|press| {
+            [
+                press.press.clone(),
+                format!("{:.4}", press.from_mm),
+                format!("{:.4}", press.to_mm),
+                format!("{:.4}", press.time_s),
+                format!("{:.3}", press.feed_mm_s),
+                press.ended.to_owned(),
+                stop(press.stop_s),
+                stop(press.stop_mm),
+            ]
+        })
+        .collect();
+    table::write(&columns, &rows, out)
+}

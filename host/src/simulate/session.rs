@@ -1,0 +1,141 @@
+//! A simulated machine that goes from one motion to the next: kernel, streams and closed loop, switched on once.
+//!
+//! Consumes a machine, then items of motion, one motion after the other, each under a director; produces every tick's
+//! record. The machine stands at 0 as far as it knows, until an axis is homed.
+
+use std::convert::Infallible;
+
+use motion_kernel::axis::AxesConfig;
+use motion_kernel::exec::ExecState;
+use motion_kernel::jog::JogAxis;
+use motion_kernel::kernel::Kernel;
+use motion_kernel::law::Limits;
+use motion_kernel::live::{Director, State};
+use motion_kernel::num::Real;
+use motion_kernel::program::Item;
+use motion_kernel::queue::LiveStreams;
+use motion_kernel::trace::Trace;
+use motion_kernel::units::Position;
+
+use super::Observer;
+use super::contour::Contour;
+use super::faults;
+use super::home_rig::HomeRig;
+use super::job::Sheet;
+use super::rig::Simulated;
+use super::run::{RunError, tick_record};
+use crate::machine::{AxisSettings, Machine};
+use crate::record::{AXES, FaultRecord};
+
+/// Path enough to stop on at any feed, as for a run under live control.
+const PIECES: usize = 64;
+const SEGMENTS: usize = 16;
+const PLACES: usize = 64;
+
+/// Why a motion did not come to its end. Displays as one line.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The machine can't be simulated, or the motion not executed.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The kernel found a fault.
+    #[error("fault in tick {}: {}: {}", .0.tick, .0.fault, .0.detail)]
+    Fault(FaultRecord),
+}
+
+/// A simulated machine, switched on.
+pub struct Session<'a, R: Real> {
+    pub(super) machine: &'a Machine,
+    pub(super) simulated: &'a Simulated,
+    pub(super) kernel: Kernel<R, AXES>,
+    config: AxesConfig<R, AXES>,
+    rig: HomeRig<'a>,
+    streams: Box<LiveStreams<R, AXES, PIECES, SEGMENTS>>,
+    /// Where it stands.
+    pub(super) set: [Position; AXES],
+    contour: Contour,
+    pub(super) ticks: u64,
+}
+
+/// What a tick asks of the motion under way.
+pub(super) enum Then {
+    GoOn,
+    /// To come to rest, and to give up what is left.
+    Abort,
+    End,
+}
+
+impl<'a, R: Real> Session<'a, R> {
+    /// A machine at rest, drives on.
+    ///
+    /// # Errors
+    /// It can't be simulated, or regulated.
+    pub fn new(machine: &'a Machine, simulated: &'a Simulated) -> Result<Self, RunError> {
+        let (rig, counts) = HomeRig::new(machine, simulated)?;
+        let (config, set) = (machine.axes_config()?, [Position::ZERO; AXES]);
+        let mut kernel = Kernel::new(&config, set, counts);
+        kernel.enable(0);
+        let (streams, contour) = (Box::default(), Contour::default());
+        Ok(Self { machine, simulated, kernel, config, rig, streams, set, contour, ticks: 0 })
+    }
+
+    /// Where the machine stands: its set positions, at rest.
+    #[must_use]
+    pub fn position(&self) -> [Position; AXES] {
+        self.set
+    }
+
+    /// What an axis may do by itself, not knowing where it is: its limits, and those of any path.
+    pub(super) fn of_axis(&self, axis: usize) -> JogAxis {
+        let &AxisSettings { feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, .. } = &self.machine.axes[axis];
+        let path = &self.machine.path;
+        let limits = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }.least(&path.limits());
+        JogAxis { feed_mm_s: feed_mm_s.min(path.feed_mm_s), limits, travel: None }
+    }
+
+    /// Drives items from where the machine stands to their end.
+    ///
+    /// # Errors
+    /// An item can't be executed, or there was a fault.
+    pub fn run(
+        &mut self,
+        items: impl Iterator<Item = Result<Item<AXES>, Infallible>>,
+        observe: &mut Observer<'_>,
+    ) -> Result<(), SessionError> {
+        self.drive(items, observe, |trace, _, state| {
+            let is_done = state == State::Done && trace.executed.state == ExecState::Idle;
+            Ok::<_, SessionError>(if is_done { Then::End } else { Then::GoOn })
+        })?;
+        self.set = self.kernel.rest_here().unwrap_or(self.set);
+        Ok(())
+    }
+
+    /// Ticks under a director, until one asks for the end.
+    pub(super) fn drive<E: From<SessionError>>(
+        &mut self,
+        items: impl Iterator<Item = Result<Item<AXES>, Infallible>>,
+        observe: &mut Observer<'_>,
+        mut look: impl FnMut(&Trace<R, AXES>, &mut HomeRig<'a>, State) -> Result<Then, E>,
+    ) -> Result<(), E> {
+        let (mut feeder, mut intake) = self.streams.split(self.machine.rules(), self.set);
+        let mut director = Director::<R, AXES, _, _, PLACES>::new(items, self.machine.tick_s, 0);
+        loop {
+            director.turn(&mut feeder).map_err(|error| SessionError::Run(RunError::Rejected(error)))?;
+            let trace = *self.kernel.tick(&mut intake, &mut self.rig);
+            self.simulated.advance();
+            self.ticks += 1;
+            observe(&tick_record(&trace, 0.0, &mut self.contour));
+            if let Some(fault) = trace.fault {
+                let job = (&self.machine.header(), &Sheet::of_machine(self.machine));
+                let setpoints = &trace.executed.setpoints;
+                let record = faults::record(&fault, job, &self.config, setpoints);
+                return Err(SessionError::Fault(record).into());
+            }
+            match look(&trace, &mut self.rig, director.state(&feeder))? {
+                Then::GoOn => {}
+                Then::Abort => director.abort(),
+                Then::End => return Ok(()),
+            }
+        }
+    }
+}
