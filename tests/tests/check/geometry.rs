@@ -134,6 +134,15 @@ impl Element {
         Self { radius_mm, grows_mm, sweep_rad, outward, onward, ..Self::line(from, axial, length_mm) }
     }
 
+    /// By how much an arc leans outwards because its ends differ in radius.
+    pub(crate) fn slant_rad(&self) -> f64 {
+        if self.radius_mm * self.sweep_rad > 0.0 {
+            self.grows_mm.abs() / (self.radius_mm * self.sweep_rad)
+        } else {
+            0.0
+        }
+    }
+
     /// `s_mm` from its start.
     pub(crate) fn at(&self, s_mm: f64) -> PathPoint {
         let still = [0.0; 3];
