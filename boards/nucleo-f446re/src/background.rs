@@ -1,8 +1,8 @@
-//! The background: start button, streams, log.
+//! The background: start button, console, streams, log.
 //!
-//! Consumes the button and what the tick has left in [`Control`]; produces items for the streams, and in a fault what
-//! the flight recorder kept, into the log. Runs in what
-//! the ticks leave of the processor, a turn behind the first tick that ends after the turn before, for ever.
+//! Consumes the button, the console and what the tick has left in [`Control`]; produces items for the streams, and in a
+//! fault what the flight recorder kept, into the log. Runs in what the ticks leave of the processor, a turn behind the first
+//! tick that ends after the turn before, for ever.
 //!
 //! Its turn begins right behind a tick, with what keeps interrupts off: taking figures out of [`Control`], at
 //! most one line of log (defmt encodes it with interrupts masked). Both are over long before the next
@@ -22,6 +22,7 @@ use motion_kernel::program::{ProgramError, SupplyError};
 use motion_kernel::recorder::frame_max;
 use motion_kernel::straight::StraightError;
 use motion_kernel::units::Position;
+use nucleo_f446re::console::Command;
 use nucleo_f446re::design_parameters::{
     BUTTON_TICKS, FLIGHT_LINE_TICKS, REPORT_TICKS, SETTLE_TICKS, SYSCLK_HZ,
 };
@@ -30,6 +31,9 @@ use nucleo_f446re::program::Run;
 use nucleo_f446re::tick_log::TickLog;
 use rtic::Mutex;
 use stm32f4xx_hal::gpio::{Input, PC13};
+use stm32f4xx_hal::pac::USART2;
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::serial::Rx;
 
 use crate::control::{Control, Streams};
 
@@ -43,10 +47,8 @@ pub(crate) static TURNS: AtomicU32 = AtomicU32::new(0);
 enum Phase {
     /// Drives off, never started.
     Ready,
-    /// The program is under way.
+    /// The program is under way, or held.
     Running,
-    /// Told to hold, or held.
-    Held,
     /// The program is done, the machine is held at its end.
     Done,
     /// An item of the program is refused; motion under way ends at rest, and is held there until reset.
@@ -69,7 +71,7 @@ pub(crate) fn run(
     mut control: impl Mutex<T = Control>,
     streams: &'static mut Streams,
     machine: &Machine,
-    button: &PC13<Input>,
+    (button, console): (&PC13<Input>, &mut Rx<USART2>),
 ) -> ! {
     let mut work = Work {
         phase: Phase::Ready,
@@ -95,11 +97,15 @@ pub(crate) fn run(
             healthy: control.healthy,
         });
         let now = TICKS.load(Ordering::Relaxed);
-        let pressed = press.is_new(button.is_low(), now);
+        let asked = if press.is_new(button.is_low(), now) {
+            Some(Asked::Press)
+        } else {
+            console.read().ok().and_then(Command::of).map(Asked::Command)
+        };
         let before = work.phase;
-        work.turn(seen, pressed, machine, &mut control);
+        work.turn(seen, asked, machine, &mut control);
         // A change of phase has had its line.
-        let may_log = work.phase == before && !pressed;
+        let may_log = work.phase == before && asked.is_none();
         if may_log && !(work.phase == Phase::Stopped && dump.line(now, &mut control)) {
             report.line(&mut control, work.run.as_ref().map_or(0, Run::starvations));
         }
@@ -117,6 +123,15 @@ fn wait_for_tick() {
     }
 }
 
+/// What is asked for.
+#[derive(Clone, Copy, PartialEq)]
+enum Asked {
+    /// By the button: to start, to hold or to go on, whichever there is to do.
+    Press,
+    /// By the console.
+    Command(Command),
+}
+
 /// What the button has started.
 struct Work {
     phase: Phase,
@@ -132,10 +147,16 @@ struct Work {
 }
 
 impl Work {
-    /// What follows from what the tick has left, and from the button. At most one line of log.
-    fn turn(&mut self, seen: Seen, pressed: bool, machine: &Machine, control: &mut impl Mutex<T = Control>) {
+    /// What follows from what the tick has left, and from what is asked for. At most one line of log.
+    fn turn(
+        &mut self,
+        seen: Seen,
+        asked: Option<Asked>,
+        machine: &Machine,
+        control: &mut impl Mutex<T = Control>,
+    ) {
         let Some(run) = &mut self.run else {
-            if pressed {
+            if asked == Some(Asked::Press) {
                 self.first_start(seen.healthy, machine, control);
             }
             return;
@@ -145,38 +166,33 @@ impl Work {
             self.phase = Phase::Refused;
             return;
         }
-        match (self.phase, self.refused) {
-            (Phase::Ready | Phase::Stopped, _) => {}
+        match (self.phase, self.refused, asked) {
+            (Phase::Ready | Phase::Stopped, ..) => {}
             _ if seen.fault.is_some() => {
                 error!("stopped: {}; reset the board to go on", seen.fault);
                 self.phase = Phase::Stopped;
             }
-            (Phase::Running | Phase::Held, Some(error)) => {
+            (Phase::Running, Some(error), _) => {
                 error!("program refused: {}; motion ends at rest; reset the board to go on", error);
                 self.phase = Phase::Refused;
             }
-            (Phase::Running, _) if pressed && seen.state == ExecState::Stopped => {
-                control.lock(|control| control.kernel.resume());
-                info!("program stop ended");
-            }
-            (Phase::Running, _) if pressed => {
-                run.hold();
-                info!("comes to rest: press the blue button to go on");
-                self.phase = Phase::Held;
-            }
-            (Phase::Running, _) if run.state() == State::Waiting && seen.state == ExecState::Idle => {
+            (Phase::Running, None, Some(asked)) => steer(run, asked, seen.state, control),
+            (Phase::Running, None, None)
+                if run.state() == State::Waiting && seen.state == ExecState::Idle =>
+            {
                 info!("done: press the blue button to run again");
                 self.phase = Phase::Done;
             }
-            (Phase::Held, _) if pressed => {
-                // It may have come to rest at a program stop instead.
-                control.lock(|control| control.kernel.resume());
-                run.resume();
-                info!("goes on");
-                self.phase = Phase::Running;
-            }
             // At rest the set position is exactly where the streams ended.
-            (Phase::Done, _) if pressed => self.start(seen.position),
+            (Phase::Done, _, Some(Asked::Press)) => self.start(seen.position),
+            // For the next run.
+            (
+                Phase::Done,
+                _,
+                Some(asked @ Asked::Command(Command::Override(_) | Command::SingleBlock(_))),
+            ) => {
+                steer(run, asked, seen.state, control);
+            }
             _ => {}
         }
     }
@@ -215,6 +231,31 @@ impl Work {
             self.no_way = run.start(here).err();
         }
         self.refused = run.turn().err();
+    }
+}
+
+/// Obeys what is asked for of a run. One line of log.
+fn steer(run: &mut Run<'_>, asked: Asked, state: ExecState, control: &mut impl Mutex<T = Control>) {
+    let stands = run.is_held() || state == ExecState::Stopped;
+    match asked {
+        Asked::Press | Asked::Command(Command::GoOn) if stands => {
+            // At a program stop, in a hold, or in a hold at a program stop.
+            control.lock(|control| control.kernel.resume());
+            run.resume();
+            info!("goes on");
+        }
+        Asked::Press | Asked::Command(Command::Hold) => {
+            run.hold();
+            info!("comes to rest: the blue button or ~ goes on");
+        }
+        Asked::Command(Command::GoOn) => info!("it is not held"),
+        Asked::Command(Command::Override(step)) => {
+            info!("feed override {=u8} %", run.override_by(step).percent());
+        }
+        Asked::Command(Command::SingleBlock(is_single)) => {
+            run.single_block(is_single);
+            info!("single block {=str}", if is_single { "on" } else { "off" });
+        }
     }
 }
 

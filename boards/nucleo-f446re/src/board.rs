@@ -9,12 +9,13 @@ use defmt::{info, unwrap};
 use embedded_hal_bus::spi::ExclusiveDevice;
 use motion_kernel::hal::Ad5754Output;
 use nucleo_f446re::design_parameters::{
-    APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, HSE_HZ, SYSCLK_HZ, WATCHDOG_MS,
+    APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, CONSOLE_BAUD, HSE_HZ, SYSCLK_HZ, WATCHDOG_MS,
 };
-use stm32f4xx_hal::gpio::{Input, Output, PA10, PC13, Speed};
-use stm32f4xx_hal::pac::{self, SPI2};
+use stm32f4xx_hal::gpio::{Alternate, Input, Output, PA3, PA10, PC13, Pull, Speed};
+use stm32f4xx_hal::pac::{self, SPI2, USART2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
+use stm32f4xx_hal::serial::{Rx, SerialExt};
 use stm32f4xx_hal::spi::{Spi, SpiExt};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
@@ -33,6 +34,8 @@ pub(crate) struct Board {
     pub(crate) scope: PA10<Output>,
     /// B1: low while it is pressed (the board has the pull-up).
     pub(crate) button: PC13<Input>,
+    /// ST-LINK's serial port.
+    pub(crate) console: Rx<USART2>,
 }
 
 impl Board {
@@ -105,6 +108,13 @@ impl Board {
             Err(error) => defmt::panic!("converter: {}", defmt::Debug2Format(&error)),
         };
 
+        // Pulled up: without ST-LINK's power nobody drives the line.
+        let receive: PA3<Alternate<7>> = gpioa.pa3.into_alternate().internal_resistor(Pull::Up);
+        let console = match device.USART2.rx(receive, CONSOLE_BAUD.bps(), &mut rcc) {
+            Ok(console) => console,
+            Err(_) => defmt::panic!("console: {=u32} baud can't be had", CONSOLE_BAUD),
+        };
+
         let watchdog = IndependentWatchdog::new(device.IWDG);
         // Not even the debugger stops it: a halted processor with drives enabled is just what it is for.
         watchdog.stop_on_debug(&device.DBGMCU, false);
@@ -115,6 +125,7 @@ impl Board {
             watchdog,
             scope: gpioa.pa10.into_push_pull_output(),
             button: gpioc.pc13.into_input(),
+            console,
         }
     }
 

@@ -135,6 +135,8 @@ const _: () = assert!(
 pub const SETTLE_TICKS: u32 = TICK_HZ / 5;
 /// How long the button must be held to count \[ticks\]: 20 ms, longer than its contacts bounce.
 pub const BUTTON_TICKS: u32 = TICK_HZ / 50;
+/// Of the serial console \[1/s\]: what terminals begin with.
+pub const CONSOLE_BAUD: u32 = 115_200;
 /// How often the background reports \[ticks\]: once a second.
 pub const REPORT_TICKS: u32 = TICK_HZ;
 

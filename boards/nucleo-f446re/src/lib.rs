@@ -4,6 +4,7 @@
 //! - [`pins`]: which signal is on which pin;
 //! - [`machine`]: the program in flash and the axes it is for;
 //! - [`program`]: what the start button runs;
+//! - [`console`]: what is commanded over the serial port;
 //! - [`tick_log`] and [`liveness`]: what the tick keeps about itself.
 //!
 //! The firmware itself is `main.rs` and the modules beside it. From the board's folder:
@@ -23,5 +24,6 @@ pub mod design_parameters;
 pub mod pins;
 pub mod machine;
 pub mod program;
+pub mod console;
 pub mod tick_log;
 pub mod liveness;

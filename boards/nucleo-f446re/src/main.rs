@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! TIM7 ─► tick (the only interrupt)                      background (idle)
-//!         drives: emergency stop, ready   ── Control ──  button, log
+//!         drives: emergency stop, ready   ── Control ──  button, console, log
 //!         encoders ─► kernel ─► converter ◄─ streams ──  program
 //!         watchdog ◄───────────────────────── turns ───
 //! ```
@@ -45,6 +45,8 @@ mod app {
     use nucleo_f446re::machine::{AXES, Machine, PROGRAM};
     use nucleo_f446re::tick_log::TickLog;
     use stm32f4xx_hal::gpio::{Input, Output, PA10, PC13};
+    use stm32f4xx_hal::pac::USART2;
+    use stm32f4xx_hal::serial::Rx;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
     use crate::background::{self, TICKS, TURNS};
@@ -69,6 +71,7 @@ mod app {
         monitor: TickMonitor,
         scope: PA10<Output>,
         button: PC13<Input>,
+        console: Rx<USART2>,
         streams: &'static mut Streams,
         machine: Machine,
     }
@@ -80,7 +83,7 @@ mod app {
         empty: motion_kernel::queue::Streams<f32, AXES, 2, 2> = motion_kernel::queue::Streams::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let Board { mut hardware, mut tick_timer, mut watchdog, scope, button } =
+        let Board { mut hardware, mut tick_timer, mut watchdog, scope, button, console } =
             Board::new(cx.device, cx.core);
         let machine = defmt::unwrap!(Machine::new(PROGRAM));
         // Where the machine stands is called the program's start.
@@ -105,6 +108,7 @@ mod app {
             monitor: defmt::unwrap!(TickMonitor::new(32, TICK_CYCLES)),
             scope,
             button,
+            console,
             streams: cx.local.storage,
             machine,
         };
@@ -150,8 +154,9 @@ mod app {
     }
 
     /// The background.
-    #[idle(local = [streams, button, machine], shared = [control])]
+    #[idle(local = [streams, button, console, machine], shared = [control])]
     fn idle(cx: idle::Context) -> ! {
-        background::run(cx.shared.control, cx.local.streams, cx.local.machine, cx.local.button)
+        let idle::LocalResources { streams, button, console, machine, .. } = cx.local;
+        background::run(cx.shared.control, streams, machine, (button, console))
     }
 }

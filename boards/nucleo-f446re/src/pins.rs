@@ -33,7 +33,7 @@ const fn pin(
 }
 
 /// The wiring, connector by connector.
-pub const PINS: [Pin; 18] = [
+pub const PINS: [Pin; 19] = [
     pin("drive ready X", "PC10", "CN7-1", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
     pin("drive ready Y", "PC11", "CN7-2", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
     pin("drive ready Z", "PC12", "CN7-3", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
@@ -52,11 +52,19 @@ pub const PINS: [Pin; 18] = [
     pin("converter SDIN", "PB15", "CN10-26", "–", "SPI2_MOSI AF5", "AD5754 SDIN"),
     pin("converter SCLK", "PB13", "CN10-30", "–", "SPI2_SCK AF5", "AD5754 SCLK"),
     pin("scope", "PA10", "CN10-33", "D2, CN9-3", "output, high in the tick", "oscilloscope"),
+    pin(
+        "console",
+        "PA3",
+        "CN10-37",
+        "D0, CN9-1",
+        "USART2_RX AF7, pull-up",
+        "ST-LINK's serial port, over USB",
+    ),
 ];
 
-/// Pins of the board that have a use already: ST-LINK's serial port, the green LED, SWD and its trace output,
+/// Pins of the board that have a use already: the way to ST-LINK's serial port, the green LED, SWD and its trace output,
 /// clocks.
-pub const RESERVED: [&str; 10] = ["PA2", "PA3", "PA5", "PA13", "PA14", "PB3", "PC14", "PC15", "PH0", "PH1"];
+pub const RESERVED: [&str; 9] = ["PA2", "PA5", "PA13", "PA14", "PB3", "PC14", "PC15", "PH0", "PH1"];
 
 #[cfg(test)]
 mod tests {
@@ -147,7 +155,7 @@ mod tests {
     ];
 
     /// DS10693, "Alternate function": the rows of the pins that use one here.
-    const FUNCTIONS: [(&str, &str, u8); 8] = [
+    const FUNCTIONS: [(&str, &str, u8); 9] = [
         ("PA0", "TIM5_CH1", 2),
         ("PA1", "TIM5_CH2", 2),
         ("PB8", "TIM2_CH1", 1),
@@ -156,6 +164,7 @@ mod tests {
         ("PA7", "TIM3_CH2", 2),
         ("PB13", "SPI2_SCK", 5),
         ("PB15", "SPI2_MOSI", 5),
+        ("PA3", "USART2_RX", 7),
     ];
 
     #[test]

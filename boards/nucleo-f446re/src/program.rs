@@ -1,7 +1,7 @@
 //! What the start button runs, under live control: from where the machine stands to the program's start, then the program;
 //! and once more with every start.
 //!
-//! Consumes the machine's position, the items in flash and the button's commands; keeps the streams filled. Background.
+//! Consumes the machine's position, the items in flash and what is commanded on the way; keeps the streams filled. Background.
 
 use core::task::Poll;
 
@@ -11,6 +11,7 @@ use motion_kernel::queue::LiveFeeder;
 use motion_kernel::straight::{Straight, StraightError};
 use motion_kernel::units::Position;
 
+use crate::console::{FeedOverride, Step};
 use crate::design_parameters::{LEAD_TICKS, PLACES, TICK_S};
 use crate::machine::AXES;
 
@@ -43,6 +44,7 @@ impl Source<AXES> for Runs {
 pub struct Run<'a> {
     feeder: LiveFeeder<'a, f32, AXES>,
     director: Director<f32, AXES, Runs, ProgramError, PLACES>,
+    feed_override: FeedOverride,
 }
 
 impl<'a> Run<'a> {
@@ -50,7 +52,8 @@ impl<'a> Run<'a> {
     #[must_use]
     pub fn new(program: Reader<'static, AXES>, feeder: LiveFeeder<'a, f32, AXES>) -> Self {
         let runs = Runs { program, to_start: None, items: None };
-        Self { feeder, director: Director::new(runs, TICK_S, LEAD_TICKS) }
+        let director = Director::new(runs, TICK_S, LEAD_TICKS);
+        Self { feeder, director, feed_override: FeedOverride::NONE }
     }
 
     /// Starts a run on a machine that stands at `here`, where the streams were split or the run before it ended.
@@ -75,6 +78,25 @@ impl<'a> Run<'a> {
     /// Goes on after a hold.
     pub fn resume(&mut self) {
         self.director.resume();
+    }
+
+    /// Whether it is at rest in a hold, or on the way there.
+    #[must_use]
+    pub fn is_held(&self) -> bool {
+        matches!(self.state(), State::Holding | State::Held)
+    }
+
+    /// Changes the feed override, which it returns, of this run and all that follow.
+    pub fn override_by(&mut self, step: Step) -> FeedOverride {
+        self.feed_override = self.feed_override.after(step);
+        // Its range is within the director's.
+        let _ = self.director.set_override(self.feed_override.share());
+        self.feed_override
+    }
+
+    /// Whether to come to rest at the end of every program line, held there.
+    pub fn single_block(&mut self, is_single: bool) {
+        self.director.set_single_block(is_single);
     }
 
     /// Reads and plans what there is room for. Ticks may come meanwhile, and do: it may take many of them.
@@ -199,6 +221,52 @@ mod tests {
             assert!(runs[0].0 > STRINGER_TICKS && held > 2, "every {every}: {held}");
             assert_eq!(starvations, 0, "every {every}");
         }
+    }
+
+    /// Faster and slower again and again, on both runs: they end where they should, sooner or later.
+    #[test]
+    fn under_any_override_it_ends_where_it_should() {
+        for (step, is_later) in [(Step::Slower, true), (Step::Faster, false)] {
+            let mut percents = Vec::new();
+            let (runs, starvations) = two_runs(1, |tick, run| {
+                if tick % 1500 == 700 {
+                    percents.push(run.override_by(step).percent());
+                } else if tick % 1500 == 1400 {
+                    assert_eq!(run.override_by(Step::AsProgrammed), FeedOverride::NONE);
+                }
+            });
+            assert_eq!(runs.map(|(_, at)| at), [end(); 2], "{step:?}");
+            assert_eq!(runs[0].0 > STRINGER_TICKS + 4, is_later, "{step:?}: {}", runs[0].0);
+            assert!(percents.len() > 3 && percents.iter().all(|percent| percent.abs_diff(100) == 10));
+            assert_eq!(starvations, 0);
+        }
+    }
+
+    /// In single block it is held behind every line of the program; it goes on by itself where that is switched off.
+    #[test]
+    fn in_single_block_it_is_held_behind_every_line() {
+        let items = Machine::new(PROGRAM).expect("suits").program.items();
+        let line_of = |item| match item {
+            Ok(Item::Line { line, .. } | Item::Septic { line, .. }) => Some(line),
+            _ => None,
+        };
+        let mut lines: Vec<u32> = items.filter_map(line_of).collect();
+        lines.dedup();
+        let (mut held, mut was_held) = (0, false);
+        let (runs, _) = two_runs(1, |tick, run| {
+            if tick == 0 {
+                run.single_block(true);
+            }
+            let is_held = run.state() == State::Held;
+            held += usize::from(is_held && !was_held);
+            was_held = is_held;
+            if is_held {
+                run.resume();
+            }
+        });
+        assert_eq!(runs.map(|(_, at)| at), [end(); 2]);
+        // In the second run there is a way back to the start.
+        assert_eq!(held, 2 * lines.len() + 1, "{lines:?}");
     }
 
     /// From one encoder count to the whole machine, longer than the streams hold, in any direction, at the feed there is.
