@@ -15,6 +15,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::DWT;
 use defmt::{error, info, warn};
+use heapless::spsc::Consumer;
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Fault;
 use motion_kernel::live::State;
@@ -27,35 +28,19 @@ use nucleo_f446re::design_parameters::{
     BUTTON_TICKS, FLIGHT_LINE_TICKS, REPORT_TICKS, SETTLE_TICKS, SYSCLK_HZ,
 };
 use nucleo_f446re::machine::{AXES, Machine};
+use nucleo_f446re::operator::{Action, Asked, Phase, Settings};
 use nucleo_f446re::program::Run;
 use nucleo_f446re::tick_log::TickLog;
 use rtic::Mutex;
 use stm32f4xx_hal::gpio::{Input, PC13};
-use stm32f4xx_hal::pac::USART2;
-use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::serial::Rx;
 
+use crate::console_port::LOST;
 use crate::control::{Control, Streams};
 
 /// Ticks since the start; counted by the tick.
 pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
 /// Turns of the background; the tick feeds the watchdog only while they are counted.
 pub(crate) static TURNS: AtomicU32 = AtomicU32::new(0);
-
-/// Where the machine is in its day.
-#[derive(Clone, Copy, PartialEq)]
-enum Phase {
-    /// Drives off, never started.
-    Ready,
-    /// The program is under way, or held.
-    Running,
-    /// The program is done, the machine is held at its end.
-    Done,
-    /// An item of the program is refused; motion under way ends at rest, and is held there until reset.
-    Refused,
-    /// Drives off until reset, or on the way there in a fault.
-    Stopped,
-}
 
 /// What the tick last left.
 #[derive(Clone, Copy)]
@@ -71,15 +56,18 @@ pub(crate) fn run(
     mut control: impl Mutex<T = Control>,
     streams: &'static mut Streams,
     machine: &Machine,
-    (button, console): (&PC13<Input>, &mut Rx<USART2>),
+    button: &PC13<Input>,
+    bytes: &mut Consumer<'static, u8>,
 ) -> ! {
     let mut work = Work {
         phase: Phase::Ready,
+        settings: Settings::NONE,
         streams: Some(streams),
         run: None,
         from: None,
         no_way: None,
         refused: None,
+        has_said: false,
     };
     let mut press = Press::default();
     let mut report = Report::default();
@@ -100,13 +88,11 @@ pub(crate) fn run(
         let asked = if press.is_new(button.is_low(), now) {
             Some(Asked::Press)
         } else {
-            console.read().ok().and_then(Command::of).map(Asked::Command)
+            bytes.dequeue().and_then(Command::of).map(Asked::Command)
         };
-        let before = work.phase;
-        work.turn(seen, asked, machine, &mut control);
-        // A change of phase has had its line.
-        let may_log = work.phase == before && asked.is_none();
-        if may_log && !(work.phase == Phase::Stopped && dump.line(now, &mut control)) {
+        let has_logged = work.turn(seen, asked, machine, &mut control)
+            || work.phase == Phase::Faulted && dump.line(now, &mut control);
+        if !has_logged {
             report.line(&mut control, work.run.as_ref().map_or(0, Run::starvations));
         }
         work.plan();
@@ -123,18 +109,10 @@ fn wait_for_tick() {
     }
 }
 
-/// What is asked for.
-#[derive(Clone, Copy, PartialEq)]
-enum Asked {
-    /// By the button: to start, to hold or to go on, whichever there is to do.
-    Press,
-    /// By the console.
-    Command(Command),
-}
-
 /// What the button has started.
 struct Work {
     phase: Phase,
+    settings: Settings,
     /// Until the first start.
     streams: Option<&'static mut Streams>,
     run: Option<Run<'static>>,
@@ -144,56 +122,112 @@ struct Work {
     no_way: Option<StraightError>,
     /// Why it can't go on.
     refused: Option<SupplyError<ProgramError>>,
+    /// The log has said that it waits for somebody.
+    has_said: bool,
 }
 
 impl Work {
-    /// What follows from what the tick has left, and from what is asked for. At most one line of log.
+    /// What follows from what the tick has left, and from what is asked for. Whether it has logged a line; at most one.
     fn turn(
         &mut self,
         seen: Seen,
         asked: Option<Asked>,
         machine: &Machine,
         control: &mut impl Mutex<T = Control>,
-    ) {
-        let Some(run) = &mut self.run else {
-            if asked == Some(Asked::Press) {
-                self.first_start(seen.healthy, machine, control);
-            }
-            return;
-        };
-        if let Some(error) = self.no_way.take() {
-            error!("no way to the program's start: {}; reset the board to go on", error);
-            self.phase = Phase::Refused;
-            return;
+    ) -> bool {
+        if self.has_ended(&seen) {
+            return true;
         }
-        match (self.phase, self.refused, asked) {
-            (Phase::Ready | Phase::Stopped, ..) => {}
+        if let (Phase::Running { .. }, Some(run)) = (self.phase, &self.run) {
+            let is_stopped = seen.state == ExecState::Stopped;
+            self.phase = Phase::Running { is_held: run.is_held(), is_stopped };
+        }
+        match asked {
+            Some(asked) => {
+                self.act(Action::of(self.phase, asked), &seen, machine, control);
+                true
+            }
+            None => self.has_come_to_rest(&seen),
+        }
+    }
+
+    /// Whether it has just come to what only a reset ends.
+    fn has_ended(&mut self, seen: &Seen) -> bool {
+        match (self.phase, self.refused, &mut self.run) {
+            (Phase::Ready | Phase::Faulted, ..) => return false,
             _ if seen.fault.is_some() => {
                 error!("stopped: {}; reset the board to go on", seen.fault);
-                self.phase = Phase::Stopped;
+                self.phase = Phase::Faulted;
             }
-            (Phase::Running, Some(error), _) => {
-                error!("program refused: {}; motion ends at rest; reset the board to go on", error);
+            (Phase::Running { .. }, Some(error), Some(run)) => {
+                error!("program refused: {}; motion comes to rest; reset the board to go on", error);
+                run.hold();
                 self.phase = Phase::Refused;
             }
-            (Phase::Running, None, Some(asked)) => steer(run, asked, seen.state, control),
-            (Phase::Running, None, None)
-                if run.state() == State::Waiting && seen.state == ExecState::Idle =>
-            {
-                info!("done: press the blue button to run again");
-                self.phase = Phase::Done;
+            _ => {
+                let Some(error) = self.no_way.take() else { return false };
+                error!("no way to the program's start: {}; reset the board to go on", error);
+                self.phase = Phase::Refused;
             }
+        }
+        true
+    }
+
+    /// Whether a run has just come to where it waits for somebody, or to its end.
+    fn has_come_to_rest(&mut self, seen: &Seen) -> bool {
+        let (Phase::Running { is_stopped, .. }, Some(run)) = (self.phase, &self.run) else { return false };
+        let state = run.state();
+        if state == State::Waiting && seen.state == ExecState::Idle {
+            info!("done: press the blue button to run again");
+            self.phase = Phase::Done;
+            return true;
+        }
+        let had_said = core::mem::replace(&mut self.has_said, is_stopped || state == State::Held);
+        if had_said || !self.has_said {
+            return false;
+        }
+        if is_stopped {
+            info!("program stop: press the blue button to go on");
+        } else {
+            info!("held: the blue button or r goes on");
+        }
+        true
+    }
+
+    /// Does what there is to do, in a line of log.
+    fn act(&mut self, action: Action, seen: &Seen, machine: &Machine, control: &mut impl Mutex<T = Control>) {
+        match (action, &mut self.run) {
+            (Action::Start, None) => self.first_start(seen.healthy, machine, control),
             // At rest the set position is exactly where the streams ended.
-            (Phase::Done, _, Some(Asked::Press)) => self.start(seen.position),
-            // For the next run.
-            (
-                Phase::Done,
-                _,
-                Some(asked @ Asked::Command(Command::Override(_) | Command::SingleBlock(_))),
-            ) => {
-                steer(run, asked, seen.state, control);
+            (Action::Start, Some(_)) => self.start(seen.position),
+            (Action::Hold, Some(run)) => {
+                run.hold();
+                info!("comes to rest");
             }
-            _ => {}
+            (Action::GoOn, Some(run)) => {
+                // In a hold, at a program stop, or both.
+                control.lock(|control| control.kernel.resume());
+                run.resume();
+                self.has_said = false;
+                info!("goes on");
+            }
+            (Action::Override(step), run) => {
+                self.settings.feed_override = self.settings.feed_override.after(step);
+                if let Some(run) = run {
+                    run.set(&self.settings);
+                }
+                info!("feed override {=u8} %", self.settings.feed_override.percent());
+            }
+            (Action::SingleBlock(is_single), run) => {
+                self.settings.is_single = is_single;
+                if let Some(run) = run {
+                    run.set(&self.settings);
+                }
+                info!("single block {=str}", if is_single { "on" } else { "off" });
+            }
+            (Action::Nothing(why), _) => info!("{=str}", why),
+            // There is no run to hold in the phases before the first start.
+            (Action::Hold | Action::GoOn, None) => {}
         }
     }
 
@@ -214,14 +248,18 @@ impl Work {
             control.intake = intake;
             control.kernel.enable(SETTLE_TICKS);
         });
-        self.run = Some(Run::new(machine.program, feeder));
+        let mut run = Run::new(machine.program, feeder);
+        run.set(&self.settings);
+        self.run = Some(run);
         self.start(here);
     }
 
     /// Starts a run from `here`, as soon as that is logged.
     fn start(&mut self, here: [Position; AXES]) {
         info!("started: from {=[?]} mm", here.map(Position::to_mm));
-        (self.from, self.phase) = (Some(here), Phase::Running);
+        self.from = Some(here);
+        self.phase = Phase::Running { is_held: false, is_stopped: false };
+        self.has_said = false;
     }
 
     /// What takes several ticks. Also in a fault: it may end in a stop on the path.
@@ -231,31 +269,6 @@ impl Work {
             self.no_way = run.start(here).err();
         }
         self.refused = run.turn().err();
-    }
-}
-
-/// Obeys what is asked for of a run. One line of log.
-fn steer(run: &mut Run<'_>, asked: Asked, state: ExecState, control: &mut impl Mutex<T = Control>) {
-    let stands = run.is_held() || state == ExecState::Stopped;
-    match asked {
-        Asked::Press | Asked::Command(Command::GoOn) if stands => {
-            // At a program stop, in a hold, or in a hold at a program stop.
-            control.lock(|control| control.kernel.resume());
-            run.resume();
-            info!("goes on");
-        }
-        Asked::Press | Asked::Command(Command::Hold) => {
-            run.hold();
-            info!("comes to rest: the blue button or ~ goes on");
-        }
-        Asked::Command(Command::GoOn) => info!("it is not held"),
-        Asked::Command(Command::Override(step)) => {
-            info!("feed override {=u8} %", run.override_by(step).percent());
-        }
-        Asked::Command(Command::SingleBlock(is_single)) => {
-            run.single_block(is_single);
-            info!("single block {=str}", if is_single { "on" } else { "off" });
-        }
     }
 }
 
@@ -339,7 +352,11 @@ impl Report {
             }
             _ => {
                 let us = core::mem::take(&mut self.longest_turn_cycles) / (SYSCLK_HZ / 1_000_000);
-                info!("longest background turn {=u32} us, {=u32} stops for want of data", us, starvations);
+                let lost = LOST.load(Ordering::Relaxed);
+                info!(
+                    "longest background turn {=u32} us, {=u32} stops for want of data, {=u32} console bytes lost",
+                    us, starvations, lost
+                );
             }
         }
         self.step = (self.step + 1) % 3;

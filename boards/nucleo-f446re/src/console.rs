@@ -1,7 +1,7 @@
 //! Commands of the serial console: one character each, so that none can come in half.
 //!
-//! Consumes bytes; produces [`Command`]s. What is none is nothing. The console steers motion that the button has started;
-//! it starts none, and goes on only behind a hold: a line that nobody drives must not set a machine going.
+//! Consumes bytes; produces [`Command`]s. Other bytes are ignored. All are small letters: what programs on a PC write to
+//! ports that they take for modems is not (`AT…`, 0x7E).
 
 use motion_kernel::live::{OVERRIDE_MAX, OVERRIDE_MIN};
 
@@ -10,7 +10,7 @@ use motion_kernel::live::{OVERRIDE_MAX, OVERRIDE_MIN};
 pub enum Command {
     /// Come to rest on the path.
     Hold,
-    /// Go on: behind a hold, a block in single block, or a program stop.
+    /// Go on behind a hold, or behind a block in single block.
     GoOn,
     /// Another feed override.
     Override(Step),
@@ -19,15 +19,15 @@ pub enum Command {
 }
 
 impl Command {
-    /// Of a byte. `!` and `~` are those of Grbl.
+    /// Of a byte.
     #[must_use]
     pub fn of(byte: u8) -> Option<Self> {
         Some(match byte {
-            b'!' => Self::Hold,
-            b'~' => Self::GoOn,
-            b'+' => Self::Override(Step::Faster),
-            b'-' => Self::Override(Step::Slower),
-            b'=' => Self::Override(Step::AsProgrammed),
+            b'h' => Self::Hold,
+            b'r' => Self::GoOn,
+            b'u' => Self::Override(Step::Up),
+            b'd' => Self::Override(Step::Down),
+            b'n' => Self::Override(Step::AsProgrammed),
             b's' => Self::SingleBlock(true),
             b'c' => Self::SingleBlock(false),
             _ => return None,
@@ -39,14 +39,14 @@ impl Command {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// By [`STEP_PERCENT`] up.
-    Faster,
+    Up,
     /// By as much down.
-    Slower,
+    Down,
     /// To 100 %.
     AsProgrammed,
 }
 
-/// Least change of the feed override \[%\].
+/// A step of the feed override, and the least override \[%\].
 pub const STEP_PERCENT: u8 = 10;
 /// Greatest feed override \[%\].
 pub const MOST_PERCENT: u8 = 200;
@@ -66,8 +66,8 @@ impl FeedOverride {
     #[must_use]
     pub fn after(self, step: Step) -> Self {
         match step {
-            Step::Faster => Self((self.0 + STEP_PERCENT).min(MOST_PERCENT)),
-            Step::Slower => Self((self.0 - STEP_PERCENT).max(STEP_PERCENT)),
+            Step::Up => Self((self.0 + STEP_PERCENT).min(MOST_PERCENT)),
+            Step::Down => Self((self.0 - STEP_PERCENT).max(STEP_PERCENT)),
             Step::AsProgrammed => Self::NONE,
         }
     }
@@ -90,27 +90,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn seven_characters_are_commands() {
+    fn seven_letters_are_commands() {
         let commands: Vec<_> = (0..=u8::MAX).filter_map(|byte| Some((byte, Command::of(byte)?))).collect();
         let expected = [
-            (b'!', Command::Hold),
-            (b'+', Command::Override(Step::Faster)),
-            (b'-', Command::Override(Step::Slower)),
-            (b'=', Command::Override(Step::AsProgrammed)),
             (b'c', Command::SingleBlock(false)),
+            (b'd', Command::Override(Step::Down)),
+            (b'h', Command::Hold),
+            (b'n', Command::Override(Step::AsProgrammed)),
+            (b'r', Command::GoOn),
             (b's', Command::SingleBlock(true)),
-            (b'~', Command::GoOn),
+            (b'u', Command::Override(Step::Up)),
         ];
         assert_eq!(commands, expected);
-        // What a line reads as that floats or is broken.
-        assert!([0x00, 0xFF].map(Command::of).iter().all(Option::is_none));
+    }
+
+    /// A line that floats or is broken, and a program that looks for a modem.
+    #[test]
+    fn what_nobody_meant_is_none() {
+        let probes: [&[u8]; 4] = [&[0x00, 0xFF], b"AT\r\n", b"AT+CGMM\r", &[0x7E, 0x00, 0x78, 0xF0, 0x7E]];
+        for byte in probes.into_iter().flatten() {
+            assert_eq!(Command::of(*byte), None, "{byte:#x}");
+        }
     }
 
     #[test]
     fn an_override_stays_within_its_range() {
         let (mut up, mut down) = (FeedOverride::NONE, FeedOverride::NONE);
         for steps in 1..=30_u8 {
-            (up, down) = (up.after(Step::Faster), down.after(Step::Slower));
+            (up, down) = (up.after(Step::Up), down.after(Step::Down));
             let most = 100_u32 + 10 * u32::from(steps);
             assert_eq!(u32::from(up.percent()), most.min(200));
             assert_eq!(down.percent(), 100_u8.saturating_sub(steps.saturating_mul(10)).max(10));

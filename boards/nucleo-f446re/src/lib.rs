@@ -3,8 +3,9 @@
 //! - [`design_parameters`]: every number of the firmware with its derivation;
 //! - [`pins`]: which signal is on which pin;
 //! - [`machine`]: the program in flash and the axes it is for;
-//! - [`program`]: what the start button runs;
 //! - [`console`]: what is commanded over the serial port;
+//! - [`operator`]: what is done about that and the button, in every phase;
+//! - [`program`]: what the start button runs;
 //! - [`tick_log`] and [`liveness`]: what the tick keeps about itself.
 //!
 //! The firmware itself is `main.rs` and the modules beside it. From the board's folder:
@@ -23,7 +24,8 @@
 pub mod design_parameters;
 pub mod pins;
 pub mod machine;
-pub mod program;
 pub mod console;
+pub mod operator;
+pub mod program;
 pub mod tick_log;
 pub mod liveness;

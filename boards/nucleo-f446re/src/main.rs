@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! TIM7 ─► tick (the only interrupt)                      background (idle)
-//!         drives: emergency stop, ready   ── Control ──  button, console, log
+//!         drives: emergency stop, ready   ── Control ──  button, log
+//!         console ── bytes ────────────────────────────  commands
 //!         encoders ─► kernel ─► converter ◄─ streams ──  program
 //!         watchdog ◄───────────────────────── turns ───
 //! ```
@@ -21,6 +22,7 @@ mod dac;
 mod drives;
 mod hal;
 mod tick_timer;
+mod console_port;
 mod control;
 mod background;
 
@@ -37,10 +39,11 @@ mod app {
     use core::sync::atomic::Ordering;
 
     use cortex_m::peripheral::DWT;
+    use heapless::spsc::{Consumer, Producer, Queue};
     use motion_kernel::exec::ExecState;
     use motion_kernel::kernel::Kernel;
     use motion_kernel::tick_monitor::TickMonitor;
-    use nucleo_f446re::design_parameters::{TICK_CYCLES, TICK_PRIORITY};
+    use nucleo_f446re::design_parameters::{CONSOLE_BYTES, TICK_CYCLES, TICK_PRIORITY};
     use nucleo_f446re::liveness::Liveness;
     use nucleo_f446re::machine::{AXES, Machine, PROGRAM};
     use nucleo_f446re::tick_log::TickLog;
@@ -51,6 +54,7 @@ mod app {
 
     use crate::background::{self, TICKS, TURNS};
     use crate::board::Board;
+    use crate::console_port;
     use crate::control::{Control, Flight, Streams};
     use crate::hal::Hardware;
     use crate::tick_timer::TickTimer;
@@ -72,6 +76,8 @@ mod app {
         scope: PA10<Output>,
         button: PC13<Input>,
         console: Rx<USART2>,
+        received: Producer<'static, u8>,
+        bytes: Consumer<'static, u8>,
         streams: &'static mut Streams,
         machine: Machine,
     }
@@ -79,6 +85,7 @@ mod app {
     #[init(local = [
         storage: Streams = Streams::new(),
         flight: Flight = Flight::new(),
+        console_bytes: Queue<u8, CONSOLE_BYTES> = Queue::new(),
         // Nothing ever enters it: what the kernel looks at until there is a program.
         empty: motion_kernel::queue::Streams<f32, AXES, 2, 2> = motion_kernel::queue::Streams::new(),
     ])]
@@ -99,6 +106,7 @@ mod app {
             log: TickLog::new(),
             flight: cx.local.flight,
         };
+        let (received, bytes) = cx.local.console_bytes.split();
         Board::start(&mut tick_timer, &mut watchdog);
         let local = Local {
             hardware,
@@ -109,6 +117,8 @@ mod app {
             scope,
             button,
             console,
+            received,
+            bytes,
             streams: cx.local.storage,
             machine,
         };
@@ -121,7 +131,7 @@ mod app {
     #[task(
         binds = TIM7,
         priority = 16,
-        local = [hardware, tick_timer, watchdog, liveness, monitor, scope],
+        local = [hardware, tick_timer, watchdog, liveness, monitor, scope, console, received],
         shared = [control]
     )]
     fn tick(mut cx: tick::Context) {
@@ -149,14 +159,15 @@ mod app {
             let overrun = cx.local.tick_timer.due_again();
             control.log.add(DWT::cycle_count().wrapping_sub(begin), latency_cycles, overrun);
         });
+        console_port::receive(cx.local.console, cx.local.received);
         TICKS.store(TICKS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         cx.local.scope.set_low();
     }
 
     /// The background.
-    #[idle(local = [streams, button, console, machine], shared = [control])]
+    #[idle(local = [streams, button, bytes, machine], shared = [control])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { streams, button, console, machine, .. } = cx.local;
-        background::run(cx.shared.control, streams, machine, (button, console))
+        let idle::LocalResources { streams, button, bytes, machine, .. } = cx.local;
+        background::run(cx.shared.control, streams, machine, button, bytes)
     }
 }

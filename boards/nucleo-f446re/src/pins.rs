@@ -58,7 +58,7 @@ pub const PINS: [Pin; 19] = [
         "CN10-37",
         "D0, CN9-1",
         "USART2_RX AF7, pull-up",
-        "ST-LINK's serial port, over USB",
+        "ST-LINK's serial port, by bridges SB13 and SB14",
     ),
 ];
 

@@ -11,9 +11,9 @@ use motion_kernel::queue::LiveFeeder;
 use motion_kernel::straight::{Straight, StraightError};
 use motion_kernel::units::Position;
 
-use crate::console::{FeedOverride, Step};
 use crate::design_parameters::{LEAD_TICKS, PLACES, TICK_S};
 use crate::machine::AXES;
+use crate::operator::Settings;
 
 /// How fast the machine goes to the program's start, at most \[mm/s\]: slowly, it may come from anywhere.
 const TO_START_MM_S: f64 = 20.0;
@@ -44,7 +44,6 @@ impl Source<AXES> for Runs {
 pub struct Run<'a> {
     feeder: LiveFeeder<'a, f32, AXES>,
     director: Director<f32, AXES, Runs, ProgramError, PLACES>,
-    feed_override: FeedOverride,
 }
 
 impl<'a> Run<'a> {
@@ -52,8 +51,7 @@ impl<'a> Run<'a> {
     #[must_use]
     pub fn new(program: Reader<'static, AXES>, feeder: LiveFeeder<'a, f32, AXES>) -> Self {
         let runs = Runs { program, to_start: None, items: None };
-        let director = Director::new(runs, TICK_S, LEAD_TICKS);
-        Self { feeder, director, feed_override: FeedOverride::NONE }
+        Self { feeder, director: Director::new(runs, TICK_S, LEAD_TICKS) }
     }
 
     /// Starts a run on a machine that stands at `here`, where the streams were split or the run before it ended.
@@ -86,17 +84,11 @@ impl<'a> Run<'a> {
         matches!(self.state(), State::Holding | State::Held)
     }
 
-    /// Changes the feed override, which it returns, of this run and all that follow.
-    pub fn override_by(&mut self, step: Step) -> FeedOverride {
-        self.feed_override = self.feed_override.after(step);
-        // Its range is within the director's.
-        let _ = self.director.set_override(self.feed_override.share());
-        self.feed_override
-    }
-
-    /// Whether to come to rest at the end of every program line, held there.
-    pub fn single_block(&mut self, is_single: bool) {
-        self.director.set_single_block(is_single);
+    /// Goes on as `settings` say, in this run and those to come.
+    pub fn set(&mut self, settings: &Settings) {
+        // The range of overrides is within the director's.
+        let _ = self.director.set_override(settings.feed_override.share());
+        self.director.set_single_block(settings.is_single);
     }
 
     /// Reads and plans what there is room for. Ticks may come meanwhile, and do: it may take many of them.
@@ -126,6 +118,7 @@ mod tests {
     use motion_kernel::queue::LiveStreams;
 
     use super::*;
+    use crate::console::{FeedOverride, Step};
     use crate::design_parameters::TURN_TICKS_MAX;
     use crate::machine::{Machine, PROGRAM};
 
@@ -223,26 +216,28 @@ mod tests {
         }
     }
 
-    /// Faster and slower again and again, on both runs: they end where they should, sooner or later.
+    /// Slower and faster again and again, on both runs: they end where they should, later or sooner.
     #[test]
     fn under_any_override_it_ends_where_it_should() {
-        for (step, is_later) in [(Step::Slower, true), (Step::Faster, false)] {
-            let mut percents = Vec::new();
+        let [slower, faster] = [Step::Down, Step::Up].map(|step| {
+            let mut settings = Settings::NONE;
             let (runs, starvations) = two_runs(1, |tick, run| {
-                if tick % 1500 == 700 {
-                    percents.push(run.override_by(step).percent());
-                } else if tick % 1500 == 1400 {
-                    assert_eq!(run.override_by(Step::AsProgrammed), FeedOverride::NONE);
-                }
+                settings.feed_override = match tick % 1500 {
+                    400..500 => settings.feed_override.after(step),
+                    1400 => FeedOverride::NONE,
+                    _ => settings.feed_override,
+                };
+                run.set(&settings);
             });
             assert_eq!(runs.map(|(_, at)| at), [end(); 2], "{step:?}");
-            assert_eq!(runs[0].0 > STRINGER_TICKS + 4, is_later, "{step:?}: {}", runs[0].0);
-            assert!(percents.len() > 3 && percents.iter().all(|percent| percent.abs_diff(100) == 10));
             assert_eq!(starvations, 0);
-        }
+            runs[0].0
+        });
+        // Curves and jerk limit most of it, so there is little to gain.
+        assert!(slower > STRINGER_TICKS + 1000 && faster < STRINGER_TICKS - 40, "{slower} {faster}");
     }
 
-    /// In single block it is held behind every line of the program; it goes on by itself where that is switched off.
+    /// In single block it is held behind every line of the program, the last one too: more may come.
     #[test]
     fn in_single_block_it_is_held_behind_every_line() {
         let items = Machine::new(PROGRAM).expect("suits").program.items();
@@ -255,7 +250,7 @@ mod tests {
         let (mut held, mut was_held) = (0, false);
         let (runs, _) = two_runs(1, |tick, run| {
             if tick == 0 {
-                run.single_block(true);
+                run.set(&Settings { is_single: true, ..Settings::NONE });
             }
             let is_held = run.state() == State::Held;
             held += usize::from(is_held && !was_held);
