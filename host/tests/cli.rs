@@ -470,11 +470,13 @@ fn jog_goes_as_far_as_its_key_says() {
     assert!((number(&first["feed_mm_s"]) - 50.0).abs() < 1e-3, "{first}");
     assert_eq!((number(&second["from_mm"]), number(&second["to_mm"])), (0.0, -2.5));
     assert_eq!((number(&third["from_mm"]), number(&third["to_mm"])), (20.0, 30.0));
-    // 0.2 s until it is released, then a stop that is no longer than from the greatest feed.
+    // Released after 0.2 s, in the ramp's second half, which jerk limits: it and braking from 50 mm/s take all of their times.
     let (stop_s, stop_mm) = (number(&fourth["stop_s"]), number(&fourth["stop_mm"]));
     assert!((number(&fourth["time_s"]) - stop_s - 0.2).abs() < 1e-9, "{fourth}");
+    let ramp_s = 2.0 * (2.0 * 50.0 / 5000.0_f64).sqrt();
+    assert!((stop_s - (2.0 * ramp_s - 0.2)).abs() < 0.0011, "{fourth}");
     let gone_mm = number(&fourth["from_mm"]) - number(&fourth["to_mm"]);
-    assert!(stop_mm > 1.0 && stop_mm < gone_mm && gone_mm < 20.0 && stop_s < 0.6, "{fourth}");
+    assert!((gone_mm - 50.0 * ramp_s).abs() < 1e-3 && stop_mm < gone_mm, "{fourth}");
     // Where the key is released behind the end, the end is the distance's.
     let gone_mm = number(&fifth["to_mm"]) - number(&fifth["from_mm"]);
     assert!((gone_mm - 1.0).abs() < 1e-9 && fifth["stop_s"].is_null(), "{fifth}");
@@ -494,11 +496,32 @@ fn jog_goes_as_far_as_its_key_says() {
             "X+: found no [axis.travel] for its axis, expected one to go on to, or a distance",
         ),
         (&["jog", "X+1", "Q+1"], "Q+1: found no such axis, expected one of X, Y, Z"),
-        (&["jog", "X+1", "--feed", "301"], "X+1: feed 301 mm/s: expected above 0, at most 300"),
-        (&["jog", "X+0"], "X+0: a distance of 0: expected a way to go"),
+        (&["jog", "X+1", "--feed", "301"], "X+1: found a feed of 301 mm/s, expected above 0, at most 300"),
+        (&["jog", "X+1", "--feed", "nan"], "X+1: found a feed of NaN mm/s, expected above 0, at most 300"),
     ] {
         assert_eq!(desk.refusal(arguments), expected);
     }
+    let output = desk.motion(&["jog", "X+0"]);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && error.contains("found a distance of 0 mm"), "{error}");
+    // What is refused replaces no file.
+    desk.put("kept.csv", "kept");
+    for arguments in
+        [&["jog", "X+1", "Q+1"][..], &["jog", "X+1", "--feed", "0"], &["home", "--machine", "machine.toml"]]
+    {
+        desk.refusal(&[arguments, &["--trace", "kept.csv"]].concat());
+        assert_eq!(desk.read("kept.csv"), "kept");
+    }
+
+    // An axis that does not follow ends the jog in a fault; what came before is printed.
+    desk.put(
+        "loose.toml",
+        &file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.003"),
+    );
+    let output = desk.motion(&["jog", "X+0.01", "X+20", "--machine", "loose.toml"]);
+    let (shown, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(shown.contains("X+0.01") && error.contains("X+20: fault in tick "), "{shown} {error}");
 }
 
 /// A run with commands, and one that ends in a fault: recorded, and once more from the recording alone.

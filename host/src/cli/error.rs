@@ -149,7 +149,7 @@ pub enum CliError {
 impl CliError {
     /// 2, but for output that failed, for a plan that the kernel refuses, for an experiment that ended in a fault or
     /// found nothing to measure, for one that found too little to tune by, for an axis that found no reference, and for a
-    /// jog that ended in a fault: these are not the user's input.
+    /// jog or a homing that ended in a fault or that the kernel refuses: these are not the user's input.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
@@ -174,7 +174,9 @@ impl CliError {
 /// A fault, or motion that the kernel refuses, is not the user's input.
 fn ended_badly(error: &SessionError) -> ExitCode {
     match error {
-        SessionError::Fault(_) | SessionError::Run(RunError::Rejected(_)) => ExitCode::FAILURE,
+        SessionError::Fault(_) | SessionError::Moves | SessionError::Run(RunError::Rejected(_)) => {
+            ExitCode::FAILURE
+        }
         SessionError::Run(_) => ExitCode::from(2),
     }
 }

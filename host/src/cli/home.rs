@@ -11,7 +11,7 @@ use super::outputs::Outputs;
 use super::table::{self, Align};
 use super::{input, write_json};
 use crate::machine::Machine;
-use crate::simulate::home::{HomedAxis, home};
+use crate::simulate::home::{HomeError, HomedAxis, Homes};
 use crate::simulate::job::Sheet;
 
 const EXAMPLES: &str = "\
@@ -57,10 +57,14 @@ struct AxisJson<'a> {
 /// The machine file is refused or homes no axis, or a file can't be written.
 pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(Some(&arguments.machine))?;
+    let name = arguments.machine.display().to_string();
+    let refused = |source: HomeError| CliError::Home { machine: name.clone(), source };
+    // Before any file is replaced.
+    let homes = Homes::new(&machine).map_err(refused)?;
     let outputs = Outputs::create(&arguments.trace, &None)?;
     let mut homed = Vec::new();
     let (ended, _) =
-        outputs.of_ticks(&Sheet::of_machine(&machine), |observe| home(&machine, &mut homed, observe))?;
+        outputs.of_ticks(&Sheet::of_machine(&machine), |observe| homes.home(&mut homed, observe))?;
     // What was homed is shown, whatever became of the next axis.
     if arguments.json {
         let axes: Vec<AxisJson<'_>> = homed.iter().map(|axis| axis_json(axis, &machine)).collect();
@@ -68,8 +72,7 @@ pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     } else if !homed.is_empty() {
         write_table(&homed, &machine, out).map_err(CliError::Output)?;
     }
-    let machine = arguments.machine.display().to_string();
-    ended.map(|()| Outcome::Done).map_err(|source| CliError::Home { machine, source })
+    ended.map(|()| Outcome::Done).map_err(refused)
 }
 
 fn axis_json<'a>(axis: &'a HomedAxis, machine: &Machine) -> AxisJson<'a> {

@@ -11,7 +11,7 @@ use super::outputs::Outputs;
 use super::table::{self, Align};
 use super::{input, write_json};
 use crate::simulate::job::Sheet;
-use crate::simulate::jog::{Ended, Jogged, Press, jog};
+use crate::simulate::jog::{Ended, Jogged, Keys, Press};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,7 +26,9 @@ stop_s, stop_mm (from the key's release to rest; null where it was not released 
 
 Exit status: 1 where a fault ended a jog, 2 where a key is refused; what came before is printed.";
 
-/// Jog axes of the simulated machine from where it is switched on: one key after the other, each until it rests.
+/// Jog axes of the simulated machine: one key after the other, each until it rests.
+///
+/// Positions, and so soft limits, count from where the machine is switched on, as they do for programs.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct JogArguments {
@@ -86,11 +88,12 @@ impl PressJson {
 /// The machine file or a key is refused, a fault ended a jog, or a file can't be written.
 pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(arguments.machine.as_ref())?;
+    // Before any file is replaced.
+    let keys = Keys::new(&machine, &arguments.presses, arguments.feed)?;
     let outputs = Outputs::create(&arguments.trace, &None)?;
     let mut jogged = Vec::new();
-    let (ended, _) = outputs.of_ticks(&Sheet::of_machine(&machine), |observe| {
-        jog(&machine, &arguments.presses, arguments.feed, &mut jogged, observe)
-    })?;
+    let (ended, _) =
+        outputs.of_ticks(&Sheet::of_machine(&machine), |observe| keys.jog(&mut jogged, observe))?;
     // What was jogged is shown, whatever became of the next key.
     let presses: Vec<PressJson> =
         jogged.iter().map(|jogged| PressJson::new(jogged, machine.tick_s)).collect();

@@ -9,9 +9,8 @@ use motion_kernel::jog::Jog;
 use motion_kernel::num::Real;
 
 use super::Observer;
-use super::rig::Simulated;
-use super::run::RunError;
-use super::session::{Session, SessionError, Then};
+use super::run::{RunError, simulated};
+use super::session::{Session, SessionError, Then, jog_axis};
 use crate::machine::{HomingSettings, Machine};
 use crate::record::AXES;
 
@@ -67,7 +66,8 @@ impl<R: Real> Session<'_, R> {
         observe: &mut Observer<'_>,
     ) -> Result<HomedAxis, HomeError> {
         let name = &self.machine.axes[axis].name;
-        let mut homing = Homing::new(settings.config, &self.of_axis(axis), axis, self.machine.tick_s);
+        let mut homing =
+            Homing::new(settings.config, &jog_axis(self.machine, axis), axis, self.machine.tick_s);
         let failed = |source: HomingError| HomeError::Axis { axis: name.clone(), source };
         let (mut jog, first) = (None::<Jog<AXES>>, self.ticks);
         loop {
@@ -113,25 +113,34 @@ impl<R: Real> Session<'_, R> {
     }
 }
 
-/// Homes every axis that has settings, one after the other, into `homed`.
-///
-/// # Errors
-/// An axis is not homed, or the machine can't be simulated.
-pub fn home(
-    machine: &Machine,
-    homed: &mut Vec<HomedAxis>,
-    observe: &mut Observer<'_>,
-) -> Result<(), HomeError> {
-    if machine.axes.iter().all(|axis| axis.homing.is_none()) {
-        return Err(HomeError::NoAxis);
+/// The axes that have settings.
+#[derive(Clone, Debug)]
+pub struct Homes<'a> {
+    machine: &'a Machine,
+    axes: Vec<(usize, &'a HomingSettings)>,
+}
+
+impl<'a> Homes<'a> {
+    /// Those of a machine.
+    ///
+    /// # Errors
+    /// There are none.
+    pub fn new(machine: &'a Machine) -> Result<Self, HomeError> {
+        let settings = machine.axes.iter().enumerate();
+        let axes: Vec<_> = settings.filter_map(|(axis, of)| Some((axis, of.homing.as_ref()?))).collect();
+        if axes.is_empty() { Err(HomeError::NoAxis) } else { Ok(Self { machine, axes }) }
     }
-    let simulated =
-        Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))?;
-    let mut session = Session::<f32>::new(machine, &simulated)?;
-    for (axis, settings) in machine.axes.iter().enumerate() {
-        if let Some(homing) = &settings.homing {
-            homed.push(session.home(axis, homing, observe)?);
+
+    /// Homes one after the other, into `homed`.
+    ///
+    /// # Errors
+    /// An axis is not homed, or the machine can't be simulated.
+    pub fn home(&self, homed: &mut Vec<HomedAxis>, observe: &mut Observer<'_>) -> Result<(), HomeError> {
+        let simulated = simulated(self.machine)?;
+        let mut session = Session::<f32>::new(self.machine, &simulated)?;
+        for &(axis, settings) in &self.axes {
+            homed.push(session.home(axis, settings, observe)?);
         }
+        Ok(())
     }
-    Ok(())
 }

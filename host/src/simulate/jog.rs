@@ -12,12 +12,12 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::jog::{Direction, Jog, JogAxis, Travel, Way};
 use motion_kernel::live::State;
 use motion_kernel::num::Real;
+use motion_kernel::straight::StraightError;
 use motion_kernel::units::Position;
 
 use super::Observer;
-use super::rig::Simulated;
-use super::run::RunError;
-use super::session::{Session, SessionError, Then};
+use super::run::{RunError, simulated};
+use super::session::{Session, SessionError, Then, jog_axis};
 use crate::machine::Machine;
 
 /// A key that is pressed.
@@ -29,55 +29,61 @@ pub struct Press {
     pub way: Way,
     /// After how many ticks the key is released, at least 1.
     pub release: Option<u64>,
+    text: String,
 }
 
-/// Why a text is no press of a key.
+/// Why a text is no press of a key. Displays as "found …, expected …".
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "found `{0}`, expected an axis, + or -, a distance in mm or none, and @TICKS until it is released: X+, X-2.5, Y+@800"
-)]
-pub struct PressError(String);
+pub enum PressError {
+    /// It has another form.
+    #[error(
+        "found `{0}`, expected an axis, + or -, a distance in mm or none, and @TICKS until it is released: X+, X-2.5, Y+@800"
+    )]
+    Form(String),
+    /// The distance is 0 or beyond what positions hold.
+    #[error("found a distance of {0} mm, expected one of at least a position step, 2⁻³² mm, and at most {most} mm", most = Position::LIMIT_MM)]
+    Distance(String),
+    /// The ticks are no positive whole number.
+    #[error("found `@{0}`, expected a whole number of ticks, at least 1")]
+    Release(String),
+}
 
 impl FromStr for Press {
     type Err = PressError;
 
     fn from_str(text: &str) -> Result<Self, PressError> {
-        let wrong = || PressError(text.to_owned());
-        let at = text.find(['+', '-']).filter(|&at| at > 0).ok_or_else(wrong)?;
+        let form = || PressError::Form(text.to_owned());
+        let at = text.find(['+', '-']).filter(|&at| at > 0).ok_or_else(form)?;
         let (axis, rest) = text.split_at(at);
         let (direction, rest) = match rest.strip_prefix('+') {
             Some(rest) => (Direction::Positive, rest),
             None => (Direction::Negative, &rest[1..]),
         };
-        let (distance, release) = match rest.split_once('@') {
-            Some((distance, tick)) => {
-                (distance, Some(tick.parse().ok().filter(|&tick| tick > 0).ok_or_else(wrong)?))
-            }
-            None => (rest, None),
+        let (distance, ticks) =
+            rest.split_once('@').map_or((rest, None), |(distance, ticks)| (distance, Some(ticks)));
+        // Digits only: a second sign, `inf` and `nan` are no figures.
+        let is_plain =
+            |text: &str, also: &[u8]| text.bytes().all(|byte| byte.is_ascii_digit() || also.contains(&byte));
+        let release = |ticks: &str| {
+            let whole = ticks.parse().ok().filter(|&whole: &u64| whole > 0 && is_plain(ticks, b""));
+            whole.ok_or_else(|| PressError::Release(ticks.to_owned()))
         };
         let way = if distance.is_empty() {
             Way::Continuous(direction)
         } else {
-            // Digits only: a second sign, `inf` and `nan` are no distance.
-            let is_plain = distance.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
-            let mm = distance.parse().ok().filter(|_| is_plain);
-            let by = mm.and_then(Position::from_mm).ok_or_else(wrong)?;
+            let mm: f64 = distance.parse().ok().filter(|_| is_plain(distance, b".")).ok_or_else(form)?;
+            let by = Position::from_mm(mm).filter(|&by| by > Position::ZERO);
+            let by = by.ok_or_else(|| PressError::Distance(distance.to_owned()))?;
             Way::By(if direction == Direction::Negative { -by } else { by })
         };
-        Ok(Self { axis: axis.to_owned(), way, release })
+        let release = ticks.map(release).transpose()?;
+        Ok(Self { axis: axis.to_owned(), way, release, text: text.to_owned() })
     }
 }
 
 impl fmt::Display for Press {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.axis)?;
-        match self.way {
-            Way::Continuous(Direction::Positive) => f.write_str("+")?,
-            Way::Continuous(Direction::Negative) => f.write_str("-")?,
-            // To the picometre, which is less than a position step.
-            Way::By(by) => write!(f, "{:+}", (by.to_mm() * 1e9).round() / 1e9)?,
-        }
-        self.release.map_or(Ok(()), |ticks| write!(f, "@{ticks}"))
+        f.write_str(&self.text)
     }
 }
 
@@ -125,6 +131,16 @@ pub enum JogError {
         /// What axes there are.
         names: String,
     },
+    /// The feed is none that its axis has.
+    #[error("{press}: found a feed of {feed_mm_s} mm/s, expected above 0, at most {most_mm_s}")]
+    Feed {
+        /// The press.
+        press: String,
+        /// The feed.
+        feed_mm_s: f64,
+        /// The greatest of the axis.
+        most_mm_s: f64,
+    },
     /// It would have no end.
     #[error("{0}: found no [axis.travel] for its axis, expected one to go on to, or a distance")]
     NoTravel(String),
@@ -135,6 +151,16 @@ pub enum JogError {
         press: String,
         /// Why.
         source: motion_kernel::jog::JogError,
+    },
+    /// At its feed there is no motion over its length.
+    #[error("{press} at {feed_mm_s} mm/s: {source}")]
+    NoMotion {
+        /// The press.
+        press: String,
+        /// Its feed.
+        feed_mm_s: f64,
+        /// Why.
+        source: StraightError,
     },
     /// A motion did not come to its end.
     #[error("{press}: {source}")]
@@ -150,7 +176,7 @@ pub enum JogError {
 }
 
 impl<R: Real> Session<'_, R> {
-    /// Presses a key of `axis`, at `feed_mm_s` or the greatest, and waits until the machine stands.
+    /// Presses a key of `axis` at `feed_mm_s`, and waits until the machine stands.
     ///
     /// # Errors
     /// It is refused, or there was a fault.
@@ -158,16 +184,21 @@ impl<R: Real> Session<'_, R> {
         &mut self,
         axis: usize,
         press: &Press,
-        feed_mm_s: Option<f64>,
+        feed_mm_s: f64,
         observe: &mut Observer<'_>,
     ) -> Result<Jogged, JogError> {
         let travel = self.machine.travel()[axis].map(|[least, greatest]| Travel { least, greatest });
-        let of_axis = JogAxis { travel, ..self.of_axis(axis) };
-        let feed_mm_s = feed_mm_s.unwrap_or(of_axis.feed_mm_s);
+        let of_axis = JogAxis { travel, ..jog_axis(self.machine, axis) };
         let jog = Jog::new(&of_axis, axis, self.set, press.way, feed_mm_s, self.machine.tick_s);
-        let jog = jog.map_err(|source| match source {
-            motion_kernel::jog::JogError::NoTravel => JogError::NoTravel(press.to_string()),
-            source => JogError::Refused { press: press.to_string(), source },
+        let jog = jog.map_err(|source| {
+            let press = press.to_string();
+            match source {
+                motion_kernel::jog::JogError::NoTravel => JogError::NoTravel(press),
+                motion_kernel::jog::JogError::Straight(source) => {
+                    JogError::NoMotion { press, feed_mm_s, source }
+                }
+                source => JogError::Refused { press, source },
+            }
         })?;
         let (first, from_mm, ends_at_limit) = (self.ticks, self.set[axis].to_mm(), jog.ends_at_limit());
         let (mut tick, mut greatest_mm_s, mut released, mut is_aborted) = (0, 0.0_f64, None, false);
@@ -186,8 +217,9 @@ impl<R: Real> Session<'_, R> {
                 Then::GoOn
             })
         });
-        drive.map_err(|source| JogError::Session { press: press.to_string(), source })?;
-        self.set = self.kernel.rest_here().unwrap_or(self.set);
+        drive
+            .and_then(|()| self.rest())
+            .map_err(|source| JogError::Session { press: press.to_string(), source })?;
         let (to_mm, ticks) = (self.set[axis].to_mm(), self.ticks - first);
         let ended = match released {
             Some((at, at_mm)) if is_aborted => {
@@ -200,31 +232,49 @@ impl<R: Real> Session<'_, R> {
     }
 }
 
-/// Presses the keys one after the other, at `feed_mm_s` or the greatest of each axis, into `jogged`.
-///
-/// # Errors
-/// There is no such axis; then nothing moves. A press is refused, or the machine can't be simulated.
-pub fn jog(
-    machine: &Machine,
-    presses: &[Press],
-    feed_mm_s: Option<f64>,
-    jogged: &mut Vec<Jogged>,
-    observe: &mut Observer<'_>,
-) -> Result<(), JogError> {
-    let axis_of = |press: &Press| {
-        machine.axes.iter().position(|axis| axis.name == press.axis).ok_or_else(|| JogError::Axis {
-            press: press.to_string(),
-            names: machine.axes.each_ref().map(|axis| axis.name.as_str()).join(", "),
-        })
-    };
-    let axes = presses.iter().map(axis_of).collect::<Result<Vec<usize>, _>>()?;
-    let simulated =
-        Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))?;
-    let mut session = Session::<f32>::new(machine, &simulated)?;
-    for (press, axis) in presses.iter().zip(axes) {
-        jogged.push(session.jog(axis, press, feed_mm_s, observe)?);
+/// Keys of a machine, each at a feed that its axis has.
+#[derive(Clone, Debug)]
+pub struct Keys<'a> {
+    machine: &'a Machine,
+    /// With the axis, from 0, and the feed \[mm/s\].
+    presses: Vec<(usize, f64, &'a Press)>,
+}
+
+impl<'a> Keys<'a> {
+    /// `presses` at `feed_mm_s`, or at the greatest feed of each axis.
+    ///
+    /// # Errors
+    /// There is no such axis, or it has no such feed.
+    pub fn new(machine: &'a Machine, presses: &'a [Press], feed_mm_s: Option<f64>) -> Result<Self, JogError> {
+        let key = |press: &'a Press| {
+            let axis = machine.axes.iter().position(|axis| axis.name == press.axis);
+            let axis = axis.ok_or_else(|| JogError::Axis {
+                press: press.to_string(),
+                names: machine.axes.each_ref().map(|axis| axis.name.as_str()).join(", "),
+            })?;
+            let most_mm_s = jog_axis(machine, axis).feed_mm_s;
+            let feed_mm_s = feed_mm_s.unwrap_or(most_mm_s);
+            // Written so that what is not a number is refused.
+            if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s) {
+                return Err(JogError::Feed { press: press.to_string(), feed_mm_s, most_mm_s });
+            }
+            Ok((axis, feed_mm_s, press))
+        };
+        Ok(Self { machine, presses: presses.iter().map(key).collect::<Result<_, _>>()? })
     }
-    Ok(())
+
+    /// Presses them one after the other, from where the machine is switched on; what came of each into `jogged`.
+    ///
+    /// # Errors
+    /// A press is refused, there was a fault, or the machine can't be simulated.
+    pub fn jog(&self, jogged: &mut Vec<Jogged>, observe: &mut Observer<'_>) -> Result<(), JogError> {
+        let simulated = simulated(self.machine)?;
+        let mut session = Session::<f32>::new(self.machine, &simulated)?;
+        for &(axis, feed_mm_s, press) in &self.presses {
+            jogged.push(session.jog(axis, press, feed_mm_s, observe)?);
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -233,39 +283,28 @@ mod tests {
 
     #[test]
     fn a_press_displays_as_the_text_it_is_read_from() {
-        for text in ["X+", "X-", "Y+@800", "X+20", "X-2.5", "Long name-0.000000001@1", "X+1000000"] {
+        for text in ["X+", "X-", "Y+@800", "X+20", "X-2.50", "Long name-0.000000001@1", "X+.5", "X+1000000"] {
             let press: Press = text.parse().unwrap_or_else(|error| panic!("{text}: {error}"));
             assert_eq!(press.to_string(), text);
         }
         let press: Press = "X-2.5@7".parse().expect("a press");
         let by = Way::By(-Position::from_mm(2.5).expect("in range"));
-        assert_eq!(press, Press { axis: "X".to_owned(), way: by, release: Some(7) });
+        assert_eq!((press.axis.as_str(), press.way, press.release), ("X", by, Some(7)));
     }
 
     #[test]
     fn what_is_no_press_is_refused() {
-        for text in [
-            "",
-            "X",
-            "5",
-            "+5",
-            "X5",
-            "X+-5",
-            "X++",
-            "X+5mm",
-            "X+1e3",
-            "X+inf",
-            "X+nan",
-            "X+.",
-            "X+2147483648",
-            "X+@",
-            "X+@0",
-            "X+@-1",
-            "X+5@1.5",
-            "X+5@1@2",
-        ] {
-            let error = text.parse::<Press>().expect_err(text);
-            assert!(error.to_string().starts_with(&format!("found `{text}`, expected")), "{error}");
+        let parsed = |text: &str| text.parse::<Press>().expect_err(text);
+        for text in
+            ["", "X", "5", "+5", "X5", "X+-5", "X++", "X+5mm", "X+1e3", "X+inf", "X+nan", "X+.", "X+ 5"]
+        {
+            assert_eq!(parsed(text), PressError::Form(text.to_owned()));
+        }
+        for distance in ["0", "0.00", "0.0000000001", "2000000000", "1000000000000"] {
+            assert_eq!(parsed(&format!("X+{distance}")), PressError::Distance(distance.to_owned()));
+        }
+        for ticks in ["", "0", "-1", "+5", "1.5", "1@2", "99999999999999999999"] {
+            assert_eq!(parsed(&format!("X-5@{ticks}")), PressError::Release(ticks.to_owned()));
         }
     }
 }

@@ -126,13 +126,17 @@ pub fn on_simulated<T>(
     injections: Option<&Injections>,
     work: impl FnOnce(&mut Rig<'_>) -> Result<T, RunError>,
 ) -> Result<T, RunError> {
-    let simulated =
-        Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))?;
+    let simulated = simulated(machine)?;
     let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
     if let Some(injections) = injections {
         rig.breaks = injections.of(machine)?;
     }
     work(&mut rig)
+}
+
+/// The machine's drives, converter and encoders, at rest at the origin.
+pub(super) fn simulated(machine: &Machine) -> Result<Simulated, RunError> {
+    Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))
 }
 
 /// Runs `job` on `hardware`.

@@ -38,6 +38,9 @@ pub enum SessionError {
     /// The machine can't be simulated, or the motion not executed.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// The motion is over, and the machine moves.
+    #[error("found the machine moving at a motion's end, expected it at rest")]
+    Moves,
     /// The kernel found a fault.
     #[error("fault in tick {}: {}: {}", .0.tick, .0.fault, .0.detail)]
     Fault(FaultRecord),
@@ -85,14 +88,6 @@ impl<'a, R: Real> Session<'a, R> {
         self.set
     }
 
-    /// What an axis may do by itself, not knowing where it is: its limits, and those of any path.
-    pub(super) fn of_axis(&self, axis: usize) -> JogAxis {
-        let &AxisSettings { feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, .. } = &self.machine.axes[axis];
-        let path = &self.machine.path;
-        let limits = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }.least(&path.limits());
-        JogAxis { feed_mm_s: feed_mm_s.min(path.feed_mm_s), limits, travel: None }
-    }
-
     /// Drives items from where the machine stands to their end.
     ///
     /// # Errors
@@ -106,7 +101,12 @@ impl<'a, R: Real> Session<'a, R> {
             let is_done = state == State::Done && trace.executed.state == ExecState::Idle;
             Ok::<_, SessionError>(if is_done { Then::End } else { Then::GoOn })
         })?;
-        self.set = self.kernel.rest_here().unwrap_or(self.set);
+        self.rest()
+    }
+
+    /// Takes where a motion has come to rest for where the machine stands.
+    pub(super) fn rest(&mut self) -> Result<(), SessionError> {
+        self.set = self.kernel.rest_here().ok_or(SessionError::Moves)?;
         Ok(())
     }
 
@@ -138,4 +138,12 @@ impl<'a, R: Real> Session<'a, R> {
             }
         }
     }
+}
+
+/// What an axis may do by itself, not knowing where it is: its limits, and those of any path.
+pub(super) fn jog_axis(machine: &Machine, axis: usize) -> JogAxis {
+    let &AxisSettings { feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, .. } = &machine.axes[axis];
+    let path = &machine.path;
+    let limits = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }.least(&path.limits());
+    JogAxis { feed_mm_s: feed_mm_s.min(path.feed_mm_s), limits, travel: None }
 }

@@ -66,7 +66,7 @@ impl Path {
                 let (angle_rad, bend) = joint(&last.element, &element);
                 // What is less is no angle to any machine.
                 let limit_rad = machine.path.joint_angle_rad.max(TANGENT_ROUNDING_RAD);
-                // How an arc meets a radius that its end rounds to is up to who draws it.
+                // An arc's ends differ in radius by rounding; the direction at its end depends on where that is put.
                 let slant_rad = last.element.slant_rad() + element.slant_rad();
                 let is_close = (angle_rad - limit_rad).abs() <= 1e-6 * limit_rad + 1e-9 + slant_rad;
                 path.is_ambiguous |= is_close;
