@@ -516,7 +516,7 @@ fn jog_goes_as_far_as_its_key_says() {
     // An axis that does not follow ends the jog in a fault; what came before is printed.
     desk.put(
         "loose.toml",
-        &file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.003"),
+        &file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.002"),
     );
     let output = desk.motion(&["jog", "X+0.01", "X+20", "--machine", "loose.toml"]);
     let (shown, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));

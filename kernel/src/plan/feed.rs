@@ -1,7 +1,7 @@
-//! Planned blocks as feed segments.
+//! Planned blocks and spans as feed segments.
 //!
 //! Consumes a block's plan and its exact start and end on the path; produces up to three segments
-//! that fill it without a gap of a single position step: accelerate, cruise, brake.
+//! that fill it without a gap of a single position step: accelerate, cruise, brake. A span is one segment.
 
 use super::lookahead::{Block, BlockPlan};
 use super::spanning::FeedSpan;
@@ -70,10 +70,12 @@ impl FeedSpan {
         length: Position,
         tick_s: f64,
     ) -> Result<Option<FeedSegment<R>>, SegmentError> {
-        match self.ramp.is_cruise() {
-            true if length <= Position::ZERO => Ok(None),
-            true => FeedSegment::cruise(self.ramp.from_mm_s, length, tick_s).map(Some),
-            false => FeedSegment::ramp(&self.ramp, length, tick_s).map(Some),
+        if !self.ramp.is_cruise() {
+            FeedSegment::ramp(&self.ramp, length, tick_s).map(Some)
+        } else if length > Position::ZERO {
+            FeedSegment::cruise(self.ramp.from_mm_s, length, tick_s).map(Some)
+        } else {
+            Ok(None)
         }
     }
 }
