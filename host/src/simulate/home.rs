@@ -9,7 +9,8 @@ use motion_kernel::jog::Jog;
 use motion_kernel::num::Real;
 
 use super::Observer;
-use super::run::{RunError, simulated};
+use super::error::RunError;
+use super::run::simulated;
 use super::session::{Session, SessionError, Then, jog_axis};
 use crate::machine::{HomingSettings, Machine};
 use crate::record::AXES;

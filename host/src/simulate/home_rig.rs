@@ -6,8 +6,8 @@ use hal_sim::SimHome;
 use motion_kernel::hal::{DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::units::{Counts, DacCode};
 
+use super::error::RunError;
 use super::rig::{Rig, Simulated};
-use super::run::RunError;
 use crate::machine::Machine;
 use crate::record::AXES;
 

@@ -8,11 +8,52 @@ use motion_kernel::num::{Fixed, Real};
 use motion_kernel::program::{Header, Item};
 use serde::{Deserialize, Serialize};
 
+use super::error::RunError;
+use super::inject::Injections;
 use super::live::Script;
-use super::run::{Number, RunError, RunOptions, StretchCorrection};
 use crate::machine::{AxisError, Machine};
 use crate::planning::{Executable, Item as PlanItem, Plan};
 use crate::record::{AXES, BlockRecord, PathLimits, RunRecord};
+
+/// The number type of the kernel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Number {
+    /// As on a board with a single-precision FPU.
+    #[default]
+    F32,
+    /// The reference.
+    F64,
+    /// As on a board without an FPU.
+    Fixed,
+}
+
+/// A correction of one stretch of a program, for the kernel's [`Correction`](motion_kernel::axis::Correction).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StretchCorrection {
+    /// Which stretch, from 0.
+    pub stretch: u32,
+    /// Ticks from knot to knot.
+    pub knot_ticks: u16,
+    /// Velocity commands \[mm/s\], the first one in the stretch's first tick.
+    pub knots_mm_s: Vec<[f64; AXES]>,
+    /// No knot is of a greater magnitude \[mm/s\].
+    pub bound_mm_s: f64,
+}
+
+/// How a program is run.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RunOptions<'a> {
+    /// The kernel's number type.
+    pub number: Number,
+    /// What was learnt of one of its stretches.
+    pub correction: Option<&'a StretchCorrection>,
+    /// Live control.
+    pub script: Option<&'a Script>,
+    /// What breaks.
+    pub injections: Option<&'a Injections>,
+    /// An experiment that may drive axes as no program does: nothing but the limits of their following errors is watched.
+    pub is_unguarded: bool,
+}
 
 /// A program with its machine, and with what is commanded on the way.
 #[derive(Clone, Debug)]

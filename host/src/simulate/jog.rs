@@ -16,7 +16,8 @@ use motion_kernel::straight::StraightError;
 use motion_kernel::units::Position;
 
 use super::Observer;
-use super::run::{RunError, simulated};
+use super::error::RunError;
+use super::run::simulated;
 use super::session::{Session, SessionError, Then, jog_axis};
 use crate::machine::Machine;
 

@@ -4,6 +4,7 @@
 //! [`TickRecord`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter and
 //! the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
+//! - [`error`]: why a run could not be made;
 //! - [`job`]: what is executed, and what its records call it by;
 //! - [`faults`]: names and table of faults;
 //! - [`inject`]: what breaks before given ticks;
@@ -23,6 +24,7 @@
 mod background;
 mod commands;
 pub(crate) mod contour;
+pub mod error;
 pub mod job;
 pub mod faults;
 pub mod inject;
@@ -36,9 +38,10 @@ pub mod session;
 pub mod home;
 pub mod jog;
 
-pub use job::{Job, Sheet};
+pub use error::RunError;
+pub use job::{Job, Number, RunOptions, Sheet, StretchCorrection};
 pub use rig::Hardware;
-pub use run::{Number, RunError, RunOptions, StretchCorrection, on_simulated, run, run_on, run_with};
+pub use run::{on_simulated, run, run_on, run_with};
 pub use summary::{AxisSummary, RunSummary};
 
 use crate::record::TickRecord;

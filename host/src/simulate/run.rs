@@ -3,97 +3,30 @@
 //! Consumes a [`Job`] and [`Hardware`]; whatever the hardware is, kernel, streams and background are the same, and so
 //! is what they do, to the bit, as long as the hardware's answers are.
 
-use core::convert::Infallible;
-
-use motion_kernel::axis::{Correction, CorrectionError};
+use motion_kernel::axis::Correction;
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Reaction;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
-use motion_kernel::program::SupplyError;
 use motion_kernel::trace::Trace;
-use serde::{Deserialize, Serialize};
 
 use super::Observer;
 use super::background::Storage;
 use super::commands::Commands;
 use super::contour::Contour;
+use super::error::RunError;
 use super::faults;
-use super::inject::{InjectionError, Injections};
-use super::job::Job;
+use super::inject::Injections;
+use super::job::{Job, Number, RunOptions, StretchCorrection};
 use super::limit_share::LimitShare;
-use super::live::Script;
 use super::rig::{Hardware, Rig, Simulated};
 use super::summary::{Collector, RunSummary};
-use crate::machine::{AxisError, Machine};
-use crate::planning::{Plan, PlanningError};
+use crate::machine::Machine;
+use crate::planning::Plan;
 use crate::record::{AXES, AxisTick, TickRecord};
 
 /// How long the machine is given to settle before its end position is read \[s\].
 const SETTLE_S: f64 = 0.2;
-
-/// The number type of the kernel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Number {
-    /// As on a board with a single-precision FPU.
-    #[default]
-    F32,
-    /// The reference.
-    F64,
-    /// As on a board without an FPU.
-    Fixed,
-}
-
-/// A correction of one stretch of a program, for the kernel's [`Correction`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StretchCorrection {
-    /// Which stretch, from 0.
-    pub stretch: u32,
-    /// Ticks from knot to knot.
-    pub knot_ticks: u16,
-    /// Velocity commands \[mm/s\], the first one in the stretch's first tick.
-    pub knots_mm_s: Vec<[f64; AXES]>,
-    /// No knot is of a greater magnitude \[mm/s\].
-    pub bound_mm_s: f64,
-}
-
-/// How a program is run.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct RunOptions<'a> {
-    /// The kernel's number type.
-    pub number: Number,
-    /// What was learnt of one of its stretches.
-    pub correction: Option<&'a StretchCorrection>,
-    /// Live control.
-    pub script: Option<&'a Script>,
-    /// What breaks.
-    pub injections: Option<&'a Injections>,
-    /// An experiment that may drive axes as no program does: nothing but the limits of their following errors is watched.
-    pub is_unguarded: bool,
-}
-
-/// Why a run could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The plan can't be executed.
-    #[error(transparent)]
-    Planning(#[from] PlanningError),
-    /// The machine's parameters can't be used.
-    #[error(transparent)]
-    Machine(#[from] AxisError),
-    /// The simulated machine can't be built.
-    #[error("simulated machine: {0}")]
-    Simulation(String),
-    /// What is to break is not there.
-    #[error(transparent)]
-    Injection(#[from] InjectionError),
-    /// The correction can't be used.
-    #[error("correction: {0}")]
-    Correction(#[from] CorrectionError),
-    /// The kernel refused what the planner made.
-    #[error("the kernel rejects the plan: {0}")]
-    Rejected(SupplyError<Infallible>),
-}
 
 /// Runs `plan` in f32, as a board would.
 ///

@@ -19,11 +19,12 @@ use motion_kernel::units::Position;
 
 use super::Observer;
 use super::contour::Contour;
+use super::error::RunError;
 use super::faults;
 use super::home_rig::HomeRig;
 use super::job::Sheet;
 use super::rig::Simulated;
-use super::run::{RunError, tick_record};
+use super::run::tick_record;
 use crate::machine::{AxisSettings, Machine};
 use crate::record::{AXES, FaultRecord};
 
