@@ -296,6 +296,7 @@ where
             self.wanted = self.wanted.or(command);
         }
         let progress = self.follow(feeder);
+        self.note_rest(feeder);
         let place = self.current.list.after(progress.done as usize);
         self.road.pass(place.stretch, place.at);
         self.ends.pass(feeder.path_queued());

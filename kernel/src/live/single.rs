@@ -35,7 +35,6 @@ where
     pub fn set_single_block(&mut self, is_single: bool) {
         if is_single != self.is_single {
             self.is_single = is_single;
-            self.held_at = None;
             self.go_on_anew();
         }
     }
@@ -52,11 +51,23 @@ where
             return false;
         }
         if self.rests(feeder) {
-            self.held_at = Some(self.current.list.end());
-            self.current.list.ends_block = false;
             self.is_held = !self.is_read();
+            self.has_waited();
         }
         true
+    }
+
+    /// At rest in a hold, or without single block, there is nothing more to wait for: it is the next block that is run.
+    pub(super) fn note_rest(&mut self, feeder: &LiveFeeder<'_, R, AXES>) {
+        if (self.is_held || !self.is_single) && self.rests(feeder) {
+            self.has_waited();
+        }
+    }
+
+    /// The end of the list under way has been waited at.
+    fn has_waited(&mut self) {
+        self.held_at = Some(self.current.list.end());
+        self.current.list.ends_block = false;
     }
 
     /// The path position of the nearest rest from a junction, and how to brake to it.

@@ -124,6 +124,54 @@ fn every_block_ends_at_rest() {
     assert!(ran > 0);
 }
 
+/// Switched on at rest, wherever a hold has come to rest, perhaps off and on again: the resume runs the next block, whole or
+/// what is left of it.
+#[test]
+fn switched_on_at_rest_it_runs_the_next_block() {
+    let (mut ran, mut at_ends) = (0, 0);
+    for seed in seeds(400) {
+        let Some(blocks) = Blocks::random(seed, 4_000.0) else { continue };
+        let ticks = blocks.case.plan.time_s / blocks.case.machine.tick_s;
+        let mut random = Random::new(seed ^ 0x0FF_0FF);
+        let (at, toggles) = ((random.unit() * ticks) as u64, random.below(3));
+        let (mut first, mut switched, mut resumed, mut second) = (None, 0, false, None);
+        let mut script = |ticks: u64, state: State, here: Rest| {
+            let Some(_) = first else {
+                first = (state == State::Held).then_some(here);
+                return (ticks == at).then_some(Command::Hold);
+            };
+            if switched <= 2 * toggles {
+                switched += 1;
+                return Some(Command::SingleBlock(switched % 2 == 1));
+            }
+            if !resumed {
+                resumed = true;
+                return Some(Command::Resume);
+            }
+            (state == State::Held).then(|| {
+                second = Some(here);
+                Command::Abort
+            })
+        };
+        let Some(run) = blocks.run(seed, &mut script) else { continue };
+        // The hold came behind the end.
+        let Some(first) = first else { continue };
+        at_ends += usize::from(blocks.is_end(first));
+        ran += 1;
+        let Some(second) = second else {
+            assert_eq!(run.state, State::Done, "seed {seed}");
+            continue;
+        };
+        // A dwell is a block, and ends where it begins, as the move before it does.
+        let ends_there = blocks.ends.iter().filter(|&&end| is_at(first, end)).count();
+        let dwells_there = ends_there > usize::from(first != (0, 0.0));
+        assert!(dwells_there || !is_at(second, first), "seed {seed}: held again at {first:?}");
+        assert!(blocks.is_end(second), "seed {seed}: {second:?} is no block's end, held at {first:?}");
+    }
+    println!("{ran} holds, {at_ends} of them at a block's end");
+    assert!(ran > 100 && at_ends > 10 || ran < 100, "{ran}, {at_ends}");
+}
+
 /// Switched on before any tick, it comes to rest at the first block end behind the place that a hold in the same tick comes
 /// to rest at, or before that, if ramps ahead let it; at most one end further, where ceilings ask for it.
 #[test]
