@@ -506,9 +506,12 @@ fn jog_goes_as_far_as_its_key_says() {
     assert!(output.status.code() == Some(2) && error.contains("found a distance of 0 mm"), "{error}");
     // What is refused replaces no file.
     desk.put("kept.csv", "kept");
-    for arguments in
-        [&["jog", "X+1", "Q+1"][..], &["jog", "X+1", "--feed", "0"], &["home", "--machine", "machine.toml"]]
-    {
+    for arguments in [
+        &["jog", "X+1", "Q+1"][..],
+        &["jog", "X+1", "--feed", "0"],
+        &["jog", "X+1", "X+"],
+        &["home", "--machine", "machine.toml"],
+    ] {
         desk.refusal(&[arguments, &["--trace", "kept.csv"]].concat());
         assert_eq!(desk.read("kept.csv"), "kept");
     }

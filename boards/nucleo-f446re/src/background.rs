@@ -88,7 +88,7 @@ pub(crate) fn run(
         let asked = if press.is_new(button.is_low(), now) {
             Some(Asked::Press)
         } else {
-            bytes.dequeue().and_then(Command::of).map(Asked::Command)
+            core::iter::from_fn(|| bytes.dequeue()).find_map(Command::of).map(Asked::Command)
         };
         let has_logged = work.turn(seen, asked, machine, &mut control)
             || work.phase == Phase::Faulted && dump.line(now, &mut control);
@@ -205,8 +205,9 @@ impl Work {
                 info!("comes to rest");
             }
             (Action::GoOn, Some(run)) => {
-                // In a hold, at a program stop, or both.
-                control.lock(|control| control.kernel.resume());
+                if let Phase::Running { is_stopped: true, .. } = self.phase {
+                    control.lock(|control| control.kernel.resume());
+                }
                 run.resume();
                 self.has_said = false;
                 info!("goes on");

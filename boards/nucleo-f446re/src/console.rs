@@ -1,7 +1,7 @@
 //! Commands of the serial console: one character each, so that none can come in half.
 //!
-//! Consumes bytes; produces [`Command`]s. Other bytes are ignored. All are small letters: what programs on a PC write to
-//! ports that they take for modems is not (`AT…`, 0x7E).
+//! Consumes bytes; produces [`Command`]s. Other bytes are ignored. What programs on a PC write to ports that they take for
+//! modems (`AT…`, frames between 0x7E) has none of these letters.
 
 use motion_kernel::live::{OVERRIDE_MAX, OVERRIDE_MIN};
 

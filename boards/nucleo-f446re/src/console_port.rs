@@ -8,7 +8,7 @@ use stm32f4xx_hal::pac::USART2;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::serial::Rx;
 
-/// Bytes that came garbled or found no room.
+/// Times that bytes came garbled, behind others that nobody had taken, or found no room.
 pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 
 /// Takes the byte that has come since the tick before, if there is one: no two can.

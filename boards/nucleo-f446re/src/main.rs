@@ -153,13 +153,13 @@ mod app {
             if cx.local.liveness.may_feed(TURNS.load(Ordering::Relaxed)) {
                 cx.local.watchdog.feed();
             }
+            console_port::receive(cx.local.console, cx.local.received);
             if let Some(kind) = cx.local.monitor.ended(DWT::cycle_count()) {
                 kernel.trip(kind);
             }
             let overrun = cx.local.tick_timer.due_again();
             control.log.add(DWT::cycle_count().wrapping_sub(begin), latency_cycles, overrun);
         });
-        console_port::receive(cx.local.console, cx.local.received);
         TICKS.store(TICKS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         cx.local.scope.set_low();
     }

@@ -1,8 +1,8 @@
 //! What is done about what the button and the console ask for.
 //!
 //! Consumes the phase that the machine is in and what is asked for; produces an [`Action`], or why there is none. Only the
-//! button starts motion, from standing ready and from a program stop, where hands may be in the machine: the console steers what
-//! was started, so that no noise on its line sets a machine going. It goes on behind a hold, which it may have asked for.
+//! button starts motion, from standing ready and from a program stop, where hands may be in the machine: no noise on the
+//! console's line can. The console ends holds, whoever asked for them.
 
 use crate::console::{Command, FeedOverride, Step};
 
@@ -20,7 +20,8 @@ pub enum Phase {
     },
     /// The program is done, the machine is held at its end.
     Done,
-    /// An item of the program is refused; motion comes to rest, and is held there until reset.
+    /// An item of the program is refused, or there is no way to its start; motion comes to rest, and is held there until
+    /// reset.
     Refused,
     /// In a fault: drives off until reset, or on the way there.
     Faulted,
@@ -57,7 +58,7 @@ impl Action {
     #[must_use]
     pub fn of(phase: Phase, asked: Asked) -> Self {
         match (phase, asked) {
-            (Phase::Refused | Phase::Faulted, _) => Self::Nothing("only a reset goes on"),
+            (Phase::Refused | Phase::Faulted, _) => Self::Nothing("reset the board to go on"),
             (_, Asked::Command(Command::Override(step))) => Self::Override(step),
             (_, Asked::Command(Command::SingleBlock(is_single))) => Self::SingleBlock(is_single),
             (Phase::Ready | Phase::Done, Asked::Press) => Self::Start,
@@ -71,11 +72,11 @@ impl Action {
                     Self::Hold
                 }
             }
+            (Phase::Running { is_stopped: true, .. }, Asked::Command(Command::Hold | Command::GoOn)) => {
+                Self::Nothing("at rest at a program stop: the blue button goes on")
+            }
             (Phase::Running { is_held: false, .. }, Asked::Command(Command::Hold)) => Self::Hold,
             (Phase::Running { .. }, Asked::Command(Command::Hold)) => Self::Nothing("it is held"),
-            (Phase::Running { is_stopped: true, .. }, Asked::Command(Command::GoOn)) => {
-                Self::Nothing("a program stop: the blue button goes on")
-            }
             (Phase::Running { is_held: true, .. }, Asked::Command(Command::GoOn)) => Self::GoOn,
             (Phase::Running { .. }, Asked::Command(Command::GoOn)) => Self::Nothing("it is not held"),
         }
@@ -116,7 +117,7 @@ mod tests {
     fn every_phase_and_all_that_is_asked_for() {
         for (asked, expected) in [
             (Asked::Press, "shgggs--"),
-            (Asked::Command(Command::Hold), "-h-h----"),
+            (Asked::Command(Command::Hold), "-h------"),
             (Asked::Command(Command::GoOn), "--g-----"),
         ] {
             let found = PHASES.map(|phase| match Action::of(phase, asked) {

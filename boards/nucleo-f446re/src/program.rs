@@ -115,43 +115,61 @@ impl<'a> Run<'a> {
 #[cfg(test)]
 mod tests {
     use motion_kernel::exec::Executor;
-    use motion_kernel::queue::LiveStreams;
+    use motion_kernel::queue::{Intake, LiveStreams};
 
     use super::*;
     use crate::console::{FeedOverride, Step};
     use crate::design_parameters::TURN_TICKS_MAX;
     use crate::machine::{Machine, PROGRAM};
 
-    /// Runs the program as the board does, twice: from its start, and from where it ended. The background's turns come
-    /// every so many ticks; before each tick of a run, `command` may say something. The ticks of each run, where it ended,
-    /// and how often it had to stop for want of data.
+    /// A board whose background has turns every so many ticks.
+    struct Desk<'a> {
+        run: Run<'a>,
+        intake: Intake<'a, f32, AXES>,
+        executor: Executor<f32, AXES>,
+        here: [Position; AXES],
+        turn_ticks: u32,
+    }
+
+    /// What `work` does with a board that stands at the program's start.
+    fn on_a_desk<T>(turn_ticks: u32, work: impl FnOnce(&mut Desk<'_>) -> T) -> T {
+        let machine = Machine::new(PROGRAM).expect("suits");
+        let here = machine.header().start;
+        let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+        let (feeder, intake) = streams.split(machine.header().rules, here);
+        let run = Run::new(machine.program, feeder);
+        work(&mut Desk { run, intake, executor: Executor::new(here), here, turn_ticks })
+    }
+
+    impl Desk<'_> {
+        /// The program from where the machine stands; before each tick `command` may say something. Its ticks, and where it
+        /// ended.
+        fn program(&mut self, command: &mut dyn FnMut(u32, &mut Run<'_>)) -> (u32, [Position; AXES]) {
+            self.run.start(self.here).expect("a way");
+            for tick in 0..1_000_000 {
+                command(tick, &mut self.run);
+                if tick % self.turn_ticks == 0 {
+                    self.run.turn().expect("accepted");
+                    if self.run.state() == State::Waiting {
+                        return (tick, self.here);
+                    }
+                }
+                let executed = self.executor.tick(&mut self.intake).expect("no fault");
+                self.here = executed.setpoints.map(|setpoint| setpoint.position);
+            }
+            panic!("it never ends");
+        }
+    }
+
+    /// Runs the program as the board does, twice: from its start, and from where it ended. The ticks of each run, where it
+    /// ended, and how often it had to stop for want of data.
     fn two_runs(
         turn_ticks: u32,
         mut command: impl FnMut(u32, &mut Run<'_>),
     ) -> ([(u32, [Position; AXES]); 2], u32) {
-        let machine = Machine::new(PROGRAM).expect("suits");
-        let start = machine.header().start;
-        let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
-        let (feeder, mut intake) = streams.split(machine.header().rules, start);
-        let mut run = Run::new(machine.program, feeder);
-        let mut executor = Executor::new(start);
-        let mut here = start;
-        let runs = core::array::from_fn(|_| {
-            run.start(here).expect("a way");
-            for tick in 0..1_000_000 {
-                command(tick, &mut run);
-                if tick % turn_ticks == 0 {
-                    run.turn().expect("accepted");
-                    if run.state() == State::Waiting {
-                        return (tick, here);
-                    }
-                }
-                let executed = executor.tick(&mut intake).expect("no fault");
-                here = executed.setpoints.map(|setpoint| setpoint.position);
-            }
-            panic!("it never ends");
-        });
-        (runs, run.starvations())
+        on_a_desk(turn_ticks, |desk| {
+            (core::array::from_fn(|_| desk.program(&mut command)), desk.run.starvations())
+        })
     }
 
     /// As `motion compile` prints: 2.320 s to (102.045923136, 0, 0).
@@ -237,7 +255,8 @@ mod tests {
         assert!(slower > STRINGER_TICKS + 1000 && faster < STRINGER_TICKS - 40, "{slower} {faster}");
     }
 
-    /// In single block it is held behind every line of the program, the last one too: more may come.
+    /// In single block it is held behind every line of the program, the last one too, because more may come. Switched on
+    /// between two runs it is held behind the way to the start first.
     #[test]
     fn in_single_block_it_is_held_behind_every_line() {
         let items = Machine::new(PROGRAM).expect("suits").program.items();
@@ -247,21 +266,36 @@ mod tests {
         };
         let mut lines: Vec<u32> = items.filter_map(line_of).collect();
         lines.dedup();
-        let (mut held, mut was_held) = (0, false);
-        let (runs, _) = two_runs(1, |tick, run| {
-            if tick == 0 {
-                run.set(&Settings { is_single: true, ..Settings::NONE });
+        let single = Settings { is_single: true, ..Settings::NONE };
+        // The ticks of a run in which it came to be held.
+        let holds = |desk: &mut Desk<'_>| {
+            let (mut ticks_held, mut was_held) = (Vec::new(), false);
+            let (_, at) = desk.program(&mut |tick, run| {
+                let is_held = run.state() == State::Held;
+                if is_held && !was_held {
+                    ticks_held.push(tick);
+                }
+                was_held = is_held;
+                if is_held {
+                    run.resume();
+                }
+            });
+            assert_eq!(at, end());
+            ticks_held
+        };
+        on_a_desk(1, |desk| {
+            desk.run.set(&single);
+            assert_eq!(holds(desk).len(), lines.len(), "{lines:?}");
+            desk.run.set(&Settings::NONE);
+            assert!(holds(desk).is_empty());
+            desk.run.set(&single);
+            for _ in 0..3 {
+                desk.run.turn().expect("nothing to do");
             }
-            let is_held = run.state() == State::Held;
-            held += usize::from(is_held && !was_held);
-            was_held = is_held;
-            if is_held {
-                run.resume();
-            }
+            let held = holds(desk);
+            assert_eq!(held.len(), lines.len() + 1, "{held:?}");
+            assert!(held[0] > back_ticks() / 2, "held before it was on its way: {held:?}");
         });
-        assert_eq!(runs.map(|(_, at)| at), [end(); 2]);
-        // In the second run there is a way back to the start.
-        assert_eq!(held, 2 * lines.len() + 1, "{lines:?}");
     }
 
     /// From one encoder count to the whole machine, longer than the streams hold, in any direction, at the feed there is.

@@ -24,7 +24,7 @@ Examples:
 JSON: list of {axis, counts, index_counts (how far the index was behind the switch; null: the switch is the reference),
 time_s, position_mm (where the axis stands now), true_mm (the same from where it was switched on)}.
 
-Exit status 1: an axis was not homed; those before it are printed.";
+Exit status: 1 where an axis was not homed, 2 where the machine file homes none; those before it are printed.";
 
 /// Home the axes that have [axis.homing] in the machine file, one after the other: search the switch, back off, approach.
 #[derive(Debug, Args)]
@@ -54,7 +54,7 @@ struct AxisJson<'a> {
 /// Homes and prints.
 ///
 /// # Errors
-/// The machine file is refused or homes no axis, or a file can't be written.
+/// The machine file is refused or homes no axis, an axis is not homed, or a file can't be written.
 pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(Some(&arguments.machine))?;
     let name = arguments.machine.display().to_string();

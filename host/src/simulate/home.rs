@@ -29,7 +29,7 @@ pub enum HomeError {
         /// Why.
         source: HomingError,
     },
-    /// A motion did not come to its end.
+    /// The machine can't be simulated, or a motion did not come to its end.
     #[error(transparent)]
     Session(#[from] SessionError),
 }
@@ -99,7 +99,7 @@ impl<R: Real> Session<'_, R> {
                 Step::Reference(counts, position) => self.kernel.reference(axis, counts, position),
                 _ => self.kernel.rest_here(),
             };
-            self.set = rest.ok_or_else(|| failed(HomingError::Failed))?;
+            self.set = rest.ok_or(SessionError::Moves)?;
             match next {
                 Step::Move(next) => jog = Some(next),
                 Step::Done(homed) => {

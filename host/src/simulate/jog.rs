@@ -21,6 +21,9 @@ use super::run::simulated;
 use super::session::{Session, SessionError, Then, jog_axis};
 use crate::machine::Machine;
 
+/// The shortest distance \[mm\]: some position steps, below which a ramp has no length.
+const LEAST_MM: f64 = 1e-9;
+
 /// A key that is pressed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Press {
@@ -41,8 +44,8 @@ pub enum PressError {
         "found `{0}`, expected an axis, + or -, a distance in mm or none, and @TICKS until it is released: X+, X-2.5, Y+@800"
     )]
     Form(String),
-    /// The distance is 0 or beyond what positions hold.
-    #[error("found a distance of {0} mm, expected one of at least a position step, 2⁻³² mm, and at most {most} mm", most = Position::LIMIT_MM)]
+    /// The distance is too short for motion, or beyond what positions hold.
+    #[error("found a distance of {0} mm, expected {LEAST_MM} to {most} mm", most = Position::LIMIT_MM)]
     Distance(String),
     /// The ticks are no positive whole number.
     #[error("found `@{0}`, expected a whole number of ticks, at least 1")]
@@ -73,7 +76,7 @@ impl FromStr for Press {
             Way::Continuous(direction)
         } else {
             let mm: f64 = distance.parse().ok().filter(|_| is_plain(distance, b".")).ok_or_else(form)?;
-            let by = Position::from_mm(mm).filter(|&by| by > Position::ZERO);
+            let by = Position::from_mm(mm).filter(|_| mm >= LEAST_MM);
             let by = by.ok_or_else(|| PressError::Distance(distance.to_owned()))?;
             Way::By(if direction == Direction::Negative { -by } else { by })
         };
@@ -154,7 +157,7 @@ pub enum JogError {
         source: motion_kernel::jog::JogError,
     },
     /// At its feed there is no motion over its length.
-    #[error("{press} at {feed_mm_s} mm/s: {source}")]
+    #[error("{press}: found no motion at {feed_mm_s} mm/s ({source}), expected a greater feed")]
     NoMotion {
         /// The press.
         press: String,
@@ -194,7 +197,6 @@ impl<R: Real> Session<'_, R> {
         let jog = jog.map_err(|source| {
             let press = press.to_string();
             match source {
-                motion_kernel::jog::JogError::NoTravel => JogError::NoTravel(press),
                 motion_kernel::jog::JogError::Straight(source) => {
                     JogError::NoMotion { press, feed_mm_s, source }
                 }
@@ -245,7 +247,7 @@ impl<'a> Keys<'a> {
     /// `presses` at `feed_mm_s`, or at the greatest feed of each axis.
     ///
     /// # Errors
-    /// There is no such axis, or it has no such feed.
+    /// There is no such axis, or it has no such feed, or no soft limit to go on to.
     pub fn new(machine: &'a Machine, presses: &'a [Press], feed_mm_s: Option<f64>) -> Result<Self, JogError> {
         let key = |press: &'a Press| {
             let axis = machine.axes.iter().position(|axis| axis.name == press.axis);
@@ -258,6 +260,9 @@ impl<'a> Keys<'a> {
             // Written so that what is not a number is refused.
             if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s) {
                 return Err(JogError::Feed { press: press.to_string(), feed_mm_s, most_mm_s });
+            }
+            if matches!(press.way, Way::Continuous(_)) && machine.travel()[axis].is_none() {
+                return Err(JogError::NoTravel(press.to_string()));
             }
             Ok((axis, feed_mm_s, press))
         };
@@ -301,7 +306,7 @@ mod tests {
         {
             assert_eq!(parsed(text), PressError::Form(text.to_owned()));
         }
-        for distance in ["0", "0.00", "0.0000000001", "2000000000", "1000000000000"] {
+        for distance in ["0", "0.00", "0.0000000009", "2000000000", "1000000000000"] {
             assert_eq!(parsed(&format!("X+{distance}")), PressError::Distance(distance.to_owned()));
         }
         for ticks in ["", "0", "-1", "+5", "1.5", "1@2", "99999999999999999999"] {
