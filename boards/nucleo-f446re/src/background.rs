@@ -212,18 +212,12 @@ impl Work {
                 self.has_said = false;
                 info!("goes on");
             }
-            (Action::Override(step), run) => {
+            (Action::Override(step), _) => {
                 self.settings.feed_override = self.settings.feed_override.after(step);
-                if let Some(run) = run {
-                    run.set(&self.settings);
-                }
                 info!("feed override {=u8} %", self.settings.feed_override.percent());
             }
-            (Action::SingleBlock(is_single), run) => {
+            (Action::SingleBlock(is_single), _) => {
                 self.settings.is_single = is_single;
-                if let Some(run) = run {
-                    run.set(&self.settings);
-                }
                 info!("single block {=str}", if is_single { "on" } else { "off" });
             }
             (Action::Nothing(why), _) => info!("{=str}", why),
@@ -249,9 +243,7 @@ impl Work {
             control.intake = intake;
             control.kernel.enable(SETTLE_TICKS);
         });
-        let mut run = Run::new(machine.program, feeder);
-        run.set(&self.settings);
-        self.run = Some(run);
+        self.run = Some(Run::new(machine.program, feeder));
         self.start(here);
     }
 
@@ -269,6 +261,7 @@ impl Work {
         if let Some(here) = self.from.take() {
             self.no_way = run.start(here).err();
         }
+        run.set(&self.settings);
         self.refused = run.turn().err();
     }
 }

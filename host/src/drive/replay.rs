@@ -16,7 +16,7 @@ use crate::machine::Machine;
 use crate::record::{AXES, TickRecord};
 use crate::simulate::RunError;
 use crate::simulate::contour::Contour;
-use crate::simulate::rig::{Rig, Simulated};
+use crate::simulate::rig::{Rig, simulated};
 
 /// What regulates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,9 +126,8 @@ fn close_loop(
     replayed: &mut Replayed,
 ) -> Result<(), RunError> {
     let machine = &recording.machine;
-    let failed = |error: &dyn core::fmt::Display| RunError::Simulation(error.to_string());
-    let simulated = Simulated::new(&machine.simulated()).map_err(|error| failed(&error))?;
-    let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
+    let simulated = simulated(machine)?;
+    let mut rig = Rig::new(&simulated)?;
     let mut regulator = Regulator::new(law, machine)?;
     let mut contour = Contour::default();
     let mut before_mm = [0.0; AXES];
@@ -138,7 +137,8 @@ fn close_loop(
         let mut set = [Position::ZERO; AXES];
         for (set, exact_mm) in set.iter_mut().zip(exact_mm) {
             let told_mm = in_steps(exact_mm, resolution_mm);
-            let expected = || failed(&format_args!("found a set position of {told_mm} mm, out of range"));
+            let expected =
+                || RunError::Simulation(format!("found a set position of {told_mm} mm, out of range"));
             *set = Position::from_mm(told_mm).ok_or_else(expected)?;
         }
         let Ok(counts) = rig.latch();

@@ -10,7 +10,7 @@ use motion_kernel::num::Real;
 
 use super::Observer;
 use super::error::RunError;
-use super::run::simulated;
+use super::rig::simulated;
 use super::session::{Session, SessionError, Then, jog_axis};
 use crate::machine::{HomingSettings, Machine};
 use crate::record::AXES;

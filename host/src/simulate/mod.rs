@@ -16,7 +16,6 @@
 //! - `limit_share`: on how much of the path a limit is active;
 //! - [`run`](mod@run): the ticks;
 //! - [`summary`]: maxima, following and contour error;
-//! - `home_rig`: the rig with home switches and index latches;
 //! - [`session`]: one motion after the other, without a plan;
 //! - [`home`]: axes find their references;
 //! - [`jog`]: keys pressed and released.
@@ -33,7 +32,6 @@ pub mod live;
 pub mod rig;
 pub mod run;
 pub mod summary;
-mod home_rig;
 pub mod session;
 pub mod home;
 pub mod jog;

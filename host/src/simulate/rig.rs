@@ -1,20 +1,21 @@
 //! The simulated machine as the kernel's hardware: encoders, inputs and enable from hal-sim, the velocity
-//! outputs through the converter's adapter and real SPI frames.
+//! outputs through the converter's adapter and real SPI frames; with home switches and index latches where they are asked for.
 //!
 //! [`Hardware`] is what a run asks of any machine.
 
 use core::convert::Infallible;
 
-use hal_sim::{Ad5754Chip, ChipError, Injection, Injector, SimMachine};
+use hal_sim::{Ad5754Chip, ChipError, Injection, Injector, SimHome, SimMachine};
 use motion_kernel::hal::{
-    Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel,
+    Ad5754Error, Ad5754Output, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, VelocityChannel,
 };
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
 
+use super::error::RunError;
 use super::inject::Break;
-use crate::machine::DEAD_TIME_CELLS;
+use crate::machine::{DEAD_TIME_CELLS, Machine};
 use crate::record::AXES;
 
 /// A machine to run a program on: what the kernel asks of a board, and the time between two ticks.
@@ -29,6 +30,14 @@ pub trait Hardware: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + Drive
 /// The simulated machine, with room for every dead time a machine file may ask for.
 pub type Simulated = SimMachine<AXES, DEAD_TIME_CELLS>;
 
+/// The machine's drives, converter and encoders, at rest at the origin.
+///
+/// # Errors
+/// They can't be simulated.
+pub fn simulated(machine: &Machine) -> Result<Simulated, RunError> {
+    Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))
+}
+
 /// The machine and the adapter that talks to its converter.
 pub struct Rig<'a> {
     machine: &'a Simulated,
@@ -37,6 +46,8 @@ pub struct Rig<'a> {
     pub injector: Injector<AXES>,
     /// What will break.
     pub(super) breaks: Vec<Break>,
+    /// What axes that can be homed have for it.
+    homes: [Option<SimHome>; AXES],
     /// Ticks so far.
     ticks: u64,
 }
@@ -46,9 +57,20 @@ impl<'a> Rig<'a> {
     ///
     /// # Errors
     /// The converter does not take its configuration.
-    pub fn new(machine: &'a Simulated) -> Result<Self, Ad5754Error<ChipError>> {
-        let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())?;
-        Ok(Self { machine, outputs, injector: Injector::new(), breaks: Vec::new(), ticks: 0 })
+    pub fn new(machine: &'a Simulated) -> Result<Self, RunError> {
+        let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())
+            .map_err(|error| RunError::Simulation(format!("{error:?}")))?;
+        let homes = [const { None }; AXES];
+        Ok(Self { machine, outputs, injector: Injector::new(), breaks: Vec::new(), homes, ticks: 0 })
+    }
+
+    /// Adds home switches and index latches of the axes that have settings for them, where encoders read `counts`.
+    pub(super) fn add_homes(&mut self, machine: &Machine, counts: [Counts; AXES]) {
+        let truth = self.machine.truth();
+        self.homes = core::array::from_fn(|axis| {
+            let homing = machine.axes[axis].homing.as_ref()?;
+            Some(SimHome::new(homing.simulated, truth[axis].position_mm, counts[axis]))
+        });
     }
 
     /// Breaks something of an axis, from 0.
@@ -89,7 +111,13 @@ impl Encoder<AXES> for Rig<'_> {
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         let Ok(counts) = self.machine.latch();
-        Ok(self.injector.counts(counts))
+        let counts = self.injector.counts(counts);
+        for ((home, truth), counts) in self.homes.iter_mut().zip(self.machine.truth()).zip(counts) {
+            if let Some(home) = home {
+                home.advance(truth.position_mm, counts);
+            }
+        }
+        Ok(counts)
     }
 }
 
@@ -97,7 +125,13 @@ impl Inputs<AXES> for Rig<'_> {
     type Error = Infallible;
 
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
-        Ok(self.injector.inputs(self.machine))
+        let mut inputs = self.injector.inputs(self.machine);
+        for (axis, home) in inputs.axes.iter_mut().zip(&self.homes) {
+            if let Some(home) = home {
+                *axis = axis.with_home(home.is_closed());
+            }
+        }
+        Ok(inputs)
     }
 }
 
@@ -114,5 +148,20 @@ impl DriveEnable<AXES> for Rig<'_> {
 
     fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
         self.machine.set_enabled(enabled)
+    }
+}
+
+impl IndexLatch for Rig<'_> {
+    type Error = Infallible;
+
+    fn arm(&mut self, axis: usize) -> Result<(), Infallible> {
+        if let Some(Some(home)) = self.homes.get_mut(axis) {
+            home.arm();
+        }
+        Ok(())
+    }
+
+    fn latched(&mut self, axis: usize) -> Result<Option<Counts>, Infallible> {
+        Ok(self.homes.get(axis).and_then(|home| home.as_ref()?.latched()))
     }
 }

@@ -19,7 +19,7 @@ use super::faults;
 use super::inject::Injections;
 use super::job::{Job, Number, RunOptions, StretchCorrection};
 use super::limit_share::LimitShare;
-use super::rig::{Hardware, Rig, Simulated};
+use super::rig::{Hardware, Rig, simulated};
 use super::summary::{Collector, RunSummary};
 use crate::machine::Machine;
 use crate::planning::Plan;
@@ -60,16 +60,11 @@ pub fn on_simulated<T>(
     work: impl FnOnce(&mut Rig<'_>) -> Result<T, RunError>,
 ) -> Result<T, RunError> {
     let simulated = simulated(machine)?;
-    let mut rig = Rig::new(&simulated).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
+    let mut rig = Rig::new(&simulated)?;
     if let Some(injections) = injections {
         rig.breaks = injections.of(machine)?;
     }
     work(&mut rig)
-}
-
-/// The machine's drives, converter and encoders, at rest at the origin.
-pub(super) fn simulated(machine: &Machine) -> Result<Simulated, RunError> {
-    Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))
 }
 
 /// Runs `job` on `hardware`.

@@ -7,6 +7,7 @@ use std::convert::Infallible;
 
 use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::ExecState;
+use motion_kernel::hal::Encoder;
 use motion_kernel::jog::JogAxis;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::law::Limits;
@@ -21,9 +22,8 @@ use super::Observer;
 use super::contour::Contour;
 use super::error::RunError;
 use super::faults;
-use super::home_rig::HomeRig;
 use super::job::Sheet;
-use super::rig::Simulated;
+use super::rig::{Rig, Simulated};
 use super::run::tick_record;
 use crate::machine::{AxisSettings, Machine};
 use crate::record::{AXES, FaultRecord};
@@ -53,7 +53,7 @@ pub struct Session<'a, R: Real> {
     pub(super) simulated: &'a Simulated,
     pub(super) kernel: Kernel<R, AXES>,
     config: AxesConfig<R, AXES>,
-    rig: HomeRig<'a>,
+    rig: Rig<'a>,
     streams: Box<LiveStreams<R, AXES, PIECES, SEGMENTS>>,
     /// Where it stands.
     pub(super) set: [Position; AXES],
@@ -75,7 +75,9 @@ impl<'a, R: Real> Session<'a, R> {
     /// # Errors
     /// It can't be simulated, or regulated.
     pub fn new(machine: &'a Machine, simulated: &'a Simulated) -> Result<Self, RunError> {
-        let (rig, counts) = HomeRig::new(machine, simulated)?;
+        let mut rig = Rig::new(simulated)?;
+        let Ok(counts) = rig.latch();
+        rig.add_homes(machine, counts);
         let (config, set) = (machine.axes_config()?, [Position::ZERO; AXES]);
         let mut kernel = Kernel::new(&config, set, counts);
         kernel.enable(0);
@@ -116,7 +118,7 @@ impl<'a, R: Real> Session<'a, R> {
         &mut self,
         items: impl Iterator<Item = Result<Item<AXES>, Infallible>>,
         observe: &mut Observer<'_>,
-        mut look: impl FnMut(&Trace<R, AXES>, &mut HomeRig<'a>, State) -> Result<Then, E>,
+        mut look: impl FnMut(&Trace<R, AXES>, &mut Rig<'a>, State) -> Result<Then, E>,
     ) -> Result<(), E> {
         let (mut feeder, mut intake) = self.streams.split(self.machine.rules(), self.set);
         let mut director = Director::<R, AXES, _, _, PLACES>::new(items, self.machine.tick_s, 0);
