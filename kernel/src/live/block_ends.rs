@@ -5,7 +5,7 @@
 
 use heapless::Deque;
 
-use super::road::{Junction, SLIVER, is_before};
+use super::road::{SLIVER, Splice, is_before};
 use crate::units::Position;
 
 /// The end of a program block: a path position of its stretch, or the start of the next stretch for one that ends it.
@@ -17,14 +17,14 @@ pub(super) struct BlockEnd {
 
 impl BlockEnd {
     /// Whether a place is there but for rounding: no nearer path can be driven over.
-    pub(super) fn is_at(&self, place: &Junction) -> bool {
+    pub(super) fn is_at(&self, place: &Splice) -> bool {
         let gap = self.at - place.at;
         self.stretch == place.stretch && gap <= SLIVER && -gap <= SLIVER
     }
 }
 
-impl From<Junction> for BlockEnd {
-    fn from(Junction { stretch, at, .. }: Junction) -> Self {
+impl From<Splice> for BlockEnd {
+    fn from(Splice { stretch, at, .. }: Splice) -> Self {
         Self { stretch, at }
     }
 }

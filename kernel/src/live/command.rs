@@ -5,7 +5,7 @@ use heapless::Vec;
 use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
 use super::replan::Ramps;
-use super::road::Junction;
+use super::road::Splice;
 use super::source::Source;
 use crate::law::{Phase, Ticks};
 use crate::num::Real;
@@ -20,14 +20,14 @@ pub(super) type Places = Vec<Place, { LIST_ITEMS + 2 }>;
 pub(super) struct Place {
     pub(super) change: Change,
     /// Where the list begins that takes over.
-    pub(super) start: Junction,
+    pub(super) start: Splice,
     /// The item under way with another end, if it is inside one.
     head: Option<Item>,
 }
 
 impl Place {
     /// Where it takes over.
-    pub(super) fn junction(&self, tick_s: f64) -> Junction {
+    pub(super) fn splice(&self, tick_s: f64) -> Splice {
         self.list(tick_s).end()
     }
 
@@ -97,7 +97,7 @@ where
         if let Some(first) = places.first().filter(|first| first.change.within)
             && let Some((start, item)) = self.current.list.get(progress.done as usize)
         {
-            let cut_mm_s = first.junction(self.tick_s).feed_mm_s;
+            let cut_mm_s = first.splice(self.tick_s).feed_mm_s;
             let cap_mm_s = self.least_cap_mm_s(start, item);
             if cut_mm_s < cap_mm_s
                 && cap_mm_s < item.end(start, self.tick_s).feed_mm_s
@@ -111,7 +111,7 @@ where
     }
 
     /// The least feed \[mm/s\] that is allowed anywhere on an item's path.
-    fn least_cap_mm_s(&self, start: &Junction, item: &Item) -> f64 {
+    fn least_cap_mm_s(&self, start: &Splice, item: &Item) -> f64 {
         let end = item.end(start, self.tick_s).at;
         let crossed = self.road.from(start).take_while(|block| block.start < end);
         let caps_mm_s = crossed.map(|block| block.allowed(self.feed_override).0);
@@ -126,20 +126,20 @@ where
     ) -> Result<(), SupplyError<E>> {
         for place in &self.places(progress) {
             let mut list = place.list(self.tick_s);
-            let junction = list.end();
-            if junction.feed_mm_s < place.start.feed_mm_s {
+            let splice = list.end();
+            if splice.feed_mm_s < place.start.feed_mm_s {
                 // What brakes goes on braking.
                 continue;
             }
-            if junction.feed_mm_s <= 0.0 {
+            if splice.feed_mm_s <= 0.0 {
                 // What follows in this list must not.
                 if self.rests_before_more(place, progress) {
                     return self.rest_behind(place.driven(), false, feeder);
                 }
                 break;
             }
-            let (path_end, _) = self.path_of(junction.stretch);
-            let Some((ramp, length)) = self.road.brake(&junction, 0.0, path_end, self.driven_override) else {
+            let (path_end, _) = self.path_of(splice.stretch);
+            let Some((ramp, length)) = self.road.brake(&splice, 0.0, path_end, self.driven_override) else {
                 continue;
             };
             list.push(Item::Feed { ramp, length });
@@ -243,7 +243,7 @@ where
     }
 
     /// Whether the item under way does not change the feed, or takes it to where the override does not allow it.
-    fn is_worth_cutting(&self, progress: &Progress, place: &Place, cut: &Junction) -> bool {
+    fn is_worth_cutting(&self, progress: &Progress, place: &Place, cut: &Splice) -> bool {
         let Some((start, item)) = self.current.list.get(progress.done as usize) else { return false };
         let whole_mm_s = item.end(start, self.tick_s).feed_mm_s;
         let cap_mm_s = self.least_cap_mm_s(start, item);

@@ -7,7 +7,7 @@ use heapless::Deque;
 use super::block_ends::{BlockEnd, BlockEnds};
 use super::list::{Item as ListItem, LIST_ITEMS, List};
 use super::replan::Ramps;
-use super::road::{Junction, Road, is_before};
+use super::road::{Road, Splice, is_before};
 use super::source::Source;
 use crate::law::{FeedSegment, Ticks};
 use crate::num::Real;
@@ -88,7 +88,7 @@ pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
     /// The program's own feed from `ahead` on; of a stretch that is planned anew only its end.
     pub(super) course: Deque<ListItem, PLACES>,
     /// Where the next list begins.
-    pub(super) ahead: Junction,
+    pub(super) ahead: Splice,
     /// The last stretch that is planned anew; those before it are, too, as far as they are still ahead.
     replanned: Option<u32>,
     pub(super) current: Handed,
@@ -102,7 +102,7 @@ pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
     /// Where single block is to come to rest within a stretch; no plan goes beyond it.
     pub(super) block_end: Option<BlockEnd>,
     /// Where it was held last.
-    pub(super) held_at: Option<Junction>,
+    pub(super) held_at: Option<Splice>,
     wanted: Option<Wanted>,
     /// How far ahead of where the tick was seen a ramp is given up.
     pub(super) lead: Ticks,
@@ -128,7 +128,7 @@ where
     /// background works, `lead_ticks` is how far ahead of what it saw it may change a ramp: as many as may pass meanwhile.
     pub fn new(items: I, tick_s: f64, lead_ticks: u32) -> Self {
         const { assert!(PLACES >= 4 * LIST_ITEMS, "places for what lies ahead, and for a list that is given up") };
-        let start = Junction { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
+        let start = Splice { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
         Self {
             items,
             tick_s,
@@ -485,7 +485,7 @@ where
     }
 
     /// What follows begins at `ahead`, and the rest of its stretch is planned anew.
-    pub(super) fn replan_from(&mut self, ahead: Junction) {
+    pub(super) fn replan_from(&mut self, ahead: Splice) {
         self.ahead = ahead;
         self.replan_through(ahead.stretch);
         self.drop_feed();

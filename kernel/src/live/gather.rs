@@ -5,7 +5,7 @@ use heapless::Vec;
 use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
 use super::replan::{Ramps, replan};
-use super::road::Junction;
+use super::road::Splice;
 use super::source::Source;
 use crate::law::Ramp;
 use crate::num::Real;
@@ -51,7 +51,7 @@ where
             return;
         }
         let feed_mm_s = ramp.from_mm_s;
-        let Some((_, stop)) = self.road.brake(&Junction { feed_mm_s, ..start }, 0.0, path_end, 1.0) else {
+        let Some((_, stop)) = self.road.brake(&Splice { feed_mm_s, ..start }, 0.0, path_end, 1.0) else {
             return;
         };
         let room_mm = CRUISE_SHARE * (path_end - start.at - stop).to_mm();

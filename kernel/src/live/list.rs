@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::road::Junction;
+use super::road::Splice;
 use crate::law::{Phase, Ramp, Ticks, TurnedRamp, segment};
 use crate::units::Position;
 
@@ -41,18 +41,18 @@ impl Item {
         matches!(self, Self::Dwell(_) | Self::Stop)
     }
 
-    /// The junction at its end, if it begins at `start`.
-    pub(super) fn end(&self, start: &Junction, tick_s: f64) -> Junction {
+    /// The splice at its end, if it begins at `start`.
+    pub(super) fn end(&self, start: &Splice, tick_s: f64) -> Splice {
         match *self {
             Self::Feed { ramp, length } => {
-                Junction { at: start.at + length, feed_mm_s: ramp.to_mm_s, ..*start }
+                Splice { at: start.at + length, feed_mm_s: ramp.to_mm_s, ..*start }
             }
             Self::Turned { ramp, at, length } => {
                 let turned = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
-                Junction { at: start.at + length, feed_mm_s: turned.to_mm_s(), ..*start }
+                Splice { at: start.at + length, feed_mm_s: turned.to_mm_s(), ..*start }
             }
             Self::End => {
-                Junction { stretch: start.stretch.wrapping_add(1), at: Position::ZERO, feed_mm_s: 0.0 }
+                Splice { stretch: start.stretch.wrapping_add(1), at: Position::ZERO, feed_mm_s: 0.0 }
             }
             Self::Dwell(_) | Self::Stop => *start,
         }
@@ -163,9 +163,9 @@ fn changed(from_mm_s: f64, change_mm_s: f64) -> f64 {
 /// Items with where they begin.
 #[derive(Clone, Debug)]
 pub(super) struct List {
-    pub(super) start: Junction,
+    pub(super) start: Splice,
     tick_s: f64,
-    items: Vec<(Junction, Item), LIST_ITEMS>,
+    items: Vec<(Splice, Item), LIST_ITEMS>,
     /// What follows takes over after so many of them; the others are a stop, should nothing follow in time.
     pub(super) leave: usize,
     /// It ends with a program block: in single block motion is held there.
@@ -173,7 +173,7 @@ pub(super) struct List {
 }
 
 impl List {
-    pub(super) fn new(start: Junction, tick_s: f64) -> Self {
+    pub(super) fn new(start: Splice, tick_s: f64) -> Self {
         Self { start, tick_s, items: Vec::new(), leave: 0, ends_block: false }
     }
 
@@ -212,11 +212,11 @@ impl List {
     }
 
     /// The items with where they start.
-    pub(super) fn placed(&self) -> impl Iterator<Item = &(Junction, Item)> {
+    pub(super) fn placed(&self) -> impl Iterator<Item = &(Splice, Item)> {
         self.items.iter()
     }
 
-    pub(super) fn get(&self, index: usize) -> Option<&(Junction, Item)> {
+    pub(super) fn get(&self, index: usize) -> Option<&(Splice, Item)> {
         self.items.get(index)
     }
 
@@ -226,12 +226,12 @@ impl List {
     }
 
     /// Where its last item ends.
-    pub(super) fn end(&self) -> Junction {
+    pub(super) fn end(&self) -> Splice {
         self.items.last().map_or(self.start, |(start, item)| item.end(start, self.tick_s))
     }
 
     /// Where it stands after so many items.
-    pub(super) fn after(&self, count: usize) -> Junction {
+    pub(super) fn after(&self, count: usize) -> Splice {
         match self.items.get(count) {
             Some((start, _)) => *start,
             None => self.end(),
@@ -256,7 +256,7 @@ mod tests {
             let (from_mm_s, change_mm_s) = (200.0 * random.unit(), random.log(0.1, 200.0));
             let ramp = Ramp::within(&limits, from_mm_s, from_mm_s + change_mm_s);
             let length = Position::from_mm(ramp.length_mm()).expect("in range");
-            let start = Junction { stretch: 0, at: Position::ZERO, feed_mm_s: from_mm_s };
+            let start = Splice { stretch: 0, at: Position::ZERO, feed_mm_s: from_mm_s };
             let mut item = Item::Feed { ramp, length };
             // Once, and then once more.
             for _ in 0..2 {

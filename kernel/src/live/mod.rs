@@ -11,16 +11,16 @@
 //! next where it was told to (see [`Change`](crate::queue::Change)). So motion is legal whatever the background does and
 //! however long it takes, and where it takes too long, the list under way ends in a stop on the path.
 //!
-//! A command is a list that begins at the next **junction**, a place where the feed does not change: anywhere in a
+//! A command is a list that begins at the next **splice**, a place where the feed does not change: anywhere in a
 //! cruise; a little later in a ramp that accelerates, which is given up by the shortest way (`Item::cut`), or for an
 //! override where it gets to the feed that this allows (`Item::cut_to`); at the end of a ramp that brakes, because ceilings ahead may need all of it. From there on it brakes to rest or to another
 //! feed under the ceilings and limits of all the blocks it crosses; where a ceiling ahead does not let it begin, at the
-//! next junction that does. What follows a stop or an override is planned anew, to the end of the stretch; a stretch
+//! next splice that does. What follows a stop or an override is planned anew, to the end of the stretch; a stretch
 //! that nothing was changed in is driven by the program's own plan.
 //!
 //! - `block_ends`, `single`: a rest at the end of every program block;
 //! - `road`: blocks ahead, and how to brake on them;
-//! - `replan`: a plan from a junction on;
+//! - `replan`: a plan from a splice on;
 //! - `list`: a feed list as the background sees it;
 //! - `gather`: what goes into the next list;
 //! - [`Source`]: where items come from, perhaps later;

@@ -1,13 +1,13 @@
-//! The feed from a junction on, planned anew over the blocks that are known.
+//! The feed from a splice on, planned anew over the blocks that are known.
 //!
-//! Consumes a junction, a feed override and the [`Road`]; produces ramps and cruises to rest where the known path ends.
+//! Consumes a splice, a feed override and the [`Road`]; produces ramps and cruises to rest where the known path ends.
 //! Background. Two stages and one pair of ramps for neighbours that are alike, as [`plan`]; over the blocks that come
 //! first with ramps that span them, where that is faster, to the feed that the plan behind them begins with.
 
 use heapless::Vec;
 
 use super::list::{Item, LIST_ITEMS, List};
-use super::road::{Junction, LENGTH_ROUNDING_MM, Road, SLIVER};
+use super::road::{LENGTH_ROUNDING_MM, Road, SLIVER, Splice};
 use crate::law::{Law, Limits};
 use crate::plan::spanning::spans_of;
 use crate::plan::{Block, BlockPlan, FeedSpan, Node, nodes_for, plan, plan_spanning, segments};
@@ -36,7 +36,7 @@ impl Ramps {
 /// of it. `None` if there is no plan: the feed is above the ceiling, or the path too short to brake.
 pub(super) fn replan<const BLOCKS: usize>(
     road: &Road<BLOCKS>,
-    from: &Junction,
+    from: &Splice,
     feed_override: f64,
     end: Position,
     ramps: Ramps,
@@ -68,12 +68,12 @@ struct Blocks<const BLOCKS: usize> {
 }
 
 impl<const BLOCKS: usize> Blocks<BLOCKS> {
-    /// Those from a junction to `end`. Neighbours with one ceiling are one block, with the least limits of all of them, if
+    /// Those from a splice to `end`. Neighbours with one ceiling are one block, with the least limits of all of them, if
     /// none of these are `alike` parts below another's.
     #[inline(never)]
     fn new(
         road: &Road<BLOCKS>,
-        from: &Junction,
+        from: &Splice,
         feed_override: f64,
         end: Position,
         alike: f64,
@@ -115,7 +115,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
 
     /// See [`replan`].
     #[inline(never)]
-    fn plan(&mut self, from: &Junction, ramps: Ramps, tick_s: f64, list: &mut List) -> Option<bool> {
+    fn plan(&mut self, from: &Splice, ramps: Ramps, tick_s: f64, list: &mut List) -> Option<bool> {
         let (blocks, ends) = (&mut self.blocks, &self.ends);
         let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
         plans.resize(blocks.len(), BlockPlan::default()).ok()?;
@@ -162,7 +162,7 @@ fn is_alike(least: &Limits<f64>, greatest: &Limits<f64>, alike: f64) -> bool {
 fn span(
     blocks: &[Block<f64>],
     plans: &[BlockPlan<f64>],
-    from: &Junction,
+    from: &Splice,
     end: Position,
     tick_s: f64,
     list: &mut List,

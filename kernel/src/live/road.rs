@@ -10,7 +10,7 @@ use crate::units::Position;
 
 /// A place where a plan may begin: on the path of a stretch, at a feed that does not change.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Junction {
+pub(super) struct Splice {
     /// The stretch, from 0.
     pub(super) stretch: u32,
     /// Path position from its start.
@@ -103,9 +103,9 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
         }
     }
 
-    /// The blocks of its stretch from a junction on, the first one cut there.
-    pub(super) fn from(&self, junction: &Junction) -> impl Iterator<Item = RoadBlock> + '_ {
-        let &Junction { stretch, at, .. } = junction;
+    /// The blocks of its stretch from a splice on, the first one cut there.
+    pub(super) fn from(&self, splice: &Splice) -> impl Iterator<Item = RoadBlock> + '_ {
+        let &Splice { stretch, at, .. } = splice;
         let ahead = self.blocks.iter().filter(move |block| block.stretch == stretch && block.end > at);
         ahead.map(move |block| RoadBlock { start: block.start.max(at), ..*block })
     }
@@ -130,12 +130,12 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
         known.then(|| caps.fold(0.0, f64::max))
     }
 
-    /// The fastest braking from a junction of motion under `feed_override` to `to_mm_s` that keeps the ceilings, joints
+    /// The fastest braking from a splice of motion under `feed_override` to `to_mm_s` that keeps the ceilings, joints
     /// and limits of all the blocks that it crosses, before `end`, with the length it is driven over; `None` if there is
     /// none.
     pub(super) fn brake(
         &self,
-        from: &Junction,
+        from: &Splice,
         to_mm_s: f64,
         end: Position,
         feed_override: f64,
@@ -164,8 +164,8 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
         None
     }
 
-    /// Whether the feed of a junction may be kept as far as `end` under `feed_override`.
-    pub(super) fn may_keep(&self, from: &Junction, end: Position, feed_override: f64) -> bool {
+    /// Whether the feed of a splice may be kept as far as `end` under `feed_override`.
+    pub(super) fn may_keep(&self, from: &Splice, end: Position, feed_override: f64) -> bool {
         let mut joint_mm_s = f64::INFINITY;
         self.from(from).take_while(|block| block.start < end).all(|block| {
             let most_mm_s = f64::min(block.allowed(feed_override).0, joint_mm_s);
@@ -175,7 +175,7 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
     }
 
     /// Whether a braking ramp is slow enough wherever a block begins.
-    fn is_below_ceilings(&self, from: &Junction, ramp: &Ramp<f64>, feed_override: f64) -> bool {
+    fn is_below_ceilings(&self, from: &Splice, ramp: &Ramp<f64>, feed_override: f64) -> bool {
         let rising = ramp.reversed();
         let length_mm = ramp.length_mm();
         let mut joint_mm_s = f64::INFINITY;

@@ -8,7 +8,7 @@ use super::command::Places;
 use super::director::Director;
 use super::list::{Item, LIST_ITEMS, List};
 use super::replan::Ramps;
-use super::road::{Junction, SLIVER};
+use super::road::{SLIVER, Splice};
 use super::source::Source;
 use crate::law::Ramp;
 use crate::num::Real;
@@ -40,7 +40,7 @@ where
     }
 
     /// Whether a list ends where single block is to come to rest.
-    pub(super) fn is_block_end(&self, place: &Junction) -> bool {
+    pub(super) fn is_block_end(&self, place: &Splice) -> bool {
         self.is_single && place.feed_mm_s <= 0.0 && self.block_end == Some(BlockEnd::from(*place))
     }
 
@@ -70,8 +70,8 @@ where
         self.current.list.ends_block = false;
     }
 
-    /// The path position of the nearest rest from a junction, and how to brake to it.
-    fn nearest_rest(&self, from: &Junction) -> Option<(Position, Option<Item>)> {
+    /// The path position of the nearest rest from a splice, and how to brake to it.
+    fn nearest_rest(&self, from: &Splice) -> Option<(Position, Option<Item>)> {
         if from.feed_mm_s <= 0.0 {
             return Some((from.at, None));
         }
@@ -168,9 +168,9 @@ where
         }
         let stretch = self.current.list.after(done).stretch;
         let rests = places.iter().filter_map(|place| {
-            let junction = place.junction(self.tick_s);
-            let (rest, _) = self.nearest_rest(&junction)?;
-            (junction.stretch == stretch).then_some(rest)
+            let splice = place.splice(self.tick_s);
+            let (rest, _) = self.nearest_rest(&splice)?;
+            (splice.stretch == stretch).then_some(rest)
         });
         if let Some(nearest) = rests.min() {
             let ends = self.block_ends(stretch, nearest);
@@ -208,8 +208,8 @@ where
     ) -> Result<bool, SupplyError<E>> {
         for place in places {
             let mut list = place.list(self.tick_s);
-            let junction = list.end();
-            if junction.feed_mm_s < place.start.feed_mm_s
+            let splice = list.end();
+            if splice.feed_mm_s < place.start.feed_mm_s
                 || !self.brake_at_block_end(&mut list)
                 || !self.keeps_up(&list, &place.change)
             {
