@@ -1162,10 +1162,10 @@ fn spline_alone_is_the_experiment() {
     let paths = found["paths"].as_array().expect("a list");
     let names: Vec<&Value> = paths.iter().map(|path| &path["name"]).collect();
     assert_eq!(names, ["arcs", "cubic spline", "quintic spline"]);
-    assert_has(&paths[0], &["length_mm", "time_s", "ticks", "deviation_mm", "joints", "by_tick"]);
-    assert_eq!(paths[1]["joints"].as_array().map(Vec::len), Some(8));
-    assert!((number(&paths[1]["joints"][5]["jerk_step_mm_s3"]) - 6268.0).abs() < 0.5);
-    assert_eq!(paths[2]["joints"][0]["published_s"], 0.055);
+    assert_has(&paths[0], &["length_mm", "time_s", "ticks", "deviation_mm", "junctions", "by_tick"]);
+    assert_eq!(paths[1]["junctions"].as_array().map(Vec::len), Some(8));
+    assert!((number(&paths[1]["junctions"][5]["jerk_step_mm_s3"]) - 6268.0).abs() < 0.5);
+    assert_eq!(paths[2]["junctions"][0]["published_s"], 0.055);
     let text = desk.stdout(&["spline", "--report", "page.html", "--trace", "axes.csv"]);
     for words in ["0.278017 s", "-319.225 to -399.031 mm/s²", "78444.3", "up to 3.8 ms", "septic pieces"] {
         assert!(text.contains(words), "{words}: {text}");

@@ -34,7 +34,7 @@ fn stepped_s(stretch: &Stretch, steps: usize) -> f64 {
             lengths.push(length);
             accels.push(block.ceiling.law.limits().accel_mm_s2);
             let last = step + 1 == steps;
-            caps.push((block.ceiling.feed_mm_s, if last { block.joint_mm_s } else { f64::INFINITY }));
+            caps.push((block.ceiling.feed_mm_s, if last { block.junction_mm_s } else { f64::INFINITY }));
         }
     }
     let mut feeds = vec![0.0_f64; lengths.len() + 1];

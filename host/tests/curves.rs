@@ -158,7 +158,7 @@ fn splines_and_lines_meet_exactly() {
             let steps = ratios.accel_step > 1e-3;
             assert_eq!(steps, moves == bent, "{mode} {moves}: {ratios:?}");
         }
-        // The passed joint is passed at speed.
+        // The passed junction is passed at speed.
         let plan = plan(tangent);
         assert!(plan.blocks[1].enter_mm_s > 5.0, "{}", plan.blocks[1].enter_mm_s);
     }

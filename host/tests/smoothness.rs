@@ -30,13 +30,13 @@ fn the_arcs_step_in_acceleration() {
     assert_near(arcs.length_mm, 28.274_33, 5e-6);
     assert_near(arcs.time_s, 0.500_431, 5e-7);
     assert_eq!(arcs.ticks, 500);
-    let [joint] = &arcs.joints[..] else { panic!("{} joints", arcs.joints.len()) };
-    assert_near(joint.time_s, 0.278_017, 5e-7);
+    let [junction] = &arcs.junctions[..] else { panic!("{} junctions", arcs.junctions.len()) };
+    assert_near(junction.time_s, 0.278_017, 5e-7);
     // A_Y = −F²/R.
     let before = -FEED_MM_S * FEED_MM_S / 10.0;
     assert_near(before, -319.225, 1e-9);
-    assert_near(before + joint.accel_mm_s2[1], -399.031, 5e-4);
-    assert_near(joint.accel_mm_s2[0], 0.0, 1e-9);
+    assert_near(before + junction.accel_mm_s2[1], -399.031, 5e-4);
+    assert_near(junction.accel_mm_s2[0], 0.0, 1e-9);
     // Its difference over ticks is no property of the path: it grows as 1/τ.
     let ticks = smoothness::arcs().ticks(FEED_MM_S, TICK_S);
     let jerk_y = ticks.jerk_mm_s3.iter().map(|jerk| jerk[1]).fold(0.0, f64::min);
@@ -57,13 +57,13 @@ fn splines_deviate_from_the_arcs() {
     for figures in [cubic, quintic] {
         // Times at the inner points, and table 2.
         let ours = [0.0556, 0.1112, 0.1668, 0.2224, 0.2780, 0.3337, 0.3892, 0.4449];
-        assert_eq!(figures.joints.len(), ours.len());
-        for ((joint, ours_s), printed_s) in figures.joints.iter().zip(ours).zip(TABLE_2_S) {
-            assert_near(joint.time_s, ours_s, 5.1e-5);
-            assert_near(joint.time_s, printed_s, 4e-3);
+        assert_eq!(figures.junctions.len(), ours.len());
+        for ((junction, ours_s), printed_s) in figures.junctions.iter().zip(ours).zip(TABLE_2_S) {
+            assert_near(junction.time_s, ours_s, 5.1e-5);
+            assert_near(junction.time_s, printed_s, 4e-3);
         }
         let farthest =
-            figures.joints.iter().zip(TABLE_2_S).map(|(j, t)| (j.time_s - t).abs()).fold(0.0, f64::max);
+            figures.junctions.iter().zip(TABLE_2_S).map(|(j, t)| (j.time_s - t).abs()).fold(0.0, f64::max);
         assert!(farthest > 3.5e-3, "{farthest}: table 2 has nothing to be quoted with");
     }
 }
@@ -72,15 +72,15 @@ fn splines_deviate_from_the_arcs() {
 fn the_cubics_jerk_steps_and_the_quintics_does_not() {
     let [_, cubic, quintic] = figures();
     let printed = [432.0, 1115.0, 1119.0, 4015.0, 144.0, 6268.0, 3919.0, 78.0];
-    for (joint, printed) in cubic.joints.iter().zip(printed) {
-        assert_near(joint.jerk_step_mm_s3(), printed, 0.5);
+    for (junction, printed) in cubic.junctions.iter().zip(printed) {
+        assert_near(junction.jerk_step_mm_s3(), printed, 0.5);
     }
     for figures in [&cubic, &quintic] {
-        for joint in &figures.joints {
-            assert!(joint.accel_mm_s2.iter().all(|step| step.abs() < 1e-9), "{joint:?}");
+        for junction in &figures.junctions {
+            assert!(junction.accel_mm_s2.iter().all(|step| step.abs() < 1e-9), "{junction:?}");
         }
     }
-    assert!(quintic.joints.iter().all(|joint| joint.jerk_step_mm_s3() < 0.05));
+    assert!(quintic.junctions.iter().all(|junction| junction.jerk_step_mm_s3() < 0.05));
     // From tick to tick: the cubic's step stays, the quintic's goes with the tick.
     let steps = |figures: &Figures| {
         let [first, _, last] = figures.by_tick;

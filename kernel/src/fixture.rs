@@ -40,4 +40,4 @@ pub(crate) const GUARD: GuardFigures = GuardFigures {
 pub(crate) const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
 
 pub(crate) const RULES: PathRules =
-    PathRules { limits: LIMITS, feed_mm_s: 300.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+    PathRules { limits: LIMITS, feed_mm_s: 300.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };

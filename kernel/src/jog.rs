@@ -19,7 +19,7 @@
 //!
 //! let at = |mm| Position::from_mm(mm).unwrap();
 //! let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
-//! let rules = PathRules { limits, feed_mm_s: 100.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+//! let rules = PathRules { limits, feed_mm_s: 100.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
 //! let travel = Some(Travel { least: at(-200.0), greatest: at(300.0) });
 //! let axis = JogAxis { feed_mm_s: 100.0, limits, travel };
 //! let tick_s = 0.0005;

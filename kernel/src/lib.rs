@@ -9,7 +9,7 @@
 //! ```text
 //!   background                                   what it hands on
 //!   ──────────                                   ────────────────
-//!   plan    ceilings, joints, look-ahead         Block, BlockPlan, FeedSpan
+//!   plan    ceilings, junctions, look-ahead         Block, BlockPlan, FeedSpan
 //!   law     ramps; inverse problems              Ramp ─► FeedSegment ┐ two streams that measure
 //!   path    lines and septic pieces              Piece ──────────────┤ the same path length
 //!                                                                    │
@@ -47,7 +47,7 @@
 //! let block = Block {
 //!     length_mm: 20.0,
 //!     cap_mm_s: 50.0,
-//!     joint_mm_s: f64::INFINITY,
+//!     junction_mm_s: f64::INFINITY,
 //!     law: Law::new(limits).unwrap(),
 //! };
 //! let mut plans = [BlockPlan::default()];
@@ -55,7 +55,7 @@
 //!
 //! // Feed the two streams, for an f32 tick of 0.5 ms. Lines longer than 16 mm are cut.
 //! let at = |mm| Position::from_mm(mm).unwrap();
-//! let rules = PathRules { limits, feed_mm_s: 50.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+//! let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
 //! let mut streams = Streams::<f32, 1, 8, 8>::new();
 //! let (mut feeder, mut intake) = streams.split(rules, [at(0.0)]);
 //! for segment in segments(&block, &plans[0], at(0.0), at(20.0), 0.0005).unwrap().into_iter().flatten() {

@@ -98,7 +98,7 @@ impl<const AXES: usize> Straight<AXES> {
         let (mut direction, mut ramps, mut block) = ([0.0; AXES], [None; 3], None);
         if length > Position::ZERO {
             direction = way_mm.map(|mm| mm / length_mm);
-            let planned = Block { length_mm: length.to_mm(), cap_mm_s: feed_mm_s, joint_mm_s: 0.0, law };
+            let planned = Block { length_mm: length.to_mm(), cap_mm_s: feed_mm_s, junction_mm_s: 0.0, law };
             let mut plans = [BlockPlan::default()];
             // From rest to rest there always is a plan.
             let _ = plan(&[planned], 0.0, 0.0, &mut plans);

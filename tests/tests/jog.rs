@@ -38,7 +38,7 @@ impl Machine {
 
     fn rules(&self) -> PathRules {
         let JogAxis { feed_mm_s, limits, .. } = self.axis;
-        PathRules { limits, feed_mm_s, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 }
+        PathRules { limits, feed_mm_s, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 }
     }
 }
 

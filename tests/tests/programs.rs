@@ -106,7 +106,7 @@ fn blocks_whose_change_of_feed_is_a_few_last_places_are_planned() {
     assert_none(&failures);
 }
 
-/// Kinks whose joint feed lies around the programmed feed: neither merging nor planning may pass one faster.
+/// Kinks whose junction feed lies around the programmed feed: neither merging nor planning may pass one faster.
 #[test]
 fn kinks_around_the_programmed_feed_keep_the_acceleration_step() {
     let reference = motion_host::machine::Machine::reference();

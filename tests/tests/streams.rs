@@ -461,7 +461,7 @@ fn as_many_pieces_as_the_bound_end_in_a_tick_and_no_more() {
 /// Lines of 1 µm at a feed that passes `pieces_per_tick` of them.
 fn short_lines(pieces_per_tick: f64) -> String {
     let feed_mm_min = 0.001 * pieces_per_tick / TICK_S * 60.0;
-    // A zigzag within the joint angle: merging keeps every line a piece.
+    // A zigzag within the junction angle: merging keeps every line a piece.
     (1..20_000).fold("G91\n".to_owned(), |text, part| {
         text + &format!("G1 X0.001 Y{:.10} F{feed_mm_min:.3}\n", f64::from(part % 2) * 1e-9)
     })

@@ -24,7 +24,7 @@ Examples:
 Columns: `per block` is the time with one pair of ramps per block; `least` is what the same path would take
 with no limit of jerk and snap, below which no plan of it can be; `tolerance` is the greatest part of it that the path
 may use; `feed` to `step` are the executed ticks over the limits of axes and path, `step` that of
-acceleration where a joint is passed without a blend. Programs that are refused are listed; then the exit
+acceleration where a junction is passed without a blend. Programs that are refused are listed; then the exit
 status is 2.";
 
 /// Compare the times of programs: exact path, blends, plan per block, and the least there is.

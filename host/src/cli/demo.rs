@@ -48,7 +48,7 @@ mod tests {
     use crate::gcode::StepKind;
     use crate::toolpath::{Element, angle, norm, subtract};
 
-    /// The tangents agree within 10⁻⁶ rad at every joint, and the last line is parallel to the first.
+    /// The tangents agree within 10⁻⁶ rad at every junction, and the last line is parallel to the first.
     #[test]
     fn the_stringer_is_tangent() {
         let program = gcode::read(STRINGER_NAME, STRINGER.as_bytes()).expect("G-code");

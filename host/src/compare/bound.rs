@@ -1,6 +1,6 @@
 //! The least time that a plan's path can take.
 //!
-//! Consumes a plan; produces the time of the fastest motion over its blocks that keeps their ceilings, their joint
+//! Consumes a plan; produces the time of the fastest motion over its blocks that keeps their ceilings, their junction
 //! feeds and the acceleration of their laws, with no limit of jerk and snap. Every plan of these blocks keeps all that
 //! too, so none is faster.
 
@@ -23,10 +23,10 @@ pub fn least_time_s(plan: &Plan) -> f64 {
 
 fn of_stretch_s(stretch: &Stretch) -> f64 {
     let blocks = stretch.for_lookahead();
-    // v² at every joint, at most as the ceilings beside it and the joint itself say; 0 at both ends.
+    // v² at every junction, at most as the ceilings beside it and the junction itself say; 0 at both ends.
     let mut squares = vec![0.0_f64; blocks.len() + 1];
     for (index, pair) in blocks.windows(2).enumerate() {
-        let feed_mm_s = pair[0].joint_mm_s.min(pair[0].cap_mm_s).min(pair[1].cap_mm_s);
+        let feed_mm_s = pair[0].junction_mm_s.min(pair[0].cap_mm_s).min(pair[1].cap_mm_s);
         squares[index + 1] = feed_mm_s * feed_mm_s;
     }
     let gained = |block: &Block<f64>| 2.0 * block.law.limits().accel_mm_s2 * block.length_mm;

@@ -24,7 +24,7 @@ pub struct Ratios {
     pub feed: f64,
     /// Acceleration, of an axis or as a vector.
     pub accel: f64,
-    /// Jerk, of an axis or as a vector; what joints step is not in it.
+    /// Jerk, of an axis or as a vector; what junctions step is not in it.
     pub jerk: f64,
     /// Change of the acceleration vector from one tick to the next, beyond what jerk accounts for, over the
     /// acceleration-step limit.

@@ -20,7 +20,7 @@ use toml::Spanned;
 use super::error::{MachineError, quote};
 use super::range::{
     AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
-    FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, JointAngle, Jump,
+    FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle,
     Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS,
     NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, Place, Positive, Ramp, Resolution, Reversal,
     StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch, Within,
@@ -186,7 +186,7 @@ struct PathTable {
     accel_mm_s2: Within<Limit>,
     jerk_mm_s3: Within<Limit>,
     snap_mm_s4: Within<Limit>,
-    joint_angle_deg: Within<JointAngle>,
+    junction_angle_deg: Within<JunctionAngle>,
     accel_step_mm_s2: Within<Limit>,
     curve_feed_share: Within<CurveShare>,
     blend_tolerance_mm: Option<Within<BlendTolerance>>,
@@ -447,7 +447,7 @@ impl PathTable {
             accel_mm_s2: self.accel_mm_s2.0,
             jerk_mm_s3: self.jerk_mm_s3.0,
             snap_mm_s4: self.snap_mm_s4.0,
-            joint_angle_rad: self.joint_angle_deg.0.to_radians(),
+            junction_angle_rad: self.junction_angle_deg.0.to_radians(),
             accel_step_mm_s2: self.accel_step_mm_s2.0,
             curve_feed_share: self.curve_feed_share.0,
             blend_tolerance_mm: self

@@ -7,7 +7,7 @@ use motion_kernel::axis::TABLE_POINTS;
 
 use super::range::{
     AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
-    FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, JointAngle, Jump,
+    FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle,
     Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit,
     OutputOffset, Place, Positive, Ramp, Range, Resolution, Reversal, StopTime, TIMER_BITS, TablePoint, Tick,
     Velocity, Watch,
@@ -89,17 +89,17 @@ pub const KEY_TABLES: &[KeyTable] = &[
             Key::new("jerk_mm_s3", "mm/s³", Limit::EXPECTED, "Greatest jerk, as a vector."),
             Key::new("snap_mm_s4", "mm/s⁴", Limit::EXPECTED, "Greatest rate of change of jerk."),
             Key::new(
-                "joint_angle_deg",
+                "junction_angle_deg",
                 "°",
-                JointAngle::EXPECTED,
+                JunctionAngle::EXPECTED,
                 "Greatest change of direction between two blocks that is driven through; beyond it the motion stops \
-                 at the joint.",
+                 at the junction.",
             ),
             Key::new(
                 "accel_step_mm_s2",
                 "mm/s²",
                 Limit::EXPECTED,
-                "Greatest jump of acceleration at a joint, where the curvature jumps.",
+                "Greatest jump of acceleration at a junction, where the curvature jumps.",
             ),
             Key::new(
                 "curve_feed_share",

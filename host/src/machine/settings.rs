@@ -19,10 +19,10 @@ use super::error::{AxisError, MachineError};
 use super::file;
 
 /// Pieces are rounded: their tangents agree with the planner's angle to this, and with a curve's feed.
-const JOINT_ANGLE_ROUNDING_RAD: f64 = 2.0e-6;
+const JUNCTION_ANGLE_ROUNDING_RAD: f64 = 2.0e-6;
 
 /// Greatest gap between two pieces \[mm\]: pieces are rounded, to a twentieth of a count of 0.1 µm.
-const JOINT_GAP_MM: f64 = 5e-6;
+const JUNCTION_GAP_MM: f64 = 5e-6;
 
 /// Tolerance of a G64 without P \[mm\]: so little that a program written for another controller still makes its part.
 pub(super) const BLEND_TOLERANCE_MM: f64 = 0.01;
@@ -66,7 +66,7 @@ impl Default for FaultSettings {
     }
 }
 
-/// Limits along the path, and rules for its joints. The four limits are from 0.001 to 10¹².
+/// Limits along the path, and rules for its junctions. The four limits are from 0.001 to 10¹².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathSettings {
     /// Greatest feed \[mm/s\].
@@ -77,9 +77,9 @@ pub struct PathSettings {
     pub jerk_mm_s3: f64,
     /// Greatest snap \[mm/s⁴\].
     pub snap_mm_s4: f64,
-    /// Greatest change of direction at a joint that is driven through \[rad\]; 0 to 30° (in the file in degrees).
-    pub joint_angle_rad: f64,
-    /// Greatest jump of acceleration at a joint \[mm/s²\]; from 0.001 to 10¹².
+    /// Greatest change of direction at a junction that is driven through \[rad\]; 0 to 30° (in the file in degrees).
+    pub junction_angle_rad: f64,
+    /// Greatest jump of acceleration at a junction \[mm/s²\]; from 0.001 to 10¹².
     pub accel_step_mm_s2: f64,
     /// Part of a curve's greatest feed that is planned with, 0.1 to 0.85; what it leaves of acceleration, jerk and
     /// snap is for changing the feed on the curve.
@@ -153,7 +153,7 @@ impl Machine {
                 accel_mm_s2: 500.0,
                 jerk_mm_s3: 5e3,
                 snap_mm_s4: 4e5,
-                joint_angle_rad: 0.5_f64.to_radians(),
+                junction_angle_rad: 0.5_f64.to_radians(),
                 accel_step_mm_s2: 500.0,
                 curve_feed_share: CURVE_FEED_SHARE,
                 blend_tolerance_mm: BLEND_TOLERANCE_MM,
@@ -205,8 +205,8 @@ impl Machine {
         PathRules {
             limits: self.path.limits(),
             feed_mm_s: self.path.feed_mm_s,
-            joint_angle_rad: self.path.joint_angle_rad + JOINT_ANGLE_ROUNDING_RAD,
-            joint_gap_mm: JOINT_GAP_MM,
+            junction_angle_rad: self.path.junction_angle_rad + JUNCTION_ANGLE_ROUNDING_RAD,
+            junction_gap_mm: JUNCTION_GAP_MM,
         }
     }
 

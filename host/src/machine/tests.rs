@@ -74,7 +74,7 @@ fn every_range_is_kept() {
         ("accel_mm_s2", LIMIT),
         ("jerk_mm_s3", LIMIT),
         ("snap_mm_s4", LIMIT),
-        ("joint_angle_deg", &["-0.5", "31"]),
+        ("junction_angle_deg", &["-0.5", "31"]),
         ("accel_step_mm_s2", LIMIT),
         ("curve_feed_share", &["0", "0.86", "-0.5"]),
         ("blend_tolerance_mm", &["-0.01", "11"]),

@@ -1,19 +1,19 @@
-//! Which joints are blended, and over which length.
+//! Which junctions are blended, and over which length.
 //!
-//! Consumes a run of moves with their tolerances; produces blocks with ceiling, law and joint feed, ready for
-//! look-ahead. Background, a bounded number of plans of at most eleven blocks for each joint.
+//! Consumes a run of moves with their tolerances; produces blocks with ceiling, law and junction feed, ready for
+//! look-ahead. Background, a bounded number of plans of at most eleven blocks for each junction.
 //!
 //! **What pays.** Jerk and snap bound the way round a corner: within a small tolerance it may take longer than a stop
-//! on the corner, and between a slow and a fast move a blend keeps the fast one slow. So every joint is tried as
+//! on the corner, and between a slow and a fast move a blend keeps the fast one slow. So every junction is tried as
 //! it is (a stop, or what the acceleration-step limit lets pass) and with blends of some lengths, each once with
 //! [`BLEND_FEED_SHARE`], which leaves nothing for changing the feed on it, and once as a curve like any other.
 //! They are compared by the time that look-ahead takes over both moves and one more on either side, with what has
-//! been chosen for the joints beside. What is shortest is taken, but a joint without a blend has to gain
-//! a five-hundredth of it: G64 asks for smooth motion. Looking at one joint after the other does not find the best of
+//! been chosen for the junctions beside. What is shortest is taken, but a junction without a blend has to gain
+//! a five-hundredth of it: G64 asks for smooth motion. Looking at one junction after the other does not find the best of
 //! all; in the end the run is planned with every blend at its longest and as it was programmed, too, and the best of these is
 //! taken. So blends and merged lines cost at most that part of the time that the exact path takes.
 //!
-//! **Tangent joints** whose curvature jumps are treated alike: passed without a blend they fall under the
+//! **Tangent junctions** whose curvature jumps are treated alike: passed without a blend they fall under the
 //! acceleration-step limit as under G61, because a path of bounded jerk through them can take longer (on the arcs of a
 //! few millimetres that a corner is rounded with, by a seventh). Where no such step is to be, the machine's limit
 //! says so: with a small one only the blend pays.
@@ -24,7 +24,7 @@ use motion_kernel::plan::{
 };
 
 use super::Mode;
-use super::ceilings::{Ceilings, ceilings, joint_feed};
+use super::ceilings::{Ceilings, ceilings, junction_feed};
 use super::error::Problem;
 use super::lookahead::{lookahead, time_s};
 use super::stretch::StretchBlock;
@@ -32,14 +32,14 @@ use crate::machine::Machine;
 use crate::toolpath::blend::Blend;
 use crate::toolpath::smooth::{Move, Run};
 
-/// Part of the time that a joint without a blend has to gain over the best one.
+/// Part of the time that a junction without a blend has to gain over the best one.
 const EXACT_GAIN_MIN: f64 = 0.002;
 
 /// Lengths of blends that are tried, as parts of the longest one.
 const SIZES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
-/// How often a joint is looked at at most.
+/// How often a junction is looked at at most.
 const SWEEPS: usize = 4;
-/// How many more moves are looked at on either side of those at a joint.
+/// How many more moves are looked at on either side of those at a junction.
 const BESIDE: usize = 1;
 /// Blocks of that many moves and the blends between them.
 const BLOCKS: usize = 2 * (2 * BESIDE + 2) - 1;
@@ -51,7 +51,7 @@ const LESS: f64 = 1.0 - 1.0e-9;
 /// An error comes with the program line.
 type AtLine<T> = Result<T, (u32, Problem)>;
 
-/// How a joint is crossed.
+/// How a junction is crossed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Crossing {
     /// The blend with its length \[mm\] and its ceiling; none: as it is.
@@ -67,7 +67,7 @@ impl Crossing {
     }
 }
 
-/// How a joint may be crossed; without a blend last.
+/// How a junction may be crossed; without a blend last.
 struct Variants {
     /// What the blends may take of either move \[mm\].
     room_mm: f64,
@@ -85,22 +85,22 @@ impl Variants {
     }
 }
 
-/// The blocks of a run that starts and ends at rest; the joint feed of the last one is 0. An error comes with the
+/// The blocks of a run that starts and ends at rest; the junction feed of the last one is 0. An error comes with the
 /// program line.
 pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlock>> {
-    let joints = Joints::new(Run::new(moves), machine)?;
-    let is_merged = joints.run.moves().len() < moves.len();
-    let merged = joints.exact();
-    let candidates = match joints.choose(&merged)? {
-        Some([longest, chosen]) => vec![joints.blocks(&chosen), joints.blocks(&longest)],
-        None if is_merged => vec![joints.blocks(&merged)],
-        None => return Ok(joints.blocks(&merged)),
+    let junctions = Junctions::new(Run::new(moves), machine)?;
+    let is_merged = junctions.run.moves().len() < moves.len();
+    let merged = junctions.exact();
+    let candidates = match junctions.choose(&merged)? {
+        Some([longest, chosen]) => vec![junctions.blocks(&chosen), junctions.blocks(&longest)],
+        None if is_merged => vec![junctions.blocks(&merged)],
+        None => return Ok(junctions.blocks(&merged)),
     };
     let exact = if is_merged {
-        let joints = Joints::new(Run::exact(moves), machine)?;
-        joints.blocks(&joints.exact())
+        let junctions = Junctions::new(Run::exact(moves), machine)?;
+        junctions.blocks(&junctions.exact())
     } else {
-        joints.blocks(&merged)
+        junctions.blocks(&merged)
     };
     let mut best = exact;
     let mut most_s = run_time_s(&best, machine.tick_s) / (1.0 - EXACT_GAIN_MIN);
@@ -113,8 +113,8 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlo
     Ok(best)
 }
 
-/// The joints of a run.
-struct Joints<'a> {
+/// The junctions of a run.
+struct Junctions<'a> {
     run: Run,
     /// Of the moves.
     ceilings: Vec<Ceilings>,
@@ -123,7 +123,7 @@ struct Joints<'a> {
     limits: Limits<f64>,
 }
 
-impl<'a> Joints<'a> {
+impl<'a> Junctions<'a> {
     fn new(run: Run, machine: &'a Machine) -> AtLine<Self> {
         let mut all = Vec::with_capacity(run.moves().len());
         for step in run.moves() {
@@ -137,72 +137,73 @@ impl<'a> Joints<'a> {
     /// is nothing to blend.
     fn choose(&self, exact: &[Crossing]) -> AtLine<Option<[Vec<Crossing>; 2]>> {
         // First as if each were alone, then those that touch within what the other leaves.
-        let alone_mm: Vec<f64> = (0..exact.len()).map(|joint| self.longest_mm(joint)).collect();
+        let alone_mm: Vec<f64> = (0..exact.len()).map(|junction| self.longest_mm(junction)).collect();
         let mut variants = Vec::with_capacity(exact.len());
-        for (joint, &longest_mm) in alone_mm.iter().enumerate() {
-            let room_mm = self.room_mm(joint, |joint| alone_mm[joint]).min(longest_mm);
-            variants.push(self.variants(joint, room_mm, exact[joint])?);
+        for (junction, &longest_mm) in alone_mm.iter().enumerate() {
+            let room_mm = self.room_mm(junction, |junction| alone_mm[junction]).min(longest_mm);
+            variants.push(self.variants(junction, room_mm, exact[junction])?);
         }
         if !variants.iter().any(Variants::are_blends) {
             return Ok(None);
         }
         let mut chosen: Vec<Crossing> = variants.iter().map(|variants| variants.all[0]).collect();
-        for (joint, variants) in variants.iter().enumerate() {
-            chosen[joint] = self.best(joint, &chosen, variants.longest());
+        for (junction, variants) in variants.iter().enumerate() {
+            chosen[junction] = self.best(junction, &chosen, variants.longest());
         }
         let longest = chosen.clone();
         // Looked at again are those beside which something changed.
         let mut is_open = vec![true; chosen.len()];
         for _ in 0..SWEEPS {
-            for joint in 0..chosen.len() {
-                if !std::mem::take(&mut is_open[joint]) || !variants[joint].are_blends() {
+            for junction in 0..chosen.len() {
+                if !std::mem::take(&mut is_open[junction]) || !variants[junction].are_blends() {
                     continue;
                 }
-                let room_mm = self.room_mm(joint, |joint| chosen[joint].way_mm()).min(alone_mm[joint]);
-                if room_mm != variants[joint].room_mm {
-                    variants[joint] = self.variants(joint, room_mm, exact[joint])?;
+                let room_mm =
+                    self.room_mm(junction, |junction| chosen[junction].way_mm()).min(alone_mm[junction]);
+                if room_mm != variants[junction].room_mm {
+                    variants[junction] = self.variants(junction, room_mm, exact[junction])?;
                 }
-                let best = self.best(joint, &chosen, &variants[joint].all);
-                if best != std::mem::replace(&mut chosen[joint], best) {
-                    let beside = joint.saturating_sub(BESIDE + 1)..chosen.len().min(joint + BESIDE + 2);
+                let best = self.best(junction, &chosen, &variants[junction].all);
+                if best != std::mem::replace(&mut chosen[junction], best) {
+                    let beside = junction.saturating_sub(BESIDE + 1)..chosen.len().min(junction + BESIDE + 2);
                     is_open[beside].iter_mut().for_each(|is_open| *is_open = true);
-                    is_open[joint] = false;
+                    is_open[junction] = false;
                 }
             }
         }
         Ok(Some([longest, chosen]))
     }
 
-    /// The way of the longest blend of a joint, 0 if there is none \[mm\].
-    fn longest_mm(&self, joint: usize) -> f64 {
-        let room_mm = self.run.taken_mm_max(joint).min(self.run.taken_mm_max(joint + 1));
-        self.run.blend(joint, room_mm, &self.limits).map_or(0.0, |blend| blend.way_mm)
+    /// The way of the longest blend of a junction, 0 if there is none \[mm\].
+    fn longest_mm(&self, junction: usize) -> f64 {
+        let room_mm = self.run.taken_mm_max(junction).min(self.run.taken_mm_max(junction + 1));
+        self.run.blend(junction, room_mm, &self.limits).map_or(0.0, |blend| blend.way_mm)
     }
 
-    /// The room of a joint where the others take `way_mm`.
-    fn room_mm(&self, joint: usize, way_mm: impl Fn(usize) -> f64) -> f64 {
-        let after = joint + 1;
-        let after_mm = if after < self.run.joints() { way_mm(after) } else { 0.0 };
-        self.run.room_mm(joint, [joint.checked_sub(1).map_or(0.0, way_mm), after_mm])
+    /// The room of a junction where the others take `way_mm`.
+    fn room_mm(&self, junction: usize, way_mm: impl Fn(usize) -> f64) -> f64 {
+        let after = junction + 1;
+        let after_mm = if after < self.run.junctions() { way_mm(after) } else { 0.0 };
+        self.run.room_mm(junction, [junction.checked_sub(1).map_or(0.0, way_mm), after_mm])
     }
 
     /// All as they are.
     fn exact(&self) -> Vec<Crossing> {
-        (0..self.run.joints()).map(|joint| self.exact_at(joint)).collect()
+        (0..self.run.junctions()).map(|junction| self.exact_at(junction)).collect()
     }
 
-    fn exact_at(&self, joint: usize) -> Crossing {
-        let [before, after] =
-            [joint, joint + 1].map(|index| (&self.run.moves()[index], &self.ceilings[index].programmed));
-        let feed_mm_s = joint_feed(&before.0.element, &after.0.element, self.machine);
+    fn exact_at(&self, junction: usize) -> Crossing {
+        let [before, after] = [junction, junction + 1]
+            .map(|index| (&self.run.moves()[index], &self.ceilings[index].programmed));
+        let feed_mm_s = junction_feed(&before.0.element, &after.0.element, self.machine);
         Crossing { blend: None, feed_mm_s: feed_mm_s.min(before.1.feed_mm_s).min(after.1.feed_mm_s) }
     }
 
-    fn variants(&self, joint: usize, room_mm: f64, exact: Crossing) -> AtLine<Variants> {
-        let [before, after] = [joint, joint + 1].map(|index| self.run.moves()[index]);
+    fn variants(&self, junction: usize, room_mm: f64, exact: Crossing) -> AtLine<Variants> {
+        let [before, after] = [junction, junction + 1].map(|index| self.run.moves()[index]);
         let mut all = Vec::with_capacity(2 * SIZES.len() + 1);
         for size in SIZES {
-            let Some(blend) = self.run.blend(joint, size * room_mm, &self.limits) else { continue };
+            let Some(blend) = self.run.blend(junction, size * room_mm, &self.limits) else { continue };
             let feed_mm_s = before.feed_mm_s.min(after.feed_mm_s);
             let step = Move { element: blend.element, feed_mm_s, ..before };
             let length_mm = blend.element.length_mm();
@@ -218,15 +219,16 @@ impl<'a> Joints<'a> {
         Ok(Variants { room_mm, all })
     }
 
-    /// The best of some crossings of a joint, the others being crossed as `chosen` says.
-    fn best(&self, joint: usize, chosen: &[Crossing], variants: &[Crossing]) -> Crossing {
+    /// The best of some crossings of a junction, the others being crossed as `chosen` says.
+    fn best(&self, junction: usize, chosen: &[Crossing], variants: &[Crossing]) -> Crossing {
         let windows: Vec<Vec<Block<f64>>> =
-            variants.iter().map(|variant| self.window(joint, variant, chosen)).collect();
-        let (first, last) = self.beside(joint);
-        let feed =
-            |joint: Option<usize>| joint.and_then(|joint| chosen.get(joint)).map_or(0.0, |c| c.feed_mm_s);
+            variants.iter().map(|variant| self.window(junction, variant, chosen)).collect();
+        let (first, last) = self.beside(junction);
+        let feed = |junction: Option<usize>| {
+            junction.and_then(|junction| chosen.get(junction)).map_or(0.0, |c| c.feed_mm_s)
+        };
         let feeds = common_feeds(&windows, [feed(first.checked_sub(1)), feed(Some(last))]);
-        let mut best = (chosen[joint], f64::INFINITY);
+        let mut best = (chosen[junction], f64::INFINITY);
         for (variant, blocks) in variants.iter().zip(&windows) {
             let gain = if variant.blend.is_none() { EXACT_GAIN_MIN } else { 0.0 };
             let time_s = window_time_s(blocks, feeds);
@@ -237,28 +239,29 @@ impl<'a> Joints<'a> {
         best.0
     }
 
-    /// The first and the last move that are looked at for a joint.
-    fn beside(&self, joint: usize) -> (usize, usize) {
-        (joint.saturating_sub(BESIDE), (joint + 1 + BESIDE).min(self.ceilings.len() - 1))
+    /// The first and the last move that are looked at for a junction.
+    fn beside(&self, junction: usize) -> (usize, usize) {
+        (junction.saturating_sub(BESIDE), (junction + 1 + BESIDE).min(self.ceilings.len() - 1))
     }
 
-    /// What is looked at for a joint, crossed as `variant` says.
+    /// What is looked at for a junction, crossed as `variant` says.
     fn window(&self, changed: usize, variant: &Crossing, chosen: &[Crossing]) -> Vec<Block<f64>> {
-        let crossing = |joint: usize| if joint == changed { Some(variant) } else { chosen.get(joint) };
-        let way_mm = |joint: Option<usize>| joint.and_then(crossing).map_or(0.0, Crossing::way_mm);
+        let crossing =
+            |junction: usize| if junction == changed { Some(variant) } else { chosen.get(junction) };
+        let way_mm = |junction: Option<usize>| junction.and_then(crossing).map_or(0.0, Crossing::way_mm);
         let (first, last) = self.beside(changed);
         let mut blocks = Vec::with_capacity(BLOCKS);
         for index in first..=last {
             let length_mm = self.run.length_mm(index) - way_mm(index.checked_sub(1)) - way_mm(Some(index));
             let after = crossing(index).filter(|_| index < last);
-            let joint_mm_s = after.map_or(f64::INFINITY, |after| after.feed_mm_s);
-            let block = |length_mm, ceiling: &Ceiling<f64>, joint_mm_s| Block {
+            let junction_mm_s = after.map_or(f64::INFINITY, |after| after.feed_mm_s);
+            let block = |length_mm, ceiling: &Ceiling<f64>, junction_mm_s| Block {
                 length_mm,
                 cap_mm_s: ceiling.feed_mm_s,
-                joint_mm_s,
+                junction_mm_s,
                 law: ceiling.law,
             };
-            blocks.push(block(length_mm, &self.ceilings[index].programmed, joint_mm_s));
+            blocks.push(block(length_mm, &self.ceilings[index].programmed, junction_mm_s));
             if let Some(Crossing { blend: Some((_, length_mm, ceilings)), .. }) = after {
                 blocks.push(block(*length_mm, &ceilings.programmed, f64::INFINITY));
             }
@@ -269,8 +272,9 @@ impl<'a> Joints<'a> {
     /// The blocks of the run.
     fn blocks(&self, crossings: &[Crossing]) -> Vec<StretchBlock> {
         let mut blocks: Vec<StretchBlock> = Vec::with_capacity(2 * self.ceilings.len());
-        let way_mm =
-            |joint: Option<usize>| joint.and_then(|joint| crossings.get(joint)).map_or(0.0, Crossing::way_mm);
+        let way_mm = |junction: Option<usize>| {
+            junction.and_then(|junction| crossings.get(junction)).map_or(0.0, Crossing::way_mm)
+        };
         for (index, (step, &ceilings)) in self.run.moves().iter().zip(&self.ceilings).enumerate() {
             let (first_mm, last_mm) = (way_mm(index.checked_sub(1)), way_mm(Some(index)));
             let is_whole = first_mm == 0.0 && last_mm == 0.0;
@@ -281,7 +285,7 @@ impl<'a> Joints<'a> {
                 ceiling: ceilings.programmed,
                 greatest: ceilings.greatest,
                 feed_mm_s,
-                joint_mm_s: 0.0,
+                junction_mm_s: 0.0,
                 tolerance_share,
             };
             blocks.push(block(element, step.feed_mm_s, ceilings, self.run.tolerance_share(index)));
@@ -293,8 +297,8 @@ impl<'a> Joints<'a> {
             }
         }
         for index in 1..blocks.len() {
-            blocks[index - 1].joint_mm_s =
-                joint_feed(&blocks[index - 1].element, &blocks[index].element, self.machine);
+            blocks[index - 1].junction_mm_s =
+                junction_feed(&blocks[index - 1].element, &blocks[index].element, self.machine);
         }
         blocks
     }
@@ -332,7 +336,7 @@ fn window_time_s(blocks: &[Block<f64>], [start_mm_s, end_mm_s]: [f64; 2]) -> f64
 
 /// The time of a run, infinite if there is no plan \[s\].
 fn run_time_s(blocks: &[StretchBlock], tick_s: f64) -> f64 {
-    let stretches = blocks.split_inclusive(|block| block.joint_mm_s <= 0.0);
+    let stretches = blocks.split_inclusive(|block| block.junction_mm_s <= 0.0);
     stretches.map(|stretch| stretch_time_s(stretch, tick_s).unwrap_or(f64::INFINITY)).sum()
 }
 
@@ -372,7 +376,7 @@ mod tests {
         assert_eq!(feeds, [1.0, 1.0, 2.0, 3.0]);
         for pair in blocks.windows(2) {
             assert_eq!(pair[0].element.ends_mm().1, pair[1].element.ends_mm().0);
-            assert!(pair[0].joint_mm_s > 1e6, "{}", pair[0].joint_mm_s);
+            assert!(pair[0].junction_mm_s > 1e6, "{}", pair[0].junction_mm_s);
         }
         assert!(blocks_of(&[]).is_empty());
     }
@@ -407,7 +411,7 @@ mod tests {
         let blocks = |feed_mm_s: f64| blocks_of(&path(&corner, 0.01, |_| feed_mm_s));
         assert_eq!(kinds(&blocks(1.0)), [(1, "line"), (1, "blend"), (2, "line")]);
         assert_eq!(kinds(&blocks(50.0)), [(1, "line"), (2, "line")]);
-        assert_eq!(blocks(50.0)[0].joint_mm_s, 0.0);
+        assert_eq!(blocks(50.0)[0].junction_mm_s, 0.0);
     }
 
     /// A slow move beside a fast one: the blend is at the slow one's feed, and shorter than the tolerance would allow.

@@ -87,7 +87,7 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
         .map(|block| Block {
             length_mm: block.length_mm.0,
             cap_mm_s: block.feed_mm_s.0,
-            joint_mm_s: f64::INFINITY,
+            junction_mm_s: f64::INFINITY,
             law,
         })
         .collect();

@@ -1,6 +1,6 @@
-//! The ceilings of a move, and what a joint allows.
+//! The ceilings of a move, and what a junction allows.
 
-use motion_kernel::plan::{Ceiling, Joint, MachineLimits, Reason, joint};
+use motion_kernel::plan::{Ceiling, Junction, MachineLimits, Reason, junction};
 
 use super::error::Problem;
 use crate::machine::Machine;
@@ -35,13 +35,13 @@ pub(super) fn ceilings(
 }
 
 /// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.
-pub(super) fn joint_feed(before: &Element, after: &Element, machine: &Machine) -> f64 {
+pub(super) fn junction_feed(before: &Element, after: &Element, machine: &Machine) -> f64 {
     let ([_, end], [start, _]) = (before.ends(), after.ends());
     let angle_rad = angle(end.tangent, start.tangent);
-    let steps = Joint { angle_rad, curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)) };
-    joint(
+    let steps = Junction { angle_rad, curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)) };
+    junction(
         &steps,
-        machine.path.joint_angle_rad.max(TANGENT_ROUNDING_RAD),
+        machine.path.junction_angle_rad.max(TANGENT_ROUNDING_RAD),
         machine.path.accel_step_mm_s2,
         machine.tick_s,
     )

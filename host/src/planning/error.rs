@@ -118,7 +118,7 @@ pub enum Problem {
 fn unplannable(error: &PlanError) -> String {
     match error {
         PlanError::Block { quantity, value, .. } => format!(
-            "{quantity} {value}, expected a length from 0 to {} mm, a ceiling above 0, a joint feed not below 0",
+            "{quantity} {value}, expected a length from 0 to {} mm, a ceiling above 0, a junction feed not below 0",
             Position::LIMIT_MM
         ),
         PlanError::EndFeed { quantity, feed_mm_s, greatest_mm_s } => {

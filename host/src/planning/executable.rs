@@ -177,11 +177,11 @@ fn path_blocks(stretch: &Stretch, dense: &[Dense]) -> Result<Vec<Placed>, (u32, 
             block.feed_mm_s,
             allowed(&block.ceiling, most_mm_s),
             allowed(&block.greatest, most_mm_s),
-            block.joint_mm_s,
+            block.junction_mm_s,
         );
         start = end;
         match blocks.last_mut() {
-            Some(last) if last.joint_mm_s() >= last.greatest().cap_mm_s && last.holds_like(&next) => {
+            Some(last) if last.junction_mm_s() >= last.greatest().cap_mm_s && last.holds_like(&next) => {
                 *last = last.with(&next);
             }
             _ => blocks.push(next),

@@ -144,7 +144,7 @@ mod tests {
     fn segments_know_their_block() {
         let law = Law::new(Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 })
             .expect("positive limits");
-        let block = |length_mm, cap_mm_s| Block { length_mm, cap_mm_s, joint_mm_s: f64::INFINITY, law };
+        let block = |length_mm, cap_mm_s| Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law };
         let blocks = [block(0.0, 80.0), block(50.0, 80.0), block(0.0, 40.0), block(25.0, 40.0)];
         for (mode, expected) in [(Mode::Spanning, &[0, 2][..]), (Mode::PerBlock, &[1, 3][..])] {
             let planned =

@@ -9,8 +9,8 @@
 //! within one kilometre of the origin on each axis. What is beyond is refused, with the line of the block.
 //!
 //! - [`program`]: steps to stretches: where motion must stop;
-//! - `blending`: which joints are blended: stretches to blocks;
-//! - `ceilings`: the ceiling of a move or a blend, what a joint allows;
+//! - `blending`: which junctions are blended: stretches to blocks;
+//! - `ceilings`: the ceiling of a move or a blend, what a junction allows;
 //! - `curves`: programmed curves to moves;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
 //! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;

@@ -86,7 +86,7 @@ impl FeedProfile {
         self.spans.iter().map(record).collect()
     }
 
-    /// The span that contains `s_mm`; at a joint, the one that ends there.
+    /// The span that contains `s_mm`; at a junction, the one that ends there.
     fn index(&self, s_mm: f64) -> usize {
         self.spans.partition_point(|span| span.start_mm + ROUNDING_MM < s_mm).saturating_sub(1)
     }

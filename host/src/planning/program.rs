@@ -130,7 +130,7 @@ fn append(run: &mut Vec<Move>, plan: &mut Plan, machine: &Machine, mode: Mode) -
     for block in blocks(run, machine)? {
         open.push(block);
         // Also after the last.
-        if block.joint_mm_s <= 0.0 {
+        if block.junction_mm_s <= 0.0 {
             close(&mut open, plan, mode)?;
         }
     }

@@ -22,8 +22,8 @@ pub struct StretchBlock {
     pub greatest: Ceiling<f64>,
     /// The program's feed \[mm/s\]; infinite for a rapid.
     pub feed_mm_s: f64,
-    /// Greatest feed through the joint at its end \[mm/s\].
-    pub joint_mm_s: f64,
+    /// Greatest feed through the junction at its end \[mm/s\].
+    pub junction_mm_s: f64,
     /// Greatest distance from the programmed path and of it from the block, over its tolerance: a bound, 0 where the
     /// path is exact.
     pub tolerance_share: f64,
@@ -33,7 +33,7 @@ impl StretchBlock {
     /// What look-ahead needs of it.
     pub(super) fn for_lookahead(&self) -> Block<f64> {
         let Ceiling { feed_mm_s: cap_mm_s, law, .. } = self.ceiling;
-        Block { length_mm: self.element.length_mm(), cap_mm_s, joint_mm_s: self.joint_mm_s, law }
+        Block { length_mm: self.element.length_mm(), cap_mm_s, junction_mm_s: self.junction_mm_s, law }
     }
 }
 
@@ -98,7 +98,8 @@ impl Stretch {
         for (block, &end_mm) in self.blocks.iter().zip(&self.ends_mm) {
             let cap_mm_s = block.ceiling.feed_mm_s;
             let law = block.ceiling.law;
-            let view = Block { length_mm: end_mm - start_mm, cap_mm_s, joint_mm_s: block.joint_mm_s, law };
+            let view =
+                Block { length_mm: end_mm - start_mm, cap_mm_s, junction_mm_s: block.junction_mm_s, law };
             let (plan, time_s) = self.profile.over(start_mm, end_mm);
             records.push(BlockRecord {
                 line: block.line,

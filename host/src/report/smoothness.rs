@@ -85,7 +85,7 @@ fn knots(paths: &[(Course, Figures)], out: &mut impl Write) -> io::Result<()> {
         "step of the jerk, cubic [mm/s³]",
         "quintic [mm/s³]",
     ];
-    let rows = cubic.joints.iter().zip(&quintic.joints).zip(TABLE_2_S).enumerate().map(
+    let rows = cubic.junctions.iter().zip(&quintic.junctions).zip(TABLE_2_S).enumerate().map(
         |(index, ((cubic, quintic), published_s))| {
             vec![
                 (index + 1).to_string(),

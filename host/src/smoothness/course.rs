@@ -29,9 +29,9 @@ pub struct Local {
     pub third: Vector,
 }
 
-/// What a joint does to the axes at constant feed.
+/// What a junction does to the axes at constant feed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointStep {
+pub struct JunctionStep {
     /// When it is passed \[s\].
     pub time_s: f64,
     /// Step of the acceleration of every axis \[mm/s²\].
@@ -86,14 +86,14 @@ impl Course {
 
     /// Path positions where one curve ends and the next begins \[mm\].
     #[must_use]
-    pub fn joints_mm(&self) -> &[f64] {
+    pub fn junctions_mm(&self) -> &[f64] {
         &self.ends_mm[..self.ends_mm.len().saturating_sub(1)]
     }
 
-    /// What is at `s_mm` of the path; at a joint, of the curve that begins there.
+    /// What is at `s_mm` of the path; at a junction, of the curve that begins there.
     #[must_use]
     pub fn at(&self, s_mm: f64) -> Option<Local> {
-        let index = self.joints_mm().partition_point(|&end_mm| end_mm <= s_mm);
+        let index = self.junctions_mm().partition_point(|&end_mm| end_mm <= s_mm);
         let element = self.elements.get(index)?;
         let start_mm = index.checked_sub(1).map_or(0.0, |before| self.ends_mm[before]);
         let (curve, end) = element.curve()?;
@@ -101,14 +101,14 @@ impl Course {
         Some(local(element, curve, parameter))
     }
 
-    /// The steps at every joint, for a constant feed.
+    /// The steps at every junction, for a constant feed.
     #[must_use]
-    pub fn joint_steps(&self, feed_mm_s: f64) -> Vec<JointStep> {
+    pub fn junction_steps(&self, feed_mm_s: f64) -> Vec<JunctionStep> {
         let end = |element: &Element| element.curve().map(|(curve, end)| local(element, curve, end));
         let start = |element: &Element| element.curve().map(|(curve, _)| local(element, curve, 0.0));
         let both = self.elements.windows(2).filter_map(|pair| Some((end(&pair[0])?, start(&pair[1])?)));
         both.zip(&self.ends_mm)
-            .map(|((before, after), end_mm)| JointStep {
+            .map(|((before, after), end_mm)| JunctionStep {
                 time_s: end_mm / feed_mm_s,
                 accel_mm_s2: scale(subtract(after.second, before.second), feed_mm_s * feed_mm_s),
                 jerk_mm_s3: scale(subtract(after.third, before.third), feed_mm_s.powi(3)),

@@ -1,6 +1,6 @@
 //! The figures of one path: what S2 reads off its plots.
 
-use super::course::{Course, JointStep};
+use super::course::{Course, JunctionStep};
 use super::deviation_mm;
 use crate::toolpath::norm;
 
@@ -22,8 +22,8 @@ pub struct Figures {
     pub ticks: usize,
     /// The greatest distance from the arcs \[mm\].
     pub deviation_mm: f64,
-    /// What steps at the joints: of the arcs, or of the polynomials.
-    pub joints: Vec<JointStep>,
+    /// What steps at the junctions: of the arcs, or of the polynomials.
+    pub junctions: Vec<JunctionStep>,
     /// For every tick of [`TICKS_S`].
     pub by_tick: [ByTick; TICKS_S.len()],
 }
@@ -60,13 +60,13 @@ impl Figures {
             time_s: length_mm / feed_mm_s,
             ticks: (length_mm / (feed_mm_s * super::TICK_S)) as usize,
             deviation_mm: points.map(|local| deviation_mm(local.point)).fold(0.0, f64::max),
-            joints: course.joint_steps(feed_mm_s),
+            junctions: course.junction_steps(feed_mm_s),
             by_tick,
         }
     }
 }
 
-impl JointStep {
+impl JunctionStep {
     /// The size of the step of jerk over all axes \[mm/s³\].
     #[must_use]
     pub fn jerk_step_mm_s3(&self) -> f64 {

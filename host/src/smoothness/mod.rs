@@ -19,7 +19,7 @@ pub mod course;
 pub mod evaluators;
 pub mod figures;
 
-pub use course::{AxisTicks, Course, JointStep};
+pub use course::{AxisTicks, Course, JunctionStep};
 pub use evaluators::{Evaluator, evaluators};
 pub use figures::Figures;
 

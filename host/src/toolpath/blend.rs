@@ -4,7 +4,7 @@
 //!
 //! Consumes two lines or arcs that meet, a tolerance and the room on either side; produces the blend and how much
 //! of both it stands for, or none where the path has to stay as it is: a corner sharper than [`ANGLE_MAX_RAD`], no
-//! tolerance, no room. A tangent joint whose curvature jumps (a line meets an arc) is a corner of 0° and is
+//! tolerance, no room. A tangent junction whose curvature jumps (a line meets an arc) is a corner of 0° and is
 //! blended like the others. Background; a bounded number of steps per corner.
 //!
 //! **Shape.** Both ends give four control points each. On a line they stand at a₁, a₂, a₃ of the way d to the

@@ -9,7 +9,7 @@
 //! - [`involute`]: involutes of circles and their offsets;
 //! - [`spline`]: splines through points, or close to them;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
-//! - [`smooth`]: a run of elements with the blend of each of its joints, by
+//! - [`smooth`]: a run of elements with the blend of each of its junctions, by
 //!   [`blend`]: one corner's septic blend, and [`merge`]: short lines to fewer lines and arcs;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`greatest`]: how curves and their pieces bend at their tightest;

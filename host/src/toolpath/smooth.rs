@@ -1,7 +1,7 @@
 //! A run of moves made ready for blends.
 //!
 //! Consumes moves that follow each other without a stop, each with the tolerance that its ends may be rounded
-//! within; produces fewer moves where lines are short, and the blend of any joint within any length. Which joints are
+//! within; produces fewer moves where lines are short, and the blend of any junction within any length. Which junctions are
 //! blended is up to planning. Background, in time linear in the moves.
 //!
 //! **Short lines.** Where lines are shorter than the blends at their ends would be, three fifths of the tolerance are spent
@@ -40,7 +40,7 @@ pub struct Move {
     pub element: Element,
     /// Programmed feed \[mm/s\], infinite for a rapid.
     pub feed_mm_s: f64,
-    /// Greatest distance that the path may be led past the move and its ends \[mm\]; 0 for exact path. At a joint the
+    /// Greatest distance that the path may be led past the move and its ends \[mm\]; 0 for exact path. At a junction the
     /// smaller one of both moves holds.
     pub tolerance_mm: f64,
     /// How far a line may be from what stands for it and others \[mm\], on top of the tolerance; without it, a part of
@@ -55,7 +55,7 @@ impl Move {
     }
 }
 
-/// A run of moves, its short lines merged, ready to be blended joint by joint. Joint `i` is that between the moves
+/// A run of moves, its short lines merged, ready to be blended junction by junction. Junction `i` is that between the moves
 /// `i` and `i + 1`.
 #[derive(Clone, Debug)]
 pub struct Run {
@@ -96,9 +96,9 @@ impl Run {
         self.lengths_mm[index]
     }
 
-    /// Number of joints.
+    /// Number of junctions.
     #[must_use]
-    pub fn joints(&self) -> usize {
+    pub fn junctions(&self) -> usize {
         self.moves.len().saturating_sub(1)
     }
 
@@ -109,26 +109,26 @@ impl Run {
         share(self.distances_mm[index], merging_mm.unwrap_or(tolerance_mm))
     }
 
-    /// The same of a blend of a joint: what its moves are off adds to what it is off these.
+    /// The same of a blend of a junction: what its moves are off adds to what it is off these.
     #[must_use]
-    pub fn tolerance_share_of(&self, joint: usize, blend: &Blend) -> f64 {
-        let [before, after] = [joint, joint + 1].map(|index| self.moves[index]);
+    pub fn tolerance_share_of(&self, junction: usize, blend: &Blend) -> f64 {
+        let [before, after] = [junction, junction + 1].map(|index| self.moves[index]);
         let merging_mm = before.merging_mm.unwrap_or(0.0).max(after.merging_mm.unwrap_or(0.0));
-        let distance_mm = self.distances_mm[joint].max(self.distances_mm[joint + 1]);
+        let distance_mm = self.distances_mm[junction].max(self.distances_mm[junction + 1]);
         share(blend.distance_mm + distance_mm, before.tolerance_mm.min(after.tolerance_mm) + merging_mm)
     }
 
-    /// The blend of a joint with at most `room_mm` of either move; none where nothing steps.
+    /// The blend of a junction with at most `room_mm` of either move; none where nothing steps.
     #[must_use]
-    pub fn blend(&self, joint: usize, room_mm: f64, limits: &Limits<f64>) -> Option<Blend> {
-        let (before, after) = (&self.moves[joint], &self.moves[joint + 1]);
+    pub fn blend(&self, junction: usize, room_mm: f64, limits: &Limits<f64>) -> Option<Blend> {
+        let (before, after) = (&self.moves[junction], &self.moves[junction + 1]);
         if is_smooth([&before.element, &after.element]) {
             return None;
         }
         // A move of exact path is cut at neither end.
         let tolerance_mm = before.tolerance_mm.min(after.tolerance_mm);
         let spent_mm =
-            before.spent_mm(self.distances_mm[joint]).max(after.spent_mm(self.distances_mm[joint + 1]));
+            before.spent_mm(self.distances_mm[junction]).max(after.spent_mm(self.distances_mm[junction + 1]));
         let tolerance_mm = tolerance_mm - spent_mm;
         Blend::new(&before.element, &after.element, tolerance_mm, room_mm, limits)
     }
@@ -141,14 +141,14 @@ impl Run {
         self.lengths_mm[index] * if is_end { 0.5 * TAKEN_MAX } else { TAKEN_MAX }
     }
 
-    /// What a blend may take of either move at its joint where those at the joints beside it take `ways_mm` \[mm\], at
+    /// What a blend may take of either move at its junction where those at the junctions beside it take `ways_mm` \[mm\], at
     /// least half of what is there.
     #[must_use]
-    pub fn room_mm(&self, joint: usize, [before_mm, after_mm]: [f64; 2]) -> f64 {
+    pub fn room_mm(&self, junction: usize, [before_mm, after_mm]: [f64; 2]) -> f64 {
         let left_mm = |index: usize, other_mm: f64| {
             (self.taken_mm_max(index) - other_mm).max(0.5 * TAKEN_MAX * self.lengths_mm[index])
         };
-        left_mm(joint, before_mm).min(left_mm(joint + 1, after_mm))
+        left_mm(junction, before_mm).min(left_mm(junction + 1, after_mm))
     }
 }
 
@@ -291,7 +291,7 @@ pub(crate) mod tests {
         let run = Run::new(&moves);
         assert_eq!(run.moves(), moves);
         assert_eq!(run.blend(0, 1.0, &LIMITS), None);
-        assert_eq!(Run::new(&[]).joints(), 0);
+        assert_eq!(Run::new(&[]).junctions(), 0);
     }
 
     /// A corner that was cut off by a micrometre is one corner.

@@ -71,7 +71,7 @@ impl<const AXES: usize> Walker<AXES> {
             }
             let local = motion.s - self.piece_start;
             if local <= piece.length() {
-                // A rounding step back over the joint is still its piece's start.
+                // A rounding step back over the junction is still its piece's start.
                 piece.set(local.max(Position::ZERO).to_offset(), motion, setpoints);
                 return Ok(piece.program_line());
             }

@@ -24,7 +24,7 @@ fn stretch(random: &Random, from: Position, items: &mut Vec<Item<1>>) -> Vec<(Po
     let blocks: Vec<Block<f64>> = (0..count)
         .map(|_| {
             let length_mm = Position::from_mm(random.log(0.02, 20.0)).expect("in range").to_mm();
-            Block { length_mm, cap_mm_s: random.log(2.0, 80.0), joint_mm_s: f64::INFINITY, law }
+            Block { length_mm, cap_mm_s: random.log(2.0, 80.0), junction_mm_s: f64::INFINITY, law }
         })
         .collect();
     let mut plans = vec![BlockPlan::default(); count];
@@ -135,7 +135,8 @@ fn ticks_between_any_two_operations_of_a_turn() {
             stretches.push((from, caps));
             from = end;
         }
-        let rules = PathRules { limits: LIMITS, feed_mm_s: 100.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+        let rules =
+            PathRules { limits: LIMITS, feed_mm_s: 100.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
         let mut streams = LiveStreams::<f64, 1, 64, 16>::new();
         let (mut feeder, intake) = streams.split(rules, [Position::ZERO]);
         let rig = RefCell::new(Rig {

@@ -94,18 +94,18 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
             {
                 let least = last.law.limits().least(&limits);
                 let greatest = group.greatest(&limits);
-                let is_joined = last.cap_mm_s == cap_mm_s && last.joint_mm_s >= cap_mm_s;
+                let is_joined = last.cap_mm_s == cap_mm_s && last.junction_mm_s >= cap_mm_s;
                 if is_joined && is_alike(&least, &greatest, alike) {
                     (*last_end, most) = (block_end, Some(greatest));
                     found.are_softer |= least != greatest;
                     last.length_mm += length_mm;
-                    last.joint_mm_s = block.joint_mm_s();
+                    last.junction_mm_s = block.junction_mm_s();
                     last.law = Law::new(least).ok()?;
                     continue;
                 }
             }
             let law = Law::new(limits).ok()?;
-            let next = Block { length_mm, cap_mm_s, joint_mm_s: block.joint_mm_s(), law };
+            let next = Block { length_mm, cap_mm_s, junction_mm_s: block.junction_mm_s(), law };
             found.blocks.push(next).ok()?;
             found.ends.push(block_end).ok()?;
             most = Some(limits);

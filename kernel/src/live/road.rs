@@ -59,9 +59,9 @@ impl RoadBlock {
         }
     }
 
-    /// Greatest feed through the joint at its end \[mm/s\].
-    pub(super) fn joint_mm_s(&self) -> f64 {
-        self.block.joint_mm_s()
+    /// Greatest feed through the junction at its end \[mm/s\].
+    pub(super) fn junction_mm_s(&self) -> f64 {
+        self.block.junction_mm_s()
     }
 }
 
@@ -130,7 +130,7 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
         known.then(|| caps.fold(0.0, f64::max))
     }
 
-    /// The fastest braking from a splice of motion under `feed_override` to `to_mm_s` that keeps the ceilings, joints
+    /// The fastest braking from a splice of motion under `feed_override` to `to_mm_s` that keeps the ceilings, junctions
     /// and limits of all the blocks that it crosses, before `end`, with the length it is driven over; `None` if there is
     /// none.
     pub(super) fn brake(
@@ -166,10 +166,10 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
 
     /// Whether the feed of a splice may be kept as far as `end` under `feed_override`.
     pub(super) fn may_keep(&self, from: &Splice, end: Position, feed_override: f64) -> bool {
-        let mut joint_mm_s = f64::INFINITY;
+        let mut junction_mm_s = f64::INFINITY;
         self.from(from).take_while(|block| block.start < end).all(|block| {
-            let most_mm_s = f64::min(block.allowed(feed_override).0, joint_mm_s);
-            joint_mm_s = block.joint_mm_s();
+            let most_mm_s = f64::min(block.allowed(feed_override).0, junction_mm_s);
+            junction_mm_s = block.junction_mm_s();
             from.feed_mm_s <= most_mm_s * (1.0 + FEED_ROUNDING)
         })
     }
@@ -178,12 +178,12 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
     fn is_below_ceilings(&self, from: &Splice, ramp: &Ramp<f64>, feed_override: f64) -> bool {
         let rising = ramp.reversed();
         let length_mm = ramp.length_mm();
-        let mut joint_mm_s = f64::INFINITY;
+        let mut junction_mm_s = f64::INFINITY;
         for block in self.from(from) {
             let at_mm = (block.start - from.at).to_mm();
             // Where it begins the feed is what it is; it only falls from there.
             let cap_mm_s = if at_mm > 0.0 { block.allowed(feed_override).0 } else { f64::INFINITY };
-            let most_mm_s = f64::min(cap_mm_s, joint_mm_s) * (1.0 + FEED_ROUNDING);
+            let most_mm_s = f64::min(cap_mm_s, junction_mm_s) * (1.0 + FEED_ROUNDING);
             let is_slow = ramp.from_mm_s <= most_mm_s
                 || length_mm - rising.length_to_feed_mm(most_mm_s) <= at_mm + LENGTH_ROUNDING_MM;
             if at_mm > length_mm {
@@ -192,7 +192,7 @@ impl<const BLOCKS: usize> Road<BLOCKS> {
             if !is_slow {
                 return false;
             }
-            joint_mm_s = block.joint_mm_s();
+            junction_mm_s = block.junction_mm_s();
         }
         true
     }

@@ -31,7 +31,7 @@
 //! # Planning
 //!
 //! Plans ([`Law`](crate::law::Law), [`reach`](crate::law::reach()), [`plan`](crate::plan::plan()),
-//! [`Ceiling`](crate::plan::Ceiling), [`joint`](crate::plan::joint())) run in 32.32 too. What is accepted is bounded
+//! [`Ceiling`](crate::plan::Ceiling), [`junction`](crate::plan::junction())) run in 32.32 too. What is accepted is bounded
 //! so that everything made of it fits; the bounds are [`Root::LIMITS`], [`Root::FEEDS_MM_S`], [`Root::LENGTH_MIN_MM`] and
 //! [`Position::LIMIT_MM`](crate::units::Position::LIMIT_MM). The step is 2⁻³² throughout, s below.
 //!
@@ -55,7 +55,7 @@
 //!
 //! What follows, and is tested: no ramp exceeds a limit of acceleration, jerk or snap by more than a part of 10⁻⁹ (its
 //! times are too long rather than too short; the rest is the rounding of constants), no ramp is longer than its block,
-//! no ceiling or joint is exceeded. Ceilings and joints keep their limits to 10⁻⁸. A stretch takes at most a part of
+//! no ceiling or junction is exceeded. Ceilings and junctions keep their limits to 10⁻⁸. A stretch takes at most a part of
 //! 10⁻⁶ longer than planned in f64, plus the part that s is of its shortest block. Planned lengths are position steps, so that
 //! they add up exactly.
 

@@ -106,7 +106,7 @@ mod tests {
             if end == Position::ZERO {
                 continue;
             }
-            let block = Block { length_mm: end.to_mm(), cap_mm_s: 200.0, joint_mm_s: 200.0, law };
+            let block = Block { length_mm: end.to_mm(), cap_mm_s: 200.0, junction_mm_s: 200.0, law };
             let mut plans = [BlockPlan::default()];
             if plan(&[block], enter_mm_s, 0.0, &mut plans).is_err() {
                 continue;

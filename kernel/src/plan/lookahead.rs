@@ -1,11 +1,11 @@
-//! Stages 1 and 2: a feed for every joint of a stretch.
+//! Stages 1 and 2: a feed for every junction of a stretch.
 //!
-//! Forward, each block's exit is what its ceiling, the next one's, their joint and the length allow;
+//! Forward, each block's exit is what its ceiling, the next one's, their junction and the length allow;
 //! backward from the stop, each block's entry is what one can brake from ("block 9" of S3). Then each
 //! block gets the peak its length allows ("block 12").
 //!
 //! One pass each way, constant work a block. The result is feasible, and Pareto-maximal: no feasible
-//! plan has every joint feed at least as high and one higher. It is *not* always the fastest, because
+//! plan has every junction feed at least as high and one higher. It is *not* always the fastest, because
 //! a ramp's length is not monotone in its lower feed.
 
 use super::ceiling::Reason;
@@ -20,9 +20,9 @@ pub struct Block<R> {
     pub length_mm: R,
     /// Ceiling of the feed \[mm/s\], > 0 and within [`Root::FEEDS_MM_S`].
     pub cap_mm_s: R,
-    /// Greatest feed through the joint at its end \[mm/s\], ≥ 0; infinite for none, in fixed point the
+    /// Greatest feed through the junction at its end \[mm/s\], ≥ 0; infinite for none, in fixed point the
     /// greatest value. Below the least of [`Root::FEEDS_MM_S`] it is a stop.
-    pub joint_mm_s: R,
+    pub junction_mm_s: R,
     /// The law its ramps follow.
     pub law: Law<R>,
 }
@@ -105,7 +105,7 @@ impl core::fmt::Display for PlanError {
                 write!(
                     f,
                     "block {block}: {quantity} {value}: expected a length of 0 or more, a ceiling above 0, \
-                     a joint feed not below 0; here from {least} to {greatest}"
+                     a junction feed not below 0; here from {least} to {greatest}"
                 )
             }
             Self::EndFeed { quantity, feed_mm_s, greatest_mm_s } => {
@@ -128,7 +128,7 @@ impl core::fmt::Display for PlanError {
 
 impl core::error::Error for PlanError {}
 
-/// Plans a stretch from `start_mm_s` to `end_mm_s` into `plans`, one for each block. The joint at the
+/// Plans a stretch from `start_mm_s` to `end_mm_s` into `plans`, one for each block. The junction at the
 /// end of the last block is not looked at.
 ///
 /// # Errors
@@ -146,7 +146,7 @@ pub fn plan<R: Root>(
     forward(blocks, start_mm_s, end_mm_s, plans)?;
     backward(blocks, start_mm_s, plans)?;
     for (block, plan) in blocks.iter().zip(plans) {
-        // The joints' feeds are below the ceiling already. Most often there is room to reach it, or
+        // The junctions' feeds are below the ceiling already. Most often there is room to reach it, or
         // the block is passed at it: that is cheaper to see than to solve for.
         let (enter, exit, cap) = (plan.enter_mm_s, plan.exit_mm_s, block.cap_mm_s);
         // Subtracted, because the sum may be beyond fixed point.
@@ -163,12 +163,12 @@ pub fn plan<R: Root>(
 pub(super) fn check<R: Root>(blocks: &[Block<R>], start: R, end: R) -> Result<(), PlanError> {
     let (slowest, fastest) = R::FEEDS_MM_S;
     for (index, block) in blocks.iter().enumerate() {
-        let (length, cap, joint) = (block.length_mm, block.cap_mm_s, block.joint_mm_s);
+        let (length, cap, junction) = (block.length_mm, block.cap_mm_s, block.junction_mm_s);
         // A length of 0 is as good as one in its range, a ceiling of 0 is not.
         for (quantity, value, least, greatest, good) in [
             ("length [mm]", length, R::LENGTH_MIN_MM, Position::LIMIT_MM, length == R::ZERO),
             ("ceiling [mm/s]", cap, slowest, fastest, false),
-            ("joint feed [mm/s]", joint, 0.0, f64::INFINITY, joint >= R::ZERO),
+            ("junction feed [mm/s]", junction, 0.0, f64::INFINITY, junction >= R::ZERO),
         ] {
             let value = value.to_f64();
             let within = value > 0.0 && value.is_finite() && value >= least && value <= greatest;
@@ -202,8 +202,8 @@ fn forward<R: Root>(
     for plan in plans {
         let [block, after @ ..] = rest else { break };
         let allowed = match after.first() {
-            Some(_) if block.joint_mm_s.to_f64() < R::FEEDS_MM_S.0 => R::ZERO,
-            Some(next) => block.cap_mm_s.min(block.joint_mm_s).min(next.cap_mm_s),
+            Some(_) if block.junction_mm_s.to_f64() < R::FEEDS_MM_S.0 => R::ZERO,
+            Some(next) => block.cap_mm_s.min(block.junction_mm_s).min(next.cap_mm_s),
             None => end,
         };
         let exit = if allowed > feed {
@@ -247,9 +247,9 @@ fn backward<R: Root>(blocks: &[Block<R>], start: R, plans: &mut [BlockPlan<R>]) 
     }
 }
 
-/// Merges neighbours that look like one block: same ceiling, same law, and a joint that does not
+/// Merges neighbours that look like one block: same ceiling, same law, and a junction that does not
 /// slow them. The plan is hardly ever slower for it (by 1.4·10⁻³ in two of 20 000 random lists: a
-/// higher feed at one joint can mean a lower one at the next). The merged blocks are at the front of the
+/// higher feed at one junction can mean a lower one at the next). The merged blocks are at the front of the
 /// slice; returns how many they are.
 #[must_use]
 pub fn merge_equal<R: Root>(blocks: &mut [Block<R>]) -> usize {
@@ -262,13 +262,13 @@ pub fn merge_equal<R: Root>(blocks: &mut [Block<R>]) -> usize {
             Some(last)
                 if last.cap_mm_s == next.cap_mm_s
                     && last.law == next.law
-                    && last.joint_mm_s >= next.cap_mm_s
+                    && last.junction_mm_s >= next.cap_mm_s
                     // Neither was checked yet, nor may the sum be refused for being one.
                     && next.length_mm <= longest
                     && last.length_mm <= longest - next.length_mm =>
             {
                 last.length_mm = last.length_mm + next.length_mm;
-                last.joint_mm_s = next.joint_mm_s;
+                last.junction_mm_s = next.junction_mm_s;
             }
             _ => {
                 if let Some(place) = blocks.get_mut(merged) {

@@ -6,15 +6,15 @@
 //!
 //! - [`ceiling`]: stage 1, the feed that a block's geometry and the machine allow, with the reason,
 //!   and how much acceleration, jerk and snap are left for changing the feed on a curve;
-//! - [`mod@joint`]: what a joint between two blocks allows;
+//! - [`mod@junction`]: what a junction between two blocks allows;
 //! - [`lookahead`]: stages 1 and 2 over the stretch: what can be reached, and from what one can brake;
-//! - [`spanning`]: ramps that begin and end between joints and may span many blocks;
+//! - [`spanning`]: ramps that begin and end between junctions and may span many blocks;
 //! - [`window`]: the same with a bounded window, blocks appended as they come;
 //! - [`feed`]: the planned blocks as feed segments over exact path positions.
 
 pub mod ceiling;
 pub mod feed;
-pub mod joint;
+pub mod junction;
 pub mod lookahead;
 pub mod spanning;
 pub mod window;
@@ -24,7 +24,7 @@ pub use ceiling::{
     Reason,
 };
 pub use feed::segments;
-pub use joint::{Joint, joint};
+pub use junction::{Junction, junction};
 pub use lookahead::{Block, BlockPlan, PlanError, merge_equal, plan};
 pub use spanning::{FeedSpan, Node, nodes_for, plan_spanning};
 pub use window::{Window, WindowError};

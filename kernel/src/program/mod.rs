@@ -93,7 +93,7 @@ pub struct Allowed {
 pub struct PathBlock {
     /// Its length.
     pub length: Position,
-    /// The program's feed, then cap and limits at up to it, then cap and limits whatever it is, then the joint's feed.
+    /// The program's feed, then cap and limits at up to it, then cap and limits whatever it is, then the junction's feed.
     #[serde(with = "array")]
     figures: [f64; 10],
 }
@@ -107,16 +107,16 @@ impl PathBlock {
         feed_mm_s: f64,
         programmed: Allowed,
         greatest: Allowed,
-        joint_mm_s: f64,
+        junction_mm_s: f64,
     ) -> Self {
         let [p, g] = [programmed, greatest].map(|Allowed { cap_mm_s, limits }| {
             [cap_mm_s, limits.accel_mm_s2, limits.jerk_mm_s3, limits.snap_mm_s4]
         });
-        let figures = [feed_mm_s, p[0], p[1], p[2], p[3], g[0], g[1], g[2], g[3], joint_mm_s];
+        let figures = [feed_mm_s, p[0], p[1], p[2], p[3], g[0], g[1], g[2], g[3], junction_mm_s];
         Self { length, figures }
     }
 
-    /// Whether the feed on another block is held to the same figures, whatever their lengths and joints.
+    /// Whether the feed on another block is held to the same figures, whatever their lengths and junctions.
     #[must_use]
     pub fn holds_like(&self, other: &Self) -> bool {
         let [held @ .., _] = self.figures;
@@ -127,9 +127,9 @@ impl PathBlock {
     /// The same block, longer by `next`, and with its end.
     #[must_use]
     pub fn with(self, next: &Self) -> Self {
-        let ([held @ .., _], [.., joint_mm_s]) = (self.figures, next.figures);
+        let ([held @ .., _], [.., junction_mm_s]) = (self.figures, next.figures);
         let [feed, a, b, c, d, e, f, g, h] = held;
-        Self { length: self.length + next.length, figures: [feed, a, b, c, d, e, f, g, h, joint_mm_s] }
+        Self { length: self.length + next.length, figures: [feed, a, b, c, d, e, f, g, h, junction_mm_s] }
     }
 
     /// The same block with limits as far as the number type holds them, for plans that are driven in it.
@@ -138,18 +138,18 @@ impl PathBlock {
     pub(crate) fn within_range<R: Real>(self) -> Self {
         // A peak that reaches its limit may be rounded up.
         let most = R::from_f64(f64::MAX).to_f64() * (1.0 - 1.0e-6);
-        let [feed, cap, a, j, s, greatest_cap, greatest_a, greatest_j, greatest_s, joint] = self.figures;
+        let [feed, cap, a, j, s, greatest_cap, greatest_a, greatest_j, greatest_s, junction] = self.figures;
         let [a, j, s, greatest_a, greatest_j, greatest_s] =
             [a, j, s, greatest_a, greatest_j, greatest_s].map(|limit| limit.min(most));
-        let figures = [feed, cap, a, j, s, greatest_cap, greatest_a, greatest_j, greatest_s, joint];
+        let figures = [feed, cap, a, j, s, greatest_cap, greatest_a, greatest_j, greatest_s, junction];
         Self { figures, ..self }
     }
 
-    /// Greatest feed through the joint at its end \[mm/s\]; 0 at the stretch's end.
+    /// Greatest feed through the junction at its end \[mm/s\]; 0 at the stretch's end.
     #[must_use]
-    pub fn joint_mm_s(&self) -> f64 {
-        let [.., joint_mm_s] = self.figures;
-        joint_mm_s
+    pub fn junction_mm_s(&self) -> f64 {
+        let [.., junction_mm_s] = self.figures;
+        junction_mm_s
     }
 
     /// The program's feed \[mm/s\]; infinite for a rapid.

@@ -24,9 +24,9 @@ pub struct PathRules {
     /// Greatest feed \[mm/s\].
     pub feed_mm_s: f64,
     /// Greatest angle between the tangents of neighbouring pieces of one stretch \[rad\].
-    pub joint_angle_rad: f64,
+    pub junction_angle_rad: f64,
     /// Greatest gap between the end of a piece and the start of the next \[mm\].
-    pub joint_gap_mm: f64,
+    pub junction_gap_mm: f64,
 }
 
 /// Why an item may not enter. Each names the quantity and its value.
@@ -248,7 +248,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
             // The chord between unit vectors is below the angle by a part in 24·angle².
             let angle_rad = magnitude(&chord);
             let rounding = 4.0 * R::EPSILON;
-            if !(angle_rad <= self.rules.joint_angle_rad + rounding) {
+            if !(angle_rad <= self.rules.junction_angle_rad + rounding) {
                 return Err(Rejection::Corner { angle_rad });
             }
         }
@@ -427,7 +427,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         let (here, start) = rolled((self.position.as_slice(), start.as_slice()));
         for (axis, (here, start)) in here.iter().zip(start).enumerate() {
             let gap_mm = (*start - *here).to_mm();
-            if !(libm::fabs(gap_mm) <= self.rules.joint_gap_mm) {
+            if !(libm::fabs(gap_mm) <= self.rules.junction_gap_mm) {
                 return Err(Rejection::Gap { axis, gap_mm });
             }
         }

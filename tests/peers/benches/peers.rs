@@ -222,7 +222,7 @@ impl Motion {
             if law.ramp_length_mm(enter_mm_s, exit_mm_s) < length_mm {
                 let peak_mm_s = peak(&law, enter_mm_s, exit_mm_s, length_mm).min(cap_mm_s);
                 return Self {
-                    block: Block { length_mm, cap_mm_s, joint_mm_s: f64::INFINITY, law },
+                    block: Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law },
                     plan: BlockPlan { enter_mm_s, peak_mm_s, exit_mm_s },
                 };
             }
@@ -345,7 +345,7 @@ fn ticks<R: Real>(all: &mut Vec<Contender>, name: &'static str) {
         .map(|_| Block {
             length_mm: random.log(1.0, 30.0),
             cap_mm_s: random.log(50.0, 300.0),
-            joint_mm_s: f64::INFINITY,
+            junction_mm_s: f64::INFINITY,
             law,
         })
         .collect();
@@ -355,8 +355,8 @@ fn ticks<R: Real>(all: &mut Vec<Contender>, name: &'static str) {
     let rules = PathRules {
         limits: Limits { accel_mm_s2: 2001.0, jerk_mm_s3: 5.001e4, snap_mm_s4: 4.001e6 },
         feed_mm_s: 301.0,
-        joint_angle_rad: 1e-3,
-        joint_gap_mm: 1e-4,
+        junction_angle_rad: 1e-3,
+        junction_gap_mm: 1e-4,
     };
     let mut streams: Box<Streams<R, 1, QUEUE, QUEUE>> = Box::default();
     let rest = [Position::ZERO];
@@ -554,7 +554,7 @@ fn plans(all: &mut Vec<Contender>, random: &mut Random) {
     let mut block = |cap_mm_s| Block {
         length_mm: random.log(0.05, 20.0),
         cap_mm_s,
-        joint_mm_s: if random.unit() < 0.3 { random.log(5.0, 500.0) } else { f64::INFINITY },
+        junction_mm_s: if random.unit() < 0.3 { random.log(5.0, 500.0) } else { f64::INFINITY },
         law,
     };
     let mut caps = Random(4);
@@ -619,7 +619,7 @@ fn plans(all: &mut Vec<Contender>, random: &mut Random) {
 fn saw_tooth(step: usize) -> Block<f64> {
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
     let law = Law::new(limits).expect("positive");
-    Block { length_mm: 0.3, cap_mm_s: 20.0 + 2.0 * step as f64, joint_mm_s: f64::INFINITY, law }
+    Block { length_mm: 0.3, cap_mm_s: 20.0 + 2.0 * step as f64, junction_mm_s: f64::INFINITY, law }
 }
 
 /// One of four machines: the paper's, a middling, a fast one, and one whose jerk limit never binds.

@@ -12,7 +12,7 @@ pub(super) const TICK_S: f64 = 0.0005;
 pub(super) const LIMITS: Limits<f64> = Limits { accel_mm_s2: 2000.0, jerk_mm_s3: 5e4, snap_mm_s4: 4e6 };
 /// What the streams are held to.
 pub(super) const RULES: PathRules =
-    PathRules { limits: LIMITS, feed_mm_s: 300.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+    PathRules { limits: LIMITS, feed_mm_s: 300.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
 /// Stretches and rests of a program at most.
 const PHRASES_MAX: usize = 6;
 /// Pieces of a stretch at most, and the longest \[mm\].
@@ -90,11 +90,11 @@ impl Program {
         for block in pieces.chunks(input.int_in_range(1..=pieces.len())?) {
             let start = block[0].0;
             let part = block.iter().fold(Position::ZERO, |sum, &(_, part)| sum + part);
-            let joint_mm_s = if start + part == whole { 0.0 } else { RULES.feed_mm_s };
+            let junction_mm_s = if start + part == whole { 0.0 } else { RULES.feed_mm_s };
             placed.push((
                 start,
                 0,
-                Item::Block(PathBlock::new(part, cap_mm_s, allowed, allowed, joint_mm_s)),
+                Item::Block(PathBlock::new(part, cap_mm_s, allowed, allowed, junction_mm_s)),
             ));
         }
         let mut start = Position::ZERO;
@@ -198,9 +198,9 @@ fn broken(input: &mut Unstructured<'_>, item: Item<2>) -> Result<Item<2>> {
                 2 => allowed.limits.jerk_mm_s3 = value,
                 _ => allowed.limits.snap_mm_s4 = value,
             }
-            let (length, joint_mm_s) =
-                if axis == 0 { (bits, block.joint_mm_s()) } else { (block.length, value) };
-            Item::Block(PathBlock::new(length, block.feed_mm_s(), block.programmed(), allowed, joint_mm_s))
+            let (length, junction_mm_s) =
+                if axis == 0 { (bits, block.junction_mm_s()) } else { (block.length, value) };
+            Item::Block(PathBlock::new(length, block.feed_mm_s(), block.programmed(), allowed, junction_mm_s))
         }
         Item::Stop => Item::EndOfStretch([bits; 2]),
     })

@@ -15,7 +15,7 @@ const SHARE: f64 = 3e-5;
 /// Steps of fixed point in a quantity that is a product of three.
 const STEPS: f64 = 1e-6;
 /// A set position is rounded, and pieces may lie apart by so much \[mm\], sixteen of them in a tick.
-const GAPS_MM: f64 = 17.0 * RULES.joint_gap_mm + 1e-4;
+const GAPS_MM: f64 = 17.0 * RULES.junction_gap_mm + 1e-4;
 
 /// The tick before.
 struct Before<R> {

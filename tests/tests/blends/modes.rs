@@ -5,7 +5,7 @@ use motion_host::planning::Item as PlanItem;
 
 use super::planned;
 
-/// G61 is as it was: tangent joints run through, corners stop, nothing is blended.
+/// G61 is as it was: tangent junctions run through, corners stop, nothing is blended.
 #[test]
 fn exact_path_stops_at_corners_only() {
     let machine = Machine::reference();

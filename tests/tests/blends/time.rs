@@ -21,7 +21,7 @@ fn of_many_feeds(random: &mut Random, asked: &[Asked]) -> String {
     format!("{}M2\n", moves.concat())
 }
 
-/// Corners and tangent joints, long moves and short ones, one feed and many: in no program are the blends slower than
+/// Corners and tangent junctions, long moves and short ones, one feed and many: in no program are the blends slower than
 /// the stops and steps of acceleration that they stand for.
 #[test]
 fn no_program_is_slower_with_blends_than_without() {
@@ -98,7 +98,7 @@ fn gentle_corners_cost_less_than_stops() {
 /// A line that becomes an arc goes straight on. The acceleration-step limit says whether it may do so at once, which is
 /// faster, or has to be led over.
 #[test]
-fn the_acceleration_step_limit_decides_about_tangent_joints() {
+fn the_acceleration_step_limit_decides_about_tangent_junctions() {
     let text = format!("G64 P0.05\n{}", without_path_mode(SAMPLES[5].1));
     let mut machine = Machine::reference();
     let step = |machine: &Machine| {

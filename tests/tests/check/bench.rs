@@ -10,7 +10,7 @@ use motion_kernel::units::Position;
 pub(crate) const TICK_S: f64 = 0.0005;
 pub(crate) const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
 pub(crate) const RULES: PathRules =
-    PathRules { limits: LIMITS, feed_mm_s: 300.0, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+    PathRules { limits: LIMITS, feed_mm_s: 300.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
 
 pub(crate) fn mm(mm: f64) -> Position {
     Position::from_mm(mm).expect("in range")
@@ -41,7 +41,7 @@ pub(crate) fn cruise<R: Real>(feed_mm_s: f64, length_mm: f64) -> FeedSegment<R> 
 
 /// From rest to rest over `length`, with a ceiling.
 pub(crate) fn rest_to_rest<R: Real>(length: Position, cap_mm_s: f64) -> Vec<FeedSegment<R>> {
-    let block = Block { length_mm: length.to_mm(), cap_mm_s, joint_mm_s: f64::INFINITY, law: law(LIMITS) };
+    let block = Block { length_mm: length.to_mm(), cap_mm_s, junction_mm_s: f64::INFINITY, law: law(LIMITS) };
     let mut plans = [BlockPlan::default()];
     plan(&[block], 0.0, 0.0, &mut plans).expect("a plan");
     let made = segments(&block, &plans[0], Position::ZERO, length, TICK_S).expect("segments");

@@ -198,8 +198,8 @@ impl Element {
     }
 }
 
-/// Angle between the directions at a joint \[rad\], and the step of the curvature vector \[1/mm\].
-pub(crate) fn joint(before: &Element, after: &Element) -> (f64, f64) {
+/// Angle between the directions at a junction \[rad\], and the step of the curvature vector \[1/mm\].
+pub(crate) fn junction(before: &Element, after: &Element) -> (f64, f64) {
     let (end, start) = (before.at(before.length_mm), after.at(0.0));
     let chord = norm(minus(end.tangent, start.tangent));
     (2.0 * (0.5 * chord).min(1.0).asin(), norm(minus(end.second, start.second)))

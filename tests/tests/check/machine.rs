@@ -14,7 +14,8 @@ pub(crate) fn any(random: &mut Random) -> Machine {
     let path = &mut machine.path;
     path.feed_mm_s = random.log_between(10.0, 2000.0);
     (path.accel_mm_s2, path.jerk_mm_s3, path.snap_mm_s4) = (accel, jerk, snap);
-    path.joint_angle_rad = if random.chance(0.03) { 0.0 } else { random.log_between(1e-3, 5.0).to_radians() };
+    path.junction_angle_rad =
+        if random.chance(0.03) { 0.0 } else { random.log_between(1e-3, 5.0).to_radians() };
     path.accel_step_mm_s2 = accel * random.log_between(0.1, 2.0);
     let feed_mm_s = path.feed_mm_s;
     for axis in &mut machine.axes {

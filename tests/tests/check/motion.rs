@@ -25,8 +25,8 @@ const HERMITE: [f64; 4] = [1.7059e-4, 2.7084e-3, 3.2076e-2, 0.25];
 /// on either side.
 const HERMITE_LIVE: [f64; 4] = [8.1e-3, 3.2076e-2, 0.25, 1.0];
 
-/// Within this of a joint both its moves count [mm]: segments end on position steps.
-const JOINT_MM: f64 = 1e-7;
+/// Within this of a junction both its moves count [mm]: segments end on position steps.
+const JUNCTION_MM: f64 = 1e-7;
 
 /// The motion along the path: s, v, a, j, snap.
 type Along = [f64; 5];
@@ -116,7 +116,7 @@ impl<'a> Checker<'a> {
         self.along(&along)?;
         self.ceiling(&along, local_mm, placed.block)?;
         if placed.block != self.block {
-            self.joints(&along, self.block, placed.block)?;
+            self.junctions(&along, self.block, placed.block)?;
             self.block = placed.block;
         }
         self.axes(executed, local_mm, &along)?;
@@ -246,7 +246,7 @@ impl<'a> Checker<'a> {
         let rounding = 1.0 + bounds::LIMIT_SHARE + bounds::LIMIT_ROUNDING * self.epsilon;
         let planned = |index: usize| self.plan.blocks.get(index).map_or(0.0, |block| block.cap_mm_s);
         let (mut cap, mut asked) = (planned(block), 0.0_f64);
-        for placed in self.cursor.near(local_mm, JOINT_MM) {
+        for placed in self.cursor.near(local_mm, JUNCTION_MM) {
             cap = cap.max(planned(placed.block));
             asked = asked.max(placed.feed_mm_s);
         }
@@ -261,16 +261,16 @@ impl<'a> Checker<'a> {
         self.bound("programmed feed", v, asked * most * rounding)
     }
 
-    /// The steps at the joints passed since the tick before.
-    fn joints(&mut self, now: &Along, from: usize, to: usize) -> Result<(), String> {
+    /// The steps at the junctions passed since the tick before.
+    fn junctions(&mut self, now: &Along, from: usize, to: usize) -> Result<(), String> {
         let tick_s = self.machine.tick_s;
-        // At least this feed, wherever in the tick the joint lay: where a ramp ends and another begins in one tick, its
+        // At least this feed, wherever in the tick the junction lay: where a ramp ends and another begins in one tick, its
         // feed sinks below both ends by an eighth of what jerk makes of it.
         let most = |order: usize| now[order].abs().max(self.before[order].abs());
         let change = 0.5 * tick_s * most(2) + 0.125 * tick_s * tick_s * most(3);
         let v = (now[1].min(self.before[1]) - change).max(0.0);
         let passed = self.cursor.neighbours().iter().filter(|p| p.block > from && p.block <= to);
-        let steps: Vec<_> = passed.filter_map(|placed| placed.joint).collect();
+        let steps: Vec<_> = passed.filter_map(|placed| placed.junction).collect();
         for (angle_rad, bend) in steps {
             let step = v * (angle_rad - 1e-11).max(0.0) / tick_s + v * v * bend;
             let limit = self.machine.path.accel_step_mm_s2;
@@ -293,9 +293,9 @@ impl<'a> Checker<'a> {
             set.map(|axis| axis.accel_mm_s2.to_f64()),
             set.map(|axis| axis.jerk_mm_s3.to_f64()),
         ];
-        // At a joint both neighbours are right.
+        // At a junction both neighbours are right.
         let mut best: Option<Comparison> = None;
-        for placed in self.cursor.near(local_mm, JOINT_MM) {
+        for placed in self.cursor.near(local_mm, JUNCTION_MM) {
             let point = placed.at(local_mm);
             let (t, n, o) = (point.tangent, point.second, point.third);
             let exact: [Vector; 3] = [

@@ -1,6 +1,6 @@
 //! The programmed path as a whole: stretches between full stops, found from the geometry alone.
 
-use super::geometry::{Element, PathPoint, joint, position_bits};
+use super::geometry::{Element, PathPoint, junction, position_bits};
 use super::program::{Asked, Generated};
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Item as PlanItem, Plan};
@@ -18,7 +18,7 @@ pub(crate) struct Placed {
     /// Index of the move, and so of the plan's block.
     pub(crate) block: usize,
     /// Angle [rad] and step of curvature [1/mm] at its start, if the motion does not stop there.
-    pub(crate) joint: Option<(f64, f64)>,
+    pub(crate) junction: Option<(f64, f64)>,
 }
 
 /// From full stop to full stop.
@@ -36,7 +36,7 @@ pub(crate) struct Path {
     pub(crate) dwell_s: f64,
     pub(crate) dwells: u64,
     pub(crate) stops: u64,
-    /// A joint's angle is so close to the machine's that rounding decides whether it stops there.
+    /// A junction's angle is so close to the machine's that rounding decides whether it stops there.
     pub(crate) is_ambiguous: bool,
 }
 
@@ -63,9 +63,9 @@ impl Path {
             let element = Element::new(step);
             let mut passed = None;
             if let Some(last) = open.moves.last() {
-                let (angle_rad, bend) = joint(&last.element, &element);
+                let (angle_rad, bend) = junction(&last.element, &element);
                 // What is less is no angle to any machine.
-                let limit_rad = machine.path.joint_angle_rad.max(TANGENT_ROUNDING_RAD);
+                let limit_rad = machine.path.junction_angle_rad.max(TANGENT_ROUNDING_RAD);
                 // An arc's ends differ in radius by rounding; the direction at its end depends on where that is put.
                 let slant_rad = last.element.slant_rad() + element.slant_rad();
                 let is_close = (angle_rad - limit_rad).abs() <= 1e-6 * limit_rad + 1e-9 + slant_rad;
@@ -81,7 +81,7 @@ impl Path {
                 start_mm: open.length_mm,
                 feed_mm_s: step.feed_mm_min / 60.0,
                 block,
-                joint: passed,
+                junction: passed,
             });
             open.length_mm += element.length_mm;
             open.end_bits = step.to.map(position_bits);
@@ -136,14 +136,14 @@ impl Path {
                 let block = ends.partition_point(|&end| end < middle_mm).min(ends.len() - 1);
                 // Within a block pieces join as the curve does.
                 let passed = (open.moves.last()).filter(|_| last != Some(block));
-                let joint = passed.map(|before: &Placed| joint(&before.element, &element));
+                let junction = passed.map(|before: &Placed| junction(&before.element, &element));
                 last = Some(block);
                 open.moves.push(Placed {
                     element,
                     start_mm: open.length_mm,
                     feed_mm_s: stretch.blocks[block].feed_mm_s,
                     block: first + block,
-                    joint,
+                    junction,
                 });
                 open.length_mm += element.length_mm;
             }
@@ -202,7 +202,7 @@ impl<'a> Cursor<'a> {
         &moves[from..(self.index + 2).min(moves.len())]
     }
 
-    /// The moves that contain `s_mm` but for rounding: the one found last, and at a joint others.
+    /// The moves that contain `s_mm` but for rounding: the one found last, and at a junction others.
     pub(crate) fn near(&self, s_mm: f64, rounding_mm: f64) -> impl Iterator<Item = &'a Placed> {
         let holds = move |placed: &Placed, margin_mm: f64| {
             let local_mm = s_mm - placed.start_mm;

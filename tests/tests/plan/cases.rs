@@ -35,7 +35,7 @@ fn ten_thousand_nanometres() {
     assert!((together / time_s(&one, &from_rest(&one)) - 1.0).abs() < 1e-9);
 }
 
-/// Every second block slow, and a saw-tooth: the joints keep the lower ceiling, fast blocks rise above it.
+/// Every second block slow, and a saw-tooth: the junctions keep the lower ceiling, fast blocks rise above it.
 #[test]
 fn alternating_ceilings_and_saw_teeth() {
     let alternating: Vec<_> = (0..200).map(|n| block(1.0, if n % 2 == 0 { 80.0 } else { 10.0 })).collect();
@@ -55,7 +55,7 @@ fn alternating_ceilings_and_saw_teeth() {
 /// A staircase: stops at every corner, so all alike blocks are planned alike.
 #[test]
 fn staircase_stops_at_every_corner() {
-    let step = Block { joint_mm_s: 0.0, ..block(0.5, 50.0) };
+    let step = Block { junction_mm_s: 0.0, ..block(0.5, 50.0) };
     let mut blocks = vec![step; 100];
     let plans = from_rest(&blocks);
     assert!(plans.iter().all(|plan| *plan == plans[0] && plan.enter_mm_s == 0.0 && plan.exit_mm_s == 0.0));
@@ -74,7 +74,7 @@ fn blocks_of_no_length() {
     assert_eq!((slow[0].exit_mm_s, slow[1].peak_mm_s, slow[2].enter_mm_s), (30.0, 30.0, 30.0));
     let at_rest = from_rest(&[block(0.0, 30.0), block(0.0, 30.0)]);
     assert!(at_rest.iter().all(|plan| plan.peak_mm_s == 0.0));
-    let stop = Block { joint_mm_s: 0.0, ..block(0.0, 80.0) };
+    let stop = Block { junction_mm_s: 0.0, ..block(0.0, 80.0) };
     assert_eq!(from_rest(&[long, stop, long])[1].enter_mm_s, 0.0);
 }
 
@@ -106,7 +106,7 @@ fn hole_in_what_can_be_reached() {
     assert!(plans[1].enter_mm_s < 60.0 && plans[0].peak_mm_s == 60.0);
 }
 
-/// Only neighbours that are alike are merged, and the last one's joint stays.
+/// Only neighbours that are alike are merged, and the last one's junction stays.
 #[test]
 fn what_is_merged() {
     let mut random = Random::new(90);
@@ -115,12 +115,12 @@ fn what_is_merged() {
             .map(|_| Block {
                 length_mm: f64::from(1 + random.below(5) as u32),
                 cap_mm_s: *random.pick(&[50.0, 50.0, 50.0, 60.0]),
-                joint_mm_s: *random.pick(&[f64::INFINITY, f64::INFINITY, 60.0, 50.0, 49.0, 0.0]),
+                junction_mm_s: *random.pick(&[f64::INFINITY, f64::INFINITY, 60.0, 50.0, 49.0, 0.0]),
                 law: if random.once_in(4) { law(500.0, 5e3, 5e5) } else { reference() },
             })
             .collect();
         let alike = |a: &Block<f64>, b: &Block<f64>| {
-            a.cap_mm_s == b.cap_mm_s && a.law == b.law && a.joint_mm_s >= b.cap_mm_s
+            a.cap_mm_s == b.cap_mm_s && a.law == b.law && a.junction_mm_s >= b.cap_mm_s
         };
         let expected: Vec<Block<f64>> = blocks
             .chunk_by(alike)
@@ -138,7 +138,7 @@ fn what_is_merged() {
 /// Merged and yet slower: eight blocks of 1 µm reach less feed than the 8 µm they are, and from less feed the short
 /// block after them accelerates further, for the benefit of a long one that hardly accelerates.
 #[test]
-fn higher_at_a_joint_and_slower_in_all() {
+fn higher_at_a_junction_and_slower_in_all() {
     let mut blocks = vec![Block { law: law(500.0, 1e5, 4e5), ..block(1e-3, 80.0) }; 8];
     blocks.extend([block(0.03, 900.0), Block { law: law(1.0, 1e4, 1e8), ..block(80.0, 300.0) }]);
     let plans = from_rest(&blocks);

@@ -1,4 +1,4 @@
-//! Plans of block lists as the executor drives them, tick by tick: every ceiling, joint and limit where the machine is at
+//! Plans of block lists as the executor drives them, tick by tick: every ceiling, junction and limit where the machine is at
 //! that tick, not only where a span says it is.
 //!
 //! The oracle knows the blocks' ends and the executed position, feed, acceleration, jerk and snap, and nothing of spans.
@@ -16,7 +16,7 @@ use crate::support::Random;
 use crate::{block, laws, reference};
 
 const TICK_S: f64 = 0.0005;
-/// Where a joint lies is known to some position steps, and to the digits of the sum of lengths \[mm\].
+/// Where a junction lies is known to some position steps, and to the digits of the sum of lengths \[mm\].
 const ROUNDING_MM: f64 = 2.0e-9;
 /// Greatest piece \[mm\].
 const PIECE_MM: f64 = 16.0;
@@ -43,7 +43,7 @@ fn segments<R: Real>(spans: &[FeedSpan], end: Position) -> Vec<FeedSegment<R>> {
 #[derive(Clone, Copy, Debug, Default)]
 struct Worst {
     feed: f64,
-    joint: f64,
+    junction: f64,
     accel: f64,
     jerk: f64,
     snap: f64,
@@ -52,12 +52,12 @@ struct Worst {
 
 impl Worst {
     fn all(&self) -> [f64; 5] {
-        [self.feed, self.joint, self.accel, self.jerk, self.snap]
+        [self.feed, self.junction, self.accel, self.jerk, self.snap]
     }
 
     fn merge(&mut self, other: &Self) {
         self.feed = self.feed.max(other.feed);
-        self.joint = self.joint.max(other.joint);
+        self.junction = self.junction.max(other.junction);
         self.accel = self.accel.max(other.accel);
         self.jerk = self.jerk.max(other.jerk);
         self.snap = self.snap.max(other.snap);
@@ -125,7 +125,7 @@ fn executed<R: Real>(name: &str, blocks: &[Block<f64>], digits: f64) -> Worst {
     };
     let feed_mm_s = blocks.iter().map(|block| block.cap_mm_s).fold(0.0, f64::max);
     // In f32 a piece ends within a rounding of its length.
-    let rules = PathRules { limits, feed_mm_s, joint_angle_rad: 0.01, joint_gap_mm: 5e-6 };
+    let rules = PathRules { limits, feed_mm_s, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
     let mut streams = Streams::<R, 1, 64, 64>::new();
     let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
     let mut executor = Executor::<R, 1>::new([Position::ZERO]);
@@ -145,17 +145,17 @@ fn executed<R: Real>(name: &str, blocks: &[Block<f64>], digits: f64) -> Worst {
         let s_mm = motion.s.to_mm();
         let [v, a, j, snap] =
             [motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(|x| x.to_f64());
-        // Joints since the last tick: the acceleration there is that of either tick but for what jerk makes of it.
+        // Junctions since the last tick: the acceleration there is that of either tick but for what jerk makes of it.
         while first < blocks.len() && ends_mm[first] < s_mm - ROUNDING_MM {
             let change = limits.jerk_mm_s3 * TICK_S;
-            let joint_mm = ends_mm[first];
-            let on = (joint_mm - before[0] - ROUNDING_MM) * (before[2] - change);
-            let back = (s_mm - joint_mm + ROUNDING_MM) * -(a + change);
+            let junction_mm = ends_mm[first];
+            let on = (junction_mm - before[0] - ROUNDING_MM) * (before[2] - change);
+            let back = (s_mm - junction_mm + ROUNDING_MM) * -(a + change);
             let least = (before[1].powi(2) + 2.0 * on).max(v.powi(2) + 2.0 * back);
             if let Some(next) = blocks.get(first + 1).filter(|_| least > 0.0) {
-                let allowed = blocks[first].joint_mm_s.min(blocks[first].cap_mm_s).min(next.cap_mm_s);
+                let allowed = blocks[first].junction_mm_s.min(blocks[first].cap_mm_s).min(next.cap_mm_s);
                 let off = 2.0 * limits.accel_mm_s2 * ROUNDING_MM / allowed;
-                worst.joint = worst.joint.max(least.sqrt() / (allowed * (1.0 + digits) + off));
+                worst.junction = worst.junction.max(least.sqrt() / (allowed * (1.0 + digits) + off));
             }
             first += 1;
         }
@@ -226,7 +226,7 @@ fn named_cases_keep_every_limit_in_every_tick() {
     assert!(worst.feed > 0.9999 && worst.accel > 0.9 && worst.jerk > 0.999, "{worst:?}");
 }
 
-/// Every block with a law of its own or all with one, joints that slow.
+/// Every block with a law of its own or all with one, junctions that slow.
 #[test]
 fn random_lists_keep_every_limit_in_every_tick() {
     let mut random = Random::new(41);
@@ -243,7 +243,7 @@ fn random_lists_keep_every_limit_in_every_tick() {
                 Block {
                     length_mm: if random.once_in(20) { 0.0 } else { length_mm * random.log(0.1, 1.0) },
                     cap_mm_s,
-                    joint_mm_s: if random.once_in(5) { random.log(1.0, 100.0) } else { f64::INFINITY },
+                    junction_mm_s: if random.once_in(5) { random.log(1.0, 100.0) } else { f64::INFINITY },
                     law: if is_mixed { *random.pick(&laws[..4]) } else { reference() },
                 }
             })
@@ -255,5 +255,5 @@ fn random_lists_keep_every_limit_in_every_tick() {
     }
     println!("{worst:?}");
     assert!(worst.ticks > 500_000);
-    assert!(worst.feed > 0.9999 && worst.joint > 0.99 && worst.accel > 0.999, "{worst:?}");
+    assert!(worst.feed > 0.9999 && worst.junction > 0.99 && worst.accel > 0.999, "{worst:?}");
 }

@@ -21,8 +21,8 @@ fn check(blocks: &[Block<f64>], start: f64, end: f64, plans: &[BlockPlan<f64>]) 
             "{index}: {plan:?} {block:?}"
         );
         assert!(
-            index + 1 == blocks.len() || exit_mm_s <= block.joint_mm_s,
-            "joint {index}: {plan:?} {block:?}"
+            index + 1 == blocks.len() || exit_mm_s <= block.junction_mm_s,
+            "junction {index}: {plan:?} {block:?}"
         );
         assert!(block.length_mm <= 0.0 || peak_mm_s > 0.0, "block {index} is never left: {plan:?}");
         let ramps_mm =
@@ -136,8 +136,12 @@ fn merging_is_hardly_ever_slower() {
         let mut blocks = Vec::new();
         for seed in random_blocks(&mut random, 12, 1e-3) {
             for _ in 0..=random.below(8) {
-                let joint_mm_s = if random.once_in(10) { seed.joint_mm_s } else { f64::INFINITY };
-                blocks.push(Block { joint_mm_s, length_mm: seed.length_mm * random.log(0.01, 1.0), ..seed });
+                let junction_mm_s = if random.once_in(10) { seed.junction_mm_s } else { f64::INFINITY };
+                blocks.push(Block {
+                    junction_mm_s,
+                    length_mm: seed.length_mm * random.log(0.01, 1.0),
+                    ..seed
+                });
             }
         }
         let mut merged = blocks.clone();
@@ -170,7 +174,7 @@ fn a_million_blocks() {
         .map(|_| Block {
             length_mm: random.log(1e-3, 1.0),
             cap_mm_s: random.log(1.0, 200.0),
-            joint_mm_s: f64::INFINITY,
+            junction_mm_s: f64::INFINITY,
             law: reference(),
         })
         .collect();

@@ -7,8 +7,8 @@ use motion_kernel::law::{FeedSegment, Law, LimitError, Limits, Ramp, SegmentErro
 use motion_kernel::num::{Fixed, Root, Scalar};
 use motion_kernel::path::Piece;
 use motion_kernel::plan::{
-    AxisLimits, Bend, Block, BlockPlan, Ceiling, Joint, MachineLimits, PlanError, joint, merge_equal, plan,
-    segments,
+    AxisLimits, Bend, Block, BlockPlan, Ceiling, Junction, MachineLimits, PlanError, junction, merge_equal,
+    plan, segments,
 };
 use motion_kernel::queue::{Feeder, PathRules, Refused, Streams};
 use motion_kernel::units::Position;
@@ -83,7 +83,7 @@ impl Range {
                 let (law, law_f64) = same.unwrap_or_else(|| laws(self.limits(random)));
                 let length_mm = fixed(if random.once_in(20) { 0.0 } else { self.length(random) });
                 let cap_mm_s = fixed(self.feed(random));
-                let joint = match random.below(10) {
+                let junction = match random.below(10) {
                     0 => 0.0,
                     1..=3 => fixed(self.feed(random)).to_f64(),
                     _ => f64::INFINITY,
@@ -91,10 +91,10 @@ impl Range {
                 let wide = Block {
                     length_mm: length_mm.to_f64(),
                     cap_mm_s: cap_mm_s.to_f64(),
-                    joint_mm_s: joint,
+                    junction_mm_s: junction,
                     law: law_f64,
                 };
-                (Block { length_mm, cap_mm_s, joint_mm_s: fixed(joint), law }, wide)
+                (Block { length_mm, cap_mm_s, junction_mm_s: fixed(junction), law }, wide)
             })
             .unzip()
     }
@@ -142,7 +142,7 @@ fn check(blocks: &[Block<Fixed>], wide: &[Block<f64>], plans: &[BlockPlan<Fixed>
             case()
         );
         assert!(peak <= block.cap_mm_s, "{}", case());
-        assert!(index + 1 == blocks.len() || exit <= block.joint_mm_s, "{}", case());
+        assert!(index + 1 == blocks.len() || exit <= block.junction_mm_s, "{}", case());
         assert!(block.length_mm == Fixed::ZERO || peak > Fixed::ZERO, "never left: {}", case());
         // Exactly, in fixed point.
         let ramps = [(enter, peak), (peak, exit)];
@@ -264,7 +264,7 @@ fn ends_of_the_ranges() {
                     let block = Block {
                         length_mm: length,
                         cap_mm_s: fixed(1e6),
-                        joint_mm_s: fixed(f64::INFINITY),
+                        junction_mm_s: fixed(f64::INFINITY),
                         law,
                     };
                     let blocks = [block; 3];
@@ -272,7 +272,7 @@ fn ends_of_the_ranges() {
                         let wide = blocks.map(|block| Block {
                             length_mm: block.length_mm.to_f64(),
                             cap_mm_s: 1e6,
-                            joint_mm_s: f64::INFINITY,
+                            junction_mm_s: f64::INFINITY,
                             law: wide,
                         });
                         worst = worst.max(check(&blocks, &wide, &plans));
@@ -327,14 +327,15 @@ fn beyond_the_ranges_is_refused() {
         }
     }
     let (law, _) = laws(good);
-    let good = Block { length_mm: fixed(1.0), cap_mm_s: fixed(10.0), joint_mm_s: fixed(f64::INFINITY), law };
+    let good =
+        Block { length_mm: fixed(1.0), cap_mm_s: fixed(10.0), junction_mm_s: fixed(f64::INFINITY), law };
     let short = Block { length_mm: fixed(1e-6 - STEP), ..good };
     let long = Block { length_mm: fixed(1e6 + STEP), ..good };
     let negative = Block { length_mm: fixed(-STEP), ..good };
     let slow = Block { cap_mm_s: fixed(1e-3 - STEP), ..good };
     let still = Block { cap_mm_s: Fixed::ZERO, ..good };
     let fast = Block { cap_mm_s: fixed(1e6 + STEP), ..good };
-    let backward = Block { joint_mm_s: fixed(-STEP), ..good };
+    let backward = Block { junction_mm_s: fixed(-STEP), ..good };
     for (bad, name) in [
         (short, "length [mm]"),
         (long, "length [mm]"),
@@ -342,7 +343,7 @@ fn beyond_the_ranges_is_refused() {
         (still, "ceiling [mm/s]"),
         (slow, "ceiling [mm/s]"),
         (fast, "ceiling [mm/s]"),
-        (backward, "joint feed [mm/s]"),
+        (backward, "junction feed [mm/s]"),
     ] {
         let refused = planned(&[good, bad], Fixed::ZERO, Fixed::ZERO);
         assert!(
@@ -356,8 +357,8 @@ fn beyond_the_ranges_is_refused() {
         assert!(matches!(planned(&blocks, fixed(bad), Fixed::ZERO), Err(PlanError::EndFeed { .. })));
         assert!(matches!(planned(&blocks, Fixed::ZERO, fixed(bad)), Err(PlanError::EndFeed { .. })));
     }
-    // A joint as slow is a stop.
-    let pair = [Block { joint_mm_s: fixed(1e-3 - STEP), ..good }, good];
+    // A junction as slow is a stop.
+    let pair = [Block { junction_mm_s: fixed(1e-3 - STEP), ..good }, good];
     assert_eq!(planned(&pair, Fixed::ZERO, Fixed::ZERO).expect("a plan")[0].exit_mm_s, Fixed::ZERO);
 }
 
@@ -366,7 +367,7 @@ fn beyond_the_ranges_is_refused() {
 fn merged_lengths_stay_in_range() {
     let (law, _) = laws([500.0, 5e3, 4e5]);
     let block =
-        |mm| Block { length_mm: fixed(mm), cap_mm_s: fixed(10.0), joint_mm_s: fixed(f64::INFINITY), law };
+        |mm| Block { length_mm: fixed(mm), cap_mm_s: fixed(10.0), junction_mm_s: fixed(f64::INFINITY), law };
     let mut blocks = [block(6e5), block(4e5), block(1.0), block(2e9), block(2e9), block(2.0)];
     assert_eq!(merge_equal(&mut blocks), 5);
     assert_eq!(blocks[..2], [block(1e6), block(1.0)]);
@@ -455,16 +456,17 @@ fn ceilings_keep_the_limits() {
     assert!(refused[0] < 1000 && refused[1] < 15_000, "{refused:?}");
 }
 
-/// Joints: the steps of velocity and acceleration keep their limit.
+/// Junctions: the steps of velocity and acceleration keep their limit.
 #[test]
-fn joints_keep_the_acceleration_step() {
+fn junctions_keep_the_acceleration_step() {
     let mut random = Random::new(93);
     let mut worst = 0.0_f64;
     for _ in 0..100_000 {
         let angle = fixed(if random.once_in(4) { 0.0 } else { random.log(1e-8, 0.1) });
         let bend = fixed(if random.once_in(4) { 0.0 } else { random.log(1e-6, 2e3) });
         let (step, tick) = (fixed(random.log(1.0, 1e9)), fixed(random.log(1e-5, 1e-2)));
-        let feed = joint(&Joint { angle_rad: angle, curvature_step_per_mm: bend }, fixed(0.1), step, tick);
+        let feed =
+            junction(&Junction { angle_rad: angle, curvature_step_per_mm: bend }, fixed(0.1), step, tick);
         let [v, angle, bend, step, tick] = [feed, angle, bend, step, tick].map(Fixed::to_f64);
         if angle == 0.0 && bend == 0.0 {
             assert_eq!(feed.to_bits(), i64::MAX);
@@ -478,9 +480,12 @@ fn joints_keep_the_acceleration_step() {
     for (angle_rad, curvature_step_per_mm) in
         [(fixed(0.05), huge), (huge, Fixed::ZERO), (fixed(0.05), fixed(1e9))]
     {
-        let steps = Joint { angle_rad, curvature_step_per_mm };
-        assert!(joint(&steps, huge, huge, fixed(1e-3)) < fixed(10.0));
-        assert_eq!(joint(&Joint { angle_rad: fixed(1.0), ..steps }, huge, huge, fixed(STEP)), Fixed::ZERO);
+        let steps = Junction { angle_rad, curvature_step_per_mm };
+        assert!(junction(&steps, huge, huge, fixed(1e-3)) < fixed(10.0));
+        assert_eq!(
+            junction(&Junction { angle_rad: fixed(1.0), ..steps }, huge, huge, fixed(STEP)),
+            Fixed::ZERO
+        );
     }
     assert!(worst <= 1e-8, "{worst:e}");
 }
@@ -551,7 +556,7 @@ fn plans_are_accepted_and_executed() {
             blocks.push(Block {
                 length_mm,
                 cap_mm_s: fixed(wide.cap_mm_s),
-                joint_mm_s: fixed(wide.joint_mm_s),
+                junction_mm_s: fixed(wide.junction_mm_s),
                 law,
             });
         }
@@ -576,8 +581,8 @@ fn plans_are_accepted_and_executed() {
         let rules = PathRules {
             limits: Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 },
             feed_mm_s: blocks.iter().map(|block| block.cap_mm_s.to_f64()).fold(0.0, f64::max),
-            joint_angle_rad: 0.01,
-            joint_gap_mm: 0.0,
+            junction_angle_rad: 0.01,
+            junction_gap_mm: 0.0,
         };
         let mut streams = Streams::<Fixed, 1, 64, 64>::new();
         let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);

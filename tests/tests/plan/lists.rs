@@ -15,7 +15,7 @@ fn law(limits: Limits<f64>) -> Law<f64> {
 }
 
 pub(crate) fn block(length_mm: f64, cap_mm_s: f64) -> Block<f64> {
-    Block { length_mm, cap_mm_s, joint_mm_s: f64::INFINITY, law: reference() }
+    Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law: reference() }
 }
 
 /// The lists, of `count` blocks each, with their names.

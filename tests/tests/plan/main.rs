@@ -65,7 +65,7 @@ fn time_s(blocks: &[Block<f64>], plans: &[BlockPlan<f64>]) -> f64 {
     blocks.iter().zip(plans).map(|(block, plan)| block_time_s(block, plan)).sum()
 }
 
-/// A list of 1 to `most` blocks: lengths from `shortest_mm` to 1 m, some 0, feeds from 10⁻² to 10³ mm/s, joints
+/// A list of 1 to `most` blocks: lengths from `shortest_mm` to 1 m, some 0, feeds from 10⁻² to 10³ mm/s, junctions
 /// that stop, slow or do neither.
 fn random_blocks(random: &mut Random, most: usize, shortest_mm: f64) -> Vec<Block<f64>> {
     let laws = laws();
@@ -75,7 +75,7 @@ fn random_blocks(random: &mut Random, most: usize, shortest_mm: f64) -> Vec<Bloc
         .map(|_| Block {
             length_mm: if random.once_in(20) { 0.0 } else { random.log(shortest_mm, 1e3) },
             cap_mm_s: random.log(1e-2, 1e3),
-            joint_mm_s: match random.below(10) {
+            junction_mm_s: match random.below(10) {
                 0 => 0.0,
                 1..=3 => random.log(1e-2, 1e3),
                 _ => f64::INFINITY,

@@ -1,6 +1,6 @@
-//! No feasible plan has every joint feed at least as high and one of them higher: brute force over a grid.
+//! No feasible plan has every junction feed at least as high and one of them higher: brute force over a grid.
 //!
-//! The plan is *not* claimed to be the fastest, and a single joint's feed can be a local bottleneck that a lower
+//! The plan is *not* claimed to be the fastest, and a single junction's feed can be a local bottleneck that a lower
 //! feed elsewhere would widen (a ramp's length is not monotone in its lower feed); that is no contradiction.
 
 use crate::support::Random;
@@ -12,14 +12,14 @@ const RAISE: f64 = 1e-6;
 /// A block may be this much too short for a ramp and still count as feasible.
 const ROUNDING: f64 = 1e-10;
 
-/// Whether a ramp fits a block, the peak aside: a plan's peak is never below its joints.
+/// Whether a ramp fits a block, the peak aside: a plan's peak is never below its junctions.
 fn fits(block: &Block<f64>, enter: f64, exit: f64) -> bool {
     block.law.ramp_length_mm(enter, exit) <= block.length_mm * (1.0 + ROUNDING)
 }
 
-/// What the joint after block `index` allows.
+/// What the junction after block `index` allows.
 fn allowed(blocks: &[Block<f64>], index: usize) -> f64 {
-    blocks[index].cap_mm_s.min(blocks[index].joint_mm_s).min(blocks[index + 1].cap_mm_s)
+    blocks[index].cap_mm_s.min(blocks[index].junction_mm_s).min(blocks[index + 1].cap_mm_s)
 }
 
 /// Feeds from the planned one up to what is allowed: slightly raised, in equal and in growing steps.
@@ -74,8 +74,8 @@ fn check(
     plans: &[BlockPlan<f64>],
     count: usize,
 ) -> bool {
-    let joints = plans.len() - 1;
-    let grid: Vec<Vec<f64>> = (0..joints)
+    let junctions = plans.len() - 1;
+    let grid: Vec<Vec<f64>> = (0..junctions)
         .map(|index| levels(random, plans[index].exit_mm_s, allowed(blocks, index), count))
         .collect();
     assert!(!dominated(blocks, start, end, &grid), "a better plan than {plans:?} for {blocks:?}");
@@ -83,7 +83,7 @@ fn check(
 }
 
 #[test]
-fn no_plan_of_the_grid_is_better_at_every_joint() {
+fn no_plan_of_the_grid_is_better_at_every_junction() {
     let mut random = Random::new(60);
     let mut could_be_raised = 0;
     for _ in 0..6000 {
@@ -111,7 +111,7 @@ fn nor_for_longer_lists() {
     assert!(could_be_raised > 500, "{could_be_raised}");
 }
 
-/// One joint, or several at random, raised by a little or by much: some block is too short.
+/// One junction, or several at random, raised by a little or by much: some block is too short.
 #[test]
 fn nothing_can_be_raised() {
     let mut random = Random::new(62);
@@ -119,14 +119,14 @@ fn nothing_can_be_raised() {
     for _ in 0..5000 {
         let blocks = random_blocks(&mut random, 20, 1e-2);
         let plans = from_rest(&blocks);
-        let joints = blocks.len() - 1;
-        for attempt in 0..joints * 4 {
+        let junctions = blocks.len() - 1;
+        for attempt in 0..junctions * 4 {
             let mut feeds: Vec<f64> = plans.iter().map(|plan| plan.exit_mm_s).collect();
             let mut raised = false;
-            for (joint, feed) in feeds.iter_mut().enumerate().take(joints) {
-                let chosen = if attempt < joints { joint == attempt } else { random.once_in(3) };
+            for (junction, feed) in feeds.iter_mut().enumerate().take(junctions) {
+                let chosen = if attempt < junctions { junction == attempt } else { random.once_in(3) };
                 let higher = *feed * (1.0 + random.log(RAISE, 1.0));
-                if chosen && higher > *feed && higher <= allowed(&blocks, joint) {
+                if chosen && higher > *feed && higher <= allowed(&blocks, junction) {
                     (*feed, raised) = (higher, true);
                 }
             }

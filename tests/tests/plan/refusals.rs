@@ -12,14 +12,14 @@ fn bad_figures_are_named() {
         for (quantity, values) in [
             ("length [mm]", [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0, -f64::MIN_POSITIVE]),
             ("ceiling [mm/s]", [f64::NAN, f64::INFINITY, 0.0, -1.0, -0.0]),
-            ("joint feed [mm/s]", [f64::NAN, f64::NEG_INFINITY, -1.0, -1e-300, -f64::MIN_POSITIVE]),
+            ("junction feed [mm/s]", [f64::NAN, f64::NEG_INFINITY, -1.0, -1e-300, -f64::MIN_POSITIVE]),
         ] {
             for bad in values {
                 let mut blocks = good;
                 match quantity {
                     "length [mm]" => blocks[place].length_mm = bad,
                     "ceiling [mm/s]" => blocks[place].cap_mm_s = bad,
-                    _ => blocks[place].joint_mm_s = bad,
+                    _ => blocks[place].junction_mm_s = bad,
                 }
                 let before = format!("{blocks:?}");
                 match planned(&blocks, 0.0, 0.0) {
@@ -53,12 +53,12 @@ fn bad_feeds_are_named() {
     let short = [block(0.1, 50.0)];
     assert!(matches!(planned(&short, 50.0, 0.0), Err(PlanError::TooShortToBrake { .. })));
     assert!(matches!(planned(&short, 0.0, 50.0), Err(PlanError::TooShortToAccelerate { .. })));
-    // Too short together, over a joint that both feeds would pass.
+    // Too short together, over a junction that both feeds would pass.
     let pair = [block(0.1, 50.0), block(0.1, 50.0)];
     assert!(matches!(planned(&pair, 50.0, 0.0), Err(PlanError::TooShortToBrake { .. })));
     assert!(matches!(planned(&pair, 0.0, 50.0), Err(PlanError::TooShortToAccelerate { .. })));
-    // A joint or a ceiling in between that the start feed can't be braked to.
-    let stop = Block { joint_mm_s: 0.0, ..block(0.1, 50.0) };
+    // A junction or a ceiling in between that the start feed can't be braked to.
+    let stop = Block { junction_mm_s: 0.0, ..block(0.1, 50.0) };
     assert!(matches!(
         planned(&[stop, block(100.0, 50.0)], 50.0, 0.0),
         Err(PlanError::TooShortToBrake { .. })
@@ -108,7 +108,7 @@ fn any_numbers() {
             match random.below(6) {
                 0 | 1 => blocks[place].length_mm = value,
                 2 => blocks[place].cap_mm_s = value,
-                3 => blocks[place].joint_mm_s = value,
+                3 => blocks[place].junction_mm_s = value,
                 4 => start = value,
                 _ => end = value,
             }

@@ -16,7 +16,7 @@ struct Total {
     time_s: f64,
 }
 
-/// Makes the segments of all blocks, joints at the rounded sums of the lengths, and checks how they join.
+/// Makes the segments of all blocks, junctions at the rounded sums of the lengths, and checks how they join.
 fn fill<R: Real>(blocks: &[Block<f64>], plans: &[BlockPlan<f64>]) -> Total {
     let mut total = Total::default();
     let (mut end_mm, mut start, mut feed) = (0.0, Position::ZERO, 0.0);

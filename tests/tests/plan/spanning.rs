@@ -30,7 +30,7 @@ pub(crate) fn spans(blocks: &[Block<f64>]) -> (f64, Vec<FeedSpan>) {
     spans_between(blocks, 0.0, 0.0).expect("in range").expect("a plan")
 }
 
-/// Every ceiling, joint and limit at many instants of every span, and that the spans are one motion.
+/// Every ceiling, junction and limit at many instants of every span, and that the spans are one motion.
 pub(crate) fn legal(blocks: &[Block<f64>], start: f64, end: f64, spans: &[FeedSpan]) -> Result<(), String> {
     const WITHIN: f64 = 1.0 + 1e-9;
     let mut ends = Vec::new();
@@ -60,7 +60,7 @@ pub(crate) fn legal(blocks: &[Block<f64>], start: f64, end: f64, spans: &[FeedSp
             for block in
                 blocks.iter().take(first + 1).skip(last).filter(|block| block.length_mm > 2.0 * rounding)
             {
-                // At the joint itself the lower ceiling holds already; only one of them can be said to be broken.
+                // At the junction itself the lower ceiling holds already; only one of them can be said to be broken.
                 if first == last && state.v_mm_s > block.cap_mm_s * WITHIN {
                     return Err(format!("{} mm/s at {s} mm below {}", state.v_mm_s, block.cap_mm_s));
                 }
@@ -80,15 +80,15 @@ pub(crate) fn legal(blocks: &[Block<f64>], start: f64, end: f64, spans: &[FeedSp
     if (at - total).abs() > rounding || feed != end {
         return Err(format!("ends at {at} of {total} mm with {feed} of {end} mm/s"));
     }
-    // Feeds through joints, from the spans that hold them.
-    for (block, &joint) in blocks.iter().zip(&ends).take(blocks.len().saturating_sub(1)) {
-        // Where exactly the joint lies is known to rounding only.
-        let found = [-rounding, 0.0, rounding].map(|off| feed_at(spans, joint + off));
+    // Feeds through junctions, from the spans that hold them.
+    for (block, &junction) in blocks.iter().zip(&ends).take(blocks.len().saturating_sub(1)) {
+        // Where exactly the junction lies is known to rounding only.
+        let found = [-rounding, 0.0, rounding].map(|off| feed_at(spans, junction + off));
         let found = found.into_iter().fold(f64::INFINITY, f64::min);
-        if found > block.joint_mm_s * WITHIN + 1e-6 {
+        if found > block.junction_mm_s * WITHIN + 1e-6 {
             return Err(format!(
-                "{found} mm/s through the joint at {joint} mm, at most {}",
-                block.joint_mm_s
+                "{found} mm/s through the junction at {junction} mm, at most {}",
+                block.junction_mm_s
             ));
         }
     }
@@ -345,7 +345,7 @@ fn random_lists_are_as_fast_as_the_yardstick() {
     assert!(literal <= 20, "{literal}");
 }
 
-/// Every block with limits of its own, joints that slow and stop, any feed at both ends.
+/// Every block with limits of its own, junctions that slow and stop, any feed at both ends.
 #[test]
 fn random_lists_are_legal() {
     let mut random = Random::new(32);
@@ -438,7 +438,7 @@ fn a_list_takes_as_long_backwards() {
     let (mut worst, mut sums) = (0.0_f64, [0.0; 2]);
     for _ in 0..500 {
         let mut blocks = random_blocks(&mut random, 30, 0.1);
-        blocks.iter_mut().for_each(|block| block.joint_mm_s = f64::INFINITY);
+        blocks.iter_mut().for_each(|block| block.junction_mm_s = f64::INFINITY);
         let mut back = blocks.clone();
         back.reverse();
         let times = [spans_between(&blocks, 0.0, 0.0), spans_between(&back, 0.0, 0.0)];
@@ -461,7 +461,7 @@ pub(crate) fn unreachable(weak_mm_s2: f64, slope: f64, length_mm: f64) -> Vec<Bl
             [(0.2, 1.0, weak), (0.4, 1.5, strong), (0.4, 2.0, weak)].map(|(part, higher, law)| Block {
                 length_mm: length_mm * part,
                 cap_mm_s: cap_mm_s * higher,
-                joint_mm_s: f64::INFINITY,
+                junction_mm_s: f64::INFINITY,
                 law,
             })
         })

@@ -87,7 +87,7 @@ fn a_long_program_passes_a_small_window() {
     assert!((end - 10_000.0).abs() < 1e-5, "{end}");
 }
 
-/// Every block with limits of its own, joints that slow and stop, in windows of any length.
+/// Every block with limits of its own, junctions that slow and stop, in windows of any length.
 #[test]
 fn windows_of_random_lists_are_legal() {
     let mut random = Random::new(36);

@@ -106,12 +106,12 @@ struct PathJson {
     time_s: f64,
     ticks: usize,
     deviation_mm: f64,
-    joints: Vec<JointJson>,
+    junctions: Vec<JunctionJson>,
     by_tick: Vec<ByTickJson>,
 }
 
 #[derive(Serialize)]
-struct JointJson {
+struct JunctionJson {
     time_s: f64,
     /// Of a spline.
     published_s: Option<f64>,
@@ -128,12 +128,12 @@ struct ByTickJson {
 
 fn json(paths: &[(Course, Figures)], [well, badly]: &[[Evaluator; WAYS]; 2]) -> ExperimentJson {
     let path = |figures: &Figures| {
-        let is_spline = figures.joints.len() == TABLE_2_S.len();
-        let joints = figures.joints.iter().enumerate().map(|(index, joint)| JointJson {
-            time_s: joint.time_s,
+        let is_spline = figures.junctions.len() == TABLE_2_S.len();
+        let junctions = figures.junctions.iter().enumerate().map(|(index, junction)| JunctionJson {
+            time_s: junction.time_s,
             published_s: is_spline.then(|| TABLE_2_S[index]),
-            accel_step_mm_s2: [joint.accel_mm_s2[0], joint.accel_mm_s2[1]],
-            jerk_step_mm_s3: joint.jerk_step_mm_s3(),
+            accel_step_mm_s2: [junction.accel_mm_s2[0], junction.accel_mm_s2[1]],
+            jerk_step_mm_s3: junction.jerk_step_mm_s3(),
         });
         let by_tick = figures.by_tick.iter().map(|by_tick| ByTickJson {
             tick_s: by_tick.tick_s,
@@ -146,7 +146,7 @@ fn json(paths: &[(Course, Figures)], [well, badly]: &[[Evaluator; WAYS]; 2]) -> 
             time_s: figures.time_s,
             ticks: figures.ticks,
             deviation_mm: figures.deviation_mm,
-            joints: joints.collect(),
+            junctions: junctions.collect(),
             by_tick: by_tick.collect(),
         }
     };
@@ -192,13 +192,13 @@ fn write_tables(paths: &[(Course, Figures); 3], out: &mut dyn Write) -> io::Resu
         })
         .collect();
     table::write(&columns, &rows, out)?;
-    for joint in &arcs.joints {
+    for junction in &arcs.junctions {
         let before_mm_s2 = -FEED_MM_S * FEED_MM_S / smoothness::RADII_MM[0];
         writeln!(
             out,
             "\nWhere the arcs meet, at {:.6} s, the acceleration of Y steps from {before_mm_s2:.3} to {:.3} mm/s².",
-            joint.time_s,
-            before_mm_s2 + joint.accel_mm_s2[1],
+            junction.time_s,
+            before_mm_s2 + junction.accel_mm_s2[1],
         )?;
     }
     writeln!(
@@ -214,8 +214,8 @@ fn write_tables(paths: &[(Course, Figures); 3], out: &mut dyn Write) -> io::Resu
         ("cubic", "mm/s³", Align::Right),
         ("quintic", "mm/s³", Align::Right),
     ];
-    let joints = cubic.joints.iter().zip(&quintic.joints).zip(TABLE_2_S).enumerate();
-    let rows: Vec<[String; 7]> = joints
+    let junctions = cubic.junctions.iter().zip(&quintic.junctions).zip(TABLE_2_S).enumerate();
+    let rows: Vec<[String; 7]> = junctions
         .map(|(index, ((cubic, quintic), published_s))| {
             [
                 (index + 1).to_string(),
@@ -229,8 +229,12 @@ fn write_tables(paths: &[(Course, Figures); 3], out: &mut dyn Write) -> io::Resu
         })
         .collect();
     table::write(&columns, &rows, out)?;
-    let farthest_s =
-        quintic.joints.iter().zip(TABLE_2_S).map(|(joint, s)| (joint.time_s - s).abs()).fold(0.0, f64::max);
+    let farthest_s = quintic
+        .junctions
+        .iter()
+        .zip(TABLE_2_S)
+        .map(|(junction, s)| (junction.time_s - s).abs())
+        .fold(0.0, f64::max);
     writeln!(
         out,
         "\nThe published times differ by up to {:.1} ms. No curve through the points that is run through at constant feed has \

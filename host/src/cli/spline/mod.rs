@@ -33,7 +33,7 @@ Examples:
 
 JSON of a run: that of `motion run`, and spline: degree, points, spans, length_mm, deviation_mm (greatest, of a point),
 jerk_step_mm_s3 (greatest, at a knot and the programmed feed), pieces, position_error_mm and feed_error (of the pieces).
-JSON of the experiment: feed_mm_s, tick_s; paths: list of name, length_mm, time_s, ticks, deviation_mm (from the arcs), joints
+JSON of the experiment: feed_mm_s, tick_s; paths: list of name, length_mm, time_s, ticks, deviation_mm (from the arcs), junctions
 (time_s, published_s, accel_step_mm_s2 of X and Y, jerk_step_mm_s3), by_tick (tick_s, jerk_max_mm_s3, jerk_step_max_mm_s3);
 evaluators: list of name, feed_error, feed_error_badly_parametrised.";
 
@@ -180,7 +180,7 @@ struct SplineFigures {
 impl SplineFigures {
     fn of(spline: &Spline, points: usize, pieces: &Pieces, feed_mm_s: f64) -> Self {
         let course = crate::smoothness::course(spline);
-        let steps = course.joint_steps(feed_mm_s);
+        let steps = course.junction_steps(feed_mm_s);
         Self {
             degree: spline.degree().number(),
             points,
@@ -189,7 +189,7 @@ impl SplineFigures {
             deviation_mm: spline.deviation_mm(),
             jerk_step_mm_s3: steps
                 .iter()
-                .map(crate::smoothness::JointStep::jerk_step_mm_s3)
+                .map(crate::smoothness::JunctionStep::jerk_step_mm_s3)
                 .fold(0.0, f64::max),
             pieces: pieces.count,
             position_error_mm: pieces.deviation.position_mm,

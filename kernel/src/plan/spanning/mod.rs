@@ -1,7 +1,7 @@
 //! Ramps that span blocks.
 //!
 //! Consumes the same blocks as [`plan`](super::plan()); produces ramps and cruises over path length that begin and end
-//! wherever it is best, not at joints. Every ceiling is kept at every point, and a ramp uses no more than the least
+//! wherever it is best, not at junctions. Every ceiling is kept at every point, and a ramp uses no more than the least
 //! limits of all the blocks it crosses.
 //!
 //! - [`valleys`]: which ceilings are rested in, and what lies between them: humps;

@@ -208,7 +208,7 @@ mod tests {
                 let length_mm =
                     if case.is_multiple_of(3) { step_mm } else { step_mm * random.log(0.01, 1.0) };
                 let law = Law::new(limits).expect("positive");
-                Block { length_mm, cap_mm_s, joint_mm_s: f64::INFINITY, law }
+                Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law }
             })
             .collect()
     }

@@ -34,7 +34,7 @@ enum Role {
     Valley,
 }
 
-/// A ceiling: a block's, that of several equal ones, or that of a joint. Working memory of the planner.
+/// A ceiling: a block's, that of several equal ones, or that of a junction. Working memory of the planner.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
     start_mm: f64,
@@ -159,7 +159,7 @@ impl<'a> Valleys<'a> {
             accel_mm_s2 = accel_mm_s2.max(block.law.limits().accel_mm_s2);
             let end_mm = at_mm + block.length_mm;
             let next_mm_s = blocks.get(index + 1).map_or(f64::INFINITY, |next| next.cap_mm_s);
-            let is_joint = index + 1 < blocks.len() && block.joint_mm_s < block.cap_mm_s.min(next_mm_s);
+            let is_junction = index + 1 < blocks.len() && block.junction_mm_s < block.cap_mm_s.min(next_mm_s);
             match &mut open {
                 Some(last)
                     if last.feed_mm_s == block.cap_mm_s
@@ -175,14 +175,14 @@ impl<'a> Valleys<'a> {
                     open = Some(Node { start_mm: at_mm, end_mm, feed_mm_s, block, ..Node::EMPTY });
                 }
             }
-            if is_joint {
+            if is_junction {
                 if let Some(last) = open.take() {
                     put(last)?;
                 }
                 put(Node {
                     start_mm: end_mm,
                     end_mm,
-                    feed_mm_s: block.joint_mm_s,
+                    feed_mm_s: block.junction_mm_s,
                     block: index as u32,
                     ..Node::EMPTY
                 })?;

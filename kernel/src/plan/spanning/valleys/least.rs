@@ -12,7 +12,7 @@ use crate::plan::Block;
 pub(super) const NONE: Limits<f64> =
     Limits { accel_mm_s2: f64::INFINITY, jerk_mm_s3: f64::INFINITY, snap_mm_s4: f64::INFINITY };
 
-/// A joint has no limits of its own, nor has a block of no length.
+/// A junction has no limits of its own, nor has a block of no length.
 fn own(node: &Node, blocks: &[Block<f64>]) -> Limits<f64> {
     let block = blocks.get(node.block as usize).filter(|_| node.end_mm > node.start_mm);
     block.map_or(NONE, |block| block.law.limits())

@@ -1,6 +1,6 @@
-//! What a joint between two blocks allows.
+//! What a junction between two blocks allows.
 //!
-//! A joint is passed without stopping if its tangents agree to a stated angle; otherwise the machine
+//! A junction is passed without stopping if its tangents agree to a stated angle; otherwise the machine
 //! stops exactly on the corner. Passing it at feed v, two things step from one tick to the next: the
 //! velocity by the angle, v·φ, which is an acceleration of v·φ/τ for one tick, and the acceleration by
 //! the jump of curvature, v²·|Δ(κN)|. No limit on jerk per tick can be honest there (it grows as 1/τ),
@@ -12,22 +12,22 @@
 
 use crate::num::Root;
 
-/// The steps at a joint.
+/// The steps at a junction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Joint<R> {
+pub struct Junction<R> {
     /// φ, the angle between the tangents \[rad\].
     pub angle_rad: R,
     /// |Δ(κN)|, the jump of the curvature vector \[1/mm\].
     pub curvature_step_per_mm: R,
 }
 
-/// The greatest feed through a joint \[mm/s\]: 0 if the angle exceeds `angle_max_rad`, infinite if
+/// The greatest feed through a junction \[mm/s\]: 0 if the angle exceeds `angle_max_rad`, infinite if
 /// nothing steps (in fixed point the greatest value). `accel_step_mm_s2` is the acceleration-step limit, `tick_s` the control tick τ.
-pub fn joint<R: Root>(joint: &Joint<R>, angle_max_rad: R, accel_step_mm_s2: R, tick_s: R) -> R {
-    let (kink, bend) = (joint.angle_rad / tick_s, joint.curvature_step_per_mm);
+pub fn junction<R: Root>(junction: &Junction<R>, angle_max_rad: R, accel_step_mm_s2: R, tick_s: R) -> R {
+    let (kink, bend) = (junction.angle_rad / tick_s, junction.curvature_step_per_mm);
     // What is beyond the range of fixed point stops, and no greater step is made use of.
     let most = R::from_f64(R::LIMITS.1);
-    if joint.angle_rad > angle_max_rad || kink > most || bend > most {
+    if junction.angle_rad > angle_max_rad || kink > most || bend > most {
         return R::ZERO;
     }
     // The root of Δκ·v² + (φ/τ)·v = step, in the form that has no cancellation.
@@ -47,7 +47,7 @@ mod tests {
         let (step, tick) = (500.0, 0.0005);
         for angle_rad in [0.0, 1e-6, 1e-3] {
             for curvature_step_per_mm in [0.0, 1e-3, 0.25, 100.0] {
-                let v = joint(&Joint { angle_rad, curvature_step_per_mm }, 0.01, step, tick);
+                let v = junction(&Junction { angle_rad, curvature_step_per_mm }, 0.01, step, tick);
                 if angle_rad == 0.0 && curvature_step_per_mm == 0.0 {
                     assert_eq!(v, f64::INFINITY);
                 } else {
@@ -56,7 +56,7 @@ mod tests {
                 }
             }
         }
-        let corner = Joint { angle_rad: 0.02, curvature_step_per_mm: 0.0 };
-        assert_eq!(joint(&corner, 0.01, step, tick), 0.0);
+        let corner = Junction { angle_rad: 0.02, curvature_step_per_mm: 0.0 };
+        assert_eq!(junction(&corner, 0.01, step, tick), 0.0);
     }
 }
