@@ -1,15 +1,15 @@
 //! What a board's flight recorder kept, read from the board's log.
 //!
-//! Consumes text in which a frame of [`motion_kernel::recorder`] stands in a line as `flight [01, 03, …]`, in
+//! Consumes text in which a frame of [`motion_kernel::flight`] stands in a line as `flight [01, 03, …]`, in
 //! hexadecimal, whatever is before or behind it; produces the ticks as those of a run. Lines without a frame are passed
 //! over. Fails at the first frame that is damaged, with its line.
 
-use motion_kernel::recorder::{FrameError, Row};
+use motion_kernel::flight::{FlightRow, FrameError};
 
 use crate::machine::Machine;
-use crate::record::{AXES, AxisTick, TickRecord};
 use crate::simulate::contour::Contour;
 use crate::simulate::run::state_name;
+use crate::trace::{AXES, AxisTick, TraceRow};
 
 /// What is in front of a frame's bytes.
 const MARK: &str = "flight [";
@@ -52,13 +52,13 @@ pub enum FlightError {
 ///
 /// # Errors
 /// There is no frame, or a frame is not whole.
-pub fn read(log: &str) -> Result<Vec<Row<f64, AXES>>, FlightError> {
-    let mut rows: Vec<Row<f64, AXES>> = Vec::new();
+pub fn read(log: &str) -> Result<Vec<FlightRow<f64, AXES>>, FlightError> {
+    let mut rows: Vec<FlightRow<f64, AXES>> = Vec::new();
     for (index, text) in log.lines().enumerate() {
         let line = index + 1;
         let Some((_, bytes)) = text.split_once(MARK) else { continue };
-        let row =
-            Row::from_frame(&frame(line, bytes)?).map_err(|source| FlightError::Frame { line, source })?;
+        let row = FlightRow::from_frame(&frame(line, bytes)?)
+            .map_err(|source| FlightError::Frame { line, source })?;
         if let Some(before) = rows.last().map(|row| row.tick).filter(|before| *before >= row.tick) {
             return Err(FlightError::Order { line, found: row.tick, before });
         }
@@ -80,9 +80,9 @@ fn frame(line: usize, text: &str) -> Result<Vec<u8>, FlightError> {
 /// The rows as ticks of a run; the path position counts from the start of each stretch. Names and units are
 /// `machine`'s.
 #[must_use]
-pub fn ticks(rows: &[Row<f64, AXES>]) -> Vec<TickRecord> {
+pub fn ticks(rows: &[FlightRow<f64, AXES>]) -> Vec<TraceRow> {
     let mut contour = Contour::default();
-    let tick = |row: &Row<f64, AXES>| {
+    let tick = |row: &FlightRow<f64, AXES>| {
         let axes = row.axes.map(|axis| AxisTick {
             set_mm: axis.set.to_mm(),
             vel_mm_s: axis.velocity_mm_s,
@@ -92,7 +92,7 @@ pub fn ticks(rows: &[Row<f64, AXES>]) -> Vec<TickRecord> {
             err_um: axis.following_error_mm * 1e3,
             out_v: axis.code.to_volts(),
         });
-        TickRecord {
+        TraceRow {
             tick: row.tick,
             s_mm: row.motion.s.to_mm(),
             v_mm_s: row.motion.v_mm_s,
@@ -110,7 +110,7 @@ pub fn ticks(rows: &[Row<f64, AXES>]) -> Vec<TickRecord> {
 
 /// What of the flight people are told, line by line.
 #[must_use]
-pub fn words(rows: &[Row<f64, AXES>], machine: &Machine) -> Vec<String> {
+pub fn words(rows: &[FlightRow<f64, AXES>], machine: &Machine) -> Vec<String> {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Vec::new() };
     let spanned = last.tick - first.tick + 1;
     let mut words = vec![format!("ticks {} to {}, {} rows", first.tick, last.tick, rows.len())];
@@ -145,14 +145,14 @@ pub fn words(rows: &[Row<f64, AXES>], machine: &Machine) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use motion_kernel::exec::ExecState;
+    use motion_kernel::flight::{FlightAxis, frame_max};
     use motion_kernel::law::PathMotion;
-    use motion_kernel::recorder::{AxisRow, frame_max};
     use motion_kernel::units::{Counts, DacCode, Position};
 
     use super::*;
 
-    fn row(tick: u64, is_faulted: bool) -> Row<f64, AXES> {
-        let axis = AxisRow {
+    fn row(tick: u64, is_faulted: bool) -> FlightRow<f64, AXES> {
+        let axis = FlightAxis {
             counts: Counts(-7),
             set: Position::from_mm(12.5).expect("near"),
             velocity_mm_s: 3.0,
@@ -164,7 +164,7 @@ mod tests {
             inputs: 1,
         };
         let at = Position::from_mm(0.5).expect("near");
-        Row {
+        FlightRow {
             tick,
             motion: PathMotion { s: at, v_mm_s: 2.0, ..PathMotion::default() },
             stretches: 1,
@@ -176,7 +176,7 @@ mod tests {
         }
     }
 
-    fn line(row: &Row<f64, AXES>) -> String {
+    fn line(row: &FlightRow<f64, AXES>) -> String {
         let mut buffer = [0; frame_max(AXES)];
         let bytes = row.to_frame(&mut buffer).expect("room");
         // As defmt shows `{=[u8]:02x}`.

@@ -12,12 +12,12 @@
 //!   compare    Program ─► figures                times of its paths, beside the least there is
 //!   simulate   Plan ─► ticks                      the kernel against hal-sim
 //!   recording  a run ─► bytes ─► the same run    replay from what the kernel was told
-//!   flight     a board's log ─► TickRecord       the ticks around a fault
-//!   record     TickRecord, RunRecord              what a run leaves behind
+//!   flight     a board's log ─► TraceRow       the ticks around a fault
+//!   record     TraceRow, RunTrace              what a run leaves behind
 //!   drive      Machine ─► figures of its axes     step, harmonics, circles
 //!   identify   recordings ─► drive parameters     what an axis is, from its runs
 //!   tuning     drive parameters ─► gains          with the reason for each
-//!   report     RunRecord ─► HTML                  one file, pictures inside
+//!   report     RunTrace ─► HTML                  one file, pictures inside
 //!   cli        the `motion` command
 //! ```
 
@@ -32,7 +32,7 @@ pub mod compare;
 pub mod simulate;
 pub mod recording;
 pub mod flight;
-pub mod record;
+pub mod trace;
 pub mod drive;
 pub mod identify;
 pub mod tuning;

@@ -7,18 +7,18 @@ use std::process::{Command, Output, Stdio};
 
 use hal_sim::closed_loop::InMemory;
 use motion_host::machine::Machine;
+use motion_kernel::flight::{FlightRecorder, frame_max};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Fixed;
 use motion_kernel::program::{Item, Reader, check};
 use motion_kernel::queue::Streams;
-use motion_kernel::recorder::{Recorder, frame_max};
 use motion_kernel::units::{Counts, DacCode, Position};
 use serde_json::Value;
 
 /// A directory of a test's own, removed afterwards.
-struct Desk(PathBuf);
+struct Workspace(PathBuf);
 
-impl Desk {
+impl Workspace {
     fn new(name: &str) -> Self {
         let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("cli-{name}"));
         let _ = fs::remove_dir_all(&path);
@@ -63,7 +63,7 @@ impl Desk {
     }
 }
 
-impl Drop for Desk {
+impl Drop for Workspace {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
     }
@@ -95,8 +95,8 @@ fn profile<'a>(from: &'a str, to: &'a str, more: &[&'a str]) -> Vec<&'a str> {
 
 #[test]
 fn profile_json() {
-    let desk = Desk::new("profile-json");
-    let ramp = desk.json(&profile("0", "200", &["--json"]));
+    let workspace = Workspace::new("profile-json");
+    let ramp = workspace.json(&profile("0", "200", &["--json"]));
     assert_has(&ramp, &["peak_jerk_mm_s3", "t1_s", "t2_s", "tp_s", "length_mm", "limited_by", "at"]);
     assert_eq!(ramp["limited_by"], "acceleration");
     assert!((number(&ramp["tp_s"]) - 0.6).abs() < 1e-12);
@@ -108,22 +108,22 @@ fn profile_json() {
     }
     assert!((number(&at[0]["snap_mm_s4"]) - 78_539.816).abs() < 1e-2);
     assert!((number(&at[0]["t_s"]) - 0.05).abs() < 1e-12);
-    assert_eq!(desk.json(&profile("19", "100", &["--json"]))["limited_by"], "jerk");
-    assert_eq!(desk.json(&profile("18", "20", &["--json"]))["limited_by"], "snap");
-    let none = desk.json(&profile("50", "50", &["--json"]));
+    assert_eq!(workspace.json(&profile("19", "100", &["--json"]))["limited_by"], "jerk");
+    assert_eq!(workspace.json(&profile("18", "20", &["--json"]))["limited_by"], "snap");
+    let none = workspace.json(&profile("50", "50", &["--json"]));
     assert!(number(&none["tp_s"]).abs() <= 0.0 && number(&none["length_mm"]).abs() <= 0.0);
 }
 
 #[test]
 fn profile_csv_and_table() {
-    let desk = Desk::new("profile-csv");
-    let csv = desk.stdout(&profile("0", "200", &["--csv", "--tick", "0.001"]));
+    let workspace = Workspace::new("profile-csv");
+    let csv = workspace.stdout(&profile("0", "200", &["--csv", "--tick", "0.001"]));
     let lines: Vec<&str> = csv.lines().collect();
     assert_eq!(lines[0], "t_s,s_mm,v_mm_s,a_mm_s2,j_mm_s3,snap_mm_s4");
     assert_eq!(lines.len(), 602);
     assert!(lines[1].starts_with("0.0,0.0,0.0,"), "{}", lines[1]);
     assert!(lines[601].starts_with("0.6"), "{}", lines[601]);
-    let table = desk.stdout(&profile("0", "200", &[]));
+    let table = workspace.stdout(&profile("0", "200", &[]));
     for word in ["t1/4", "tp", "mm/s³", "acceleration", "12000.0 mm/min", "78539.82", "22.826727"] {
         assert!(table.contains(word), "{word} is not in\n{table}");
     }
@@ -131,7 +131,7 @@ fn profile_csv_and_table() {
 
 #[test]
 fn profile_names_a_wrong_argument() {
-    let desk = Desk::new("profile-wrong");
+    let workspace = Workspace::new("profile-wrong");
     for (name, value) in [
         ("--from", "-1"),
         ("--from", "nan"),
@@ -144,18 +144,18 @@ fn profile_names_a_wrong_argument() {
         let mut arguments = profile("0", "200", &["--tick", "0.001"]);
         let place = arguments.iter().position(|argument| *argument == name).expect("an argument") + 1;
         arguments[place] = value;
-        let output = desk.motion(&arguments);
+        let output = workspace.motion(&arguments);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{name} {value}");
         assert!(error.contains(name) && error.contains(&format!("found {value}, expected")), "{error}");
     }
-    assert_eq!(desk.motion(&["profile", "--from", "0"]).status.code(), Some(2));
-    assert_eq!(desk.motion(&profile("0", "1", &["--json", "--csv"])).status.code(), Some(2));
-    assert_eq!(desk.motion(&["dance"]).status.code(), Some(2));
-    assert_eq!(desk.motion(&["--help"]).status.code(), Some(0));
-    let refusal = desk.refusal(&profile("0", "200", &["--csv", "--tick", "1e-12"]));
+    assert_eq!(workspace.motion(&["profile", "--from", "0"]).status.code(), Some(2));
+    assert_eq!(workspace.motion(&profile("0", "1", &["--json", "--csv"])).status.code(), Some(2));
+    assert_eq!(workspace.motion(&["dance"]).status.code(), Some(2));
+    assert_eq!(workspace.motion(&["--help"]).status.code(), Some(0));
+    let refusal = workspace.refusal(&profile("0", "200", &["--csv", "--tick", "1e-12"]));
     assert!(refusal.contains("expected at most 1e8 ticks"), "{refusal}");
-    let refusal = desk.refusal(&[
+    let refusal = workspace.refusal(&[
         "profile", "--from", "0", "--to", "1e300", "--accel", "1e-300", "--jerk", "1", "--snap", "1",
     ]);
     assert!(refusal.contains("found ") && refusal.contains(", expected "), "{refusal}");
@@ -163,19 +163,19 @@ fn profile_names_a_wrong_argument() {
 
 #[test]
 fn machine_prints_its_file() {
-    let desk = Desk::new("machine");
-    let file = desk.stdout(&["machine"]);
+    let workspace = Workspace::new("machine");
+    let file = workspace.stdout(&["machine"]);
     assert_eq!(file, include_str!("../src/machine/reference.toml"));
-    desk.put("mine.toml", &file);
-    desk.put("part.ngc", STRINGER);
-    let with = desk.stdout(&["plan", "part.ngc", "--machine", "mine.toml", "--json"]);
-    assert_eq!(with, desk.stdout(&["plan", "part.ngc", "--json"]));
+    workspace.put("mine.toml", &file);
+    workspace.put("part.ngc", STRINGER);
+    let with = workspace.stdout(&["plan", "part.ngc", "--machine", "mine.toml", "--json"]);
+    assert_eq!(with, workspace.stdout(&["plan", "part.ngc", "--json"]));
 }
 
 #[test]
 fn machine_explains_its_keys() {
-    let desk = Desk::new("explain");
-    let text = desk.stdout(&["machine", "--explain"]);
+    let workspace = Workspace::new("explain");
+    let text = workspace.stdout(&["machine", "--explain"]);
     for words in [
         "[axis.regulator.inverse.bed]",
         "kp_per_s [1/s]: a number from 0 to 1e9; required",
@@ -184,7 +184,7 @@ fn machine_explains_its_keys() {
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    let keys = desk.json(&["machine", "--explain", "--json"]);
+    let keys = workspace.json(&["machine", "--explain", "--json"]);
     let keys = keys.as_array().expect("a list");
     assert_has(
         &keys[0],
@@ -192,18 +192,18 @@ fn machine_explains_its_keys() {
     );
     let lead = keys.iter().find(|key| key["key"] == "feedforward_lead_s").expect("the lead");
     assert_eq!((&lead["table"], &lead["default"]), (&Value::from("axis.regulator"), &Value::from("0")));
-    assert_eq!(desk.motion(&["machine", "--json"]).status.code(), Some(2));
+    assert_eq!(workspace.motion(&["machine", "--json"]).status.code(), Some(2));
 }
 
 #[test]
 fn drive_compares_regulators() {
-    let desk = Desk::new("compare");
+    let workspace = Workspace::new("compare");
     let arguments = ["drive", "compare", "--from", "5", "--to", "5", "--resolutions-um", "1"];
-    let text = desk.stdout(&[&arguments[..], &["--report", "compare.html"]].concat());
+    let text = workspace.stdout(&[&arguments[..], &["--report", "compare.html"]].concat());
     assert!(text.contains("stringer.ngc") && text.contains("P + inverse with preview"), "{text}");
-    let page = desk.read("compare.html");
+    let page = workspace.read("compare.html");
     assert!(page.contains("<svg") && !page.contains("NaN") && page.trim_end().ends_with("</html>"));
-    let json = desk.json(&[&arguments[..], &["--json"]].concat());
+    let json = workspace.json(&[&arguments[..], &["--json"]].concat());
     assert_has(&json["fitted"][2], &["axis", "ff1", "ff2_s", "ff3_s2"]);
     let rows = json["regulators"].as_array().expect("a list");
     assert_eq!((rows.len(), rows[1]["set_resolution_um"].as_f64()), (16, Some(1.0)));
@@ -211,16 +211,16 @@ fn drive_compares_regulators() {
     assert_has(&rows[1]["motions"][2], &keys);
     assert_has(&json["sweeps"][6]["circles"][0], &keys);
     for wrong in ["0", "-1", "nan", "1001"] {
-        let refusal = desk.refusal(&["drive", "compare", &format!("--resolutions-um={wrong}")]);
+        let refusal = workspace.refusal(&["drive", "compare", &format!("--resolutions-um={wrong}")]);
         assert!(refusal.contains("found set-point resolutions [") && refusal.contains("expected 1 to 10"));
     }
 }
 
 #[test]
 fn plan_of_the_stringer() {
-    let desk = Desk::new("plan");
-    desk.put("part.ngc", STRINGER);
-    let plan = desk.json(&["plan", "part.ngc", "--json"]);
+    let workspace = Workspace::new("plan");
+    workspace.put("part.ngc", STRINGER);
+    let plan = workspace.json(&["plan", "part.ngc", "--json"]);
     assert_has(&plan, &["time_s", "blocks", "feed"]);
     let blocks = plan["blocks"].as_array().expect("a list");
     for block in blocks {
@@ -256,7 +256,7 @@ fn plan_of_the_stringer() {
         time_s += number(&part["time_s"]);
     }
     assert!((time_s - number(&plan["time_s"])).abs() < 1e-9);
-    let table = desk.stdout(&["plan", "part.ngc", "--per-block"]);
+    let table = workspace.stdout(&["plan", "part.ngc", "--per-block"]);
     for word in ["limited by", "mm/min", "acceleration", "5 blocks"] {
         assert!(table.contains(word), "{word} is not in\n{table}");
     }
@@ -274,30 +274,30 @@ const BLOCKS: &str = r#"{
 
 #[test]
 fn plan_of_a_block_list() {
-    let desk = Desk::new("blocks");
-    desk.put("list.json", BLOCKS);
+    let workspace = Workspace::new("blocks");
+    workspace.put("list.json", BLOCKS);
     for more in [&["--per-block"][..], &[]] {
-        let plan = desk.json(&[&["plan", "list.json", "--json"], more].concat());
+        let plan = workspace.json(&[&["plan", "list.json", "--json"], more].concat());
         let blocks = plan["blocks"].as_array().expect("a list");
         assert_eq!(blocks.len(), 2);
         assert!(blocks.iter().all(|block| block["line"] == 0));
         assert!(number(&blocks[1]["exit_mm_s"]).abs() <= 0.0);
     }
-    desk.put("extra.json", &BLOCKS.replace("\"feed_mm_s\": 40", "\"speed_mm_s\": 40"));
-    let refusal = desk.refusal(&["plan", "extra.json"]);
+    workspace.put("extra.json", &BLOCKS.replace("\"feed_mm_s\": 40", "\"speed_mm_s\": 40"));
+    let refusal = workspace.refusal(&["plan", "extra.json"]);
     assert!(refusal.starts_with("extra.json:7") && refusal.contains("speed_mm_s"), "{refusal}");
-    desk.put("negative.json", &BLOCKS.replace("\"length_mm\": 25", "\"length_mm\": -25"));
-    let refusal = desk.refusal(&["plan", "negative.json"]);
+    workspace.put("negative.json", &BLOCKS.replace("\"length_mm\": 25", "\"length_mm\": -25"));
+    let refusal = workspace.refusal(&["plan", "negative.json"]);
     assert!(refusal.starts_with("negative.json:7") && refusal.contains("found -25, expected"), "{refusal}");
-    desk.put("torn.json", &BLOCKS[..100]);
-    assert!(desk.refusal(&["plan", "torn.json"]).starts_with("torn.json:"));
+    workspace.put("torn.json", &BLOCKS[..100]);
+    assert!(workspace.refusal(&["plan", "torn.json"]).starts_with("torn.json:"));
 }
 
 #[test]
 fn run_of_the_stringer() {
-    let desk = Desk::new("run");
-    desk.put("part.ngc", STRINGER);
-    let run = desk.json(&["run", "part.ngc", "--json", "--trace", "part.csv", "--report", "part.html"]);
+    let workspace = Workspace::new("run");
+    workspace.put("part.ngc", STRINGER);
+    let run = workspace.json(&["run", "part.ngc", "--json", "--trace", "part.csv", "--report", "part.html"]);
     assert_has(
         &run,
         &[
@@ -325,7 +325,7 @@ fn run_of_the_stringer() {
     assert_eq!(run["faults"], Value::Array(Vec::new()));
     assert!((number(&run["time_s"]) - number(&run["planned_time_s"])).abs() < 2.0 * number(&run["tick_s"]));
 
-    let trace = desk.read("part.csv");
+    let trace = workspace.read("part.csv");
     let mut rows = trace.lines();
     let mut header = "tick,t_s,s_mm,v_mm_s,a_mm_s2,j_mm_s3,state,line".to_owned();
     for name in ["X", "Y", "Z"] {
@@ -343,9 +343,9 @@ fn run_of_the_stringer() {
             assert!(decimals.len() >= 9, "{position}");
         }
     }
-    assert!(desk.read("part.html").contains("<svg"));
+    assert!(workspace.read("part.html").contains("<svg"));
 
-    let summary = desk.stdout(&["run", "part.ngc"]);
+    let summary = workspace.stdout(&["run", "part.ngc"]);
     for word in ["following error", "contour error", "planned", "mm/min"] {
         assert!(summary.contains(word), "{word} is not in\n{summary}");
     }
@@ -354,11 +354,11 @@ fn run_of_the_stringer() {
 /// Held and let go, driven at half the feed, given up: as the trace shows it.
 #[test]
 fn run_under_live_control() {
-    let desk = Desk::new("live");
-    desk.put("line.ngc", "G1 X60 F2400\nM2\n");
+    let workspace = Workspace::new("live");
+    workspace.put("line.ngc", "G1 X60 F2400\nM2\n");
     let run = |at: &str| {
-        let found = desk.json(&["run", "line.ngc", "--at", at, "--trace", "line.csv", "--json"]);
-        let trace = desk.read("line.csv");
+        let found = workspace.json(&["run", "line.ngc", "--at", at, "--trace", "line.csv", "--json"]);
+        let trace = workspace.read("line.csv");
         let column = |name: &str| -> Vec<String> {
             let index = trace.lines().next().expect("a header").split(',').position(|n| n == name);
             let index = index.expect(name);
@@ -392,7 +392,7 @@ fn run_under_live_control() {
         "{end_mm}"
     );
 
-    let output = desk.motion(&["run", "line.ngc", "--at", "10:stop"]);
+    let output = workspace.motion(&["run", "line.ngc", "--at", "10:stop"]);
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{error}");
     assert!(
@@ -403,7 +403,7 @@ fn run_under_live_control() {
     );
 
     // At rest at the end of the first line, and after the resume to the end.
-    desk.put("line.ngc", "G1 X20 F2400\nX60\nM2\n");
+    workspace.put("line.ngc", "G1 X20 F2400\nX60\nM2\n");
     let (_, states, _, end_mm) = run("0:single");
     assert!(states.last().is_some_and(|state| state == "held") && (end_mm - 20.0).abs() < 1e-9, "{end_mm}");
     let (_, states, _, end_mm) = run("0:single,6000:resume");
@@ -414,31 +414,31 @@ fn run_under_live_control() {
 /// The machine file's homing in use: the reference is the index behind the switch; what is not found is named.
 #[test]
 fn home_finds_the_reference() {
-    let desk = Desk::new("home");
-    let file = desk.stdout(&["machine"]);
-    desk.put("none.toml", &file);
+    let workspace = Workspace::new("home");
+    let file = workspace.stdout(&["machine"]);
+    workspace.put("none.toml", &file);
     assert_eq!(
-        desk.refusal(&["home", "--machine", "none.toml"]),
+        workspace.refusal(&["home", "--machine", "none.toml"]),
         "none.toml: found no [axis.homing], expected one for each axis that is to be homed"
     );
     let (before, homing) = file.split_once("#[axis.homing]").expect("homing");
     let (homing, after) = homing.split_once("\n\n").expect("its end");
     let homing = format!("[axis.homing]{homing}").replace("\n#", "\n").replace("\n ", "\n# ");
     let with = |homing: &str| [before, homing, "\n\n", after].concat();
-    desk.put("home.toml", &with(&homing));
-    let axes = desk.json(&["home", "--machine", "home.toml", "--trace", "home.csv", "--json"]);
+    workspace.put("home.toml", &with(&homing));
+    let axes = workspace.json(&["home", "--machine", "home.toml", "--trace", "home.csv", "--json"]);
     let [axis] = &axes.as_array().expect("a list")[..] else { panic!("{axes}") };
     assert_has(axis, &["axis", "counts", "index_counts", "time_s", "position_mm", "true_mm"]);
     // The index at 4.2 − 19·10 mm is the first behind -180 mm.
     assert_eq!((axis["axis"].as_str(), number(&axis["counts"])), (Some("X"), -1_858_000.0));
     assert!((number(&axis["true_mm"]) - (250.0 - 185.8)).abs() < 2e-3, "{axis}");
     assert_eq!(number(&axis["position_mm"]), 0.0);
-    let ticks = desk.read("home.csv").lines().count() - 1;
+    let ticks = workspace.read("home.csv").lines().count() - 1;
     assert!((ticks as f64 * 0.0005 - number(&axis["time_s"])).abs() < 1e-9, "{ticks} {axis}");
-    assert!(desk.stdout(&["home", "--machine", "home.toml"]).contains("-1858000"));
+    assert!(workspace.stdout(&["home", "--machine", "home.toml"]).contains("-1858000"));
 
-    desk.put("short.toml", &with(&homing.replace("travel_mm = 600.0", "travel_mm = 100.0")));
-    let output = desk.motion(&["home", "--machine", "short.toml"]);
+    workspace.put("short.toml", &with(&homing.replace("travel_mm = 600.0", "travel_mm = 100.0")));
+    let output = workspace.motion(&["home", "--machine", "short.toml"]);
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{error}");
     let expected = "short.toml: axis X: no home switch within 100 mm: expected it to close there";
@@ -448,14 +448,14 @@ fn home_finds_the_reference() {
 /// Keys pressed one after the other: by a distance, to the soft limit, released on the way; and what is refused.
 #[test]
 fn jog_goes_as_far_as_its_key_says() {
-    let desk = Desk::new("jog");
-    let file = desk.stdout(&["machine"]);
+    let workspace = Workspace::new("jog");
+    let file = workspace.stdout(&["machine"]);
     let bounded = file.replace("#[axis.travel]", "[axis.travel]");
     let bounded = bounded.replace("#low_mm = -400", "low_mm = -40").replace("#high_mm = 400", "high_mm = 30");
-    desk.put("machine.toml", &bounded);
+    workspace.put("machine.toml", &bounded);
     let keys = ["X+20", "Y-2.5", "X+", "X-@400", "X+1@5000"];
     let rest = ["--machine", "machine.toml", "--feed", "50", "--trace", "jog.csv", "--json"];
-    let presses = desk.json(&[&["jog"][..], &keys, &rest].concat());
+    let presses = workspace.json(&[&["jog"][..], &keys, &rest].concat());
     let presses = presses.as_array().expect("a list");
     let ended: Vec<_> = presses.iter().map(|press| press["ended"].as_str().expect("a text")).collect();
     assert_eq!(ended, ["distance", "distance", "soft limit", "released", "distance"]);
@@ -480,12 +480,12 @@ fn jog_goes_as_far_as_its_key_says() {
     // Where the key is released behind the end, the end is the distance's.
     let gone_mm = number(&fifth["to_mm"]) - number(&fifth["from_mm"]);
     assert!((gone_mm - 1.0).abs() < 1e-9 && fifth["stop_s"].is_null(), "{fifth}");
-    let ticks = desk.read("jog.csv").lines().count() - 1;
+    let ticks = workspace.read("jog.csv").lines().count() - 1;
     let time_s: f64 = presses.iter().map(|press| number(&press["time_s"])).sum();
     assert!((ticks as f64 * 0.0005 - time_s).abs() < 1e-9, "{ticks} {time_s}");
 
     // What came before is printed, though the last key asks for more than there is room for.
-    let output = desk.motion(&["jog", "X-", "X-1", "--machine", "machine.toml"]);
+    let output = workspace.motion(&["jog", "X-", "X-1", "--machine", "machine.toml"]);
     let (shown, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert_eq!(output.status.code(), Some(2), "{error}");
     assert!(shown.contains("-40.0000") && shown.contains("soft limit"), "{shown}");
@@ -499,29 +499,29 @@ fn jog_goes_as_far_as_its_key_says() {
         (&["jog", "X+1", "--feed", "301"], "X+1: found a feed of 301 mm/s, expected above 0, at most 300"),
         (&["jog", "X+1", "--feed", "nan"], "X+1: found a feed of NaN mm/s, expected above 0, at most 300"),
     ] {
-        assert_eq!(desk.refusal(arguments), expected);
+        assert_eq!(workspace.refusal(arguments), expected);
     }
-    let output = desk.motion(&["jog", "X+0"]);
+    let output = workspace.motion(&["jog", "X+0"]);
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(2) && error.contains("found a distance of 0 mm"), "{error}");
     // What is refused replaces no file.
-    desk.put("kept.csv", "kept");
+    workspace.put("kept.csv", "kept");
     for arguments in [
         &["jog", "X+1", "Q+1"][..],
         &["jog", "X+1", "--feed", "0"],
         &["jog", "X+1", "X+"],
         &["home", "--machine", "machine.toml"],
     ] {
-        desk.refusal(&[arguments, &["--trace", "kept.csv"]].concat());
-        assert_eq!(desk.read("kept.csv"), "kept");
+        workspace.refusal(&[arguments, &["--trace", "kept.csv"]].concat());
+        assert_eq!(workspace.read("kept.csv"), "kept");
     }
 
     // An axis that does not follow ends the jog in a fault; what came before is printed.
-    desk.put(
+    workspace.put(
         "loose.toml",
         &file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.002"),
     );
-    let output = desk.motion(&["jog", "X+0.01", "X+20", "--machine", "loose.toml"]);
+    let output = workspace.motion(&["jog", "X+0.01", "X+20", "--machine", "loose.toml"]);
     let (shown, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert_eq!(output.status.code(), Some(1), "{error}");
     assert!(shown.contains("X+0.01") && error.contains("X+20: fault in tick "), "{shown} {error}");
@@ -530,15 +530,15 @@ fn jog_goes_as_far_as_its_key_says() {
 /// A run with commands, and one that ends in a fault: recorded, and once more from the recording alone.
 #[test]
 fn replay_of_a_recorded_run() {
-    let desk = Desk::new("replay");
-    desk.put("part.ngc", STRINGER);
-    let file = desk.stdout(&["machine"]);
+    let workspace = Workspace::new("replay");
+    workspace.put("part.ngc", STRINGER);
+    let file = workspace.stdout(&["machine"]);
     let strict = file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.003");
-    desk.put("machine.toml", &file);
-    desk.put("strict.toml", &strict);
+    workspace.put("machine.toml", &file);
+    workspace.put("strict.toml", &strict);
     for (machine, status) in [("machine.toml", 0), ("strict.toml", 1)] {
         let run = |arguments: &[&str]| {
-            let output = desk.motion(arguments);
+            let output = workspace.motion(arguments);
             (output.status.code(), String::from_utf8(output.stdout).expect("UTF-8"))
         };
         let at = "100:override=0.7,900:hold,1500:resume";
@@ -559,12 +559,12 @@ fn replay_of_a_recorded_run() {
         ]);
         assert_eq!(recorded.0, Some(status));
         // Whatever the machine and the program are by now.
-        desk.put("part.ngc", "M2\n");
+        workspace.put("part.ngc", "M2\n");
         let replayed =
             run(&["replay", "part.mrec", "--trace", "replay.csv", "--report", "replay.html", "--json"]);
         assert_eq!(replayed.0, Some(0));
-        assert!(desk.read("run.csv") == desk.read("replay.csv"), "the traces differ");
-        assert!(desk.read("run.html") == desk.read("replay.html"), "the reports differ");
+        assert!(workspace.read("run.csv") == workspace.read("replay.csv"), "the traces differ");
+        assert!(workspace.read("run.html") == workspace.read("replay.html"), "the reports differ");
         let json = |text: &str| serde_json::from_str::<Value>(text).expect("JSON");
         let (recorded, mut replayed) = (json(&recorded.1), json(&replayed.1));
         let replay = replayed.as_object_mut().expect("an object").remove("replay").expect("a replay");
@@ -573,26 +573,26 @@ fn replay_of_a_recorded_run() {
         assert!(number(&replay["ticks"]) > number(&recorded["ticks"]));
         assert_eq!(recorded["faults"].as_array().expect("a list").len(), status as usize);
         assert!(run(&["replay", "part.mrec"]).1.contains("\n  identical over "));
-        desk.put("part.ngc", STRINGER);
+        workspace.put("part.ngc", STRINGER);
     }
 
-    let mut bytes = fs::read(desk.0.join("part.mrec")).expect("a recording");
+    let mut bytes = fs::read(workspace.0.join("part.mrec")).expect("a recording");
     let half = bytes.len() / 2;
     bytes[half] ^= 4;
-    fs::write(desk.0.join("damaged.mrec"), &bytes).expect("a file");
-    let refusal = desk.refusal(&["replay", "damaged.mrec", "--trace", "none.csv"]);
+    fs::write(workspace.0.join("damaged.mrec"), &bytes).expect("a file");
+    let refusal = workspace.refusal(&["replay", "damaged.mrec", "--trace", "none.csv"]);
     assert!(refusal.starts_with("damaged.mrec: found checksum "), "{refusal}");
-    assert!(!desk.0.join("none.csv").exists());
-    let refusal = desk.refusal(&["replay", "part.ngc"]);
+    assert!(!workspace.0.join("none.csv").exists());
+    let refusal = workspace.refusal(&["replay", "part.ngc"]);
     assert!(refusal.ends_with("at its start, expected a recording, which begins with MREC"), "{refusal}");
 }
 
 /// The ticks around a fault, as a board's log has them.
 #[test]
 fn flight_of_a_boards_log() {
-    let desk = Desk::new("flight");
+    let workspace = Workspace::new("flight");
     let mut log = String::from("0 INFO ready: press the blue button to start\n");
-    let mut recorder = Recorder::<f32, 3, 16, 4>::new();
+    let mut recorder = FlightRecorder::<f32, 3, 16, 4>::new();
     let machine = Machine::reference();
     let config = machine.axes_config().expect("axes");
     let start = [Position::ZERO; 3];
@@ -613,30 +613,30 @@ fn flight_of_a_boards_log() {
             row.to_frame(&mut buffer).expect("room").iter().map(|b| format!("{b:02x}")).collect();
         log += &format!("{} INFO  flight [{}]\n", row.tick, bytes.join(", "));
     }
-    desk.put("board.log", &log);
-    let said = desk.stdout(&["flight", "board.log", "--trace", "flight.csv", "--report", "flight.html"]);
+    workspace.put("board.log", &log);
+    let said = workspace.stdout(&["flight", "board.log", "--trace", "flight.csv", "--report", "flight.html"]);
     for part in
         ["ticks 29 to 44, 16 rows", "fault latched in tick 40", "of axis Y at most -2.0000 mm, limit 1 mm"]
     {
         assert!(said.contains(part), "{part}: {said}");
     }
-    let trace = desk.read("flight.csv");
+    let trace = workspace.read("flight.csv");
     assert_eq!(trace.lines().count(), 17);
     assert!(trace.lines().last().expect("a row").starts_with("44,0.022000000,"), "{trace}");
-    assert!(desk.read("flight.html").contains("fault latched"));
-    desk.put("short.log", log.lines().next().expect("a line"));
+    assert!(workspace.read("flight.html").contains("fault latched"));
+    workspace.put("short.log", log.lines().next().expect("a line"));
     assert_eq!(
-        desk.refusal(&["flight", "short.log"]),
+        workspace.refusal(&["flight", "short.log"]),
         "short.log: found no frame, expected lines with `flight […]`"
     );
 }
 
 #[test]
 fn a_program_from_standard_input() {
-    let desk = Desk::new("stdin");
+    let workspace = Workspace::new("stdin");
     let mut child = Command::new(env!("CARGO_BIN_EXE_motion"))
         .args(["run", "-", "--json"])
-        .current_dir(&desk.0)
+        .current_dir(&workspace.0)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -651,10 +651,10 @@ fn a_program_from_standard_input() {
 /// `motion … | head`: no complaint about a reader that has seen enough.
 #[test]
 fn a_closed_pipe_is_not_an_error() {
-    let desk = Desk::new("pipe");
+    let workspace = Workspace::new("pipe");
     let mut child = Command::new(env!("CARGO_BIN_EXE_motion"))
         .args(profile("0", "200", &["--csv", "--tick", "1e-6"]))
-        .current_dir(&desk.0)
+        .current_dir(&workspace.0)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -667,50 +667,50 @@ fn a_closed_pipe_is_not_an_error() {
 /// An axis that may follow with an error of 0.1 µm only can't.
 #[test]
 fn a_fault_is_status_1() {
-    let desk = Desk::new("fault");
-    desk.put("part.ngc", STRINGER);
-    let file = desk.stdout(&["machine"]);
-    desk.put(
+    let workspace = Workspace::new("fault");
+    workspace.put("part.ngc", STRINGER);
+    let file = workspace.stdout(&["machine"]);
+    workspace.put(
         "strict.toml",
         &file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.0001"),
     );
-    let output = desk.motion(&["run", "part.ngc", "--machine", "strict.toml", "--json"]);
+    let output = workspace.motion(&["run", "part.ngc", "--machine", "strict.toml", "--json"]);
     assert_eq!(output.status.code(), Some(1));
     let run: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let faults = run["faults"].as_array().expect("a list");
     assert_eq!(keys(&faults[0]), ["axis", "detail", "fault", "tick"]);
     assert_eq!(faults[0]["axis"], "X");
-    let output = desk.motion(&["run", "part.ngc", "--machine", "strict.toml"]);
+    let output = workspace.motion(&["run", "part.ngc", "--machine", "strict.toml"]);
     assert!(String::from_utf8_lossy(&output.stdout).contains("FAULT in tick"));
 }
 
 #[test]
 fn wrong_input_is_status_2_and_named() {
-    let desk = Desk::new("wrong");
-    desk.put("part.ngc", STRINGER);
-    desk.put("unknown.ngc", "G21\nG1 X10 F100\n G33 Z1\n");
-    desk.put("fast.toml", &desk.stdout(&["machine"]).replace("tick_s = 0.0005", "tick_s = 5"));
-    desk.put("note.toml", "not a machine\n");
+    let workspace = Workspace::new("wrong");
+    workspace.put("part.ngc", STRINGER);
+    workspace.put("unknown.ngc", "G21\nG1 X10 F100\n G33 Z1\n");
+    workspace.put("fast.toml", &workspace.stdout(&["machine"]).replace("tick_s = 0.0005", "tick_s = 5"));
+    workspace.put("note.toml", "not a machine\n");
     for command in ["run", "plan"] {
-        let refusal = desk.refusal(&[command, "missing.ngc"]);
+        let refusal = workspace.refusal(&[command, "missing.ngc"]);
         assert!(refusal.starts_with("missing.ngc: found ") && refusal.contains(", expected"), "{refusal}");
-        let refusal = desk.refusal(&[command, "unknown.ngc"]);
+        let refusal = workspace.refusal(&[command, "unknown.ngc"]);
         assert!(
             refusal.starts_with("unknown.ngc:3:2: found G33") && refusal.contains(", expected"),
             "{refusal}"
         );
-        let refusal = desk.refusal(&[command, "part.ngc", "--machine", "missing.toml"]);
+        let refusal = workspace.refusal(&[command, "part.ngc", "--machine", "missing.toml"]);
         assert!(refusal.starts_with("missing.toml: found "), "{refusal}");
-        let refusal = desk.refusal(&[command, "part.ngc", "--machine", "fast.toml"]);
+        let refusal = workspace.refusal(&[command, "part.ngc", "--machine", "fast.toml"]);
         assert!(
             refusal.starts_with("fast.toml:14:10: found tick_s = 5, expected a number from"),
             "{refusal}"
         );
-        let refusal = desk.refusal(&[command, "part.ngc", "--machine", "note.toml"]);
+        let refusal = workspace.refusal(&[command, "part.ngc", "--machine", "note.toml"]);
         assert!(refusal.starts_with("note.toml:1:") && refusal.contains("expected"), "{refusal}");
     }
     for option in ["--trace", "--report"] {
-        let refusal = desk.refusal(&["run", "part.ngc", option, "no/such/place"]);
+        let refusal = workspace.refusal(&["run", "part.ngc", option, "no/such/place"]);
         assert!(refusal.starts_with("no/such/place: found "), "{refusal}");
     }
 }
@@ -721,7 +721,7 @@ const KILOMETRE: &str = "expected at most 1000000 mm between two full stops";
 /// Every refusal of a plan, to the letter: the line of the block concerned, what was found, what was expected.
 #[test]
 fn what_planning_refuses() {
-    let desk = Desk::new("planning");
+    let workspace = Workspace::new("planning");
     for (program, refusal) in [
         (
             "G1 X1 F600\nG1 X1.001 F0.0000000001\nG1 X2 F600\nM2\n",
@@ -747,9 +747,9 @@ fn what_planning_refuses() {
                 .to_owned(),
         ),
     ] {
-        desk.put("part.ngc", program);
+        workspace.put("part.ngc", program);
         for mode in [&[][..], &["--per-block"]] {
-            let found = desk.refusal(&[&["plan", "part.ngc"], mode].concat());
+            let found = workspace.refusal(&[&["plan", "part.ngc"], mode].concat());
             assert_eq!(found, format!("part.ngc:{refusal}"), "{program}");
         }
     }
@@ -760,10 +760,10 @@ fn what_planning_refuses() {
 fn what_a_block_list_refuses() {
     const LIMITS: &str = r#""limits": {"accel_mm_s2": 500, "jerk_mm_s3": 5000, "snap_mm_s4": 400000},"#;
     const SECOND: &str = r#"{"length_mm": 25, "feed_mm_s": 40}"#;
-    let desk = Desk::new("lists");
+    let workspace = Workspace::new("lists");
     let refusal = |text: &str| {
-        desk.put("list.json", text);
-        let refusal = desk.refusal(&["plan", "list.json"]);
+        workspace.put("list.json", text);
+        let refusal = workspace.refusal(&["plan", "list.json"]);
         refusal.strip_prefix("list.json:").expect("its name").to_owned()
     };
     for (found, to, expected) in [
@@ -804,19 +804,19 @@ fn what_a_block_list_refuses() {
 
 #[test]
 fn alone_it_demonstrates() {
-    let desk = Desk::new("demonstration");
-    let said = desk.stdout(&[]);
+    let workspace = Workspace::new("demonstration");
+    let said = workspace.stdout(&[]);
     for word in ["stringer.html", "N3 G2", "limited by", "jerk", "acceleration", "braking", "following error"]
     {
         assert!(said.contains(word), "{word} is not in\n{said}");
     }
-    assert!(desk.read("stringer.html").contains("<svg"));
+    assert!(workspace.read("stringer.html").contains("<svg"));
 }
 
 #[test]
 fn drive_prints_its_keys() {
-    let desk = Desk::new("drive");
-    let step = desk.json(&["drive", "step", "--json", "--report", "step.html"]);
+    let workspace = Workspace::new("drive");
+    let step = workspace.json(&["drive", "step", "--json", "--report", "step.html"]);
     assert_has(
         &step,
         &[
@@ -837,7 +837,7 @@ fn drive_prints_its_keys() {
     assert_eq!(figures.len(), 7);
     assert_has(&figures[0], &["quantity", "unit", "measured", "expected", "tolerance", "published", "holds"]);
 
-    let harmonic = desk.json(&["drive", "harmonic", "--from", "8", "--to", "9", "--by", "1", "--json"]);
+    let harmonic = workspace.json(&["drive", "harmonic", "--from", "8", "--to", "9", "--by", "1", "--json"]);
     let axis = &harmonic["axes"][1];
     assert_has(axis, &["name", "bandwidth_swing_hz", "bandwidth_fundamental_hz", "current_limited_hz"]);
     let point = &axis["points"][0];
@@ -846,13 +846,13 @@ fn drive_prints_its_keys() {
         &["frequency_hz", "radius_mm", "swing_ratio", "fundamental_ratio", "phase_deg", "delay_ms"],
     );
 
-    let inertia = desk.json(&["drive", "inertia", "--loads", "2", "--json", "--report", "inertia.html"]);
+    let inertia = workspace.json(&["drive", "inertia", "--loads", "2", "--json", "--report", "inertia.html"]);
     assert_has(&inertia["loads"][0], &["load_inertia_ratio", "plateau_accel_m_s2", "is_limited"]);
 
     // Not the published feed: nothing to compare with.
     let two =
         ["drive", "circle", "--from", "4", "--to", "5", "--feed-mm-min", "2000", "--feedforward", "v,as-is"];
-    let circle = desk.json(&[&two[..], &["--json", "--report", "circle.html"]].concat());
+    let circle = workspace.json(&[&two[..], &["--json", "--report", "circle.html"]].concat());
     assert_eq!(circle["reference"].as_array().map(Vec::len), Some(0));
     let names: Vec<&Value> =
         circle["feedforward"].as_array().expect("two").iter().map(|f| &f["name"]).collect();
@@ -872,10 +872,10 @@ fn drive_prints_its_keys() {
     );
 
     let bode =
-        desk.json(&["drive", "bode", "--points", "3", "--axis", "z", "--json", "--report", "bode.html"]);
+        workspace.json(&["drive", "bode", "--points", "3", "--axis", "z", "--json", "--report", "bode.html"]);
     assert_has(&bode["points"][2], &["step_ratio", "swing_ratio", "harmonic_phase_deg", "linear_phase_deg"]);
     for report in ["step.html", "inertia.html", "circle.html", "bode.html"] {
-        let page = desk.read(report);
+        let page = workspace.read(report);
         assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"), "{report}");
         assert!(page.contains("<svg") && !page.contains("NaN"), "{report}");
     }
@@ -883,7 +883,7 @@ fn drive_prints_its_keys() {
 
 #[test]
 fn drive_refuses_what_cannot_be_done() {
-    let desk = Desk::new("drive-refusals");
+    let workspace = Workspace::new("drive-refusals");
     for (arguments, words) in [
         (&["step", "--axis", "W"][..], "found axis W, expected"),
         (
@@ -903,19 +903,19 @@ fn drive_refuses_what_cannot_be_done() {
         (&["bode", "--points", "1"], "found 1 frequencies from 1 to 100 Hz, expected"),
         (&["step", "--machine", "none.toml"], "none.toml: found"),
     ] {
-        let refusal = desk.refusal(&[&["drive"], arguments].concat());
+        let refusal = workspace.refusal(&[&["drive"], arguments].concat());
         assert!(refusal.contains(words), "{arguments:?}: {refusal}");
     }
     // What the parser of arguments refuses has the same status.
-    assert_eq!(desk.motion(&["drive", "circle", "--feedforward", "q"]).status.code(), Some(2));
-    assert_eq!(desk.motion(&["drive", "harmonic", "--feedforward", "v"]).status.code(), Some(2));
+    assert_eq!(workspace.motion(&["drive", "circle", "--feedforward", "q"]).status.code(), Some(2));
+    assert_eq!(workspace.motion(&["drive", "harmonic", "--feedforward", "v"]).status.code(), Some(2));
 }
 
 /// A machine is tuned, the file is what was verified, and what would be worse is not written.
 #[test]
 fn drive_tune_writes_what_it_has_verified() {
-    let desk = Desk::new("tune");
-    let json = desk.json(&["drive", "tune", "--axis", "x,Y", "--output", "tuned.toml", "--json"]);
+    let workspace = Workspace::new("tune");
+    let json = workspace.json(&["drive", "tune", "--axis", "x,Y", "--output", "tuned.toml", "--json"]);
     assert_has(&json, &["axes", "learning", "output", "verification"]);
     assert!(json["learning"].is_null());
     assert_eq!(json["output"], "tuned.toml");
@@ -934,7 +934,7 @@ fn drive_tune_writes_what_it_has_verified() {
         let contour_um = |when: &str| number(&circle[when]["contour_error_um"]);
         assert!(contour_um("after") < 1.0 && contour_um("before") > 5.0, "{circle}");
     }
-    let tuned = Machine::from_toml("tuned.toml", &desk.read("tuned.toml")).expect("a machine file");
+    let tuned = Machine::from_toml("tuned.toml", &workspace.read("tuned.toml")).expect("a machine file");
     let [x, _, z] = &tuned.axes;
     assert!((x.feedforward.lead_s - 1.67e-3).abs() < 1e-5 && x.feedforward.drive.is_some());
     assert_eq!(z, &Machine::reference().axes[2]);
@@ -953,7 +953,7 @@ fn drive_tune_writes_what_it_has_verified() {
         "--json",
     ];
     // The series is worse at 28 Hz than what was published; learning goes on all the same.
-    let output = desk.motion(&arguments);
+    let output = workspace.motion(&arguments);
     assert_eq!(output.status.code(), Some(1));
     let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let learning = &json["learning"];
@@ -963,7 +963,7 @@ fn drive_tune_writes_what_it_has_verified() {
         assert_has(axis, &["axis", "contraction", "contraction_hz", "filter_corner_hz"]);
         assert!(number(&axis["contraction"]) < 1.0 && number(&axis["filter_corner_hz"]) > 50.0, "{axis}");
     }
-    let csv = desk.read("learnt.csv");
+    let csv = workspace.read("learnt.csv");
     let mut lines = csv.lines();
     assert_eq!(lines.next(), Some("time_s,X_mm_s,Y_mm_s,Z_mm_s"));
     let row: Vec<f64> =
@@ -981,13 +981,13 @@ fn drive_tune_writes_what_it_has_verified() {
     assert!(contours.len() == 3 && contours[0] > 10.0 && contours[2] < 2.5, "{contours:?}");
 
     let worse = ["drive", "tune", "--machine", "tuned.toml", "--method", "series", "--output", "worse.toml"];
-    let output = desk.motion(&worse);
+    let output = workspace.motion(&worse);
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(said.contains("a circle got worse: nothing is written"), "{said}");
     // All axes were tuned, and all of them moved.
     assert!(said.contains("Circles of X and Y at") && said.contains("Circles of Z and X at"), "{said}");
-    assert!(!desk.0.join("worse.toml").exists());
+    assert!(!workspace.0.join("worse.toml").exists());
 
     // Before the work, and so before a file is made.
     for (arguments, words) in [
@@ -995,13 +995,13 @@ fn drive_tune_writes_what_it_has_verified() {
         (&["--learn", "2", "--learn-hz", "0"], "found frequency [Hz] 0, expected"),
     ] {
         let arguments = [&["drive", "tune", "--report", "early.html"], arguments].concat();
-        let refusal = desk.refusal(&arguments);
+        let refusal = workspace.refusal(&arguments);
         assert!(refusal.contains(words), "{refusal}");
-        assert!(!desk.0.join("early.html").exists());
+        assert!(!workspace.0.join("early.html").exists());
     }
-    let refusal = desk.refusal(&["drive", "tune", "--axis", "W"]);
+    let refusal = workspace.refusal(&["drive", "tune", "--axis", "W"]);
     assert!(refusal.contains("found axis W, expected the name of an axis of the machine"), "{refusal}");
-    let refusal = desk.refusal(&["drive", "tune", "--machine", "missing.toml"]);
+    let refusal = workspace.refusal(&["drive", "tune", "--machine", "missing.toml"]);
     assert!(refusal.contains("missing.toml"), "{refusal}");
 }
 
@@ -1009,7 +1009,7 @@ fn drive_tune_writes_what_it_has_verified() {
 /// because axes that lag alike leave none.
 #[test]
 fn drive_tune_judges_one_axis_by_itself() {
-    let desk = Desk::new("tune-one");
+    let workspace = Workspace::new("tune-one");
     let mut text = motion_host::machine::REFERENCE_TOML.to_owned();
     // A machine whose axes are matched.
     text = text.replace("coulomb_friction_mm_s2 = 260.0", "coulomb_friction_mm_s2 = 85.0");
@@ -1017,10 +1017,10 @@ fn drive_tune_judges_one_axis_by_itself() {
     let end =
         bed + text[bed..].find("mass_ratio = 0.06\n").expect("its last key") + "mass_ratio = 0.06\n".len();
     text.replace_range(bed..end, "");
-    desk.put("pair.toml", &text);
+    workspace.put("pair.toml", &text);
     for (name, plane, moved) in [("X", ["X", "Y"], "first"), ("Z", ["Z", "X"], "first")] {
         let file = format!("{name}.toml");
-        let json = desk.json(&[
+        let json = workspace.json(&[
             "drive",
             "tune",
             "--machine",
@@ -1049,11 +1049,11 @@ fn drive_tune_judges_one_axis_by_itself() {
 /// What a board gets is a program to it; what is wrong with the input is said with file and line, and nothing is written.
 #[test]
 fn compile_writes_a_program_or_says_why_not() {
-    let desk = Desk::new("compile");
-    desk.put("part.ngc", "G1 X10 Y5 F3000\nG2 X20 Y15 I5 J5 F1000\nG4 P0.1\nG0 Z3\nM2\n");
+    let workspace = Workspace::new("compile");
+    workspace.put("part.ngc", "G1 X10 Y5 F3000\nG2 X20 Y15 I5 J5 F1000\nG4 P0.1\nG0 Z3\nM2\n");
     for number in ["f32", "fixed"] {
-        let said = desk.stdout(&["compile", "part.ngc", "--number", number, "--output", "part.bin"]);
-        let bytes = fs::read(desk.0.join("part.bin")).expect("a file");
+        let said = workspace.stdout(&["compile", "part.ngc", "--number", number, "--output", "part.bin"]);
+        let bytes = fs::read(workspace.0.join("part.bin")).expect("a file");
         assert!(said.contains(&format!(" {} bytes", bytes.len())), "{said}");
         let program = Reader::<3>::new(&bytes).expect("a program");
         assert_eq!(*program.header(), Machine::reference().header());
@@ -1065,7 +1065,8 @@ fn compile_writes_a_program_or_says_why_not() {
         };
         assert_eq!(blocks(&program), 0);
         let compile = ["compile", "part.ngc", "--live", "--number", number, "--output", "part.bin"];
-        let (said, bytes) = (desk.stdout(&compile), fs::read(desk.0.join("part.bin")).expect("a file"));
+        let (said, bytes) =
+            (workspace.stdout(&compile), fs::read(workspace.0.join("part.bin")).expect("a file"));
         let program = Reader::<3>::new(&bytes).expect("a program");
         // Two stretches.
         assert!(blocks(&program) >= 2);
@@ -1073,16 +1074,16 @@ fn compile_writes_a_program_or_says_why_not() {
             said.contains(&format!(" {} items, {} bytes", program.items().count(), bytes.len())),
             "{said}"
         );
-        fs::remove_file(desk.0.join("part.bin")).expect("it is there");
+        fs::remove_file(workspace.0.join("part.bin")).expect("it is there");
     }
-    desk.put("wrong.ngc", "G1 X10 F3000\nG1 X2O\nM2\n");
-    let refusal = desk.refusal(&["compile", "wrong.ngc", "--output", "part.bin"]);
+    workspace.put("wrong.ngc", "G1 X10 F3000\nG1 X2O\nM2\n");
+    let refusal = workspace.refusal(&["compile", "wrong.ngc", "--output", "part.bin"]);
     assert!(refusal.starts_with("wrong.ngc:2:") && refusal.contains(", expected"), "{refusal}");
-    desk.put("dense.ngc", "G1 X1 F600\nG1 X1.0000000001\nM2\n");
-    let refusal = desk.refusal(&["compile", "dense.ngc", "--output", "part.bin"]);
+    workspace.put("dense.ngc", "G1 X1 F600\nG1 X1.0000000001\nM2\n");
+    let refusal = workspace.refusal(&["compile", "dense.ngc", "--output", "part.bin"]);
     assert!(refusal.starts_with("dense.ngc:2: found "), "{refusal}");
-    assert!(!desk.0.join("part.bin").exists());
-    let refusal = desk.refusal(&["compile", "part.ngc", "--output", "no/such/place"]);
+    assert!(!workspace.0.join("part.bin").exists());
+    let refusal = workspace.refusal(&["compile", "part.ngc", "--output", "no/such/place"]);
     assert!(refusal.starts_with("no/such/place: found ") && refusal.contains(", expected"), "{refusal}");
     // A machine that f32 holds and fixed point does not.
     let wide = motion_host::machine::REFERENCE_TOML.replacen(
@@ -1090,17 +1091,17 @@ fn compile_writes_a_program_or_says_why_not() {
         "feedforward_accel_s = 1.0",
         1,
     );
-    desk.put("wide.toml", &wide);
+    workspace.put("wide.toml", &wide);
     let compile = |number| {
         ["compile", "part.ngc", "--machine", "wide.toml", "--number", number, "--output", "wide.bin"]
     };
-    let refusal = desk.refusal(&compile("fixed"));
+    let refusal = workspace.refusal(&compile("fixed"));
     assert!(
         refusal.contains("axis X: feedforward gains") && refusal.contains("expected numbers within"),
         "{refusal}"
     );
-    assert!(!desk.0.join("wide.bin").exists());
-    desk.stdout(&compile("f32"));
+    assert!(!workspace.0.join("wide.bin").exists());
+    workspace.stdout(&compile("f32"));
 }
 
 /// Points of two turns of a curve in space, `count` of them.
@@ -1114,9 +1115,9 @@ fn points(count: u32) -> String {
 
 #[test]
 fn spline_runs_points() {
-    let desk = Desk::new("spline-points");
-    desk.put("points.csv", &points(200));
-    let run = desk.json(&["spline", "points.csv", "--feed", "1500", "--json"]);
+    let workspace = Workspace::new("spline-points");
+    workspace.put("points.csv", &points(200));
+    let run = workspace.json(&["spline", "points.csv", "--feed", "1500", "--json"]);
     assert_has(&run, &["ticks", "planned_time_s", "path_length_mm", "max", "axes", "faults", "spline"]);
     let spline = &run["spline"];
     assert_eq!(
@@ -1140,24 +1141,24 @@ fn spline_runs_points() {
     assert!((number(&run["max"]["feed_mm_s"]) - 25.0).abs() < 1e-3);
     // Fewer knots within a tolerance, and a jerk that steps with degree 3.
     let near = ["spline", "points.csv", "--tolerance", "0.01", "--degree", "3", "--json"];
-    let spline = &desk.json(&near)["spline"];
+    let spline = &workspace.json(&near)["spline"];
     assert!(number(&spline["spans"]) < 100.0 && number(&spline["deviation_mm"]) <= 0.01, "{spline}");
     assert!(number(&spline["jerk_step_mm_s3"]) > 1.0, "{spline}");
-    let text = desk.stdout(&["spline", "points.csv", "--report", "run.html", "--trace", "run.csv"]);
+    let text = workspace.stdout(&["spline", "points.csv", "--report", "run.html", "--trace", "run.csv"]);
     for words in ["spline of degree 5", "pieces of degree 7", "report written to run.html"] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    let page = desk.read("run.html");
+    let page = workspace.read("run.html");
     assert!(
         page.contains("<svg") && page.contains("spline of degree 5") && page.trim_end().ends_with("</html>")
     );
-    assert!(desk.read("run.csv").starts_with("tick,t_s,s_mm,"));
+    assert!(workspace.read("run.csv").starts_with("tick,t_s,s_mm,"));
 }
 
 #[test]
 fn spline_alone_is_the_experiment() {
-    let desk = Desk::new("spline-experiment");
-    let found = desk.json(&["spline", "--json"]);
+    let workspace = Workspace::new("spline-experiment");
+    let found = workspace.json(&["spline", "--json"]);
     assert_eq!(keys(&found), ["evaluators", "feed_mm_s", "paths", "tick_s"]);
     let paths = found["paths"].as_array().expect("a list");
     let names: Vec<&Value> = paths.iter().map(|path| &path["name"]).collect();
@@ -1166,15 +1167,15 @@ fn spline_alone_is_the_experiment() {
     assert_eq!(paths[1]["junctions"].as_array().map(Vec::len), Some(8));
     assert!((number(&paths[1]["junctions"][5]["jerk_step_mm_s3"]) - 6268.0).abs() < 0.5);
     assert_eq!(paths[2]["junctions"][0]["published_s"], 0.055);
-    let text = desk.stdout(&["spline", "--report", "page.html", "--trace", "axes.csv"]);
+    let text = workspace.stdout(&["spline", "--report", "page.html", "--trace", "axes.csv"]);
     for words in ["0.278017 s", "-319.225 to -399.031 mm/s²", "78444.3", "up to 3.8 ms", "septic pieces"] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    let page = desk.read("page.html");
+    let page = workspace.read("page.html");
     assert!(
         page.matches("<svg").count() >= 3 && !page.contains("NaN") && page.trim_end().ends_with("</html>")
     );
-    let trace = desk.read("axes.csv");
+    let trace = workspace.read("axes.csv");
     let lines: Vec<&str> = trace.lines().collect();
     assert!(
         lines[0].starts_with("tick,t_s,arcs_x_vel_mm_s,arcs_x_acc_mm_s2,arcs_x_jerk_mm_s3,arcs_y_vel_mm_s,")
@@ -1182,12 +1183,12 @@ fn spline_alone_is_the_experiment() {
     assert_eq!(lines.len(), 502);
     let columns = lines[0].split(',').count();
     assert!(lines.iter().all(|line| line.split(',').count() == columns));
-    assert_eq!(desk.motion(&["spline", "--degree", "3"]).status.code(), Some(2));
+    assert_eq!(workspace.motion(&["spline", "--degree", "3"]).status.code(), Some(2));
 }
 
 #[test]
 fn spline_names_what_is_wrong_with_its_points() {
-    let desk = Desk::new("spline-wrong");
+    let workspace = Workspace::new("spline-wrong");
     let heading = "x_mm,y_mm,z_mm,u\n";
     let line = "0,0,0,0\n1,1,0,1\n2,0,0,2\n3,1,0,3\n4,0,0,4\n";
     for (text, more, refusal) in [
@@ -1226,14 +1227,14 @@ fn spline_names_what_is_wrong_with_its_points() {
         ),
         (format!("{heading}{line}1e7,0,0,5\n"), "", "p.csv:7: found a curve of "),
     ] {
-        desk.put("p.csv", &text);
+        workspace.put("p.csv", &text);
         let arguments =
             [&["spline", "p.csv"][..], if more.is_empty() { &[] } else { std::slice::from_ref(&more) }];
-        let found = desk.refusal(&arguments.concat());
+        let found = workspace.refusal(&arguments.concat());
         assert!(found.starts_with(refusal), "{found}");
     }
-    let found = desk.refusal(&["spline", "missing.csv"]);
+    let found = workspace.refusal(&["spline", "missing.csv"]);
     assert!(found.starts_with("missing.csv: found ") && found.contains(", expected"), "{found}");
-    let found = desk.refusal(&["spline", "--report", "no/such/place"]);
+    let found = workspace.refusal(&["spline", "--report", "no/such/place"]);
     assert!(found.starts_with("no/such/place: found "), "{found}");
 }

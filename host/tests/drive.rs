@@ -218,7 +218,7 @@ fn circles_of_every_size_reach_their_feed() {
             let turning = Turning::new(frequency_hz, feed_mm_s);
             let recording = turning.record(&open).expect("a circle");
             let ticks = turning.measured(&recording).expect("constant feed");
-            let speed = |t: &motion_host::record::TickRecord| t.axes[0].vel_mm_s.hypot(t.axes[1].vel_mm_s);
+            let speed = |t: &motion_host::trace::TraceRow| t.axes[0].vel_mm_s.hypot(t.axes[1].vel_mm_s);
             assert!(
                 ticks.iter().all(|tick| (speed(tick) / feed_mm_s - 1.0).abs() < 1e-4),
                 "{frequency_hz} Hz, {feed_mm_s} mm/s"

@@ -6,7 +6,7 @@
 use crate::axis::{AxesConfig, GuardFigures};
 use crate::exec::ExecState;
 use crate::fault::{FaultKind, Reaction, Reactions};
-use crate::fixture::{Follower, GUARD, LIMITS, RULES, TICK_S, figures, guarded};
+use crate::fixture::{GUARD, LIMITS, RULES, TICK_S, TestAxes, figures, guarded};
 use crate::kernel::Kernel;
 use crate::law::{FeedSegment, Law, Ramp};
 use crate::num::Real;
@@ -62,7 +62,7 @@ fn run(
     feeder.end_unchecked([at(24.0), at(32.0)]);
     let mut kernel = Kernel::<f32, 2>::new(&config(), [at(0.0); 2], [Counts(0); 2]);
     kernel.enable(10);
-    let mut bench = Follower::<2>::default();
+    let mut bench = TestAxes::<2>::default();
     // The last three set positions that were followed.
     let mut set_mm = [[0.0; 3]; 2];
     let mut missed_mm = 0.0_f64;

@@ -4,7 +4,7 @@
 mod guarded;
 
 #[cfg(feature = "guards")]
-pub(crate) use guarded::{Follower, TICK_S, guarded};
+pub(crate) use guarded::{TICK_S, TestAxes, guarded};
 
 use crate::axis::{AxisFigures, Feedforward, Gains, GuardFigures};
 use crate::law::Limits;

@@ -67,7 +67,7 @@ pub struct Seen<const AXES: usize> {
 pub enum Step<const AXES: usize> {
     /// Nothing.
     Wait,
-    /// Rest here, split the streams and drive this with a new director.
+    /// Rest here, split the streams and drive this with a new live control.
     Move(Jog<AXES>),
     /// Abort the move.
     Stop,
@@ -207,7 +207,7 @@ impl Homing {
     ///
     /// # Errors
     /// The axis is not homed; it is at rest.
-    pub fn turn<const AXES: usize>(&mut self, seen: &Seen<AXES>) -> Result<Step<AXES>, HomingError> {
+    pub fn poll<const AXES: usize>(&mut self, seen: &Seen<AXES>) -> Result<Step<AXES>, HomingError> {
         let step = self.step(seen);
         if matches!(step, Err(_) | Ok(Step::Done(_))) {
             self.stage = Stage::Ended;
@@ -383,8 +383,8 @@ mod tests {
         }
 
         /// The switch is closed below -20 mm, an index lies at -22 mm.
-        fn turn(&mut self, homing: &mut Homing) -> Result<Step<1>, HomingError> {
-            let step = homing.turn(&self.seen);
+        fn poll(&mut self, homing: &mut Homing) -> Result<Step<1>, HomingError> {
+            let step = homing.poll(&self.seen);
             match &step {
                 Ok(Step::Move(jog)) => {
                     [self.end] = jog.end();
@@ -415,7 +415,7 @@ mod tests {
                 if steps == given_up {
                     homing.abort();
                 }
-                match machine.turn(&mut homing) {
+                match machine.poll(&mut homing) {
                     Ok(Step::Done(homed)) => {
                         assert_eq!(homed, Homed { counts: Counts(-220), index_counts: Some(-20) });
                         return Ok(steps);
@@ -445,7 +445,7 @@ mod tests {
     #[test]
     fn an_axis_that_is_not_there_is_refused() {
         let mut homing = Homing { axis: 1, ..homing() };
-        let error = Machine::new().turn(&mut homing).expect_err("refused");
+        let error = Machine::new().poll(&mut homing).expect_err("refused");
         assert_eq!(error, HomingError::Move(JogError::Axis { axis: 1, axes: 1 }));
     }
 }

@@ -1,9 +1,9 @@
 //! Jog: one axis straight on, as far as an increment or to the soft limit.
 //!
 //! Consumes where the machine stands, an axis and a feed; produces the items of a program of one straight stretch, which
-//! the [`Director`](crate::live::Director) drives as any other. So a jog is jerk-limited, and stops exactly at the
+//! the [`LiveControl`](crate::live::LiveControl) drives as any other. So a jog is jerk-limited, and stops exactly at the
 //! increment's end or at the soft limit, by construction. Releasing the key is
-//! [`Director::abort`](crate::live::Director::abort), another feed [`Director::set_override`](crate::live::Director::set_override),
+//! [`LiveControl::abort`](crate::live::LiveControl::abort), another feed [`LiveControl::set_override`](crate::live::LiveControl::set_override),
 //! both at any tick; what was not driven is then dropped, and the next jog begins from where the axis stands
 //! ([`Kernel::rest_here`](crate::kernel::Kernel::rest_here)).
 //!
@@ -13,7 +13,7 @@
 //! use motion_kernel::exec::Executor;
 //! use motion_kernel::jog::{Direction, Jog, JogAxis, Travel, Way};
 //! use motion_kernel::law::Limits;
-//! use motion_kernel::live::{Director, State};
+//! use motion_kernel::live::{LiveControl, State};
 //! use motion_kernel::queue::{LiveStreams, PathRules};
 //! use motion_kernel::units::Position;
 //!
@@ -29,16 +29,16 @@
 //! let jog = Jog::new(&axis, 0, start, Way::Continuous(Direction::Positive), 20.0, tick_s).unwrap();
 //! let mut streams = LiveStreams::<f32, 2, 32, 16>::new();
 //! let (mut feeder, mut intake) = streams.split(rules, start);
-//! let mut director = Director::<f32, 2, _, _, 64>::new(jog, tick_s, 0);
+//! let mut control = LiveControl::<f32, 2, _, _, 64>::new(jog, tick_s, 0);
 //! let mut executor = Executor::new(start);
 //! let mut rest = start;
 //! for tick in 0.. {
 //!     if tick == 400 {
-//!         director.abort();
+//!         control.abort();
 //!     }
-//!     director.turn(&mut feeder).unwrap();
+//!     control.poll(&mut feeder).unwrap();
 //!     rest = executor.tick(&mut intake).unwrap().setpoints.map(|axis| axis.position);
-//!     if director.state(&feeder) == State::Aborted {
+//!     if control.state(&feeder) == State::Aborted {
 //!         break;
 //!     }
 //! }

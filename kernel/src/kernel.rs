@@ -21,7 +21,7 @@ mod reference;
 
 use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Preview};
 #[cfg(feature = "guards")]
-use crate::axis::{Found, LOOK_TICKS};
+use crate::axis::{AxisFault, LOOK_TICKS};
 use crate::exec::{ExecState, Executor};
 use crate::fault::{Fault, FaultKind};
 #[cfg(feature = "guards")]
@@ -449,7 +449,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         let parts = self.axes.get(axis).zip(self.config.get(axis));
         let found = match parts.zip(self.trace.executed.setpoints.get(axis)) {
             Some(((state, config), setpoint)) => state.judge(config, setpoint, since),
-            None => Found::FollowingError { error_mm },
+            None => AxisFault::FollowingError { error_mm },
         };
         self.latch_fault(kind_of(axis, found));
     }
@@ -510,15 +510,15 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
 /// What was found of an axis, as a fault.
 #[cfg(feature = "guards")]
-fn kind_of<R>(axis: usize, found: Found<R>) -> FaultKind<R> {
+fn kind_of<R>(axis: usize, found: AxisFault<R>) -> FaultKind<R> {
     match found {
-        Found::FollowingError { error_mm } => FaultKind::FollowingError { axis, error_mm },
-        Found::EncoderLost => FaultKind::EncoderLost { axis },
-        Found::EncoderJump { jump_mm } => FaultKind::EncoderJump { axis, jump_mm },
-        Found::Runaway => FaultKind::Runaway { axis },
-        Found::Saturated => FaultKind::Saturated { axis },
-        Found::SoftLimit => FaultKind::SoftLimit { axis },
-        Found::SetpointJump { jump_mm } => FaultKind::SetpointJump { axis, jump_mm },
-        Found::NotFinite => FaultKind::NotFinite { axis },
+        AxisFault::FollowingError { error_mm } => FaultKind::FollowingError { axis, error_mm },
+        AxisFault::EncoderLost => FaultKind::EncoderLost { axis },
+        AxisFault::EncoderJump { jump_mm } => FaultKind::EncoderJump { axis, jump_mm },
+        AxisFault::Runaway => FaultKind::Runaway { axis },
+        AxisFault::Saturated => FaultKind::Saturated { axis },
+        AxisFault::SoftLimit => FaultKind::SoftLimit { axis },
+        AxisFault::SetpointJump { jump_mm } => FaultKind::SetpointJump { axis, jump_mm },
+        AxisFault::NotFinite => FaultKind::NotFinite { axis },
     }
 }

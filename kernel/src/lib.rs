@@ -24,7 +24,7 @@
 //!   hal     ±10 V outputs, encoders, enable      Counts back to axis
 //! ```
 //!
-//! [`kernel`] assembles the tick, [`trace`] is what a tick records, [`recorder`] keeps the last of them, [`units`] and [`num`] are what
+//! [`kernel`] assembles the tick, [`trace`] is what a tick records, [`flight`] keeps the last of them, [`units`] and [`num`] are what
 //! all of them compute with.
 //!
 //! Units are mm, s and V throughout. Equations are cited by paper and number: S1 is the sin² law,
@@ -98,7 +98,7 @@ pub mod hal;
 pub mod fault;
 pub mod tick_monitor;
 pub mod trace;
-pub mod recorder;
+pub mod flight;
 pub mod kernel;
 #[cfg(feature = "live")]
 pub mod straight;

@@ -1,7 +1,7 @@
 //! One straight stretch from rest to rest, as the items of a program.
 //!
 //! Consumes where the machine stands, where it is to go and what holds the feed; produces what the
-//! [`Director`](crate::live::Director) drives as any other program: a jog, or the way to a program's start.
+//! [`LiveControl`](crate::live::LiveControl) drives as any other program: a jog, or the way to a program's start.
 //!
 //! Background; an item at a time, no memory for the path.
 
@@ -175,7 +175,7 @@ mod tests {
     use super::*;
     use crate::exec::Executor;
     use crate::fixture::{LIMITS, RULES};
-    use crate::live::{Director, State};
+    use crate::live::{LiveControl, State};
     use crate::queue::LiveStreams;
     use crate::random::Random;
 
@@ -206,11 +206,11 @@ mod tests {
             let mut streams = LiveStreams::<f64, 3, 64, 16>::new();
             let (mut feeder, mut intake) = streams.split(RULES, start);
             let mut executor = Executor::new(start);
-            let mut director = Director::<f64, 3, _, Infallible, 64>::new(way, TICK_S, 0);
+            let mut control = LiveControl::<f64, 3, _, Infallible, 64>::new(way, TICK_S, 0);
             let (mut ticks, mut place) = (0_u32, start);
             loop {
-                director.turn(&mut feeder).expect("accepted");
-                if director.state(&feeder) == State::Done {
+                control.poll(&mut feeder).expect("accepted");
+                if control.state(&feeder) == State::Done {
                     break;
                 }
                 let executed = executor.tick(&mut intake).expect("no fault");

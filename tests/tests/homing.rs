@@ -9,10 +9,10 @@ use hal_sim::{EncoderNoise, HomeParameters, IndexParameters, SwitchParameters};
 use motion_host::gcode;
 use motion_host::machine::{HomingSettings, Machine};
 use motion_host::planning::{Executable, Mode, plan_program};
-use motion_host::record::TickRecord;
+use motion_host::simulate::hardware::Simulated;
 use motion_host::simulate::home::{HomeError, HomedAxis};
-use motion_host::simulate::rig::Simulated;
 use motion_host::simulate::session::Session;
+use motion_host::trace::TraceRow;
 use motion_kernel::homing::{HomingConfig, HomingError};
 use motion_kernel::jog::{Direction, Jog, JogAxis, Way};
 use motion_kernel::num::{Fixed, Real};
@@ -71,7 +71,7 @@ fn config(direction: Direction, has_index: bool) -> HomingConfig {
 /// Every tick of a session: along the path within the limits and without a step, and no step in what the regulator sees.
 struct Watch {
     machine: Machine,
-    before: Option<TickRecord>,
+    before: Option<TraceRow>,
     wrong: Option<String>,
 }
 
@@ -80,7 +80,7 @@ impl Watch {
         Self { machine: machine.clone(), before: None, wrong: None }
     }
 
-    fn look(&mut self, tick: &TickRecord) {
+    fn look(&mut self, tick: &TraceRow) {
         let path = &self.machine.path;
         let limits = [path.feed_mm_s, path.accel_mm_s2, path.jerk_mm_s3, path.snap_mm_s4];
         let found = [tick.v_mm_s, tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4];

@@ -18,7 +18,7 @@ const LINE: usize = 256;
 
 /// How an axis is recorded.
 #[derive(Clone, Copy, Debug)]
-struct Rig {
+struct AxisSetup {
     resolution_um: f64,
     noise_seed: Option<u64>,
     /// Gain of a P regulator \[1/s\]; `None`: open loop.
@@ -30,7 +30,7 @@ struct Rig {
     output_offset_v: f64,
 }
 
-const RIG: Rig = Rig {
+const SETUP: AxisSetup = AxisSetup {
     resolution_um: 0.1,
     noise_seed: None,
     regulator_per_s: None,
@@ -39,16 +39,16 @@ const RIG: Rig = Rig {
     output_offset_v: 0.0,
 };
 
-fn record(drive: DriveParameters, rig: Rig, excitation: &Excitation) -> AxisRecording {
+fn record(drive: DriveParameters, setup: AxisSetup, excitation: &Excitation) -> AxisRecording {
     let encoder = EncoderParameters {
-        resolution_mm: rig.resolution_um * 1e-3,
-        noise: rig.noise_seed.map(|seed| EncoderNoise { amplitude_counts: 1, seed }),
+        resolution_mm: setup.resolution_um * 1e-3,
+        noise: setup.noise_seed.map(|seed| EncoderNoise { amplitude_counts: 1, seed }),
         ..REFERENCE_ENCODER
     };
     // Not on a count: the encoder's rounding is as unknown as on a machine.
     let parameters =
         AxisParameters { drive, encoder, start_position_mm: 12.345_678_9, ..AxisParameters::REFERENCE_X };
-    let mut axis = SimAxis::<LINE>::new(parameters, REFERENCE_TICK_S, rig.substeps).expect("an axis");
+    let mut axis = SimAxis::<LINE>::new(parameters, REFERENCE_TICK_S, setup.substeps).expect("an axis");
     let latch_mm = |axis: &mut SimAxis<LINE>| axis.latch().0 as f64 * encoder.resolution_mm;
     let start_mm = latch_mm(&mut axis);
     let mut recording = AxisRecording {
@@ -59,18 +59,19 @@ fn record(drive: DriveParameters, rig: Rig, excitation: &Excitation) -> AxisReco
     let mut setpoint_mm = start_mm;
     for velocity_mm_s in excitation.velocity_mm_s(REFERENCE_TICK_S) {
         let actual_mm = latch_mm(&mut axis);
-        let regulated_mm_s = rig.regulator_per_s.map_or(0.0, |gain| gain * (setpoint_mm - actual_mm));
+        let regulated_mm_s = setup.regulator_per_s.map_or(0.0, |gain| gain * (setpoint_mm - actual_mm));
         let code = DacCode::from_volts((velocity_mm_s + regulated_mm_s) / REFERENCE_MM_S_PER_VOLT);
         setpoint_mm += velocity_mm_s * REFERENCE_TICK_S;
         recording.command_mm_s.push(code.to_volts() * REFERENCE_MM_S_PER_VOLT);
         recording.actual_mm.push(actual_mm);
-        axis.advance(code.to_volts() * rig.output_gain + rig.output_offset_v, true);
+        axis.advance(code.to_volts() * setup.output_gain + setup.output_offset_v, true);
     }
     recording
 }
 
-fn recordings(drive: DriveParameters, rig: Rig) -> Vec<AxisRecording> {
-    let noisy = |run: usize| Rig { noise_seed: rig.noise_seed.map(|seed| seed + run as u64), ..rig };
+fn recordings(drive: DriveParameters, setup: AxisSetup) -> Vec<AxisRecording> {
+    let noisy =
+        |run: usize| AxisSetup { noise_seed: setup.noise_seed.map(|seed| seed + run as u64), ..setup };
     identification_plan(f64::INFINITY)
         .iter()
         .enumerate()
@@ -143,12 +144,12 @@ type Deviation = (f64, f64);
 struct Case {
     name: String,
     drive: DriveParameters,
-    rig: Rig,
+    setup: AxisSetup,
 }
 
 /// Deviations in the order of `COLUMNS`, without those of the bed if there is none.
 fn deviations(case: &Case, found: &AxisParametersFound) -> Vec<Deviation> {
-    let Case { name, drive: truth, rig } = case;
+    let Case { name, drive: truth, setup } = case;
     let scaled = |estimate: Estimate, truth: f64, factor: f64| {
         ((estimate.value - truth) * factor, estimate.half_width_95 * factor)
     };
@@ -172,11 +173,11 @@ fn deviations(case: &Case, found: &AxisParametersFound) -> Vec<Deviation> {
         deviations.push(percent(found.mass_ratio, truth.mass_ratio));
     }
     assert!(
-        (found.command_gain.value / rig.output_gain - 1.0).abs() < 1e-4,
+        (found.command_gain.value / setup.output_gain - 1.0).abs() < 1e-4,
         "{name}: {:?}",
         found.command_gain
     );
-    let offset_mm_s = rig.output_offset_v * REFERENCE_MM_S_PER_VOLT;
+    let offset_mm_s = setup.output_offset_v * REFERENCE_MM_S_PER_VOLT;
     assert!(
         (found.command_offset_mm_s.value - offset_mm_s).abs() < 1e-3,
         "{name}: {:?}",
@@ -193,7 +194,7 @@ fn check(cases: &[Case]) {
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(case) = cases.get(index) else { return done };
-            let runs = recordings(case.drive, case.rig);
+            let runs = recordings(case.drive, case.setup);
             let start = Instant::now();
             let found = identify(&runs).unwrap_or_else(|error| panic!("{}: {error}", case.name));
             done.push((index, deviations(case, &found.parameters), start.elapsed().as_secs_f64()));
@@ -226,9 +227,9 @@ fn check(cases: &[Case]) {
     }
 }
 
-fn case(name: &str, drive: DriveParameters, rig: Rig) -> Case {
-    let noise = if rig.noise_seed.is_some() { ", noise" } else { "" };
-    Case { name: format!("{name}, {} µm{noise}", rig.resolution_um), drive, rig }
+fn case(name: &str, drive: DriveParameters, setup: AxisSetup) -> Case {
+    let noise = if setup.noise_seed.is_some() { ", noise" } else { "" };
+    Case { name: format!("{name}, {} µm{noise}", setup.resolution_um), drive, setup }
 }
 
 const RESOLUTIONS_UM: [f64; 3] = [0.1, 0.5, 1.0];
@@ -238,9 +239,9 @@ fn reference_axes_are_found() {
     let mut cases = Vec::new();
     for resolution_um in RESOLUTIONS_UM {
         for noise_seed in [None, Some(1)] {
-            let rig = Rig { resolution_um, noise_seed, ..RIG };
-            cases.push(case("X", REFERENCE_X, rig));
-            cases.push(case("Y", REFERENCE_Y, rig));
+            let setup = AxisSetup { resolution_um, noise_seed, ..SETUP };
+            cases.push(case("X", REFERENCE_X, setup));
+            cases.push(case("Y", REFERENCE_Y, setup));
         }
     }
     check(&cases);
@@ -248,20 +249,21 @@ fn reference_axes_are_found() {
 
 #[test]
 fn other_ways_to_record_find_the_same() {
-    let closed = Rig { regulator_per_s: Some(230.0), ..RIG };
+    let closed = AxisSetup { regulator_per_s: Some(230.0), ..SETUP };
     check(&[
         case("X closed loop", REFERENCE_X, closed),
         case("Y closed loop", REFERENCE_Y, closed),
-        case("Y closed loop", REFERENCE_Y, Rig { noise_seed: Some(3), resolution_um: 1.0, ..closed }),
-        case("X gain, offset", REFERENCE_X, Rig { output_gain: 0.96, output_offset_v: 0.01, ..RIG }),
-        case("Y gain, offset", REFERENCE_Y, Rig { output_gain: 1.05, output_offset_v: -0.02, ..RIG }),
+        case("Y closed loop", REFERENCE_Y, AxisSetup { noise_seed: Some(3), resolution_um: 1.0, ..closed }),
+        case("X gain, offset", REFERENCE_X, AxisSetup { output_gain: 0.96, output_offset_v: 0.01, ..SETUP }),
+        case("Y gain, offset", REFERENCE_Y, AxisSetup { output_gain: 1.05, output_offset_v: -0.02, ..SETUP }),
     ]);
 }
 
 #[test]
 fn a_few_drives_are_found_with_every_encoder() {
     for resolution_um in RESOLUTIONS_UM {
-        let of_seed = |seed| case(&format!("seed {seed}"), random_drive(seed), Rig { resolution_um, ..RIG });
+        let of_seed =
+            |seed| case(&format!("seed {seed}"), random_drive(seed), AxisSetup { resolution_um, ..SETUP });
         check(&(0..3).map(of_seed).collect::<Vec<_>>());
     }
 }
@@ -270,7 +272,8 @@ fn a_few_drives_are_found_with_every_encoder() {
 #[ignore = "takes three minutes; tuning.rs finds fifty drives through the kernel"]
 fn fifty_drives_are_found_with_every_encoder() {
     for resolution_um in RESOLUTIONS_UM {
-        let of_seed = |seed| case(&format!("seed {seed}"), random_drive(seed), Rig { resolution_um, ..RIG });
+        let of_seed =
+            |seed| case(&format!("seed {seed}"), random_drive(seed), AxisSetup { resolution_um, ..SETUP });
         check(&(0..50).map(of_seed).collect::<Vec<_>>());
     }
 }
@@ -278,9 +281,9 @@ fn fifty_drives_are_found_with_every_encoder() {
 /// The model need not be the simulation, step by step: a machine has no sub-steps.
 #[test]
 fn finer_simulations_are_met_too() {
-    let rig = Rig { substeps: 40, ..RIG };
+    let setup = AxisSetup { substeps: 40, ..SETUP };
     for drive in [REFERENCE_X, REFERENCE_Y] {
-        let found = identify(&recordings(drive, rig)).expect("a result").parameters;
+        let found = identify(&recordings(drive, setup)).expect("a result").parameters;
         println!("{found}");
         assert_eq!(found.bed.is_some(), drive.bed.is_some());
         for (estimate, truth) in [
@@ -299,7 +302,7 @@ fn finer_simulations_are_met_too() {
 /// A drive that has stopped against friction keeps torque in its integrator; a recording that begins there doesn't say.
 #[test]
 fn a_lead_in_covers_what_was_before_the_recording() {
-    let mut runs = recordings(REFERENCE_Y, RIG);
+    let mut runs = recordings(REFERENCE_Y, SETUP);
     for run in &mut runs[1..3] {
         // In the rest between both directions.
         let middle = run.actual_mm.len() / 2;
@@ -307,7 +310,7 @@ fn a_lead_in_covers_what_was_before_the_recording() {
         run.command_mm_s.drain(..middle);
         run.lead_in_ticks = (0.25 / REFERENCE_TICK_S) as usize;
     }
-    let case = case("Y cut", REFERENCE_Y, RIG);
+    let case = case("Y cut", REFERENCE_Y, SETUP);
     let found = identify(&runs).expect("a result");
     for ((deviation, _), Column { name, limit }) in deviations(&case, &found.parameters).iter().zip(&COLUMNS)
     {
@@ -323,7 +326,7 @@ fn a_limit_that_no_run_reaches_is_not_determined() {
         Excitation::Harmonic { amplitude_mm_s: 35.0, frequency_hz: 5.0, periods: 5 },
         Excitation::Harmonic { amplitude_mm_s: 35.0, frequency_hz: 25.0, periods: 10 },
     ];
-    let runs: Vec<_> = gentle.iter().map(|excitation| record(REFERENCE_X, RIG, excitation)).collect();
+    let runs: Vec<_> = gentle.iter().map(|excitation| record(REFERENCE_X, SETUP, excitation)).collect();
     let found = identify(&runs).expect("a result");
     println!("{found}");
     assert!(!found.parameters.accel_limit_mm_s2.is_determined(), "{:?}", found.parameters.accel_limit_mm_s2);
@@ -334,7 +337,7 @@ fn a_limit_that_no_run_reaches_is_not_determined() {
 
 #[test]
 fn figures_of_the_step_are_those_of_the_reference() {
-    let figures = figures(&recordings(REFERENCE_X, RIG)).expect("figures");
+    let figures = figures(&recordings(REFERENCE_X, SETUP)).expect("figures");
     println!("{figures}");
     let step = figures.steps.iter().find(|step| (step.feed_mm_s - 120.0).abs() < 0.1).expect("S4's step");
     // S4: 2 and 10 ms, 1.1 %, 62 ms; half a tick less than by backward differences.
@@ -347,7 +350,7 @@ fn figures_of_the_step_are_those_of_the_reference() {
 
 #[test]
 fn what_is_no_servo_axis_is_refused() {
-    let mut runs = recordings(REFERENCE_X, RIG);
+    let mut runs = recordings(REFERENCE_X, SETUP);
     for run in &mut runs {
         run.actual_mm.iter_mut().for_each(|position| *position *= -1.0);
     }
@@ -355,7 +358,7 @@ fn what_is_no_servo_axis_is_refused() {
     assert_eq!(identify(&[]), Err(IdentifyError::NoRuns));
 
     // Positions of another run.
-    let mut mixed = recordings(REFERENCE_X, RIG);
+    let mut mixed = recordings(REFERENCE_X, SETUP);
     let mut random = Random(9);
     mixed[1].actual_mm.iter_mut().for_each(|position| *position += 20.0 * random.next());
     assert!(matches!(identify(&mixed), Err(IdentifyError::UnlikeModel { run: 2, .. })));

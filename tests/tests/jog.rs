@@ -8,7 +8,7 @@ use check::random::Random;
 use motion_kernel::exec::{ExecState, Executed, Executor};
 use motion_kernel::jog::{Direction, Jog, JogAxis, JogError, Travel, Way};
 use motion_kernel::law::Limits;
-use motion_kernel::live::{Director, State};
+use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::queue::{LiveStreams, PathRules};
 use motion_kernel::units::Position;
@@ -98,7 +98,7 @@ fn press<R: Real>(
     let end = jog.end();
     let mut streams = LiveStreams::<R, AXES, 32, 16>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
-    let mut director = Director::<R, AXES, _, _, 64>::new(jog, machine.tick_s, 0);
+    let mut control = LiveControl::<R, AXES, _, _, 64>::new(jog, machine.tick_s, 0);
     let mut executor = Executor::<R, AXES>::new(start);
     // Feed positions are products with 32 bits of the length that they are parts of.
     let rounding_mm = rounding_mm + 2.0_f64.powi(-32) * (end[axis] - start[axis]).to_mm().abs();
@@ -106,13 +106,13 @@ fn press<R: Real>(
     let (mut before, mut most) = (start, 1.0_f64);
     for tick in 0..2_000_000 {
         if tick == release {
-            director.abort();
+            control.abort();
         } else if random.chance(0.002) {
             let share = random.between(0.1, 2.0);
             most = most.max(share);
-            director.set_override(share).expect("within range");
+            control.set_override(share).expect("within range");
         }
-        director.turn(&mut feeder).map_err(|error| format!("tick {tick}: {error}"))?;
+        control.poll(&mut feeder).map_err(|error| format!("tick {tick}: {error}"))?;
         let Executed { setpoints, motion, state, .. } =
             executor.tick(&mut intake).map_err(|fault| format!("tick {tick}: {fault:?}"))?;
         let now = setpoints.map(|axis| axis.position);
@@ -143,7 +143,7 @@ fn press<R: Real>(
         }
         before = now;
         if state != ExecState::Moving {
-            match director.state(&feeder) {
+            match control.state(&feeder) {
                 State::Done => return Ok((now, Outcome::Arrived)),
                 State::Aborted => return Ok((now, Outcome::Released)),
                 _ => {}

@@ -136,7 +136,7 @@ fn random_programs_run_on_the_simulated_machine() {
         let Ok(plan) = plan_program("random.ngc", &read, &machine, Mode::Spanning) else { continue };
         let mut end_mm = [0.0; 3];
         let mut ticks = 0_u64;
-        let mut observe = |tick: &motion_host::record::TickRecord| {
+        let mut observe = |tick: &motion_host::trace::TraceRow| {
             assert_eq!(tick.tick, ticks, "seed {seed}: a tick without a record");
             ticks += 1;
             end_mm = tick.axes.map(|axis| axis.set_mm);

@@ -7,11 +7,11 @@ use check::random::Random;
 use check::totals::Totals;
 use check::{drive, machine, program};
 use motion_host::planning::{Mode, Plan};
-use motion_host::record::{AXES, TickRecord};
 use motion_host::recording::{Recorder, Recording, replay};
 use motion_host::simulate::inject::Injections;
 use motion_host::simulate::live::Script;
 use motion_host::simulate::{self, Hardware, Job, Number, RunOptions, RunSummary, StretchCorrection};
+use motion_host::trace::{AXES, TraceRow};
 use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
@@ -137,7 +137,7 @@ fn seen(ticks: Vec<String>, summary: &RunSummary) -> Seen {
     Seen { ticks, summary: format!("{summary:?}") }
 }
 
-fn words(tick: &TickRecord) -> String {
+fn words(tick: &TraceRow) -> String {
     format!("{tick:?}")
 }
 

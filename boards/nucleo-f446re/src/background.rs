@@ -18,9 +18,9 @@ use defmt::{error, info, warn};
 use heapless::spsc::Consumer;
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Fault;
+use motion_kernel::flight::frame_max;
 use motion_kernel::live::State;
 use motion_kernel::program::{ProgramError, SupplyError};
-use motion_kernel::recorder::frame_max;
 use motion_kernel::straight::StraightError;
 use motion_kernel::units::Position;
 use nucleo_f446re::console::Command;
@@ -30,7 +30,7 @@ use nucleo_f446re::design_parameters::{
 use nucleo_f446re::machine::{AXES, Machine};
 use nucleo_f446re::operator::{Action, Asked, Phase, Settings};
 use nucleo_f446re::program::Run;
-use nucleo_f446re::tick_log::TickLog;
+use nucleo_f446re::tick_timing::TickTiming;
 use rtic::Mutex;
 use stm32f4xx_hal::gpio::{Input, PC13};
 
@@ -90,7 +90,7 @@ pub(crate) fn run(
         } else {
             core::iter::from_fn(|| bytes.dequeue()).find_map(Command::of).map(Asked::Command)
         };
-        let has_logged = work.turn(seen, asked, machine, &mut control)
+        let has_logged = work.poll(seen, asked, machine, &mut control)
             || work.phase == Phase::Faulted && dump.line(now, &mut control);
         if !has_logged {
             report.line(&mut control, work.run.as_ref().map_or(0, Run::starvations));
@@ -128,7 +128,7 @@ struct Work {
 
 impl Work {
     /// What follows from what the tick has left, and from what is asked for. Whether it has logged a line; at most one.
-    fn turn(
+    fn poll(
         &mut self,
         seen: Seen,
         asked: Option<Asked>,
@@ -262,7 +262,7 @@ impl Work {
             self.no_way = run.start(here).err();
         }
         run.set(&self.settings);
-        self.refused = run.turn().err();
+        self.refused = run.poll().err();
     }
 }
 
@@ -356,7 +356,7 @@ impl Report {
         self.step = (self.step + 1) % 3;
     }
 
-    fn tick(&mut self, log: &TickLog) {
+    fn tick(&mut self, log: &TickTiming) {
         self.overruns = self.overruns.saturating_add(log.overruns);
         info!(
             "tick cycles min {=u32} max {=u32} last {=u32}, latency {=u32} to {=u32}, overruns {=u32}",

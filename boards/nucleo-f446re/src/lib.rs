@@ -6,7 +6,7 @@
 //! - [`console`]: what is commanded over the serial port;
 //! - [`operator`]: what is done about that and the button, in every phase;
 //! - [`program`]: what the start button runs;
-//! - [`tick_log`] and [`liveness`]: what the tick keeps about itself.
+//! - [`tick_timing`] and [`liveness`]: what the tick keeps about itself.
 //!
 //! The firmware itself is `main.rs` and the modules beside it. From the board's folder:
 //!
@@ -27,5 +27,5 @@ pub mod machine;
 pub mod console;
 pub mod operator;
 pub mod program;
-pub mod tick_log;
+pub mod tick_timing;
 pub mod liveness;

@@ -46,7 +46,7 @@ mod app {
     use nucleo_f446re::design_parameters::{CONSOLE_BYTES, TICK_CYCLES, TICK_PRIORITY};
     use nucleo_f446re::liveness::Liveness;
     use nucleo_f446re::machine::{AXES, Machine, PROGRAM};
-    use nucleo_f446re::tick_log::TickLog;
+    use nucleo_f446re::tick_timing::TickTiming;
     use stm32f4xx_hal::gpio::{Input, Output, PA10, PC13};
     use stm32f4xx_hal::pac::USART2;
     use stm32f4xx_hal::serial::Rx;
@@ -103,7 +103,7 @@ mod app {
             state: ExecState::Idle,
             position: start,
             healthy: false,
-            log: TickLog::new(),
+            log: TickTiming::new(),
             flight: cx.local.flight,
         };
         let (received, bytes) = cx.local.console_bytes.split();

@@ -5,7 +5,7 @@
 
 use core::task::Poll;
 
-use motion_kernel::live::{Director, Source, State};
+use motion_kernel::live::{LiveControl, Source, State};
 use motion_kernel::program::{Item, Items, ProgramError, Reader, SupplyError};
 use motion_kernel::queue::LiveFeeder;
 use motion_kernel::straight::{Straight, StraightError};
@@ -43,7 +43,7 @@ impl Source<AXES> for Runs {
 /// The program's runs, and how much of them is in the streams.
 pub struct Run<'a> {
     feeder: LiveFeeder<'a, f32, AXES>,
-    director: Director<f32, AXES, Runs, ProgramError, PLACES>,
+    control: LiveControl<f32, AXES, Runs, ProgramError, PLACES>,
 }
 
 impl<'a> Run<'a> {
@@ -51,7 +51,7 @@ impl<'a> Run<'a> {
     #[must_use]
     pub fn new(program: Reader<'static, AXES>, feeder: LiveFeeder<'a, f32, AXES>) -> Self {
         let runs = Runs { program, to_start: None, items: None };
-        Self { feeder, director: Director::new(runs, TICK_S, LEAD_TICKS) }
+        Self { feeder, control: LiveControl::new(runs, TICK_S, LEAD_TICKS) }
     }
 
     /// Starts a run on a machine that stands at `here`, where the streams were split or the run before it ended.
@@ -59,7 +59,7 @@ impl<'a> Run<'a> {
     /// # Errors
     /// There is no way to the program's start.
     pub fn start(&mut self, here: [Position; AXES]) -> Result<(), StraightError> {
-        let runs = self.director.source_mut();
+        let runs = self.control.source_mut();
         let header = runs.program.header();
         let feed_mm_s = TO_START_MM_S.min(header.rules.feed_mm_s);
         let to_start = Straight::new(here, header.start, header.rules.limits, [feed_mm_s; 2], TICK_S)?;
@@ -70,12 +70,12 @@ impl<'a> Run<'a> {
 
     /// Feed hold: comes to rest on the path.
     pub fn hold(&mut self) {
-        self.director.hold();
+        self.control.hold();
     }
 
     /// Goes on after a hold.
     pub fn resume(&mut self) {
-        self.director.resume();
+        self.control.resume();
     }
 
     /// Whether it is at rest in a hold, or on the way there.
@@ -86,29 +86,29 @@ impl<'a> Run<'a> {
 
     /// Goes on as `settings` say, in this run and those to come.
     pub fn set(&mut self, settings: &Settings) {
-        // The range of overrides is within the director's.
-        let _ = self.director.set_override(settings.feed_override.share());
-        self.director.set_single_block(settings.is_single);
+        // The range of overrides is within live control's.
+        let _ = self.control.set_override(settings.feed_override.share());
+        self.control.set_single_block(settings.is_single);
     }
 
     /// Reads and plans what there is room for. Ticks may come meanwhile, and do: it may take many of them.
     ///
     /// # Errors
     /// An item can't be executed, as from now on. What has entered before it ends at rest ([`State::Failed`]).
-    pub fn turn(&mut self) -> Result<(), SupplyError<ProgramError>> {
-        self.director.turn(&mut self.feeder)
+    pub fn poll(&mut self) -> Result<(), SupplyError<ProgramError>> {
+        self.control.poll(&mut self.feeder)
     }
 
     /// What it is doing; [`State::Waiting`] before, between and behind runs.
     #[must_use]
     pub fn state(&self) -> State {
-        self.director.state(&self.feeder)
+        self.control.state(&self.feeder)
     }
 
     /// How often motion had to stop because the background was too slow.
     #[must_use]
     pub fn starvations(&self) -> u32 {
-        self.director.starvations()
+        self.control.starvations()
     }
 }
 
@@ -123,7 +123,7 @@ mod tests {
     use crate::machine::{Machine, PROGRAM};
 
     /// A board whose background has turns every so many ticks.
-    struct Desk<'a> {
+    struct TestBoard<'a> {
         run: Run<'a>,
         intake: Intake<'a, f32, AXES>,
         executor: Executor<f32, AXES>,
@@ -132,16 +132,16 @@ mod tests {
     }
 
     /// What `work` does with a board that stands at the program's start.
-    fn on_a_desk<T>(turn_ticks: u32, work: impl FnOnce(&mut Desk<'_>) -> T) -> T {
+    fn on_a_board<T>(turn_ticks: u32, work: impl FnOnce(&mut TestBoard<'_>) -> T) -> T {
         let machine = Machine::new(PROGRAM).expect("suits");
         let here = machine.header().start;
         let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
         let (feeder, intake) = streams.split(machine.header().rules, here);
         let run = Run::new(machine.program, feeder);
-        work(&mut Desk { run, intake, executor: Executor::new(here), here, turn_ticks })
+        work(&mut TestBoard { run, intake, executor: Executor::new(here), here, turn_ticks })
     }
 
-    impl Desk<'_> {
+    impl TestBoard<'_> {
         /// The program from where the machine stands; before each tick `command` may say something. Its ticks, and where it
         /// ended.
         fn program(&mut self, command: &mut dyn FnMut(u32, &mut Run<'_>)) -> (u32, [Position; AXES]) {
@@ -149,7 +149,7 @@ mod tests {
             for tick in 0..1_000_000 {
                 command(tick, &mut self.run);
                 if tick % self.turn_ticks == 0 {
-                    self.run.turn().expect("accepted");
+                    self.run.poll().expect("accepted");
                     if self.run.state() == State::Waiting {
                         return (tick, self.here);
                     }
@@ -167,8 +167,8 @@ mod tests {
         turn_ticks: u32,
         mut command: impl FnMut(u32, &mut Run<'_>),
     ) -> ([(u32, [Position; AXES]); 2], u32) {
-        on_a_desk(turn_ticks, |desk| {
-            (core::array::from_fn(|_| desk.program(&mut command)), desk.run.starvations())
+        on_a_board(turn_ticks, |board| {
+            (core::array::from_fn(|_| board.program(&mut command)), board.run.starvations())
         })
     }
 
@@ -268,9 +268,9 @@ mod tests {
         lines.dedup();
         let single = Settings { is_single: true, ..Settings::NONE };
         // The ticks of a run in which it came to be held.
-        let holds = |desk: &mut Desk<'_>| {
+        let holds = |board: &mut TestBoard<'_>| {
             let (mut ticks_held, mut was_held) = (Vec::new(), false);
-            let (_, at) = desk.program(&mut |tick, run| {
+            let (_, at) = board.program(&mut |tick, run| {
                 let is_held = run.state() == State::Held;
                 if is_held && !was_held {
                     ticks_held.push(tick);
@@ -283,16 +283,16 @@ mod tests {
             assert_eq!(at, end());
             ticks_held
         };
-        on_a_desk(1, |desk| {
-            desk.run.set(&single);
-            assert_eq!(holds(desk).len(), lines.len(), "{lines:?}");
-            desk.run.set(&Settings::NONE);
-            assert!(holds(desk).is_empty());
-            desk.run.set(&single);
+        on_a_board(1, |board| {
+            board.run.set(&single);
+            assert_eq!(holds(board).len(), lines.len(), "{lines:?}");
+            board.run.set(&Settings::NONE);
+            assert!(holds(board).is_empty());
+            board.run.set(&single);
             for _ in 0..3 {
-                desk.run.turn().expect("nothing to do");
+                board.run.poll().expect("nothing to do");
             }
-            let held = holds(desk);
+            let held = holds(board);
             assert_eq!(held.len(), lines.len() + 1, "{held:?}");
             assert!(held[0] > back_ticks() / 2, "held before it was on its way: {held:?}");
         });
@@ -311,10 +311,10 @@ mod tests {
                 let mut run = Run::new(machine.program, feeder);
                 let mut executor = Executor::new(here);
                 run.start(here).expect("a way");
-                run.director.source_mut().items = None;
+                run.control.source_mut().items = None;
                 let (mut ticks, mut at) = (0_u32, here);
                 loop {
-                    run.turn().expect("accepted");
+                    run.poll().expect("accepted");
                     if run.state() == State::Waiting {
                         break;
                     }

@@ -11,7 +11,7 @@ use crate::{AXES, LINE, Number, PIECES, SUBSTEPS, fail};
 
 /// Capacity of a feed list.
 pub const SEGMENTS: usize = 16;
-/// Blocks and ramps that the director knows ahead.
+/// Blocks and ramps that live control knows ahead.
 pub const PLACES: usize = 64;
 
 /// The background.

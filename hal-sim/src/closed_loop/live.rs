@@ -5,7 +5,7 @@
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{Ad5754Output, Encoder};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::live::{Director, State};
+use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Items, ProgramError, Reader, SupplyError};
 use motion_kernel::queue::{LiveFeeder, LiveStreams};
@@ -74,10 +74,10 @@ impl Commands {
     }
 }
 
-/// The background under live control: keeps the streams full and obeys. `PLACES` as of [`Director`].
+/// The background under live control: keeps the streams full and obeys. `PLACES` as of [`LiveControl`].
 pub struct LiveProducer<'a, R: Real, const AXES: usize, const PLACES: usize> {
     feeder: LiveFeeder<'a, R, AXES>,
-    director: Director<R, AXES, Items<'a, AXES>, ProgramError, PLACES>,
+    control: LiveControl<R, AXES, Items<'a, AXES>, ProgramError, PLACES>,
     commands: Commands,
 }
 
@@ -87,27 +87,27 @@ impl<R: Real, const AXES: usize, const PLACES: usize> LiveProducer<'_, R, AXES, 
     /// # Errors
     /// The program holds an item that can't be executed.
     #[inline(never)]
-    pub fn turn(&mut self) -> Result<(), SupplyError<ProgramError>> {
+    pub fn poll(&mut self) -> Result<(), SupplyError<ProgramError>> {
         let Some(command) = self.commands.next() else { return Ok(()) };
         match command {
             None => {}
-            Some(Command::Hold) => self.director.hold(),
-            Some(Command::Resume) => self.director.resume(),
-            Some(Command::Abort) => self.director.abort(),
+            Some(Command::Hold) => self.control.hold(),
+            Some(Command::Resume) => self.control.resume(),
+            Some(Command::Abort) => self.control.abort(),
             // All of these are within the range.
-            Some(Command::Override(share)) => self.director.set_override(share).unwrap_or_default(),
+            Some(Command::Override(share)) => self.control.set_override(share).unwrap_or_default(),
         }
         if self.commands.are_over() {
-            self.director.resume();
-            self.director.set_override(1.0).unwrap_or_default();
+            self.control.resume();
+            self.control.set_override(1.0).unwrap_or_default();
         }
-        self.director.turn(&mut self.feeder)
+        self.control.poll(&mut self.feeder)
     }
 
     /// Whether nothing is left to do for a tick that ended in `state`.
     pub fn is_over(&self, state: ExecState) -> bool {
-        state == ExecState::Idle && self.director.state(&self.feeder) == State::Done
-            || self.director.state(&self.feeder) == State::Aborted
+        state == ExecState::Idle && self.control.state(&self.feeder) == State::Done
+            || self.control.state(&self.feeder) == State::Aborted
     }
 }
 
@@ -148,9 +148,9 @@ pub fn close<
     };
     let mut kernel = Kernel::new(&axes, header.start, counts);
     kernel.enable(0);
-    let director = Director::new(program.items(), header.tick_s, 0);
+    let control = LiveControl::new(program.items(), header.tick_s, 0);
     let commands = Commands { random: SplitMix64::new(seed), turns_left: COMMANDED_TURNS, lost: 0 };
-    let producer = LiveProducer { feeder, director, commands };
+    let producer = LiveProducer { feeder, control, commands };
     Ok((producer, ClosedLoop { kernel, intake, machine, outputs, memory }))
 }
 

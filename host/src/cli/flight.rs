@@ -9,8 +9,8 @@ use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::{self, Outputs};
 use crate::flight;
-use crate::record::{FaultRecord, RunRecord};
-use crate::simulate::Sheet;
+use crate::simulate::RunInfo;
+use crate::trace::{RunTrace, TracedFault};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -49,22 +49,22 @@ pub fn flight(arguments: &FlightArguments, out: &mut dyn Write) -> Result<Outcom
     let rows = flight::read(&String::from_utf8_lossy(&source.text))
         .map_err(|error| CliError::Flight { path: source.name.clone(), source: error })?;
     let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
-    let sheet = Sheet { program: source.name, ..Sheet::of_machine(&machine) };
-    let faults = rows.iter().find(|row| row.is_faulted).map(|row| FaultRecord {
+    let info = RunInfo { program: source.name, ..RunInfo::of_machine(&machine) };
+    let faults = rows.iter().find(|row| row.is_faulted).map(|row| TracedFault {
         tick: row.tick,
         axis: None,
         fault: "fault latched".to_owned(),
         detail: "what it was stands in the log".to_owned(),
     });
-    let record = RunRecord {
+    let trace = RunTrace {
         faults: faults.into_iter().collect(),
         notices: flight::words(&rows, &machine),
         following_error_limit_um: machine.axes.each_ref().map(|axis| axis.following_error_limit_mm * 1e3),
         ticks: flight::ticks(&rows),
-        ..sheet.record()
+        ..info.empty_trace()
     };
-    outputs.of_record(&sheet, &record)?;
-    for line in &record.notices {
+    outputs.of_trace(&info, &trace)?;
+    for line in &trace.notices {
         writeln!(out, "  {line}").map_err(CliError::Output)?;
     }
     outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;

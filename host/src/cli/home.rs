@@ -12,7 +12,7 @@ use super::table::{self, Align};
 use super::{input, write_json};
 use crate::machine::Machine;
 use crate::simulate::home::{HomeError, HomedAxis, Homes};
-use crate::simulate::job::Sheet;
+use crate::simulate::job::RunInfo;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -64,7 +64,7 @@ pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let outputs = Outputs::create(&arguments.trace, &None)?;
     let mut homed = Vec::new();
     let (ended, _) =
-        outputs.of_ticks(&Sheet::of_machine(&machine), |observe| homes.home(&mut homed, observe))?;
+        outputs.of_ticks(&RunInfo::of_machine(&machine), |observe| homes.home(&mut homed, observe))?;
     // What was homed is shown, whatever became of the next axis.
     if arguments.json {
         let axes: Vec<AxisJson<'_>> = homed.iter().map(|axis| axis_json(axis, &machine)).collect();

@@ -10,7 +10,7 @@ use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
 use super::table::{self, Align};
 use super::{input, write_json};
-use crate::simulate::job::Sheet;
+use crate::simulate::job::RunInfo;
 use crate::simulate::jog::{Ended, Jogged, Keys, Press};
 
 const EXAMPLES: &str = "\
@@ -93,7 +93,7 @@ pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let outputs = Outputs::create(&arguments.trace, &None)?;
     let mut jogged = Vec::new();
     let (ended, _) =
-        outputs.of_ticks(&Sheet::of_machine(&machine), |observe| keys.jog(&mut jogged, observe))?;
+        outputs.of_ticks(&RunInfo::of_machine(&machine), |observe| keys.jog(&mut jogged, observe))?;
     // What was jogged is shown, whatever became of the next key.
     let presses: Vec<PressJson> =
         jogged.iter().map(|jogged| PressJson::new(jogged, machine.tick_s)).collect();

@@ -8,9 +8,9 @@ use super::error::CliError;
 use super::input::Output;
 use super::progress::Progress;
 use super::trace::TraceWriter;
-use crate::record::{RunRecord, TickRecord};
 use crate::report;
-use crate::simulate::{Job, Observer, RunError, RunSummary, Sheet};
+use crate::simulate::{Job, Observer, RunError, RunInfo, RunSummary};
+use crate::trace::{RunTrace, TraceRow};
 
 /// Files that are asked for, opened: a wrong path should not cost the user a long run.
 pub(super) struct Outputs {
@@ -31,8 +31,8 @@ impl Outputs {
         run: impl FnOnce(&mut Observer<'_>) -> Result<T, RunError>,
         summary_of: impl Fn(&T) -> &RunSummary,
     ) -> Result<T, CliError> {
-        let (ran, report) = self.of_ticks(&job.sheet, |observe| {
-            let mut progress = Progress::new((job.sheet.planned_time_s / job.sheet.tick_s) as u64);
+        let (ran, report) = self.of_ticks(&job.info, |observe| {
+            let mut progress = Progress::new((job.info.planned_time_s / job.info.tick_s) as u64);
             let ran = run(&mut |tick| {
                 observe(tick);
                 progress.tick();
@@ -40,24 +40,24 @@ impl Outputs {
             progress.finish();
             ran
         })?;
-        let ran = ran.map_err(|source| CliError::Run { program: job.sheet.program.clone(), source })?;
-        report.write(|ticks| record(job, summary_of(&ran), ticks))?;
+        let ran = ran.map_err(|source| CliError::Run { program: job.info.program.clone(), source })?;
+        report.write(|ticks| trace_of(job, summary_of(&ran), ticks))?;
         Ok(ran)
     }
 
-    /// The files about a record that was not made by a run of now.
-    pub(super) fn of_record(self, sheet: &Sheet, record: &RunRecord) -> Result<(), CliError> {
-        let ((), report) = self.of_ticks(sheet, |observe| record.ticks.iter().for_each(observe))?;
-        report.write(|ticks| RunRecord { ticks, ..record.clone() })
+    /// The files about a trace that was not made by a run of now.
+    pub(super) fn of_trace(self, info: &RunInfo, trace: &RunTrace) -> Result<(), CliError> {
+        let ((), report) = self.of_ticks(info, |observe| trace.ticks.iter().for_each(observe))?;
+        report.write(|ticks| RunTrace { ticks, ..trace.clone() })
     }
 
     /// What `run` returns, its ticks traced, and the report that is to be written of them.
     pub(super) fn of_ticks<T>(
         self,
-        sheet: &Sheet,
+        info: &RunInfo,
         run: impl FnOnce(&mut Observer<'_>) -> T,
     ) -> Result<(T, Report), CliError> {
-        let mut files = Files::new(self, sheet)?;
+        let mut files = Files::new(self, info)?;
         let ran = run(&mut |tick| files.add(tick));
         // What was traced of a run that failed stays.
         Ok((ran, files.finish_trace()?))
@@ -73,14 +73,14 @@ struct Files {
 /// Only a report needs all the ticks at once.
 pub(super) struct Report {
     output: Option<Output>,
-    ticks: Vec<TickRecord>,
+    ticks: Vec<TraceRow>,
 }
 
 impl Files {
-    fn new(outputs: Outputs, sheet: &Sheet) -> Result<Self, CliError> {
+    fn new(outputs: Outputs, info: &RunInfo) -> Result<Self, CliError> {
         let trace = match outputs.trace {
             None => None,
-            Some(Output { name, file }) => match TraceWriter::new(file, sheet) {
+            Some(Output { name, file }) => match TraceWriter::new(file, info) {
                 Ok(writer) => Some((name, writer)),
                 Err(source) => return Err(CliError::Write { path: name, source }),
             },
@@ -88,7 +88,7 @@ impl Files {
         Ok(Self { trace, report: Report { output: outputs.report, ticks: Vec::new() } })
     }
 
-    fn add(&mut self, tick: &TickRecord) {
+    fn add(&mut self, tick: &TraceRow) {
         if let Some((_, trace)) = &mut self.trace {
             trace.add(tick);
         }
@@ -106,24 +106,24 @@ impl Files {
 }
 
 impl Report {
-    fn write(self, record: impl FnOnce(Vec<TickRecord>) -> RunRecord) -> Result<(), CliError> {
+    fn write(self, trace: impl FnOnce(Vec<TraceRow>) -> RunTrace) -> Result<(), CliError> {
         let Some(Output { name, mut file }) = self.output else { return Ok(()) };
-        report::write_html(&record(self.ticks), &mut file)
+        report::write_html(&trace(self.ticks), &mut file)
             .and_then(|()| file.flush())
             .map_err(|source| CliError::Write { path: name, source })
     }
 }
 
-fn record(job: &Job, summary: &RunSummary, ticks: Vec<TickRecord>) -> RunRecord {
+fn trace_of(job: &Job, summary: &RunSummary, ticks: Vec<TraceRow>) -> RunTrace {
     let limit_um = job.header.axes.each_ref().map(|axis| axis.following_error_limit_mm * 1e3);
-    RunRecord {
+    RunTrace {
         following_error_limit_um: limit_um,
         end_error_counts: summary.axes.each_ref().map(|axis| axis.end_error_counts),
         ticks,
         commands: summary.commands.clone(),
         faults: summary.faults.clone(),
         notices: summary.notices.clone(),
-        ..job.sheet.record()
+        ..job.info.empty_trace()
     }
 }
 

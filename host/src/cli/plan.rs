@@ -11,7 +11,7 @@ use super::table::{self, Align};
 use super::{input, write_json};
 use crate::gcode;
 use crate::planning::{FeedRecord, Mode, Plan, plan_blocks, plan_program};
-use crate::record::BlockRecord;
+use crate::trace::TracedBlock;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -107,7 +107,7 @@ pub fn plan(arguments: &PlanArguments, out: &mut dyn Write) -> Result<Outcome, C
 }
 
 fn json<'plan>(plan: &'plan Plan) -> PlanJson<'plan> {
-    let block = |block: &'plan BlockRecord| BlockJson {
+    let block = |block: &'plan TracedBlock| BlockJson {
         line: block.line,
         kind: &block.kind,
         start_mm: block.start_mm,
@@ -153,7 +153,7 @@ pub(super) fn write_plan(plan: &Plan, out: &mut dyn Write) -> io::Result<()> {
         ("peak", "mm/min", Align::Right),
         ("time", "s", Align::Right),
     ];
-    let row = |(index, block): (usize, &BlockRecord)| {
+    let row = |(index, block): (usize, &TracedBlock)| {
         [
             (index + 1).to_string(),
             if block.line == 0 { "–".to_owned() } else { block.line.to_string() },

@@ -14,11 +14,11 @@ use super::write_json;
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
-use crate::record::{CommandRecord, FaultRecord};
 use crate::recording::Recorder;
 use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
 use crate::simulate::{self, AxisSummary, Job, RunError, RunOptions, RunSummary};
+use crate::trace::{TracedCommand, TracedFault};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -112,13 +112,15 @@ pub(super) fn execute(
     let job = Job::new(options, plan, machine).map_err(refused)?;
     let Some(mut record) = record else {
         let run = |observe: &mut simulate::Observer<'_>| {
-            simulate::on_simulated(machine, options.injections, |rig| simulate::run_on(&job, rig, observe))
+            simulate::on_simulated(machine, options.injections, |hardware| {
+                simulate::run_on(&job, hardware, observe)
+            })
         };
         return outputs.of_run(&job, run, |summary| summary);
     };
     let run = |observe: &mut simulate::Observer<'_>| {
-        simulate::on_simulated(machine, options.injections, |rig| {
-            let mut recorder = Recorder::new(rig);
+        simulate::on_simulated(machine, options.injections, |hardware| {
+            let mut recorder = Recorder::new(hardware);
             let summary = simulate::run_on(&job, &mut recorder, observe)?;
             Ok((summary, recorder.finish(&job)))
         })
@@ -140,7 +142,7 @@ pub(super) struct RunJson<'run> {
     limit_active_share: f64,
     axes: Vec<AxisJson<'run>>,
     contour_error_um_max: f64,
-    commands: &'run [CommandRecord],
+    commands: &'run [TracedCommand],
     faults: Vec<FaultJson<'run>>,
     notices: &'run [String],
 }
@@ -178,7 +180,7 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         end_error_counts: axis.end_error_counts,
         output_v_max: axis.output_v_max,
     };
-    let fault = |fault: &'run FaultRecord| FaultJson {
+    let fault = |fault: &'run TracedFault| FaultJson {
         tick: fault.tick,
         axis: fault.axis.as_deref(),
         fault: &fault.fault,
@@ -248,14 +250,14 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
     if !(summary.commands.is_empty() && summary.faults.is_empty() && summary.notices.is_empty()) {
         writeln!(out)?;
     }
-    for CommandRecord { tick, command, s_mm, stop, .. } in &summary.commands {
+    for TracedCommand { tick, command, s_mm, stop, .. } in &summary.commands {
         write!(out, "  {command} before tick {tick} ({:.4} s, {s_mm:.4} mm)", *tick as f64 * tick_s)?;
         match stop {
             Some(stop) => writeln!(out, ": at rest after {:.4} s and {:.4} mm", stop.time_s, stop.length_mm)?,
             None => writeln!(out)?,
         }
     }
-    for FaultRecord { tick, axis, fault, detail } in &summary.faults {
+    for TracedFault { tick, axis, fault, detail } in &summary.faults {
         let axis = axis.as_ref().map_or_else(String::new, |name| format!(" of axis {name}"));
         writeln!(out, "  FAULT in tick {tick} ({:.4} s): {fault}{axis}: {detail}", *tick as f64 * tick_s)?;
     }

@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 
 use super::csv_failure;
-use crate::record::TickRecord;
-use crate::simulate::Sheet;
+use crate::simulate::RunInfo;
+use crate::trace::TraceRow;
 
 /// Columns of the path, then seven of each axis.
 const PATH_COLUMNS: [&str; 8] = ["tick", "t_s", "s_mm", "v_mm_s", "a_mm_s2", "j_mm_s3", "state", "line"];
@@ -31,22 +31,22 @@ pub(super) struct TraceWriter<W: Write> {
 
 impl<W: Write> TraceWriter<W> {
     /// Writes the header.
-    pub(super) fn new(out: W, sheet: &Sheet) -> io::Result<Self> {
+    pub(super) fn new(out: W, info: &RunInfo) -> io::Result<Self> {
         let mut csv = csv::Writer::from_writer(out);
         for column in PATH_COLUMNS {
             csv.write_field(column).map_err(csv_failure)?;
         }
-        for axis in &sheet.axes {
+        for axis in &info.axes {
             for column in AXIS_COLUMNS {
                 csv.write_field(format!("{}_{column}", axis.name)).map_err(csv_failure)?;
             }
         }
         csv.write_record(None::<&[u8]>).map_err(csv_failure)?;
-        Ok(Self { csv, tick_s: sheet.tick_s, field: Vec::new(), failure: None })
+        Ok(Self { csv, tick_s: info.tick_s, field: Vec::new(), failure: None })
     }
 
     /// Adds a row. A failure is kept for [`Self::finish`]: a run is not stopped for it.
-    pub(super) fn add(&mut self, tick: &TickRecord) {
+    pub(super) fn add(&mut self, tick: &TraceRow) {
         if self.failure.is_none() {
             self.failure = self.row(tick).err();
         }
@@ -60,7 +60,7 @@ impl<W: Write> TraceWriter<W> {
         }
     }
 
-    fn row(&mut self, tick: &TickRecord) -> io::Result<()> {
+    fn row(&mut self, tick: &TraceRow) -> io::Result<()> {
         self.text(format_args!("{}", tick.tick))?;
         self.number(tick.tick as f64 * self.tick_s, TIME)?;
         self.number(tick.s_mm, POSITION)?;
@@ -96,15 +96,15 @@ impl<W: Write> TraceWriter<W> {
 mod tests {
     use super::*;
     use crate::machine::Machine;
-    use crate::record::{AXES, AxisTick};
+    use crate::trace::{AXES, AxisTick};
 
     #[test]
     fn header_and_row() {
         let mut text = Vec::new();
         let mut trace =
-            TraceWriter::new(&mut text, &Sheet::of_machine(&Machine::reference())).expect("memory");
+            TraceWriter::new(&mut text, &RunInfo::of_machine(&Machine::reference())).expect("memory");
         let axis = AxisTick { set_mm: 7_999.999_999_999_8, act_mm: -0.1, ..AxisTick::default() };
-        trace.add(&TickRecord {
+        trace.add(&TraceRow {
             tick: 3,
             s_mm: 1.0 / 3.0,
             v_mm_s: 2.0,

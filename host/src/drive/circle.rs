@@ -87,7 +87,7 @@ pub fn figures(recording: &Recording, turning: &Turning) -> Result<CircleFigures
 /// The feed was not held long enough.
 pub fn deviations(recording: &Recording, turning: &Turning) -> Result<Vec<(f64, f64)>, DriveError> {
     let radius_mm = turning.radius_mm();
-    let deviation = |tick: &crate::record::TickRecord| {
+    let deviation = |tick: &crate::trace::TraceRow| {
         let (set, actual) = turning.relative_to_centre(&tick.axes);
         (libm::atan2(set[1], set[0]), (libm::hypot(actual[0], actual[1]) - radius_mm) * 1e3)
     };

@@ -23,7 +23,7 @@ use super::peer_regulator::PeerGains;
 use super::replay::{Law, Replayed, replay};
 use super::turning::Turning;
 use crate::machine::Machine;
-use crate::record::AXES;
+use crate::trace::AXES;
 
 /// Frequencies at which the differencing regulator's gains are fitted \[Hz\].
 pub const FIT_HZ: [f64; 3] = [4.0, 10.0, 16.0];

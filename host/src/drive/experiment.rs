@@ -11,8 +11,8 @@ use crate::gcode::{self, GcodeError};
 use crate::identify::IdentifyError;
 use crate::machine::{AxisSettings, Machine};
 use crate::planning::{Mode, PlanningError, plan_program};
-use crate::record::{AXES, AxisTick, FaultRecord, TickRecord};
 use crate::simulate::{self, RunError, RunOptions};
+use crate::trace::{AXES, AxisTick, TraceRow, TracedFault};
 
 /// Feeds and limits are compared in f32: this much more is the same.
 pub(super) const ROUNDING: f64 = 1e-6;
@@ -82,7 +82,7 @@ pub enum DriveError {
         /// What was run.
         experiment: String,
         /// The fault.
-        fault: FaultRecord,
+        fault: TracedFault,
     },
     /// The planned feed was not held long enough to be measured.
     #[error("{experiment}: found {found_s:.3} s at constant feed, expected {needed_s:.3} s")]
@@ -112,7 +112,7 @@ pub enum DriveError {
     },
 }
 
-fn on_axis(fault: &FaultRecord) -> String {
+fn on_axis(fault: &TracedFault) -> String {
     fault.axis.as_ref().map_or_else(String::new, |axis| format!(" of axis {axis}"))
 }
 
@@ -259,7 +259,7 @@ pub struct Recording {
     /// The feed that was held \[mm/s\].
     pub feed_mm_s: f64,
     /// Every tick, from the first motion on.
-    pub ticks: Vec<TickRecord>,
+    pub ticks: Vec<TraceRow>,
 }
 
 impl Recording {
@@ -315,7 +315,7 @@ impl Recording {
     /// # Errors
     /// The feed was not held that long.
     pub fn steady(&self, settle_s: f64, measured_s: f64) -> Result<Range<usize>, DriveError> {
-        let is_steady = |tick: &TickRecord| (tick.v_mm_s - self.feed_mm_s).abs() <= ROUNDING * self.feed_mm_s;
+        let is_steady = |tick: &TraceRow| (tick.v_mm_s - self.feed_mm_s).abs() <= ROUNDING * self.feed_mm_s;
         let from = self.ticks.iter().position(is_steady).unwrap_or(0);
         let to = self.ticks.iter().rposition(is_steady).map_or(0, |last| last + 1);
         let in_ticks = |seconds: f64| (seconds / self.tick_s()).round() as usize;

@@ -10,7 +10,7 @@ use super::step;
 use super::turning::{Turning, plane_of};
 use crate::identify::{AxisRecording, Excitation, Identification, identification_plan, identify};
 use crate::machine::Machine;
-use crate::record::AXES;
+use crate::trace::AXES;
 
 const LETTERS: [&str; AXES] = ["X", "Y", "Z"];
 

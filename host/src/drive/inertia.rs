@@ -85,7 +85,7 @@ pub fn accelerations(
     let tick_s = recording.tick_s();
     let half = ((0.5 * AVERAGED_S / tick_s).round() as usize).max(1);
     let span_s = half as f64 * tick_s;
-    let accel = |(index, part): (usize, &[crate::record::TickRecord])| {
+    let accel = |(index, part): (usize, &[crate::trace::TraceRow])| {
         let [a, b, c] = [0, half, 2 * half].map(|at| part[at].axes[axis].act_mm);
         ((index + half) as f64 * tick_s, (c - b - (b - a)) / (span_s * span_s))
     };

@@ -13,10 +13,10 @@ use motion_kernel::units::{Counts, DacCode, Position};
 use super::experiment::{DriveError, Recording, within};
 use super::peer_regulator::{PeerGains, PeerRegulator};
 use crate::machine::Machine;
-use crate::record::{AXES, TickRecord};
 use crate::simulate::RunError;
 use crate::simulate::contour::Contour;
-use crate::simulate::rig::{Rig, simulated};
+use crate::simulate::hardware::{SimulatedHardware, simulated};
+use crate::trace::{AXES, TraceRow};
 
 /// What regulates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +60,7 @@ impl<'a> Regulator<'a> {
     /// told of the positions.
     fn tick(
         &mut self,
-        tick: &mut TickRecord,
+        tick: &mut TraceRow,
         (set, counts): ([Position; AXES], [Counts; AXES]),
         (before_mm, tick_s): ([f64; AXES], f64),
     ) -> [DacCode; AXES] {
@@ -127,7 +127,7 @@ fn close_loop(
 ) -> Result<(), RunError> {
     let machine = &recording.machine;
     let simulated = simulated(machine)?;
-    let mut rig = Rig::new(&simulated)?;
+    let mut hardware = SimulatedHardware::new(&simulated)?;
     let mut regulator = Regulator::new(law, machine)?;
     let mut contour = Contour::default();
     let mut before_mm = [0.0; AXES];
@@ -141,10 +141,10 @@ fn close_loop(
                 || RunError::Simulation(format!("found a set position of {told_mm} mm, out of range"));
             *set = Position::from_mm(told_mm).ok_or_else(expected)?;
         }
-        let Ok(counts) = rig.latch();
+        let Ok(counts) = hardware.latch();
         let codes = regulator.tick(&mut tick, (set, counts), (before_mm, machine.tick_s));
-        rig.write(&codes).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
-        let Ok(()) = rig.set_enabled(true);
+        hardware.write(&codes).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
+        let Ok(()) = hardware.set_enabled(true);
         simulated.advance();
         tick.contour_um = contour.error_um(&tick.axes);
         replayed.recording.ticks.push(tick);

@@ -8,7 +8,7 @@
 use super::experiment::{Demands, DriveError, Recording, differences, open_loop, raised, within};
 use super::spectrum::Spectrum;
 use crate::machine::Machine;
-use crate::record::AXES;
+use crate::trace::AXES;
 
 /// Time over which velocities are averaged \[s\]: rounding of 0.1 µm is then 0.04 mm/s, a thirtieth of a per cent of
 /// S4's step, and the overshoot loses half of a hundredth of it.
@@ -107,7 +107,7 @@ impl Step {
     #[must_use]
     pub fn response(&self, recording: &Recording) -> StepResponse {
         let rest_v = recording.machine.axes[self.axis].output_offset_v;
-        let is_step = |tick: &crate::record::AxisTick| (tick.out_v - rest_v).abs() > STEP_V_MIN;
+        let is_step = |tick: &crate::trace::AxisTick| (tick.out_v - rest_v).abs() > STEP_V_MIN;
         let first = recording.axis(self.axis).position(is_step).unwrap_or(0);
         let held = recording.axis(self.axis).rposition(is_step).map_or(0, |last| last + 1);
         let positions_mm =

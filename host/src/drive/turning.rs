@@ -9,8 +9,8 @@ use core::f64::consts::TAU;
 use super::experiment::{Demands, DriveError, Recording, raised, within};
 use crate::gcode::Plane;
 use crate::machine::Machine;
-use crate::record::{AXES, AxisTick, TickRecord};
 use crate::simulate::RunOptions;
+use crate::trace::{AXES, AxisTick, TraceRow};
 
 /// Turns for reaching the feed and for braking from it.
 const RAMP_TURNS: f64 = 6.0;
@@ -133,7 +133,7 @@ impl Turning {
     ///
     /// # Errors
     /// The feed was not held long enough.
-    pub fn measured<'run>(&self, recording: &'run Recording) -> Result<&'run [TickRecord], DriveError> {
+    pub fn measured<'run>(&self, recording: &'run Recording) -> Result<&'run [TraceRow], DriveError> {
         Ok(&recording.ticks[recording.steady(self.settle_s, self.span_s())?])
     }
 

@@ -9,7 +9,7 @@ use super::lookahead::lookahead;
 use super::profile::FeedProfile;
 use super::{Mode, Plan};
 use crate::gcode;
-use crate::record::BlockRecord;
+use crate::trace::TracedBlock;
 
 /// The tick that durations are counted in where no machine says one \[s\].
 const TICK_S: f64 = 0.0005;
@@ -111,7 +111,7 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
     let mut records = Vec::with_capacity(blocks.len());
     for (block, &end_mm) in blocks.iter().zip(&ends_mm) {
         let (plan, time_s) = profile.over(start_mm, end_mm);
-        records.push(BlockRecord {
+        records.push(TracedBlock {
             line: 0,
             kind: "block".into(),
             start_mm,

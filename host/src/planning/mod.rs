@@ -42,7 +42,7 @@ pub use program::{plan_moves, plan_program};
 pub use spline::plan_spline;
 pub use stretch::Stretch;
 
-use crate::record::BlockRecord;
+use crate::trace::TracedBlock;
 
 /// How ramps and blocks go together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -81,7 +81,7 @@ pub struct Plan {
     /// Name of the program or block list.
     pub source: String,
     /// Blocks, in path order.
-    pub blocks: Vec<BlockRecord>,
+    pub blocks: Vec<TracedBlock>,
     /// Feed, in path order.
     pub feed: Vec<FeedRecord>,
     /// Duration, dwells included, stops not \[s\].

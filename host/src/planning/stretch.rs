@@ -6,8 +6,8 @@ use super::error::Problem;
 use super::lookahead::{PlannedSegment, lookahead};
 use super::profile::FeedProfile;
 use super::{FeedRecord, Mode};
-use crate::record::BlockRecord;
 use crate::toolpath::Element;
+use crate::trace::TracedBlock;
 
 /// A block of a stretch, before planning.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +92,7 @@ impl Stretch {
         self.ends_mm.last().copied().unwrap_or(0.0)
     }
 
-    pub(super) fn block_records(&self) -> Vec<BlockRecord> {
+    pub(super) fn block_records(&self) -> Vec<TracedBlock> {
         let mut start_mm = 0.0;
         let mut records = Vec::with_capacity(self.blocks.len());
         for (block, &end_mm) in self.blocks.iter().zip(&self.ends_mm) {
@@ -101,7 +101,7 @@ impl Stretch {
             let view =
                 Block { length_mm: end_mm - start_mm, cap_mm_s, junction_mm_s: block.junction_mm_s, law };
             let (plan, time_s) = self.profile.over(start_mm, end_mm);
-            records.push(BlockRecord {
+            records.push(TracedBlock {
                 line: block.line,
                 kind: block.element.kind().into(),
                 start_mm: self.start_mm + start_mm,

@@ -11,9 +11,9 @@
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
 //! Inside it the program is a compiled program with the blocks of its path ([`motion_kernel::program`]), the commands
-//! are the text of a script, and each tick is an entry of some eight bytes ([`tape`]).
+//! are the text of a script, and each tick is an entry of some eight bytes ([`answers`]).
 //!
-//! - [`tape`]: what the hardware answered, tick by tick;
+//! - [`answers`]: what the hardware answered, tick by tick;
 //! - [`recorder`]: hardware that writes it down;
 //! - [`replay`](mod@replay): hardware that answers from it, and the comparison.
 //!
@@ -21,7 +21,7 @@
 
 pub mod recorder;
 pub mod replay;
-pub mod tape;
+pub mod answers;
 
 pub use recorder::Recorder;
 pub use replay::{Difference, Replay, replay};
@@ -31,10 +31,10 @@ use motion_kernel::program::{self, CheckError, Checksum, ProgramError, Reader, S
 use motion_kernel::units::Counts;
 use serde::{Deserialize, Serialize};
 
-use self::tape::Tape;
-use crate::record::AXES;
+use self::answers::RecordedAnswers;
 use crate::simulate::live::Script;
-use crate::simulate::{Job, Number, Sheet, StretchCorrection};
+use crate::simulate::{Job, Number, RunInfo, StretchCorrection};
+use crate::trace::AXES;
 
 const MAGIC: [u8; 4] = *b"MREC";
 const VERSION: u8 = 2;
@@ -47,10 +47,10 @@ pub struct Recording {
     program: Vec<u8>,
     correction: Option<StretchCorrection>,
     script: Option<Script>,
-    sheet: Sheet,
+    info: RunInfo,
     /// What the encoders read before the first tick.
     start: [Counts; AXES],
-    tape: Tape,
+    answers: RecordedAnswers,
 }
 
 /// Why bytes are not a recording. Displays as "found …, expected …".
@@ -93,12 +93,12 @@ pub enum RecordingError {
 impl Recording {
     /// Of a job, with what a [`Recorder`] has seen of it.
     #[must_use]
-    pub(self) fn new(job: &Job, start: [Counts; AXES], tape: Tape) -> Self {
+    pub(self) fn new(job: &Job, start: [Counts; AXES], answers: RecordedAnswers) -> Self {
         let mut program = Vec::new();
         // Entries of three axes fit the format.
         program::write(&job.header, Some(&job.guards), &job.items, &mut program).expect("three axes");
-        let Job { number, correction, script, sheet, .. } = job.clone();
-        Self { number, program, correction, script, sheet, start, tape }
+        let Job { number, correction, script, info, .. } = job.clone();
+        Self { number, program, correction, script, info, start, answers }
     }
 
     /// The recording as bytes.
@@ -137,7 +137,7 @@ impl Recording {
         if !left.is_empty() {
             return Err(RecordingError::Malformed(format!("{} bytes too many", left.len())));
         }
-        recording.tape.check()?;
+        recording.answers.check()?;
         match recording.number {
             Number::F32 => recording.check::<f32>(),
             Number::F64 => recording.check::<f64>(),
@@ -168,20 +168,20 @@ impl Recording {
             items: reader.items().collect::<Result<_, _>>()?,
             correction: self.correction.clone(),
             script: self.script.clone(),
-            sheet: self.sheet.clone(),
+            info: self.info.clone(),
         })
     }
 
     /// Ticks in it, those included in which the machine settled after the program's end.
     #[must_use]
     pub fn ticks(&self) -> u64 {
-        self.tape.ticks
+        self.answers.ticks
     }
 
     /// The digest of all its ticks.
     #[must_use]
     pub fn digest(&self) -> u64 {
-        self.tape.digest
+        self.answers.digest
     }
 }
 

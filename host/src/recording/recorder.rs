@@ -6,9 +6,9 @@ use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
 
 use super::Recording;
-use super::tape::{Answers, Checks, TapeWriter};
-use crate::record::AXES;
+use super::answers::{AnswerWriter, Answers, Checks};
 use crate::simulate::{Hardware, Job};
+use crate::trace::AXES;
 
 /// Passes everything on to `H`, and keeps its answers.
 #[derive(Debug)]
@@ -17,7 +17,7 @@ pub struct Recorder<'a, H> {
     start: [Counts; AXES],
     answers: Answers,
     checks: Checks,
-    tape: TapeWriter,
+    writer: AnswerWriter,
 }
 
 impl<'a, H: Hardware> Recorder<'a, H> {
@@ -29,26 +29,26 @@ impl<'a, H: Hardware> Recorder<'a, H> {
             start,
             answers: Answers::NONE,
             checks: Checks::default(),
-            tape: TapeWriter::new(start),
+            writer: AnswerWriter::new(start),
         }
     }
 
     /// What was recorded of the run of `job`.
     #[must_use]
     pub fn finish(self, job: &Job) -> Recording {
-        Recording::new(job, self.start, self.tape.finish(self.checks.digest()))
+        Recording::new(job, self.start, self.writer.finish(self.checks.digest()))
     }
 }
 
 impl<H: Hardware> Hardware for Recorder<'_, H> {
     fn start_counts(&mut self) -> [Counts; AXES] {
         self.start = self.hardware.start_counts();
-        self.tape = TapeWriter::new(self.start);
+        self.writer = AnswerWriter::new(self.start);
         self.start
     }
 
     fn advance<R: Scalar>(&mut self, trace: &Trace<R, AXES>) -> bool {
-        self.tape.add(&self.answers, self.checks.add(trace));
+        self.writer.add(&self.answers, self.checks.add(trace));
         self.answers = Answers::NONE;
         self.hardware.advance(trace)
     }

@@ -8,9 +8,9 @@ use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
 
 use super::Recording;
-use super::tape::{Answers, Checks, TapeReader};
-use crate::record::AXES;
+use super::answers::{AnswerReader, Answers, Checks};
 use crate::simulate::{self, Hardware, Job, Observer, RunError, RunSummary};
+use crate::trace::AXES;
 
 /// A run that was made again.
 #[derive(Clone, Debug)]
@@ -90,7 +90,7 @@ pub fn replay(recording: &Recording, job: &Job, observe: &mut Observer<'_>) -> R
 #[derive(Debug)]
 pub struct Player<'a> {
     start: [Counts; AXES],
-    tape: TapeReader<'a>,
+    reader: AnswerReader<'a>,
     /// Of the tick under way, with its check byte.
     answers: Option<(Answers, u8)>,
     told: Option<bool>,
@@ -107,7 +107,7 @@ impl<'a> Player<'a> {
     fn new(recording: &'a Recording) -> Self {
         Self {
             start: recording.start,
-            tape: recording.tape.read(recording.start),
+            reader: recording.answers.read(recording.start),
             answers: None,
             told: None,
             checks: Checks::default(),
@@ -142,7 +142,7 @@ impl Encoder<AXES> for Player<'_> {
 
     // The first thing that a tick asks for.
     fn latch(&mut self) -> Result<[Counts; AXES], RecordedFailure> {
-        self.answers = self.tape.next();
+        self.answers = self.reader.next();
         self.answers.and_then(|(answers, _)| answers.counts).ok_or(RecordedFailure)
     }
 }

@@ -3,13 +3,13 @@
 use motion_kernel::hal::{AxisInputs, MachineInputs};
 use motion_kernel::program::ProgramError;
 
-use super::tape::{Answers, TapeWriter};
+use super::answers::{AnswerWriter, Answers};
 use super::*;
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, plan_program};
-use crate::record::TickRecord;
 use crate::simulate::{self, RunOptions};
+use crate::trace::TraceRow;
 
 const PROGRAM: &str = "G21 G90\nG1 X3 F600\nG1 X3 Y2\nG4 P0.05\nG1 X0 Y0 F2000\nM2\n";
 
@@ -20,28 +20,28 @@ fn recorded(number: Number) -> Recording {
     let script: Script = "300:hold,700:resume,900:override=0.5".parse().expect("a script");
     let options = RunOptions { number, script: Some(&script), ..RunOptions::default() };
     let job = Job::new(&options, &plan, &machine).expect("a job");
-    simulate::on_simulated(&machine, None, |rig| {
-        let mut recorder = Recorder::new(rig);
-        simulate::run_on(&job, &mut recorder, &mut |_: &TickRecord| ())?;
+    simulate::on_simulated(&machine, None, |hardware| {
+        let mut recorder = Recorder::new(hardware);
+        simulate::run_on(&job, &mut recorder, &mut |_: &TraceRow| ())?;
         Ok(recorder.finish(&job))
     })
     .expect("a run")
 }
 
 fn replayed(recording: &Recording) -> Replay {
-    replay(recording, &recording.job().expect("a job"), &mut |_: &TickRecord| ()).expect("a replay")
+    replay(recording, &recording.job().expect("a job"), &mut |_: &TraceRow| ()).expect("a replay")
 }
 
-/// The tape with the answers of one tick changed; its check bytes are those of the run.
+/// The recorded answers with the answers of one tick changed; its check bytes are those of the run.
 fn tampered(recording: &Recording, tick: u64, change: impl Fn(&mut Answers)) -> Recording {
-    let mut tape = TapeWriter::new(recording.start);
-    for (index, (mut answers, check)) in recording.tape.read(recording.start).enumerate() {
+    let mut writer = AnswerWriter::new(recording.start);
+    for (index, (mut answers, check)) in recording.answers.read(recording.start).enumerate() {
         if index as u64 == tick {
             change(&mut answers);
         }
-        tape.add(&answers, check);
+        writer.add(&answers, check);
     }
-    Recording { tape: tape.finish(recording.digest()), ..recording.clone() }
+    Recording { answers: writer.finish(recording.digest()), ..recording.clone() }
 }
 
 #[test]
@@ -98,13 +98,13 @@ fn a_replay_that_is_longer_or_shorter_says_so() {
     let recording = recorded(Number::F64);
     let ticks = recording.ticks();
     let of = |count: u64| {
-        let mut tape = TapeWriter::new(recording.start);
-        let all = recording.tape.read(recording.start);
+        let mut writer = AnswerWriter::new(recording.start);
+        let all = recording.answers.read(recording.start);
         let last = all.clone().last();
         for (answers, check) in all.chain(last).take(count as usize) {
-            tape.add(&answers, check);
+            writer.add(&answers, check);
         }
-        Recording { tape: tape.finish(recording.digest()), ..recording.clone() }
+        Recording { answers: writer.finish(recording.digest()), ..recording.clone() }
     };
     let shorter = of(100);
     let Replay { difference, ticks: made, .. } = replayed(&shorter);
@@ -115,14 +115,14 @@ fn a_replay_that_is_longer_or_shorter_says_so() {
     assert_eq!(difference, Some(Difference::Shorter { ticks, expected: ticks + 1 }));
 
     let mut other = recording.clone();
-    other.tape.digest = 7;
+    other.answers.digest = 7;
     let expected = Difference::Digest { found: recording.digest(), expected: 7 };
     assert_eq!(replayed(&other).difference, Some(expected));
 }
 
 /// Counts as far apart as they can be, and every combination of failures.
 #[test]
-fn a_tape_reads_what_was_written() {
+fn recorded_answers_read_what_was_written() {
     let ends = [0, 1, -1, i64::MAX, i64::MIN, 1 << 40];
     let stopped = MachineInputs { emergency_stop: true, ..MachineInputs::HEALTHY };
     let mut reached = MachineInputs::HEALTHY;
@@ -138,13 +138,13 @@ fn a_tape_reads_what_was_written() {
         }
     }
     let start = [Counts(i64::MIN), Counts(5), Counts(i64::MAX)];
-    let mut tape = TapeWriter::new(start);
+    let mut writer = AnswerWriter::new(start);
     for (index, answers) in all.iter().enumerate() {
-        tape.add(answers, index as u8);
+        writer.add(answers, index as u8);
     }
-    let tape = tape.finish(0);
-    tape.check().expect("entries");
-    for (index, (read, written)) in tape.read(start).zip(&all).enumerate() {
+    let recorded = writer.finish(0);
+    recorded.check().expect("entries");
+    for (index, (read, written)) in recorded.read(start).zip(&all).enumerate() {
         assert_eq!(read, (*written, index as u8));
     }
 }
@@ -175,7 +175,7 @@ fn strangers_are_named() {
     program::write(&job.header, None, &job.items, &mut unguarded.program).expect("three axes");
     assert_eq!(sealed(&unguarded), RecordingError::Unguarded);
     let mut missing = recording.clone();
-    missing.tape.ticks += 1;
+    missing.answers.ticks += 1;
     assert!(matches!(sealed(&missing), RecordingError::Malformed(_)));
     let mut trailing = recording.to_bytes();
     trailing.truncate(trailing.len() - 4);

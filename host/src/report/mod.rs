@@ -1,6 +1,6 @@
 //! The report of a run: one HTML file for the engineer who wants to see what the machine did.
 //!
-//! Consumes a [`RunRecord`], produces a page that needs nothing else: no script, no font, no picture from elsewhere.
+//! Consumes a [`RunTrace`], produces a page that needs nothing else: no script, no font, no picture from elsewhere.
 //! It opens on a desk, on a phone and in ten years, and prints on paper. Time and memory grow with the number of
 //! ticks; the size of the page does not: plots keep the extremes of every column, tables end after a number of rows
 //! and say what they left out. Fails only if the output cannot be written.
@@ -21,7 +21,7 @@ use self::palette::Ink;
 use self::plots::path::View;
 use self::plots::{Caption, contour, feed, marks, path, time};
 use self::summary::{Outcome, Span, Summary};
-use crate::record::{AXES, FaultRecord, RunRecord};
+use crate::trace::{AXES, RunTrace, TracedFault};
 
 /// Faults named in the sentence at the top; the table below it has the others.
 const FAULTS_IN_SENTENCE: usize = 3;
@@ -35,34 +35,34 @@ const LINE_NUMBERS: &str = "Numbers along the top, where there is room for them,
 /// Notices shown.
 const NOTICES_MAX: usize = 100;
 
-/// Writes the report of `record` as one self-contained HTML file.
+/// Writes the report of `trace` as one self-contained HTML file.
 ///
-/// An empty record, a run of one tick and values that are not finite all make a valid page that says so.
+/// An empty trace, a run of one tick and values that are not finite all make a valid page that says so.
 ///
 /// # Errors
 ///
 /// Whatever `out` reports. Drawing itself happens in memory.
-pub fn write_html(record: &RunRecord, out: &mut impl Write) -> io::Result<()> {
-    let summary = Summary::of(record);
-    let names = axis_names(record);
-    head(file_name(program_name(record)), out)?;
-    header(record, &summary, &names, out)?;
-    if !record.ticks.is_empty() {
-        path_section(record, &summary, &names, out)?;
-        feed_section(record, &summary, out)?;
-        contour_section(record, &summary, out)?;
-        time_section(record, &summary, out)?;
-        axes_section(record, &summary, &names, out)?;
+pub fn write_html(trace: &RunTrace, out: &mut impl Write) -> io::Result<()> {
+    let summary = Summary::of(trace);
+    let names = axis_names(trace);
+    head(file_name(program_name(trace)), out)?;
+    header(trace, &summary, &names, out)?;
+    if !trace.ticks.is_empty() {
+        path_section(trace, &summary, &names, out)?;
+        feed_section(trace, &summary, out)?;
+        contour_section(trace, &summary, out)?;
+        time_section(trace, &summary, out)?;
+        axes_section(trace, &summary, &names, out)?;
     }
-    if !record.blocks.is_empty() {
-        writeln!(out, "<section><h2>Blocks</h2>\n{}</section>", tables::blocks(record))?;
+    if !trace.blocks.is_empty() {
+        writeln!(out, "<section><h2>Blocks</h2>\n{}</section>", tables::blocks(trace))?;
     }
     writeln!(out, "</main></body></html>")
 }
 
 /// Names to call the axes by; one without a name gets its number.
-fn axis_names(record: &RunRecord) -> [String; AXES] {
-    std::array::from_fn(|axis| match record.axis_names[axis].trim() {
+fn axis_names(trace: &RunTrace) -> [String; AXES] {
+    std::array::from_fn(|axis| match trace.axis_names[axis].trim() {
         "" => format!("axis {}", axis + 1),
         name => name.to_string(),
     })
@@ -81,8 +81,8 @@ fn head(subject: &str, out: &mut impl Write) -> io::Result<()> {
     )
 }
 
-fn program_name(record: &RunRecord) -> &str {
-    if record.program.is_empty() { "unnamed program" } else { &record.program }
+fn program_name(trace: &RunTrace) -> &str {
+    if trace.program.is_empty() { "unnamed program" } else { &trace.program }
 }
 
 /// The last part of a path, which is what a reader looks for.
@@ -91,18 +91,18 @@ fn file_name(program: &str) -> &str {
 }
 
 fn header(
-    record: &RunRecord,
+    trace: &RunTrace,
     summary: &Summary,
     names: &[String; AXES],
     out: &mut impl Write,
 ) -> io::Result<()> {
-    let program = program_name(record);
+    let program = program_name(trace);
     writeln!(out, "<header><h1>{}</h1>", escape(file_name(program)))?;
     if file_name(program) != program {
         writeln!(out, "<p class=\"machine\">Program: {}</p>", escape(program))?;
     }
-    if !record.machine.is_empty() {
-        writeln!(out, "<p class=\"machine\">Machine: {}</p>", escape(&record.machine))?;
+    if !trace.machine.is_empty() {
+        writeln!(out, "<p class=\"machine\">Machine: {}</p>", escape(&trace.machine))?;
     }
     let class = match summary.outcome {
         Outcome::Empty => "empty",
@@ -110,39 +110,39 @@ fn header(
         Outcome::Unfinished => "unfinished",
         Outcome::Faulted => "faulted",
     };
-    writeln!(out, "<p class=\"result {class}\">{}</p></header>", result(record, summary))?;
-    writeln!(out, "{}{}", tables::faults(record), tables::commands(record))?;
-    notices(record, summary, out)?;
-    writeln!(out, "<h2>Key figures</h2>\n{}", tables::key_figures(record, summary))?;
-    writeln!(out, "{}", tables::axes(record, summary, names))
+    writeln!(out, "<p class=\"result {class}\">{}</p></header>", result(trace, summary))?;
+    writeln!(out, "{}{}", tables::faults(trace), tables::commands(trace))?;
+    notices(trace, summary, out)?;
+    writeln!(out, "<h2>Key figures</h2>\n{}", tables::key_figures(trace, summary))?;
+    writeln!(out, "{}", tables::axes(trace, summary, names))
 }
 
 /// How the run ended, in one sentence.
-fn result(record: &RunRecord, summary: &Summary) -> String {
-    let blocks = counted(record.blocks.len(), "block", "blocks");
+fn result(trace: &RunTrace, summary: &Summary) -> String {
+    let blocks = counted(trace.blocks.len(), "block", "blocks");
     let length = figure(summary.path_length_mm, 6);
     let time = duration(summary.executed_time_s);
     match summary.outcome {
-        Outcome::Empty => "<strong>Nothing was run:</strong> the record holds no tick.".to_string(),
+        Outcome::Empty => "<strong>Nothing was run:</strong> the trace holds no tick.".to_string(),
         Outcome::Done => format!("<strong>Done without a fault:</strong> {blocks}, {length} mm in {time}."),
         Outcome::Unfinished => format!(
             "<strong>Not finished:</strong> the run ended without a fault after {time}, {} of {length} mm along the path.",
             figure(summary.path_done_mm, 6)
         ),
         Outcome::Faulted => {
-            let named: Vec<_> = record
+            let named: Vec<_> = trace
                 .faults
                 .iter()
                 .take(FAULTS_IN_SENTENCE)
-                .map(|fault| name_fault(fault, record.tick_s))
+                .map(|fault| name_fault(fault, trace.tick_s))
                 .collect();
-            let others = match record.faults.len().saturating_sub(FAULTS_IN_SENTENCE) {
+            let others = match trace.faults.len().saturating_sub(FAULTS_IN_SENTENCE) {
                 0 => String::new(),
                 others => format!(", and {}", counted(others, "other", "others")),
             };
             format!(
                 "<strong>Ended in {}:</strong> {}{others}, {} of {length} mm along the path.",
-                if record.faults.len() == 1 { "a fault" } else { "faults" },
+                if trace.faults.len() == 1 { "a fault" } else { "faults" },
                 named.join("; "),
                 figure(summary.path_done_mm, 6),
             )
@@ -150,27 +150,27 @@ fn result(record: &RunRecord, summary: &Summary) -> String {
     }
 }
 
-fn name_fault(fault: &FaultRecord, tick_s: f64) -> String {
+fn name_fault(fault: &TracedFault, tick_s: f64) -> String {
     let axis = fault.axis.as_deref().map_or(String::new(), |axis| format!(" on axis {}", escape(axis)));
     let detail =
         if fault.detail.is_empty() { String::new() } else { format!(" ({})", escape(&fault.detail)) };
     format!("{}{axis} at {:.4} s{detail}", escape(&fault.fault), fault.tick as f64 * tick_s)
 }
 
-fn notices(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
-    if record.notices.is_empty() && summary.not_finite == 0 {
+fn notices(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+    if trace.notices.is_empty() && summary.not_finite == 0 {
         return Ok(());
     }
     writeln!(out, "<h2>Notices</h2>\n<ul class=\"notices\">")?;
-    for notice in record.notices.iter().take(NOTICES_MAX) {
+    for notice in trace.notices.iter().take(NOTICES_MAX) {
         writeln!(out, "<li>{}</li>", escape(notice))?;
     }
-    if record.notices.len() > NOTICES_MAX {
-        writeln!(out, "<li>{} more left out.</li>", record.notices.len() - NOTICES_MAX)?;
+    if trace.notices.len() > NOTICES_MAX {
+        writeln!(out, "<li>{} more left out.</li>", trace.notices.len() - NOTICES_MAX)?;
     }
     if summary.not_finite > 0 {
         let values = counted(summary.not_finite as usize, "value", "values");
-        writeln!(out, "<li>{values} in the record not finite, and therefore not drawn.</li>")?;
+        writeln!(out, "<li>{values} in the trace not finite, and therefore not drawn.</li>")?;
     }
     writeln!(out, "</ul>")
 }
@@ -216,7 +216,7 @@ fn views(summary: &Summary) -> Vec<View> {
 }
 
 fn path_section(
-    record: &RunRecord,
+    trace: &RunTrace,
     summary: &Summary,
     names: &[String; AXES],
     out: &mut impl Write,
@@ -234,7 +234,7 @@ fn path_section(
         let title = format!("Path, {} and {}", names[view.right], names[view.up]);
         let description = path::describe(summary, names, view);
         let caption = Caption { id: &format!("path{number}"), title: &title, description: &description };
-        let drawing = path::draw(record, summary, names, view, &caption)?;
+        let drawing = path::draw(trace, summary, names, view, &caption)?;
         let last = number + 1 == count;
         let words = if last {
             "Set path, coloured by feed in mm/s. Ring: start; square: end; cross: first fault."
@@ -247,17 +247,17 @@ fn path_section(
 }
 
 /// Where on the path faults were latched.
-fn faults_mm(record: &RunRecord) -> Vec<f64> {
-    let place = |fault: &FaultRecord| {
-        let index = record.ticks.partition_point(|tick| tick.tick < fault.tick);
-        record.ticks.get(index).map(|tick| tick.s_mm)
+fn faults_mm(trace: &RunTrace) -> Vec<f64> {
+    let place = |fault: &TracedFault| {
+        let index = trace.ticks.partition_point(|tick| tick.tick < fault.tick);
+        trace.ticks.get(index).map(|tick| tick.s_mm)
     };
-    record.faults.iter().filter_map(place).collect()
+    trace.faults.iter().filter_map(place).collect()
 }
 
-fn feed_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
-    let (top_mm_s, beyond) = feed::top(record, summary);
-    let reasons = feed::reasons(&record.blocks, top_mm_s);
+fn feed_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+    let (top_mm_s, beyond) = feed::top(trace, summary);
+    let reasons = feed::reasons(&trace.blocks, top_mm_s);
     let description = format!(
         "Feed over {} mm of path, at most {} mm/s, under ceilings: {}.",
         figure(summary.path_length_mm, 6),
@@ -270,10 +270,10 @@ fn feed_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> 
     legend.extend(
         reasons.iter().map(|reason| (palette::ceiling(reason, &reasons), format!("ceiling: {reason}"))),
     );
-    legend.extend(command_key(record));
-    legend.extend(fault_key(record));
+    legend.extend(command_key(trace));
+    legend.extend(fault_key(trace));
     let mut words = String::new();
-    if feed::has_line_numbers(record, summary) {
+    if feed::has_line_numbers(trace, summary) {
         words += LINE_NUMBERS;
     }
     if reasons.contains(&palette::NOT_REACHED) {
@@ -285,21 +285,21 @@ fn feed_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> 
             "Ceilings above {top} mm/s are out of reach and not drawn; the table of blocks has them. "
         );
     }
-    if record.commands.iter().any(|command| command.feed_override.is_some_and(|share| share > 1.0)) {
+    if trace.commands.iter().any(|command| command.feed_override.is_some_and(|share| share > 1.0)) {
         words += "Under an override above 100 % the feed may pass a programmed ceiling, and no other. ";
     }
-    if tables::full_stops(record) > STOPS_TOLD_APART {
+    if tables::full_stops(trace) > STOPS_TOLD_APART {
         words += "Where the curve fills an area, the feed falls to 0 and rises again more often than the picture resolves. ";
     }
-    if feed::is_crowded(record, summary) {
+    if feed::is_crowded(trace, summary) {
         words += "Where many blocks share a column, a band spans their ceilings; its lower edge is the lowest of them.";
     }
     writeln!(out, "<section><h2>Feed along the path</h2>")?;
-    figure_html(&feed::draw(record, summary, &caption)?, &legend, &words, out)?;
+    figure_html(&feed::draw(trace, summary, &caption)?, &legend, &words, out)?;
     writeln!(out, "</section>")
 }
 
-fn contour_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+fn contour_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
     if summary.contour_um.is_empty() {
         return Ok(());
     }
@@ -311,12 +311,12 @@ fn contour_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) 
     let caption =
         Caption { id: "contour", title: "Contour error over path length", description: &description };
     let mut words = "The part of the following error across the path. ".to_string();
-    if feed::has_line_numbers(record, summary) {
+    if feed::has_line_numbers(trace, summary) {
         words += LINE_NUMBERS;
     }
     writeln!(out, "<section><h2>Contour error along the path</h2>")?;
-    let drawing = contour::draw(record, summary, &faults_mm(record), &caption)?;
-    figure_html(&drawing, &fault_key(record), &words, out)?;
+    let drawing = contour::draw(trace, summary, &faults_mm(trace), &caption)?;
+    figure_html(&drawing, &fault_key(trace), &words, out)?;
     writeln!(out, "</section>")
 }
 
@@ -349,7 +349,7 @@ fn rests_key(summary: &Summary) -> String {
     }
 }
 
-fn time_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+fn time_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
     let description = format!(
         "Four curves over {}: feed up to {} mm/s, acceleration up to {} mm/s², jerk up to {} mm/s³, snap up to {} mm/s⁴.",
         duration(summary.executed_time_s),
@@ -364,27 +364,27 @@ fn time_section(record: &RunRecord, summary: &Summary, out: &mut impl Write) -> 
         description: &description,
     };
     let limits = [
-        ("acceleration", summary.accel_mm_s2, record.limits.accel_mm_s2, "mm/s²"),
-        ("jerk", summary.jerk_mm_s3, record.limits.jerk_mm_s3, "mm/s³"),
-        ("snap", summary.snap_mm_s4, record.limits.snap_mm_s4, "mm/s⁴"),
+        ("acceleration", summary.accel_mm_s2, trace.limits.accel_mm_s2, "mm/s²"),
+        ("jerk", summary.jerk_mm_s3, trace.limits.jerk_mm_s3, "mm/s³"),
+        ("snap", summary.snap_mm_s4, trace.limits.snap_mm_s4, "mm/s⁴"),
     ];
     let mut legend = Vec::new();
     if limits.iter().any(|(_, span, limit, _)| time::shows_limit(*span, *limit)) {
         legend.push((palette::LIMIT, "limit".to_string()));
     }
-    if !record.commands.is_empty() {
+    if !trace.commands.is_empty() {
         legend.push((palette::OVERRIDE, "feed override".to_string()));
     }
-    legend.extend(command_key(record));
-    legend.extend(fault_key(record));
+    legend.extend(command_key(trace));
+    legend.extend(fault_key(trace));
     let words = limits_beyond(limits.into_iter()) + &rests_key(summary);
     writeln!(out, "<section><h2>Motion along the path over time</h2>")?;
-    figure_html(&time::along_path(record, summary, &caption)?, &legend, &words, out)?;
+    figure_html(&time::along_path(trace, summary, &caption)?, &legend, &words, out)?;
     writeln!(out, "</section>")
 }
 
 fn axes_section(
-    record: &RunRecord,
+    trace: &RunTrace,
     summary: &Summary,
     names: &[String; AXES],
     out: &mut impl Write,
@@ -392,7 +392,7 @@ fn axes_section(
     writeln!(out, "<section><h2>Axes over time</h2>")?;
     for (axis, (name, figures)) in names.iter().zip(&summary.axes).enumerate() {
         // An axis that failed is of interest even if it was to stand still.
-        let failed = record.faults.iter().any(|fault| fault.axis.as_ref() == Some(&record.axis_names[axis]));
+        let failed = trace.faults.iter().any(|fault| fault.axis.as_ref() == Some(&trace.axis_names[axis]));
         if !figures.moved() && !failed {
             writeln!(
                 out,
@@ -411,13 +411,13 @@ fn axes_section(
             figure(figures.out_v.magnitude(), 3),
         );
         let caption = Caption { id: &format!("axis{axis}"), title: &title, description: &description };
-        let drawing = time::of_axis(record, summary, axis, &caption)?;
-        let limit_um = record.following_error_limit_um[axis];
+        let drawing = time::of_axis(trace, summary, axis, &caption)?;
+        let limit_um = trace.following_error_limit_um[axis];
         let mut legend = Vec::new();
         if time::shows_limit(figures.err_um, limit_um) {
             legend.push((palette::LIMIT, "limit".to_string()));
         }
-        legend.extend(fault_key(record));
+        legend.extend(fault_key(trace));
         let beyond = limits_beyond([("following error", figures.err_um, limit_um, "µm")].into_iter());
         writeln!(out, "<div class=\"axis\"><h3>{}</h3>", escape(name))?;
         figure_html(&drawing, &legend, &(beyond + &rests_key(summary)), out)?;
@@ -427,8 +427,8 @@ fn axes_section(
 }
 
 /// Legend of the commands' lines, where there are any.
-fn command_key(record: &RunRecord) -> Option<(Ink, String)> {
-    let number = record.commands.len();
+fn command_key(trace: &RunTrace) -> Option<(Ink, String)> {
+    let number = trace.commands.len();
     let words = if number > marks::COMMAND_MARKS_MAX {
         format!("command, the first {} of {number}", marks::COMMAND_MARKS_MAX)
     } else {
@@ -438,8 +438,8 @@ fn command_key(record: &RunRecord) -> Option<(Ink, String)> {
 }
 
 /// Legend of the fault lines, where there are any.
-fn fault_key(record: &RunRecord) -> Vec<(Ink, String)> {
-    if record.faults.is_empty() { Vec::new() } else { vec![(palette::FAULT, "fault latched".to_string())] }
+fn fault_key(trace: &RunTrace) -> Vec<(Ink, String)> {
+    if trace.faults.is_empty() { Vec::new() } else { vec![(palette::FAULT, "fault latched".to_string())] }
 }
 
 #[cfg(test)]

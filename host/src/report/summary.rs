@@ -1,6 +1,6 @@
 //! The figures of a run, from one pass over its ticks.
 
-use crate::record::{AXES, RunRecord, TickRecord};
+use crate::trace::{AXES, RunTrace, TraceRow};
 
 /// A path counts as finished when less than this is left of it \[mm\]. Far above rounding, far below any tolerance.
 const FINISHED_WITHIN_MM: f64 = 1e-3;
@@ -126,13 +126,13 @@ pub(super) struct Summary {
     pub(super) axes: [AxisSummary; AXES],
     /// Whether at some time the second and the third axis moved together without the first.
     pub(super) moved_beside_first: bool,
-    /// Values in the record that are not finite and can therefore not be shown.
+    /// Values in the trace that are not finite and can therefore not be shown.
     pub(super) not_finite: u64,
 }
 
 impl Summary {
-    /// Reads a record once.
-    pub(super) fn of(record: &RunRecord) -> Self {
+    /// Reads a trace once.
+    pub(super) fn of(trace: &RunTrace) -> Self {
         let mut path = [Span::default(); 4];
         let mut axes = [AxisSummary::default(); AXES];
         let mut squares = [(0.0, 0u64); AXES];
@@ -140,7 +140,7 @@ impl Summary {
         let mut contour_um = Span::default();
         let mut moved_beside_first = false;
         let mut not_finite = 0;
-        for tick in &record.ticks {
+        for tick in &trace.ticks {
             done_mm.add(tick.s_mm);
             contour_um.add(tick.contour_um);
             not_finite += u64::from(!tick.contour_um.is_finite());
@@ -165,23 +165,23 @@ impl Summary {
         for (axis, (sum, number)) in axes.iter_mut().zip(squares) {
             axis.err_um_rms = if number > 0 { (sum / number as f64).sqrt() } else { 0.0 };
         }
-        let path_length_mm = record.blocks.iter().map(|block| block.length_mm).sum();
+        let path_length_mm = trace.blocks.iter().map(|block| block.length_mm).sum();
         let path_done_mm = if done_mm.is_empty() { 0.0 } else { done_mm.high };
-        let outcome = if !record.faults.is_empty() {
+        let outcome = if !trace.faults.is_empty() {
             Outcome::Faulted
-        } else if record.ticks.is_empty() {
+        } else if trace.ticks.is_empty() {
             Outcome::Empty
         } else if path_done_mm < path_length_mm - FINISHED_WITHIN_MM {
             Outcome::Unfinished
         } else {
             Outcome::Done
         };
-        let instant = |tick: Option<&TickRecord>| tick.map_or(0.0, |tick| tick.tick as f64 * record.tick_s);
+        let instant = |tick: Option<&TraceRow>| tick.map_or(0.0, |tick| tick.tick as f64 * trace.tick_s);
         let [feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4] = path;
         Self {
             outcome,
-            time_s: (instant(record.ticks.first()), instant(record.ticks.last())),
-            executed_time_s: record.ticks.len() as f64 * record.tick_s,
+            time_s: (instant(trace.ticks.first()), instant(trace.ticks.last())),
+            executed_time_s: trace.ticks.len() as f64 * trace.tick_s,
             path_length_mm,
             path_done_mm,
             feed_mm_s,
@@ -189,7 +189,7 @@ impl Summary {
             jerk_mm_s3,
             snap_mm_s4,
             contour_um,
-            rests: rests(record),
+            rests: rests(trace),
             axes,
             moved_beside_first,
             not_finite,
@@ -198,13 +198,13 @@ impl Summary {
 }
 
 /// Dwells, program stops and holds: ticks that follow each other in one of these states.
-fn rests(record: &RunRecord) -> Vec<Rest> {
+fn rests(trace: &RunTrace) -> Vec<Rest> {
     let mut rests = Vec::new();
-    for ticks in record.ticks.chunk_by(|a, b| a.state == b.state) {
+    for ticks in trace.ticks.chunk_by(|a, b| a.state == b.state) {
         let [first, ..] = ticks else { continue };
         if ["dwell", "stopped", "held"].contains(&first.state) {
-            let from_s = first.tick as f64 * record.tick_s;
-            let to_s = from_s + ticks.len() as f64 * record.tick_s;
+            let from_s = first.tick as f64 * trace.tick_s;
+            let to_s = from_s + ticks.len() as f64 * trace.tick_s;
             rests.push(Rest { state: first.state, from_s, to_s });
         }
     }
@@ -212,6 +212,6 @@ fn rests(record: &RunRecord) -> Vec<Rest> {
 }
 
 /// Feed and its three derivatives.
-fn along_path(tick: &TickRecord) -> [f64; 4] {
+fn along_path(tick: &TraceRow) -> [f64; 4] {
     [tick.v_mm_s, tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4]
 }

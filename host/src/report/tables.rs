@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::format::{count, counted, duration, escape, figure, fixed, share};
 use super::plots::marks;
 use super::summary::{Span, Summary};
-use crate::record::{AXES, RunRecord};
+use crate::trace::{AXES, RunTrace};
 
 /// Rows of a table on the page; the rest is in the trace file.
 pub(super) const ROWS_MAX: usize = 200;
@@ -54,12 +54,12 @@ fn wrapped(name: &str, head: &[&str], body: &str) -> String {
 }
 
 /// Blocks at whose end the machine stands.
-pub(super) fn full_stops(record: &RunRecord) -> usize {
-    record.blocks.iter().filter(|block| block.exit_mm_s <= 0.0).count()
+pub(super) fn full_stops(trace: &RunTrace) -> usize {
+    trace.blocks.iter().filter(|block| block.exit_mm_s <= 0.0).count()
 }
 
 /// Figures of the whole run, as terms and values.
-pub(super) fn key_figures(record: &RunRecord, summary: &Summary) -> String {
+pub(super) fn key_figures(trace: &RunTrace, summary: &Summary) -> String {
     let feed = summary.feed_mm_s.magnitude();
     let path = if summary.path_done_mm < summary.path_length_mm - 1e-3 {
         format!("{} of {} mm", figure(summary.path_done_mm, 6), figure(summary.path_length_mm, 6))
@@ -72,7 +72,7 @@ pub(super) fn key_figures(record: &RunRecord, summary: &Summary) -> String {
         let share = share.map_or(String::new(), |share| format!("<small>{share} of the limit</small>"));
         format!("{} {unit}{share}", figure(span.magnitude(), 4))
     };
-    let limits = &record.limits;
+    let limits = &trace.limits;
     let mut rows = vec![
         ("Path length", path),
         (
@@ -80,16 +80,16 @@ pub(super) fn key_figures(record: &RunRecord, summary: &Summary) -> String {
             format!(
                 "{}<small>planned {}</small>",
                 duration(summary.executed_time_s),
-                duration(record.planned_time_s)
+                duration(trace.planned_time_s)
             ),
         ),
-        ("Ticks", format!("{} of {} ms", count(record.ticks.len() as u64), figure(record.tick_s * 1e3, 4))),
+        ("Ticks", format!("{} of {} ms", count(trace.ticks.len() as u64), figure(trace.tick_s * 1e3, 4))),
         (
             "Blocks",
             format!(
                 "{}<small>{}</small>",
-                count(record.blocks.len() as u64),
-                counted(full_stops(record), "full stop", "full stops")
+                count(trace.blocks.len() as u64),
+                counted(full_stops(trace), "full stop", "full stops")
             ),
         ),
         ("Highest feed", format!("{} mm/s<small>{} mm/min</small>", figure(feed, 4), figure(feed * 60.0, 4))),
@@ -115,9 +115,9 @@ pub(super) fn key_figures(record: &RunRecord, summary: &Summary) -> String {
 }
 
 /// A row per axis.
-pub(super) fn axes(record: &RunRecord, summary: &Summary, names: &[String; AXES]) -> String {
+pub(super) fn axes(trace: &RunTrace, summary: &Summary, names: &[String; AXES]) -> String {
     let mut body = String::new();
-    for ((axis, name), end) in summary.axes.iter().zip(names).zip(record.end_error_counts) {
+    for ((axis, name), end) in summary.axes.iter().zip(names).zip(trace.end_error_counts) {
         let _ = writeln!(
             body,
             "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
@@ -148,35 +148,35 @@ pub(super) fn axes(record: &RunRecord, summary: &Summary, names: &[String; AXES]
 }
 
 /// A row per fault; nothing if there was none.
-pub(super) fn faults(record: &RunRecord) -> String {
-    if record.faults.is_empty() {
+pub(super) fn faults(trace: &RunTrace) -> String {
+    if trace.faults.is_empty() {
         return String::new();
     }
     let mut body = String::new();
-    for fault in record.faults.iter().take(ROWS_MAX) {
+    for fault in trace.faults.iter().take(ROWS_MAX) {
         let _ = writeln!(
             body,
             "<tr><td>{}</td><td>{:.4}</td><td class=\"word\">{}</td><td class=\"word\">{}</td><td class=\"word long\">{}</td></tr>",
             fault.tick,
-            fault.tick as f64 * record.tick_s,
+            fault.tick as f64 * trace.tick_s,
             fault.axis.as_deref().map_or("–".to_string(), escape),
             escape(&fault.fault),
             escape(&fault.detail),
         );
     }
-    let left_out = LeftOut::of(record.faults.len()).map_or(String::new(), LeftOut::remark);
+    let left_out = LeftOut::of(trace.faults.len()).map_or(String::new(), LeftOut::remark);
     let mut table = String::from("<h2>Faults</h2>\n");
     table.push_str(&wrapped("Faults", &["Tick", "Time [s]", "*Axis", "*Fault", "*Detail"], &body));
     table + &left_out
 }
 
 /// A row per command; nothing if there was none.
-pub(super) fn commands(record: &RunRecord) -> String {
-    if record.commands.is_empty() {
+pub(super) fn commands(trace: &RunTrace) -> String {
+    if trace.commands.is_empty() {
         return String::new();
     }
     let mut body = String::new();
-    for command in record.commands.iter().take(ROWS_MAX) {
+    for command in trace.commands.iter().take(ROWS_MAX) {
         let stop = command.stop.as_ref().map_or_else(
             || "<td>–</td>".repeat(3),
             |stop| {
@@ -188,12 +188,12 @@ pub(super) fn commands(record: &RunRecord) -> String {
             body,
             "<tr><td>{}</td><td>{:.4}</td><td class=\"word\">{}</td><td>{}</td>{stop}</tr>",
             command.tick,
-            command.tick as f64 * record.tick_s,
+            command.tick as f64 * trace.tick_s,
             escape(&marks::word(command)),
             fixed(command.s_mm, 3),
         );
     }
-    let left_out = LeftOut::of(record.commands.len()).map_or(String::new(), LeftOut::remark);
+    let left_out = LeftOut::of(trace.commands.len()).map_or(String::new(), LeftOut::remark);
     let head = [
         "Before tick",
         "Time [s]",
@@ -209,9 +209,9 @@ pub(super) fn commands(record: &RunRecord) -> String {
 }
 
 /// A row per block.
-pub(super) fn blocks(record: &RunRecord) -> String {
+pub(super) fn blocks(trace: &RunTrace) -> String {
     let mut body = String::new();
-    for block in record.blocks.iter().take(ROWS_MAX) {
+    for block in trace.blocks.iter().take(ROWS_MAX) {
         let _ = writeln!(
             body,
             "<tr><th scope=\"row\">{}</th><td class=\"word\">{}</td><td>{}</td><td>{}</td><td class=\"word\">{}</td>\
@@ -239,10 +239,10 @@ pub(super) fn blocks(record: &RunRecord) -> String {
         "Time [ms]",
     ];
     let table = wrapped("Blocks", &head, &body);
-    let left_out = LeftOut::of(record.blocks.len()).map_or(String::new(), LeftOut::remark);
+    let left_out = LeftOut::of(trace.blocks.len()).map_or(String::new(), LeftOut::remark);
     format!(
         "<p>{} in path order; line: the line of the program.</p>\n{table}{left_out}",
-        counted(record.blocks.len(), "block", "blocks")
+        counted(trace.blocks.len(), "block", "blocks")
     )
 }
 

@@ -1,7 +1,7 @@
 //! The page as a whole, on made-up runs.
 
 use super::*;
-use crate::record::{AxisTick, BlockRecord, CommandRecord, PathLimits, StopRecord, TickRecord};
+use crate::trace::{AxisTick, PathLimits, TraceRow, TracedBlock, TracedCommand, TracedStop};
 
 /// Ramps and cruises of the sample: duration \[s\], feed at both ends \[mm/s\]. A ramp is a raised cosine in
 /// acceleration.
@@ -50,8 +50,8 @@ fn feed_at(mut time_s: f64) -> [f64; 4] {
 }
 
 /// The five-block path in ticks of `tick_s`, Z dipping if `with_z`.
-fn sample(tick_s: f64, with_z: bool) -> RunRecord {
-    let mut record = RunRecord {
+fn sample(tick_s: f64, with_z: bool) -> RunTrace {
+    let mut trace = RunTrace {
         program: "flange.ngc".to_string(),
         machine: "reference machine".to_string(),
         tick_s,
@@ -60,12 +60,12 @@ fn sample(tick_s: f64, with_z: bool) -> RunRecord {
         following_error_limit_um: [1000.0; AXES],
         end_error_counts: [0, -3, 1],
         planned_time_s: FEED.iter().map(|ramp| ramp.0).sum(),
-        ..RunRecord::default()
+        ..RunTrace::default()
     };
     let mut start_mm = 0.0;
     for (line, kind, length_mm, _, cap_mm_s, cap_reason, [enter_mm_s, peak_mm_s, exit_mm_s], time_s) in BLOCKS
     {
-        record.blocks.push(BlockRecord {
+        trace.blocks.push(TracedBlock {
             line,
             kind: kind.into(),
             start_mm,
@@ -79,12 +79,12 @@ fn sample(tick_s: f64, with_z: bool) -> RunRecord {
         });
         start_mm += length_mm;
     }
-    let ticks = (record.planned_time_s / tick_s).ceil() as u64 + 1;
+    let ticks = (trace.planned_time_s / tick_s).ceil() as u64 + 1;
     let (mut s, mut heading, mut x, mut y) = (0.0f64, 0.0f64, 0.0, 0.0);
     let mut seed = 1u32;
     for tick in 0..ticks {
         let [v, a, j, snap] = feed_at(tick as f64 * tick_s);
-        let index = record.blocks.iter().rposition(|block| s >= block.start_mm).unwrap_or(0);
+        let index = trace.blocks.iter().rposition(|block| s >= block.start_mm).unwrap_or(0);
         let mut axes = [AxisTick::default(); AXES];
         let z = if with_z { -4.0 * (s / start_mm * std::f64::consts::PI).sin() } else { 0.0 };
         for (axis, (set, along)) in axes.iter_mut().zip([(x, heading.cos()), (y, heading.sin()), (z, 0.0)]) {
@@ -97,7 +97,7 @@ fn sample(tick_s: f64, with_z: bool) -> RunRecord {
             axis.out_v = v * along / 10.0 + 0.01 * noise;
         }
         let state = if tick + 1 == ticks { "idle" } else { "moving" };
-        record.ticks.push(TickRecord {
+        trace.ticks.push(TraceRow {
             tick,
             s_mm: if tick + 1 == ticks { start_mm } else { s.min(start_mm) },
             v_mm_s: v,
@@ -105,7 +105,7 @@ fn sample(tick_s: f64, with_z: bool) -> RunRecord {
             j_mm_s3: j,
             snap_mm_s4: snap,
             state,
-            line: record.blocks[index].line,
+            line: trace.blocks[index].line,
             contour_um: 0.5 * axes[1].err_um.abs(),
             axes,
         });
@@ -113,12 +113,12 @@ fn sample(tick_s: f64, with_z: bool) -> RunRecord {
         heading += BLOCKS[index].3 * step;
         (x, y, s) = (x + heading.cos() * step, y + heading.sin() * step, s + step);
     }
-    record
+    trace
 }
 
-fn page(record: &RunRecord) -> String {
+fn page(trace: &RunTrace) -> String {
     let mut out = Vec::new();
-    write_html(record, &mut out).expect("writing to memory");
+    write_html(trace, &mut out).expect("writing to memory");
     let page = String::from_utf8(out).expect("UTF-8");
     assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
     for forbidden in ["NaN", "inf\"", ",inf", "<script", "http-equiv", "src=", "href="] {
@@ -153,9 +153,9 @@ fn a_whole_run_makes_every_section() {
 
 #[test]
 fn limits_are_drawn_where_they_fit_and_named_where_not() {
-    let mut record = sample(1e-3, true);
-    let summary = Summary::of(&record);
-    let whole = page(&record);
+    let mut trace = sample(1e-3, true);
+    let summary = Summary::of(&trace);
+    let whole = page(&trace);
     assert!(whole.contains(&format!(
         "{} mm/s²<small>{} of the limit</small>",
         figure(summary.accel_mm_s2.magnitude(), 4),
@@ -170,68 +170,68 @@ fn limits_are_drawn_where_they_fit_and_named_where_not() {
     // Both directions of three curves on two sheets, and the legend.
     assert_eq!(lines(&whole), 2 * 3 * 2 + 1);
     assert!(whole.contains("of its limit, 1000 µm, which is not drawn"));
-    record.limits.snap_mm_s4 = 4e7;
-    let flat = page(&record);
+    trace.limits.snap_mm_s4 = 4e7;
+    let flat = page(&trace);
     assert_eq!(lines(&flat), 2 * 2 * 2 + 1);
     assert!(flat.contains("The snap stays within"));
-    record.limits = PathLimits::default();
-    let unlimited = page(&record);
+    trace.limits = PathLimits::default();
+    let unlimited = page(&trace);
     assert!(lines(&unlimited) == 0 && !unlimited.contains("of the limit<"));
 }
 
 #[test]
 fn rests_are_shaded_and_timed() {
-    let mut record = sample(1e-3, false);
-    assert!(!page(&record).contains("Shaded"));
-    for tick in &mut record.ticks[500..750] {
+    let mut trace = sample(1e-3, false);
+    assert!(!page(&trace).contains("Shaded"));
+    for tick in &mut trace.ticks[500..750] {
         tick.state = "dwell";
     }
-    let dwelt = page(&record);
+    let dwelt = page(&trace);
     assert!(dwelt.contains("Shaded: dwells.") && dwelt.contains("250 ms<small>1 dwell</small>"));
     // Four panels along the path, two for each of two axes, on two sheets.
     let shade = format!("fill=\"{}\"", palette::REST.hex());
     let in_style = palette::style_sheet().matches(&shade).count();
     assert_eq!(dwelt.matches(&shade).count() - in_style, 2 * (4 + 2 + 2));
-    record.ticks[900].state = "stopped";
-    assert!(page(&record).contains("Shaded: dwells and program stops."));
+    trace.ticks[900].state = "stopped";
+    assert!(page(&trace).contains("Shaded: dwells and program stops."));
 }
 
 #[test]
 fn contour_error_is_drawn_and_its_peak_named() {
-    let mut record = sample(1e-3, false);
-    record.ticks[300].contour_um = 12.5;
-    let page = page(&record);
+    let mut trace = sample(1e-3, false);
+    trace.ticks[300].contour_um = 12.5;
+    let page = page(&trace);
     assert!(page.contains("<dt>Highest contour error</dt><dd>12.5 µm</dd>"));
     assert!(page.contains("id=\"contour-narrow-t\"") && page.contains("Contour error along the path"));
 }
 
 #[test]
 fn views_and_axis_plots_follow_what_moved() {
-    let planes = |record: &RunRecord| {
-        let views = views(&Summary::of(record));
+    let planes = |trace: &RunTrace| {
+        let views = views(&Summary::of(trace));
         views.iter().map(|view| (view.right, view.up)).collect::<Vec<_>>()
     };
-    let mut record = sample(1e-2, true);
-    assert_eq!(planes(&record), [(0, 1), (0, 2)]);
-    (record.ticks[50].axes[0].vel_mm_s, record.ticks[50].axes[1].vel_mm_s) = (0.0, 30.0);
-    record.ticks[50].axes[2].vel_mm_s = 30.0;
-    assert_eq!(planes(&record), [(0, 1), (0, 2), (1, 2)]);
-    record.ticks.iter_mut().for_each(|tick| tick.axes[0].set_mm = 7.0);
-    assert_eq!(planes(&record), [(1, 2)]);
+    let mut trace = sample(1e-2, true);
+    assert_eq!(planes(&trace), [(0, 1), (0, 2)]);
+    (trace.ticks[50].axes[0].vel_mm_s, trace.ticks[50].axes[1].vel_mm_s) = (0.0, 30.0);
+    trace.ticks[50].axes[2].vel_mm_s = 30.0;
+    assert_eq!(planes(&trace), [(0, 1), (0, 2), (1, 2)]);
+    trace.ticks.iter_mut().for_each(|tick| tick.axes[0].set_mm = 7.0);
+    assert_eq!(planes(&trace), [(1, 2)]);
     // Without a motion there is nothing to plot, unless the axis failed.
-    assert!(page(&record).contains("X was not moved") && !page(&record).contains("id=\"axis0-wide-t\""));
-    record.faults.push(FaultRecord {
+    assert!(page(&trace).contains("X was not moved") && !page(&trace).contains("id=\"axis0-wide-t\""));
+    trace.faults.push(TracedFault {
         tick: 20,
         axis: Some("X".to_string()),
         fault: "following error".to_string(),
         detail: String::new(),
     });
-    assert!(page(&record).contains("id=\"axis0-wide-t\""));
+    assert!(page(&trace).contains("id=\"axis0-wide-t\""));
 }
 
 #[test]
 fn empty_and_one_tick_records_make_a_page() {
-    assert!(page(&RunRecord::default()).contains("Nothing was run"));
+    assert!(page(&RunTrace::default()).contains("Nothing was run"));
     let mut one = sample(1e-3, false);
     one.ticks.truncate(1);
     assert!(page(&one).contains("Not finished"));
@@ -241,33 +241,33 @@ fn empty_and_one_tick_records_make_a_page() {
 
 #[test]
 fn text_from_the_program_cannot_become_markup() {
-    let mut record = sample(1e-2, false);
+    let mut trace = sample(1e-2, false);
     let hostile = "<script>alert('x')</script>&\"";
-    record.program = hostile.to_string();
-    record.machine = hostile.to_string();
-    record.notices = vec![hostile.to_string()];
-    record.axis_names = [hostile, "", "Z"].map(String::from);
-    record.faults.push(FaultRecord {
+    trace.program = hostile.to_string();
+    trace.machine = hostile.to_string();
+    trace.notices = vec![hostile.to_string()];
+    trace.axis_names = [hostile, "", "Z"].map(String::from);
+    trace.faults.push(TracedFault {
         tick: 20,
         axis: Some(hostile.to_string()),
         fault: hostile.to_string(),
         detail: hostile.to_string(),
     });
-    let page = page(&record);
+    let page = page(&trace);
     assert!(page.contains("&lt;script&gt;") && page.contains("axis 2"));
 }
 
 #[test]
 fn faults_are_named_first_and_marked_in_the_plots() {
-    let mut record = sample(1e-3, false);
-    record.ticks.truncate(900);
-    record.faults.push(FaultRecord {
+    let mut trace = sample(1e-3, false);
+    trace.ticks.truncate(900);
+    trace.faults.push(TracedFault {
         tick: 850,
         axis: Some("Y".to_string()),
         fault: "following-error".to_string(),
         detail: "512.3 µm, limit 500 µm".to_string(),
     });
-    let page = page(&record);
+    let page = page(&trace);
     assert!(
         page.contains("<strong>Ended in a fault:</strong> following-error on axis Y at 0.8500 s (512.3 µm")
     );
@@ -278,46 +278,46 @@ fn faults_are_named_first_and_marked_in_the_plots() {
 
 #[test]
 fn values_that_are_not_finite_are_reported_and_not_drawn() {
-    let mut record = sample(1e-3, false);
-    record.ticks[100].v_mm_s = f64::NAN;
-    record.ticks[200].axes[0].err_um = f64::INFINITY;
-    record.ticks[300].axes[1].set_mm = f64::NEG_INFINITY;
-    record.ticks[400].s_mm = f64::NAN;
-    record.blocks[2].cap_mm_s = f64::INFINITY;
-    assert!(page(&record).contains("3 values in the record not finite"));
-    for tick in &mut record.ticks {
+    let mut trace = sample(1e-3, false);
+    trace.ticks[100].v_mm_s = f64::NAN;
+    trace.ticks[200].axes[0].err_um = f64::INFINITY;
+    trace.ticks[300].axes[1].set_mm = f64::NEG_INFINITY;
+    trace.ticks[400].s_mm = f64::NAN;
+    trace.blocks[2].cap_mm_s = f64::INFINITY;
+    assert!(page(&trace).contains("3 values in the trace not finite"));
+    for tick in &mut trace.ticks {
         tick.v_mm_s = f64::NAN;
         tick.axes =
             [AxisTick { set_mm: f64::NAN, err_um: f64::NAN, out_v: f64::NAN, ..AxisTick::default() }; AXES];
     }
-    page(&record);
+    page(&trace);
 }
 
 /// The sample cut into `number` blocks of one length, so that many share a column of the plot.
-fn chopped(mut record: RunRecord, number: u32) -> RunRecord {
-    let length_mm = record.blocks.iter().map(|block| block.length_mm).sum::<f64>() / f64::from(number);
-    let pattern = std::mem::take(&mut record.blocks);
-    let block = |(line, block): (u32, &BlockRecord)| BlockRecord {
+fn chopped(mut trace: RunTrace, number: u32) -> RunTrace {
+    let length_mm = trace.blocks.iter().map(|block| block.length_mm).sum::<f64>() / f64::from(number);
+    let pattern = std::mem::take(&mut trace.blocks);
+    let block = |(line, block): (u32, &TracedBlock)| TracedBlock {
         line,
         start_mm: f64::from(line) * length_mm,
         length_mm,
         ..block.clone()
     };
-    record.blocks = (0..number).zip(pattern.iter().cycle()).map(block).collect();
-    record
+    trace.blocks = (0..number).zip(pattern.iter().cycle()).map(block).collect();
+    trace
 }
 
 #[test]
 fn the_largest_run_stays_small_and_keeps_its_peak() {
-    let mut record = chopped(sample(2.05e-6, true), 20_000);
-    assert!(record.ticks.len() > 1_000_000);
+    let mut trace = chopped(sample(2.05e-6, true), 20_000);
+    assert!(trace.ticks.len() > 1_000_000);
     // The worst case for the size: nothing is smooth, neither in time nor on the path.
     let mut seed = 7u32;
     let mut noise = || {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         f64::from(seed >> 8) / f64::from(1u32 << 24) - 0.5
     };
-    for tick in &mut record.ticks {
+    for tick in &mut trace.ticks {
         tick.v_mm_s = 40.0 + 80.0 * noise();
         (tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4) = (500.0 * noise(), 5e3 * noise(), 4e5 * noise());
         for axis in &mut tick.axes {
@@ -326,8 +326,8 @@ fn the_largest_run_stays_small_and_keeps_its_peak() {
             axis.out_v = 20.0 * noise();
         }
     }
-    record.ticks[777_777].axes[0].err_um = 40.0;
-    let page = page(&record);
+    trace.ticks[777_777].axes[0].err_um = 40.0;
+    let page = page(&trace);
     assert!(page.len() < 1_500_000, "{} bytes", page.len());
     assert!(page.contains("19\u{202f}800 of 20\u{202f}000 rows left out"));
     // The lone peak is the highest point of its curve and lies just below the top of its axes.
@@ -350,42 +350,42 @@ fn sample_pages() {
     faulted.notices =
         vec!["N15: M3 S12000 accepted, not acted on".to_string(), "N5: G64 read as exact path".to_string()];
     faulted.ticks.truncate(5000);
-    faulted.faults.push(FaultRecord {
+    faulted.faults.push(TracedFault {
         tick: 4990,
         axis: Some("Y".to_string()),
         fault: "following-error".to_string(),
         detail: "512.3 µm, limit 500 µm".to_string(),
     });
     let dense = chopped(sample(1e-4, false), 3_000);
-    for (name, record) in
+    for (name, trace) in
         [("report", sample(2.5e-4, true)), ("report-faulted", faulted), ("report-dense", dense)]
     {
         let path = std::env::temp_dir().join(name).with_extension("html");
-        std::fs::write(path, page(&record)).expect("temporary file");
+        std::fs::write(path, page(&trace)).expect("temporary file");
     }
 }
 
 #[test]
 fn commands_are_marked_and_listed() {
-    let mut record = sample(1e-3, false);
-    assert!(!page(&record).contains("Feed override") && !page(&record).contains("<h2>Commands"));
-    let command = |tick, command: &str, feed_override, stop| CommandRecord {
+    let mut trace = sample(1e-3, false);
+    assert!(!page(&trace).contains("Feed override") && !page(&trace).contains("<h2>Commands"));
+    let command = |tick, command: &str, feed_override, stop| TracedCommand {
         tick,
         command: command.to_string(),
         feed_override,
         s_mm: 12.5,
         stop,
     };
-    let stop = StopRecord { tick: 700, time_s: 0.1234, length_mm: 3.25 };
-    record.commands = vec![
+    let stop = TracedStop { tick: 700, time_s: 0.1234, length_mm: 3.25 };
+    trace.commands = vec![
         command(300, "override=0.5", Some(0.5), None),
         command(577, "hold", None, Some(stop)),
         command(900, "resume", None, None),
         command(1000, "override=1.333", Some(1.333), None),
         command(1500, "<b>abort", None, None),
     ];
-    record.ticks[750].state = "held";
-    let whole = page(&record);
+    trace.ticks[750].state = "held";
+    let whole = page(&trace);
     for part in [
         "<h2>Commands</h2>",
         "Feed override [%]",
@@ -403,14 +403,14 @@ fn commands_are_marked_and_listed() {
     // On the feed plot and on the override's, each for two widths.
     assert_eq!(whole.matches("\nhold\n").count(), 4);
     assert_eq!(whole.matches("\nfault\n").count(), 0);
-    record.faults =
-        vec![FaultRecord { tick: 1600, axis: None, fault: "output".to_string(), detail: String::new() }];
+    trace.faults =
+        vec![TracedFault { tick: 1600, axis: None, fault: "output".to_string(), detail: String::new() }];
     // And on the path's, which says so with its own mark.
-    assert_eq!(page(&record).matches("\nfault\n").count(), 4 + 2);
+    assert_eq!(page(&trace).matches("\nfault\n").count(), 4 + 2);
 
     // Ten thousand of them are counted, and do not hide the curve.
-    record.commands = (0..10_000).map(|tick| command(tick / 6, "override=0.9", Some(0.9), None)).collect();
-    let crowd = page(&record);
+    trace.commands = (0..10_000).map(|tick| command(tick / 6, "override=0.9", Some(0.9), None)).collect();
+    let crowd = page(&trace);
     assert!(crowd.contains("command, the first 60 of 10"));
     assert!(crowd.len() < 3 * whole.len(), "{} {}", crowd.len(), whole.len());
 }

@@ -3,7 +3,7 @@
 use core::convert::Infallible;
 
 use motion_kernel::exec::ExecState;
-use motion_kernel::live::{Director, State};
+use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::path::Travel;
 use motion_kernel::program::{Item, Supply, SupplyError};
@@ -11,7 +11,7 @@ use motion_kernel::queue::{Feeder, Intake, LiveFeeder, LiveStreams, PathRules, S
 use motion_kernel::units::Position;
 
 use super::live::{Command, Script};
-use crate::record::AXES;
+use crate::trace::AXES;
 
 /// Capacities of the two streams, as a board has them.
 const PIECES: usize = 64;
@@ -36,7 +36,7 @@ pub(super) enum Background<'a, R: Real, I> {
 /// Under live control.
 pub(super) struct Live<'a, R: Real, I> {
     feeder: LiveFeeder<'a, R, AXES>,
-    director: Director<R, AXES, I, Infallible, PLACES>,
+    control: LiveControl<R, AXES, I, Infallible, PLACES>,
     script: &'a Script,
     /// Commands given so far.
     given: usize,
@@ -68,7 +68,7 @@ impl<'script, R: Real> Storage<'script, R> {
             Self::Live(streams, script) => {
                 let (mut feeder, intake) = streams.split(rules, start);
                 feeder.bound(travel);
-                let live = Live { feeder, director: Director::new(items, tick_s, 0), script, given: 0 };
+                let live = Live { feeder, control: LiveControl::new(items, tick_s, 0), script, given: 0 };
                 (Background::Live(Box::new(live)), intake)
             }
         }
@@ -77,30 +77,30 @@ impl<'script, R: Real> Storage<'script, R> {
 
 impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_, R, I> {
     /// Before a tick.
-    pub(super) fn turn(&mut self, tick: u64) -> Result<(), SupplyError<Infallible>> {
+    pub(super) fn poll(&mut self, tick: u64) -> Result<(), SupplyError<Infallible>> {
         match self {
             Self::Plain(plain) => {
                 let (feeder, supply) = &mut **plain;
                 supply.fill(feeder)
             }
             Self::Live(live) => {
-                let Live { feeder, director, script, given } = &mut **live;
+                let Live { feeder, control, script, given } = &mut **live;
                 while let Some(timed) = script.commands().get(*given)
                     && timed.tick <= tick
                 {
                     match timed.command {
-                        Command::Hold => director.hold(),
-                        Command::Resume => director.resume(),
-                        Command::Abort => director.abort(),
+                        Command::Hold => control.hold(),
+                        Command::Resume => control.resume(),
+                        Command::Abort => control.abort(),
                         // A script holds none beyond the range.
-                        Command::Override(share) => director.set_override(share).unwrap_or_default(),
-                        Command::SingleBlock(is_single) => director.set_single_block(is_single),
+                        Command::Override(share) => control.set_override(share).unwrap_or_default(),
+                        Command::SingleBlock(is_single) => control.set_single_block(is_single),
                     }
                     *given += 1;
                     // Each by itself, as if time passed between them.
-                    director.turn(feeder)?;
+                    control.poll(feeder)?;
                 }
-                director.turn(feeder)
+                control.poll(feeder)
             }
         }
     }
@@ -112,11 +112,11 @@ impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_,
             Self::Plain(plain) => (plain.1.is_empty() && state == ExecState::Idle).then_some(None),
             Self::Live(live) => {
                 let is_last = live.given == live.script.commands().len();
-                match live.director.state(&live.feeder) {
+                match live.control.state(&live.feeder) {
                     State::Done if state == ExecState::Idle => Some(None),
                     State::Aborted => Some(Some("aborted: the rest of the program was given up")),
                     State::Held if is_last => Some(Some("held to the end of the script, and not resumed")),
-                    State::Running if is_last && live.director.is_stopped_by_override(&live.feeder) => {
+                    State::Running if is_last && live.control.is_stopped_by_override(&live.feeder) => {
                         Some(Some("at rest under an override of 0 to the end of the script"))
                     }
                     _ => None,
@@ -129,7 +129,7 @@ impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_,
     pub(super) fn starvations(&self) -> u32 {
         match self {
             Self::Plain(_) => 0,
-            Self::Live(live) => live.director.starvations(),
+            Self::Live(live) => live.control.starvations(),
         }
     }
 }

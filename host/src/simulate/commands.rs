@@ -1,16 +1,16 @@
 //! What became of the commands of a run.
 //!
-//! Consumes a script and the executed ticks; produces a [`CommandRecord`] for each command that was given, with the rest
+//! Consumes a script and the executed ticks; produces a [`TracedCommand`] for each command that was given, with the rest
 //! that it led to.
 
 use super::live::{Command, Script, Timed};
-use crate::record::{CommandRecord, StopRecord, TickRecord};
+use crate::trace::{TraceRow, TracedCommand, TracedStop};
 
 /// Follows the ticks.
 #[derive(Debug, Default)]
 pub(super) struct Commands<'run> {
     ahead: &'run [Timed],
-    records: Vec<CommandRecord>,
+    records: Vec<TracedCommand>,
     /// Commands that wait for a rest, with their index in the records.
     waiting: Vec<(usize, Command)>,
     /// The rest under way: its first tick, and where.
@@ -25,7 +25,7 @@ impl<'run> Commands<'run> {
         Self { ahead: script.map_or(&[], Script::commands), tick_s, ..Self::default() }
     }
 
-    pub(super) fn add(&mut self, tick: &TickRecord) {
+    pub(super) fn add(&mut self, tick: &TraceRow) {
         while let [next, ahead @ ..] = self.ahead
             && next.tick <= tick.tick
         {
@@ -50,7 +50,7 @@ impl<'run> Commands<'run> {
             _ => None,
         };
         let (_, s_mm) = self.latest;
-        self.records.push(CommandRecord {
+        self.records.push(TracedCommand {
             tick,
             command: command.to_string(),
             feed_override,
@@ -63,16 +63,16 @@ impl<'run> Commands<'run> {
     fn settle(&mut self, is_ended: impl Fn(Command) -> bool) {
         let Self { rest, records, tick_s, .. } = self;
         self.waiting.retain(|&(index, command)| {
-            let record = &mut records[index];
+            let trace = &mut records[index];
             if is_ended(command)
                 && let Some((tick, s_mm)) = *rest
             {
                 // At rest before it was given: no time.
-                let ticks = (tick + 1).saturating_sub(record.tick);
-                record.stop = Some(StopRecord {
-                    tick: tick.max(record.tick),
+                let ticks = (tick + 1).saturating_sub(trace.tick);
+                trace.stop = Some(TracedStop {
+                    tick: tick.max(trace.tick),
                     time_s: ticks as f64 * *tick_s,
-                    length_mm: (s_mm - record.s_mm).max(0.0),
+                    length_mm: (s_mm - trace.s_mm).max(0.0),
                 });
             }
             !is_ended(command)
@@ -80,7 +80,7 @@ impl<'run> Commands<'run> {
     }
 
     /// Of all commands that were given.
-    pub(super) fn finish(mut self) -> Vec<CommandRecord> {
+    pub(super) fn finish(mut self) -> Vec<TracedCommand> {
         self.settle(|_| true);
         self.records
     }
@@ -108,16 +108,16 @@ fn is_ended_by(waiting: Command, command: Command) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{AXES, AxisTick};
+    use crate::trace::{AXES, AxisTick};
 
     /// Ticks of 1 ms with these feeds; the path grows by a hundredth of the feed.
-    fn records(script: &str, feeds_mm_s: &[f64]) -> Vec<CommandRecord> {
+    fn records(script: &str, feeds_mm_s: &[f64]) -> Vec<TracedCommand> {
         let script: Script = script.parse().expect("a script");
         let mut commands = Commands::new(Some(&script), 1e-3);
         let mut s_mm = 0.0;
         for (tick, &v_mm_s) in feeds_mm_s.iter().enumerate() {
             s_mm += 0.01 * v_mm_s;
-            commands.add(&TickRecord {
+            commands.add(&TraceRow {
                 tick: tick as u64,
                 s_mm,
                 v_mm_s,
@@ -133,11 +133,11 @@ mod tests {
         commands.finish()
     }
 
-    fn stops(records: &[CommandRecord]) -> Vec<Option<(u64, u32, f64)>> {
-        let stop = |stop: &StopRecord| {
+    fn stops(records: &[TracedCommand]) -> Vec<Option<(u64, u32, f64)>> {
+        let stop = |stop: &TracedStop| {
             (stop.tick, (stop.time_s * 1e3).round() as u32, (stop.length_mm * 1e6).round() / 1e6)
         };
-        records.iter().map(|record| record.stop.as_ref().map(stop)).collect()
+        records.iter().map(|trace| trace.stop.as_ref().map(stop)).collect()
     }
 
     #[test]
@@ -159,7 +159,7 @@ mod tests {
         let feeds = [10.0, 10.0, 10.0, 0.0, 0.0, 0.0];
         let found = records("1:hold,2:override=0.5,5:resume", &feeds);
         assert_eq!(stops(&found), [Some((3, 3, 0.2)), None, None]);
-        let shares: Vec<_> = found.iter().map(|record| record.feed_override).collect();
+        let shares: Vec<_> = found.iter().map(|trace| trace.feed_override).collect();
         assert_eq!(shares, [None, Some(0.5), None]);
         assert_eq!(
             stops(&records("1:override=0,2:resume,4:override=1", &feeds)),

@@ -1,6 +1,6 @@
 //! The contour error: how far the machine is beside its path.
 
-use crate::record::{AXES, AxisTick};
+use crate::trace::{AXES, AxisTick};
 
 /// Speed below which the direction of motion is rounding \[mm/s\].
 const AT_REST_MM_S: f64 = 1e-6;

@@ -7,17 +7,17 @@ use motion_kernel::num::Real;
 use motion_kernel::path::Setpoint;
 use motion_kernel::program::Header;
 
-use super::job::Sheet;
-use crate::record::{AXES, FaultRecord};
+use super::job::RunInfo;
+use crate::trace::{AXES, TracedFault};
 
 /// A fault as a run records it, of a job's machine in the tick's motion.
-pub(super) fn record<R: Real>(
+pub(super) fn traced<R: Real>(
     fault: &Fault<R>,
-    job: (&Header<AXES>, &Sheet),
+    job: (&Header<AXES>, &RunInfo),
     config: &AxesConfig<R, AXES>,
     setpoints: &[Setpoint<R>; AXES],
-) -> FaultRecord {
-    let (header, sheet) = job;
+) -> TracedFault {
+    let (header, info) = job;
     let (name, axis) = (name(&fault.kind), axis(&fault.kind));
     let detail = match fault.kind {
         FaultKind::Executor(cause) => format!("{cause:?}"),
@@ -35,8 +35,8 @@ pub(super) fn record<R: Real>(
         FaultKind::TickMissed { ticks } => format!("{ticks} ticks did not come"),
         ref kind => row(kind).rule.to_owned(),
     };
-    let axis = axis.map(|axis| sheet.axes[axis].name.clone());
-    FaultRecord { tick: fault.tick, axis, fault: name.to_owned(), detail }
+    let axis = axis.map(|axis| info.axes[axis].name.clone());
+    TracedFault { tick: fault.tick, axis, fault: name.to_owned(), detail }
 }
 
 fn axis<R>(kind: &FaultKind<R>) -> Option<usize> {

@@ -10,10 +10,10 @@ use motion_kernel::num::Real;
 
 use super::Observer;
 use super::error::RunError;
-use super::rig::simulated;
+use super::hardware::simulated;
 use super::session::{Session, SessionError, Then, jog_axis};
 use crate::machine::{HomingSettings, Machine};
-use crate::record::AXES;
+use crate::trace::AXES;
 
 /// Why the machine is not homed. Displays as one line.
 #[derive(Debug, thiserror::Error)]
@@ -73,8 +73,8 @@ impl<R: Real> Session<'_, R> {
         let (mut jog, first) = (None::<Jog<AXES>>, self.ticks);
         loop {
             let mut next = Step::Wait;
-            self.drive(jog.take().into_iter().flatten(), observe, |trace, rig, state| {
-                let Ok(index) = rig.latched(axis);
+            self.drive(jog.take().into_iter().flatten(), observe, |trace, hardware, state| {
+                let Ok(index) = hardware.latched(axis);
                 let seen = Seen {
                     set: trace.executed.setpoints.map(|setpoint| setpoint.position),
                     counts: trace.axes[axis].counts,
@@ -82,11 +82,11 @@ impl<R: Real> Session<'_, R> {
                     index,
                     state,
                 };
-                Ok::<_, HomeError>(match homing.turn(&seen).map_err(failed)? {
+                Ok::<_, HomeError>(match homing.poll(&seen).map_err(failed)? {
                     Step::Wait => Then::GoOn,
                     Step::Stop => Then::Abort,
                     Step::ArmIndex => {
-                        let Ok(()) = rig.arm(axis);
+                        let Ok(()) = hardware.arm(axis);
                         Then::GoOn
                     }
                     step => {

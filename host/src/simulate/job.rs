@@ -13,7 +13,7 @@ use super::inject::Injections;
 use super::live::Script;
 use crate::machine::{AxisError, Machine};
 use crate::planning::{Executable, Item as PlanItem, Plan};
-use crate::record::{AXES, BlockRecord, PathLimits, RunRecord};
+use crate::trace::{AXES, PathLimits, RunTrace, TracedBlock};
 
 /// The number type of the kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -71,12 +71,12 @@ pub struct Job {
     /// Live control.
     pub script: Option<Script>,
     /// For records.
-    pub sheet: Sheet,
+    pub info: RunInfo,
 }
 
 /// What records say of a run beside its ticks. The kernel has nothing of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Sheet {
+pub struct RunInfo {
     /// The program's name.
     pub program: String,
     /// The machine's.
@@ -88,7 +88,7 @@ pub struct Sheet {
     /// The axes.
     pub axes: [SheetAxis; AXES],
     /// Blocks of the plan, in path order.
-    pub blocks: Vec<BlockRecord>,
+    pub blocks: Vec<TracedBlock>,
     /// Where each stretch starts, from the program's start along the path \[mm\].
     pub starts_mm: Vec<f64>,
     /// Path length of the plan \[mm\].
@@ -112,7 +112,7 @@ pub struct SheetAxis {
     pub jerk_mm_s3: f64,
 }
 
-impl Sheet {
+impl RunInfo {
     /// Of a machine, without a program.
     #[must_use]
     pub fn of_machine(machine: &Machine) -> Self {
@@ -134,10 +134,10 @@ impl Sheet {
         }
     }
 
-    /// A record with what the sheet has for it, and no tick.
+    /// A trace with what the info has for it, and no tick.
     #[must_use]
-    pub fn record(&self) -> RunRecord {
-        RunRecord {
+    pub fn empty_trace(&self) -> RunTrace {
+        RunTrace {
             program: self.program.clone(),
             machine: self.machine.clone(),
             tick_s: self.tick_s,
@@ -145,7 +145,7 @@ impl Sheet {
             axis_names: self.axes.each_ref().map(|axis| axis.name.clone()),
             blocks: self.blocks.clone(),
             planned_time_s: self.planned_time_s,
-            ..RunRecord::default()
+            ..RunTrace::default()
         }
     }
 
@@ -184,7 +184,7 @@ impl Job {
             items: executable.items,
             correction: options.correction.cloned(),
             script: options.script.cloned(),
-            sheet: Sheet::new(plan, machine),
+            info: RunInfo::new(plan, machine),
         })
     }
 
@@ -192,9 +192,7 @@ impl Job {
     pub(super) fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, AXES>, AxisError> {
         let tick_s = self.header.tick_s;
         let axes = AxesConfig::new(&self.header.axes, tick_s);
-        axes.and_then(|axes| axes.guarded(&self.guards, tick_s)).map_err(|error| AxisError {
-            axis: self.sheet.axes[error.axis].name.clone(),
-            source: error.cause,
-        })
+        axes.and_then(|axes| axes.guarded(&self.guards, tick_s))
+            .map_err(|error| AxisError { axis: self.info.axes[error.axis].name.clone(), source: error.cause })
     }
 }

@@ -17,7 +17,7 @@ use motion_kernel::units::Position;
 
 use super::Observer;
 use super::error::RunError;
-use super::rig::simulated;
+use super::hardware::simulated;
 use super::session::{Session, SessionError, Then, jog_axis};
 use crate::machine::Machine;
 

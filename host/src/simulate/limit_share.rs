@@ -5,8 +5,8 @@
 //! is what a better plan could still gain on. The law's jerk and snap touch their limits only at the top of their
 //! curves, so that ramps count for little; a plan that wastes nothing is still below 1.
 
-use super::job::Sheet;
-use crate::record::{BlockRecord, TickRecord};
+use super::job::RunInfo;
+use crate::trace::{TraceRow, TracedBlock};
 
 /// At this part of itself a limit counts as reached.
 const REACHED: f64 = 0.98;
@@ -15,39 +15,39 @@ const ROUNDING_MM: f64 = 1.0e-9;
 
 /// Collects ticks.
 pub(super) struct LimitShare<'run> {
-    sheet: &'run Sheet,
+    info: &'run RunInfo,
     /// Blocks that do not end before the latest tick.
-    blocks: &'run [BlockRecord],
+    blocks: &'run [TracedBlock],
     limited_mm: f64,
     length_mm: f64,
 }
 
 impl<'run> LimitShare<'run> {
-    pub(super) fn new(sheet: &'run Sheet) -> Self {
-        Self { sheet, blocks: &sheet.blocks, limited_mm: 0.0, length_mm: 0.0 }
+    pub(super) fn new(info: &'run RunInfo) -> Self {
+        Self { info, blocks: &info.blocks, limited_mm: 0.0, length_mm: 0.0 }
     }
 
-    pub(super) fn add(&mut self, tick: &TickRecord) {
-        let ends_before = |block: &&BlockRecord| block.start_mm + block.length_mm < tick.s_mm - ROUNDING_MM;
+    pub(super) fn add(&mut self, tick: &TraceRow) {
+        let ends_before = |block: &&TracedBlock| block.start_mm + block.length_mm < tick.s_mm - ROUNDING_MM;
         self.blocks = &self.blocks[self.blocks.iter().take_while(ends_before).count()..];
-        let step_mm = tick.v_mm_s * self.sheet.tick_s;
+        let step_mm = tick.v_mm_s * self.info.tick_s;
         self.length_mm += step_mm;
         if self.is_limited(tick) {
             self.limited_mm += step_mm;
         }
     }
 
-    fn is_limited(&self, tick: &TickRecord) -> bool {
-        let path = &self.sheet.limits;
+    fn is_limited(&self, tick: &TraceRow) -> bool {
+        let path = &self.info.limits;
         let reached = |value: f64, limit: f64| value.abs() >= REACHED * limit;
-        let vector = |of: fn(&crate::record::AxisTick) -> f64| {
+        let vector = |of: fn(&crate::trace::AxisTick) -> f64| {
             tick.axes.iter().map(|axis| of(axis).powi(2)).sum::<f64>().sqrt()
         };
         self.blocks.first().is_some_and(|block| reached(tick.v_mm_s, block.cap_mm_s))
             || reached(vector(|axis| axis.acc_mm_s2), path.accel_mm_s2)
             || reached(vector(|axis| axis.jerk_mm_s3), path.jerk_mm_s3)
             || reached(tick.snap_mm_s4, path.snap_mm_s4)
-            || tick.axes.iter().zip(&self.sheet.axes).any(|(axis, limits)| {
+            || tick.axes.iter().zip(&self.info.axes).any(|(axis, limits)| {
                 reached(axis.vel_mm_s, limits.feed_mm_s)
                     || reached(axis.acc_mm_s2, limits.accel_mm_s2)
                     || reached(axis.jerk_mm_s3, limits.jerk_mm_s3)

@@ -1,7 +1,7 @@
 //! A plan executed by the kernel on the simulated machine, tick by tick.
 //!
 //! Consumes a [`Plan`](crate::planning::Plan) and a [`Machine`](crate::machine::Machine), as a [`Job`]; produces one
-//! [`TickRecord`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter and
+//! [`TraceRow`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter and
 //! the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
 //! - [`error`]: why a run could not be made;
@@ -10,7 +10,7 @@
 //! - [`inject`]: what breaks before given ticks;
 //! - [`live`]: commands before given ticks;
 //! - `background`: what fills the streams, with commands or without;
-//! - [`rig`]: the simulated machine as the kernel's hardware;
+//! - [`hardware`]: the simulated machine as the kernel's hardware;
 //! - `commands`: what became of them;
 //! - `contour`: how far the machine is beside its path;
 //! - `limit_share`: on how much of the path a limit is active;
@@ -29,7 +29,7 @@ pub mod faults;
 pub mod inject;
 mod limit_share;
 pub mod live;
-pub mod rig;
+pub mod hardware;
 pub mod run;
 pub mod summary;
 pub mod session;
@@ -37,12 +37,12 @@ pub mod home;
 pub mod jog;
 
 pub use error::RunError;
-pub use job::{Job, Number, RunOptions, Sheet, StretchCorrection};
-pub use rig::Hardware;
+pub use hardware::Hardware;
+pub use job::{Job, Number, RunInfo, RunOptions, StretchCorrection};
 pub use run::{on_simulated, run, run_on, run_with};
 pub use summary::{AxisSummary, RunSummary};
 
-use crate::record::TickRecord;
+use crate::trace::TraceRow;
 
 /// Called with every tick.
-pub type Observer<'a> = dyn FnMut(&TickRecord) + 'a;
+pub type Observer<'a> = dyn FnMut(&TraceRow) + 'a;

@@ -16,14 +16,14 @@ use super::commands::Commands;
 use super::contour::Contour;
 use super::error::RunError;
 use super::faults;
+use super::hardware::{Hardware, SimulatedHardware, simulated};
 use super::inject::Injections;
 use super::job::{Job, Number, RunOptions, StretchCorrection};
 use super::limit_share::LimitShare;
-use super::rig::{Hardware, Rig, simulated};
 use super::summary::{Collector, RunSummary};
 use crate::machine::Machine;
 use crate::planning::Plan;
-use crate::record::{AXES, AxisTick, TickRecord};
+use crate::trace::{AXES, AxisTick, TraceRow};
 
 /// How long the machine is given to settle before its end position is read \[s\].
 const SETTLE_S: f64 = 0.2;
@@ -47,7 +47,7 @@ pub fn run_with(
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
     let job = Job::new(options, plan, machine)?;
-    on_simulated(machine, options.injections, |rig| run_on(&job, rig, observe))
+    on_simulated(machine, options.injections, |hardware| run_on(&job, hardware, observe))
 }
 
 /// What `work` does with the simulated machine, at rest at the origin, which breaks as `injections` say.
@@ -57,14 +57,14 @@ pub fn run_with(
 pub fn on_simulated<T>(
     machine: &Machine,
     injections: Option<&Injections>,
-    work: impl FnOnce(&mut Rig<'_>) -> Result<T, RunError>,
+    work: impl FnOnce(&mut SimulatedHardware<'_>) -> Result<T, RunError>,
 ) -> Result<T, RunError> {
     let simulated = simulated(machine)?;
-    let mut rig = Rig::new(&simulated)?;
+    let mut hardware = SimulatedHardware::new(&simulated)?;
     if let Some(injections) = injections {
-        rig.breaks = injections.of(machine)?;
+        hardware.breaks = injections.of(machine)?;
     }
-    work(&mut rig)
+    work(&mut hardware)
 }
 
 /// Runs `job` on `hardware`.
@@ -88,7 +88,7 @@ fn run_in<R: Real>(
     hardware: &mut impl Hardware,
     observe: &mut Observer<'_>,
 ) -> Result<RunSummary, RunError> {
-    let Job { header, sheet, correction, script, .. } = job;
+    let Job { header, info, correction, script, .. } = job;
     let tick_s = header.tick_s;
     let config = job.axes_config()?;
     let mut kernel = Kernel::<R, AXES>::new(&config, header.start, hardware.start_counts());
@@ -108,36 +108,36 @@ fn run_in<R: Real>(
 
     let mut summary = RunSummary {
         tick_s,
-        planned_time_s: sheet.planned_time_s,
-        path_length_mm: sheet.path_length_mm,
-        notices: sheet.notices.clone(),
+        planned_time_s: info.planned_time_s,
+        path_length_mm: info.path_length_mm,
+        notices: info.notices.clone(),
         ..RunSummary::default()
     };
     let mut collector = Collector::default();
     let mut contour = Contour::default();
-    let mut limit_share = LimitShare::new(sheet);
+    let mut limit_share = LimitShare::new(info);
     let mut commands = Commands::new(script.as_ref(), tick_s);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     let mut goes_on = true;
     while goes_on {
-        background.turn(collector.ticks()).map_err(RunError::Rejected)?;
+        background.poll(collector.ticks()).map_err(RunError::Rejected)?;
         let trace = *kernel.tick(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
         let state = trace.executed.state;
         // What is idle after the last item is no longer part of the program, but for the tick in which
         // it ended.
         let ended = background.ended(state);
-        let start_mm = sheet.starts_mm.get(trace.executed.stretches as usize).copied();
-        let start_mm = start_mm.unwrap_or(sheet.path_length_mm);
-        let record = tick_record(&trace, start_mm, &mut contour);
-        collector.add(&record);
-        limit_share.add(&record);
-        commands.add(&record);
-        observe(&record);
+        let start_mm = info.starts_mm.get(trace.executed.stretches as usize).copied();
+        let start_mm = start_mm.unwrap_or(info.path_length_mm);
+        let row = trace_row(&trace, start_mm, &mut contour);
+        collector.add(&row);
+        limit_share.add(&row);
+        commands.add(&row);
+        observe(&row);
         if let Some(fault) = trace.fault {
             if summary.faults.is_empty() {
                 let setpoints = &trace.executed.setpoints;
-                summary.faults.push(faults::record(&fault, (header, sheet), &config, setpoints));
+                summary.faults.push(faults::traced(&fault, (header, info), &config, setpoints));
             }
             if kernel.reaction() == Some(Reaction::Immediate) {
                 break;
@@ -179,7 +179,7 @@ fn run_in<R: Real>(
         last = Some(trace);
     }
     for (index, axis) in summary.axes.iter_mut().enumerate() {
-        axis.name.clone_from(&sheet.axes[index].name);
+        axis.name.clone_from(&info.axes[index].name);
         if let Some(trace) = &last {
             let error_mm = trace.axes[index].following_error_mm.to_f64();
             axis.end_error_counts = (error_mm / header.axes[index].mm_per_count.abs()).round() as i64;
@@ -188,11 +188,7 @@ fn run_in<R: Real>(
     Ok(summary)
 }
 
-pub(super) fn tick_record<R: Real>(
-    trace: &Trace<R, AXES>,
-    start_mm: f64,
-    contour: &mut Contour,
-) -> TickRecord {
+pub(super) fn trace_row<R: Real>(trace: &Trace<R, AXES>, start_mm: f64, contour: &mut Contour) -> TraceRow {
     let executed = &trace.executed;
     let motion = &executed.motion;
     let axes = core::array::from_fn(|index| {
@@ -207,7 +203,7 @@ pub(super) fn tick_record<R: Real>(
             out_v: output.code.to_volts(),
         }
     });
-    TickRecord {
+    TraceRow {
         tick: trace.tick,
         s_mm: start_mm + motion.s.to_mm(),
         v_mm_s: motion.v_mm_s.to_f64(),

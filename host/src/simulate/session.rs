@@ -1,6 +1,6 @@
 //! A simulated machine that goes from one motion to the next: kernel, streams and closed loop, switched on once.
 //!
-//! Consumes a machine, then items of motion, one motion after the other, each under a director; produces every tick's
+//! Consumes a machine, then items of motion, one motion after the other, each under live control; produces every tick's
 //! record. The machine stands at 0 as far as it knows, until an axis is homed.
 
 use std::convert::Infallible;
@@ -11,7 +11,7 @@ use motion_kernel::hal::Encoder;
 use motion_kernel::jog::JogAxis;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::law::Limits;
-use motion_kernel::live::{Director, State};
+use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::Item;
 use motion_kernel::queue::LiveStreams;
@@ -22,11 +22,11 @@ use super::Observer;
 use super::contour::Contour;
 use super::error::RunError;
 use super::faults;
-use super::job::Sheet;
-use super::rig::{Rig, Simulated};
-use super::run::tick_record;
+use super::hardware::{Simulated, SimulatedHardware};
+use super::job::RunInfo;
+use super::run::trace_row;
 use crate::machine::{AxisSettings, Machine};
-use crate::record::{AXES, FaultRecord};
+use crate::trace::{AXES, TracedFault};
 
 /// Path enough to stop on at any feed, as for a run under live control.
 const PIECES: usize = 64;
@@ -44,7 +44,7 @@ pub enum SessionError {
     Moves,
     /// The kernel found a fault.
     #[error("fault in tick {}: {}: {}", .0.tick, .0.fault, .0.detail)]
-    Fault(FaultRecord),
+    Fault(TracedFault),
 }
 
 /// A simulated machine, switched on.
@@ -53,7 +53,7 @@ pub struct Session<'a, R: Real> {
     pub(super) simulated: &'a Simulated,
     pub(super) kernel: Kernel<R, AXES>,
     config: AxesConfig<R, AXES>,
-    rig: Rig<'a>,
+    hardware: SimulatedHardware<'a>,
     streams: Box<LiveStreams<R, AXES, PIECES, SEGMENTS>>,
     /// Where it stands.
     pub(super) set: [Position; AXES],
@@ -75,14 +75,14 @@ impl<'a, R: Real> Session<'a, R> {
     /// # Errors
     /// It can't be simulated, or regulated.
     pub fn new(machine: &'a Machine, simulated: &'a Simulated) -> Result<Self, RunError> {
-        let mut rig = Rig::new(simulated)?;
-        let Ok(counts) = rig.latch();
-        rig.add_homes(machine, counts);
+        let mut hardware = SimulatedHardware::new(simulated)?;
+        let Ok(counts) = hardware.latch();
+        hardware.add_homes(machine, counts);
         let (config, set) = (machine.axes_config()?, [Position::ZERO; AXES]);
         let mut kernel = Kernel::new(&config, set, counts);
         kernel.enable(0);
         let (streams, contour) = (Box::default(), Contour::default());
-        Ok(Self { machine, simulated, kernel, config, rig, streams, set, contour, ticks: 0 })
+        Ok(Self { machine, simulated, kernel, config, hardware, streams, set, contour, ticks: 0 })
     }
 
     /// Where the machine stands: its set positions, at rest.
@@ -113,30 +113,30 @@ impl<'a, R: Real> Session<'a, R> {
         Ok(())
     }
 
-    /// Ticks under a director, until one asks for the end.
+    /// Ticks under live control, until one asks for the end.
     pub(super) fn drive<E: From<SessionError>>(
         &mut self,
         items: impl Iterator<Item = Result<Item<AXES>, Infallible>>,
         observe: &mut Observer<'_>,
-        mut look: impl FnMut(&Trace<R, AXES>, &mut Rig<'a>, State) -> Result<Then, E>,
+        mut look: impl FnMut(&Trace<R, AXES>, &mut SimulatedHardware<'a>, State) -> Result<Then, E>,
     ) -> Result<(), E> {
         let (mut feeder, mut intake) = self.streams.split(self.machine.rules(), self.set);
-        let mut director = Director::<R, AXES, _, _, PLACES>::new(items, self.machine.tick_s, 0);
+        let mut control = LiveControl::<R, AXES, _, _, PLACES>::new(items, self.machine.tick_s, 0);
         loop {
-            director.turn(&mut feeder).map_err(|error| SessionError::Run(RunError::Rejected(error)))?;
-            let trace = *self.kernel.tick(&mut intake, &mut self.rig);
+            control.poll(&mut feeder).map_err(|error| SessionError::Run(RunError::Rejected(error)))?;
+            let trace = *self.kernel.tick(&mut intake, &mut self.hardware);
             self.simulated.advance();
             self.ticks += 1;
-            observe(&tick_record(&trace, 0.0, &mut self.contour));
+            observe(&trace_row(&trace, 0.0, &mut self.contour));
             if let Some(fault) = trace.fault {
-                let job = (&self.machine.header(), &Sheet::of_machine(self.machine));
+                let job = (&self.machine.header(), &RunInfo::of_machine(self.machine));
                 let setpoints = &trace.executed.setpoints;
-                let record = faults::record(&fault, job, &self.config, setpoints);
+                let record = faults::traced(&fault, job, &self.config, setpoints);
                 return Err(SessionError::Fault(record).into());
             }
-            match look(&trace, &mut self.rig, director.state(&feeder))? {
+            match look(&trace, &mut self.hardware, control.state(&feeder))? {
                 Then::GoOn => {}
-                Then::Abort => director.abort(),
+                Then::Abort => control.abort(),
                 Then::End => return Ok(()),
             }
         }

@@ -1,6 +1,6 @@
 //! Figures of a run, collected tick by tick.
 
-use crate::record::{AXES, CommandRecord, FaultRecord, TickRecord};
+use crate::trace::{AXES, TraceRow, TracedCommand, TracedFault};
 
 /// The figures of a run.
 #[derive(Clone, Debug, Default)]
@@ -31,9 +31,9 @@ pub struct RunSummary {
     /// Greatest distance of the actual position from the programmed path \[µm\].
     pub contour_error_um_max: f64,
     /// Commands of live control that were given, in order.
-    pub commands: Vec<CommandRecord>,
+    pub commands: Vec<TracedCommand>,
     /// Faults, in order.
-    pub faults: Vec<FaultRecord>,
+    pub faults: Vec<TracedFault>,
     /// What was accepted and not acted on, and how the run was made.
     pub notices: Vec<String>,
 }
@@ -70,7 +70,7 @@ impl Collector {
         self.ticks
     }
 
-    pub(super) fn add(&mut self, tick: &TickRecord) {
+    pub(super) fn add(&mut self, tick: &TraceRow) {
         self.ticks += 1;
         let along = [tick.v_mm_s, tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4];
         for (max, value) in self.max.iter_mut().zip(along) {

@@ -147,7 +147,7 @@ impl<R: Real> GuardConfig<R> {
 
 /// What was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Found<R> {
+pub(crate) enum AxisFault<R> {
     FollowingError { error_mm: R },
     EncoderLost,
     EncoderJump { jump_mm: R },
@@ -303,43 +303,43 @@ impl<R: Real> Guard<R> {
 
     /// What broke in an axis that was not allowed to go on, `since` ticks after it was looked at.
     #[cold]
-    pub(super) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> Found<R> {
+    pub(super) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> AxisFault<R> {
         let &Setpoint { velocity_mm_s, accel_mm_s2, jerk_mm_s3, .. } = setpoint;
         // What is not finite times 0 is not 0.
         let is_number = |value: R| value * R::ZERO == R::ZERO;
         if ![velocity_mm_s, accel_mm_s2, jerk_mm_s3].into_iter().all(is_number) {
-            return Found::NotFinite;
+            return AxisFault::NotFinite;
         }
         match self.alarm {
             Alarm::Jump { jump_mm } => self.judge_jump(config, jump_mm),
             Alarm::Error { error_mm } => {
                 if self.has_stopped_counting(config) {
-                    Found::EncoderLost
+                    AxisFault::EncoderLost
                 } else if self.runs_away(config, self.moved_mm(config), self.by_load_mm(config, since)) {
-                    Found::Runaway
+                    AxisFault::Runaway
                 } else {
-                    Found::FollowingError { error_mm }
+                    AxisFault::FollowingError { error_mm }
                 }
             }
-            Alarm::None | Alarm::NotFinite => Found::NotFinite,
+            Alarm::None | Alarm::NotFinite => AxisFault::NotFinite,
         }
     }
 
-    fn judge_jump(&self, config: &AxisConfig<R>, jump_mm: R) -> Found<R> {
+    fn judge_jump(&self, config: &AxisConfig<R>, jump_mm: R) -> AxisFault<R> {
         let [latest, before, first] = self.counts;
         let (step, step_before) = (latest.wrapping_sub(before), before.wrapping_sub(first));
         let [step_mm, before_mm] = [step, step_before].map(|counts| mm(config, counts));
         let most_mm = config.guard.jump_mm;
         let is_more = |change_mm: R| (change_mm + change_mm).abs() > most_mm;
         if !is_more(step_mm - before_mm) {
-            Found::SetpointJump { jump_mm }
+            AxisFault::SetpointJump { jump_mm }
         } else if step == 0 {
-            Found::EncoderLost
+            AxisFault::EncoderLost
         } else if !is_more(step_mm + before_mm) {
             // It counts the other way, as fast.
-            Found::Runaway
+            AxisFault::Runaway
         } else {
-            Found::EncoderJump { jump_mm: step_mm - before_mm }
+            AxisFault::EncoderJump { jump_mm: step_mm - before_mm }
         }
     }
 
@@ -389,7 +389,7 @@ impl<R: Real> Guard<R> {
         config: &AxisConfig<R>,
         setpoint: &Setpoint<R>,
         output: &AxisOutput<R>,
-    ) -> Option<Found<R>> {
+    ) -> Option<AxisFault<R>> {
         let guard = &config.guard;
         self.is_excused = false;
         if guard.response_looks == 0 {
@@ -418,14 +418,14 @@ impl<R: Real> Guard<R> {
         self.saturated_looks = count(self.saturated_looks, output.saturated);
         self.last = Look { is_taken: true, counts: self.counts[0], moved_mm, commanded };
         if runs_away || self.against_looks >= guard.response_looks {
-            Some(Found::Runaway)
+            Some(AxisFault::Runaway)
         } else if self.still_looks >= guard.response_looks {
-            Some(Found::EncoderLost)
+            Some(AxisFault::EncoderLost)
         } else if self.saturated_looks >= guard.saturation_looks {
-            Some(Found::Saturated)
+            Some(AxisFault::Saturated)
         } else if guard.travel.is_some_and(|travel| drives_out(travel, setpoint, output)) {
             // The least urgent, so the last.
-            Some(Found::SoftLimit)
+            Some(AxisFault::SoftLimit)
         } else {
             None
         }
@@ -455,7 +455,7 @@ mod tests {
     }
 
     /// Ticks of an axis that is set at 0 and reads `counts`; the first one in which it is lost.
-    fn lost(counts: impl Fn(i64) -> i64, setpoint: &Setpoint<f32>) -> Option<(i64, Found<f32>)> {
+    fn lost(counts: impl Fn(i64) -> i64, setpoint: &Setpoint<f32>) -> Option<(i64, AxisFault<f32>)> {
         let (config, mut axis) = (config(), AxisState::default());
         (0..200).find_map(|tick| {
             let mut output = AxisOutput { counts: Counts(counts(tick)), ..AxisOutput::default() };
@@ -471,10 +471,10 @@ mod tests {
         // It begins gently.
         let ramp = |tick: i64| if tick < 4 { tick * tick * 25 } else { 225 + (tick - 3) * 175 };
         let found = lost(ramp, &at_rest).expect("beyond its limit in the end");
-        assert!(matches!(found.1, Found::FollowingError { .. }) && ramp(found.0) > 2500, "{found:?}");
+        assert!(matches!(found.1, AxisFault::FollowingError { .. }) && ramp(found.0) > 2500, "{found:?}");
         let jump = |tick: i64| if tick < 50 { 0 } else { 200 };
         assert!(
-            matches!(lost(jump, &at_rest), Some((50, Found::EncoderJump { .. }))),
+            matches!(lost(jump, &at_rest), Some((50, AxisFault::EncoderJump { .. }))),
             "{:?}",
             lost(jump, &at_rest)
         );
@@ -493,7 +493,7 @@ mod tests {
             let error_mm = MM_PER_COUNT * 65.0 * tick as f64;
             let is_first = error_mm > limit_mm && error_mm <= limit_mm + 65.5 * MM_PER_COUNT;
             assert!(
-                is_first && matches!(found, Found::FollowingError { .. }),
+                is_first && matches!(found, AxisFault::FollowingError { .. }),
                 "{limit_mm}: {error_mm} {found:?}"
             );
         }
@@ -510,7 +510,7 @@ mod tests {
             let is_cut = velocity_mm_s.is_infinite();
             // Infinity is cut at the output's limit, as any command.
             assert_eq!((output.lost, output.saturated), (!is_cut, is_cut), "{velocity_mm_s}");
-            assert!(is_cut || axis.judge(&config, &setpoint, 1) == Found::NotFinite);
+            assert!(is_cut || axis.judge(&config, &setpoint, 1) == AxisFault::NotFinite);
         }
     }
 
@@ -561,9 +561,9 @@ mod tests {
                 found
             })
         };
-        assert_eq!(found(0), [Found::SoftLimit, Found::EncoderLost]);
-        assert_eq!(found(-20), [Found::SoftLimit, Found::Runaway]);
-        assert_eq!(found(5), [Found::SoftLimit]);
+        assert_eq!(found(0), [AxisFault::SoftLimit, AxisFault::EncoderLost]);
+        assert_eq!(found(-20), [AxisFault::SoftLimit, AxisFault::Runaway]);
+        assert_eq!(found(5), [AxisFault::SoftLimit]);
     }
 
     /// Thrown back by a load, an axis brakes by less than a look can see, but by more than some of them; one that does not
@@ -583,7 +583,7 @@ mod tests {
                 if tick % 8 == 7 { axis.look(&config, &setpoint, &output) } else { None }
             })
         };
-        assert_eq!(found(0.0), Some(Found::Runaway));
+        assert_eq!(found(0.0), Some(AxisFault::Runaway));
         assert_eq!(found(20.0), None);
     }
 }

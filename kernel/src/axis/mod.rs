@@ -38,7 +38,7 @@ use serde::{Deserialize, Serialize};
 
 use check::{Check, fits};
 #[cfg(feature = "guards")]
-pub(crate) use guard::Found;
+pub(crate) use guard::AxisFault;
 #[cfg(feature = "guards")]
 use guard::{Guard, GuardConfig};
 
@@ -348,7 +348,7 @@ impl<R: Real> AxisState<R> {
 
     /// What broke in an axis that is lost, `since` ticks after it was looked at.
     #[cfg(feature = "guards")]
-    pub(crate) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> Found<R> {
+    pub(crate) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> AxisFault<R> {
         self.guard.judge(config, setpoint, since)
     }
 
@@ -359,7 +359,7 @@ impl<R: Real> AxisState<R> {
         config: &AxisConfig<R>,
         setpoint: &Setpoint<R>,
         output: &AxisOutput<R>,
-    ) -> Option<Found<R>> {
+    ) -> Option<AxisFault<R>> {
         self.guard.look(config, setpoint, output)
     }
 }

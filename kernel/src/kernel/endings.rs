@@ -3,7 +3,7 @@
 use super::Kernel;
 use crate::axis::AxesConfig;
 use crate::fault::{FaultKind, Reaction, Reactions};
-use crate::fixture::{Follower, GUARD, RULES, figures, guarded};
+use crate::fixture::{GUARD, RULES, TestAxes, figures, guarded};
 use crate::queue::Streams;
 use crate::units::{Counts, DacCode, Position};
 
@@ -16,7 +16,7 @@ fn the_longest_ramp_falls_in_every_tick() {
     let mut kernel = Kernel::<f32, 1>::new(&config, [Position::ZERO], [Counts(0)]);
     let mut streams = Streams::<f32, 1, 2, 2>::new();
     let (_, mut intake) = streams.split(RULES, [Position::ZERO]);
-    let mut bench = Follower::<1>::default();
+    let mut bench = TestAxes::<1>::default();
     kernel.enable(0);
     kernel.tick(&mut intake, &mut bench);
     let still = bench.codes[0].0;
@@ -44,7 +44,7 @@ fn any_of_many_axes_is_judged() {
             let mut kernel = Kernel::<f32, AXES>::new(&config, [Position::ZERO; AXES], [Counts(0); AXES]);
             let mut streams = Streams::<f32, AXES, 2, 2>::new();
             let (_, mut intake) = streams.split(RULES, [Position::ZERO; AXES]);
-            let mut bench = Follower::<AXES>::default();
+            let mut bench = TestAxes::<AXES>::default();
             kernel.enable(0);
             kernel.tick(&mut intake, &mut bench);
             kernel.guards.look_ticks = wait as u8;
@@ -65,7 +65,7 @@ fn drives_that_are_not_on_are_not_enabled_for_a_ramp() {
         let mut kernel = Kernel::<f32, 1>::new(&config, [Position::ZERO], [Counts(0)]);
         let mut streams = Streams::<f32, 1, 2, 2>::new();
         let (_, mut intake) = streams.split(RULES, [Position::ZERO]);
-        let mut bench = Follower::<1>::default();
+        let mut bench = TestAxes::<1>::default();
         for settle_ticks in [0, 100] {
             kernel.tick(&mut intake, &mut bench);
             kernel.enable(settle_ticks);

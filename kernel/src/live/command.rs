@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::director::Director;
+use super::control::LiveControl;
 use super::list::{Item, LIST_ITEMS, List};
 use super::replan::Ramps;
 use super::road::Splice;
@@ -46,7 +46,7 @@ impl Place {
     }
 }
 
-impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PLACES>
+impl<R, const AXES: usize, I, E, const PLACES: usize> LiveControl<R, AXES, I, E, PLACES>
 where
     R: Real,
     E: Clone,

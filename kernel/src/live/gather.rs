@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::director::Director;
+use super::control::LiveControl;
 use super::list::{Item, LIST_ITEMS, List};
 use super::replan::{Ramps, replan};
 use super::road::Splice;
@@ -17,7 +17,7 @@ const BLOCKS_AHEAD: usize = 8;
 /// Of the path that is queued beyond a stop, how much a cruise takes at once: limits further on may be lower.
 const CRUISE_SHARE: f64 = 0.75;
 
-impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PLACES>
+impl<R, const AXES: usize, I, E, const PLACES: usize> LiveControl<R, AXES, I, E, PLACES>
 where
     R: Real,
     E: Clone,

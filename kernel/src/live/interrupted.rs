@@ -3,7 +3,7 @@
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
 
-use super::{Director, State};
+use super::{LiveControl, State};
 use crate::exec::{ExecState, Executor};
 use crate::law::{Law, Limits, PathMotion};
 use crate::plan::{Block, BlockPlan, plan, segments};
@@ -59,7 +59,7 @@ fn stretch(random: &Random, from: Position, items: &mut Vec<Item<1>>) -> Vec<(Po
 }
 
 /// What ticks, and holds each tick against the one before.
-struct Rig<'a> {
+struct TestMachine<'a> {
     executor: Executor<f64, 1>,
     intake: Intake<'a, f64, 1>,
     /// Where each stretch begins, and its ceilings.
@@ -70,7 +70,7 @@ struct Rig<'a> {
     ticks: u64,
 }
 
-impl Rig<'_> {
+impl TestMachine<'_> {
     fn tick(&mut self) {
         let executed = self.executor.tick(&mut self.intake).expect("no fault");
         (self.ticks, self.state) = (self.ticks + 1, executed.state);
@@ -139,7 +139,7 @@ fn ticks_between_any_two_operations_of_a_turn() {
             PathRules { limits: LIMITS, feed_mm_s: 100.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
         let mut streams = LiveStreams::<f64, 1, 64, 16>::new();
         let (mut feeder, intake) = streams.split(rules, [Position::ZERO]);
-        let rig = RefCell::new(Rig {
+        let machine = RefCell::new(TestMachine {
             executor: Executor::new([Position::ZERO]),
             intake,
             stretches,
@@ -153,41 +153,41 @@ fn ticks_between_any_two_operations_of_a_turn() {
         let between = || {
             if random.chance(interrupts) {
                 count.set(count.get() + 1);
-                rig.borrow_mut().tick();
+                machine.borrow_mut().tick();
             }
         };
         feeder.between = Some(&between);
         let lead_ticks = (random.unit() * 6.0) as u32;
         let items = items.into_iter().map(Ok);
-        let mut director = Director::<f64, 1, _, Infallible, 64>::new(items, TICK_S, lead_ticks);
+        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items, TICK_S, lead_ticks);
         loop {
-            let ticks = rig.borrow().ticks;
-            assert!(ticks < 400_000, "seed {seed}: no end, {:?}", director.state(&feeder));
+            let ticks = machine.borrow().ticks;
+            assert!(ticks < 400_000, "seed {seed}: no end, {:?}", control.state(&feeder));
             // In the end everything is let go.
             if ticks > 60_000 {
-                director.resume();
-                director.set_override(1.0).expect("in range");
+                control.resume();
+                control.set_override(1.0).expect("in range");
             } else if random.chance(often) {
                 commands += 1;
                 match (random.unit() * 4.0) as usize {
-                    0 => director.hold(),
-                    1 => director.resume(),
-                    2 => director.set_override(1.0).expect("in range"),
-                    _ => director.set_override(random.log(0.05, 2.0)).expect("in range"),
+                    0 => control.hold(),
+                    1 => control.resume(),
+                    2 => control.set_override(1.0).expect("in range"),
+                    _ => control.set_override(random.log(0.05, 2.0)).expect("in range"),
                 }
             }
-            director.turn(&mut feeder).unwrap_or_else(|error| panic!("seed {seed}: {error:?}"));
-            rig.borrow_mut().tick();
-            if director.state(&feeder) == State::Done {
+            control.poll(&mut feeder).unwrap_or_else(|error| panic!("seed {seed}: {error:?}"));
+            machine.borrow_mut().tick();
+            if control.state(&feeder) == State::Done {
                 break;
             }
         }
-        let rig = rig.borrow();
-        assert_eq!(rig.stretch, rig.stretches.len(), "seed {seed}");
-        assert_eq!(rig.state, ExecState::Idle, "seed {seed}");
-        ticks += rig.ticks;
+        let machine = machine.borrow();
+        assert_eq!(machine.stretch, machine.stretches.len(), "seed {seed}");
+        assert_eq!(machine.state, ExecState::Idle, "seed {seed}");
+        ticks += machine.ticks;
         inside += count.get();
-        starvations += director.starvations();
+        starvations += control.starvations();
     }
     println!(
         "{ticks} ticks, {inside} of them in a turn; {commands} commands, {starvations} stops for want of data"

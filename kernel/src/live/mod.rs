@@ -1,7 +1,7 @@
 //! Live control: hold, resume, feed override and abort at any tick, and a stop where data come too late.
 //!
 //! ```text
-//!   items ─► Director ─► path queue, feed lists ─► executor
+//!   items ─► LiveControl ─► path queue, feed lists ─► executor
 //!   commands ──┘  ▲                                   │
 //!                 └────────── where it is ◄───────────┘
 //! ```
@@ -25,11 +25,11 @@
 //! - `gather`: what goes into the next list;
 //! - [`Source`]: where items come from, perhaps later;
 //! - `command`: what takes over from the motion under way, and where;
-//! - [`director`]: what follows what.
+//! - [`control`]: what follows what.
 
 mod block_ends;
 mod command;
-pub mod director;
+pub mod control;
 mod gather;
 #[cfg(test)]
 mod interrupted;
@@ -39,6 +39,6 @@ mod road;
 mod source;
 mod single;
 
-pub use director::{Director, OVERRIDE_MAX, OVERRIDE_MIN, State};
+pub use control::{LiveControl, OVERRIDE_MAX, OVERRIDE_MIN, State};
 pub use list::LIST_ITEMS;
 pub use source::Source;

@@ -1,11 +1,11 @@
 //! Single block: motion comes to rest at the end of every program block and is held there.
 //!
 //! The end that is stopped at is the end of the known path as far as plans go: a list that ends there is a complete motion
-//! as any other, under all the ceilings on the way. A hold at a block's end is the hold that [`Director::resume`] ends.
+//! as any other, under all the ceilings on the way. A hold at a block's end is the hold that [`LiveControl::resume`] ends.
 
 use super::block_ends::BlockEnd;
 use super::command::Places;
-use super::director::Director;
+use super::control::LiveControl;
 use super::list::{Item, LIST_ITEMS, List};
 use super::replan::Ramps;
 use super::road::{SLIVER, Splice};
@@ -22,7 +22,7 @@ const ENDS_TRIED: usize = 2;
 /// How often a braking ramp is moved on to end where it should: limits may be others further on.
 const MOVES: usize = 4;
 
-impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PLACES>
+impl<R, const AXES: usize, I, E, const PLACES: usize> LiveControl<R, AXES, I, E, PLACES>
 where
     R: Real,
     E: Clone,
@@ -30,7 +30,7 @@ where
 {
     /// Single block: comes to rest exactly at the end of the program block under way (what has the same program line; a
     /// dwell or a stop is one too), or of the next one that it can still stop at, and is held there until
-    /// [`Director::resume`], which lets it run one block more. At rest, it is the next block that is run. Switched off, a
+    /// [`LiveControl::resume`], which lets it run one block more. At rest, it is the next block that is run. Switched off, a
     /// hold that has come about remains one until the resume.
     pub fn set_single_block(&mut self, is_single: bool) {
         if is_single != self.is_single {

@@ -95,16 +95,16 @@ impl ListPlace {
     }
 }
 
-/// The words between the two.
+/// The mailbox between the two.
 #[derive(Debug)]
-pub(super) struct Words {
+pub(super) struct Mailbox {
     change: AtomicU32,
     /// A change that came too late.
     refused: AtomicU32,
     /// A bit for each list that the background fills or has filled; the tick empties the others.
-    claimed: AtomicU32,
+    owned: AtomicU32,
     /// Counts what the background writes of the words above, so that the tick looks at one where there is nothing new.
-    news: AtomicU32,
+    generation: AtomicU32,
     /// The tick asks for a stop on the path: 1.
     #[cfg(feature = "guards")]
     stop_wanted: AtomicU32,
@@ -115,10 +115,10 @@ pub(super) struct Words {
     left_low: AtomicU32,
 }
 
-/// Looks at [`Words`] that a tick may interrupt; the second one is not interrupted, a tick apart.
-const LOOKS: usize = 4;
+/// Reads of [`Mailbox`] that a tick may interrupt; the second one is not interrupted, a tick apart.
+const READS: usize = 4;
 
-impl Words {
+impl Mailbox {
     const WAITS_BIT: u32 = ListPlace::DONE_BITS;
     const PHASE_BIT: u32 = Self::WAITS_BIT + 1;
 
@@ -126,8 +126,8 @@ impl Words {
         Self {
             change: AtomicU32::new(Change::NONE),
             refused: AtomicU32::new(Change::NONE),
-            claimed: AtomicU32::new(1),
-            news: AtomicU32::new(0),
+            owned: AtomicU32::new(1),
+            generation: AtomicU32::new(0),
             #[cfg(feature = "guards")]
             stop_wanted: AtomicU32::new(0),
             tick: AtomicU32::new(0),
@@ -137,13 +137,13 @@ impl Words {
         }
     }
 
-    /// As after [`Words::new`]. Neither end is in use.
+    /// As after [`Mailbox::new`]. Neither end is in use.
     pub(super) fn reset(&self) {
         for word in [&self.change, &self.refused] {
             word.store(Change::NONE, Ordering::Relaxed);
         }
-        self.claimed.store(1, Ordering::Relaxed);
-        for word in [&self.news, &self.tick, &self.place, &self.left_high, &self.left_low] {
+        self.owned.store(1, Ordering::Relaxed);
+        for word in [&self.generation, &self.tick, &self.place, &self.left_high, &self.left_low] {
             word.store(0, Ordering::Relaxed);
         }
         #[cfg(feature = "guards")]
@@ -166,7 +166,7 @@ impl Words {
     pub(super) fn ask(&self, change: Option<Change>, number: u32) {
         let word = change.map_or(Change::NONE, |change| change.to_word(number));
         self.change.store(word, Ordering::Release);
-        super::count(&self.news);
+        super::count(&self.generation);
     }
 
     /// Whether the change that was asked for last came too late.
@@ -175,31 +175,31 @@ impl Words {
         asked != Change::NONE && self.refused.load(Ordering::Acquire) == asked
     }
 
-    pub(super) fn claim(&self, list: u8, claimed: bool) {
-        let (bits, bit) = (self.claimed.load(Ordering::Relaxed), 1 << list);
-        self.claimed.store(if claimed { bits | bit } else { bits & !bit }, Ordering::Release);
-        super::count(&self.news);
+    pub(super) fn own(&self, list: u8, owned: bool) {
+        let (bits, bit) = (self.owned.load(Ordering::Relaxed), 1 << list);
+        self.owned.store(if owned { bits | bit } else { bits & !bit }, Ordering::Release);
+        super::count(&self.generation);
     }
 
     /// Another number than before if the background has written.
     #[inline]
-    pub(super) fn news(&self) -> u32 {
-        self.news.load(Ordering::Acquire)
+    pub(super) fn generation(&self) -> u32 {
+        self.generation.load(Ordering::Acquire)
     }
 
     /// Where the executor is, as far as the background can know.
     pub(super) fn progress(&self) -> Progress {
-        let mut progress = self.look();
-        for _ in 0..LOOKS {
+        let mut progress = self.read();
+        for _ in 0..READS {
             if progress.tick == self.tick.load(Ordering::Acquire) {
                 break;
             }
-            progress = self.look();
+            progress = self.read();
         }
         progress
     }
 
-    fn look(&self) -> Progress {
+    fn read(&self) -> Progress {
         let tick = self.tick.load(Ordering::Acquire);
         let place = self.place.load(Ordering::Acquire);
         let (high, low) = (self.left_high.load(Ordering::Acquire), self.left_low.load(Ordering::Acquire));
@@ -239,8 +239,8 @@ impl Words {
     }
 
     #[inline]
-    pub(super) fn is_claimed(&self, list: u8) -> bool {
-        self.claimed.load(Ordering::Acquire) >> list & 1 == 1
+    pub(super) fn is_owned(&self, list: u8) -> bool {
+        self.owned.load(Ordering::Acquire) >> list & 1 == 1
     }
 
     pub(super) fn refuse(&self, word: u32) {

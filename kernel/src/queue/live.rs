@@ -6,10 +6,10 @@
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use super::change::{Change, LISTS, ListPlace, Progress, Words};
+use super::change::{Change, LISTS, ListPlace, Mailbox, Progress};
 use super::{
-    Density, FeedItem, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, Taken, accept,
-    count, enter, length,
+    Density, FeedItem, Fill, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, accept, count,
+    enter, length,
 };
 use crate::law::{FeedSegment, Phase, Ticks};
 use crate::live::LIST_ITEMS;
@@ -52,7 +52,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
         while path.dequeue().is_some() {}
         while feed.dequeue().is_some() {}
         let shared: &Shared = shared;
-        shared.words.reset();
+        shared.mailbox.reset();
         let (path_in, path_out) = path.split();
         let (first_in, first_out) = feed.split();
         let (second_in, second_out) = self.second.split();
@@ -74,12 +74,12 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             feed: first_out,
             shared,
             finished: 0,
-            path_taken: Taken::new(&shared.path_entered, PIECES - 1),
-            feed_taken: Taken::new(&shared.feed_entered, SEGMENTS - 1),
+            path_fill: Fill::new(&shared.path_entered, PIECES - 1),
+            feed_fill: Fill::new(&shared.feed_entered, SEGMENTS - 1),
             lists: Some(Lists {
                 place: ListPlace::new(0, 0),
                 others: [(1, second_out), (2, third_out)],
-                seen: shared.words.news(),
+                seen: shared.mailbox.generation(),
                 due: ListPlace::NEVER,
                 change: None,
                 refused: None,
@@ -170,7 +170,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     #[must_use]
     pub fn progress(&self) -> Progress {
         self.interruptible();
-        self.shared.words.progress()
+        self.shared.mailbox.progress()
     }
 
     /// Whether there is a list to begin now.
@@ -182,16 +182,16 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     fn free_list(&self) -> Option<u8> {
         self.interruptible();
         let is_free = |(list, queue): &(u8, &Producer<'_, _>)| {
-            !self.shared.words.is_claimed(*list) && length(queue) == 0
+            !self.shared.mailbox.is_owned(*list) && length(queue) == 0
         };
         (0..LISTS).zip(&self.lists).find(is_free).map(|(list, _)| list)
     }
 
-    /// A list that is empty and not under way nor asked for, claimed for what goes on from path position `start` at
+    /// A list that is empty and not under way nor asked for, owned for what goes on from path position `start` at
     /// `feed_mm_s`, behind what `density` says; `None` if there is none now.
     pub fn begin(&mut self, start: Position, feed_mm_s: R, density: Density) -> Option<u8> {
         let free = self.free_list()?;
-        self.shared.words.claim(free, true);
+        self.shared.mailbox.own(free, true);
         self.feed_accept = self.path_accept.feed_from(start, feed_mm_s, density);
         self.filled = Some(free);
         Some(free)
@@ -271,28 +271,28 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
             return Err(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() });
         }
         self.changes = self.changes.wrapping_add(1);
-        self.shared.words.ask(Some(change), self.changes);
+        self.shared.mailbox.ask(Some(change), self.changes);
         Ok(())
     }
 
     /// Takes back what was asked for. The tick may have followed it already.
     pub fn no_change(&mut self) {
         self.interruptible();
-        self.shared.words.ask(None, 0);
+        self.shared.mailbox.ask(None, 0);
     }
 
     /// Whether the change asked for came too late.
     #[must_use]
     pub fn is_refused(&self) -> bool {
         self.interruptible();
-        self.shared.words.is_refused()
+        self.shared.mailbox.is_refused()
     }
 
     /// Whether a fault asks for a stop on the path; never again after the streams are split anew.
     #[must_use]
     pub fn is_stop_wanted(&self) -> bool {
         #[cfg(feature = "guards")]
-        return self.shared.words.is_stop_wanted();
+        return self.shared.mailbox.is_stop_wanted();
         #[cfg(not(feature = "guards"))]
         false
     }
@@ -300,7 +300,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Gives up a list: the tick empties it.
     pub fn give_up(&mut self, list: u8) {
         self.interruptible();
-        self.shared.words.claim(list, false);
+        self.shared.mailbox.own(list, false);
     }
 }
 
@@ -309,7 +309,7 @@ pub(super) struct Lists<'a, R: Real> {
     /// The current list, and how many items of it are done.
     place: ListPlace,
     others: [(u8, Consumer<'a, FeedItem<R>>); LISTS as usize - 1],
-    /// The news that have been dealt with.
+    /// The generation that has been dealt with.
     seen: u32,
     /// From here on a change is due; never reached if none is asked for.
     due: ListPlace,
@@ -320,20 +320,20 @@ pub(super) struct Lists<'a, R: Real> {
 }
 
 impl<R: Real> Lists<'_, R> {
-    /// Deals with news, in as many ticks as it takes to empty what was given up.
+    /// Deals with what is new, in as many ticks as it takes to empty what was given up.
     #[cold]
     #[inline(never)]
-    fn look(&mut self, words: &Words, news: u32) {
-        self.change = words
+    fn poll(&mut self, mailbox: &Mailbox, generation: u32) {
+        self.change = mailbox
             .asked()
             .filter(|(word, change)| change.from == self.place.list() && self.refused != Some(*word));
         self.due =
             self.change.map_or(ListPlace::NEVER, |(_, change)| ListPlace::new(change.from, change.after));
         for _ in 0..DROPPED_PER_TICK {
-            let given_up = self.others.iter_mut().filter(|(list, _)| !words.is_claimed(*list));
+            let given_up = self.others.iter_mut().filter(|(list, _)| !mailbox.is_owned(*list));
             // One item of one of them, while there is any.
             if given_up.map(|(_, queue)| queue.dequeue()).all(|item| item.is_none()) {
-                self.seen = news;
+                self.seen = generation;
                 break;
             }
         }
@@ -349,11 +349,11 @@ impl<R: Real> Lists<'_, R> {
 impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     /// What the background asks for now; what it gave up goes.
     #[inline]
-    pub(super) fn look_for_change(&mut self) {
+    pub(super) fn poll_changes(&mut self) {
         if let Some(lists) = &mut self.lists {
-            let news = self.shared.words.news();
-            if lists.seen != news {
-                lists.look(&self.shared.words, news);
+            let generation = self.shared.mailbox.generation();
+            if lists.seen != generation {
+                lists.poll(&self.shared.mailbox, generation);
             }
         }
     }
@@ -410,7 +410,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         let Some(lists) = &mut self.lists else { return };
         if let Some((word, _)) = lists.forget() {
             lists.refused = Some(word);
-            self.shared.words.refuse(word);
+            self.shared.mailbox.refuse(word);
         }
     }
 
@@ -418,7 +418,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
     #[inline]
     pub(crate) fn publish(&self, inside: Option<(Phase, Ticks)>, waits: bool) {
         if let Some(lists) = &self.lists {
-            self.shared.words.publish(lists.place, inside, waits);
+            self.shared.mailbox.publish(lists.place, inside, waits);
         }
     }
 }

@@ -91,7 +91,7 @@ struct Shared {
     path_covers_feed: AtomicBool,
     /// Where motion can be changed.
     #[cfg(feature = "live")]
-    words: change::Words,
+    mailbox: change::Mailbox,
 }
 
 impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
@@ -110,7 +110,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
                 feed_covers_path: AtomicBool::new(true),
                 path_covers_feed: AtomicBool::new(true),
                 #[cfg(feature = "live")]
-                words: change::Words::new(),
+                mailbox: change::Mailbox::new(),
             },
         }
     }
@@ -130,16 +130,16 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
         let mut feeder =
             Feeder { path: path_in, feed: feed_in, shared, accept: accept::Acceptance::new(rules, position) };
         feeder.publish();
-        let path = Taken::new(&shared.path_entered, PIECES - 1);
-        let feed = Taken::new(&shared.feed_entered, SEGMENTS - 1);
+        let path = Fill::new(&shared.path_entered, PIECES - 1);
+        let feed = Fill::new(&shared.feed_entered, SEGMENTS - 1);
         let finished = shared.stretches.load(Ordering::Relaxed);
         let intake = Intake {
             path: path_out,
             feed: feed_out,
             shared,
             finished,
-            path_taken: path,
-            feed_taken: feed,
+            path_fill: path,
+            feed_fill: feed,
             #[cfg(feature = "live")]
             lists: None,
             correction: None,
@@ -314,13 +314,13 @@ fn count(counter: &AtomicU32) {
 
 /// How full a queue was as the tick began.
 #[derive(Clone, Copy, Debug)]
-struct Taken {
+struct Fill {
     so_far: u32,
     before_tick: u32,
     capacity: i32,
 }
 
-impl Taken {
+impl Fill {
     /// Of an empty queue.
     #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
     fn new(entered: &AtomicU32, capacity: usize) -> Self {
@@ -341,8 +341,8 @@ pub struct Intake<'a, R: Real, const AXES: usize> {
     feed: Consumer<'a, FeedItem<R>>,
     shared: &'a Shared,
     finished: u32,
-    path_taken: Taken,
-    feed_taken: Taken,
+    path_fill: Fill,
+    feed_fill: Fill,
     #[cfg(feature = "live")]
     lists: Option<live::Lists<'a, R>>,
     correction: Option<Correction<'a, R, AXES>>,
@@ -374,7 +374,7 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     pub(crate) fn want_stop(&self) -> bool {
         #[cfg(feature = "live")]
         if self.lists.is_some() {
-            self.shared.words.want_stop();
+            self.shared.mailbox.want_stop();
             return true;
         }
         false
@@ -383,10 +383,10 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     /// A new tick: the producer has had its turn.
     #[inline]
     pub(crate) fn start_tick(&mut self) {
-        self.path_taken.before_tick = self.path_taken.so_far;
-        self.feed_taken.before_tick = self.feed_taken.so_far;
+        self.path_fill.before_tick = self.path_fill.so_far;
+        self.feed_fill.before_tick = self.feed_fill.so_far;
         #[cfg(feature = "live")]
-        self.look_for_change();
+        self.poll_changes();
     }
 
     /// The first item of the feed stream: the one under way, or the next.
@@ -398,7 +398,7 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     /// The first item of the feed stream is done.
     #[inline]
     pub(crate) fn drop_feed(&mut self) {
-        self.feed_taken.so_far = self.feed_taken.so_far.wrapping_add(1);
+        self.feed_fill.so_far = self.feed_fill.so_far.wrapping_add(1);
         self.feed.dequeue();
         #[cfg(feature = "live")]
         if self.lists.is_some() {
@@ -415,7 +415,7 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
     /// The first item of the path stream, a piece, is done.
     #[inline]
     pub(crate) fn drop_piece(&mut self) {
-        self.path_taken.so_far = self.path_taken.so_far.wrapping_add(1);
+        self.path_fill.so_far = self.path_fill.so_far.wrapping_add(1);
         self.path.dequeue();
     }
 
@@ -435,8 +435,8 @@ impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
             // What is handed over ends at rest on the path that is there.
             return true;
         }
-        let feed_full = || self.feed_taken.was_full(&self.shared.feed_entered);
-        let path_full = || self.path_taken.was_full(&self.shared.path_entered);
+        let feed_full = || self.feed_fill.was_full(&self.shared.feed_entered);
+        let path_full = || self.path_fill.was_full(&self.shared.path_entered);
         self.shared.stretches.load(Ordering::Acquire) != self.finished
             || (path_full() && (feed_full() || self.shared.feed_covers_path.load(Ordering::Acquire)))
             || (feed_full() && self.shared.path_covers_feed.load(Ordering::Acquire))

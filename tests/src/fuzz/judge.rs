@@ -6,7 +6,7 @@ use motion_kernel::num::Real;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::DacCode;
 
-use super::bench::TRIM_V;
+use super::axes::TRIM_V;
 
 use super::items::{LIMITS, RULES, TICK_S};
 

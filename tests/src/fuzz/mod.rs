@@ -10,11 +10,11 @@
 //! - a whole program on a machine that follows is driven to its exact end.
 //!
 //! ```text
-//! bytes ─► items ─► runs: streams, or live control ─► kernel ─► bench
+//! bytes ─► items ─► runs: streams, or live control ─► kernel ─► test axes
 //!                                                       └─► judge
 //! ```
 
-mod bench;
+mod axes;
 mod items;
 mod judge;
 mod runs;

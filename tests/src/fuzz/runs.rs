@@ -8,13 +8,13 @@ use arbitrary::{Result, Unstructured};
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::live::{Director, Source, State};
+use motion_kernel::live::{LiveControl, Source, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::{Intake, LiveStreams, Streams};
 use motion_kernel::units::{Counts, Position};
 
-use super::bench::{Bench, REACTIONS, axes};
+use super::axes::{REACTIONS, TestAxes, axes};
 use super::items::{Program, RULES, TICK_S};
 use super::judge::Judge;
 
@@ -33,7 +33,7 @@ const OFF_TICKS: u32 = REACTIONS.stop_ticks + REACTIONS.ramp_ticks as u32 + 2;
 /// The machine's side of a run.
 struct Machine<R: Real> {
     kernel: Kernel<R, 2>,
-    bench: Bench,
+    hardware: TestAxes,
     judge: Judge<R>,
     /// Where it was set by the latest tick.
     set: [Position; 2],
@@ -52,7 +52,7 @@ impl<R: Real> Machine<R> {
         let set = [Position::ZERO; 2];
         Self {
             kernel,
-            bench: Bench::default(),
+            hardware: TestAxes::default(),
             judge: Judge::new(),
             set,
             faulty: 0,
@@ -77,14 +77,14 @@ impl<R: Real> Machine<R> {
             }
             4 => return self.trip(input),
             5 => {
-                self.bench.mend();
+                self.hardware.mend();
                 return Ok(());
             }
             6 => {
                 self.kernel.rest_here();
             }
             7 => self.refer(input)?,
-            _ => return self.bench.upset(input),
+            _ => return self.hardware.upset(input),
         }
         (self.is_moved, self.is_given_up) = (true, true);
         Ok(())
@@ -107,17 +107,17 @@ impl<R: Real> Machine<R> {
         let (axis, behind) = (input.choose_index(2)?, input.arbitrary::<i16>()?);
         let mm = f64::from(input.arbitrary::<i16>()?) / 64.0;
         let position = Position::from_mm(mm).expect("within half a metre");
-        let Counts(now) = self.bench.counts[axis];
+        let Counts(now) = self.hardware.counts[axis];
         let counts = Counts(now.wrapping_sub(i64::from(behind)));
         let before = self.set[axis];
         if let Some(set) = self.kernel.reference(axis, counts, position) {
-            self.bench.shift(axis, set[axis] - before);
+            self.hardware.shift(axis, set[axis] - before);
         }
         Ok(())
     }
 
     fn tick(&mut self, intake: &mut Intake<'_, R, 2>) -> ExecState {
-        let trace = *self.kernel.tick(intake, &mut self.bench);
+        let trace = *self.kernel.tick(intake, &mut self.hardware);
         // Enabled anew in the middle of a stretch the machine stands where it is.
         if core::mem::take(&mut self.is_moved) {
             self.judge.anew();
@@ -128,13 +128,13 @@ impl<R: Real> Machine<R> {
             self.faulty += 1;
         } else {
             self.faulty = 0;
-            if !self.bench.is_hostile {
-                self.bench.follow(&trace);
+            if !self.hardware.is_hostile {
+                self.hardware.follow(&trace);
             }
         }
         if self.faulty > OFF_TICKS {
             assert_eq!(self.kernel.reaction(), Some(Reaction::Immediate), "{trace:?}");
-            self.bench.mend();
+            self.hardware.mend();
         }
         if trace.executed.state == ExecState::Stopped {
             self.kernel.resume();
@@ -144,7 +144,7 @@ impl<R: Real> Machine<R> {
 
     /// Nothing has kept the program from being driven to its end.
     fn is_undisturbed(&self) -> bool {
-        !self.bench.is_hostile && !self.is_given_up
+        !self.hardware.is_hostile && !self.is_given_up
     }
 }
 
@@ -220,34 +220,34 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
     let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO; 2]);
     let there = Cell::new(0);
     let source = Arriving { items: program.items.iter(), there: &there };
-    let mut director = Director::<R, 2, _, _, PLACES>::new(source, TICK_S, input.int_in_range(0..=3)?);
+    let mut control = LiveControl::<R, 2, _, _, PLACES>::new(source, TICK_S, input.int_in_range(0..=3)?);
     let mut machine = Machine::<R>::new();
     let (mut has_turn, mut is_aborted) = (true, false);
     while !input.is_empty() {
         match input.int_in_range(0..=15)? {
             0 => machine.event(input)?,
             1 => has_turn = !has_turn,
-            2 => director.hold(),
-            3 => director.set_single_block(input.arbitrary()?),
-            4 | 5 => director.resume(),
+            2 => control.hold(),
+            3 => control.set_single_block(input.arbitrary()?),
+            4 | 5 => control.resume(),
             6 => {
                 let share: f64 = input.arbitrary()?;
                 // Refused, or taken as it is.
-                let _ = director.set_override(share);
+                let _ = control.set_override(share);
             }
             7 | 8 => {
                 let eighths: u8 = input.int_in_range(0..=16)?;
-                director.set_override(f64::from(eighths) / 8.0).expect("within the range");
+                control.set_override(f64::from(eighths) / 8.0).expect("within the range");
             }
             9 if input.ratio(1, 8)? => {
-                director.abort();
+                control.abort();
                 is_aborted = true;
             }
             _ => there.set(there.get() + usize::from(input.arbitrary::<u8>()?)),
         }
         for _ in 0..input.arbitrary::<u8>()? {
             if has_turn {
-                let _ = director.turn(&mut feeder);
+                let _ = control.poll(&mut feeder);
             }
             machine.tick(&mut intake);
         }
@@ -256,17 +256,17 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
     let fault = machine.kernel.fault();
     // What fills the lists is never the reason: what can't be executed is refused.
     assert!(
-        machine.bench.is_hostile || machine.is_given_up || fault.is_none(),
+        machine.hardware.is_hostile || machine.is_given_up || fault.is_none(),
         "no fault of the machine: {fault:?}"
     );
     if program.is_whole && machine.is_undisturbed() && program.ticks < TICKS_MAX {
-        director.set_single_block(false);
-        director.resume();
-        director.set_override(1.0).expect("within the range");
+        control.set_single_block(false);
+        control.resume();
+        control.set_override(1.0).expect("within the range");
         for _ in 0..20 * program.ticks as u64 + 40_000 {
-            director.turn(&mut feeder).expect("a whole program");
+            control.poll(&mut feeder).expect("a whole program");
             let state = machine.tick(&mut intake);
-            match director.state(&feeder) {
+            match control.state(&feeder) {
                 State::Done if state == ExecState::Idle => {
                     assert_eq!(machine.set, program.end);
                     return Ok(());
@@ -275,7 +275,7 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
                 _ => {}
             }
         }
-        panic!("a whole program has no end: {:?}, {:?}", director.state(&feeder), machine.kernel.fault());
+        panic!("a whole program has no end: {:?}, {:?}", control.state(&feeder), machine.kernel.fault());
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Plan};
 use motion_kernel::exec::{ExecState, Executed, Executor};
-use motion_kernel::live::{Director, Source, State};
+use motion_kernel::live::{LiveControl, Source, State};
 use motion_kernel::queue::LiveStreams;
 use motion_kernel::units::Position;
 
@@ -109,29 +109,29 @@ where
     let mut streams = LiveStreams::<R, 3, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
     let mut executor = Executor::<R, 3>::new(start);
-    let mut director = Director::<R, 3, _, _, PLACES>::new(source, machine.tick_s, 0);
+    let mut control = LiveControl::<R, 3, _, _, PLACES>::new(source, machine.tick_s, 0);
     let mut checker = Checker::new::<R>(machine, plan, path, seed).live(1.0);
     let mut greatest = Greatest { ticks: response_ticks, falling: VecDeque::new() };
     let (mut ticks, mut turns, mut stretches, mut feed_override) = (0_u64, 0_u64, 0_usize, 1.0);
     let (mut rests, mut commands, mut stops, mut dwelt) = (0_u64, 0_u64, 0_u64, 0_u64);
     let mut executed = executor.tick(&mut intake).map_err(|fault| format!("{fault:?}"))?;
     loop {
-        let state = director.state(&feeder);
+        let state = control.state(&feeder);
         let command = script(&Seen { ticks, state, executed: &executed });
         commands += u64::from(command.is_some_and(|command| command != Command::Stall));
         match command {
             None | Some(Command::Stall) => {}
-            Some(Command::Hold) => director.hold(),
-            Some(Command::Resume) => director.resume(),
+            Some(Command::Hold) => control.hold(),
+            Some(Command::Resume) => control.resume(),
             Some(Command::Override(share)) => {
-                director.set_override(share).expect("within range");
+                control.set_override(share).expect("within range");
                 feed_override = share;
             }
-            Some(Command::Abort) => director.abort(),
-            Some(Command::SingleBlock(is_single)) => director.set_single_block(is_single),
+            Some(Command::Abort) => control.abort(),
+            Some(Command::SingleBlock(is_single)) => control.set_single_block(is_single),
         }
         if command != Some(Command::Stall) {
-            director.turn(&mut feeder).map_err(|error| format!("tick {ticks}: rejected: {error}"))?;
+            control.poll(&mut feeder).map_err(|error| format!("tick {ticks}: rejected: {error}"))?;
             turns += 1;
         }
         let before = (executed.motion, executed.state);
@@ -153,7 +153,7 @@ where
             stops += 1;
             executor.resume();
         }
-        let state = director.state(&feeder);
+        let state = control.state(&feeder);
         if matches!(state, State::Done | State::Aborted) && executed.state != ExecState::Dwell {
             // Nothing is lost, nothing repeated: of a dwell a part of a tick at either end may not be seen.
             let dwell_ticks = path.dwell_s / machine.tick_s;
@@ -172,7 +172,7 @@ where
                 totals: checker.totals,
                 ticks,
                 state,
-                starvations: director.starvations(),
+                starvations: control.starvations(),
                 rests,
                 commands,
             });

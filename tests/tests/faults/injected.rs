@@ -113,12 +113,12 @@ fn inject<R: Real>(case: &Case, machine: &Machine, seed: u64, longest_ticks: f64
         error = Some(problem);
         Next::End
     };
-    run::<R>(&plan, machine, &mut |tick, rig, _: &mut Kernel<R, 3>, seen: Option<&Seen<R>>| {
+    run::<R>(&plan, machine, &mut |tick, hardware, _: &mut Kernel<R, 3>, seen: Option<&Seen<R>>| {
         if tick == inject_at {
             let position_mm = seen.map_or(0.0, |seen| seen.position_mm[axis]);
             match injection(case.name, &mut random, position_mm) {
-                Some(injection) => rig.inject(axis, injection),
-                None => rig.injector.emergency_stop = true,
+                Some(injection) => hardware.inject(axis, injection),
+                None => hardware.injector.emergency_stop = true,
             }
         }
         let Some(seen) = seen else { return Next::GoOn };
@@ -179,13 +179,13 @@ fn inject<R: Real>(case: &Case, machine: &Machine, seed: u64, longest_ticks: f64
             return end(format!("tick {k} of {:?}: {codes:?} from {ramp_from:?}", case.reaction));
         }
         if seen.is_off && k > ramp_ticks as u64 + 400 {
-            rig.injector.repair();
+            hardware.injector.repair();
             if case.name == "drive reversed" {
-                rig.inject(axis, Injection::DriveReversed);
+                hardware.inject(axis, Injection::DriveReversed);
             }
             if case.name == "overload" {
                 let accel_limit_mm_s2 = machine.axes[axis].drive.accel_limit_mm_s2;
-                rig.inject(axis, Injection::Overload { accel_limit_mm_s2 });
+                hardware.inject(axis, Injection::Overload { accel_limit_mm_s2 });
             }
             return Next::Recover([1.0, 1.0, -1.0]);
         }

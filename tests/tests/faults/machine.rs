@@ -2,12 +2,12 @@
 
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan};
-use motion_host::simulate::rig::{Rig, Simulated};
+use motion_host::simulate::hardware::{Simulated, SimulatedHardware};
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Reaction;
 use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
-use motion_kernel::live::{Director, State};
+use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
 use motion_kernel::queue::{LiveStreams, Streams};
@@ -71,36 +71,36 @@ pub(crate) enum Next {
     End,
 }
 
-/// What a test does between two ticks: the rig to break, the kernel to trip.
+/// What a test does between two ticks: the hardware to break, the kernel to trip.
 pub(crate) type Between<'a, R> =
-    dyn FnMut(u64, &mut Rig<'_>, &mut Kernel<R, 3>, Option<&Seen<R>>) -> Next + 'a;
+    dyn FnMut(u64, &mut SimulatedHardware<'_>, &mut Kernel<R, 3>, Option<&Seen<R>>) -> Next + 'a;
 
 /// Runs a plan; `between` is called before every tick. After the program's end the machine stands for 100 ticks. Ends with
 /// the last tick's number.
 pub(crate) fn run<R: Real>(plan: &Plan, machine: &Machine, between: &mut Between<'_, R>) -> u64 {
     let executable = Executable::new::<R>(plan).expect("executable");
     let simulated = Simulated::new(&machine.simulated()).expect("a machine");
-    let mut rig = Rig::new(&simulated).expect("a converter");
-    let Ok(counts) = rig.latch();
+    let mut hardware = SimulatedHardware::new(&simulated).expect("a converter");
+    let Ok(counts) = hardware.latch();
     let start = [Position::ZERO; 3];
     let mut kernel = Kernel::<R, 3>::new(&machine.axes_config().expect("axes"), start, counts);
     kernel.enable(SETTLE_TICKS);
     let mut streams = Box::new(LiveStreams::<R, 3, PIECES, SEGMENTS>::new());
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
-    let mut director = Director::<R, 3, _, _, PLACES>::new(executable.supplied(), executable.tick_s, 0);
+    let mut control = LiveControl::<R, 3, _, _, PLACES>::new(executable.supplied(), executable.tick_s, 0);
     let mut last: Option<Seen<R>> = None;
     let mut standing = 0;
     for tick in 0.. {
-        match between(tick, &mut rig, &mut kernel, last.as_ref()) {
+        match between(tick, &mut hardware, &mut kernel, last.as_ref()) {
             Next::GoOn => {}
             Next::End => return tick,
             Next::Recover(signs) => {
-                recover(machine, &simulated, &mut rig, &mut kernel, signs);
+                recover(machine, &simulated, &mut hardware, &mut kernel, signs);
                 return tick;
             }
         }
-        director.turn(&mut feeder).expect("items");
-        let trace = *kernel.tick(&mut intake, &mut rig);
+        control.poll(&mut feeder).expect("items");
+        let trace = *kernel.tick(&mut intake, &mut hardware);
         simulated.advance();
         if trace.executed.state == ExecState::Stopped {
             kernel.resume();
@@ -111,7 +111,7 @@ pub(crate) fn run<R: Real>(plan: &Plan, machine: &Machine, between: &mut Between
             is_off: kernel.reaction() == Some(Reaction::Immediate),
             position_mm: simulated.truth().map(|axis| axis.position_mm),
         });
-        let is_done = director.state(&feeder) == State::Done && trace.executed.state == ExecState::Idle;
+        let is_done = control.state(&feeder) == State::Done && trace.executed.state == ExecState::Idle;
         standing = if is_done { standing + 1 } else { 0 };
         if standing > 100 {
             return tick;
@@ -124,7 +124,7 @@ pub(crate) fn run<R: Real>(plan: &Plan, machine: &Machine, between: &mut Between
 fn recover<R: Real>(
     machine: &Machine,
     simulated: &Simulated,
-    rig: &mut Rig<'_>,
+    hardware: &mut SimulatedHardware<'_>,
     kernel: &mut Kernel<R, 3>,
     signs: [f64; 3],
 ) {
@@ -135,7 +135,7 @@ fn recover<R: Real>(
         let (_, mut intake) = streams.split(machine.rules(), [Position::ZERO; 3]);
         kernel.enable(0);
         for _ in 0..400 {
-            let trace = kernel.tick(&mut intake, rig);
+            let trace = kernel.tick(&mut intake, hardware);
             assert_eq!(trace.fault, Some(fault));
             simulated.advance();
             assert!(!simulated.is_enabled());
@@ -156,7 +156,7 @@ fn recover<R: Real>(
         here[axis] = if sign > 0.0 { here[axis] + length } else { here[axis] - length };
         feeder.end_stretch(here).expect("room");
         let is_there = (0..5000).any(|_| {
-            let trace = kernel.tick(&mut intake, rig);
+            let trace = kernel.tick(&mut intake, hardware);
             assert_eq!(trace.fault, None, "moving again");
             simulated.advance();
             let set = trace.executed.setpoints.map(|setpoint| setpoint.position);

@@ -4,7 +4,7 @@
 use crate::check::bench::{LIMITS, RULES, line, mm, point, ramp, rest_to_rest};
 use hal_sim::{AxisParameters, MachineParameters, SimMachine};
 use motion_host::machine::Machine;
-use motion_host::simulate::rig::Rig;
+use motion_host::simulate::hardware::SimulatedHardware;
 use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::{ExecFault, ExecState};
 use motion_kernel::fault::FaultKind;
@@ -15,7 +15,7 @@ use motion_kernel::units::{Counts, DacCode, Position};
 
 /// Axes that follow perfectly until told to fail.
 #[derive(Debug, Default)]
-struct Bench {
+struct TestAxes {
     counts: [Counts; 2],
     written: [DacCode; 2],
     is_enabled: bool,
@@ -28,21 +28,21 @@ struct Bench {
 
 struct Failure;
 
-impl Encoder<2> for Bench {
+impl Encoder<2> for TestAxes {
     type Error = Failure;
     fn latch(&mut self) -> Result<[Counts; 2], Failure> {
         if self.encoder_fails { Err(Failure) } else { Ok(self.counts) }
     }
 }
 
-impl Inputs<2> for Bench {
+impl Inputs<2> for TestAxes {
     type Error = Failure;
     fn read_inputs(&mut self) -> Result<MachineInputs<2>, Failure> {
         if self.inputs_fail { Err(Failure) } else { Ok(self.inputs) }
     }
 }
 
-impl VelocityChannel<2> for Bench {
+impl VelocityChannel<2> for TestAxes {
     type Error = Failure;
     fn write(&mut self, codes: &[DacCode; 2]) -> Result<(), Failure> {
         if self.output_fails {
@@ -53,7 +53,7 @@ impl VelocityChannel<2> for Bench {
     }
 }
 
-impl DriveEnable<2> for Bench {
+impl DriveEnable<2> for TestAxes {
     type Error = Failure;
     fn set_enabled(&mut self, is_enabled: bool) -> Result<(), Failure> {
         if self.enable_fails {
@@ -89,11 +89,11 @@ fn is_found_writing(kind: &FaultKind<f32>) -> bool {
 fn tick(
     kernel: &mut Kernel<f32, 2>,
     intake: &mut Intake<'_, f32, 2>,
-    bench: &mut Bench,
+    axes: &mut TestAxes,
 ) -> Option<FaultKind<f32>> {
-    let trace = *kernel.tick(intake, bench);
+    let trace = *kernel.tick(intake, axes);
     if trace.fault.is_none() {
-        bench.counts = trace
+        axes.counts = trace
             .executed
             .setpoints
             .map(|axis| Counts((axis.position.to_mm() / MM_PER_COUNT).round() as i64));
@@ -117,42 +117,42 @@ fn offer(feeder: &mut Feeder<'_, f32, 2>, from_mm: f64) {
 
 /// Runs into a fault that `break_it` provokes at tick 100, and checks all that is promised about it.
 fn provoke(
-    break_it: impl Fn(&mut Bench),
-    repair: impl Fn(&mut Bench),
+    break_it: impl Fn(&mut TestAxes),
+    repair: impl Fn(&mut TestAxes),
     is_expected: impl Fn(&FaultKind<f32>) -> bool,
 ) {
-    let (mut kernel, mut bench) = (kernel(), Bench::default());
+    let (mut kernel, mut axes) = (kernel(), TestAxes::default());
     let mut streams = Streams::<f32, 2, 8, 8>::new();
     let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
     offer(&mut feeder, 0.0);
     for _ in 0..100 {
-        assert_eq!(tick(&mut kernel, &mut intake, &mut bench), None);
+        assert_eq!(tick(&mut kernel, &mut intake, &mut axes), None);
     }
-    assert!(bench.is_enabled && bench.written[0] != DacCode::ZERO);
+    assert!(axes.is_enabled && axes.written[0] != DacCode::ZERO);
     let mut fault = None;
     for _ in 0..400 {
-        break_it(&mut bench);
-        fault = fault.or(tick(&mut kernel, &mut intake, &mut bench));
+        break_it(&mut axes);
+        fault = fault.or(tick(&mut kernel, &mut intake, &mut axes));
     }
     let fault = fault.expect("a fault");
     assert!(is_expected(&fault), "{fault:?}");
     let latched = kernel.fault().expect("latched");
     // Repaired it stays, and another failure does not replace it.
-    repair(&mut bench);
-    assert_eq!(tick(&mut kernel, &mut intake, &mut bench), Some(fault));
-    bench.encoder_fails = true;
-    bench.output_fails = true;
-    tick(&mut kernel, &mut intake, &mut bench);
-    (bench.encoder_fails, bench.output_fails) = (false, false);
+    repair(&mut axes);
+    assert_eq!(tick(&mut kernel, &mut intake, &mut axes), Some(fault));
+    axes.encoder_fails = true;
+    axes.output_fails = true;
+    tick(&mut kernel, &mut intake, &mut axes);
+    (axes.encoder_fails, axes.output_fails) = (false, false);
     for _ in 0..10 {
-        assert_eq!(tick(&mut kernel, &mut intake, &mut bench), Some(fault));
+        assert_eq!(tick(&mut kernel, &mut intake, &mut axes), Some(fault));
     }
     assert_eq!(kernel.fault(), Some(latched));
-    assert!(!bench.is_enabled && bench.written == [DacCode::ZERO; 2], "{bench:?}");
+    assert!(!axes.is_enabled && axes.written == [DacCode::ZERO; 2], "{axes:?}");
     // The way back: cleared, at rest where the axes are, with new streams.
     let stands = kernel.clear_fault().expect("off");
     assert_eq!(kernel.fault(), None);
-    let here = bench.counts.map(|Counts(counts)| counts as f64 * MM_PER_COUNT);
+    let here = axes.counts.map(|Counts(counts)| counts as f64 * MM_PER_COUNT);
     for (found, here) in stands.iter().zip(here) {
         assert!((found.to_mm() - here).abs() < 1e-9);
     }
@@ -161,21 +161,21 @@ fn provoke(
     offer(&mut feeder, here[0]);
     // Not before it is asked to.
     for _ in 0..3 {
-        let trace = kernel.tick(&mut intake, &mut bench);
-        assert!(trace.executed.state == ExecState::Idle && !bench.is_enabled);
+        let trace = kernel.tick(&mut intake, &mut axes);
+        assert!(trace.executed.state == ExecState::Idle && !axes.is_enabled);
     }
     kernel.enable(5);
     for settling in 0..5 {
-        let trace = kernel.tick(&mut intake, &mut bench);
-        assert!(trace.executed.state == ExecState::Idle && bench.is_enabled, "{settling}");
+        let trace = kernel.tick(&mut intake, &mut axes);
+        assert!(trace.executed.state == ExecState::Idle && axes.is_enabled, "{settling}");
     }
     for _ in 0..20_000 {
-        let trace = kernel.tick(&mut intake, &mut bench);
+        let trace = kernel.tick(&mut intake, &mut axes);
         assert_eq!(trace.fault, None);
         let set = trace.executed.setpoints.map(|axis| axis.position);
-        bench.counts = set.map(|position| Counts((position.to_mm() / MM_PER_COUNT).round() as i64));
+        axes.counts = set.map(|position| Counts((position.to_mm() / MM_PER_COUNT).round() as i64));
         if trace.executed.stretches == 1 && trace.executed.state == ExecState::Idle {
-            assert!(bench.is_enabled);
+            assert!(axes.is_enabled);
             assert_eq!(set, [mm(here[0] + 20.0), mm(here[1])]);
             return;
         }
@@ -185,7 +185,7 @@ fn provoke(
 
 #[test]
 fn following_error() {
-    let stuck = |bench: &mut Bench| bench.counts[0] = Counts(0);
+    let stuck = |axes: &mut TestAxes| axes.counts[0] = Counts(0);
     provoke(
         stuck,
         |_| {},
@@ -229,21 +229,21 @@ fn drive_fault() {
 /// The first tick can't enable the drives: no motion with them off.
 #[test]
 fn enable() {
-    let (mut kernel, mut bench) = (kernel(), Bench { enable_fails: true, ..Bench::default() });
+    let (mut kernel, mut axes) = (kernel(), TestAxes { enable_fails: true, ..TestAxes::default() });
     let mut streams = Streams::<f32, 2, 8, 8>::new();
     let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
     offer(&mut feeder, 0.0);
-    tick(&mut kernel, &mut intake, &mut bench);
+    tick(&mut kernel, &mut intake, &mut axes);
     let before = kernel.fault();
     assert!(matches!(before.map(|fault| fault.kind), Some(FaultKind::Enable)), "{before:?}");
-    bench.enable_fails = false;
-    tick(&mut kernel, &mut intake, &mut bench);
-    assert!(kernel.fault() == before && bench.written == [DacCode::ZERO; 2] && !bench.is_enabled);
+    axes.enable_fails = false;
+    tick(&mut kernel, &mut intake, &mut axes);
+    assert!(kernel.fault() == before && axes.written == [DacCode::ZERO; 2] && !axes.is_enabled);
 }
 
 /// Runs dry inside a stretch: as much as fits the queues, then nothing more.
 fn starve(is_path: bool) {
-    let (mut kernel, mut bench) = (kernel(), Bench::default());
+    let (mut kernel, mut axes) = (kernel(), TestAxes::default());
     let mut streams = Streams::<f32, 2, 8, 4>::new();
     let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
     // Both streams are full (one place stays empty), so the stretch may start; then the rest of the path
@@ -258,12 +258,12 @@ fn starve(is_path: bool) {
     }
     let mut fault = None;
     for _ in 0..10_000 {
-        let trace = kernel.tick(&mut intake, &mut bench);
+        let trace = kernel.tick(&mut intake, &mut axes);
         if trace.fault.is_none() {
             assert!(trace.executed.motion.v_mm_s <= top_mm_s as f32);
             let set = trace.executed.setpoints.map(|axis| axis.position.to_mm());
             assert!(!is_path || set[0] <= path_mm);
-            bench.counts = set.map(|at| Counts((at / MM_PER_COUNT).round() as i64));
+            axes.counts = set.map(|at| Counts((at / MM_PER_COUNT).round() as i64));
         } else {
             assert!(trace.axes.iter().all(|axis| axis.code == DacCode::ZERO));
         }
@@ -272,7 +272,7 @@ fn starve(is_path: bool) {
     }
     let expected = if is_path { ExecFault::PathStarved } else { ExecFault::FeedStarved };
     assert_eq!(fault.map(|fault| fault.kind), Some(FaultKind::Executor(expected)));
-    assert!(!bench.is_enabled && bench.written == [DacCode::ZERO; 2]);
+    assert!(!axes.is_enabled && axes.written == [DacCode::ZERO; 2]);
 }
 
 #[test]
@@ -294,8 +294,8 @@ fn converter_bus() {
         let axis = AxisParameters::REFERENCE_X;
         let parameters = MachineParameters::at_reference_tick([axis; 3]);
         let simulated = SimMachine::<3, _>::new(&parameters).expect("a machine");
-        let mut rig = Rig::new(&simulated).expect("a converter");
-        let Ok(counts) = rig.latch();
+        let mut hardware = SimulatedHardware::new(&simulated).expect("a converter");
+        let Ok(counts) = hardware.latch();
         let start = [Position::ZERO; 3];
         let mut kernel = Kernel::<f32, 3>::new(&reference.axes_config().expect("axes"), start, counts);
         kernel.enable(0);
@@ -309,13 +309,13 @@ fn converter_bus() {
         feeder.end_stretch([mm(10.0), mm(0.0), mm(0.0)]).expect("room");
         // The frames of 100 ticks, then some.
         for _ in 0..100 {
-            assert_eq!(kernel.tick(&mut intake, &mut rig).fault, None);
+            assert_eq!(kernel.tick(&mut intake, &mut hardware).fault, None);
             simulated.advance();
         }
         simulated.chip().fail_bus_after(Some(frames));
         let mut ticks = 100;
         while kernel.fault().is_none() {
-            kernel.tick(&mut intake, &mut rig);
+            kernel.tick(&mut intake, &mut hardware);
             simulated.advance();
             ticks += 1;
         }
@@ -326,39 +326,39 @@ fn converter_bus() {
         assert_eq!(ticks, fault.tick + 1);
         assert!(!simulated.is_enabled());
         simulated.chip().fail_bus_after(None);
-        kernel.tick(&mut intake, &mut rig);
+        kernel.tick(&mut intake, &mut hardware);
         assert_eq!(simulated.chip().volts()[..3], [0.0; 3]);
         assert_eq!(kernel.fault(), Some(fault));
     }
 }
 
 /// In the middle of a move: the machine, its streams, and what it has done.
-fn moving(then: impl FnOnce(&mut Kernel<f32, 2>, &mut Intake<'_, f32, 2>, &mut Bench)) {
-    let (mut kernel, mut bench) = (kernel(), Bench::default());
+fn moving(then: impl FnOnce(&mut Kernel<f32, 2>, &mut Intake<'_, f32, 2>, &mut TestAxes)) {
+    let (mut kernel, mut axes) = (kernel(), TestAxes::default());
     let mut streams = Streams::<f32, 2, 8, 8>::new();
     let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
     offer(&mut feeder, 0.0);
     for _ in 0..100 {
-        assert_eq!(tick(&mut kernel, &mut intake, &mut bench), None);
+        assert_eq!(tick(&mut kernel, &mut intake, &mut axes), None);
     }
-    assert!(bench.is_enabled && bench.written[0] != DacCode::ZERO);
-    then(&mut kernel, &mut intake, &mut bench);
+    assert!(axes.is_enabled && axes.written[0] != DacCode::ZERO);
+    then(&mut kernel, &mut intake, &mut axes);
 }
 
 /// What the board has found ends like any other fault, in the very next tick, whose number it has.
 #[test]
 fn faults_that_the_board_reports() {
     for kind in [FaultKind::EmergencyStop, FaultKind::Drive { axis: 1 }] {
-        moving(|kernel, intake, bench| {
+        moving(|kernel, intake, axes| {
             kernel.trip(kind);
             kernel.trip(FaultKind::Encoder); // not the first one
-            let trace = *kernel.tick(intake, bench);
+            let trace = *kernel.tick(intake, axes);
             assert_eq!(trace.fault.map(|fault| (fault.kind, fault.tick)), Some((kind, trace.tick)));
             assert_eq!(trace.tick, 100);
-            assert!(!bench.is_enabled && bench.written == [DacCode::ZERO; 2], "{bench:?}");
+            assert!(!axes.is_enabled && axes.written == [DacCode::ZERO; 2], "{axes:?}");
             kernel.enable(0);
-            assert_eq!(tick(kernel, intake, bench), Some(kind));
-            assert!(!bench.is_enabled, "a fault is not enabled away");
+            assert_eq!(tick(kernel, intake, axes), Some(kind));
+            assert!(!axes.is_enabled, "a fault is not enabled away");
         });
     }
 }
@@ -366,12 +366,12 @@ fn faults_that_the_board_reports() {
 /// Disabling is no fault: outputs and drives go off, and the streams stand still.
 #[test]
 fn disabling_takes_effect_in_the_next_tick() {
-    moving(|kernel, intake, bench| {
+    moving(|kernel, intake, axes| {
         kernel.disable();
-        let set = kernel.tick(intake, bench).executed.setpoints[0].position;
-        assert!(!bench.is_enabled && bench.written == [DacCode::ZERO; 2], "{bench:?}");
+        let set = kernel.tick(intake, axes).executed.setpoints[0].position;
+        assert!(!axes.is_enabled && axes.written == [DacCode::ZERO; 2], "{axes:?}");
         for _ in 0..10 {
-            let trace = kernel.tick(intake, bench);
+            let trace = kernel.tick(intake, axes);
             assert_eq!((trace.fault, trace.executed.setpoints[0].position), (None, set));
         }
         assert_eq!(kernel.stand_here()[0].to_bits() >> 20, set.to_bits() >> 20);
@@ -382,16 +382,16 @@ fn disabling_takes_effect_in_the_next_tick() {
 /// start where they stand.
 #[test]
 fn enabling_after_disabling_stands_still() {
-    moving(|kernel, intake, bench| {
+    moving(|kernel, intake, axes| {
         kernel.disable();
-        kernel.tick(intake, bench);
+        kernel.tick(intake, axes);
         kernel.enable(400);
         for _ in 0..400 {
-            let trace = kernel.tick(intake, bench);
+            let trace = kernel.tick(intake, axes);
             assert_eq!((trace.fault, trace.executed.state), (None, ExecState::Idle));
-            assert!(bench.is_enabled && bench.written == [DacCode::ZERO; 2], "{bench:?}");
+            assert!(axes.is_enabled && axes.written == [DacCode::ZERO; 2], "{axes:?}");
         }
-        let fault = kernel.tick(intake, bench).fault.map(|fault| fault.kind);
+        let fault = kernel.tick(intake, axes).fault.map(|fault| fault.kind);
         assert_eq!(fault, Some(FaultKind::Executor(ExecFault::NotHere)));
     });
 }
@@ -399,16 +399,16 @@ fn enabling_after_disabling_stands_still() {
 /// The peak is the greatest magnitude since it was last asked for.
 #[test]
 fn peaks_are_held_until_they_are_taken() {
-    moving(|kernel, intake, bench| {
+    moving(|kernel, intake, axes| {
         let first = kernel.take_peak_following_error_mm();
         assert!(first[0] > 0.0 && first[1].abs() < 1e-6, "{first:?}");
         assert!(kernel.take_peak_following_error_mm().iter().all(|peak| *peak == 0.0));
         // 0.2 mm ahead for one tick.
-        bench.counts[0].0 += 2000;
-        kernel.tick(intake, bench);
-        bench.counts[0].0 -= 2000;
+        axes.counts[0].0 += 2000;
+        kernel.tick(intake, axes);
+        axes.counts[0].0 -= 2000;
         for _ in 0..5 {
-            tick(kernel, intake, bench);
+            tick(kernel, intake, axes);
         }
         let peak = kernel.take_peak_following_error_mm()[0];
         assert!((0.19..0.21).contains(&peak), "{peak}");

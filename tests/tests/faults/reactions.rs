@@ -148,8 +148,8 @@ fn what_the_machine_says_of_its_reactions_is_done() {
         (machine.faults.ramp_s, machine.faults.stop_s) = (ramp_s, stop_s);
         let plan = plan("G21 G90\nG1 X200 F9000\n", &machine);
         let mut off = 0;
-        run::<f32>(&plan, &machine, &mut |tick, rig, _, seen| {
-            rig.injector.emergency_stop = tick >= 1000;
+        run::<f32>(&plan, &machine, &mut |tick, hardware, _, seen| {
+            hardware.injector.emergency_stop = tick >= 1000;
             let Some(seen) = seen else { return Next::GoOn };
             if tick > 1000 {
                 assert_eq!(
@@ -207,10 +207,10 @@ fn an_open_emergency_stop_hides_nothing() {
     let breaks = [Injection::DriveNotReady, Injection::DriveFault, Injection::LimitHigh { at_mm: -1.0 }];
     for then in breaks {
         let mut reactions = Vec::new();
-        run::<f32>(&plan, &machine, &mut |tick, rig, kernel, seen| {
-            rig.injector.emergency_stop = tick >= 1000;
+        run::<f32>(&plan, &machine, &mut |tick, hardware, kernel, seen| {
+            hardware.injector.emergency_stop = tick >= 1000;
             if tick == 1010 {
-                rig.inject(0, then);
+                hardware.inject(0, then);
             }
             let Some(seen) = seen else { return Next::GoOn };
             if let Some(reaction) = kernel.reaction() {
@@ -239,7 +239,7 @@ fn a_limit_switch_is_driven_off_but_not_onto() {
         let x_mm = if towards { 20.0 * sign } else { -20.0 * sign };
         let plan = plan(&format!("G21 G90\nG1 X{x_mm} F3000\n"), &machine);
         let mut found = None;
-        run::<f32>(&plan, &machine, &mut |tick, rig, kernel, seen| {
+        run::<f32>(&plan, &machine, &mut |tick, hardware, kernel, seen| {
             // Reached from the beginning, before the drives have settled.
             if tick == 0 {
                 let at = if sign > 0.0 {
@@ -247,7 +247,7 @@ fn a_limit_switch_is_driven_off_but_not_onto() {
                 } else {
                     Injection::LimitLow { at_mm: 0.001 }
                 };
-                rig.inject(0, at);
+                hardware.inject(0, at);
             }
             found = kernel.fault().map(|fault| fault.kind);
             if let Some(seen) = seen

@@ -73,7 +73,7 @@ fn live_on_the_pc_in<R: Real>(bytes: &[u8], seed: u64) -> String {
         live::close::<_, _, _, _, PLACES, _>(&program, &mut streams, &machine, seed).expect("a loop");
     let (mut digest, mut ticks) = (Digest::new(), 0);
     loop {
-        producer.turn().expect("accepted");
+        producer.poll().expect("accepted");
         let trace = closed_loop.tick();
         digest.add(&trace);
         ticks += 1;

@@ -42,7 +42,7 @@ mod plain {
         Supply::new(items, tick_s)
     }
 
-    pub(super) fn turn(supply: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {
+    pub(super) fn poll(supply: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {
         supply.fill(feeder).is_ok()
     }
 }
@@ -52,7 +52,7 @@ mod plain {
 mod live {
     use core::sync::atomic::Ordering;
 
-    use motion_kernel::live::Director;
+    use motion_kernel::live::LiveControl;
     use motion_kernel::queue::LiveFeeder;
     use qemu_boards::live::{PLACES, Streams};
 
@@ -60,23 +60,23 @@ mod live {
 
     pub(super) type Queues = Streams;
     pub(super) type Feeder<'a> = LiveFeeder<'a, Number, AXES>;
-    pub(super) type Background<'a> = Director<Number, AXES, Items<'a, AXES>, ProgramError, PLACES>;
+    pub(super) type Background<'a> = LiveControl<Number, AXES, Items<'a, AXES>, ProgramError, PLACES>;
 
     pub(super) fn background(items: Items<'_, AXES>, tick_s: f64) -> Background<'_> {
-        Director::new(items, tick_s, 2)
+        LiveControl::new(items, tick_s, 2)
     }
 
-    pub(super) fn turn(director: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {
+    pub(super) fn poll(control: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {
         match COMMAND.load(Ordering::Relaxed) {
-            20 => director.hold(),
-            21 => director.resume(),
-            22 => director.abort(),
+            20 => control.hold(),
+            21 => control.resume(),
+            22 => control.abort(),
             eighths @ 32..49 => {
-                director.set_override(0.125 * f64::from(eighths - 32)).unwrap_or_default();
+                control.set_override(0.125 * f64::from(eighths - 32)).unwrap_or_default();
             }
             _ => {}
         }
-        director.turn(feeder).is_ok()
+        control.poll(feeder).is_ok()
     }
 }
 
@@ -123,7 +123,7 @@ fn run() -> Option<()> {
 }
 
 fn go_on(background: &mut Background<'_>, feeder: &mut Feeder<'_>) {
-    while turn(background, feeder) {
+    while poll(background, feeder) {
         cortex_m::asm::wfi();
     }
 }

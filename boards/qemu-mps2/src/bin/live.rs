@@ -14,7 +14,7 @@ fn main() -> ! {
     for (seed, bytes) in (0..).zip(programs()) {
         let (mut digest, mut ticks) = (Digest::new(), 0_u32);
         let is_fault = live::run(bytes, seed, |producer, closed| {
-            producer.turn().unwrap_or_else(|error| fail(&error));
+            producer.poll().unwrap_or_else(|error| fail(&error));
             let trace = closed.tick();
             digest.add(&trace);
             ticks += 1;

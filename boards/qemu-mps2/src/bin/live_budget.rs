@@ -22,7 +22,7 @@ fn main() -> ! {
     let mut deepest = 0;
     for (seed, bytes) in (0..).zip(programs()) {
         let is_fault = live::run(bytes, seed, |producer, closed| {
-            let (turned, turn) = counter.count(|| producer.turn());
+            let (turned, turn) = counter.count(|| producer.poll());
             turned.unwrap_or_else(|error| fail(&error));
             let mut spent = 0;
             let trace = closed.tick_by(|kernel, intake, memory| {

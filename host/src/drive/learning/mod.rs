@@ -36,8 +36,8 @@ use motion_kernel::axis::correction::KNOT_TICKS_MAX;
 
 use super::experiment::{DriveError, Recording, within};
 use crate::machine::Machine;
-use crate::record::{AXES, FaultRecord, TickRecord};
 use crate::simulate::{Number, RunError, RunOptions, StretchCorrection};
+use crate::trace::{AXES, TraceRow, TracedFault};
 
 pub mod motion;
 
@@ -135,7 +135,7 @@ pub enum Reason {
     /// Two repeats in a row were no better than the best before.
     NoBetter,
     /// A repeat ended in a fault; its correction is not the best.
-    Fault(FaultRecord),
+    Fault(TracedFault),
 }
 
 /// What a run of the stretch was like.
@@ -313,7 +313,7 @@ impl Learning {
         let mut laws = [const { None }; AXES];
         let mut bound_mm_s = 0.0_f64;
         for (axis, (model, settings)) in models.iter().zip(&first.machine.axes).enumerate() {
-            let velocity_mm_s = |tick: &TickRecord| tick.axes[axis].vel_mm_s.abs();
+            let velocity_mm_s = |tick: &TraceRow| tick.axes[axis].vel_mm_s.abs();
             let fastest_mm_s = ticks.iter().map(velocity_mm_s).fold(0.0, f64::max);
             // An axis that stands has nothing to learn but its encoder's noise.
             if fastest_mm_s <= 0.0 {
@@ -431,7 +431,7 @@ impl Learning {
     }
 }
 
-fn stretch_ticks<'run>(recording: &'run Recording, stretch: &Stretch) -> &'run [TickRecord] {
+fn stretch_ticks<'run>(recording: &'run Recording, stretch: &Stretch) -> &'run [TraceRow] {
     recording.ticks.get(stretch.ticks.clone()).unwrap_or_default()
 }
 

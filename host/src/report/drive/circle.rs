@@ -175,8 +175,8 @@ fn one_frequency(
         around.push(Series { ink, points: points[last..].to_vec() });
         let ticks = turning.measured(recording).map_err(io::Error::other)?;
         let [x, _] = turning.axes();
-        let over_time = |(tick, record): (usize, &crate::record::TickRecord)| {
-            (tick as f64 * recording.tick_s() * 1e3, record.axes[x].err_um)
+        let over_time = |(tick, trace): (usize, &crate::trace::TraceRow)| {
+            (tick as f64 * recording.tick_s() * 1e3, trace.axes[x].err_um)
         };
         following.push(Series { ink, points: ticks.iter().enumerate().map(over_time).collect() });
     }

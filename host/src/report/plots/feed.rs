@@ -6,14 +6,14 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::{
-    Area, Caption, Chart, Drawn, NARROW, Panel, Sheet, UNITS_PER_PX, WIDE, curve, ends_over, marks,
-    on_both_sheets,
+    Area, Caption, Chart, Drawn, Layout, NARROW, Panel, UNITS_PER_PX, WIDE, curve, ends_over, marks,
+    on_both_layouts,
 };
-use crate::record::{BlockRecord, RunRecord};
 use crate::report::decimate;
 use crate::report::format::scale_mark;
 use crate::report::palette::{self, NOT_REACHED};
 use crate::report::summary::Summary;
+use crate::trace::{RunTrace, TracedBlock};
 
 /// A ceiling may lie far above any feed (a rapid over a short way). The axis ends at this many times the highest
 /// feed, planned or run; a higher ceiling holds nothing back and is left out.
@@ -43,14 +43,14 @@ impl Step<'_> {
 }
 
 /// Whether blocks are so many that columns of the plot show a range of ceilings.
-pub(in crate::report) fn is_crowded(record: &RunRecord, summary: &Summary) -> bool {
-    let (top_mm_s, _) = top(record, summary);
-    steps(&record.blocks, top_mm_s, summary.path_length_mm, NARROW.columns).iter().any(Step::is_range)
+pub(in crate::report) fn is_crowded(trace: &RunTrace, summary: &Summary) -> bool {
+    let (top_mm_s, _) = top(trace, summary);
+    steps(&trace.blocks, top_mm_s, summary.path_length_mm, NARROW.columns).iter().any(Step::is_range)
 }
 
 /// What set a block's ceiling. A block that is too short to reach it names what keeps the feed below instead; what
 /// set its ceiling is then not known, and does not matter.
-fn reason(block: &BlockRecord) -> &str {
+fn reason(block: &TracedBlock) -> &str {
     match &*block.cap_reason {
         "accelerating" | "braking" => NOT_REACHED,
         reason => reason,
@@ -58,7 +58,7 @@ fn reason(block: &BlockRecord) -> &str {
 }
 
 /// Reasons of the ceilings up to `top_mm_s`, in the order of their appearance.
-pub(in crate::report) fn reasons(blocks: &[BlockRecord], top_mm_s: f64) -> Vec<&str> {
+pub(in crate::report) fn reasons(blocks: &[TracedBlock], top_mm_s: f64) -> Vec<&str> {
     let mut known = Vec::new();
     for block in blocks.iter().filter(|block| block.cap_mm_s <= top_mm_s) {
         if !known.contains(&reason(block)) {
@@ -69,11 +69,11 @@ pub(in crate::report) fn reasons(blocks: &[BlockRecord], top_mm_s: f64) -> Vec<&
 }
 
 /// Top of the feed axis \[mm/s\], and whether a ceiling lies above it.
-pub(in crate::report) fn top(record: &RunRecord, summary: &Summary) -> (f64, bool) {
-    let planned = record.blocks.iter().map(|block| block.peak_mm_s).filter(|peak| peak.is_finite());
+pub(in crate::report) fn top(trace: &RunTrace, summary: &Summary) -> (f64, bool) {
+    let planned = trace.blocks.iter().map(|block| block.peak_mm_s).filter(|peak| peak.is_finite());
     let feed = planned.fold(summary.feed_mm_s.magnitude(), f64::max);
     let limit = if feed > 0.0 { CEILING_TO_FEED_MAX * feed } else { f64::INFINITY };
-    let ceilings = || record.blocks.iter().map(|block| block.cap_mm_s);
+    let ceilings = || trace.blocks.iter().map(|block| block.cap_mm_s);
     let beyond = ceilings().any(|cap| cap > limit);
     let highest = ceilings().filter(|cap| cap.is_finite() && *cap <= limit).fold(feed, f64::max);
     (if highest > 0.0 { highest } else { 1.0 }, beyond)
@@ -81,10 +81,10 @@ pub(in crate::report) fn top(record: &RunRecord, summary: &Summary) -> (f64, boo
 
 /// The ceilings up to the top as steps, at most about two for each of `columns`. A column with many blocks shows their range in
 /// the ink of the lowest, the one that holds the feed down.
-fn steps<'a>(blocks: &'a [BlockRecord], top_mm_s: f64, length_mm: f64, columns: usize) -> Vec<Step<'a>> {
+fn steps<'a>(blocks: &'a [TracedBlock], top_mm_s: f64, length_mm: f64, columns: usize) -> Vec<Step<'a>> {
     let column_mm = length_mm / columns.max(1) as f64;
     let mut steps: Vec<Step<'a>> = Vec::new();
-    let shown = |block: &&BlockRecord| block.cap_mm_s <= top_mm_s && block.length_mm.is_finite();
+    let shown = |block: &&TracedBlock| block.cap_mm_s <= top_mm_s && block.length_mm.is_finite();
     for block in blocks.iter().filter(shown) {
         let (cap, reason) = (block.cap_mm_s, reason(block));
         let to_mm = block.start_mm + block.length_mm;
@@ -122,8 +122,8 @@ fn steps<'a>(blocks: &'a [BlockRecord], top_mm_s: f64, length_mm: f64, columns: 
 }
 
 /// Whether there is room in a wide plot for the number of at least one line.
-pub(in crate::report) fn has_line_numbers(record: &RunRecord, summary: &Summary) -> bool {
-    !numbered(&WIDE, &record.blocks, length_shown(summary)).is_empty()
+pub(in crate::report) fn has_line_numbers(trace: &RunTrace, summary: &Summary) -> bool {
+    !numbered(&WIDE, &trace.blocks, length_shown(summary)).is_empty()
 }
 
 /// End of the path axis \[mm\].
@@ -132,33 +132,33 @@ pub(super) fn length_shown(summary: &Summary) -> f64 {
 }
 
 /// Lines of the program that are long enough for their number above the plot: number, from, to.
-fn numbered(sheet: &Sheet, blocks: &[BlockRecord], length_mm: f64) -> Vec<(String, f64, f64)> {
-    let units_per_mm = f64::from(sheet.width - 2 * sheet.left) / length_mm.max(f64::MIN_POSITIVE);
+fn numbered(layout: &Layout, blocks: &[TracedBlock], length_mm: f64) -> Vec<(String, f64, f64)> {
+    let units_per_mm = f64::from(layout.width - 2 * layout.left) / length_mm.max(f64::MIN_POSITIVE);
     let stretches = lines(blocks).into_iter().map(|(line, from, to)| (line.to_string(), from, to));
-    stretches.filter(|(word, from, to)| (to - from) * units_per_mm > sheet.width_of(word) + 16.0).collect()
+    stretches.filter(|(word, from, to)| (to - from) * units_per_mm > layout.width_of(word) + 16.0).collect()
 }
 
 /// Where the lines of the program meet, with their numbers at the height `at`; `y_top` is the end of the axis.
 pub(super) fn line_numbers(
     chart: &mut Chart<'_>,
-    sheet: &Sheet,
-    blocks: &[BlockRecord],
+    layout: &Layout,
+    blocks: &[TracedBlock],
     length_mm: f64,
     (at, y_top): (f64, f64),
 ) -> Drawn {
-    for (word, from, to) in numbered(sheet, blocks, length_mm) {
+    for (word, from, to) in numbered(layout, blocks, length_mm) {
         let rule = palette::RULE.rgb().stroke_width(3);
         for x in [from, to] {
             chart.draw_series([PathElement::new([(x, 0.0), (x, y_top)], rule)])?;
         }
-        let style = sheet.letters(palette::TEXT, HPos::Center, VPos::Center);
+        let style = layout.letters(palette::TEXT, HPos::Center, VPos::Center);
         chart.draw_series([Text::new(word, (from.midpoint(to), at), style)])?;
     }
     Ok(())
 }
 
 /// Stretches of one G-code line: line, from, to. A line may be several blocks (its blends, its pieces).
-fn lines(blocks: &[BlockRecord]) -> Vec<(u32, f64, f64)> {
+fn lines(blocks: &[TracedBlock]) -> Vec<(u32, f64, f64)> {
     let mut lines: Vec<(u32, f64, f64)> = Vec::new();
     for block in blocks.iter().filter(|block| block.start_mm.is_finite() && block.length_mm.is_finite()) {
         let to = block.start_mm + block.length_mm;
@@ -172,42 +172,43 @@ fn lines(blocks: &[BlockRecord]) -> Vec<(u32, f64, f64)> {
 
 /// Draws feed and ceilings, with commands and faults where on the path they came.
 pub(in crate::report) fn draw(
-    record: &RunRecord,
+    trace: &RunTrace,
     summary: &Summary,
     caption: &Caption<'_>,
 ) -> io::Result<String> {
     let x = ends_over(0.0, length_shown(summary));
-    let words = |sheet: &Sheet| marks::Words::new(marks::over_path(record), sheet, x, sheet.left);
-    let height = |sheet: &Sheet| sheet.panel_height * 2 + sheet.axis_height() + words(sheet).height(sheet);
-    on_both_sheets(caption, height, |area, sheet| draw_on(area, sheet, record, summary, &words(sheet)))
+    let words = |layout: &Layout| marks::Words::new(marks::over_path(trace), layout, x, layout.left);
+    let height =
+        |layout: &Layout| layout.panel_height * 2 + layout.axis_height() + words(layout).height(layout);
+    on_both_layouts(caption, height, |area, layout| draw_on(area, layout, trace, summary, &words(layout)))
 }
 
 fn draw_on(
     area: &Area<'_>,
-    sheet: &Sheet,
-    record: &RunRecord,
+    layout: &Layout,
+    trace: &RunTrace,
     summary: &Summary,
     words: &marks::Words,
 ) -> Drawn {
-    let (top_mm_s, _) = top(record, summary);
+    let (top_mm_s, _) = top(trace, summary);
     let length_mm = length_shown(summary);
     // Room above the highest ceiling for the line numbers, and above these for the words.
     let numbered_mm_s = 1.14 * top_mm_s;
-    let plot = f64::from(sheet.panel_height * 2 - sheet.title_height());
+    let plot = f64::from(layout.panel_height * 2 - layout.title_height());
     let panel = Panel {
         title: "Feed [mm/s]",
         x: ends_over(0.0, length_mm),
-        y: (0.0, numbered_mm_s * (1.0 + f64::from(words.height(sheet)) / plot)),
+        y: (0.0, numbered_mm_s * (1.0 + f64::from(words.height(layout)) / plot)),
         x_name: Some("path length [mm]"),
-        right: sheet.left,
+        right: layout.left,
         is_logarithmic: false,
         shade: &[],
     };
-    let mut chart = panel.draw(area, sheet)?;
-    line_numbers(&mut chart, sheet, &record.blocks, length_mm, (1.09 * top_mm_s, numbered_mm_s))?;
+    let mut chart = panel.draw(area, layout)?;
+    line_numbers(&mut chart, layout, &trace.blocks, length_mm, (1.09 * top_mm_s, numbered_mm_s))?;
 
-    let known = reasons(&record.blocks, top_mm_s);
-    for step in steps(&record.blocks, top_mm_s, length_mm, sheet.columns) {
+    let known = reasons(&trace.blocks, top_mm_s);
+    for step in steps(&trace.blocks, top_mm_s, length_mm, layout.columns) {
         let ink = palette::ceiling(step.reason, &known).rgb();
         if step.is_range() {
             let corners = [(step.from_mm, step.low_mm_s), (step.to_mm, step.high_mm_s)];
@@ -218,20 +219,20 @@ fn draw_on(
         chart.draw_series([PathElement::new(level, ink.stroke_width(stroke))])?;
     }
 
-    let feed = record.ticks.iter().map(|tick| (tick.s_mm, tick.v_mm_s));
-    curve(&mut chart, decimate::by_column(feed, panel.x, sheet.columns), palette::FEED, sheet.stroke)?;
-    words.draw(&mut chart, area, sheet, panel.y, sheet.title_height())?;
-    per_minute(area, sheet, &panel)
+    let feed = trace.ticks.iter().map(|tick| (tick.s_mm, tick.v_mm_s));
+    curve(&mut chart, decimate::by_column(feed, panel.x, layout.columns), palette::FEED, layout.stroke)?;
+    words.draw(&mut chart, area, layout, panel.y, layout.title_height())?;
+    per_minute(area, layout, &panel)
 }
 
 /// The same axis once more on the right, in the unit of the program.
-fn per_minute(area: &Area<'_>, sheet: &Sheet, panel: &Panel<'_>) -> Drawn {
+fn per_minute(area: &Area<'_>, layout: &Layout, panel: &Panel<'_>) -> Drawn {
     let (width, height) = area.dim_in_pixel();
-    let (upper, lower) = (sheet.title_height() as i32, (height - sheet.axis_height()) as i32);
+    let (upper, lower) = (layout.title_height() as i32, (height - layout.axis_height()) as i32);
     let x = (width - panel.right) as i32;
     let top = panel.y.1 * 60.0;
-    let step = round_step(top / sheet.marks.1 as f64);
-    let letters = |h| sheet.letters(palette::TEXT, h, VPos::Center);
+    let step = round_step(top / layout.marks.1 as f64);
+    let letters = |h| layout.letters(palette::TEXT, h, VPos::Center);
     let axis = palette::AXIS.rgb().stroke_width(4);
     area.draw(&PathElement::new([(x, upper), (x, lower)], axis))?;
     for mark in 0..=(top / step) as i32 {
@@ -240,7 +241,7 @@ fn per_minute(area: &Area<'_>, sheet: &Sheet, panel: &Panel<'_>) -> Drawn {
         area.draw(&PathElement::new([(x, y), (x + 16, y)], axis))?;
         area.draw(&Text::new(scale_mark(value, top), (x + 28, y), letters(HPos::Left)))?;
     }
-    let title = sheet.letters(palette::TEXT, HPos::Right, VPos::Top);
+    let title = layout.letters(palette::TEXT, HPos::Right, VPos::Top);
     area.draw(&Text::new("[mm/min]", ((width - UNITS_PER_PX) as i32, 4), title))
 }
 
@@ -260,8 +261,8 @@ mod tests {
         length_mm: f64,
         cap_mm_s: f64,
         cap_reason: &'static str,
-    ) -> BlockRecord {
-        BlockRecord {
+    ) -> TracedBlock {
+        TracedBlock {
             line,
             kind: "line".into(),
             start_mm,
@@ -305,12 +306,12 @@ mod tests {
             block(5, 40.0, 10.0, 40.0, "programmed"),
         ];
         blocks[2].peak_mm_s = 40.0;
-        let record = RunRecord { blocks, ..RunRecord::default() };
-        let summary = Summary::of(&record);
-        let (top_mm_s, beyond) = top(&record, &summary);
+        let trace = RunTrace { blocks, ..RunTrace::default() };
+        let summary = Summary::of(&trace);
+        let (top_mm_s, beyond) = top(&trace, &summary);
         assert!((top_mm_s - 50.0).abs() < 1e-12 && beyond);
-        assert_eq!(reasons(&record.blocks, top_mm_s), [NOT_REACHED, "programmed"]);
-        let drawn = steps(&record.blocks, top_mm_s, 50.0, 100);
+        assert_eq!(reasons(&trace.blocks, top_mm_s), [NOT_REACHED, "programmed"]);
+        let drawn = steps(&trace.blocks, top_mm_s, 50.0, 100);
         let ends: Vec<_> = drawn.iter().map(|step| (step.reason, step.from_mm, step.to_mm)).collect();
         // The programmed ceilings are alike, but the block between them has another.
         assert_eq!(ends, [(NOT_REACHED, 0.0, 20.0), ("programmed", 20.0, 30.0), ("programmed", 40.0, 50.0)]);

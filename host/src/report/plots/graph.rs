@@ -5,7 +5,7 @@ use std::io;
 use plotters::element::PathElement;
 use plotters::style::Color as _;
 
-use super::{Caption, Panel, Sheet, curve, ends_with_zero, on_both_sheets};
+use super::{Caption, Layout, Panel, curve, ends_with_zero, on_both_layouts};
 use crate::report::decimate;
 use crate::report::palette::{self, Ink};
 use crate::report::summary::Span;
@@ -53,14 +53,14 @@ impl Stack {
     /// Draws it for both widths.
     pub(in crate::report) fn draw(&self, caption: &Caption<'_>) -> io::Result<String> {
         let height =
-            |sheet: &Sheet| self.graphs.len() as u32 * self.graph_height(sheet) + sheet.axis_height();
+            |layout: &Layout| self.graphs.len() as u32 * self.graph_height(layout) + layout.axis_height();
         let along = |x: f64| if self.is_logarithmic { x.log10() } else { x };
         let x = (along(self.x.0), along(self.x.1));
-        on_both_sheets(caption, height, |area, sheet| {
+        on_both_layouts(caption, height, |area, layout| {
             let mut rest = area.clone();
             for (index, graph) in self.graphs.iter().enumerate() {
                 let last = index + 1 == self.graphs.len();
-                let (upper, lower) = rest.split_vertically(self.graph_height(sheet));
+                let (upper, lower) = rest.split_vertically(self.graph_height(layout));
                 let part = if last { &rest } else { &upper };
                 let y = graph.ends();
                 let panel = Panel {
@@ -68,11 +68,11 @@ impl Stack {
                     x,
                     y,
                     x_name: last.then_some(self.x_name),
-                    right: sheet.right,
+                    right: layout.right,
                     is_logarithmic: self.is_logarithmic,
                     shade: &[],
                 };
-                let mut chart = panel.draw(part, sheet)?;
+                let mut chart = panel.draw(part, layout)?;
                 let limit = palette::LIMIT.rgb().stroke_width(5);
                 let inside = graph.levels.iter().filter(|level| (y.0..=y.1).contains(*level));
                 chart.draw_series(
@@ -85,9 +85,9 @@ impl Stack {
                     let shown = points.filter(|point| is_inside(x, point.0) && is_inside(y, point.1));
                     curve(
                         &mut chart,
-                        decimate::by_column(shown, x, sheet.columns),
+                        decimate::by_column(shown, x, layout.columns),
                         series.ink,
-                        sheet.stroke,
+                        layout.stroke,
                     )?;
                 }
                 rest = lower;
@@ -97,11 +97,11 @@ impl Stack {
     }
 
     /// A single graph gets more room than each of a stack.
-    fn graph_height(&self, sheet: &Sheet) -> u32 {
+    fn graph_height(&self, layout: &Layout) -> u32 {
         match self.graphs.len() {
-            1 => 2 * sheet.panel_height,
-            2 => sheet.panel_height * 8 / 5,
-            _ => sheet.panel_height * 5 / 4,
+            1 => 2 * layout.panel_height,
+            2 => layout.panel_height * 8 / 5,
+            _ => layout.panel_height * 5 / 4,
         }
     }
 }

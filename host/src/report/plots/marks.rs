@@ -4,10 +4,10 @@ use plotters::element::{PathElement, Text};
 use plotters::style::Color as _;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::{Area, Chart, Drawn, Sheet};
-use crate::record::{CommandRecord, RunRecord};
+use super::{Area, Chart, Drawn, Layout};
 use crate::report::format::figure;
 use crate::report::palette::{self, Ink};
+use crate::trace::{RunTrace, TracedCommand};
 
 /// Commands marked in one plot; more than these would hide the curve.
 pub(in crate::report) const COMMAND_MARKS_MAX: usize = 60;
@@ -25,21 +25,21 @@ pub(in crate::report) struct Mark {
 }
 
 /// A command as people read it: "hold", "override 50 %".
-pub(in crate::report) fn word(command: &CommandRecord) -> String {
+pub(in crate::report) fn word(command: &TracedCommand) -> String {
     match command.feed_override {
         Some(share) => format!("override {} %", figure(share * 100.0, 4)),
         None => command.command.clone(),
     }
 }
 
-/// The marks of `record`, each where `place` finds its tick.
-fn marks(record: &RunRecord, place: impl Fn(u64) -> Option<f64>) -> Vec<Mark> {
+/// The marks of `trace`, each where `place` finds its tick.
+fn marks(trace: &RunTrace, place: impl Fn(u64) -> Option<f64>) -> Vec<Mark> {
     let commands =
-        record.commands.iter().take(COMMAND_MARKS_MAX).filter_map(|command| {
+        trace.commands.iter().take(COMMAND_MARKS_MAX).filter_map(|command| {
             Some(Mark { at: place(command.tick)?, word: word(command), is_fault: false })
         });
     let faults =
-        record.faults.iter().take(super::FAULT_MARKS_MAX).filter_map(|fault| {
+        trace.faults.iter().take(super::FAULT_MARKS_MAX).filter_map(|fault| {
             Some(Mark { at: place(fault.tick)?, word: "fault".to_owned(), is_fault: true })
         });
     let mut marks: Vec<Mark> = commands.chain(faults).filter(|mark| mark.at.is_finite()).collect();
@@ -48,15 +48,15 @@ fn marks(record: &RunRecord, place: impl Fn(u64) -> Option<f64>) -> Vec<Mark> {
 }
 
 /// Over time \[s\].
-pub(super) fn over_time(record: &RunRecord) -> Vec<Mark> {
-    marks(record, |tick| Some(tick as f64 * record.tick_s))
+pub(super) fn over_time(trace: &RunTrace) -> Vec<Mark> {
+    marks(trace, |tick| Some(tick as f64 * trace.tick_s))
 }
 
 /// Over the path \[mm\]: where the machine was when the tick began.
-pub(super) fn over_path(record: &RunRecord) -> Vec<Mark> {
-    marks(record, |tick| {
-        let index = record.ticks.partition_point(|row| row.tick < tick);
-        let row = record.ticks.get(index.saturating_sub(1)).or(record.ticks.last());
+pub(super) fn over_path(trace: &RunTrace) -> Vec<Mark> {
+    marks(trace, |tick| {
+        let index = trace.ticks.partition_point(|row| row.tick < tick);
+        let row = trace.ticks.get(index.saturating_sub(1)).or(trace.ticks.last());
         row.map(|row| row.s_mm)
     })
 }
@@ -77,16 +77,16 @@ pub(super) struct Words {
 
 impl Words {
     /// For a plot with `x` as the ends of its horizontal axis, and so much room on its right.
-    pub(super) fn new(marks: Vec<Mark>, sheet: &Sheet, x: (f64, f64), right: u32) -> Self {
-        let width = f64::from(sheet.width - sheet.left - right);
-        let gap = f64::from(sheet.text) / 4.0;
+    pub(super) fn new(marks: Vec<Mark>, layout: &Layout, x: (f64, f64), right: u32) -> Self {
+        let width = f64::from(layout.width - layout.left - right);
+        let gap = f64::from(layout.text) / 4.0;
         let mut taken: Vec<Vec<(f64, f64)>> = Vec::new();
         let mut place = |mark: &Mark| {
             let at = (mark.at - x.0) / (x.1 - x.0) * width;
             if !(0.0..=width).contains(&at) {
                 return None;
             }
-            let room = sheet.width_of(&mark.word) + gap;
+            let room = layout.width_of(&mark.word) + gap;
             let is_left = at + room > width;
             let span = if is_left { (at - room - gap, at) } else { (at, at + room + gap) };
             let is_free =
@@ -104,13 +104,13 @@ impl Words {
     }
 
     /// Height of one row.
-    fn row_height(sheet: &Sheet) -> u32 {
-        sheet.text * 5 / 4
+    fn row_height(layout: &Layout) -> u32 {
+        layout.text * 5 / 4
     }
 
     /// Room for the words above the plot, in drawing units.
-    pub(super) fn height(&self, sheet: &Sheet) -> u32 {
-        self.rows as u32 * Self::row_height(sheet)
+    pub(super) fn height(&self, layout: &Layout) -> u32 {
+        self.rows as u32 * Self::row_height(layout)
     }
 
     /// Draws lines as high as the plot, and words into the room at its top. `top` is the upper end of the plot in `area`.
@@ -118,7 +118,7 @@ impl Words {
         &self,
         chart: &mut Chart<'_>,
         area: &Area<'_>,
-        sheet: &Sheet,
+        layout: &Layout,
         y: (f64, f64),
         top: u32,
     ) -> Drawn {
@@ -131,13 +131,13 @@ impl Words {
             let Some(Place { row, is_left }) = place else { continue };
             let (left, _) = area.get_base_pixel();
             let (x, _) = chart.backend_coord(&(mark.at, y.0));
-            let gap = sheet.text as i32 / 4;
+            let gap = layout.text as i32 / 4;
             let (x, anchor) = if *is_left { (x - gap, HPos::Right) } else { (x + gap, HPos::Left) };
-            let at = (x - left, (top + Self::row_height(sheet) * *row as u32 + sheet.text / 2) as i32);
+            let at = (x - left, (top + Self::row_height(layout) * *row as u32 + layout.text / 2) as i32);
             area.draw(&Text::new(
                 mark.word.clone(),
                 at,
-                sheet.letters(mark.text_ink(), anchor, VPos::Center),
+                layout.letters(mark.text_ink(), anchor, VPos::Center),
             ))?;
         }
         Ok(())
@@ -159,9 +159,9 @@ mod tests {
     use super::super::{NARROW, WIDE};
     use super::*;
 
-    fn words(at: &[f64], sheet: &Sheet) -> Words {
+    fn words(at: &[f64], layout: &Layout) -> Words {
         let mark = |&at: &f64| Mark { at, word: "override 50 %".to_owned(), is_fault: false };
-        Words::new(at.iter().map(mark).collect(), sheet, (0.0, 10.0), sheet.right)
+        Words::new(at.iter().map(mark).collect(), layout, (0.0, 10.0), layout.right)
     }
 
     fn rows(words: &Words) -> Vec<Option<(usize, bool)>> {

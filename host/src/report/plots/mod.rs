@@ -1,8 +1,8 @@
-//! What all plots share: the sheet they are drawn on, the panel with its axes, and the wrapping for the page.
+//! What all plots share: the layout they are drawn on, the panel with its axes, and the wrapping for the page.
 //!
 //! Every plot is drawn twice, for a wide and for a narrow page, because a picture scaled down to a phone takes its
-//! letters along. The style sheet shows one of the two. The drawing library places things on whole units only, so a
-//! sheet has [`UNITS_PER_PX`] of them to a pixel, and a smooth curve stays smooth.
+//! letters along. The style layout shows one of the two. The drawing library places things on whole units only, so a
+//! layout has [`UNITS_PER_PX`] of them to a pixel, and a smooth curve stays smooth.
 
 pub(super) mod contour;
 pub(super) mod feed;
@@ -39,8 +39,8 @@ pub(super) type Drawn<T = ()> = Result<T, DrawingAreaErrorKind<io::Error>>;
 
 /// Paper of one width. All lengths in drawing units.
 #[derive(Debug)]
-pub(super) struct Sheet {
-    /// Class of the drawing in the style sheet.
+pub(super) struct Layout {
+    /// Class of the drawing in the style layout.
     pub(super) class: &'static str,
     /// Width.
     pub(super) width: u32,
@@ -61,7 +61,7 @@ pub(super) struct Sheet {
 }
 
 /// For a screen or a printed page.
-const WIDE: Sheet = Sheet {
+const WIDE: Layout = Layout {
     class: "wide",
     width: 960 * UNITS_PER_PX,
     text: 62,
@@ -74,7 +74,7 @@ const WIDE: Sheet = Sheet {
 };
 
 /// For a phone.
-const NARROW: Sheet = Sheet {
+const NARROW: Layout = Layout {
     class: "narrow",
     width: 358 * UNITS_PER_PX,
     text: 58,
@@ -86,7 +86,7 @@ const NARROW: Sheet = Sheet {
     stroke: 7,
 };
 
-impl Sheet {
+impl Layout {
     /// Letters in `ink`, held at `anchor`.
     pub(super) fn letters(&self, ink: Ink, h: HPos, v: VPos) -> TextStyle<'static> {
         let mut style = TextStyle::from(("sans-serif", self.text).into_font()).pos(Pos::new(h, v));
@@ -120,23 +120,23 @@ pub(super) struct Caption<'a> {
     pub(super) description: &'a str,
 }
 
-/// Draws for both widths; `height` may depend on the sheet.
-pub(super) fn on_both_sheets(
+/// Draws for both widths; `height` may depend on the layout.
+pub(super) fn on_both_layouts(
     caption: &Caption<'_>,
-    height: impl Fn(&Sheet) -> u32,
-    draw: impl Fn(&Area<'_>, &Sheet) -> Drawn,
+    height: impl Fn(&Layout) -> u32,
+    draw: impl Fn(&Area<'_>, &Layout) -> Drawn,
 ) -> io::Result<String> {
     let mut page = String::new();
-    for sheet in [&WIDE, &NARROW] {
-        let size = (sheet.width, height(sheet));
+    for layout in [&WIDE, &NARROW] {
+        let size = (layout.width, height(layout));
         let mut svg = String::new();
         {
             let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-            draw(&area, sheet).and_then(|()| area.present()).map_err(io::Error::other)?;
+            draw(&area, layout).and_then(|()| area.present()).map_err(io::Error::other)?;
         }
         // The library's own opening tag fixes the size in pixels and names nothing.
         let drawing = svg.split_once('>').map_or("", |(_, rest)| rest);
-        let (id, class) = (caption.id, sheet.class);
+        let (id, class) = (caption.id, layout.class);
         page.push_str(&format!(
             "<svg class=\"{class}\" viewBox=\"0 0 {} {}\" role=\"img\" aria-labelledby=\"{id}-{class}-t {id}-{class}-d\" \
              xmlns=\"http://www.w3.org/2000/svg\"><title id=\"{id}-{class}-t\">{}</title>\
@@ -204,15 +204,15 @@ pub(super) struct Panel<'a> {
 impl Panel<'_> {
     /// Draws title, grid and axes. A panel without a horizontal axis leaves a gap below, so that the lowest number
     /// keeps clear of the next title.
-    pub(super) fn draw<'a>(&self, area: &Area<'a>, sheet: &Sheet) -> Drawn<Chart<'a>> {
-        let title = sheet.letters(palette::TEXT, HPos::Left, VPos::Top);
-        area.draw(&Text::new(self.title.to_string(), (sheet.left as i32, 4), title))?;
+    pub(super) fn draw<'a>(&self, area: &Area<'a>, layout: &Layout) -> Drawn<Chart<'a>> {
+        let title = layout.letters(palette::TEXT, HPos::Left, VPos::Top);
+        area.draw(&Text::new(self.title.to_string(), (layout.left as i32, 4), title))?;
         let mut chart = ChartBuilder::on(area)
-            .margin_top(sheet.title_height())
+            .margin_top(layout.title_height())
             .margin_right(self.right)
-            .margin_bottom(if self.x_name.is_some() { 0 } else { sheet.text / 2 })
-            .y_label_area_size(sheet.left)
-            .x_label_area_size(if self.x_name.is_some() { sheet.axis_height() } else { 0 })
+            .margin_bottom(if self.x_name.is_some() { 0 } else { layout.text / 2 })
+            .y_label_area_size(layout.left)
+            .x_label_area_size(if self.x_name.is_some() { layout.axis_height() } else { 0 })
             .build_cartesian_2d(self.x.0..self.x.1, self.y.0..self.y.1)?;
         let (x_span, y_span) = (self.x.1 - self.x.0, self.y.1 - self.y.0);
         // First, so that grid and curve lie on it.
@@ -225,16 +225,16 @@ impl Panel<'_> {
             .bold_line_style(palette::GRID.rgb().stroke_width(4))
             .axis_style(palette::AXIS.rgb().stroke_width(4))
             .set_all_tick_mark_size(16)
-            .x_labels(if self.is_logarithmic { 0 } else { sheet.marks.0 })
-            .y_labels(sheet.marks.1)
+            .x_labels(if self.is_logarithmic { 0 } else { layout.marks.0 })
+            .y_labels(layout.marks.1)
             .x_label_formatter(&|x| scale_mark(*x, x_span))
             .y_label_formatter(&|y| scale_mark(*y, y_span))
             .x_desc(self.x_name.unwrap_or(""))
-            .label_style(sheet.letters(palette::TEXT, HPos::Center, VPos::Center))
-            .axis_desc_style(sheet.letters(palette::TEXT, HPos::Center, VPos::Center))
+            .label_style(layout.letters(palette::TEXT, HPos::Center, VPos::Center))
+            .axis_desc_style(layout.letters(palette::TEXT, HPos::Center, VPos::Center))
             .draw()?;
         if self.is_logarithmic {
-            self.decades(&mut chart, area, sheet)?;
+            self.decades(&mut chart, area, layout)?;
         }
         if self.y.0 < 0.0 && self.y.1 > 0.0 {
             chart.draw_series([PathElement::new(
@@ -246,7 +246,7 @@ impl Panel<'_> {
     }
 
     /// Grid lines and marks at 1, 2, 5, 10, …
-    fn decades(&self, chart: &mut Chart<'_>, area: &Area<'_>, sheet: &Sheet) -> Drawn {
+    fn decades(&self, chart: &mut Chart<'_>, area: &Area<'_>, layout: &Layout) -> Drawn {
         let (low, high) = (self.x.0.floor() as i32, self.x.1.ceil() as i32);
         let all = (low..=high).flat_map(|decade| [1.0, 2.0, 5.0].map(|part| part * 10f64.powi(decade)));
         let rounding = 1e-9;
@@ -262,8 +262,8 @@ impl Panel<'_> {
             let (left, top) = area.get_base_pixel();
             for mark in marks {
                 let (x, y) = chart.backend_coord(&(mark.log10(), self.y.0));
-                let style = sheet.letters(palette::TEXT, HPos::Center, VPos::Top);
-                let at = (x - left, y - top + sheet.text as i32 / 3);
+                let style = layout.letters(palette::TEXT, HPos::Center, VPos::Top);
+                let at = (x - left, y - top + layout.text as i32 / 3);
                 area.draw(&Text::new(scale_mark(mark, mark), at, style))?;
             }
         }

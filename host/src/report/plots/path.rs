@@ -5,12 +5,12 @@ use std::io;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::{Area, Caption, Drawn, Panel, Sheet, on_both_sheets};
-use crate::record::{AXES, RunRecord, TickRecord};
+use super::{Area, Caption, Drawn, Layout, Panel, on_both_layouts};
 use crate::report::decimate;
 use crate::report::format::figure;
 use crate::report::palette::{self, CLASSES};
 use crate::report::summary::{Span, Summary};
+use crate::trace::{AXES, RunTrace, TraceRow};
 
 /// Corners of the drawn path: far more than a screen resolves, and a bound on the size of the file.
 const CORNERS_MAX: usize = 12_000;
@@ -49,11 +49,11 @@ struct Scale {
 }
 
 impl Scale {
-    /// Fits both spans into the sheet, with air around them.
-    fn fit(x: Span, y: Span, sheet: &Sheet) -> Self {
-        let width = f64::from(sheet.width - sheet.left - sheet.right);
-        let tall = if sheet.class == "narrow" { TALL_NARROW } else { TALL };
-        let air = f64::from(2 * sheet.text);
+    /// Fits both spans into the layout, with air around them.
+    fn fit(x: Span, y: Span, layout: &Layout) -> Self {
+        let width = f64::from(layout.width - layout.left - layout.right);
+        let tall = if layout.class == "narrow" { TALL_NARROW } else { TALL };
+        let air = f64::from(2 * layout.text);
         // A point has no size; give it a millimetre.
         let largest = x.width().max(y.width());
         let (dx, dy) = if largest > 0.0 { (x.width(), y.width()) } else { (1.0, 1.0) };
@@ -69,7 +69,7 @@ impl Scale {
             x_mm: centred(x, width),
             y_mm: centred(y, axes_height),
             units_per_mm,
-            height: axes_height as u32 + sheet.title_height() + sheet.axis_height(),
+            height: axes_height as u32 + layout.title_height() + layout.axis_height(),
         }
     }
 
@@ -84,7 +84,7 @@ impl Scale {
 
 /// Draws one view of the path.
 pub(in crate::report) fn draw(
-    record: &RunRecord,
+    trace: &RunTrace,
     summary: &Summary,
     names: &[String; AXES],
     view: &View,
@@ -92,24 +92,24 @@ pub(in crate::report) fn draw(
 ) -> io::Result<String> {
     let (x, y) = (summary.axes[view.right].set_mm, summary.axes[view.up].set_mm);
     let feed_max = summary.feed_mm_s.magnitude();
-    let place = |tick: &TickRecord| (tick.axes[view.right].set_mm, tick.axes[view.up].set_mm);
-    on_both_sheets(
+    let place = |tick: &TraceRow| (tick.axes[view.right].set_mm, tick.axes[view.up].set_mm);
+    on_both_layouts(
         caption,
-        |sheet| Scale::fit(x, y, sheet).height,
-        |area, sheet| {
-            let scale = Scale::fit(x, y, sheet);
+        |layout| Scale::fit(x, y, layout).height,
+        |area, layout| {
+            let scale = Scale::fit(x, y, layout);
             let panel = Panel {
                 title: &format!("{} [mm]", names[view.up]),
                 x: scale.x_mm,
                 y: scale.y_mm,
                 x_name: Some(&format!("{} [mm]", names[view.right])),
-                right: sheet.right,
+                right: layout.right,
                 is_logarithmic: false,
                 shade: &[],
             };
-            let mut chart = panel.draw(area, sheet)?;
+            let mut chart = panel.draw(area, layout)?;
             let corners = || {
-                record.ticks.iter().map(|tick| {
+                trace.ticks.iter().map(|tick| {
                     let (x, y) = place(tick);
                     let (x, y) = scale.to_units(x, y);
                     (x, y, class_of(tick.v_mm_s, feed_max))
@@ -120,19 +120,19 @@ pub(in crate::report) fn draw(
                 super::curve(&mut chart, points, CLASSES[stretch.class], 14)?;
             }
             let area = chart.plotting_area().strip_coord_spec();
-            let on_area = |tick: &TickRecord| {
+            let on_area = |tick: &TraceRow| {
                 let (x, y) = place(tick);
                 let (x, y) = scale.to_units(x, y);
                 let (_, height) = area.dim_in_pixel();
                 (x.is_finite() && y.is_finite()).then(|| (x.round() as i32, height as i32 - y.round() as i32))
             };
-            let start = record.ticks.iter().find_map(on_area);
-            let end = record.ticks.iter().rev().find_map(on_area);
-            let fault = record.faults.first().and_then(|fault| {
-                let index = record.ticks.partition_point(|tick| tick.tick < fault.tick);
-                record.ticks.get(index).and_then(on_area)
+            let start = trace.ticks.iter().find_map(on_area);
+            let end = trace.ticks.iter().rev().find_map(on_area);
+            let fault = trace.faults.first().and_then(|fault| {
+                let index = trace.ticks.partition_point(|tick| tick.tick < fault.tick);
+                trace.ticks.get(index).and_then(on_area)
             });
-            marks(&area, sheet, start, end, fault)
+            marks(&area, layout, start, end, fault)
         },
     )
 }
@@ -140,15 +140,15 @@ pub(in crate::report) fn draw(
 /// Start (ring), end (square) and first fault (cross) with their words, which give way to each other.
 fn marks(
     area: &Area<'_>,
-    sheet: &Sheet,
+    layout: &Layout,
     start: Option<(i32, i32)>,
     end: Option<(i32, i32)>,
     fault: Option<(i32, i32)>,
 ) -> Drawn {
     let near = |a: (i32, i32), b: (i32, i32)| {
         // As long as the longest word and the gap before it.
-        f64::from((a.0 - b.0).abs()) < sheet.width_of("start") + 12.0
-            && (a.1 - b.1).unsigned_abs() < sheet.text * 3 / 2
+        f64::from((a.0 - b.0).abs()) < layout.width_of("start") + 12.0
+            && (a.1 - b.1).unsigned_abs() < layout.text * 3 / 2
     };
     let ink = palette::TEXT.rgb();
     let mut words: Vec<((i32, i32), String)> = Vec::new();
@@ -174,10 +174,10 @@ fn marks(
     }
     let (width, _) = area.dim_in_pixel();
     for ((x, y), word) in words {
-        // Above the mark; to the left of it where the sheet ends on the right.
-        let to_left = f64::from(x) + sheet.width_of(&word) > f64::from(width);
+        // Above the mark; to the left of it where the layout ends on the right.
+        let to_left = f64::from(x) + layout.width_of(&word) > f64::from(width);
         let (h, dx) = if to_left { (HPos::Right, -24) } else { (HPos::Left, 24) };
-        let style = sheet.letters(palette::TEXT, h, VPos::Bottom);
+        let style = layout.letters(palette::TEXT, h, VPos::Bottom);
         area.draw(&Text::new(word, (x + dx, y - 20), style))?;
     }
     Ok(())
@@ -203,12 +203,12 @@ mod tests {
 
     #[test]
     fn a_millimetre_is_as_long_in_both_directions() {
-        for sheet in [&super::super::WIDE, &super::super::NARROW] {
+        for layout in [&super::super::WIDE, &super::super::NARROW] {
             for (dx, dy) in [(100.0, 20.0), (3.0, 400.0), (50.0, 0.0), (0.0, 0.0)] {
                 let scale =
-                    Scale::fit(Span { low: 1.0, high: 1.0 + dx }, Span { low: -2.0, high: dy - 2.0 }, sheet);
-                let width = f64::from(sheet.width - sheet.left - sheet.right);
-                let height = f64::from(scale.height - sheet.title_height() - sheet.axis_height());
+                    Scale::fit(Span { low: 1.0, high: 1.0 + dx }, Span { low: -2.0, high: dy - 2.0 }, layout);
+                let width = f64::from(layout.width - layout.left - layout.right);
+                let height = f64::from(scale.height - layout.title_height() - layout.axis_height());
                 let across = width / (scale.x_mm.1 - scale.x_mm.0);
                 let upwards = height / (scale.y_mm.1 - scale.y_mm.0);
                 assert!((across / upwards - 1.0).abs() < 1e-9, "{across} {upwards}");

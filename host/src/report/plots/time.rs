@@ -6,14 +6,14 @@ use plotters::element::PathElement;
 use plotters::style::Color as _;
 
 use super::{
-    Area, Caption, Drawn, Panel, Sheet, command_marks, curve, ends_over, ends_with_zero, fault_marks, marks,
-    on_both_sheets,
+    Area, Caption, Drawn, Layout, Panel, command_marks, curve, ends_over, ends_with_zero, fault_marks, marks,
+    on_both_layouts,
 };
-use crate::record::{CommandRecord, RunRecord, TickRecord};
 use crate::report::decimate;
 use crate::report::format::figure;
 use crate::report::palette::{self, Ink};
 use crate::report::summary::{Rest, Span, Summary};
+use crate::trace::{RunTrace, TraceRow, TracedCommand};
 
 /// Full scale of the output \[V\].
 const RAIL_V: f64 = 10.0;
@@ -22,7 +22,7 @@ const RAIL_V: f64 = 10.0;
 const RAIL_SHOWN_FROM_V: f64 = 7.0;
 
 /// A quantity over time.
-struct Curve<V: Fn(&TickRecord) -> f64> {
+struct Curve<V: Fn(&TraceRow) -> f64> {
     title: &'static str,
     span: Span,
     /// What the machine allows, in both directions; 0 if that is not known.
@@ -39,7 +39,7 @@ pub(in crate::report) fn shows_limit(span: Span, limit: f64) -> bool {
     limit > 0.0 && limit.is_finite() && span.magnitude() >= LIMIT_SHOWN_FROM * limit
 }
 
-impl<V: Fn(&TickRecord) -> f64> Curve<V> {
+impl<V: Fn(&TraceRow) -> f64> Curve<V> {
     /// The limits to be drawn: in the directions in which the curve goes.
     fn limits(&self) -> impl Iterator<Item = f64> {
         let shown = shows_limit(self.span, self.limit);
@@ -84,12 +84,12 @@ fn shades(rests: &[Rest], x: (f64, f64), columns: usize) -> Vec<(f64, f64)> {
 
 /// Feed, acceleration, jerk and snap along the path.
 pub(in crate::report) fn along_path(
-    record: &RunRecord,
+    trace: &RunTrace,
     summary: &Summary,
     caption: &Caption<'_>,
 ) -> io::Result<String> {
-    type Value = fn(&TickRecord) -> f64;
-    let limits = &record.limits;
+    type Value = fn(&TraceRow) -> f64;
+    let limits = &trace.limits;
     let curve = |title, span, limit, ink, value: Value| Curve { title, span, limit, ink, value };
     let curves = [
         curve("Feed [mm/s]", summary.feed_mm_s, 0.0, palette::FEED, |tick| tick.v_mm_s),
@@ -103,36 +103,36 @@ pub(in crate::report) fn along_path(
         curve("Jerk [mm/s³]", summary.jerk_mm_s3, limits.jerk_mm_s3, palette::JERK, |tick| tick.j_mm_s3),
         curve("Snap [mm/s⁴]", summary.snap_mm_s4, limits.snap_mm_s4, palette::SNAP, |tick| tick.snap_mm_s4),
     ];
-    stack(record, summary, &curves, caption, &record.commands)
+    stack(trace, summary, &curves, caption, &trace.commands)
 }
 
 /// Following error and output of one axis.
 pub(in crate::report) fn of_axis(
-    record: &RunRecord,
+    trace: &RunTrace,
     summary: &Summary,
     axis: usize,
     caption: &Caption<'_>,
 ) -> io::Result<String> {
     let figures = &summary.axes[axis];
-    let error = move |tick: &TickRecord| tick.axes[axis].err_um;
-    let volts = move |tick: &TickRecord| tick.axes[axis].out_v;
+    let error = move |tick: &TraceRow| tick.axes[axis].err_um;
+    let volts = move |tick: &TraceRow| tick.axes[axis].out_v;
     let mut output = figures.out_v;
     if output.magnitude() >= RAIL_SHOWN_FROM_V {
         output.add(RAIL_V);
         output.add(-RAIL_V);
     }
-    type Value<'a> = Box<dyn Fn(&TickRecord) -> f64 + 'a>;
+    type Value<'a> = Box<dyn Fn(&TraceRow) -> f64 + 'a>;
     let curves = [
         Curve {
             title: "Following error [µm]",
             span: figures.err_um,
-            limit: record.following_error_limit_um[axis],
+            limit: trace.following_error_limit_um[axis],
             ink: palette::ERROR,
             value: Box::new(error) as Value<'_>,
         },
         Curve { title: "Output [V]", span: output, limit: 0.0, ink: palette::VOLTS, value: Box::new(volts) },
     ];
-    stack(record, summary, &curves, caption, &[])
+    stack(trace, summary, &curves, caption, &[])
 }
 
 /// The commands of a run, and the override that they make.
@@ -144,74 +144,74 @@ struct LiveControl {
 }
 
 impl LiveControl {
-    fn new(record: &RunRecord, sheet: &Sheet, x: (f64, f64)) -> Self {
+    fn new(trace: &RunTrace, layout: &Layout, x: (f64, f64)) -> Self {
         let mut course = vec![(x.0, 100.0)];
         let mut present = 100.0;
-        for command in &record.commands {
+        for command in &trace.commands {
             if let Some(share) = command.feed_override {
-                let at = (command.tick as f64 * record.tick_s).clamp(x.0, x.1);
+                let at = (command.tick as f64 * trace.tick_s).clamp(x.0, x.1);
                 course.extend([(at, present), (at, 100.0 * share)]);
                 present = 100.0 * share;
             }
         }
         course.push((x.1, present));
-        Self { x, words: marks::Words::new(marks::over_time(record), sheet, x, sheet.right), course }
+        Self { x, words: marks::Words::new(marks::over_time(trace), layout, x, layout.right), course }
     }
 
     /// Without words.
-    fn plot_height(sheet: &Sheet) -> u32 {
-        sheet.panel_height * 4 / 5
+    fn plot_height(layout: &Layout) -> u32 {
+        layout.panel_height * 4 / 5
     }
 
-    fn height(&self, sheet: &Sheet) -> u32 {
-        Self::plot_height(sheet) + self.words.height(sheet)
+    fn height(&self, layout: &Layout) -> u32 {
+        Self::plot_height(layout) + self.words.height(layout)
     }
 
-    fn draw(&self, area: &Area<'_>, sheet: &Sheet, shade: &[(f64, f64)]) -> Drawn {
+    fn draw(&self, area: &Area<'_>, layout: &Layout, shade: &[(f64, f64)]) -> Drawn {
         let highest = self.course.iter().map(|point| point.1).fold(100.0, f64::max);
-        let plot = f64::from(Self::plot_height(sheet) - sheet.title_height() - sheet.text / 2);
-        let top = 1.1 * highest * (1.0 + f64::from(self.words.height(sheet)) / plot);
+        let plot = f64::from(Self::plot_height(layout) - layout.title_height() - layout.text / 2);
+        let top = 1.1 * highest * (1.0 + f64::from(self.words.height(layout)) / plot);
         let panel = Panel {
             title: "Feed override [%]",
             x: self.x,
             y: (0.0, top),
             x_name: None,
-            right: sheet.right,
+            right: layout.right,
             is_logarithmic: false,
             shade,
         };
-        let mut chart = panel.draw(area, sheet)?;
-        let points = decimate::by_column(self.course.iter().copied(), self.x, sheet.columns);
-        curve(&mut chart, points, palette::OVERRIDE, sheet.stroke)?;
-        self.words.draw(&mut chart, area, sheet, panel.y, sheet.title_height())
+        let mut chart = panel.draw(area, layout)?;
+        let points = decimate::by_column(self.course.iter().copied(), self.x, layout.columns);
+        curve(&mut chart, points, palette::OVERRIDE, layout.stroke)?;
+        self.words.draw(&mut chart, area, layout, panel.y, layout.title_height())
     }
 }
 
-fn stack<V: Fn(&TickRecord) -> f64>(
-    record: &RunRecord,
+fn stack<V: Fn(&TraceRow) -> f64>(
+    trace: &RunTrace,
     summary: &Summary,
     curves: &[Curve<V>],
     caption: &Caption<'_>,
-    commands: &[CommandRecord],
+    commands: &[TracedCommand],
 ) -> io::Result<String> {
     let x = ends_over(summary.time_s.0, summary.time_s.1);
-    let live = |sheet: &Sheet| (!commands.is_empty()).then(|| LiveControl::new(record, sheet, x));
-    let height = |sheet: &Sheet| {
-        let live = live(sheet).map_or(0, |live| live.height(sheet));
-        live + curves.len() as u32 * sheet.panel_height + sheet.axis_height()
+    let live = |layout: &Layout| (!commands.is_empty()).then(|| LiveControl::new(trace, layout, x));
+    let height = |layout: &Layout| {
+        let live = live(layout).map_or(0, |live| live.height(layout));
+        live + curves.len() as u32 * layout.panel_height + layout.axis_height()
     };
-    let faults_s: Vec<f64> = record.faults.iter().map(|fault| fault.tick as f64 * record.tick_s).collect();
-    let commands_s: Vec<f64> = commands.iter().map(|command| command.tick as f64 * record.tick_s).collect();
-    on_both_sheets(caption, height, |area, sheet| {
+    let faults_s: Vec<f64> = trace.faults.iter().map(|fault| fault.tick as f64 * trace.tick_s).collect();
+    let commands_s: Vec<f64> = commands.iter().map(|command| command.tick as f64 * trace.tick_s).collect();
+    on_both_layouts(caption, height, |area, layout| {
         let mut rest = area.clone();
-        if let Some(live) = live(sheet) {
-            let (upper, lower) = rest.split_vertically(live.height(sheet));
-            live.draw(&upper, sheet, &shades(&summary.rests, x, sheet.columns))?;
+        if let Some(live) = live(layout) {
+            let (upper, lower) = rest.split_vertically(live.height(layout));
+            live.draw(&upper, layout, &shades(&summary.rests, x, layout.columns))?;
             rest = lower;
         }
         for (index, shown) in curves.iter().enumerate() {
             let last = index + 1 == curves.len();
-            let (upper, lower) = rest.split_vertically(sheet.panel_height);
+            let (upper, lower) = rest.split_vertically(layout.panel_height);
             // The lowest panel carries the time axis of all.
             let part = if last { &rest } else { &upper };
             let panel = Panel {
@@ -219,17 +219,17 @@ fn stack<V: Fn(&TickRecord) -> f64>(
                 x,
                 y: shown.ends(),
                 x_name: last.then_some("time [s]"),
-                right: sheet.right,
+                right: layout.right,
                 is_logarithmic: false,
-                shade: &shades(&summary.rests, x, sheet.columns),
+                shade: &shades(&summary.rests, x, layout.columns),
             };
-            let mut chart = panel.draw(part, sheet)?;
+            let mut chart = panel.draw(part, layout)?;
             let style = palette::LIMIT.rgb().stroke_width(5);
             let line = |limit| PathElement::new([(x.0, limit), (x.1, limit)], style);
             chart.draw_series(shown.limits().map(line))?;
             let points =
-                record.ticks.iter().map(|tick| (tick.tick as f64 * record.tick_s, (shown.value)(tick)));
-            curve(&mut chart, decimate::by_column(points, x, sheet.columns), shown.ink, sheet.stroke)?;
+                trace.ticks.iter().map(|tick| (tick.tick as f64 * trace.tick_s, (shown.value)(tick)));
+            curve(&mut chart, decimate::by_column(points, x, layout.columns), shown.ink, layout.stroke)?;
             command_marks(&mut chart, &commands_s, panel.x, panel.y)?;
             fault_marks(&mut chart, &faults_s, panel.x, panel.y)?;
             rest = lower;
@@ -249,7 +249,7 @@ mod tests {
             span: Span { low, high },
             limit: 5000.0,
             ink: palette::JERK,
-            value: |tick: &TickRecord| tick.j_mm_s3,
+            value: |tick: &TraceRow| tick.j_mm_s3,
         };
         assert_eq!(curve(-900.0, 999.0).limits().count(), 0);
         assert_eq!(curve(-900.0, 999.0).title(), "Jerk [mm/s³]");

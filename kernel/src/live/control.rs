@@ -16,7 +16,7 @@ use crate::program::{Item, SupplyError};
 use crate::queue::{Change, Density, LiveFeeder, Progress, Rejection};
 use crate::units::Position;
 
-/// What the director is doing.
+/// What live control is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
@@ -70,7 +70,7 @@ struct Next {
 
 /// The background of live control, with room for `PLACES` blocks and as many planned ramps.
 #[derive(Debug)]
-pub struct Director<R: Real, const AXES: usize, I, E, const PLACES: usize> {
+pub struct LiveControl<R: Real, const AXES: usize, I, E, const PLACES: usize> {
     items: I,
     pub(super) tick_s: f64,
     pending: Option<Ready<R, AXES>>,
@@ -118,7 +118,7 @@ const TOO_SMALL: Rejection = Rejection::Empty;
 /// A ramp is given up at most so many ticks ahead.
 const LEAD_TICKS_MAX: u64 = 64;
 
-impl<R, const AXES: usize, I, E, const PLACES: usize> Director<R, AXES, I, E, PLACES>
+impl<R, const AXES: usize, I, E, const PLACES: usize> LiveControl<R, AXES, I, E, PLACES>
 where
     R: Real,
     E: Clone,
@@ -272,7 +272,7 @@ where
     /// # Errors
     /// An item can't be executed. Nothing is read any more, every later call returns the same error, and what was handed
     /// over ends at rest; a hold or an abort is still obeyed, but for one that itself can't be.
-    pub fn turn(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+    pub fn poll(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
         self.turn_on(feeder).unwrap_or_else(|error| {
             self.error.get_or_insert(error);
         });
@@ -740,27 +740,27 @@ mod tests {
             let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
             let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
             let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
-            let mut director =
-                Director::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
+            let mut control =
+                LiveControl::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
             for _ in 0..seen {
-                director.turn(&mut feeder).expect("items");
+                control.poll(&mut feeder).expect("items");
                 executor.tick(&mut intake).expect("no fault");
             }
             let progress = feeder.progress();
             for _ in 0..5 {
                 executor.tick(&mut intake).expect("no fault");
             }
-            director.hold();
-            director.obey(Wanted::Stop, &progress, &mut feeder).expect("a stop");
+            control.hold();
+            control.obey(Wanted::Stop, &progress, &mut feeder).expect("a stop");
             let mut ticks = 0;
-            while director.state(&feeder) != State::Held && ticks < 20_000 {
+            while control.state(&feeder) != State::Held && ticks < 20_000 {
                 executor.tick(&mut intake).expect("no fault");
-                director.turn(&mut feeder).expect("items");
+                control.poll(&mut feeder).expect("items");
                 ticks += 1;
             }
             // A ramp to the end and another to rest, not 5 s of cruise.
             assert!(ticks < 1200, "seen at tick {seen}: {ticks} ticks to rest");
-            assert_eq!(director.starvations(), 0, "seen at tick {seen}");
+            assert_eq!(control.starvations(), 0, "seen at tick {seen}");
         }
     }
 
@@ -780,32 +780,32 @@ mod tests {
         let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
         let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
         let none = std::vec::Vec::new().into_iter();
-        let mut director = Director::<f64, 1, _, Infallible, 64>::new(Late { items: none }, TICK_S, 0);
+        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(Late { items: none }, TICK_S, 0);
         let mut start = Position::ZERO;
         for _ in 0..3 {
             for _ in 0..100 {
-                director.turn(&mut feeder).expect("items");
+                control.poll(&mut feeder).expect("items");
                 let executed = executor.tick(&mut intake).expect("no fault");
                 assert_eq!(executed.setpoints[0].position, start);
-                assert_eq!(director.state(&feeder), State::Waiting);
+                assert_eq!(control.state(&feeder), State::Waiting);
             }
             let mut items = line(Position::ZERO).to_vec();
             let Item::EndOfStretch([length]) = items[5] else { panic!("{:?}", items[5]) };
             items[1] = Item::Line { line: 1, start: [start], direction: [1.0], length };
             start = start + length;
             items[5] = Item::EndOfStretch([start]);
-            director.source_mut().items = items.into_iter();
+            control.source_mut().items = items.into_iter();
             for tick in 0.. {
-                director.turn(&mut feeder).expect("items");
-                if director.state(&feeder) == State::Waiting {
+                control.poll(&mut feeder).expect("items");
+                if control.state(&feeder) == State::Waiting {
                     break;
                 }
-                assert_eq!(director.state(&feeder), State::Running);
+                assert_eq!(control.state(&feeder), State::Running);
                 executor.tick(&mut intake).expect("no fault");
                 assert!(tick < 12_000, "it never ends");
             }
         }
-        assert_eq!(director.starvations(), 0);
+        assert_eq!(control.starvations(), 0);
     }
 
     /// Limits beyond fixed point's range: the program's ramps are soft enough, and so is a stop.
@@ -824,15 +824,15 @@ mod tests {
         let mut streams = LiveStreams::<Fixed, 1, 8, 16>::new();
         let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
         let mut executor = Executor::<Fixed, 1>::new([Position::ZERO]);
-        let mut director = Director::<Fixed, 1, _, Infallible, 64>::new(items, TICK_S, 0);
+        let mut control = LiveControl::<Fixed, 1, _, Infallible, 64>::new(items, TICK_S, 0);
         for tick in 0..2100 {
             if tick == 2000 {
-                director.hold();
+                control.hold();
             }
-            director.turn(&mut feeder).expect("a stop");
+            control.poll(&mut feeder).expect("a stop");
             executor.tick(&mut intake).expect("no fault");
         }
-        assert_eq!(director.state(&feeder), State::Held);
+        assert_eq!(control.state(&feeder), State::Held);
     }
 
     /// A block that is a step longer or shorter than its path: what was handed over ends at rest, and the rest is refused.
@@ -843,16 +843,16 @@ mod tests {
             let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
             let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
             let items = line(Position::from_bits(steps));
-            let mut director =
-                Director::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
+            let mut control =
+                LiveControl::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
             let mut refused = 0;
             for _ in 0..20_000 {
-                let turned = director.turn(&mut feeder);
+                let turned = control.poll(&mut feeder);
                 refused +=
                     usize::from(matches!(turned, Err(SupplyError::Rejected(Rejection::Blocks { .. }))));
                 executor.tick(&mut intake).expect("no fault");
             }
-            assert_eq!((refused, director.state(&feeder)), (20_000, State::Failed), "{steps}");
+            assert_eq!((refused, control.state(&feeder)), (20_000, State::Failed), "{steps}");
         }
     }
 }

@@ -16,7 +16,7 @@ use motion_kernel::units::{Counts, DacCode};
 use super::error::RunError;
 use super::inject::Break;
 use crate::machine::{DEAD_TIME_CELLS, Machine};
-use crate::record::AXES;
+use crate::trace::AXES;
 
 /// A machine to run a program on: what the kernel asks of a board, and the time between two ticks.
 pub trait Hardware: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> {
@@ -39,7 +39,7 @@ pub fn simulated(machine: &Machine) -> Result<Simulated, RunError> {
 }
 
 /// The machine and the adapter that talks to its converter.
-pub struct Rig<'a> {
+pub struct SimulatedHardware<'a> {
     machine: &'a Simulated,
     outputs: Ad5754Output<&'a Ad5754Chip, AXES>,
     /// What is broken.
@@ -52,7 +52,7 @@ pub struct Rig<'a> {
     ticks: u64,
 }
 
-impl<'a> Rig<'a> {
+impl<'a> SimulatedHardware<'a> {
     /// Sets up the converter.
     ///
     /// # Errors
@@ -91,7 +91,7 @@ impl<'a> Rig<'a> {
     }
 }
 
-impl Hardware for Rig<'_> {
+impl Hardware for SimulatedHardware<'_> {
     fn start_counts(&mut self) -> [Counts; AXES] {
         let Ok(counts) = self.latch();
         self.break_now();
@@ -106,7 +106,7 @@ impl Hardware for Rig<'_> {
     }
 }
 
-impl Encoder<AXES> for Rig<'_> {
+impl Encoder<AXES> for SimulatedHardware<'_> {
     type Error = Infallible;
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
@@ -121,7 +121,7 @@ impl Encoder<AXES> for Rig<'_> {
     }
 }
 
-impl Inputs<AXES> for Rig<'_> {
+impl Inputs<AXES> for SimulatedHardware<'_> {
     type Error = Infallible;
 
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
@@ -135,7 +135,7 @@ impl Inputs<AXES> for Rig<'_> {
     }
 }
 
-impl VelocityChannel<AXES> for Rig<'_> {
+impl VelocityChannel<AXES> for SimulatedHardware<'_> {
     type Error = Ad5754Error<ChipError>;
 
     fn write(&mut self, codes: &[DacCode; AXES]) -> Result<(), Self::Error> {
@@ -143,7 +143,7 @@ impl VelocityChannel<AXES> for Rig<'_> {
     }
 }
 
-impl DriveEnable<AXES> for Rig<'_> {
+impl DriveEnable<AXES> for SimulatedHardware<'_> {
     type Error = Infallible;
 
     fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
@@ -151,7 +151,7 @@ impl DriveEnable<AXES> for Rig<'_> {
     }
 }
 
-impl IndexLatch for Rig<'_> {
+impl IndexLatch for SimulatedHardware<'_> {
     type Error = Infallible;
 
     fn arm(&mut self, axis: usize) -> Result<(), Infallible> {

@@ -12,7 +12,7 @@ use motion_kernel::units::Counts;
 use serde::{Deserialize, Serialize};
 
 use super::RecordingError;
-use crate::record::AXES;
+use crate::trace::AXES;
 
 /// What the hardware answered in one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,7 +32,7 @@ impl Answers {
     pub(super) const NONE: Self = Self { counts: None, inputs: None, is_written: true, told: None };
 }
 
-/// An entry of the tape.
+/// An entry of the recorded answers.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Entry {
     flags: u8,
@@ -70,7 +70,7 @@ fn inputs_of(&[x, y, z, machine]: &InputBytes) -> MachineInputs<AXES> {
 
 /// All ticks of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Tape {
+pub struct RecordedAnswers {
     pub(super) ticks: u64,
     /// Of all of them.
     pub(super) digest: u64,
@@ -93,19 +93,19 @@ impl Checks {
     }
 }
 
-/// A tape that is being written.
+/// Recorded answers being written.
 #[derive(Clone, Debug)]
-pub(super) struct TapeWriter {
-    tape: Tape,
+pub(super) struct AnswerWriter {
+    recorded: RecordedAnswers,
     /// As read last.
     counts: [Counts; AXES],
     inputs: MachineInputs<AXES>,
 }
 
-impl TapeWriter {
+impl AnswerWriter {
     /// From what the encoders read before the first tick.
     pub(super) fn new(start: [Counts; AXES]) -> Self {
-        Self { tape: Tape::default(), counts: start, inputs: MachineInputs::HEALTHY }
+        Self { recorded: RecordedAnswers::default(), counts: start, inputs: MachineInputs::HEALTHY }
     }
 
     pub(super) fn add(&mut self, answers: &Answers, check: u8) {
@@ -126,21 +126,21 @@ impl TapeWriter {
             | flag(news.is_some(), INPUTS_FOLLOW);
         let mut buffer = [0; ENTRY_MAX];
         let entry = postcard::to_slice(&Entry { flags, moved, check }, &mut buffer);
-        self.tape.entries.extend_from_slice(entry.expect("room for the longest"));
+        self.recorded.entries.extend_from_slice(entry.expect("room for the longest"));
         if let Some(inputs) = news {
-            self.tape.entries.extend_from_slice(&input_bytes(&inputs));
+            self.recorded.entries.extend_from_slice(&input_bytes(&inputs));
             self.inputs = inputs;
         }
-        self.tape.ticks += 1;
+        self.recorded.ticks += 1;
     }
 
-    /// The whole tape; `digest` is that of all its ticks.
-    pub(super) fn finish(self, digest: u64) -> Tape {
-        Tape { digest, ..self.tape }
+    /// All recorded answers; `digest` is that of all its ticks.
+    pub(super) fn finish(self, digest: u64) -> RecordedAnswers {
+        RecordedAnswers { digest, ..self.recorded }
     }
 }
 
-impl Tape {
+impl RecordedAnswers {
     /// Whether it holds as many entries as it says, and nothing else.
     pub(super) fn check(&self) -> Result<(), RecordingError> {
         let mut reader = self.read([Counts(0); AXES]);
@@ -154,21 +154,21 @@ impl Tape {
     }
 
     /// From the start.
-    pub(super) fn read(&self, start: [Counts; AXES]) -> TapeReader<'_> {
-        TapeReader { left: &self.entries, counts: start, inputs: MachineInputs::HEALTHY, ticks: 0 }
+    pub(super) fn read(&self, start: [Counts; AXES]) -> AnswerReader<'_> {
+        AnswerReader { left: &self.entries, counts: start, inputs: MachineInputs::HEALTHY, ticks: 0 }
     }
 }
 
-/// A tape being read: the answers of each tick, and the check byte behind it.
+/// Recorded answers being read: the answers of each tick, and the check byte behind it.
 #[derive(Clone, Debug)]
-pub(super) struct TapeReader<'a> {
+pub(super) struct AnswerReader<'a> {
     left: &'a [u8],
     counts: [Counts; AXES],
     inputs: MachineInputs<AXES>,
     ticks: u64,
 }
 
-impl Iterator for TapeReader<'_> {
+impl Iterator for AnswerReader<'_> {
     type Item = (Answers, u8);
 
     fn next(&mut self) -> Option<Self::Item> {

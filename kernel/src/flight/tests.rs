@@ -51,7 +51,7 @@ impl Random {
 }
 
 /// Every figure of the row beside what the tick says.
-fn is_of<R: Real>(row: &Row<R, 2>, trace: &Trace<R, 2>) -> bool {
+fn is_of<R: Real>(row: &FlightRow<R, 2>, trace: &Trace<R, 2>) -> bool {
     let executed = &trace.executed;
     row.tick == trace.tick
         && row.motion == executed.motion
@@ -72,7 +72,7 @@ fn is_of<R: Real>(row: &Row<R, 2>, trace: &Trace<R, 2>) -> bool {
 /// A history of random length with a fault somewhere or nowhere, cleared and gone on with; the oracle keeps all of it.
 fn keeps_what_a_list_keeps<R: Real, const ROWS: usize, const AFTER: usize>(seed: u64) -> (bool, bool) {
     let random = Random::new(seed);
-    let mut recorder = Recorder::<R, 2, ROWS, AFTER>::new();
+    let mut recorder = FlightRecorder::<R, 2, ROWS, AFTER>::new();
     let (mut has_wrapped, mut was_frozen) = (false, false);
     let mut tick = random.below(1 << 40);
     for _ in 0..1 + random.below(4) {
@@ -135,21 +135,21 @@ fn frames_of<R: Real>(seed: u64) {
     let random = Random::new(seed);
     for _ in 0..50 {
         let tick = random.next();
-        let row = Row::new(&random.trace::<R>(tick, None));
+        let row = FlightRow::new(&random.trace::<R>(tick, None));
         let mut buffer = [0; frame_max(2)];
         let frame = row.to_frame(&mut buffer).expect("room").to_vec();
-        assert_eq!(Row::from_frame(&frame), Ok(row.to_f64()));
+        assert_eq!(FlightRow::from_frame(&frame), Ok(row.to_f64()));
         let mut short = vec![0; frame.len() - 1];
         assert!(row.to_frame(&mut short).is_none());
         for bit in 0..8 * frame.len() {
             let mut damaged = frame.clone();
             damaged[bit / 8] ^= 1 << (bit % 8);
-            assert!(Row::<f64, 2>::from_frame(&damaged).is_err(), "bit {bit}");
+            assert!(FlightRow::<f64, 2>::from_frame(&damaged).is_err(), "bit {bit}");
         }
         for length in 0..frame.len() {
-            assert!(Row::<f64, 2>::from_frame(&frame[..length]).is_err(), "{length} bytes");
+            assert!(FlightRow::<f64, 2>::from_frame(&frame[..length]).is_err(), "{length} bytes");
         }
-        assert_eq!(Row::<f64, 3>::from_frame(&frame), Err(FrameError::Axes { found: 2, expected: 3 }));
+        assert_eq!(FlightRow::<f64, 3>::from_frame(&frame), Err(FrameError::Axes { found: 2, expected: 3 }));
     }
 }
 
@@ -158,7 +158,7 @@ fn frames_of<R: Real>(seed: u64) {
 fn a_row_of_f64_is_its_own_in_f64() {
     let random = Random::new(1);
     for tick in 0..100 {
-        let row = Row::new(&random.trace::<f64>(tick, None));
+        let row = FlightRow::new(&random.trace::<f64>(tick, None));
         assert_eq!(row.to_f64(), row);
     }
 }
@@ -175,7 +175,7 @@ fn a_frame_gives_its_row_or_says_why_not() {
 /// The longest numbers that there are.
 #[test]
 fn no_frame_is_longer_than_its_bound() {
-    let axis = AxisRow {
+    let axis = FlightAxis {
         counts: Counts(i64::MIN),
         set: Position::from_bits(i64::MIN),
         velocity_mm_s: 0.1,
@@ -187,8 +187,8 @@ fn no_frame_is_longer_than_its_bound() {
         inputs: u8::MAX,
     };
     let motion = PathMotion { s: axis.set, v_mm_s: 0.1, a_mm_s2: 0.1, j_mm_s3: 0.1, snap_mm_s4: 0.1 };
-    fn fits<const AXES: usize>(axis: AxisRow<f64>, motion: PathMotion<f64>) {
-        let row = Row {
+    fn fits<const AXES: usize>(axis: FlightAxis<f64>, motion: PathMotion<f64>) {
+        let row = FlightRow {
             tick: u64::MAX,
             motion,
             stretches: u32::MAX,
@@ -205,5 +205,5 @@ fn no_frame_is_longer_than_its_bound() {
     fits::<3>(axis, motion);
     fits::<8>(axis, motion);
     // What the module says of its memory.
-    assert_eq!(size_of::<Row<f32, 3>>(), 168);
+    assert_eq!(size_of::<FlightRow<f32, 3>>(), 168);
 }

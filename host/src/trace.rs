@@ -11,7 +11,7 @@ pub const AXES: usize = 3;
 
 /// A whole run.
 #[derive(Clone, Debug, Default)]
-pub struct RunRecord {
+pub struct RunTrace {
     /// Program name as the user gave it.
     pub program: String,
     /// Machine name from the machine file.
@@ -27,15 +27,15 @@ pub struct RunRecord {
     /// Set − actual position of each axis after settling \[counts\].
     pub end_error_counts: [i64; AXES],
     /// Blocks of the plan, in path order over the whole program.
-    pub blocks: Vec<BlockRecord>,
+    pub blocks: Vec<TracedBlock>,
     /// Every tick, in order.
-    pub ticks: Vec<TickRecord>,
+    pub ticks: Vec<TraceRow>,
     /// Duration of the plan, dwells included \[s\].
     pub planned_time_s: f64,
     /// Commands of live control, in order.
-    pub commands: Vec<CommandRecord>,
+    pub commands: Vec<TracedCommand>,
     /// Faults, in order.
-    pub faults: Vec<FaultRecord>,
+    pub faults: Vec<TracedFault>,
     /// What was accepted and not acted on, and other remarks for the reader.
     pub notices: Vec<String>,
 }
@@ -53,7 +53,7 @@ pub struct PathLimits {
 
 /// One block of the plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BlockRecord {
+pub struct TracedBlock {
     /// G-code line, from 1.
     pub line: u32,
     /// "line", "arc", "helix", "blend" or "spline".
@@ -79,7 +79,7 @@ pub struct BlockRecord {
 
 /// One tick: set values along the path, and every axis.
 #[derive(Clone, Copy, Debug)]
-pub struct TickRecord {
+pub struct TraceRow {
     /// Tick number from 0.
     pub tick: u64,
     /// Path position from the program's start \[mm\].
@@ -123,7 +123,7 @@ pub struct AxisTick {
 
 /// A fault as recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FaultRecord {
+pub struct TracedFault {
     /// Tick in which it was latched.
     pub tick: u64,
     /// Name of the axis, if it concerns one.
@@ -136,7 +136,7 @@ pub struct FaultRecord {
 
 /// A command of live control as it was given, and what became of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CommandRecord {
+pub struct TracedCommand {
     /// Tick before which it was given.
     pub tick: u64,
     /// As in a script: "hold", "override=0.5".
@@ -146,12 +146,12 @@ pub struct CommandRecord {
     /// Path position where it was given \[mm\].
     pub s_mm: f64,
     /// The rest that it asked for, if that was reached before a command to go on.
-    pub stop: Option<StopRecord>,
+    pub stop: Option<TracedStop>,
 }
 
 /// How motion came to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct StopRecord {
+pub struct TracedStop {
     /// The first tick that ended at rest.
     pub tick: u64,
     /// From the command to the end of that tick; 0 if it was at rest already \[s\].

@@ -49,7 +49,7 @@ pub(super) fn axes<R: Real>() -> AxesConfig<R, 2> {
 
 /// A machine whose encoders read what was set, until they are told otherwise.
 #[derive(Debug, Default)]
-pub(super) struct Bench {
+pub(super) struct TestAxes {
     pub(super) counts: [Counts; 2],
     inputs: MachineInputs<2>,
     /// Of latch, inputs, write and enable.
@@ -62,7 +62,7 @@ pub(super) struct Bench {
     pub(super) is_hostile: bool,
 }
 
-impl Bench {
+impl TestAxes {
     /// Counts that jump, inputs that change, calls that fail.
     pub(super) fn upset(&mut self, input: &mut Unstructured<'_>) -> Result<()> {
         self.is_hostile = true;
@@ -111,7 +111,7 @@ fn counts(at: Position) -> i64 {
 /// What every call may answer.
 pub(super) struct Failure;
 
-impl Encoder<2> for Bench {
+impl Encoder<2> for TestAxes {
     type Error = Failure;
 
     fn latch(&mut self) -> core::result::Result<[Counts; 2], Failure> {
@@ -119,7 +119,7 @@ impl Encoder<2> for Bench {
     }
 }
 
-impl Inputs<2> for Bench {
+impl Inputs<2> for TestAxes {
     type Error = Failure;
 
     fn read_inputs(&mut self) -> core::result::Result<MachineInputs<2>, Failure> {
@@ -127,7 +127,7 @@ impl Inputs<2> for Bench {
     }
 }
 
-impl VelocityChannel<2> for Bench {
+impl VelocityChannel<2> for TestAxes {
     type Error = Failure;
 
     fn write(&mut self, codes: &[DacCode; 2]) -> core::result::Result<(), Failure> {
@@ -137,7 +137,7 @@ impl VelocityChannel<2> for Bench {
     }
 }
 
-impl DriveEnable<2> for Bench {
+impl DriveEnable<2> for TestAxes {
     type Error = Failure;
 
     fn set_enabled(&mut self, is_enabled: bool) -> core::result::Result<(), Failure> {

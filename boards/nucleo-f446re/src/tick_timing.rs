@@ -6,7 +6,7 @@
 /// Figures of the ticks since they were last taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_arch = "arm", derive(defmt::Format))]
-pub struct TickLog {
+pub struct TickTiming {
     /// Ticks.
     pub ticks: u32,
     /// Core cycles of the shortest tick.
@@ -24,7 +24,7 @@ pub struct TickLog {
     pub overruns: u32,
 }
 
-impl TickLog {
+impl TickTiming {
     /// No ticks yet.
     #[must_use]
     pub const fn new() -> Self {
@@ -56,7 +56,7 @@ impl TickLog {
     }
 }
 
-impl Default for TickLog {
+impl Default for TickTiming {
     fn default() -> Self {
         Self::new()
     }
@@ -68,12 +68,12 @@ mod tests {
 
     #[test]
     fn keeps_extremes_and_begins_anew() {
-        let mut log = TickLog::new();
+        let mut log = TickTiming::new();
         log.add(500, 30, false);
         log.add(900, 24, true);
         log.add(700, 26, false);
         let taken = log.take();
-        let expected = TickLog {
+        let expected = TickTiming {
             ticks: 3,
             min_cycles: 500,
             max_cycles: 900,
@@ -83,6 +83,6 @@ mod tests {
             overruns: 1,
         };
         assert_eq!(taken, expected);
-        assert_eq!(log, TickLog::new());
+        assert_eq!(log, TickTiming::new());
     }
 }

@@ -1,8 +1,8 @@
 //! Flight recorder: the last ticks, kept when a fault comes.
 //!
-//! Consumes each tick's [`Trace`], in the tick: one [`Row`] is copied, and nothing else depends on how many there are. A
+//! Consumes each tick's [`Trace`], in the tick: one [`FlightRow`] is copied, and nothing else depends on how many there are. A
 //! fault freezes it: `AFTER` ticks behind the fault's are kept still, so that one sees how the machine came to rest, and
-//! then nothing is written until [`Recorder::clear`]. Read from the background, oldest first.
+//! then nothing is written until [`FlightRecorder::clear`]. Read from the background, oldest first.
 //!
 //! A row leaves a board as a frame of bytes of its own, so that a frame that is lost on the way costs one row:
 //!
@@ -10,7 +10,7 @@
 //! |---|---|
 //! | 1 | version of this format, 1 |
 //! | 1 | number of axes |
-//! | … | [`Row`] of f64, whatever the kernel's number type, in the [postcard](https://postcard.jamesmunns.com) wire format |
+//! | … | [`FlightRow`] of f64, whatever the kernel's number type, in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
 //! Memory is that of the rows: 168 bytes each for three axes in f32.
@@ -39,7 +39,7 @@ pub const fn frame_max(axes: usize) -> usize {
 
 /// What is kept of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row<R, const AXES: usize> {
+pub struct FlightRow<R, const AXES: usize> {
     /// Tick number since the start.
     pub tick: u64,
     /// The motion along the path; `s` counts from the stretch's start.
@@ -56,12 +56,12 @@ pub struct Row<R, const AXES: usize> {
     pub is_faulted: bool,
     /// Each axis.
     #[serde(with = "array", bound(serialize = "R: Serialize", deserialize = "R: Copy + Deserialize<'de>"))]
-    pub axes: [AxisRow<R>; AXES],
+    pub axes: [FlightAxis<R>; AXES],
 }
 
 /// What is kept of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AxisRow<R> {
+pub struct FlightAxis<R> {
     /// What the encoder read at the start of the tick.
     pub counts: Counts,
     /// The position set-point that was regulated to.
@@ -82,13 +82,13 @@ pub struct AxisRow<R> {
     pub inputs: u8,
 }
 
-impl<R: Scalar, const AXES: usize> Row<R, AXES> {
+impl<R: Scalar, const AXES: usize> FlightRow<R, AXES> {
     /// Of a tick.
     #[must_use]
     #[inline]
     pub fn new(trace: &Trace<R, AXES>) -> Self {
         let Trace { tick, ref executed, ref axes, ref inputs, ref fault } = *trace;
-        let empty = AxisRow {
+        let empty = FlightAxis {
             counts: Counts(0),
             set: Position::ZERO,
             velocity_mm_s: R::ZERO,
@@ -102,7 +102,7 @@ impl<R: Scalar, const AXES: usize> Row<R, AXES> {
         let mut rows = [empty; AXES];
         let of_axes = rows.iter_mut().zip(axes).zip(executed.setpoints.iter().zip(&inputs.axes));
         for ((row, output), (setpoint, inputs)) in of_axes {
-            *row = AxisRow {
+            *row = FlightAxis {
                 counts: output.counts,
                 set: output.set,
                 velocity_mm_s: setpoint.velocity_mm_s,
@@ -128,9 +128,9 @@ impl<R: Scalar, const AXES: usize> Row<R, AXES> {
 
     /// The same in f64: exactly for floats, to the nearest for fixed point.
     #[must_use]
-    pub fn to_f64(&self) -> Row<f64, AXES> {
+    pub fn to_f64(&self) -> FlightRow<f64, AXES> {
         let Self { tick, motion, stretches, line, state, emergency_stop, is_faulted, .. } = *self;
-        Row {
+        FlightRow {
             tick,
             motion: PathMotion {
                 s: motion.s,
@@ -144,7 +144,7 @@ impl<R: Scalar, const AXES: usize> Row<R, AXES> {
             state,
             emergency_stop,
             is_faulted,
-            axes: self.axes.map(|axis| AxisRow {
+            axes: self.axes.map(|axis| FlightAxis {
                 counts: axis.counts,
                 set: axis.set,
                 velocity_mm_s: axis.velocity_mm_s.to_f64(),
@@ -215,7 +215,7 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-impl<const AXES: usize> Row<f64, AXES> {
+impl<const AXES: usize> FlightRow<f64, AXES> {
     /// The row in `frame`.
     ///
     /// # Errors
@@ -242,13 +242,13 @@ impl<const AXES: usize> Row<f64, AXES> {
 
 /// The last `ROWS` ticks, of which `AFTER` behind that of a fault.
 #[derive(Debug)]
-pub struct Recorder<R, const AXES: usize, const ROWS: usize, const AFTER: usize> {
-    rows: Deque<Row<R, AXES>, ROWS>,
+pub struct FlightRecorder<R, const AXES: usize, const ROWS: usize, const AFTER: usize> {
+    rows: Deque<FlightRow<R, AXES>, ROWS>,
     /// The fault that freezes it, and how many ticks are to be kept still.
     fault: Option<(Fault<R>, usize)>,
 }
 
-impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> Recorder<R, AXES, ROWS, AFTER> {
+impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> FlightRecorder<R, AXES, ROWS, AFTER> {
     const HAS_ROOM: () = assert!(AFTER < ROWS, "no room for the tick of the fault");
 
     /// Without a tick.
@@ -271,7 +271,7 @@ impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> Recorder
             self.rows.pop_front();
         }
         // There is room.
-        let _ = self.rows.push_back(Row::new(trace));
+        let _ = self.rows.push_back(FlightRow::new(trace));
     }
 
     /// Whether a fault has frozen it: nothing is added any more.
@@ -288,12 +288,12 @@ impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> Recorder
 
     /// The row so many behind the oldest.
     #[must_use]
-    pub fn row(&self, index: usize) -> Option<&Row<R, AXES>> {
+    pub fn row(&self, index: usize) -> Option<&FlightRow<R, AXES>> {
         self.rows.get(index)
     }
 
     /// All rows, oldest first.
-    pub fn rows(&self) -> impl ExactSizeIterator<Item = &Row<R, AXES>> {
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = &FlightRow<R, AXES>> {
         self.rows.iter()
     }
 
@@ -306,7 +306,7 @@ impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> Recorder
 }
 
 impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> Default
-    for Recorder<R, AXES, ROWS, AFTER>
+    for FlightRecorder<R, AXES, ROWS, AFTER>
 {
     fn default() -> Self {
         Self::new()
