@@ -1,4 +1,4 @@
-//! Ticks that come between any two operations of a turn of the background, under any commands.
+//! Ticks that come between any two operations of one poll of the background, under any commands.
 
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
@@ -123,7 +123,7 @@ impl TestMachine<'_> {
 
 /// A refused word or a late one costs time, never a limit: what is handed over is legal whenever the tick finds it.
 #[test]
-fn ticks_between_any_two_operations_of_a_turn() {
+fn ticks_between_any_two_operations_of_a_poll() {
     let (mut ticks, mut inside, mut starvations, mut commands) = (0, 0_u64, 0, 0_u64);
     for seed in 0..150 {
         println!("seed {seed}");
@@ -190,7 +190,7 @@ fn ticks_between_any_two_operations_of_a_turn() {
         starvations += control.starvations();
     }
     println!(
-        "{ticks} ticks, {inside} of them in a turn; {commands} commands, {starvations} stops for want of data"
+        "{ticks} ticks, {inside} of them in a poll; {commands} commands, {starvations} stops for want of data"
     );
     assert!(inside > 10_000 && commands > 5_000, "{inside} {commands}");
 }

@@ -1,16 +1,16 @@
-//! A feed list as the background sees it: what it holds, and where each item begins.
+//! A feed list as the background sees it: its items, and the splice at which each begins.
 
 use heapless::Vec;
 
-use super::road::Splice;
+use super::splice::Splice;
 use crate::law::{Phase, Ramp, Ticks, TurnedRamp, segment};
 use crate::units::Position;
 
-/// Feeds that are found by different ways differ by rounding: of 1 mm/s, and of themselves.
+/// Feeds that are calculated differently differ by rounding: of 1 mm/s, and of themselves.
 const FEED_ROUNDING_MM_S: f64 = 1.0e-12;
 
-/// Halvings that find the place to turn at: to a millionth of a millionth.
-const TURN_STEPS: usize = 40;
+/// Halvings that find where a ramp is cut: to a millionth of a millionth.
+const CUT_STEPS: usize = 40;
 
 /// The most items of a feed list: its queue needs one place more.
 pub const LIST_ITEMS: usize = 15;
@@ -20,8 +20,8 @@ pub const LIST_ITEMS: usize = 15;
 pub(super) enum Item {
     /// A ramp or a cruise.
     Feed { ramp: Ramp<f64>, length: Position },
-    /// A ramp that turns so long after its start.
-    Turned { ramp: Ramp<f64>, at: Ticks, length: Position },
+    /// A ramp that is cut in its rise, this long after its start.
+    Cut { ramp: Ramp<f64>, at: Ticks, length: Position },
     /// The end of the stretch.
     End,
     /// Rest for a time.
@@ -33,7 +33,7 @@ pub(super) enum Item {
 impl Item {
     /// Whether it is a part of the feed over a stretch.
     pub(super) fn is_feed(&self) -> bool {
-        matches!(self, Self::Feed { .. } | Self::Turned { .. })
+        matches!(self, Self::Feed { .. } | Self::Cut { .. })
     }
 
     /// Whether it is a rest between stretches.
@@ -47,9 +47,9 @@ impl Item {
             Self::Feed { ramp, length } => {
                 Splice { at: start.at + length, feed_mm_s: ramp.to_mm_s, ..*start }
             }
-            Self::Turned { ramp, at, length } => {
-                let turned = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
-                Splice { at: start.at + length, feed_mm_s: turned.to_mm_s(), ..*start }
+            Self::Cut { ramp, at, length } => {
+                let cut = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
+                Splice { at: start.at + length, feed_mm_s: cut.to_mm_s(), ..*start }
             }
             Self::End => {
                 Splice { stretch: start.stretch.wrapping_add(1), at: Position::ZERO, feed_mm_s: 0.0 }
@@ -62,9 +62,9 @@ impl Item {
     pub(super) fn duration(&self, tick_s: f64) -> Option<Ticks> {
         match *self {
             Self::Feed { ramp, .. } => Ticks::from_seconds(ramp.duration_s(), tick_s),
-            Self::Turned { ramp, at, .. } => {
-                let turned = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
-                Ticks::from_seconds(turned.duration_s(), tick_s)
+            Self::Cut { ramp, at, .. } => {
+                let cut = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
+                Ticks::from_seconds(cut.duration_s(), tick_s)
             }
             Self::Dwell(duration) => Some(duration),
             Self::End | Self::Stop => None,
@@ -79,9 +79,9 @@ impl Item {
         let ramp = match self {
             // As its segment was made.
             Self::Feed { ramp, .. } => segment::to_f64(ramp),
-            &Self::Turned { ramp, .. } if phase == Phase::Rise => {
-                let turned = TurnedRamp { ramp, turn_s: elapsed_s };
-                return Some(Self::Turned { ramp, at: elapsed, length: length(turned.length_mm())? });
+            &Self::Cut { ramp, .. } if phase == Phase::Rise => {
+                let cut = TurnedRamp { ramp, turn_s: elapsed_s };
+                return Some(Self::Cut { ramp, at: elapsed, length: length(cut.length_mm())? });
             }
             _ => return None,
         };
@@ -90,11 +90,11 @@ impl Item {
                 let ramp = Ramp::cruise(ramp.from_mm_s, elapsed_s);
                 Some(Self::Feed { ramp, length: length(ramp.length_mm())? })
             }
-            // Over before it could be turned.
+            // Over before it could be cut.
             Phase::Rise if ramp.t1_s <= tick_s => None,
             Phase::Rise if 2.0 * elapsed_s <= ramp.t1_s => {
-                let turned = TurnedRamp { ramp, turn_s: elapsed_s };
-                Some(Self::Turned { ramp, at: elapsed, length: length(turned.length_mm())? })
+                let cut = TurnedRamp { ramp, turn_s: elapsed_s };
+                Some(Self::Cut { ramp, at: elapsed, length: length(cut.length_mm())? })
             }
             Phase::Rise | Phase::Hold => {
                 let t2_s = if phase == Phase::Rise { ramp.t1_s } else { ramp.t1_s + elapsed_s };
@@ -122,14 +122,14 @@ impl Item {
                 }
                 (ramp, 0.5 * ramp.t1_s)
             }
-            Self::Turned { ramp, at, .. } => (ramp, at.to_f64() * tick_s),
+            Self::Cut { ramp, at, .. } => (ramp, at.to_f64() * tick_s),
             _ => return None,
         };
         let (mut low_s, mut high_s) = (0.0, most_s);
-        for _ in 0..TURN_STEPS {
-            let turned = TurnedRamp { ramp, turn_s: 0.5 * (low_s + high_s) };
-            let end_s = if turned.to_mm_s() > feed_mm_s { &mut high_s } else { &mut low_s };
-            *end_s = turned.turn_s;
+        for _ in 0..CUT_STEPS {
+            let cut = TurnedRamp { ramp, turn_s: 0.5 * (low_s + high_s) };
+            let end_s = if cut.to_mm_s() > feed_mm_s { &mut high_s } else { &mut low_s };
+            *end_s = cut.turn_s;
         }
         self.cut(Phase::Rise, before(low_s)?, tick_s)
     }
@@ -138,7 +138,7 @@ impl Item {
     pub(super) fn phase_duration(&self, phase: Phase, tick_s: f64) -> Option<Ticks> {
         let ramp = match self {
             Self::Feed { ramp, .. } => ramp,
-            Self::Turned { at, .. } if phase == Phase::Rise => return Some(*at),
+            Self::Cut { at, .. } if phase == Phase::Rise => return Some(*at),
             _ => return None,
         };
         let seconds = match phase {
@@ -160,33 +160,74 @@ fn changed(from_mm_s: f64, change_mm_s: f64) -> f64 {
     }
 }
 
-/// Items with where they begin.
+/// Items with the splice at which each begins.
 #[derive(Clone, Debug)]
 pub(super) struct List {
-    pub(super) start: Splice,
+    start: Splice,
     tick_s: f64,
     items: Vec<(Splice, Item), LIST_ITEMS>,
-    /// What follows takes over after so many of them; the others are a stop, should nothing follow in time.
-    pub(super) leave: usize,
-    /// It ends with a program block: in single block motion is held there.
-    pub(super) ends_block: bool,
+    /// An item was appended that had no place.
+    is_overfull: bool,
+    exit: usize,
+    ends_block: bool,
 }
 
 impl List {
     pub(super) fn new(start: Splice, tick_s: f64) -> Self {
-        Self { start, tick_s, items: Vec::new(), leave: 0, ends_block: false }
+        Self { start, tick_s, items: Vec::new(), is_overfull: false, exit: 0, ends_block: false }
+    }
+
+    /// As a new one from `start`.
+    pub(super) fn restart(&mut self, start: Splice) {
+        self.truncate(0);
+        (self.start, self.exit, self.ends_block) = (start, 0, false);
+    }
+
+    /// Where it begins.
+    pub(super) fn start(&self) -> &Splice {
+        &self.start
+    }
+
+    /// The successor takes over after this many items; the rest is a fallback stop.
+    pub(super) fn exit(&self) -> usize {
+        self.exit
+    }
+
+    /// The splice at which the successor takes over.
+    pub(super) fn exit_splice(&self) -> Splice {
+        self.after(self.exit)
+    }
+
+    /// The successor takes over where it ends: there is no fallback stop, or that is driven.
+    pub(super) fn set_exit_to_end(&mut self) {
+        self.exit = self.len();
+    }
+
+    /// Whether it ends with a program block: in single block motion is held there.
+    pub(super) fn ends_block(&self) -> bool {
+        self.ends_block
+    }
+
+    pub(super) fn set_ends_block(&mut self, ends_block: bool) {
+        self.ends_block = ends_block;
     }
 
     pub(super) fn is_full(&self) -> bool {
         self.items.is_full()
     }
 
+    /// Whether an item had no place. Such a list is never handed over.
+    pub(super) fn is_overfull(&self) -> bool {
+        self.is_overfull
+    }
+
     pub(super) fn len(&self) -> usize {
         self.items.len()
     }
 
-    /// Appends an item; there is room. Its feed continues the list's but for rounding, which is taken off.
-    pub(super) fn push(&mut self, mut item: Item) {
+    /// Appends an item, for which who makes the list has left a place. Its feed continues the list's but for rounding,
+    /// which is taken off: the item as appended.
+    pub(super) fn push(&mut self, mut item: Item) -> Item {
         let end = self.end();
         if let Item::Feed { ramp, .. } = &mut item
             && libm::fabs(ramp.from_mm_s - end.feed_mm_s) <= FEED_ROUNDING_MM_S * (1.0 + end.feed_mm_s)
@@ -196,7 +237,9 @@ impl List {
             }
             ramp.from_mm_s = end.feed_mm_s;
         }
-        let _ = self.items.push((end, item));
+        self.is_overfull |= self.items.push((end, item)).is_err();
+        debug_assert!(!self.is_overfull, "an item without a place");
+        item
     }
 
     pub(super) fn contains(&self, item: &Item) -> bool {
@@ -205,6 +248,7 @@ impl List {
 
     pub(super) fn truncate(&mut self, len: usize) {
         self.items.truncate(len);
+        self.is_overfull = false;
     }
 
     pub(super) fn items(&self) -> impl Iterator<Item = &Item> {
@@ -220,17 +264,12 @@ impl List {
         self.items.get(index)
     }
 
-    /// The items from the last to the one at `from`.
-    pub(super) fn back_to(&self, from: usize) -> impl Iterator<Item = &Item> {
-        self.items.get(from..).unwrap_or(&[]).iter().rev().map(|(_, item)| item)
-    }
-
     /// Where its last item ends.
     pub(super) fn end(&self) -> Splice {
         self.items.last().map_or(self.start, |(start, item)| item.end(start, self.tick_s))
     }
 
-    /// Where it stands after so many items.
+    /// The splice after this many items.
     pub(super) fn after(&self, count: usize) -> Splice {
         match self.items.get(count) {
             Some((start, _)) => *start,
@@ -245,7 +284,7 @@ mod tests {
     use crate::law::Limits;
     use crate::random::Random;
 
-    /// Wherever a ramp is to end, it can be given up so that it does, whole or turned already, and never beyond.
+    /// Wherever a ramp is to end, it can be cut so that it does, whole or cut already, and never beyond.
     #[test]
     fn a_ramp_is_given_up_where_it_gets_to_a_feed() {
         let random = Random::new(2);
@@ -266,7 +305,7 @@ mod tests {
                 let found_mm_s = cut.end(&start, tick_s).feed_mm_s;
                 let is_close = found_mm_s <= feed_mm_s && found_mm_s >= feed_mm_s - 1e-5;
                 assert!(is_close, "{number}: {found_mm_s}, expected {feed_mm_s}, {ramp:?}");
-                turned += usize::from(matches!(cut, Item::Turned { .. }));
+                turned += usize::from(matches!(cut, Item::Cut { .. }));
                 item = cut;
             }
         }

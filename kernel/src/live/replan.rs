@@ -1,13 +1,15 @@
 //! The feed from a splice on, planned anew over the blocks that are known.
 //!
-//! Consumes a splice, a feed override and the [`Road`]; produces ramps and cruises to rest where the known path ends.
+//! Consumes a splice, a feed override and the [`Lookahead`]; produces ramps and cruises to rest where the known path ends.
 //! Background. Two stages and one pair of ramps for neighbours that are alike, as [`plan`]; over the blocks that come
 //! first with ramps that span them, where that is faster, to the feed that the plan behind them begins with.
 
 use heapless::Vec;
 
+use super::brake::LENGTH_ROUNDING_MM;
 use super::list::{Item, LIST_ITEMS, List};
-use super::road::{LENGTH_ROUNDING_MM, Road, SLIVER, Splice};
+use super::lookahead::Lookahead;
+use super::splice::{SLIVER, Splice};
 use crate::law::{Law, Limits};
 use crate::plan::spanning::spans_of;
 use crate::plan::{Block, BlockPlan, FeedSpan, Node, nodes_for, plan, plan_spanning, segments};
@@ -32,21 +34,29 @@ impl Ramps {
     pub(super) const IN_ORDER: [Self; 2] = [Self::Spanning, Self::PerBlock];
 }
 
-/// The first items of a plan from `from` to rest at `end`, into `list`, as many as it has room for; whether that is all
-/// of it. `None` if there is no plan: the feed is above the ceiling, or the path too short to brake.
+/// How much of a plan a list has taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reach {
+    /// All of it.
+    Whole,
+    /// What there was room for.
+    Part,
+}
+
+/// The first items of a plan from `from` to rest at `end`, into `list`, as many as it has room for. `None` if there is no plan: the feed is above the ceiling, or the path too short to brake.
 pub(super) fn replan<const BLOCKS: usize>(
-    road: &Road<BLOCKS>,
+    lookahead: &Lookahead<BLOCKS>,
     from: &Splice,
     feed_override: f64,
     end: Position,
     ramps: Ramps,
     tick_s: f64,
     list: &mut List,
-) -> Option<bool> {
+) -> Option<Reach> {
     let heads = list.len();
     // What is alike may be too soft where one has to brake at once.
     for alike in [ALIKE, 0.0] {
-        let mut blocks = Blocks::<BLOCKS>::new(road, from, feed_override, end, alike)?;
+        let mut blocks = Blocks::<BLOCKS>::new(lookahead, from, feed_override, end, alike)?;
         let planned = blocks.plan(from, ramps, tick_s, list);
         if planned.is_some() {
             return planned;
@@ -72,7 +82,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
     /// none of these are `alike` parts below another's.
     #[inline(never)]
     fn new(
-        road: &Road<BLOCKS>,
+        lookahead: &Lookahead<BLOCKS>,
         from: &Splice,
         feed_override: f64,
         end: Position,
@@ -81,9 +91,9 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
         let mut found = Self { blocks: Vec::new(), ends: Vec::new(), are_softer: false };
         // A sliver of a block belongs to the one behind it.
         let (mut start, mut most) = (from.at, None::<Limits<f64>>);
-        for block in road.from(from).take_while(|block| block.start < end) {
+        for block in lookahead.from(from).take_while(|block| block.start() < end) {
             let (cap_mm_s, limits) = block.allowed(feed_override);
-            let block_end = block.end.min(end);
+            let block_end = block.end().min(end);
             if block_end - start <= SLIVER && block_end < end {
                 continue;
             }
@@ -115,7 +125,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
 
     /// See [`replan`].
     #[inline(never)]
-    fn plan(&mut self, from: &Splice, ramps: Ramps, tick_s: f64, list: &mut List) -> Option<bool> {
+    fn plan(&mut self, from: &Splice, ramps: Ramps, tick_s: f64, list: &mut List) -> Option<Reach> {
         let (blocks, ends) = (&mut self.blocks, &self.ends);
         let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
         plans.resize(blocks.len(), BlockPlan::default()).ok()?;
@@ -127,8 +137,8 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
             let count = blocks.len().min(SPANNED);
             let (first, plans, ends) = (blocks.get(..count)?, plans.get(..count)?, ends.get(..count)?);
             let heads = list.len();
-            if let Some(is_whole) = span(first, plans, from, *ends.last()?, tick_s, list) {
-                return Some(is_whole && count == blocks.len());
+            if let Some(reach) = span(first, plans, from, *ends.last()?, tick_s, list) {
+                return Some(if count == blocks.len() { reach } else { Reach::Part });
             }
             list.truncate(heads);
         }
@@ -137,13 +147,13 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
             let made = segments::<f64, f64>(block, plan, start, block_end, tick_s).ok()?;
             for segment in made.iter().flatten() {
                 if list.is_full() {
-                    return Some(false);
+                    return Some(Reach::Part);
                 }
                 list.push(Item::Feed { ramp: *segment.as_ramp(), length: segment.length() });
             }
             start = block_end;
         }
-        Some(true)
+        Some(Reach::Whole)
     }
 }
 
@@ -166,7 +176,7 @@ fn span(
     end: Position,
     tick_s: f64,
     list: &mut List,
-) -> Option<bool> {
+) -> Option<Reach> {
     let mut nodes = [Node::EMPTY; nodes_for(SPANNED)];
     let mut spans: Vec<FeedSpan, { LIST_ITEMS + 1 }> = Vec::new();
     let mut is_cut = false;
@@ -180,12 +190,12 @@ fn span(
     let (mut start, mut rest) = (from.at, &spans[..]);
     while let [span, next @ ..] = rest {
         if list.is_full() {
-            return Some(false);
+            return Some(Reach::Part);
         }
         let span_end = match next.first() {
             Some(next) => from.at + Position::from_mm(next.start_mm)?,
             // What was cut off behind it is gone, and with it where it ends.
-            None if is_cut => return Some(false),
+            None if is_cut => return Some(Reach::Part),
             None => end,
         };
         let length = span_end - start;
@@ -194,5 +204,5 @@ fn span(
         }
         (start, rest) = (span_end, next);
     }
-    Some(true)
+    Some(Reach::Whole)
 }

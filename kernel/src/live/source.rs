@@ -4,7 +4,7 @@ use core::task::Poll;
 
 use crate::program::Item;
 
-/// What the items of a program are read from. A sender that is late says so, and is asked again in the next turn of the
+/// What the items of a program are read from. A sender that is late says so, and is asked again in the next poll of the
 /// background; every iterator is a source whose items are all there.
 pub trait Source<const AXES: usize> {
     /// Why an item can't be had.

@@ -100,6 +100,14 @@ pub enum Rejection {
     },
     /// Path that no block says the feed of: live control could not brake on it.
     NoBlock,
+    /// More is to be kept than there are places for, where room had been left: an error of live control, not of the program.
+    #[cfg(feature = "live")]
+    Full {
+        /// Of which there are too many.
+        what: &'static str,
+        /// As many as there are places for.
+        places: usize,
+    },
     /// A change to or from a feed list that is not the one it may be: to the one that was filled last, from another,
     /// after fewer items than that word holds.
     #[cfg(feature = "live")]
@@ -116,6 +124,15 @@ pub enum Rejection {
         /// The length or coordinate \[mm\].
         mm: f64,
     },
+}
+
+#[cfg(feature = "live")]
+impl Rejection {
+    /// There are no more than `places` for `what`.
+    #[cold]
+    pub(crate) fn full(what: &'static str, places: usize) -> Self {
+        Self::Full { what, places }
+    }
 }
 
 impl core::fmt::Display for Rejection {
@@ -136,6 +153,8 @@ impl core::fmt::Display for Rejection {
             }
             Self::Travel { axis, mm } => write!(f, "position {mm} mm of axis {axis}: expected its travel"),
             Self::Empty => write!(f, "a stretch without any length"),
+            #[cfg(feature = "live")]
+            Self::Full { what, places } => write!(f, "more {what} than the {places} that there is room for"),
             #[cfg(feature = "live")]
             Self::Blocks { blocks_mm, path_mm } => {
                 write!(f, "{blocks_mm} mm of blocks, {path_mm} mm of path: expected equal lengths")

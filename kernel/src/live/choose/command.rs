@@ -1,0 +1,160 @@
+//! Commands: what takes over from the motion under way, and where.
+
+use super::{Choice, Chooser};
+use crate::live::list::{Item, List};
+use crate::live::mode::Request;
+use crate::live::places::{Place, Places, Takeover};
+use crate::live::replan::Ramps;
+use crate::live::splice::Splice;
+use crate::queue::Progress;
+use crate::units::Position;
+
+/// Which ramps that accelerate are cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cut {
+    /// Those that get too fast for the override.
+    TooFast,
+    /// All of them.
+    All,
+}
+
+impl<const PLACES: usize> Chooser<'_, PLACES> {
+    /// What obeys a request to motion that is as far as `progress` says.
+    pub(in crate::live) fn obey(&mut self, request: Request, progress: &Progress, list: &mut List) -> Choice {
+        let places = self.timeline.places(progress);
+        match request {
+            Request::Stop => self.stop(places, progress, list),
+            Request::Override => self.change_override(places, progress, list),
+        }
+    }
+
+    /// Brakes to rest from the first place that allows it; if there is none, the list under way ends at rest.
+    pub(super) fn stop(&self, places: Places<'_>, progress: &Progress, list: &mut List) -> Choice {
+        for place in places {
+            place.begin(list);
+            let splice = list.end();
+            if splice.feed_mm_s < place.start().feed_mm_s {
+                // What brakes continues to brake.
+                continue;
+            }
+            if splice.is_at_rest() {
+                // What follows in this list must not.
+                if let Some(rest) = self.rest_before_more(&place, progress) {
+                    return rest;
+                }
+                break;
+            }
+            let path_end = self.extent_of(splice.stretch).end();
+            let driven_override = self.timeline.driven_override();
+            let Some((ramp, length)) = self.lookahead.brake(&splice, 0.0, path_end, driven_override) else {
+                continue;
+            };
+            list.push(Item::Feed { ramp, length });
+            if self.timeline.keeps_up(list, place.takeover()) {
+                return self.rest_at_end_of(list, &place);
+            }
+        }
+        Choice::DriveToEnd
+    }
+
+    /// A list that ends at rest takes over.
+    pub(super) fn rest_at_end_of(&self, list: &mut List, place: &Place) -> Choice {
+        list.set_exit_to_end();
+        Choice::TakeOver { takeover: place.takeover(), feed_override: self.timeline.driven_override() }
+    }
+
+    /// Continues under another override, or to the end of a block, from the first place that allows it; if there is none,
+    /// from where the list under way is left.
+    fn change_override(&mut self, places: Places<'_>, progress: &Progress, list: &mut List) -> Choice {
+        self.block_end = None;
+        if self.mode.is_single_block() {
+            let choice = self.change_to_block_end(&places, progress, list);
+            if choice != Choice::Nothing {
+                return choice;
+            }
+        }
+        let choice = self.change_from(self.places_for_override(places), progress, Cut::TooFast, list);
+        match choice {
+            Choice::Nothing if self.timeline.splice().at > Position::ZERO => Choice::Replan,
+            choice => choice,
+        }
+    }
+
+    /// Continues under the override from the first of `places` that allows it.
+    pub(super) fn change_from(
+        &mut self,
+        places: Places<'_>,
+        progress: &Progress,
+        cut: Cut,
+        list: &mut List,
+    ) -> Choice {
+        let inside = places.inside().map(|(start, item, _)| (*start, *item));
+        for place in places {
+            let (start, splice) = (*place.start(), place.splice(self.tick_s));
+            if let Takeover::After(_) = place.takeover() {
+                if start.is_at_rest() {
+                    // It continues from here as from any stop.
+                    return self.rest_before_more(&place, progress).unwrap_or(Choice::Nothing);
+                }
+            } else if !(cut == Cut::All && splice.feed_mm_s >= start.feed_mm_s)
+                && !inside.is_some_and(|(start, item)| self.is_worth_cutting(&start, &item, &splice))
+            {
+                continue;
+            }
+            // Whatever comes of it: what is ahead of this stretch is planned anew from here on.
+            self.feed.replan_through(start.stretch);
+            for ramps in Ramps::IN_ORDER {
+                place.begin(list);
+                let heads = list.len();
+                if !self.gather_under_override(list, false, ramps) {
+                    break;
+                }
+                let feed_override = self.mode.feed_override();
+                if self.end_in_a_stop(list, feed_override)
+                    && list.exit() >= heads
+                    && self.timeline.keeps_up(list, place.takeover())
+                {
+                    return Choice::TakeOver { takeover: place.takeover(), feed_override };
+                }
+            }
+        }
+        Choice::Nothing
+    }
+
+    /// The places for another override: a ramp that would exceed it is cut where it gets to the feed that is allowed, or
+    /// else at once. So an override that keeps falling by little does not hold up an acceleration.
+    fn places_for_override<'a>(&self, places: Places<'a>) -> Places<'a> {
+        let Some((start, item, place)) = places.inside() else { return places };
+        let cut_mm_s = place.splice(self.tick_s).feed_mm_s;
+        let cap_mm_s = self.least_cap_mm_s(start, item);
+        let whole_mm_s = item.end(start, self.tick_s).feed_mm_s;
+        let is_between = cut_mm_s < cap_mm_s && cap_mm_s < whole_mm_s;
+        match is_between.then(|| item.cut_to(cap_mm_s, self.tick_s)).flatten() {
+            Some(head) => places.with_head(head),
+            None => places,
+        }
+    }
+
+    /// The least feed \[mm/s\] that is allowed anywhere on an item's path.
+    fn least_cap_mm_s(&self, start: &Splice, item: &Item) -> f64 {
+        let end = item.end(start, self.tick_s).at;
+        let crossed = self.lookahead.from(start).take_while(|block| block.start() < end);
+        let caps_mm_s = crossed.map(|block| block.allowed(self.mode.feed_override()).0);
+        caps_mm_s.reduce(f64::min).unwrap_or(0.0)
+    }
+
+    /// Where the machine is at rest at a place, perhaps in a dwell, and more of the list under way would follow: a rest there.
+    fn rest_before_more(&self, place: &Place, progress: &Progress) -> Option<Choice> {
+        let after = place.takeover().driven();
+        let is_here = progress.inside.is_none() && after == progress.done as usize;
+        (is_here && after < self.timeline.list().len()).then_some(Choice::Rest { after, ends_block: false })
+    }
+
+    /// Whether an item, cut at a splice, does not change the feed, or as a whole takes it to where the override does not
+    /// allow it.
+    fn is_worth_cutting(&self, start: &Splice, item: &Item, cut: &Splice) -> bool {
+        let whole_mm_s = item.end(start, self.tick_s).feed_mm_s;
+        let cap_mm_s = self.least_cap_mm_s(start, item);
+        cut.feed_mm_s == start.feed_mm_s || whole_mm_s > start.feed_mm_s && whole_mm_s > cap_mm_s
+    }
+}

@@ -1,0 +1,176 @@
+//! Single block: motion comes to rest at the end of every program block and is held there.
+//!
+//! The end that is stopped at is the end of the known path as far as plans go: a list that ends there is a complete motion
+//! as any other, under all the ceilings on the way. A hold at a block's end is the hold that a resume ends.
+
+use super::command::Cut;
+use super::{Choice, Chooser};
+use crate::law::Ramp;
+use crate::live::list::{Item, LIST_ITEMS, List};
+use crate::live::places::Places;
+use crate::live::replan::Ramps;
+use crate::live::splice::{BlockEnd, SLIVER, Splice};
+use crate::queue::Progress;
+use crate::units::Position;
+
+/// How many block ends in reach are tried: nearly always the first one can be stopped at. Where none can, motion brakes to
+/// rest before them and continues from there.
+const ENDS_TRIED: usize = 2;
+/// How often a braking ramp is moved on to end where it should: limits may be others further ahead.
+const MOVES: usize = 4;
+
+impl<const PLACES: usize> Chooser<'_, PLACES> {
+    /// Whether a list ends where single block is to come to rest.
+    pub(super) fn is_block_end(&self, place: &Splice) -> bool {
+        self.mode.is_single_block() && place.is_at_rest() && self.block_end == Some(BlockEnd::from(*place))
+    }
+
+    /// The path position of the nearest rest from a splice, and how to brake to it.
+    fn nearest_rest(&self, from: &Splice) -> Option<(Position, Option<Item>)> {
+        if from.is_at_rest() {
+            return Some((from.at, None));
+        }
+        let path_end = self.extent_of(from.stretch).end();
+        let driven_override = self.timeline.driven_override();
+        let (ramp, length) = self.lookahead.brake(from, 0.0, path_end, driven_override)?;
+        Some((from.at + length, Some(Item::Feed { ramp, length })))
+    }
+
+    /// The first block ends of `stretch` from `nearest` on.
+    fn block_ends(&self, stretch: u32, nearest: Position) -> [Option<BlockEnd>; ENDS_TRIED] {
+        let mut first = [None; ENDS_TRIED];
+        let ends = self.lookahead.block_ends(stretch).filter(|end| end.at >= nearest);
+        for (place, end) in first.iter_mut().zip(ends) {
+            *place = Some(end);
+        }
+        first
+    }
+
+    /// Keeps the feed at the list's end as long as possible and brakes, to rest at the block end; false where that is not
+    /// legal. A ramp crosses blocks that a plan has no ramps for.
+    fn brake_at_block_end(&self, list: &mut List) -> bool {
+        let from = list.end();
+        if from.is_at_rest() {
+            return false;
+        }
+        let end = self.extent_of(from.stretch).end();
+        let driven_override = self.timeline.driven_override();
+        let mut begin = from;
+        for _ in 0..MOVES {
+            let Some((ramp, length)) = self.lookahead.brake(&begin, 0.0, end, driven_override) else {
+                return false;
+            };
+            let left = end - (begin.at + length);
+            if left == Position::ZERO {
+                let kept = begin.at - from.at;
+                if !self.lookahead.may_keep(&from, begin.at, driven_override) || list.len() + 2 > LIST_ITEMS {
+                    return false;
+                }
+                if kept > Position::ZERO {
+                    let cruise = Ramp::cruise(from.feed_mm_s, kept.to_mm() / from.feed_mm_s);
+                    list.push(Item::Feed { ramp: cruise, length: kept });
+                }
+                list.push(Item::Feed { ramp, length });
+                return true;
+            }
+            begin.at = begin.at + left;
+        }
+        false
+    }
+
+    /// A plan from where the next list begins to the first block end that can be stopped at, or else to the end of the
+    /// stretch or of what is known of it.
+    pub(super) fn gather_block(&mut self, list: &mut List, ramps: Ramps) -> bool {
+        let splice = *self.timeline.splice();
+        if let Some((nearest, brake)) = self.nearest_rest(&splice) {
+            // At rest, not what it rests at.
+            let nearest = if brake.is_none() { nearest + SLIVER + SLIVER } else { nearest };
+            let ends = self.block_ends(splice.stretch, nearest);
+            for end in ends.into_iter().flatten() {
+                self.block_end = Some(end);
+                if self.gather_under_override(list, true, ramps) {
+                    return true;
+                }
+                list.truncate(0);
+                if self.brake_at_block_end(list) {
+                    return true;
+                }
+            }
+            if let ([Some(_), ..], Some(brake)) = (ends, brake) {
+                list.push(brake);
+                return true;
+            }
+        }
+        self.block_end = None;
+        self.gather_under_override(list, true, ramps)
+    }
+
+    /// Continues to the first block end that can be stopped at from within the list under way.
+    pub(super) fn change_to_block_end(
+        &mut self,
+        places: &Places<'_>,
+        progress: &Progress,
+        list: &mut List,
+    ) -> Choice {
+        let (under_way, done) = (places.list(), progress.done as usize);
+        if progress.waits {
+            return self.end_block_after(done);
+        }
+        let stretch = under_way.after(done).stretch;
+        let rests = places.clone().filter_map(|place| {
+            let splice = place.splice(self.tick_s);
+            let (rest, _) = self.nearest_rest(&splice)?;
+            (splice.stretch == stretch).then_some(rest)
+        });
+        if let Some(nearest) = rests.min() {
+            let ends = self.block_ends(stretch, nearest);
+            for end in ends.into_iter().flatten() {
+                self.block_end = Some(end);
+                for cut in [Cut::TooFast, Cut::All] {
+                    let choice = self.change_from(places.clone(), progress, cut, list);
+                    if choice != Choice::Nothing {
+                        return choice;
+                    }
+                }
+                let choice = self.brake_from(places.clone(), list);
+                if choice != Choice::Nothing {
+                    return choice;
+                }
+            }
+            self.block_end = None;
+            if ends.iter().any(Option::is_some) {
+                return self.stop(places.clone(), progress, list);
+            }
+        }
+        // The end of the stretch, or of what is waited for between two: after it, if that is to come in this list.
+        let is_no_feed = |&index: &usize| under_way.get(index).is_some_and(|(_, item)| !item.is_feed());
+        match (done..under_way.exit()).find(is_no_feed) {
+            Some(last) => self.end_block_after(last + 1),
+            None => Choice::Nothing,
+        }
+    }
+
+    /// Brakes to the block end from the first place that allows it.
+    fn brake_from(&self, places: Places<'_>, list: &mut List) -> Choice {
+        for place in places {
+            place.begin(list);
+            if list.end().feed_mm_s >= place.start().feed_mm_s
+                && self.brake_at_block_end(list)
+                && self.timeline.keeps_up(list, place.takeover())
+            {
+                list.set_ends_block(true);
+                return self.rest_at_end_of(list, &place);
+            }
+        }
+        Choice::Nothing
+    }
+
+    /// Ends the list under way after this many of its items, which end a block there.
+    fn end_block_after(&self, after: usize) -> Choice {
+        if after < self.timeline.list().len() {
+            Choice::Rest { after, ends_block: true }
+        } else {
+            Choice::EndBlock
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Live control with an executor: commands that come too late, items that come later, blocks that contradict their path.
+
+use core::convert::Infallible;
+use core::task::Poll;
+
+use super::*;
+use crate::exec::Executor;
+use crate::fixture::{self, LIMITS};
+use crate::law::{Law, Limits, Ramp};
+use crate::num::Fixed;
+use crate::program::{Allowed, Item, PathBlock};
+use crate::queue::{LiveStreams, PathRules, Rejection};
+use crate::straight::Straight;
+
+const TICK_S: f64 = 0.0005;
+
+fn at(mm: f64) -> Position {
+    Position::from_mm(mm).expect("in range")
+}
+
+const RULES: PathRules = PathRules { feed_mm_s: 20.0, ..fixture::RULES };
+
+/// A hundred millimetres of cruise between two ramps, on a block that is so much longer.
+fn line(longer: Position) -> [Item<1>; 6] {
+    let up = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, 20.0);
+    let (ramp, cruise) = (at(up.length_mm()), at(100.0));
+    let whole = ramp + cruise + ramp;
+    let allowed = Allowed { cap_mm_s: 20.0, limits: LIMITS };
+    let line = Item::Line { line: 1, start: [Position::ZERO], direction: [1.0], length: whole };
+    [
+        Item::Block(PathBlock::new(whole + longer, 20.0, allowed, allowed, 0.0)),
+        line,
+        Item::Feed { ramp: up, length: ramp },
+        Item::Feed { ramp: Ramp::cruise(20.0, 5.0), length: cruise },
+        Item::Feed { ramp: up.reversed(), length: ramp },
+        Item::EndOfStretch([whole]),
+    ]
+}
+
+/// Ticks that come between reading where the tick is and asking for a change make it too late: the command is made again, from where
+/// motion is by then.
+#[test]
+fn a_refused_command_is_made_again() {
+    let items = line(Position::ZERO);
+    let ramp_s = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, 20.0).duration_s();
+    // In the rise, the hold of a cruise, and just before a ramp ends.
+    for seen in [50, 2000, (ramp_s / TICK_S) as u32 - 2] {
+        let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+        let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
+        let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
+        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
+        for _ in 0..seen {
+            control.poll(&mut feeder).expect("items");
+            executor.tick(&mut intake).expect("no fault");
+        }
+        let progress = feeder.progress();
+        for _ in 0..5 {
+            executor.tick(&mut intake).expect("no fault");
+        }
+        control.hold();
+        control.obey(Request::Stop, &progress, &mut feeder).expect("a stop");
+        let mut ticks = 0;
+        while control.state(&feeder) != State::Held && ticks < 20_000 {
+            executor.tick(&mut intake).expect("no fault");
+            control.poll(&mut feeder).expect("items");
+            ticks += 1;
+        }
+        // A ramp to the end and another to rest, not 5 s of cruise.
+        assert!(ticks < 1200, "seen at tick {seen}: {ticks} ticks to rest");
+        assert_eq!(control.starvations(), 0, "seen at tick {seen}");
+    }
+}
+
+/// Three programs from one source, which has nothing for a while before, between and behind them.
+#[test]
+fn a_source_may_go_on_later() {
+    struct Late {
+        items: std::vec::IntoIter<Item<1>>,
+    }
+    impl Source<1> for Late {
+        type Error = Infallible;
+        fn poll_next(&mut self) -> Poll<Option<Result<Item<1>, Infallible>>> {
+            self.items.next().map_or(Poll::Pending, |item| Poll::Ready(Some(Ok(item))))
+        }
+    }
+    let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+    let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
+    let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
+    let none = std::vec::Vec::new().into_iter();
+    let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(Late { items: none }, TICK_S, 0);
+    let mut start = Position::ZERO;
+    for _ in 0..3 {
+        for _ in 0..100 {
+            control.poll(&mut feeder).expect("items");
+            let executed = executor.tick(&mut intake).expect("no fault");
+            assert_eq!(executed.setpoints[0].position, start);
+            assert_eq!(control.state(&feeder), State::Waiting);
+        }
+        let mut items = line(Position::ZERO).to_vec();
+        let Item::EndOfStretch([length]) = items[5] else { panic!("{:?}", items[5]) };
+        items[1] = Item::Line { line: 1, start: [start], direction: [1.0], length };
+        start = start + length;
+        items[5] = Item::EndOfStretch([start]);
+        control.source_mut().items = items.into_iter();
+        for tick in 0.. {
+            control.poll(&mut feeder).expect("items");
+            if control.state(&feeder) == State::Waiting {
+                break;
+            }
+            assert_eq!(control.state(&feeder), State::Running);
+            executor.tick(&mut intake).expect("no fault");
+            assert!(tick < 12_000, "it never ends");
+        }
+    }
+    assert_eq!(control.starvations(), 0);
+}
+
+/// Limits beyond fixed point's range: the program's ramps are soft enough, and so is a stop.
+#[test]
+fn a_stop_asks_for_no_more_than_the_number_type_holds() {
+    let hard = Limits { accel_mm_s2: 1e4, jerk_mm_s3: 1e9, snap_mm_s4: 4e9 };
+    let soft = Straight::new([Position::ZERO], [at(100.0)], LIMITS, [20.0; 2], TICK_S).expect("a way");
+    let allowed = Allowed { cap_mm_s: 20.0, limits: hard };
+    let items = soft.map(|item| match item {
+        Ok(Item::Block(block)) => Ok(Item::Block(PathBlock::new(block.length, 20.0, allowed, allowed, 0.0))),
+        item => item,
+    });
+    let rules = PathRules { limits: hard, ..RULES };
+    let mut streams = LiveStreams::<Fixed, 1, 8, 16>::new();
+    let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
+    let mut executor = Executor::<Fixed, 1>::new([Position::ZERO]);
+    let mut control = LiveControl::<Fixed, 1, _, Infallible, 64>::new(items, TICK_S, 0);
+    for tick in 0..2100 {
+        if tick == 2000 {
+            control.hold();
+        }
+        control.poll(&mut feeder).expect("a stop");
+        executor.tick(&mut intake).expect("no fault");
+    }
+    assert_eq!(control.state(&feeder), State::Held);
+}
+
+/// A block that is a step longer or shorter than its path: what was handed over ends at rest, and the rest is refused.
+#[test]
+fn blocks_that_contradict_their_path_are_refused() {
+    for steps in [-1, 1, 1 << 30] {
+        let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+        let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
+        let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
+        let items = line(Position::from_bits(steps));
+        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
+        let mut refused = 0;
+        for _ in 0..20_000 {
+            let turned = control.poll(&mut feeder);
+            refused += usize::from(matches!(turned, Err(SupplyError::Rejected(Rejection::Blocks { .. }))));
+            executor.tick(&mut intake).expect("no fault");
+        }
+        assert_eq!((refused, control.state(&feeder)), (20_000, State::Failed), "{steps}");
+    }
+}

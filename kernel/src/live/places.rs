@@ -1,0 +1,133 @@
+//! Where another list may take over from the one under way.
+//!
+//! Consumes the list under way and how far the tick is; produces the places that a command may use, in the order of time:
+//! here or within the item under way, and after each item that is still to be driven. Background.
+
+use super::list::{Item, List};
+use super::splice::Splice;
+use crate::law::{Phase, Ticks};
+use crate::queue::Progress;
+
+/// Where a list takes over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Takeover {
+    /// After this many items of the list under way.
+    After(usize),
+    /// Within the item that follows as many: the first item of the list is that one with another end.
+    Within(usize),
+}
+
+impl Takeover {
+    /// The items of the list under way that are driven whole.
+    pub(super) fn driven(self) -> usize {
+        match self {
+            Self::After(count) | Self::Within(count) => count,
+        }
+    }
+}
+
+/// Where a command may take over.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    takeover: Takeover,
+    start: Splice,
+    head: Option<Item>,
+}
+
+impl Place {
+    pub(super) fn takeover(&self) -> Takeover {
+        self.takeover
+    }
+
+    /// Where the list begins that takes over.
+    pub(super) fn start(&self) -> &Splice {
+        &self.start
+    }
+
+    /// The splice from which on it may do something else.
+    pub(super) fn splice(&self, tick_s: f64) -> Splice {
+        self.head.map_or(self.start, |head| head.end(&self.start, tick_s))
+    }
+
+    /// Restarts a list with the item under way and nothing else.
+    pub(super) fn begin(&self, list: &mut List) {
+        list.restart(self.start);
+        if let Some(head) = self.head {
+            list.push(head);
+        }
+    }
+}
+
+/// The places in a list.
+#[derive(Clone, Debug)]
+pub(super) struct Places<'a> {
+    list: &'a List,
+    /// Within the item under way, instead of where it can be cut soonest.
+    later: Option<Place>,
+    first: Option<Place>,
+    /// After so many items is the next one.
+    count: usize,
+}
+
+impl<'a> Places<'a> {
+    /// Where a list may be left by motion that is as far as `progress` says. Motion is cut no sooner than `lead` after that.
+    pub(super) fn new(list: &'a List, progress: &Progress, lead: Ticks, tick_s: f64) -> Self {
+        let done = progress.done as usize;
+        let mut places = Self { list, later: None, first: None, count: done + 1 };
+        places.first = match progress.inside {
+            Some((phase, left)) => places.within(done, phase, left, lead, tick_s),
+            None => Some(places.after(done)),
+        };
+        places
+    }
+
+    /// The list under way.
+    pub(super) fn list(&self) -> &'a List {
+        self.list
+    }
+
+    /// The item under way, if it can be cut.
+    pub(super) fn inside(&self) -> Option<(&'a Splice, &'a Item, &Place)> {
+        let place = self.first.as_ref()?;
+        let Takeover::Within(done) = place.takeover else { return None };
+        let (start, item) = self.list.get(done)?;
+        Some((start, item, place))
+    }
+
+    /// Adds a place within the item under way, with another end of it.
+    pub(super) fn with_head(self, head: Item) -> Self {
+        let later = self.first.map(|first| Place { head: Some(head), ..first });
+        Self { later, ..self }
+    }
+
+    fn after(&self, count: usize) -> Place {
+        Place { takeover: Takeover::After(count), start: self.list.after(count), head: None }
+    }
+
+    /// Within the item under way, cut as soon as possible.
+    fn within(&self, done: usize, phase: Phase, left: Ticks, lead: Ticks, tick_s: f64) -> Option<Place> {
+        let (start, item) = self.list.get(done)?;
+        let duration = item.phase_duration(phase, tick_s)?;
+        // Not where it begins: there is no beginning to repeat yet.
+        let lead = if left >= duration { lead.max(Ticks::ONE) } else { lead };
+        let elapsed = duration.minus(left)?.plus(lead);
+        if elapsed > duration {
+            return None;
+        }
+        let head = item.cut(phase, elapsed, tick_s)?;
+        Some(Place { takeover: Takeover::Within(done), start: *start, head: Some(head) })
+    }
+}
+
+impl Iterator for Places<'_> {
+    type Item = Place;
+
+    fn next(&mut self) -> Option<Place> {
+        if let Some(place) = self.later.take().or_else(|| self.first.take()) {
+            return Some(place);
+        }
+        let count = self.count;
+        self.count += 1;
+        (count <= self.list.exit()).then(|| self.after(count))
+    }
+}

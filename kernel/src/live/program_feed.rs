@@ -1,0 +1,166 @@
+//! The program's own feed: what was read of it, with a cursor to what is handed over next.
+//!
+//! What lists hold stays here until it is driven, so that a list that is taken back moves the cursor and nothing else.
+//! Background; bounded by its places.
+
+use heapless::Deque;
+
+use super::list::{Item, LIST_ITEMS, List};
+use super::splice::is_before;
+use crate::law::Ramp;
+use crate::queue::Rejection;
+use crate::units::Position;
+
+/// Feed, ends of stretch and rests in the program's order. Of a stretch that is planned anew only its end is of use.
+#[derive(Debug)]
+pub(super) struct ProgramFeed<const PLACES: usize> {
+    items: Deque<Item, PLACES>,
+    /// How many of the first items the list under way holds.
+    under_way: usize,
+    /// The next item to hand over, counted from the first.
+    cursor: usize,
+    /// The last stretch that is planned anew; those before it are, too, as far as they are still ahead.
+    replanned: Option<u32>,
+}
+
+impl<const PLACES: usize> ProgramFeed<PLACES> {
+    pub(super) const fn new() -> Self {
+        Self { items: Deque::new(), under_way: 0, cursor: 0, replanned: None }
+    }
+
+    /// Whether there is a place for one more item, and for an end of stretch that waits for the path's queue.
+    pub(super) fn has_room(&self) -> bool {
+        const { assert!(PLACES >= 4 * LIST_ITEMS, "places for what lies ahead, and for two lists") };
+        let ahead = self.items.len().saturating_sub(self.cursor);
+        // Two lists hold the others.
+        ahead + 2 * LIST_ITEMS < PLACES
+    }
+
+    /// Appends an item that was read.
+    pub(super) fn push(&mut self, item: Item) -> Result<(), Rejection> {
+        self.items.push_back(item).map_err(|_| Rejection::full("items of the program ahead", PLACES))
+    }
+
+    /// The item at the cursor.
+    pub(super) fn peek(&self) -> Option<&Item> {
+        self.items.get(self.cursor)
+    }
+
+    /// Whether all that was read is in lists.
+    pub(super) fn is_empty(&self) -> bool {
+        self.peek().is_none()
+    }
+
+    /// Moves the cursor over an item that a list holds: as it holds it, should that be taken back.
+    pub(super) fn advance(&mut self, item: Item) {
+        self.set(self.cursor, item);
+        self.cursor += 1;
+    }
+
+    /// Moves the cursor back over what a list holds of this from its item `from` to `to`. Feed that is planned anew is
+    /// dropped on the way.
+    pub(super) fn take_back(&mut self, list: &List, from: usize, to: usize) {
+        let keeps_feed = !self.replans(list.start().stretch);
+        let items = list.items().take(to).skip(from);
+        let mut count = items.filter(|item| keeps_feed || !item.is_feed()).count();
+        while count > 0 && self.cursor > 0 {
+            self.cursor -= 1;
+            if keeps_feed || !self.peek().is_some_and(Item::is_feed) {
+                count -= 1;
+            } else {
+                self.drop(1);
+            }
+        }
+    }
+
+    /// Moves the cursor to where the list under way is left.
+    pub(super) fn roll_back(&mut self) {
+        self.cursor = self.under_way;
+    }
+
+    /// Another list is under way: what it does not hold of the items before the cursor is driven or planned anew.
+    pub(super) fn follow(&mut self) {
+        let gone = self.under_way.min(self.cursor);
+        for _ in 0..gone {
+            self.items.pop_front();
+        }
+        self.cursor -= gone;
+        self.under_way = self.cursor;
+    }
+
+    /// Splits the cruise at the cursor after a part of it, which is at the cursor then; `None` if there is none, or no
+    /// place for the rest.
+    pub(super) fn split_cruise(&mut self, part: Position) -> Option<Item> {
+        let &Item::Feed { ramp: Ramp { from_mm_s: feed_mm_s, .. }, length } = self.peek()? else {
+            return None;
+        };
+        let cruise = |length: Position| Item::Feed {
+            ramp: Ramp::cruise(feed_mm_s, length.to_mm() / feed_mm_s),
+            length,
+        };
+        let (first, rest) = (cruise(part), cruise(length - part));
+        // The items before it are fewer than those after it: they move.
+        self.items.push_front(first).ok()?;
+        for index in 0..self.cursor {
+            self.copy(index + 1, index);
+        }
+        self.set(self.cursor, first);
+        self.set(self.cursor + 1, rest);
+        Some(first)
+    }
+
+    /// Whether a stretch is planned anew.
+    pub(super) fn replans(&self, stretch: u32) -> bool {
+        self.replanned.is_some_and(|last| !is_before(last, stretch))
+    }
+
+    /// From now on the stretches up to this one are planned anew.
+    pub(super) fn replan_through(&mut self, stretch: u32) {
+        if !self.replans(stretch) {
+            self.replanned = Some(stretch);
+        }
+    }
+
+    /// The rest of a stretch, which is at the cursor, is planned anew.
+    pub(super) fn replan_from(&mut self, stretch: u32) {
+        self.replan_through(stretch);
+        self.drop_feed();
+    }
+
+    /// Drops the feed at the cursor, which is planned anew.
+    pub(super) fn drop_feed(&mut self) {
+        let mut dropped = 0;
+        while self.items.get(self.cursor + dropped).is_some_and(Item::is_feed) {
+            dropped += 1;
+        }
+        self.drop(dropped);
+    }
+
+    /// Drops as many items at the cursor. Those before it are the fewer ones: they move.
+    fn drop(&mut self, count: usize) {
+        if count == 0 {
+            return;
+        }
+        for index in (0..self.cursor).rev() {
+            self.copy(index, index + count);
+        }
+        for _ in 0..count {
+            self.items.pop_front();
+        }
+        if self.cursor < self.under_way {
+            self.under_way = self.under_way.saturating_sub(count);
+        }
+    }
+
+    fn copy(&mut self, from: usize, to: usize) {
+        if let Some(&item) = self.items.get(from) {
+            self.set(to, item);
+        }
+    }
+
+    fn set(&mut self, index: usize, item: Item) {
+        if let Some(place) = self.items.get_mut(index) {
+            *place = item;
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! Reads the program: its path into the queue, its blocks into the lookahead, its feed to where lists are made of it.
+//!
+//! Consumes the items of a [`Source`]; keeps what was read and not yet handed over. The only part of live control that talks
+//! to the path queue. Background; reads as far as its places and the queue's last.
+
+use core::task::Poll;
+
+use super::list::Item as ListItem;
+use super::lookahead::Lookahead;
+use super::program_feed::ProgramFeed;
+use super::source::Source;
+use super::splice::{BlockEnd, Extent, Splice};
+use crate::num::Real;
+use crate::program::supply::{Ready, is_taken};
+use crate::program::{Item, SupplyError};
+use crate::queue::{LiveFeeder, Rejection};
+use crate::units::Position;
+
+/// What the source said when it was asked last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Answer {
+    /// An item, or it has not been asked yet.
+    Item,
+    /// Nothing for now.
+    Late,
+    /// That there are no more.
+    End,
+}
+
+/// The path that is queued of the stretch being read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct QueuedPath {
+    stretch: u32,
+    end: Position,
+}
+
+impl QueuedPath {
+    /// How far the path of `stretch` is known to a plan that does not go beyond `block_end`.
+    pub(super) fn extent_of<const PLACES: usize>(
+        &self,
+        stretch: u32,
+        block_end: Option<BlockEnd>,
+        lookahead: &Lookahead<PLACES>,
+    ) -> Extent {
+        match block_end {
+            Some(end) if end.stretch == stretch => Extent::SoFar(end.at),
+            _ if self.stretch == stretch => Extent::SoFar(self.end),
+            _ => Extent::Whole(lookahead.end_of(stretch).unwrap_or(Position::ZERO)),
+        }
+    }
+}
+
+/// What was read, and where reading stands.
+#[derive(Debug)]
+pub(super) struct Reader<R: Real, const AXES: usize, I, const PLACES: usize> {
+    source: I,
+    tick_s: f64,
+    answer: Answer,
+    /// Made ready, and not yet taken by the path queue.
+    pending: Option<Ready<R, AXES>>,
+    /// There is no room for the next item.
+    is_full: bool,
+    path: QueuedPath,
+    lookahead: Lookahead<PLACES>,
+    feed: ProgramFeed<PLACES>,
+}
+
+impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R, AXES, I, PLACES> {
+    pub(super) fn new(source: I, tick_s: f64) -> Self {
+        Self {
+            source,
+            tick_s,
+            answer: Answer::Item,
+            pending: None,
+            is_full: false,
+            path: QueuedPath { stretch: 0, end: Position::ZERO },
+            lookahead: Lookahead::new(),
+            feed: ProgramFeed::new(),
+        }
+    }
+
+    pub(super) fn source_mut(&mut self) -> &mut I {
+        &mut self.source
+    }
+
+    pub(super) fn lookahead(&self) -> &Lookahead<PLACES> {
+        &self.lookahead
+    }
+
+    pub(super) fn path(&self) -> QueuedPath {
+        self.path
+    }
+
+    pub(super) fn feed_mut(&mut self) -> &mut ProgramFeed<PLACES> {
+        &mut self.feed
+    }
+
+    /// What is known ahead: the lookahead, and the program's feed.
+    pub(super) fn ahead(&mut self) -> (&Lookahead<PLACES>, &mut ProgramFeed<PLACES>) {
+        (&self.lookahead, &mut self.feed)
+    }
+
+    /// Whether there is no room for more to be read.
+    pub(super) fn is_full(&self) -> bool {
+        self.is_full
+    }
+
+    /// Whether there is nothing more to come.
+    pub(super) fn is_read(&self) -> bool {
+        self.answer == Answer::End && self.pending.is_none() && self.feed.is_empty()
+    }
+
+    /// Whether the source has nothing for now, and nothing is left of what it gave, up to the end of a stretch.
+    pub(super) fn is_waiting(&self) -> bool {
+        self.answer == Answer::Late
+            && self.pending.is_none()
+            && self.feed.is_empty()
+            && self.path.end == Position::ZERO
+            && self.lookahead.end_of(self.path.stretch).is_none_or(|end| end == Position::ZERO)
+    }
+
+    /// Forgets what lies before a place.
+    pub(super) fn pass(&mut self, place: &Splice, feeder: &LiveFeeder<'_, R, AXES>) {
+        self.lookahead.pass(place, feeder.path_queued());
+    }
+
+    /// Reads items while there is room for them; if the program is given up, only what is pending.
+    pub(super) fn read(
+        &mut self,
+        is_given_up: bool,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<I::Error>> {
+        loop {
+            self.is_full = !self.enter(feeder).map_err(SupplyError::Rejected)?;
+            if self.is_full {
+                return Ok(());
+            }
+            self.pending = None;
+            self.is_full = !self.feed.has_room() || self.lookahead.is_full();
+            if self.is_full || is_given_up || self.answer == Answer::End {
+                return Ok(());
+            }
+            let polled = self.source.poll_next();
+            self.answer = match &polled {
+                Poll::Ready(Some(_)) => Answer::Item,
+                Poll::Ready(None) => Answer::End,
+                Poll::Pending => Answer::Late,
+            };
+            match polled {
+                Poll::Ready(Some(item)) => self.take(item.map_err(SupplyError::Source)?)?,
+                Poll::Ready(None) => {}
+                Poll::Pending => return Ok(()),
+            }
+        }
+    }
+
+    /// Enters what is pending; whether the path queue had room for it.
+    fn enter(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<bool, Rejection> {
+        let QueuedPath { stretch, end: start } = self.path;
+        match &self.pending {
+            Some(Ready::Piece(piece)) => {
+                let end = start + piece.length();
+                let fastest_mm_s = self.lookahead.fastest_mm_s(stretch, start, end);
+                let is_taken = is_taken(feeder.piece(*piece, fastest_mm_s.ok_or(Rejection::NoBlock)?))?;
+                if is_taken {
+                    self.lookahead.queued_piece(stretch, start, piece.program_line())?;
+                    self.path.end = end;
+                }
+                Ok(is_taken)
+            }
+            Some(Ready::EndOfStretch(end)) => {
+                let is_taken = is_taken(feeder.end_of_path(*end))?;
+                if is_taken {
+                    self.feed.push(ListItem::End)?;
+                    self.lookahead.queued_end_of_stretch();
+                    self.path = QueuedPath { stretch: stretch.wrapping_add(1), end: Position::ZERO };
+                }
+                Ok(is_taken)
+            }
+            Some(Ready::Segment(_) | Ready::Dwell(_) | Ready::Stop | Ready::Block) | None => Ok(true),
+        }
+    }
+
+    fn take(&mut self, item: Item<AXES>) -> Result<(), SupplyError<I::Error>> {
+        let taken = match item {
+            Item::Block(block) => self.lookahead.push(self.path.stretch, block.within_range::<R>()),
+            Item::Line { .. } | Item::Septic { .. } | Item::EndOfStretch(_) => {
+                if let Item::EndOfStretch(_) = item {
+                    self.check_blocks().map_err(SupplyError::Rejected)?;
+                }
+                self.pending = Some(item.ready(self.tick_s)?);
+                Ok(())
+            }
+            Item::Feed { .. } if self.feed.replans(self.path.stretch) => Ok(()),
+            Item::Feed { ramp, length } => self.feed.push(ListItem::Feed { ramp, length }),
+            Item::Dwell(duration) => self.feed.push(ListItem::Dwell(duration)),
+            Item::Stop => self.feed.push(ListItem::Stop),
+        };
+        taken.map_err(SupplyError::Rejected)
+    }
+
+    /// The blocks of the stretch that has been read end where its path does: plans are made for the blocks.
+    fn check_blocks(&self) -> Result<(), Rejection> {
+        let QueuedPath { stretch, end: path } = self.path;
+        let blocks = self.lookahead.end_of(stretch).unwrap_or(Position::ZERO);
+        if blocks == path {
+            return Ok(());
+        }
+        Err(Rejection::Blocks { blocks_mm: blocks.to_mm(), path_mm: path.to_mm() })
+    }
+}

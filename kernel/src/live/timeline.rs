@@ -1,0 +1,280 @@
+//! The feed lists in time: the one under way, and the next.
+//!
+//! Consumes lists with the place where each takes over; hands them to the tick, follows it, and takes back what it has not
+//! reached. The only part of live control that talks to the feed lists. Background.
+
+use super::list::{Item, LIST_ITEMS, List};
+use super::lookahead::Lookahead;
+use super::mode::Request;
+use super::places::{Places, Takeover};
+use super::program_feed::ProgramFeed;
+use super::splice::{BlockEnd, Splice};
+use crate::law::{FeedSegment, Ticks};
+use crate::num::Real;
+use crate::program::SupplyError;
+use crate::program::supply::is_taken;
+use crate::queue::{Change, Density, LISTS, LiveFeeder, Progress, Rejection};
+use crate::units::Position;
+
+/// A ramp is cut at most so many ticks after where the tick was seen.
+const LEAD_TICKS_MAX: u64 = 64;
+
+/// A list that the tick has or will have.
+#[derive(Debug)]
+struct Handed {
+    id: u8,
+    list: List,
+    /// Of what is driven before it.
+    before: Density,
+}
+
+/// The list that follows the one under way.
+#[derive(Debug)]
+struct Next {
+    handed: Handed,
+    /// What it was made for, if that was a command.
+    request: Option<Request>,
+    /// The override of the motion before it.
+    before_override: f64,
+}
+
+/// What the tick has, and what it will have.
+#[derive(Debug)]
+pub(super) struct Timeline {
+    tick_s: f64,
+    under_way: Handed,
+    next: Option<Next>,
+    /// Where the next list begins.
+    splice: Splice,
+    /// The override of the motion that was handed over last.
+    driven_override: f64,
+    /// How far ahead of where the tick was seen a ramp is cut.
+    lead: Ticks,
+    /// Where motion was held last, or has waited at the end of a block.
+    waited_at: Option<Splice>,
+}
+
+impl Timeline {
+    /// At rest before all motion, in the list that the streams begin with.
+    pub(super) fn new(tick_s: f64, lead_ticks: u32) -> Self {
+        let splice = Splice { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
+        Self {
+            tick_s,
+            under_way: Handed { id: 0, list: List::new(splice, tick_s), before: Density::NONE },
+            next: None,
+            splice,
+            driven_override: 1.0,
+            lead: Ticks::from_bits(u64::from(lead_ticks) << 32),
+            waited_at: None,
+        }
+    }
+
+    /// The list under way.
+    pub(super) fn list(&self) -> &List {
+        &self.under_way.list
+    }
+
+    /// Where the next list begins.
+    pub(super) fn splice(&self) -> &Splice {
+        &self.splice
+    }
+
+    pub(super) fn driven_override(&self) -> f64 {
+        self.driven_override
+    }
+
+    /// Whether a list follows the one under way.
+    pub(super) fn has_next(&self) -> bool {
+        self.next.is_some()
+    }
+
+    /// What the list that follows was made for.
+    pub(super) fn request_of_next(&self) -> Option<Request> {
+        self.next.as_ref()?.request
+    }
+
+    /// What the list that follows, if there is one, was made for.
+    pub(super) fn set_request_of_next(&mut self, request: Request) {
+        if let Some(next) = &mut self.next {
+            next.request = Some(request);
+        }
+    }
+
+    /// Where the list under way may be left by motion that is as far as `progress` says.
+    pub(super) fn places(&self, progress: &Progress) -> Places<'_> {
+        Places::new(&self.under_way.list, progress, self.lead, self.tick_s)
+    }
+
+    /// Whether all that was handed over has been driven.
+    pub(super) fn is_driven(&self, progress: &Progress) -> bool {
+        progress.list == self.under_way.id
+            && self.next.is_none()
+            && progress.inside.is_none()
+            && !progress.waits
+            && progress.done as usize >= self.under_way.list.len()
+    }
+
+    /// The end of the list under way has been waited at.
+    pub(super) fn has_waited(&mut self) {
+        self.waited_at = Some(self.under_way.list.end());
+        self.under_way.list.set_ends_block(false);
+    }
+
+    /// Whether motion is to wait where the next list begins: at the end of a block, which it has not waited at.
+    pub(super) fn waits_at_block_end<const PLACES: usize>(&self, lookahead: &Lookahead<PLACES>) -> bool {
+        let splice = &self.splice;
+        let has_waited = || self.waited_at.is_some_and(|waited| BlockEnd::from(waited).is_at(splice));
+        let is_block_end = || lookahead.block_ends(splice.stretch).any(|end| end.is_at(splice));
+        self.under_way.list.ends_block() || splice.is_at_rest() && !has_waited() && is_block_end()
+    }
+
+    /// The list under way ends a block.
+    pub(super) fn end_block(&mut self) {
+        self.under_way.list.set_ends_block(true);
+    }
+
+    /// Where the tick is; the list that follows is the one under way as soon as it is on it.
+    pub(super) fn follow<R: Real, const AXES: usize, const PLACES: usize>(
+        &mut self,
+        feed: &mut ProgramFeed<PLACES>,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Progress {
+        let progress = feeder.progress();
+        if let Some(next) = self.next.take_if(|next| next.handed.id == progress.list) {
+            feeder.give_up(self.under_way.id);
+            self.under_way = next.handed;
+            feed.follow();
+        }
+        progress
+    }
+
+    /// Takes back the list that follows: motion is as before. What the tick does in between counts.
+    pub(super) fn take_back_next<R: Real, const AXES: usize, const PLACES: usize>(
+        &mut self,
+        feed: &mut ProgramFeed<PLACES>,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Progress {
+        feeder.no_change();
+        let progress = self.follow(feed, feeder);
+        if let Some(Next { handed, before_override, .. }) = self.next.take() {
+            feeder.give_up(handed.id);
+            self.driven_override = before_override;
+            self.splice = self.under_way.list.exit_splice();
+            feed.roll_back();
+        }
+        progress
+    }
+
+    /// The tick had passed the place of a change: the next one is made further ahead.
+    pub(super) fn lead_more(&mut self) {
+        if self.lead.to_bits() < LEAD_TICKS_MAX << 32 {
+            self.lead = self.lead.plus(Ticks::ONE);
+        }
+    }
+
+    /// Whether motion is in the fallback stop of the list under way, because nothing followed in time.
+    pub(super) fn is_in_fallback(&self, progress: &Progress) -> bool {
+        let Handed { id, list, .. } = &self.under_way;
+        let (done, exit) = (progress.done as usize, list.exit());
+        let is_in_stop = done > exit || done == exit && progress.inside.is_some();
+        self.next.is_none() && progress.list == *id && is_in_stop && exit < list.len()
+    }
+
+    /// The list under way is driven to its end, fallback stop included, and what follows begins there. False if it was to be
+    /// driven to there anyway.
+    pub(super) fn drive_to_end(&mut self) -> bool {
+        let list = &mut self.under_way.list;
+        if list.exit() >= list.len() {
+            return false;
+        }
+        list.set_exit_to_end();
+        self.splice = list.end();
+        true
+    }
+
+    /// The density of the list under way up to where another takes over.
+    fn density_before(&self, takeover: Takeover) -> Density {
+        let Handed { list, before, .. } = &self.under_way;
+        let mut density = *before;
+        for duration in list.items().take(takeover.driven()).filter_map(|item| item.duration(self.tick_s)) {
+            let accepted = density.follow(duration);
+            debug_assert!(accepted.is_ok(), "it was accepted when it was handed over");
+        }
+        density
+    }
+
+    /// Whether the executor keeps up with a list that takes over there.
+    pub(super) fn keeps_up(&self, list: &List, takeover: Takeover) -> bool {
+        let mut density = self.density_before(takeover);
+        let mut durations = list.items().filter_map(|item| item.duration(self.tick_s));
+        durations.all(|duration| density.follow(duration).is_ok())
+    }
+
+    /// Hands over a list, for which there is a free one, with motion under `feed_override`, and asks for the change to it.
+    /// What follows it begins at its exit.
+    pub(super) fn hand_over<R: Real, E, const AXES: usize, const PLACES: usize>(
+        &mut self,
+        list: List,
+        takeover: Takeover,
+        feed_override: f64,
+        lookahead: &Lookahead<PLACES>,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        let (from, before) = (R::from_f64(list.start().feed_mm_s), self.density_before(takeover));
+        let id = feeder.begin(list.start().at, from, before);
+        let id = id.ok_or(SupplyError::Rejected(Rejection::full("feed lists", LISTS.into())))?;
+        let change = Change {
+            from: self.under_way.id,
+            to: id,
+            after: takeover.driven() as u32,
+            within: matches!(takeover, Takeover::Within(_)),
+        };
+        let is_asked = self
+            .fill(&list, id, lookahead, feeder)
+            .and_then(|()| feeder.change(change).map_err(SupplyError::Rejected));
+        if let Err(error) = is_asked {
+            feeder.give_up(id);
+            return Err(error);
+        }
+        self.splice = list.exit_splice();
+        let before_override = core::mem::replace(&mut self.driven_override, feed_override);
+        let handed = Handed { id, list, before };
+        self.next = Some(Next { handed, request: None, before_override });
+        Ok(())
+    }
+
+    fn fill<R: Real, E, const AXES: usize, const PLACES: usize>(
+        &self,
+        list: &List,
+        id: u8,
+        lookahead: &Lookahead<PLACES>,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        let mut has_room = !list.is_overfull();
+        for (start, item) in list.placed() {
+            let is_taken = match *item {
+                Item::Feed { ramp, length } => {
+                    let segment = FeedSegment::ramp(&ramp, length, self.tick_s);
+                    is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
+                }
+                Item::Cut { ramp, at, length } => {
+                    let segment = FeedSegment::turned(&ramp, at, length, self.tick_s);
+                    is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
+                }
+                Item::End => {
+                    // Where all its blocks have been passed, its end has.
+                    let path = lookahead.end_of(start.stretch).unwrap_or(start.at);
+                    is_taken(feeder.end_of_feed(id, path))
+                }
+                Item::Dwell(duration) => is_taken(feeder.dwell(id, duration)),
+                Item::Stop => is_taken(feeder.program_stop(id)),
+            };
+            has_room &= is_taken.map_err(SupplyError::Rejected)?;
+        }
+        if has_room {
+            Ok(())
+        } else {
+            Err(SupplyError::Rejected(Rejection::full("items of a feed list", LIST_ITEMS)))
+        }
+    }
+}
