@@ -9,6 +9,8 @@
 
 mod command;
 mod single_block;
+#[cfg(test)]
+mod tests;
 
 use super::list::{Item, LIST_ITEMS, List};
 use super::lookahead::Lookahead;

@@ -164,3 +164,93 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Ticks;
+    use crate::live::splice::Splice;
+
+    const DWELL: Item = Item::Dwell(Ticks::ONE);
+
+    fn feed(mm: f64) -> Item {
+        let length = Position::from_mm(mm).expect("in range");
+        Item::Feed { ramp: Ramp::cruise(1.0, mm), length }
+    }
+
+    /// A list of the first items, under way.
+    fn handed(items: &[Item], count: usize) -> (ProgramFeed<64>, List) {
+        let mut program = ProgramFeed::new();
+        for item in items {
+            program.push(*item).expect("room");
+        }
+        let mut list = List::new(Splice { stretch: 0, at: Position::ZERO, feed_mm_s: 1.0 }, 1.0);
+        for item in &items[..count] {
+            program.advance(list.push(*item));
+        }
+        program.follow();
+        (program, list)
+    }
+
+    /// What comes from the cursor on.
+    fn ahead(program: &ProgramFeed<64>) -> Vec<Item> {
+        program.items.iter().skip(program.cursor).copied().collect()
+    }
+
+    /// A command takes the items of the list under way back that it replaces; when it is refused they are under way again.
+    #[test]
+    fn what_is_taken_back_comes_again() {
+        let items = [feed(1.0), feed(2.0), Item::End, DWELL, feed(3.0)];
+        let (mut program, list) = handed(&items, 4);
+        program.take_back(&list, 1, 4);
+        assert_eq!(ahead(&program), items[1..]);
+        program.roll_back();
+        assert_eq!(ahead(&program), items[4..]);
+    }
+
+    /// Of a stretch that is planned anew only its end and the rests come again; the feed among them is dropped, and counts
+    /// no more.
+    #[test]
+    fn feed_that_is_planned_anew_does_not_come_again() {
+        let items = [DWELL, DWELL, feed(1.0), feed(2.0), Item::End, feed(3.0), Item::End];
+        let (mut program, list) = handed(&items, 5);
+        program.replan_through(0);
+        program.take_back(&list, 1, 5);
+        assert_eq!(ahead(&program), [DWELL, Item::End, feed(3.0), Item::End]);
+        program.roll_back();
+        assert_eq!(ahead(&program), [feed(3.0), Item::End]);
+        program.replan_from(1);
+        assert_eq!(ahead(&program), [Item::End]);
+        assert_eq!(program.under_way, program.cursor);
+    }
+
+    /// Only what the list under way no longer needs makes room.
+    #[test]
+    fn there_is_room_for_what_two_lists_may_take_back() {
+        let mut program = ProgramFeed::<64>::new();
+        while program.has_room() {
+            program.push(feed(1.0)).expect("room");
+        }
+        assert_eq!(ahead(&program).len(), 64 - 2 * LIST_ITEMS);
+        for _ in 0..2 {
+            for _ in 0..LIST_ITEMS {
+                program.advance(feed(1.0));
+            }
+            while program.has_room() {
+                program.push(feed(1.0)).expect("room: the lists hold the others");
+            }
+        }
+        program.push(Item::End).expect_err("no place for one that nobody left");
+    }
+
+    #[test]
+    fn a_cruise_is_split_at_the_cursor() {
+        let items = [feed(1.0), feed(4.0), Item::End];
+        let (mut program, _) = handed(&items, 1);
+        let part = program.split_cruise(Position::from_mm(1.0).expect("in range"));
+        assert_eq!(part, Some(feed(1.0)));
+        assert_eq!(ahead(&program), [feed(1.0), feed(3.0), Item::End]);
+        program.advance(feed(1.0));
+        assert_eq!(program.split_cruise(Position::from_bits(1)).map(|item| item.is_feed()), Some(true));
+    }
+}

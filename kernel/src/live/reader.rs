@@ -35,6 +35,11 @@ pub(super) struct QueuedPath {
 }
 
 impl QueuedPath {
+    /// As far as `end` of `stretch`.
+    pub(super) fn new(stretch: u32, end: Position) -> Self {
+        Self { stretch, end }
+    }
+
     /// How far the path of `stretch` is known to a plan that does not go beyond `block_end`.
     pub(super) fn extent_of<const PLACES: usize>(
         &self,
@@ -73,7 +78,7 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
             answer: Answer::Item,
             pending: None,
             is_full: false,
-            path: QueuedPath { stretch: 0, end: Position::ZERO },
+            path: QueuedPath::new(0, Position::ZERO),
             lookahead: Lookahead::new(),
             feed: ProgramFeed::new(),
         }
@@ -173,7 +178,7 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
                 if is_taken {
                     self.feed.push(ListItem::End)?;
                     self.lookahead.queued_end_of_stretch();
-                    self.path = QueuedPath { stretch: stretch.wrapping_add(1), end: Position::ZERO };
+                    self.path = QueuedPath::new(stretch.wrapping_add(1), Position::ZERO);
                 }
                 Ok(is_taken)
             }

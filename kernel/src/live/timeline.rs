@@ -69,6 +69,14 @@ impl Timeline {
         }
     }
 
+    /// With a list under way that was never handed over.
+    #[cfg(test)]
+    pub(super) fn driving(list: List, tick_s: f64) -> Self {
+        let splice = list.exit_splice();
+        let under_way = Handed { id: 0, list, before: Density::NONE };
+        Self { under_way, splice, ..Self::new(tick_s, 0) }
+    }
+
     /// The list under way.
     pub(super) fn list(&self) -> &List {
         &self.under_way.list
