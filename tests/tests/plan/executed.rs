@@ -11,7 +11,7 @@ use motion_kernel::plan::{Block, FeedSpan, Node, nodes_for, plan_spanning};
 use motion_kernel::queue::{Feeder, PathRules, Refused, Streams};
 use motion_kernel::units::Position;
 
-use crate::spanning::staircase;
+use crate::spanning::rising_steps;
 use crate::support::Random;
 use crate::{block, laws, reference};
 
@@ -209,12 +209,12 @@ fn named_cases_keep_every_limit_in_every_tick() {
     ];
     for step_mm in [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0] {
         let steps = if step_mm > 1.0 { 20 } else { 500 };
-        let up = staircase(steps, step_mm, 1.0, 80.0);
+        let up = rising_steps(steps, step_mm, 1.0, 80.0);
         let down: Vec<_> = up.iter().rev().copied().collect();
-        all.push(("stairs up and down", up.iter().chain(&down).copied().collect()));
-        all.push(("stairs down and up", down.iter().chain(&up).copied().collect()));
-        all.push(("stairs up", up));
-        all.push(("stairs down", down));
+        all.push(("steps up and down", up.iter().chain(&down).copied().collect()));
+        all.push(("steps down and up", down.iter().chain(&up).copied().collect()));
+        all.push(("steps up", up));
+        all.push(("steps down", down));
     }
     let mut worst = Worst::default();
     for (name, blocks) in &all {

@@ -202,7 +202,7 @@ fn a_bad_block_is_counted_from_the_first() {
     }
 }
 
-/// Where giving up valleys would take too long there are no ramps that span blocks, and still a plan.
+/// Where giving up minima would take too long there are no ramps that span blocks, and still a plan.
 #[test]
 fn one_pair_of_ramps_a_block_is_the_last_resort() {
     let blocks = unreachable(1.0, -0.5, 1.0);

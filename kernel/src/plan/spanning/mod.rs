@@ -4,22 +4,24 @@
 //! wherever it is best, not at junctions. Every ceiling is kept at every point, and a ramp uses no more than the least
 //! limits of all the blocks it crosses.
 //!
-//! - [`valleys`]: which ceilings are rested in, and what lies between them: humps;
-//! - [`climb`]: up one side of a hump, below its stairs;
-//! - `top`: the feed between its two sides.
+//! - `intervals`: divides the stretch at the minima of its ceilings;
+//! - `ascent`: the ramps up one side of an interval, below its steps;
+//! - `ramp_fit`: one of these ramps;
+//! - `peak`: the greatest feed of an interval, between its two sides.
 //!
-//! Works in f64 on slices of the caller, allocates nothing. Time goes with the number of blocks; chains of valleys
+//! Works in f64 on slices of the caller, allocates nothing. Time goes with the number of blocks; chains of minima
 //! that cannot be reached cost more, up to a bound beyond which there is no such plan.
 
-pub mod climb;
-mod top;
-pub mod valleys;
+mod ascent;
+mod intervals;
+mod peak;
+mod ramp_fit;
 
-pub use valleys::Node;
+pub use intervals::Node;
 
-use self::climb::Climb;
-use self::top::{Sides, lowest_fits};
-use self::valleys::{Hump, Valleys};
+use self::ascent::{Ascent, AscentRamp};
+use self::intervals::{Interval, Intervals};
+use self::peak::{Sides, lowest_fits};
 use super::lookahead::{Block, BlockPlan, PlanError, check};
 use crate::law::Ramp;
 
@@ -50,6 +52,7 @@ pub const fn nodes_for(blocks: usize) -> usize {
 
 /// Lengths that differ by no more are equal \[mm\].
 pub(super) const ROUNDING_MM: f64 = 1.0e-9;
+
 /// Plans a stretch with ramps that may span blocks, and hands every ramp and cruise to `put`, in path order. Returns
 /// the time it takes \[s\], or `None` where no such plan was found (one pair of ramps a block may still be possible).
 ///
@@ -64,18 +67,18 @@ pub fn plan_spanning(
 ) -> Result<Option<f64>, PlanError> {
     check(blocks, start_mm_s, end_mm_s)?;
     let room = places.len();
-    let Some(mut valleys) = Valleys::new(blocks, start_mm_s, end_mm_s, places) else {
+    let Some(mut intervals) = Intervals::new(blocks, start_mm_s, end_mm_s, places) else {
         return Err(PlanError::Output { blocks: nodes_for(blocks.len()), plans: room });
     };
-    // Several kilobytes each: used for all humps.
-    let (mut up, mut down) = (Climb::NONE, Climb::NONE);
-    if !valleys.settle(|valleys, hump| lowest_fits(hump, valleys, &mut up, &mut down)) {
+    // Several kilobytes each: used for all intervals.
+    let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
+    if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, &mut up, &mut down)) {
         return Ok(None);
     }
     let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
-    for hump in valleys.humps() {
-        out.cruise(hump.start_mm, hump.enter_mm_s);
-        if drive(&hump, &valleys, &mut up, &mut down, &mut out).is_none() {
+    for interval in intervals.in_order() {
+        out.cruise(interval.start_mm, interval.enter_mm_s);
+        if drive(&interval, &intervals, &mut up, &mut down, &mut out).is_none() {
             return Ok(None);
         }
     }
@@ -132,27 +135,27 @@ impl<F: FnMut(FeedSpan)> Out<'_, F> {
 
 /// Up, along and down.
 fn drive<F: FnMut(FeedSpan)>(
-    hump: &Hump,
-    valleys: &Valleys<'_>,
-    up: &mut Climb,
-    down: &mut Climb,
+    interval: &Interval,
+    intervals: &Intervals<'_>,
+    up: &mut Ascent,
+    down: &mut Ascent,
     out: &mut Out<'_, F>,
 ) -> Option<()> {
-    let Some(sides) = Sides::new(hump, valleys) else { return Some(()) };
-    let top = sides.best(up, down)?;
-    let mut feed = hump.enter_mm_s;
-    for leg in up.legs() {
-        out.cruise(hump.start_mm + leg.start_mm, feed);
-        out.ramp(&leg.ramp);
-        feed = leg.ramp.to_mm_s;
+    let Some(sides) = Sides::new(interval, intervals) else { return Some(()) };
+    let peak = sides.best(up, down)?;
+    let mut feed = interval.enter_mm_s;
+    for AscentRamp { start_mm, ramp } in up.ramps() {
+        out.cruise(interval.start_mm + start_mm, feed);
+        out.ramp(ramp);
+        feed = ramp.to_mm_s;
     }
-    feed = top;
-    for leg in down.legs().rev() {
-        let ramp = leg.ramp.reversed();
-        out.cruise(hump.end_mm - leg.start_mm - ramp.length_mm(), feed);
+    feed = peak;
+    for AscentRamp { start_mm, ramp } in down.ramps().rev() {
+        let ramp = ramp.reversed();
+        out.cruise(interval.end_mm - start_mm - ramp.length_mm(), feed);
         out.ramp(&ramp);
         feed = ramp.to_mm_s;
     }
-    out.cruise(hump.end_mm, feed);
+    out.cruise(interval.end_mm, feed);
     Some(())
 }
