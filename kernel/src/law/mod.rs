@@ -25,5 +25,5 @@ pub use passing::Passing;
 pub use ramp::{FeedState, LimitedBy, Ramp};
 pub use reach::{peak, reach};
 #[cfg(feature = "live")]
-pub use segment::TurnedRamp;
+pub use segment::CutRamp;
 pub use segment::{FeedSegment, PathMotion, Phase, SegmentError, Ticks};

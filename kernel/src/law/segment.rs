@@ -12,7 +12,7 @@
 //! whatever the number type; the sine's part, a five-hundredth of Jp·t₁³, is a `Real`.
 
 #[cfg(feature = "live")]
-mod turn;
+mod cut;
 
 use core::f64::consts::PI;
 
@@ -24,7 +24,7 @@ use crate::num::{Real, Root, Unit, is_within, rolled, whole};
 use crate::units::Position;
 
 #[cfg(feature = "live")]
-pub use turn::TurnedRamp;
+pub use cut::CutRamp;
 
 /// A duration in control ticks, in steps of 2⁻³² tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -82,13 +82,13 @@ impl Ticks {
     }
 }
 
-/// The parts of a segment, in order. A cruise has only a hold, and a ramp that is turned has its turn there.
+/// The parts of a segment, in order. A cruise has only a hold, and a ramp that is cut early has the way back there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
     /// 0 … t₁: acceleration builds up.
     Rise,
-    /// t₁ … t₂: constant acceleration, or cruise; in a turned ramp from its turn to the turn's image.
+    /// t₁ … t₂: constant acceleration, or cruise; in a cut ramp from the cut to its image.
     Hold,
     /// t₂ … t_p: acceleration falls back to 0.
     Fall,
@@ -231,9 +231,9 @@ pub struct FeedSegment<R> {
     ramp: Ramp<R>,
     rise: Clock,
     hold: Clock,
-    /// Where in the rise it turns, counted from 1 downwards in 2⁻⁶⁴; 0 if it does not, see `turned`.
+    /// Where in the rise it is cut, counted from 1 downwards in 2⁻⁶⁴; 0 if it is not, see `cut`.
     #[cfg(feature = "live")]
-    turns_at: u64,
+    cut_at: u64,
     /// F₀·t₁ and −F·t₁ less Jp·t₁³/(8π²), and Jp·t₁³/12, in position steps.
     rise_bits: i64,
     fall_bits: i64,
@@ -419,7 +419,7 @@ impl<R: Real> FeedSegment<R> {
             rise,
             hold,
             #[cfg(feature = "live")]
-            turns_at: 0,
+            cut_at: 0,
             rise_bits,
             fall_bits: -fall_less_bits,
             cube_bits,
@@ -469,11 +469,11 @@ impl<R: Real> FeedSegment<R> {
         self.clock(phase).duration
     }
 
-    /// Only live control turns ramps.
+    /// Only live control cuts ramps.
     #[inline]
-    fn turns_at(&self) -> u64 {
+    fn cut_at(&self) -> u64 {
         #[cfg(feature = "live")]
-        return self.turns_at;
+        return self.cut_at;
         #[cfg(not(feature = "live"))]
         0
     }
@@ -483,7 +483,7 @@ impl<R: Real> FeedSegment<R> {
     pub fn fraction_at_start(&self, phase: Phase) -> u64 {
         match phase {
             Phase::Rise => 0,
-            Phase::Hold | Phase::Fall => self.turns_at(),
+            Phase::Hold | Phase::Fall => self.cut_at(),
         }
     }
 
@@ -492,7 +492,7 @@ impl<R: Real> FeedSegment<R> {
     #[inline]
     pub fn fraction_in(&self, phase: Phase, time: Ticks) -> u64 {
         let clock = self.clock(phase);
-        clock.part(time, clock.duration > Ticks::ONE || self.turns_at() != 0)
+        clock.part(time, clock.duration > Ticks::ONE || self.cut_at() != 0)
     }
 
     /// The normalised time `elapsed` after the start of `phase`, in 2⁻⁶⁴.
@@ -515,8 +515,8 @@ impl<R: Real> FeedSegment<R> {
     /// end. In the tick.
     #[inline(always)]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
-        let turns = phase == Phase::Hold && self.turns_at() != 0;
-        if phase == Phase::Hold && !turns {
+        let is_cut = phase == Phase::Hold && self.cut_at() != 0;
+        if phase == Phase::Hold && !is_cut {
             let x = (fraction >> 32) as u32;
             let s = self
                 .hold_start_bits
@@ -531,10 +531,10 @@ impl<R: Real> FeedSegment<R> {
                 snap_mm_s4: R::ZERO,
             };
         }
-        // The fall is the rise run backwards from the end, and before the middle of a turn time counts towards it: the
+        // The fall is the rise run backwards from the end, and before the middle of a cut ramp time counts towards it: the
         // same shape, once, for all.
         let falling = phase == Phase::Fall;
-        let before = turns && fraction.cast_signed() < 0;
+        let before = is_cut && fraction.cast_signed() < 0;
         let fraction = match (falling, before) {
             (true, _) => !fraction,
             (false, true) => fraction.wrapping_neg(),
@@ -549,10 +549,10 @@ impl<R: Real> FeedSegment<R> {
         let bent = Position::from_bits(cube) + Position::from_offset(self.sine_mm.scaled(shape.snap));
         let (accel, snap) = (self.accel_mm_s2.scaled(shape.accel), self.snap_mm_s4.scaled(shape.snap));
         #[cfg(feature = "live")]
-        if turns {
+        if is_cut {
             let rise =
                 PathMotion { s: bent, v_mm_s: gained, a_mm_s2: accel, j_mm_s3: jerk, snap_mm_s4: snap };
-            return self.at_turn(&rise, unit, x, before);
+            return self.at_cut(&rise, unit, x, before);
         }
         let (s, v_mm_s, j_mm_s3) = if falling {
             let even = Position::from_bits(portion(self.fall_bits, x));

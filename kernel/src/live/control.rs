@@ -637,7 +637,7 @@ where
                     is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
                 }
                 ListItem::Turned { ramp, at, length } => {
-                    let segment = FeedSegment::turned(&ramp, at, length, self.tick_s);
+                    let segment = FeedSegment::cut(&ramp, at, length, self.tick_s);
                     is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
                 }
                 ListItem::End => {
