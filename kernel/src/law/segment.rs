@@ -298,16 +298,7 @@ impl<R: Real> FeedSegment<R> {
     /// # Errors
     /// A figure is not finite, negative or too large, the lengths differ, or the feed steps.
     pub fn ramp<P: Root>(ramp: &Ramp<P>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
-        let ramp = to_f64(ramp);
-        let path_mm = length.to_mm();
-        let ramp_mm = ramp.length_mm();
-        // In a narrower planning type the ramp's figures carry that type's rounding.
-        let size = P::from_f64(ramp_mm + ramp.from_mm_s + ramp.to_mm_s);
-        let rounding = 16.0 * size.spacing().to_f64();
-        if !(libm::fabs(ramp_mm - path_mm) <= LENGTH_TOLERANCE_MM + rounding) {
-            return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
-        }
-        Self::new(&ramp, length, tick_s)
+        Self::new(&of_length(ramp, length)?, length, tick_s)
     }
 
     /// A cruise at `feed_mm_s` > 0 over `length` of path.
@@ -325,39 +316,11 @@ impl<R: Real> FeedSegment<R> {
         // The first reason why it can't be made. What follows goes on with what it has: a way out at each figure would
         // take more flash than all that is computed.
         let mut refused = None;
-        made(
-            &mut refused,
-            &[
-                "entry feed [mm/s]",
-                "exit feed [mm/s]",
-                "peak jerk [mm/s³]",
-                "length [mm]",
-                "t1 [s]",
-                "t2 − t1 [s]",
-                "tick [s]",
-            ],
-            [from_mm_s, to_mm_s, peak_jerk_mm_s3, length.to_mm(), t1_s, hold_s, tick_s],
-            |value| is_within(value, 0.0, f64::MAX).then_some(R::ZERO),
-        );
-        if t1_s <= 0.0 && from_mm_s != to_mm_s {
-            refused.get_or_insert(SegmentError::FeedStep { from_mm_s, to_mm_s });
-        }
-        let mut ticks = |quantity, value| {
-            Ticks::from_seconds(value, tick_s).unwrap_or_else(|| {
-                refused.get_or_insert(SegmentError::OutOfRange { quantity, value });
-                Ticks::ZERO
-            })
-        };
-        let rise = Clock::new(ticks("t1 [s]", t1_s));
-        let hold = Clock::new(ticks("t2 − t1 [s]", hold_s));
+        let [rise, hold] = check(&mut refused, ramp, length, tick_s, R::RAMP_MM_MAX).map(Clock::new);
         let jerk = ramp.signed_jerk_mm_s3();
         let accel = jerk * t1_s;
         let speed = accel * t1_s;
         let length_scale = speed * t1_s;
-        if !(libm::fabs(length_scale) <= R::RAMP_MM_MAX) {
-            let value = libm::fabs(length_scale);
-            refused.get_or_insert(SegmentError::OutOfRange { quantity: "jerk · t1³ [mm]", value });
-        }
         let end = Shape::END;
         let (hold_a, hold_v) = (accel * end.accel, from_mm_s + speed * end.speed);
         let snap = if t1_s > 0.0 { PI * jerk / t1_s } else { 0.0 };
@@ -563,6 +526,64 @@ impl<R: Real> FeedSegment<R> {
         };
         PathMotion { s: (s + bent).min(self.length), v_mm_s, a_mm_s2: accel, j_mm_s3, snap_mm_s4: snap }
     }
+}
+
+/// The ramp in f64, if its own length is `length` but for rounding.
+pub(super) fn of_length<P: Root>(ramp: &Ramp<P>, length: Position) -> Result<Ramp<f64>, SegmentError> {
+    let ramp = to_f64(ramp);
+    let path_mm = length.to_mm();
+    let ramp_mm = ramp.length_mm();
+    // In a narrower planning type the ramp's figures carry that type's rounding.
+    let size = P::from_f64(ramp_mm + ramp.from_mm_s + ramp.to_mm_s);
+    let rounding = 16.0 * size.spacing().to_f64();
+    if !(libm::fabs(ramp_mm - path_mm) <= LENGTH_TOLERANCE_MM + rounding) {
+        return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
+    }
+    Ok(ramp)
+}
+
+/// What every number type asks of a ramp over `length`; the first reason to refuse it is kept. Returns how long it rises
+/// and holds.
+#[inline(never)]
+pub(super) fn check(
+    refused: &mut Option<SegmentError>,
+    ramp: &Ramp<f64>,
+    length: Position,
+    tick_s: f64,
+    ramp_mm_max: f64,
+) -> [Ticks; 2] {
+    let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, .. } = *ramp;
+    let hold_s = t2_s - t1_s;
+    made(
+        refused,
+        &[
+            "entry feed [mm/s]",
+            "exit feed [mm/s]",
+            "peak jerk [mm/s³]",
+            "length [mm]",
+            "t1 [s]",
+            "t2 − t1 [s]",
+            "tick [s]",
+        ],
+        [from_mm_s, to_mm_s, peak_jerk_mm_s3, length.to_mm(), t1_s, hold_s, tick_s],
+        // Any type will do; with that of lengths there is no function more in the image.
+        |value| is_within(value, 0.0, f64::MAX).then_some(Position::ZERO),
+    );
+    if t1_s <= 0.0 && from_mm_s != to_mm_s {
+        refused.get_or_insert(SegmentError::FeedStep { from_mm_s, to_mm_s });
+    }
+    let mut ticks = |quantity, value| {
+        Ticks::from_seconds(value, tick_s).unwrap_or_else(|| {
+            refused.get_or_insert(SegmentError::OutOfRange { quantity, value });
+            Ticks::ZERO
+        })
+    };
+    let phases = [ticks("t1 [s]", t1_s), ticks("t2 − t1 [s]", hold_s)];
+    let value = peak_jerk_mm_s3 * t1_s * t1_s * t1_s;
+    if !(value <= ramp_mm_max) {
+        refused.get_or_insert(SegmentError::OutOfRange { quantity: "jerk · t1³ [mm]", value });
+    }
+    phases
 }
 
 /// Each of `values` made by `make`; the first that can't be is refused by its name.

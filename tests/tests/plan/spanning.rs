@@ -10,28 +10,39 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use motion_kernel::law::{Law, Limits, Passing, Ramp};
-use motion_kernel::plan::{Block, FeedSpan, Node, PlanError, merge_equal, nodes_for, plan_spanning};
+use motion_kernel::plan::{Block, Node, PlanError, merge_equal, nodes_for, plan_spanning};
 
 use crate::support::Random;
 use crate::{block, from_rest, law, planned, random_blocks, reference, time_s};
+
+/// A ramp or a cruise with its place on the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Span {
+    pub(crate) start_mm: f64,
+    pub(crate) length_mm: f64,
+    pub(crate) ramp: Ramp<f64>,
+}
 
 pub(crate) fn spans_between(
     blocks: &[Block<f64>],
     start: f64,
     end: f64,
-) -> Result<Option<(f64, Vec<FeedSpan>)>, PlanError> {
+) -> Result<Option<(f64, Vec<Span>)>, PlanError> {
     let mut places = vec![Node::EMPTY; nodes_for(blocks.len())];
     let mut spans = Vec::new();
-    let time_s = plan_spanning(blocks, start, end, &mut places, &mut |span| spans.push(span))?;
+    let mut put = |start_mm: f64, &ramp: &Ramp<f64>| {
+        spans.push(Span { start_mm, length_mm: ramp.length_mm(), ramp });
+    };
+    let time_s = plan_spanning(blocks, start, end, &mut places, &mut put)?;
     Ok(time_s.map(|time_s| (time_s, spans)))
 }
 
-pub(crate) fn spans(blocks: &[Block<f64>]) -> (f64, Vec<FeedSpan>) {
+pub(crate) fn spans(blocks: &[Block<f64>]) -> (f64, Vec<Span>) {
     spans_between(blocks, 0.0, 0.0).expect("in range").expect("a plan")
 }
 
 /// Every ceiling, junction and limit at many instants of every span, and that the spans are one motion.
-pub(crate) fn legal(blocks: &[Block<f64>], start: f64, end: f64, spans: &[FeedSpan]) -> Result<(), String> {
+pub(crate) fn legal(blocks: &[Block<f64>], start: f64, end: f64, spans: &[Span]) -> Result<(), String> {
     const WITHIN: f64 = 1.0 + 1e-9;
     let mut ends = Vec::new();
     let mut total = 0.0;
@@ -96,7 +107,7 @@ pub(crate) fn legal(blocks: &[Block<f64>], start: f64, end: f64, spans: &[FeedSp
 }
 
 /// The feed at `s_mm`, by halving the time.
-fn feed_at(spans: &[FeedSpan], s_mm: f64) -> f64 {
+fn feed_at(spans: &[Span], s_mm: f64) -> f64 {
     let index = spans.partition_point(|span| span.start_mm < s_mm).saturating_sub(1);
     let Some(span) = spans.get(index) else { return 0.0 };
     if span.ramp.peak_jerk_mm_s3 <= 0.0 {
@@ -376,8 +387,8 @@ fn random_lists_are_legal() {
 fn too_few_places_are_refused() {
     let blocks = [block(1.0, 10.0), block(1.0, 20.0)];
     let mut places = [Node::EMPTY; 3];
-    let refused = plan_spanning(&blocks, 0.0, 0.0, &mut places, &mut |_| {});
-    assert_eq!(refused, Err(PlanError::Output { blocks: 6, plans: 3 }));
+    let refused = plan_spanning(&blocks, 0.0, 0.0, &mut places, &mut |_, _| {});
+    assert_eq!(refused, Err(PlanError::Room { of: "nodes", needed: 6, places: 3 }));
 }
 
 /// The inverse: how far into a ramp a feed is passed.
