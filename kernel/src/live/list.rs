@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use super::splice::Splice;
-use crate::law::{Phase, Ramp, Ticks, TurnedRamp, segment};
+use crate::law::{CutRamp, Phase, Ramp, Ticks, segment};
 use crate::units::Position;
 
 /// Feeds that are calculated differently differ by rounding: of 1 mm/s, and of themselves.
@@ -48,7 +48,7 @@ impl Item {
                 Splice { at: start.at + length, feed_mm_s: ramp.to_mm_s, ..*start }
             }
             Self::Cut { ramp, at, length } => {
-                let cut = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
+                let cut = CutRamp { ramp, cut_s: at.to_f64() * tick_s };
                 Splice { at: start.at + length, feed_mm_s: cut.to_mm_s(), ..*start }
             }
             Self::End => {
@@ -63,7 +63,7 @@ impl Item {
         match *self {
             Self::Feed { ramp, .. } => Ticks::from_seconds(ramp.duration_s(), tick_s),
             Self::Cut { ramp, at, .. } => {
-                let cut = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
+                let cut = CutRamp { ramp, cut_s: at.to_f64() * tick_s };
                 Ticks::from_seconds(cut.duration_s(), tick_s)
             }
             Self::Dwell(duration) => Some(duration),
@@ -80,7 +80,7 @@ impl Item {
             // As its segment was made.
             Self::Feed { ramp, .. } => segment::to_f64(ramp),
             &Self::Cut { ramp, .. } if phase == Phase::Rise => {
-                let cut = TurnedRamp { ramp, turn_s: elapsed_s };
+                let cut = CutRamp { ramp, cut_s: elapsed_s };
                 return Some(Self::Cut { ramp, at: elapsed, length: length(cut.length_mm())? });
             }
             _ => return None,
@@ -93,7 +93,7 @@ impl Item {
             // Over before it could be cut.
             Phase::Rise if ramp.t1_s <= tick_s => None,
             Phase::Rise if 2.0 * elapsed_s <= ramp.t1_s => {
-                let cut = TurnedRamp { ramp, turn_s: elapsed_s };
+                let cut = CutRamp { ramp, cut_s: elapsed_s };
                 Some(Self::Cut { ramp, at: elapsed, length: length(cut.length_mm())? })
             }
             Phase::Rise | Phase::Hold => {
@@ -127,9 +127,9 @@ impl Item {
         };
         let (mut low_s, mut high_s) = (0.0, most_s);
         for _ in 0..CUT_STEPS {
-            let cut = TurnedRamp { ramp, turn_s: 0.5 * (low_s + high_s) };
+            let cut = CutRamp { ramp, cut_s: 0.5 * (low_s + high_s) };
             let end_s = if cut.to_mm_s() > feed_mm_s { &mut high_s } else { &mut low_s };
-            *end_s = cut.turn_s;
+            *end_s = cut.cut_s;
         }
         self.cut(Phase::Rise, before(low_s)?, tick_s)
     }

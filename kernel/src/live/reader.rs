@@ -10,6 +10,7 @@ use super::lookahead::Lookahead;
 use super::program_feed::ProgramFeed;
 use super::source::Source;
 use super::splice::{BlockEnd, Extent, Splice};
+use crate::law::PlannedRamp;
 use crate::num::Real;
 use crate::program::supply::{Ready, is_taken};
 use crate::program::{Item, SupplyError};
@@ -196,8 +197,8 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
                 self.pending = Some(item.ready(self.tick_s)?);
                 Ok(())
             }
-            Item::Feed { .. } if self.feed.replans(self.path.stretch) => Ok(()),
-            Item::Feed { ramp, length } => self.feed.push(ListItem::Feed { ramp, length }),
+            Item::Feed(_) if self.feed.replans(self.path.stretch) => Ok(()),
+            Item::Feed(PlannedRamp { ramp, length }) => self.feed.push(ListItem::Feed { ramp, length }),
             Item::Dwell(duration) => self.feed.push(ListItem::Dwell(duration)),
             Item::Stop => self.feed.push(ListItem::Stop),
         };

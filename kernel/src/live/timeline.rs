@@ -266,7 +266,7 @@ impl Timeline {
                     is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
                 }
                 Item::Cut { ramp, at, length } => {
-                    let segment = FeedSegment::turned(&ramp, at, length, self.tick_s);
+                    let segment = FeedSegment::cut(&ramp, at, length, self.tick_s);
                     is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
                 }
                 Item::End => {

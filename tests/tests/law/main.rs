@@ -10,7 +10,7 @@ mod ramp;
 mod segment;
 #[path = "../support/mod.rs"]
 mod support;
-mod turned;
+mod cut;
 
 use motion_kernel::law::Limits;
 use motion_kernel::num::Root;

@@ -37,8 +37,8 @@ fn ramps(blocks: &[Block<f64>]) -> f64 {
     let mut places = vec![Node::EMPTY; nodes_for(blocks.len())];
     let mut planned_s = || {
         time_s(|| {
-            let planned = plan_spanning(black_box(blocks), 0.0, 0.0, &mut places, &mut |span| {
-                black_box(span);
+            let planned = plan_spanning(black_box(blocks), 0.0, 0.0, &mut places, &mut |_, ramp| {
+                black_box(ramp);
             });
             assert!(planned.is_ok_and(|time_s| time_s.is_some()));
         })

@@ -10,12 +10,12 @@ mod feasible;
 mod fixed;
 mod lists;
 mod maximal;
+mod planner;
 mod refusals;
 mod segments;
 mod spanning;
 #[path = "../support/mod.rs"]
 mod support;
-mod window;
 
 use lists::{block, reference};
 use motion_kernel::law::{Law, Limits};

@@ -6,7 +6,7 @@ use core::task::Poll;
 use super::*;
 use crate::exec::Executor;
 use crate::fixture::{self, LIMITS};
-use crate::law::{Law, Limits, Ramp};
+use crate::law::{Law, Limits, PlannedRamp, Ramp};
 use crate::num::Fixed;
 use crate::program::{Allowed, Item, PathBlock};
 use crate::queue::{LiveStreams, PathRules, Rejection};
@@ -30,9 +30,9 @@ fn line(longer: Position) -> [Item<1>; 6] {
     [
         Item::Block(PathBlock::new(whole + longer, 20.0, allowed, allowed, 0.0)),
         line,
-        Item::Feed { ramp: up, length: ramp },
-        Item::Feed { ramp: Ramp::cruise(20.0, 5.0), length: cruise },
-        Item::Feed { ramp: up.reversed(), length: ramp },
+        Item::Feed(PlannedRamp { ramp: up, length: ramp }),
+        Item::Feed(PlannedRamp { ramp: Ramp::cruise(20.0, 5.0), length: cruise }),
+        Item::Feed(PlannedRamp { ramp: up.reversed(), length: ramp }),
         Item::EndOfStretch([whole]),
     ]
 }
