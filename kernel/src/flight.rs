@@ -18,11 +18,12 @@
 use heapless::Deque;
 use serde::{Deserialize, Serialize};
 
+use crate::array;
 use crate::exec::ExecState;
 use crate::fault::Fault;
 use crate::law::PathMotion;
 use crate::num::{Real, Scalar};
-use crate::program::{Checksum, array};
+use crate::program::Checksum;
 use crate::trace::Trace;
 use crate::units::{Counts, DacCode, Position};
 

@@ -14,12 +14,13 @@
 //! machine gives it time, on the path or along a ramp; else at once. The first fault stays, but a later one
 //! may ask for a more urgent end.
 
+mod corrected_intake;
 #[cfg(all(test, feature = "guards"))]
 mod endings;
 #[cfg(feature = "live")]
 mod reference;
 
-use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Preview};
+use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Correction, Preview};
 #[cfg(feature = "guards")]
 use crate::axis::{AxisFault, LOOK_TICKS};
 use crate::exec::{ExecState, Executor};
@@ -31,6 +32,7 @@ use crate::num::Real;
 use crate::queue::Intake;
 use crate::trace::Trace;
 use crate::units::{Counts, DacCode, Position};
+pub use corrected_intake::CorrectedIntake;
 
 /// Whether the drives may move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,7 +182,35 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
     /// One control tick: reads the encoders and inputs, executes the streams, regulates every axis, writes the
     /// outputs. Call it from the tick's interrupt and nowhere else. What it did stays readable until the next.
+    #[inline]
     pub fn tick<H>(&mut self, intake: &mut Intake<'_, R, AXES>, hal: &mut H) -> &Trace<R, AXES>
+    where
+        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
+    {
+        self.tick_with(intake, None, hal)
+    }
+
+    /// [`Kernel::tick`] with what was learnt of a stretch added to feedforward while that is driven.
+    #[inline]
+    pub fn tick_corrected<H>(
+        &mut self,
+        intake: &mut CorrectedIntake<'_, R, AXES>,
+        hal: &mut H,
+    ) -> &Trace<R, AXES>
+    where
+        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
+    {
+        let CorrectedIntake { intake, correction } = intake;
+        self.tick_with(intake, correction.as_mut(), hal)
+    }
+
+    #[inline]
+    fn tick_with<H>(
+        &mut self,
+        intake: &mut Intake<'_, R, AXES>,
+        correction: Option<&mut Correction<'_, R, AXES>>,
+        hal: &mut H,
+    ) -> &Trace<R, AXES>
     where
         H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
     {
@@ -206,7 +236,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             Err(_) => self.latch_fault(FaultKind::Inputs),
         }
         self.execute(intake);
-        self.regulate(intake);
+        self.regulate(correction);
         #[cfg(not(feature = "guards"))]
         let codes = &mut [DacCode::ZERO; AXES];
         #[cfg(feature = "guards")]
@@ -252,10 +282,10 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// The outputs of all axes. Where the drives are off they stand still, and regulators and peaks
     /// keep what they had.
     #[inline]
-    fn regulate(&mut self, intake: &mut Intake<'_, R, AXES>) {
+    fn regulate(&mut self, correction: Option<&mut Correction<'_, R, AXES>>) {
         let Trace { executed, axes: outputs, .. } = &mut self.trace;
         if self.power.regulates() {
-            if let Some(correction) = intake.correction() {
+            if let Some(correction) = correction {
                 let is_moving = executed.state == ExecState::Moving;
                 let corrections = correction.next(is_moving.then_some(executed.stretches));
                 for (axis, correction_mm_s) in self.axes.iter_mut().zip(corrections) {

@@ -6,7 +6,7 @@
 use motion_kernel::axis::Correction;
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Reaction;
-use motion_kernel::kernel::Kernel;
+use motion_kernel::kernel::{CorrectedIntake, Kernel};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::trace::Trace;
 
@@ -100,8 +100,9 @@ fn run_in<R: Real>(
         .collect();
     let mut storage = Storage::<R>::new(script.as_ref());
     let items = job.items.iter().map(|&item| Ok(item));
-    let (mut background, mut intake) =
+    let (mut background, intake) =
         storage.split(header.rules, (header.start, job.guards.travel()), items, tick_s);
+    let mut intake = CorrectedIntake::from(intake);
     if let &Some(StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
         intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?)?;
     }
@@ -121,7 +122,7 @@ fn run_in<R: Real>(
     let mut goes_on = true;
     while goes_on {
         background.poll(collector.ticks()).map_err(RunError::Rejected)?;
-        let trace = *kernel.tick(&mut intake, hardware);
+        let trace = *kernel.tick_corrected(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
         let state = trace.executed.state;
         // What is idle after the last item is no longer part of the program, but for the tick in which
@@ -174,7 +175,7 @@ fn run_in<R: Real>(
         if !goes_on {
             break;
         }
-        let trace = *kernel.tick(&mut intake, hardware);
+        let trace = *kernel.tick_corrected(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
         last = Some(trace);
     }

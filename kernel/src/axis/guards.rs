@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::fault::Reactions;
+use crate::fault::reaction::Reactions;
 #[cfg(feature = "guards")]
 use crate::path::Travel;
 #[cfg(feature = "guards")]
@@ -14,7 +14,7 @@ use crate::units::Position;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Guards<const AXES: usize> {
     /// Of each axis; `None` to watch nothing of it but the limit of its following error.
-    #[serde(with = "crate::program::array")]
+    #[serde(with = "crate::array")]
     pub axes: [Option<GuardFigures>; AXES],
     /// How faults end.
     pub reactions: Reactions,

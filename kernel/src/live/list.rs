@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use super::road::Splice;
 use crate::law::{Phase, Ramp, Ticks, TurnedRamp, segment};
+pub use crate::queue::LIST_ITEMS;
 use crate::units::Position;
 
 /// Feeds that are found by different ways differ by rounding: of 1 mm/s, and of themselves.
@@ -11,9 +12,6 @@ const FEED_ROUNDING_MM_S: f64 = 1.0e-12;
 
 /// Halvings that find the place to turn at: to a millionth of a millionth.
 const TURN_STEPS: usize = 40;
-
-/// The most items of a feed list: its queue needs one place more.
-pub const LIST_ITEMS: usize = 15;
 
 /// An item of a feed list.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -21,17 +21,18 @@
 
 mod fixed_point;
 mod float;
+mod series;
 pub mod sine;
-pub(crate) mod table;
+mod table;
 
 pub use fixed_point::Fixed;
 pub(crate) use float::{is_finite, is_within, whole};
+pub use series::Coefficients;
+pub(crate) use series::SERIES_TERMS_MAX;
 
 use core::fmt::Debug;
 use core::hint::black_box;
 use core::ops::{Add, Div, Mul, Neg, Sub};
-
-use crate::law::shape::Coefficients;
 
 /// `slices` for a loop of the background that is not to be unrolled: the optimiser does not see how long they are. In
 /// software a few operations of f64 are a hundred bytes, and flash is worth more than the background's time. A loop
@@ -89,8 +90,7 @@ pub trait Scalar:
 
 /// A normalised quantity, |x| < 4.
 pub trait Unit: Scalar + Coefficients {
-    /// Terms of the power series of the law's shapes that this type resolves over half a phase, at
-    /// most 12 (see [`crate::law::shape`]).
+    /// Terms of the series of [`Coefficients`] that this type resolves up to y = 1, at most 12.
     const SERIES_TERMS: usize;
     /// Magnitudes below this are held; infinite for floats.
     const LIMIT: f64;

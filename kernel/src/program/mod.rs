@@ -8,7 +8,6 @@
 //! - [`mod@check`]: whether all of a program can be executed, before any of it is;
 //! - [`mod@bytes`]: a program as bytes, with the machine it is for.
 
-pub(crate) mod array;
 pub mod bytes;
 pub mod check;
 mod checksum;
@@ -38,10 +37,10 @@ pub enum Item<const AXES: usize> {
         /// The program line it came from.
         line: u32,
         /// Where it starts.
-        #[serde(with = "array")]
+        #[serde(with = "crate::array")]
         start: [Position; AXES],
         /// A unit vector.
-        #[serde(with = "array")]
+        #[serde(with = "crate::array")]
         direction: [f64; AXES],
         /// Its length.
         length: Position,
@@ -51,10 +50,10 @@ pub enum Item<const AXES: usize> {
         /// The program line it came from.
         line: u32,
         /// Where it starts.
-        #[serde(with = "array")]
+        #[serde(with = "crate::array")]
         start: [Position; AXES],
         /// q₁ … q₇ of every axis, parts of the length.
-        #[serde(with = "array")]
+        #[serde(with = "crate::array")]
         coefficients: [[f64; 7]; AXES],
         /// Its length.
         length: Position,
@@ -67,7 +66,7 @@ pub enum Item<const AXES: usize> {
         length: Position,
     },
     /// The stretch ends here, at rest.
-    EndOfStretch(#[serde(with = "array")] [Position; AXES]),
+    EndOfStretch(#[serde(with = "crate::array")] [Position; AXES]),
     /// Rest, between stretches.
     Dwell(Ticks),
     /// Rest until told to resume, between stretches.
@@ -94,7 +93,7 @@ pub struct PathBlock {
     /// Its length.
     pub length: Position,
     /// The program's feed, then cap and limits at up to it, then cap and limits whatever it is, then the junction's feed.
-    #[serde(with = "array")]
+    #[serde(with = "crate::array")]
     figures: [f64; 10],
 }
 

@@ -14,6 +14,8 @@ use crate::law::{Phase, Ticks};
 
 /// How many feed lists there are: one under way, one to follow, one for what is more urgent.
 pub const LISTS: u8 = 3;
+/// The most items of a feed list: its queue needs one place more.
+pub const LIST_ITEMS: usize = 15;
 
 /// Where a list takes over from the one under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

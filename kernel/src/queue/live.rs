@@ -6,13 +6,12 @@
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use super::change::{Change, LISTS, ListPlace, Mailbox, Progress};
+use super::change::{Change, LIST_ITEMS, LISTS, ListPlace, Mailbox, Progress};
 use super::{
     Density, FeedItem, Fill, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, accept, count,
     enter, length,
 };
 use crate::law::{FeedSegment, Phase, Ticks};
-use crate::live::LIST_ITEMS;
 use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
@@ -84,7 +83,6 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
                 change: None,
                 refused: None,
             }),
-            correction: None,
         };
         (feeder, intake)
     }

@@ -19,7 +19,6 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use crate::axis::{Correction, CorrectionError};
 use crate::law::{FeedSegment, Ticks};
 use crate::num::Real;
 use crate::path::Piece;
@@ -31,7 +30,7 @@ pub(crate) use accept::Acceptance;
 pub use accept::Density;
 pub use accept::{PathRules, Rejection, SEGMENTS_PER_TICK_MAX};
 #[cfg(feature = "live")]
-pub use change::{Change, LISTS, Progress};
+pub use change::{Change, LIST_ITEMS, LISTS, Progress};
 #[cfg(feature = "live")]
 pub use live::{LiveFeeder, LiveStreams};
 
@@ -142,7 +141,6 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             feed_fill: feed,
             #[cfg(feature = "live")]
             lists: None,
-            correction: None,
         };
         (feeder, intake)
     }
@@ -345,28 +343,16 @@ pub struct Intake<'a, R: Real, const AXES: usize> {
     feed_fill: Fill,
     #[cfg(feature = "live")]
     lists: Option<live::Lists<'a, R>>,
-    correction: Option<Correction<'a, R, AXES>>,
 }
 
-impl<'a, R: Real, const AXES: usize> Intake<'a, R, AXES> {
-    /// What was learnt of a stretch to come. Another one replaces it; there is no way back to none but one without
-    /// knots.
-    ///
-    /// # Errors
-    /// Under live control, where motion keeps no times that could have been learnt. Never without.
+impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
+    /// Whether feed comes in lists, under live control.
     #[inline]
-    pub fn correct(&mut self, correction: Correction<'a, R, AXES>) -> Result<(), CorrectionError> {
+    pub(crate) fn is_live(&self) -> bool {
         #[cfg(feature = "live")]
-        if self.lists.is_some() {
-            return Err(CorrectionError::LiveControl);
-        }
-        self.correction = Some(correction);
-        Ok(())
-    }
-
-    #[inline]
-    pub(crate) fn correction(&mut self) -> Option<&mut Correction<'a, R, AXES>> {
-        self.correction.as_mut()
+        return self.lists.is_some();
+        #[cfg(not(feature = "live"))]
+        false
     }
 
     /// Asks the background for a stop on the path; whether it can make one, under live control.

@@ -43,7 +43,7 @@ following_error_second_um}}}, learning: null, or {repeats: list of {contour_erro
 axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}}, output.
 
 --learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, what feedforward is
-to be given in addition, straight between rows; the kernel takes it as Intake::correct. Without a row if nothing was
+to be given in addition, straight between rows; the kernel takes it as CorrectedIntake::correct. Without a row if nothing was
 better than no correction. Without this option what was learnt is only shown.
 
 Exit status 1, and nothing is written: the tuned machine is worse on a circle than it was, or the recordings do not
