@@ -5,9 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::fault::reaction::Reactions;
-#[cfg(feature = "guards")]
 use crate::path::Travel;
-#[cfg(feature = "guards")]
 use crate::units::Position;
 
 /// Guards of a machine: a compiled program carries them.
@@ -28,7 +26,6 @@ impl<const AXES: usize> Guards<AXES> {
     }
 
     /// Where the axes may go; an end beyond the kernel's range bounds nothing.
-    #[cfg(feature = "guards")]
     #[must_use]
     pub fn travel(&self) -> Travel<AXES> {
         self.axes.map(|axis| {

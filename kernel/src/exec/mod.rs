@@ -152,7 +152,6 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     ) -> Result<(), ExecFault> {
         self.walker.start_tick();
         intake.start_tick();
-        #[cfg(feature = "live")]
         if intake.is_change_due() {
             self.change_over(intake);
         }
@@ -170,7 +169,6 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         }
         executed.state = self.state();
         executed.stretches = self.stretches;
-        #[cfg(feature = "live")]
         intake.publish(
             match &self.activity {
                 Activity::Moving(moving) => Some(moving.inside()),
@@ -183,7 +181,6 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
 
     /// Goes over to the feed list that is asked for: between two items, or within one that the new list repeats. What
     /// can't be followed any more is refused.
-    #[cfg(feature = "live")]
     #[cold]
     fn change_over(&mut self, intake: &mut Intake<'_, R, AXES>) {
         let carried = match (&self.activity, intake.feed(), intake.feed_after_change()) {

@@ -2,13 +2,11 @@
 //!
 //! Consumes the motion along the path; produces a [`Setpoint`] for every axis. [`piece`] is one stretch
 //! of geometry, a line or a polynomial of degree seven in arc length, and its evaluation by the chain
-//! rule. `travel` is where the axes may go (feature `guards`).
+//! rule. `travel` is where the axes may go.
 
 pub mod piece;
-#[cfg(feature = "guards")]
 mod travel;
 
 pub use piece::{Geometry, Piece, PieceError, Setpoint};
 pub(crate) use piece::{Steepness, magnitude};
-#[cfg(feature = "guards")]
 pub use travel::Travel;
