@@ -1,7 +1,6 @@
 //! Identification of simulated axes from what a machine would record: converter codes and encoder counts.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 use hal_sim::{
     AxisParameters, BedMode, DriveParameters, EncoderNoise, EncoderParameters, REFERENCE_ENCODER,
@@ -195,9 +194,8 @@ fn check(cases: &[Case]) {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(case) = cases.get(index) else { return done };
             let runs = recordings(case.drive, case.setup);
-            let start = Instant::now();
             let found = identify(&runs).unwrap_or_else(|error| panic!("{}: {error}", case.name));
-            done.push((index, deviations(case, &found.parameters), start.elapsed().as_secs_f64()));
+            done.push((index, deviations(case, &found.parameters)));
         }
     };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -205,18 +203,18 @@ fn check(cases: &[Case]) {
         let workers: Vec<_> = (0..cores).map(|_| scope.spawn(worker)).collect();
         workers.into_iter().flat_map(|worker| worker.join().expect("no panic")).collect()
     });
-    rows.sort_by_key(|(index, ..)| *index);
+    rows.sort_by_key(|(index, _)| *index);
 
     print!("{:28}", "found - true ± 95 %");
     COLUMNS.iter().for_each(|column| print!("{:>16}", column.name));
     println!();
-    for (index, deviations, time_s) in &rows {
+    for (index, deviations) in &rows {
         print!("{:28}", cases[*index].name);
         deviations.iter().for_each(|(deviation, half)| print!("{deviation:>8.2} ±{half:>6.2}"));
-        println!("  {time_s:.2} s");
+        println!();
     }
     for (column, Column { name, limit }) in COLUMNS.iter().enumerate() {
-        let of_column = rows.iter().filter_map(|(_, deviations, _)| deviations.get(column));
+        let of_column = rows.iter().filter_map(|(_, deviations)| deviations.get(column));
         let mut errors: Vec<f64> = of_column.clone().map(|(deviation, _)| deviation.abs()).collect();
         errors.sort_by(f64::total_cmp);
         let Some(worst) = errors.last() else { continue };
