@@ -11,6 +11,7 @@ use motion_host::identify::{
     identify,
 };
 use motion_kernel::units::DacCode;
+use motion_tests::random::Random;
 
 /// Cells for the dead time at up to 40 sub-steps.
 const LINE: usize = 256;
@@ -78,24 +79,10 @@ fn recordings(drive: DriveParameters, setup: AxisSetup) -> Vec<AxisRecording> {
         .collect()
 }
 
-/// Numbers from −1 to 1 (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        bits ^= bits >> 31;
-        (bits >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-}
-
 /// The reference Y with every parameter changed by up to ± 30 %.
 fn random_drive(seed: u64) -> DriveParameters {
-    let mut random = Random(seed);
-    let mut about = |value: f64| value * (1.0 + 0.3 * random.next());
+    let mut random = Random::at(seed);
+    let mut about = |value: f64| value * (1.0 + 0.3 * random.between(-1.0, 1.0));
     let y = REFERENCE_Y;
     let bed = y.bed.expect("a bed");
     DriveParameters {
@@ -357,7 +344,7 @@ fn what_is_no_servo_axis_is_refused() {
 
     // Positions of another run.
     let mut mixed = recordings(REFERENCE_X, SETUP);
-    let mut random = Random(9);
-    mixed[1].actual_mm.iter_mut().for_each(|position| *position += 20.0 * random.next());
+    let mut random = Random::at(9);
+    mixed[1].actual_mm.iter_mut().for_each(|position| *position += 20.0 * random.between(-1.0, 1.0));
     assert!(matches!(identify(&mixed), Err(IdentifyError::UnlikeModel { run: 2, .. })));
 }

@@ -4,9 +4,9 @@ use motion_kernel::law::{Law, Limits};
 use motion_kernel::plan::{Block, Node, nodes_for};
 use motion_kernel::work;
 
-use crate::lists::{block, lists, reference};
 use crate::spanning::spans;
-use crate::support::Random;
+use motion_tests::block_lists::{block, lists, reference};
+use motion_tests::random::Random;
 
 /// What the caller provides for a list of blocks, a block \[bytes\].
 const MEMORY_MAX: usize = 300;
@@ -44,7 +44,7 @@ const STEPS_MAX: f64 = 140.0;
 fn many_laws_in_a_hump_cost_little_more() {
     let count = 40_000;
     let hump = |is_mixed: bool| -> Vec<Block<f64>> {
-        let mut random = Random::new(53);
+        let mut random = Random::of_stream(53);
         (0..count)
             .map(|n| {
                 let accel_mm_s2 = 500.0 + random.unit() * f64::from(u8::from(is_mixed));
