@@ -111,6 +111,9 @@ pub mod jog;
 #[cfg(all(feature = "live", feature = "guards"))]
 pub mod homing;
 
+#[doc(hidden)]
+pub mod work;
+
 #[cfg(all(test, feature = "guards"))]
 mod corrupted;
 #[cfg(test)]

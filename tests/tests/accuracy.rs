@@ -2,18 +2,11 @@
 //!
 //! The result is a committed table, `tests/expected/accuracy.md`; see `motion_tests::figures`.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use check::drive::{PIECES, SEGMENTS, is_beyond_fixed_point};
-use check::random::Random;
-use check::totals::Totals;
-use check::{drive, machine, program};
 use motion_host::drive::inverse::inverse;
 use motion_host::gcode;
 use motion_host::machine::Machine;
@@ -26,7 +19,11 @@ use motion_kernel::path::Setpoint;
 use motion_kernel::program::Supply;
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
+use motion_tests::check::drive::{PIECES, SEGMENTS, is_beyond_fixed_point};
+use motion_tests::check::totals::Totals;
+use motion_tests::check::{drive, machine, program};
 use motion_tests::figures::{Table as Figures, hold};
+use motion_tests::random::Random;
 
 const STRINGER: &str = include_str!("../../host/src/cli/stringer.ngc");
 const MM_PER_COUNT: f64 = 1e-4;

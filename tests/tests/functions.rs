@@ -4,13 +4,11 @@
 //! Errors are absolute in units of the shapes' scales, and relative from x = 10⁻⁴ up, where a ramp begins (a
 //! ramp's other end is the mirror image). Fixed point has steps and no relative precision.
 
-mod support;
-
 use motion_kernel::law::shape::Shape;
 use motion_kernel::num::sine::{Libm, Micromath, Own, SineCosine};
 use motion_kernel::num::{Fixed, Real, Unit};
+use motion_tests::dd::{Dd, dd};
 use motion_tests::figures::{Table, hold};
-use support::dd::{Dd, dd};
 
 const DENSE: u32 = 200_000;
 /// Where relative errors begin.

@@ -1,10 +1,5 @@
 //! Homing on the simulated machine: the reference from any start, every failure by its name and at rest, and motion behind it.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
-use check::bench::mm;
-use check::random::Random;
 use hal_sim::{EncoderNoise, HomeParameters, IndexParameters, SwitchParameters};
 use motion_host::gcode;
 use motion_host::machine::{HomingSettings, Machine};
@@ -17,6 +12,8 @@ use motion_kernel::homing::{HomingConfig, HomingError};
 use motion_kernel::jog::{Direction, Jog, JogAxis, Way};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::units::{Counts, Position};
+use motion_tests::check::bench::mm;
+use motion_tests::random::Random;
 
 const AXIS: usize = 0;
 const MM_PER_COUNT: f64 = 1e-4;
@@ -161,7 +158,7 @@ fn places(seed: u64) -> impl Iterator<Item = Place> {
 
 #[test]
 fn with_an_index_it_is_the_same_count_from_anywhere() {
-    let count = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(40) as usize;
+    let count = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(40) as usize;
     for seed in 1..=2 {
         for (number, place) in places(seed).take(count / 2).enumerate() {
             let settings =
@@ -187,7 +184,7 @@ fn with_an_index_it_is_the_same_count_from_anywhere() {
 /// The switch is seen once a tick: at the slow feed it is at most a tick's way later, and a count.
 #[test]
 fn with_a_switch_alone_it_is_as_good_as_a_tick() {
-    let count = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(40) as usize;
+    let count = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(40) as usize;
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for seed in 3..=4 {
         for (number, place) in places(seed).take(count / 2).enumerate() {

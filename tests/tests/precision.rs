@@ -3,13 +3,9 @@
 //! The law is written out here from S1 (1)–(6), in f64 with what cancels rearranged; time is a whole number of
 //! ticks, so its only error is its last place. Path lengths are exact to 2⁻³² mm.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
 use std::f64::consts::PI;
 use std::fmt::Write;
 
-use check::geometry::{Arc, Element, Move, UNITS_PER_MM, dot, minus, norm};
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, FeedRecord, Mode, Plan, plan_program};
@@ -17,6 +13,8 @@ use motion_kernel::exec::{ExecState, Executed, Executor};
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
+use motion_tests::check::bounds;
+use motion_tests::check::geometry::{self, Arc, Element, Move, UNITS_PER_MM, dot, minus, norm};
 
 /// Promised: a quarter of a count.
 const COUNTS_MAX: f64 = 0.25;
@@ -72,7 +70,7 @@ fn compare(text: &str, element: &Element, from: [i64; 3], machine: &Machine) -> 
     let before = &executable.items[..ends.expect("a move")];
     let last = before.iter().rposition(|item| matches!(item, Item::EndOfStretch(_))).map_or(0, |end| end + 1);
     executable.items.drain(..last);
-    let start = from.map(|units| Position::from_bits(check::geometry::position_bits(units)));
+    let start = from.map(|units| Position::from_bits(geometry::position_bits(units)));
     let mut streams = Streams::<f32, 3, 64, 64>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
     let mut supply = Supply::new(executable.supplied(), executable.tick_s);
@@ -202,7 +200,7 @@ fn arcs_from_a_millimetre_to_five_metres() {
                 worst[0], worst[1], worst[2], worst[3]
             );
             assert!(worst[0] <= COUNTS_MAX, "R {radius_mm} at X{far_mm}: {worst:?}");
-            for (share, bound) in worst[1..].iter().zip(check::bounds::AXIS_SHARES) {
+            for (share, bound) in worst[1..].iter().zip(bounds::AXIS_SHARES) {
                 assert!(*share <= bound, "R {radius_mm} at X{far_mm}: {worst:?}");
             }
         }
@@ -251,7 +249,7 @@ fn increments(count: i64) {
             worst = worst.max((along - executed.motion.s.to_mm()).abs() / MM_PER_COUNT);
         }
         if executed.state == ExecState::Idle && supply.is_empty() {
-            let exact = [33_333_333 * count, -11_111_111 * count].map(check::geometry::position_bits);
+            let exact = [33_333_333 * count, -11_111_111 * count].map(geometry::position_bits);
             let end = executed.setpoints.map(|axis| axis.position.to_bits());
             println!("{count} increments: {worst:.4} counts");
             assert!((end[0] - exact[0]).abs() <= 1 && (end[1] - exact[1]).abs() <= 1, "{end:?} {exact:?}");

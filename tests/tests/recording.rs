@@ -1,11 +1,5 @@
 //! A recorded run replays to the bit: whatever the program, the commands, the number type, and what failed on the way.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
-use check::random::Random;
-use check::totals::Totals;
-use check::{drive, machine, program};
 use motion_host::planning::{Mode, Plan};
 use motion_host::recording::{Recorder, Recording, replay};
 use motion_host::simulate::inject::Injections;
@@ -16,6 +10,9 @@ use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
+use motion_tests::check::totals::Totals;
+use motion_tests::check::{drive, machine, program};
+use motion_tests::random::Random;
 
 /// What breaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,7 +107,7 @@ impl<H: Hardware> DriveEnable<AXES> for Breaking<'_, H> {
 
 /// Commands before random ticks.
 fn script(random: &mut Random, ticks: u64) -> Script {
-    let mut at: Vec<u64> = (0..1 + random.below(12)).map(|_| random.next() % ticks.max(1)).collect();
+    let mut at: Vec<u64> = (0..1 + random.below(12)).map(|_| random.bits() % ticks.max(1)).collect();
     at.sort_unstable();
     let command = |random: &mut Random| match random.below(9) {
         0 | 1 => "hold".to_owned(),
@@ -176,7 +173,7 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
         }
         _ => None,
     };
-    let at = random.next() % (ticks + 1);
+    let at = random.bits() % (ticks + 1);
     // As `motion run --inject` breaks it: what the hardware answers then is in the recording, not why.
     let injections = (breakage.is_none() && random.chance(0.5)).then(|| {
         let axis = ["X", "Y", "Z"][random.below(AXES)];
@@ -231,8 +228,8 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
 
 #[test]
 fn a_recorded_run_replays_to_the_bit() {
-    let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
-    let programs = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(250);
+    let first = motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(1);
+    let programs = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(250);
     let (mut runs, mut ticks, mut bytes) = (0, 0, 0);
     let mut faults = std::collections::BTreeMap::<String, u32>::new();
     for seed in first..first + programs {

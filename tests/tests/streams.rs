@@ -1,10 +1,7 @@
 //! The two streams: what they refuse, that refusing leaves no trace, and that delivery changes nothing.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
-use check::bench::{LIMITS, RULES, TICK_S, cruise, line, mm, point, ramp, rest_to_rest};
-use check::random::Random;
+use motion_tests::check::bench::{LIMITS, RULES, TICK_S, cruise, line, mm, point, ramp, rest_to_rest};
+use motion_tests::random::Random;
 use std::convert::Infallible;
 
 use motion_host::gcode;

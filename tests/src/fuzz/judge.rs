@@ -6,9 +6,8 @@ use motion_kernel::num::Real;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::DacCode;
 
-use super::axes::TRIM_V;
-
 use super::items::{LIMITS, RULES, TICK_S};
+use super::machine::TRIM_V;
 
 /// A part of itself by which a limit may be exceeded: that of the tangent, twice.
 const SHARE: f64 = 3e-5;

@@ -12,9 +12,9 @@ use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
 
-use crate::check::random::Random;
 use crate::machine::{Next, Seen, random_plan, run};
 use crate::setting;
+use motion_tests::random::Random;
 
 /// A round of looks at three axes [ticks].
 const ROUND_TICKS: u64 = 24;
@@ -56,7 +56,7 @@ fn injection(name: &str, random: &mut Random, position_mm: f64) -> Option<Inject
         "encoder lost" => Injection::EncoderLost,
         "encoder jump" => {
             // Beyond twice the limit of a jump, and beyond what a tick moves, so that it is neither a stop nor a turn.
-            let counts = random.log_between(4000.0, 1e6) as i32;
+            let counts = random.log(4000.0, 1e6) as i32;
             Injection::EncoderJump { counts: if random.chance(0.5) { counts } else { -counts } }
         }
         "encoder reversed" => Injection::EncoderReversed,

@@ -14,10 +14,10 @@ use motion_kernel::queue::{LiveStreams, Streams};
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{DacCode, Position};
 
-use crate::check::bench::{mm, rest_to_rest};
-use crate::check::random::Random;
-use crate::check::totals::Totals;
-use crate::check::{drive, program};
+use motion_tests::check::bench::{mm, rest_to_rest};
+use motion_tests::check::totals::Totals;
+use motion_tests::check::{drive, program};
+use motion_tests::random::Random;
 
 const PIECES: usize = 256;
 const SEGMENTS: usize = 16;

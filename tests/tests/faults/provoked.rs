@@ -1,70 +1,18 @@
 //! Faults of the kernel: typed, latched, the first one stays, outputs 0 V, drives disabled, and a defined
 //! way back.
 
-use crate::check::bench::{LIMITS, RULES, line, mm, point, ramp, rest_to_rest};
 use hal_sim::{AxisParameters, MachineParameters, SimMachine};
 use motion_host::machine::Machine;
 use motion_host::simulate::hardware::SimulatedHardware;
 use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::{ExecFault, ExecState};
 use motion_kernel::fault::FaultKind;
-use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+use motion_kernel::hal::{AxisInputs, Encoder};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::queue::{Feeder, Intake, Streams};
 use motion_kernel::units::{Counts, DacCode, Position};
-
-/// Axes that follow perfectly until told to fail.
-#[derive(Debug, Default)]
-struct TestAxes {
-    counts: [Counts; 2],
-    written: [DacCode; 2],
-    is_enabled: bool,
-    inputs: MachineInputs<2>,
-    inputs_fail: bool,
-    encoder_fails: bool,
-    output_fails: bool,
-    enable_fails: bool,
-}
-
-struct Failure;
-
-impl Encoder<2> for TestAxes {
-    type Error = Failure;
-    fn latch(&mut self) -> Result<[Counts; 2], Failure> {
-        if self.encoder_fails { Err(Failure) } else { Ok(self.counts) }
-    }
-}
-
-impl Inputs<2> for TestAxes {
-    type Error = Failure;
-    fn read_inputs(&mut self) -> Result<MachineInputs<2>, Failure> {
-        if self.inputs_fail { Err(Failure) } else { Ok(self.inputs) }
-    }
-}
-
-impl VelocityChannel<2> for TestAxes {
-    type Error = Failure;
-    fn write(&mut self, codes: &[DacCode; 2]) -> Result<(), Failure> {
-        if self.output_fails {
-            return Err(Failure);
-        }
-        self.written = *codes;
-        Ok(())
-    }
-}
-
-impl DriveEnable<2> for TestAxes {
-    type Error = Failure;
-    fn set_enabled(&mut self, is_enabled: bool) -> Result<(), Failure> {
-        if self.enable_fails {
-            return Err(Failure);
-        }
-        self.is_enabled = is_enabled;
-        Ok(())
-    }
-}
-
-const MM_PER_COUNT: f64 = 1e-4;
+use motion_tests::axes::{MM_PER_COUNT, TestAxes};
+use motion_tests::check::bench::{LIMITS, RULES, line, mm, point, ramp, rest_to_rest};
 
 /// Two axes of the reference machine, with another limit of the following error.
 fn kernel() -> Kernel<f32, 2> {
@@ -93,10 +41,7 @@ fn tick(
 ) -> Option<FaultKind<f32>> {
     let trace = *kernel.tick(intake, axes);
     if trace.fault.is_none() {
-        axes.counts = trace
-            .executed
-            .setpoints
-            .map(|axis| Counts((axis.position.to_mm() / MM_PER_COUNT).round() as i64));
+        axes.follow(&trace);
     } else if trace.fault.is_some_and(|fault| fault.tick < trace.tick || !is_found_writing(&fault.kind)) {
         assert!(trace.axes.iter().all(|axis| axis.code == DacCode::ZERO), "{trace:?}");
     }
@@ -140,10 +85,10 @@ fn provoke(
     // Repaired it stays, and another failure does not replace it.
     repair(&mut axes);
     assert_eq!(tick(&mut kernel, &mut intake, &mut axes), Some(fault));
-    axes.encoder_fails = true;
-    axes.output_fails = true;
+    axes.fails.latch = true;
+    axes.fails.write = true;
     tick(&mut kernel, &mut intake, &mut axes);
-    (axes.encoder_fails, axes.output_fails) = (false, false);
+    (axes.fails.latch, axes.fails.write) = (false, false);
     for _ in 0..10 {
         assert_eq!(tick(&mut kernel, &mut intake, &mut axes), Some(fault));
     }
@@ -170,10 +115,10 @@ fn provoke(
         assert!(trace.executed.state == ExecState::Idle && axes.is_enabled, "{settling}");
     }
     for _ in 0..20_000 {
-        let trace = kernel.tick(&mut intake, &mut axes);
+        let trace = *kernel.tick(&mut intake, &mut axes);
         assert_eq!(trace.fault, None);
+        axes.follow(&trace);
         let set = trace.executed.setpoints.map(|axis| axis.position);
-        axes.counts = set.map(|position| Counts((position.to_mm() / MM_PER_COUNT).round() as i64));
         if trace.executed.stretches == 1 && trace.executed.state == ExecState::Idle {
             assert!(axes.is_enabled);
             assert_eq!(set, [mm(here[0] + 20.0), mm(here[1])]);
@@ -195,17 +140,17 @@ fn following_error() {
 
 #[test]
 fn encoder() {
-    provoke(|b| b.encoder_fails = true, |b| b.encoder_fails = false, |k| matches!(k, FaultKind::Encoder));
+    provoke(|b| b.fails.latch = true, |b| b.fails.latch = false, |k| matches!(k, FaultKind::Encoder));
 }
 
 #[test]
 fn output() {
-    provoke(|b| b.output_fails = true, |b| b.output_fails = false, |k| matches!(k, FaultKind::Output));
+    provoke(|b| b.fails.write = true, |b| b.fails.write = false, |k| matches!(k, FaultKind::Output));
 }
 
 #[test]
 fn inputs() {
-    provoke(|b| b.inputs_fail = true, |b| b.inputs_fail = false, |k| matches!(k, FaultKind::Inputs));
+    provoke(|b| b.fails.inputs = true, |b| b.fails.inputs = false, |k| matches!(k, FaultKind::Inputs));
 }
 
 #[test]
@@ -229,14 +174,15 @@ fn drive_fault() {
 /// The first tick can't enable the drives: no motion with them off.
 #[test]
 fn enable() {
-    let (mut kernel, mut axes) = (kernel(), TestAxes { enable_fails: true, ..TestAxes::default() });
+    let (mut kernel, mut axes) = (kernel(), TestAxes::default());
+    axes.fails.enable = true;
     let mut streams = Streams::<f32, 2, 8, 8>::new();
     let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
     offer(&mut feeder, 0.0);
     tick(&mut kernel, &mut intake, &mut axes);
     let before = kernel.fault();
     assert!(matches!(before.map(|fault| fault.kind), Some(FaultKind::Enable)), "{before:?}");
-    axes.enable_fails = false;
+    axes.fails.enable = false;
     tick(&mut kernel, &mut intake, &mut axes);
     assert!(kernel.fault() == before && axes.written == [DacCode::ZERO; 2] && !axes.is_enabled);
 }
@@ -258,12 +204,12 @@ fn starve(is_path: bool) {
     }
     let mut fault = None;
     for _ in 0..10_000 {
-        let trace = kernel.tick(&mut intake, &mut axes);
+        let trace = *kernel.tick(&mut intake, &mut axes);
         if trace.fault.is_none() {
             assert!(trace.executed.motion.v_mm_s <= top_mm_s as f32);
             let set = trace.executed.setpoints.map(|axis| axis.position.to_mm());
             assert!(!is_path || set[0] <= path_mm);
-            axes.counts = set.map(|at| Counts((at / MM_PER_COUNT).round() as i64));
+            axes.follow(&trace);
         } else {
             assert!(trace.axes.iter().all(|axis| axis.code == DacCode::ZERO));
         }

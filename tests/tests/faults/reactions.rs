@@ -7,11 +7,11 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
 
-use crate::check::drive;
-use crate::check::random::Random;
-use crate::check::totals::Totals;
 use crate::machine::{Next, Seen, random_plan, run};
 use crate::setting;
+use motion_tests::check::drive;
+use motion_tests::check::totals::Totals;
+use motion_tests::random::Random;
 
 fn plan(text: &str, machine: &Machine) -> Plan {
     let mode = motion_host::planning::Mode::Spanning;

@@ -7,12 +7,13 @@ use motion_host::machine::Machine;
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
 
-use super::check::bounds::Number;
-use super::check::geometry::{Arc, Move, UNITS_PER_MM};
-use super::check::live::Command;
-use super::check::program::{self, Asked, Generated};
-use super::check::{from_env, random::Random};
 use super::{Case, Runs};
+use motion_tests::check::bounds::Number;
+use motion_tests::check::geometry::{Arc, Move, UNITS_PER_MM};
+use motion_tests::check::live::Command;
+use motion_tests::check::program::{self, Asked, Generated};
+use motion_tests::from_env;
+use motion_tests::random::Random;
 
 /// What the holds of a program came to.
 #[derive(Default)]

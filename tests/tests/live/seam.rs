@@ -8,7 +8,7 @@ use motion_kernel::law::{FeedSegment, Law, Ramp, Ticks, TurnedRamp};
 use motion_kernel::path::Piece;
 use motion_kernel::queue::{Change, Density, LiveStreams, Refused, Rejection, SEGMENTS_PER_TICK_MAX};
 
-use super::check::bench::mm;
+use motion_tests::check::bench::mm;
 
 /// What one list ends with and the next begins with counts together, and so do the rests of a list.
 #[test]

@@ -4,13 +4,13 @@
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
 
-use super::check::bounds::Number;
-use super::check::live::{Command, Run, Seen, Setup, execute};
-use super::check::path::Path;
-use super::check::program::{Asked, Generated};
-use super::check::random::Random;
-use super::check::totals::Totals;
 use super::{Case, generated, is_out_of_range, seeds};
+use motion_tests::check::bounds::Number;
+use motion_tests::check::live::{Command, Run, Seen, Setup, execute};
+use motion_tests::check::path::Path;
+use motion_tests::check::program::{Asked, Generated};
+use motion_tests::check::totals::Totals;
+use motion_tests::random::Random;
 
 /// Ends of blocks are rounded to position steps of 2⁻³² mm, here and in the plan.
 const END_MM: f64 = 1e-8;
@@ -232,7 +232,7 @@ fn among_all_other_commands() {
     for seed in seeds(300) {
         let Some(blocks) = Blocks::random(seed, 3_000.0) else { continue };
         let mut random = Random::new(seed ^ 0xB10C);
-        let often = random.log_between(2e-3, 0.3);
+        let often = random.log(2e-3, 0.3);
         let most = if random.chance(0.5) { 1.0 } else { 2.0 };
         let (mut is_held, mut was_single) = (false, false);
         let mut script = |ticks: u64, state: State, at: Rest| {

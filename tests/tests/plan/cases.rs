@@ -1,9 +1,9 @@
 //! Named cases: the field's, and S3's.
 
-use crate::support::Random;
 use crate::{block, from_rest, law, planned, reference, time_s};
 use motion_kernel::law::reach;
 use motion_kernel::plan::{Block, merge_equal};
+use motion_tests::random::Random;
 
 fn merged_time_s(mut blocks: Vec<Block<f64>>) -> (usize, f64) {
     let count = merge_equal(&mut blocks);
@@ -109,7 +109,7 @@ fn hole_in_what_can_be_reached() {
 /// Only neighbours that are alike are merged, and the last one's junction stays.
 #[test]
 fn what_is_merged() {
-    let mut random = Random::new(90);
+    let mut random = Random::of_stream(90);
     for _ in 0..5000 {
         let blocks: Vec<Block<f64>> = (0..random.below(20))
             .map(|_| Block {

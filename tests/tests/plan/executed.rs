@@ -12,8 +12,8 @@ use motion_kernel::queue::{Feeder, PathRules, Refused, Streams};
 use motion_kernel::units::Position;
 
 use crate::spanning::staircase;
-use crate::support::Random;
 use crate::{block, laws, reference};
+use motion_tests::random::Random;
 
 const TICK_S: f64 = 0.0005;
 /// Where a junction lies is known to some position steps, and to the digits of the sum of lengths \[mm\].
@@ -229,7 +229,7 @@ fn named_cases_keep_every_limit_in_every_tick() {
 /// Every block with a law of its own or all with one, junctions that slow.
 #[test]
 fn random_lists_keep_every_limit_in_every_tick() {
-    let mut random = Random::new(41);
+    let mut random = Random::of_stream(41);
     let mut worst = Worst::default();
     for case in 0..300 {
         let count = 1 + random.below(80);

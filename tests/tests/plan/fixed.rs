@@ -1,7 +1,6 @@
 //! Plans in fixed point: within every limit, feasible, as fast as those in f64, and without overflow for all that
 //! is accepted. A debug build panics where fixed point overflows; an optimised one wraps.
 
-use crate::support::Random;
 use motion_kernel::exec::{ExecState, Executor};
 use motion_kernel::law::{FeedSegment, Law, LimitError, Limits, Ramp, SegmentError, peak, reach};
 use motion_kernel::num::{Fixed, Root, Scalar};
@@ -12,6 +11,7 @@ use motion_kernel::plan::{
 };
 use motion_kernel::queue::{Feeder, PathRules, Refused, Streams};
 use motion_kernel::units::Position;
+use motion_tests::random::Random;
 
 const TICK_S: f64 = 5e-4;
 /// The step of fixed point.
@@ -172,7 +172,7 @@ fn wide_plans(plans: &[BlockPlan<Fixed>]) -> Vec<BlockPlan<f64>> {
 
 /// Random lists, planned in both types.
 fn random_lists(stream: u64, range: Range, lists: usize) {
-    let mut random = Random::new(stream);
+    let mut random = Random::of_stream(stream);
     let (mut worst, mut slowest, mut slower, mut count) = (-1.0_f64, 0.0_f64, 0.0_f64, 0);
     for _ in 0..lists {
         let (blocks, wide) = range.blocks(&mut random, 40);
@@ -288,7 +288,7 @@ fn ends_of_the_ranges() {
 /// Changes of feed around those where one limit takes over from another, step by step.
 #[test]
 fn where_regimes_meet() {
-    let mut random = Random::new(96);
+    let mut random = Random::of_stream(96);
     let mut worst = -1.0_f64;
     for case in 0..4000 {
         let range = if case % 2 == 0 { Range::Machines } else { Range::Accepted };
@@ -387,7 +387,7 @@ fn ceiling<R: Root>(limits: AxisLimits<R>, share: R, radius: R, planar: R) -> Re
 /// Ceilings on arcs: the vectors of any state a ramp can be in, by the chain rule in f64, and the feed in f64.
 #[test]
 fn ceilings_keep_the_limits() {
-    let mut random = Random::new(92);
+    let mut random = Random::of_stream(92);
     let (mut worst, mut slowest, mut refused) = (0.0_f64, 0.0_f64, [0; 2]);
     for case in 0..40_000 {
         let range = if case % 2 == 0 { Range::Machines } else { Range::Accepted };
@@ -459,7 +459,7 @@ fn ceilings_keep_the_limits() {
 /// Junctions: the steps of velocity and acceleration keep their limit.
 #[test]
 fn junctions_keep_the_acceleration_step() {
-    let mut random = Random::new(93);
+    let mut random = Random::of_stream(93);
     let mut worst = 0.0_f64;
     for _ in 0..100_000 {
         let angle = fixed(if random.once_in(4) { 0.0 } else { random.log(1e-8, 0.1) });
@@ -494,7 +494,7 @@ fn junctions_keep_the_acceleration_step() {
 /// is too soft for a segment is refused.
 #[test]
 fn segments_join() {
-    let mut random = Random::new(95);
+    let mut random = Random::of_stream(95);
     let (mut count, mut refused) = (0, 0);
     for case in 0..20_000 {
         let range = if case % 2 == 0 { Range::Machines } else { Range::Accepted };
@@ -543,7 +543,7 @@ fn offer<T: std::fmt::Debug>(answer: Result<(), Refused<T>>) -> bool {
 /// executed within the limits, without a step, to the exact end.
 #[test]
 fn plans_are_accepted_and_executed() {
-    let mut random = Random::new(94);
+    let mut random = Random::of_stream(94);
     let (mut executed, mut ticks, mut worst) = (0, 0_u64, [0.0_f64; 5]);
     while executed < 150 {
         let limits = Range::Machines.limits(&mut random);

@@ -4,8 +4,8 @@ use motion_kernel::law::Ramp;
 use motion_kernel::plan::{Block, BlockPlan, FeedSpan, Node, PlanError, Window, WindowError, nodes_for};
 
 use crate::spanning::{legal, spans as whole, spans_between, unreachable};
-use crate::support::Random;
 use crate::{block, from_rest, planned, random_blocks, reference, time_s};
+use motion_tests::random::Random;
 
 /// The spans of a plan with a window of `room` blocks.
 fn windowed(blocks: &[Block<f64>], room: usize) -> Result<Vec<FeedSpan>, WindowError> {
@@ -42,7 +42,7 @@ fn windowed_from(
 /// A window of twice the stopping length, however the ceilings run: legal, and hardly slower than the whole.
 #[test]
 fn a_window_loses_little_to_the_whole() {
-    let mut random = Random::new(34);
+    let mut random = Random::of_stream(34);
     let mut worst = 0.0_f64;
     for case in 0..200 {
         let mut walk = 50.0;
@@ -76,7 +76,7 @@ fn a_window_loses_little_to_the_whole() {
 /// A program of any length in the same memory.
 #[test]
 fn a_long_program_passes_a_small_window() {
-    let mut random = Random::new(35);
+    let mut random = Random::of_stream(35);
     let blocks: Vec<_> = (0..100_000).map(|_| block(0.1, 20.0 + 60.0 * random.log(0.01, 1.0))).collect();
     let spans = windowed(&blocks, 400).expect("a plan");
     let time_s: f64 = spans.iter().map(|span| span.ramp.duration_s()).sum();
@@ -90,7 +90,7 @@ fn a_long_program_passes_a_small_window() {
 /// Every block with limits of its own, junctions that slow and stop, in windows of any length.
 #[test]
 fn windows_of_random_lists_are_legal() {
-    let mut random = Random::new(36);
+    let mut random = Random::of_stream(36);
     for _ in 0..500 {
         let blocks = random_blocks(&mut random, 120, 1e-3);
         let room = 1 + random.below(40);
@@ -120,7 +120,7 @@ fn a_short_window_is_slow_but_legal() {
 /// From a feed, as live control goes on from one: planned if one pair of ramps a block is, and legal.
 #[test]
 fn a_window_starts_at_a_feed() {
-    let mut random = Random::new(39);
+    let mut random = Random::of_stream(39);
     let (mut made, mut refused, mut per_block) = (0, 0, 0);
     for _ in 0..4000 {
         let blocks = random_blocks(&mut random, 40, 1e-2);
@@ -161,7 +161,7 @@ fn a_window_starts_at_a_feed() {
 /// With hardly any room for spans there still is a plan, or it is said that there is none.
 #[test]
 fn little_room_for_spans() {
-    let mut random = Random::new(40);
+    let mut random = Random::of_stream(40);
     let (mut made, mut refused) = (0, 0);
     for _ in 0..1000 {
         let blocks = random_blocks(&mut random, 60, 1e-2);
@@ -187,7 +187,7 @@ fn little_room_for_spans() {
 /// A bad block is named by its place in the program, however long the window has moved on.
 #[test]
 fn a_bad_block_is_counted_from_the_first() {
-    let mut random = Random::new(42);
+    let mut random = Random::of_stream(42);
     for _ in 0..200 {
         let (bad, room) = (random.below(500), 1 + random.below(40));
         let mut blocks: Vec<_> =

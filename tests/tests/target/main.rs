@@ -19,10 +19,6 @@ mod image;
 mod programs;
 mod tools;
 
-#[path = "../check/mod.rs"]
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
 use std::process::ExitCode;
 use std::sync::Arc;
 

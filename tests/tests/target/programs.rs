@@ -9,8 +9,8 @@ use motion_kernel::num::Fixed;
 use motion_kernel::program::{Header, Item, write};
 use motion_kernel::units::Position;
 
-use crate::check::random::Random;
-use crate::check::{machine, program};
+use motion_tests::check::{machine, program};
+use motion_tests::random::Random;
 
 const STRINGER: &str = include_str!("../../../host/src/cli/stringer.ngc");
 /// Longer ones take the emulators too long [s].

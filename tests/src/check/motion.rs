@@ -40,7 +40,7 @@ struct Comparison {
     steps: [f64; 3],
 }
 
-pub(crate) struct Checker<'a> {
+pub struct Checker<'a> {
     machine: &'a Machine,
     plan: &'a Plan,
     cursor: Cursor<'a>,
@@ -56,11 +56,11 @@ pub(crate) struct Checker<'a> {
     /// Under live control, the greatest feed override that the feed may still be of: motion is not the plan's any more,
     /// but keeps the limits.
     live: Option<f64>,
-    pub(crate) totals: Totals,
+    pub totals: Totals,
 }
 
 impl<'a> Checker<'a> {
-    pub(crate) fn new<R: Number>(machine: &'a Machine, plan: &'a Plan, path: &'a Path, seed: u64) -> Self {
+    pub fn new<R: Number>(machine: &'a Machine, plan: &'a Plan, path: &'a Path, seed: u64) -> Self {
         Self {
             machine,
             plan,
@@ -78,22 +78,22 @@ impl<'a> Checker<'a> {
     }
 
     /// The same for motion under live control, with feed overrides up to `feed_override`.
-    pub(crate) fn live(self, feed_override: f64) -> Self {
+    pub fn live(self, feed_override: f64) -> Self {
         Self { live: Some(feed_override), ..self }
     }
 
     /// From now on the feed may be of an override up to `feed_override`.
-    pub(crate) fn override_up_to(&mut self, feed_override: f64) {
+    pub fn override_up_to(&mut self, feed_override: f64) {
         self.live = Some(feed_override);
     }
 
     /// How far the machine has come, from the program's start [mm].
-    pub(crate) fn s_mm(&self) -> f64 {
+    pub fn s_mm(&self) -> f64 {
         self.before[0]
     }
 
     /// Checks a tick; says what is wrong.
-    pub(crate) fn tick<R: Real>(&mut self, executed: &Executed<R, 3>) -> Result<(), String> {
+    pub fn tick<R: Real>(&mut self, executed: &Executed<R, 3>) -> Result<(), String> {
         self.totals.ticks += 1;
         let motion = &executed.motion;
         let local_mm = motion.s.to_mm();

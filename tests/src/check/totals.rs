@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Totals {
-    pub(crate) programs: u64,
-    pub(crate) moves: u64,
-    pub(crate) ticks: u64,
+pub struct Totals {
+    pub programs: u64,
+    pub moves: u64,
+    pub ticks: u64,
     /// Refused by planning because more would fall into one tick than its bound.
-    pub(crate) refused: BTreeMap<String, u64>,
+    pub refused: BTreeMap<String, u64>,
     /// Found value over its bound, the greatest of all; above 1 a check has failed.
-    pub(crate) worst: BTreeMap<&'static str, (f64, u64)>,
+    pub worst: BTreeMap<&'static str, (f64, u64)>,
 }
 
 impl Totals {
-    pub(crate) fn add(&mut self, other: &Self) {
+    pub fn add(&mut self, other: &Self) {
         self.programs += other.programs;
         self.moves += other.moves;
         self.ticks += other.ticks;
@@ -29,7 +29,7 @@ impl Totals {
         }
     }
 
-    pub(crate) fn worst(&mut self, name: &'static str, ratio: f64, seed: u64) {
+    pub fn worst(&mut self, name: &'static str, ratio: f64, seed: u64) {
         let worst = self.worst.entry(name).or_default();
         if ratio > worst.0 {
             *worst = (ratio, seed);

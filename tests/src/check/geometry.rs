@@ -2,72 +2,72 @@
 
 use std::f64::consts::PI;
 
-pub(crate) type Vector = [f64; 3];
+pub type Vector = [f64; 3];
 
 /// Units of 10⁻¹⁰ mm, the last decimal a program may have.
-pub(crate) const UNITS_PER_MM: f64 = 1e10;
+pub const UNITS_PER_MM: f64 = 1e10;
 
-pub(crate) fn mm(units: i64) -> f64 {
+pub fn mm(units: i64) -> f64 {
     units as f64 / UNITS_PER_MM
 }
 
-pub(crate) fn norm(v: Vector) -> f64 {
+pub fn norm(v: Vector) -> f64 {
     dot(v, v).sqrt()
 }
 
-pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
+pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(crate) fn minus(a: Vector, b: Vector) -> Vector {
+pub fn minus(a: Vector, b: Vector) -> Vector {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// The steps of 2⁻³² mm nearest to a number of units.
-pub(crate) fn position_bits(units: i64) -> i64 {
+pub fn position_bits(units: i64) -> i64 {
     let scaled = i128::from(units) << 33;
     ((scaled / 10_000_000_000 + scaled.signum()) / 2) as i64
 }
 
 /// A move of a program.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Move {
-    pub(crate) from: [i64; 3],
-    pub(crate) to: [i64; 3],
+pub struct Move {
+    pub from: [i64; 3],
+    pub to: [i64; 3],
     /// None for a line.
-    pub(crate) arc: Option<Arc>,
+    pub arc: Option<Arc>,
     /// Programmed feed \[mm/min\]; infinite for a rapid.
-    pub(crate) feed_mm_min: f64,
+    pub feed_mm_min: f64,
 }
 
 /// What makes a move an arc or a helix.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Arc {
+pub struct Arc {
     /// First and second axis of the plane, and its normal; right-handed.
-    pub(crate) axes: [usize; 3],
+    pub axes: [usize; 3],
     /// Centre minus start, along the first and second axis.
-    pub(crate) offset: [i64; 2],
-    pub(crate) is_clockwise: bool,
+    pub offset: [i64; 2],
+    pub is_clockwise: bool,
 }
 
 /// A point of the path and its derivatives by arc length.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PathPoint {
-    pub(crate) at: Vector,
-    pub(crate) tangent: Vector,
-    pub(crate) second: Vector,
-    pub(crate) third: Vector,
+pub struct PathPoint {
+    pub at: Vector,
+    pub tangent: Vector,
+    pub second: Vector,
+    pub third: Vector,
     /// Magnitudes of the three derivatives, of a polynomial of the terms that they are sums of.
-    pub(crate) sizes: [f64; 3],
+    pub sizes: [f64; 3],
 }
 
 /// A move made ready to be evaluated.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Element {
-    pub(crate) length_mm: f64,
+pub struct Element {
+    pub length_mm: f64,
     from: Vector,
     /// Radius, 0 for a line, and what it grows by until the end (the rounding of the programmed end).
-    pub(crate) radius_mm: f64,
+    pub radius_mm: f64,
     grows_mm: f64,
     sweep_rad: f64,
     outward: Vector,
@@ -80,7 +80,7 @@ pub(crate) struct Element {
 
 impl Element {
     /// A line as compiled.
-    pub(crate) fn line(from: Vector, direction: Vector, length_mm: f64) -> Self {
+    pub fn line(from: Vector, direction: Vector, length_mm: f64) -> Self {
         Self {
             length_mm,
             from,
@@ -95,12 +95,12 @@ impl Element {
     }
 
     /// A curve as compiled. It has no radius of its own.
-    pub(crate) fn polynomial(from: Vector, coefficients: [[f64; 7]; 3], length_mm: f64) -> Self {
+    pub fn polynomial(from: Vector, coefficients: [[f64; 7]; 3], length_mm: f64) -> Self {
         let line = Self::line(from, [0.0; 3], length_mm);
         Self { radius_mm: f64::INFINITY, coefficients: Some(coefficients), ..line }
     }
 
-    pub(crate) fn new(step: &Move) -> Self {
+    pub fn new(step: &Move) -> Self {
         let from = step.from.map(mm);
         let whole: Vector = core::array::from_fn(|axis| mm(step.to[axis] - step.from[axis]));
         let Some(arc) = step.arc else {
@@ -135,7 +135,7 @@ impl Element {
     }
 
     /// By how much an arc leans outwards because its ends differ in radius.
-    pub(crate) fn slant_rad(&self) -> f64 {
+    pub fn slant_rad(&self) -> f64 {
         if self.radius_mm * self.sweep_rad > 0.0 {
             self.grows_mm.abs() / (self.radius_mm * self.sweep_rad)
         } else {
@@ -144,7 +144,7 @@ impl Element {
     }
 
     /// `s_mm` from its start.
-    pub(crate) fn at(&self, s_mm: f64) -> PathPoint {
+    pub fn at(&self, s_mm: f64) -> PathPoint {
         let still = [0.0; 3];
         if let Some(coefficients) = &self.coefficients {
             return self.on_polynomial(coefficients, s_mm / self.length_mm);
@@ -199,7 +199,7 @@ impl Element {
 }
 
 /// Angle between the directions at a junction \[rad\], and the step of the curvature vector \[1/mm\].
-pub(crate) fn junction(before: &Element, after: &Element) -> (f64, f64) {
+pub fn junction(before: &Element, after: &Element) -> (f64, f64) {
     let (end, start) = (before.at(before.length_mm), after.at(0.0));
     let chord = norm(minus(end.tangent, start.tangent));
     (2.0 * (0.5 * chord).min(1.0).asin(), norm(minus(end.second, start.second)))

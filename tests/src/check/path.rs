@@ -10,38 +10,38 @@ use motion_kernel::units::Position;
 
 /// A move on its stretch.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
-    pub(crate) element: Element,
+pub struct Placed {
+    pub element: Element,
     /// From the stretch's start [mm].
-    pub(crate) start_mm: f64,
-    pub(crate) feed_mm_s: f64,
+    pub start_mm: f64,
+    pub feed_mm_s: f64,
     /// Index of the move, and so of the plan's block.
-    pub(crate) block: usize,
+    pub block: usize,
     /// Angle [rad] and step of curvature [1/mm] at its start, if the motion does not stop there.
-    pub(crate) junction: Option<(f64, f64)>,
+    pub junction: Option<(f64, f64)>,
 }
 
 /// From full stop to full stop.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Stretch {
-    pub(crate) moves: Vec<Placed>,
-    pub(crate) length_mm: f64,
+pub struct Stretch {
+    pub moves: Vec<Placed>,
+    pub length_mm: f64,
     /// Exact end, in steps of 2⁻³² mm.
-    pub(crate) end_bits: [i64; 3],
+    pub end_bits: [i64; 3],
 }
 
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Path {
-    pub(crate) stretches: Vec<Stretch>,
-    pub(crate) dwell_s: f64,
-    pub(crate) dwells: u64,
-    pub(crate) stops: u64,
+pub struct Path {
+    pub stretches: Vec<Stretch>,
+    pub dwell_s: f64,
+    pub dwells: u64,
+    pub stops: u64,
     /// A junction's angle is so close to the machine's that rounding decides whether it stops there.
-    pub(crate) is_ambiguous: bool,
+    pub is_ambiguous: bool,
 }
 
 impl Path {
-    pub(crate) fn new(program: &Generated, machine: &Machine) -> Self {
+    pub fn new(program: &Generated, machine: &Machine) -> Self {
         let mut path = Self::default();
         let mut open = Stretch::default();
         let mut block = 0;
@@ -93,7 +93,7 @@ impl Path {
 
     /// The path of a plan as compiled, where what is programmed is not what is driven: with blends. Those are held
     /// against the program elsewhere.
-    pub(crate) fn compiled(plan: &Plan, executable: &Executable) -> Self {
+    pub fn compiled(plan: &Plan, executable: &Executable) -> Self {
         let mut path = Self::default();
         let mut items = executable.items.iter();
         let mut first = 0;
@@ -161,28 +161,28 @@ impl Path {
         }
     }
 
-    pub(crate) fn length_mm(&self) -> f64 {
+    pub fn length_mm(&self) -> f64 {
         self.stretches.iter().map(|stretch| stretch.length_mm).sum()
     }
 }
 
 /// Walks a path forward.
 #[derive(Clone, Debug)]
-pub(crate) struct Cursor<'a> {
+pub struct Cursor<'a> {
     path: &'a Path,
     stretch: usize,
     index: usize,
     /// Length of the stretches before.
-    pub(crate) before_mm: f64,
+    pub before_mm: f64,
 }
 
 impl<'a> Cursor<'a> {
-    pub(crate) fn new(path: &'a Path) -> Self {
+    pub fn new(path: &'a Path) -> Self {
         Self { path, stretch: 0, index: 0, before_mm: 0.0 }
     }
 
     /// The move that contains `s_mm` of a stretch; none after the last stretch.
-    pub(crate) fn seek(&mut self, stretch: usize, s_mm: f64) -> Option<&'a Placed> {
+    pub fn seek(&mut self, stretch: usize, s_mm: f64) -> Option<&'a Placed> {
         while self.stretch < stretch {
             self.before_mm += self.path.stretches.get(self.stretch)?.length_mm;
             self.stretch += 1;
@@ -196,14 +196,14 @@ impl<'a> Cursor<'a> {
     }
 
     /// The move found last and what lies around it on the stretch.
-    pub(crate) fn neighbours(&self) -> &'a [Placed] {
+    pub fn neighbours(&self) -> &'a [Placed] {
         let moves = self.path.stretches.get(self.stretch).map_or(&[][..], |stretch| &stretch.moves);
         let from = self.index.saturating_sub(20).min(moves.len());
         &moves[from..(self.index + 2).min(moves.len())]
     }
 
     /// The moves that contain `s_mm` but for rounding: the one found last, and at a junction others.
-    pub(crate) fn near(&self, s_mm: f64, rounding_mm: f64) -> impl Iterator<Item = &'a Placed> {
+    pub fn near(&self, s_mm: f64, rounding_mm: f64) -> impl Iterator<Item = &'a Placed> {
         let holds = move |placed: &Placed, margin_mm: f64| {
             let local_mm = s_mm - placed.start_mm;
             local_mm >= -margin_mm && local_mm <= placed.element.length_mm + margin_mm
@@ -219,7 +219,7 @@ impl<'a> Cursor<'a> {
 }
 
 impl Placed {
-    pub(crate) fn at(&self, s_mm: f64) -> PathPoint {
+    pub fn at(&self, s_mm: f64) -> PathPoint {
         self.element.at(s_mm - self.start_mm)
     }
 }

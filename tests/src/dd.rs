@@ -5,13 +5,13 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `hi + lo`, |lo| ≤ half an ulp of `hi`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-pub(crate) struct Dd {
-    pub(crate) hi: f64,
-    pub(crate) lo: f64,
+pub struct Dd {
+    pub hi: f64,
+    pub lo: f64,
 }
 
 /// A double as it is.
-pub(crate) fn dd(value: f64) -> Dd {
+pub fn dd(value: f64) -> Dd {
     Dd { hi: value, lo: 0.0 }
 }
 
@@ -40,18 +40,18 @@ fn two_product(a: f64, b: f64) -> Dd {
 }
 
 impl Dd {
-    pub(crate) const ZERO: Self = Self { hi: 0.0, lo: 0.0 };
-    pub(crate) const PI: Self = Self { hi: std::f64::consts::PI, lo: 1.224_646_799_147_353_2e-16 };
+    pub const ZERO: Self = Self { hi: 0.0, lo: 0.0 };
+    pub const PI: Self = Self { hi: std::f64::consts::PI, lo: 1.224_646_799_147_353_2e-16 };
 
-    pub(crate) fn abs(self) -> Self {
+    pub fn abs(self) -> Self {
         if self.hi < 0.0 { -self } else { self }
     }
 
-    pub(crate) fn min(self, other: Self) -> Self {
+    pub fn min(self, other: Self) -> Self {
         if other < self { other } else { self }
     }
 
-    pub(crate) fn sqrt(self) -> Self {
+    pub fn sqrt(self) -> Self {
         if self.hi <= 0.0 {
             return Self::ZERO;
         }
@@ -59,7 +59,7 @@ impl Dd {
         root + (self - root * root) / dd(2.0 * root.hi)
     }
 
-    pub(crate) fn cbrt(self) -> Self {
+    pub fn cbrt(self) -> Self {
         if self.hi == 0.0 {
             return Self::ZERO;
         }
@@ -70,7 +70,7 @@ impl Dd {
         root
     }
 
-    pub(crate) fn to_f64(self) -> f64 {
+    pub fn to_f64(self) -> f64 {
         self.hi
     }
 }

@@ -20,16 +20,11 @@ use super::totals::Totals;
 /// Longer plans are not executed [ticks].
 const TICKS_MAX: f64 = 150_000.0;
 /// A board's capacities.
-pub(crate) const PIECES: usize = 64;
-pub(crate) const SEGMENTS: usize = 64;
+pub const PIECES: usize = 64;
+pub const SEGMENTS: usize = 64;
 
 /// Reads and plans; none if planning refuses it for its density.
-pub(crate) fn plan(
-    text: &str,
-    machine: &Machine,
-    mode: Mode,
-    totals: &mut Totals,
-) -> Result<Option<Plan>, String> {
+pub fn plan(text: &str, machine: &Machine, mode: Mode, totals: &mut Totals) -> Result<Option<Plan>, String> {
     let program = gcode::read("random.ngc", text.as_bytes()).map_err(|error| error.to_string())?;
     match plan_program("random.ngc", &program, machine, mode) {
         Ok(plan) => Ok(Some(plan)),
@@ -46,7 +41,7 @@ pub(crate) fn plan(
 }
 
 /// Plans and executes a program; every tick is checked.
-pub(crate) fn execute<R: Number>(
+pub fn execute<R: Number>(
     program: &Generated,
     machine: &Machine,
     mode: Mode,
@@ -120,7 +115,7 @@ pub(crate) fn execute<R: Number>(
     Ok(totals)
 }
 
-pub(crate) fn is_beyond_fixed_point(problem: &Problem) -> bool {
+pub fn is_beyond_fixed_point(problem: &Problem) -> bool {
     matches!(
         problem,
         Problem::Segment { error: SegmentError::OutOfRange { .. }, .. }
@@ -129,7 +124,7 @@ pub(crate) fn is_beyond_fixed_point(problem: &Problem) -> bool {
 }
 
 /// The plan has the program's moves.
-pub(crate) fn same_lengths(plan: &Plan, path: &Path) -> Result<(), String> {
+pub fn same_lengths(plan: &Plan, path: &Path) -> Result<(), String> {
     let moves: Vec<_> = path.stretches.iter().flat_map(|stretch| &stretch.moves).collect();
     if moves.len() != plan.blocks.len() {
         return Err(format!("{} blocks planned, {} moves programmed", plan.blocks.len(), moves.len()));
@@ -149,7 +144,7 @@ pub(crate) fn same_lengths(plan: &Plan, path: &Path) -> Result<(), String> {
 }
 
 /// The machine rests exactly where the program says, to a step of 2⁻³² mm.
-pub(crate) fn at_end(path: &Path, stretch: usize, position: &[Position; 3]) -> Result<(), String> {
+pub fn at_end(path: &Path, stretch: usize, position: &[Position; 3]) -> Result<(), String> {
     let end =
         path.stretches.get(stretch).ok_or_else(|| format!("stretch {stretch} was not programmed"))?.end_bits;
     for (found, exact) in position.iter().zip(end) {

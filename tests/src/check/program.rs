@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 
 use super::geometry::{Arc, Element, Move, UNITS_PER_MM, mm};
-use super::random::Random;
+use crate::random::Random;
 
 /// One thing a program asks for.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Asked {
+pub enum Asked {
     Move(Move),
     Dwell(f64),
     Stop,
@@ -16,9 +16,9 @@ pub(crate) enum Asked {
 
 /// A program as text, and what it asks for.
 #[derive(Clone, Debug)]
-pub(crate) struct Generated {
-    pub(crate) text: String,
-    pub(crate) asked: Vec<Asked>,
+pub struct Generated {
+    pub text: String,
+    pub asked: Vec<Asked>,
 }
 
 /// Programs stay within this cube [mm].
@@ -43,8 +43,8 @@ struct Writer<'a> {
 }
 
 /// A program of `fragments` groups of moves for a machine whose greatest feed is `feed_max_mm_s`.
-pub(crate) fn generate(random: &mut Random, fragments: usize, feed_max_mm_s: f64) -> Generated {
-    let move_s = random.log_between(0.02, 3.0);
+pub fn generate(random: &mut Random, fragments: usize, feed_max_mm_s: f64) -> Generated {
+    let move_s = random.log(0.02, 3.0);
     let mut writer = Writer {
         program: Generated { text: "G17 G21 G90\n".to_owned(), asked: Vec::new() },
         at: [0; 3],
@@ -66,7 +66,7 @@ pub(crate) fn generate(random: &mut Random, fragments: usize, feed_max_mm_s: f64
 }
 
 /// A program of lines from the origin through `points`, at one feed.
-pub(crate) fn lines(points: &[[i64; 3]], feed_mm_min: f64) -> Generated {
+pub fn lines(points: &[[i64; 3]], feed_mm_min: f64) -> Generated {
     let mut program = Generated { text: format!("F{feed_mm_min}\n"), asked: Vec::new() };
     let mut from = [0; 3];
     for &to in points {
@@ -81,7 +81,7 @@ pub(crate) fn lines(points: &[[i64; 3]], feed_mm_min: f64) -> Generated {
 impl Writer<'_> {
     fn fragment(&mut self) {
         if self.random.chance(0.7) {
-            self.feed_mm_min = self.random.log_between(0.1, 1e5);
+            self.feed_mm_min = self.random.log(0.1, 1e5);
         }
         self.is_rapid = self.random.chance(0.15);
         if self.random.chance(0.1) {
@@ -102,12 +102,12 @@ impl Writer<'_> {
             8 => {
                 for _ in 0..self.random.below(12) {
                     let direction = self.direction();
-                    let length_mm = self.random.log_between(1e-3, 2.0);
+                    let length_mm = self.random.log(1e-3, 2.0);
                     self.line(direction, length_mm);
                 }
             }
             _ if self.random.chance(0.5) => {
-                let text = format!("{:.6}", self.random.log_between(1e-5, 0.3));
+                let text = format!("{:.6}", self.random.log(1e-5, 0.3));
                 let _ = writeln!(self.program.text, "G4 P{text}");
                 self.program.asked.push(Asked::Dwell(text.parse().expect("a number")));
             }
@@ -119,7 +119,7 @@ impl Writer<'_> {
     }
 
     fn length(&mut self, least_mm: f64) -> f64 {
-        self.random.log_between(least_mm, self.longest_mm)
+        self.random.log(least_mm, self.longest_mm)
     }
 
     fn direction(&mut self) -> [f64; 3] {
@@ -170,7 +170,7 @@ impl Writer<'_> {
 
     fn circle(&mut self) {
         self.plane = self.random.below(3);
-        let radius_mm = self.random.log_between(2e-3, 0.4 * self.longest_mm);
+        let radius_mm = self.random.log(2e-3, 0.4 * self.longest_mm);
         let angle = self.random.between(0.0, 2.0 * PI);
         let sweep = if self.random.chance(0.3) { 2.0 * PI } else { self.random.between(0.01, 6.2) };
         let rise = if self.random.chance(0.5) { radius_mm * self.random.between(-3.0, 3.0) } else { 0.0 };
@@ -194,14 +194,14 @@ impl Writer<'_> {
                 let length_mm = self.length(1e-2);
                 self.line(direction, length_mm);
             } else {
-                let radius_mm = self.random.log_between(1e-2, 0.4 * self.longest_mm);
-                let sweep = self.random.log_between(0.02, 5.0);
+                let radius_mm = self.random.log(1e-2, 0.4 * self.longest_mm);
+                let sweep = self.random.log(0.02, 5.0);
                 let is_clockwise = self.random.chance(0.5);
                 let inward = if is_clockwise { [y, -x] } else { [-y, x] };
                 self.arc(radius_mm, inward, sweep, is_clockwise, 0.0);
             }
             if self.random.chance(0.2) {
-                self.feed_mm_min = self.random.log_between(10.0, 1e5);
+                self.feed_mm_min = self.random.log(10.0, 1e5);
             }
         }
     }
@@ -209,15 +209,15 @@ impl Writer<'_> {
     /// Many short lines with small angles between them.
     fn polyline(&mut self) {
         let mut direction = self.random.direction();
-        let length_mm = self.random.log_between(1e-3, 2.0);
-        let angle = self.random.log_between(1e-7, 2e-2);
+        let length_mm = self.random.log(1e-3, 2.0);
+        let angle = self.random.log(1e-7, 2e-2);
         let is_even = self.random.chance(0.5);
         for _ in 0..10 + self.random.below(100) {
             let aside = self.random.direction();
             let bent: [f64; 3] = core::array::from_fn(|axis| direction[axis] + angle * aside[axis]);
             let size = bent.iter().map(|c| c * c).sum::<f64>().sqrt();
             direction = bent.map(|c| c / size);
-            let share = if is_even { 1.0 } else { self.random.log_between(0.1, 1.0) };
+            let share = if is_even { 1.0 } else { self.random.log(0.1, 1.0) };
             self.line(direction, length_mm * share);
         }
     }
@@ -225,7 +225,7 @@ impl Writer<'_> {
     /// A line in equal parts, exactly.
     fn equal_parts(&mut self) {
         let direction = self.direction();
-        let length_mm = self.random.log_between(1e-3, 1.0);
+        let length_mm = self.random.log(1e-3, 1.0);
         let parts = 2 + self.random.below(80) as i64;
         let to = self.end_of(direction, length_mm);
         let step: [i64; 3] = core::array::from_fn(|axis| to[axis] - self.at[axis]);

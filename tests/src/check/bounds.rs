@@ -5,7 +5,7 @@
 use motion_kernel::num::{Fixed, Real};
 
 /// How a number type rounds.
-pub(crate) trait Number: Real {
+pub trait Number: Real {
     /// Part of itself by which a scaled value is rounded: ε of a float; in fixed point the step of the
     /// normalised quantities that scale it.
     const RELATIVE: f64;
@@ -32,36 +32,36 @@ impl Number for Fixed {
 /// Acceleration, jerk and snap along the path may exceed their limits by this many ε of themselves: the
 /// scale of a ramp is rounded once, its shape reaches 1/2, 1 and 1 within 2 ε, and their product is
 /// rounded again.
-pub(crate) const LIMIT_ROUNDING: f64 = 4.0;
+pub const LIMIT_ROUNDING: f64 = 4.0;
 /// The same in f64, where the decimal places of the limits count too.
-pub(crate) const LIMIT_SHARE: f64 = 1e-9;
+pub const LIMIT_SHARE: f64 = 1e-9;
 
 /// Values of one tick against what the tick before predicts: so many ε of the terms that were added.
 /// The normalised time of a phase is rounded to ε/2, and the shapes change by up to π per unit of it.
-pub(crate) const CONTINUITY_ROUNDING: f64 = 8.0;
+pub const CONTINUITY_ROUNDING: f64 = 8.0;
 /// The path position against its prediction: the two ends of every segment are rounded to position steps,
 /// and a ramp's own length may be this far from the path it covers [mm].
-pub(crate) const LENGTH_ROUNDING_MM: f64 = 1.2e-8;
+pub const LENGTH_ROUNDING_MM: f64 = 1.2e-8;
 
 /// How far rounding may set the path position back where the motion is slower than it [mm]: a few position
 /// steps, and twice the error of the sine's part of a ramp's length, Jp·t₁³/(16π³). The sine is 4π times the
 /// acceleration's shape, so it has 4π times that one's rounding, of about 2 `relative`.
-pub(crate) fn backward_mm(relative: f64, jerk_t1_cubed_mm: f64) -> f64 {
+pub fn backward_mm(relative: f64, jerk_t1_cubed_mm: f64) -> f64 {
     2e-9 + 2.0 * 2.0 * 12.6 * relative * jerk_t1_cubed_mm / 496.1
 }
 
 /// Set positions against the programmed path [mm]: the curves' tolerance, a hundredth of a count of 0.1 µm …
-pub(crate) const CURVE_MM: f64 = 1e-6;
+pub const CURVE_MM: f64 = 1e-6;
 /// … and the offset from the start of a piece, of at most `PIECE_MM_MAX`: direction, length and product
 /// are each rounded to ε/2.
-pub(crate) fn position_mm<R: Number>() -> f64 {
+pub fn position_mm<R: Number>() -> f64 {
     CURVE_MM + 1.5 * R::RELATIVE * R::PIECE_MM_MAX.min(16.0) + 1e-9
 }
 
 /// Velocity, acceleration and jerk of the axes against the chain rule on the programmed path, as a part of
 /// the sum of the magnitudes of its terms. Septic pieces of up to 45° of arc; derivatives of
 /// higher order are less well approximated.
-pub(crate) const AXIS_SHARES: [f64; 3] = [4e-6, 5e-6, 2e-5];
+pub const AXIS_SHARES: [f64; 3] = [4e-6, 5e-6, 2e-5];
 
 /// What fixed point adds to that, in [`Number::STEP`]s. A septic's coefficients and what is made of them
 /// are parts of the piece's length, in units of 2⁻²⁹ = 8 steps. Half a unit for each coefficient (k,
@@ -70,7 +70,7 @@ pub(crate) const AXIS_SHARES: [f64; 3] = [4e-6, 5e-6, 2e-5];
 /// derivative; the products are rounded to one step each, and so is 1/L, of which v/L has v-fold the error.
 /// The place in the piece is off by two units. √3 of
 /// that for the vector of three axes. `bend` and `twist` are κ and κ', `piece_mm` is L.
-pub(crate) fn axis_steps([v, a, j]: [f64; 3], bend: f64, twist: f64, piece_mm: f64) -> [f64; 3] {
+pub fn axis_steps([v, a, j]: [f64; 3], bend: f64, twist: f64, piece_mm: f64) -> [f64; 3] {
     if bend <= 0.0 {
         return [3.0; 3];
     }

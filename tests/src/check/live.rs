@@ -15,13 +15,13 @@ use super::motion::Checker;
 use super::path::Path;
 use super::totals::Totals;
 
-pub(crate) const PIECES: usize = 64;
-pub(crate) const SEGMENTS: usize = 16;
-pub(crate) const PLACES: usize = 64;
+pub const PIECES: usize = 64;
+pub const SEGMENTS: usize = 16;
+pub const PLACES: usize = 64;
 
 /// What a script does between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Command {
+pub enum Command {
     Hold,
     Resume,
     Override(f64),
@@ -32,37 +32,37 @@ pub(crate) enum Command {
 }
 
 /// What a script sees of the tick that was.
-pub(crate) struct Seen<'a, R: Number> {
-    pub(crate) ticks: u64,
-    pub(crate) state: State,
-    pub(crate) executed: &'a Executed<R, 3>,
+pub struct Seen<'a, R: Number> {
+    pub ticks: u64,
+    pub state: State,
+    pub executed: &'a Executed<R, 3>,
 }
 
 /// What is run.
 #[derive(Clone, Copy)]
-pub(crate) struct Setup<'a> {
-    pub(crate) plan: &'a Plan,
-    pub(crate) path: &'a Path,
-    pub(crate) machine: &'a Machine,
-    pub(crate) seed: u64,
+pub struct Setup<'a> {
+    pub plan: &'a Plan,
+    pub path: &'a Path,
+    pub machine: &'a Machine,
+    pub seed: u64,
     /// After so many ticks with a background the feed is that of no earlier override, where that is known; the greatest one
     /// otherwise.
-    pub(crate) response_ticks: u64,
+    pub response_ticks: u64,
 }
 
 /// A run that came to its end.
 #[derive(Debug)]
-pub(crate) struct Run {
-    pub(crate) totals: Totals,
-    pub(crate) ticks: u64,
-    pub(crate) state: State,
-    pub(crate) starvations: u32,
+pub struct Run {
+    pub totals: Totals,
+    pub ticks: u64,
+    pub state: State,
+    pub starvations: u32,
     /// How often motion came to rest, at its end too.
-    pub(crate) rests: u64,
+    pub rests: u64,
     /// Commands given, without [`Command::Stall`].
-    pub(crate) commands: u64,
+    pub commands: u64,
     /// Where the machine stands [mm].
-    pub(crate) s_mm: f64,
+    pub s_mm: f64,
 }
 
 /// The greatest of the latest values.
@@ -87,7 +87,7 @@ impl Greatest {
 }
 
 /// Executes a plan whose items are all there; `script` is asked for a command before every tick.
-pub(crate) fn execute<R: Number>(
+pub fn execute<R: Number>(
     setup: &Setup<'_>,
     script: &mut dyn FnMut(&Seen<'_, R>) -> Option<Command>,
 ) -> Result<Run, String> {
@@ -96,7 +96,7 @@ pub(crate) fn execute<R: Number>(
 }
 
 /// Executes the items of a plan as they come from `source`.
-pub(crate) fn execute_from<R: Number, S: Source<3>>(
+pub fn execute_from<R: Number, S: Source<3>>(
     setup: &Setup<'_>,
     source: S,
     script: &mut dyn FnMut(&Seen<'_, R>) -> Option<Command>,

@@ -1,12 +1,12 @@
-//! Lists of blocks by which planning is timed: from those that cost nothing to those where every ceiling is in the way.
+//! Lists of blocks by which the cost of planning is measured: from those that cost nothing to those where every ceiling is in the way.
 
 use motion_kernel::law::{Law, Limits};
 use motion_kernel::plan::Block;
 
-use super::support::Random;
+use crate::random::Random;
 
 /// S1's limits.
-pub(crate) fn reference() -> Law<f64> {
+pub fn reference() -> Law<f64> {
     law(Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 })
 }
 
@@ -14,13 +14,14 @@ fn law(limits: Limits<f64>) -> Law<f64> {
     Law::new(limits).expect("positive")
 }
 
-pub(crate) fn block(length_mm: f64, cap_mm_s: f64) -> Block<f64> {
+/// A block of the reference law that stops at neither end.
+pub fn block(length_mm: f64, cap_mm_s: f64) -> Block<f64> {
     Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law: reference() }
 }
 
 /// The lists, of `count` blocks each, with their names.
-pub(crate) fn lists(count: usize) -> Vec<(&'static str, Vec<Block<f64>>)> {
-    let mut random = Random::new(52);
+pub fn lists(count: usize) -> Vec<(&'static str, Vec<Block<f64>>)> {
+    let mut random = Random::of_stream(52);
     let mut walk = |length_mm: f64| {
         let mut feed: f64 = 50.0;
         let mut list = Vec::with_capacity(count);

@@ -1,0 +1,15 @@
+//! Random programs and machines, and what is checked about their execution, shared by the tests.
+//!
+//! Nothing here uses the kernel's feed law, the toolpath's curves or the G-code reader's geometry: what
+//! a program means is known from how it was generated, and motion is checked against itself.
+
+pub mod bench;
+pub mod bounds;
+pub mod drive;
+pub mod geometry;
+pub mod live;
+pub mod machine;
+pub mod motion;
+pub mod path;
+pub mod program;
+pub mod totals;
