@@ -1,6 +1,6 @@
 //! Counters with a single writer.
 
-use super::atomic::{AtomicU32, Ordering};
+use super::handover::{AtomicU32, Ordering};
 
 /// Adds one. There is a single writer, so that cores without read-modify-write instructions count too.
 pub(super) fn count(counter: &AtomicU32) {

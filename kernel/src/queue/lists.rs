@@ -1,9 +1,8 @@
 //! The tick's end of the feed lists: follows the changes that the background asks for, or refuses them, and empties what
 //! it gave up.
 
-use heapless::spsc::Consumer;
-
 use super::change::{Change, LISTS, ListPlace};
+use super::handover::Consumer;
 use super::item::FeedItem;
 use super::mailbox::Mailbox;
 use crate::law::{Phase, Ticks};

@@ -1,8 +1,8 @@
 //! The words that background and tick write for one another.
 
-use super::atomic::{AtomicU32, Ordering};
 use super::change::{Change, ListPlace, Progress};
 use super::counter::count;
+use super::handover::{AtomicU32, Ordering};
 use crate::law::{Phase, Ticks};
 
 /// The mailbox between the two.

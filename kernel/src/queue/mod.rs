@@ -9,7 +9,7 @@
 //! of their own; [`Feeder::end_stretch`] enters the two together and only if both streams have
 //! measured the same length.
 
-mod atomic;
+mod handover;
 mod counter;
 
 mod accept;

@@ -2,7 +2,7 @@
 
 use heapless::spsc::Producer;
 
-use super::atomic::{AtomicU32, Ordering};
+use super::handover::{AtomicU32, Ordering};
 
 /// Always true. A queue takes remainders by its places, and where the compiler does not know that there are any it links
 /// a panic; their number less one is the capacity.
