@@ -9,7 +9,7 @@
 //! ```text
 //!   background                                   what it hands on
 //!   ──────────                                   ────────────────
-//!   plan    ceilings, junctions, look-ahead         Block, BlockPlan, FeedSpan
+//!   plan    ceilings, junctions, look-ahead         Block, Path, PlannedRamp
 //!   law     ramps; inverse problems              Ramp ─► FeedSegment ┐ two streams that measure
 //!   path    lines and septic pieces              Piece ──────────────┤ the same path length
 //!                                                                    │
@@ -38,7 +38,7 @@
 //! use motion_kernel::exec::{ExecState, Executor};
 //! use motion_kernel::law::{Law, Limits};
 //! use motion_kernel::path::Piece;
-//! use motion_kernel::plan::{Block, BlockPlan, plan, segments};
+//! use motion_kernel::plan::{Block, BlockPlan, plan, ramps};
 //! use motion_kernel::queue::{PathRules, Streams};
 //! use motion_kernel::units::Position;
 //!
@@ -58,8 +58,8 @@
 //! let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
 //! let mut streams = Streams::<f32, 1, 8, 8>::new();
 //! let (mut feeder, mut intake) = streams.split(rules, [at(0.0)]);
-//! for segment in segments(&block, &plans[0], at(0.0), at(20.0), 0.0005).unwrap().into_iter().flatten() {
-//!     feeder.segment(segment).unwrap();
+//! for ramp in ramps(&block, &plans[0], at(0.0), at(20.0), 0.0005).unwrap().into_iter().flatten() {
+//!     feeder.segment(ramp.segment(0.0005).unwrap()).unwrap();
 //! }
 //! feeder.piece(Piece::line(1, [at(0.0)], [1.0], at(10.0)).unwrap()).unwrap();
 //! feeder.piece(Piece::line(1, [at(10.0)], [1.0], at(10.0)).unwrap()).unwrap();

@@ -7,9 +7,9 @@
 
 use core::convert::Infallible;
 
-use crate::law::{Law, LimitError, Limits, Ramp, SegmentError};
+use crate::law::{Law, LimitError, Limits, PlannedRamp, SegmentError};
 use crate::num::Root;
-use crate::plan::{Block, BlockPlan, plan, segments};
+use crate::plan::{Block, BlockPlan, plan};
 use crate::program::{Allowed, Item, PathBlock};
 use crate::units::Position;
 
@@ -66,7 +66,7 @@ pub struct Straight<const AXES: usize> {
     /// How far pieces and feed are given out.
     path: Position,
     feed: Position,
-    ramps: [Option<(Ramp<f64>, Position)>; 3],
+    ramps: [Option<PlannedRamp>; 3],
     is_ended: bool,
 }
 
@@ -103,11 +103,8 @@ impl<const AXES: usize> Straight<AXES> {
             // From rest to rest there always is a plan.
             let _ = plan(&[planned], 0.0, 0.0, &mut plans);
             let [of_block] = plans;
-            let made = segments::<f64, f64>(&planned, &of_block, Position::ZERO, length, tick_s);
-            ramps = made.map_err(StraightError::Segment)?.map(|segment| {
-                let segment = segment?;
-                Some((*segment.as_ramp(), segment.length()))
-            });
+            let made = crate::plan::ramps(&planned, &of_block, Position::ZERO, length, tick_s);
+            ramps = made.map_err(StraightError::Segment)?;
             let allowed = |cap_mm_s| Allowed { cap_mm_s, limits };
             block = Some(PathBlock::new(length, feed_mm_s, allowed(feed_mm_s), allowed(most_mm_s), 0.0));
         }
@@ -155,9 +152,9 @@ impl<const AXES: usize> Iterator for Straight<AXES> {
             self.path = self.path + length;
             return Some(Ok(Item::Line { line: 0, start, direction: self.direction, length }));
         }
-        if let Some((ramp, length)) = self.ramps.iter_mut().find_map(Option::take) {
-            self.feed = self.feed + length;
-            return Some(Ok(Item::Feed { ramp, length }));
+        if let Some(ramp) = self.ramps.iter_mut().find_map(Option::take) {
+            self.feed = self.feed + ramp.length;
+            return Some(Ok(Item::Feed(ramp)));
         }
         if core::mem::replace(&mut self.is_ended, true) {
             return None;
@@ -202,7 +199,7 @@ mod tests {
             let feed_mm_s = random.log(1.0, RULES.feed_mm_s);
             let way = Straight::new(start, end, LIMITS, [feed_mm_s; 2], TICK_S).expect("a way");
             let ramps = way.ramps.iter().flatten();
-            let planned_s = ramps.map(|(ramp, _)| ramp.duration_s()).sum::<f64>();
+            let planned_s = ramps.map(|planned| planned.ramp.duration_s()).sum::<f64>();
             let mut streams = LiveStreams::<f64, 3, 64, 16>::new();
             let (mut feeder, mut intake) = streams.split(RULES, start);
             let mut executor = Executor::new(start);

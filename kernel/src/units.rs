@@ -20,6 +20,13 @@ const STEPS_PER_MM: f64 = 4_294_967_296.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Position(I32F32);
 
+#[cfg(feature = "defmt")]
+impl defmt::Format for Position {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=f64} mm", self.to_mm());
+    }
+}
+
 impl Position {
     /// The origin.
     pub const ZERO: Self = Self(I32F32::ZERO);

@@ -53,8 +53,8 @@ fn main() {
 /// The time of planning a list \[s\].
 fn planned_s(blocks: &[Block<f64>], places: &mut [Node]) -> f64 {
     time_s(|| {
-        let planned = plan_spanning(black_box(blocks), 0.0, 0.0, places, &mut |span| {
-            black_box(span);
+        let planned = plan_spanning(black_box(blocks), 0.0, 0.0, places, &mut |start_mm, ramp| {
+            black_box((start_mm, ramp));
         });
         assert!(planned.is_ok_and(|time_s| time_s.is_some()), "no plan");
     })

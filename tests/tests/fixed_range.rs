@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use motion_host::machine::Machine;
 use motion_host::toolpath::curve::Spiral;
 use motion_host::toolpath::septic::fit;
-use motion_kernel::law::{Limits, PathMotion, Ramp};
+use motion_kernel::law::{Limits, PathMotion, PlannedRamp, Ramp};
 use motion_kernel::num::{Fixed, Real, Scalar};
 use motion_kernel::path::{Piece, PieceError};
 use motion_kernel::program::{self, CheckError, Header, Item, SupplyError};
@@ -49,7 +49,7 @@ fn to_the_curve(
         Position::from_bits((i128::from(way.to_bits()) * i128::from(part) / i128::from(parts)) as i64)
     };
     let at = |s: Position| direction.map(|d| mm(d * s.to_mm()));
-    let mut items = vec![Item::Feed { ramp, length: way }];
+    let mut items = vec![Item::Feed(PlannedRamp { ramp, length: way })];
     for part in 0..parts {
         let (from, to) = (on_way(part), on_way(part + 1));
         items.push(Item::Line { line: 1, start: at(from), direction, length: to - from });
@@ -57,7 +57,7 @@ fn to_the_curve(
     items.push(Item::Septic { line: 1, start: at(way), coefficients, length });
     let t2_s = length.to_mm() / feed_mm_s;
     let cruise = Ramp { from_mm_s: feed_mm_s, t1_s: 0.0, t2_s, peak_jerk_mm_s3: 0.0, ..ramp };
-    items.push(Item::Feed { ramp: cruise, length });
+    items.push(Item::Feed(PlannedRamp { ramp: cruise, length }));
     items
 }
 

@@ -8,7 +8,7 @@ use std::fmt::Write;
 
 use motion_host::gcode;
 use motion_host::machine::Machine;
-use motion_host::planning::{Executable, FeedRecord, Mode, Plan, plan_program};
+use motion_host::planning::{Executable, Mode, PlacedRamp, Plan, plan_program};
 use motion_kernel::exec::{ExecState, Executed, Executor};
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::Streams;
@@ -27,8 +27,9 @@ const DERIVED_SHARE: f64 = 1.2e-6;
 type Worst = [f64; 4];
 
 /// Length, feed, acceleration and jerk at `t` in a ramp or cruise.
-fn law(record: &FeedRecord, t: f64) -> [f64; 4] {
-    let (t1, t2, whole) = (record.t1_s, record.t2_s, record.time_s);
+fn law(placed: &PlacedRamp, t: f64) -> [f64; 4] {
+    let (record, whole) = (&placed.planned.ramp, placed.time_s());
+    let (t1, t2) = (record.t1_s, record.t2_s);
     let jerk =
         if record.to_mm_s < record.from_mm_s { -record.peak_jerk_mm_s3 } else { record.peak_jerk_mm_s3 };
     if t1 <= 0.0 {
@@ -82,14 +83,14 @@ fn compare(text: &str, element: &Element, from: [i64; 3], machine: &Machine) -> 
         let executed = executor.tick(&mut intake).expect("no fault");
         let (mut t, mut at_mm) = (tick as f64 * machine.tick_s, 0.0);
         for record in &records {
-            if t <= record.time_s {
+            if t <= record.time_s() {
                 let [s, v, a, j] = law(record, t);
                 add(&mut worst, &executed, element, [at_mm + s, v, a, j], &peaks(&records));
                 compared += 1;
                 break;
             }
-            t -= record.time_s;
-            at_mm += record.length_mm;
+            t -= record.time_s();
+            at_mm += record.length_mm();
         }
         if executed.state == ExecState::Idle {
             assert!(compared + 1 >= tick, "{compared} of {tick} ticks lie in the plan");
@@ -100,8 +101,8 @@ fn compare(text: &str, element: &Element, from: [i64; 3], machine: &Machine) -> 
 }
 
 /// Greatest feed, acceleration and jerk of the plan.
-fn peaks(records: &[&FeedRecord]) -> [f64; 3] {
-    records.iter().fold([0.0; 3], |peaks, record| {
+fn peaks(records: &[&PlacedRamp]) -> [f64; 3] {
+    records.iter().map(|record| &record.planned.ramp).fold([0.0; 3], |peaks, record| {
         let values = [record.to_mm_s, 0.5 * record.peak_jerk_mm_s3 * record.t1_s, record.peak_jerk_mm_s3];
         core::array::from_fn(|k| f64::max(peaks[k], values[k]))
     })

@@ -4,13 +4,14 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::Args;
+use motion_kernel::law::Ramp;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::table::{self, Align};
 use super::{input, write_json};
 use crate::gcode;
-use crate::planning::{FeedRecord, Mode, Plan, plan_blocks, plan_program};
+use crate::planning::{Mode, PlacedRamp, Plan, plan_blocks, plan_program};
 use crate::trace::TracedBlock;
 
 const EXAMPLES: &str = "\
@@ -119,15 +120,10 @@ fn json<'plan>(plan: &'plan Plan) -> PlanJson<'plan> {
         exit_mm_s: block.exit_mm_s,
         time_s: block.time_s,
     };
-    let feed = |feed: &FeedRecord| FeedJson {
-        start_mm: feed.start_mm,
-        length_mm: feed.length_mm,
-        from_mm_s: feed.from_mm_s,
-        to_mm_s: feed.to_mm_s,
-        peak_jerk_mm_s3: feed.peak_jerk_mm_s3,
-        t1_s: feed.t1_s,
-        t2_s: feed.t2_s,
-        time_s: feed.time_s,
+    let feed = |placed: &PlacedRamp| {
+        let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, .. } = placed.planned.ramp;
+        let (start_mm, length_mm, time_s) = (placed.start_mm, placed.length_mm(), placed.time_s());
+        FeedJson { start_mm, length_mm, from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, time_s }
     };
     PlanJson {
         time_s: plan.time_s,

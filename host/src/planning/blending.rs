@@ -26,7 +26,7 @@ use motion_kernel::plan::{
 use super::Mode;
 use super::ceilings::{Ceilings, ceilings, junction_feed};
 use super::error::Problem;
-use super::lookahead::{lookahead, time_s};
+use super::lookahead::lookahead;
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
 use crate::toolpath::blend::Blend;
@@ -330,7 +330,7 @@ fn common_feeds(windows: &[Vec<Block<f64>>], mut feeds: [f64; 2]) -> [f64; 2] {
 /// The time over some blocks, infinite if there is no plan \[s\].
 fn window_time_s(blocks: &[Block<f64>], [start_mm_s, end_mm_s]: [f64; 2]) -> f64 {
     let mut nodes = [Node::EMPTY; nodes_for(BLOCKS)];
-    let spanning = plan_spanning(blocks, start_mm_s, end_mm_s, &mut nodes, &mut |_| ());
+    let spanning = plan_spanning(blocks, start_mm_s, end_mm_s, &mut nodes, &mut |_, _| ());
     spanning.ok().flatten().unwrap_or(f64::INFINITY)
 }
 
@@ -350,8 +350,8 @@ fn stretch_time_s(stretch: &[StretchBlock], tick_s: f64) -> Option<f64> {
             end_mm
         })
         .collect();
-    let planned = lookahead(&blocks, &ends_mm, 0.0, 0.0, Mode::Spanning, tick_s).ok()?;
-    Some(time_s(&planned))
+    let planned = lookahead(&blocks, &ends_mm, [0.0; 2], Mode::Spanning, tick_s).ok()?;
+    Some(planned.iter().map(|planned| planned.ramp.duration_s()).sum())
 }
 
 #[cfg(test)]

@@ -98,9 +98,9 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
             Some(*end)
         })
         .collect();
-    let (start, end) = (list.start_feed_mm_s.0, list.end_feed_mm_s.0);
+    let feeds_mm_s = [list.start_feed_mm_s.0, list.end_feed_mm_s.0];
     let planned =
-        lookahead(&blocks, &ends_mm, start, end, mode, TICK_S).map_err(|(block, problem)| {
+        lookahead(&blocks, &ends_mm, feeds_mm_s, mode, TICK_S).map_err(|(block, problem)| {
             match key(&problem) {
                 Some(key) => fail(line_of(text, key), problem),
                 None => fail(line_of_block(text, block), problem),
@@ -128,7 +128,7 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
     Ok(Plan {
         source: source_name.to_owned(),
         blocks: records,
-        feed: profile.records(0.0),
+        feed: profile.ramps().to_vec(),
         time_s: profile.time_s(),
         length_mm: ends_mm.last().copied().unwrap_or(0.0),
         items: Vec::new(),

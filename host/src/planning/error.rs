@@ -131,7 +131,7 @@ fn unplannable(error: &PlanError) -> String {
         PlanError::TooShortToAccelerate { end_mm_s, greatest_mm_s } => format!(
             "end feed {end_mm_s} mm/s, expected at most {greatest_mm_s} mm/s: the path is too short to reach more"
         ),
-        PlanError::Output { blocks, plans } => format!("room for {plans} plans, expected {blocks}"),
+        PlanError::Ramp { .. } | PlanError::Room { .. } => error.to_string(),
     }
 }
 

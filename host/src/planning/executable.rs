@@ -6,7 +6,7 @@
 use core::convert::Infallible;
 
 use motion_kernel::exec::PIECES_PER_TICK_MAX;
-use motion_kernel::law::{FeedSegment, Ticks};
+use motion_kernel::law::Ticks;
 use motion_kernel::num::Real;
 use motion_kernel::plan::Ceiling;
 use motion_kernel::program::{Allowed, Item, PathBlock, write};
@@ -14,7 +14,7 @@ use motion_kernel::units::Position;
 
 use super::density::{PiecePace, SegmentPace};
 use super::error::{PlanningError, Problem};
-use super::lookahead::PlannedSegment;
+use super::lookahead::block_at;
 use super::stretch::Stretch;
 use super::{Item as PlanItem, Plan};
 use crate::machine::Machine;
@@ -108,16 +108,19 @@ fn stretch_items<R: Real>(
         (_, end) = block.element.ends_mm();
     }
     piece_pace.stretch(stretch, &pieces, &piece_blocks, tick_s)?;
-    let mut feed = Vec::new();
-    for &PlannedSegment { ramp, length, block } in &stretch.planned {
-        let at_line = |problem: Problem| (stretch.blocks[block].line, problem);
+    let ends = block_ends(stretch)?;
+    let (mut feed, mut start) = (Vec::new(), Position::ZERO);
+    for placed in stretch.profile.ramps() {
+        let at_line = |problem: Problem| (stretch.blocks[block_at(&ends, start)].line, problem);
         // What the number type cannot hold is refused here.
-        let segment = FeedSegment::<R>::ramp(&ramp, length, tick_s)
-            .map_err(|error| at_line(Problem::Segment { error, tick_s }))?;
+        let segment = placed.planned.segment::<R>(tick_s);
+        let segment = segment.map_err(|error| at_line(Problem::Segment { error, tick_s }))?;
         segment_pace.next(segment.duration()).map_err(at_line)?;
-        feed.push(Placed { length, item: Item::Feed { ramp, length } });
+        let length = placed.planned.length;
+        feed.push(Placed { length, item: Item::Feed(placed.planned) });
+        start = start + length;
     }
-    let blocks = path_blocks(stretch, &Dense::of(&pieces, tick_s))?;
+    let blocks = path_blocks(stretch, &ends, &Dense::of(&pieces, tick_s));
     in_order_of_start(&blocks, &pieces, &feed, items);
     let last_line = stretch.blocks.last().map_or(0, |block| block.line);
     let end = exact(end).map_err(|error| (last_line, error.into()))?;
@@ -161,16 +164,21 @@ impl Dense {
     }
 }
 
+/// Where each block ends.
+fn block_ends(stretch: &Stretch) -> Result<Vec<Position>, (u32, Problem)> {
+    let ends = stretch.blocks.iter().zip(stretch.ends_mm());
+    ends.map(|(block, &end_mm)| on_path(end_mm).map_err(|error| (block.line, error.into()))).collect()
+}
+
 /// What holds the feed, along the path; neighbours that are held alike are one.
-fn path_blocks(stretch: &Stretch, dense: &[Dense]) -> Result<Vec<Placed>, (u32, Problem)> {
+fn path_blocks(stretch: &Stretch, ends: &[Position], dense: &[Dense]) -> Vec<Placed> {
     let allowed = |ceiling: &Ceiling<f64>, most_mm_s: f64| Allowed {
         cap_mm_s: ceiling.feed_mm_s.min(most_mm_s),
         limits: ceiling.law.limits(),
     };
     let mut blocks: Vec<PathBlock> = Vec::new();
     let mut start = Position::ZERO;
-    for (block, &end_mm) in stretch.blocks.iter().zip(stretch.ends_mm()) {
-        let end = on_path(end_mm).map_err(|error| (block.line, error.into()))?;
+    for (block, &end) in stretch.blocks.iter().zip(ends) {
         let most_mm_s = Dense::most_mm_s(dense, start, end);
         let next = PathBlock::new(
             end - start,
@@ -187,7 +195,7 @@ fn path_blocks(stretch: &Stretch, dense: &[Dense]) -> Result<Vec<Placed>, (u32, 
             _ => blocks.push(next),
         }
     }
-    Ok(blocks.into_iter().map(|block| Placed { length: block.length, item: Item::Block(block) }).collect())
+    blocks.into_iter().map(|block| Placed { length: block.length, item: Item::Block(block) }).collect()
 }
 
 /// Blocks and both streams as one, in the order of the path positions where the items start.

@@ -13,8 +13,8 @@
 //! - `ceilings`: the ceiling of a move or a blend, what a junction allows;
 //! - `curves`: programmed curves to moves;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
-//! - [`stretch`]: ceilings, look-ahead and feed segments of one stretch;
-//! - `lookahead`: the kernel's look-ahead, with ramps that span blocks or per block;
+//! - [`stretch`]: ceilings, look-ahead and ramps of one stretch;
+//! - `lookahead`: the kernel's planner in the host's memory;
 //! - [`profile`]: feed and time at any path position of a planned stretch;
 //! - [`blocks`]: bare block lists, BLOCKS.json;
 //! - [`executable`]: a plan in the kernel's terms;
@@ -38,6 +38,7 @@ mod travel;
 pub use blocks::plan_blocks;
 pub use error::{Place, PlanningError, Problem};
 pub use executable::Executable;
+pub use profile::PlacedRamp;
 pub use program::{plan_moves, plan_program};
 pub use spline::plan_spline;
 pub use stretch::Stretch;
@@ -54,27 +55,6 @@ pub enum Mode {
     PerBlock,
 }
 
-/// The feed over a length of path: a ramp, or a cruise with equal feeds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FeedRecord {
-    /// Where it starts, from the program's start \[mm\].
-    pub start_mm: f64,
-    /// Length \[mm\].
-    pub length_mm: f64,
-    /// Feed at the start \[mm/s\].
-    pub from_mm_s: f64,
-    /// Feed at the end \[mm/s\].
-    pub to_mm_s: f64,
-    /// Peak jerk \[mm/s³\]; 0 for a cruise.
-    pub peak_jerk_mm_s3: f64,
-    /// t₁ of S1 \[s\]; 0 for a cruise.
-    pub t1_s: f64,
-    /// t₂ of S1 \[s\].
-    pub t2_s: f64,
-    /// Duration \[s\].
-    pub time_s: f64,
-}
-
 /// A planned program.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -82,8 +62,8 @@ pub struct Plan {
     pub source: String,
     /// Blocks, in path order.
     pub blocks: Vec<TracedBlock>,
-    /// Feed, in path order.
-    pub feed: Vec<FeedRecord>,
+    /// Feed, in path order, placed from the program's start; times as in `time_s`.
+    pub feed: Vec<PlacedRamp>,
     /// Duration, dwells included, stops not \[s\].
     pub time_s: f64,
     /// Path length \[mm\].

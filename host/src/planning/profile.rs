@@ -1,43 +1,41 @@
 //! Feed and time at any path position of a planned stretch.
 
-use motion_kernel::law::Ramp;
+use motion_kernel::law::PlannedRamp;
 use motion_kernel::plan::BlockPlan;
 
-use super::FeedRecord;
-use super::lookahead::PlannedSegment;
-
-/// Positions closer than this are the same: segments start and end on position steps, blocks do not.
+/// Positions closer than this are the same: ramps start and end on position steps, blocks do not.
 const ROUNDING_MM: f64 = 1.0e-9;
 
 /// The feed over a stretch.
 #[derive(Clone, Debug, Default)]
 pub struct FeedProfile {
-    spans: Vec<Span>,
+    ramps: Vec<PlacedRamp>,
     time_s: f64,
 }
 
-/// One segment, with its place on the path and in time.
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    start_mm: f64,
-    length_mm: f64,
-    start_s: f64,
-    time_s: f64,
-    ramp: Ramp<f64>,
+/// A ramp or a cruise with its place on the path and in time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedRamp {
+    /// Where it starts \[mm\].
+    pub start_mm: f64,
+    /// When it starts \[s\].
+    pub start_s: f64,
+    /// The ramp over its length of path.
+    pub planned: PlannedRamp,
 }
 
 impl FeedProfile {
-    pub(super) fn new(planned: &[PlannedSegment]) -> Self {
+    pub(super) fn new(planned: &[PlannedRamp]) -> Self {
         let (mut start_mm, mut time_s) = (0.0, 0.0);
-        let mut spans = Vec::with_capacity(planned.len());
+        let mut ramps = Vec::with_capacity(planned.len());
         // Added up in f64: a stretch's positions are not exact, but what is compared with them is as long.
-        for segment in planned {
-            let (length_mm, ramp) = (segment.length.to_mm(), segment.ramp);
-            spans.push(Span { start_mm, length_mm, start_s: time_s, time_s: ramp.duration_s(), ramp });
-            start_mm += length_mm;
-            time_s += ramp.duration_s();
+        for &planned in planned {
+            let placed = PlacedRamp { start_mm, start_s: time_s, planned };
+            start_mm += placed.length_mm();
+            time_s += placed.time_s();
+            ramps.push(placed);
         }
-        Self { spans, time_s }
+        Self { ramps, time_s }
     }
 
     /// Duration \[s\].
@@ -49,8 +47,8 @@ impl FeedProfile {
     /// Feed \[mm/s\] and time \[s\] at `s_mm` from the stretch's start.
     #[must_use]
     pub fn at(&self, s_mm: f64) -> (f64, f64) {
-        match self.spans.get(self.index(s_mm)) {
-            Some(span) => span.at(s_mm),
+        match self.ramps.get(self.index(s_mm)) {
+            Some(placed) => placed.at(s_mm),
             None => (0.0, 0.0),
         }
     }
@@ -60,57 +58,61 @@ impl FeedProfile {
     pub fn over(&self, from_mm: f64, to_mm: f64) -> (BlockPlan<f64>, f64) {
         let ((enter_mm_s, start_s), (exit_mm_s, end_s)) = (self.at(from_mm), self.at(to_mm));
         let first = self.index(from_mm);
-        // The feed has its extremes at the ends of segments.
+        // The feed has its extremes at the ends of ramps.
         let peak_mm_s = self
-            .spans
+            .ramps
             .iter()
             .skip(first)
-            .take_while(|span| span.start_mm + span.length_mm < to_mm + ROUNDING_MM)
-            .map(|span| span.ramp.to_mm_s)
+            .take_while(|placed| placed.start_mm + placed.length_mm() < to_mm + ROUNDING_MM)
+            .map(|placed| placed.planned.ramp.to_mm_s)
             .fold(enter_mm_s.max(exit_mm_s), f64::max);
         (BlockPlan { enter_mm_s, peak_mm_s, exit_mm_s }, end_s - start_s)
     }
 
-    /// The segments, for a stretch that starts at `start_mm` of the program.
-    pub(super) fn records(&self, start_mm: f64) -> Vec<FeedRecord> {
-        let record = |span: &Span| FeedRecord {
-            start_mm: start_mm + span.start_mm,
-            length_mm: span.length_mm,
-            from_mm_s: span.ramp.from_mm_s,
-            to_mm_s: span.ramp.to_mm_s,
-            peak_jerk_mm_s3: span.ramp.peak_jerk_mm_s3,
-            t1_s: span.ramp.t1_s,
-            t2_s: span.ramp.t2_s,
-            time_s: span.time_s,
-        };
-        self.spans.iter().map(record).collect()
+    /// The ramps, in path order.
+    #[must_use]
+    pub fn ramps(&self) -> &[PlacedRamp] {
+        &self.ramps
     }
 
-    /// The span that contains `s_mm`; at a junction, the one that ends there.
+    /// The ramp that contains `s_mm`; at a junction, the one that ends there.
     fn index(&self, s_mm: f64) -> usize {
-        self.spans.partition_point(|span| span.start_mm + ROUNDING_MM < s_mm).saturating_sub(1)
+        self.ramps.partition_point(|placed| placed.start_mm + ROUNDING_MM < s_mm).saturating_sub(1)
     }
 }
 
-impl Span {
+impl PlacedRamp {
+    /// Its length \[mm\].
+    #[must_use]
+    pub fn length_mm(&self) -> f64 {
+        self.planned.length.to_mm()
+    }
+
+    /// Its duration \[s\].
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.planned.ramp.duration_s()
+    }
+
+    /// Feed \[mm/s\] and time \[s\] at `s_mm`, counted as its start.
     fn at(&self, s_mm: f64) -> (f64, f64) {
-        let local_mm = s_mm - self.start_mm;
+        let (ramp, local_mm) = (self.planned.ramp, s_mm - self.start_mm);
         if local_mm <= ROUNDING_MM {
-            return (self.ramp.from_mm_s, self.start_s);
+            return (ramp.from_mm_s, self.start_s);
         }
-        if local_mm >= self.length_mm - ROUNDING_MM {
-            return (self.ramp.to_mm_s, self.start_s + self.time_s);
+        if local_mm >= self.length_mm() - ROUNDING_MM {
+            return (ramp.to_mm_s, self.start_s + self.time_s());
         }
-        if self.ramp.is_cruise() {
-            let feed = self.ramp.from_mm_s;
+        if ramp.is_cruise() {
+            let feed = ramp.from_mm_s;
             return (feed, self.start_s + local_mm / feed);
         }
         // The position grows with time: halve until the time has its last digit.
-        let (mut early, mut late) = (0.0, self.time_s);
+        let (mut early, mut late) = (0.0, self.time_s());
         for _ in 0..64 {
             let middle = 0.5 * (early + late);
-            if self.ramp.at(middle).s_mm < local_mm { early = middle } else { late = middle }
+            if ramp.at(middle).s_mm < local_mm { early = middle } else { late = middle }
         }
-        (self.ramp.at(late).v_mm_s, self.start_s + late)
+        (ramp.at(late).v_mm_s, self.start_s + late)
     }
 }

@@ -5,7 +5,7 @@ use super::curves::{Point, cubic, through};
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
-use super::{Item, Mode, Plan, travel};
+use super::{Item, Mode, PlacedRamp, Plan, travel};
 use crate::gcode::{Feed, PathMode, Program, StepKind};
 use crate::machine::Machine;
 use crate::toolpath::Element;
@@ -142,7 +142,12 @@ fn append(run: &mut Vec<Move>, plan: &mut Plan, machine: &Machine, mode: Mode) -
 fn close(open: &mut Vec<StretchBlock>, plan: &mut Plan, mode: Mode) -> Result<(), (u32, Problem)> {
     let stretch = Stretch::new(std::mem::take(open), plan.length_mm, mode, plan.tick_s)?;
     plan.blocks.extend(stretch.block_records());
-    plan.feed.extend(stretch.feed_records());
+    let (length_mm, time_s) = (plan.length_mm, plan.time_s);
+    plan.feed.extend(stretch.profile.ramps().iter().map(|&ramp| PlacedRamp {
+        start_mm: length_mm + ramp.start_mm,
+        start_s: time_s + ramp.start_s,
+        ..ramp
+    }));
     plan.time_s += stretch.profile.time_s();
     plan.length_mm += stretch.length_mm();
     plan.items.push(Item::Stretch(stretch));

@@ -1,11 +1,11 @@
-//! One stretch, from full stop to full stop: ceilings, look-ahead, feed segments.
+//! One stretch, from full stop to full stop: ceilings, look-ahead, ramps.
 
 use motion_kernel::plan::{Block, Ceiling};
 
+use super::Mode;
 use super::error::Problem;
-use super::lookahead::{PlannedSegment, lookahead};
+use super::lookahead::lookahead;
 use super::profile::FeedProfile;
-use super::{FeedRecord, Mode};
 use crate::toolpath::Element;
 use crate::trace::TracedBlock;
 
@@ -46,8 +46,6 @@ pub struct Stretch {
     pub blocks: Vec<StretchBlock>,
     /// Path position of every block's end, from the stretch's start \[mm\].
     ends_mm: Vec<f64>,
-    /// As planned, in path order.
-    pub(super) planned: Vec<PlannedSegment>,
     /// Feed and time over the stretch.
     pub profile: FeedProfile,
 }
@@ -70,9 +68,9 @@ impl Stretch {
             plan_blocks.push(block);
         }
         let at_line = |(block, problem): (usize, Problem)| (blocks[block].line, problem);
-        let planned = lookahead(&plan_blocks, &ends_mm, 0.0, 0.0, mode, tick_s).map_err(at_line)?;
+        let planned = lookahead(&plan_blocks, &ends_mm, [0.0; 2], mode, tick_s).map_err(at_line)?;
         let profile = FeedProfile::new(&planned);
-        Ok(Self { start_mm, blocks, ends_mm, planned, profile })
+        Ok(Self { start_mm, blocks, ends_mm, profile })
     }
 
     /// Path position of every block's end, from the stretch's start \[mm\].
@@ -116,9 +114,5 @@ impl Stretch {
             start_mm = end_mm;
         }
         records
-    }
-
-    pub(super) fn feed_records(&self) -> Vec<FeedRecord> {
-        self.profile.records(self.start_mm)
     }
 }

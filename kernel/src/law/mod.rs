@@ -8,22 +8,24 @@
 //! - [`passing`]: about where a ramp passes a feed, for the planner;
 //! - [`mod@reach`]: the inverse problems, background only: highest feed reachable in a length, and
 //!   highest peak between two feeds;
-//! - [`segment`]: a ramp or a cruise made ready for the tick: no division is left to do.
+//! - [`planned`]: a ramp or a cruise over an exact length of path, as plans hand it on;
+//! - [`segment`]: the same made ready for the tick: no division is left to do.
 //!
 //! Feeds are magnitudes along the path and never negative. All the functions here are pure.
 
 pub mod limits;
-pub mod ramp;
 pub mod passing;
+pub mod planned;
+pub mod ramp;
 pub mod reach;
 pub mod segment;
-
 pub mod shape;
 
 pub use limits::{Law, LimitError, Limits};
 pub use passing::Passing;
+pub use planned::PlannedRamp;
 pub use ramp::{FeedState, LimitedBy, Ramp};
 pub use reach::{peak, reach};
 #[cfg(feature = "live")]
-pub use segment::TurnedRamp;
+pub use segment::CutRamp;
 pub use segment::{FeedSegment, PathMotion, Phase, SegmentError, Ticks};

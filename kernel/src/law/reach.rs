@@ -129,14 +129,14 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     for _ in 0..NEWTON_STEPS_MAX {
         let square = y * y;
         let (change, by_y) = (square * y, three * square);
-        // While snap limits the shorter leg, y is the cube root that its time takes.
+        // While snap limits the shorter ramp, y is the cube root that its time takes.
         let short_time = if change <= law.snap_limited_to_mm_s {
             ((y + y) / law.snap_root, two / law.snap_root)
         } else {
             time(law, change, by_y)
         };
-        let (short, short_slope) = leg(higher, change, short_time, by_y);
-        let (long, long_slope) = leg(lower, change + step, time(law, change + step, by_y), by_y);
+        let (short, short_slope) = length(higher, change, short_time, by_y);
+        let (long, long_slope) = length(lower, change + step, time(law, change + step, by_y), by_y);
         let (excess, slope) = (short + long - length_mm, short_slope + long_slope);
         if !(excess > R::ZERO && slope > R::ZERO) {
             break;
@@ -164,7 +164,7 @@ fn time<R: Root>(law: &Law<R>, change: R, by_y: R) -> (R, R) {
 }
 
 /// Length of the ramp from `lower` by `change`, and its derivative by y, from those of its time.
-fn leg<R: Root>(lower: R, change: R, (time, time_slope): (R, R), by_y: R) -> (R, R) {
+fn length<R: Root>(lower: R, change: R, (time, time_slope): (R, R), by_y: R) -> (R, R) {
     let half = R::from_f64(0.5);
     let mean = lower + half * change;
     (mean * time, half * time * by_y + mean * time_slope)

@@ -12,7 +12,7 @@
 //! whatever the number type; the sine's part, a five-hundredth of Jp·t₁³, is a `Real`.
 
 #[cfg(feature = "live")]
-mod turn;
+mod cut;
 
 use core::f64::consts::PI;
 
@@ -24,7 +24,7 @@ use crate::num::{Real, Root, Unit, is_within, rolled, whole};
 use crate::units::Position;
 
 #[cfg(feature = "live")]
-pub use turn::TurnedRamp;
+pub use cut::CutRamp;
 
 /// A duration in control ticks, in steps of 2⁻³² tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -82,13 +82,13 @@ impl Ticks {
     }
 }
 
-/// The parts of a segment, in order. A cruise has only a hold, and a ramp that is turned has its turn there.
+/// The parts of a segment, in order. A cruise has only a hold, and a ramp that is cut early has the way back there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
     /// 0 … t₁: acceleration builds up.
     Rise,
-    /// t₁ … t₂: constant acceleration, or cruise; in a turned ramp from its turn to the turn's image.
+    /// t₁ … t₂: constant acceleration, or cruise; in a cut ramp from the cut to its image.
     Hold,
     /// t₂ … t_p: acceleration falls back to 0.
     Fall,
@@ -231,9 +231,9 @@ pub struct FeedSegment<R> {
     ramp: Ramp<R>,
     rise: Clock,
     hold: Clock,
-    /// Where in the rise it turns, counted from 1 downwards in 2⁻⁶⁴; 0 if it does not, see `turned`.
+    /// Where in the rise it is cut, counted from 1 downwards in 2⁻⁶⁴; 0 if it is not, see `cut`.
     #[cfg(feature = "live")]
-    turns_at: u64,
+    cut_at: u64,
     /// F₀·t₁ and −F·t₁ less Jp·t₁³/(8π²), and Jp·t₁³/12, in position steps.
     rise_bits: i64,
     fall_bits: i64,
@@ -298,16 +298,7 @@ impl<R: Real> FeedSegment<R> {
     /// # Errors
     /// A figure is not finite, negative or too large, the lengths differ, or the feed steps.
     pub fn ramp<P: Root>(ramp: &Ramp<P>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
-        let ramp = to_f64(ramp);
-        let path_mm = length.to_mm();
-        let ramp_mm = ramp.length_mm();
-        // In a narrower planning type the ramp's figures carry that type's rounding.
-        let size = P::from_f64(ramp_mm + ramp.from_mm_s + ramp.to_mm_s);
-        let rounding = 16.0 * size.spacing().to_f64();
-        if !(libm::fabs(ramp_mm - path_mm) <= LENGTH_TOLERANCE_MM + rounding) {
-            return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
-        }
-        Self::new(&ramp, length, tick_s)
+        Self::new(&of_length(ramp, length)?, length, tick_s)
     }
 
     /// A cruise at `feed_mm_s` > 0 over `length` of path.
@@ -325,39 +316,11 @@ impl<R: Real> FeedSegment<R> {
         // The first reason why it can't be made. What follows goes on with what it has: a way out at each figure would
         // take more flash than all that is computed.
         let mut refused = None;
-        made(
-            &mut refused,
-            &[
-                "entry feed [mm/s]",
-                "exit feed [mm/s]",
-                "peak jerk [mm/s³]",
-                "length [mm]",
-                "t1 [s]",
-                "t2 − t1 [s]",
-                "tick [s]",
-            ],
-            [from_mm_s, to_mm_s, peak_jerk_mm_s3, length.to_mm(), t1_s, hold_s, tick_s],
-            |value| is_within(value, 0.0, f64::MAX).then_some(R::ZERO),
-        );
-        if t1_s <= 0.0 && from_mm_s != to_mm_s {
-            refused.get_or_insert(SegmentError::FeedStep { from_mm_s, to_mm_s });
-        }
-        let mut ticks = |quantity, value| {
-            Ticks::from_seconds(value, tick_s).unwrap_or_else(|| {
-                refused.get_or_insert(SegmentError::OutOfRange { quantity, value });
-                Ticks::ZERO
-            })
-        };
-        let rise = Clock::new(ticks("t1 [s]", t1_s));
-        let hold = Clock::new(ticks("t2 − t1 [s]", hold_s));
+        let [rise, hold] = check(&mut refused, ramp, length, tick_s, R::RAMP_MM_MAX).map(Clock::new);
         let jerk = ramp.signed_jerk_mm_s3();
         let accel = jerk * t1_s;
         let speed = accel * t1_s;
         let length_scale = speed * t1_s;
-        if !(libm::fabs(length_scale) <= R::RAMP_MM_MAX) {
-            let value = libm::fabs(length_scale);
-            refused.get_or_insert(SegmentError::OutOfRange { quantity: "jerk · t1³ [mm]", value });
-        }
         let end = Shape::END;
         let (hold_a, hold_v) = (accel * end.accel, from_mm_s + speed * end.speed);
         let snap = if t1_s > 0.0 { PI * jerk / t1_s } else { 0.0 };
@@ -419,7 +382,7 @@ impl<R: Real> FeedSegment<R> {
             rise,
             hold,
             #[cfg(feature = "live")]
-            turns_at: 0,
+            cut_at: 0,
             rise_bits,
             fall_bits: -fall_less_bits,
             cube_bits,
@@ -469,11 +432,11 @@ impl<R: Real> FeedSegment<R> {
         self.clock(phase).duration
     }
 
-    /// Only live control turns ramps.
+    /// Only live control cuts ramps.
     #[inline]
-    fn turns_at(&self) -> u64 {
+    fn cut_at(&self) -> u64 {
         #[cfg(feature = "live")]
-        return self.turns_at;
+        return self.cut_at;
         #[cfg(not(feature = "live"))]
         0
     }
@@ -483,7 +446,7 @@ impl<R: Real> FeedSegment<R> {
     pub fn fraction_at_start(&self, phase: Phase) -> u64 {
         match phase {
             Phase::Rise => 0,
-            Phase::Hold | Phase::Fall => self.turns_at(),
+            Phase::Hold | Phase::Fall => self.cut_at(),
         }
     }
 
@@ -492,7 +455,7 @@ impl<R: Real> FeedSegment<R> {
     #[inline]
     pub fn fraction_in(&self, phase: Phase, time: Ticks) -> u64 {
         let clock = self.clock(phase);
-        clock.part(time, clock.duration > Ticks::ONE || self.turns_at() != 0)
+        clock.part(time, clock.duration > Ticks::ONE || self.cut_at() != 0)
     }
 
     /// The normalised time `elapsed` after the start of `phase`, in 2⁻⁶⁴.
@@ -515,8 +478,8 @@ impl<R: Real> FeedSegment<R> {
     /// end. In the tick.
     #[inline(always)]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
-        let turns = phase == Phase::Hold && self.turns_at() != 0;
-        if phase == Phase::Hold && !turns {
+        let is_cut = phase == Phase::Hold && self.cut_at() != 0;
+        if phase == Phase::Hold && !is_cut {
             let x = (fraction >> 32) as u32;
             let s = self
                 .hold_start_bits
@@ -531,10 +494,10 @@ impl<R: Real> FeedSegment<R> {
                 snap_mm_s4: R::ZERO,
             };
         }
-        // The fall is the rise run backwards from the end, and before the middle of a turn time counts towards it: the
+        // The fall is the rise run backwards from the end, and before the middle of a cut ramp time counts towards it: the
         // same shape, once, for all.
         let falling = phase == Phase::Fall;
-        let before = turns && fraction.cast_signed() < 0;
+        let before = is_cut && fraction.cast_signed() < 0;
         let fraction = match (falling, before) {
             (true, _) => !fraction,
             (false, true) => fraction.wrapping_neg(),
@@ -549,10 +512,10 @@ impl<R: Real> FeedSegment<R> {
         let bent = Position::from_bits(cube) + Position::from_offset(self.sine_mm.scaled(shape.snap));
         let (accel, snap) = (self.accel_mm_s2.scaled(shape.accel), self.snap_mm_s4.scaled(shape.snap));
         #[cfg(feature = "live")]
-        if turns {
+        if is_cut {
             let rise =
                 PathMotion { s: bent, v_mm_s: gained, a_mm_s2: accel, j_mm_s3: jerk, snap_mm_s4: snap };
-            return self.at_turn(&rise, unit, x, before);
+            return self.at_cut(&rise, unit, x, before);
         }
         let (s, v_mm_s, j_mm_s3) = if falling {
             let even = Position::from_bits(portion(self.fall_bits, x));
@@ -563,6 +526,64 @@ impl<R: Real> FeedSegment<R> {
         };
         PathMotion { s: (s + bent).min(self.length), v_mm_s, a_mm_s2: accel, j_mm_s3, snap_mm_s4: snap }
     }
+}
+
+/// The ramp in f64, if its own length is `length` but for rounding.
+pub(super) fn of_length<P: Root>(ramp: &Ramp<P>, length: Position) -> Result<Ramp<f64>, SegmentError> {
+    let ramp = to_f64(ramp);
+    let path_mm = length.to_mm();
+    let ramp_mm = ramp.length_mm();
+    // In a narrower planning type the ramp's figures carry that type's rounding.
+    let size = P::from_f64(ramp_mm + ramp.from_mm_s + ramp.to_mm_s);
+    let rounding = 16.0 * size.spacing().to_f64();
+    if !(libm::fabs(ramp_mm - path_mm) <= LENGTH_TOLERANCE_MM + rounding) {
+        return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
+    }
+    Ok(ramp)
+}
+
+/// What every number type asks of a ramp over `length`; the first reason to refuse it is kept. Returns how long it rises
+/// and holds.
+#[inline(never)]
+pub(super) fn check(
+    refused: &mut Option<SegmentError>,
+    ramp: &Ramp<f64>,
+    length: Position,
+    tick_s: f64,
+    ramp_mm_max: f64,
+) -> [Ticks; 2] {
+    let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, .. } = *ramp;
+    let hold_s = t2_s - t1_s;
+    made(
+        refused,
+        &[
+            "entry feed [mm/s]",
+            "exit feed [mm/s]",
+            "peak jerk [mm/s³]",
+            "length [mm]",
+            "t1 [s]",
+            "t2 − t1 [s]",
+            "tick [s]",
+        ],
+        [from_mm_s, to_mm_s, peak_jerk_mm_s3, length.to_mm(), t1_s, hold_s, tick_s],
+        // Any type will do; with that of lengths there is no function more in the image.
+        |value| is_within(value, 0.0, f64::MAX).then_some(Position::ZERO),
+    );
+    if t1_s <= 0.0 && from_mm_s != to_mm_s {
+        refused.get_or_insert(SegmentError::FeedStep { from_mm_s, to_mm_s });
+    }
+    let mut ticks = |quantity, value| {
+        Ticks::from_seconds(value, tick_s).unwrap_or_else(|| {
+            refused.get_or_insert(SegmentError::OutOfRange { quantity, value });
+            Ticks::ZERO
+        })
+    };
+    let phases = [ticks("t1 [s]", t1_s), ticks("t2 − t1 [s]", hold_s)];
+    let value = peak_jerk_mm_s3 * t1_s * t1_s * t1_s;
+    if !(value <= ramp_mm_max) {
+        refused.get_or_insert(SegmentError::OutOfRange { quantity: "jerk · t1³ [mm]", value });
+    }
+    phases
 }
 
 /// Each of `values` made by `make`; the first that can't be is refused by its name.

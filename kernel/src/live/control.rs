@@ -9,7 +9,7 @@ use super::list::{Item as ListItem, LIST_ITEMS, List};
 use super::replan::Ramps;
 use super::road::{Road, Splice, is_before};
 use super::source::Source;
-use crate::law::{FeedSegment, Ticks};
+use crate::law::{FeedSegment, PlannedRamp, Ticks};
 use crate::num::Real;
 use crate::program::supply::{Ready, is_taken};
 use crate::program::{Item, SupplyError};
@@ -442,8 +442,8 @@ where
                 self.pending = Some(item.ready(self.tick_s)?);
                 return Ok(());
             }
-            Item::Feed { .. } if self.replans(self.reading) => return Ok(()),
-            Item::Feed { ramp, length } => ListItem::Feed { ramp, length },
+            Item::Feed(_) if self.replans(self.reading) => return Ok(()),
+            Item::Feed(PlannedRamp { ramp, length }) => ListItem::Feed { ramp, length },
             Item::Dwell(duration) => ListItem::Dwell(duration),
             Item::Stop => ListItem::Stop,
         };
@@ -637,7 +637,7 @@ where
                     is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
                 }
                 ListItem::Turned { ramp, at, length } => {
-                    let segment = FeedSegment::turned(&ramp, at, length, self.tick_s);
+                    let segment = FeedSegment::cut(&ramp, at, length, self.tick_s);
                     is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
                 }
                 ListItem::End => {
@@ -722,9 +722,9 @@ mod tests {
         [
             Item::Block(PathBlock::new(whole + longer, 20.0, allowed, allowed, 0.0)),
             line,
-            Item::Feed { ramp: up, length: ramp },
-            Item::Feed { ramp: Ramp::cruise(20.0, 5.0), length: cruise },
-            Item::Feed { ramp: up.reversed(), length: ramp },
+            Item::Feed(PlannedRamp { ramp: up, length: ramp }),
+            Item::Feed(PlannedRamp { ramp: Ramp::cruise(20.0, 5.0), length: cruise }),
+            Item::Feed(PlannedRamp { ramp: up.reversed(), length: ramp }),
             Item::EndOfStretch([whole]),
         ]
     }

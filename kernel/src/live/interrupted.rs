@@ -6,7 +6,7 @@ use core::convert::Infallible;
 use super::{LiveControl, State};
 use crate::exec::{ExecState, Executor};
 use crate::law::{Law, Limits, PathMotion};
-use crate::plan::{Block, BlockPlan, plan, segments};
+use crate::plan::{Block, BlockPlan, plan, ramps};
 use crate::program::{Allowed, Item, PathBlock};
 use crate::queue::{Intake, LiveStreams, PathRules};
 use crate::random::Random;
@@ -43,11 +43,9 @@ fn stretch(random: &Random, from: Position, items: &mut Vec<Item<1>>) -> Vec<(Po
             at = at + part;
         }
         let mut at = start;
-        for segment in
-            segments::<f64, f64>(block, plan, start, end, TICK_S).expect("segments").iter().flatten()
-        {
-            placed.push((at, Item::Feed { ramp: *segment.as_ramp(), length: segment.length() }));
-            at = at + segment.length();
+        for ramp in ramps(block, plan, start, end, TICK_S).expect("ramps").into_iter().flatten() {
+            placed.push((at, Item::Feed(ramp)));
+            at = at + ramp.length;
         }
         start = end;
         caps.push((end, cap_mm_s));

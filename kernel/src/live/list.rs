@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use super::road::Splice;
-use crate::law::{Phase, Ramp, Ticks, TurnedRamp, segment};
+use crate::law::{CutRamp, Phase, Ramp, Ticks, segment};
 pub use crate::queue::LIST_ITEMS;
 use crate::units::Position;
 
@@ -46,7 +46,7 @@ impl Item {
                 Splice { at: start.at + length, feed_mm_s: ramp.to_mm_s, ..*start }
             }
             Self::Turned { ramp, at, length } => {
-                let turned = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
+                let turned = CutRamp { ramp, cut_s: at.to_f64() * tick_s };
                 Splice { at: start.at + length, feed_mm_s: turned.to_mm_s(), ..*start }
             }
             Self::End => {
@@ -61,7 +61,7 @@ impl Item {
         match *self {
             Self::Feed { ramp, .. } => Ticks::from_seconds(ramp.duration_s(), tick_s),
             Self::Turned { ramp, at, .. } => {
-                let turned = TurnedRamp { ramp, turn_s: at.to_f64() * tick_s };
+                let turned = CutRamp { ramp, cut_s: at.to_f64() * tick_s };
                 Ticks::from_seconds(turned.duration_s(), tick_s)
             }
             Self::Dwell(duration) => Some(duration),
@@ -78,7 +78,7 @@ impl Item {
             // As its segment was made.
             Self::Feed { ramp, .. } => segment::to_f64(ramp),
             &Self::Turned { ramp, .. } if phase == Phase::Rise => {
-                let turned = TurnedRamp { ramp, turn_s: elapsed_s };
+                let turned = CutRamp { ramp, cut_s: elapsed_s };
                 return Some(Self::Turned { ramp, at: elapsed, length: length(turned.length_mm())? });
             }
             _ => return None,
@@ -91,7 +91,7 @@ impl Item {
             // Over before it could be turned.
             Phase::Rise if ramp.t1_s <= tick_s => None,
             Phase::Rise if 2.0 * elapsed_s <= ramp.t1_s => {
-                let turned = TurnedRamp { ramp, turn_s: elapsed_s };
+                let turned = CutRamp { ramp, cut_s: elapsed_s };
                 Some(Self::Turned { ramp, at: elapsed, length: length(turned.length_mm())? })
             }
             Phase::Rise | Phase::Hold => {
@@ -125,9 +125,9 @@ impl Item {
         };
         let (mut low_s, mut high_s) = (0.0, most_s);
         for _ in 0..TURN_STEPS {
-            let turned = TurnedRamp { ramp, turn_s: 0.5 * (low_s + high_s) };
+            let turned = CutRamp { ramp, cut_s: 0.5 * (low_s + high_s) };
             let end_s = if turned.to_mm_s() > feed_mm_s { &mut high_s } else { &mut low_s };
-            *end_s = turned.turn_s;
+            *end_s = turned.cut_s;
         }
         self.cut(Phase::Rise, before(low_s)?, tick_s)
     }

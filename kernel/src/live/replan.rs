@@ -1,16 +1,15 @@
 //! The feed from a splice on, planned anew over the blocks that are known.
 //!
 //! Consumes a splice, a feed override and the [`Road`]; produces ramps and cruises to rest where the known path ends.
-//! Background. Two stages and one pair of ramps for neighbours that are alike, as [`plan`]; over the blocks that come
-//! first with ramps that span them, where that is faster, to the feed that the plan behind them begins with.
+//! Background. One pair of ramps for neighbours that are alike; over the blocks that come first with ramps that span them,
+//! where that is faster.
 
 use heapless::Vec;
 
-use super::list::{Item, LIST_ITEMS, List};
+use super::list::{Item, List};
 use super::road::{LENGTH_ROUNDING_MM, Road, SLIVER, Splice};
-use crate::law::{Law, Limits};
-use crate::plan::spanning::spans_of;
-use crate::plan::{Block, BlockPlan, FeedSpan, Node, nodes_for, plan, plan_spanning, segments};
+use crate::law::{Law, Limits, PlannedRamp};
+use crate::plan::{Block, BlockPlan, Effort, Memory, Node, Path, PlanError, nodes_for, plan_ramps};
 use crate::units::Position;
 
 /// Over so many blocks ramps may span: a list seldom reaches farther, and what they need goes with it.
@@ -114,36 +113,40 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
     }
 
     /// See [`replan`].
+    // In a frame of its own: what the planner works with takes kilobytes.
     #[inline(never)]
     fn plan(&mut self, from: &Splice, ramps: Ramps, tick_s: f64, list: &mut List) -> Option<bool> {
-        let (blocks, ends) = (&mut self.blocks, &self.ends);
         let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
-        plans.resize(blocks.len(), BlockPlan::default()).ok()?;
-        if plan(blocks, from.feed_mm_s, 0.0, &mut plans).is_err() {
-            // Where one has to brake at once the feed may be a rounding too high for the length.
-            blocks.first_mut()?.length_mm += LENGTH_ROUNDING_MM;
-            plan(blocks, from.feed_mm_s, 0.0, &mut plans).ok()?;
-        } else if ramps == Ramps::Spanning && blocks.len() > 1 {
-            let count = blocks.len().min(SPANNED);
-            let (first, plans, ends) = (blocks.get(..count)?, plans.get(..count)?, ends.get(..count)?);
-            let heads = list.len();
-            if let Some(is_whole) = span(first, plans, from, *ends.last()?, tick_s, list) {
-                return Some(is_whole && count == blocks.len());
-            }
-            list.truncate(heads);
-        }
-        let mut start = from.at;
-        for ((block, plan), &block_end) in blocks.iter().zip(&plans).zip(ends) {
-            let made = segments::<f64, f64>(block, plan, start, block_end, tick_s).ok()?;
-            for segment in made.iter().flatten() {
-                if list.is_full() {
-                    return Some(false);
+        plans.resize(self.blocks.len(), BlockPlan::default()).ok()?;
+        let mut nodes = [Node::EMPTY; nodes_for(SPANNED)];
+        let heads = list.len();
+        let ends = &mut self.ends;
+        let mut plan = |blocks: &mut [Block<f64>], effort| {
+            let path =
+                Path { blocks, ends: &mut *ends, start: from.at, feeds_mm_s: [from.feed_mm_s, 0.0], tick_s };
+            let memory = Memory { plans: &mut plans, nodes: &mut nodes };
+            plan_ramps(path, effort, memory, &mut |index, PlannedRamp { ramp, length }| {
+                list.truncate(heads + index);
+                let has_room = !list.is_full();
+                if has_room {
+                    list.push(Item::Feed { ramp, length });
                 }
-                list.push(Item::Feed { ramp: *segment.as_ramp(), length: segment.length() });
+                has_room
+            })
+        };
+        let effort = match ramps {
+            Ramps::Spanning if self.blocks.len() > 1 => Effort::Spanning { most: SPANNED },
+            Ramps::Spanning | Ramps::PerBlock => Effort::PerBlock,
+        };
+        match plan(&mut self.blocks, effort) {
+            Ok(planned) => Some(planned.is_whole),
+            Err(PlanError::Ramp { .. }) => None,
+            Err(_) => {
+                // Where one has to brake at once the feed may be a rounding too high for the length.
+                self.blocks.first_mut()?.length_mm += LENGTH_ROUNDING_MM;
+                plan(&mut self.blocks, Effort::PerBlock).ok().map(|planned| planned.is_whole)
             }
-            start = block_end;
         }
-        Some(true)
     }
 }
 
@@ -153,46 +156,4 @@ fn is_alike(least: &Limits<f64>, greatest: &Limits<f64>, alike: f64) -> bool {
     is_near(least.accel_mm_s2, greatest.accel_mm_s2)
         && is_near(least.jerk_mm_s3, greatest.jerk_mm_s3)
         && is_near(least.snap_mm_s4, greatest.snap_mm_s4)
-}
-
-/// The same over `blocks`, to the feed and the position that their `plans` end with, by ramps that may span them. `None` where
-/// that is not faster.
-// In a frame of its own: what it works with takes many kilobytes.
-#[inline(never)]
-fn span(
-    blocks: &[Block<f64>],
-    plans: &[BlockPlan<f64>],
-    from: &Splice,
-    end: Position,
-    tick_s: f64,
-    list: &mut List,
-) -> Option<bool> {
-    let mut nodes = [Node::EMPTY; nodes_for(SPANNED)];
-    let mut spans: Vec<FeedSpan, { LIST_ITEMS + 1 }> = Vec::new();
-    let mut is_cut = false;
-    let to_mm_s = plans.last()?.exit_mm_s;
-    let time_s = plan_spanning(blocks, from.feed_mm_s, to_mm_s, &mut nodes, &mut |span| {
-        is_cut |= spans.push(span).is_err();
-    });
-    if !(time_s.ok()?? < spans_of(blocks, plans, &mut |_| {})) {
-        return None;
-    }
-    let (mut start, mut rest) = (from.at, &spans[..]);
-    while let [span, next @ ..] = rest {
-        if list.is_full() {
-            return Some(false);
-        }
-        let span_end = match next.first() {
-            Some(next) => from.at + Position::from_mm(next.start_mm)?,
-            // What was cut off behind it is gone, and with it where it ends.
-            None if is_cut => return Some(false),
-            None => end,
-        };
-        let length = span_end - start;
-        if let Some(segment) = span.segment::<f64>(length, tick_s).ok()? {
-            list.push(Item::Feed { ramp: *segment.as_ramp(), length });
-        }
-        (start, rest) = (span_end, next);
-    }
-    Some(true)
 }

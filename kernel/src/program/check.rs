@@ -138,7 +138,7 @@ impl Held {
                 *self = Self::default();
                 is_whole
             }
-            Item::Feed { .. } | Item::Dwell(_) | Item::Stop => true,
+            Item::Feed(_) | Item::Dwell(_) | Item::Stop => true,
         }
     }
 

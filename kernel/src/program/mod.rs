@@ -23,7 +23,7 @@ pub use supply::{Supply, SupplyError};
 
 use serde::{Deserialize, Serialize};
 
-use crate::law::{Limits, Ramp, Ticks};
+use crate::law::{Limits, PlannedRamp, Ticks};
 #[cfg(feature = "live")]
 use crate::num::Real;
 use crate::units::Position;
@@ -59,12 +59,7 @@ pub enum Item<const AXES: usize> {
         length: Position,
     },
     /// The feed over a length of path; a cruise is a ramp between equal feeds.
-    Feed {
-        /// The ramp.
-        ramp: Ramp<f64>,
-        /// The length.
-        length: Position,
-    },
+    Feed(PlannedRamp),
     /// The stretch ends here, at rest.
     EndOfStretch(#[serde(with = "crate::array")] [Position; AXES]),
     /// Rest, between stretches.

@@ -68,9 +68,7 @@ impl<const AXES: usize> Item<AXES> {
             Self::Septic { line, start, coefficients, length } => {
                 Ready::Piece(Piece::septic(line, start, coefficients, length).map_err(SupplyError::Piece)?)
             }
-            Self::Feed { ramp, length } => {
-                Ready::Segment(FeedSegment::ramp(&ramp, length, tick_s).map_err(SupplyError::Segment)?)
-            }
+            Self::Feed(planned) => Ready::Segment(planned.segment(tick_s).map_err(SupplyError::Segment)?),
             Self::EndOfStretch(end) => Ready::EndOfStretch(end),
             Self::Dwell(duration) => Ready::Dwell(duration),
             Self::Stop => Ready::Stop,

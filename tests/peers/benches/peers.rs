@@ -37,7 +37,7 @@ use motion_kernel::exec::Executor;
 use motion_kernel::law::{FeedSegment, Law, Limits, Phase, Ramp, Ticks, peak, reach};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
-use motion_kernel::plan::{Block, BlockPlan, Node, merge_equal, nodes_for, plan, plan_spanning, segments};
+use motion_kernel::plan::{Block, BlockPlan, Node, merge_equal, nodes_for, plan, plan_spanning, ramps};
 use motion_kernel::queue::{Feeder, PathRules, Streams};
 use motion_kernel::units::Position;
 use rsruckig::prelude::{DataArrayOrVec, InputParameter, ThrowErrorHandler, Trajectory};
@@ -231,8 +231,8 @@ impl Motion {
 
     fn segments<R: Real>(&self) -> Vec<FeedSegment<R>> {
         let end = Position::from_mm(self.block.length_mm).expect("in range");
-        let made = segments(&self.block, &self.plan, Position::ZERO, end, TICK_S).expect("in range");
-        made.into_iter().flatten().collect()
+        let made = ramps(&self.block, &self.plan, Position::ZERO, end, TICK_S).expect("in range");
+        made.into_iter().flatten().map(|ramp| ramp.segment(TICK_S).expect("in range")).collect()
     }
 
     fn rsruckig(&self) -> InputParameter<1> {
@@ -364,8 +364,8 @@ fn ticks<R: Real>(all: &mut Vec<Contender>, name: &'static str) {
         let mut at = Position::ZERO;
         for (block, plan) in blocks.iter().zip(&plans) {
             let end = at + Position::from_mm(block.length_mm).expect("in range");
-            for segment in segments(block, plan, at, end, TICK_S).expect("in range").into_iter().flatten() {
-                feeder.segment(segment).expect("continues");
+            for ramp in ramps(block, plan, at, end, TICK_S).expect("in range").into_iter().flatten() {
+                feeder.segment(ramp.segment(TICK_S).expect("in range")).expect("continues");
             }
             // f32 holds pieces of up to 16 mm.
             let middle = Position::from_bits((at.to_bits() + end.to_bits()) / 2);
@@ -591,8 +591,8 @@ fn plans(all: &mut Vec<Contender>, random: &mut Random) {
             calls: BLOCKS_PLANNED,
             run: Box::new(move || {
                 let start = Instant::now();
-                let time_s = plan_spanning(black_box(&blocks), 0.0, 0.0, &mut places, &mut |span| {
-                    black_box(span);
+                let time_s = plan_spanning(black_box(&blocks), 0.0, 0.0, &mut places, &mut |start_mm, ramp| {
+                    black_box((start_mm, ramp));
                 });
                 assert!(time_s.is_ok_and(|time_s| time_s.is_some()), "from rest to rest");
                 start.elapsed()

@@ -3,7 +3,7 @@
 use motion_kernel::law::{FeedSegment, Law, Limits, Ramp};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
-use motion_kernel::plan::{Block, BlockPlan, plan, segments};
+use motion_kernel::plan::{Block, BlockPlan, plan, ramps};
 use motion_kernel::queue::PathRules;
 use motion_kernel::units::Position;
 
@@ -44,6 +44,6 @@ pub fn rest_to_rest<R: Real>(length: Position, cap_mm_s: f64) -> Vec<FeedSegment
     let block = Block { length_mm: length.to_mm(), cap_mm_s, junction_mm_s: f64::INFINITY, law: law(LIMITS) };
     let mut plans = [BlockPlan::default()];
     plan(&[block], 0.0, 0.0, &mut plans).expect("a plan");
-    let made = segments(&block, &plans[0], Position::ZERO, length, TICK_S).expect("segments");
-    made.into_iter().flatten().collect()
+    let made = ramps(&block, &plans[0], Position::ZERO, length, TICK_S).expect("ramps");
+    made.into_iter().flatten().map(|ramp| ramp.segment(TICK_S).expect("a segment")).collect()
 }

@@ -206,11 +206,12 @@ impl<'a> Checker<'a> {
         let (mut crackle, mut snap, mut jerk, mut accel) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
         let (mut feed, mut gained, mut span) = (0.0_f64, 0.0_f64, 0.0_f64);
         let records = &self.plan.feed;
-        while records.get(self.feed).is_some_and(|r| r.start_mm + r.length_mm < then[0] - 1e-7) {
+        while records.get(self.feed).is_some_and(|r| r.start_mm + r.length_mm() < then[0] - 1e-7) {
             self.feed += 1;
         }
         for record in records[self.feed..].iter().take_while(|r| r.start_mm <= now[0] + 1e-7) {
-            let (jp, t1) = (record.peak_jerk_mm_s3, record.t1_s);
+            let ramp = &record.planned.ramp;
+            let (jp, t1) = (ramp.peak_jerk_mm_s3, ramp.t1_s);
             if jp > 0.0 {
                 crackle = crackle.max(2.0 * PI * PI * jp / (t1 * t1));
                 snap = snap.max(PI * jp / t1);
@@ -218,9 +219,9 @@ impl<'a> Checker<'a> {
                 accel = accel.max(0.5 * jp * t1);
             }
             // In a phase of constant acceleration the feed is computed from its start.
-            feed = feed.max(record.from_mm_s).max(record.to_mm_s);
+            feed = feed.max(ramp.from_mm_s).max(ramp.to_mm_s);
             gained = gained.max(jp * t1 * t1 * t1);
-            span = span.max(record.length_mm);
+            span = span.max(record.length_mm());
         }
         if now[0] < then[0] - bounds::backward_mm(self.epsilon, gained) {
             return Err(format!("goes back from {} to {} mm", then[0], now[0]));

@@ -1,7 +1,7 @@
 //! A program out of bytes: stretches that can be driven, rests between them, and some items broken.
 
 use arbitrary::{Result, Unstructured};
-use motion_kernel::law::{Law, Limits, Ramp, Ticks};
+use motion_kernel::law::{Law, Limits, PlannedRamp, Ramp, Ticks};
 use motion_kernel::program::{Allowed, Item, PathBlock};
 use motion_kernel::queue::PathRules;
 use motion_kernel::units::Position;
@@ -99,7 +99,7 @@ impl Program {
         }
         let mut start = Position::ZERO;
         for (ramp, length) in feed {
-            placed.push((start, 2, Item::Feed { ramp, length }));
+            placed.push((start, 2, Item::Feed(PlannedRamp { ramp, length })));
             start = start + length;
         }
         placed.sort_by_key(|&(start, kind, _)| (start, kind));
@@ -175,7 +175,7 @@ fn broken(input: &mut Unstructured<'_>, item: Item<2>) -> Result<Item<2>> {
             }
             Item::Septic { line, start, coefficients, length }
         }
-        Item::Feed { mut ramp, mut length } => {
+        Item::Feed(PlannedRamp { mut ramp, mut length }) => {
             match which {
                 0 => ramp.from_mm_s = value,
                 1 => ramp.to_mm_s = value,
@@ -183,7 +183,7 @@ fn broken(input: &mut Unstructured<'_>, item: Item<2>) -> Result<Item<2>> {
                 3 => (ramp.t1_s, ramp.t2_s) = (value, input.arbitrary()?),
                 _ => length = bits,
             }
-            Item::Feed { ramp, length }
+            Item::Feed(PlannedRamp { ramp, length })
         }
         Item::EndOfStretch(mut end) => {
             end[axis] = bits;

@@ -8,7 +8,7 @@ mod optimal;
 mod oracle;
 mod ramp;
 mod segment;
-mod turned;
+mod cut;
 
 use motion_kernel::law::Limits;
 use motion_kernel::num::Root;

@@ -4,7 +4,7 @@ use motion_host::machine::Machine;
 use motion_kernel::axis::{Correction, CorrectionError};
 use motion_kernel::exec::{ExecState, Executor};
 use motion_kernel::kernel::CorrectedIntake;
-use motion_kernel::law::{FeedSegment, Law, Ramp, Ticks, TurnedRamp};
+use motion_kernel::law::{CutRamp, FeedSegment, Law, Ramp, Ticks};
 use motion_kernel::path::Piece;
 use motion_kernel::queue::{Change, Density, LiveStreams, Refused, Rejection, SEGMENTS_PER_TICK_MAX};
 
@@ -104,13 +104,13 @@ fn a_change_that_comes_too_late_is_refused() {
     }
     let progress = feeder.progress();
     assert_eq!((progress.tick, progress.list, progress.done), (100, list, 0));
-    // The same ramp, turned where it was 50 ticks ago, and to rest.
-    let turned = TurnedRamp { ramp: up, turn_s: 50.0 * tick_s };
+    // The same ramp, cut where it was 50 ticks ago, and to rest.
+    let cut = CutRamp { ramp: up, cut_s: 50.0 * tick_s };
     let other = feeder.begin(mm(0.0), 0.0, Density::NONE).expect("a list");
-    let turn_at = Ticks::from_seconds(50.0, 1.0).expect("in range");
-    let first = FeedSegment::turned(&up, turn_at, mm(turned.length_mm()), tick_s).expect("a segment");
+    let cut_at = Ticks::from_seconds(50.0, 1.0).expect("in range");
+    let first = FeedSegment::cut(&up, cut_at, mm(cut.length_mm()), tick_s).expect("a segment");
     feeder.segment(other, first).expect("room");
-    let stop = Ramp::new(&law, turned.to_mm_s(), 0.0);
+    let stop = Ramp::new(&law, cut.to_mm_s(), 0.0);
     feeder
         .segment(other, FeedSegment::ramp(&stop, mm(stop.length_mm()), tick_s).expect("a segment"))
         .expect("room");

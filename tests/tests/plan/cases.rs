@@ -52,9 +52,9 @@ fn alternating_ceilings_and_saw_teeth() {
     assert!(down.iter().all(|plan| plan.exit_mm_s <= plan.peak_mm_s));
 }
 
-/// A staircase: stops at every corner, so all alike blocks are planned alike.
+/// Steps around corners: stops at every one, so all alike blocks are planned alike.
 #[test]
-fn staircase_stops_at_every_corner() {
+fn a_stepped_path_stops_at_every_corner() {
     let step = Block { junction_mm_s: 0.0, ..block(0.5, 50.0) };
     let mut blocks = vec![step; 100];
     let plans = from_rest(&blocks);

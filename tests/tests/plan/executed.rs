@@ -7,11 +7,11 @@ use motion_kernel::exec::{ExecState, Executor};
 use motion_kernel::law::{FeedSegment, Limits};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
-use motion_kernel::plan::{Block, FeedSpan, Node, nodes_for, plan_spanning};
+use motion_kernel::plan::Block;
 use motion_kernel::queue::{Feeder, PathRules, Refused, Streams};
 use motion_kernel::units::Position;
 
-use crate::spanning::staircase;
+use crate::spanning::{Span, rising_steps, spans};
 use crate::{block, laws, reference};
 use motion_tests::random::Random;
 
@@ -26,7 +26,7 @@ fn position(mm: f64) -> Position {
 }
 
 /// The segments of a plan over exact positions, up to `end`.
-fn segments<R: Real>(spans: &[FeedSpan], end: Position) -> Vec<FeedSegment<R>> {
+fn segments<R: Real>(spans: &[Span], end: Position) -> Vec<FeedSegment<R>> {
     let starts: Vec<Position> = spans.iter().map(|span| position(span.start_mm)).chain([end]).collect();
     let made = spans.iter().zip(starts.windows(2)).filter_map(|(span, ends)| {
         let length = ends[1] - ends[0];
@@ -103,10 +103,7 @@ impl<R: Real> Supply<'_, R> {
 
 /// Plans and executes; `digits` is what the number type keeps of a feed.
 fn executed<R: Real>(name: &str, blocks: &[Block<f64>], digits: f64) -> Worst {
-    let mut places = vec![Node::EMPTY; nodes_for(blocks.len())];
-    let mut spans = Vec::new();
-    let planned = plan_spanning(blocks, 0.0, 0.0, &mut places, &mut |span| spans.push(span));
-    let time_s = planned.expect("in range").expect("a plan");
+    let (time_s, spans) = spans(blocks);
     let ends_mm: Vec<f64> = blocks
         .iter()
         .scan(0.0, |at, block| {
@@ -209,12 +206,12 @@ fn named_cases_keep_every_limit_in_every_tick() {
     ];
     for step_mm in [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0] {
         let steps = if step_mm > 1.0 { 20 } else { 500 };
-        let up = staircase(steps, step_mm, 1.0, 80.0);
+        let up = rising_steps(steps, step_mm, 1.0, 80.0);
         let down: Vec<_> = up.iter().rev().copied().collect();
-        all.push(("stairs up and down", up.iter().chain(&down).copied().collect()));
-        all.push(("stairs down and up", down.iter().chain(&up).copied().collect()));
-        all.push(("stairs up", up));
-        all.push(("stairs down", down));
+        all.push(("steps up and down", up.iter().chain(&down).copied().collect()));
+        all.push(("steps down and up", down.iter().chain(&up).copied().collect()));
+        all.push(("steps up", up));
+        all.push(("steps down", down));
     }
     let mut worst = Worst::default();
     for (name, blocks) in &all {

@@ -7,7 +7,7 @@ use motion_kernel::num::{Fixed, Root, Scalar};
 use motion_kernel::path::Piece;
 use motion_kernel::plan::{
     AxisLimits, Bend, Block, BlockPlan, Ceiling, Junction, MachineLimits, PlanError, junction, merge_equal,
-    plan, segments,
+    plan, ramps,
 };
 use motion_kernel::queue::{Feeder, PathRules, Refused, Streams};
 use motion_kernel::units::Position;
@@ -507,7 +507,10 @@ fn segments_join() {
         for (block, plan) in blocks.iter().zip(&plans) {
             let start = end;
             end = start + Position::from_bits(block.length_mm.to_bits());
-            let made = match segments::<Fixed, Fixed>(block, plan, start, end, TICK_S) {
+            let made = ramps(block, plan, start, end, TICK_S).and_then(|made| {
+                made.iter().flatten().map(|ramp| ramp.segment::<Fixed>(TICK_S)).collect::<Result<Vec<_>, _>>()
+            });
+            let made = match made {
                 Ok(made) => made,
                 Err(SegmentError::OutOfRange { .. }) => {
                     refused += 1;
@@ -516,7 +519,7 @@ fn segments_join() {
                 Err(error) => panic!("{error}: {block:?} {plan:?}"),
             };
             let mut at = start;
-            for segment in made.iter().flatten() {
+            for segment in &made {
                 let ramp = segment.as_ramp();
                 assert_eq!(ramp.from_mm_s, feed, "{block:?} {plan:?} {made:?}");
                 feed = ramp.to_mm_s;
@@ -567,10 +570,10 @@ fn plans_are_accepted_and_executed() {
         for (block, plan) in blocks.iter().zip(&plans) {
             let start = end;
             end = start + Position::from_bits(block.length_mm.to_bits());
-            let made = segments(block, plan, start, end, TICK_S).expect("segments");
-            let length = made.iter().flatten().fold(start, |at, segment| at + segment.length());
+            let made = ramps(block, plan, start, end, TICK_S).expect("ramps");
+            let length = made.iter().flatten().fold(start, |at, ramp| at + ramp.length);
             assert_eq!(length, end, "{block:?} {plan:?}");
-            all.extend(made.into_iter().flatten());
+            all.extend(made.iter().flatten().map(|ramp| ramp.segment(TICK_S).expect("a segment")));
         }
         let duration: f64 = all.iter().map(|segment| segment.duration().to_f64()).sum();
         if !(1.0..60_000.0).contains(&duration) {

@@ -9,10 +9,10 @@ mod executed;
 mod feasible;
 mod fixed;
 mod maximal;
+mod planner;
 mod refusals;
 mod segments;
 mod spanning;
-mod window;
 
 use motion_kernel::law::{Law, Limits};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, plan};

@@ -73,7 +73,10 @@ fn room_for_plans_must_match() {
     let blocks = [block(10.0, 50.0); 3];
     for room in [0, 2, 4] {
         let mut plans = vec![BlockPlan::default(); room];
-        assert_eq!(plan(&blocks, 0.0, 0.0, &mut plans), Err(PlanError::Output { blocks: 3, plans: room }));
+        assert_eq!(
+            plan(&blocks, 0.0, 0.0, &mut plans),
+            Err(PlanError::Room { of: "plans", needed: 3, places: room })
+        );
         assert!(plans.iter().all(|plan| *plan == BlockPlan::default()));
     }
     assert_eq!(planned(&[], 0.0, 0.0), Ok(Vec::new()));

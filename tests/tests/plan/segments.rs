@@ -1,9 +1,8 @@
 //! Planned blocks as feed segments: they fill the path without a gap.
 
 use crate::{block, from_rest, random_blocks};
-use motion_kernel::law::FeedSegment;
 use motion_kernel::num::Real;
-use motion_kernel::plan::{Block, BlockPlan, segments};
+use motion_kernel::plan::{Block, BlockPlan, ramps};
 use motion_kernel::units::Position;
 use motion_tests::random::Random;
 
@@ -23,10 +22,11 @@ fn fill<R: Real>(blocks: &[Block<f64>], plans: &[BlockPlan<f64>]) -> Total {
     for (index, (block, plan)) in blocks.iter().zip(plans).enumerate() {
         end_mm += block.length_mm;
         let end = Position::from_mm(end_mm).expect("in range");
-        let made: [Option<FeedSegment<R>>; 3] = segments(block, plan, start, end, TICK_S)
+        let made = ramps(block, plan, start, end, TICK_S)
             .unwrap_or_else(|error| panic!("block {index}: {error}: {block:?} {plan:?}"));
         let mut reached = start;
-        for segment in made.iter().flatten() {
+        for planned in made.into_iter().flatten() {
+            let segment = planned.segment::<R>(TICK_S).expect("a segment");
             let ramp = segment.as_ramp();
             assert!(segment.length() > Position::ZERO, "block {index}: {segment:?}");
             assert_eq!(

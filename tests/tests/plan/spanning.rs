@@ -3,35 +3,46 @@
 //! The yardstick is a plan that always exists: acceleration alone under ceilings that are widened by c·t₁/2 on both
 //! sides, then filtered in time with the law's own pulse of length t₁ ([`Yardstick`]). With t₁ = 2A/J it keeps the
 //! jerk limit only where its acceleration does not swing from +A to −A within t₁, where the pulses add up; t₁ is
-//! stretched until it does. A hump with no room to hold its feed stays up to a twentieth slower than it: its filter
+//! stretched until it does. An interval with no room to hold its feed stays up to a twentieth slower than it: its filter
 //! lets the end of one ramp overlap the begin of the next, which two ramps of the law do not.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use motion_kernel::law::{Law, Limits, Passing, Ramp};
-use motion_kernel::plan::{Block, FeedSpan, Node, PlanError, merge_equal, nodes_for, plan_spanning};
+use motion_kernel::plan::{Block, Node, PlanError, merge_equal, nodes_for, plan_spanning};
 
 use crate::{block, from_rest, law, planned, random_blocks, reference, time_s};
 use motion_tests::random::Random;
+
+/// A ramp or a cruise with its place on the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Span {
+    pub(crate) start_mm: f64,
+    pub(crate) length_mm: f64,
+    pub(crate) ramp: Ramp<f64>,
+}
 
 pub(crate) fn spans_between(
     blocks: &[Block<f64>],
     start: f64,
     end: f64,
-) -> Result<Option<(f64, Vec<FeedSpan>)>, PlanError> {
+) -> Result<Option<(f64, Vec<Span>)>, PlanError> {
     let mut places = vec![Node::EMPTY; nodes_for(blocks.len())];
     let mut spans = Vec::new();
-    let time_s = plan_spanning(blocks, start, end, &mut places, &mut |span| spans.push(span))?;
+    let mut put = |start_mm: f64, &ramp: &Ramp<f64>| {
+        spans.push(Span { start_mm, length_mm: ramp.length_mm(), ramp });
+    };
+    let time_s = plan_spanning(blocks, start, end, &mut places, &mut put)?;
     Ok(time_s.map(|time_s| (time_s, spans)))
 }
 
-pub(crate) fn spans(blocks: &[Block<f64>]) -> (f64, Vec<FeedSpan>) {
+pub(crate) fn spans(blocks: &[Block<f64>]) -> (f64, Vec<Span>) {
     spans_between(blocks, 0.0, 0.0).expect("in range").expect("a plan")
 }
 
 /// Every ceiling, junction and limit at many instants of every span, and that the spans are one motion.
-pub(crate) fn legal(blocks: &[Block<f64>], start: f64, end: f64, spans: &[FeedSpan]) -> Result<(), String> {
+pub(crate) fn legal(blocks: &[Block<f64>], start: f64, end: f64, spans: &[Span]) -> Result<(), String> {
     const WITHIN: f64 = 1.0 + 1e-9;
     let mut ends = Vec::new();
     let mut total = 0.0;
@@ -96,7 +107,7 @@ pub(crate) fn legal(blocks: &[Block<f64>], start: f64, end: f64, spans: &[FeedSp
 }
 
 /// The feed at `s_mm`, by halving the time.
-fn feed_at(spans: &[FeedSpan], s_mm: f64) -> f64 {
+fn feed_at(spans: &[Span], s_mm: f64) -> f64 {
     let index = spans.partition_point(|span| span.start_mm < s_mm).saturating_sub(1);
     let Some(span) = spans.get(index) else { return 0.0 };
     if span.ramp.peak_jerk_mm_s3 <= 0.0 {
@@ -254,11 +265,11 @@ fn compared(name: &'static str, blocks: &[Block<f64>]) -> Compared {
     }
 }
 
-pub(crate) fn staircase(steps: usize, step_mm: f64, low: f64, high: f64) -> Vec<Block<f64>> {
+pub(crate) fn rising_steps(steps: usize, step_mm: f64, low: f64, high: f64) -> Vec<Block<f64>> {
     (0..steps).map(|n| block(step_mm, low + (high - low) * n as f64 / steps as f64)).collect()
 }
 
-/// The named cases, and staircases up and down with steps from 1 µm to 100 mm.
+/// The named cases, and steps up and down, from 1 µm to 100 mm.
 #[test]
 fn named_cases_are_as_fast_as_the_yardstick() {
     let feed = 5000.0 / 60.0;
@@ -288,11 +299,11 @@ fn named_cases_are_as_fast_as_the_yardstick() {
     for step_mm in [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0] {
         for steps in [20, 500] {
             for (low, high) in [(1.0, 80.0), (20.0, 200.0)] {
-                let up = staircase(steps, step_mm, low, high);
+                let up = rising_steps(steps, step_mm, low, high);
                 let down: Vec<_> = up.iter().rev().copied().collect();
                 let both: Vec<_> = up.iter().chain(&down).copied().collect();
                 all.extend([
-                    compared("stairs up", &up),
+                    compared("steps up", &up),
                     compared("down", &down),
                     compared("up and down", &both),
                 ]);
@@ -340,7 +351,7 @@ fn random_lists_are_as_fast_as_the_yardstick() {
         all[0].ratio,
         above(1.02)
     );
-    // Single humps without room to hold; everything else is within.
+    // Single intervals without room to hold; everything else is within.
     assert!(above(1.02) <= 5 && all[0].ratio < 1.05);
     assert!(literal <= 20, "{literal}");
 }
@@ -376,8 +387,8 @@ fn random_lists_are_legal() {
 fn too_few_places_are_refused() {
     let blocks = [block(1.0, 10.0), block(1.0, 20.0)];
     let mut places = [Node::EMPTY; 3];
-    let refused = plan_spanning(&blocks, 0.0, 0.0, &mut places, &mut |_| {});
-    assert_eq!(refused, Err(PlanError::Output { blocks: 6, plans: 3 }));
+    let refused = plan_spanning(&blocks, 0.0, 0.0, &mut places, &mut |_, _| {});
+    assert_eq!(refused, Err(PlanError::Room { of: "nodes", needed: 6, places: 3 }));
 }
 
 /// The inverse: how far into a ramp a feed is passed.
@@ -451,7 +462,7 @@ fn a_list_takes_as_long_backwards() {
     assert!(worst < 0.02, "{worst}");
 }
 
-/// Strong and weak blocks by turns, of which only the strong ones would let every third ceiling be rested in: valleys that
+/// Strong and weak blocks by turns, of which only the strong ones would let every third ceiling be rested in: minima that
 /// cannot be reached, by the thousand.
 pub(crate) fn unreachable(weak_mm_s2: f64, slope: f64, length_mm: f64) -> Vec<Block<f64>> {
     let (weak, strong) = (law(weak_mm_s2, 1e4, 1e6), law(5e4, 1e9, 1e12));
@@ -468,9 +479,9 @@ pub(crate) fn unreachable(weak_mm_s2: f64, slope: f64, length_mm: f64) -> Vec<Bl
         .collect()
 }
 
-/// A chain of valleys that are given up one after the other from the same foot is no reason for having no plan.
+/// A chain of minima that are given up one after the other from the same foot is no reason for having no plan.
 #[test]
-fn a_long_chain_of_valleys_is_given_up() {
+fn a_long_chain_of_minima_is_given_up() {
     let on = unreachable(500.0, 0.0, 0.01);
     let back: Vec<_> = on.iter().rev().copied().collect();
     for blocks in [on, back] {

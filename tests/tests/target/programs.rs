@@ -4,7 +4,7 @@ use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan, plan_program};
 use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Table, Tables};
-use motion_kernel::law::{Law, Ramp};
+use motion_kernel::law::{Law, PlannedRamp, Ramp};
 use motion_kernel::num::Fixed;
 use motion_kernel::program::{Header, Item, write};
 use motion_kernel::units::Position;
@@ -233,10 +233,11 @@ pub(crate) fn utmost<const AXES: usize>() -> Vec<u8> {
     let length = |mm: f64| Position::from_mm(mm).expect("in range");
     let ramps = core::iter::once(up).chain((0..SEGMENTS).map(change)).chain([down]);
     let feed: Vec<Item<AXES>> =
-        ramps.map(|ramp| Item::Feed { ramp, length: length(ramp.length_mm()) }).collect();
+        ramps.map(|ramp| Item::Feed(PlannedRamp { ramp, length: length(ramp.length_mm()) })).collect();
     let of = |items: &[Item<AXES>]| -> i64 {
-        let bits =
-            items.iter().map(|item| if let Item::Feed { length, .. } = item { length.to_bits() } else { 0 });
+        let bits = items
+            .iter()
+            .map(|item| if let Item::Feed(planned) = item { planned.length.to_bits() } else { 0 });
         bits.sum()
     };
     // Straight, but as curves, along the diagonal.
@@ -296,7 +297,7 @@ pub(crate) fn one_axis() -> Vec<u8> {
                 Item::Line { line, start: [start[0]], direction: [direction[0]], length }
             }
             Item::Septic { .. } => unreachable!("a program of lines"),
-            Item::Feed { ramp, length } => Item::Feed { ramp, length },
+            Item::Feed(planned) => Item::Feed(planned),
             Item::EndOfStretch(end) => Item::EndOfStretch([end[0]]),
             Item::Dwell(duration) => Item::Dwell(duration),
             Item::Stop => Item::Stop,

@@ -4,43 +4,26 @@
 //! wherever it is best, not at junctions. Every ceiling is kept at every point, and a ramp uses no more than the least
 //! limits of all the blocks it crosses.
 //!
-//! - [`valleys`]: which ceilings are rested in, and what lies between them: humps;
-//! - [`climb`]: up one side of a hump, below its stairs;
-//! - `top`: the feed between its two sides.
+//! - `intervals`: divides the stretch at the minima of its ceilings;
+//! - `ascent`: the ramps up one side of an interval, below its steps;
+//! - `ramp_fit`: one of these ramps;
+//! - `peak`: the greatest feed of an interval, between its two sides.
 //!
-//! Works in f64 on slices of the caller, allocates nothing. Time goes with the number of blocks; chains of valleys
+//! Works in f64 on slices of the caller, allocates nothing. Time goes with the number of blocks; chains of minima
 //! that cannot be reached cost more, up to a bound beyond which there is no such plan.
 
-pub mod climb;
-mod top;
-pub mod valleys;
+mod ascent;
+mod intervals;
+mod peak;
+mod ramp_fit;
 
-pub use valleys::Node;
+pub use intervals::Node;
 
-use self::climb::Climb;
-use self::top::{Sides, lowest_fits};
-use self::valleys::{Hump, Valleys};
-use super::lookahead::{Block, BlockPlan, PlanError, check};
+use self::ascent::{Ascent, AscentRamp};
+use self::intervals::{Interval, Intervals};
+use self::peak::{Sides, lowest_fits};
+use super::two_pass::{Block, PlanError, check};
 use crate::law::Ramp;
-
-/// A ramp or a cruise, with its place on the path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FeedSpan {
-    /// Where it starts \[mm\].
-    pub start_mm: f64,
-    /// Its length \[mm\].
-    pub length_mm: f64,
-    /// The ramp; a cruise has equal feeds and t₂ = its duration.
-    pub ramp: Ramp<f64>,
-}
-
-impl FeedSpan {
-    /// At one feed > 0 from one position to another.
-    pub(super) fn cruise(start_mm: f64, end_mm: f64, feed_mm_s: f64) -> Self {
-        let length_mm = end_mm - start_mm;
-        Self { start_mm, length_mm, ramp: Ramp::cruise(feed_mm_s, length_mm / feed_mm_s) }
-    }
-}
 
 /// Places for nodes that are enough for any list of so many blocks.
 #[must_use]
@@ -49,9 +32,11 @@ pub const fn nodes_for(blocks: usize) -> usize {
 }
 
 /// Lengths that differ by no more are equal \[mm\].
-pub(super) const ROUNDING_MM: f64 = 1.0e-9;
-/// Plans a stretch with ramps that may span blocks, and hands every ramp and cruise to `put`, in path order. Returns
-/// the time it takes \[s\], or `None` where no such plan was found (one pair of ramps a block may still be possible).
+const ROUNDING_MM: f64 = 1.0e-9;
+
+/// Plans a stretch with ramps that may span blocks, and hands every ramp and cruise to `put` with the place where it
+/// starts \[mm\], in path order. Returns the time it takes \[s\], or `None` where no such plan was found: one pair of ramps
+/// a block may still be possible.
 ///
 /// # Errors
 /// A figure is out of range, or `places` is shorter than [`nodes_for`] says.
@@ -60,99 +45,77 @@ pub fn plan_spanning(
     start_mm_s: f64,
     end_mm_s: f64,
     places: &mut [Node],
-    put: &mut impl FnMut(FeedSpan),
+    put: &mut impl FnMut(f64, &Ramp<f64>),
 ) -> Result<Option<f64>, PlanError> {
     check(blocks, start_mm_s, end_mm_s)?;
     let room = places.len();
-    let Some(mut valleys) = Valleys::new(blocks, start_mm_s, end_mm_s, places) else {
-        return Err(PlanError::Output { blocks: nodes_for(blocks.len()), plans: room });
+    let Some(mut intervals) = Intervals::new(blocks, start_mm_s, end_mm_s, places) else {
+        return Err(PlanError::Room { of: "nodes", needed: nodes_for(blocks.len()), places: room });
     };
-    // Several kilobytes each: used for all humps.
-    let (mut up, mut down) = (Climb::NONE, Climb::NONE);
-    if !valleys.settle(|valleys, hump| lowest_fits(hump, valleys, &mut up, &mut down)) {
+    // Several kilobytes each: used for all intervals.
+    let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
+    if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, &mut up, &mut down)) {
         return Ok(None);
     }
     let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
-    for hump in valleys.humps() {
-        out.cruise(hump.start_mm, hump.enter_mm_s);
-        if drive(&hump, &valleys, &mut up, &mut down, &mut out).is_none() {
+    for interval in intervals.in_order() {
+        out.cruise(interval.start_mm, interval.enter_mm_s);
+        if drive(&interval, &intervals, &mut up, &mut down, &mut out).is_none() {
             return Ok(None);
         }
     }
     Ok(Some(out.time_s))
 }
 
-/// One pair of ramps a block, as [`plan`](super::plan()) found them; returns the time they take \[s\].
-pub(crate) fn spans_of(
-    blocks: &[Block<f64>],
-    plans: &[BlockPlan<f64>],
-    put: &mut impl FnMut(FeedSpan),
-) -> f64 {
-    let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
-    let mut end_mm = 0.0;
-    for (block, plan) in blocks.iter().zip(plans) {
-        end_mm += block.length_mm;
-        let rise = Ramp::new(&block.law, plan.enter_mm_s, plan.peak_mm_s);
-        let fall = Ramp::new(&block.law, plan.peak_mm_s, plan.exit_mm_s);
-        if !rise.is_cruise() {
-            out.ramp(&rise);
-        }
-        out.cruise(end_mm - fall.length_mm(), plan.peak_mm_s);
-        if !fall.is_cruise() {
-            out.ramp(&fall);
-        }
-    }
-    out.time_s
-}
-
-/// Where spans go.
+/// Where ramps go, and where the next one starts.
 struct Out<'a, F> {
     at_mm: f64,
     time_s: f64,
     put: &'a mut F,
 }
 
-impl<F: FnMut(FeedSpan)> Out<'_, F> {
+impl<F: FnMut(f64, &Ramp<f64>)> Out<'_, F> {
     fn cruise(&mut self, to_mm: f64, feed_mm_s: f64) {
         if to_mm > self.at_mm && feed_mm_s > 0.0 {
-            let span = FeedSpan::cruise(self.at_mm, to_mm, feed_mm_s);
-            (self.put)(span);
-            self.time_s += span.ramp.duration_s();
+            self.put(&Ramp::cruise(feed_mm_s, (to_mm - self.at_mm) / feed_mm_s));
         }
         self.at_mm = self.at_mm.max(to_mm);
     }
 
     fn ramp(&mut self, ramp: &Ramp<f64>) {
-        let length_mm = ramp.length_mm();
-        (self.put)(FeedSpan { start_mm: self.at_mm, length_mm, ramp: *ramp });
+        self.put(ramp);
+        self.at_mm += ramp.length_mm();
+    }
+
+    fn put(&mut self, ramp: &Ramp<f64>) {
+        (self.put)(self.at_mm, ramp);
         self.time_s += ramp.duration_s();
-        self.at_mm += length_mm;
     }
 }
 
 /// Up, along and down.
-fn drive<F: FnMut(FeedSpan)>(
-    hump: &Hump,
-    valleys: &Valleys<'_>,
-    up: &mut Climb,
-    down: &mut Climb,
+fn drive<F: FnMut(f64, &Ramp<f64>)>(
+    interval: &Interval,
+    intervals: &Intervals<'_>,
+    up: &mut Ascent,
+    down: &mut Ascent,
     out: &mut Out<'_, F>,
 ) -> Option<()> {
-    let Some(sides) = Sides::new(hump, valleys) else { return Some(()) };
-    let top = sides.best(up, down)?;
-    let mut feed = hump.enter_mm_s;
-    for leg in up.legs() {
-        out.cruise(hump.start_mm + leg.start_mm, feed);
-        out.ramp(&leg.ramp);
-        feed = leg.ramp.to_mm_s;
+    let Some(sides) = Sides::new(interval, intervals) else { return Some(()) };
+    let peak = sides.best(up, down)?;
+    let mut feed = interval.enter_mm_s;
+    for AscentRamp { start_mm, ramp } in up.ramps() {
+        out.cruise(interval.start_mm + start_mm, feed);
+        out.ramp(ramp);
+        feed = ramp.to_mm_s;
     }
-    feed = top;
-    for leg in down.legs().rev() {
-        let ramp = leg.ramp.reversed();
-        out.cruise(hump.end_mm - leg.start_mm - ramp.length_mm(), feed);
+    feed = peak;
+    for AscentRamp { start_mm, ramp } in down.ramps().rev() {
+        let ramp = ramp.reversed();
+        out.cruise(interval.end_mm - start_mm - ramp.length_mm(), feed);
         out.ramp(&ramp);
         feed = ramp.to_mm_s;
     }
-    out.cruise(hump.end_mm, feed);
+    out.cruise(interval.end_mm, feed);
     Some(())
 }

@@ -9,7 +9,7 @@
 //! a ramp's length is not monotone in its lower feed.
 
 use super::ceiling::Reason;
-use crate::law::{Law, peak, reach};
+use crate::law::{Law, SegmentError, peak, reach};
 use crate::num::Root;
 use crate::units::Position;
 
@@ -89,12 +89,21 @@ pub enum PlanError {
         /// The greatest that can be reached \[mm/s\].
         greatest_mm_s: f64,
     },
-    /// The output has another number of blocks than the input.
-    Output {
-        /// Blocks.
-        blocks: usize,
-        /// Room for plans.
-        plans: usize,
+    /// The ramps of a block are beyond the tick's range.
+    Ramp {
+        /// Where the block starts on the path.
+        start: Position,
+        /// Why.
+        error: SegmentError,
+    },
+    /// The caller's memory has another number of places than are needed.
+    Room {
+        /// What they are for.
+        of: &'static str,
+        /// How many are needed.
+        needed: usize,
+        /// How many there are.
+        places: usize,
     },
 }
 
@@ -121,7 +130,8 @@ impl core::fmt::Display for PlanError {
             Self::TooShortToAccelerate { end_mm_s, greatest_mm_s } => {
                 write!(f, "too short to reach {end_mm_s} mm/s: at most {greatest_mm_s} mm/s")
             }
-            Self::Output { blocks, plans } => write!(f, "{blocks} blocks, room for {plans} plans"),
+            Self::Ramp { start, error } => write!(f, "block from {} mm: {error}", start.to_mm()),
+            Self::Room { of, needed, places } => write!(f, "room for {places} {of}, expected {needed}"),
         }
     }
 }
@@ -140,7 +150,7 @@ pub fn plan<R: Root>(
     plans: &mut [BlockPlan<R>],
 ) -> Result<(), PlanError> {
     if blocks.len() != plans.len() {
-        return Err(PlanError::Output { blocks: blocks.len(), plans: plans.len() });
+        return Err(PlanError::Room { of: "plans", needed: blocks.len(), places: plans.len() });
     }
     check(blocks, start_mm_s, end_mm_s)?;
     forward(blocks, start_mm_s, end_mm_s, plans)?;
@@ -253,6 +263,11 @@ fn backward<R: Root>(blocks: &[Block<R>], start: R, plans: &mut [BlockPlan<R>]) 
 /// slice; returns how many they are.
 #[must_use]
 pub fn merge_equal<R: Root>(blocks: &mut [Block<R>]) -> usize {
+    merge_each(blocks, |_, _| ())
+}
+
+/// As [`merge_equal`]; `moved` is told for every block the index that it had and that of the merged one which it is in.
+pub(super) fn merge_each<R: Root>(blocks: &mut [Block<R>], mut moved: impl FnMut(usize, usize)) -> usize {
     let mut merged: usize = 0;
     let longest = R::from_f64(Position::LIMIT_MM);
     for index in 0..blocks.len() {
@@ -277,6 +292,7 @@ pub fn merge_equal<R: Root>(blocks: &mut [Block<R>]) -> usize {
                 merged += 1;
             }
         }
+        moved(index, merged - 1);
     }
     merged
 }

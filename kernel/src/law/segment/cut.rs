@@ -1,11 +1,11 @@
 //! A ramp that is given up while its acceleration still rises: the jerk goes back the way it came.
 //!
-//! Consumes a ramp under way and where in its rise it is to turn; produces a [`FeedSegment`] whose rise is that ramp's,
-//! but for rounding, up to there. With x = t/t₁, and a turn at x₁ ≤ 1/2, the jerk Jp·sin²πx runs up to x₁, back to 0, and the
+//! Consumes a ramp under way and where in its rise it is cut; produces a [`FeedSegment`] whose rise is that ramp's,
+//! but for rounding, up to there. With x = t/t₁, and a cut at x₁ ≤ 1/2, the jerk Jp·sin²πx runs up to x₁, back to 0, and the
 //! whole mirrored: the change of feed is symmetric about its middle like any ramp's, 4·x₁·t₁ long, and its limits are the
-//! ramp's, because jerk and snap only take values that they have in it. Snap steps where it turns.
+//! ramp's, because jerk and snap only take values that they have in it. Snap steps at the cut and at its image.
 //!
-//! Between the turns lies one expression about the middle, where acceleration is greatest: with u the time from there in
+//! Between the cut and its image lies one expression about the middle, where acceleration is greatest: with u the time from there in
 //! parts of t₁, V, A and S the feed, acceleration and position in the middle,
 //!
 //! ```text
@@ -22,33 +22,33 @@ use crate::law::shape::Shape;
 use crate::num::Real;
 use crate::units::Position;
 
-/// A ramp that turns at `turn_s` of its rise, which is at most half of it.
+/// A ramp that is cut at `cut_s` of its rise, which is at most half of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TurnedRamp {
+pub struct CutRamp {
     /// As it was begun.
     pub ramp: Ramp<f64>,
-    /// When it turns \[s\].
-    pub turn_s: f64,
+    /// When it is cut \[s\].
+    pub cut_s: f64,
 }
 
-impl TurnedRamp {
+impl CutRamp {
     /// The greatest acceleration, in the middle, with the sign of the change of feed \[mm/s²\].
     #[must_use]
     pub fn peak_accel_mm_s2(&self) -> f64 {
-        let shape = Shape::at(self.turn_s / self.ramp.t1_s);
+        let shape = Shape::at(self.cut_s / self.ramp.t1_s);
         2.0 * self.ramp.signed_jerk_mm_s3() * self.ramp.t1_s * shape.accel
     }
 
     /// The feed at its end \[mm/s\].
     #[must_use]
     pub fn to_mm_s(&self) -> f64 {
-        self.ramp.from_mm_s + 2.0 * self.turn_s * self.peak_accel_mm_s2()
+        self.ramp.from_mm_s + 2.0 * self.cut_s * self.peak_accel_mm_s2()
     }
 
     /// Its duration \[s\].
     #[must_use]
     pub fn duration_s(&self) -> f64 {
-        4.0 * self.turn_s
+        4.0 * self.cut_s
     }
 
     /// Its length \[mm\].
@@ -58,30 +58,25 @@ impl TurnedRamp {
     }
 }
 
-/// Where a ramp turns may be off by half a step of time \[ticks\].
+/// Where a ramp is cut may be off by half a step of time \[ticks\].
 const ROUNDING_TICKS: f64 = 1.0 / 4_294_967_296.0;
 
 impl<R: Real> FeedSegment<R> {
-    /// A ramp that turns `turn_at` after its start, over `length` of path, which must be its own to 10⁻⁸ mm.
+    /// A ramp that is cut `cut_at` after its start, over `length` of path, which must be its own to 10⁻⁸ mm.
     ///
     /// # Errors
-    /// The ramp does not turn in the first half of its rise, or rises in less than a tick; a figure is not finite or too
+    /// The ramp is not cut in the first half of its rise, or rises in less than a tick; a figure is not finite or too
     /// large; the lengths differ.
-    pub fn turned(
-        ramp: &Ramp<f64>,
-        turn_at: Ticks,
-        length: Position,
-        tick_s: f64,
-    ) -> Result<Self, SegmentError> {
+    pub fn cut(ramp: &Ramp<f64>, cut_at: Ticks, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
         // As for the whole ramp: what is rounded here would be a step there.
         let ramp = &super::to_f64(ramp);
-        let turned = TurnedRamp { ramp: *ramp, turn_s: turn_at.to_f64() * tick_s };
-        let TurnedRamp { turn_s, .. } = turned;
+        let cut = CutRamp { ramp: *ramp, cut_s: cut_at.to_f64() * tick_s };
+        let CutRamp { cut_s, .. } = cut;
         let rise_ticks = ramp.t1_s / tick_s;
-        if !(turn_s > 0.0 && turn_at.to_f64() <= 0.5 * rise_ticks + ROUNDING_TICKS && rise_ticks > 1.0) {
-            return Err(SegmentError::OutOfRange { quantity: "turn in the rise [s]", value: turn_s });
+        if !(cut_s > 0.0 && cut_at.to_f64() <= 0.5 * rise_ticks + ROUNDING_TICKS && rise_ticks > 1.0) {
+            return Err(SegmentError::OutOfRange { quantity: "cut in the rise [s]", value: cut_s });
         }
-        let (path_mm, ramp_mm) = (length.to_mm(), turned.length_mm());
+        let (path_mm, ramp_mm) = (length.to_mm(), cut.length_mm());
         if !(libm::fabs(ramp_mm - path_mm) <= super::LENGTH_TOLERANCE_MM) {
             return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
         }
@@ -89,7 +84,7 @@ impl<R: Real> FeedSegment<R> {
         let whole_mm = Position::from_mm(ramp.length_mm())
             .ok_or(SegmentError::OutOfRange { quantity: "length [mm]", value: ramp.length_mm() })?;
         let mut segment = Self::new(ramp, whole_mm, tick_s)?;
-        let to_mm_s = turned.to_mm_s();
+        let to_mm_s = cut.to_mm_s();
         let bits = |quantity, mm: f64| {
             Position::from_mm(mm)
                 .map(Position::to_bits)
@@ -100,16 +95,16 @@ impl<R: Real> FeedSegment<R> {
         };
         let t1_s = ramp.t1_s;
         let scale_mm = ramp.signed_jerk_mm_s3() * t1_s * t1_s * t1_s;
-        let peak = turned.peak_accel_mm_s2();
-        let middle_mm_s = ramp.from_mm_s + peak * turn_s;
-        let turn_mm = ramp.from_mm_s * turn_s + scale_mm * Shape::at(turn_s / t1_s).length;
-        let middle_mm = 2.0 * turn_mm + 0.5 * peak * turn_s * turn_s;
+        let peak = cut.peak_accel_mm_s2();
+        let middle_mm_s = ramp.from_mm_s + peak * cut_s;
+        let cut_mm = ramp.from_mm_s * cut_s + scale_mm * Shape::at(cut_s / t1_s).length;
+        let middle_mm = 2.0 * cut_mm + 0.5 * peak * cut_s * cut_s;
         let step = segment.rise.step;
         // x₁ as the tick counts it: so many steps.
-        let turned_part = (u128::from(step) * u128::from(turn_at.0)) >> 32;
-        segment.turns_at = (turned_part as u64).wrapping_neg();
-        segment.rise.duration = turn_at;
-        segment.hold = Clock { duration: turn_at.plus(turn_at), step };
+        let cut_part = (u128::from(step) * u128::from(cut_at.0)) >> 32;
+        segment.cut_at = (cut_part as u64).wrapping_neg();
+        segment.rise.duration = cut_at;
+        segment.hold = Clock { duration: cut_at.plus(cut_at), step };
         segment.length = length;
         segment.ramp.to_mm_s = real("exit feed [mm/s]", to_mm_s)?;
         segment.fall_bits = bits("exit feed · t1 [mm]", -to_mm_s * t1_s - scale_mm / (8.0 * PI * PI))?;
@@ -122,11 +117,11 @@ impl<R: Real> FeedSegment<R> {
         Ok(segment)
     }
 
-    /// Between the turns, at `x` parts of t₁ from the middle, of which a rise would have made `rise`: its bent length and
+    /// Between the cut and its image, at `x` parts of t₁ from the middle, of which a rise would have made `rise`: its bent length and
     /// what it gained of each. In the tick.
     #[cold]
     #[inline(never)]
-    pub(super) fn at_turn(&self, rise: &PathMotion<R>, unit: R::Unit, x: u32, before: bool) -> PathMotion<R> {
+    pub(super) fn at_cut(&self, rise: &PathMotion<R>, unit: R::Unit, x: u32, before: bool) -> PathMotion<R> {
         /// 12/(8π²), in 2⁻³².
         const LINEAR: u32 = (12.0 / (8.0 * PI * PI) * 4_294_967_296.0) as u32;
         let bent = rise.s - Position::from_bits(portion(portion(self.cube_bits, LINEAR), x));

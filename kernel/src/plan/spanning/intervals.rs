@@ -1,19 +1,19 @@
-//! Which ceilings of a stretch are rested in.
+//! The intervals of a stretch, from one minimum of its ceilings to the next.
 //!
-//! Consumes the ceilings of a stretch; divides it into **humps**: from one valley to the next the feed rises, holds
-//! and falls again, once. A valley is a ceiling that is worth coming down to from both sides; all others are stairs
-//! on the way up or down, the top of their hump, or too high to matter.
+//! Consumes the ceilings of a stretch; divides it into **intervals**: from one minimum to the next the feed rises, holds
+//! and falls again, once. A minimum is a ceiling that is worth coming down to from both sides; all others are steps
+//! on the way up or down, the peak of their interval, or too high to matter.
 //!
-//! The ceilings are looked at from the lowest up, in the tree of their minima: what lies beside a stair and is higher
+//! The ceilings are looked at from the lowest up, in the tree of their minima: what lies next to a step and is higher
 //! need not be looked at any more, so that the work is proportional to the number of ceilings.
 //!
 //! - `least`: the least limits between two positions;
-//! - `settle`: whether the valleys can be reached, and which of them are given up.
+//! - `settle`: whether the minima can be reached, and which of them are given up.
 
 mod least;
 mod settle;
 
-use super::climb::{Stair, Stairs};
+use super::ascent::{Step, Steps};
 use crate::law::{Law, Limits, Ramp, peak};
 use crate::plan::Block;
 
@@ -31,7 +31,7 @@ enum Role {
     /// Held from its start, on the way down.
     Falling,
     /// Rested in: the feed comes down to it, or starts or ends there.
-    Valley,
+    Minimum,
 }
 
 /// A ceiling: a block's, that of several equal ones, or that of a junction. Working memory of the planner.
@@ -49,14 +49,14 @@ pub struct Node {
     /// The lowest of the ceilings to its left, and to its right, that are not below it.
     left: u32,
     right: u32,
-    /// The next lower one to the left; the valley that waits behind it; the valley before it.
+    /// The next lower one to the left; the minimum that waits after it; the minimum before it.
     link: u32,
-    /// For a valley that waits: what its right side reaches to.
+    /// For a minimum that waits: what its right side reaches to.
     bounds: (u32, u32),
-    /// For a valley: the ceiling of the hump after it \[mm/s\].
-    top_mm_s: f64,
+    /// For a minimum: the ceiling of the interval after it \[mm/s\].
+    peak_mm_s: f64,
     role: Role,
-    /// The role it had before it became a valley to divide a long staircase.
+    /// The role it had before it became a minimum to divide a long series of steps.
     divides: Option<Role>,
 }
 
@@ -73,54 +73,54 @@ impl Node {
         right: NONE,
         link: NONE,
         bounds: (NONE, NONE),
-        top_mm_s: f64::INFINITY,
+        peak_mm_s: f64::INFINITY,
         role: Role::Free,
         divides: None,
     };
 }
 
-/// The part of a stretch between two valleys.
+/// The part of a stretch between two minima.
 #[derive(Clone, Copy, Debug)]
-pub struct Hump {
+pub(super) struct Interval {
     /// Where it starts \[mm\].
-    pub start_mm: f64,
+    pub(super) start_mm: f64,
     /// Where it ends \[mm\].
-    pub end_mm: f64,
+    pub(super) end_mm: f64,
     /// The feed at its start \[mm/s\].
-    pub enter_mm_s: f64,
+    pub(super) enter_mm_s: f64,
     /// The feed at its end \[mm/s\].
-    pub exit_mm_s: f64,
+    pub(super) exit_mm_s: f64,
     /// Its ceiling \[mm/s\], as far as known.
-    pub top_mm_s: f64,
-    /// Stairs on the way up, from its start.
-    pub rising: Stairs,
-    /// Stairs on the way down, from its end.
-    pub falling: Stairs,
+    pub(super) peak_mm_s: f64,
+    /// Steps on the way up, from its start.
+    pub(super) rising: Steps,
+    /// Steps on the way down, from its end.
+    pub(super) falling: Steps,
     /// Nodes inside, from and up to.
     nodes: (usize, usize),
 }
 
 /// The ceilings of a stretch and what has been found out about them.
-pub struct Valleys<'a> {
+pub(super) struct Intervals<'a> {
     blocks: &'a [Block<f64>],
     nodes: &'a mut [Node],
     /// Greatest acceleration of any block.
     accel_mm_s2: f64,
 }
 
-/// A part of the stretch that is looked at: the valleys it lies between, and the nodes next to what is left of it.
+/// A part of the stretch that is looked at: the minima it lies between, and the nodes next to what is left of it.
 #[derive(Clone, Copy)]
 struct Open {
-    left_valley: u32,
+    left_minimum: u32,
     left_bound: u32,
-    right_valley: u32,
+    right_minimum: u32,
     right_bound: u32,
     /// The lowest ceiling that is left.
     root: u32,
 }
 
-/// What a ceiling means for the hump it lies in.
-enum Seen {
+/// What a ceiling means for the interval it lies in.
+enum Class {
     /// It is not reached from the left.
     BelowLeft,
     /// It is not reached from the right.
@@ -138,9 +138,9 @@ struct Gap {
     ideal_s: f64,
 }
 
-impl<'a> Valleys<'a> {
+impl<'a> Intervals<'a> {
     /// Makes the nodes. `None` if there are too few places for them.
-    pub fn new(
+    pub(super) fn new(
         blocks: &'a [Block<f64>],
         start_mm_s: f64,
         end_mm_s: f64,
@@ -204,9 +204,9 @@ impl<'a> Valleys<'a> {
         least::collect(nodes, blocks);
         let root = tree(nodes);
         let last = (count - 1) as u32;
-        let mut valleys = Self { blocks, nodes, accel_mm_s2 };
-        valleys.find(Open { left_valley: 0, left_bound: 0, right_valley: last, right_bound: last, root });
-        Some(valleys)
+        let mut intervals = Self { blocks, nodes, accel_mm_s2 };
+        intervals.find(Open { left_minimum: 0, left_bound: 0, right_minimum: last, right_bound: last, root });
+        Some(intervals)
     }
 
     fn node(&self, index: u32) -> Node {
@@ -223,31 +223,31 @@ impl<'a> Valleys<'a> {
 
     /// Gives every node its role.
     fn find(&mut self, all: Open) {
-        for sentinel in [all.left_valley, all.right_valley] {
+        for sentinel in [all.left_minimum, all.right_minimum] {
             if let Some(node) = self.node_mut(sentinel) {
-                node.role = Role::Valley;
+                node.role = Role::Minimum;
             }
         }
-        // Valleys whose right side waits, linked, the last one first.
+        // Minima whose right side waits, linked, the last one first.
         let (mut open, mut waiting) = (all, NONE);
         loop {
-            let mut top_mm_s = f64::INFINITY;
+            let mut peak_mm_s = f64::INFINITY;
             while open.root != NONE {
                 let root = self.node(open.root);
-                let role = match self.look(&open, &root) {
-                    Seen::BelowLeft => {
+                let role = match self.classify(&open, &root) {
+                    Class::BelowLeft => {
                         open.root = root.right;
                         continue;
                     }
-                    Seen::BelowRight => {
+                    Class::BelowRight => {
                         open.root = root.left;
                         continue;
                     }
-                    Seen::Top => {
-                        top_mm_s = root.feed_mm_s;
+                    Class::Top => {
+                        peak_mm_s = root.feed_mm_s;
                         break;
                     }
-                    Seen::Limits(role) => role,
+                    Class::Limits(role) => role,
                 };
                 let here = open.root;
                 if let Some(node) = self.node_mut(here) {
@@ -256,49 +256,49 @@ impl<'a> Valleys<'a> {
                 match role {
                     Role::Rising => (open.left_bound, open.root) = (here, root.right),
                     Role::Falling => (open.right_bound, open.root) = (here, root.left),
-                    Role::Valley | Role::Free => {
+                    Role::Minimum | Role::Free => {
                         if let Some(node) = self.node_mut(here) {
-                            node.bounds = (open.right_valley, open.right_bound);
+                            node.bounds = (open.right_minimum, open.right_bound);
                             node.link = waiting;
                         }
                         waiting = here;
-                        (open.right_valley, open.right_bound, open.root) = (here, here, root.left);
+                        (open.right_minimum, open.right_bound, open.root) = (here, here, root.left);
                     }
                 }
             }
-            if let Some(node) = self.node_mut(open.left_valley) {
-                node.top_mm_s = top_mm_s;
+            if let Some(node) = self.node_mut(open.left_minimum) {
+                node.peak_mm_s = peak_mm_s;
             }
-            if open.right_valley != waiting || waiting == NONE {
+            if open.right_minimum != waiting || waiting == NONE {
                 return;
             }
-            let valley = self.node(waiting);
+            let minimum = self.node(waiting);
             open = Open {
-                left_valley: waiting,
+                left_minimum: waiting,
                 left_bound: waiting,
-                right_valley: valley.bounds.0,
-                right_bound: valley.bounds.1,
-                root: valley.right,
+                right_minimum: minimum.bounds.0,
+                right_bound: minimum.bounds.1,
+                root: minimum.right,
             };
-            waiting = valley.link;
+            waiting = minimum.link;
         }
     }
 
     /// What the lowest ceiling that is left means.
-    fn look(&self, open: &Open, root: &Node) -> Seen {
+    fn classify(&self, open: &Open, root: &Node) -> Class {
         let (left, right) = (self.node(open.left_bound), self.node(open.right_bound));
         let squared = |feed: f64, length_mm: f64| feed * feed + 2.0 * self.accel_mm_s2 * length_mm;
         let ceiling = root.feed_mm_s * root.feed_mm_s;
         // Acceleration alone does not reach it, nor anything before it.
         if squared(left.feed_mm_s, root.end_mm - left.end_mm) <= ceiling {
-            return Seen::BelowLeft;
+            return Class::BelowLeft;
         }
         if squared(right.feed_mm_s, right.start_mm - root.start_mm) <= ceiling {
-            return Seen::BelowRight;
+            return Class::BelowRight;
         }
         let (before, after) = (self.gap(&left, root), self.gap(root, &right));
-        // What can be gained counts from the valley itself too: a stair before this one may not be reached.
-        let (first, last) = (self.node(open.left_valley), self.node(open.right_valley));
+        // What can be gained counts from the minimum itself too: a step before this one may not be reached.
+        let (first, last) = (self.node(open.left_minimum), self.node(open.right_minimum));
         let all_before = (first.feed_mm_s, root.start_mm - first.end_mm);
         let all_after = (last.feed_mm_s, last.start_mm - root.end_mm);
         let can_rise = root.feed_mm_s >= left.feed_mm_s;
@@ -313,60 +313,60 @@ impl<'a> Valleys<'a> {
             && (lost_right <= 0.0
                 || lost_right <= self.broken(root, &right, &after, &left, &before, root.left));
         match (rises, falls) {
-            (true, true) if lost_left <= 0.0 && lost_right <= 0.0 => Seen::Top,
-            (true, true) if lost_left <= lost_right => Seen::Limits(Role::Rising),
-            (true, false) => Seen::Limits(Role::Rising),
-            (_, true) => Seen::Limits(Role::Falling),
-            (false, false) => Seen::Limits(Role::Valley),
+            (true, true) if lost_left <= 0.0 && lost_right <= 0.0 => Class::Top,
+            (true, true) if lost_left <= lost_right => Class::Limits(Role::Rising),
+            (true, false) => Class::Limits(Role::Rising),
+            (_, true) => Class::Limits(Role::Falling),
+            (false, false) => Class::Limits(Role::Minimum),
         }
     }
 
-    /// The valley after one, [`NONE`] after the last.
-    fn next_valley(&self, valley: u32) -> u32 {
-        let after = valley as usize + 1;
-        let found = self.nodes.iter().skip(after).position(|node| node.role == Role::Valley);
+    /// The minimum after one, [`NONE`] after the last.
+    fn next_minimum(&self, minimum: u32) -> u32 {
+        let after = minimum as usize + 1;
+        let found = self.nodes.iter().skip(after).position(|node| node.role == Role::Minimum);
         found.map_or(NONE, |steps| (after + steps) as u32)
     }
 
-    /// The humps, in path order.
-    pub fn humps(&self) -> impl Iterator<Item = Hump> + '_ {
+    /// The intervals, in path order.
+    pub(super) fn in_order(&self) -> impl Iterator<Item = Interval> + '_ {
         let mut left = 0;
         core::iter::from_fn(move || {
-            let right = self.next_valley(left);
+            let right = self.next_minimum(left);
             if right == NONE {
                 return None;
             }
-            let hump = self.hump(left, right);
+            let interval = self.interval(left, right);
             left = right;
-            Some(hump)
+            Some(interval)
         })
     }
 
-    /// The hump between two valleys.
-    fn hump(&self, left: u32, right: u32) -> Hump {
+    /// The interval between two minima.
+    fn interval(&self, left: u32, right: u32) -> Interval {
         let (first, last) = (left as usize, right as usize);
         let (left, right) = (self.node(left), self.node(right));
-        // A stair that divides a staircase is rested in at its far end only, and belongs to the hump before that.
-        let is_stair = |node: &Node, role: Role| node.divides == Some(role);
-        let inside = first + usize::from(!is_stair(&left, Role::Falling))
-            ..last + usize::from(is_stair(&right, Role::Rising));
-        let start_mm = if is_stair(&left, Role::Falling) { left.start_mm } else { left.end_mm };
-        let end_mm = if is_stair(&right, Role::Rising) { right.end_mm } else { right.start_mm };
+        // A step that divides a series is rested in at its far end only, and belongs to the interval before that.
+        let is_step = |node: &Node, role: Role| node.divides == Some(role);
+        let inside = first + usize::from(!is_step(&left, Role::Falling))
+            ..last + usize::from(is_step(&right, Role::Rising));
+        let start_mm = if is_step(&left, Role::Falling) { left.start_mm } else { left.end_mm };
+        let end_mm = if is_step(&right, Role::Rising) { right.end_mm } else { right.start_mm };
         let nodes = self.nodes.get(inside.clone()).unwrap_or(&[]);
         crate::work::add(nodes.len());
-        let (mut rising, mut falling) = (Stairs::NONE, Stairs::NONE);
+        let (mut rising, mut falling) = (Steps::NONE, Steps::NONE);
         for node in nodes.iter().filter(|node| node.role == Role::Rising) {
-            rising.push(Stair { end_mm: node.end_mm - start_mm, feed_mm_s: node.feed_mm_s });
+            rising.push(Step { end_mm: node.end_mm - start_mm, feed_mm_s: node.feed_mm_s });
         }
         for node in nodes.iter().rev().filter(|node| node.role == Role::Falling) {
-            falling.push(Stair { end_mm: end_mm - node.start_mm, feed_mm_s: node.feed_mm_s });
+            falling.push(Step { end_mm: end_mm - node.start_mm, feed_mm_s: node.feed_mm_s });
         }
-        Hump {
+        Interval {
             start_mm,
             end_mm,
             enter_mm_s: left.feed_mm_s,
             exit_mm_s: right.feed_mm_s,
-            top_mm_s: left.top_mm_s,
+            peak_mm_s: left.peak_mm_s,
             rising,
             falling,
             nodes: (inside.start, inside.end),
@@ -391,7 +391,7 @@ impl<'a> Valleys<'a> {
         root: &Node,
         bound: &Node,
         gap: &Gap,
-        (valley_mm_s, valley_mm): (f64, f64),
+        (minimum_mm_s, minimum_mm): (f64, f64),
         between: u32,
         is_below: bool,
     ) -> f64 {
@@ -401,13 +401,13 @@ impl<'a> Valleys<'a> {
         let Some(law) = self.law(between).filter(|_| between != NONE) else { return 0.0 };
         let feed = root.feed_mm_s;
         let left_mm = (gap.length_mm - law.ramp_length_mm(bound.feed_mm_s, feed))
-            .min(valley_mm - law.ramp_length_mm(valley_mm_s, feed));
+            .min(minimum_mm - law.ramp_length_mm(minimum_mm_s, feed));
         if left_mm <= 0.0 {
             return 0.0;
         }
-        let top = peak(&law, feed, feed, left_mm);
+        let peak = peak(&law, feed, feed, left_mm);
         let time_s =
-            2.0 * law.ramp_time_s(top - feed) + (left_mm - 2.0 * law.ramp_length_mm(feed, top)) / top;
+            2.0 * law.ramp_time_s(peak - feed) + (left_mm - 2.0 * law.ramp_length_mm(feed, peak)) / peak;
         (left_mm / feed - time_s).min(gap.length_mm / feed - gap.ideal_s)
     }
 
@@ -424,29 +424,29 @@ impl<'a> Valleys<'a> {
         let is_reached = mean_mm_s > other.feed_mm_s
             && law.ramp_length_mm(feed, mean_mm_s) + law.ramp_length_mm(other.feed_mm_s, mean_mm_s)
                 < beyond.length_mm;
-        let top = if is_reached {
+        let peak = if is_reached {
             mean_mm_s
         } else {
             peak(&law, feed, other.feed_mm_s, beyond.length_mm).min(mean_mm_s)
         };
-        if !(top > feed) {
+        if !(peak > feed) {
             return 0.0;
         }
-        let lag_s = |from: f64, to: f64| law.ramp_time_s(to - from) - law.ramp_length_mm(from, to) / top;
-        let rested = lag_s(bound.feed_mm_s, feed) + lag_s(feed, top);
-        let ramp = Ramp::new(&law, bound.feed_mm_s, top);
+        let lag_s = |from: f64, to: f64| law.ramp_time_s(to - from) - law.ramp_length_mm(from, to) / peak;
+        let rested = lag_s(bound.feed_mm_s, feed) + lag_s(feed, peak);
+        let ramp = Ramp::new(&law, bound.feed_mm_s, peak);
         let waited_mm = (root.end_mm - root.start_mm) + gap.length_mm - ramp.length_to_feed_mm(feed);
         let waited_s = match (waited_mm > 0.0, bound.feed_mm_s > 0.0) {
             (false, _) => 0.0,
-            (true, true) => waited_mm * (1.0 / bound.feed_mm_s - 1.0 / top),
+            (true, true) => waited_mm * (1.0 / bound.feed_mm_s - 1.0 / peak),
             (true, false) => f64::INFINITY,
         };
-        (rested - lag_s(bound.feed_mm_s, top) - waited_s).max(0.0)
+        (rested - lag_s(bound.feed_mm_s, peak) - waited_s).max(0.0)
     }
 
-    /// The laws of the blocks of a hump.
-    pub fn laws_of(&self, hump: &Hump) -> impl Iterator<Item = Law<f64>> {
-        let nodes = self.nodes.get(hump.nodes.0..hump.nodes.1).unwrap_or(&[]);
+    /// The laws of the blocks of an interval.
+    pub(super) fn laws_of(&self, interval: &Interval) -> impl Iterator<Item = Law<f64>> {
+        let nodes = self.nodes.get(interval.nodes.0..interval.nodes.1).unwrap_or(&[]);
         let blocks = self.blocks;
         nodes
             .iter()

@@ -1,26 +1,25 @@
-//! Planned blocks and spans as feed segments.
+//! The ramps of one planned block.
 //!
-//! Consumes a block's plan and its exact start and end on the path; produces up to three segments
-//! that fill it without a gap of a single position step: accelerate, cruise, brake. A span is one segment.
+//! Consumes a block's plan and its exact start and end on the path; produces up to three ramps and cruises
+//! that fill it without a gap of a single position step: accelerate, cruise, brake.
 
-use super::lookahead::{Block, BlockPlan};
-use super::spanning::FeedSpan;
-use crate::law::{FeedSegment, Ramp, SegmentError};
-use crate::num::{Real, Root};
+use super::two_pass::{Block, BlockPlan};
+use crate::law::{PlannedRamp, Ramp, SegmentError};
+use crate::num::Root;
 use crate::units::Position;
 
-/// The segments of one block from path position `start` to `end`, in order; `None` where the block
+/// The ramps of one block from path position `start` to `end`, in order; `None` where the block
 /// has no such part.
 ///
 /// # Errors
 /// The positions do not fit the block's length, or a figure is beyond the tick's range.
-pub fn segments<R: Real, P: Root>(
+pub fn ramps<P: Root>(
     block: &Block<P>,
     plan: &BlockPlan<P>,
     start: Position,
     end: Position,
     tick_s: f64,
-) -> Result<[Option<FeedSegment<R>>; 3], SegmentError> {
+) -> Result<[Option<PlannedRamp>; 3], SegmentError> {
     let ramp = |from_mm_s: P, to_mm_s: P| {
         let ramp = Ramp::new(&block.law, from_mm_s, to_mm_s);
         let mm = ramp.length_mm().to_f64();
@@ -42,42 +41,23 @@ pub fn segments<R: Real, P: Root>(
         (rise, fall) = (ramp(enter_mm_s, enter_mm_s)?, ramp(enter_mm_s, exit_mm_s)?);
     }
     let ((rise, rise_length), (fall, fall_length)) = (rise, fall);
-    let (top, brake) = (start + rise_length, end - fall_length);
+    let (peak, brake) = (start + rise_length, end - fall_length);
     // With no room to cruise the two ramps meet but for rounding: they are made to meet.
     let rounding_mm = block.length_mm.spacing().to_f64();
-    let meets = (brake - top).to_mm() <= GAP_MM + 16.0 * rounding_mm;
-    let (top, brake) = match (meets, rise.duration_s() > P::ZERO, fall.duration_s() > P::ZERO) {
-        (true, true, true) => (top, top),
+    let meets = (brake - peak).to_mm() <= GAP_MM + 16.0 * rounding_mm;
+    let (peak, brake) = match (meets, rise.duration_s() > P::ZERO, fall.duration_s() > P::ZERO) {
+        (true, true, true) => (peak, peak),
         (true, true, false) => (end, end),
         (true, false, true) => (start, start),
-        (false, _, _) | (true, false, false) => (top, brake),
+        (false, _, _) | (true, false, false) => (peak, brake),
     };
     let feed_mm_s = peak_mm_s.to_f64();
     let made = |ramp: &Ramp<P>, length: Position| {
-        if length == Position::ZERO { Ok(None) } else { FeedSegment::ramp(ramp, length, tick_s).map(Some) }
+        if length == Position::ZERO { Ok(None) } else { PlannedRamp::new(ramp, length, tick_s).map(Some) }
     };
-    let cruise = if brake > top { Some(FeedSegment::cruise(feed_mm_s, brake - top, tick_s)?) } else { None };
-    Ok([made(&rise, top - start)?, cruise, made(&fall, end - brake)?])
-}
-
-impl FeedSpan {
-    /// Its segment over an exact `length` of path; `None` of a cruise that rounding leaves no length.
-    ///
-    /// # Errors
-    /// The length is not the ramp's, or a figure is beyond the tick's range.
-    pub fn segment<R: Real>(
-        &self,
-        length: Position,
-        tick_s: f64,
-    ) -> Result<Option<FeedSegment<R>>, SegmentError> {
-        if !self.ramp.is_cruise() {
-            FeedSegment::ramp(&self.ramp, length, tick_s).map(Some)
-        } else if length > Position::ZERO {
-            FeedSegment::cruise(self.ramp.from_mm_s, length, tick_s).map(Some)
-        } else {
-            Ok(None)
-        }
-    }
+    let cruise =
+        if brake > peak { Some(PlannedRamp::cruise(feed_mm_s, brake - peak, tick_s)?) } else { None };
+    Ok([made(&rise, peak - start)?, cruise, made(&fall, end - brake)?])
 }
 
 /// Less than this between two ramps is rounding \[mm\].
@@ -85,7 +65,7 @@ const GAP_MM: f64 = 4.0e-9;
 
 #[cfg(test)]
 mod tests {
-    use super::super::lookahead::plan;
+    use super::super::two_pass::plan;
     use super::*;
     use crate::law::{Law, Limits};
     use crate::random::Random;
@@ -111,11 +91,11 @@ mod tests {
             if plan(&[block], enter_mm_s, 0.0, &mut plans).is_err() {
                 continue;
             }
-            let made = segments::<f64, f64>(&block, &plans[0], Position::ZERO, end, 5e-4).expect("segments");
+            let made = ramps(&block, &plans[0], Position::ZERO, end, 5e-4).expect("ramps");
             let (mut at, mut feed_mm_s) = (Position::ZERO, enter_mm_s);
-            for segment in made.iter().flatten() {
-                assert_eq!(segment.as_ramp().from_mm_s, feed_mm_s, "block {number}: {plans:?}");
-                (at, feed_mm_s) = (at + segment.length(), segment.as_ramp().to_mm_s);
+            for PlannedRamp { ramp, length } in made.into_iter().flatten() {
+                assert_eq!(ramp.from_mm_s, feed_mm_s, "block {number}: {plans:?}");
+                (at, feed_mm_s) = (at + length, ramp.to_mm_s);
             }
             assert_eq!((at, feed_mm_s), (end, 0.0), "block {number}");
             made_up += 1;

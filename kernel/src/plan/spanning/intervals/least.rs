@@ -4,7 +4,7 @@
 //! lowest bit of its place, counted from 1, says (a Fenwick tree). Any range is a few of those: work goes with the square
 //! of the logarithm of its length.
 
-use super::{Hump, Node, Valleys};
+use super::{Interval, Intervals, Node};
 use crate::law::Limits;
 use crate::plan::Block;
 
@@ -36,11 +36,17 @@ pub(super) fn collect(nodes: &mut [Node], blocks: &[Block<f64>]) {
     }
 }
 
-impl Valleys<'_> {
-    /// The least limits in a hump from `low_mm` to `high_mm`; of a position by itself, of the block that comes next on the
+impl Intervals<'_> {
+    /// The least limits in an interval from `low_mm` to `high_mm`; of a position by itself, of the block that comes next on the
     /// way on, or on the way back.
-    pub fn least(&self, hump: &Hump, low_mm: f64, high_mm: f64, is_back: bool) -> Limits<f64> {
-        let (first, last) = hump.nodes;
+    pub(in crate::plan::spanning) fn least(
+        &self,
+        interval: &Interval,
+        low_mm: f64,
+        high_mm: f64,
+        is_back: bool,
+    ) -> Limits<f64> {
+        let (first, last) = interval.nodes;
         let nodes = self.nodes.get(first..last).unwrap_or(&[]);
         let (from, to) = if is_back {
             let from = nodes.partition_point(|node| node.end_mm < low_mm);
@@ -50,7 +56,7 @@ impl Valleys<'_> {
             (from, nodes.partition_point(|node| node.start_mm <= high_mm))
         };
         let least = self.least_of(first + from, first + to);
-        // Beyond the hump's end, by rounding, those of all of it hold.
+        // Beyond the interval's end, by rounding, those of all of it hold.
         if least == NONE { self.least_of(first, last) } else { least }
     }
 

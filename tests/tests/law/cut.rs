@@ -1,7 +1,7 @@
-//! Ramps that turn in their rise, against the integral of their jerk.
+//! Ramps that are cut in their rise, against the integral of their jerk.
 
 use crate::{LIMITS, feeds, limits};
-use motion_kernel::law::{FeedSegment, Law, PathMotion, Phase, Ramp, SegmentError, Ticks, TurnedRamp};
+use motion_kernel::law::{CutRamp, FeedSegment, Law, PathMotion, Phase, Ramp, SegmentError, Ticks};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::units::Position;
 use motion_tests::random::Random;
@@ -35,7 +35,7 @@ fn integrated(state: [f64; 3], jerk: impl Fn(f64) -> f64, from_s: f64, to_s: f64
     [s, v, a]
 }
 
-/// Every tick of a turned ramp as the executor walks through it.
+/// Every tick of a cut ramp as the executor walks through it.
 fn walk<R: Real>(segment: &FeedSegment<R>, mut visit: impl FnMut(f64, &PathMotion<R>)) {
     let mut before = 0.0;
     for phase in [Phase::Rise, Phase::Hold, Phase::Fall] {
@@ -53,7 +53,7 @@ fn walk<R: Real>(segment: &FeedSegment<R>, mut visit: impl FnMut(f64, &PathMotio
     }
 }
 
-/// A random ramp and where it turns.
+/// A random ramp and where it is cut.
 fn some(random: &mut Random) -> Option<(Ramp<f64>, Ticks)> {
     let law = Law::new(limits(*random.pick(&LIMITS))).expect("limits");
     let (from, to) = feeds::<f32>(random);
@@ -71,24 +71,24 @@ fn check<R: Real>(stream: u64, epsilon: f64) -> usize {
     let (mut worst, mut points) = ([0.0_f64; 5], 0);
     for _ in 0..400 {
         let Some((ramp, at)) = some(&mut random) else { continue };
-        let turned = TurnedRamp { ramp, turn_s: at.to_f64() * TICK_S };
-        let length = Position::from_mm(turned.length_mm()).expect("in range");
-        let segment = match FeedSegment::<R>::turned(&ramp, at, length, TICK_S) {
+        let cut = CutRamp { ramp, cut_s: at.to_f64() * TICK_S };
+        let length = Position::from_mm(cut.length_mm()).expect("in range");
+        let segment = match FeedSegment::<R>::cut(&ramp, at, length, TICK_S) {
             Ok(segment) => segment,
             Err(SegmentError::OutOfRange { .. }) => continue,
-            Err(error) => panic!("{error} of {turned:?}"),
+            Err(error) => panic!("{error} of {cut:?}"),
         };
-        let (turn_s, t1_s) = (turned.turn_s, ramp.t1_s);
+        let (cut_s, t1_s) = (cut.cut_s, ramp.t1_s);
         let peak = if ramp.to_mm_s < ramp.from_mm_s { -ramp.peak_jerk_mm_s3 } else { ramp.peak_jerk_mm_s3 };
         // The law's jerk, its beginning backwards, and both once more with the other sign.
         let jerk = |t: f64| {
-            let u = t.rem_euclid(2.0 * turn_s);
-            let x = if u < turn_s { u } else { 2.0 * turn_s - u } / t1_s;
-            peak * (PI * x).sin().powi(2) * if t < 2.0 * turn_s { 1.0 } else { -1.0 }
+            let u = t.rem_euclid(2.0 * cut_s);
+            let x = if u < cut_s { u } else { 2.0 * cut_s - u } / t1_s;
+            peak * (PI * x).sin().powi(2) * if t < 2.0 * cut_s { 1.0 } else { -1.0 }
         };
         let (mut state, mut at_s) = ([0.0, ramp.from_mm_s, 0.0], 0.0);
         let mut to = |t: f64| {
-            for knot in [turn_s, 2.0 * turn_s, 3.0 * turn_s] {
+            for knot in [cut_s, 2.0 * cut_s, 3.0 * cut_s] {
                 if at_s < knot && knot < t {
                     state = integrated(state, jerk, at_s, knot);
                     at_s = knot;
@@ -120,10 +120,10 @@ fn check<R: Real>(stream: u64, epsilon: f64) -> usize {
             }
             points += 1;
         });
-        let [s, v, a] = to(turned.duration_s());
-        assert!((s - turned.length_mm()).abs() < 1e-9 * (1.0 + s), "{turned:?}: {s}");
-        assert!((v - turned.to_mm_s()).abs() < 1e-9 * highest, "{turned:?}: {v}");
-        assert!(a.abs() < 1e-9 * peak.abs() * t1_s, "{turned:?}: {a}");
+        let [s, v, a] = to(cut.duration_s());
+        assert!((s - cut.length_mm()).abs() < 1e-9 * (1.0 + s), "{cut:?}: {s}");
+        assert!((v - cut.to_mm_s()).abs() < 1e-9 * highest, "{cut:?}: {v}");
+        assert!(a.abs() < 1e-9 * peak.abs() * t1_s, "{cut:?}: {a}");
     }
     println!("{points} points, worst in parts of the bounds {worst:.3?}");
     assert!(worst.iter().all(|&worst| worst <= 1.0), "{worst:?}");
@@ -131,21 +131,21 @@ fn check<R: Real>(stream: u64, epsilon: f64) -> usize {
 }
 
 #[test]
-fn a_turned_ramp_is_the_integral_of_its_jerk() {
+fn a_cut_ramp_is_the_integral_of_its_jerk() {
     let points = check::<f64>(31, 1e-12) + check::<f32>(32, 2e-6) + check::<Fixed>(33, 1e-6);
     assert!(points > 100_000, "{points}");
 }
 
-/// Up to the turn both are one ramp, to the bit.
+/// Up to the cut both are one ramp, to the bit.
 #[test]
 fn the_rise_is_that_of_the_ramp_under_way() {
     let (mut random, mut compared) = (Random::of_stream(34), 0);
     for _ in 0..400 {
         let Some((ramp, at)) = some(&mut random) else { continue };
-        let turned = TurnedRamp { ramp, turn_s: at.to_f64() * TICK_S };
+        let cut = CutRamp { ramp, cut_s: at.to_f64() * TICK_S };
         let length = |mm| Position::from_mm(mm).expect("in range");
         let whole = FeedSegment::<f32>::ramp(&ramp, length(ramp.length_mm()), TICK_S);
-        let other = FeedSegment::<f32>::turned(&ramp, at, length(turned.length_mm()), TICK_S);
+        let other = FeedSegment::<f32>::cut(&ramp, at, length(cut.length_mm()), TICK_S);
         let (Ok(whole), Ok(other)) = (whole, other) else { continue };
         let mut fraction = 0;
         for _ in 0..(at.to_f64() as u64) {
@@ -158,12 +158,12 @@ fn the_rise_is_that_of_the_ramp_under_way() {
 }
 
 #[test]
-fn a_turn_belongs_in_the_first_half_of_the_rise() {
+fn a_cut_belongs_in_the_first_half_of_the_rise() {
     let mut random = Random::of_stream(35);
     let (ramp, _) = std::iter::repeat_with(|| some(&mut random)).flatten().next().expect("endless");
     for share in [0.0, 0.5001, 0.9] {
         let at = Ticks::from_seconds(share * ramp.t1_s, TICK_S).expect("in range");
-        let refused = FeedSegment::<f64>::turned(&ramp, at, Position::ZERO, TICK_S);
+        let refused = FeedSegment::<f64>::cut(&ramp, at, Position::ZERO, TICK_S);
         assert!(matches!(refused, Err(SegmentError::OutOfRange { .. })), "{share}: {refused:?}");
     }
 }

@@ -1,55 +1,55 @@
-//! How high a hump goes.
+//! The peak of an interval: its greatest feed.
 //!
-//! Consumes a hump, for which there are chains of ramps up both its sides to any top; produces the top with which it takes the least
-//! time. The time is no smooth function of the top: just above a stair a chain may need one more rest.
+//! Consumes an interval, with chains of ramps up both its sides to any peak; produces the peak with which the interval
+//! takes the least time. The time is no smooth function of the peak: just above a step a chain may need one more rest.
 
 use super::ROUNDING_MM;
-use super::climb::Climb;
-use super::valleys::{Hump, Valleys};
+use super::ascent::{Ascent, AscentRamp};
+use super::intervals::{Interval, Intervals};
 use crate::law::{Law, LimitedBy, Limits, peak};
 
-/// Solver steps for the feed at the top of a hump.
-const TOP_STEPS: usize = 24;
-/// Of them, so many aim at where the ramps next to the top would meet, and the steps to find that.
-const LEG_STEPS: usize = 4;
-const LEGS_STEPS: usize = 6;
+/// Solver steps for the feed at the peak of an interval.
+const PEAK_STEPS: usize = 24;
+/// Of them, so many aim at where the ramps next to the peak would meet, and the steps to find that.
+const AIMED_STEPS: usize = 4;
+const AIM_STEPS: usize = 6;
 /// No more steps once another could gain so small a part of the time.
-const TOP_GAIN: f64 = 2.0e-5;
-/// No more steps once so small a part of the hump is left to cruise at its top.
-const TOP_GAP: f64 = 1.0e-3;
+const PEAK_GAIN: f64 = 2.0e-5;
+/// No more steps once so small a part of the interval is left to cruise at its peak.
+const PEAK_GAP: f64 = 1.0e-3;
 
-/// The two sides of a hump, for any top.
+/// The two sides of an interval, for any peak.
 pub(super) struct Sides<'a> {
-    hump: &'a Hump,
-    valleys: &'a Valleys<'a>,
+    interval: &'a Interval,
+    intervals: &'a Intervals<'a>,
     /// The law of all its blocks, if it is one.
     uniform: Option<Law<f64>>,
 }
 
 impl<'a> Sides<'a> {
-    /// `None` if the hump has no blocks.
-    pub(super) fn new(hump: &'a Hump, valleys: &'a Valleys<'a>) -> Option<Self> {
-        let mut laws = valleys.laws_of(hump);
+    /// `None` if the interval has no blocks.
+    pub(super) fn new(interval: &'a Interval, intervals: &'a Intervals<'a>) -> Option<Self> {
+        let mut laws = intervals.laws_of(interval);
         let first = laws.next()?;
         let uniform = laws.all(|law| law == first).then_some(first);
-        Some(Self { hump, valleys, uniform })
+        Some(Self { interval, intervals, uniform })
     }
 
-    /// The lowest top there is.
+    /// The lowest peak there is.
     pub(super) fn lowest(&self) -> f64 {
-        self.hump.enter_mm_s.max(self.hump.exit_mm_s)
+        self.interval.enter_mm_s.max(self.interval.exit_mm_s)
     }
 
-    /// The highest top that is worth trying: the ceiling, or what the law would reach without stairs, or with several laws,
+    /// The highest peak that is worth trying: the ceiling, or what the law would reach without steps, or with several laws,
     /// what their greatest acceleration alone would.
     fn highest(&self) -> f64 {
-        let Hump { enter_mm_s, exit_mm_s, start_mm, end_mm, top_mm_s, .. } = *self.hump;
-        let accel = self.valleys.laws_of(self.hump).map(|law| law.limits().accel_mm_s2);
+        let Interval { enter_mm_s, exit_mm_s, start_mm, end_mm, peak_mm_s, .. } = *self.interval;
+        let accel = self.intervals.laws_of(self.interval).map(|law| law.limits().accel_mm_s2);
         let squares = 0.5 * (enter_mm_s * enter_mm_s + exit_mm_s * exit_mm_s);
         let bound = libm::sqrt(squares + accel.fold(0.0, f64::max) * (end_mm - start_mm));
         let reached =
             self.uniform.map_or(bound, |law| bound.min(peak(&law, enter_mm_s, exit_mm_s, end_mm - start_mm)));
-        top_mm_s.min(reached).max(self.lowest())
+        peak_mm_s.min(reached).max(self.lowest())
     }
 
     /// The least limits of the blocks between two positions; of a position by itself, of the block that comes next on
@@ -57,35 +57,35 @@ impl<'a> Sides<'a> {
     fn limits(&self, low_mm: f64, high_mm: f64, is_back: bool) -> Limits<f64> {
         match self.uniform {
             Some(law) => law.limits(),
-            None => self.valleys.least(self.hump, low_mm, high_mm, is_back),
+            None => self.intervals.least(self.interval, low_mm, high_mm, is_back),
         }
     }
 
-    /// Length of the hump, and a rounding: a ramp that was planned before to end just there still does.
+    /// Length of the interval, and a rounding: a ramp that was planned before to end just there still does.
     fn room_mm(&self) -> f64 {
-        self.hump.end_mm - self.hump.start_mm + ROUNDING_MM
+        self.interval.end_mm - self.interval.start_mm + ROUNDING_MM
     }
 
-    /// Puts both climbs before their stairs.
-    pub(super) fn start(&self, up: &mut Climb, down: &mut Climb) {
-        up.start(&self.hump.rising, self.hump.enter_mm_s, self.room_mm());
-        down.start(&self.hump.falling, self.hump.exit_mm_s, self.room_mm());
+    /// Puts both ascents before their steps.
+    pub(super) fn start(&self, up: &mut Ascent, down: &mut Ascent) {
+        up.start(&self.interval.rising, self.interval.enter_mm_s, self.room_mm());
+        down.start(&self.interval.falling, self.interval.exit_mm_s, self.room_mm());
     }
 
-    /// Both sides up to `top`; returns what is left between them \[mm\], less than 0 if there is no room. `None` if there
+    /// Both sides up to `peak`; returns what is left between them \[mm\], less than 0 if there is no room. `None` if there
     /// is none for one side by itself.
-    pub(super) fn fit(&self, top: f64, up: &mut Climb, down: &mut Climb) -> Option<f64> {
-        let (start_mm, end_mm) = (self.hump.start_mm, self.hump.end_mm);
-        let up_mm = up.find(top, |a, b| self.limits(start_mm + a, start_mm + b, false))?;
-        let down_mm = down.find(top, |a, b| self.limits(end_mm - b, end_mm - a, true))?;
+    pub(super) fn fit(&self, peak: f64, up: &mut Ascent, down: &mut Ascent) -> Option<f64> {
+        let (start_mm, end_mm) = (self.interval.start_mm, self.interval.end_mm);
+        let up_mm = up.find(peak, |a, b| self.limits(start_mm + a, start_mm + b, false))?;
+        let down_mm = down.find(peak, |a, b| self.limits(end_mm - b, end_mm - a, true))?;
         Some(self.room_mm() - up_mm - down_mm)
     }
 
-    /// Up to the top with which the hump takes the least time, which is returned.
-    pub(super) fn best(&self, up: &mut Climb, down: &mut Climb) -> Option<f64> {
+    /// Up to the peak with which the interval takes the least time, which is returned.
+    pub(super) fn best(&self, up: &mut Ascent, down: &mut Ascent) -> Option<f64> {
         self.start(up, down);
         let (mut low, mut high) = (self.lowest(), self.highest());
-        let room_mm = self.hump.end_mm - self.hump.start_mm;
+        let room_mm = self.interval.end_mm - self.interval.start_mm;
         let mut left_high = match self.fit(high, up, down) {
             Some(left) if left >= 0.0 => return Some(high),
             Some(left) => left,
@@ -93,19 +93,20 @@ impl<'a> Sides<'a> {
         };
         // That the lowest one fits is known.
         let (mut left_low, mut gap_mm, mut last) = (room_mm, room_mm, high);
-        // The best need not be the highest that fits: just above a stair a chain may lose more than its top gains.
+        // The best need not be the highest that fits: just above a step a chain may lose more than its peak gains.
         let (mut best, mut best_s) = (low, f64::INFINITY);
         // False position, with halving where that stands still; aimed a little short, so that there is room.
-        let aim_mm = 0.5 * TOP_GAP * room_mm;
-        for step in 0..TOP_STEPS {
-            let gains = best_s == f64::INFINITY || gap_mm * (high - low) > TOP_GAIN * best_s * high * low;
-            if gap_mm < TOP_GAP * room_mm || !gains {
+        let aim_mm = 0.5 * PEAK_GAP * room_mm;
+        for step in 0..PEAK_STEPS {
+            let gains = best_s == f64::INFINITY || gap_mm * (high - low) > PEAK_GAIN * best_s * high * low;
+            if gap_mm < PEAK_GAP * room_mm || !gains {
                 break;
             }
-            let by_legs = if step < LEG_STEPS { top_by_legs(up, down, last, room_mm - aim_mm) } else { None };
+            let by_ramps =
+                if step < AIMED_STEPS { peak_by_ramps(up, down, last, room_mm - aim_mm) } else { None };
             let part = (left_low - aim_mm) / (left_low - left_high);
             let part = if part > 0.02 && part < 0.98 { part } else { 0.5 };
-            last = by_legs.filter(|&top| low < top && top < high).unwrap_or(low + part * (high - low));
+            last = by_ramps.filter(|&peak| low < peak && peak < high).unwrap_or(low + part * (high - low));
             match self.fit(last, up, down) {
                 Some(left) if left >= 0.0 => {
                     (low, left_low, gap_mm) = (last, left, left);
@@ -128,25 +129,29 @@ impl<'a> Sides<'a> {
     }
 }
 
-/// Whether a hump can be driven at all: with the lowest top there is.
-pub(super) fn lowest_fits(hump: &Hump, valleys: &Valleys<'_>, up: &mut Climb, down: &mut Climb) -> bool {
-    let Some(sides) = Sides::new(hump, valleys) else {
-        return hump.enter_mm_s == hump.exit_mm_s;
+/// Whether an interval can be driven at all: with the lowest peak there is.
+pub(super) fn lowest_fits(
+    interval: &Interval,
+    intervals: &Intervals<'_>,
+    up: &mut Ascent,
+    down: &mut Ascent,
+) -> bool {
+    let Some(sides) = Sides::new(interval, intervals) else {
+        return interval.enter_mm_s == interval.exit_mm_s;
     };
     sides.start(up, down);
     sides.fit(sides.lowest(), up, down).is_some_and(|left_mm| left_mm >= 0.0)
 }
 
-/// The top of a hump for which both sides together are `room_mm` long, if their last ramps, now up to `top_mm_s`, only get
-/// longer or shorter by it.
-fn top_by_legs(up: &Climb, down: &Climb, top_mm_s: f64, room_mm: f64) -> Option<f64> {
-    let legs = [up.last_leg()?, down.last_leg()?];
-    let mut top = top_mm_s;
-    for _ in 0..LEGS_STEPS {
+/// The peak of an interval for which both sides together are `room_mm` long, if their last
+/// ramps, now up to `peak_mm_s`, only get longer or shorter by it.
+fn peak_by_ramps(up: &Ascent, down: &Ascent, peak_mm_s: f64, room_mm: f64) -> Option<f64> {
+    let ramps = [up.last_ramp()?, down.last_ramp()?];
+    let mut peak = peak_mm_s;
+    for _ in 0..AIM_STEPS {
         let (mut length_mm, mut slope_s) = (0.0, 0.0);
-        for leg in legs {
-            let ramp = &leg.ramp;
-            let change = top - ramp.from_mm_s;
+        for AscentRamp { start_mm, ramp } in ramps {
+            let change = peak - ramp.from_mm_s;
             if !(change > 0.0) {
                 return None;
             }
@@ -162,17 +167,17 @@ fn top_by_legs(up: &Climb, down: &Climb, top_mm_s: f64, room_mm: f64) -> Option<
                     (time_s, time_s / (3.0 * change))
                 }
             };
-            let mean_mm_s = 0.5 * (ramp.from_mm_s + top);
-            length_mm += leg.start_mm + mean_mm_s * time_s;
+            let mean_mm_s = 0.5 * (ramp.from_mm_s + peak);
+            length_mm += start_mm + mean_mm_s * time_s;
             slope_s += 0.5 * time_s + mean_mm_s * time_slope;
         }
         let step = (length_mm - room_mm) / slope_s;
-        top -= step;
-        if step.abs() < 1.0e-5 * top {
+        peak -= step;
+        if step.abs() < 1.0e-5 * peak {
             break;
         }
     }
-    Some(top)
+    Some(peak)
 }
 
 #[cfg(test)]
@@ -186,7 +191,7 @@ mod tests {
     use crate::plan::{Block, Node, nodes_for};
     use crate::random::Random;
 
-    /// A hump's list of blocks: a staircase, random feeds, up and down, or a random walk; one law or one for each block.
+    /// An interval's list of blocks: rising steps, random feeds, up and down, or a random walk; one law or one for each block.
     fn blocks(random: &Random, case: usize) -> Vec<Block<f64>> {
         let count = 1 + random.below(60) as usize;
         let (step_mm, mut walk_mm_s) = (random.log(1e-3, 50.0), 50.0);
@@ -213,7 +218,7 @@ mod tests {
             .collect()
     }
 
-    /// Against tops tried one by one, over all that there are: by how much longer the hump takes, beyond what a scan can tell.
+    /// Against peaks tried one by one, over all that there are: by how much longer the interval takes, beyond what a scan can tell.
     #[test]
     fn no_top_of_a_scan_is_much_better() {
         let (mut lost, seed) = (Vec::new(), 20_261);
@@ -221,26 +226,27 @@ mod tests {
             let random = Random::new(seed + 7919 * case as u64);
             let blocks = blocks(&random, case);
             let mut places = vec![Node::EMPTY; nodes_for(blocks.len())];
-            let mut valleys = Valleys::new(&blocks, 0.0, 0.0, &mut places).expect("places");
-            let (mut up, mut down) = (Climb::NONE, Climb::NONE);
-            if !valleys.settle(|valleys, hump| lowest_fits(hump, valleys, &mut up, &mut down)) {
+            let mut intervals = Intervals::new(&blocks, 0.0, 0.0, &mut places).expect("places");
+            let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
+            if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, &mut up, &mut down)) {
                 continue;
             }
-            for hump in valleys.humps() {
-                let Some(sides) = Sides::new(&hump, &valleys) else { continue };
-                let top = sides.best(&mut up, &mut down).expect("the lowest fits");
-                let mut time_s = |top: f64| {
-                    let left_mm = sides.fit(top, &mut up, &mut down).filter(|&left_mm| left_mm >= 0.0)?;
-                    Some(up.time_s() + down.time_s() + left_mm / top)
+            for interval in intervals.in_order() {
+                let Some(sides) = Sides::new(&interval, &intervals) else { continue };
+                let peak = sides.best(&mut up, &mut down).expect("the lowest fits");
+                let mut time_s = |peak: f64| {
+                    let left_mm = sides.fit(peak, &mut up, &mut down).filter(|&left_mm| left_mm >= 0.0)?;
+                    Some(up.time_s() + down.time_s() + left_mm / peak)
                 };
-                let found_s = time_s(top).expect("what was found fits");
+                let found_s = time_s(peak).expect("what was found fits");
                 // Acceleration alone reaches no more than this.
-                let accel = valleys.laws_of(&hump).map(|law| law.limits().accel_mm_s2).fold(0.0, f64::max);
-                let squares = 0.5 * (hump.enter_mm_s.powi(2) + hump.exit_mm_s.powi(2));
-                let reached_mm_s = (squares + accel * (hump.end_mm - hump.start_mm)).sqrt();
-                let (low, high) = (sides.lowest(), hump.top_mm_s.min(reached_mm_s).max(sides.lowest()));
-                let tops = (0..=300).map(|step| low + (high - low) * f64::from(step) / 300.0);
-                let least_s = tops.filter_map(time_s).fold(f64::INFINITY, f64::min);
+                let accel =
+                    intervals.laws_of(&interval).map(|law| law.limits().accel_mm_s2).fold(0.0, f64::max);
+                let squares = 0.5 * (interval.enter_mm_s.powi(2) + interval.exit_mm_s.powi(2));
+                let reached_mm_s = (squares + accel * (interval.end_mm - interval.start_mm)).sqrt();
+                let (low, high) = (sides.lowest(), interval.peak_mm_s.min(reached_mm_s).max(sides.lowest()));
+                let peaks = (0..=300).map(|step| low + (high - low) * f64::from(step) / 300.0);
+                let least_s = peaks.filter_map(time_s).fold(f64::INFINITY, f64::min);
                 lost.push(((found_s / least_s - 1.0).max(0.0), case));
             }
         }
@@ -248,7 +254,7 @@ mod tests {
         let mean = lost.iter().map(|lost| lost.0).sum::<f64>() / lost.len() as f64;
         let above = |part: f64| lost.iter().filter(|lost| lost.0 > part).count() as f64 / lost.len() as f64;
         println!(
-            "seed {seed}, {} humps: {mean:.6} lost in the mean, more than 0.001 in {:.4}, 0.01 in {:.4}; worst {:?}",
+            "seed {seed}, {} intervals: {mean:.6} lost in the mean, more than 0.001 in {:.4}, 0.01 in {:.4}; worst {:?}",
             lost.len(),
             above(1e-3),
             above(1e-2),
@@ -259,7 +265,7 @@ mod tests {
         );
     }
 
-    /// Where ramps need room, just above a stair, tops of which few fit may be missed.
+    /// Where ramps need room, just above a step, peaks of which few fit may be missed.
     const LOST_MAX: f64 = 0.06;
     const MEAN_LOST_MAX: f64 = 2.0e-4;
     const SHARE_LOST_MAX: f64 = 0.02;

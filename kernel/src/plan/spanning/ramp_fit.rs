@@ -1,12 +1,12 @@
-//! One ramp of a chain, past the stairs between its feeds.
+//! One ramp of a chain, past the steps between its feeds.
 //!
-//! Consumes where it may start and the stairs that it passes; produces the ramp that loses the least time: as hard as
+//! Consumes where it may start and the steps that it passes; produces the ramp that loses the least time: as hard as
 //! allowed if nothing is in its way, else later or softer.
 
-use super::{Leg, Reached};
+use super::ascent::{AscentRamp, Reached};
 use crate::law::{Limits, Passing, Ramp};
 
-/// A ramp below stairs is made softer by this factor, so often at most.
+/// A ramp below steps is made softer by this factor, at most this often.
 const SOFTER: f64 = 3.0;
 const SOFTER_STEPS: usize = 9;
 /// Steps of the search for its best acceleration.
@@ -16,15 +16,17 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 /// How often a ramp may get longer because of what it passes.
 const LIMITS_STEPS: usize = 8;
 
-/// Whether a ramp could be as it likes.
+/// How a ramp fits below the steps that it passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Way {
+pub(super) enum Fit {
+    /// As hard as allowed, from where it may start.
     Free,
+    /// Later or softer than that.
     Hindered,
 }
 
 /// One ramp to be found.
-pub(super) struct Jump<'a, L> {
+pub(super) struct RampFit<'a, L> {
     /// It may start here.
     pub(super) start_mm: f64,
     pub(super) from_mm_s: f64,
@@ -33,57 +35,57 @@ pub(super) struct Jump<'a, L> {
     pub(super) room_mm: f64,
     /// What is lost by a millimetre of waiting \[s/mm\]: infinite at rest, where nothing can be waited for.
     pub(super) wait_s_mm: f64,
-    /// The stairs it passes.
+    /// The steps it passes.
     pub(super) between: &'a [Reached],
     /// What it is made with: the limits where it may start, then those of what the last one passed, too.
     pub(super) within: Limits<f64>,
     /// What may be used between two positions.
     pub(super) limits: &'a L,
-    /// The stair that hindered a ramp last: most often it hinders the next one too.
+    /// The step that hindered a ramp last: most often it hinders the next one too.
     pub(super) hinders: usize,
 }
 
 /// What a ramp with one acceleration loses.
 enum Tried {
-    Lost(f64, Leg),
+    Lost(f64, AscentRamp),
     /// It loses too much before anything is in its way.
     TooSoft,
     /// It would have to wait too long.
     TooHard,
 }
 
-impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
+impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
     /// The ramp that loses the least, if it is less than `most_s`.
-    pub(super) fn best(&mut self, most_s: f64) -> Option<(Leg, Way)> {
+    pub(super) fn best(&mut self, most_s: f64) -> Option<(AscentRamp, Fit)> {
         let mut most_s = most_s;
         // As hard as allowed.
         let hard = Ramp::within(&self.within, self.from_mm_s, self.to_mm_s);
         let mut best = None;
-        match self.below_stairs(hard, self.within, most_s) {
-            Tried::Lost(_, leg) if leg.start_mm <= self.start_mm => return Some((leg, Way::Free)),
-            Tried::Lost(lost_s, leg) => {
+        match self.below_steps(hard, self.within, most_s) {
+            Tried::Lost(_, ramp) if ramp.start_mm <= self.start_mm => return Some((ramp, Fit::Free)),
+            Tried::Lost(lost_s, ramp) => {
                 most_s = lost_s;
-                best = Some((leg, Way::Hindered));
+                best = Some((ramp, Fit::Hindered));
             }
             Tried::TooSoft => return None,
             Tried::TooHard => {}
         }
         // The softest that might lose little enough: by itself a ramp loses its time × change/(2·to), and it takes no less
-        // than change/acceleration. If the hardest is one to be beaten, the stair that makes it wait says what softer ones lose.
+        // than change/acceleration. If the hardest is one to be beaten, the step that makes it wait says what softer ones lose.
         let change = self.to_mm_s - self.from_mm_s;
-        let known = best.map_or(hard, |(leg, _): (Leg, Way)| leg.ramp);
+        let known = best.map_or(hard, |(ramp, _): (AscentRamp, Fit)| ramp.ramp);
         if self.is_hopeless(&known, change * change / (2.0 * self.to_mm_s * most_s), most_s) {
             return best;
         }
         let all_s = most_s;
-        // Softer by steps, from what the ramp would reach, as long as it helps.
+        // Softer by factors, from what the ramp would reach, as long as it helps.
         let hardest = hard.peak_accel_mm_s2();
-        let mut try_at = |jump: &mut Self, accel: f64| {
-            let tried = jump.with(accel, most_s);
-            if let Tried::Lost(lost_s, leg) = tried {
+        let mut try_at = |fit: &mut Self, accel: f64| {
+            let tried = fit.with(accel, most_s);
+            if let Tried::Lost(lost_s, ramp) = tried {
                 if lost_s < most_s {
                     most_s = lost_s;
-                    best = Some((leg, Way::Hindered));
+                    best = Some((ramp, Fit::Hindered));
                 }
                 return (lost_s, false);
             }
@@ -122,7 +124,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
     /// The ramp with at most this acceleration, if it loses at most `most_s`.
     fn with(&mut self, accel_mm_s2: f64, most_s: f64) -> Tried {
         let limits = self.softened(accel_mm_s2);
-        self.below_stairs(Ramp::within(&limits, self.from_mm_s, self.to_mm_s), limits, most_s)
+        self.below_steps(Ramp::within(&limits, self.from_mm_s, self.to_mm_s), limits, most_s)
     }
 
     /// The limits where it may start, with no more than this acceleration.
@@ -132,7 +134,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
 
     /// `ramp`, which is the fastest within `limits`, placed after what it may not pass earlier, and made softer by what it
     /// passes.
-    fn below_stairs(&mut self, ramp: Ramp<f64>, limits: Limits<f64>, most_s: f64) -> Tried {
+    fn below_steps(&mut self, ramp: Ramp<f64>, limits: Limits<f64>, most_s: f64) -> Tried {
         let (mut ramp, mut limits) = (ramp, limits);
         // What is passed later may allow less; the ramp gets longer by it.
         for _ in 0..LIMITS_STEPS {
@@ -151,7 +153,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
                     if at_mm > self.start_mm { (at_mm - self.start_mm) * self.wait_s_mm } else { 0.0 };
                 let Limits { jerk_mm_s3, snap_mm_s4, .. } = limits;
                 self.within = Limits { jerk_mm_s3, snap_mm_s4, ..self.within };
-                return Tried::Lost(own_s + waited_s, Leg { start_mm: at_mm, ramp });
+                return Tried::Lost(own_s + waited_s, AscentRamp { start_mm: at_mm, ramp });
             }
             limits = least;
             ramp = Ramp::within(&limits, self.from_mm_s, self.to_mm_s);
@@ -159,10 +161,10 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
         Tried::TooSoft
     }
 
-    /// Whether no ramp between `hard` and the one with so much acceleration loses less than `most_s`, as far as one stair
-    /// can tell: what a ramp loses by itself and where it passes the stair both grow with its time, nearly in
-    /// proportion, so that between two that lose too much because of the same stair there is none that does not. That goes
-    /// on as it does where the stair hinders no more: what is lost is never less than that.
+    /// Whether no ramp between `hard` and the one with so much acceleration loses less than `most_s`, as far as one step
+    /// can tell: what a ramp loses by itself and where it passes the step both grow with its time, nearly in
+    /// proportion, so that between two that lose too much because of the same step there is none that does not. That goes
+    /// on as it does where the step hinders no more: what is lost is never less than that.
     fn is_hopeless(&self, hard: &Ramp<f64>, accel_mm_s2: f64, most_s: f64) -> bool {
         if !(accel_mm_s2 > 0.0) {
             return false;
@@ -172,41 +174,41 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
             let own_s = ramp.duration_s() - ramp.length_mm() / self.to_mm_s;
             (Passing::new(ramp), self.start_mm + (most_s - own_s) / self.wait_s_mm)
         });
-        let is_late = |stair: &Reached| {
+        let is_late = |step: &Reached| {
             ends.iter().all(|(passing, latest_mm)| {
-                stair.ready_mm - passing.length_to_feed_mm(stair.feed_mm_s).0 >= *latest_mm
+                step.ready_mm - passing.length_to_feed_mm(step.feed_mm_s).0 >= *latest_mm
             })
         };
         self.between.get(self.hinders).is_some_and(is_late) || self.between.iter().any(is_late)
     }
 
-    /// The first place from where the ramp passes no stair's feed before the stair ends, if it is not after `latest_mm`.
+    /// The first place from where the ramp passes no step's feed before the step ends, if it is not after `latest_mm`.
     fn earliest_mm(&mut self, ramp: &Ramp<f64>, latest_mm: f64) -> Option<f64> {
         if self.between.is_empty() {
             return (self.start_mm <= latest_mm).then_some(self.start_mm);
         }
-        // Where exactly a feed is passed is dear to find out: only for stairs that come into question.
+        // Where exactly a feed is passed is dear to find out: only for steps that come into question.
         let passing = Passing::new(ramp);
-        let about_mm = |stair: &Reached| {
-            let (low_mm, high_mm) = passing.length_to_feed_mm(stair.feed_mm_s);
-            (stair.ready_mm - high_mm, stair.ready_mm - low_mm)
+        let about_mm = |step: &Reached| {
+            let (low_mm, high_mm) = passing.length_to_feed_mm(step.feed_mm_s);
+            (step.ready_mm - high_mm, step.ready_mm - low_mm)
         };
-        let exact_mm = |stair: &Reached| stair.ready_mm - ramp.length_to_feed_mm(stair.feed_mm_s);
-        if self.between.get(self.hinders).is_some_and(|stair| about_mm(stair).0 > latest_mm) {
+        let exact_mm = |step: &Reached| step.ready_mm - ramp.length_to_feed_mm(step.feed_mm_s);
+        if self.between.get(self.hinders).is_some_and(|step| about_mm(step).0 > latest_mm) {
             return None;
         }
-        // The stair that surely makes it wait longest, and what others might.
+        // The step that surely makes it wait longest, and what others might.
         let (mut first_mm, mut last_mm, mut longest) = (self.start_mm, self.start_mm, None);
         let mut others_mm = self.start_mm;
-        for (index, stair) in self.between.iter().enumerate() {
-            let (low_mm, high_mm) = about_mm(stair);
+        for (index, step) in self.between.iter().enumerate() {
+            let (low_mm, high_mm) = about_mm(step);
             if low_mm > latest_mm {
                 self.hinders = index;
                 return None;
             }
             if low_mm > first_mm {
                 others_mm = others_mm.max(last_mm);
-                (first_mm, last_mm, longest) = (low_mm, high_mm, Some(stair));
+                (first_mm, last_mm, longest) = (low_mm, high_mm, Some(step));
                 self.hinders = index;
             } else {
                 others_mm = others_mm.max(high_mm);
@@ -214,9 +216,9 @@ impl<L: Fn(f64, f64) -> Limits<f64>> Jump<'_, L> {
         }
         let mut at_mm = longest.map_or(self.start_mm, exact_mm).max(self.start_mm);
         if others_mm > at_mm {
-            for stair in self.between {
-                if about_mm(stair).1 > at_mm {
-                    at_mm = at_mm.max(exact_mm(stair));
+            for step in self.between {
+                if about_mm(step).1 > at_mm {
+                    at_mm = at_mm.max(exact_mm(step));
                 }
             }
         }

@@ -1,0 +1,210 @@
+//! The planner's one entry: blocks, from a feed to a feed, as ramps over exact lengths of path.
+//!
+//! Consumes blocks with their exact ends and the caller's memory; produces [`PlannedRamp`]s. It makes a plan with ramps that
+//! span blocks and one with a pair of ramps a block, and takes the faster. Both are legal; which is faster depends on how
+//! often the ceilings change. Where no ramps that span blocks are found the pairs are the fallback.
+
+use super::ramps::ramps;
+use super::spanning::{Node, plan_spanning};
+use super::two_pass::{Block, BlockPlan, PlanError, check, merge_each, plan};
+use crate::law::{PlannedRamp, Ramp, SegmentError};
+use crate::units::Position;
+
+/// What is to be planned.
+pub struct Path<'a> {
+    /// The blocks, in order. Equal neighbours may be merged here.
+    pub blocks: &'a mut [Block<f64>],
+    /// Where each one ends.
+    pub ends: &'a mut [Position],
+    /// Where the first one starts.
+    pub start: Position,
+    /// The feeds at the start of the first one and at the end of the last \[mm/s\].
+    pub feeds_mm_s: [f64; 2],
+    /// The control tick that the ramps are for \[s\].
+    pub tick_s: f64,
+}
+
+/// How much is done for a fast plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// One pair of ramps a block.
+    PerBlock,
+    /// One pair of ramps for equal neighbours together.
+    Merged,
+    /// Ramps that span blocks, where that is faster than one pair for equal neighbours together.
+    Spanning {
+        /// So many blocks may be spanned. Where there are more, no neighbours are merged; and where spanning is faster, the
+        /// plan ends after these blocks, at the feed with which the pairs of the others begin.
+        most: usize,
+    },
+}
+
+impl Effort {
+    /// Ramps may span all blocks.
+    pub const SPANNING: Self = Self::Spanning { most: usize::MAX };
+}
+
+/// The planner's working memory. What is in it before and after means nothing.
+pub struct Memory<'a> {
+    /// One for each block.
+    pub plans: &'a mut [BlockPlan<f64>],
+    /// [`nodes_for`](super::nodes_for) the blocks that may be spanned.
+    pub nodes: &'a mut [Node],
+}
+
+/// What was planned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Planned {
+    /// There was room for all ramps, and they cover all blocks.
+    pub is_whole: bool,
+    /// The time that they take, if so \[s\].
+    pub time_s: f64,
+}
+
+/// Plans `path` and hands the ramps of the faster plan to `put` in path order, each with its number from 0. A number that
+/// comes again replaces the ramp that had it, and all ramps after that one. `put` returns whether there was room; if not,
+/// the rest of that plan is left out.
+///
+/// # Errors
+/// A figure is out of range, the path is too short for its start or end feed, a ramp is beyond the tick's range, or there is
+/// too little working memory.
+pub fn plan_ramps(
+    path: Path<'_>,
+    effort: Effort,
+    memory: Memory<'_>,
+    put: &mut impl FnMut(usize, PlannedRamp) -> bool,
+) -> Result<Planned, PlanError> {
+    let Path { blocks, ends, start, feeds_mm_s: [start_mm_s, end_mm_s], tick_s } = path;
+    let Memory { plans, nodes } = memory;
+    let most = if let Effort::Spanning { most } = effort { most.min(blocks.len()) } else { 0 };
+    let spans_all = most > 0 && most == blocks.len();
+    let mut spanning = None;
+    // The lengths of merged blocks are rounded: where all may be spanned, that comes first.
+    if spans_all {
+        spanning = span(Stretch { blocks, ends, start, tick_s }, [start_mm_s, end_mm_s], nodes, put)?;
+    }
+    let mut count = blocks.len();
+    if spans_all || effort == Effort::Merged {
+        check(blocks, start_mm_s, end_mm_s)?;
+        count = merge_each(blocks, |from, to| {
+            if let Some(&end) = ends.get(from)
+                && let Some(place) = ends.get_mut(to)
+            {
+                *place = end;
+            }
+        });
+    }
+    let places = plans.len();
+    let plans = plans.get_mut(..count).ok_or(PlanError::Room { of: "plans", needed: count, places })?;
+    let all = Stretch { blocks, ends, start, tick_s }.first(count);
+    plan(all.blocks, start_mm_s, end_mm_s, plans)?;
+    let compared = if spans_all { count } else { most };
+    if let (false, Some(BlockPlan { exit_mm_s, .. })) = (spans_all, plans.get(..most).and_then(<[_]>::last)) {
+        spanning = span(all.first(most), [start_mm_s, *exit_mm_s], nodes, put)?;
+    }
+    if let Some(found) = spanning {
+        let by_pairs = pairs(all.first(compared), plans, &mut |_, _| true);
+        if by_pairs.is_err() || by_pairs.is_ok_and(|by_pairs| found.time_s < by_pairs.time_s) {
+            return Ok(Planned { is_whole: found.is_whole && spans_all, ..found });
+        }
+    }
+    pairs(all, plans, put)
+}
+
+/// Blocks with their exact ends.
+#[derive(Clone, Copy)]
+struct Stretch<'a> {
+    blocks: &'a [Block<f64>],
+    ends: &'a [Position],
+    start: Position,
+    tick_s: f64,
+}
+
+impl Stretch<'_> {
+    fn first(self, count: usize) -> Self {
+        let (blocks, ends) = (self.blocks.get(..count), self.ends.get(..count));
+        Self { blocks: blocks.unwrap_or(self.blocks), ends: ends.unwrap_or(self.ends), ..self }
+    }
+}
+
+/// The ramps of one plan on their way to the caller.
+struct Out<'a, F> {
+    put: &'a mut F,
+    count: usize,
+    planned: Planned,
+}
+
+impl<'a, F: FnMut(usize, PlannedRamp) -> bool> Out<'a, F> {
+    fn new(put: &'a mut F) -> Self {
+        Self { put, count: 0, planned: Planned { is_whole: true, time_s: 0.0 } }
+    }
+
+    fn put(&mut self, ramp: PlannedRamp) {
+        self.planned.time_s += ramp.ramp.duration_s();
+        self.planned.is_whole = self.planned.is_whole && (self.put)(self.count, ramp);
+        self.count += 1;
+    }
+}
+
+/// One pair of ramps a block, as `plans` say.
+fn pairs(
+    stretch: Stretch<'_>,
+    plans: &[BlockPlan<f64>],
+    put: &mut impl FnMut(usize, PlannedRamp) -> bool,
+) -> Result<Planned, PlanError> {
+    let (mut out, mut start) = (Out::new(put), stretch.start);
+    for ((block, plan), &end) in stretch.blocks.iter().zip(plans).zip(stretch.ends) {
+        let made = ramps(block, plan, start, end, stretch.tick_s);
+        for ramp in made.map_err(|error| PlanError::Ramp { start, error })?.into_iter().flatten() {
+            out.put(ramp);
+        }
+        if !out.planned.is_whole {
+            break;
+        }
+        start = end;
+    }
+    Ok(out.planned)
+}
+
+/// Ramps that span blocks; `None` where there is no such plan in the tick's range.
+// In a frame of its own: what it works with takes many kilobytes.
+#[inline(never)]
+fn span(
+    stretch: Stretch<'_>,
+    [start_mm_s, end_mm_s]: [f64; 2],
+    nodes: &mut [Node],
+    put: &mut impl FnMut(usize, PlannedRamp) -> bool,
+) -> Result<Option<Planned>, PlanError> {
+    let mut out = Out::new(put);
+    // A ramp ends where the next one starts: one waits until that is known.
+    let (mut waiting, mut start, mut is_made) = (None, stretch.start, true);
+    let mut end_at = |end: Option<Position>, next: Option<Ramp<f64>>| {
+        let Some(end) = end else {
+            is_made = false;
+            return;
+        };
+        if let Some(ramp) = core::mem::replace(&mut waiting, next) {
+            match placed(&ramp, end - start, stretch.tick_s) {
+                Ok(ramp) => ramp.into_iter().for_each(|ramp| out.put(ramp)),
+                Err(_) => is_made = false,
+            }
+            start = end;
+        }
+    };
+    let found = plan_spanning(stretch.blocks, start_mm_s, end_mm_s, nodes, &mut |start_mm, ramp| {
+        end_at(Position::from_mm(start_mm).map(|way| stretch.start + way), Some(*ramp));
+    })?;
+    end_at(stretch.ends.last().copied(), None);
+    Ok(found.filter(|_| is_made).map(|_| out.planned))
+}
+
+/// `ramp` over `length`; `None` of a cruise that rounding leaves no length.
+fn placed(ramp: &Ramp<f64>, length: Position, tick_s: f64) -> Result<Option<PlannedRamp>, SegmentError> {
+    if !ramp.is_cruise() {
+        PlannedRamp::new(ramp, length, tick_s).map(Some)
+    } else if length > Position::ZERO {
+        PlannedRamp::cruise(ramp.from_mm_s, length, tick_s).map(Some)
+    } else {
+        Ok(None)
+    }
+}
