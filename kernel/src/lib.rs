@@ -76,6 +76,8 @@
 //! }
 //! ```
 #![cfg_attr(not(test), no_std)]
+// Which feature an item needs, on docs.rs.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 // No panic path in what runs on a board; tests may.
 #![cfg_attr(

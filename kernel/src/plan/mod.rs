@@ -11,6 +11,17 @@
 //! - [`spanning`]: ramps that begin and end between junctions and may span many blocks;
 //! - [`window`]: the same with a bounded window, blocks appended as they come;
 //! - [`feed`]: the planned blocks as feed segments over exact path positions.
+//!
+//! ```
+//! use motion_kernel::plan::{Junction, junction};
+//!
+//! // A corner of 0.5° in a tick of 0.5 ms, where the acceleration may step by 200 mm/s².
+//! let corner = Junction { angle_rad: 0.5_f64.to_radians(), curvature_step_per_mm: 0.0 };
+//! let feed_mm_s = junction(&corner, 0.02, 200.0, 0.0005);
+//! assert!((feed_mm_s * corner.angle_rad / 0.0005 - 200.0).abs() < 1e-6);
+//! // Beyond the angle that may be passed the machine stops on the corner.
+//! assert_eq!(junction(&Junction { angle_rad: 0.03, ..corner }, 0.02, 200.0, 0.0005), 0.0);
+//! ```
 
 pub mod ceiling;
 pub mod feed;
