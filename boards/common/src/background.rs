@@ -86,6 +86,8 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
 
     /// The first part of a turn, right after tick `now`: what is asked for, and what the tick has left. What there is to
     /// log of it.
+    // A frame of its own: what it takes is free again while motion is planned.
+    #[inline(never)]
     pub fn turn<const ROWS: usize, const AFTER: usize>(
         &mut self,
         now: u32,
