@@ -1,6 +1,41 @@
 //! What can go wrong on the machine: typed, with its tick and its figures, and how it ends.
 //!
 //! Rejections of bad input are another matter: [`crate::queue::Rejection`].
+//!
+//! ```
+//! # use hal_sim::closed_loop::InMemory;
+//! # use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
+//! # use motion_kernel::kernel::Kernel;
+//! # use motion_kernel::law::Limits;
+//! # use motion_kernel::queue::{PathRules, Streams};
+//! # use motion_kernel::units::{Counts, DacCode, Position};
+//! use motion_kernel::fault::FaultKind;
+//!
+//! # let axis = AxisFigures {
+//! #     mm_per_count: 0.0001,
+//! #     mm_s_at_10_v: 100.0,
+//! #     output_offset_v: 0.0,
+//! #     output_limit_v: 10.0,
+//! #     gains: Gains { kp_per_s: 50.0, ki_per_s2: 0.0, kd: 0.0 },
+//! #     feedforward: Feedforward::default(),
+//! #     following_error_limit_mm: 0.5,
+//! # };
+//! # let config = AxesConfig::<f32, 1>::new(&[axis], 0.0005).expect("an axis");
+//! # let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
+//! # let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
+//! # let mut streams = Streams::<f32, 1, 18, 10>::new();
+//! # let (_, mut intake) = streams.split(rules, [Position::ZERO]);
+//! # let mut hal = InMemory { counts: [Counts(0)], codes: [DacCode(0)], enabled: None };
+//! let mut kernel = Kernel::new(&config, [Position::ZERO], [Counts(0)]);
+//! kernel.enable(0);
+//! kernel.tick(&mut intake, &mut hal);
+//! // Somebody turns the axis by 1 mm, more than its limit of 0.5 mm.
+//! hal.counts = [Counts(10_000)];
+//! kernel.tick(&mut intake, &mut hal);
+//! let fault = kernel.fault().expect("a following error");
+//! assert_eq!(fault.tick, 1);
+//! assert!(matches!(fault.kind, FaultKind::FollowingError { axis: 0, error_mm } if error_mm < -0.99));
+//! ```
 
 pub(crate) mod reaction;
 

@@ -76,6 +76,8 @@
 //! }
 //! ```
 #![cfg_attr(not(test), no_std)]
+// Which feature an item needs, on docs.rs.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 // Some of what all kernels share is called by guards or by live control only; the linker drops it where they are absent.
 #![cfg_attr(not(all(feature = "guards", feature = "live")), allow(dead_code))]

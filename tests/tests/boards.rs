@@ -6,7 +6,7 @@ use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, plan_program};
 
-const STRINGER: &str = "../boards/nucleo-f446re/program/stringer.bin";
+const STRINGER: &str = "../boards/common/program/stringer.bin";
 
 #[test]
 fn the_flashed_stringer_is_what_compile_writes() {
@@ -18,6 +18,6 @@ fn the_flashed_stringer_is_what_compile_writes() {
     let found = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(STRINGER)).expect("a file");
     assert!(
         made == found,
-        "cargo run --release -- compile host/src/cli/stringer.ngc --live -o boards/nucleo-f446re/program/stringer.bin"
+        "cargo run --release -- compile host/src/cli/stringer.ngc --live -o boards/common/program/stringer.bin"
     );
 }

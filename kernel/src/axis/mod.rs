@@ -12,6 +12,30 @@
 //!
 //! Configuration ([`AxesConfig`], [`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so gains can
 //! change without a bump.
+//!
+//! ```
+//! use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
+//! use motion_kernel::units::Counts;
+//!
+//! let axis = AxisFigures {
+//!     mm_per_count: 0.0001,
+//!     mm_s_at_10_v: 100.0,
+//!     output_offset_v: 0.0,
+//!     output_limit_v: 10.0,
+//!     gains: Gains { kp_per_s: 50.0, ki_per_s2: 0.0, kd: 0.0 },
+//!     feedforward: Feedforward::default(),
+//!     following_error_limit_mm: 0.5,
+//! };
+//! let config = AxesConfig::<f32, 1>::new(&[axis], 0.0005)?;
+//! let actual = config.axes[0].encoder.position(Counts(10_000));
+//! assert!((actual.to_mm() - 1.0).abs() < 1e-9);
+//! assert_eq!(config.axes[0].output.code(50.0).to_volts(), 5.0);
+//!
+//! // A refusal names the axis and the figure.
+//! let refused = AxesConfig::<f32, 1>::new(&[AxisFigures { mm_per_count: 0.0, ..axis }], 0.0005);
+//! assert_eq!(refused.map_err(|error| error.axis), Err(0));
+//! # Ok::<(), motion_kernel::axis::AxesError>(())
+//! ```
 
 mod check;
 pub mod correction;

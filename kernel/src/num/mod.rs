@@ -18,6 +18,18 @@
 //! Every operation is IEEE basic arithmetic or integer arithmetic, nothing is contracted to a fused
 //! multiply-add and no platform library is called, so the same input gives the same bits on every
 //! target.
+//!
+//! ```
+//! use motion_kernel::num::{Fixed, Real, Scalar};
+//!
+//! /// The way to a stop under a constant deceleration, in any number type \[mm\].
+//! fn stop_mm<R: Real>(feed_mm_s: f64, share_s_per_mm: f64) -> f64 {
+//!     let feed = R::from_f64(feed_mm_s);
+//!     (feed * (feed * R::from_f64(share_s_per_mm))).to_f64()
+//! }
+//! assert_eq!(stop_mm::<f32>(50.0, 0.001), stop_mm::<f64>(50.0, 0.001));
+//! assert!((stop_mm::<Fixed>(50.0, 0.001) - 2.5).abs() < 1e-6);
+//! ```
 
 mod fixed_point;
 mod float;

@@ -8,6 +8,24 @@
 //! A *stretch* is the motion from one full stop to the next. Both streams mark its end with an item
 //! of their own; [`Feeder::end_stretch`] enters the two together and only if both streams have
 //! measured the same length.
+//!
+//! ```
+//! use motion_kernel::law::Limits;
+//! use motion_kernel::path::Piece;
+//! use motion_kernel::queue::{PathRules, Refused, Rejection, Streams};
+//! use motion_kernel::units::Position;
+//!
+//! let at = |mm| Position::from_mm(mm).expect("within a kilometre");
+//! let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
+//! let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
+//! let mut streams = Streams::<f32, 1, 18, 10>::new();
+//! let (mut feeder, _intake) = streams.split(rules, [at(0.0)]);
+//! let line = |from_mm| Piece::line(1, [at(from_mm)], [1.0], at(4.0)).expect("a line");
+//! assert_eq!(feeder.piece(line(0.0)), Ok(()));
+//! // The next piece begins where the first one ends.
+//! let refused = feeder.piece(line(5.0));
+//! assert!(matches!(refused, Err(Refused::Invalid(Rejection::Gap { axis: 0, .. }))));
+//! ```
 
 mod handover;
 mod counter;

@@ -6,13 +6,12 @@
 use core::task::Poll;
 
 use motion_kernel::live::{LiveControl, Source, State};
+use motion_kernel::num::Real;
 use motion_kernel::program::{Item, Items, ProgramError, Reader, SupplyError};
 use motion_kernel::queue::LiveFeeder;
 use motion_kernel::straight::{Straight, StraightError};
 use motion_kernel::units::Position;
 
-use crate::design_parameters::{LEAD_TICKS, PLACES, TICK_S};
-use crate::machine::AXES;
 use crate::operator::Settings;
 
 /// How fast the machine goes to the program's start, at most \[mm/s\]: slowly, it may come from anywhere.
@@ -20,13 +19,13 @@ const TO_START_MM_S: f64 = 20.0;
 
 /// The items of one run after the other; none for now where no run has been started.
 #[derive(Debug)]
-struct Runs {
-    program: Reader<'static, AXES>,
+struct Runs<'a, const AXES: usize> {
+    program: Reader<'a, AXES>,
     to_start: Option<Straight<AXES>>,
-    items: Option<Items<'static, AXES>>,
+    items: Option<Items<'a, AXES>>,
 }
 
-impl Source<AXES> for Runs {
+impl<const AXES: usize> Source<AXES> for Runs<'_, AXES> {
     type Error = ProgramError;
 
     fn poll_next(&mut self) -> Poll<Option<Result<Item<AXES>, ProgramError>>> {
@@ -40,18 +39,18 @@ impl Source<AXES> for Runs {
     }
 }
 
-/// The program's runs, and how much of them is in the streams.
-pub struct Run<'a> {
-    feeder: LiveFeeder<'a, f32, AXES>,
-    control: LiveControl<f32, AXES, Runs, ProgramError, PLACES>,
+/// The program's runs, and how much of them is in the streams. Live control knows `PLACES` blocks and ramps ahead, each.
+pub struct Run<'a, R: Real, const AXES: usize, const PLACES: usize> {
+    feeder: LiveFeeder<'a, R, AXES>,
+    control: LiveControl<R, AXES, Runs<'a, AXES>, ProgramError, PLACES>,
 }
 
-impl<'a> Run<'a> {
-    /// No run yet, for streams that were split where the machine stands.
+impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACES> {
+    /// No run yet, for streams that were split where the machine stands, and changes `lead_ticks` ahead.
     #[must_use]
-    pub fn new(program: Reader<'static, AXES>, feeder: LiveFeeder<'a, f32, AXES>) -> Self {
+    pub fn new(program: Reader<'a, AXES>, feeder: LiveFeeder<'a, R, AXES>, lead_ticks: u32) -> Self {
         let runs = Runs { program, to_start: None, items: None };
-        Self { feeder, control: LiveControl::new(runs, TICK_S, LEAD_TICKS) }
+        Self { feeder, control: LiveControl::new(runs, program.header().tick_s, lead_ticks) }
     }
 
     /// Starts a run on a machine that stands at `here`, where the streams were split or the run before it ended.
@@ -62,7 +61,7 @@ impl<'a> Run<'a> {
         let runs = self.control.source_mut();
         let header = runs.program.header();
         let feed_mm_s = TO_START_MM_S.min(header.rules.feed_mm_s);
-        let to_start = Straight::new(here, header.start, header.rules.limits, [feed_mm_s; 2], TICK_S)?;
+        let to_start = Straight::new(here, header.start, header.rules.limits, [feed_mm_s; 2], header.tick_s)?;
         runs.to_start = Some(to_start);
         runs.items = Some(runs.program.items());
         Ok(())
@@ -73,7 +72,7 @@ impl<'a> Run<'a> {
         self.control.hold();
     }
 
-    /// Goes on after a hold.
+    /// Resumes after a hold.
     pub fn resume(&mut self) {
         self.control.resume();
     }
@@ -84,7 +83,7 @@ impl<'a> Run<'a> {
         matches!(self.state(), State::Holding | State::Held)
     }
 
-    /// Goes on as `settings` say, in this run and those to come.
+    /// Applies `settings` to this run and those to come.
     pub fn set(&mut self, settings: &Settings) {
         // The range of overrides is within live control's.
         let _ = self.control.set_override(settings.feed_override.share());
@@ -99,7 +98,7 @@ impl<'a> Run<'a> {
         self.control.poll(&mut self.feeder)
     }
 
-    /// What it is doing; [`State::Waiting`] before, between and behind runs.
+    /// What it is doing; [`State::Waiting`] before, between and after runs.
     #[must_use]
     pub fn state(&self) -> State {
         self.control.state(&self.feeder)
@@ -119,8 +118,9 @@ mod tests {
 
     use super::*;
     use crate::console::{FeedOverride, Step};
-    use crate::design_parameters::TURN_TICKS_MAX;
-    use crate::machine::{Machine, PROGRAM};
+    use crate::fixture::{AXES, BOARD, TICK_S, TURN_TICKS_MAX, end, machine};
+
+    type Run<'a> = super::Run<'a, f32, AXES, 64>;
 
     /// A board whose background has turns every so many ticks.
     struct TestBoard<'a> {
@@ -133,11 +133,11 @@ mod tests {
 
     /// What `work` does with a board that stands at the program's start.
     fn on_a_board<T>(turn_ticks: u32, work: impl FnOnce(&mut TestBoard<'_>) -> T) -> T {
-        let machine = Machine::new(PROGRAM).expect("suits");
+        let machine = machine();
         let here = machine.header().start;
         let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
         let (feeder, intake) = streams.split(machine.header().rules, here);
-        let run = Run::new(machine.program, feeder);
+        let run = Run::new(machine.program, feeder, BOARD.lead_ticks);
         work(&mut TestBoard { run, intake, executor: Executor::new(here), here, turn_ticks })
     }
 
@@ -174,15 +174,9 @@ mod tests {
 
     /// As `motion compile` prints: 2.320 s to (102.045923136, 0, 0).
     const STRINGER_TICKS: u32 = 4640;
-    const END_MM: [f64; AXES] = [102.045_923_136, 0.0, 0.0];
-
-    fn end() -> [Position; AXES] {
-        END_MM.map(|mm| Position::from_mm(mm).expect("in range"))
-    }
-
     /// And back at 20 mm/s before the second: with a ramp's time 2·√(2·20/5000) s on top.
     fn back_ticks() -> u32 {
-        let back_s = END_MM[0] / TO_START_MM_S + 2.0 * (2.0 * TO_START_MM_S / 5.0e3).sqrt();
+        let back_s = end()[0].to_mm() / TO_START_MM_S + 2.0 * (2.0 * TO_START_MM_S / 5.0e3).sqrt();
         (back_s / TICK_S) as u32
     }
 
@@ -200,12 +194,12 @@ mod tests {
     #[test]
     fn seldom_turns_cost_no_stop() {
         let (runs, starvations) = two_runs(TURN_TICKS_MAX, |_, _| {});
-        let items = Machine::new(PROGRAM).expect("suits").program.items();
+        let items = machine().program.items();
         let stretches = items.filter(|item| matches!(item, Ok(Item::EndOfStretch(_)))).count() as u32;
         let most_ticks = [STRINGER_TICKS, STRINGER_TICKS + back_ticks()];
         for (((ticks, at), most), ways) in runs.into_iter().zip(most_ticks).zip([0, 1]) {
             assert_eq!(at, end());
-            // A turn for each stretch to begin behind, and one to see the end in.
+            // A turn for each stretch to begin after, and one to see the end in.
             assert!(ticks <= most + (stretches + ways + 1) * TURN_TICKS_MAX, "{ticks} {most}");
         }
         assert_eq!(starvations, 0);
@@ -255,11 +249,11 @@ mod tests {
         assert!(slower > STRINGER_TICKS + 1000 && faster < STRINGER_TICKS - 40, "{slower} {faster}");
     }
 
-    /// In single block it is held behind every line of the program, the last one too, because more may come. Switched on
-    /// between two runs it is held behind the way to the start first.
+    /// In single block it is held after every line of the program, the last one too, because more may come. Switched on
+    /// between two runs it is held after the way to the start first.
     #[test]
-    fn in_single_block_it_is_held_behind_every_line() {
-        let items = Machine::new(PROGRAM).expect("suits").program.items();
+    fn in_single_block_it_is_held_after_every_line() {
+        let items = machine().program.items();
         let line_of = |item| match item {
             Ok(Item::Line { line, .. } | Item::Septic { line, .. }) => Some(line),
             _ => None,
@@ -301,14 +295,14 @@ mod tests {
     /// From one encoder count to the whole machine, longer than the streams hold, in any direction, at the feed there is.
     #[test]
     fn the_way_to_the_start_is_any() {
-        let machine = Machine::new(PROGRAM).expect("suits");
+        let machine = machine();
         let rules = machine.header().rules;
         for mm in [0.0, 1e-4, 2e-4, 1e-3, 0.01, 1.0, 15.999, 16.0, 16.001, 100.0, 3000.0] {
             for direction in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.48, -0.64, 0.6]] {
                 let here = direction.map(|part| Position::from_mm(part * mm).expect("in range"));
                 let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
                 let (feeder, mut intake) = streams.split(rules, here);
-                let mut run = Run::new(machine.program, feeder);
+                let mut run = Run::new(machine.program, feeder, BOARD.lead_ticks);
                 let mut executor = Executor::new(here);
                 run.start(here).expect("a way");
                 run.control.source_mut().items = None;

@@ -1,25 +1,24 @@
 //! Whether the watchdog may be fed: only while tick and background are both alive.
 //!
 //! Consumes the background's count of its turns, each tick. The tick feeds the watchdog, so a tick that
-//! has stopped ends in a reset within [`WATCHDOG_MAX_NS`](crate::design_parameters::WATCHDOG_MAX_NS). A
+//! has stopped ends in a reset within the watchdog's time. A
 //! background that has stopped no longer counts, and the tick then stops feeding. Either alone would miss
 //! half: a tick goes on regulating with nobody to stop it, a background would go on logging while an output
 //! stays at its last voltage.
 
-use crate::design_parameters::BACKGROUND_SILENT_TICKS_MAX;
-
 /// What the tick knows of the background.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Liveness {
     turns: u32,
     silent_ticks: u32,
+    silent_ticks_max: u32,
 }
 
 impl Liveness {
-    /// The background has just been seen.
+    /// The background has just been seen, and may be silent for `silent_ticks_max`.
     #[must_use]
-    pub const fn new() -> Self {
-        Self { turns: 0, silent_ticks: 0 }
+    pub const fn new(silent_ticks_max: u32) -> Self {
+        Self { turns: 0, silent_ticks: 0, silent_ticks_max }
     }
 
     /// One tick, in which the background has counted `turns`: whether to feed the watchdog.
@@ -29,7 +28,7 @@ impl Liveness {
         } else {
             (self.turns, self.silent_ticks) = (turns, 0);
         }
-        self.silent_ticks <= BACKGROUND_SILENT_TICKS_MAX
+        self.silent_ticks <= self.silent_ticks_max
     }
 }
 
@@ -39,11 +38,11 @@ mod tests {
 
     #[test]
     fn feeds_only_while_the_background_counts() {
-        let mut liveness = Liveness::new();
+        let mut liveness = Liveness::new(200);
         for turns in 1..10_000 {
             assert!(liveness.may_feed(turns));
         }
-        for _ in 0..BACKGROUND_SILENT_TICKS_MAX {
+        for _ in 0..200 {
             assert!(liveness.may_feed(9_999));
         }
         for _ in 0..10_000 {

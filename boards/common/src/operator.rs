@@ -30,7 +30,7 @@ pub enum Phase {
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
-    /// By the button: to start, to hold or to go on, whichever there is to do.
+    /// By the button: to start, to hold or to resume, whichever there is to do.
     Press,
     /// By the console.
     Command(Command),
@@ -43,8 +43,8 @@ pub enum Action {
     Start,
     /// Come to rest on the path.
     Hold,
-    /// Go on from a hold or a program stop.
-    GoOn,
+    /// Resume from a hold or a program stop.
+    Resume,
     /// Another feed override, for this run and those to come.
     Override(Step),
     /// Single block, for this run and those to come.
@@ -62,23 +62,23 @@ impl Action {
             (_, Asked::Command(Command::Override(step))) => Self::Override(step),
             (_, Asked::Command(Command::SingleBlock(is_single))) => Self::SingleBlock(is_single),
             (Phase::Ready | Phase::Done, Asked::Press) => Self::Start,
-            (Phase::Ready | Phase::Done, Asked::Command(Command::Hold | Command::GoOn)) => {
-                Self::Nothing("nothing runs: the blue button starts")
+            (Phase::Ready | Phase::Done, Asked::Command(Command::Hold | Command::Resume)) => {
+                Self::Nothing("nothing runs: the start button starts")
             }
             (Phase::Running { is_held, is_stopped }, Asked::Press) => {
                 if is_held || is_stopped {
-                    Self::GoOn
+                    Self::Resume
                 } else {
                     Self::Hold
                 }
             }
-            (Phase::Running { is_stopped: true, .. }, Asked::Command(Command::Hold | Command::GoOn)) => {
-                Self::Nothing("at rest at a program stop: the blue button goes on")
+            (Phase::Running { is_stopped: true, .. }, Asked::Command(Command::Hold | Command::Resume)) => {
+                Self::Nothing("at rest at a program stop: the start button resumes")
             }
             (Phase::Running { is_held: false, .. }, Asked::Command(Command::Hold)) => Self::Hold,
             (Phase::Running { .. }, Asked::Command(Command::Hold)) => Self::Nothing("it is held"),
-            (Phase::Running { is_held: true, .. }, Asked::Command(Command::GoOn)) => Self::GoOn,
-            (Phase::Running { .. }, Asked::Command(Command::GoOn)) => Self::Nothing("it is not held"),
+            (Phase::Running { is_held: true, .. }, Asked::Command(Command::Resume)) => Self::Resume,
+            (Phase::Running { .. }, Asked::Command(Command::Resume)) => Self::Nothing("it is not held"),
         }
     }
 }
@@ -88,7 +88,7 @@ impl Action {
 pub struct Settings {
     /// The feed override.
     pub feed_override: FeedOverride,
-    /// Rest behind every program line.
+    /// Rest after every program line.
     pub is_single: bool,
 }
 
@@ -112,18 +112,18 @@ mod tests {
         Phase::Faulted,
     ];
 
-    /// A row for what is asked for, a letter for each phase: s starts, h holds, g goes on, - does nothing.
+    /// A row for what is asked for, a letter for each phase: s starts, h holds, g resumes, - does nothing.
     #[test]
     fn every_phase_and_all_that_is_asked_for() {
         for (asked, expected) in [
             (Asked::Press, "shgggs--"),
             (Asked::Command(Command::Hold), "-h------"),
-            (Asked::Command(Command::GoOn), "--g-----"),
+            (Asked::Command(Command::Resume), "--g-----"),
         ] {
             let found = PHASES.map(|phase| match Action::of(phase, asked) {
                 Action::Start => 's',
                 Action::Hold => 'h',
-                Action::GoOn => 'g',
+                Action::Resume => 'g',
                 Action::Nothing(_) => '-',
                 Action::Override(_) | Action::SingleBlock(_) => '?',
             });

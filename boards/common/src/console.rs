@@ -10,8 +10,8 @@ use motion_kernel::live::{OVERRIDE_MAX, OVERRIDE_MIN};
 pub enum Command {
     /// Come to rest on the path.
     Hold,
-    /// Go on behind a hold, or behind a block in single block.
-    GoOn,
+    /// Resume after a hold, or after a block in single block.
+    Resume,
     /// Another feed override.
     Override(Step),
     /// Come to rest at the end of every program line, or do so no more.
@@ -24,7 +24,7 @@ impl Command {
     pub fn of(byte: u8) -> Option<Self> {
         Some(match byte {
             b'h' => Self::Hold,
-            b'r' => Self::GoOn,
+            b'r' => Self::Resume,
             b'u' => Self::Override(Step::Up),
             b'd' => Self::Override(Step::Down),
             b'n' => Self::Override(Step::AsProgrammed),
@@ -97,7 +97,7 @@ mod tests {
             (b'd', Command::Override(Step::Down)),
             (b'h', Command::Hold),
             (b'n', Command::Override(Step::AsProgrammed)),
-            (b'r', Command::GoOn),
+            (b'r', Command::Resume),
             (b's', Command::SingleBlock(true)),
             (b'u', Command::Override(Step::Up)),
         ];

@@ -5,7 +5,6 @@
 
 /// Figures of the ticks since they were last taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_arch = "arm", derive(defmt::Format))]
 pub struct TickTiming {
     /// Ticks.
     pub ticks: u32,
@@ -68,11 +67,11 @@ mod tests {
 
     #[test]
     fn keeps_extremes_and_begins_anew() {
-        let mut log = TickTiming::new();
-        log.add(500, 30, false);
-        log.add(900, 24, true);
-        log.add(700, 26, false);
-        let taken = log.take();
+        let mut timing = TickTiming::new();
+        timing.add(500, 30, false);
+        timing.add(900, 24, true);
+        timing.add(700, 26, false);
+        let taken = timing.take();
         let expected = TickTiming {
             ticks: 3,
             min_cycles: 500,
@@ -83,6 +82,6 @@ mod tests {
             overruns: 1,
         };
         assert_eq!(taken, expected);
-        assert_eq!(log, TickTiming::new());
+        assert_eq!(timing, TickTiming::new());
     }
 }
