@@ -313,8 +313,8 @@ impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> FlightRe
         if self.rows.is_full() {
             self.rows.pop_front();
         }
-        // There is room.
-        let _ = self.rows.push_back(FlightRow::new(trace));
+        let kept = self.rows.push_back(FlightRow::new(trace));
+        debug_assert!(kept.is_ok(), "the oldest row has made room");
     }
 
     /// Whether a fault has frozen it: nothing is added any more.

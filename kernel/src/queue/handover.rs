@@ -1,5 +1,4 @@
-//! What background and tick hand over through: words and queues. `tests/handover.rs` puts its own in their place, to run
-//! the mailbox and the tick's lists in every interleaving.
+//! What background and tick hand over through: words and queues. A check may put its own in their place.
 
 pub(super) use core::sync::atomic::{AtomicU32, Ordering};
 
