@@ -60,12 +60,8 @@ fn offer(feeder: &mut Feeder<'_, f32, 2>, from_mm: f64) {
     feeder.end_stretch(point([from_mm + 20.0, 0.0])).expect("its end");
 }
 
-/// Runs into a fault that `break_it` provokes at tick 100, and checks all that is promised about it.
-fn provoke(
-    break_it: impl Fn(&mut TestAxes),
-    repair: impl Fn(&mut TestAxes),
-    is_expected: impl Fn(&FaultKind<f32>) -> bool,
-) {
+/// In the middle of a move: the machine, its streams, and what it has done.
+fn moving(then: impl FnOnce(&mut Kernel<f32, 2>, &mut Intake<'_, f32, 2>, &mut TestAxes)) {
     let (mut kernel, mut axes) = (kernel(), TestAxes::default());
     let mut streams = Streams::<f32, 2, 8, 8>::new();
     let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
@@ -74,58 +70,69 @@ fn provoke(
         assert_eq!(tick(&mut kernel, &mut intake, &mut axes), None);
     }
     assert!(axes.is_enabled && axes.written[0] != DacCode::ZERO);
-    let mut fault = None;
-    for _ in 0..400 {
-        break_it(&mut axes);
-        fault = fault.or(tick(&mut kernel, &mut intake, &mut axes));
-    }
-    let fault = fault.expect("a fault");
-    assert!(is_expected(&fault), "{fault:?}");
-    let latched = kernel.fault().expect("latched");
-    // Repaired it stays, and another failure does not replace it.
-    repair(&mut axes);
-    assert_eq!(tick(&mut kernel, &mut intake, &mut axes), Some(fault));
-    axes.fails.latch = true;
-    axes.fails.write = true;
-    tick(&mut kernel, &mut intake, &mut axes);
-    (axes.fails.latch, axes.fails.write) = (false, false);
-    for _ in 0..10 {
-        assert_eq!(tick(&mut kernel, &mut intake, &mut axes), Some(fault));
-    }
-    assert_eq!(kernel.fault(), Some(latched));
-    assert!(!axes.is_enabled && axes.written == [DacCode::ZERO; 2], "{axes:?}");
-    // The way back: cleared, at rest where the axes are, with new streams.
-    let stands = kernel.clear_fault().expect("off");
-    assert_eq!(kernel.fault(), None);
-    let here = axes.counts.map(|Counts(counts)| counts as f64 * MM_PER_COUNT);
-    for (found, here) in stands.iter().zip(here) {
-        assert!((found.to_mm() - here).abs() < 1e-9);
-    }
-    let mut streams = Streams::<f32, 2, 8, 8>::new();
-    let (mut feeder, mut intake) = streams.split(RULES, point(here));
-    offer(&mut feeder, here[0]);
-    // Not before it is asked to.
-    for _ in 0..3 {
-        let trace = kernel.tick(&mut intake, &mut axes);
-        assert!(trace.executed.state == ExecState::Idle && !axes.is_enabled);
-    }
-    kernel.enable(5);
-    for settling in 0..5 {
-        let trace = kernel.tick(&mut intake, &mut axes);
-        assert!(trace.executed.state == ExecState::Idle && axes.is_enabled, "{settling}");
-    }
-    for _ in 0..20_000 {
-        let trace = *kernel.tick(&mut intake, &mut axes);
-        assert_eq!(trace.fault, None);
-        axes.follow(&trace);
-        let set = trace.executed.setpoints.map(|axis| axis.position);
-        if trace.executed.stretches == 1 && trace.executed.state == ExecState::Idle {
-            assert!(axes.is_enabled);
-            assert_eq!(set, [mm(here[0] + 20.0), mm(here[1])]);
-            return;
+    then(&mut kernel, &mut intake, &mut axes);
+}
+
+/// Runs into a fault that `break_it` provokes at tick 100, and checks all that is promised about it.
+fn provoke(
+    break_it: impl Fn(&mut TestAxes),
+    repair: impl Fn(&mut TestAxes),
+    is_expected: impl Fn(&FaultKind<f32>) -> bool,
+) {
+    moving(|kernel, intake, axes| {
+        let mut fault = None;
+        for _ in 0..400 {
+            break_it(axes);
+            fault = fault.or(tick(kernel, intake, axes));
         }
-    }
-    panic!("it did not move again");
+        let fault = fault.expect("a fault");
+        assert!(is_expected(&fault), "{fault:?}");
+        let latched = kernel.fault().expect("latched");
+        // Repaired it stays, and another failure does not replace it.
+        repair(axes);
+        assert_eq!(tick(kernel, intake, axes), Some(fault));
+        axes.fails.latch = true;
+        axes.fails.write = true;
+        tick(kernel, intake, axes);
+        (axes.fails.latch, axes.fails.write) = (false, false);
+        for _ in 0..10 {
+            assert_eq!(tick(kernel, intake, axes), Some(fault));
+        }
+        assert_eq!(kernel.fault(), Some(latched));
+        assert!(!axes.is_enabled && axes.written == [DacCode::ZERO; 2], "{axes:?}");
+        // The way back: cleared, at rest where the axes are, with new streams.
+        let stands = kernel.clear_fault().expect("off");
+        assert_eq!(kernel.fault(), None);
+        let here = axes.counts.map(|Counts(counts)| counts as f64 * MM_PER_COUNT);
+        for (found, here) in stands.iter().zip(here) {
+            assert!((found.to_mm() - here).abs() < 1e-9);
+        }
+        let mut streams = Streams::<f32, 2, 8, 8>::new();
+        let (mut feeder, mut intake) = streams.split(RULES, point(here));
+        offer(&mut feeder, here[0]);
+        // Not before it is asked to.
+        for _ in 0..3 {
+            let trace = kernel.tick(&mut intake, axes);
+            assert!(trace.executed.state == ExecState::Idle && !axes.is_enabled);
+        }
+        kernel.enable(5);
+        for settling in 0..5 {
+            let trace = kernel.tick(&mut intake, axes);
+            assert!(trace.executed.state == ExecState::Idle && axes.is_enabled, "{settling}");
+        }
+        for _ in 0..20_000 {
+            let trace = *kernel.tick(&mut intake, axes);
+            assert_eq!(trace.fault, None);
+            axes.follow(&trace);
+            let set = trace.executed.setpoints.map(|axis| axis.position);
+            if trace.executed.stretches == 1 && trace.executed.state == ExecState::Idle {
+                assert!(axes.is_enabled);
+                assert_eq!(set, [mm(here[0] + 20.0), mm(here[1])]);
+                return;
+            }
+        }
+        panic!("it did not move again");
+    });
 }
 
 #[test]
@@ -276,19 +283,6 @@ fn converter_bus() {
         assert_eq!(simulated.chip().volts()[..3], [0.0; 3]);
         assert_eq!(kernel.fault(), Some(fault));
     }
-}
-
-/// In the middle of a move: the machine, its streams, and what it has done.
-fn moving(then: impl FnOnce(&mut Kernel<f32, 2>, &mut Intake<'_, f32, 2>, &mut TestAxes)) {
-    let (mut kernel, mut axes) = (kernel(), TestAxes::default());
-    let mut streams = Streams::<f32, 2, 8, 8>::new();
-    let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
-    offer(&mut feeder, 0.0);
-    for _ in 0..100 {
-        assert_eq!(tick(&mut kernel, &mut intake, &mut axes), None);
-    }
-    assert!(axes.is_enabled && axes.written[0] != DacCode::ZERO);
-    then(&mut kernel, &mut intake, &mut axes);
 }
 
 /// What the board has found ends like any other fault, in the very next tick, whose number it has.

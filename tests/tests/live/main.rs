@@ -23,7 +23,7 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
 use motion_tests::check::bounds::Number;
-use motion_tests::check::live::{Command, Run, Seen, Setup, execute, execute_from};
+use motion_tests::check::live::{Command, Run, Setup, TickView, execute, execute_from};
 use motion_tests::check::path::Path;
 use motion_tests::check::program::{Asked, Generated};
 use motion_tests::check::totals::Totals;
@@ -68,7 +68,7 @@ impl Case {
     fn run<R: Number>(
         &self,
         seed: u64,
-        script: &mut dyn FnMut(&Seen<'_, R>) -> Option<Command>,
+        script: &mut dyn FnMut(&TickView<'_, R>) -> Option<Command>,
     ) -> Result<Run, String> {
         execute::<R>(&self.setup(seed), script)
     }

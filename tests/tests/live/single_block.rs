@@ -6,7 +6,7 @@ use motion_kernel::num::Fixed;
 
 use super::{Case, generated, is_out_of_range, seeds};
 use motion_tests::check::bounds::Number;
-use motion_tests::check::live::{Command, Run, Seen, Setup, execute};
+use motion_tests::check::live::{Command, Run, Setup, TickView, execute};
 use motion_tests::check::path::Path;
 use motion_tests::check::program::{Asked, Generated};
 use motion_tests::check::totals::Totals;
@@ -82,7 +82,7 @@ fn block_ends(program: &Generated, path: &Path) -> Vec<Rest> {
     program.asked.iter().map(end).collect()
 }
 
-fn rest_of<R: Number>(seen: &Seen<'_, R>) -> Rest {
+fn rest_of<R: Number>(seen: &TickView<'_, R>) -> Rest {
     (seen.executed.stretches as usize, seen.executed.motion.s.to_mm())
 }
 

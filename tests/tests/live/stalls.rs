@@ -1,4 +1,4 @@
-//! A producer that is late: its turns, and its items.
+//! A producer that is late: its polls, and its items.
 
 use core::task::Poll;
 use std::cell::{Cell, RefCell};
