@@ -226,7 +226,7 @@ fn a_load_shows_the_current_limit() {
     }
 }
 
-/// A slow X is found beside a fast Y, and Y beside it, by motions that X reaches.
+/// A slow X and a fast Y are both identified, by motions that X reaches.
 #[test]
 fn a_slow_axis_is_identified() {
     let mut machine = Machine::reference();

@@ -88,7 +88,7 @@ fn a_feed_too_fast_for_its_piece_is_refused() {
     assert_eq!(refusal::<f64>(&header, &fast), None);
     assert_eq!(refusal::<f32>(&header, &fast), None);
     assert_eq!(refusal::<Fixed>(&header, &to_the_curve(LIMITS, 100.0, coefficients, length)), None);
-    // Sharp at first, fast where it is straight again: on the same ramp it is too fast, behind it is not.
+    // Sharp at first, fast where it is straight again: on the same ramp it is too fast, after it not.
     let end: [Position; 3] =
         Piece::<Fixed, 3>::septic(1, [Position::ZERO; 3], coefficients, length).expect("a piece").end();
     let onward = [0.7_f64.cos(), 0.7_f64.sin(), 0.0];

@@ -1,4 +1,4 @@
-//! Homing on the simulated machine: the reference from any start, every failure by its name and at rest, and motion behind it.
+//! Homing on the simulated machine: the reference from any start, every failure by its name and at rest, and motion after it.
 
 use hal_sim::{EncoderNoise, HomeParameters, IndexParameters, SwitchParameters};
 use motion_host::machine::{HomingSettings, Machine};
@@ -144,7 +144,7 @@ fn homed_in(seed: u64, settings: HomingSettings) -> Result<HomedAxis, HomingErro
 fn places(seed: u64) -> impl Iterator<Item = Place> {
     let mut random = Random::new(seed);
     let direction = if random.chance(0.5) { Direction::Positive } else { Direction::Negative };
-    // In machine positions, from the switch: the index 3 mm behind it.
+    // In machine positions, from the switch: the index follows after 3 mm.
     (0..).map(move |_| {
         let switch_mm =
             if random.chance(0.3) { -random.between(0.0, 30.0) } else { random.between(0.0, 150.0) };

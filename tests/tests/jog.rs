@@ -203,7 +203,7 @@ fn presses<R: Real>(seed: u64, rounding_mm: f64) -> Result<[usize; 4], String> {
 }
 
 #[test]
-fn keys_at_random() {
+fn keys_pressed_at_random_move_within_limits_to_exact_ends() {
     let mut totals = [0; 4];
     let first = motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(1);
     let machines = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(120);

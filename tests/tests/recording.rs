@@ -118,7 +118,7 @@ fn script(random: &mut Random, ticks: u64) -> Script {
         _ => format!("override={}", random.between(0.1, 2.0)),
     };
     let text: Vec<String> = at.iter().map(|tick| format!("{tick}:{}", command(random))).collect();
-    // Whatever was held goes on in the end.
+    // Whatever was held continues in the end.
     let last = 2 * ticks;
     format!("{},{last}:override=1,{last}:continuous,{last}:resume", text.join(",")).parse().expect("a script")
 }

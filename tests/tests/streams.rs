@@ -482,7 +482,7 @@ fn a_program_too_dense_for_a_tick_is_refused_with_its_line_and_the_feed_that_wou
 }
 
 /// Under live control lines that are too dense for their machine's feed are driven slower, and only those: not the long
-/// line behind them.
+/// line after them.
 #[test]
 fn only_what_is_dense_is_driven_slower_for_it() {
     let fast = |item: &Item<3>| match item {
@@ -545,7 +545,7 @@ fn a_check_finds_whatever_the_streams_would_refuse() {
 }
 
 /// For live control blocks have to hold the whole path and nothing else: without any of them, without the last one, with
-/// one that is longer, with one behind the end, and with one that comes after what it holds.
+/// one that is longer, with one after the end, and with one that comes after what it holds.
 #[test]
 fn a_check_for_live_control_finds_path_that_is_not_held() {
     let good = executable(SHORT).items;

@@ -62,7 +62,7 @@ impl<R: Real> TickView<R> {
     }
 }
 
-/// How a run goes on after a tick.
+/// What a run does after a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Next {
     GoOn,

@@ -136,7 +136,7 @@ fn provoke(
 }
 
 #[test]
-fn following_error() {
+fn an_axis_that_stands_still_is_a_following_error() {
     let stuck = |axes: &mut TestAxes| axes.counts[0] = Counts(0);
     provoke(
         stuck,
@@ -146,22 +146,22 @@ fn following_error() {
 }
 
 #[test]
-fn encoder() {
+fn encoders_that_can_not_be_read_are_a_fault() {
     provoke(|b| b.fails.latch = true, |b| b.fails.latch = false, |k| matches!(k, FaultKind::Encoder));
 }
 
 #[test]
-fn output() {
+fn a_converter_that_can_not_be_written_is_a_fault() {
     provoke(|b| b.fails.write = true, |b| b.fails.write = false, |k| matches!(k, FaultKind::Output));
 }
 
 #[test]
-fn inputs() {
+fn inputs_that_can_not_be_read_are_a_fault() {
     provoke(|b| b.fails.inputs = true, |b| b.fails.inputs = false, |k| matches!(k, FaultKind::Inputs));
 }
 
 #[test]
-fn emergency_stop() {
+fn an_open_emergency_stop_is_a_fault() {
     provoke(
         |b| b.inputs.emergency_stop = true,
         |b| b.inputs.emergency_stop = false,
@@ -170,7 +170,7 @@ fn emergency_stop() {
 }
 
 #[test]
-fn drive_fault() {
+fn a_drive_that_reports_a_fault_is_one() {
     provoke(
         |b| b.inputs.axes[1] = AxisInputs::HEALTHY.with_fault(true),
         |b| b.inputs.axes[1] = AxisInputs::HEALTHY,
@@ -180,7 +180,7 @@ fn drive_fault() {
 
 /// The first tick can't enable the drives: no motion with them off.
 #[test]
-fn enable() {
+fn drives_that_can_not_be_enabled_do_not_move() {
     let (mut kernel, mut axes) = (kernel(), TestAxes::default());
     axes.fails.enable = true;
     let mut streams = Streams::<f32, 2, 8, 8>::new();
@@ -229,19 +229,19 @@ fn starve(is_path: bool) {
 }
 
 #[test]
-fn starvation_of_the_path() {
+fn a_path_that_runs_dry_is_a_fault_and_stays_one() {
     starve(true);
 }
 
 #[test]
-fn starvation_of_the_feed() {
+fn a_feed_that_runs_dry_is_a_fault_and_stays_one() {
     starve(false);
 }
 
 /// The converter's bus fails in the middle of a move, on the simulated machine: when it is back, the first
 /// thing it gets is 0 V, although the axes do not stand where they were set.
 #[test]
-fn converter_bus() {
+fn a_converter_bus_that_comes_back_first_gets_0_v() {
     let reference = Machine::reference();
     for frames in [0, 1, 2, 3, 401, 402, 403, 404] {
         let axis = AxisParameters::REFERENCE_X;
@@ -287,7 +287,7 @@ fn converter_bus() {
 
 /// What the board has found ends like any other fault, in the very next tick, whose number it has.
 #[test]
-fn faults_that_the_board_reports() {
+fn a_fault_that_the_board_reports_ends_motion_in_the_next_tick() {
     for kind in [FaultKind::EmergencyStop, FaultKind::Drive { axis: 1 }] {
         moving(|kernel, intake, axes| {
             kernel.trip(kind);

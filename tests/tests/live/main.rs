@@ -258,7 +258,7 @@ fn an_abort_ends_at_rest_on_the_path() {
     assert!(ran > 60 && early > ran / 2, "{early} of {ran}");
 }
 
-/// Held in a dwell it does not go on behind it, whatever the list under way holds, until it is told to; nor with an
+/// Held in a dwell, motion does not continue after it, whatever the list under way holds, until it is told to; nor with an
 /// override of 0, nor when it is to be given up.
 #[test]
 fn held_in_a_dwell_it_stays() {

@@ -216,18 +216,18 @@ fn share(feed: Fixed, part: f64) -> Fixed {
 }
 
 #[test]
-fn machines() {
+fn lists_of_machines_keep_limits_and_are_as_fast_as_in_f64() {
     random_lists(90, Range::Machines, 20_000);
 }
 
 #[test]
-fn all_that_is_accepted() {
+fn every_accepted_list_keeps_limits_and_is_as_fast_as_in_f64() {
     random_lists(91, Range::Accepted, 20_000);
 }
 
 /// The ends of all ranges with each other: no overflow, and the inverse problems solved as in f64.
 #[test]
-fn ends_of_the_ranges() {
+fn the_ends_of_the_ranges_neither_overflow_nor_exceed_limits() {
     let ends = [1.0, 1e3, 1e9];
     let feeds = [0.0, STEP, 1e-6, 1.0, 1e3, 1e6];
     let lengths = [1e-6 + STEP, 1e-3, 1.0, 1e6];
@@ -288,7 +288,7 @@ fn ends_of_the_ranges() {
 
 /// Changes of feed around those where one limit takes over from another, step by step.
 #[test]
-fn where_regimes_meet() {
+fn limits_are_kept_where_regimes_meet() {
     let mut random = Random::of_stream(96);
     let mut worst = -1.0_f64;
     for case in 0..4000 {
