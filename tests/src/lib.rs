@@ -11,7 +11,9 @@ pub mod cycles;
 pub mod dd;
 pub mod figures;
 pub mod fuzz;
+pub mod judge;
 pub mod random;
+pub mod s4;
 
 /// A number from the environment: the seed of a test, or how much it does in its long form.
 ///

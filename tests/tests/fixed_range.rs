@@ -43,25 +43,25 @@ fn to_the_curve(
 ) -> Vec<Item<3>> {
     let direction = coefficients.map(|axis| axis[0]);
     let ramp = Ramp::new(&law(limits), 0.0, feed_mm_s);
-    let way = mm(ramp.length_mm());
-    let parts = (way.to_mm() / 15.0) as i64 + 1;
-    let on_way = |part: i64| {
-        Position::from_bits((i128::from(way.to_bits()) * i128::from(part) / i128::from(parts)) as i64)
+    let whole = mm(ramp.length_mm());
+    let parts = (whole.to_mm() / 15.0) as i64 + 1;
+    let at_part = |part: i64| {
+        Position::from_bits((i128::from(whole.to_bits()) * i128::from(part) / i128::from(parts)) as i64)
     };
     let at = |s: Position| direction.map(|d| mm(d * s.to_mm()));
-    let mut items = vec![Item::Feed(PlannedRamp { ramp, length: way })];
+    let mut items = vec![Item::Feed(PlannedRamp { ramp, length: whole })];
     for part in 0..parts {
-        let (from, to) = (on_way(part), on_way(part + 1));
+        let (from, to) = (at_part(part), at_part(part + 1));
         items.push(Item::Line { line: 1, start: at(from), direction, length: to - from });
     }
-    items.push(Item::Septic { line: 1, start: at(way), coefficients, length });
+    items.push(Item::Septic { line: 1, start: at(whole), coefficients, length });
     let t2_s = length.to_mm() / feed_mm_s;
     let cruise = Ramp { from_mm_s: feed_mm_s, t1_s: 0.0, t2_s, peak_jerk_mm_s3: 0.0, ..ramp };
     items.push(Item::Feed(PlannedRamp { ramp: cruise, length }));
     items
 }
 
-/// What is wrong with items that end under way.
+/// What is wrong with items that end in motion.
 fn refusal<R: Real>(header: &Header<3>, items: &[Item<3>]) -> Option<SupplyError<Infallible>> {
     match program::check::<R, 3, _>(header, items.iter().map(|&item| Ok(item))) {
         Err(CheckError::Item { cause, .. }) => Some(cause),
@@ -88,7 +88,7 @@ fn a_feed_too_fast_for_its_piece_is_refused() {
     assert_eq!(refusal::<f64>(&header, &fast), None);
     assert_eq!(refusal::<f32>(&header, &fast), None);
     assert_eq!(refusal::<Fixed>(&header, &to_the_curve(LIMITS, 100.0, coefficients, length)), None);
-    // Sharp at first, fast where it is straight again: on the same ramp it is too fast, behind it is not.
+    // Sharp at first, fast where it is straight again: on the same ramp it is too fast, after it not.
     let end: [Position; 3] =
         Piece::<Fixed, 3>::septic(1, [Position::ZERO; 3], coefficients, length).expect("a piece").end();
     let onward = [0.7_f64.cos(), 0.7_f64.sin(), 0.0];

@@ -9,7 +9,7 @@ use motion_tests::random::Random;
 const INPUTS: usize = 2000;
 
 #[test]
-fn the_corpus() {
+fn every_seed_of_the_corpus_keeps_the_promises() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/kernel");
     let mut inputs = 0;
     for entry in std::fs::read_dir(&folder).expect("a corpus") {
@@ -22,7 +22,7 @@ fn the_corpus() {
 }
 
 #[test]
-fn random_bytes() {
+fn random_bytes_keep_the_promises() {
     let inputs = motion_tests::from_env("MOTION_TEST_PROGRAMS").map_or(INPUTS, |inputs| inputs as usize);
     let mut random = Random::of_stream(61);
     let mut said = 0;

@@ -334,7 +334,7 @@ fn figures_of_the_step_are_those_of_the_reference() {
 }
 
 #[test]
-fn what_is_no_servo_axis_is_refused() {
+fn recordings_of_no_servo_axis_are_refused() {
     let mut runs = recordings(REFERENCE_X, SETUP);
     for run in &mut runs {
         run.actual_mm.iter_mut().for_each(|position| *position *= -1.0);

@@ -8,6 +8,7 @@ use motion_kernel::num::{Fixed, Real};
 use motion_kernel::queue::{LiveStreams, PathRules};
 use motion_kernel::units::Position;
 use motion_tests::check::bench::mm;
+use motion_tests::judge::{Judge, along};
 use motion_tests::random::Random;
 
 const AXES: usize = 3;
@@ -100,6 +101,7 @@ fn press<R: Real>(
     // Feed positions are products with 32 bits of the length that they are parts of.
     let rounding_mm = rounding_mm + 2.0_f64.powi(-32) * (end[axis] - start[axis]).to_mm().abs();
     let mut differences = Differences::new(machine, axis, start[axis], rounding_mm);
+    let judge = Judge::new(&machine.rules(), machine.tick_s, 1e-5, 0.0);
     let (mut before, mut most) = (start, 1.0_f64);
     for tick in 0..2_000_000 {
         if tick == release {
@@ -119,13 +121,7 @@ fn press<R: Real>(
         if v_mm_s > most_mm_s {
             return Err(format!("tick {tick}: feed {v_mm_s}, asked for at most {most_mm_s}"));
         }
-        let Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 } = machine.axis.limits;
-        let found = [motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(R::to_f64);
-        for (found, limit) in found.into_iter().zip([accel_mm_s2, jerk_mm_s3, snap_mm_s4]) {
-            if found.abs() > limit * (1.0 + 1e-5) {
-                return Err(format!("tick {tick}: {found}, limit {limit}"));
-            }
-        }
+        judge.limits(&along(&motion)).map_err(|error| format!("tick {tick}: {error}"))?;
         for other in (0..AXES).filter(|&other| other != axis) {
             if now[other] != start[other] {
                 return Err(format!("tick {tick}: axis {other} moves in a jog of axis {axis}"));
@@ -207,7 +203,7 @@ fn presses<R: Real>(seed: u64, rounding_mm: f64) -> Result<[usize; 4], String> {
 }
 
 #[test]
-fn keys_at_random() {
+fn keys_pressed_at_random_move_within_limits_to_exact_ends() {
     let mut totals = [0; 4];
     let first = motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(1);
     let machines = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(120);

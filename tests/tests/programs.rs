@@ -8,12 +8,11 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use motion_host::gcode;
-use motion_host::planning::{Mode, plan_program};
+use motion_host::planning::Mode;
 use motion_host::simulate::run;
 use motion_kernel::num::Fixed;
 use motion_tests::check::totals::Totals;
-use motion_tests::check::{drive, geometry, machine, program};
+use motion_tests::check::{drive, geometry, machine, planned, program};
 use motion_tests::random::Random;
 
 /// Programs in the form that runs with every `cargo test`, and in the long form.
@@ -95,8 +94,7 @@ fn blocks_whose_change_of_feed_is_a_few_last_places_are_planned() {
     for step in 1..=400 {
         let length_mm = 1e-5 * 1.03_f64.powi(step);
         let text = format!("G1 X200 F17000\nX{:.10} F18000\nX400 F17999\nM2\n", 200.0 + length_mm);
-        let read = gcode::read("short.ngc", text.as_bytes()).expect("G-code");
-        if let Err(refused) = plan_program("short.ngc", &read, &reference, Mode::Spanning) {
+        if let Err(refused) = planned(&text, &reference) {
             failures.push(format!("{length_mm:e} mm: {refused}"));
         }
     }
@@ -129,8 +127,7 @@ fn random_programs_run_on_the_simulated_machine() {
         let machine = machine::gentle(&mut random);
         let fragments = 1 + random.below(4);
         let program = program::generate(&mut random, fragments, 30.0);
-        let read = gcode::read("random.ngc", program.text.as_bytes()).expect("generated");
-        let Ok(plan) = plan_program("random.ngc", &read, &machine, Mode::Spanning) else { continue };
+        let Ok(plan) = planned(&program.text, &machine) else { continue };
         let mut end_mm = [0.0; 3];
         let mut ticks = 0_u64;
         let mut observe = |tick: &motion_host::trace::TraceRow| {

@@ -118,20 +118,20 @@ fn script(random: &mut Random, ticks: u64) -> Script {
         _ => format!("override={}", random.between(0.1, 2.0)),
     };
     let text: Vec<String> = at.iter().map(|tick| format!("{tick}:{}", command(random))).collect();
-    // Whatever was held goes on in the end.
+    // Whatever was held continues in the end.
     let last = 2 * ticks;
     format!("{},{last}:override=1,{last}:continuous,{last}:resume", text.join(",")).parse().expect("a script")
 }
 
 /// A run as far as anybody can see it.
 #[derive(Debug, PartialEq)]
-struct Seen {
+struct Observed {
     ticks: Vec<String>,
     summary: String,
 }
 
-fn seen(ticks: Vec<String>, summary: &RunSummary) -> Seen {
-    Seen { ticks, summary: format!("{summary:?}") }
+fn observed(ticks: Vec<String>, summary: &RunSummary) -> Observed {
+    Observed { ticks, summary: format!("{summary:?}") }
 }
 
 fn words(tick: &TraceRow) -> String {
@@ -207,7 +207,7 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
         Ok((summary, recorder.finish(&job)))
     })
     .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
-    let recorded = seen(ticks, &summary);
+    let recorded = observed(ticks, &summary);
 
     let bytes = recording.to_bytes();
     let read = Recording::from_bytes(&bytes).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
@@ -217,7 +217,7 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
     let again = replay(&read, &job, &mut |tick| ticks.push(words(tick))).expect("a replay");
     assert_eq!(again.difference, None, "seed {seed}");
     assert_eq!(again.ticks, recording.ticks(), "seed {seed}");
-    assert!(seen(ticks, &again.summary) == recorded, "seed {seed}: the ticks or the summary differ");
+    assert!(observed(ticks, &again.summary) == recorded, "seed {seed}: the ticks or the summary differ");
     let fault = summary.faults.first().map(|fault| fault.fault.clone());
     // What is broken shows, unless the run ended before.
     if breakage.is_some() && at + 1 < summary.ticks {

@@ -27,12 +27,12 @@ pub enum Command {
     Override(f64),
     Abort,
     SingleBlock(bool),
-    /// The background does not get its turn.
+    /// The background is not polled.
     Stall,
 }
 
-/// What a script sees of the tick that was.
-pub struct Seen<'a, R: Number> {
+/// What a script is told of the latest tick.
+pub struct TickView<'a, R: Number> {
     pub ticks: u64,
     pub state: State,
     pub executed: &'a Executed<R, 3>,
@@ -89,7 +89,7 @@ impl Greatest {
 /// Executes a plan whose items are all there; `script` is asked for a command before every tick.
 pub fn execute<R: Number>(
     setup: &Setup<'_>,
-    script: &mut dyn FnMut(&Seen<'_, R>) -> Option<Command>,
+    script: &mut dyn FnMut(&TickView<'_, R>) -> Option<Command>,
 ) -> Result<Run, String> {
     let executable = Executable::new::<R>(setup.plan).map_err(|error| error.to_string())?;
     execute_from::<R, _>(setup, executable.supplied(), script)
@@ -99,7 +99,7 @@ pub fn execute<R: Number>(
 pub fn execute_from<R: Number, S: Source<3>>(
     setup: &Setup<'_>,
     source: S,
-    script: &mut dyn FnMut(&Seen<'_, R>) -> Option<Command>,
+    script: &mut dyn FnMut(&TickView<'_, R>) -> Option<Command>,
 ) -> Result<Run, String>
 where
     S::Error: Clone + std::fmt::Display,
@@ -112,12 +112,12 @@ where
     let mut control = LiveControl::<R, 3, _, _, PLACES>::new(source, machine.tick_s, 0);
     let mut checker = Checker::new::<R>(machine, plan, path, seed).live(1.0);
     let mut greatest = Greatest { ticks: response_ticks, falling: VecDeque::new() };
-    let (mut ticks, mut turns, mut stretches, mut feed_override) = (0_u64, 0_u64, 0_usize, 1.0);
+    let (mut ticks, mut polls, mut stretches, mut feed_override) = (0_u64, 0_u64, 0_usize, 1.0);
     let (mut rests, mut commands, mut stops, mut dwelt) = (0_u64, 0_u64, 0_u64, 0_u64);
     let mut executed = executor.tick(&mut intake).map_err(|fault| format!("{fault:?}"))?;
     loop {
         let state = control.state(&feeder);
-        let command = script(&Seen { ticks, state, executed: &executed });
+        let command = script(&TickView { ticks, state, executed: &executed });
         commands += u64::from(command.is_some_and(|command| command != Command::Stall));
         match command {
             None | Some(Command::Stall) => {}
@@ -132,15 +132,15 @@ where
         }
         if command != Some(Command::Stall) {
             control.poll(&mut feeder).map_err(|error| format!("tick {ticks}: rejected: {error}"))?;
-            turns += 1;
+            polls += 1;
         }
         let before = (executed.motion, executed.state);
         executed = executor.tick(&mut intake).map_err(|fault| {
             let length_mm = path.stretches.get(stretches).map(|stretch| stretch.length_mm);
             format!("tick {ticks}: {fault:?} after {before:?} on {length_mm:?} mm of stretch {stretches}")
         })?;
-        // What was commanded just before the background lost its turns may be obeyed behind them.
-        checker.override_up_to(greatest.of(turns, feed_override));
+        // What was commanded just before the background was kept from its polls may be obeyed after them.
+        checker.override_up_to(greatest.of(polls, feed_override));
         checker.tick(&executed).map_err(|error| format!("tick {ticks}: {error}"))?;
         ticks += 1;
         rests += u64::from(before.1 == ExecState::Moving && executed.state != ExecState::Moving);

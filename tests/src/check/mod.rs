@@ -13,3 +13,13 @@ pub mod motion;
 pub mod path;
 pub mod program;
 pub mod totals;
+
+use motion_host::gcode;
+use motion_host::machine::Machine;
+use motion_host::planning::{Mode, Plan, PlanningError, plan_program};
+
+/// The plan of a program, in ramps that span blocks.
+pub fn planned(text: &str, machine: &Machine) -> Result<Plan, PlanningError> {
+    let program = gcode::read("test.ngc", text.as_bytes()).expect("G-code");
+    plan_program("test.ngc", &program, machine, Mode::Spanning)
+}

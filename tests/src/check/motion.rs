@@ -16,6 +16,7 @@ use super::bounds::{self, Number};
 use super::geometry::{Vector, minus, norm};
 use super::path::{Cursor, Path};
 use super::totals::Totals;
+use crate::judge;
 
 /// Greatest error of Hermite's rules for a change of s, v, a, j over one tick, over K·τⁿ: Peano's kernels,
 /// integrated numerically.
@@ -97,8 +98,7 @@ impl<'a> Checker<'a> {
         self.totals.ticks += 1;
         let motion = &executed.motion;
         let local_mm = motion.s.to_mm();
-        let values =
-            [motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(|value| value.to_f64());
+        let values = judge::along(motion);
         let stretch = executed.stretches as usize;
         let placed = self.cursor.seek(stretch, local_mm).copied();
         let [v, a, j, snap] = values;

@@ -163,15 +163,15 @@ pub(super) fn of_streams<R: Real>(input: &mut Unstructured<'_>) -> Result<()> {
     let items = program.items.iter().map(|&item| Ok::<_, Infallible>(item));
     let mut supply = Supply::new(items, TICK_S);
     let mut machine = Machine::<R>::new();
-    let mut has_turn = true;
+    let mut is_polled = true;
     while !input.is_empty() {
         match input.int_in_range(0..=15)? {
             0 => machine.event(input)?,
-            1 => has_turn = !has_turn,
+            1 => is_polled = !is_polled,
             _ => {}
         }
         for _ in 0..input.arbitrary::<u8>()? {
-            if has_turn {
+            if is_polled {
                 let _ = supply.fill(&mut feeder);
             }
             machine.tick(&mut intake);
@@ -220,7 +220,7 @@ impl Source<2> for Arriving<'_> {
     }
 }
 
-/// Held, resumed, overridden, given up; items and turns come late.
+/// Held, resumed, overridden, given up; items and polls come late.
 pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Result<()> {
     let program = Program::read(input)?;
     let mut streams = LiveStreams::<R, 2, PIECES, LIVE_SEGMENTS>::new();
@@ -229,11 +229,11 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
     let source = Arriving { items: program.items.iter(), there: &there };
     let mut control = LiveControl::<R, 2, _, _, PLACES>::new(source, TICK_S, input.int_in_range(0..=3)?);
     let mut machine = Machine::<R>::new();
-    let (mut has_turn, mut is_aborted) = (true, false);
+    let (mut is_polled, mut is_aborted) = (true, false);
     while !input.is_empty() {
         match input.int_in_range(0..=15)? {
             0 => machine.event(input)?,
-            1 => has_turn = !has_turn,
+            1 => is_polled = !is_polled,
             2 => control.hold(),
             3 => control.set_single_block(input.arbitrary()?),
             4 | 5 => control.resume(),
@@ -253,7 +253,7 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
             _ => there.set(there.get() + usize::from(input.arbitrary::<u8>()?)),
         }
         for _ in 0..input.arbitrary::<u8>()? {
-            if has_turn {
+            if is_polled {
                 let _ = control.poll(&mut feeder);
             }
             machine.tick(&mut intake);

@@ -12,7 +12,7 @@ const PROGRAMS: u64 = 150;
 /// Time of a blended program over that of the same program without blends, at most.
 const RATIO_MAX: f64 = 1.005;
 
-/// Moves at feeds of their own, slow ones beside fast ones.
+/// Moves at feeds of their own, slow ones next to fast ones.
 fn of_many_feeds(random: &mut Random, asked: &[Asked]) -> String {
     let moves: Vec<String> =
         asked.iter().map(|step| format!("F{:.3} {}", random.log(20.0, 12_000.0), step.text())).collect();
@@ -77,7 +77,7 @@ fn no_sample_is_slower_with_blends_than_without() {
     }
 }
 
-/// Gentle corners are passed in less time than stopping takes, however short the lines beside them.
+/// Gentle corners are passed in less time than stopping takes, however short the lines next to them.
 #[test]
 fn gentle_corners_cost_less_than_stops() {
     let machine = Machine::reference();

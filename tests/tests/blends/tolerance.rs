@@ -73,7 +73,7 @@ fn is_straight_on(asked: &[Asked]) -> bool {
         && norm(minus(asked[0].heading(), asked[1].heading())) < 1e-6
 }
 
-/// Curves and corners in short chords that lie beside them by a part of the tolerance, as a scanner or a rounding
+/// Curves and corners in short chords that lie off them by a part of the tolerance, as a scanner or a rounding
 /// postprocessor leaves them.
 fn chords(random: &mut Random, tolerance: f64) -> Vec<Asked> {
     let (mut on_curve, mut heading) = ([0.0, 0.0], random.between(0.0, core::f64::consts::TAU));

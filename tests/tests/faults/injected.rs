@@ -12,7 +12,7 @@ use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
 
-use crate::machine::{Next, Seen, random_plan, run};
+use crate::machine::{Next, TickView, random_plan, run};
 use crate::setting;
 use motion_tests::random::Random;
 
@@ -113,7 +113,7 @@ fn inject<R: Real>(case: &Case, machine: &Machine, seed: u64, longest_ticks: f64
         error = Some(problem);
         Next::End
     };
-    run::<R>(&plan, machine, &mut |tick, hardware, _: &mut Kernel<R, 3>, seen: Option<&Seen<R>>| {
+    run::<R>(&plan, machine, &mut |tick, hardware, _: &mut Kernel<R, 3>, seen: Option<&TickView<R>>| {
         if tick == inject_at {
             let position_mm = seen.map_or(0.0, |seen| seen.position_mm[axis]);
             match injection(case.name, &mut random, position_mm) {

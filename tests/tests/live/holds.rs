@@ -71,7 +71,7 @@ impl Held {
 #[test]
 fn held_before_every_tick_of_a_corner() {
     let mm = |mm: f64| (mm * UNITS_PER_MM).round() as i64;
-    // A corner of a millimetre at less than the feed before and behind it.
+    // A corner of a millimetre at less than the feed before and after it.
     let points = [[12.0, 0.0], [12.9, 0.02], [14.0, 0.05], [30.0, 0.5]].map(|[x, y]| [mm(x), mm(y), 0]);
     let program = program::lines(&points, 2400.0);
     let case = Case::of(&program, Machine::reference(), 10_000.0).expect("a short program");

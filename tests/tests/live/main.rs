@@ -23,7 +23,7 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
 use motion_tests::check::bounds::Number;
-use motion_tests::check::live::{Command, Run, Seen, Setup, execute, execute_from};
+use motion_tests::check::live::{Command, Run, Setup, TickView, execute, execute_from};
 use motion_tests::check::path::Path;
 use motion_tests::check::program::{Asked, Generated};
 use motion_tests::check::totals::Totals;
@@ -68,7 +68,7 @@ impl Case {
     fn run<R: Number>(
         &self,
         seed: u64,
-        script: &mut dyn FnMut(&Seen<'_, R>) -> Option<Command>,
+        script: &mut dyn FnMut(&TickView<'_, R>) -> Option<Command>,
     ) -> Result<Run, String> {
         execute::<R>(&self.setup(seed), script)
     }
@@ -258,7 +258,7 @@ fn an_abort_ends_at_rest_on_the_path() {
     assert!(ran > 60 && early > ran / 2, "{early} of {ran}");
 }
 
-/// Held in a dwell it does not go on behind it, whatever the list under way holds, until it is told to; nor with an
+/// Held in a dwell, motion does not continue after it, whatever the list under way holds, until it is told to; nor with an
 /// override of 0, nor when it is to be given up.
 #[test]
 fn held_in_a_dwell_it_stays() {

@@ -217,7 +217,7 @@ fn feed_and_time_are_those_of_the_override() {
     runs.print_and_assert();
 }
 
-/// Dwells and stops before and behind all motion keep no override from holding, and are not waited for.
+/// Dwells and stops before and after all motion keep no override from holding, and are not waited for.
 #[test]
 fn an_override_holds_between_rests() {
     let to = [(8.0 * UNITS_PER_MM) as i64, 0, 0];
@@ -240,7 +240,7 @@ fn an_override_holds_between_rests() {
             (seen.ticks == at).then_some(Command::Override(0.5))
         });
         runs.add(at, run);
-        // Motion begins behind 60 ms of dwells, and half a second is more than a ramp to 20 mm/s takes.
+        // Motion begins after 60 ms of dwells, and half a second is more than a ramp to 20 mm/s takes.
         let is_before = at < 100;
         let expected_mm_s = if is_before { 10.0 } else { 20.0 };
         assert!((fastest_mm_s - expected_mm_s).abs() < 1e-9, "override at {at}: {fastest_mm_s} mm/s");
@@ -293,7 +293,7 @@ fn an_override_that_trembles_does_not_hold_up_an_acceleration() {
     assert!(falling < free + free / 4 && trembling < free + free / 4, "{free}: {falling}, {trembling}");
 }
 
-/// An override holds behind a dwell too, however the list before it is filled.
+/// An override holds after a dwell too, however the list before it is filled.
 #[test]
 fn an_override_holds_behind_a_dwell() {
     for blocks in 1..=40 {

@@ -1,4 +1,4 @@
-//! A producer that is late: its turns, and its items.
+//! A producer that is late: its polls, and its items.
 
 use core::task::Poll;
 use std::cell::{Cell, RefCell};
@@ -16,7 +16,7 @@ use motion_tests::check::live::{Command, Run, execute_from};
 use motion_tests::random::Random;
 
 /// A background that is late at random: every stall that outlasts what is queued ends in a stop on the path, and motion
-/// goes on behind it; nothing is lost, nothing repeated.
+/// continues after it; nothing is lost, nothing repeated.
 #[test]
 fn a_late_background_is_waited_for_at_rest() {
     let (mut runs, mut stalls) = (Runs::default(), 0_u64);
@@ -119,7 +119,7 @@ fn with_stalls<R: Number>(case: &Case, seed: u64, stalls: &Stalls) -> Result<Run
 }
 
 /// Items, from pieces of a micrometre to moves of a metre, that come late at random, half of them not before motion has
-/// come to rest: each stall ends in a legal stop on the path or before motion had to brake, and motion goes on smoothly;
+/// come to rest: each stall ends in a legal stop on the path or before motion had to brake, and motion continues smoothly;
 /// nothing is lost, nothing repeated. The long form is `MOTION_TEST_PROGRAMS=9000`: more than 10⁵ stalls.
 #[test]
 fn late_items_are_waited_for_on_the_path() {

@@ -38,12 +38,12 @@ fn a_block_costs_a_bounded_number_of_steps_however_long_the_list() {
 /// What the dearest list takes, one of mixed laws, is about nine tenths of it.
 const STEPS_MAX: f64 = 140.0;
 
-/// Every block has a law of its own, in humps of thousands of blocks: looking up what a ramp may use does not make them
+/// Every block has a law of its own, in intervals of thousands of blocks: looking up what a ramp may use does not make them
 /// dearer than one law for all.
 #[test]
-fn many_laws_in_a_hump_cost_little_more() {
+fn many_laws_in_an_interval_cost_little_more() {
     let count = 40_000;
-    let hump = |is_mixed: bool| -> Vec<Block<f64>> {
+    let interval = |is_mixed: bool| -> Vec<Block<f64>> {
         let mut random = Random::of_stream(53);
         (0..count)
             .map(|n| {
@@ -53,7 +53,7 @@ fn many_laws_in_a_hump_cost_little_more() {
             })
             .collect()
     };
-    let costs = [false, true].map(|is_mixed| steps(&hump(is_mixed)));
+    let costs = [false, true].map(|is_mixed| steps(&interval(is_mixed)));
     println!("{costs:?} steps a block");
     assert!(costs[1] < LAWS_MAX * costs[0], "{costs:?}");
 }

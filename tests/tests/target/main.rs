@@ -61,7 +61,7 @@ fn main() -> ExitCode {
                 Err(reason) => Err(Failed::from(reason)),
             };
             match reason {
-                // The kind is what the harness prints beside the name.
+                // The kind is what the harness prints next to the name.
                 Some(reason) if !is_ci => Trial::test(name, run).with_kind(reason).with_ignored_flag(true),
                 _ => Trial::test(name, run),
             }
