@@ -1,6 +1,6 @@
 //! Gives the compiler the program and the linker the board's memory map and its scripts.
 //!
-//! The program is `program/stringer.bin`, or what `MOTION_PROGRAM` names. The map is the repository's
+//! The program is `common/program/stringer.bin`, or what `MOTION_PROGRAM` names. The map is the repository's
 //! `memory.x`, copied to where the linker looks, so that there is one.
 
 use std::env;
@@ -8,7 +8,7 @@ use std::error::Error;
 use std::fs;
 use std::path::PathBuf;
 
-const PROGRAM: &str = "program/stringer.bin";
+const PROGRAM: &str = "../common/program/stringer.bin";
 const MEMORY: &str = "../../memory.x";
 
 fn main() -> Result<(), Box<dyn Error>> {

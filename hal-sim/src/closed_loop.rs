@@ -17,10 +17,10 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{
     Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel,
 };
-use motion_kernel::kernel::Kernel;
+use motion_kernel::kernel::{CorrectedIntake, Kernel};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Header, Items, ProgramError, Reader, Supply, SupplyError};
-use motion_kernel::queue::{Feeder, Intake, Streams};
+use motion_kernel::queue::{Feeder, Streams};
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
 
@@ -130,7 +130,7 @@ impl<R: Real, const AXES: usize> Producer<'_, R, AXES> {
 /// The interrupt's part.
 pub struct ClosedLoop<'a, R: Real, const AXES: usize, const LINE: usize> {
     kernel: Kernel<R, AXES>,
-    intake: Intake<'a, R, AXES>,
+    intake: CorrectedIntake<'a, R, AXES>,
     machine: &'a SimMachine<AXES, LINE>,
     outputs: Ad5754Output<&'a Ad5754Chip, AXES>,
     memory: InMemory<AXES>,
@@ -169,6 +169,7 @@ pub fn close<
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
     let mut kernel = Kernel::new(config, start, counts);
     kernel.enable(0);
+    let intake = intake.into();
     Ok((Producer { feeder, supply }, ClosedLoop { kernel, intake, machine, outputs, memory }))
 }
 
@@ -196,13 +197,17 @@ impl<'a, R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'a, R, AXES, 
     /// One tick of the kernel and of the machine. A program stop is resumed at once.
     #[inline(never)]
     pub fn tick(&mut self) -> Trace<R, AXES> {
-        self.tick_by(|kernel, intake, memory| *kernel.tick(intake, memory))
+        self.tick_by(|kernel, intake, memory| *kernel.tick_corrected(intake, memory))
     }
 
     /// The same with the kernel's tick called by `tick`, to measure it.
     pub fn tick_by(
         &mut self,
-        tick: impl FnOnce(&mut Kernel<R, AXES>, &mut Intake<'_, R, AXES>, &mut InMemory<AXES>) -> Trace<R, AXES>,
+        tick: impl FnOnce(
+            &mut Kernel<R, AXES>,
+            &mut CorrectedIntake<'_, R, AXES>,
+            &mut InMemory<AXES>,
+        ) -> Trace<R, AXES>,
     ) -> Trace<R, AXES> {
         let mut machine = self.machine;
         let Ok(counts) = machine.latch();

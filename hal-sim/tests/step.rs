@@ -9,6 +9,7 @@
 use hal_sim::{AxisParameters, MachineParameters, REFERENCE_MM_S_PER_VOLT, SimMachine};
 use motion_kernel::hal::{Ad5754Output, DriveEnable, Encoder, VelocityChannel};
 use motion_kernel::units::DacCode;
+use motion_tests::s4::assert_near;
 
 const TICK_S: f64 = 0.0005;
 const TICKS: usize = 400;
@@ -64,15 +65,6 @@ fn step(axis: AxisParameters, substeps: u32) -> StepFigures {
         peak_accel_m_s2: largest(&read_accel).1 / 1e3,
         peak_jerk_m_s3: largest(&rates(&read_accel)).1 / 1e3,
     }
-}
-
-#[track_caller]
-fn assert_near(quantity: &str, actual: f64, expected: f64, tolerance: f64) {
-    println!("{quantity}: {actual:.3}, expected {expected} ± {tolerance}");
-    assert!(
-        (actual - expected).abs() <= tolerance,
-        "{quantity}: {actual}, expected {expected} ± {tolerance}"
-    );
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! Modules in the order the data travels:
 //!
 //! ```text
+//!   files      paths ─► OutputFile              what is read stays, what is written is whole
 //!   machine    TOML ─► Machine                    limits, axes, drives
 //!   gcode      text ─► Program                    exact decimals, modal state
 //!   points     CSV ─► Points                    what a spline goes through
@@ -21,6 +22,7 @@
 //!   cli        the `motion` command
 //! ```
 
+pub mod files;
 pub mod machine;
 pub mod cli;
 pub mod gcode;

@@ -32,12 +32,71 @@ pub struct RunTrace {
     pub ticks: Vec<TraceRow>,
     /// Duration of the plan, dwells included \[s\].
     pub planned_time_s: f64,
+    /// How it ended.
+    pub end: RunEnd,
     /// Commands of live control, in order.
     pub commands: Vec<TracedCommand>,
     /// Faults, in order.
     pub faults: Vec<TracedFault>,
     /// What was accepted and not acted on, and other remarks for the reader.
     pub notices: Vec<String>,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RunEnd {
+    /// At the end of the program.
+    #[default]
+    Finished,
+    /// At rest, and no command was left to resume it.
+    Held(HeldBy),
+    /// At rest, with the rest of the program given up.
+    Aborted,
+    /// By a fault.
+    Faulted,
+    /// By the hardware: a replay that differs from its recording.
+    Cut,
+}
+
+/// What holds a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeldBy {
+    /// A hold.
+    Hold,
+    /// Single block, at the end of a line.
+    SingleBlock,
+    /// An override of 0.
+    Override,
+}
+
+impl RunEnd {
+    /// What stopped it before the end of the program, for scripts.
+    #[must_use]
+    pub fn stopped_by(self) -> Option<&'static str> {
+        match self {
+            Self::Finished => None,
+            Self::Held(HeldBy::Hold) => Some("hold"),
+            Self::Held(HeldBy::SingleBlock) => Some("single block"),
+            Self::Held(HeldBy::Override) => Some("override"),
+            Self::Aborted => Some("abort"),
+            Self::Faulted => Some("fault"),
+            Self::Cut => Some("difference"),
+        }
+    }
+
+    /// How it ended before the end of the program, for people.
+    #[must_use]
+    pub fn words(self) -> Option<&'static str> {
+        match self {
+            Self::Finished => None,
+            Self::Held(HeldBy::Hold) => Some("held"),
+            Self::Held(HeldBy::SingleBlock) => Some("held by single block"),
+            Self::Held(HeldBy::Override) => Some("held by an override of 0"),
+            Self::Aborted => Some("aborted"),
+            Self::Faulted => Some("faulted"),
+            Self::Cut => Some("ended by a difference"),
+        }
+    }
 }
 
 /// What the machine allows along the path. A limit of 0 is not known.

@@ -9,6 +9,7 @@ use motion_host::gcode::Plane;
 use motion_host::machine::Machine;
 use motion_host::tuning::feedforward::series;
 use motion_kernel::axis::Feedforward;
+use motion_tests::s4::{CONTOUR_V, CONTOUR_VAJ, ContourTable};
 
 #[track_caller]
 fn assert_hold(comparisons: &[Comparison]) {
@@ -50,29 +51,6 @@ fn circles_have_the_figures_of_s4() {
     assert_hold(&reference::compare_circle(&Machine::reference()).expect("circles"));
 }
 
-/// Contour error \[µm\] and its tolerance at 1, 2, … 16 Hz.
-type ContourTable = [(f64, f64); 16];
-
-/// Velocity feedforward.
-const CONTOUR_V: ContourTable = [
-    (7.21, 0.72),
-    (9.31, 0.78),
-    (11.97, 0.86),
-    (15.03, 0.95),
-    (18.52, 1.06),
-    (22.36, 1.17),
-    (26.41, 1.29),
-    (30.59, 1.42),
-    (34.96, 1.55),
-    (39.65, 1.69),
-    (45.04, 1.85),
-    (53.59, 2.11),
-    (69.96, 2.6),
-    (54.73, 2.14),
-    (58.54, 2.26),
-    (63.15, 2.39),
-];
-
 /// Velocity and acceleration.
 const CONTOUR_VA: ContourTable = [
     (5.57, 0.67),
@@ -91,26 +69,6 @@ const CONTOUR_VA: ContourTable = [
     (32.16, 1.46),
     (34.49, 1.53),
     (37.54, 1.63),
-];
-
-/// All three, the jerk gain as published.
-const CONTOUR_VAJ: ContourTable = [
-    (5.56, 0.67),
-    (6.05, 0.68),
-    (6.97, 0.71),
-    (8.3, 0.75),
-    (9.93, 0.8),
-    (11.78, 0.85),
-    (13.74, 0.91),
-    (15.75, 0.97),
-    (17.74, 1.03),
-    (19.77, 1.09),
-    (22.37, 1.17),
-    (27.66, 1.33),
-    (39.99, 1.7),
-    (22.33, 1.17),
-    (22.43, 1.17),
-    (23.01, 1.19),
 ];
 
 /// All three, the jerk gain of the drive's series.
@@ -268,7 +226,7 @@ fn a_load_shows_the_current_limit() {
     }
 }
 
-/// A slow X is found beside a fast Y, and Y beside it, by motions that X reaches.
+/// A slow X and a fast Y are both identified, by motions that X reaches.
 #[test]
 fn a_slow_axis_is_identified() {
     let mut machine = Machine::reference();

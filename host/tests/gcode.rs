@@ -5,6 +5,7 @@
 #![allow(clippy::float_cmp, reason = "exact values are the point")]
 
 use motion_host::gcode::{self, ArcMove, Feed, Length, NoticeKind, Program, Step, StepKind};
+use motion_tests::random::Random;
 use std::f64::consts::PI;
 use std::panic::catch_unwind;
 
@@ -16,29 +17,8 @@ const SAMPLES: [(&str, &str); 5] = [
     ("modes.ngc", include_str!("../../tests/programs/modes.ngc")),
 ];
 
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.next() % end as u64) as usize
-    }
-
-    fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
-        &from[self.below(from.len())]
-    }
-}
-
 fn seed() -> u64 {
-    std::env::var("MOTION_TEST_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(20_240_917)
+    motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(20_240_917)
 }
 
 fn read(name: &str, text: &str) -> Program {
@@ -507,7 +487,7 @@ fn random_line(random: &mut Random) -> String {
 fn random_valid_programs_are_read_as_written() {
     for case in 0..400 {
         let seed = seed().wrapping_add(case);
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let mut text = "F100\n".to_owned();
         for _ in 0..60 {
             text += &random_line(&mut random);
@@ -531,7 +511,7 @@ fn mutate(text: &mut Vec<u8>, random: &mut Random) {
         }
         let at = random.below(text.len());
         match random.below(7) {
-            0 => text[at] = random.next() as u8,
+            0 => text[at] = random.bits() as u8,
             1 | 2 => text[at] = *random.pick(ALPHABET),
             3 => drop(text.remove(at)),
             4 => text.insert(at, *random.pick(ALPHABET)),
@@ -558,7 +538,7 @@ fn count_accepted_mutants(text: &[u8], count: u64, first_seed: u64) -> u64 {
     let seeds = (0..count).map(|case| first_seed.wrapping_add(case));
     let accepted = seeds.filter(|&seed| {
         let mut mutant = text.to_vec();
-        mutate(&mut mutant, &mut Random(seed));
+        mutate(&mut mutant, &mut Random::new(seed));
         check(&mutant, seed)
     });
     accepted.count() as u64
@@ -576,8 +556,8 @@ fn mutants_are_refused_or_read_as_written() {
 fn no_bytes_make_it_panic() {
     for case in 0..3000 {
         let seed = seed().wrapping_add(case);
-        let mut random = Random(seed);
-        let text: Vec<u8> = (0..random.below(300)).map(|_| random.next() as u8).collect();
+        let mut random = Random::new(seed);
+        let text: Vec<u8> = (0..random.below(300)).map(|_| random.bits() as u8).collect();
         check(&text, seed);
     }
 }

@@ -12,56 +12,20 @@ use motion_host::toolpath::spline::{
     Degree, Derivatives, Ends, Spline, SplineError, chord_lengths, fit, interpolate,
 };
 use motion_host::toolpath::{Element, Involute, Polynomial, Vector, septics};
+use motion_tests::check::geometry::{minus, norm};
+use motion_tests::random::Random;
 
 const DEGREES: [Degree; 2] = [Degree::Cubic, Degree::Quintic];
 
-/// SplitMix64. `MOTION_TEST_SEED` replays a failing seed, which the test prints.
-struct Random(u64);
-
-impl Random {
-    fn new(stream: u64) -> Self {
-        let seed = std::env::var("MOTION_TEST_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(7);
-        println!("MOTION_TEST_SEED={seed}");
-        Self(stream.wrapping_mul(0xD1B5_4A32_D192_ED03) ^ seed)
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    fn between(&mut self, least: f64, greatest: f64) -> f64 {
-        least + (greatest - least) * ((self.next() >> 11) as f64 / (1_u64 << 53) as f64)
-    }
-
-    fn below(&mut self, end: u64) -> u64 {
-        self.next() % end
-    }
-
-    fn vector(&mut self, size: f64) -> Vector {
-        [(); 3].map(|()| self.between(-size, size))
-    }
-
-    /// Numbers that grow from 0 by steps that differ up to `uneven`-fold.
-    fn growing(&mut self, count: usize, uneven: f64) -> Vec<f64> {
-        let mut sum = 0.0;
-        (0..count)
-            .map(|index| {
-                sum += if index == 0 { 0.0 } else { self.between(1.0, uneven) };
-                sum
-            })
-            .collect()
-    }
-}
-
-fn norm(a: Vector) -> f64 {
-    a.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-fn minus(a: Vector, b: Vector) -> Vector {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+/// Numbers that grow from 0 by steps that differ up to `uneven`-fold.
+fn growing(random: &mut Random, count: usize, uneven: f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    (0..count)
+        .map(|index| {
+            sum += if index == 0 { 0.0 } else { random.between(1.0, uneven) };
+            sum
+        })
+        .collect()
 }
 
 fn plus(a: Vector, b: Vector) -> Vector {
@@ -100,11 +64,11 @@ fn assert_continuous(spline: &Spline, order: usize) {
 
 #[test]
 fn it_goes_through_its_points_smoothly() {
-    let mut random = Random::new(1);
+    let mut random = Random::of_stream(1);
     for round in 0..200 {
-        let count = 6 + random.below(40) as usize;
+        let count = 6 + random.below(40);
         let points: Vec<Vector> = (0..count).map(|_| random.vector(50.0)).collect();
-        let parameters = random.growing(count, 3.0);
+        let parameters = growing(&mut random, count, 3.0);
         let clamps = [(); 2].map(|()| Derivatives { first: random.vector(30.0), second: random.vector(9.0) });
         for degree in DEGREES {
             for ends in [Ends::Free, Ends::Clamped(clamps)] {
@@ -139,10 +103,10 @@ fn it_goes_through_its_points_smoothly() {
 /// A polynomial of its degree is its own spline, whatever the parameters, and its own fit with one span.
 #[test]
 fn polynomials_are_reproduced() {
-    let mut random = Random::new(2);
+    let mut random = Random::of_stream(2);
     for _ in 0..200 {
-        let count = 6 + random.below(20) as usize;
-        let parameters = random.growing(count, 10.0);
+        let count = 6 + random.below(20);
+        let parameters = growing(&mut random, count, 10.0);
         let last = parameters[count - 1];
         for degree in DEGREES {
             let coefficients: Vec<Vector> = (0..=degree.number()).map(|_| random.vector(5.0)).collect();
@@ -185,10 +149,10 @@ fn the_order_of_accuracy_is_the_degree_and_one() {
 /// What is stated is what an independent look finds, within the tolerance, with fewer knots than points, C³ throughout.
 #[test]
 fn a_fit_keeps_its_tolerance_and_says_how_well() {
-    let mut random = Random::new(3);
+    let mut random = Random::of_stream(3);
     let mut saved = 0;
     for round in 0..120 {
-        let count = 6 + random.below(300) as usize;
+        let count = 6 + random.below(300);
         let (turns, noise) = (random.between(0.5, 12.0), 10.0_f64.powf(random.between(-7.0, -1.0)));
         let points: Vec<Vector> = (0..count)
             .map(|index| {
@@ -256,7 +220,7 @@ fn what_is_no_spline_is_refused() {
         assert!(matches!(fit(&good, &even, Degree::Cubic, mm), Err(SplineError::Tolerance { .. })));
     }
     // Steps that differ by up to ten decades: solved to the stated digits, or refused; never wrong, never a panic.
-    let mut random = Random::new(4);
+    let mut random = Random::of_stream(4);
     let (mut solved, mut refused) = (0, 0);
     for _ in 0..500 {
         let (mut u, decades) = (0.0, random.between(0.0, 10.0));
@@ -301,16 +265,16 @@ fn measured(curve: &dyn Curve, from: f64, to: f64, steps: u32) -> Vec<(f64, Vect
 /// each other, and are as long as the curve.
 #[test]
 fn pieces_are_as_close_as_they_say() {
-    let mut random = Random::new(5);
+    let mut random = Random::of_stream(5);
     let (mut worst, mut count) = ([0.0_f64; 2], 0);
     for _ in 0..60 {
         let points: Vec<Vector> = (0..10).map(|_| random.vector(20.0)).collect();
         // Well and badly parametrised.
         let parameters = match random.below(2) {
             0 => chord_lengths(&points).expect("points that differ"),
-            _ => random.growing(10, 4.0),
+            _ => growing(&mut random, 10, 4.0),
         };
-        let degree = DEGREES[random.below(2) as usize];
+        let degree = DEGREES[random.below(2)];
         let spline = interpolate(&points, &parameters, degree, &Ends::Free).expect("a spline");
         for (_, element) in spline.elements() {
             let (curve, end) = element.curve().expect("a curve");
@@ -449,12 +413,12 @@ fn endless_curves_hit_the_cap() {
 /// Random polynomials of every kind, cusps and loops among them: pieces or a typed error, and nothing that is not finite.
 #[test]
 fn random_polynomials_have_pieces_or_an_error() {
-    let mut random = Random::new(6);
+    let mut random = Random::of_stream(6);
     let (mut good, mut bad) = (0, 0);
     for round in 0..400 {
         let size = 10.0_f64.powf(random.between(-6.0, 4.0));
         let mut coefficients = [[0.0; 3]; 7];
-        for coefficient in coefficients.iter_mut().take(1 + random.below(7) as usize) {
+        for coefficient in coefficients.iter_mut().take(1 + random.below(7)) {
             *coefficient = match random.below(4) {
                 0 => [0.0; 3],
                 1 => [random.between(-size, size), 0.0, 0.0],

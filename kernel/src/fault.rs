@@ -1,10 +1,46 @@
 //! What can go wrong on the machine: typed, with its tick and its figures, and how it ends.
 //!
 //! Rejections of bad input are another matter: [`crate::queue::Rejection`].
+//!
+//! ```
+//! # use hal_sim::closed_loop::InMemory;
+//! # use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
+//! # use motion_kernel::kernel::Kernel;
+//! # use motion_kernel::law::Limits;
+//! # use motion_kernel::queue::{PathRules, Streams};
+//! # use motion_kernel::units::{Counts, DacCode, Position};
+//! use motion_kernel::fault::FaultKind;
+//!
+//! # let axis = AxisFigures {
+//! #     mm_per_count: 0.0001,
+//! #     mm_s_at_10_v: 100.0,
+//! #     output_offset_v: 0.0,
+//! #     output_limit_v: 10.0,
+//! #     gains: Gains { kp_per_s: 50.0, ki_per_s2: 0.0, kd: 0.0 },
+//! #     feedforward: Feedforward::default(),
+//! #     following_error_limit_mm: 0.5,
+//! # };
+//! # let config = AxesConfig::<f32, 1>::new(&[axis], 0.0005).expect("an axis");
+//! # let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
+//! # let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
+//! # let mut streams = Streams::<f32, 1, 18, 10>::new();
+//! # let (_, mut intake) = streams.split(rules, [Position::ZERO]);
+//! # let mut hal = InMemory { counts: [Counts(0)], codes: [DacCode(0)], enabled: None };
+//! let mut kernel = Kernel::new(&config, [Position::ZERO], [Counts(0)]);
+//! kernel.enable(0);
+//! kernel.tick(&mut intake, &mut hal);
+//! // Somebody turns the axis by 1 mm, more than its limit of 0.5 mm.
+//! hal.counts = [Counts(10_000)];
+//! kernel.tick(&mut intake, &mut hal);
+//! let fault = kernel.fault().expect("a following error");
+//! assert_eq!(fault.tick, 1);
+//! assert!(matches!(fault.kind, FaultKind::FollowingError { axis: 0, error_mm } if error_mm < -0.99));
+//! ```
 
-use serde::{Deserialize, Serialize};
+pub(crate) mod reaction;
 
 use crate::exec::ExecFault;
+pub use reaction::{Reaction, Reactions};
 
 /// What went wrong, where and when.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,35 +136,6 @@ pub enum FaultKind<R> {
         /// How many.
         ticks: u32,
     },
-}
-
-/// How a fault ends. The greater one is the more urgent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Reaction {
-    /// A stop on the path, regulated, then drives off. Where nothing can hold the motion, or it does not come to rest in
-    /// time, the outputs are ramped.
-    Stop,
-    /// Outputs to 0 V over some time, then drives off. Nothing is regulated.
-    Ramp,
-    /// Outputs at 0 V and drives off in the same tick. So ends every fault before the drives have been told to be on.
-    Immediate,
-}
-
-/// What a machine says of its reactions; without the feature `guards` they all are immediate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Reactions {
-    /// Ticks in which the outputs go to 0 V; 0 makes every reaction an immediate one.
-    pub ramp_ticks: u16,
-    /// Ticks after which a stop on the path is given up.
-    pub stop_ticks: u32,
-    /// The emergency stop's.
-    pub emergency_stop: Reaction,
-}
-
-impl Reactions {
-    /// Every reaction is an immediate one.
-    pub const IMMEDIATE: Self = Self { ramp_ticks: 0, stop_ticks: 0, emergency_stop: Reaction::Immediate };
 }
 
 impl<R> FaultKind<R> {

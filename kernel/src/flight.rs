@@ -14,15 +14,58 @@
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
 //! Memory is that of the rows: 168 bytes each for three axes in f32.
+//!
+//! ```
+//! # use hal_sim::closed_loop::InMemory;
+//! # use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
+//! # use motion_kernel::kernel::Kernel;
+//! # use motion_kernel::law::Limits;
+//! # use motion_kernel::queue::{PathRules, Streams};
+//! # use motion_kernel::units::{Counts, DacCode, Position};
+//! use motion_kernel::fault::FaultKind;
+//! use motion_kernel::flight::{FlightRecorder, FlightRow, frame_max};
+//!
+//! # let axis = AxisFigures {
+//! #     mm_per_count: 0.0001,
+//! #     mm_s_at_10_v: 100.0,
+//! #     output_offset_v: 0.0,
+//! #     output_limit_v: 10.0,
+//! #     gains: Gains { kp_per_s: 50.0, ki_per_s2: 0.0, kd: 0.0 },
+//! #     feedforward: Feedforward::default(),
+//! #     following_error_limit_mm: 0.5,
+//! # };
+//! # let config = AxesConfig::<f32, 1>::new(&[axis], 0.0005).expect("an axis");
+//! # let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
+//! # let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
+//! # let mut streams = Streams::<f32, 1, 18, 10>::new();
+//! # let (_, mut intake) = streams.split(rules, [Position::ZERO]);
+//! # let mut hal = InMemory { counts: [Counts(0)], codes: [DacCode(0)], enabled: None };
+//! let mut kernel = Kernel::new(&config, [Position::ZERO], [Counts(0)]);
+//! let mut flight = FlightRecorder::<f32, 1, 8, 3>::new();
+//! for tick in 0..20 {
+//!     if tick == 10 {
+//!         kernel.trip(FaultKind::EmergencyStop);
+//!     }
+//!     flight.add(kernel.tick(&mut intake, &mut hal));
+//! }
+//! // The fault's tick, three after it, and what was before.
+//! assert!(flight.is_frozen());
+//! let row = flight.row(7).expect("the newest");
+//! assert_eq!(row.tick, 13);
+//! let mut buffer = [0; frame_max(1)];
+//! let frame = row.to_frame(&mut buffer).expect("room");
+//! assert_eq!(FlightRow::<f64, 1>::from_frame(frame), Ok(row.to_f64()));
+//! ```
 
 use heapless::Deque;
 use serde::{Deserialize, Serialize};
 
+use crate::array;
 use crate::exec::ExecState;
 use crate::fault::Fault;
 use crate::law::PathMotion;
 use crate::num::{Real, Scalar};
-use crate::program::{Checksum, array};
+use crate::program::Checksum;
 use crate::trace::Trace;
 use crate::units::{Counts, DacCode, Position};
 
@@ -270,8 +313,8 @@ impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> FlightRe
         if self.rows.is_full() {
             self.rows.pop_front();
         }
-        // There is room.
-        let _ = self.rows.push_back(FlightRow::new(trace));
+        let kept = self.rows.push_back(FlightRow::new(trace));
+        debug_assert!(kept.is_ok(), "the oldest row has made room");
     }
 
     /// Whether a fault has frozen it: nothing is added any more.

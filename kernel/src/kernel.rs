@@ -14,23 +14,28 @@
 //! machine gives it time, on the path or along a ramp; else at once. The first fault stays, but a later one
 //! may ask for a more urgent end.
 
+mod corrected_intake;
 #[cfg(all(test, feature = "guards"))]
 mod endings;
+#[cfg(feature = "guards")]
+mod guarded;
+#[cfg(not(feature = "guards"))]
+#[path = "kernel/unguarded.rs"]
+mod guarded;
 #[cfg(feature = "live")]
 mod reference;
 
-use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Preview};
-#[cfg(feature = "guards")]
-use crate::axis::{AxisFault, LOOK_TICKS};
+use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Correction, Preview};
 use crate::exec::{ExecState, Executor};
+use crate::fault::Reaction;
 use crate::fault::{Fault, FaultKind};
-#[cfg(feature = "guards")]
-use crate::fault::{Reaction, Reactions};
 use crate::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use crate::num::Real;
 use crate::queue::Intake;
 use crate::trace::Trace;
 use crate::units::{Counts, DacCode, Position};
+pub use corrected_intake::CorrectedIntake;
+use guarded::{Ending, Guards};
 
 /// Whether the drives may move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,17 +46,8 @@ enum Power {
         ticks_left: u32,
     },
     On,
-    /// In a fault, coming to rest on the path; at rest, until the preview has passed.
-    #[cfg(feature = "guards")]
-    Stopping {
-        ticks_left: u32,
-        is_at_rest: bool,
-    },
-    /// In a fault, outputs on their way to 0 V, drives enabled.
-    #[cfg(feature = "guards")]
-    Ramping {
-        ticks_left: u16,
-    },
+    /// In a fault whose reaction takes time.
+    Ending(Ending),
 }
 
 impl Power {
@@ -60,20 +56,19 @@ impl Power {
     fn executes(self) -> bool {
         match self {
             Self::On => true,
-            #[cfg(feature = "guards")]
-            Self::Stopping { is_at_rest, .. } => !is_at_rest,
-            _ => false,
+            Self::Ending(ending) => ending.executes(),
+            Self::Off | Self::Starting { .. } => false,
         }
     }
 
     /// The axes are regulated.
     #[inline]
     fn regulates(self) -> bool {
-        #[cfg(feature = "guards")]
-        if matches!(self, Self::Ramping { .. }) {
-            return false;
+        match self {
+            Self::Off => false,
+            Self::Starting { .. } | Self::On => true,
+            Self::Ending(ending) => ending.regulates(),
         }
-        self != Self::Off
     }
 }
 
@@ -91,30 +86,14 @@ pub struct Kernel<R: Real, const AXES: usize> {
     axes: [AxisState<R>; AXES],
     config: [AxisConfig<R>; AXES],
     preview: Preview<AXES>,
-    #[cfg(feature = "guards")]
     guards: Guards<AXES>,
-}
-
-/// What the kernel remembers of guards and reactions.
-#[cfg(feature = "guards")]
-#[derive(Clone, Copy, Debug)]
-struct Guards<const AXES: usize> {
-    reactions: Reactions,
-    /// What was put out last.
-    written: [DacCode; AXES],
-    /// What was put out when the ramp began.
-    ramp_from: [DacCode; AXES],
-    /// Place in the round of looks at the axes.
-    look_ticks: u8,
 }
 
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// A kernel at rest at `position`, where the encoders read `counts`, drives disabled.
     #[must_use]
     pub fn new(config: &AxesConfig<R, AXES>, position: [Position; AXES], counts: [Counts; AXES]) -> Self {
-        #[cfg(feature = "guards")]
-        let reactions = config.reactions;
-        let &AxesConfig { axes: ref config, preview_ticks, .. } = config;
+        let &AxesConfig { axes: ref config, preview_ticks, reactions } = config;
         let (mut axes, mut outputs) = ([AxisState::default(); AXES], [AxisOutput::default(); AXES]);
         let of_axes = axes.iter_mut().zip(&mut outputs).zip(config).zip(counts.iter().zip(&position));
         for (((axis, output), config), (&counts, &position)) in of_axes {
@@ -139,13 +118,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             power: Power::Off,
             told: None,
             trace,
-            #[cfg(feature = "guards")]
-            guards: Guards {
-                reactions,
-                written: [DacCode::ZERO; AXES],
-                ramp_from: [DacCode::ZERO; AXES],
-                look_ticks: 0,
-            },
+            guards: Guards::new(reactions),
         }
     }
 
@@ -158,7 +131,6 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             if !self.executor.is_at_rest() {
                 self.stand_here();
             }
-            #[cfg(feature = "guards")]
             for axis in &mut self.axes {
                 axis.restart_guard();
             }
@@ -180,7 +152,35 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
     /// One control tick: reads the encoders and inputs, executes the streams, regulates every axis, writes the
     /// outputs. Call it from the tick's interrupt and nowhere else. What it did stays readable until the next.
+    #[inline]
     pub fn tick<H>(&mut self, intake: &mut Intake<'_, R, AXES>, hal: &mut H) -> &Trace<R, AXES>
+    where
+        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
+    {
+        self.tick_with(intake, None, hal)
+    }
+
+    /// [`Kernel::tick`] with what was learnt of a stretch added to feedforward while that is driven.
+    #[inline]
+    pub fn tick_corrected<H>(
+        &mut self,
+        intake: &mut CorrectedIntake<'_, R, AXES>,
+        hal: &mut H,
+    ) -> &Trace<R, AXES>
+    where
+        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
+    {
+        let CorrectedIntake { intake, correction } = intake;
+        self.tick_with(intake, correction.as_mut(), hal)
+    }
+
+    #[inline]
+    fn tick_with<H>(
+        &mut self,
+        intake: &mut Intake<'_, R, AXES>,
+        correction: Option<&mut Correction<'_, R, AXES>>,
+        hal: &mut H,
+    ) -> &Trace<R, AXES>
     where
         H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
     {
@@ -196,7 +196,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         match hal.read_inputs() {
             Ok(inputs) => {
                 // Without guards, what is healthy is not worth the instructions.
-                if cfg!(feature = "guards") || !inputs.is_healthy() {
+                if Guards::<AXES>::KEEP_INPUTS || !inputs.is_healthy() {
                     let before = core::mem::replace(&mut self.trace.inputs, inputs);
                     if !inputs.is_healthy() {
                         self.judge_inputs(&before);
@@ -206,11 +206,9 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             Err(_) => self.latch_fault(FaultKind::Inputs),
         }
         self.execute(intake);
-        self.regulate(intake);
-        #[cfg(not(feature = "guards"))]
-        let codes = &mut [DacCode::ZERO; AXES];
-        #[cfg(feature = "guards")]
-        let codes = &mut self.guards.written;
+        self.regulate(correction);
+        let mut local = [DacCode::ZERO; AXES];
+        let codes = self.guards.written(&mut local);
         for (code, axis) in codes.iter_mut().zip(&self.trace.axes) {
             *code = axis.code;
         }
@@ -231,31 +229,25 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     #[inline]
     fn execute(&mut self, intake: &mut Intake<'_, R, AXES>) {
         match &mut self.power {
-            Power::Off => {}
             Power::Starting { ticks_left: 0 } => self.power = Power::On,
             Power::Starting { ticks_left } => *ticks_left -= 1,
-            Power::On => {}
-            #[cfg(feature = "guards")]
-            Power::Stopping { .. } | Power::Ramping { .. } => {}
+            Power::Off | Power::On | Power::Ending(_) => {}
         }
         if self.power.executes()
             && let Err(fault) = self.executor.tick_into(intake, &mut self.trace.executed)
         {
             self.latch_fault(FaultKind::Executor(fault));
         }
-        #[cfg(feature = "guards")]
-        if let Power::Stopping { .. } = self.power {
-            self.go_on_stopping(intake);
-        }
+        self.continue_stop(intake);
     }
 
     /// The outputs of all axes. Where the drives are off they stand still, and regulators and peaks
     /// keep what they had.
     #[inline]
-    fn regulate(&mut self, intake: &mut Intake<'_, R, AXES>) {
+    fn regulate(&mut self, correction: Option<&mut Correction<'_, R, AXES>>) {
         let Trace { executed, axes: outputs, .. } = &mut self.trace;
         if self.power.regulates() {
-            if let Some(correction) = intake.correction() {
+            if let Some(correction) = correction {
                 let is_moving = executed.state == ExecState::Moving;
                 let corrections = correction.next(is_moving.then_some(executed.stretches));
                 for (axis, correction_mm_s) in self.axes.iter_mut().zip(corrections) {
@@ -272,13 +264,11 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             if is_lost {
                 self.lose();
             }
-            #[cfg(feature = "guards")]
-            self.look();
+            self.sample();
         }
         if !self.power.regulates() {
             self.stand_still();
-            #[cfg(feature = "guards")]
-            self.ramp();
+            self.continue_ramp();
         }
     }
 
@@ -316,9 +306,6 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     fn lose(&mut self) {
         let lost = self.trace.axes.iter().enumerate().find(|(_, output)| output.lost);
         if let Some((axis, &AxisOutput { following_error_mm: error_mm, .. })) = lost {
-            #[cfg(not(feature = "guards"))]
-            self.latch_fault(FaultKind::FollowingError { axis, error_mm });
-            #[cfg(feature = "guards")]
             self.judge(axis, error_mm);
         }
     }
@@ -343,7 +330,6 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     /// The drives stay disabled until [`Kernel::enable`]. `None` while the reaction to a fault is under way: nothing cuts it
     /// short but a more urgent one, [`Kernel::disable`] and [`Kernel::stand_here`].
     pub fn clear_fault(&mut self) -> Option<[Position; AXES]> {
-        #[cfg(feature = "guards")]
         if self.reaction().is_some_and(|reaction| reaction < Reaction::Immediate) {
             return None;
         }
@@ -384,141 +370,9 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     }
 
     fn latch_fault_in(&mut self, tick: u64, kind: FaultKind<R>) {
-        #[cfg(not(feature = "guards"))]
-        {
-            self.power = Power::Off;
-        }
-        #[cfg(feature = "guards")]
-        self.react(kind.reaction(self.guards.reactions.emergency_stop));
+        self.react(&kind);
         if self.trace.fault.is_none() {
             self.trace.fault = Some(Fault { tick, kind });
         }
-    }
-}
-
-/// Guards of the axes, and how faults end.
-#[cfg(feature = "guards")]
-impl<R: Real, const AXES: usize> Kernel<R, AXES> {
-    /// Ticks of a round of looks at the axes.
-    const ROUND_TICKS: u8 = {
-        assert!(AXES * (LOOK_TICKS as usize) < 256, "a round of looks is counted in a byte");
-        LOOK_TICKS * AXES as u8
-    };
-
-    /// How the fault is ending, in the order of urgency: on the path, along a ramp, or with the drives off, which is the end
-    /// of every fault. `None` without a fault.
-    pub fn reaction(&self) -> Option<Reaction> {
-        self.trace.fault.map(|_| match self.power {
-            Power::Stopping { .. } => Reaction::Stop,
-            Power::Ramping { .. } => Reaction::Ramp,
-            // A fault leaves no other.
-            _ => Reaction::Immediate,
-        })
-    }
-
-    /// Looks at one axis in every [`LOOK_TICKS`] ticks.
-    #[inline]
-    fn look(&mut self) {
-        self.guards.look_ticks += 1;
-        if self.guards.look_ticks.is_multiple_of(LOOK_TICKS) {
-            self.look_at(usize::from(self.guards.look_ticks / LOOK_TICKS) - 1);
-        }
-    }
-
-    #[inline(never)]
-    fn look_at(&mut self, axis: usize) {
-        if self.guards.look_ticks >= Self::ROUND_TICKS {
-            self.guards.look_ticks = 0;
-        }
-        let parts = self.axes.get_mut(axis).zip(self.config.get(axis));
-        let ticks = self.trace.executed.setpoints.get(axis).zip(self.trace.axes.get(axis));
-        if let Some(((state, config), (setpoint, output))) = parts.zip(ticks)
-            && !output.lost
-            && let Some(found) = state.look(config, setpoint, output)
-        {
-            self.latch_fault(kind_of(axis, found));
-        }
-    }
-
-    /// Latches what broke in an axis that is lost.
-    fn judge(&mut self, axis: usize, error_mm: R) {
-        // Since its place in the round, or in the round before.
-        let place = LOOK_TICKS.saturating_mul(axis as u8 + 1);
-        let now = self.guards.look_ticks + 1;
-        let since = if now > place { now - place } else { now + (Self::ROUND_TICKS - place) };
-        let parts = self.axes.get(axis).zip(self.config.get(axis));
-        let found = match parts.zip(self.trace.executed.setpoints.get(axis)) {
-            Some(((state, config), setpoint)) => state.judge(config, setpoint, since),
-            None => AxisFault::FollowingError { error_mm },
-        };
-        self.latch_fault(kind_of(axis, found));
-    }
-
-    /// Begins a reaction, unless one as urgent is under way.
-    fn react(&mut self, reaction: Reaction) {
-        let Reactions { ramp_ticks, stop_ticks, .. } = self.guards.reactions;
-        let reaction = if ramp_ticks == 0 { Reaction::Immediate } else { reaction };
-        self.power = match (self.power, reaction) {
-            (Power::Off, _) | (_, Reaction::Immediate) => Power::Off,
-            // Drives that have not been told to be on are not enabled for a ramp.
-            _ if self.told != Some(true) => Power::Off,
-            (Power::Ramping { .. }, _) | (Power::Stopping { .. }, Reaction::Stop) => self.power,
-            (Power::On, Reaction::Stop) if self.trace.executed.state == ExecState::Moving => {
-                Power::Stopping { ticks_left: stop_ticks, is_at_rest: false }
-            }
-            // What rests does not begin to move.
-            (Power::On, Reaction::Stop) => self.at_rest(),
-            (Power::On | Power::Starting { .. } | Power::Stopping { .. }, _) => {
-                self.guards.ramp_from = self.guards.written;
-                Power::Ramping { ticks_left: ramp_ticks }
-            }
-        };
-    }
-
-    /// The end of a stop: what is delayed is still to come.
-    fn at_rest(&self) -> Power {
-        Power::Stopping { ticks_left: u32::from(self.preview.ticks()), is_at_rest: true }
-    }
-
-    /// A tick of a stop on the path, after the executor's.
-    #[cold]
-    fn go_on_stopping(&mut self, intake: &Intake<'_, R, AXES>) {
-        let Power::Stopping { ticks_left, is_at_rest } = self.power else { return };
-        let has_come_to_rest = !is_at_rest && self.trace.executed.state != ExecState::Moving;
-        if has_come_to_rest {
-            self.power = self.at_rest();
-        } else if ticks_left > 0 && (is_at_rest || intake.want_stop()) {
-            self.power = Power::Stopping { ticks_left: ticks_left - 1, is_at_rest };
-        } else {
-            self.react(if is_at_rest { Reaction::Immediate } else { Reaction::Ramp });
-        }
-    }
-
-    /// The outputs of a ramp to 0 V; its last tick is the first one with the drives off.
-    #[cold]
-    fn ramp(&mut self) {
-        let Power::Ramping { ticks_left } = self.power else { return };
-        let (left, all) = (i64::from(ticks_left) - 1, i64::from(self.guards.reactions.ramp_ticks));
-        for (output, &DacCode(from)) in self.trace.axes.iter_mut().zip(&self.guards.ramp_from) {
-            let DacCode(still) = output.code;
-            let above = (i64::from(from) - i64::from(still)) * left;
-            output.code = DacCode(still.wrapping_add(above.checked_div(all).unwrap_or(0) as i16));
-        }
-        self.power = if left == 0 { Power::Off } else { Power::Ramping { ticks_left: ticks_left - 1 } };
-    }
-}
-
-/// What was found of an axis, as a fault.
-#[cfg(feature = "guards")]
-fn kind_of<R>(axis: usize, found: AxisFault<R>) -> FaultKind<R> {
-    match found {
-        AxisFault::FollowingError { error_mm } => FaultKind::FollowingError { axis, error_mm },
-        AxisFault::EncoderLost => FaultKind::EncoderLost { axis },
-        AxisFault::EncoderJump { jump_mm } => FaultKind::EncoderJump { axis, jump_mm },
-        AxisFault::Runaway => FaultKind::Runaway { axis },
-        AxisFault::Saturated => FaultKind::Saturated { axis },
-        AxisFault::SoftLimit => FaultKind::SoftLimit { axis },
-        AxisFault::SetpointJump { jump_mm } => FaultKind::SetpointJump { axis, jump_mm },
-        AxisFault::NotFinite => FaultKind::NotFinite { axis },
     }
 }

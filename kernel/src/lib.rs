@@ -76,13 +76,18 @@
 //! }
 //! ```
 #![cfg_attr(not(test), no_std)]
+// Which feature an item needs, on docs.rs.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
+// Some of what all kernels share is called by guards or by live control only; the linker drops it where they are absent.
+#![cfg_attr(not(all(feature = "guards", feature = "live")), allow(dead_code))]
 // No panic path in what runs on a board; tests may.
 #![cfg_attr(
     not(test),
     deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)
 )]
 
+mod array;
 pub mod units;
 pub mod num;
 pub mod plan;
@@ -107,6 +112,9 @@ pub mod jog;
 // Without guards a tick does not keep the inputs of a healthy machine, so nobody would see the switch.
 #[cfg(all(feature = "live", feature = "guards"))]
 pub mod homing;
+
+#[doc(hidden)]
+pub mod work;
 
 #[cfg(all(test, feature = "guards"))]
 mod corrupted;

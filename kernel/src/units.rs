@@ -2,6 +2,15 @@
 //!
 //! Everything else is a plain number with its unit in its name. Used by every room; holds no logic
 //! beyond the conversions between these types.
+//!
+//! ```
+//! use motion_kernel::units::{DacCode, Position};
+//!
+//! let position = Position::from_mm(12.5).expect("within a kilometre");
+//! assert_eq!(position.to_bits(), 25 << 31); // exactly, in steps of 2⁻³² mm
+//! assert_eq!(Position::from_mm(2.0e6), None);
+//! assert_eq!(DacCode::from_volts(-5.0_f64), DacCode(-16384));
+//! ```
 
 use fixed::types::I32F32;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -23,7 +32,7 @@ pub struct Position(I32F32);
 #[cfg(feature = "defmt")]
 impl defmt::Format for Position {
     fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{} mm", self.to_mm());
+        defmt::write!(f, "{=f64} mm", self.to_mm());
     }
 }
 

@@ -16,13 +16,8 @@ use std::time::Instant;
 use motion_kernel::law::Ramp;
 use motion_kernel::plan::{Block, Node, nodes_for, plan_spanning};
 
-use lists::reference;
-use support::Random;
-
-#[path = "../tests/plan/lists.rs"]
-mod lists;
-#[path = "../tests/support/mod.rs"]
-mod support;
+use motion_tests::block_lists::{lists, reference};
+use motion_tests::random::Random;
 
 const BLOCKS: usize = 1_000_000;
 const ROUNDS: usize = 5;
@@ -44,7 +39,7 @@ fn main() {
     println!("| {BLOCKS} blocks | µs a block | ramps a block |");
     println!("|---|---:|---:|");
     let mut ramp_s = f64::INFINITY;
-    for (name, blocks) in lists::lists(BLOCKS).into_iter().filter(|list| is_asked(list.0)) {
+    for (name, blocks) in lists(BLOCKS).into_iter().filter(|list| is_asked(list.0)) {
         let rounds = [(); ROUNDS].map(|()| (planned_s(&blocks, &mut places), ramps_s(&feeds) / RAMPS as f64));
         let least_s = rounds.iter().map(|round| round.0).fold(f64::INFINITY, f64::min);
         ramp_s = rounds.iter().map(|round| round.1).fold(ramp_s, f64::min);
@@ -66,7 +61,7 @@ fn planned_s(blocks: &[Block<f64>], places: &mut [Node]) -> f64 {
 }
 
 fn feeds() -> Vec<[f64; 2]> {
-    let mut random = Random::new(51);
+    let mut random = Random::of_stream(51);
     (0..10_000).map(|_| [random.log(1.0, 100.0), random.log(1.0, 100.0)]).collect()
 }
 

@@ -2,22 +2,14 @@
 //!
 //! The result is a committed table, `tests/expected/accuracy.md`; see `motion_tests::figures`.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use check::drive::{PIECES, SEGMENTS, is_beyond_fixed_point};
-use check::random::Random;
-use check::totals::Totals;
-use check::{drive, machine, program};
 use motion_host::drive::inverse::inverse;
-use motion_host::gcode;
 use motion_host::machine::Machine;
-use motion_host::planning::{Executable, Mode, Plan, plan_program};
+use motion_host::planning::{Executable, Mode, Plan};
 use motion_kernel::axis::feedforward::{FeedforwardConfig, FeedforwardState};
 use motion_kernel::axis::{DriveInverse, Feedforward, Table, Tables};
 use motion_kernel::exec::{ExecState, Executed, Executor};
@@ -26,7 +18,12 @@ use motion_kernel::path::Setpoint;
 use motion_kernel::program::Supply;
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
+use motion_tests::check::drive::{PIECES, SEGMENTS, is_beyond_fixed_point};
+use motion_tests::check::totals::Totals;
+use motion_tests::check::{drive, machine, planned, program};
 use motion_tests::figures::{Table as Figures, hold};
+use motion_tests::judge::along;
+use motion_tests::random::Random;
 
 const STRINGER: &str = include_str!("../../host/src/cli/stringer.ngc");
 const MM_PER_COUNT: f64 = 1e-4;
@@ -58,7 +55,7 @@ impl Tick {
             state: executed.state,
             stretches: executed.stretches,
             positions: set.map(|axis| axis.position),
-            along: [motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(R::to_f64),
+            along: along(motion),
             axes: set.map(|axis| [axis.velocity_mm_s, axis.accel_mm_s2, axis.jerk_mm_s3].map(R::to_f64)),
         }
     }
@@ -167,8 +164,7 @@ fn all(plan: &Plan, machine: &Machine) -> Result<[Option<Worst>; 3], String> {
 
 fn reference_machine(text: &str) -> [Worst; 3] {
     let machine = Machine::reference();
-    let program = gcode::read("accuracy.ngc", text.as_bytes()).expect("G-code");
-    let plan = plan_program("accuracy.ngc", &program, &machine, Mode::Spanning).expect("a plan");
+    let plan = planned(text, &machine).expect("a plan");
     all(&plan, &machine).expect("executed").map(|worst| worst.expect("within the type's range"))
 }
 
@@ -272,8 +268,7 @@ fn of_x<R: Real>(executable: &Executable, machine: &Machine) -> Vec<[f64; 3]> {
 fn feedforward_in_fixed_point_and_f32_against_f64() {
     let machine = Machine::reference();
     let tick_s = machine.tick_s;
-    let program = gcode::read("accuracy.ngc", STRINGER.as_bytes()).expect("G-code");
-    let plan = plan_program("accuracy.ngc", &program, &machine, Mode::Spanning).expect("a plan");
+    let plan = planned(STRINGER, &machine).expect("a plan");
     let executable = Executable::new::<Fixed>(&plan).expect("within fixed point");
     let stringer = [
         of_x::<f64>(&executable, &machine),

@@ -2,22 +2,20 @@
 
 use std::path::Path;
 
-use motion_host::gcode;
 use motion_host::machine::Machine;
-use motion_host::planning::{Executable, Mode, plan_program};
+use motion_host::planning::Executable;
+use motion_tests::check::planned;
 
-const STRINGER: &str = "../boards/nucleo-f446re/program/stringer.bin";
+const STRINGER: &str = "../boards/common/program/stringer.bin";
 
 #[test]
 fn the_flashed_stringer_is_what_compile_writes() {
     let machine = Machine::reference();
-    let text = include_bytes!("../../host/src/cli/stringer.ngc");
-    let program = gcode::read("stringer.ngc", text).expect("a program");
-    let plan = plan_program("stringer.ngc", &program, &machine, Mode::Spanning).expect("a plan");
+    let plan = planned(include_str!("../../host/src/cli/stringer.ngc"), &machine).expect("a plan");
     let made = Executable::new::<f32>(&plan).expect("executable").to_live_bytes(&machine);
     let found = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(STRINGER)).expect("a file");
     assert!(
         made == found,
-        "cargo run --release -- compile host/src/cli/stringer.ngc --live -o boards/nucleo-f446re/program/stringer.bin"
+        "cargo run --release -- compile host/src/cli/stringer.ngc --live -o boards/common/program/stringer.bin"
     );
 }

@@ -1,12 +1,7 @@
 //! Fixed point has a range: what could leave it inside the tick is refused before. Debug assertions find what is not.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
 use std::convert::Infallible;
 
-use check::bench::{TICK_S, law, mm};
-use check::random::Random;
 use motion_host::machine::Machine;
 use motion_host::toolpath::curve::Spiral;
 use motion_host::toolpath::septic::fit;
@@ -16,6 +11,8 @@ use motion_kernel::path::{Piece, PieceError};
 use motion_kernel::program::{self, CheckError, Header, Item, SupplyError};
 use motion_kernel::queue::{Refused, Rejection, Streams};
 use motion_kernel::units::Position;
+use motion_tests::check::bench::{TICK_S, law, mm};
+use motion_tests::random::Random;
 
 /// The first piece of an arc from the origin, of one axis' direction after another.
 fn arc(radius_mm: f64, sweep_rad: f64, height_per_rad: f64) -> ([[f64; 7]; 3], Position) {
@@ -46,25 +43,25 @@ fn to_the_curve(
 ) -> Vec<Item<3>> {
     let direction = coefficients.map(|axis| axis[0]);
     let ramp = Ramp::new(&law(limits), 0.0, feed_mm_s);
-    let way = mm(ramp.length_mm());
-    let parts = (way.to_mm() / 15.0) as i64 + 1;
-    let on_way = |part: i64| {
-        Position::from_bits((i128::from(way.to_bits()) * i128::from(part) / i128::from(parts)) as i64)
+    let whole = mm(ramp.length_mm());
+    let parts = (whole.to_mm() / 15.0) as i64 + 1;
+    let at_part = |part: i64| {
+        Position::from_bits((i128::from(whole.to_bits()) * i128::from(part) / i128::from(parts)) as i64)
     };
     let at = |s: Position| direction.map(|d| mm(d * s.to_mm()));
-    let mut items = vec![Item::Feed(PlannedRamp { ramp, length: way })];
+    let mut items = vec![Item::Feed(PlannedRamp { ramp, length: whole })];
     for part in 0..parts {
-        let (from, to) = (on_way(part), on_way(part + 1));
+        let (from, to) = (at_part(part), at_part(part + 1));
         items.push(Item::Line { line: 1, start: at(from), direction, length: to - from });
     }
-    items.push(Item::Septic { line: 1, start: at(way), coefficients, length });
+    items.push(Item::Septic { line: 1, start: at(whole), coefficients, length });
     let t2_s = length.to_mm() / feed_mm_s;
     let cruise = Ramp { from_mm_s: feed_mm_s, t1_s: 0.0, t2_s, peak_jerk_mm_s3: 0.0, ..ramp };
     items.push(Item::Feed(PlannedRamp { ramp: cruise, length }));
     items
 }
 
-/// What is wrong with items that end under way.
+/// What is wrong with items that end in motion.
 fn refusal<R: Real>(header: &Header<3>, items: &[Item<3>]) -> Option<SupplyError<Infallible>> {
     match program::check::<R, 3, _>(header, items.iter().map(|&item| Ok(item))) {
         Err(CheckError::Item { cause, .. }) => Some(cause),
@@ -91,7 +88,7 @@ fn a_feed_too_fast_for_its_piece_is_refused() {
     assert_eq!(refusal::<f64>(&header, &fast), None);
     assert_eq!(refusal::<f32>(&header, &fast), None);
     assert_eq!(refusal::<Fixed>(&header, &to_the_curve(LIMITS, 100.0, coefficients, length)), None);
-    // Sharp at first, fast where it is straight again: on the same ramp it is too fast, behind it is not.
+    // Sharp at first, fast where it is straight again: on the same ramp it is too fast, after it not.
     let end: [Position; 3] =
         Piece::<Fixed, 3>::septic(1, [Position::ZERO; 3], coefficients, length).expect("a piece").end();
     let onward = [0.7_f64.cos(), 0.7_f64.sin(), 0.0];
@@ -133,12 +130,12 @@ fn a_piece_that_bends_too_far_is_an_error() {
     let mut random = Random::new(11);
     let mut made = 0;
     for _ in 0..20_000 {
-        let size = random.log_between(1e-3, 4.0);
+        let size = random.log(1e-3, 4.0);
         let mut coefficients = [[0.0; 7]; 3].map(|axis: [f64; 7]| axis.map(|_| random.between(-size, size)));
         if random.chance(0.5) {
             coefficients = arc(1.0, random.between(0.01, 1.4), random.between(-1.0, 1.0)).0;
         }
-        let length = Position::from_bits(random.log_between(1.0, 17.0 * 4_294_967_296.0) as i64);
+        let length = Position::from_bits(random.log(1.0, 17.0 * 4_294_967_296.0) as i64);
         made += usize::from(Piece::<Fixed, 3>::septic(1, start, coefficients, length).is_ok());
     }
     assert!(made > 5_000, "{made}");
@@ -151,13 +148,10 @@ fn what_is_accepted_stays_within_the_range() {
     let mut random = Random::new(7);
     let (mut accepted, mut refused, mut fullest) = (0, 0, 0.0_f64);
     while accepted < 2000 || refused < 500 {
-        let (coefficients, length) = arc(random.log_between(1e-3, 100.0), random.between(0.01, 0.8), 0.0);
-        let limits = Limits {
-            accel_mm_s2: random.log_between(1e3, 1e7),
-            jerk_mm_s3: random.log_between(1e5, 1e9),
-            snap_mm_s4: 1e9,
-        };
-        let feed_mm_s = random.log_between(1.0, 1e3);
+        let (coefficients, length) = arc(random.log(1e-3, 100.0), random.between(0.01, 0.8), 0.0);
+        let limits =
+            Limits { accel_mm_s2: random.log(1e3, 1e7), jerk_mm_s3: random.log(1e5, 1e9), snap_mm_s4: 1e9 };
+        let feed_mm_s = random.log(1.0, 1e3);
         let header = with(limits, feed_mm_s);
         let items = to_the_curve(limits, feed_mm_s, coefficients, length);
         let make = |start| Piece::<Fixed, 3>::septic(1, start, coefficients, length).expect("a piece");

@@ -4,13 +4,11 @@
 //! Errors are absolute in units of the shapes' scales, and relative from x = 10⁻⁴ up, where a ramp begins (a
 //! ramp's other end is the mirror image). Fixed point has steps and no relative precision.
 
-mod support;
-
 use motion_kernel::law::shape::Shape;
 use motion_kernel::num::sine::{Libm, Micromath, Own, SineCosine};
 use motion_kernel::num::{Fixed, Real, Unit};
+use motion_tests::dd::{Dd, dd};
 use motion_tests::figures::{Table, hold};
-use support::dd::{Dd, dd};
 
 const DENSE: u32 = 200_000;
 /// Where relative errors begin.
@@ -79,8 +77,8 @@ fn sum(series: &[Dd], square: Dd) -> Dd {
     series.iter().rev().fold(Dd::ZERO, |sum, &term| sum * square + term)
 }
 
-/// One way to evaluate, and its worst errors.
-struct Way<U> {
+/// A method of evaluation, and its worst errors.
+struct Method<U> {
     name: String,
     sin_cos: Option<fn(U) -> (U, U)>,
     stated: f64,
@@ -90,7 +88,7 @@ struct Way<U> {
     relative: [f64; 3],
 }
 
-impl<U: Unit> Way<U> {
+impl<U: Unit> Method<U> {
     fn series(number: &str) -> Self {
         Self {
             name: format!("{number}, series"),
@@ -135,8 +133,8 @@ fn error<U: Unit>(value: U, exact: Dd) -> f64 {
     (dd(value.to_f64()) - exact).abs().to_f64()
 }
 
-/// Measures `ways`, checks what they state, and appends their rows.
-fn measure<U: Unit>(reference: &Reference, mut ways: Vec<Way<U>>, relative: bool, table: &mut Table) {
+/// Measures `methods`, checks what they state, and appends their rows.
+fn measure<U: Unit>(reference: &Reference, mut methods: Vec<Method<U>>, relative: bool, table: &mut Table) {
     let dense = (0..=DENSE).map(|i| f64::from(i) / f64::from(DENSE));
     let near = std::iter::successors(Some(1e-6), |x| Some(x * 1.000_1)).take_while(|&x| x < 1.0);
     for x in dense.chain(near) {
@@ -144,17 +142,23 @@ fn measure<U: Unit>(reference: &Reference, mut ways: Vec<Way<U>>, relative: bool
         let wide = dd(x.to_f64());
         let shape = reference.shape(wide);
         let sine = (wide.hi <= 0.5).then(|| reference.sin_cos(wide));
-        for way in &mut ways {
-            way.at(x, &shape, sine.as_ref());
+        for method in &mut methods {
+            method.at(x, &shape, sine.as_ref());
         }
     }
-    for way in &ways {
-        assert!(way.sine <= way.stated, "{}: {:e}, stated {:e}", way.name, way.sine, way.stated);
+    for method in &methods {
+        assert!(
+            method.sine <= method.stated,
+            "{}: {:e}, stated {:e}",
+            method.name,
+            method.sine,
+            method.stated
+        );
         let figure = |error: f64| format!("{error:.1e}");
-        let mut cells = vec![way.name.clone()];
-        cells.push(way.sin_cos.map_or_else(|| "–".to_owned(), |_| figure(way.sine)));
-        cells.extend(way.absolute.map(figure));
-        cells.extend(way.relative.map(|error| if relative { figure(error) } else { "–".to_owned() }));
+        let mut cells = vec![method.name.clone()];
+        cells.push(method.sin_cos.map_or_else(|| "–".to_owned(), |_| figure(method.sine)));
+        cells.extend(method.absolute.map(figure));
+        cells.extend(method.relative.map(|error| if relative { figure(error) } else { "–".to_owned() }));
         table.row(&cells);
     }
 }
@@ -174,17 +178,17 @@ fn errors_are_those_of_the_table() {
         "feed, relative",
         "length, relative",
     ]);
-    let ways = vec![
-        Way::series("f32"),
-        Way::closed::<Own>("f32"),
-        Way::closed::<Libm>("f32"),
-        Way::closed::<Micromath>("f32"),
+    let methods = vec![
+        Method::series("f32"),
+        Method::closed::<Own>("f32"),
+        Method::closed::<Libm>("f32"),
+        Method::closed::<Micromath>("f32"),
     ];
-    measure::<f32>(&reference, ways, true, &mut table);
-    let ways = vec![Way::series("fixed"), Way::closed::<Own>("fixed")];
-    measure::<<Fixed as Real>::Unit>(&reference, ways, false, &mut table);
-    let ways = vec![Way::series("f64"), Way::closed::<Own>("f64"), Way::closed::<Libm>("f64")];
-    measure::<f64>(&reference, ways, true, &mut table);
+    measure::<f32>(&reference, methods, true, &mut table);
+    let methods = vec![Method::series("fixed"), Method::closed::<Own>("fixed")];
+    measure::<<Fixed as Real>::Unit>(&reference, methods, false, &mut table);
+    let methods = vec![Method::series("f64"), Method::closed::<Own>("f64"), Method::closed::<Libm>("f64")];
+    measure::<f64>(&reference, methods, true, &mut table);
     println!("{}", table.to_markdown());
     hold("functions", &table, 0.02).unwrap_or_else(|difference| panic!("{difference}"));
 }

@@ -1,18 +1,15 @@
 //! The fuzz target's own runs: every seed of its corpus, and random bytes.
 
-#[path = "support/mod.rs"]
-mod support;
-
 use std::path::Path;
 
 use motion_tests::fuzz::drive;
-use support::Random;
+use motion_tests::random::Random;
 
 /// Random inputs in a short run; `MOTION_TEST_PROGRAMS` has more.
 const INPUTS: usize = 2000;
 
 #[test]
-fn the_corpus() {
+fn every_seed_of_the_corpus_keeps_the_promises() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/kernel");
     let mut inputs = 0;
     for entry in std::fs::read_dir(&folder).expect("a corpus") {
@@ -25,15 +22,14 @@ fn the_corpus() {
 }
 
 #[test]
-fn random_bytes() {
-    let inputs =
-        std::env::var("MOTION_TEST_PROGRAMS").ok().and_then(|text| text.parse().ok()).unwrap_or(INPUTS);
-    let mut random = Random::new(61);
+fn random_bytes_keep_the_promises() {
+    let inputs = motion_tests::from_env("MOTION_TEST_PROGRAMS").map_or(INPUTS, |inputs| inputs as usize);
+    let mut random = Random::of_stream(61);
     let mut said = 0;
     for input in 0..inputs {
         let mut bytes = vec![0; 8 + random.below(400)];
         for byte in &mut bytes {
-            *byte = random.next() as u8;
+            *byte = random.bits() as u8;
         }
         println!("input {input}");
         said += usize::from(drive(&bytes));

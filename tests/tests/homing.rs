@@ -1,14 +1,8 @@
-//! Homing on the simulated machine: the reference from any start, every failure by its name and at rest, and motion behind it.
+//! Homing on the simulated machine: the reference from any start, every failure by its name and at rest, and motion after it.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
-use check::bench::mm;
-use check::random::Random;
 use hal_sim::{EncoderNoise, HomeParameters, IndexParameters, SwitchParameters};
-use motion_host::gcode;
 use motion_host::machine::{HomingSettings, Machine};
-use motion_host::planning::{Executable, Mode, plan_program};
+use motion_host::planning::Executable;
 use motion_host::simulate::hardware::Simulated;
 use motion_host::simulate::home::{HomeError, HomedAxis};
 use motion_host::simulate::session::Session;
@@ -17,6 +11,10 @@ use motion_kernel::homing::{HomingConfig, HomingError};
 use motion_kernel::jog::{Direction, Jog, JogAxis, Way};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::units::{Counts, Position};
+use motion_tests::check::bench::mm;
+use motion_tests::check::planned;
+use motion_tests::judge::Judge;
+use motion_tests::random::Random;
 
 const AXIS: usize = 0;
 const MM_PER_COUNT: f64 = 1e-4;
@@ -68,46 +66,41 @@ fn config(direction: Direction, has_index: bool) -> HomingConfig {
     }
 }
 
-/// Every tick of a session: along the path within the limits and without a step, and no step in what the regulator sees.
-struct Watch {
-    machine: Machine,
+/// Judges every tick of a session: along the path within the limits and without a step, and no step in what the regulator
+/// is given.
+struct SessionJudge {
+    path: Judge,
     before: Option<TraceRow>,
     wrong: Option<String>,
 }
 
-impl Watch {
+impl SessionJudge {
     fn new(machine: &Machine) -> Self {
-        Self { machine: machine.clone(), before: None, wrong: None }
+        Self { path: Judge::new(&machine.rules(), machine.tick_s, 1e-5, 0.0), before: None, wrong: None }
     }
 
-    fn look(&mut self, tick: &TraceRow) {
-        let path = &self.machine.path;
-        let limits = [path.feed_mm_s, path.accel_mm_s2, path.jerk_mm_s3, path.snap_mm_s4];
-        let found = [tick.v_mm_s, tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4];
-        let beyond = found.iter().zip(limits).any(|(found, limit)| found.abs() > limit * (1.0 + 1e-5));
-        let mut wrong = beyond.then(|| format!("{found:?} beyond {limits:?}"));
-        if let Some(before) = &self.before {
-            let h = self.machine.tick_s;
-            let step = (tick.v_mm_s - before.v_mm_s).abs();
-            if step > path.accel_mm_s2 * h * (1.0 + 1e-5) {
-                wrong = Some(format!("the feed steps by {step} mm/s"));
-            }
-            let step = (tick.a_mm_s2 - before.a_mm_s2).abs();
-            if step > path.jerk_mm_s3 * h * (1.0 + 1e-5) {
-                wrong = Some(format!("the acceleration steps by {step} mm/s²"));
-            }
-            for (now, before) in tick.axes.iter().zip(&before.axes) {
-                // A set position that gets another name is no step of the machine.
-                let step_um = (now.err_um - before.err_um).abs();
-                if step_um > 60.0 {
-                    wrong = Some(format!("the following error steps by {step_um} µm"));
-                }
+    fn tick(&mut self, row: &TraceRow) {
+        let verdict = self.verdict(row);
+        if let Err(wrong) = verdict {
+            self.wrong.get_or_insert(format!("tick {}: {wrong}", row.tick));
+        }
+        self.before = Some(*row);
+    }
+
+    fn verdict(&self, row: &TraceRow) -> Result<(), String> {
+        let along = |row: &TraceRow| [row.v_mm_s, row.a_mm_s2, row.j_mm_s3, row.snap_mm_s4];
+        self.path.limits(&along(row))?;
+        let Some(before) = &self.before else { return Ok(()) };
+        self.path.feed(&along(before), &along(row))?;
+        self.path.accel(&along(before), &along(row))?;
+        for (now, before) in row.axes.iter().zip(&before.axes) {
+            // A set position that gets another name is no step of the machine.
+            let step_um = (now.err_um - before.err_um).abs();
+            if step_um > 60.0 {
+                return Err(format!("the following error steps by {step_um} µm"));
             }
         }
-        if let Some(wrong) = wrong {
-            self.wrong.get_or_insert(format!("tick {}: {wrong}", tick.tick));
-        }
-        self.before = Some(*tick);
+        Ok(())
     }
 }
 
@@ -115,7 +108,7 @@ impl Watch {
 fn homed<R: Real>(
     settings: HomingSettings,
     noise: Option<EncoderNoise>,
-    behind: &mut dyn FnMut(&mut Session<'_, R>, &Simulated, &mut Watch),
+    behind: &mut dyn FnMut(&mut Session<'_, R>, &Simulated, &mut SessionJudge),
 ) -> Result<HomedAxis, HomingError> {
     let mut machine = Machine::reference();
     (machine.axes[AXIS].homing, machine.axes[AXIS].noise) = (Some(settings), noise);
@@ -123,19 +116,19 @@ fn homed<R: Real>(
     machine.axes[1].feedforward.lead_s = 12.0 * machine.tick_s;
     let simulated = Simulated::new(&machine.simulated()).expect("a machine");
     let mut session = Session::<R>::new(&machine, &simulated).expect("a session");
-    let mut watch = Watch::new(&machine);
-    let homed = session.home(AXIS, &settings, &mut |tick| watch.look(tick));
+    let mut judge = SessionJudge::new(&machine);
+    let homed = session.home(AXIS, &settings, &mut |row| judge.tick(row));
     let homed = homed.map_err(|error| match error {
         HomeError::Axis { source, .. } => source,
         other => panic!("{settings:?}: {other}"),
     });
     // What fails comes to rest first.
-    let rest = watch.before.expect("a tick");
+    let rest = judge.before.expect("a tick");
     assert_eq!(rest.v_mm_s, 0.0, "{settings:?}");
     if homed.is_ok() {
-        behind(&mut session, &simulated, &mut watch);
+        behind(&mut session, &simulated, &mut judge);
     }
-    assert_eq!(watch.wrong, None, "{settings:?}");
+    assert_eq!(judge.wrong, None, "{settings:?}");
     homed
 }
 
@@ -151,7 +144,7 @@ fn homed_in(seed: u64, settings: HomingSettings) -> Result<HomedAxis, HomingErro
 fn places(seed: u64) -> impl Iterator<Item = Place> {
     let mut random = Random::new(seed);
     let direction = if random.chance(0.5) { Direction::Positive } else { Direction::Negative };
-    // In machine positions, from the switch: the index 3 mm behind it.
+    // In machine positions, from the switch: the index follows after 3 mm.
     (0..).map(move |_| {
         let switch_mm =
             if random.chance(0.3) { -random.between(0.0, 30.0) } else { random.between(0.0, 150.0) };
@@ -161,7 +154,7 @@ fn places(seed: u64) -> impl Iterator<Item = Place> {
 
 #[test]
 fn with_an_index_it_is_the_same_count_from_anywhere() {
-    let count = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(40) as usize;
+    let count = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(40) as usize;
     for seed in 1..=2 {
         for (number, place) in places(seed).take(count / 2).enumerate() {
             let settings =
@@ -184,10 +177,10 @@ fn with_an_index_it_is_the_same_count_from_anywhere() {
     }
 }
 
-/// The switch is seen once a tick: at the slow feed it is at most a tick's way later, and a count.
+/// The switch is seen once a tick: at the slow feed it is at most the travel of a tick later, and a count.
 #[test]
 fn with_a_switch_alone_it_is_as_good_as_a_tick() {
-    let count = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(40) as usize;
+    let count = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(40) as usize;
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for seed in 3..=4 {
         for (number, place) in places(seed).take(count / 2).enumerate() {
@@ -207,7 +200,7 @@ fn with_a_switch_alone_it_is_as_good_as_a_tick() {
     println!("the switch was seen {least} to {most} mm late");
 }
 
-/// Guards look at an axis every 24 ticks; whenever its position gets another name, none of them takes that for motion.
+/// Guards sample an axis every 24 ticks; whenever its position gets another name, none of them takes that for motion.
 #[test]
 fn a_reference_is_no_motion_for_the_guards() {
     for tick in 0..48_u32 {
@@ -258,22 +251,21 @@ fn programs_go_on_from_the_new_position() {
     fn driven<R: Real>(direction: Direction) {
         let place = Place { direction, switch_mm: 25.0, switch_length_mm: 35.0, index_mm: 28.5 };
         let settings = HomingSettings { config: config(direction, true), simulated: place.simulated() };
-        homed::<R>(settings, None, &mut |session, simulated, watch| {
+        homed::<R>(settings, None, &mut |session, simulated, judge| {
             assert_eq!(session.position(), [Position::ZERO; 3]);
             let origin_mm = simulated.truth()[AXIS].position_mm;
-            let machine = watch.machine.clone();
-            let text = b"G1 X20 Y5 F2400\nG4 P0.2\nG1 X-5\nG0 X7 Y0\n";
-            let program = gcode::read("x.ngc", text).expect("a program");
-            let plan = plan_program("x.ngc", &program, &machine, Mode::Spanning).expect("a plan");
+            let machine = Machine::reference();
+            let text = "G1 X20 Y5 F2400\nG4 P0.2\nG1 X-5\nG0 X7 Y0\n";
+            let plan = planned(text, &machine).expect("a plan");
             let executable = Executable::new::<R>(&plan).expect("executable");
             for _ in 0..2 {
-                session.run(executable.supplied(), &mut |tick| watch.look(tick)).expect("a run");
+                session.run(executable.supplied(), &mut |row| judge.tick(row)).expect("a run");
                 assert_eq!(session.position(), [7.0, 0.0, 0.0].map(mm));
                 let moved_mm = simulated.truth()[AXIS].position_mm - origin_mm;
                 assert!((moved_mm - 7.0).abs() < 0.01, "{moved_mm}");
                 let back = Way::By(mm(-7.0));
                 let jog = Jog::new(&jog_axis(&machine), AXIS, session.position(), back, 30.0, machine.tick_s);
-                session.run(jog.expect("a jog"), &mut |tick| watch.look(tick)).expect("a run");
+                session.run(jog.expect("a jog"), &mut |row| judge.tick(row)).expect("a run");
                 assert_eq!(session.position(), [Position::ZERO; 3]);
             }
         })

@@ -1,7 +1,6 @@
 //! Identification of simulated axes from what a machine would record: converter codes and encoder counts.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 use hal_sim::{
     AxisParameters, BedMode, DriveParameters, EncoderNoise, EncoderParameters, REFERENCE_ENCODER,
@@ -12,6 +11,7 @@ use motion_host::identify::{
     identify,
 };
 use motion_kernel::units::DacCode;
+use motion_tests::random::Random;
 
 /// Cells for the dead time at up to 40 sub-steps.
 const LINE: usize = 256;
@@ -79,24 +79,10 @@ fn recordings(drive: DriveParameters, setup: AxisSetup) -> Vec<AxisRecording> {
         .collect()
 }
 
-/// Numbers from −1 to 1 (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        bits ^= bits >> 31;
-        (bits >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-}
-
 /// The reference Y with every parameter changed by up to ± 30 %.
 fn random_drive(seed: u64) -> DriveParameters {
-    let mut random = Random(seed);
-    let mut about = |value: f64| value * (1.0 + 0.3 * random.next());
+    let mut random = Random::at(seed);
+    let mut about = |value: f64| value * (1.0 + 0.3 * random.between(-1.0, 1.0));
     let y = REFERENCE_Y;
     let bed = y.bed.expect("a bed");
     DriveParameters {
@@ -195,9 +181,8 @@ fn check(cases: &[Case]) {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(case) = cases.get(index) else { return done };
             let runs = recordings(case.drive, case.setup);
-            let start = Instant::now();
             let found = identify(&runs).unwrap_or_else(|error| panic!("{}: {error}", case.name));
-            done.push((index, deviations(case, &found.parameters), start.elapsed().as_secs_f64()));
+            done.push((index, deviations(case, &found.parameters)));
         }
     };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -205,18 +190,18 @@ fn check(cases: &[Case]) {
         let workers: Vec<_> = (0..cores).map(|_| scope.spawn(worker)).collect();
         workers.into_iter().flat_map(|worker| worker.join().expect("no panic")).collect()
     });
-    rows.sort_by_key(|(index, ..)| *index);
+    rows.sort_by_key(|(index, _)| *index);
 
     print!("{:28}", "found - true ± 95 %");
     COLUMNS.iter().for_each(|column| print!("{:>16}", column.name));
     println!();
-    for (index, deviations, time_s) in &rows {
+    for (index, deviations) in &rows {
         print!("{:28}", cases[*index].name);
         deviations.iter().for_each(|(deviation, half)| print!("{deviation:>8.2} ±{half:>6.2}"));
-        println!("  {time_s:.2} s");
+        println!();
     }
     for (column, Column { name, limit }) in COLUMNS.iter().enumerate() {
-        let of_column = rows.iter().filter_map(|(_, deviations, _)| deviations.get(column));
+        let of_column = rows.iter().filter_map(|(_, deviations)| deviations.get(column));
         let mut errors: Vec<f64> = of_column.clone().map(|(deviation, _)| deviation.abs()).collect();
         errors.sort_by(f64::total_cmp);
         let Some(worst) = errors.last() else { continue };
@@ -349,7 +334,7 @@ fn figures_of_the_step_are_those_of_the_reference() {
 }
 
 #[test]
-fn what_is_no_servo_axis_is_refused() {
+fn recordings_of_no_servo_axis_are_refused() {
     let mut runs = recordings(REFERENCE_X, SETUP);
     for run in &mut runs {
         run.actual_mm.iter_mut().for_each(|position| *position *= -1.0);
@@ -359,7 +344,7 @@ fn what_is_no_servo_axis_is_refused() {
 
     // Positions of another run.
     let mut mixed = recordings(REFERENCE_X, SETUP);
-    let mut random = Random(9);
-    mixed[1].actual_mm.iter_mut().for_each(|position| *position += 20.0 * random.next());
+    let mut random = Random::at(9);
+    mixed[1].actual_mm.iter_mut().for_each(|position| *position += 20.0 * random.between(-1.0, 1.0));
     assert!(matches!(identify(&mixed), Err(IdentifyError::UnlikeModel { run: 2, .. })));
 }

@@ -1,10 +1,5 @@
 //! Jog: keys pressed and released at random, checked from the executed positions alone.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
-use check::bench::mm;
-use check::random::Random;
 use motion_kernel::exec::{ExecState, Executed, Executor};
 use motion_kernel::jog::{Direction, Jog, JogAxis, JogError, Travel, Way};
 use motion_kernel::law::Limits;
@@ -12,6 +7,9 @@ use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::queue::{LiveStreams, PathRules};
 use motion_kernel::units::Position;
+use motion_tests::check::bench::mm;
+use motion_tests::judge::{Judge, along};
+use motion_tests::random::Random;
 
 const AXES: usize = 3;
 type Place = [Position; AXES];
@@ -26,13 +24,13 @@ struct Machine {
 
 impl Machine {
     fn random(random: &mut Random) -> Self {
-        let accel_mm_s2 = random.log_between(50.0, 5e3);
-        let jerk_mm_s3 = accel_mm_s2 * random.log_between(5.0, 100.0);
-        let snap_mm_s4 = jerk_mm_s3 * random.log_between(20.0, 500.0);
+        let accel_mm_s2 = random.log(50.0, 5e3);
+        let jerk_mm_s3 = accel_mm_s2 * random.log(5.0, 100.0);
+        let snap_mm_s4 = jerk_mm_s3 * random.log(20.0, 500.0);
         let limits = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 };
-        let least = mm(-random.log_between(0.1, 300.0));
-        let travel = Travel { least, greatest: least + mm(random.log_between(0.2, 600.0)) };
-        let feed_mm_s = random.log_between(5.0, 300.0);
+        let least = mm(-random.log(0.1, 300.0));
+        let travel = Travel { least, greatest: least + mm(random.log(0.2, 600.0)) };
+        let feed_mm_s = random.log(5.0, 300.0);
         Self { axis: JogAxis { feed_mm_s, limits, travel: Some(travel) }, travel, tick_s: 5e-4 }
     }
 
@@ -103,6 +101,7 @@ fn press<R: Real>(
     // Feed positions are products with 32 bits of the length that they are parts of.
     let rounding_mm = rounding_mm + 2.0_f64.powi(-32) * (end[axis] - start[axis]).to_mm().abs();
     let mut differences = Differences::new(machine, axis, start[axis], rounding_mm);
+    let judge = Judge::new(&machine.rules(), machine.tick_s, 1e-5, 0.0);
     let (mut before, mut most) = (start, 1.0_f64);
     for tick in 0..2_000_000 {
         if tick == release {
@@ -122,13 +121,7 @@ fn press<R: Real>(
         if v_mm_s > most_mm_s {
             return Err(format!("tick {tick}: feed {v_mm_s}, asked for at most {most_mm_s}"));
         }
-        let Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 } = machine.axis.limits;
-        let found = [motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(R::to_f64);
-        for (found, limit) in found.into_iter().zip([accel_mm_s2, jerk_mm_s3, snap_mm_s4]) {
-            if found.abs() > limit * (1.0 + 1e-5) {
-                return Err(format!("tick {tick}: {found}, limit {limit}"));
-            }
-        }
+        judge.limits(&along(&motion)).map_err(|error| format!("tick {tick}: {error}"))?;
         for other in (0..AXES).filter(|&other| other != axis) {
             if now[other] != start[other] {
                 return Err(format!("tick {tick}: axis {other} moves in a jog of axis {axis}"));
@@ -161,7 +154,7 @@ fn presses<R: Real>(seed: u64, rounding_mm: f64) -> Result<[usize; 4], String> {
     let mut place: Place = core::array::from_fn(|_| inside(&mut random));
     // Outside of the travel, as after a change of the soft limits.
     if random.chance(0.2) {
-        place[0] = greatest + mm(random.log_between(0.01, 20.0));
+        place[0] = greatest + mm(random.log(0.01, 20.0));
     }
     let [mut arrived, mut at_limit, mut released, mut refused] = [0; 4];
     for _ in 0..12 {
@@ -170,10 +163,10 @@ fn presses<R: Real>(seed: u64, rounding_mm: f64) -> Result<[usize; 4], String> {
         let way = if random.chance(0.5) {
             Way::Continuous(if positive { Direction::Positive } else { Direction::Negative })
         } else {
-            let by = mm(random.log_between(1e-4, 50.0));
+            let by = mm(random.log(1e-4, 50.0));
             Way::By(if positive { by } else { -by })
         };
-        let feed_mm_s = machine.axis.feed_mm_s * random.log_between(0.01, 1.0);
+        let feed_mm_s = machine.axis.feed_mm_s * random.log(0.01, 1.0);
         let here = place[axis];
         let is_outwards = if positive { here >= greatest } else { here <= least };
         if is_outwards {
@@ -191,8 +184,7 @@ fn presses<R: Real>(seed: u64, rounding_mm: f64) -> Result<[usize; 4], String> {
         };
         // No key is held for minutes.
         let is_long = (end - here).to_mm().abs() / feed_mm_s > 30.0;
-        let release =
-            if is_long || random.chance(0.5) { random.log_between(1.0, 4000.0) as u64 } else { u64::MAX };
+        let release = if is_long || random.chance(0.5) { random.log(1.0, 4000.0) as u64 } else { u64::MAX };
         let asked = (axis, way, feed_mm_s);
         let (now, outcome) = press::<R>(&machine, place, asked, release, &mut random, rounding_mm)
             .map_err(|error| format!("{machine:?} from {here:?}, {asked:?}: {error}"))?;
@@ -211,10 +203,10 @@ fn presses<R: Real>(seed: u64, rounding_mm: f64) -> Result<[usize; 4], String> {
 }
 
 #[test]
-fn keys_at_random() {
+fn keys_pressed_at_random_move_within_limits_to_exact_ends() {
     let mut totals = [0; 4];
-    let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
-    let machines = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(120);
+    let first = motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(1);
+    let machines = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(120);
     for seed in first..first + machines {
         let counts = match seed % 3 {
             // f32 rounds what is local to a piece of 16 mm.

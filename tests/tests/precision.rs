@@ -3,20 +3,17 @@
 //! The law is written out here from S1 (1)–(6), in f64 with what cancels rearranged; time is a whole number of
 //! ticks, so its only error is its last place. Path lengths are exact to 2⁻³² mm.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
 use std::f64::consts::PI;
 use std::fmt::Write;
 
-use check::geometry::{Arc, Element, Move, UNITS_PER_MM, dot, minus, norm};
-use motion_host::gcode;
 use motion_host::machine::Machine;
-use motion_host::planning::{Executable, Mode, PlacedRamp, Plan, plan_program};
+use motion_host::planning::{Executable, PlacedRamp};
 use motion_kernel::exec::{ExecState, Executed, Executor};
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
+use motion_tests::check::geometry::{self, Arc, Element, Move, UNITS_PER_MM, dot, minus, norm};
+use motion_tests::check::{bounds, planned};
 
 /// Promised: a quarter of a count.
 const COUNTS_MAX: f64 = 0.25;
@@ -64,8 +61,7 @@ fn law(placed: &PlacedRamp, t: f64) -> [f64; 4] {
 
 /// Executes the last stretch of `text`, a single move, in f32 on the reference machine; compares every tick.
 fn compare(text: &str, element: &Element, from: [i64; 3], machine: &Machine) -> Worst {
-    let program = gcode::read("precision.ngc", text.as_bytes()).expect("G-code");
-    let plan: Plan = plan_program("precision.ngc", &program, machine, Mode::Spanning).expect("a plan");
+    let plan = planned(text, machine).expect("a plan");
     let start_mm = plan.blocks.last().expect("a block").start_mm;
     let records: Vec<_> = plan.feed.iter().filter(|record| record.start_mm >= start_mm - 1e-6).collect();
     let mut executable = Executable::new::<f32>(&plan).expect("executable");
@@ -73,7 +69,7 @@ fn compare(text: &str, element: &Element, from: [i64; 3], machine: &Machine) -> 
     let before = &executable.items[..ends.expect("a move")];
     let last = before.iter().rposition(|item| matches!(item, Item::EndOfStretch(_))).map_or(0, |end| end + 1);
     executable.items.drain(..last);
-    let start = from.map(|units| Position::from_bits(check::geometry::position_bits(units)));
+    let start = from.map(|units| Position::from_bits(geometry::position_bits(units)));
     let mut streams = Streams::<f32, 3, 64, 64>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
     let mut supply = Supply::new(executable.supplied(), executable.tick_s);
@@ -154,8 +150,8 @@ fn line(from: [f64; 3], to: [f64; 3]) -> Element {
 
 fn check_line(name: &str, from: [f64; 3], to: [f64; 3], feed_mm_min: f64) {
     let [[fx, fy, fz], [x, y, z]] = [from, to];
-    let way = if from == [0.0; 3] { String::new() } else { format!("G0 X{fx} Y{fy} Z{fz}\nG4 P0\n") };
-    let text = format!("{way}G1 X{x} Y{y} Z{z} F{feed_mm_min}\nM2\n");
+    let approach = if from == [0.0; 3] { String::new() } else { format!("G0 X{fx} Y{fy} Z{fz}\nG4 P0\n") };
+    let text = format!("{approach}G1 X{x} Y{y} Z{z} F{feed_mm_min}\nM2\n");
     let worst = compare(&text, &line(from, to), units(from), &Machine::reference());
     println!(
         "{name}, {feed_mm_min} mm/min: {:.4} counts; V {:.1e} A {:.1e} J {:.1e}",
@@ -195,15 +191,16 @@ fn arcs_from_a_millimetre_to_five_metres() {
             let from = units([far_mm, 0.0, 0.0]);
             let element = Element::new(&Move { from, to: from, arc: Some(arc), feed_mm_min: 0.0 });
             let word = if is_clockwise { "G2" } else { "G3" };
-            let way = if far_mm > 0.0 { format!("G0 X{far_mm}\nG4 P0\n") } else { String::new() };
-            let text = format!("{way}{word} X{far_mm} Y0 I{:.10} J{:.10} F18000\nM2\n", offset[0], offset[1]);
+            let approach = if far_mm > 0.0 { format!("G0 X{far_mm}\nG4 P0\n") } else { String::new() };
+            let text =
+                format!("{approach}{word} X{far_mm} Y0 I{:.10} J{:.10} F18000\nM2\n", offset[0], offset[1]);
             let worst = compare(&text, &element, from, &Machine::reference());
             println!(
                 "R {radius_mm} at X{far_mm}: {:.4} counts; V {:.1e} A {:.1e} J {:.1e}",
                 worst[0], worst[1], worst[2], worst[3]
             );
             assert!(worst[0] <= COUNTS_MAX, "R {radius_mm} at X{far_mm}: {worst:?}");
-            for (share, bound) in worst[1..].iter().zip(check::bounds::AXIS_SHARES) {
+            for (share, bound) in worst[1..].iter().zip(bounds::AXIS_SHARES) {
                 assert!(*share <= bound, "R {radius_mm} at X{far_mm}: {worst:?}");
             }
         }
@@ -227,11 +224,10 @@ fn increments(count: i64) {
     for _ in 0..count {
         let _ = writeln!(text, "X0.0033333333 Y-0.0011111111");
     }
-    let program = gcode::read("increments.ngc", text.as_bytes()).expect("G-code");
     // Slow enough for lines of 3.5 µm.
     let mut machine = Machine::reference();
     machine.path.feed_mm_s = 80.0;
-    let plan = plan_program("increments.ngc", &program, &machine, Mode::Spanning).expect("a plan");
+    let plan = planned(&text, &machine).expect("a plan");
     let executable = Executable::new::<f32>(&plan).expect("executable");
     let start = [Position::ZERO; 3];
     let mut streams = Streams::<f32, 3, 64, 64>::new();
@@ -252,7 +248,7 @@ fn increments(count: i64) {
             worst = worst.max((along - executed.motion.s.to_mm()).abs() / MM_PER_COUNT);
         }
         if executed.state == ExecState::Idle && supply.is_empty() {
-            let exact = [33_333_333 * count, -11_111_111 * count].map(check::geometry::position_bits);
+            let exact = [33_333_333 * count, -11_111_111 * count].map(geometry::position_bits);
             let end = executed.setpoints.map(|axis| axis.position.to_bits());
             println!("{count} increments: {worst:.4} counts");
             assert!((end[0] - exact[0]).abs() <= 1 && (end[1] - exact[1]).abs() <= 1, "{end:?} {exact:?}");

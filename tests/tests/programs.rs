@@ -5,19 +5,15 @@
 //! `MOTION_TEST_SEED` is the first seed, `MOTION_TEST_PROGRAMS` how many; with a single program its
 //! text is printed.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use check::random::Random;
-use check::totals::Totals;
-use check::{drive, machine, program};
-use motion_host::gcode;
-use motion_host::planning::{Mode, plan_program};
+use motion_host::planning::Mode;
 use motion_host::simulate::run;
 use motion_kernel::num::Fixed;
+use motion_tests::check::totals::Totals;
+use motion_tests::check::{drive, geometry, machine, planned, program};
+use motion_tests::random::Random;
 
 /// Programs in the form that runs with every `cargo test`, and in the long form.
 const PROGRAMS: u64 = 1200;
@@ -47,8 +43,8 @@ fn one(seed: u64, is_shown: bool) -> Result<Totals, String> {
 
 /// Runs the seeds on all cores; all failures, and the totals.
 fn many(programs: u64) -> (Totals, Vec<String>) {
-    let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
-    let programs = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(programs);
+    let first = motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(1);
+    let programs = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(programs);
     let next = AtomicU64::new(0);
     let results = Mutex::new((Totals::default(), Vec::new()));
     let workers = std::thread::available_parallelism().map_or(2, usize::from);
@@ -98,8 +94,7 @@ fn blocks_whose_change_of_feed_is_a_few_last_places_are_planned() {
     for step in 1..=400 {
         let length_mm = 1e-5 * 1.03_f64.powi(step);
         let text = format!("G1 X200 F17000\nX{:.10} F18000\nX400 F17999\nM2\n", 200.0 + length_mm);
-        let read = gcode::read("short.ngc", text.as_bytes()).expect("G-code");
-        if let Err(refused) = plan_program("short.ngc", &read, &reference, Mode::Spanning) {
+        if let Err(refused) = planned(&text, &reference) {
             failures.push(format!("{length_mm:e} mm: {refused}"));
         }
     }
@@ -110,7 +105,7 @@ fn blocks_whose_change_of_feed_is_a_few_last_places_are_planned() {
 #[test]
 fn kinks_around_the_programmed_feed_keep_the_acceleration_step() {
     let reference = motion_host::machine::Machine::reference();
-    let mm = |mm: f64| (mm * check::geometry::UNITS_PER_MM).round() as i64;
+    let mm = |mm: f64| (mm * geometry::UNITS_PER_MM).round() as i64;
     for percent in 50..150_u32 {
         // v·φ/τ is the step at 50 mm/s for 100 %.
         let angle = 0.01 * f64::from(percent) * reference.path.accel_step_mm_s2 * reference.tick_s / 50.0;
@@ -132,8 +127,7 @@ fn random_programs_run_on_the_simulated_machine() {
         let machine = machine::gentle(&mut random);
         let fragments = 1 + random.below(4);
         let program = program::generate(&mut random, fragments, 30.0);
-        let read = gcode::read("random.ngc", program.text.as_bytes()).expect("generated");
-        let Ok(plan) = plan_program("random.ngc", &read, &machine, Mode::Spanning) else { continue };
+        let Ok(plan) = planned(&program.text, &machine) else { continue };
         let mut end_mm = [0.0; 3];
         let mut ticks = 0_u64;
         let mut observe = |tick: &motion_host::trace::TraceRow| {
@@ -144,7 +138,7 @@ fn random_programs_run_on_the_simulated_machine() {
         let summary = run(&plan, &machine, &mut observe).expect("a run");
         assert!(summary.faults.is_empty(), "seed {seed}: {:?}", summary.faults);
         let last = program.asked.iter().rev().find_map(|asked| match asked {
-            program::Asked::Move(step) => Some(step.to.map(check::geometry::mm)),
+            program::Asked::Move(step) => Some(step.to.map(geometry::mm)),
             _ => None,
         });
         for (found, asked) in end_mm.into_iter().zip(last.unwrap_or_default()) {
@@ -169,7 +163,7 @@ fn every_tick_of_ten_thousand_programs_keeps_the_promises() {
     let (totals, failures) = many(PROGRAMS_LONG);
     println!("{totals}");
     assert_none(&failures);
-    if check::from_env("MOTION_TEST_PROGRAMS").is_none() {
+    if motion_tests::from_env("MOTION_TEST_PROGRAMS").is_none() {
         assert!(totals.programs >= 10_000 && totals.ticks >= TICKS_LONG, "{totals}");
     }
 }

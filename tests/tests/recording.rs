@@ -1,11 +1,5 @@
 //! A recorded run replays to the bit: whatever the program, the commands, the number type, and what failed on the way.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
-use check::random::Random;
-use check::totals::Totals;
-use check::{drive, machine, program};
 use motion_host::planning::{Mode, Plan};
 use motion_host::recording::{Recorder, Recording, replay};
 use motion_host::simulate::inject::Injections;
@@ -16,6 +10,9 @@ use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
+use motion_tests::check::totals::Totals;
+use motion_tests::check::{drive, machine, program};
+use motion_tests::random::Random;
 
 /// What breaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,7 +107,7 @@ impl<H: Hardware> DriveEnable<AXES> for Breaking<'_, H> {
 
 /// Commands before random ticks.
 fn script(random: &mut Random, ticks: u64) -> Script {
-    let mut at: Vec<u64> = (0..1 + random.below(12)).map(|_| random.next() % ticks.max(1)).collect();
+    let mut at: Vec<u64> = (0..1 + random.below(12)).map(|_| random.bits() % ticks.max(1)).collect();
     at.sort_unstable();
     let command = |random: &mut Random| match random.below(9) {
         0 | 1 => "hold".to_owned(),
@@ -121,20 +118,20 @@ fn script(random: &mut Random, ticks: u64) -> Script {
         _ => format!("override={}", random.between(0.1, 2.0)),
     };
     let text: Vec<String> = at.iter().map(|tick| format!("{tick}:{}", command(random))).collect();
-    // Whatever was held goes on in the end.
+    // Whatever was held continues in the end.
     let last = 2 * ticks;
     format!("{},{last}:override=1,{last}:continuous,{last}:resume", text.join(",")).parse().expect("a script")
 }
 
 /// A run as far as anybody can see it.
 #[derive(Debug, PartialEq)]
-struct Seen {
+struct Observed {
     ticks: Vec<String>,
     summary: String,
 }
 
-fn seen(ticks: Vec<String>, summary: &RunSummary) -> Seen {
-    Seen { ticks, summary: format!("{summary:?}") }
+fn observed(ticks: Vec<String>, summary: &RunSummary) -> Observed {
+    Observed { ticks, summary: format!("{summary:?}") }
 }
 
 fn words(tick: &TraceRow) -> String {
@@ -176,7 +173,7 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
         }
         _ => None,
     };
-    let at = random.next() % (ticks + 1);
+    let at = random.bits() % (ticks + 1);
     // As `motion run --inject` breaks it: what the hardware answers then is in the recording, not why.
     let injections = (breakage.is_none() && random.chance(0.5)).then(|| {
         let axis = ["X", "Y", "Z"][random.below(AXES)];
@@ -210,7 +207,7 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
         Ok((summary, recorder.finish(&job)))
     })
     .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
-    let recorded = seen(ticks, &summary);
+    let recorded = observed(ticks, &summary);
 
     let bytes = recording.to_bytes();
     let read = Recording::from_bytes(&bytes).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
@@ -220,7 +217,7 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
     let again = replay(&read, &job, &mut |tick| ticks.push(words(tick))).expect("a replay");
     assert_eq!(again.difference, None, "seed {seed}");
     assert_eq!(again.ticks, recording.ticks(), "seed {seed}");
-    assert!(seen(ticks, &again.summary) == recorded, "seed {seed}: the ticks or the summary differ");
+    assert!(observed(ticks, &again.summary) == recorded, "seed {seed}: the ticks or the summary differ");
     let fault = summary.faults.first().map(|fault| fault.fault.clone());
     // What is broken shows, unless the run ended before.
     if breakage.is_some() && at + 1 < summary.ticks {
@@ -231,8 +228,8 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
 
 #[test]
 fn a_recorded_run_replays_to_the_bit() {
-    let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
-    let programs = check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(250);
+    let first = motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(1);
+    let programs = motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(250);
     let (mut runs, mut ticks, mut bytes) = (0, 0, 0);
     let mut faults = std::collections::BTreeMap::<String, u32>::new();
     for seed in first..first + programs {

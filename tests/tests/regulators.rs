@@ -110,7 +110,7 @@ fn a_replay_of_the_kernel_is_the_run() {
     }
 }
 
-/// Five per cent beside the fitted gains the axes follow worse: the comparison is with the best that differencing has.
+/// With gains five per cent off the fitted ones the axes follow worse: the comparison is with the best that differencing has.
 #[test]
 fn fitted_gains_are_the_best() {
     let regulators = regulators();
@@ -132,7 +132,7 @@ fn fitted_gains_are_the_best() {
     }
 }
 
-/// The inverse of the known drive on drives that are not the known ones, one figure 20 % beside at a time.
+/// The inverse of the known drive on drives that are not the known ones, one figure 20 % off at a time.
 #[test]
 fn a_drive_known_badly_is_still_followed_better() {
     let regulators = regulators();

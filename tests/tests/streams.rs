@@ -1,15 +1,12 @@
 //! The two streams: what they refuse, that refusing leaves no trace, and that delivery changes nothing.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
-use check::bench::{LIMITS, RULES, TICK_S, cruise, line, mm, point, ramp, rest_to_rest};
-use check::random::Random;
+use motion_tests::check::bench::{LIMITS, RULES, TICK_S, cruise, line, mm, point, ramp, rest_to_rest};
+use motion_tests::check::planned;
+use motion_tests::random::Random;
 use std::convert::Infallible;
 
-use motion_host::gcode;
 use motion_host::machine::Machine;
-use motion_host::planning::{Executable, Mode, Problem, plan_program};
+use motion_host::planning::{Executable, Problem};
 use motion_kernel::exec::{ExecFault, ExecState, Executed, Executor, PIECES_PER_TICK_MAX};
 use motion_kernel::law::{FeedSegment, Limits, Ticks};
 use motion_kernel::path::{Piece, PieceError};
@@ -181,8 +178,7 @@ fn what_is_not_a_finite_positive_number_makes_no_item() {
 
 /// G-code on the reference machine.
 fn executable(text: &str) -> Executable {
-    let program = gcode::read("streams.ngc", text.as_bytes()).expect("G-code");
-    let plan = plan_program("streams.ngc", &program, &Machine::reference(), Mode::Spanning).expect("a plan");
+    let plan = planned(text, &Machine::reference()).expect("a plan");
     Executable::new::<f32>(&plan).expect("executable")
 }
 
@@ -340,8 +336,7 @@ fn pieces_of_several_stretches_in_one_tick_are_counted_together() {
     let plan = |moves: usize| {
         let side = |word: &str| format!("{word}{}\n", 0.9 / moves as f64).repeat(moves);
         let text = format!("G91 G61 G1 F54000\n{}M2\n", (side("X") + &side("Y")).repeat(20));
-        let program = gcode::read("stairs.ngc", text.as_bytes()).expect("G-code");
-        plan_program("stairs.ngc", &program, &machine, Mode::Spanning).map(|_| ()).map_err(|e| e.problem)
+        planned(&text, &machine).map(|_| ()).map_err(|e| e.problem)
     };
     assert_eq!(plan(2), Ok(()));
     let found = plan(6);
@@ -470,28 +465,24 @@ fn short_lines(pieces_per_tick: f64) -> String {
 #[test]
 fn a_program_too_dense_for_a_tick_is_refused_with_its_line_and_the_feed_that_would_do() {
     let machine = Machine::reference();
-    let plan = |text: &str| {
-        let program = gcode::read("dense.ngc", text.as_bytes()).expect("G-code");
-        plan_program("dense.ngc", &program, &machine, Mode::Spanning)
-    };
-    let Err(refused) = plan(&short_lines(20.0)) else { panic!("20 pieces a tick") };
+    let Err(refused) = planned(&short_lines(20.0), &machine) else { panic!("20 pieces a tick") };
     // Where the feed is reached, not where the program begins.
     let text = refused.to_string();
-    let line = text.strip_prefix("dense.ngc:").and_then(|rest| rest.split(':').next()?.parse().ok());
+    let line = text.strip_prefix("test.ngc:").and_then(|rest| rest.split(':').next()?.parse().ok());
     assert!(line.is_some_and(|line: u32| line > 100), "{text}");
     let Problem::DensePieces { pieces, feed_mm_s, feed_max_mm_s, .. } = refused.problem else {
         panic!("{refused}");
     };
     assert_eq!(pieces, PIECES_PER_TICK_MAX);
     assert!(feed_max_mm_s < feed_mm_s && text.contains("expected at most 16 pieces a tick"));
-    let would_do = plan(&short_lines(0.999 * feed_max_mm_s * TICK_S / 0.001)).map(|_| ());
+    let would_do = planned(&short_lines(0.999 * feed_max_mm_s * TICK_S / 0.001), &machine).map(|_| ());
     assert_eq!(would_do, Ok(()), "the feed that it names");
     let executed = execute::<64>(&executable(&short_lines(15.9)), |_| true);
     assert!(executed.len() > 100);
 }
 
 /// Under live control lines that are too dense for their machine's feed are driven slower, and only those: not the long
-/// line behind them.
+/// line after them.
 #[test]
 fn only_what_is_dense_is_driven_slower_for_it() {
     let fast = |item: &Item<3>| match item {
@@ -554,7 +545,7 @@ fn a_check_finds_whatever_the_streams_would_refuse() {
 }
 
 /// For live control blocks have to hold the whole path and nothing else: without any of them, without the last one, with
-/// one that is longer, with one behind the end, and with one that comes after what it holds.
+/// one that is longer, with one after the end, and with one that comes after what it holds.
 #[test]
 fn a_check_for_live_control_finds_path_that_is_not_held() {
     let good = executable(SHORT).items;
@@ -621,8 +612,7 @@ fn ten_thousand_lines_of_a_nanometre() {
     for feed_mm_min in [0.1, 1.0, 10.0, 1000.0] {
         let line = format!("G1 X0.000001 F{feed_mm_min}\n");
         let text = "G91\n".to_owned() + &line.repeat(10_000);
-        let program = gcode::read("nano.ngc", text.as_bytes()).expect("G-code");
-        match plan_program("nano.ngc", &program, &Machine::reference(), Mode::Spanning) {
+        match planned(&text, &Machine::reference()) {
             Ok(plan) => {
                 let positions = execute::<64>(&Executable::new::<f32>(&plan).expect("executable"), |_| true);
                 let end = positions[positions.len() - 1][0];

@@ -1,8 +1,7 @@
 //! The stringer flange of S3: the published plan, and the whole pipeline on its G-code.
 
-use motion_host::gcode;
 use motion_host::machine::Machine;
-use motion_host::planning::{Mode, Plan, plan_blocks, plan_program};
+use motion_host::planning::{Mode, Plan, plan_blocks};
 use motion_host::simulate::{Number, RunOptions, RunSummary, run_with};
 
 const PROGRAM: &str = include_str!("../../host/src/cli/stringer.ngc");
@@ -65,8 +64,7 @@ fn per_block_plan_is_the_published_one() {
 }
 
 fn planned(machine: &Machine) -> Plan {
-    let program = gcode::read("stringer.ngc", PROGRAM.as_bytes()).expect("a program");
-    plan_program("stringer.ngc", &program, machine, Mode::Spanning).expect("a plan")
+    motion_tests::check::planned(PROGRAM, machine).expect("a plan")
 }
 
 /// S3's result on the reference machine: N2 and N4 limited by jerk, N3 by acceleration, N5 by braking.

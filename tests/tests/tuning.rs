@@ -3,16 +3,13 @@
 //! S4's machine had 4 µm of following error at 4 Hz, a contour error of 20 µm at 10 Hz, and 32 µm of form deviation at
 //! its resonance of 13 Hz.
 
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
 use motion_host::drive::circle::{self, CircleFigures};
 use motion_host::drive::identification::identify_axes;
 use motion_host::machine::Machine;
 use motion_host::tuning::{AxisTuning, Margins, Method, propose};
 use motion_tests::figures::{Table, hold};
 
-use crate::check::random::Random;
+use motion_tests::random::Random;
 
 const FEED_MM_S: f64 = 2150.0 / 60.0;
 /// What identification is off by at most, as a part; the README says so.

@@ -6,6 +6,8 @@
 //!
 //! To change the tick, change [`TICK_HZ`]: the rest follows or does not compile.
 
+use motion_board::BoardParameters;
+
 // --- Clock tree: RM0390 section 6.2, limits DS10693 section 6.3.1 ---------------------------------
 
 /// Clock from the ST-LINK's MCO at OSC_IN, oscillator bypassed (UM1724, "OSC clock supply") \[Hz\].
@@ -120,21 +122,14 @@ pub const TURN_CYCLES_MAX: u32 = 2 * TURN_INSTRUCTIONS_MAX;
 /// The same in ticks, which take their part of the processor: some 33 ms.
 pub const TURN_TICKS_MAX: u32 = (TURN_CYCLES_MAX as u64 * TICK_HZ as u64)
     .div_ceil((SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) as u64) as u32;
-/// So far ahead of what it saw the background changes a ramp \[ticks\]: 4 ms, what an ordinary turn with a plan takes. Where
-/// that was too late, live control tries again, a tick further ahead each time, and stays there.
+/// So far ahead of what it saw the background changes a ramp \[ticks\]: 4 ms, what an ordinary turn with a plan takes.
 pub const LEAD_TICKS: u32 = 8;
-/// For so long the background may be silent before the tick stops feeding the watchdog \[ticks\]: 0.1 s.
-pub const BACKGROUND_SILENT_TICKS_MAX: u32 = TICK_HZ / 10;
 
 const _: () = assert!(
-    3 * TURN_TICKS_MAX < BACKGROUND_SILENT_TICKS_MAX,
+    3 * TURN_TICKS_MAX < BOARD.silent_ticks_max(),
     "the longest turn is close to what the watchdog takes for silence"
 );
 
-/// How long the machine is held still after the drives are enabled \[ticks\]: 0.2 s for their relays and brakes.
-pub const SETTLE_TICKS: u32 = TICK_HZ / 5;
-/// How long the button must be held to count \[ticks\]: 20 ms, longer than its contacts bounce.
-pub const BUTTON_TICKS: u32 = TICK_HZ / 50;
 /// Bits a second of the serial console. A byte is ten bits, two ticks long, so that the tick, which takes one byte, leaves
 /// none behind, however late it is within its tolerance.
 pub const CONSOLE_BAUD: u32 = 9600;
@@ -147,15 +142,20 @@ const _: () = assert!(
     "more bytes may come in a turn of the background than there are places"
 );
 
-/// How often the background reports \[ticks\]: once a second.
-pub const REPORT_TICKS: u32 = TICK_HZ;
-
 /// Ticks that the flight recorder keeps: a twelfth of a second, 28 KB. What it takes, the stack has less.
 pub const FLIGHT_ROWS: usize = TICK_HZ as usize / 12;
 /// Of these, behind that of the fault: 25 ms, in which one sees the axes coast.
 pub const FLIGHT_AFTER: usize = TICK_HZ as usize / 40;
-/// From one of its lines in the log to the next \[ticks\]: 10 ms, for some 250 bytes that the probe has to read.
-pub const FLIGHT_LINE_TICKS: u32 = TICK_HZ / 100;
+
+// --- What the crate of all boards asks for -----------------------------------------------------------
+
+/// The board, for `motion_board`.
+pub const BOARD: BoardParameters = BoardParameters {
+    tick_hz: TICK_HZ,
+    cycles_hz: SYSCLK_HZ,
+    counts_per_s_max: ENCODER_COUNTS_PER_S_MAX,
+    lead_ticks: LEAD_TICKS,
+};
 
 #[cfg(test)]
 mod tests {
@@ -163,7 +163,7 @@ mod tests {
     use crate::machine::{Machine, PROGRAM};
 
     fn machine() -> Machine {
-        Machine::new(PROGRAM).expect("suits")
+        Machine::new(PROGRAM, &BOARD).expect("suits")
     }
 
     #[test]

@@ -2,13 +2,10 @@
 //!
 //! - [`design_parameters`]: every number of the firmware with its derivation;
 //! - [`pins`]: which signal is on which pin;
-//! - [`machine`]: the program in flash and the axes it is for;
-//! - [`console`]: what is commanded over the serial port;
-//! - [`operator`]: what is done about that and the button, in every phase;
-//! - [`program`]: what the start button runs;
-//! - [`tick_timing`] and [`liveness`]: what the tick keeps about itself.
+//! - [`machine`]: the number of axes, the program in flash, and the sizes that follow.
 //!
-//! The firmware itself is `main.rs` and the modules beside it. From the board's folder:
+//! The firmware itself is `main.rs` and its modules; what it shares with other boards is the crate `motion_board`. From the
+//! board's folder:
 //!
 //! ```console
 //! cargo test --lib --target x86_64-unknown-linux-gnu
@@ -24,8 +21,3 @@
 pub mod design_parameters;
 pub mod pins;
 pub mod machine;
-pub mod console;
-pub mod operator;
-pub mod program;
-pub mod tick_timing;
-pub mod liveness;

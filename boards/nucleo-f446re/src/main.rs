@@ -23,7 +23,6 @@ mod drives;
 mod hal;
 mod tick_timer;
 mod console_port;
-mod control;
 mod background;
 
 use core::sync::atomic::Ordering;
@@ -39,23 +38,20 @@ mod app {
     use core::sync::atomic::Ordering;
 
     use cortex_m::peripheral::DWT;
-    use heapless::spsc::{Consumer, Producer, Queue};
-    use motion_kernel::exec::ExecState;
+    use heapless::spsc::{Producer, Queue};
+    use motion_board::Liveness;
     use motion_kernel::kernel::Kernel;
     use motion_kernel::tick_monitor::TickMonitor;
-    use nucleo_f446re::design_parameters::{CONSOLE_BYTES, TICK_CYCLES, TICK_PRIORITY};
-    use nucleo_f446re::liveness::Liveness;
-    use nucleo_f446re::machine::{AXES, Machine, PROGRAM};
-    use nucleo_f446re::tick_timing::TickTiming;
-    use stm32f4xx_hal::gpio::{Input, Output, PA10, PC13};
+    use nucleo_f446re::design_parameters::{BOARD, CONSOLE_BYTES, TICK_CYCLES, TICK_PRIORITY};
+    use nucleo_f446re::machine::{AXES, Control, Flight, Machine, Number, PROGRAM, Streams};
+    use stm32f4xx_hal::gpio::{Output, PA10};
     use stm32f4xx_hal::pac::USART2;
     use stm32f4xx_hal::serial::Rx;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-    use crate::background::{self, TICKS, TURNS};
+    use crate::background::{self, Panel, TICKS, TURNS};
     use crate::board::Board;
     use crate::console_port;
-    use crate::control::{Control, Flight, Streams};
     use crate::hal::Hardware;
     use crate::tick_timer::TickTimer;
 
@@ -74,10 +70,9 @@ mod app {
         liveness: Liveness,
         monitor: TickMonitor,
         scope: PA10<Output>,
-        button: PC13<Input>,
         console: Rx<USART2>,
         received: Producer<'static, u8>,
-        bytes: Consumer<'static, u8>,
+        panel: Panel,
         streams: &'static mut Streams,
         machine: Machine,
     }
@@ -87,38 +82,29 @@ mod app {
         flight: Flight = Flight::new(),
         console_bytes: Queue<u8, CONSOLE_BYTES> = Queue::new(),
         // Nothing ever enters it: what the kernel looks at until there is a program.
-        empty: motion_kernel::queue::Streams<f32, AXES, 2, 2> = motion_kernel::queue::Streams::new(),
+        empty: motion_kernel::queue::Streams<Number, AXES, 2, 2> = motion_kernel::queue::Streams::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let Board { mut hardware, mut tick_timer, mut watchdog, scope, button, console } =
             Board::new(cx.device, cx.core);
-        let machine = defmt::unwrap!(Machine::new(PROGRAM));
+        let machine = defmt::unwrap!(Machine::new(PROGRAM, &BOARD));
         // Where the machine stands is called the program's start.
         let start = machine.header().start;
         let kernel = Kernel::new(&machine.axes, start, hardware.encoders.latch());
         let (_, intake) = cx.local.empty.split(machine.header().rules, start);
-        let control = Control {
-            kernel,
-            intake,
-            state: ExecState::Idle,
-            position: start,
-            healthy: false,
-            log: TickTiming::new(),
-            flight: cx.local.flight,
-        };
+        let control = Control::new(kernel, intake, start, cx.local.flight);
         let (received, bytes) = cx.local.console_bytes.split();
         Board::start(&mut tick_timer, &mut watchdog);
         let local = Local {
             hardware,
             tick_timer,
             watchdog,
-            liveness: Liveness::new(),
+            liveness: Liveness::new(BOARD.silent_ticks_max()),
             monitor: defmt::unwrap!(TickMonitor::new(32, TICK_CYCLES)),
             scope,
-            button,
             console,
             received,
-            bytes,
+            panel: Panel { button, bytes },
             streams: cx.local.storage,
             machine,
         };
@@ -140,34 +126,26 @@ mod app {
         let hardware = cx.local.hardware;
         cx.local.scope.set_high();
         cx.shared.control.lock(|control| {
-            let Control { kernel, intake, flight, .. } = control;
-            let fault = hardware.drives.check();
-            for kind in fault.into_iter().chain(cx.local.monitor.began(begin)) {
-                kernel.trip(kind);
-            }
-            let trace = kernel.tick(intake, hardware);
-            flight.add(trace);
-            control.healthy = fault.is_none();
-            control.state = trace.executed.state;
-            control.position = trace.executed.setpoints.map(|setpoint| setpoint.position);
+            let unhealthy = hardware.drives.check();
+            control.tick(unhealthy, cx.local.monitor.began(begin), hardware);
             if cx.local.liveness.may_feed(TURNS.load(Ordering::Relaxed)) {
                 cx.local.watchdog.feed();
             }
             console_port::receive(cx.local.console, cx.local.received);
             if let Some(kind) = cx.local.monitor.ended(DWT::cycle_count()) {
-                kernel.trip(kind);
+                control.trip(kind);
             }
             let overrun = cx.local.tick_timer.due_again();
-            control.log.add(DWT::cycle_count().wrapping_sub(begin), latency_cycles, overrun);
+            control.timing.add(DWT::cycle_count().wrapping_sub(begin), latency_cycles, overrun);
         });
         TICKS.store(TICKS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         cx.local.scope.set_low();
     }
 
     /// The background.
-    #[idle(local = [streams, button, bytes, machine], shared = [control])]
+    #[idle(local = [streams, panel, machine], shared = [control])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { streams, button, bytes, machine, .. } = cx.local;
-        background::run(cx.shared.control, streams, machine, button, bytes)
+        let idle::LocalResources { streams, panel, machine, .. } = cx.local;
+        background::run(cx.shared.control, streams, machine, panel)
     }
 }

@@ -151,7 +151,7 @@ pub fn close<
     let control = LiveControl::new(program.items(), header.tick_s, 0);
     let commands = Commands { random: SplitMix64::new(seed), turns_left: COMMANDED_TURNS, lost: 0 };
     let producer = LiveProducer { feeder, control, commands };
-    Ok((producer, ClosedLoop { kernel, intake, machine, outputs, memory }))
+    Ok((producer, ClosedLoop { kernel, intake: intake.into(), machine, outputs, memory }))
 }
 
 #[cfg(test)]

@@ -1,13 +1,15 @@
 //! `motion compile`: a planned program as bytes, for a board.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use motion_kernel::num::{Fixed, Root};
 
 use super::error::{CliError, Outcome};
-use super::input::{self, Output};
+use super::input;
+use super::outputs::Written;
+use crate::files::Files;
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Executable, Mode, Plan, plan_program};
@@ -56,6 +58,11 @@ enum Number {
 /// # Errors
 /// The program or the machine file is refused, or a file can't be read or written.
 pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let mut files = Files::reading([
+        ("PROGRAM", Some(arguments.program.as_path())),
+        ("--machine", arguments.machine.as_deref()),
+    ]);
+    let output = files.output("--output", &arguments.output)?;
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
@@ -70,7 +77,8 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
     } else {
         (executable.without_blocks().count(), executable.to_bytes(&machine))
     };
-    write(&arguments.output, &bytes)?;
+    let mut written = Written::default();
+    written.write("program", Some(output), |file| file.write_all(&bytes));
     for notice in &plan.notices {
         writeln!(out, "note: {notice}").map_err(CliError::Output)?;
     }
@@ -86,17 +94,11 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
         machine.name
     )
     .map_err(CliError::Output)?;
-    Ok(Outcome::Done)
+    written.outcome(Outcome::Done)
 }
 
 /// The program in the board's numbers, if they hold its axes, too.
 fn executable<R: Root>(plan: &Plan, machine: &Machine) -> Result<Executable, CliError> {
     machine.axes_config::<R>().map_err(|source| CliError::Axis { machine: machine.name.clone(), source })?;
     Ok(Executable::new::<R>(plan)?)
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    let mut output = Output::create(path)?;
-    let written = output.file.write_all(bytes).and_then(|()| output.file.flush());
-    written.map_err(|source| CliError::Write { path: output.name, source })
 }

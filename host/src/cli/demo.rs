@@ -5,6 +5,7 @@ use std::io::Write;
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
 use super::{plan, run};
+use crate::files::Files;
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, plan_program};
@@ -24,7 +25,7 @@ pub fn demonstrate(out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = Machine::reference();
     let program = gcode::read(STRINGER_NAME, STRINGER.as_bytes())?;
     let plan = plan_program(STRINGER_NAME, &program, &machine, Mode::Spanning)?;
-    let outputs = Outputs::create(&None, &Some(REPORT.into()))?;
+    let outputs = Outputs::report(&mut Files::reading([]), "the report", REPORT.into())?;
     let mut say = |text: &str| writeln!(out, "{text}").map_err(CliError::Output);
     say("Demonstration: a stringer flange, 5000 mm/min, on the reference machine.\n")?;
     for line in STRINGER.lines() {
@@ -32,14 +33,16 @@ pub fn demonstrate(out: &mut dyn Write) -> Result<Outcome, CliError> {
     }
     say("\nPlan: what limits the feed\n")?;
     plan::write_plan(&plan, out).map_err(CliError::Output)?;
-    let summary = run::execute(&RunOptions::default(), &plan, &machine, outputs, None)?;
+    let (summary, written) = run::execute(&RunOptions::default(), &plan, &machine, outputs, None)?;
     let mut say = |text: &str| writeln!(out, "{text}").map_err(CliError::Output);
     say("\nRun: the real-time kernel on simulated axes\n")?;
     run::write_summary(&summary, out).map_err(CliError::Output)?;
-    let place = std::path::absolute(REPORT).unwrap_or_else(|_| REPORT.into());
-    writeln!(out, "\nReport written to {}", place.display()).map_err(CliError::Output)?;
+    if written.place_of("report").is_some() {
+        let place = std::path::absolute(REPORT).unwrap_or_else(|_| REPORT.into());
+        writeln!(out, "\nReport written to {}", place.display()).map_err(CliError::Output)?;
+    }
     writeln!(out, "`motion --help` shows what else there is.").map_err(CliError::Output)?;
-    Ok(if summary.faults.is_empty() { Outcome::Done } else { Outcome::Failed })
+    written.outcome(Outcome::of(&summary))
 }
 
 #[cfg(test)]

@@ -6,36 +6,55 @@ use std::process::ExitCode;
 use thiserror::Error;
 
 use crate::drive::DriveError;
+use crate::files::FilesError;
 use crate::flight::FlightError;
 use crate::gcode::GcodeError;
 use crate::machine::{AxisError, MachineError};
 use crate::planning::PlanningError;
 use crate::points::PointsError;
 use crate::recording::RecordingError;
-use crate::simulate::RunError;
 use crate::simulate::home::HomeError;
 use crate::simulate::jog::JogError;
 use crate::simulate::session::SessionError;
+use crate::simulate::{RunError, RunSummary};
 use crate::toolpath::spline::SplineError;
+use crate::trace::RunEnd;
 use crate::tuning::TuningError;
 
-/// How a command that ran to its end ended.
+/// How a command that printed its results ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Everything is as it should be.
     Done,
     /// The run ended in a fault, or a check failed.
     Failed,
+    /// The run was held, and nothing resumed it.
+    Held,
+    /// The run was aborted.
+    Aborted,
 }
 
 impl Outcome {
-    /// 0 or 1.
+    /// That of a run.
+    #[must_use]
+    pub fn of(summary: &RunSummary) -> Self {
+        match summary.end {
+            RunEnd::Finished => Self::Done,
+            RunEnd::Faulted | RunEnd::Cut => Self::Failed,
+            RunEnd::Held(_) => Self::Held,
+            RunEnd::Aborted => Self::Aborted,
+        }
+    }
+
+    /// 0, 1, 3 or 4: see [`cli`](super).
     #[must_use]
     pub fn exit_code(self) -> ExitCode {
-        match self {
-            Self::Done => ExitCode::SUCCESS,
-            Self::Failed => ExitCode::FAILURE,
-        }
+        ExitCode::from(match self {
+            Self::Done => 0,
+            Self::Failed => 1,
+            Self::Held => 3,
+            Self::Aborted => 4,
+        })
     }
 }
 
@@ -50,13 +69,23 @@ pub enum CliError {
         /// The system's reason.
         source: io::Error,
     },
-    /// A file can't be written.
-    #[error("{path}: found {source}, expected a file that can be written")]
-    Write {
-        /// As the user gave it.
-        path: String,
-        /// The system's reason.
-        source: io::Error,
+    /// A file is not to be written, or can't be opened: found before the work.
+    #[error(transparent)]
+    Files(#[from] FilesError),
+    /// Files could not be written; the results were printed.
+    #[error("{}", .0.join("\nmotion: "))]
+    Unwritten(Vec<String>),
+    /// The run ended before commands were due; its results were printed.
+    #[error(
+        "--at {commands}: found the end of the run in tick {last_tick}, expected commands within the run"
+    )]
+    Unreached {
+        /// The commands, as the user gave them.
+        commands: String,
+        /// The last tick of the run.
+        last_tick: u64,
+        /// How the run ended.
+        outcome: Outcome,
     },
     /// Standard output can't be written.
     #[error("standard output: found {0}, expected a place that can be written")]
@@ -147,15 +176,28 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// 2, but for output that failed, for a plan that the kernel refuses, for an experiment that ended in a fault or
-    /// found nothing to measure, for one that found too little to tune by, for an axis that found no reference, and for a
-    /// jog or a homing that ended in a fault or that the kernel refuses: these are not the user's input.
+    /// The error of a run that ended before commands of its script were due; else `outcome`.
+    ///
+    /// # Errors
+    /// There are such commands.
+    pub fn of_unreached(summary: &RunSummary, outcome: Outcome) -> Result<Outcome, Self> {
+        if summary.unreached.is_empty() {
+            return Ok(outcome);
+        }
+        let (commands, last_tick) = (summary.unreached.join(","), summary.ticks.saturating_sub(1));
+        Err(Self::Unreached { commands, last_tick, outcome })
+    }
+
+    /// 2 where the user's input is wrong. Where it is not: 6 for results that could not be written; 5 for commands that
+    /// were not reached by a run that finished; 1 for a fault, for a plan or a motion that the kernel refuses, for an
+    /// experiment that found nothing to measure or too little to tune by, and for an axis that found no reference.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Output(_) | Self::Tuning(_) | Self::Run { source: RunError::Rejected(_), .. } => {
-                ExitCode::FAILURE
-            }
+            Self::Output(_) | Self::Unwritten(_) => ExitCode::from(6),
+            Self::Unreached { outcome: Outcome::Done, .. } => ExitCode::from(5),
+            Self::Unreached { outcome, .. } => outcome.exit_code(),
+            Self::Tuning(_) | Self::Run { source: RunError::Rejected(_), .. } => ExitCode::FAILURE,
             Self::Home { source: HomeError::Axis { .. }, .. } => ExitCode::FAILURE,
             Self::Home { source: HomeError::Session(ended), .. }
             | Self::Jog(JogError::Session { source: ended, .. }) => ended_badly(ended),
@@ -174,7 +216,7 @@ impl CliError {
 /// A fault, or motion that the kernel refuses, is not the user's input.
 fn ended_badly(error: &SessionError) -> ExitCode {
     match error {
-        SessionError::Fault(_) | SessionError::Moves | SessionError::Run(RunError::Rejected(_)) => {
+        SessionError::Fault { .. } | SessionError::Moves | SessionError::Run(RunError::Rejected(_)) => {
             ExitCode::FAILURE
         }
         SessionError::Run(_) => ExitCode::from(2),

@@ -7,7 +7,8 @@ use clap::Args;
 
 use super::error::{CliError, Outcome};
 use super::input;
-use super::outputs::{self, Outputs};
+use super::outputs::Outputs;
+use crate::files::Files;
 use crate::flight;
 use crate::simulate::RunInfo;
 use crate::trace::{RunTrace, TracedFault};
@@ -44,11 +45,13 @@ pub struct FlightArguments {
 /// # Errors
 /// The log has no frame or a damaged one, or a file can't be read or written.
 pub fn flight(arguments: &FlightArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let mut files =
+        Files::reading([("LOG", Some(arguments.log.as_path())), ("--machine", arguments.machine.as_deref())]);
+    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.log)?;
     let rows = flight::read(&String::from_utf8_lossy(&source.text))
         .map_err(|error| CliError::Flight { path: source.name.clone(), source: error })?;
-    let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
     let info = RunInfo { program: source.name, ..RunInfo::of_machine(&machine) };
     let faults = rows.iter().find(|row| row.is_faulted).map(|row| TracedFault {
         tick: row.tick,
@@ -63,10 +66,10 @@ pub fn flight(arguments: &FlightArguments, out: &mut dyn Write) -> Result<Outcom
         ticks: flight::ticks(&rows),
         ..info.empty_trace()
     };
-    outputs.of_trace(&info, &trace)?;
+    let written = outputs.of_trace(&info, &trace);
     for line in &trace.notices {
         writeln!(out, "  {line}").map_err(CliError::Output)?;
     }
-    outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
-    Ok(Outcome::Done)
+    written.say(out)?;
+    written.outcome(Outcome::Done)
 }

@@ -10,6 +10,7 @@ use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
 use super::table::{self, Align};
 use super::{input, write_json};
+use crate::files::Files;
 use crate::machine::Machine;
 use crate::simulate::home::{HomeError, HomedAxis, Homes};
 use crate::simulate::job::RunInfo;
@@ -56,23 +57,25 @@ struct AxisJson<'a> {
 /// # Errors
 /// The machine file is refused or homes no axis, an axis is not homed, or a file can't be written.
 pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let mut files = Files::reading([("--machine", Some(arguments.machine.as_path()))]);
+    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), None)?;
     let machine = input::machine(Some(&arguments.machine))?;
     let name = arguments.machine.display().to_string();
     let refused = |source: HomeError| CliError::Home { machine: name.clone(), source };
-    // Before any file is replaced.
     let homes = Homes::new(&machine).map_err(refused)?;
-    let outputs = Outputs::create(&arguments.trace, &None)?;
     let mut homed = Vec::new();
-    let (ended, _) =
-        outputs.of_ticks(&RunInfo::of_machine(&machine), |observe| homes.home(&mut homed, observe))?;
-    // What was homed is shown, whatever became of the next axis.
+    let info = RunInfo::of_machine(&machine);
+    let (ended, ticks) = outputs.of_ticks(&info, |observe| homes.home(&mut homed, observe));
+    // What was homed is written and shown, whatever became of the next axis.
+    let written = ticks.write(|_| info.empty_trace());
     if arguments.json {
         let axes: Vec<AxisJson<'_>> = homed.iter().map(|axis| axis_json(axis, &machine)).collect();
         write_json(&axes, out)?;
     } else if !homed.is_empty() {
         write_table(&homed, &machine, out).map_err(CliError::Output)?;
     }
-    ended.map(|()| Outcome::Done).map_err(refused)
+    ended.map_err(refused)?;
+    written.outcome(Outcome::Done)
 }
 
 fn axis_json<'a>(axis: &'a HomedAxis, machine: &Machine) -> AxisJson<'a> {

@@ -1,14 +1,12 @@
-//! Programs and machine files, and the files that are written.
+//! Programs and machine files.
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Read};
+use std::fs;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
+use crate::files::STANDARD_INPUT;
 use crate::machine::Machine;
-
-/// The name that stands for standard input.
-const STANDARD_INPUT: &str = "-";
 
 /// A text and the name it goes by in errors and reports.
 pub(super) struct Source {
@@ -38,21 +36,4 @@ pub(super) fn machine(path: Option<&PathBuf>) -> Result<Machine, CliError> {
     let name = path.display().to_string();
     let text = fs::read_to_string(path).map_err(|source| CliError::Read { path: name.clone(), source })?;
     Ok(Machine::from_toml(&name, &text)?)
-}
-
-/// A file to be written, and its name for errors.
-pub(super) struct Output {
-    pub(super) name: String,
-    pub(super) file: BufWriter<File>,
-}
-
-impl Output {
-    /// Creates the file; what was there is replaced.
-    pub(super) fn create(path: &Path) -> Result<Self, CliError> {
-        let name = path.display().to_string();
-        match File::create(path) {
-            Ok(file) => Ok(Self { name, file: BufWriter::new(file) }),
-            Err(source) => Err(CliError::Write { path: name, source }),
-        }
-    }
 }

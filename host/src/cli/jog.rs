@@ -10,6 +10,7 @@ use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
 use super::table::{self, Align};
 use super::{input, write_json};
+use crate::files::Files;
 use crate::simulate::job::RunInfo;
 use crate::simulate::jog::{Ended, Jogged, Keys, Press};
 
@@ -87,14 +88,15 @@ impl PressJson {
 /// # Errors
 /// The machine file or a key is refused, a fault ended a jog, or a file can't be written.
 pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let mut files = Files::reading([("--machine", arguments.machine.as_deref())]);
+    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), None)?;
     let machine = input::machine(arguments.machine.as_ref())?;
-    // Before any file is replaced.
     let keys = Keys::new(&machine, &arguments.presses, arguments.feed)?;
-    let outputs = Outputs::create(&arguments.trace, &None)?;
     let mut jogged = Vec::new();
-    let (ended, _) =
-        outputs.of_ticks(&RunInfo::of_machine(&machine), |observe| keys.jog(&mut jogged, observe))?;
-    // What was jogged is shown, whatever became of the next key.
+    let info = RunInfo::of_machine(&machine);
+    let (ended, ticks) = outputs.of_ticks(&info, |observe| keys.jog(&mut jogged, observe));
+    // What was jogged is written and shown, whatever became of the next key.
+    let written = ticks.write(|_| info.empty_trace());
     let presses: Vec<PressJson> =
         jogged.iter().map(|jogged| PressJson::new(jogged, machine.tick_s)).collect();
     if arguments.json {
@@ -102,7 +104,8 @@ pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     } else if !presses.is_empty() {
         write_table(&presses, out).map_err(CliError::Output)?;
     }
-    ended.map(|()| Outcome::Done).map_err(CliError::Jog)
+    ended.map_err(CliError::Jog)?;
+    written.outcome(Outcome::Done)
 }
 
 fn write_table(presses: &[PressJson], out: &mut dyn Write) -> io::Result<()> {

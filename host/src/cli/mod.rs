@@ -1,8 +1,21 @@
 //! The command line: what users and scripts rely on.
 //!
-//! Consumes arguments, files and standard input; produces text for people, `--json` for scripts, CSV for tables.
-//! Exit status 0: done; 1: the run ended in a fault, or a check failed; 2: wrong input. An error is one line on standard
-//! error that names file, line and column, what was found and what was expected.
+//! Consumes arguments, files and standard input; produces text for people, `--json` for scripts, CSV for tables. An error
+//! is one line on standard error that names file, line and column, what was found and what was expected.
+//!
+//! | exit status | meaning |
+//! |---:|---|
+//! | 0 | done: a run came to the end of its program |
+//! | 1 | a fault ended the run, a check failed, or the kernel refused the motion |
+//! | 2 | wrong input: an argument, a program, a machine file, a path; found before the work |
+//! | 3 | the run was held, and no command resumed it |
+//! | 4 | the run was aborted |
+//! | 5 | the run finished before a command of `--at` was due |
+//! | 6 | results could not be written: a file, or standard output |
+//! | 130, 143 | interrupted: Ctrl-C (SIGINT), SIGTERM |
+//!
+//! With 1, 3, 4, 5 and 6 the results are printed. A file that is not written whole stays as it was, in all cases
+//! ([`files`](crate::files)).
 //!
 //! - [`profile`]: one ramp of the feed law, in figures;
 //! - [`plan`]: the feed plan of a program or a block list;
@@ -41,12 +54,13 @@ mod progress;
 mod table;
 mod trace;
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
 use self::error::{CliError, Outcome};
+use crate::files::interrupt;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -64,7 +78,16 @@ Examples:
   motion machine > mine.toml                     a machine file to start from
   motion machine --explain                       what every key of it means
 
-Exit status: 0 done, 1 the run ended in a fault or a check failed, 2 wrong input.";
+Exit status:
+  0  done: a run came to the end of its program
+  1  a fault ended the run, a check failed, or the kernel refused the motion
+  2  wrong input, found before the work
+  3  the run was held, and no command resumed it
+  4  the run was aborted
+  5  the run finished before a command of --at was due
+  6  results could not be written: a file, or standard output
+  130, 143  interrupted by Ctrl-C or SIGTERM
+With 1, 3, 4, 5 and 6 the results are printed. A file that is not written whole stays as it was.";
 
 /// G-code to motion: plans the feed, runs the real-time kernel, and shows what simulated ±10 V axes make of it.
 ///
@@ -95,20 +118,24 @@ enum Command {
 /// The whole program: arguments to exit status.
 #[must_use]
 pub fn main() -> ExitCode {
+    interrupt::watch();
     let cli = Cli::parse();
     let mut out = BufWriter::new(io::stdout().lock());
     let done = execute(&cli, &mut out);
-    match done.and_then(|outcome| out.flush().map(|()| outcome).map_err(CliError::Output)) {
-        Ok(outcome) => outcome.exit_code(),
+    // What was printed before an error belongs before it.
+    let flushed = out.flush();
+    let failure = match (done, flushed) {
         // Whoever reads us has seen enough (`motion plan part.ngc | head`).
-        Err(CliError::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
-        Err(error) => {
-            // What was printed before the error belongs before it.
-            let _ = out.flush();
-            eprintln!("motion: {error}");
-            error.exit_code()
+        (Err(CliError::Output(error)), _) if error.kind() == ErrorKind::BrokenPipe => {
+            return ExitCode::SUCCESS;
         }
-    }
+        (Ok(outcome), Err(error)) if error.kind() == ErrorKind::BrokenPipe => return outcome.exit_code(),
+        (Ok(outcome), Ok(())) => return outcome.exit_code(),
+        (Ok(_), Err(error)) => CliError::Output(error),
+        (Err(error), _) => error,
+    };
+    eprintln!("motion: {failure}");
+    failure.exit_code()
 }
 
 fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {

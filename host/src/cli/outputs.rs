@@ -1,37 +1,105 @@
 //! Files about a run: the trace, written as it goes, and the report afterwards.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, Write};
 use std::path::PathBuf;
 
-use super::error::CliError;
-use super::input::Output;
+use super::error::{CliError, Outcome};
 use super::progress::Progress;
 use super::trace::TraceWriter;
+use crate::files::{Failure, Files, FilesError, OutputFile};
 use crate::report;
 use crate::simulate::{Job, Observer, RunError, RunInfo, RunSummary};
 use crate::trace::{RunTrace, TraceRow};
 
+/// Opens the file of an option, if it is given.
+pub(super) fn open(
+    files: &mut Files,
+    option: &'static str,
+    path: Option<&PathBuf>,
+) -> Result<Option<OutputFile>, FilesError> {
+    path.map(|path| files.output(option, path)).transpose()
+}
+
+/// What became of the files of a command. They are written before the results are printed, and nothing that happens to a
+/// file swallows the results.
+#[derive(Debug, Default)]
+pub(super) struct Written {
+    files: Vec<(&'static str, String)>,
+    failures: Vec<FilesError>,
+}
+
+impl Written {
+    /// Writes a file that was asked for.
+    pub(super) fn write(
+        &mut self,
+        what: &'static str,
+        output: Option<OutputFile>,
+        write: impl FnOnce(&mut OutputFile) -> io::Result<()>,
+    ) {
+        if let Some(output) = output {
+            let name = output.name().to_owned();
+            self.add(what, name, output.write_whole(write));
+        }
+    }
+
+    fn add(&mut self, what: &'static str, name: String, done: Result<(), FilesError>) {
+        match done {
+            Ok(()) => self.files.push((what, name)),
+            Err(failure) => self.failures.push(failure),
+        }
+    }
+
+    /// Where the file went, if it was written.
+    pub(super) fn place_of(&self, what: &str) -> Option<&str> {
+        self.files.iter().find(|(of, _)| *of == what).map(|(_, name)| name.as_str())
+    }
+
+    /// Says where files were written.
+    pub(super) fn say(&self, out: &mut dyn Write) -> Result<(), CliError> {
+        for (what, name) in &self.files {
+            writeln!(out, "  {what} written to {name}").map_err(CliError::Output)?;
+        }
+        Ok(())
+    }
+
+    /// That of the command, unless a file was not written.
+    pub(super) fn outcome(self, outcome: Outcome) -> Result<Outcome, CliError> {
+        if self.failures.is_empty() {
+            Ok(outcome)
+        } else {
+            Err(CliError::Unwritten(self.failures.iter().map(FilesError::to_string).collect()))
+        }
+    }
+}
+
 /// Files that are asked for, opened: a wrong path should not cost the user a long run.
 pub(super) struct Outputs {
-    trace: Option<Output>,
-    report: Option<Output>,
+    trace: Option<OutputFile>,
+    report: Option<OutputFile>,
 }
 
 impl Outputs {
-    pub(super) fn create(trace: &Option<PathBuf>, report: &Option<PathBuf>) -> Result<Self, CliError> {
-        let create = |path: &Option<PathBuf>| path.as_deref().map(Output::create).transpose();
-        Ok(Self { trace: create(trace)?, report: create(report)? })
+    pub(super) fn open(
+        files: &mut Files,
+        trace: Option<&PathBuf>,
+        report: Option<&PathBuf>,
+    ) -> Result<Self, FilesError> {
+        Ok(Self { trace: open(files, "--trace", trace)?, report: open(files, "--report", report)? })
     }
 
-    /// What `run` makes of a job, with the files about it.
+    /// Only with the report, by what names it.
+    pub(super) fn report(files: &mut Files, role: &'static str, path: PathBuf) -> Result<Self, FilesError> {
+        Ok(Self { trace: None, report: open(files, role, Some(&path))? })
+    }
+
+    /// What `run` makes of a job, with the files about it. A run that can't be made leaves no files.
     pub(super) fn of_run<T>(
         self,
         job: &Job,
         run: impl FnOnce(&mut Observer<'_>) -> Result<T, RunError>,
         summary_of: impl Fn(&T) -> &RunSummary,
-    ) -> Result<T, CliError> {
-        let (ran, report) = self.of_ticks(&job.info, |observe| {
+    ) -> Result<(T, Written), CliError> {
+        let (ran, ticks) = self.of_ticks(&job.info, |observe| {
             let mut progress = Progress::new((job.info.planned_time_s / job.info.tick_s) as u64);
             let ran = run(&mut |tick| {
                 observe(tick);
@@ -39,78 +107,57 @@ impl Outputs {
             });
             progress.finish();
             ran
-        })?;
+        });
         let ran = ran.map_err(|source| CliError::Run { program: job.info.program.clone(), source })?;
-        report.write(|ticks| trace_of(job, summary_of(&ran), ticks))?;
-        Ok(ran)
+        let written = ticks.write(|ticks| trace_of(job, summary_of(&ran), ticks));
+        Ok((ran, written))
     }
 
     /// The files about a trace that was not made by a run of now.
-    pub(super) fn of_trace(self, info: &RunInfo, trace: &RunTrace) -> Result<(), CliError> {
-        let ((), report) = self.of_ticks(info, |observe| trace.ticks.iter().for_each(observe))?;
-        report.write(|ticks| RunTrace { ticks, ..trace.clone() })
+    pub(super) fn of_trace(self, info: &RunInfo, trace: &RunTrace) -> Written {
+        let ((), ticks) = self.of_ticks(info, |observe| trace.ticks.iter().for_each(observe));
+        ticks.write(|ticks| RunTrace { ticks, ..trace.clone() })
     }
 
-    /// What `run` returns, its ticks traced, and the report that is to be written of them.
-    pub(super) fn of_ticks<T>(
-        self,
-        info: &RunInfo,
-        run: impl FnOnce(&mut Observer<'_>) -> T,
-    ) -> Result<(T, Report), CliError> {
-        let mut files = Files::new(self, info)?;
-        let ran = run(&mut |tick| files.add(tick));
-        // What was traced of a run that failed stays.
-        Ok((ran, files.finish_trace()?))
+    /// What `run` returns, and its ticks, of which the files are to be written.
+    pub(super) fn of_ticks<T>(self, info: &RunInfo, run: impl FnOnce(&mut Observer<'_>) -> T) -> (T, Ticks) {
+        let trace = self.trace.map(|output| {
+            let (name, failure) = (output.name().to_owned(), output.failure());
+            (name, failure, TraceWriter::new(output, info))
+        });
+        let mut ticks = Ticks { trace, report: self.report, ticks: Vec::new() };
+        let ran = run(&mut |tick| ticks.add(tick));
+        (ran, ticks)
     }
 }
 
-/// Files being written.
-struct Files {
-    trace: Option<(String, TraceWriter<BufWriter<File>>)>,
-    report: Report,
-}
-
-/// Only a report needs all the ticks at once.
-pub(super) struct Report {
-    output: Option<Output>,
+/// The ticks of a run. Only a report needs all of them at once.
+pub(super) struct Ticks {
+    trace: Option<(String, Failure, TraceWriter<OutputFile>)>,
+    report: Option<OutputFile>,
     ticks: Vec<TraceRow>,
 }
 
-impl Files {
-    fn new(outputs: Outputs, info: &RunInfo) -> Result<Self, CliError> {
-        let trace = match outputs.trace {
-            None => None,
-            Some(Output { name, file }) => match TraceWriter::new(file, info) {
-                Ok(writer) => Some((name, writer)),
-                Err(source) => return Err(CliError::Write { path: name, source }),
-            },
-        };
-        Ok(Self { trace, report: Report { output: outputs.report, ticks: Vec::new() } })
-    }
-
+impl Ticks {
     fn add(&mut self, tick: &TraceRow) {
-        if let Some((_, trace)) = &mut self.trace {
+        if let Some((_, _, trace)) = &mut self.trace {
             trace.add(tick);
         }
-        if self.report.output.is_some() {
-            self.report.ticks.push(*tick);
+        if self.report.is_some() {
+            self.ticks.push(*tick);
         }
     }
 
-    fn finish_trace(self) -> Result<Report, CliError> {
-        if let Some((path, trace)) = self.trace {
-            trace.finish().map_err(|source| CliError::Write { path, source })?;
+    /// Writes the trace, and the report of what `trace` makes of the ticks.
+    pub(super) fn write(self, trace: impl FnOnce(Vec<TraceRow>) -> RunTrace) -> Written {
+        let mut written = Written::default();
+        if let Some((name, failure, writer)) = self.trace {
+            let done = writer.finish().map_err(|source| failure.of(source));
+            written.add("trace", name, done.and_then(OutputFile::commit));
         }
-        Ok(self.report)
-    }
-}
-
-impl Report {
-    fn write(self, trace: impl FnOnce(Vec<TraceRow>) -> RunTrace) -> Result<(), CliError> {
-        let Some(Output { name, mut file }) = self.output else { return Ok(()) };
-        report::write_html(&trace(self.ticks), &mut file)
-            .and_then(|()| file.flush())
-            .map_err(|source| CliError::Write { path: name, source })
+        let ticks = self.ticks;
+        written.write("report", self.report, |file| report::write_html(&trace(ticks), file));
+        written
     }
 }
 
@@ -120,19 +167,10 @@ fn trace_of(job: &Job, summary: &RunSummary, ticks: Vec<TraceRow>) -> RunTrace {
         following_error_limit_um: limit_um,
         end_error_counts: summary.axes.each_ref().map(|axis| axis.end_error_counts),
         ticks,
+        end: summary.end,
         commands: summary.commands.clone(),
         faults: summary.faults.clone(),
         notices: summary.notices.clone(),
         ..job.info.empty_trace()
     }
-}
-
-/// Says where files were written.
-pub(super) fn say_written(files: &[(&str, &Option<PathBuf>)], out: &mut dyn Write) -> Result<(), CliError> {
-    for (what, path) in files {
-        if let Some(path) = path {
-            writeln!(out, "  {what} written to {}", path.display()).map_err(CliError::Output)?;
-        }
-    }
-    Ok(())
 }

@@ -7,9 +7,10 @@ use clap::Args;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
-use super::outputs::{self, Outputs};
+use super::outputs::Outputs;
 use super::run::{self, RunJson};
 use super::{input, write_json};
+use crate::files::Files;
 use crate::recording::{self, Difference, Recording};
 
 const EXAMPLES: &str = "\
@@ -22,7 +23,8 @@ Examples:
 The kernel gets the recorded program, machine, commands and answers of the hardware; nothing is simulated. Trace and
 report are those of the run.
 
-Exit status: 0 identical, be it to a fault; 1 a tick differs; 2 the file is no recording, or damaged.
+Exit status: 0 identical, even if the run was held, aborted or ended by a fault; 1 a tick differs; 2 the file is no
+recording, or damaged; 6 a file could not be written.
 JSON: that of `motion run`, and replay: identical, ticks (those of settling included), digest, difference.";
 
 /// Replay a recorded run: the same kernel on what it was told then, compared tick by tick.
@@ -48,12 +50,13 @@ pub struct ReplayArguments {
 /// # Errors
 /// The file is no recording, what it holds can't be executed, or a file can't be written.
 pub fn replay(arguments: &ReplayArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let mut files = Files::reading([("FILE", Some(arguments.recording.as_path()))]);
+    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
     let source = input::read(&arguments.recording)?;
     let refused = |error| CliError::Recording { path: source.name.clone(), source: error };
     let recording = Recording::from_bytes(&source.text).map_err(refused)?;
     let job = recording.job().map_err(refused)?;
-    let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
-    let replayed = outputs.of_run(
+    let (replayed, written) = outputs.of_run(
         &job,
         |observe| recording::replay(&recording, &job, observe),
         |replayed| &replayed.summary,
@@ -74,9 +77,9 @@ pub fn replay(arguments: &ReplayArguments, out: &mut dyn Write) -> Result<Outcom
             Some(difference) => format!("NOT IDENTICAL: the replay {difference}"),
         };
         writeln!(out, "\n  {verdict}").map_err(CliError::Output)?;
-        outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
+        written.say(out)?;
     }
-    Ok(if difference.is_none() { Outcome::Done } else { Outcome::Failed })
+    written.outcome(if difference.is_none() { Outcome::Done } else { Outcome::Failed })
 }
 
 #[derive(Serialize)]

@@ -7,10 +7,11 @@ use clap::Args;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
-use super::input::{self, Output};
-use super::outputs::{self, Outputs};
+use super::input;
+use super::outputs::{self, Outputs, Written};
 use super::table::{self, Align};
 use super::write_json;
+use crate::files::{Files, OutputFile};
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
@@ -18,7 +19,7 @@ use crate::recording::Recorder;
 use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
 use crate::simulate::{self, AxisSummary, Job, RunError, RunOptions, RunSummary};
-use crate::trace::{TracedCommand, TracedFault};
+use crate::trace::{RunEnd, TracedCommand, TracedFault};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -31,7 +32,11 @@ Examples:
   motion run part.ngc --record part.mrec             and everything that `motion replay` needs to run it again
   generate-part | motion run - --json                for a script
 
-Exit status 1: the run ended in a fault; the summary, the trace and the report are written all the same.";
+Exit status: 0 the program finished, 1 a fault, 3 held, 4 aborted, 5 a command of --at was not reached, 6 a file could not
+be written. The summary is printed, and the files are written, in all of these cases.
+
+JSON: finished, stopped_by (null, \"hold\", \"single block\", \"override\", \"abort\" or \"fault\"), reached_mm, reached_line
+(how far the run came), commands_not_reached, and the figures of the run.";
 
 /// Run a program: plan it, execute it tick by tick with the real-time kernel, on simulated axes.
 #[derive(Debug, Args)]
@@ -77,27 +82,30 @@ pub struct RunArguments {
 /// # Errors
 /// The program or the machine file is refused, there is no plan, or a file can't be written.
 pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let mut files = Files::reading([
+        ("PROGRAM", Some(arguments.program.as_path())),
+        ("--machine", arguments.machine.as_deref()),
+    ]);
+    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
+    let record = outputs::open(&mut files, "--record", arguments.record.as_ref())?;
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let program = gcode::read(&source.name, &source.text)?;
     let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;
-    let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
-    let record = arguments.record.as_deref().map(Output::create).transpose()?;
     let options = RunOptions {
         script: arguments.at.as_ref(),
         injections: arguments.inject.as_ref(),
         ..RunOptions::default()
     };
-    let summary = execute(&options, &plan, &machine, outputs, record)?;
+    let (summary, written) = execute(&options, &plan, &machine, outputs, record)?;
     if arguments.json {
         write_json(&json(&summary), out)?;
     } else {
         write_summary(&summary, out).map_err(CliError::Output)?;
-        let files =
-            [("trace", &arguments.trace), ("report", &arguments.report), ("recording", &arguments.record)];
-        outputs::say_written(&files, out)?;
+        written.say(out)?;
     }
-    Ok(if summary.faults.is_empty() { Outcome::Done } else { Outcome::Failed })
+    let outcome = written.outcome(Outcome::of(&summary))?;
+    CliError::of_unreached(&summary, outcome)
 }
 
 /// Runs a plan; writes the trace as it goes, report and recording afterwards.
@@ -106,11 +114,11 @@ pub(super) fn execute(
     plan: &Plan,
     machine: &Machine,
     outputs: Outputs,
-    record: Option<Output>,
-) -> Result<RunSummary, CliError> {
+    record: Option<OutputFile>,
+) -> Result<(RunSummary, Written), CliError> {
     let refused = |source: RunError| CliError::Run { program: plan.source.clone(), source };
     let job = Job::new(options, plan, machine).map_err(refused)?;
-    let Some(mut record) = record else {
+    let Some(record) = record else {
         let run = |observe: &mut simulate::Observer<'_>| {
             simulate::on_simulated(machine, options.injections, |hardware| {
                 simulate::run_on(&job, hardware, observe)
@@ -125,14 +133,17 @@ pub(super) fn execute(
             Ok((summary, recorder.finish(&job)))
         })
     };
-    let (summary, recording) = outputs.of_run(&job, run, |(summary, _)| summary)?;
-    let written = record.file.write_all(&recording.to_bytes()).and_then(|()| record.file.flush());
-    written.map_err(|source| CliError::Write { path: record.name, source })?;
-    Ok(summary)
+    let ((summary, recording), mut written) = outputs.of_run(&job, run, |(summary, _)| summary)?;
+    written.write("recording", Some(record), |file| file.write_all(&recording.to_bytes()));
+    Ok((summary, written))
 }
 
 #[derive(Serialize)]
 pub(super) struct RunJson<'run> {
+    finished: bool,
+    stopped_by: Option<&'static str>,
+    reached_mm: f64,
+    reached_line: u32,
     ticks: u64,
     tick_s: f64,
     planned_time_s: f64,
@@ -143,6 +154,7 @@ pub(super) struct RunJson<'run> {
     axes: Vec<AxisJson<'run>>,
     contour_error_um_max: f64,
     commands: &'run [TracedCommand],
+    commands_not_reached: &'run [String],
     faults: Vec<FaultJson<'run>>,
     notices: &'run [String],
 }
@@ -187,6 +199,10 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         detail: &fault.detail,
     };
     RunJson {
+        finished: summary.end == RunEnd::Finished,
+        stopped_by: summary.end.stopped_by(),
+        reached_mm: summary.reached_mm,
+        reached_line: summary.reached_line,
         ticks: summary.ticks,
         tick_s: summary.tick_s,
         planned_time_s: summary.planned_time_s,
@@ -202,6 +218,7 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         axes: summary.axes.iter().map(axis).collect(),
         contour_error_um_max: summary.contour_error_um_max,
         commands: &summary.commands,
+        commands_not_reached: &summary.unreached,
         faults: summary.faults.iter().map(fault).collect(),
         notices: &summary.notices,
     }
@@ -211,9 +228,17 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
 pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Result<()> {
     let RunSummary { ticks, tick_s, planned_time_s, time_s, path_length_mm, .. } = summary;
     let tick_ms = tick_s * 1e3;
+    if let Some(words) = summary.end.words() {
+        let line = match summary.reached_line {
+            0 => String::new(),
+            line => format!(", line {line}"),
+        };
+        writeln!(out, "  {words} at {:.4} of {path_length_mm:.4} mm{line}", summary.reached_mm)?;
+    }
+    let length_mm = if summary.end == RunEnd::Finished { *path_length_mm } else { summary.reached_mm };
     writeln!(
         out,
-        "  {path_length_mm:.4} mm in {time_s:.4} s (planned {planned_time_s:.6} s), {ticks} ticks of {tick_ms} ms"
+        "  {length_mm:.4} mm in {time_s:.4} s (planned {planned_time_s:.6} s), {ticks} ticks of {tick_ms} ms"
     )?;
     writeln!(
         out,

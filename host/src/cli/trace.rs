@@ -30,34 +30,39 @@ pub(super) struct TraceWriter<W: Write> {
 }
 
 impl<W: Write> TraceWriter<W> {
-    /// Writes the header.
-    pub(super) fn new(out: W, info: &RunInfo) -> io::Result<Self> {
-        let mut csv = csv::Writer::from_writer(out);
-        for column in PATH_COLUMNS {
-            csv.write_field(column).map_err(csv_failure)?;
-        }
-        for axis in &info.axes {
-            for column in AXIS_COLUMNS {
-                csv.write_field(format!("{}_{column}", axis.name)).map_err(csv_failure)?;
-            }
-        }
-        csv.write_record(None::<&[u8]>).map_err(csv_failure)?;
-        Ok(Self { csv, tick_s: info.tick_s, field: Vec::new(), failure: None })
+    /// Writes the header. A failure is kept for [`Self::finish`]: a run is not stopped for it.
+    pub(super) fn new(out: W, info: &RunInfo) -> Self {
+        let csv = csv::Writer::from_writer(out);
+        let mut writer = Self { csv, tick_s: info.tick_s, field: Vec::new(), failure: None };
+        writer.failure = writer.header(info).err();
+        writer
     }
 
-    /// Adds a row. A failure is kept for [`Self::finish`]: a run is not stopped for it.
+    /// Adds a row, or keeps its failure.
     pub(super) fn add(&mut self, tick: &TraceRow) {
         if self.failure.is_none() {
             self.failure = self.row(tick).err();
         }
     }
 
-    /// Writes out what is still in memory.
-    pub(super) fn finish(mut self) -> io::Result<()> {
-        match self.failure.take() {
+    /// Writes out what is still in memory; returns what it was written to.
+    pub(super) fn finish(self) -> io::Result<W> {
+        match self.failure {
             Some(failure) => Err(failure),
-            None => self.csv.flush(),
+            None => self.csv.into_inner().map_err(csv::IntoInnerError::into_error),
         }
+    }
+
+    fn header(&mut self, info: &RunInfo) -> io::Result<()> {
+        for column in PATH_COLUMNS {
+            self.csv.write_field(column).map_err(csv_failure)?;
+        }
+        for axis in &info.axes {
+            for column in AXIS_COLUMNS {
+                self.csv.write_field(format!("{}_{column}", axis.name)).map_err(csv_failure)?;
+            }
+        }
+        self.csv.write_record(None::<&[u8]>).map_err(csv_failure)
     }
 
     fn row(&mut self, tick: &TraceRow) -> io::Result<()> {
@@ -101,8 +106,7 @@ mod tests {
     #[test]
     fn header_and_row() {
         let mut text = Vec::new();
-        let mut trace =
-            TraceWriter::new(&mut text, &RunInfo::of_machine(&Machine::reference())).expect("memory");
+        let mut trace = TraceWriter::new(&mut text, &RunInfo::of_machine(&Machine::reference()));
         let axis = AxisTick { set_mm: 7_999.999_999_999_8, act_mm: -0.1, ..AxisTick::default() };
         trace.add(&TraceRow {
             tick: 3,

@@ -126,8 +126,10 @@ fn result(trace: &RunTrace, summary: &Summary) -> String {
         Outcome::Empty => "<strong>Nothing was run:</strong> the trace holds no tick.".to_string(),
         Outcome::Done => format!("<strong>Done without a fault:</strong> {blocks}, {length} mm in {time}."),
         Outcome::Unfinished => format!(
-            "<strong>Not finished:</strong> the run ended without a fault after {time}, {} of {length} mm along the path.",
-            figure(summary.path_done_mm, 6)
+            "<strong>Not finished:</strong> {} at {} of {length} mm along the path{}, after {time}.",
+            trace.end.words().unwrap_or("the run ended without a fault"),
+            figure(summary.path_done_mm, 6),
+            reached_line(trace)
         ),
         Outcome::Faulted => {
             let named: Vec<_> = trace
@@ -141,13 +143,20 @@ fn result(trace: &RunTrace, summary: &Summary) -> String {
                 others => format!(", and {}", counted(others, "other", "others")),
             };
             format!(
-                "<strong>Ended in {}:</strong> {}{others}, {} of {length} mm along the path.",
+                "<strong>Ended in {}:</strong> {}{others}, at {} of {length} mm along the path{}.",
                 if trace.faults.len() == 1 { "a fault" } else { "faults" },
                 named.join("; "),
                 figure(summary.path_done_mm, 6),
+                reached_line(trace),
             )
         }
     }
+}
+
+/// The line that the run came to, if it came to one.
+fn reached_line(trace: &RunTrace) -> String {
+    let line = trace.ticks.iter().rev().map(|tick| tick.line).find(|&line| line > 0);
+    line.map_or_else(String::new, |line| format!(", line {line}"))
 }
 
 fn name_fault(fault: &TracedFault, tick_s: f64) -> String {

@@ -1,6 +1,6 @@
 //! The figures of a run, from one pass over its ticks.
 
-use crate::trace::{AXES, RunTrace, TraceRow};
+use crate::trace::{AXES, RunEnd, RunTrace, TraceRow};
 
 /// A path counts as finished when less than this is left of it \[mm\]. Far above rounding, far below any tolerance.
 const FINISHED_WITHIN_MM: f64 = 1e-3;
@@ -18,7 +18,7 @@ pub(super) enum Outcome {
     Empty,
     /// The whole path was run, without a fault.
     Done,
-    /// No fault, but the path was not run to its end.
+    /// No fault, but something stopped the run before the end of its program.
     Unfinished,
     /// At least one fault was latched.
     Faulted,
@@ -171,7 +171,7 @@ impl Summary {
             Outcome::Faulted
         } else if trace.ticks.is_empty() {
             Outcome::Empty
-        } else if path_done_mm < path_length_mm - FINISHED_WITHIN_MM {
+        } else if trace.end != RunEnd::Finished || path_done_mm < path_length_mm - FINISHED_WITHIN_MM {
             Outcome::Unfinished
         } else {
             Outcome::Done

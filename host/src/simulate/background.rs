@@ -11,7 +11,7 @@ use motion_kernel::queue::{Feeder, Intake, LiveFeeder, LiveStreams, PathRules, S
 use motion_kernel::units::Position;
 
 use super::live::{Command, Script};
-use crate::trace::AXES;
+use crate::trace::{AXES, HeldBy, RunEnd};
 
 /// Capacities of the two streams, as a board has them.
 const PIECES: usize = 64;
@@ -40,6 +40,8 @@ pub(super) struct Live<'a, R: Real, I> {
     script: &'a Script,
     /// Commands given so far.
     given: usize,
+    /// Whether the latest of hold and resume was a hold.
+    is_on_hold: bool,
 }
 
 impl<'script, R: Real> Storage<'script, R> {
@@ -68,7 +70,8 @@ impl<'script, R: Real> Storage<'script, R> {
             Self::Live(streams, script) => {
                 let (mut feeder, intake) = streams.split(rules, start);
                 feeder.bound(travel);
-                let live = Live { feeder, control: LiveControl::new(items, tick_s, 0), script, given: 0 };
+                let control = LiveControl::new(items, tick_s, 0);
+                let live = Live { feeder, control, script, given: 0, is_on_hold: false };
                 (Background::Live(Box::new(live)), intake)
             }
         }
@@ -84,10 +87,15 @@ impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_,
                 supply.fill(feeder)
             }
             Self::Live(live) => {
-                let Live { feeder, control, script, given } = &mut **live;
+                let Live { feeder, control, script, given, is_on_hold } = &mut **live;
                 while let Some(timed) = script.commands().get(*given)
                     && timed.tick <= tick
                 {
+                    match timed.command {
+                        Command::Hold => *is_on_hold = true,
+                        Command::Resume => *is_on_hold = false,
+                        _ => {}
+                    }
                     match timed.command {
                         Command::Hold => control.hold(),
                         Command::Resume => control.resume(),
@@ -105,19 +113,22 @@ impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_,
         }
     }
 
-    /// Whether the run ends with a tick that ended in `state`: nothing is left, or nothing will let it go on. Why, if
-    /// that is not the program's end.
-    pub(super) fn ended(&self, state: ExecState) -> Option<Option<&'static str>> {
+    /// How the run ends with a tick that ended in `state`, if it does: no item is left, or no command to resume.
+    pub(super) fn ended(&self, state: ExecState) -> Option<RunEnd> {
         match self {
-            Self::Plain(plain) => (plain.1.is_empty() && state == ExecState::Idle).then_some(None),
+            Self::Plain(plain) => {
+                (plain.1.is_empty() && state == ExecState::Idle).then_some(RunEnd::Finished)
+            }
             Self::Live(live) => {
                 let is_last = live.given == live.script.commands().len();
                 match live.control.state(&live.feeder) {
-                    State::Done if state == ExecState::Idle => Some(None),
-                    State::Aborted => Some(Some("aborted: the rest of the program was given up")),
-                    State::Held if is_last => Some(Some("held to the end of the script, and not resumed")),
+                    State::Done if state == ExecState::Idle => Some(RunEnd::Finished),
+                    State::Aborted => Some(RunEnd::Aborted),
+                    State::Held if is_last => {
+                        Some(RunEnd::Held(if live.is_on_hold { HeldBy::Hold } else { HeldBy::SingleBlock }))
+                    }
                     State::Running if is_last && live.control.is_stopped_by_override(&live.feeder) => {
-                        Some(Some("at rest under an override of 0 to the end of the script"))
+                        Some(RunEnd::Held(HeldBy::Override))
                     }
                     _ => None,
                 }

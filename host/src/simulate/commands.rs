@@ -79,10 +79,10 @@ impl<'run> Commands<'run> {
         });
     }
 
-    /// Of all commands that were given.
-    pub(super) fn finish(mut self) -> Vec<TracedCommand> {
+    /// Of all commands that were given, and the others as the user gave them.
+    pub(super) fn finish(mut self) -> (Vec<TracedCommand>, Vec<String>) {
         self.settle(|_| true);
-        self.records
+        (self.records, self.ahead.iter().map(Timed::to_string).collect())
     }
 }
 
@@ -130,7 +130,7 @@ mod tests {
                 axes: [AxisTick::default(); AXES],
             });
         }
-        commands.finish()
+        commands.finish().0
     }
 
     fn stops(records: &[TracedCommand]) -> Vec<Option<(u64, u32, f64)>> {

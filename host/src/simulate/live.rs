@@ -60,11 +60,17 @@ impl fmt::Display for Command {
     }
 }
 
+impl fmt::Display for Timed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.tick, self.command)
+    }
+}
+
 impl fmt::Display for Script {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, Timed { tick, command }) in self.0.iter().enumerate() {
+        for (index, timed) in self.0.iter().enumerate() {
             let comma = if index > 0 { "," } else { "" };
-            write!(f, "{comma}{tick}:{command}")?;
+            write!(f, "{comma}{timed}")?;
         }
         Ok(())
     }

@@ -6,7 +6,7 @@
 use motion_kernel::axis::Correction;
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Reaction;
-use motion_kernel::kernel::Kernel;
+use motion_kernel::kernel::{CorrectedIntake, Kernel};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::trace::Trace;
 
@@ -23,7 +23,7 @@ use super::limit_share::LimitShare;
 use super::summary::{Collector, RunSummary};
 use crate::machine::Machine;
 use crate::planning::Plan;
-use crate::trace::{AXES, AxisTick, TraceRow};
+use crate::trace::{AXES, AxisTick, RunEnd, TraceRow};
 
 /// How long the machine is given to settle before its end position is read \[s\].
 const SETTLE_S: f64 = 0.2;
@@ -100,8 +100,9 @@ fn run_in<R: Real>(
         .collect();
     let mut storage = Storage::<R>::new(script.as_ref());
     let items = job.items.iter().map(|&item| Ok(item));
-    let (mut background, mut intake) =
+    let (mut background, intake) =
         storage.split(header.rules, (header.start, job.guards.travel()), items, tick_s);
+    let mut intake = CorrectedIntake::from(intake);
     if let &Some(StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
         intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?)?;
     }
@@ -119,9 +120,10 @@ fn run_in<R: Real>(
     let mut commands = Commands::new(script.as_ref(), tick_s);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     let mut goes_on = true;
+    summary.end = RunEnd::Cut;
     while goes_on {
         background.poll(collector.ticks()).map_err(RunError::Rejected)?;
-        let trace = *kernel.tick(&mut intake, hardware);
+        let trace = *kernel.tick_corrected(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
         let state = trace.executed.state;
         // What is idle after the last item is no longer part of the program, but for the tick in which
@@ -135,6 +137,7 @@ fn run_in<R: Real>(
         commands.add(&row);
         observe(&row);
         if let Some(fault) = trace.fault {
+            summary.end = RunEnd::Faulted;
             if summary.faults.is_empty() {
                 let setpoints = &trace.executed.setpoints;
                 summary.faults.push(faults::traced(&fault, (header, info), &config, setpoints));
@@ -144,8 +147,8 @@ fn run_in<R: Real>(
             }
             continue;
         }
-        if let Some(reason) = ended {
-            summary.notices.extend(reason.map(str::to_owned));
+        if let Some(end) = ended {
+            summary.end = end;
             break;
         }
         if state == ExecState::Stopped {
@@ -160,7 +163,7 @@ fn run_in<R: Real>(
         1 => summary.notices.push("1 stop on the path because data came too late".to_owned()),
         more => summary.notices.push(format!("{more} stops on the path because data came too late")),
     }
-    summary.commands = commands.finish();
+    (summary.commands, summary.unreached) = commands.finish();
     summary.limit_active_share = limit_share.share();
     summary.time_s = (summary.ticks - stopped_ticks) as f64 * tick_s;
     if stops > 0 {
@@ -174,7 +177,7 @@ fn run_in<R: Real>(
         if !goes_on {
             break;
         }
-        let trace = *kernel.tick(&mut intake, hardware);
+        let trace = *kernel.tick_corrected(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
         last = Some(trace);
     }

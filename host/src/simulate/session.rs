@@ -43,8 +43,13 @@ pub enum SessionError {
     #[error("found the machine moving at a motion's end, expected it at rest")]
     Moves,
     /// The kernel found a fault.
-    #[error("fault in tick {}: {}: {}", .0.tick, .0.fault, .0.detail)]
-    Fault(TracedFault),
+    #[error("fault in tick {}, at {at}: {}: {}", .fault.tick, .fault.fault, .fault.detail)]
+    Fault {
+        /// The fault.
+        fault: Box<TracedFault>,
+        /// The set positions, for people.
+        at: String,
+    },
 }
 
 /// A simulated machine, switched on.
@@ -131,8 +136,11 @@ impl<'a, R: Real> Session<'a, R> {
             if let Some(fault) = trace.fault {
                 let job = (&self.machine.header(), &RunInfo::of_machine(self.machine));
                 let setpoints = &trace.executed.setpoints;
-                let record = faults::traced(&fault, job, &self.config, setpoints);
-                return Err(SessionError::Fault(record).into());
+                let fault = Box::new(faults::traced(&fault, job, &self.config, setpoints));
+                let axes = self.machine.axes.iter().zip(setpoints);
+                let at = axes.map(|(axis, set)| format!("{} {:.4} mm", axis.name, set.position.to_mm()));
+                let at = at.collect::<Vec<_>>().join(", ");
+                return Err(SessionError::Fault { fault, at }.into());
             }
             match look(&trace, &mut self.hardware, control.state(&feeder))? {
                 Then::GoOn => {}

@@ -1,10 +1,16 @@
 //! Figures of a run, collected tick by tick.
 
-use crate::trace::{AXES, TraceRow, TracedCommand, TracedFault};
+use crate::trace::{AXES, RunEnd, TraceRow, TracedCommand, TracedFault};
 
 /// The figures of a run.
 #[derive(Clone, Debug, Default)]
 pub struct RunSummary {
+    /// How it ended.
+    pub end: RunEnd,
+    /// How far it came along the path \[mm\].
+    pub reached_mm: f64,
+    /// The G-code line that it came to, from 1; 0 if it did not move.
+    pub reached_line: u32,
     /// Ticks from the first motion to the end of the program.
     pub ticks: u64,
     /// Control tick \[s\].
@@ -32,6 +38,8 @@ pub struct RunSummary {
     pub contour_error_um_max: f64,
     /// Commands of live control that were given, in order.
     pub commands: Vec<TracedCommand>,
+    /// Commands of the script that were not given, because the run ended before their ticks: `TICK:COMMAND`.
+    pub unreached: Vec<String>,
     /// Faults, in order.
     pub faults: Vec<TracedFault>,
     /// What was accepted and not acted on, and how the run was made.
@@ -61,6 +69,8 @@ pub(super) struct Collector {
     error_um_square_sum: [f64; AXES],
     output_v_max: [f64; AXES],
     contour_um_max: f64,
+    reached_mm: f64,
+    reached_line: u32,
     ticks: u64,
 }
 
@@ -82,6 +92,9 @@ impl Collector {
             self.output_v_max[index] = self.output_v_max[index].max(axis.out_v.abs());
         }
         self.contour_um_max = self.contour_um_max.max(tick.contour_um);
+        self.reached_mm = self.reached_mm.max(tick.s_mm);
+        // At rest between two stretches there is none.
+        self.reached_line = if tick.line > 0 { tick.line } else { self.reached_line };
     }
 
     pub(super) fn fill(&self, summary: &mut RunSummary) {
@@ -89,6 +102,7 @@ impl Collector {
         [summary.max_feed_mm_s, summary.max_accel_mm_s2, summary.max_jerk_mm_s3, summary.max_snap_mm_s4] =
             self.max;
         summary.contour_error_um_max = self.contour_um_max;
+        (summary.reached_mm, summary.reached_line) = (self.reached_mm, self.reached_line);
         for (index, axis) in summary.axes.iter_mut().enumerate() {
             axis.following_error_um_max = self.error_um_max[index];
             axis.following_error_um_rms = (self.error_um_square_sum[index] / self.ticks.max(1) as f64).sqrt();

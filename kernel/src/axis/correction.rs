@@ -41,7 +41,6 @@ pub enum CorrectionError {
     /// The bound is not positive, or beyond the kernel's range.
     Bound,
     /// Under live control: what was learnt belongs to the times of the program's own plan.
-    #[cfg(feature = "live")]
     LiveControl,
 }
 
@@ -53,7 +52,6 @@ impl core::fmt::Display for CorrectionError {
                 write!(f, "{found} ticks from knot to knot: expected 1 to {KNOT_TICKS_MAX}")
             }
             Self::Bound => write!(f, "a bound that is not above 0 and below 1e6 mm/s"),
-            #[cfg(feature = "live")]
             Self::LiveControl => {
                 write!(
                     f,

@@ -1,7 +1,7 @@
 //! What is watched of an axis: whether encoder, drive and set-point make sense together.
 //!
 //! In the tick, behind the feature `guards`. Two comparisons an axis and tick; what they find suspicious is judged in a
-//! path of its own, as is one axis in every [`LOOK_TICKS`] ticks. No loop, no failure: a fault is reported.
+//! path of its own, as is one axis that is sampled in every [`SAMPLE_TICKS`] ticks. No loop, no failure: a fault is reported.
 //!
 //! With the following error ε, the set velocity v and acceleration a of the tick, the drive's greatest acceleration a_d,
 //! the axis' greatest A, and a noise of n counts of the size q:
@@ -13,19 +13,19 @@
 //! - **encoder lost**: no counts while the command is above `moving_mm_s`, over `response_s`;
 //! - **runaway**: the axis loses velocity towards its command at more than `load_accel_mm_s2`, which no load does, or
 //!   moves against its command without braking for longer than `response_s`;
-//! - **saturation**: the output at its limit at every look over `saturation_s`;
+//! - **saturation**: the output at its limit in every sample over `saturation_s`;
 //! - **soft limit**: the set position beyond the travel, and on its way farther out.
 //!
 //! Comparisons are written so that what is not a number is a fault.
 
 use super::check::{Check, fits};
-use super::{AxisConfig, AxisOutput, GuardFigures};
+use super::{AxesConfig, AxesError, AxisConfig, AxisOutput, AxisState, GuardFigures, Guards};
 use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, Position};
 
-/// From one look at an axis to the next one at another axis \[ticks\].
-pub const LOOK_TICKS: u8 = 8;
+/// From one axis being sampled to the next \[ticks\].
+pub(crate) const SAMPLE_TICKS: u8 = 8;
 /// Beyond the travel by so little is no fault \[mm\]: positions are rounded.
 const TRAVEL_ROUNDING_MM: f64 = 2.0e-3;
 /// Least of figures that are not 0.
@@ -42,15 +42,15 @@ pub(super) struct GuardConfig<R> {
     jump_mm: R,
     tick_s: R,
     moving_mm_s: R,
-    /// Change of the distance over two ticks by load, in a tick and from look to look \[mm\].
+    /// Change of the distance over two ticks by load, in a tick and from sample to sample \[mm\].
     load_mm: R,
-    load_look_mm: R,
+    load_sample_mm: R,
     /// What noise makes of the distance over two ticks \[mm\].
     noise_mm: R,
     noise_counts: i32,
-    /// In looks at this axis; 0: not watched.
-    response_looks: u16,
-    saturation_looks: u16,
+    /// In samples of this axis; 0: not watched.
+    response_samples: u16,
+    saturation_samples: u16,
     travel: Option<[Position; 2]>,
 }
 
@@ -65,21 +65,21 @@ impl<R: Real> GuardConfig<R> {
             tick_s: R::ZERO,
             moving_mm_s: R::ZERO,
             load_mm: R::ZERO,
-            load_look_mm: R::ZERO,
+            load_sample_mm: R::ZERO,
             noise_mm: R::ZERO,
             noise_counts: 0,
-            response_looks: 0,
-            saturation_looks: 0,
+            response_samples: 0,
+            saturation_samples: 0,
             travel: None,
         }
     }
 
-    /// For an axis that is looked at every `look_ticks` ticks of `tick_s`. Background.
+    /// For an axis that is sampled every `sample_ticks` ticks of `tick_s`. Background.
     pub(super) fn new(
         check: &mut Check,
         figures: &GuardFigures,
         config: &AxisConfig<R>,
-        look_ticks: u32,
+        sample_ticks: u32,
         tick_s: f64,
     ) -> Self {
         let mut figure = |quantity, value: f64, least: f64| {
@@ -89,9 +89,9 @@ impl<R: Real> GuardConfig<R> {
         };
         let least = LEAST;
         let &GuardFigures { response_s, saturation_s, noise_counts, .. } = figures;
-        let look_s = f64::from(look_ticks) * tick_s;
+        let sample_s = f64::from(sample_ticks) * tick_s;
         let load_mm = 2.0 * figures.load_accel_mm_s2 * tick_s * tick_s;
-        let looks = |s: f64| libm::ceil(s / look_s) as u16;
+        let samples = |s: f64| libm::ceil(s / sample_s) as u16;
         let at_rest_mm = figure("following error at rest [mm]", figures.following_error_at_rest_mm, least);
         let per_velocity_s =
             figure("following error per velocity [s]", figures.following_error_per_velocity_s, 0.0);
@@ -102,7 +102,7 @@ impl<R: Real> GuardConfig<R> {
         figure("acceleration by load [mm/s²]", figures.load_accel_mm_s2, least);
         figure("response [s]", response_s, least);
         figure("saturation [s]", saturation_s, least);
-        // The tick looks at the limit in motion only beyond the one at rest.
+        // The tick compares with the limit in motion only beyond the one at rest.
         let is_within = at_rest_mm <= config.following_error_limit_mm;
         let expected = "at most the limit of the following error";
         check.that(is_within, "following error at rest [mm]", figures.following_error_at_rest_mm, expected);
@@ -126,12 +126,12 @@ impl<R: Real> GuardConfig<R> {
             tick_s: R::from_f64(tick_s),
             moving_mm_s,
             load_mm: R::from_f64(load_mm),
-            load_look_mm: R::from_f64(load_mm * f64::from(look_ticks)),
+            load_sample_mm: R::from_f64(load_mm * f64::from(sample_ticks)),
             noise_mm: R::from_f64(2.0 * noise_mm),
             noise_counts: 2 * i32::from(noise_counts),
-            // One more: the first look may come just before there is something to see.
-            response_looks: looks(response_s).saturating_add(1),
-            saturation_looks: looks(saturation_s).saturating_add(1),
+            // One more: the first sample may come just before there is something to see.
+            response_samples: samples(response_s).saturating_add(1),
+            saturation_samples: samples(saturation_s).saturating_add(1),
             travel,
         }
     }
@@ -142,6 +142,40 @@ impl<R: Real> GuardConfig<R> {
             + self.per_velocity_s * setpoint.velocity_mm_s.abs()
             + self.per_accel_s2 * setpoint.accel_mm_s2.abs();
         grown_mm.min(most_mm)
+    }
+}
+
+impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
+    /// The same axes for a control tick of `tick_s`, guarded by all of `guards`, with its reactions. Background.
+    ///
+    /// # Errors
+    /// The first figure that is out of its range or beyond the number type's.
+    pub fn guarded(mut self, guards: &Guards<AXES>, tick_s: f64) -> Result<Self, AxesError> {
+        let sample_ticks = u32::from(SAMPLE_TICKS) * AXES as u32;
+        self.reactions = guards.reactions;
+        for (axis, (config, figures)) in self.axes.iter_mut().zip(&guards.axes).enumerate() {
+            let Some(figures) = figures else { continue };
+            config.guard = Check::all(|check| GuardConfig::new(check, figures, config, sample_ticks, tick_s))
+                .map_err(|cause| AxesError { axis, cause })?;
+        }
+        Ok(self)
+    }
+}
+
+impl<R: Real> AxisState<R> {
+    /// What broke in an axis that is lost, `since` ticks after it was sampled.
+    pub(crate) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> AxisFault<R> {
+        self.guard.judge(config, setpoint, since)
+    }
+
+    /// Samples an axis that was regulated in this tick.
+    pub(crate) fn sample(
+        &mut self,
+        config: &AxisConfig<R>,
+        setpoint: &Setpoint<R>,
+        output: &AxisOutput<R>,
+    ) -> Option<AxisFault<R>> {
+        self.guard.sample(config, setpoint, output)
     }
 }
 
@@ -172,9 +206,9 @@ enum Alarm<R> {
     NotFinite,
 }
 
-/// What an axis was like when it was looked at.
+/// What an axis was like when it was sampled.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Look<R> {
+struct Sample<R> {
     /// There was one since the axis was enabled.
     is_taken: bool,
     counts: i32,
@@ -194,12 +228,12 @@ pub(super) struct Guard<R> {
     /// The lower halves of the last three readings, the latest first.
     counts: [i32; 3],
     alarm: Alarm<R>,
-    last: Look<R>,
-    still_looks: u16,
-    against_looks: u16,
-    /// What it moved by at the look before the first of them \[mm\].
+    last: Sample<R>,
+    still_samples: u16,
+    against_samples: u16,
+    /// What it moved by at the sample before the first of them \[mm\].
     against_from_mm: R,
-    saturated_looks: u16,
+    saturated_samples: u16,
     /// The next jump is that of a machine that was moving where it was told to stand.
     is_excused: bool,
 }
@@ -217,7 +251,8 @@ impl<R: Real> Guard<R> {
 
     /// What was seen before the drives were off says nothing.
     pub(super) fn restart(&mut self) {
-        (self.last, self.still_looks, self.against_looks, self.saturated_looks) = (Look::default(), 0, 0, 0);
+        (self.last, self.still_samples, self.against_samples, self.saturated_samples) =
+            (Sample::default(), 0, 0, 0);
         self.command_mm_s = R::ZERO;
     }
 
@@ -301,7 +336,7 @@ impl<R: Real> Guard<R> {
         is_number
     }
 
-    /// What broke in an axis that was not allowed to go on, `since` ticks after it was looked at.
+    /// What broke in an axis that was not allowed to go on, `since` ticks after it was sampled.
     #[cold]
     pub(super) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> AxisFault<R> {
         let &Setpoint { velocity_mm_s, accel_mm_s2, jerk_mm_s3, .. } = setpoint;
@@ -347,7 +382,7 @@ impl<R: Real> Guard<R> {
         let [latest, before, first] = self.counts;
         let least_mm = mm(config, COUNTS_A_TICK).abs();
         latest == before && before == first && self.command_mm_s.abs() * config.guard.tick_s >= least_mm
-            || self.last.is_taken && self.still_looks > 0 && self.is_still(config)
+            || self.last.is_taken && self.still_samples > 0 && self.is_still(config)
     }
 
     fn is_still(&self, config: &AxisConfig<R>) -> bool {
@@ -355,7 +390,7 @@ impl<R: Real> Guard<R> {
         (-config.guard.noise_counts..=config.guard.noise_counts).contains(&moved)
     }
 
-    /// Whether the axis, which moved by `now_mm` over two ticks, has since the last look lost velocity towards its command
+    /// Whether the axis, which moved by `now_mm` over two ticks, has since the last sample lost velocity towards its command
     /// faster than by load.
     fn runs_away(&self, config: &AxisConfig<R>, now_mm: R, by_load_mm: R) -> bool {
         let [latest, before, first] = self.counts;
@@ -382,9 +417,9 @@ impl<R: Real> Guard<R> {
         mm(config, latest.wrapping_sub(first))
     }
 
-    /// One look at an axis that was regulated in this tick.
+    /// Samples an axis that was regulated in this tick.
     #[inline(never)]
-    pub(super) fn look(
+    pub(super) fn sample(
         &mut self,
         config: &AxisConfig<R>,
         setpoint: &Setpoint<R>,
@@ -392,7 +427,7 @@ impl<R: Real> Guard<R> {
     ) -> Option<AxisFault<R>> {
         let guard = &config.guard;
         self.is_excused = false;
-        if guard.response_looks == 0 {
+        if guard.response_samples == 0 {
             return None;
         }
         let commanded = match self.command_mm_s {
@@ -403,25 +438,25 @@ impl<R: Real> Guard<R> {
         let moved_mm = self.moved_mm(config);
         let moving_mm = guard.moving_mm_s * guard.tick_s + guard.noise_mm;
         let is_against = commanded > 0 && moved_mm < -moving_mm || commanded < 0 && moved_mm > moving_mm;
-        // A load that is too great brakes slowly, but brakes: if it doesn't show from one look to the next, then over some.
-        if self.against_looks == 0 {
+        // A load that is too great brakes slowly, but brakes: if it doesn't show from one sample to the next, then over some.
+        if self.against_samples == 0 {
             self.against_from_mm = self.last.moved_mm;
         }
         let brakes_mm = self.against_from_mm.abs() - moved_mm.abs();
         let is_against = is_against && brakes_mm <= guard.noise_mm;
         let goes_on = self.last.is_taken && commanded != 0 && commanded == self.last.commanded;
-        let count = |looks: u16, again: bool| if again { looks.saturating_add(1) } else { 0 };
+        let count = |samples: u16, again: bool| if again { samples.saturating_add(1) } else { 0 };
         let is_still = self.is_still(config);
-        let runs_away = self.runs_away(config, moved_mm, guard.load_look_mm);
-        self.still_looks = count(self.still_looks, goes_on && is_still);
-        self.against_looks = count(self.against_looks, goes_on && is_against);
-        self.saturated_looks = count(self.saturated_looks, output.saturated);
-        self.last = Look { is_taken: true, counts: self.counts[0], moved_mm, commanded };
-        if runs_away || self.against_looks >= guard.response_looks {
+        let runs_away = self.runs_away(config, moved_mm, guard.load_sample_mm);
+        self.still_samples = count(self.still_samples, goes_on && is_still);
+        self.against_samples = count(self.against_samples, goes_on && is_against);
+        self.saturated_samples = count(self.saturated_samples, output.saturated);
+        self.last = Sample { is_taken: true, counts: self.counts[0], moved_mm, commanded };
+        if runs_away || self.against_samples >= guard.response_samples {
             Some(AxisFault::Runaway)
-        } else if self.still_looks >= guard.response_looks {
+        } else if self.still_samples >= guard.response_samples {
             Some(AxisFault::EncoderLost)
-        } else if self.saturated_looks >= guard.saturation_looks {
+        } else if self.saturated_samples >= guard.saturation_samples {
             Some(AxisFault::Saturated)
         } else if guard.travel.is_some_and(|travel| drives_out(travel, setpoint, output)) {
             // The least urgent, so the last.
@@ -446,7 +481,6 @@ fn mm<R: Real>(config: &AxisConfig<R>, counts: i32) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis::{AxesConfig, AxisState, Guards};
     use crate::fault::Reactions;
     use crate::fixture::{GUARD, MM_PER_COUNT, TICK_S, figures, guarded};
 
@@ -526,7 +560,7 @@ mod tests {
         }
     }
 
-    /// The tick looks at the limit at rest first, so no other may be less.
+    /// The tick compares with the limit at rest first, so no other may be less.
     #[test]
     fn a_limit_at_rest_above_the_greatest_is_refused() {
         let refused = |at_rest_mm: f64| {
@@ -555,7 +589,7 @@ mod tests {
                 axis.tick(&config, &setpoint, &mut output);
                 if !output.lost && tick % 8 == 7 {
                     found.extend(
-                        axis.look(&config, &setpoint, &output).filter(|new| found.last() != Some(new)),
+                        axis.sample(&config, &setpoint, &output).filter(|new| found.last() != Some(new)),
                     );
                 }
                 found
@@ -566,7 +600,7 @@ mod tests {
         assert_eq!(found(5), [AxisFault::SoftLimit]);
     }
 
-    /// Thrown back by a load, an axis brakes by less than a look can see, but by more than some of them; one that does not
+    /// Thrown back by a load, an axis brakes by less than a sample can see, but by more than some of them; one that does not
     /// brake at all runs away.
     #[test]
     fn what_brakes_slowly_does_not_run_away() {
@@ -580,7 +614,7 @@ mod tests {
                 let mut output = AxisOutput { counts, ..AxisOutput::default() };
                 axis.tick(&config, &setpoint, &mut output);
                 assert!(!output.lost, "{brake_mm_s2} tick {tick}");
-                if tick % 8 == 7 { axis.look(&config, &setpoint, &output) } else { None }
+                if tick % 8 == 7 { axis.sample(&config, &setpoint, &output) } else { None }
             })
         };
         assert_eq!(found(0.0), Some(AxisFault::Runaway));

@@ -4,17 +4,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::fault::Reactions;
-#[cfg(feature = "guards")]
+use crate::fault::reaction::Reactions;
 use crate::path::Travel;
-#[cfg(feature = "guards")]
 use crate::units::Position;
 
 /// Guards of a machine: a compiled program carries them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Guards<const AXES: usize> {
     /// Of each axis; `None` to watch nothing of it but the limit of its following error.
-    #[serde(with = "crate::program::array")]
+    #[serde(with = "crate::array")]
     pub axes: [Option<GuardFigures>; AXES],
     /// How faults end.
     pub reactions: Reactions,
@@ -28,7 +26,6 @@ impl<const AXES: usize> Guards<AXES> {
     }
 
     /// Where the axes may go; an end beyond the kernel's range bounds nothing.
-    #[cfg(feature = "guards")]
     #[must_use]
     pub fn travel(&self) -> Travel<AXES> {
         self.axes.map(|axis| {

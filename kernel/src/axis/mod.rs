@@ -12,11 +12,38 @@
 //!
 //! Configuration ([`AxesConfig`], [`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so gains can
 //! change without a bump.
+//!
+//! ```
+//! use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
+//! use motion_kernel::units::Counts;
+//!
+//! let axis = AxisFigures {
+//!     mm_per_count: 0.0001,
+//!     mm_s_at_10_v: 100.0,
+//!     output_offset_v: 0.0,
+//!     output_limit_v: 10.0,
+//!     gains: Gains { kp_per_s: 50.0, ki_per_s2: 0.0, kd: 0.0 },
+//!     feedforward: Feedforward::default(),
+//!     following_error_limit_mm: 0.5,
+//! };
+//! let config = AxesConfig::<f32, 1>::new(&[axis], 0.0005)?;
+//! let actual = config.axes[0].encoder.position(Counts(10_000));
+//! assert!((actual.to_mm() - 1.0).abs() < 1e-9);
+//! assert_eq!(config.axes[0].output.code(50.0).to_volts(), 5.0);
+//!
+//! // A refusal names the axis and the figure.
+//! let refused = AxesConfig::<f32, 1>::new(&[AxisFigures { mm_per_count: 0.0, ..axis }], 0.0005);
+//! assert_eq!(refused.map_err(|error| error.axis), Err(0));
+//! # Ok::<(), motion_kernel::axis::AxesError>(())
+//! ```
 
 mod check;
 pub mod correction;
 pub mod feedforward;
 #[cfg(feature = "guards")]
+mod guard;
+#[cfg(not(feature = "guards"))]
+#[path = "limit_only.rs"]
 mod guard;
 mod guards;
 pub mod preview;
@@ -27,8 +54,6 @@ pub use correction::{Correction, CorrectionError};
 pub use feedforward::{
     BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, TABLE_POINTS, Table, Tables,
 };
-#[cfg(feature = "guards")]
-pub use guard::LOOK_TICKS;
 pub use guards::{GuardFigures, Guards};
 pub use preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX, Preview};
 pub use regulator::{Command, Gains, Regulator, RegulatorState};
@@ -38,12 +63,10 @@ use serde::{Deserialize, Serialize};
 
 use check::{Check, fits};
 #[cfg(feature = "guards")]
-pub(crate) use guard::AxisFault;
-#[cfg(feature = "guards")]
+pub(crate) use guard::{AxisFault, SAMPLE_TICKS};
 use guard::{Guard, GuardConfig};
 
-#[cfg(feature = "guards")]
-use crate::fault::Reactions;
+use crate::fault::reaction::Reactions;
 use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, DacCode, Position};
@@ -79,7 +102,6 @@ pub struct AxisConfig<R> {
     pub regulator: Regulator<R>,
     /// Greatest following error at which the axis faults \[mm\].
     pub following_error_limit_mm: R,
-    #[cfg(feature = "guards")]
     guard: GuardConfig<R>,
 }
 
@@ -90,8 +112,7 @@ pub struct AxesConfig<R, const AXES: usize> {
     pub axes: [AxisConfig<R>; AXES],
     /// By how many ticks position set-points are delayed.
     pub preview_ticks: u8,
-    /// How faults end.
-    #[cfg(feature = "guards")]
+    /// How faults end; without the feature `guards` immediately.
     pub reactions: Reactions,
 }
 
@@ -130,29 +151,8 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
             config
         });
         // The axes before it are those without a refusal.
-        let made = Self {
-            axes,
-            preview_ticks,
-            #[cfg(feature = "guards")]
-            reactions: Reactions::IMMEDIATE,
-        };
+        let made = Self { axes, preview_ticks, reactions: Reactions::IMMEDIATE };
         check.refused.map_or(Ok(made), |cause| Err(AxesError { axis, cause }))
-    }
-
-    /// The same axes for a control tick of `tick_s`, guarded by all of `guards`, with its reactions. Background.
-    ///
-    /// # Errors
-    /// The first figure that is out of its range or beyond the number type's.
-    #[cfg(feature = "guards")]
-    pub fn guarded(mut self, guards: &Guards<AXES>, tick_s: f64) -> Result<Self, AxesError> {
-        let look_ticks = u32::from(LOOK_TICKS) * AXES as u32;
-        self.reactions = guards.reactions;
-        for (axis, (config, figures)) in self.axes.iter_mut().zip(&guards.axes).enumerate() {
-            let Some(figures) = figures else { continue };
-            config.guard = Check::all(|check| GuardConfig::new(check, figures, config, look_ticks, tick_s))
-                .map_err(|cause| AxesError { axis, cause })?;
-        }
-        Ok(self)
     }
 
     /// By how many ticks these axes need their position set-points delayed: as the longest lead asks for.
@@ -191,13 +191,11 @@ impl<R: Real> AxisConfig<R> {
                 limit_mm,
             ),
             following_error_limit_mm: R::from_f64(limit_mm),
-            #[cfg(feature = "guards")]
             guard: GuardConfig::limit_only(limit_mm),
         }
     }
 
     /// The following error at which the axis faults in a motion \[mm\].
-    #[cfg(feature = "guards")]
     pub fn following_error_limit_mm_in(&self, setpoint: &Setpoint<R>) -> R {
         self.guard.limit_mm(self.following_error_limit_mm, setpoint)
     }
@@ -212,7 +210,6 @@ pub struct AxisState<R> {
     pub regulator: RegulatorState<R>,
     /// Largest |following error| since it was last cleared \[mm\].
     pub peak_following_error_mm: R,
-    #[cfg(feature = "guards")]
     guard: Guard<R>,
 }
 
@@ -240,10 +237,7 @@ impl<R: Real> AxisState<R> {
     /// Declares the encoder's present reading to be `position`.
     pub fn set_position(&mut self, config: &AxisConfig<R>, counts: Counts, position: Position) {
         self.refer(config, counts, position);
-        #[cfg(feature = "guards")]
-        {
-            self.guard = Guard::at(counts);
-        }
+        self.guard = Guard::at(counts);
     }
 
     /// Declares a reading of the encoder, not the present one, to be `position`. What guards remember are counts, and stays.
@@ -263,7 +257,6 @@ impl<R: Real> AxisState<R> {
     pub(crate) fn stand_here(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) -> Position {
         output.set = self.position(config, output.counts);
         self.regulator = RegulatorState::default();
-        #[cfg(feature = "guards")]
         self.guard.stand_here();
         output.set
     }
@@ -273,7 +266,6 @@ impl<R: Real> AxisState<R> {
     #[inline]
     pub fn stand_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) {
         let error_mm = self.hold_still(config, output);
-        #[cfg(feature = "guards")]
         self.guard.watch(error_mm - self.regulator.last_error_mm(), output.counts);
         self.regulator.watch(error_mm);
     }
@@ -310,20 +302,12 @@ impl<R: Real> AxisState<R> {
         let following_error_mm: R = (output.set - actual).to_offset();
         let size_mm = following_error_mm.abs();
         self.peak_following_error_mm = self.peak_following_error_mm.max(size_mm);
-        // Written so that what is not a number counts as lost.
-        #[cfg(not(feature = "guards"))]
-        let is_lost = !(size_mm <= config.following_error_limit_mm);
-        #[cfg(feature = "guards")]
-        let is_lost = {
-            let last_error_mm = self.regulator.last_error_mm();
-            !self.guard.allows(config, following_error_mm, last_error_mm, output.counts, setpoint)
-        };
-        if is_lost {
+        let last_error_mm = self.regulator.last_error_mm();
+        if !self.guard.allows(config, following_error_mm, last_error_mm, output.counts, setpoint) {
             return self.lose(config, output);
         }
         let command =
             config.regulator.tick(&mut self.regulator, following_error_mm, setpoint, config.output.limits());
-        #[cfg(feature = "guards")]
         if !self.guard.allows_command(command.velocity_mm_s, config.output.limits().1) {
             return self.lose(config, output);
         }
@@ -341,26 +325,8 @@ impl<R: Real> AxisState<R> {
     }
 
     /// Forgets what was seen of the axis before its drive was enabled.
-    #[cfg(feature = "guards")]
     pub(crate) fn restart_guard(&mut self) {
         self.guard.restart();
-    }
-
-    /// What broke in an axis that is lost, `since` ticks after it was looked at.
-    #[cfg(feature = "guards")]
-    pub(crate) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> AxisFault<R> {
-        self.guard.judge(config, setpoint, since)
-    }
-
-    /// A look at an axis that was regulated in this tick.
-    #[cfg(feature = "guards")]
-    pub(crate) fn look(
-        &mut self,
-        config: &AxisConfig<R>,
-        setpoint: &Setpoint<R>,
-        output: &AxisOutput<R>,
-    ) -> Option<AxisFault<R>> {
-        self.guard.look(config, setpoint, output)
     }
 }
 

@@ -69,7 +69,6 @@ impl<const AXES: usize> Preview<AXES> {
     }
 
     /// Moves all positions of an axis by `shift`.
-    #[cfg(feature = "live")]
     pub(crate) fn shift(&mut self, axis: usize, shift: Position) {
         for past in self.past.iter_mut().filter_map(|past| past.get_mut(axis)) {
             *past = *past + shift;

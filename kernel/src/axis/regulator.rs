@@ -68,7 +68,6 @@ impl<R: Real> RegulatorState<R> {
     }
 
     /// ε of the tick before \[mm\].
-    #[cfg(feature = "guards")]
     #[inline]
     pub(super) fn last_error_mm(&self) -> R {
         self.last_error_mm

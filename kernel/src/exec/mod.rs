@@ -7,6 +7,25 @@
 //!
 //! Bound: [`STEPS_PER_TICK_MAX`] phase changes, [`PIECES_PER_TICK_MAX`]
 //! pieces; no solver, no division. Fails by [`ExecFault`] only.
+//!
+//! ```
+//! use motion_kernel::exec::{ExecState, Executor};
+//! use motion_kernel::law::Limits;
+//! use motion_kernel::queue::{PathRules, Streams};
+//! use motion_kernel::units::Position;
+//!
+//! # let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
+//! # let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
+//! let mut streams = Streams::<f32, 1, 18, 10>::new();
+//! let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
+//! feeder.program_stop().expect("room in empty streams");
+//!
+//! let mut executor = Executor::new([Position::ZERO]);
+//! let state = executor.tick(&mut intake).expect("no fault").state;
+//! assert_eq!(state, ExecState::Stopped);
+//! executor.resume();
+//! assert_eq!(executor.tick(&mut intake).expect("no fault").state, ExecState::Idle);
+//! ```
 
 mod motion;
 mod walk;
@@ -152,7 +171,6 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     ) -> Result<(), ExecFault> {
         self.walker.start_tick();
         intake.start_tick();
-        #[cfg(feature = "live")]
         if intake.is_change_due() {
             self.change_over(intake);
         }
@@ -170,7 +188,6 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         }
         executed.state = self.state();
         executed.stretches = self.stretches;
-        #[cfg(feature = "live")]
         intake.publish(
             match &self.activity {
                 Activity::Moving(moving) => Some(moving.inside()),
@@ -183,7 +200,6 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
 
     /// Goes over to the feed list that is asked for: between two items, or within one that the new list repeats. What
     /// can't be followed any more is refused.
-    #[cfg(feature = "live")]
     #[cold]
     fn change_over(&mut self, intake: &mut Intake<'_, R, AXES>) {
         let carried = match (&self.activity, intake.feed(), intake.feed_after_change()) {

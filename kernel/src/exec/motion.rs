@@ -56,7 +56,6 @@ impl Moving {
     }
 
     /// The same place in `segment`, which repeats the beginning of `before`; `None` if that ends here already.
-    #[cfg(feature = "live")]
     #[cold]
     pub(super) fn carried_over<R: Real>(
         &self,
@@ -80,7 +79,6 @@ impl Moving {
     }
 
     /// The phase, and the time that it still takes.
-    #[cfg(feature = "live")]
     #[inline]
     pub(super) fn inside(&self) -> (Phase, Ticks) {
         (self.phase, self.left)

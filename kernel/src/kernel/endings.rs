@@ -34,12 +34,12 @@ fn the_longest_ramp_falls_in_every_tick() {
     assert!(kernel.clear_fault().is_some() && kernel.reaction().is_none());
 }
 
-/// As many axes as a round of looks has places for, each of them lost at every place of the round.
+/// As many axes as a round of samples has places for, each of them lost at every place of the round.
 #[test]
 fn any_of_many_axes_is_judged() {
     const AXES: usize = 31;
     for lost in 0..AXES {
-        for wait in 0..AXES * usize::from(super::LOOK_TICKS) {
+        for wait in 0..AXES * usize::from(crate::axis::SAMPLE_TICKS) {
             let config = guarded::<f32, AXES>(figures(), GUARD);
             let mut kernel = Kernel::<f32, AXES>::new(&config, [Position::ZERO; AXES], [Counts(0); AXES]);
             let mut streams = Streams::<f32, AXES, 2, 2>::new();
@@ -47,7 +47,7 @@ fn any_of_many_axes_is_judged() {
             let mut bench = TestAxes::<AXES>::default();
             kernel.enable(0);
             kernel.tick(&mut intake, &mut bench);
-            kernel.guards.look_ticks = wait as u8;
+            kernel.guards.sample_ticks = wait as u8;
             bench.counts[lost] = Counts(123_456_789);
             let fault = kernel.tick(&mut intake, &mut bench).fault.expect("lost");
             let is_it = matches!(fault.kind, FaultKind::EncoderJump { axis, .. } if axis == lost);

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ramp::LimitedBy;
 use crate::num::Root;
+use crate::work;
 
 /// Limits along the path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,6 +49,7 @@ impl<R: Root> Limits<R> {
     /// The smaller of each.
     #[must_use]
     pub fn least(&self, other: &Self) -> Self {
+        work::add(1);
         Self {
             accel_mm_s2: self.accel_mm_s2.min(other.accel_mm_s2),
             jerk_mm_s3: self.jerk_mm_s3.min(other.jerk_mm_s3),
@@ -152,6 +154,7 @@ impl<R: Root> Law<R> {
     /// whatever the rounding. The regime is found by comparing times, because the changes of feed where
     /// one takes over from another may be a few steps only.
     pub(super) fn times_s(&self, change_mm_s: R) -> (R, R, LimitedBy) {
+        work::add(1);
         if change_mm_s <= R::ZERO {
             return (R::ZERO, R::ZERO, LimitedBy::Snap);
         }

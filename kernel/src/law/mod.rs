@@ -12,6 +12,19 @@
 //! - [`segment`]: the same made ready for the tick: no division is left to do.
 //!
 //! Feeds are magnitudes along the path and never negative. All the functions here are pure.
+//!
+//! ```
+//! use motion_kernel::law::{Law, Limits, Ramp};
+//!
+//! let law = Law::new(Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 })?;
+//! let ramp = Ramp::new(&law, 10.0_f64, 50.0);
+//! // Symmetrical, so its mean feed is that of its ends.
+//! assert!((ramp.length_mm() - 30.0 * ramp.duration_s()).abs() < 1e-9);
+//! assert!(ramp.peak_accel_mm_s2() <= 500.0);
+//! let middle = ramp.at(0.5 * ramp.duration_s());
+//! assert!((middle.v_mm_s - 30.0).abs() < 1e-9);
+//! # Ok::<(), motion_kernel::law::LimitError>(())
+//! ```
 
 pub mod limits;
 pub mod passing;

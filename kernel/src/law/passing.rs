@@ -6,6 +6,7 @@
 
 use super::Ramp;
 use super::shape::{ABOUT_WITHIN, Shape};
+use crate::work;
 
 /// While acceleration is held the formula is exact but for its rounding, as a part of the length.
 const HELD_WITHIN: f64 = 1.0e-12;
@@ -49,6 +50,7 @@ impl Passing {
     /// Two lengths between which [`Ramp::length_to_feed_mm`] lies \[mm\]: less than a thousandth of the ramp's length apart.
     #[must_use]
     pub fn length_to_feed_mm(&self, feed_mm_s: f64) -> (f64, f64) {
+        work::add(1);
         let (gained, left) = (feed_mm_s - self.from_mm_s, self.to_mm_s - feed_mm_s);
         if gained <= 0.0 {
             return (0.0, 0.0);

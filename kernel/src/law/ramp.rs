@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::limits::{Law, Limits};
 use super::shape::Shape;
 use crate::num::{Root, Scalar};
+use crate::work;
 
 /// A ramp between two feeds (S1, section 1). A braking ramp is the accelerating one mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -85,6 +86,7 @@ impl<R: Root> Ramp<R> {
     /// all where acceleration fixes it.
     #[must_use]
     pub fn within(limits: &Limits<R>, from_mm_s: R, to_mm_s: R) -> Self {
+        work::add(1);
         let change = (to_mm_s - from_mm_s).abs();
         let (accel, snap) = (limits.accel_mm_s2, limits.snap_mm_s4);
         let (pi, two) = (R::from_f64(core::f64::consts::PI), R::from_f64(2.0));
@@ -160,6 +162,7 @@ impl<R: Root> Ramp<R> {
     /// length at its end and above. Never too short but by rounding.
     #[must_use]
     pub fn length_to_feed_mm(&self, feed_mm_s: R) -> R {
+        work::add(1);
         if feed_mm_s <= self.from_mm_s {
             return R::ZERO;
         }

@@ -19,7 +19,7 @@
 //! jerk = π²y²/4 − C     acceleration = π²y³/24 − B     snap = π·(y − 4·acceleration)
 //! ```
 //!
-//! where cancelling costs jerk and acceleration less than two bits, and snap keeps its absolute error.
+//! (the coefficients are those of [`Coefficients`](crate::num::Coefficients)), where cancelling costs jerk and acceleration less than two bits, and snap keeps its absolute error.
 //! The series run up to x = 1/2; beyond, the shapes are those at 1 − x mirrored. The falling phase is
 //! the rising one run backwards from the ramp's end, so both ends of a ramp have the full relative
 //! precision. All the coefficients and all that is computed stay below 4: fixed point of 32 bits
@@ -30,10 +30,8 @@
 //!
 //! The closed forms are there too, [`Shape::closed`], with any sine of [`crate::num::sine`].
 
-use fixed::types::I3F29;
-
 use crate::num::sine::SineCosine;
-use crate::num::{Root, Unit, table};
+use crate::num::{Root, SERIES_TERMS_MAX, Unit};
 
 /// Newton steps after which [`Shape::where_speed_is`] has its last digit in f64.
 const SPEED_STEPS_MAX: usize = 8;
@@ -58,61 +56,6 @@ pub struct Shape<U> {
     /// 0 … 1 … −1 … 0.
     pub snap: U,
 }
-
-/// (−1)^(n+1)·π^(2n+2)/(2·(2n+2)!), n = 1 …: C over y⁴.
-const SPEED: [f64; SERIES_TERMS_MAX] = [
-    2.029_356_063_208_384_109_1,
-    -0.667_631_384_427_294_747_94,
-    0.117_665_315_179_446_602_27,
-    -0.012_903_445_695_007_030_00,
-    0.000_964_787_154_701_961_523_95,
-    -0.000_052_319_052_462_422_853_559,
-    0.000_002_151_534_793_516_473_503_6,
-    -0.000_000_069_394_762_311_068_860_572,
-    0.000_000_001_802_365_398_731_250_466_9,
-    -0.000_000_000_038_503_535_653_006_766_899,
-    0.000_000_000_000_688_432_364_018_870_685_21,
-    -0.000_000_000_000_010_453_161_676_573_842_349,
-];
-/// (−1)^(n+1)·π^(2n+2)/(2·(2n+3)!), n = 1 …: B over y⁵.
-const LENGTH: [f64; SERIES_TERMS_MAX] = [
-    0.202_935_606_320_838_410_91,
-    -0.047_687_956_030_521_053_42,
-    0.006_536_961_954_413_700_12,
-    -0.000_586_520_258_863_955_909_38,
-    0.000_037_107_198_257_767_750_921,
-    -0.000_001_743_968_415_414_095_118_6,
-    0.000_000_063_280_435_103_425_691_284,
-    -0.000_000_001_826_177_955_554_443_699_3,
-    0.000_000_000_042_913_461_874_553_582_546,
-    -0.000_000_000_000_837_033_383_761_016_671_72,
-    0.000_000_000_000_013_768_647_280_377_413_704,
-    -0.000_000_000_000_000_193_577_068_084_700_784_24,
-];
-/// Terms that f64 resolves up to x = 1/2: the first one left out is below 7·10⁻¹⁷ of the sum's
-/// first.
-const SERIES_TERMS_MAX: usize = 12;
-
-/// The coefficients of the series in a number's own type.
-pub trait Coefficients: Sized + 'static {
-    /// Of the feed gained: C over y⁴.
-    const SPEED: &'static [Self; SERIES_TERMS_MAX];
-    /// Of the length gained: B over y⁵.
-    const LENGTH: &'static [Self; SERIES_TERMS_MAX];
-}
-
-macro_rules! coefficients {
-    ($unit:ty, $table:path) => {
-        impl Coefficients for $unit {
-            const SPEED: &'static [Self; SERIES_TERMS_MAX] = &$table(&SPEED);
-            const LENGTH: &'static [Self; SERIES_TERMS_MAX] = &$table(&LENGTH);
-        }
-    };
-}
-
-coefficients!(f32, table::f32s);
-coefficients!(f64, table::f64s);
-coefficients!(I3F29, table::fixed_points);
 
 impl Shape<f64> {
     /// At x = 1, S1 (7)–(9).
@@ -173,8 +116,8 @@ impl<U: Unit> Shape<U> {
         let y = z + z;
         let square = y * y;
         let cube = square * y;
-        let b = series(U::LENGTH, square) * (cube * square);
-        let c = series(U::SPEED, square) * (square * square);
+        let b = series(U::SINE_TAIL, square) * (cube * square);
+        let c = series(U::COSINE_TAIL, square) * (square * square);
         let accel = cube * unit(PI * PI / 24.0) - b;
         let jerk = square * unit(PI * PI / 4.0) - c;
         let twice = accel + accel;
@@ -233,6 +176,8 @@ fn series<U: Unit>(coefficients: &[U; SERIES_TERMS_MAX], square: U) -> U {
 
 #[cfg(test)]
 mod tests {
+    use fixed::types::I3F29;
+
     use super::*;
     use crate::num::Scalar;
     use crate::num::sine::Own;

@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use super::splice::Splice;
 use crate::law::{CutRamp, Phase, Ramp, Ticks, segment};
+pub use crate::queue::LIST_ITEMS;
 use crate::units::Position;
 
 /// Feeds that are calculated differently differ by rounding: of 1 mm/s, and of themselves.
@@ -11,9 +12,6 @@ const FEED_ROUNDING_MM_S: f64 = 1.0e-12;
 
 /// Halvings that find where a ramp is cut: to a millionth of a millionth.
 const CUT_STEPS: usize = 40;
-
-/// The most items of a feed list: its queue needs one place more.
-pub const LIST_ITEMS: usize = 15;
 
 /// An item of a feed list.
 #[derive(Clone, Copy, Debug, PartialEq)]

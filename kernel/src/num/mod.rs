@@ -18,20 +18,33 @@
 //! Every operation is IEEE basic arithmetic or integer arithmetic, nothing is contracted to a fused
 //! multiply-add and no platform library is called, so the same input gives the same bits on every
 //! target.
+//!
+//! ```
+//! use motion_kernel::num::{Fixed, Real, Scalar};
+//!
+//! /// The way to a stop under a constant deceleration, in any number type \[mm\].
+//! fn stop_mm<R: Real>(feed_mm_s: f64, share_s_per_mm: f64) -> f64 {
+//!     let feed = R::from_f64(feed_mm_s);
+//!     (feed * (feed * R::from_f64(share_s_per_mm))).to_f64()
+//! }
+//! assert_eq!(stop_mm::<f32>(50.0, 0.001), stop_mm::<f64>(50.0, 0.001));
+//! assert!((stop_mm::<Fixed>(50.0, 0.001) - 2.5).abs() < 1e-6);
+//! ```
 
 mod fixed_point;
 mod float;
+mod series;
 pub mod sine;
-pub(crate) mod table;
+mod table;
 
 pub use fixed_point::Fixed;
 pub(crate) use float::{is_finite, is_within, whole};
+pub use series::Coefficients;
+pub(crate) use series::SERIES_TERMS_MAX;
 
 use core::fmt::Debug;
 use core::hint::black_box;
 use core::ops::{Add, Div, Mul, Neg, Sub};
-
-use crate::law::shape::Coefficients;
 
 /// `slices` for a loop of the background that is not to be unrolled: the optimiser does not see how long they are. In
 /// software a few operations of f64 are a hundred bytes, and flash is worth more than the background's time. A loop
@@ -89,8 +102,7 @@ pub trait Scalar:
 
 /// A normalised quantity, |x| < 4.
 pub trait Unit: Scalar + Coefficients {
-    /// Terms of the power series of the law's shapes that this type resolves over half a phase, at
-    /// most 12 (see [`crate::law::shape`]).
+    /// Terms of the series of [`Coefficients`] that this type resolves up to y = 1, at most 12.
     const SERIES_TERMS: usize;
     /// Magnitudes below this are held; infinite for floats.
     const LIMIT: f64;

@@ -306,7 +306,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
 }
 
 /// What memory may do to a piece.
-#[cfg(all(test, feature = "guards"))]
+#[cfg(test)]
 impl<const AXES: usize> Piece<f32, AXES> {
     /// Of a line, with one bit of start, length or direction another one.
     pub(crate) fn with_flipped_bit(mut self, bit: u32) -> Self {
@@ -351,7 +351,6 @@ impl Steepness {
     pub(crate) const STRAIGHT: Self = Self { per_mm: 0.0, slope: 1.0, bend_per_mm: 0.0, twist_per_mm2: 0.0 };
 
     /// Of |x''| by arc length \[1/mm\].
-    #[cfg(feature = "guards")]
     pub(crate) fn bend_per_mm(&self) -> f64 {
         self.bend_per_mm
     }

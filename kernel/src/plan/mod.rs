@@ -11,6 +11,17 @@
 //! - [`mod@ramps`]: the pair of ramps of a planned block over exact path positions;
 //! - `spanning`: ramps that begin and end between junctions and may span many blocks;
 //! - [`planner`]: the entry for all callers: the faster of the two, in the caller's memory.
+//!
+//! ```
+//! use motion_kernel::plan::{Junction, junction};
+//!
+//! // A corner of 0.5° in a tick of 0.5 ms, where the acceleration may step by 200 mm/s².
+//! let corner = Junction { angle_rad: 0.5_f64.to_radians(), curvature_step_per_mm: 0.0 };
+//! let feed_mm_s = junction(&corner, 0.02, 200.0, 0.0005);
+//! assert!((feed_mm_s * corner.angle_rad / 0.0005 - 200.0).abs() < 1e-6);
+//! // Beyond the angle that may be passed the machine stops on the corner.
+//! assert_eq!(junction(&Junction { angle_rad: 0.03, ..corner }, 0.02, 200.0, 0.0005), 0.0);
+//! ```
 
 pub mod ceiling;
 pub mod junction;

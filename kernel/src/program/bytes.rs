@@ -40,10 +40,10 @@ pub struct Header<const AXES: usize> {
     /// What the streams are held to.
     pub rules: PathRules,
     /// The machine's axes.
-    #[serde(with = "super::array")]
+    #[serde(with = "crate::array")]
     pub axes: [AxisFigures; AXES],
     /// Where the machine stands when it starts.
-    #[serde(with = "super::array")]
+    #[serde(with = "crate::array")]
     pub start: [Position; AXES],
 }
 

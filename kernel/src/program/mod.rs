@@ -7,8 +7,35 @@
 //! - [`supply`]: keeps the two streams filled from items;
 //! - [`mod@check`]: whether all of a program can be executed, before any of it is;
 //! - [`mod@bytes`]: a program as bytes, with the machine it is for.
+//!
+//! ```
+//! use core::convert::Infallible;
+//!
+//! use motion_kernel::exec::{ExecState, Executor};
+//! use motion_kernel::law::{Limits, Ticks};
+//! use motion_kernel::program::{Item, ProgramError, Reader, Supply};
+//! use motion_kernel::queue::{PathRules, Streams};
+//! use motion_kernel::units::Position;
+//!
+//! // What is no program is refused as a whole.
+//! assert!(matches!(Reader::<1>::new(b"G1 X10 F600"), Err(ProgramError::NotAProgram)));
+//!
+//! // Items of any source fill the streams: here two dwells of 1 ms and a program stop.
+//! let dwell = Item::<1>::Dwell(Ticks::from_seconds(0.001, 0.0005).expect("some ticks"));
+//! let items = [dwell, dwell, Item::Stop].map(Ok::<_, Infallible>);
+//! # let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
+//! # let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
+//! let mut streams = Streams::<f32, 1, 18, 10>::new();
+//! let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
+//! let mut supply = Supply::new(items.into_iter(), 0.0005);
+//! supply.fill(&mut feeder).expect("items that can be executed");
+//! assert!(supply.is_empty());
+//! let mut executor = Executor::new([Position::ZERO]);
+//! let states = [(); 5].map(|()| executor.tick(&mut intake).expect("no fault").state);
+//! assert_eq!(states[1], ExecState::Dwell);
+//! assert_eq!(states[4], ExecState::Stopped);
+//! ```
 
-pub(crate) mod array;
 pub mod bytes;
 pub mod check;
 mod checksum;
@@ -38,10 +65,10 @@ pub enum Item<const AXES: usize> {
         /// The program line it came from.
         line: u32,
         /// Where it starts.
-        #[serde(with = "array")]
+        #[serde(with = "crate::array")]
         start: [Position; AXES],
         /// A unit vector.
-        #[serde(with = "array")]
+        #[serde(with = "crate::array")]
         direction: [f64; AXES],
         /// Its length.
         length: Position,
@@ -51,10 +78,10 @@ pub enum Item<const AXES: usize> {
         /// The program line it came from.
         line: u32,
         /// Where it starts.
-        #[serde(with = "array")]
+        #[serde(with = "crate::array")]
         start: [Position; AXES],
         /// q₁ … q₇ of every axis, parts of the length.
-        #[serde(with = "array")]
+        #[serde(with = "crate::array")]
         coefficients: [[f64; 7]; AXES],
         /// Its length.
         length: Position,
@@ -62,7 +89,7 @@ pub enum Item<const AXES: usize> {
     /// The feed over a length of path; a cruise is a ramp between equal feeds.
     Feed(PlannedRamp),
     /// The stretch ends here, at rest.
-    EndOfStretch(#[serde(with = "array")] [Position; AXES]),
+    EndOfStretch(#[serde(with = "crate::array")] [Position; AXES]),
     /// Rest, between stretches.
     Dwell(Ticks),
     /// Rest until told to resume, between stretches.
@@ -89,7 +116,7 @@ pub struct PathBlock {
     /// Its length.
     pub length: Position,
     /// The program's feed, then cap and limits at up to it, then cap and limits whatever it is, then the junction's feed.
-    #[serde(with = "array")]
+    #[serde(with = "crate::array")]
     figures: [f64; 10],
 }
 

@@ -4,22 +4,24 @@
 //! checked as in [`Feeder`](super::Feeder); that it ends at rest, on path that is queued, is what who fills it answers for
 //! (`kernel/live`).
 
-use heapless::spsc::{Consumer, Producer, Queue};
+use heapless::spsc::{Producer, Queue};
 
-use super::change::{Change, LISTS, ListPlace, Mailbox, Progress};
-use super::{
-    Density, FeedItem, Fill, Intake, PathItem, PathRules, Refused, Rejection, Shared, Streams, accept, count,
-    enter, length,
-};
-use crate::law::{FeedSegment, Phase, Ticks};
-use crate::live::LIST_ITEMS;
+use super::accept::{Acceptance, PathRules};
+use super::change::{Change, LIST_ITEMS, LISTS, Progress};
+use super::counter::count;
+use super::density::Density;
+use super::intake::Intake;
+use super::item::{FeedItem, PathItem, Refused};
+use super::lists::Lists;
+use super::mailbox::Mailbox;
+use super::rejection::Rejection;
+use super::room::{Fill, enter, length};
+use super::shared::Shared;
+use super::streams::Streams;
+use crate::law::{FeedSegment, Ticks};
 use crate::num::Real;
 use crate::path::Piece;
 use crate::units::Position;
-
-/// The most items of a list that is not needed any more that go in one tick. Each costs some twenty instructions; a list
-/// of sixteen places is empty eight ticks after it was given up.
-const DROPPED_PER_TICK: usize = 2;
 
 /// Storage of a path and three feed lists: `PIECES` − 1 pieces, `SEGMENTS` − 1 items a list.
 #[derive(Debug)]
@@ -27,6 +29,7 @@ pub struct LiveStreams<R: Real, const AXES: usize, const PIECES: usize, const SE
     first: Streams<R, AXES, PIECES, SEGMENTS>,
     second: Queue<FeedItem<R>, SEGMENTS>,
     third: Queue<FeedItem<R>, SEGMENTS>,
+    mailbox: Mailbox,
 }
 
 impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
@@ -35,7 +38,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
     /// Empty streams.
     #[must_use]
     pub const fn new() -> Self {
-        Self { first: Streams::new(), second: Queue::new(), third: Queue::new() }
+        Self { first: Streams::new(), second: Queue::new(), third: Queue::new(), mailbox: Mailbox::new() }
     }
 
     /// The two ends, for a machine that stands at `position`; the first list is under way, and empty. What was queued
@@ -52,16 +55,18 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
         while path.dequeue().is_some() {}
         while feed.dequeue().is_some() {}
         let shared: &Shared = shared;
-        shared.mailbox.reset();
+        let mailbox = &self.mailbox;
+        mailbox.reset();
         let (path_in, path_out) = path.split();
         let (first_in, first_out) = feed.split();
         let (second_in, second_out) = self.second.split();
         let (third_in, third_out) = self.third.split();
-        let acceptance = accept::Acceptance::new(rules, position);
+        let acceptance = Acceptance::new(rules, position);
         let feeder = LiveFeeder {
             path: path_in,
             lists: [first_in, second_in, third_in],
             shared,
+            mailbox,
             path_accept: acceptance,
             feed_accept: acceptance,
             filled: None,
@@ -76,15 +81,7 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             finished: 0,
             path_fill: Fill::new(&shared.path_entered, PIECES - 1),
             feed_fill: Fill::new(&shared.feed_entered, SEGMENTS - 1),
-            lists: Some(Lists {
-                place: ListPlace::new(0, 0),
-                others: [(1, second_out), (2, third_out)],
-                seen: shared.mailbox.generation(),
-                due: ListPlace::NEVER,
-                change: None,
-                refused: None,
-            }),
-            correction: None,
+            lists: Lists::new(mailbox, [second_out, third_out]),
         };
         (feeder, intake)
     }
@@ -103,9 +100,10 @@ pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
     path: Producer<'a, PathItem<R, AXES>>,
     lists: [Producer<'a, FeedItem<R>>; LISTS as usize],
     shared: &'a Shared,
-    path_accept: accept::Acceptance<R, AXES>,
+    mailbox: &'a Mailbox,
+    path_accept: Acceptance<R, AXES>,
     /// Of the list being filled.
-    feed_accept: accept::Acceptance<R, AXES>,
+    feed_accept: Acceptance<R, AXES>,
     filled: Option<u8>,
     /// Changes asked for so far.
     changes: u32,
@@ -127,7 +125,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Refuses pieces that leave `travel` from now on, all of each, not only its ends.
     #[cfg(feature = "guards")]
     pub fn bound(&mut self, travel: crate::path::Travel<AXES>) {
-        self.path_accept.bound(travel);
+        self.path_accept.bound(super::bounds::Bounds::new(travel));
     }
 
     /// Enters a piece of path that is driven at `fastest_mm_s` at most.
@@ -170,7 +168,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     #[must_use]
     pub fn progress(&self) -> Progress {
         self.interruptible();
-        self.shared.mailbox.progress()
+        self.mailbox.progress()
     }
 
     /// Whether there is a list to begin now.
@@ -181,9 +179,8 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
 
     fn free_list(&self) -> Option<u8> {
         self.interruptible();
-        let is_free = |(list, queue): &(u8, &Producer<'_, _>)| {
-            !self.shared.mailbox.is_owned(*list) && length(queue) == 0
-        };
+        let is_free =
+            |(list, queue): &(u8, &Producer<'_, _>)| !self.mailbox.is_owned(*list) && length(queue) == 0;
         (0..LISTS).zip(&self.lists).find(is_free).map(|(list, _)| list)
     }
 
@@ -191,7 +188,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// `feed_mm_s`, behind what `density` says; `None` if there is none now.
     pub fn begin(&mut self, start: Position, feed_mm_s: R, density: Density) -> Option<u8> {
         let free = self.free_list()?;
-        self.shared.mailbox.own(free, true);
+        self.mailbox.own(free, true);
         self.feed_accept = self.path_accept.feed_from(start, feed_mm_s, density);
         self.filled = Some(free);
         Some(free)
@@ -271,154 +268,32 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
             return Err(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() });
         }
         self.changes = self.changes.wrapping_add(1);
-        self.shared.mailbox.ask(Some(change), self.changes);
+        self.mailbox.ask(Some(change), self.changes);
         Ok(())
     }
 
     /// Takes back what was asked for. The tick may have followed it already.
     pub fn no_change(&mut self) {
         self.interruptible();
-        self.shared.mailbox.ask(None, 0);
+        self.mailbox.ask(None, 0);
     }
 
     /// Whether the change asked for came too late.
     #[must_use]
     pub fn is_refused(&self) -> bool {
         self.interruptible();
-        self.shared.mailbox.is_refused()
+        self.mailbox.is_refused()
     }
 
     /// Whether a fault asks for a stop on the path; never again after the streams are split anew.
     #[must_use]
     pub fn is_stop_wanted(&self) -> bool {
-        #[cfg(feature = "guards")]
-        return self.shared.mailbox.is_stop_wanted();
-        #[cfg(not(feature = "guards"))]
-        false
+        self.mailbox.is_stop_wanted()
     }
 
     /// Gives up a list: the tick empties it.
     pub fn give_up(&mut self, list: u8) {
         self.interruptible();
-        self.shared.mailbox.own(list, false);
-    }
-}
-
-/// The tick's end of the lists; the one under way is the intake's feed.
-pub(super) struct Lists<'a, R: Real> {
-    /// The current list, and how many items of it are done.
-    place: ListPlace,
-    others: [(u8, Consumer<'a, FeedItem<R>>); LISTS as usize - 1],
-    /// The generation that has been dealt with.
-    seen: u32,
-    /// From here on a change is due; never reached if none is asked for.
-    due: ListPlace,
-    /// What is asked for, as of the tick's start, with its word.
-    change: Option<(u32, Change)>,
-    /// The word that came too late last.
-    refused: Option<u32>,
-}
-
-impl<R: Real> Lists<'_, R> {
-    /// Deals with what is new, in as many ticks as it takes to empty what was given up.
-    #[cold]
-    #[inline(never)]
-    fn poll(&mut self, mailbox: &Mailbox, generation: u32) {
-        self.change = mailbox
-            .asked()
-            .filter(|(word, change)| change.from == self.place.list() && self.refused != Some(*word));
-        self.due =
-            self.change.map_or(ListPlace::NEVER, |(_, change)| ListPlace::new(change.from, change.after));
-        for _ in 0..DROPPED_PER_TICK {
-            let given_up = self.others.iter_mut().filter(|(list, _)| !mailbox.is_owned(*list));
-            // One item of one of them, while there is any.
-            if given_up.map(|(_, queue)| queue.dequeue()).all(|item| item.is_none()) {
-                self.seen = generation;
-                break;
-            }
-        }
-    }
-
-    /// What is asked for no longer is.
-    fn forget(&mut self) -> Option<(u32, Change)> {
-        self.due = ListPlace::NEVER;
-        self.change.take()
-    }
-}
-
-impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
-    /// What the background asks for now; what it gave up goes.
-    #[inline]
-    pub(super) fn poll_changes(&mut self) {
-        if let Some(lists) = &mut self.lists {
-            let generation = self.shared.mailbox.generation();
-            if lists.seen != generation {
-                lists.poll(&self.shared.mailbox, generation);
-            }
-        }
-    }
-
-    #[inline(never)]
-    pub(super) fn count_done(&mut self) {
-        let Some(lists) = &mut self.lists else { return };
-        lists.place = lists.place.next();
-        if lists.due == lists.place && lists.change.is_some_and(|(_, change)| !change.within) {
-            self.take_over();
-        }
-    }
-
-    /// A change that is asked for inside the item that is under way, or has been passed, or is due with nothing under
-    /// way.
-    #[inline]
-    pub(crate) fn is_change_due(&self) -> bool {
-        self.lists.as_ref().is_some_and(|lists| lists.due <= lists.place)
-    }
-
-    /// The first item of the list that is asked for, if the place where it takes over lies within the item under way.
-    pub(crate) fn feed_after_change(&self) -> Option<&FeedItem<R>> {
-        let lists = self.lists.as_ref()?;
-        let (_, change) = lists.change.filter(|(_, change)| change.within && lists.due == lists.place)?;
-        lists.others.iter().find(|(list, _)| *list == change.to)?.1.peek()
-    }
-
-    /// Whether the change that is due takes over where no segment is under way.
-    pub(crate) fn takes_over_between_items(&self) -> bool {
-        self.lists.as_ref().is_some_and(|lists| lists.due == lists.place)
-    }
-
-    /// Follows the change.
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn take_over(&mut self) {
-        let Some(lists) = &mut self.lists else { return };
-        let Some((_, change)) = lists.forget() else { return };
-        for (list, queue) in &mut lists.others {
-            if *list == change.to {
-                *list = lists.place.list();
-                lists.place = ListPlace::new(change.to, 0);
-                core::mem::swap(queue, &mut self.feed);
-                // What is given up already is emptied from the next tick on.
-                lists.seen = lists.seen.wrapping_sub(1);
-                return;
-            }
-        }
-    }
-
-    /// The change came too late.
-    #[cold]
-    pub(crate) fn refuse(&mut self) {
-        let Some(lists) = &mut self.lists else { return };
-        if let Some((word, _)) = lists.forget() {
-            lists.refused = Some(word);
-            self.shared.mailbox.refuse(word);
-        }
-    }
-
-    /// Where the executor is at the end of a tick.
-    #[inline]
-    pub(crate) fn publish(&self, inside: Option<(Phase, Ticks)>, waits: bool) {
-        if let Some(lists) = &self.lists {
-            self.shared.mailbox.publish(lists.place, inside, waits);
-        }
+        self.mailbox.own(list, false);
     }
 }

@@ -14,9 +14,9 @@
 //!                                                       └─► judge
 //! ```
 
-mod axes;
 mod items;
 mod judge;
+mod machine;
 mod runs;
 
 use arbitrary::{Result, Unstructured};

@@ -14,9 +14,10 @@ use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::{Intake, LiveStreams, Streams};
 use motion_kernel::units::{Counts, Position};
 
-use super::axes::{REACTIONS, TestAxes, axes};
 use super::items::{Program, RULES, TICK_S};
 use super::judge::Judge;
+use super::machine::{REACTIONS, axes, mend, upset};
+use crate::axes::{TestAxes, counts};
 
 /// Of the queues, small enough to be full at times.
 const PIECES: usize = 16;
@@ -34,6 +35,8 @@ const OFF_TICKS: u32 = REACTIONS.stop_ticks + REACTIONS.ramp_ticks as u32 + 2;
 struct Machine<R: Real> {
     kernel: Kernel<R, 2>,
     hardware: TestAxes,
+    /// It has answered other than it should.
+    is_hostile: bool,
     judge: Judge<R>,
     /// Where it was set by the latest tick.
     set: [Position; 2],
@@ -53,6 +56,7 @@ impl<R: Real> Machine<R> {
         Self {
             kernel,
             hardware: TestAxes::default(),
+            is_hostile: false,
             judge: Judge::new(),
             set,
             faulty: 0,
@@ -77,14 +81,17 @@ impl<R: Real> Machine<R> {
             }
             4 => return self.trip(input),
             5 => {
-                self.hardware.mend();
+                mend(&mut self.hardware);
                 return Ok(());
             }
             6 => {
                 self.kernel.rest_here();
             }
             7 => self.refer(input)?,
-            _ => return self.hardware.upset(input),
+            _ => {
+                self.is_hostile = true;
+                return upset(&mut self.hardware, input);
+            }
         }
         (self.is_moved, self.is_given_up) = (true, true);
         Ok(())
@@ -108,10 +115,10 @@ impl<R: Real> Machine<R> {
         let mm = f64::from(input.arbitrary::<i16>()?) / 64.0;
         let position = Position::from_mm(mm).expect("within half a metre");
         let Counts(now) = self.hardware.counts[axis];
-        let counts = Counts(now.wrapping_sub(i64::from(behind)));
+        let latched = Counts(now.wrapping_sub(i64::from(behind)));
         let before = self.set[axis];
-        if let Some(set) = self.kernel.reference(axis, counts, position) {
-            self.hardware.shift(axis, set[axis] - before);
+        if let Some(set) = self.kernel.reference(axis, latched, position) {
+            self.hardware.origin[axis] -= counts(set[axis] - before);
         }
         Ok(())
     }
@@ -128,13 +135,13 @@ impl<R: Real> Machine<R> {
             self.faulty += 1;
         } else {
             self.faulty = 0;
-            if !self.hardware.is_hostile {
+            if !self.is_hostile {
                 self.hardware.follow(&trace);
             }
         }
         if self.faulty > OFF_TICKS {
             assert_eq!(self.kernel.reaction(), Some(Reaction::Immediate), "{trace:?}");
-            self.hardware.mend();
+            mend(&mut self.hardware);
         }
         if trace.executed.state == ExecState::Stopped {
             self.kernel.resume();
@@ -144,7 +151,7 @@ impl<R: Real> Machine<R> {
 
     /// Nothing has kept the program from being driven to its end.
     fn is_undisturbed(&self) -> bool {
-        !self.hardware.is_hostile && !self.is_given_up
+        !self.is_hostile && !self.is_given_up
     }
 }
 
@@ -156,15 +163,15 @@ pub(super) fn of_streams<R: Real>(input: &mut Unstructured<'_>) -> Result<()> {
     let items = program.items.iter().map(|&item| Ok::<_, Infallible>(item));
     let mut supply = Supply::new(items, TICK_S);
     let mut machine = Machine::<R>::new();
-    let mut has_turn = true;
+    let mut is_polled = true;
     while !input.is_empty() {
         match input.int_in_range(0..=15)? {
             0 => machine.event(input)?,
-            1 => has_turn = !has_turn,
+            1 => is_polled = !is_polled,
             _ => {}
         }
         for _ in 0..input.arbitrary::<u8>()? {
-            if has_turn {
+            if is_polled {
                 let _ = supply.fill(&mut feeder);
             }
             machine.tick(&mut intake);
@@ -213,7 +220,7 @@ impl Source<2> for Arriving<'_> {
     }
 }
 
-/// Held, resumed, overridden, given up; items and turns come late.
+/// Held, resumed, overridden, given up; items and polls come late.
 pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Result<()> {
     let program = Program::read(input)?;
     let mut streams = LiveStreams::<R, 2, PIECES, LIVE_SEGMENTS>::new();
@@ -222,11 +229,11 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
     let source = Arriving { items: program.items.iter(), there: &there };
     let mut control = LiveControl::<R, 2, _, _, PLACES>::new(source, TICK_S, input.int_in_range(0..=3)?);
     let mut machine = Machine::<R>::new();
-    let (mut has_turn, mut is_aborted) = (true, false);
+    let (mut is_polled, mut is_aborted) = (true, false);
     while !input.is_empty() {
         match input.int_in_range(0..=15)? {
             0 => machine.event(input)?,
-            1 => has_turn = !has_turn,
+            1 => is_polled = !is_polled,
             2 => control.hold(),
             3 => control.set_single_block(input.arbitrary()?),
             4 | 5 => control.resume(),
@@ -246,7 +253,7 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
             _ => there.set(there.get() + usize::from(input.arbitrary::<u8>()?)),
         }
         for _ in 0..input.arbitrary::<u8>()? {
-            if has_turn {
+            if is_polled {
                 let _ = control.poll(&mut feeder);
             }
             machine.tick(&mut intake);
@@ -256,7 +263,7 @@ pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Resul
     let fault = machine.kernel.fault();
     // What fills the lists is never the reason: what can't be executed is refused.
     assert!(
-        machine.hardware.is_hostile || machine.is_given_up || fault.is_none(),
+        machine.is_hostile || machine.is_given_up || fault.is_none(),
         "no fault of the machine: {fault:?}"
     );
     if program.is_whole && machine.is_undisturbed() && program.ticks < TICKS_MAX {

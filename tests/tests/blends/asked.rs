@@ -1,7 +1,7 @@
 //! Programmed moves: their points, distances and tangents in closed form, their text, and random ones.
 
-use super::check::random::Random;
-use super::{Vector, along, dot, norm, rounded, subtract};
+use super::{Vector, along, dot, minus, norm, rounded};
+use motion_tests::random::Random;
 
 /// A programmed move.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +31,7 @@ impl Asked {
     pub(super) fn heading(&self) -> Vector {
         match *self {
             Self::Line { from, to } => {
-                let chord = subtract(to, from);
+                let chord = minus(to, from);
                 chord.map(|c| c / norm(chord))
             }
             Self::Arc { to, axes: [first, second, _], centre, sweep, .. } => {
@@ -47,7 +47,7 @@ impl Asked {
     /// The point at a part of the sweep or the length.
     pub(super) fn at(&self, part: f64) -> Vector {
         match *self {
-            Self::Line { from, to } => along(from, subtract(to, from), part),
+            Self::Line { from, to } => along(from, minus(to, from), part),
             Self::Arc { from, axes: [first, second, _], centre, sweep, .. } => {
                 let (x, y) = (from[first] - centre[0], from[second] - centre[1]);
                 let angle = y.atan2(x) + sweep * part;
@@ -60,13 +60,13 @@ impl Asked {
     }
 
     pub(super) fn distance(&self, point: Vector) -> f64 {
-        let to_ends = norm(subtract(point, self.at(0.0))).min(norm(subtract(point, self.to())));
+        let to_ends = norm(minus(point, self.at(0.0))).min(norm(minus(point, self.to())));
         match *self {
             Self::Line { from, to } => {
-                let chord = subtract(to, from);
-                let foot = dot(subtract(point, from), chord) / dot(chord, chord);
+                let chord = minus(to, from);
+                let foot = dot(minus(point, from), chord) / dot(chord, chord);
                 if (0.0..=1.0).contains(&foot) {
-                    norm(subtract(point, along(from, chord, foot)))
+                    norm(minus(point, along(from, chord, foot)))
                 } else {
                     to_ends
                 }
@@ -185,7 +185,7 @@ pub(super) fn corners(
     let mut at = [0.0; 3];
     let mut asked = Vec::new();
     for index in 0..moves {
-        let length = random.log_between(length.0, length.1);
+        let length = random.log(length.0, length.1);
         let is_tangent = index > 0 && random.chance(0.2);
         let corner = if index == 0 || is_tangent { 0.0 } else { random.between(angle.0, angle.1) };
         let step = next(random, at, heading, corner, length, plane);

@@ -6,7 +6,7 @@ use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
 use super::asked::Asked;
-use super::{Vector, norm, subtract};
+use super::{Vector, minus, norm};
 
 /// A piece as the kernel gets it: derivatives by arc length are computed here.
 pub(super) struct Compiled {
@@ -71,7 +71,7 @@ pub(super) fn continuous(stretches: &[Vec<Compiled>]) -> Result<(), String> {
     for pair in stretches.iter().flat_map(|pieces| pieces.windows(2)) {
         let (end, start) = (pair[0].at(1.0), pair[1].at(0.0));
         let shorter = pair[0].length.min(pair[1].length);
-        let step = |order: usize| norm(subtract(end[order], start[order]));
+        let step = |order: usize| norm(minus(end[order], start[order]));
         let steps = [step(0), step(1), step(2) * shorter, step(3) * shorter * shorter];
         // Coordinates are rounded to 2⁻³² mm and lines have their direction from them.
         let rounding = 2e-9 + 4e-10 / shorter;
@@ -103,7 +103,7 @@ pub(super) fn distance(asked: &[Asked], stretches: &[Vec<Compiled>], tolerance: 
     }
     let chords: Vec<Asked> = driven
         .windows(2)
-        .filter(|pair| norm(subtract(pair[0], pair[1])) > 0.0)
+        .filter(|pair| norm(minus(pair[0], pair[1])) > 0.0)
         .map(|pair| Asked::Line { from: pair[0], to: pair[1] })
         .collect();
     for step in asked {

@@ -8,7 +8,7 @@ use motion_kernel::program::Supply;
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
 
-use super::{norm, subtract};
+use super::{minus, norm};
 
 /// What the ticks of a program came to.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,7 +52,7 @@ pub(super) fn driven<R: Real>(plan: &Plan, machine: &Machine) -> Result<Worst, S
         }
         worst.path[0] = worst.path[0].max(norm(a) / machine.path.accel_mm_s2);
         worst.path[1] = worst.path[1].max(norm(j) / machine.path.jerk_mm_s3);
-        worst.accel_step_mm_s2 = worst.accel_step_mm_s2.max(norm(subtract(a, last_accel)));
+        worst.accel_step_mm_s2 = worst.accel_step_mm_s2.max(norm(minus(a, last_accel)));
         (last_accel, last_jerk) = (a, j);
         worst.ticks += 1;
         match executed.state {

@@ -6,11 +6,11 @@ use motion_host::toolpath::{Element, Involute, Polynomial, Role};
 use motion_kernel::num::{Fixed, Real};
 
 use super::asked::{Asked, corners, line, program};
-use super::check::random::Random;
 use super::compiled::{Compiled, compiled, continuous, distance};
 use super::driven::{Worst, driven};
 use super::tolerance::CHAINS;
 use super::{SAMPLES, assert_none, norm, planned, rounded, seeds, without_path_mode};
+use motion_tests::random::Random;
 
 /// Many moves one after the other, on machines whose axes differ: every tick within every limit, jerk without a
 /// step, the tolerance kept over the whole path.
@@ -33,8 +33,8 @@ fn every_tick_of_blended_programs_keeps_the_limits() {
         let lengths = if random.chance(0.5) { (0.1, 20.0) } else { (0.005, 0.5) };
         let moves = 3 + random.below(20);
         let asked = corners(&mut random, moves, lengths, (1e-3, 2.8));
-        let tolerance = rounded(random.log_between(1e-3, 0.3));
-        let text = program(&asked, tolerance, random.log_between(60.0, 12_000.0));
+        let tolerance = rounded(random.log(1e-3, 0.3));
+        let text = program(&asked, tolerance, random.log(60.0, 12_000.0));
         let done = || -> Result<Worst, String> {
             let plan = planned(&text, &machine)?;
             let stretches = compiled(&plan);
@@ -58,16 +58,16 @@ fn every_tick_of_blended_programs_keeps_the_limits() {
 
 /// A blend, a curve with random control points or an involute.
 fn curved(random: &mut Random) -> Option<Element> {
-    let size_mm = random.log_between(1e-3, 100.0);
+    let size_mm = random.log(1e-3, 100.0);
     let unit = |turn: f64| [turn.cos(), turn.sin(), 0.0];
     match random.below(3) {
         0 => {
-            let direction = unit(random.log_between(1e-3, 2.9));
-            let room_mm = size_mm * random.log_between(0.05, 1.0);
+            let direction = unit(random.log(1e-3, 2.9));
+            let room_mm = size_mm * random.log(0.05, 1.0);
             let before = Element::Line { from: [-size_mm, 0.0, 0.0], to: [0.0; 3] };
             let after = Element::Line { from: [0.0; 3], to: direction.map(|part| part * size_mm) };
             let limits = Machine::reference().limits().in_any_direction();
-            let tolerance_mm = random.log_between(1e-5, 1.0);
+            let tolerance_mm = random.log(1e-5, 1.0);
             Blend::new(&before, &after, tolerance_mm, room_mm, &limits).map(|blend| blend.element)
         }
         1 => {
@@ -77,7 +77,7 @@ fn curved(random: &mut Random) -> Option<Element> {
             Some(Element::polynomial([0.0; 3], Polynomial::bezier(points), Role::Spline))
         }
         _ => {
-            let angles = (random.log_between(1e-2, 10.0), random.log_between(1e-2, 10.0));
+            let angles = (random.log(1e-2, 10.0), random.log(1e-2, 10.0));
             let frame = (unit(1.0), unit(1.0 + core::f64::consts::FRAC_PI_2));
             Involute::new(frame, size_mm, angles).ok().map(|shape| Element::involute([0.0; 3], shape))
         }

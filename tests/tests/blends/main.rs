@@ -10,9 +10,6 @@
 //! - `tolerance`, `limits`, `time`, `modes`: the tests.
 
 mod asked;
-#[path = "../check/mod.rs"]
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
 mod compiled;
 mod driven;
 mod limits;
@@ -23,8 +20,7 @@ mod tolerance;
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Mode, Plan, plan_program};
-
-type Vector = [f64; 3];
+use motion_tests::check::geometry::{Vector, dot, minus, norm};
 
 /// The programs of the tests.
 const SAMPLES: [(&str, &str); 6] = [
@@ -36,20 +32,8 @@ const SAMPLES: [(&str, &str); 6] = [
     ("stringer", include_str!("../../../host/src/cli/stringer.ngc")),
 ];
 
-fn subtract(a: Vector, b: Vector) -> Vector {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
 fn along(a: Vector, direction: Vector, length: f64) -> Vector {
     [a[0] + direction[0] * length, a[1] + direction[1] * length, a[2] + direction[2] * length]
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn norm(a: Vector) -> f64 {
-    dot(a, a).sqrt()
 }
 
 /// To 10⁻¹⁰ mm, as G-code has them.
@@ -76,8 +60,8 @@ fn planned(text: &str, machine: &Machine) -> Result<Plan, String> {
 }
 
 fn seeds(count: u64) -> impl Iterator<Item = u64> {
-    let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
-    first..first + check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(count)
+    let first = motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(1);
+    first..first + motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(count)
 }
 
 fn assert_none(failures: &[String]) {

@@ -21,9 +21,9 @@ fn exact_path_stops_at_corners_only() {
     assert_eq!(stretches, 5);
 }
 
-/// Without P the machine's tolerance holds; P0 and turns of more than 170° stay exact.
+/// Without P the machine's tolerance holds; P0 and corners of more than 170° stay exact.
 #[test]
-fn what_is_not_blended() {
+fn without_p_the_tolerance_of_the_machine_holds_and_exact_corners_stay_exact() {
     let mut machine = Machine::reference();
     let blends = |machine: &Machine, text: &str| {
         planned(text, machine).expect("a plan").blocks.iter().filter(|block| block.kind == "blend").count()

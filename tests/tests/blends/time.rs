@@ -3,21 +3,19 @@
 use motion_host::machine::Machine;
 
 use super::asked::{Asked, corners, line, program};
-use super::check::random::Random;
 use super::driven::driven;
-use super::{SAMPLES, assert_none, check, planned, rounded, seeds, without_path_mode};
+use super::{SAMPLES, assert_none, planned, rounded, seeds, without_path_mode};
+use motion_tests::random::Random;
 
 /// Programs of many moves.
 const PROGRAMS: u64 = 150;
 /// Time of a blended program over that of the same program without blends, at most.
 const RATIO_MAX: f64 = 1.005;
 
-/// Moves at feeds of their own, slow ones beside fast ones.
+/// Moves at feeds of their own, slow ones next to fast ones.
 fn of_many_feeds(random: &mut Random, asked: &[Asked]) -> String {
-    let moves: Vec<String> = asked
-        .iter()
-        .map(|step| format!("F{:.3} {}", random.log_between(20.0, 12_000.0), step.text()))
-        .collect();
+    let moves: Vec<String> =
+        asked.iter().map(|step| format!("F{:.3} {}", random.log(20.0, 12_000.0), step.text())).collect();
     format!("{}M2\n", moves.concat())
 }
 
@@ -30,15 +28,15 @@ fn no_program_is_slower_with_blends_than_without() {
     for seed in seeds(PROGRAMS) {
         let mut random = Random::new(seed);
         let mut machine = Machine::reference();
-        machine.path.accel_step_mm_s2 = random.log_between(1.0, 500.0);
+        machine.path.accel_step_mm_s2 = random.log(1.0, 500.0);
         let lengths = if random.chance(0.5) { (0.1, 30.0) } else { (0.005, 0.5) };
         let moves = 3 + random.below(20);
         let asked = corners(&mut random, moves, lengths, (1e-3, 3.1));
-        let tolerance = rounded(random.log_between(1e-3, 0.5));
+        let tolerance = rounded(random.log(1e-3, 0.5));
         let moves = if random.chance(0.5) {
             of_many_feeds(&mut random, &asked)
         } else {
-            program(&asked, tolerance, random.log_between(60.0, 12_000.0))
+            program(&asked, tolerance, random.log(60.0, 12_000.0))
         };
         let moves = moves.replace(&format!("G64 P{tolerance:.10}"), "");
         let time = |mode: &str| planned(&format!("{mode}\n{moves}"), &machine);
@@ -60,7 +58,7 @@ fn no_program_is_slower_with_blends_than_without() {
     }
     println!("worst {worst}, on average {}, {blends} blends", sum / PROGRAMS as f64);
     assert_none(&failures);
-    if check::from_env("MOTION_TEST_PROGRAMS").is_none() {
+    if motion_tests::from_env("MOTION_TEST_PROGRAMS").is_none() {
         assert!(blends > 400 && sum < 0.93 * PROGRAMS as f64, "{blends} blends, {sum}");
     }
 }
@@ -79,7 +77,7 @@ fn no_sample_is_slower_with_blends_than_without() {
     }
 }
 
-/// Gentle corners are passed in less time than stopping takes, however short the lines beside them.
+/// Gentle corners are passed in less time than stopping takes, however short the lines next to them.
 #[test]
 fn gentle_corners_cost_less_than_stops() {
     let machine = Machine::reference();

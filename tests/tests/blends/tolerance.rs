@@ -3,9 +3,9 @@
 use motion_host::machine::Machine;
 
 use super::asked::{Asked, corners, program};
-use super::check::random::Random;
 use super::compiled::{compiled, continuous, distance};
-use super::{assert_none, check, norm, planned, rounded, seeds, subtract};
+use super::{assert_none, minus, norm, planned, rounded, seeds};
+use motion_tests::random::Random;
 
 /// Programs of two moves.
 const PAIRS: u64 = 4000;
@@ -36,7 +36,7 @@ fn a_blend_keeps_its_tolerance_and_steps_nowhere() {
         let mut random = Random::new(seed);
         let radians = |degrees: f64| degrees.to_radians();
         let asked = corners(&mut random, 2, (1e-3, 100.0), (radians(1.0), radians(165.0)));
-        let tolerance = rounded(random.log_between(1e-3, 1.0));
+        let tolerance = rounded(random.log(1e-3, 1.0));
         let text = program(&asked, tolerance, FEED_MM_MIN);
         let done = || -> Result<f64, String> {
             let plan = planned(&text, &machine)?;
@@ -62,7 +62,7 @@ fn a_blend_keeps_its_tolerance_and_steps_nowhere() {
     }
     println!("{blends} blends, worst {worst} of the tolerance, {close} above 0.99");
     assert_none(&failures);
-    if check::from_env("MOTION_TEST_PROGRAMS").is_none() {
+    if motion_tests::from_env("MOTION_TEST_PROGRAMS").is_none() {
         assert!(blends > 3000 && close > 600, "{blends} blends, {close} that use their tolerance");
     }
 }
@@ -70,10 +70,10 @@ fn a_blend_keeps_its_tolerance_and_steps_nowhere() {
 /// Two lines in one direction have nothing to blend.
 fn is_straight_on(asked: &[Asked]) -> bool {
     asked.iter().all(|step| matches!(step, Asked::Line { .. }))
-        && norm(subtract(asked[0].heading(), asked[1].heading())) < 1e-6
+        && norm(minus(asked[0].heading(), asked[1].heading())) < 1e-6
 }
 
-/// Curves and corners in short chords that lie beside them by a part of the tolerance, as a scanner or a rounding
+/// Curves and corners in short chords that lie off them by a part of the tolerance, as a scanner or a rounding
 /// postprocessor leaves them.
 fn chords(random: &mut Random, tolerance: f64) -> Vec<Asked> {
     let (mut on_curve, mut heading) = ([0.0, 0.0], random.between(0.0, core::f64::consts::TAU));
@@ -81,7 +81,7 @@ fn chords(random: &mut Random, tolerance: f64) -> Vec<Asked> {
     let beside = tolerance * random.between(0.0, 0.5);
     for _ in 0..4 {
         heading += random.between(-1.2, 1.2);
-        let length = tolerance * random.log_between(0.5, 20.0);
+        let length = tolerance * random.log(0.5, 20.0);
         let turn = random.between(-0.05, 0.05);
         for _ in 0..10 + random.below(40) {
             heading += turn;
@@ -103,7 +103,7 @@ fn merged_chords_keep_the_tolerance() {
     let (mut worst, mut merged, mut all) = (0.0_f64, 0, 0);
     for seed in seeds(CHAINS) {
         let mut random = Random::new(seed);
-        let tolerance = rounded(random.log_between(3e-3, 0.3));
+        let tolerance = rounded(random.log(3e-3, 0.3));
         let asked = chords(&mut random, tolerance);
         let text = program(&asked, tolerance, FEED_MM_MIN);
         let done = || -> Result<f64, String> {
@@ -122,7 +122,7 @@ fn merged_chords_keep_the_tolerance() {
     }
     println!("{all} chords became {merged} lines and arcs, worst {worst} of the tolerance");
     assert_none(&failures);
-    if check::from_env("MOTION_TEST_PROGRAMS").is_none() {
+    if motion_tests::from_env("MOTION_TEST_PROGRAMS").is_none() {
         assert!(2 * merged < all && worst > 0.9, "{merged} of {all}, worst {worst}");
     }
 }
@@ -135,7 +135,7 @@ fn merging_has_a_tolerance_of_its_own() {
     let (mut worst, mut beyond, mut counts) = (0.0_f64, 0, [0; 3]);
     for seed in seeds(CHAINS / 5) {
         let mut random = Random::new(seed);
-        let tolerance = rounded(random.log_between(3e-3, 0.1));
+        let tolerance = rounded(random.log(3e-3, 0.1));
         let asked = chords(&mut random, tolerance);
         let text = program(&asked, tolerance, FEED_MM_MIN);
         let done = || -> Result<(), String> {
@@ -177,7 +177,7 @@ fn merging_has_a_tolerance_of_its_own() {
     }
     println!("{counts:?} moves, worst {worst} of both tolerances, {beyond} times beyond P alone");
     assert_none(&failures);
-    if check::from_env("MOTION_TEST_PROGRAMS").is_none() {
+    if motion_tests::from_env("MOTION_TEST_PROGRAMS").is_none() {
         assert!(counts[0] > 3 * counts[1] && counts[1] > counts[2] && beyond > 5, "{counts:?}, {beyond}");
     }
 }

@@ -5,9 +5,9 @@ use motion_host::machine::Machine;
 use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Gains};
 use motion_kernel::num::{Fixed, Real};
 
-use crate::check::random::Random;
 use crate::machine::{Next, random_plan, run};
 use crate::setting;
+use motion_tests::random::Random;
 
 /// The reference machine, tuned: the inverse of its drives, early feedforward.
 fn tuned() -> Machine {
@@ -41,9 +41,9 @@ fn tuned() -> Machine {
 fn any(random: &mut Random) -> Machine {
     let mut machine = if random.chance(0.5) { tuned() } else { Machine::reference() };
     for axis in &mut machine.axes {
-        axis.mm_per_count = random.log_between(2e-5, 5e-3);
+        axis.mm_per_count = random.log(2e-5, 5e-3);
         let amplitude_counts = random.below(5) as u16;
-        axis.noise = (amplitude_counts > 0).then_some(EncoderNoise { amplitude_counts, seed: random.next() });
+        axis.noise = (amplitude_counts > 0).then_some(EncoderNoise { amplitude_counts, seed: random.bits() });
         axis.mm_s_at_10_v *= random.sign() * random.between(1.0, 1.5);
         // A trim that is off commands motion where there is none: by less than moving_mm_s.
         axis.output_offset_v = random.between(-0.05, 0.05);

@@ -12,9 +12,9 @@ use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
 
-use crate::check::random::Random;
-use crate::machine::{Next, Seen, random_plan, run};
+use crate::machine::{Next, TickView, random_plan, run};
 use crate::setting;
+use motion_tests::random::Random;
 
 /// A round of looks at three axes [ticks].
 const ROUND_TICKS: u64 = 24;
@@ -56,7 +56,7 @@ fn injection(name: &str, random: &mut Random, position_mm: f64) -> Option<Inject
         "encoder lost" => Injection::EncoderLost,
         "encoder jump" => {
             // Beyond twice the limit of a jump, and beyond what a tick moves, so that it is neither a stop nor a turn.
-            let counts = random.log_between(4000.0, 1e6) as i32;
+            let counts = random.log(4000.0, 1e6) as i32;
             Injection::EncoderJump { counts: if random.chance(0.5) { counts } else { -counts } }
         }
         "encoder reversed" => Injection::EncoderReversed,
@@ -113,7 +113,7 @@ fn inject<R: Real>(case: &Case, machine: &Machine, seed: u64, longest_ticks: f64
         error = Some(problem);
         Next::End
     };
-    run::<R>(&plan, machine, &mut |tick, hardware, _: &mut Kernel<R, 3>, seen: Option<&Seen<R>>| {
+    run::<R>(&plan, machine, &mut |tick, hardware, _: &mut Kernel<R, 3>, seen: Option<&TickView<R>>| {
         if tick == inject_at {
             let position_mm = seen.map_or(0.0, |seen| seen.position_mm[axis]);
             match injection(case.name, &mut random, position_mm) {

@@ -14,10 +14,10 @@ use motion_kernel::queue::{LiveStreams, Streams};
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{DacCode, Position};
 
-use crate::check::bench::{mm, rest_to_rest};
-use crate::check::random::Random;
-use crate::check::totals::Totals;
-use crate::check::{drive, program};
+use motion_tests::check::bench::{mm, rest_to_rest};
+use motion_tests::check::totals::Totals;
+use motion_tests::check::{drive, program};
+use motion_tests::random::Random;
 
 const PIECES: usize = 256;
 const SEGMENTS: usize = 16;
@@ -42,14 +42,14 @@ pub(crate) fn random_plan(random: &mut Random, machine: &Machine, longest_ticks:
 
 /// What a tick showed.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen<R> {
+pub(crate) struct TickView<R> {
     pub(crate) trace: Trace<R, 3>,
     pub(crate) is_enabled: bool,
     pub(crate) is_off: bool,
     pub(crate) position_mm: [f64; 3],
 }
 
-impl<R: Real> Seen<R> {
+impl<R: Real> TickView<R> {
     pub(crate) fn codes(&self) -> [i16; 3] {
         self.trace.axes.map(|axis| axis.code.0)
     }
@@ -62,7 +62,7 @@ impl<R: Real> Seen<R> {
     }
 }
 
-/// How a run goes on after a tick.
+/// What a run does after a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Next {
     GoOn,
@@ -73,7 +73,7 @@ pub(crate) enum Next {
 
 /// What a test does between two ticks: the hardware to break, the kernel to trip.
 pub(crate) type Between<'a, R> =
-    dyn FnMut(u64, &mut SimulatedHardware<'_>, &mut Kernel<R, 3>, Option<&Seen<R>>) -> Next + 'a;
+    dyn FnMut(u64, &mut SimulatedHardware<'_>, &mut Kernel<R, 3>, Option<&TickView<R>>) -> Next + 'a;
 
 /// Runs a plan; `between` is called before every tick. After the program's end the machine stands for 100 ticks. Ends with
 /// the last tick's number.
@@ -88,7 +88,7 @@ pub(crate) fn run<R: Real>(plan: &Plan, machine: &Machine, between: &mut Between
     let mut streams = Box::new(LiveStreams::<R, 3, PIECES, SEGMENTS>::new());
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
     let mut control = LiveControl::<R, 3, _, _, PLACES>::new(executable.supplied(), executable.tick_s, 0);
-    let mut last: Option<Seen<R>> = None;
+    let mut last: Option<TickView<R>> = None;
     let mut standing = 0;
     for tick in 0.. {
         match between(tick, &mut hardware, &mut kernel, last.as_ref()) {
@@ -105,7 +105,7 @@ pub(crate) fn run<R: Real>(plan: &Plan, machine: &Machine, between: &mut Between
         if trace.executed.state == ExecState::Stopped {
             kernel.resume();
         }
-        last = Some(Seen {
+        last = Some(TickView {
             trace,
             is_enabled: simulated.is_enabled(),
             is_off: kernel.reaction() == Some(Reaction::Immediate),

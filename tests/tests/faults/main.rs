@@ -13,9 +13,6 @@
 //! ticks are calm.
 
 mod calm;
-#[path = "../check/mod.rs"]
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
 mod injected;
 mod machine;
 mod provoked;
@@ -25,7 +22,7 @@ mod table;
 
 /// A number from the environment.
 fn setting(name: &str, default: u64) -> u64 {
-    let value = std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default);
+    let value = motion_tests::from_env(name).unwrap_or(default);
     println!("{name}={value}");
     value
 }

@@ -1,70 +1,18 @@
 //! Faults of the kernel: typed, latched, the first one stays, outputs 0 V, drives disabled, and a defined
 //! way back.
 
-use crate::check::bench::{LIMITS, RULES, line, mm, point, ramp, rest_to_rest};
 use hal_sim::{AxisParameters, MachineParameters, SimMachine};
 use motion_host::machine::Machine;
 use motion_host::simulate::hardware::SimulatedHardware;
 use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::{ExecFault, ExecState};
 use motion_kernel::fault::FaultKind;
-use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+use motion_kernel::hal::{AxisInputs, Encoder};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::queue::{Feeder, Intake, Streams};
 use motion_kernel::units::{Counts, DacCode, Position};
-
-/// Axes that follow perfectly until told to fail.
-#[derive(Debug, Default)]
-struct TestAxes {
-    counts: [Counts; 2],
-    written: [DacCode; 2],
-    is_enabled: bool,
-    inputs: MachineInputs<2>,
-    inputs_fail: bool,
-    encoder_fails: bool,
-    output_fails: bool,
-    enable_fails: bool,
-}
-
-struct Failure;
-
-impl Encoder<2> for TestAxes {
-    type Error = Failure;
-    fn latch(&mut self) -> Result<[Counts; 2], Failure> {
-        if self.encoder_fails { Err(Failure) } else { Ok(self.counts) }
-    }
-}
-
-impl Inputs<2> for TestAxes {
-    type Error = Failure;
-    fn read_inputs(&mut self) -> Result<MachineInputs<2>, Failure> {
-        if self.inputs_fail { Err(Failure) } else { Ok(self.inputs) }
-    }
-}
-
-impl VelocityChannel<2> for TestAxes {
-    type Error = Failure;
-    fn write(&mut self, codes: &[DacCode; 2]) -> Result<(), Failure> {
-        if self.output_fails {
-            return Err(Failure);
-        }
-        self.written = *codes;
-        Ok(())
-    }
-}
-
-impl DriveEnable<2> for TestAxes {
-    type Error = Failure;
-    fn set_enabled(&mut self, is_enabled: bool) -> Result<(), Failure> {
-        if self.enable_fails {
-            return Err(Failure);
-        }
-        self.is_enabled = is_enabled;
-        Ok(())
-    }
-}
-
-const MM_PER_COUNT: f64 = 1e-4;
+use motion_tests::axes::{MM_PER_COUNT, TestAxes};
+use motion_tests::check::bench::{LIMITS, RULES, line, mm, point, ramp, rest_to_rest};
 
 /// Two axes of the reference machine, with another limit of the following error.
 fn kernel() -> Kernel<f32, 2> {
@@ -93,10 +41,7 @@ fn tick(
 ) -> Option<FaultKind<f32>> {
     let trace = *kernel.tick(intake, axes);
     if trace.fault.is_none() {
-        axes.counts = trace
-            .executed
-            .setpoints
-            .map(|axis| Counts((axis.position.to_mm() / MM_PER_COUNT).round() as i64));
+        axes.follow(&trace);
     } else if trace.fault.is_some_and(|fault| fault.tick < trace.tick || !is_found_writing(&fault.kind)) {
         assert!(trace.axes.iter().all(|axis| axis.code == DacCode::ZERO), "{trace:?}");
     }
@@ -115,12 +60,8 @@ fn offer(feeder: &mut Feeder<'_, f32, 2>, from_mm: f64) {
     feeder.end_stretch(point([from_mm + 20.0, 0.0])).expect("its end");
 }
 
-/// Runs into a fault that `break_it` provokes at tick 100, and checks all that is promised about it.
-fn provoke(
-    break_it: impl Fn(&mut TestAxes),
-    repair: impl Fn(&mut TestAxes),
-    is_expected: impl Fn(&FaultKind<f32>) -> bool,
-) {
+/// In the middle of a move: the machine, its streams, and what it has done.
+fn moving(then: impl FnOnce(&mut Kernel<f32, 2>, &mut Intake<'_, f32, 2>, &mut TestAxes)) {
     let (mut kernel, mut axes) = (kernel(), TestAxes::default());
     let mut streams = Streams::<f32, 2, 8, 8>::new();
     let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
@@ -129,62 +70,73 @@ fn provoke(
         assert_eq!(tick(&mut kernel, &mut intake, &mut axes), None);
     }
     assert!(axes.is_enabled && axes.written[0] != DacCode::ZERO);
-    let mut fault = None;
-    for _ in 0..400 {
-        break_it(&mut axes);
-        fault = fault.or(tick(&mut kernel, &mut intake, &mut axes));
-    }
-    let fault = fault.expect("a fault");
-    assert!(is_expected(&fault), "{fault:?}");
-    let latched = kernel.fault().expect("latched");
-    // Repaired it stays, and another failure does not replace it.
-    repair(&mut axes);
-    assert_eq!(tick(&mut kernel, &mut intake, &mut axes), Some(fault));
-    axes.encoder_fails = true;
-    axes.output_fails = true;
-    tick(&mut kernel, &mut intake, &mut axes);
-    (axes.encoder_fails, axes.output_fails) = (false, false);
-    for _ in 0..10 {
-        assert_eq!(tick(&mut kernel, &mut intake, &mut axes), Some(fault));
-    }
-    assert_eq!(kernel.fault(), Some(latched));
-    assert!(!axes.is_enabled && axes.written == [DacCode::ZERO; 2], "{axes:?}");
-    // The way back: cleared, at rest where the axes are, with new streams.
-    let stands = kernel.clear_fault().expect("off");
-    assert_eq!(kernel.fault(), None);
-    let here = axes.counts.map(|Counts(counts)| counts as f64 * MM_PER_COUNT);
-    for (found, here) in stands.iter().zip(here) {
-        assert!((found.to_mm() - here).abs() < 1e-9);
-    }
-    let mut streams = Streams::<f32, 2, 8, 8>::new();
-    let (mut feeder, mut intake) = streams.split(RULES, point(here));
-    offer(&mut feeder, here[0]);
-    // Not before it is asked to.
-    for _ in 0..3 {
-        let trace = kernel.tick(&mut intake, &mut axes);
-        assert!(trace.executed.state == ExecState::Idle && !axes.is_enabled);
-    }
-    kernel.enable(5);
-    for settling in 0..5 {
-        let trace = kernel.tick(&mut intake, &mut axes);
-        assert!(trace.executed.state == ExecState::Idle && axes.is_enabled, "{settling}");
-    }
-    for _ in 0..20_000 {
-        let trace = kernel.tick(&mut intake, &mut axes);
-        assert_eq!(trace.fault, None);
-        let set = trace.executed.setpoints.map(|axis| axis.position);
-        axes.counts = set.map(|position| Counts((position.to_mm() / MM_PER_COUNT).round() as i64));
-        if trace.executed.stretches == 1 && trace.executed.state == ExecState::Idle {
-            assert!(axes.is_enabled);
-            assert_eq!(set, [mm(here[0] + 20.0), mm(here[1])]);
-            return;
+    then(&mut kernel, &mut intake, &mut axes);
+}
+
+/// Runs into a fault that `break_it` provokes at tick 100, and checks all that is promised about it.
+fn provoke(
+    break_it: impl Fn(&mut TestAxes),
+    repair: impl Fn(&mut TestAxes),
+    is_expected: impl Fn(&FaultKind<f32>) -> bool,
+) {
+    moving(|kernel, intake, axes| {
+        let mut fault = None;
+        for _ in 0..400 {
+            break_it(axes);
+            fault = fault.or(tick(kernel, intake, axes));
         }
-    }
-    panic!("it did not move again");
+        let fault = fault.expect("a fault");
+        assert!(is_expected(&fault), "{fault:?}");
+        let latched = kernel.fault().expect("latched");
+        // Repaired it stays, and another failure does not replace it.
+        repair(axes);
+        assert_eq!(tick(kernel, intake, axes), Some(fault));
+        axes.fails.latch = true;
+        axes.fails.write = true;
+        tick(kernel, intake, axes);
+        (axes.fails.latch, axes.fails.write) = (false, false);
+        for _ in 0..10 {
+            assert_eq!(tick(kernel, intake, axes), Some(fault));
+        }
+        assert_eq!(kernel.fault(), Some(latched));
+        assert!(!axes.is_enabled && axes.written == [DacCode::ZERO; 2], "{axes:?}");
+        // The way back: cleared, at rest where the axes are, with new streams.
+        let stands = kernel.clear_fault().expect("off");
+        assert_eq!(kernel.fault(), None);
+        let here = axes.counts.map(|Counts(counts)| counts as f64 * MM_PER_COUNT);
+        for (found, here) in stands.iter().zip(here) {
+            assert!((found.to_mm() - here).abs() < 1e-9);
+        }
+        let mut streams = Streams::<f32, 2, 8, 8>::new();
+        let (mut feeder, mut intake) = streams.split(RULES, point(here));
+        offer(&mut feeder, here[0]);
+        // Not before it is asked to.
+        for _ in 0..3 {
+            let trace = kernel.tick(&mut intake, axes);
+            assert!(trace.executed.state == ExecState::Idle && !axes.is_enabled);
+        }
+        kernel.enable(5);
+        for settling in 0..5 {
+            let trace = kernel.tick(&mut intake, axes);
+            assert!(trace.executed.state == ExecState::Idle && axes.is_enabled, "{settling}");
+        }
+        for _ in 0..20_000 {
+            let trace = *kernel.tick(&mut intake, axes);
+            assert_eq!(trace.fault, None);
+            axes.follow(&trace);
+            let set = trace.executed.setpoints.map(|axis| axis.position);
+            if trace.executed.stretches == 1 && trace.executed.state == ExecState::Idle {
+                assert!(axes.is_enabled);
+                assert_eq!(set, [mm(here[0] + 20.0), mm(here[1])]);
+                return;
+            }
+        }
+        panic!("it did not move again");
+    });
 }
 
 #[test]
-fn following_error() {
+fn an_axis_that_stands_still_is_a_following_error() {
     let stuck = |axes: &mut TestAxes| axes.counts[0] = Counts(0);
     provoke(
         stuck,
@@ -194,22 +146,22 @@ fn following_error() {
 }
 
 #[test]
-fn encoder() {
-    provoke(|b| b.encoder_fails = true, |b| b.encoder_fails = false, |k| matches!(k, FaultKind::Encoder));
+fn encoders_that_can_not_be_read_are_a_fault() {
+    provoke(|b| b.fails.latch = true, |b| b.fails.latch = false, |k| matches!(k, FaultKind::Encoder));
 }
 
 #[test]
-fn output() {
-    provoke(|b| b.output_fails = true, |b| b.output_fails = false, |k| matches!(k, FaultKind::Output));
+fn a_converter_that_can_not_be_written_is_a_fault() {
+    provoke(|b| b.fails.write = true, |b| b.fails.write = false, |k| matches!(k, FaultKind::Output));
 }
 
 #[test]
-fn inputs() {
-    provoke(|b| b.inputs_fail = true, |b| b.inputs_fail = false, |k| matches!(k, FaultKind::Inputs));
+fn inputs_that_can_not_be_read_are_a_fault() {
+    provoke(|b| b.fails.inputs = true, |b| b.fails.inputs = false, |k| matches!(k, FaultKind::Inputs));
 }
 
 #[test]
-fn emergency_stop() {
+fn an_open_emergency_stop_is_a_fault() {
     provoke(
         |b| b.inputs.emergency_stop = true,
         |b| b.inputs.emergency_stop = false,
@@ -218,7 +170,7 @@ fn emergency_stop() {
 }
 
 #[test]
-fn drive_fault() {
+fn a_drive_that_reports_a_fault_is_one() {
     provoke(
         |b| b.inputs.axes[1] = AxisInputs::HEALTHY.with_fault(true),
         |b| b.inputs.axes[1] = AxisInputs::HEALTHY,
@@ -228,15 +180,16 @@ fn drive_fault() {
 
 /// The first tick can't enable the drives: no motion with them off.
 #[test]
-fn enable() {
-    let (mut kernel, mut axes) = (kernel(), TestAxes { enable_fails: true, ..TestAxes::default() });
+fn drives_that_can_not_be_enabled_do_not_move() {
+    let (mut kernel, mut axes) = (kernel(), TestAxes::default());
+    axes.fails.enable = true;
     let mut streams = Streams::<f32, 2, 8, 8>::new();
     let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
     offer(&mut feeder, 0.0);
     tick(&mut kernel, &mut intake, &mut axes);
     let before = kernel.fault();
     assert!(matches!(before.map(|fault| fault.kind), Some(FaultKind::Enable)), "{before:?}");
-    axes.enable_fails = false;
+    axes.fails.enable = false;
     tick(&mut kernel, &mut intake, &mut axes);
     assert!(kernel.fault() == before && axes.written == [DacCode::ZERO; 2] && !axes.is_enabled);
 }
@@ -258,12 +211,12 @@ fn starve(is_path: bool) {
     }
     let mut fault = None;
     for _ in 0..10_000 {
-        let trace = kernel.tick(&mut intake, &mut axes);
+        let trace = *kernel.tick(&mut intake, &mut axes);
         if trace.fault.is_none() {
             assert!(trace.executed.motion.v_mm_s <= top_mm_s as f32);
             let set = trace.executed.setpoints.map(|axis| axis.position.to_mm());
             assert!(!is_path || set[0] <= path_mm);
-            axes.counts = set.map(|at| Counts((at / MM_PER_COUNT).round() as i64));
+            axes.follow(&trace);
         } else {
             assert!(trace.axes.iter().all(|axis| axis.code == DacCode::ZERO));
         }
@@ -276,19 +229,19 @@ fn starve(is_path: bool) {
 }
 
 #[test]
-fn starvation_of_the_path() {
+fn a_path_that_runs_dry_is_a_fault_and_stays_one() {
     starve(true);
 }
 
 #[test]
-fn starvation_of_the_feed() {
+fn a_feed_that_runs_dry_is_a_fault_and_stays_one() {
     starve(false);
 }
 
 /// The converter's bus fails in the middle of a move, on the simulated machine: when it is back, the first
 /// thing it gets is 0 V, although the axes do not stand where they were set.
 #[test]
-fn converter_bus() {
+fn a_converter_bus_that_comes_back_first_gets_0_v() {
     let reference = Machine::reference();
     for frames in [0, 1, 2, 3, 401, 402, 403, 404] {
         let axis = AxisParameters::REFERENCE_X;
@@ -332,22 +285,9 @@ fn converter_bus() {
     }
 }
 
-/// In the middle of a move: the machine, its streams, and what it has done.
-fn moving(then: impl FnOnce(&mut Kernel<f32, 2>, &mut Intake<'_, f32, 2>, &mut TestAxes)) {
-    let (mut kernel, mut axes) = (kernel(), TestAxes::default());
-    let mut streams = Streams::<f32, 2, 8, 8>::new();
-    let (mut feeder, mut intake) = streams.split(RULES, point([0.0, 0.0]));
-    offer(&mut feeder, 0.0);
-    for _ in 0..100 {
-        assert_eq!(tick(&mut kernel, &mut intake, &mut axes), None);
-    }
-    assert!(axes.is_enabled && axes.written[0] != DacCode::ZERO);
-    then(&mut kernel, &mut intake, &mut axes);
-}
-
 /// What the board has found ends like any other fault, in the very next tick, whose number it has.
 #[test]
-fn faults_that_the_board_reports() {
+fn a_fault_that_the_board_reports_ends_motion_in_the_next_tick() {
     for kind in [FaultKind::EmergencyStop, FaultKind::Drive { axis: 1 }] {
         moving(|kernel, intake, axes| {
             kernel.trip(kind);

@@ -7,11 +7,11 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
 
-use crate::check::drive;
-use crate::check::random::Random;
-use crate::check::totals::Totals;
-use crate::machine::{Next, Seen, random_plan, run};
+use crate::machine::{Next, TickView, random_plan, run};
 use crate::setting;
+use motion_tests::check::drive;
+use motion_tests::check::totals::Totals;
+use motion_tests::random::Random;
 
 fn plan(text: &str, machine: &Machine) -> Plan {
     let mode = motion_host::planning::Mode::Spanning;
@@ -37,47 +37,51 @@ fn a_stop_stays_on_the_path_and_within_its_limits() {
         let at = 25 + (random.unit() * plan.time_s / machine.tick_s) as u64;
         let (mut last_s_mm, mut stretches) = (0.0, 0);
         let (mut last_a, mut ended) = (0.0, None);
-        run::<f64>(&plan, &machine, &mut |tick, _, kernel: &mut Kernel<f64, 3>, seen: Option<&Seen<f64>>| {
-            if tick == at {
-                kernel.trip(FaultKind::TickMissed { ticks: 2 });
-            }
-            let Some(seen) = seen else { return Next::GoOn };
-            let motion = seen.trace.executed.motion;
-            if tick > at {
-                let found = seen.trace.fault.map(|fault| (fault.tick, fault.kind));
-                assert_eq!(found, Some((at, FaultKind::TickMissed { ticks: 2 })), "seed {seed}");
-                if tick == at + 1 && motion.v_mm_s > 0.0 {
-                    moving += 1;
+        run::<f64>(
+            &plan,
+            &machine,
+            &mut |tick, _, kernel: &mut Kernel<f64, 3>, seen: Option<&TickView<f64>>| {
+                if tick == at {
+                    kernel.trip(FaultKind::TickMissed { ticks: 2 });
                 }
-                if !seen.is_off {
-                    assert!(seen.is_enabled, "seed {seed} tick {tick}");
-                    let limits = &machine.path;
-                    assert!(
-                        motion.a_mm_s2.abs() <= limits.accel_mm_s2 * 1.000_001,
-                        "seed {seed} tick {tick}"
-                    );
-                    let jerk = (motion.a_mm_s2 - last_a) / machine.tick_s;
-                    assert!(jerk.abs() <= limits.jerk_mm_s3 * 1.001, "seed {seed} tick {tick}: {jerk}");
-                    // Never back, but for rounding.
-                    let s_mm = motion.s.to_mm();
-                    let is_new = seen.trace.executed.stretches != stretches;
-                    assert!(s_mm >= last_s_mm - 1e-9 || is_new, "seed {seed} tick {tick}");
-                    for axis in seen.trace.axes {
-                        assert!(axis.following_error_mm.abs() < 0.1, "seed {seed} tick {tick}");
+                let Some(seen) = seen else { return Next::GoOn };
+                let motion = seen.trace.executed.motion;
+                if tick > at {
+                    let found = seen.trace.fault.map(|fault| (fault.tick, fault.kind));
+                    assert_eq!(found, Some((at, FaultKind::TickMissed { ticks: 2 })), "seed {seed}");
+                    if tick == at + 1 && motion.v_mm_s > 0.0 {
+                        moving += 1;
                     }
-                } else if ended.is_none() {
-                    assert!(motion.v_mm_s == 0.0 && !seen.is_enabled && seen.codes() == [0; 3]);
-                    ended = Some(tick - at);
+                    if !seen.is_off {
+                        assert!(seen.is_enabled, "seed {seed} tick {tick}");
+                        let limits = &machine.path;
+                        assert!(
+                            motion.a_mm_s2.abs() <= limits.accel_mm_s2 * 1.000_001,
+                            "seed {seed} tick {tick}"
+                        );
+                        let jerk = (motion.a_mm_s2 - last_a) / machine.tick_s;
+                        assert!(jerk.abs() <= limits.jerk_mm_s3 * 1.001, "seed {seed} tick {tick}: {jerk}");
+                        // Never back, but for rounding.
+                        let s_mm = motion.s.to_mm();
+                        let is_new = seen.trace.executed.stretches != stretches;
+                        assert!(s_mm >= last_s_mm - 1e-9 || is_new, "seed {seed} tick {tick}");
+                        for axis in seen.trace.axes {
+                            assert!(axis.following_error_mm.abs() < 0.1, "seed {seed} tick {tick}");
+                        }
+                    } else if ended.is_none() {
+                        assert!(motion.v_mm_s == 0.0 && !seen.is_enabled && seen.codes() == [0; 3]);
+                        ended = Some(tick - at);
+                    }
                 }
-            }
-            (last_s_mm, last_a) = (motion.s.to_mm(), motion.a_mm_s2);
-            stretches = seen.trace.executed.stretches;
-            if ended.is_some_and(|ended| tick > at + ended + 400) {
-                Next::Recover([1.0, 1.0, -1.0])
-            } else {
-                Next::GoOn
-            }
-        });
+                (last_s_mm, last_a) = (motion.s.to_mm(), motion.a_mm_s2);
+                stretches = seen.trace.executed.stretches;
+                if ended.is_some_and(|ended| tick > at + ended + 400) {
+                    Next::Recover([1.0, 1.0, -1.0])
+                } else {
+                    Next::GoOn
+                }
+            },
+        );
         longest = longest.max(ended.unwrap_or_else(|| panic!("seed {seed}: no end")));
     }
     println!("{moving} of {times} in motion, the longest stop took {longest} ticks");

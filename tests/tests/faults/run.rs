@@ -1,16 +1,14 @@
 //! What a run reports of a fault that was injected.
 
-use motion_host::gcode;
 use motion_host::machine::Machine;
-use motion_host::planning::{Mode, plan_program};
 use motion_host::simulate::inject::Injections;
 use motion_host::simulate::live::Script;
 use motion_host::simulate::{RunOptions, RunSummary, run_with};
+use motion_tests::check::planned;
 
 fn run(injections: &str, script: Option<&Script>) -> RunSummary {
     let machine = Machine::reference();
-    let program = gcode::read("part.ngc", b"G21 G90\nG1 X100 Y40 F6000\n").expect("a program");
-    let plan = plan_program("part.ngc", &program, &machine, Mode::Spanning).expect("a plan");
+    let plan = planned("G21 G90\nG1 X100 Y40 F6000\n", &machine).expect("a plan");
     let injections: Injections = injections.parse().expect("injections");
     let options = RunOptions { injections: Some(&injections), script, ..RunOptions::default() };
     run_with(&options, &plan, &machine, &mut |_| {}).expect("a run")

@@ -1,10 +1,10 @@
 //! Ramps that are cut in their rise, against the integral of their jerk.
 
-use crate::support::Random;
 use crate::{LIMITS, feeds, limits};
 use motion_kernel::law::{CutRamp, FeedSegment, Law, PathMotion, Phase, Ramp, SegmentError, Ticks};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::units::Position;
+use motion_tests::random::Random;
 use std::f64::consts::PI;
 
 const TICK_S: f64 = 0.0005;
@@ -67,7 +67,7 @@ fn some(random: &mut Random) -> Option<(Ramp<f64>, Ticks)> {
 }
 
 fn check<R: Real>(stream: u64, epsilon: f64) -> usize {
-    let mut random = Random::new(stream);
+    let mut random = Random::of_stream(stream);
     let (mut worst, mut points) = ([0.0_f64; 5], 0);
     for _ in 0..400 {
         let Some((ramp, at)) = some(&mut random) else { continue };
@@ -139,7 +139,7 @@ fn a_cut_ramp_is_the_integral_of_its_jerk() {
 /// Up to the cut both are one ramp, to the bit.
 #[test]
 fn the_rise_is_that_of_the_ramp_under_way() {
-    let (mut random, mut compared) = (Random::new(34), 0);
+    let (mut random, mut compared) = (Random::of_stream(34), 0);
     for _ in 0..400 {
         let Some((ramp, at)) = some(&mut random) else { continue };
         let cut = CutRamp { ramp, cut_s: at.to_f64() * TICK_S };
@@ -159,7 +159,7 @@ fn the_rise_is_that_of_the_ramp_under_way() {
 
 #[test]
 fn a_cut_belongs_in_the_first_half_of_the_rise() {
-    let mut random = Random::new(35);
+    let mut random = Random::of_stream(35);
     let (ramp, _) = std::iter::repeat_with(|| some(&mut random)).flatten().next().expect("endless");
     for share in [0.0, 0.5001, 0.9] {
         let at = Ticks::from_seconds(share * ramp.t1_s, TICK_S).expect("in range");

@@ -1,11 +1,11 @@
 //! The inverse problems against bisection in thirty digits.
 
 use crate::oracle::length;
-use crate::support::Random;
-use crate::support::dd::{Dd, dd};
 use crate::{LIMITS, feed, limits, narrow};
 use motion_kernel::law::{Law, Limits, peak, reach};
 use motion_kernel::num::Root;
+use motion_tests::dd::{Dd, dd};
+use motion_tests::random::Random;
 
 /// Greatest errors of a feed in units in the last place, in f64 and f32. Measured over six seeds: 4.4 and 5.3;
 /// 4.6 and 5.3. Newton's steps are bounded, so this also says that the bound is enough.
@@ -87,7 +87,7 @@ fn laws<R: Root>() -> Vec<(Limits<f64>, Law<R>)> {
 }
 
 fn reach_errors<R: Root>(stream: u64, bound: f64) {
-    let mut random = Random::new(stream);
+    let mut random = Random::of_stream(stream);
     let laws = laws::<R>();
     let mut errors = Errors::default();
     for _ in 0..20_000 {
@@ -102,7 +102,7 @@ fn reach_errors<R: Root>(stream: u64, bound: f64) {
 }
 
 fn peak_errors<R: Root>(stream: u64, bound: f64) {
-    let mut random = Random::new(stream);
+    let mut random = Random::of_stream(stream);
     let laws = laws::<R>();
     let mut errors = Errors::default();
     for _ in 0..20_000 {
@@ -146,7 +146,7 @@ fn peak_in_f32() {
 /// never gives a lower feed than the errors above explain.
 #[test]
 fn monotone_in_the_higher_feed() {
-    let mut random = Random::new(44);
+    let mut random = Random::of_stream(44);
     let laws = laws::<f64>();
     for _ in 0..100_000 {
         let (limits, law) = random.pick(&laws);

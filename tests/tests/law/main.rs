@@ -8,13 +8,11 @@ mod optimal;
 mod oracle;
 mod ramp;
 mod segment;
-#[path = "../support/mod.rs"]
-mod support;
 mod cut;
 
 use motion_kernel::law::Limits;
 use motion_kernel::num::Root;
-use support::Random;
+use motion_tests::random::Random;
 
 /// Sets of limits: S1's; a fast machine; a faster one; one whose jerk limit is out of reach; two whose ramps
 /// are mostly limited by jerk, and mostly by acceleration. All are f32 values too.

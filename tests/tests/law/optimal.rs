@@ -1,8 +1,8 @@
 //! The choice (22), (23) keeps the limits, and no other law made of sin² pulses is faster.
 
-use crate::support::Random;
 use crate::{LIMITS, feeds, limits};
 use motion_kernel::law::{Law, Limits, Ramp};
+use motion_tests::random::Random;
 use std::f64::consts::PI;
 
 /// Room for rounding.
@@ -32,7 +32,7 @@ fn around_one(random: &mut Random) -> f64 {
 
 #[test]
 fn no_other_pulses_are_faster() {
-    let mut random = Random::new(20);
+    let mut random = Random::of_stream(20);
     let (mut symmetric, mut asymmetric, mut nearest) = (0, 0, f64::INFINITY);
     for _ in 0..20_000 {
         let limits = limits(*random.pick(&LIMITS));

@@ -12,8 +12,8 @@
 //!
 //! by six-point Gauss–Legendre on panels of at most 1/64 of a phase: its error is below 10⁻²⁹.
 
-use crate::support::dd::{Dd, dd};
 use motion_kernel::law::Limits;
+use motion_tests::dd::{Dd, dd};
 
 const NODES: usize = 6;
 /// Panels are at most this part of a phase.

@@ -1,11 +1,11 @@
 //! One ramp: [`Ramp`] against S1's examples and against the oracle.
 
 use crate::oracle::{Exact, Motion, Quadrature, choose};
-use crate::support::Random;
-use crate::support::dd::{Dd, dd};
 use crate::{LIMITS, feed, feeds, limits, narrow};
 use motion_kernel::law::{FeedState, Law, LimitedBy, Ramp};
 use motion_kernel::num::Root;
+use motion_tests::dd::{Dd, dd};
+use motion_tests::random::Random;
 
 /// Greatest relative errors of S, V, A, J and snap, beyond what the rounding of time explains (see
 /// [`excess`]). Measured: 1.0·10⁻¹⁵ and, in f32, 4.2·10⁻⁷, for the jerk; the others are below.
@@ -169,7 +169,7 @@ fn times<R: Root>(random: &mut Random, exact: &Exact<'_>, count: usize) -> Vec<f
 }
 
 fn worst_over_random_ramps<R: Root>(stream: u64, ramps: usize, points: usize) -> [f64; 5] {
-    let mut random = Random::new(stream);
+    let mut random = Random::of_stream(stream);
     let quadrature = Quadrature::new();
     let mut worst = [0.0_f64; 5];
     let mut regimes = [0; 3];
@@ -216,7 +216,7 @@ fn f32_is_the_integrated_law() {
 /// Outside its time a ramp continues at constant feed; equal feeds are no ramp.
 #[test]
 fn outside_and_without_a_change() {
-    let mut random = Random::new(3);
+    let mut random = Random::of_stream(3);
     for _ in 0..1000 {
         let law = Law::new(limits(*random.pick(&LIMITS))).expect("positive");
         let (from, to) = feeds::<f64>(&mut random);
@@ -269,7 +269,7 @@ fn choice_of_jerk_and_times() {
             }
         }
     }
-    let mut random = Random::new(4);
+    let mut random = Random::of_stream(4);
     check::<f64>(&mut random);
     check::<f32>(&mut random);
 }
@@ -278,7 +278,7 @@ fn choice_of_jerk_and_times() {
 /// only, which is less than the streams allow for.
 #[test]
 fn peaks_keep_their_limits_but_for_rounding() {
-    let mut random = Random::new(11);
+    let mut random = Random::of_stream(11);
     let mut worst = [0.0_f64; 3];
     for _ in 0..400_000 {
         let accel = random.log(1.0, 2e4);

@@ -1,10 +1,10 @@
 //! [`FeedSegment`], the form the tick evaluates, against the ramp it was made from.
 
-use crate::support::Random;
 use crate::{LIMITS, feeds, limits};
 use motion_kernel::law::{FeedSegment, FeedState, Law, Limits, PathMotion, Phase, Ramp, SegmentError, Ticks};
 use motion_kernel::num::{Real, Root, Scalar};
 use motion_kernel::units::Position;
+use motion_tests::random::Random;
 
 /// Greatest errors of V, A, J and snap, in the number type's epsilon times the ramp's greatest value of
 /// the quantity, beyond what the rounding of time explains. Measured: 1.6, 1.4, 3.9 and 6.5 (f32).
@@ -149,7 +149,7 @@ fn ends_are_exact<R: Real>(segment: &FeedSegment<R>) {
 }
 
 fn random_segments<R: Real>(stream: u64) {
-    let mut random = Random::new(stream);
+    let mut random = Random::of_stream(stream);
     let mut worst = Worst::default();
     let mut below_a_tick = 0;
     for _ in 0..20_000 {
@@ -187,7 +187,7 @@ fn f32_segments_are_their_ramps() {
 /// Every tick of some ramps and cruises, adding up: the executor's own way.
 #[test]
 fn steps_add_up() {
-    let mut random = Random::new(32);
+    let mut random = Random::of_stream(32);
     for _ in 0..200 {
         let law = Law::new(limits(*random.pick(&LIMITS[..4]))).expect("positive");
         let (from, to) = feeds::<f64>(&mut random);
@@ -240,7 +240,7 @@ fn phases_meet() {
             }
         }
     }
-    let mut random = Random::new(33);
+    let mut random = Random::of_stream(33);
     check::<f64>(&mut random);
     check::<f32>(&mut random);
 }
@@ -267,7 +267,7 @@ fn long_and_slow() {
     let soft = Limits { accel_mm_s2: 1e-2, jerk_mm_s3: 1e-4, snap_mm_s4: 1e-3 };
     let ramp = Ramp::new(&Law::new(soft).expect("positive"), 0.0, 50.0);
     let length = Position::from_mm(ramp.length_mm()).expect("in range");
-    let (mut random, mut worst) = (Random::new(34), Worst::default());
+    let (mut random, mut worst) = (Random::of_stream(34), Worst::default());
     for _ in 0..100 {
         let segment = FeedSegment::<f64>::ramp(&ramp, length, 1e-5).expect("a segment");
         walk(&mut random, &ramp, &segment, 1e-5, &mut worst);
@@ -351,7 +351,7 @@ fn refusals() {
 /// In a narrower planning type the ramp's figures carry that type's rounding, and no more.
 #[test]
 fn ramps_of_f32_make_segments() {
-    let mut random = Random::new(35);
+    let mut random = Random::of_stream(35);
     for _ in 0..5000 {
         let wide = limits(*random.pick(&LIMITS));
         let law = Law::new(crate::narrow::<f32>(&wide)).expect("positive");

@@ -7,12 +7,13 @@ use motion_host::machine::Machine;
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
 
-use super::check::bounds::Number;
-use super::check::geometry::{Arc, Move, UNITS_PER_MM};
-use super::check::live::Command;
-use super::check::program::{self, Asked, Generated};
-use super::check::{from_env, random::Random};
 use super::{Case, Runs};
+use motion_tests::check::bounds::Number;
+use motion_tests::check::geometry::{Arc, Move, UNITS_PER_MM};
+use motion_tests::check::live::Command;
+use motion_tests::check::program::{self, Asked, Generated};
+use motion_tests::from_env;
+use motion_tests::random::Random;
 
 /// What the holds of a program came to.
 #[derive(Default)]
@@ -70,7 +71,7 @@ impl Held {
 #[test]
 fn held_before_every_tick_of_a_corner() {
     let mm = |mm: f64| (mm * UNITS_PER_MM).round() as i64;
-    // A corner of a millimetre at less than the feed before and behind it.
+    // A corner of a millimetre at less than the feed before and after it.
     let points = [[12.0, 0.0], [12.9, 0.02], [14.0, 0.05], [30.0, 0.5]].map(|[x, y]| [mm(x), mm(y), 0]);
     let program = program::lines(&points, 2400.0);
     let case = Case::of(&program, Machine::reference(), 10_000.0).expect("a short program");

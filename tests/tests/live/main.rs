@@ -10,9 +10,6 @@
 //!
 //! `MOTION_TEST_SEED` is the first seed, `MOTION_TEST_PROGRAMS` how many.
 
-#[path = "../check/mod.rs"]
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
 mod holds;
 mod overrides;
 mod seam;
@@ -20,18 +17,18 @@ mod single_block;
 mod stalls;
 mod stops;
 
-use check::bounds::Number;
-use check::live::{Command, Run, Seen, Setup, execute, execute_from};
-use check::path::Path;
-use check::program::{Asked, Generated};
-use check::random::Random;
-use check::totals::Totals;
-use check::{drive, machine, program};
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan};
 use motion_kernel::exec::ExecState;
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
+use motion_tests::check::bounds::Number;
+use motion_tests::check::live::{Command, Run, Setup, TickView, execute, execute_from};
+use motion_tests::check::path::Path;
+use motion_tests::check::program::{Asked, Generated};
+use motion_tests::check::totals::Totals;
+use motion_tests::check::{drive, geometry, machine, program};
+use motion_tests::random::Random;
 use stalls::{Late, Stalls};
 
 /// A machine, a program for it and its plan; none where planning refuses it or it is long.
@@ -58,7 +55,7 @@ impl Case {
     fn blended<R: Number>(seed: u64, longest_ticks: f64) -> Option<Self> {
         let mut random = Random::new(seed);
         let (machine, program) = generated(&mut random);
-        let tolerance_mm = random.log_between(1e-3, 0.5);
+        let tolerance_mm = random.log(1e-3, 0.5);
         let text = format!("G64 P{tolerance_mm:.6}\n{}", program.text);
         let plan = planned(&text, &machine, longest_ticks)?;
         if !plan.blocks.iter().any(|block| block.kind == "blend") {
@@ -71,7 +68,7 @@ impl Case {
     fn run<R: Number>(
         &self,
         seed: u64,
-        script: &mut dyn FnMut(&Seen<'_, R>) -> Option<Command>,
+        script: &mut dyn FnMut(&TickView<'_, R>) -> Option<Command>,
     ) -> Result<Run, String> {
         execute::<R>(&self.setup(seed), script)
     }
@@ -99,8 +96,8 @@ fn planned(text: &str, machine: &Machine, longest_ticks: f64) -> Option<Plan> {
 
 /// The seeds of a test that has `programs` of them in its short form.
 fn seeds(programs: u64) -> std::ops::Range<u64> {
-    let first = check::from_env("MOTION_TEST_SEED").unwrap_or(1);
-    first..first + check::from_env("MOTION_TEST_PROGRAMS").unwrap_or(programs)
+    let first = motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(1);
+    first..first + motion_tests::from_env("MOTION_TEST_PROGRAMS").unwrap_or(programs)
 }
 
 /// Whether a run failed for fixed point's range alone, which has tests of its own.
@@ -167,7 +164,7 @@ fn without_commands_it_is_the_plan() {
 /// Any command before any tick; a background that is late for some, and items that are for some.
 fn random_commands<R: Number>(case: &Case, seed: u64) -> Result<Run, String> {
     let mut random = Random::new(seed ^ 0xC0_FFEE);
-    let often = random.log_between(2e-3, 0.5);
+    let often = random.log(2e-3, 0.5);
     let most = if random.chance(0.5) { 1.0 } else { 2.0 };
     let (is_late, has_late_items) = (random.chance(0.3), random.chance(0.3));
     let is_given_up = random.chance(0.1);
@@ -184,7 +181,7 @@ fn random_commands<R: Number>(case: &Case, seed: u64) -> Result<Run, String> {
             0..=2 if matches!(state, State::Running | State::Waiting) => Command::Hold,
             0..=3 => Command::Resume,
             4 if is_late => {
-                late = random.log_between(1.0, 1000.0) as u64;
+                late = random.log(1.0, 1000.0) as u64;
                 Command::Stall
             }
             4 if is_given_up && random.chance(0.01) => Command::Abort,
@@ -261,14 +258,14 @@ fn an_abort_ends_at_rest_on_the_path() {
     assert!(ran > 60 && early > ran / 2, "{early} of {ran}");
 }
 
-/// Held in a dwell it does not go on behind it, whatever the list under way holds, until it is told to; nor with an
+/// Held in a dwell, motion does not continue after it, whatever the list under way holds, until it is told to; nor with an
 /// override of 0, nor when it is to be given up.
 #[test]
 fn held_in_a_dwell_it_stays() {
     let line = |x: f64| {
-        Asked::Move(check::geometry::Move {
-            from: [((x - 5.0) * check::geometry::UNITS_PER_MM).round() as i64, 0, 0],
-            to: [(x * check::geometry::UNITS_PER_MM).round() as i64, 0, 0],
+        Asked::Move(geometry::Move {
+            from: [((x - 5.0) * geometry::UNITS_PER_MM).round() as i64, 0, 0],
+            to: [(x * geometry::UNITS_PER_MM).round() as i64, 0, 0],
             arc: None,
             feed_mm_min: 1200.0,
         })

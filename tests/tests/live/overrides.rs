@@ -18,12 +18,12 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::law::Limits;
 use motion_kernel::live::OVERRIDE_MAX;
 
-use super::check::geometry::{Move, UNITS_PER_MM};
-use super::check::live::{Command, Run, Setup, execute};
-use super::check::machine;
-use super::check::program::{Asked, Generated};
-use super::check::random::Random;
 use super::{Case, Runs, seeds};
+use motion_tests::check::geometry::{Move, UNITS_PER_MM};
+use motion_tests::check::live::{Command, Run, Setup, execute};
+use motion_tests::check::machine;
+use motion_tests::check::program::{Asked, Generated};
+use motion_tests::random::Random;
 
 /// The law's longest rise \[s\].
 fn longest_rise_s(accel: f64, jerk: f64, snap: f64) -> f64 {
@@ -84,7 +84,7 @@ fn straight(random: &mut Random) -> Option<Straight> {
     let path = &machine.path;
     let limits =
         Limits { accel_mm_s2: path.accel_mm_s2, jerk_mm_s3: path.jerk_mm_s3, snap_mm_s4: path.snap_mm_s4 };
-    let feed_mm_min = format!("{:.4}", 60.0 * path.feed_mm_s * random.log_between(0.05, 0.49));
+    let feed_mm_min = format!("{:.4}", 60.0 * path.feed_mm_s * random.log(0.05, 0.49));
     let feed_mm_min: f64 = feed_mm_min.parse().expect("a number");
     let feed_mm_s = feed_mm_min / 60.0;
     let most_mm_s = OVERRIDE_MAX * feed_mm_s;
@@ -148,7 +148,7 @@ impl Tracked {
         let tick_s = case.machine.tick_s;
         let every = (0.01 / tick_s).round().max(1.0) as u64;
         let response = (response_s / tick_s).ceil() as u64;
-        let step = random.log_between(0.002, 0.05);
+        let step = random.log(0.002, 0.05);
         let (mut feed_override, mut history) = (1.0_f64, Vec::<f64>::new());
         let (mut asked_mm, mut range_mm, mut driven_mm) = (0.0_f64, 0.0_f64, 0.0_f64);
         let (length_mm, mut low) = (case.plan.length_mm, None);
@@ -217,7 +217,7 @@ fn feed_and_time_are_those_of_the_override() {
     runs.print_and_assert();
 }
 
-/// Dwells and stops before and behind all motion keep no override from holding, and are not waited for.
+/// Dwells and stops before and after all motion keep no override from holding, and are not waited for.
 #[test]
 fn an_override_holds_between_rests() {
     let to = [(8.0 * UNITS_PER_MM) as i64, 0, 0];
@@ -240,7 +240,7 @@ fn an_override_holds_between_rests() {
             (seen.ticks == at).then_some(Command::Override(0.5))
         });
         runs.add(at, run);
-        // Motion begins behind 60 ms of dwells, and half a second is more than a ramp to 20 mm/s takes.
+        // Motion begins after 60 ms of dwells, and half a second is more than a ramp to 20 mm/s takes.
         let is_before = at < 100;
         let expected_mm_s = if is_before { 10.0 } else { 20.0 };
         assert!((fastest_mm_s - expected_mm_s).abs() < 1e-9, "override at {at}: {fastest_mm_s} mm/s");
@@ -293,7 +293,7 @@ fn an_override_that_trembles_does_not_hold_up_an_acceleration() {
     assert!(falling < free + free / 4 && trembling < free + free / 4, "{free}: {falling}, {trembling}");
 }
 
-/// An override holds behind a dwell too, however the list before it is filled.
+/// An override holds after a dwell too, however the list before it is filled.
 #[test]
 fn an_override_holds_behind_a_dwell() {
     for blocks in 1..=40 {

@@ -3,11 +3,12 @@
 use motion_host::machine::Machine;
 use motion_kernel::axis::{Correction, CorrectionError};
 use motion_kernel::exec::{ExecState, Executor};
+use motion_kernel::kernel::CorrectedIntake;
 use motion_kernel::law::{CutRamp, FeedSegment, Law, Ramp, Ticks};
 use motion_kernel::path::Piece;
 use motion_kernel::queue::{Change, Density, LiveStreams, Refused, Rejection, SEGMENTS_PER_TICK_MAX};
 
-use super::check::bench::mm;
+use motion_tests::check::bench::mm;
 
 /// What one list ends with and the next begins with counts together, and so do the rests of a list.
 #[test]
@@ -68,10 +69,10 @@ fn a_change_to_anything_else_is_refused() {
 #[test]
 fn a_learnt_correction_is_refused() {
     let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
-    let (_feeder, mut intake) = streams.split(Machine::reference().rules(), [mm(0.0)]);
+    let (_feeder, intake) = streams.split(Machine::reference().rules(), [mm(0.0)]);
     let knots = [[0.1], [0.2]];
     let correction = Correction::new(0, &knots, 40, 1.0).expect("a correction");
-    assert_eq!(intake.correct(correction), Err(CorrectionError::LiveControl));
+    assert_eq!(CorrectedIntake::from(intake).correct(correction), Err(CorrectionError::LiveControl));
 }
 
 /// The tick has passed the place where a list would take over: it says so, and ends as it would have.

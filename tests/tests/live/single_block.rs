@@ -4,13 +4,13 @@
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
 
-use super::check::bounds::Number;
-use super::check::live::{Command, Run, Seen, Setup, execute};
-use super::check::path::Path;
-use super::check::program::{Asked, Generated};
-use super::check::random::Random;
-use super::check::totals::Totals;
 use super::{Case, generated, is_out_of_range, seeds};
+use motion_tests::check::bounds::Number;
+use motion_tests::check::live::{Command, Run, Setup, TickView, execute};
+use motion_tests::check::path::Path;
+use motion_tests::check::program::{Asked, Generated};
+use motion_tests::check::totals::Totals;
+use motion_tests::random::Random;
 
 /// Ends of blocks are rounded to position steps of 2⁻³² mm, here and in the plan.
 const END_MM: f64 = 1e-8;
@@ -82,7 +82,7 @@ fn block_ends(program: &Generated, path: &Path) -> Vec<Rest> {
     program.asked.iter().map(end).collect()
 }
 
-fn rest_of<R: Number>(seen: &Seen<'_, R>) -> Rest {
+fn rest_of<R: Number>(seen: &TickView<'_, R>) -> Rest {
     (seen.executed.stretches as usize, seen.executed.motion.s.to_mm())
 }
 
@@ -154,7 +154,7 @@ fn switched_on_at_rest_it_runs_the_next_block() {
             })
         };
         let Some(run) = blocks.run(seed, &mut script) else { continue };
-        // The hold came behind the end.
+        // The hold came after the end.
         let Some(first) = first else { continue };
         at_ends += usize::from(blocks.is_end(first));
         ran += 1;
@@ -172,7 +172,7 @@ fn switched_on_at_rest_it_runs_the_next_block() {
     assert!(ran > 100 && at_ends > 10 || ran < 100, "{ran}, {at_ends}");
 }
 
-/// Switched on before any tick, it comes to rest at the first block end behind the place that a hold in the same tick comes
+/// Switched on before any tick, it comes to rest at the first block end after the place that a hold in the same tick comes
 /// to rest at, or before that, if ramps ahead let it; at most one end further, where ceilings ask for it.
 #[test]
 fn it_stops_at_the_first_end_in_reach() {
@@ -232,7 +232,7 @@ fn among_all_other_commands() {
     for seed in seeds(300) {
         let Some(blocks) = Blocks::random(seed, 3_000.0) else { continue };
         let mut random = Random::new(seed ^ 0xB10C);
-        let often = random.log_between(2e-3, 0.3);
+        let often = random.log(2e-3, 0.3);
         let most = if random.chance(0.5) { 1.0 } else { 2.0 };
         let (mut is_held, mut was_single) = (false, false);
         let mut script = |ticks: u64, state: State, at: Rest| {

@@ -1,4 +1,4 @@
-//! A producer that is late: its turns, and its items.
+//! A producer that is late: its polls, and its items.
 
 use core::task::Poll;
 use std::cell::{Cell, RefCell};
@@ -10,24 +10,24 @@ use motion_kernel::live::Source;
 use motion_kernel::num::Fixed;
 use motion_kernel::program::Item;
 
-use super::check::bounds::Number;
-use super::check::live::{Command, Run, execute_from};
-use super::check::random::Random;
 use super::{Case, Runs, seeds};
+use motion_tests::check::bounds::Number;
+use motion_tests::check::live::{Command, Run, execute_from};
+use motion_tests::random::Random;
 
 /// A background that is late at random: every stall that outlasts what is queued ends in a stop on the path, and motion
-/// goes on behind it; nothing is lost, nothing repeated.
+/// continues after it; nothing is lost, nothing repeated.
 #[test]
 fn a_late_background_is_waited_for_at_rest() {
     let (mut runs, mut stalls) = (Runs::default(), 0_u64);
     for seed in seeds(300) {
         let Some(case) = Case::random(seed, 6_000.0) else { continue };
         let mut random = Random::new(seed ^ 0x57A11);
-        let often = random.log_between(1e-3, 0.3);
+        let often = random.log(1e-3, 0.3);
         let mut left = 0;
         let mut script = || {
             if left == 0 && random.chance(often) {
-                left = random.log_between(1.0, 3000.0) as u64;
+                left = random.log(1.0, 3000.0) as u64;
                 stalls += 1;
             }
             left = u64::saturating_sub(left, 1);
@@ -61,7 +61,7 @@ impl Stalls {
 
     pub(super) fn new(seed: u64, often: Option<(f64, f64)>) -> Self {
         let mut random = Random::new(seed ^ 0x17E45);
-        let often = often.map_or(0.0, |(least, most)| random.log_between(least, most));
+        let often = often.map_or(0.0, |(least, most)| random.log(least, most));
         let zero = Cell::new(0);
         Self { left: zero.clone(), count: zero.clone(), at_rest: zero, often, random: random.into() }
     }
@@ -74,7 +74,7 @@ impl Stalls {
         let mut random = self.random.borrow_mut();
         if random.chance(self.often) {
             let is_long = random.chance(0.5);
-            let ticks = random.log_between(1.0, 300.0) as u64;
+            let ticks = random.log(1.0, 300.0) as u64;
             self.left.set(if is_long { Self::UNTIL_REST } else { ticks });
             self.count.set(self.count.get() + 1);
         }
@@ -86,7 +86,7 @@ impl Stalls {
         let is_at_rest = matches!(state, ExecState::Idle | ExecState::Held);
         if left == Self::UNTIL_REST {
             if is_at_rest {
-                self.left.set(self.random.borrow_mut().log_between(1.0, 30.0) as u64);
+                self.left.set(self.random.borrow_mut().log(1.0, 30.0) as u64);
                 self.at_rest.set(self.at_rest.get() + 1);
             }
         } else {
@@ -119,7 +119,7 @@ fn with_stalls<R: Number>(case: &Case, seed: u64, stalls: &Stalls) -> Result<Run
 }
 
 /// Items, from pieces of a micrometre to moves of a metre, that come late at random, half of them not before motion has
-/// come to rest: each stall ends in a legal stop on the path or before motion had to brake, and motion goes on smoothly;
+/// come to rest: each stall ends in a legal stop on the path or before motion had to brake, and motion continues smoothly;
 /// nothing is lost, nothing repeated. The long form is `MOTION_TEST_PROGRAMS=9000`: more than 10⁵ stalls.
 #[test]
 fn late_items_are_waited_for_on_the_path() {

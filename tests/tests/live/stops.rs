@@ -7,11 +7,12 @@ use motion_kernel::live::State;
 use motion_tests::figures::{Table, hold};
 
 use super::Case;
-use super::check::geometry::{Move, UNITS_PER_MM};
-use super::check::live::{Command, Run};
-use super::check::program::{Asked, Generated};
-use super::check::random::Random;
-use super::check::{from_env, machine};
+use motion_tests::check::geometry::{Move, UNITS_PER_MM};
+use motion_tests::check::live::{Command, Run};
+use motion_tests::check::machine;
+use motion_tests::check::program::{Asked, Generated};
+use motion_tests::from_env;
+use motion_tests::random::Random;
 
 /// The time that stopping takes at least with limits of acceleration and jerk alone, from a feed and an acceleration
 /// (the optimum of a velocity interface without a limit of snap).
@@ -42,7 +43,7 @@ fn straight(random: &mut Random) -> Option<Case> {
         (machine.path.feed_mm_s, machine.path.feed_mm_s / machine.path.accel_mm_s2 + 2.0 * rise_s(&machine));
     let (mut x_mm, mut text, mut asked, mut from) = (0.0, String::new(), Vec::new(), [0; 3]);
     for _ in 0..12 {
-        let feed_mm_min = format!("{:.4}", 60.0 * most_mm_s * random.log_between(0.02, 1.0));
+        let feed_mm_min = format!("{:.4}", 60.0 * most_mm_s * random.log(0.02, 1.0));
         x_mm += most_mm_s * room_s * random.between(1.5, 3.0);
         let to = [(x_mm * UNITS_PER_MM).round() as i64, 0, 0];
         text.push_str(&format!("G1 X{:.10} F{feed_mm_min}\n", to[0] as f64 / UNITS_PER_MM));

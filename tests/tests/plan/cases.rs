@@ -1,9 +1,9 @@
 //! Named cases: the field's, and S3's.
 
-use crate::support::Random;
 use crate::{block, from_rest, law, planned, reference, time_s};
 use motion_kernel::law::reach;
 use motion_kernel::plan::{Block, merge_equal};
+use motion_tests::random::Random;
 
 fn merged_time_s(mut blocks: Vec<Block<f64>>) -> (usize, f64) {
     let count = merge_equal(&mut blocks);
@@ -13,7 +13,7 @@ fn merged_time_s(mut blocks: Vec<Block<f64>>) -> (usize, f64) {
 
 /// 50 mm at 5000 mm/min in 500 pieces: 7.03 s with a ramp in each, 0.965 s as the one line it is.
 #[test]
-fn tessellated_line() {
+fn a_tessellated_line_is_planned_as_the_line_it_is() {
     let blocks = vec![block(0.1, 5000.0 / 60.0); 500];
     let apart = time_s(&blocks, &from_rest(&blocks));
     let (count, together) = merged_time_s(blocks);
@@ -24,7 +24,7 @@ fn tessellated_line() {
 }
 
 #[test]
-fn ten_thousand_nanometres() {
+fn ten_thousand_blocks_of_a_nanometre_are_planned_as_one() {
     let blocks = vec![block(1e-6, 5000.0 / 60.0); 10_000];
     let plans = from_rest(&blocks);
     let apart = time_s(&blocks, &plans);
@@ -37,7 +37,7 @@ fn ten_thousand_nanometres() {
 
 /// Every second block slow, and a saw-tooth: the junctions keep the lower ceiling, fast blocks rise above it.
 #[test]
-fn alternating_ceilings_and_saw_teeth() {
+fn junctions_keep_the_lower_ceiling() {
     let alternating: Vec<_> = (0..200).map(|n| block(1.0, if n % 2 == 0 { 80.0 } else { 10.0 })).collect();
     let plans = from_rest(&alternating);
     for pair in plans[..199].windows(2) {
@@ -80,7 +80,7 @@ fn blocks_of_no_length() {
 
 /// The 8 m machine: the whole length, as one block and as 8000.
 #[test]
-fn eight_metres() {
+fn eight_metres_in_one_block_and_in_8000_take_the_same_time() {
     let one = [block(8000.0, 500.0)];
     let plan = from_rest(&one)[0];
     assert_eq!((plan.enter_mm_s, plan.peak_mm_s, plan.exit_mm_s), (0.0, 500.0, 0.0));
@@ -108,8 +108,8 @@ fn hole_in_what_can_be_reached() {
 
 /// Only neighbours that are alike are merged, and the last one's junction stays.
 #[test]
-fn what_is_merged() {
-    let mut random = Random::new(90);
+fn only_neighbours_that_are_alike_are_merged() {
+    let mut random = Random::of_stream(90);
     for _ in 0..5000 {
         let blocks: Vec<Block<f64>> = (0..random.below(20))
             .map(|_| Block {
@@ -154,7 +154,7 @@ fn higher_at_a_junction_and_slower_in_all() {
 
 /// S3's stringer, block by block, to the published micrometres and microseconds.
 #[test]
-fn stringer() {
+fn the_stringer_has_the_published_feeds_and_time() {
     let caps = [5000.0 / 60.0, 80_000.0_f64.cbrt(), 5000.0_f64.sqrt(), 80_000.0_f64.cbrt(), 5000.0 / 60.0];
     let quarter = std::f64::consts::PI / 180.0;
     let lengths = [50.0, 4.0 * 75.0 * quarter, 10.0 * 150.0 * quarter, 4.0 * 75.0 * quarter, 25.0];

@@ -1,13 +1,12 @@
-//! What planning takes: memory from sizes, time beside a loop of the law's own work in the same run.
+//! What planning takes: memory from sizes, work as the planner counts it, in evaluations of the law and visits to a ceiling.
 
-use std::hint::black_box;
-use std::time::Instant;
+use motion_kernel::law::{Law, Limits};
+use motion_kernel::plan::{Block, Node, nodes_for};
+use motion_kernel::work;
 
-use motion_kernel::law::{Law, Limits, Ramp};
-use motion_kernel::plan::{Block, Node, nodes_for, plan_spanning};
-
-use crate::lists::{block, lists, reference};
-use crate::support::Random;
+use crate::spanning::spans;
+use motion_tests::block_lists::{block, lists, reference};
+use motion_tests::random::Random;
 
 /// What the caller provides for a list of blocks, a block \[bytes\].
 const MEMORY_MAX: usize = 300;
@@ -20,64 +19,32 @@ fn memory_of_a_million_blocks() {
     assert!(bytes <= MEMORY_MAX * blocks);
 }
 
-/// Time of a call \[s\].
-fn time_s(call: impl FnOnce()) -> f64 {
-    let start = Instant::now();
-    call();
-    start.elapsed().as_secs_f64()
-}
-
-/// The time of planning a list, in ramps of the law over random changes of feed: both take turns and about as long, so that
-/// a machine that slows down slows both. The median of some rounds.
-fn ramps(blocks: &[Block<f64>]) -> f64 {
-    let mut random = Random::new(51);
-    let law = reference();
-    let feeds: Vec<[f64; 2]> =
-        (0..10_000).map(|_| [random.log(1.0, 100.0), random.log(1.0, 100.0)]).collect();
-    let mut places = vec![Node::EMPTY; nodes_for(blocks.len())];
-    let mut planned_s = || {
-        time_s(|| {
-            let planned = plan_spanning(black_box(blocks), 0.0, 0.0, &mut places, &mut |_, ramp| {
-                black_box(ramp);
-            });
-            assert!(planned.is_ok_and(|time_s| time_s.is_some()));
-        })
-    };
-    let pass = || {
-        for &[from, to] in &feeds {
-            black_box(Ramp::new(&law, black_box(from), black_box(to)));
-        }
-    };
-    let passes = 1 + (planned_s() / time_s(pass)) as usize;
-    let mut rounds: Vec<f64> = (0..7)
-        .map(|_| planned_s() / time_s(|| (0..passes).for_each(|_| pass())) * (passes * feeds.len()) as f64)
-        .collect();
-    rounds.sort_by(f64::total_cmp);
-    rounds[3]
+/// Steps of work to plan a list, a block.
+fn steps(blocks: &[Block<f64>]) -> f64 {
+    let before = work::done();
+    spans(blocks);
+    (work::done() - before) as f64 / blocks.len() as f64
 }
 
 #[test]
-fn a_block_costs_some_ramps() {
-    let costs: Vec<(&str, f64)> =
-        lists(10_000).iter().map(|(name, blocks)| (*name, ramps(blocks) / blocks.len() as f64)).collect();
-    for (name, ramps) in &costs {
-        println!("{name}: {ramps:.1} ramps a block");
+fn a_block_costs_a_bounded_number_of_steps_however_long_the_list() {
+    for ((name, short), (_, long)) in lists(5_000).iter().zip(&lists(20_000)) {
+        let costs = [short, long].map(|blocks| steps(blocks));
+        println!("{name}: {costs:.1?} steps a block");
+        assert!(costs.iter().all(|&steps| steps > 0.0 && steps < STEPS_MAX), "{name}: {costs:?}");
     }
-    let (name, worst) =
-        costs.into_iter().fold(("", 0.0_f64), |worst, cost| if cost.1 > worst.1 { cost } else { worst });
-    assert!(worst < RAMPS_MAX, "{name}: {worst}");
 }
 
-/// What the dearest list takes, one of mixed laws, is about two thirds of it: room for other compilers and machines.
-const RAMPS_MAX: f64 = 800.0;
+/// What the dearest list takes, one of mixed laws, is about nine tenths of it.
+const STEPS_MAX: f64 = 140.0;
 
-/// Every block with a law of its own, in humps of thousands of blocks: looking up what a ramp may use does not make them
+/// Every block has a law of its own, in intervals of thousands of blocks: looking up what a ramp may use does not make them
 /// dearer than one law for all.
 #[test]
-fn many_laws_in_a_hump_cost_little_more() {
+fn many_laws_in_an_interval_cost_little_more() {
     let count = 40_000;
-    let hump = |is_mixed: bool| -> Vec<Block<f64>> {
-        let mut random = Random::new(53);
+    let interval = |is_mixed: bool| -> Vec<Block<f64>> {
+        let mut random = Random::of_stream(53);
         (0..count)
             .map(|n| {
                 let accel_mm_s2 = 500.0 + random.unit() * f64::from(u8::from(is_mixed));
@@ -86,8 +53,10 @@ fn many_laws_in_a_hump_cost_little_more() {
             })
             .collect()
     };
-    let costs = [false, true].map(|is_mixed| ramps(&hump(is_mixed)) / f64::from(count));
-    println!("{costs:?} ramps a block");
+    let costs = [false, true].map(|is_mixed| steps(&interval(is_mixed)));
+    println!("{costs:?} steps a block");
     assert!(costs[1] < LAWS_MAX * costs[0], "{costs:?}");
 }
-const LAWS_MAX: f64 = 1.5;
+
+/// 1.13 where this was written.
+const LAWS_MAX: f64 = 1.25;

@@ -12,8 +12,9 @@ use motion_kernel::queue::{Feeder, PathRules, Refused, Streams};
 use motion_kernel::units::Position;
 
 use crate::spanning::{Span, rising_steps, spans};
-use crate::support::Random;
 use crate::{block, laws, reference};
+use motion_tests::judge::along;
+use motion_tests::random::Random;
 
 const TICK_S: f64 = 0.0005;
 /// Where a junction lies is known to some position steps, and to the digits of the sum of lengths \[mm\].
@@ -65,8 +66,8 @@ impl Worst {
     }
 }
 
-/// A path in one direction on its way into the streams.
-struct Supply<'a, R> {
+/// A stretch along one axis, in lines of at most 16 mm, that fills the streams.
+pub(crate) struct Supply<'a, R> {
     segments: &'a [FeedSegment<R>],
     at: Position,
     end: Position,
@@ -81,8 +82,12 @@ fn is_taken<T: std::fmt::Debug>(answer: Result<(), Refused<T>>) -> bool {
     }
 }
 
-impl<R: Real> Supply<'_, R> {
-    fn fill(&mut self, feeder: &mut Feeder<'_, R, 1>) {
+impl<'a, R: Real> Supply<'a, R> {
+    pub(crate) fn new(segments: &'a [FeedSegment<R>], end: Position) -> Self {
+        Self { segments, at: Position::ZERO, end, is_ended: false }
+    }
+
+    pub(crate) fn fill(&mut self, feeder: &mut Feeder<'_, R, 1>) {
         while self.at < self.end {
             let length = Ord::min(self.end - self.at, position(PIECE_MM));
             if !is_taken(feeder.piece(Piece::line(1, [self.at], [1.0], length).expect("a line"))) {
@@ -126,7 +131,7 @@ fn executed<R: Real>(name: &str, blocks: &[Block<f64>], digits: f64) -> Worst {
     let mut streams = Streams::<R, 1, 64, 64>::new();
     let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
     let mut executor = Executor::<R, 1>::new([Position::ZERO]);
-    let mut supply = Supply { segments: &all, at: Position::ZERO, end, is_ended: false };
+    let mut supply = Supply::new(&all, end);
     let mut worst = Worst::default();
     // Position, feed and acceleration of the tick before.
     let (mut first, mut before) = (0, [0.0; 3]);
@@ -140,8 +145,7 @@ fn executed<R: Real>(name: &str, blocks: &[Block<f64>], digits: f64) -> Worst {
         worst.ticks += 1;
         let motion = &now.motion;
         let s_mm = motion.s.to_mm();
-        let [v, a, j, snap] =
-            [motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(|x| x.to_f64());
+        let [v, a, j, snap] = along(motion);
         // Junctions since the last tick: the acceleration there is that of either tick but for what jerk makes of it.
         while first < blocks.len() && ends_mm[first] < s_mm - ROUNDING_MM {
             let change = limits.jerk_mm_s3 * TICK_S;
@@ -226,7 +230,7 @@ fn named_cases_keep_every_limit_in_every_tick() {
 /// Every block with a law of its own or all with one, junctions that slow.
 #[test]
 fn random_lists_keep_every_limit_in_every_tick() {
-    let mut random = Random::new(41);
+    let mut random = Random::of_stream(41);
     let mut worst = Worst::default();
     for case in 0..300 {
         let count = 1 + random.below(80);

@@ -1,8 +1,8 @@
 //! Whatever the blocks are, the plan keeps every ceiling and every ramp has its length.
 
-use crate::support::Random;
 use crate::{from_rest, planned, random_blocks, reference, time_s};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, merge_equal};
+use motion_tests::random::Random;
 
 /// How much longer than its block a block's ramps may be, relative: rounding.
 const ROUNDING: f64 = 1e-9;
@@ -39,7 +39,7 @@ fn check(blocks: &[Block<f64>], start: f64, end: f64, plans: &[BlockPlan<f64>]) 
 
 #[test]
 fn random_lists() {
-    let mut random = Random::new(50);
+    let mut random = Random::of_stream(50);
     let (mut lists, mut count, mut refused, mut worst) = (0, 0, 0, 0.0_f64);
     while lists < 100_000 {
         let blocks = random_blocks(&mut random, 60, 1e-6);
@@ -75,7 +75,7 @@ fn random_lists() {
 /// few roundings above it are planned exactly as they were given, or refused.
 #[test]
 fn refusals_name_the_greatest_feed() {
-    let mut random = Random::new(51);
+    let mut random = Random::of_stream(51);
     let (mut named, mut above) = (0, 0);
     for _ in 0..20_000 {
         let blocks = random_blocks(&mut random, 6, 1e-2);
@@ -109,7 +109,7 @@ fn refusals_name_the_greatest_feed() {
 
 #[test]
 fn same_input_same_bits() {
-    let mut random = Random::new(52);
+    let mut random = Random::of_stream(52);
     for _ in 0..2000 {
         let blocks = random_blocks(&mut random, 60, 1e-6);
         let (first, second) = (planned(&blocks, 0.0, 0.0), planned(&blocks, 0.0, 0.0));
@@ -129,7 +129,7 @@ fn same_input_same_bits() {
 /// length is not monotone in its lower feed). Measured: one list in 20 000, by 8·10⁻⁵.
 #[test]
 fn merging_is_hardly_ever_slower() {
-    let mut random = Random::new(53);
+    let mut random = Random::of_stream(53);
     let (mut slower, mut slowest, mut fastest) = (0, 0.0_f64, 1.0_f64);
     for _ in 0..20_000 {
         // Runs of alike blocks.
@@ -169,7 +169,7 @@ fn merging_is_hardly_ever_slower() {
 /// Linear work: a million blocks are planned, and so is a million of them that brake.
 #[test]
 fn a_million_blocks() {
-    let mut random = Random::new(54);
+    let mut random = Random::of_stream(54);
     let blocks: Vec<Block<f64>> = (0..1_000_000)
         .map(|_| Block {
             length_mm: random.log(1e-3, 1.0),

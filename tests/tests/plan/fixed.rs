@@ -1,17 +1,18 @@
 //! Plans in fixed point: within every limit, feasible, as fast as those in f64, and without overflow for all that
 //! is accepted. A debug build panics where fixed point overflows; an optimised one wraps.
 
-use crate::support::Random;
+use crate::executed::Supply;
 use motion_kernel::exec::{ExecState, Executor};
 use motion_kernel::law::{FeedSegment, Law, LimitError, Limits, Ramp, SegmentError, peak, reach};
 use motion_kernel::num::{Fixed, Root, Scalar};
-use motion_kernel::path::Piece;
 use motion_kernel::plan::{
     AxisLimits, Bend, Block, BlockPlan, Ceiling, Junction, MachineLimits, PlanError, junction, merge_equal,
     plan, ramps,
 };
-use motion_kernel::queue::{Feeder, PathRules, Refused, Streams};
+use motion_kernel::queue::{PathRules, Streams};
 use motion_kernel::units::Position;
+use motion_tests::judge;
+use motion_tests::random::Random;
 
 const TICK_S: f64 = 5e-4;
 /// The step of fixed point.
@@ -172,7 +173,7 @@ fn wide_plans(plans: &[BlockPlan<Fixed>]) -> Vec<BlockPlan<f64>> {
 
 /// Random lists, planned in both types.
 fn random_lists(stream: u64, range: Range, lists: usize) {
-    let mut random = Random::new(stream);
+    let mut random = Random::of_stream(stream);
     let (mut worst, mut slowest, mut slower, mut count) = (-1.0_f64, 0.0_f64, 0.0_f64, 0);
     for _ in 0..lists {
         let (blocks, wide) = range.blocks(&mut random, 40);
@@ -215,18 +216,18 @@ fn share(feed: Fixed, part: f64) -> Fixed {
 }
 
 #[test]
-fn machines() {
+fn lists_of_machines_keep_limits_and_are_as_fast_as_in_f64() {
     random_lists(90, Range::Machines, 20_000);
 }
 
 #[test]
-fn all_that_is_accepted() {
+fn every_accepted_list_keeps_limits_and_is_as_fast_as_in_f64() {
     random_lists(91, Range::Accepted, 20_000);
 }
 
 /// The ends of all ranges with each other: no overflow, and the inverse problems solved as in f64.
 #[test]
-fn ends_of_the_ranges() {
+fn the_ends_of_the_ranges_neither_overflow_nor_exceed_limits() {
     let ends = [1.0, 1e3, 1e9];
     let feeds = [0.0, STEP, 1e-6, 1.0, 1e3, 1e6];
     let lengths = [1e-6 + STEP, 1e-3, 1.0, 1e6];
@@ -287,8 +288,8 @@ fn ends_of_the_ranges() {
 
 /// Changes of feed around those where one limit takes over from another, step by step.
 #[test]
-fn where_regimes_meet() {
-    let mut random = Random::new(96);
+fn limits_are_kept_where_regimes_meet() {
+    let mut random = Random::of_stream(96);
     let mut worst = -1.0_f64;
     for case in 0..4000 {
         let range = if case % 2 == 0 { Range::Machines } else { Range::Accepted };
@@ -387,7 +388,7 @@ fn ceiling<R: Root>(limits: AxisLimits<R>, share: R, radius: R, planar: R) -> Re
 /// Ceilings on arcs: the vectors of any state a ramp can be in, by the chain rule in f64, and the feed in f64.
 #[test]
 fn ceilings_keep_the_limits() {
-    let mut random = Random::new(92);
+    let mut random = Random::of_stream(92);
     let (mut worst, mut slowest, mut refused) = (0.0_f64, 0.0_f64, [0; 2]);
     for case in 0..40_000 {
         let range = if case % 2 == 0 { Range::Machines } else { Range::Accepted };
@@ -459,7 +460,7 @@ fn ceilings_keep_the_limits() {
 /// Junctions: the steps of velocity and acceleration keep their limit.
 #[test]
 fn junctions_keep_the_acceleration_step() {
-    let mut random = Random::new(93);
+    let mut random = Random::of_stream(93);
     let mut worst = 0.0_f64;
     for _ in 0..100_000 {
         let angle = fixed(if random.once_in(4) { 0.0 } else { random.log(1e-8, 0.1) });
@@ -494,7 +495,7 @@ fn junctions_keep_the_acceleration_step() {
 /// is too soft for a segment is refused.
 #[test]
 fn segments_join() {
-    let mut random = Random::new(95);
+    let mut random = Random::of_stream(95);
     let (mut count, mut refused) = (0, 0);
     for case in 0..20_000 {
         let range = if case % 2 == 0 { Range::Machines } else { Range::Accepted };
@@ -533,20 +534,11 @@ fn segments_join() {
     assert!(refused < 4000);
 }
 
-/// Offers an item until the queue has room.
-fn offer<T: std::fmt::Debug>(answer: Result<(), Refused<T>>) -> bool {
-    match answer {
-        Ok(()) => true,
-        Err(Refused::Full(_)) => false,
-        Err(Refused::Invalid(rejection)) => panic!("{rejection}"),
-    }
-}
-
 /// From the plan to the last tick without a float but at the seam: what is planned in fixed point is accepted, and
 /// executed within the limits, without a step, to the exact end.
 #[test]
 fn plans_are_accepted_and_executed() {
-    let mut random = Random::new(94);
+    let mut random = Random::of_stream(94);
     let (mut executed, mut ticks, mut worst) = (0, 0_u64, [0.0_f64; 5]);
     while executed < 150 {
         let limits = Range::Machines.limits(&mut random);
@@ -590,7 +582,7 @@ fn plans_are_accepted_and_executed() {
         let mut streams = Streams::<Fixed, 1, 64, 64>::new();
         let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
         let mut executor = Executor::<Fixed, 1>::new([Position::ZERO]);
-        let mut supply = Supply { segments: &all, at: Position::ZERO, end, is_ended: false };
+        let mut supply = Supply::new(&all, end);
         let rounding = all.iter().map(FeedSegment::as_ramp).fold(0.0, |rounding: f64, ramp| {
             let t1_s = ramp.t1_s.to_f64();
             let gained = ramp.peak_jerk_mm_s3.to_f64() * t1_s.powi(3);
@@ -606,7 +598,7 @@ fn plans_are_accepted_and_executed() {
                 break;
             }
             let motion = &now.motion;
-            let along = [motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3, motion.snap_mm_s4].map(Fixed::to_f64);
+            let along = judge::along(motion);
             let limits = [rules.feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4];
             for k in 0..4 {
                 worst[k] = worst[k].max(along[k].abs() / limits[k] - 1.0);
@@ -629,33 +621,4 @@ fn plans_are_accepted_and_executed() {
     assert!(ticks > 100_000);
     assert!(worst[..4].iter().all(|&part| part <= 2e-8), "{worst:?}");
     assert!(worst[4] <= 1.0, "{worst:?}");
-}
-
-/// One stretch along one axis, in lines of at most 16 mm.
-struct Supply<'a> {
-    segments: &'a [FeedSegment<Fixed>],
-    at: Position,
-    end: Position,
-    is_ended: bool,
-}
-
-impl Supply<'_> {
-    fn fill(&mut self, feeder: &mut Feeder<'_, Fixed, 1>) {
-        while self.at < self.end {
-            let length = Ord::min(self.end - self.at, Position::from_mm(16.0).expect("in range"));
-            let line = Piece::line(1, [self.at], [1.0], length).expect("a line");
-            if !offer(feeder.piece(line)) {
-                break;
-            }
-            self.at = self.at + length;
-        }
-        while let [first, rest @ ..] = self.segments
-            && offer(feeder.segment(*first))
-        {
-            self.segments = rest;
-        }
-        if self.at == self.end && self.segments.is_empty() && !self.is_ended {
-            self.is_ended = offer(feeder.end_stretch([self.end]));
-        }
-    }
 }

@@ -8,19 +8,16 @@ mod cost;
 mod executed;
 mod feasible;
 mod fixed;
-mod lists;
 mod maximal;
 mod planner;
 mod refusals;
 mod segments;
 mod spanning;
-#[path = "../support/mod.rs"]
-mod support;
 
-use lists::{block, reference};
 use motion_kernel::law::{Law, Limits};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, plan};
-use support::Random;
+use motion_tests::block_lists::{block, reference};
+use motion_tests::random::Random;
 
 /// The law for acceleration, jerk and snap limits.
 fn law(accel_mm_s2: f64, jerk_mm_s3: f64, snap_mm_s4: f64) -> Law<f64> {

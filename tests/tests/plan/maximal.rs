@@ -3,9 +3,9 @@
 //! The plan is *not* claimed to be the fastest, and a single junction's feed can be a local bottleneck that a lower
 //! feed elsewhere would widen (a ramp's length is not monotone in its lower feed); that is no contradiction.
 
-use crate::support::Random;
 use crate::{from_rest, planned, random_blocks};
 use motion_kernel::plan::{Block, BlockPlan};
+use motion_tests::random::Random;
 
 /// The smallest raise looked at, relative. The kernel's own rounding is far below it.
 const RAISE: f64 = 1e-6;
@@ -84,7 +84,7 @@ fn check(
 
 #[test]
 fn no_plan_of_the_grid_is_better_at_every_junction() {
-    let mut random = Random::new(60);
+    let mut random = Random::of_stream(60);
     let mut could_be_raised = 0;
     for _ in 0..6000 {
         let mut blocks = random_blocks(&mut random, 3, 1e-1);
@@ -98,7 +98,7 @@ fn no_plan_of_the_grid_is_better_at_every_junction() {
 /// Longer lists, coarser grids, between feeds.
 #[test]
 fn nor_for_longer_lists() {
-    let mut random = Random::new(61);
+    let mut random = Random::of_stream(61);
     let mut could_be_raised = 0;
     for _ in 0..2000 {
         let blocks = random_blocks(&mut random, 40, 1e-2);
@@ -114,7 +114,7 @@ fn nor_for_longer_lists() {
 /// One junction, or several at random, raised by a little or by much: some block is too short.
 #[test]
 fn nothing_can_be_raised() {
-    let mut random = Random::new(62);
+    let mut random = Random::of_stream(62);
     let mut tried = 0_u32;
     for _ in 0..5000 {
         let blocks = random_blocks(&mut random, 20, 1e-2);
@@ -148,7 +148,7 @@ fn nothing_can_be_raised() {
 /// Every block's peak is the highest there is room for: at its ceiling, or it fills its length.
 #[test]
 fn peaks_use_the_length() {
-    let mut random = Random::new(63);
+    let mut random = Random::of_stream(63);
     for _ in 0..5000 {
         let blocks = random_blocks(&mut random, 20, 1e-2);
         for (block, plan) in blocks.iter().zip(from_rest(&blocks)).filter(|(block, _)| block.length_mm > 0.0)

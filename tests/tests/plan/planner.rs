@@ -7,7 +7,7 @@ use motion_kernel::plan::{
 use motion_kernel::units::Position;
 
 use crate::spanning::{Span, legal, spans_between, unreachable};
-use crate::support::Random;
+use motion_tests::random::Random;
 use crate::{block, from_rest, planned, random_blocks, time_s};
 
 /// The ramps of a plan, of which there is room for so many.
@@ -64,7 +64,7 @@ fn placed(ramps: &[PlannedRamp]) -> Vec<Span> {
 /// Legal with every effort, and never slower for more of it; from a feed there is a plan where one pair a block is one.
 #[test]
 fn more_effort_is_faster() {
-    let mut random = Random::new(39);
+    let mut random = Random::of_stream(39);
     let (mut made, mut refused, mut faster, mut fallback) = (0, 0, 0, 0);
     for _ in 0..4000 {
         let blocks = random_blocks(&mut random, 40, 1e-2);
@@ -93,7 +93,7 @@ fn more_effort_is_faster() {
 /// Where there are more blocks than may be spanned, what is put is the begin of a motion that can be finished from there.
 #[test]
 fn a_part_is_spanned() {
-    let mut random = Random::new(40);
+    let mut random = Random::of_stream(40);
     let mut parts = 0;
     for _ in 0..1000 {
         let blocks = random_blocks(&mut random, 60, 1e-2);
@@ -116,7 +116,7 @@ fn a_part_is_spanned() {
 /// Where there is little room, what is put is the begin of the whole.
 #[test]
 fn little_room_for_ramps() {
-    let mut random = Random::new(42);
+    let mut random = Random::of_stream(42);
     let mut cut = 0;
     for _ in 0..1000 {
         let blocks = random_blocks(&mut random, 40, 1e-2);
@@ -135,7 +135,7 @@ fn little_room_for_ramps() {
 /// A bad block is named by its place among those that were given, whatever is merged.
 #[test]
 fn a_bad_block_is_counted_as_given() {
-    let mut random = Random::new(43);
+    let mut random = Random::of_stream(43);
     for _ in 0..200 {
         let bad = random.below(50);
         let mut blocks: Vec<_> = (0..50).map(|_| block(1.0, 10.0 + random.below(2) as f64)).collect();

@@ -1,8 +1,8 @@
 //! Bad input gives the error that names it, never a panic and never another plan.
 
-use crate::support::Random;
 use crate::{block, planned, random_blocks};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, plan};
+use motion_tests::random::Random;
 
 #[test]
 fn bad_figures_are_named() {
@@ -100,7 +100,7 @@ fn any_numbers() {
         1e160,
         f64::EPSILON,
     ];
-    let mut random = Random::new(70);
+    let mut random = Random::of_stream(70);
     let mut plans_made = 0;
     for _ in 0..50_000 {
         let mut blocks = random_blocks(&mut random, 8, 1e-6);

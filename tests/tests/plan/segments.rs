@@ -1,10 +1,10 @@
 //! Planned blocks as feed segments: they fill the path without a gap.
 
-use crate::support::Random;
 use crate::{block, from_rest, random_blocks};
 use motion_kernel::num::Real;
 use motion_kernel::plan::{Block, BlockPlan, ramps};
 use motion_kernel::units::Position;
+use motion_tests::random::Random;
 
 const TICK_S: f64 = 5e-4;
 
@@ -57,7 +57,7 @@ fn fill<R: Real>(blocks: &[Block<f64>], plans: &[BlockPlan<f64>]) -> Total {
 }
 
 fn random_stretches<R: Real>(stream: u64, shortest_mm: f64) {
-    let mut random = Random::new(stream);
+    let mut random = Random::of_stream(stream);
     let mut count = 0;
     for _ in 0..5000 {
         let blocks = random_blocks(&mut random, 30, shortest_mm);

@@ -12,8 +12,8 @@ use std::f64::consts::PI;
 use motion_kernel::law::{Law, Limits, Passing, Ramp};
 use motion_kernel::plan::{Block, Node, PlanError, merge_equal, nodes_for, plan_spanning};
 
-use crate::support::Random;
 use crate::{block, from_rest, law, planned, random_blocks, reference, time_s};
+use motion_tests::random::Random;
 
 /// A ramp or a cruise with its place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -323,7 +323,7 @@ fn named_cases_are_as_fast_as_the_yardstick() {
 /// Random lists of many kinds, all with one law.
 #[test]
 fn random_lists_are_as_fast_as_the_yardstick() {
-    let mut random = Random::new(31);
+    let mut random = Random::of_stream(31);
     let mut all = Vec::new();
     for case in 0..1000 {
         let count = 1 + random.below(120);
@@ -359,7 +359,7 @@ fn random_lists_are_as_fast_as_the_yardstick() {
 /// Every block with limits of its own, junctions that slow and stop, any feed at both ends.
 #[test]
 fn random_lists_are_legal() {
-    let mut random = Random::new(32);
+    let mut random = Random::of_stream(32);
     let (mut made, mut none) = (0, 0);
     for _ in 0..3000 {
         let blocks = random_blocks(&mut random, 60, 1e-3);
@@ -395,7 +395,7 @@ fn too_few_places_are_refused() {
 #[test]
 fn a_ramp_passes_its_feeds_where_it_says() {
     let law = reference();
-    let mut random = Random::new(33);
+    let mut random = Random::of_stream(33);
     for _ in 0..10_000 {
         let from = random.log(1e-2, 1e2);
         let ramp = Ramp::new(&law, from, from + random.log(1e-3, 1e3));
@@ -417,7 +417,7 @@ fn a_ramp_passes_its_feeds_where_it_says() {
 /// A ramp within limits is that of their law, whatever fixes it.
 #[test]
 fn a_ramp_within_limits_is_that_of_their_law() {
-    let mut random = Random::new(38);
+    let mut random = Random::of_stream(38);
     let mut fixed_by = [0; 3];
     for _ in 0..30_000 {
         let mut any = || random.log(1.0, 1e7);
@@ -445,7 +445,7 @@ fn a_ramp_within_limits_is_that_of_their_law() {
 /// Backwards the same plan, whatever law each block has.
 #[test]
 fn a_list_takes_as_long_backwards() {
-    let mut random = Random::new(37);
+    let mut random = Random::of_stream(37);
     let (mut worst, mut sums) = (0.0_f64, [0.0; 2]);
     for _ in 0..500 {
         let mut blocks = random_blocks(&mut random, 30, 0.1);

@@ -19,10 +19,6 @@ mod image;
 mod programs;
 mod tools;
 
-#[path = "../check/mod.rs"]
-#[allow(dead_code, reason = "each test takes what it needs of the shared checks")]
-mod check;
-
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -65,7 +61,7 @@ fn main() -> ExitCode {
                 Err(reason) => Err(Failed::from(reason)),
             };
             match reason {
-                // The kind is what the harness prints beside the name.
+                // The kind is what the harness prints next to the name.
                 Some(reason) if !is_ci => Trial::test(name, run).with_kind(reason).with_ignored_flag(true),
                 _ => Trial::test(name, run),
             }

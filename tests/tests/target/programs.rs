@@ -9,8 +9,8 @@ use motion_kernel::num::Fixed;
 use motion_kernel::program::{Header, Item, write};
 use motion_kernel::units::Position;
 
-use crate::check::random::Random;
-use crate::check::{machine, program};
+use motion_tests::check::{machine, planned, program};
+use motion_tests::random::Random;
 
 const STRINGER: &str = include_str!("../../../host/src/cli/stringer.ngc");
 /// Longer ones take the emulators too long [s].
@@ -132,8 +132,7 @@ fn generated_by(count: usize, to_bytes: fn(&Executable, &Machine) -> Vec<u8>) ->
         let machine = machine::gentle(&mut random);
         let fragments = 1 + random.below(3);
         let generated = program::generate(&mut random, fragments, 30.0);
-        let read = gcode::read("random.ngc", generated.text.as_bytes()).expect("generated");
-        let Ok(plan) = plan_program("random.ngc", &read, &machine, Mode::Spanning) else { continue };
+        let Ok(plan) = planned(&generated.text, &machine) else { continue };
         if plan.time_s > TIME_MAX_S {
             continue;
         }

@@ -12,18 +12,17 @@ use critical_section::Mutex;
 use hal_sim::closed_loop::InMemory;
 use motion_kernel::axis::{AxesConfig, Correction};
 use motion_kernel::fault::FaultKind;
-use motion_kernel::kernel::Kernel;
+use motion_kernel::kernel::{CorrectedIntake, Kernel};
 use motion_kernel::num::Scalar;
 use motion_kernel::program::{Items, ProgramError, Reader};
-use motion_kernel::queue::Intake;
 use motion_kernel::units::{Counts, DacCode};
 use qemu_boards::programs::programs;
 use qemu_boards::{AXES, Number};
 
 #[cfg(feature = "live")]
-use live::{Background, Feeder, Queues, background, turn};
+use live::{Background, Feeder, Queues, background, poll};
 #[cfg(not(feature = "live"))]
-use plain::{Background, Feeder, Queues, background, turn};
+use plain::{Background, Feeder, Queues, background, poll};
 
 /// The program's own plan fills the streams.
 #[cfg(not(feature = "live"))]
@@ -83,7 +82,7 @@ mod live {
 /// What the tick owns.
 struct Foreground {
     kernel: Kernel<Number, AXES>,
-    intake: Intake<'static, Number, AXES>,
+    intake: CorrectedIntake<'static, Number, AXES>,
     memory: InMemory<AXES>,
 }
 
@@ -113,7 +112,8 @@ fn run() -> Option<()> {
     let mut kernel = Kernel::new(&config, header.start, counts);
     kernel.enable(100);
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
-    let foreground = cortex_m::singleton!(: Foreground = Foreground { kernel, intake, memory })?;
+    let foreground =
+        cortex_m::singleton!(: Foreground = Foreground { kernel, intake: intake.into(), memory })?;
     critical_section::with(|cs| {
         *FOREGROUND.borrow(cs).try_borrow_mut().ok()? = Some(foreground);
         Some(())
@@ -148,7 +148,7 @@ fn SysTick() {
 fn kernel_command(
     command: u32,
     kernel: &mut Kernel<Number, AXES>,
-    intake: &mut Intake<'static, Number, AXES>,
+    intake: &mut CorrectedIntake<'static, Number, AXES>,
 ) {
     static KNOTS: [[Number; AXES]; 2] = [[Number::ZERO; AXES]; 2];
     match command {
@@ -180,8 +180,8 @@ fn kernel_command(
 #[inline(never)]
 fn kernel_tick(
     kernel: &mut Kernel<Number, AXES>,
-    intake: &mut Intake<'static, Number, AXES>,
+    intake: &mut CorrectedIntake<'static, Number, AXES>,
     memory: &mut InMemory<AXES>,
 ) {
-    kernel.tick(intake, memory);
+    kernel.tick_corrected(intake, memory);
 }

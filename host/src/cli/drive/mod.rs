@@ -18,18 +18,19 @@ pub mod tune;
 
 mod verification;
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
-use super::input::{self, Output};
+use super::input;
+use super::outputs::{self, Written};
 use super::table::{self, Align};
 use crate::drive::Terms;
 use crate::drive::reference::Comparison;
+use crate::files::{Files, OutputFile};
 use crate::machine::Machine;
 
 /// More frequencies than this are a mistyped step.
@@ -106,26 +107,25 @@ impl Common {
     }
 
     /// Opened before the experiment: a wrong path should not cost the user a long one.
-    fn report(&self) -> Result<Option<Output>, CliError> {
-        self.report.as_deref().map(Output::create).transpose()
+    fn report(&self) -> Result<Option<OutputFile>, CliError> {
+        let mut files = Files::reading([("--machine", self.machine.as_deref())]);
+        Ok(outputs::open(&mut files, "--report", self.report.as_ref())?)
     }
 
     /// Writes the page, and says where unless a script reads.
     fn write_report(
         &self,
-        report: Option<Output>,
+        report: Option<OutputFile>,
         out: &mut dyn Write,
-        write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+        write: impl FnOnce(&mut OutputFile) -> io::Result<()>,
     ) -> Result<(), CliError> {
-        let Some(mut output) = report else {
-            return Ok(());
-        };
-        let written = write(&mut output.file).and_then(|()| output.file.flush());
-        written.map_err(|source| CliError::Write { path: output.name.clone(), source })?;
-        if !self.json {
-            writeln!(out, "\n  report written to {}", output.name).map_err(CliError::Output)?;
+        let mut written = Written::default();
+        written.write("report", report, write);
+        if written.place_of("report").is_some() && !self.json {
+            writeln!(out).map_err(CliError::Output)?;
+            written.say(out)?;
         }
-        Ok(())
+        written.outcome(Outcome::Done).map(drop)
     }
 }
 

@@ -11,23 +11,27 @@ use serde::Serialize;
 use super::axis_named;
 use super::verification::{Verification, VerificationJson, planes};
 use crate::cli::error::{CliError, Outcome};
-use crate::cli::input::Output;
+use crate::cli::outputs::{self, Written};
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
 use crate::drive::identification::identify_axes;
 use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, learn};
 use crate::drive::reference::CIRCLE_FEED_MM_S;
 use crate::drive::turning::Turning;
+use crate::files::Files;
 use crate::identify::{Estimate, Identification};
 use crate::machine::{AxisEdit, Machine, REFERENCE_TOML, edited};
 use crate::simulate::StretchCorrection;
 use crate::tuning::{self, AxisTuning, TuningError, propose};
 
 const HELP: &str = "\
-Runs velocity steps and circles open loop, finds the drive's parameters in what the converter put out and the encoders
-read, and makes of them a position gain with margins and a feedforward. Then it drives circles before and after, in as
-many planes as let every tuned axis move. Where both axes of a plane were tuned their contour error is judged, where one
-was, its following error.
+What moves are simulated axes: those of the machine file, with its [axis.drive]. No axis of a real machine is moved, and
+none is identified.
+
+The command runs velocity steps and circles in open loop. From the converter's outputs and the encoders' counts it
+estimates the parameters of each drive. From these it derives a position gain, with its margins, and a feedforward. Then
+it drives circles with the old and the new figures, in as many planes as it takes to move every tuned axis. Where both
+axes of a plane were tuned, the contour error counts; where only one was, its following error counts.
 
 Examples:
   motion drive tune                                  see what the reference machine could do
@@ -43,13 +47,13 @@ following_error_second_um}}}, learning: null, or {repeats: list of {contour_erro
 axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}}, output.
 
 --learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, what feedforward is
-to be given in addition, straight between rows; the kernel takes it as Intake::correct. Without a row if nothing was
+to be given in addition, straight between rows; the kernel takes it as CorrectedIntake::correct. Without a row if nothing was
 better than no correction. Without this option what was learnt is only shown.
 
-Exit status 1, and nothing is written: the tuned machine is worse on a circle than it was, or the recordings do not
-determine what everything depends on (command gain, Kv, Ti, total delay).";
+Exit status 1, and the machine file stays as it was: the tuned machine is worse on a circle than it was, or the recordings
+do not determine what everything depends on (command gain, Kv, Ti, total delay).";
 
-/// Identify the axes, propose gains and feedforward with their reasons, verify them on circles.
+/// Tune the simulated axes: identify them, propose gains and feedforward with reasons, verify them on circles.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct TuneArguments {
@@ -74,7 +78,7 @@ pub struct TuneArguments {
     /// Write the best correction that was learnt: CSV, velocity commands over the time in the stretch.
     #[arg(long, value_name = "FILE", requires = "learn")]
     learn_output: Option<PathBuf>,
-    /// Write the machine file with the new figures; it may be the one that was read.
+    /// Write the machine file with the new figures. It may be the one that is read.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Machine file (`motion machine` prints one); without it, the reference machine.
@@ -114,6 +118,13 @@ impl From<Method> for tuning::Method {
 /// # Errors
 /// An argument is refused, an axis can't be identified, a fault ended a run, or a file can't be written.
 pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let mut files = Files::reading([("--machine", arguments.machine.as_deref())]);
+    let output = match &arguments.output {
+        Some(path) => Some(files.edited("--output", path, "--machine")?),
+        None => None,
+    };
+    let learn_output = outputs::open(&mut files, "--learn-output", arguments.learn_output.as_ref())?;
+    let report = outputs::open(&mut files, "--report", arguments.report.as_ref())?;
     let source = Source::read(arguments.machine.as_ref())?;
     let machine = Machine::from_toml(&source.name, &source.text)?;
     let axes = match arguments.axis.as_slice() {
@@ -130,8 +141,6 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         lesson.turning.check(machine.tick_s)?;
         lesson.options.check(&machine)?;
     }
-    let learn_output = arguments.learn_output.as_deref().map(Output::create).transpose()?;
-    let report = arguments.report.as_deref().map(Output::create).transpose()?;
     let found = identify_axes(&machine, &axes)?;
     let tunings: Vec<Tuned> = axes
         .iter()
@@ -148,12 +157,14 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let verification = Verification::new(&machine, &tuned, &axes)?;
     let is_better = verification.is_better();
     let learnt = learning.map(|lesson| lesson.learn(&tuned, &tunings)).transpose()?;
-    if is_better && let Some(path) = &arguments.output {
-        fs::write(path, &text)
-            .map_err(|source| CliError::Write { path: path.display().to_string(), source })?;
+    let mut written = Written::default();
+    written.write("machine file", output.filter(|_| is_better), |file| file.write_all(text.as_bytes()));
+    if let Some(learnt) = &learnt {
+        written.write("correction", learn_output, |file| write_correction(&tuned, learnt, file));
     }
+    written.write("report", report, |file| verification.write_report(&tuned, file));
     if arguments.json {
-        let output = arguments.output.as_ref().filter(|_| is_better).map(|path| path.display().to_string());
+        let output = written.place_of("machine file").map(str::to_owned);
         write_json(&json(&machine, &tunings, &verification, learnt.as_ref(), output), out)?;
     } else {
         write_words(&machine, &tunings, &verification, out).map_err(CliError::Output)?;
@@ -161,27 +172,14 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
             write_learnt(&tuned, learnt, arguments.learn_hz, out).map_err(CliError::Output)?;
         }
         let end = match (&arguments.output, is_better) {
-            (_, false) => "  a circle got worse: nothing is written".to_owned(),
-            (Some(path), true) => format!("  written to {}", path.display()),
-            (None, true) => "  nothing is written; --output FILE writes the machine file".to_owned(),
+            (_, false) => Some("  a circle got worse: nothing is written"),
+            (None, true) => Some("  nothing is written; --output FILE writes the machine file"),
+            (Some(_), true) => None,
         };
-        writeln!(out, "{end}").map_err(CliError::Output)?;
+        end.map_or(Ok(()), |end| writeln!(out, "{end}")).map_err(CliError::Output)?;
+        written.say(out)?;
     }
-    if let (Some(mut output), Some(learnt)) = (learn_output, &learnt) {
-        let written = write_correction(&tuned, learnt, &mut output.file).and_then(|()| output.file.flush());
-        written.map_err(|source| CliError::Write { path: output.name.clone(), source })?;
-        if !arguments.json {
-            writeln!(out, "  correction written to {}", output.name).map_err(CliError::Output)?;
-        }
-    }
-    if let Some(mut output) = report {
-        let written = verification.write_report(&tuned, &mut output.file).and_then(|()| output.file.flush());
-        written.map_err(|source| CliError::Write { path: output.name.clone(), source })?;
-        if !arguments.json {
-            writeln!(out, "  report written to {}", output.name).map_err(CliError::Output)?;
-        }
-    }
-    Ok(if is_better { Outcome::Done } else { Outcome::Failed })
+    written.outcome(if is_better { Outcome::Done } else { Outcome::Failed })
 }
 
 /// The machine file's text: of a file, or the reference machine's.

@@ -5,18 +5,19 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use super::super::error::{CliError, Outcome};
-use super::super::input::Output;
-use super::super::outputs;
+use super::super::outputs::{self, Written};
 use super::super::table::{self, Align};
 use super::super::{csv_failure, write_json};
 use super::SplineArguments;
+use crate::files::Files;
 use crate::report;
 use crate::smoothness::evaluators::WAYS;
 use crate::smoothness::{self, AxisTicks, Course, Evaluator, FEED_MM_S, Figures, TABLE_2_S, TICK_S};
 
 pub(super) fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
-    let trace = arguments.trace.as_deref().map(Output::create).transpose()?;
-    let report = arguments.report.as_deref().map(Output::create).transpose()?;
+    let mut files = Files::reading([]);
+    let trace = outputs::open(&mut files, "--trace", arguments.trace.as_ref())?;
+    let report = outputs::open(&mut files, "--report", arguments.report.as_ref())?;
     let courses = smoothness::courses()
         .map_err(|source| CliError::Spline { place: "the built-in points".to_owned(), source })?;
     let paths = courses.map(|course| {
@@ -26,30 +27,18 @@ pub(super) fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Ou
     let evaluated = smoothness::well_and_badly_parametrised()
         .map_err(|source| CliError::Spline { place: "the built-in points".to_owned(), source })?
         .map(|course| smoothness::evaluators(&course, FEED_MM_S, TICK_S));
-    if let Some(output) = trace {
-        write(output, |file| write_trace(&paths, file))?;
-    }
-    if let Some(output) = report {
-        write(output, |file| report::smoothness::write_smoothness(&paths, &evaluated, file))?;
-    }
+    let mut written = Written::default();
+    written.write("trace", trace, |file| write_trace(&paths, file));
+    written.write("report", report, |file| report::smoothness::write_smoothness(&paths, &evaluated, file));
     if arguments.json {
         write_json(&json(&paths, &evaluated), out)?;
     } else {
         write_tables(&paths, out)
             .and_then(|()| write_evaluators(&evaluated, out))
             .map_err(CliError::Output)?;
-        outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
+        written.say(out)?;
     }
-    Ok(Outcome::Done)
-}
-
-fn write(
-    mut output: Output,
-    write: impl FnOnce(&mut io::BufWriter<std::fs::File>) -> io::Result<()>,
-) -> Result<(), CliError> {
-    write(&mut output.file)
-        .and_then(|()| output.file.flush())
-        .map_err(|source| CliError::Write { path: output.name, source })
+    written.outcome(Outcome::Done)
 }
 
 /// A row a tick: velocity, acceleration and jerk of X and Y on every path; empty where there is no difference yet.

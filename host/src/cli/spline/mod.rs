@@ -10,9 +10,10 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::input;
-use super::outputs::{self, Outputs};
+use super::outputs::Outputs;
 use super::run::{self, RunJson};
 use super::write_json;
+use crate::files::Files;
 use crate::planning::plan_spline;
 use crate::planning::spline::Pieces;
 use crate::points::{self, Points};
@@ -120,6 +121,8 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
             expected: "a finite feed above 0 mm/min",
         });
     }
+    let mut files = Files::reading([("POINTS.csv", Some(path)), ("--machine", arguments.machine.as_deref())]);
+    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(path)?;
     let points = points::read(&source.name, &source.text)?;
@@ -138,15 +141,14 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
     let (mut plan, pieces) = plan_spline(&source.name, &spline, &points.lines, feed_mm_s, &machine)?;
     let figures = SplineFigures::of(&spline, points.points.len(), &pieces, feed_mm_s);
     plan.notices.extend(figures.words());
-    let outputs = Outputs::create(&arguments.trace, &arguments.report)?;
-    let summary = run::execute(&RunOptions::default(), &plan, &machine, outputs, None)?;
+    let (summary, written) = run::execute(&RunOptions::default(), &plan, &machine, outputs, None)?;
     if arguments.json {
         write_json(&SplineJson { run: run::json(&summary), spline: figures }, out)?;
     } else {
         run::write_summary(&summary, out).map_err(CliError::Output)?;
-        outputs::say_written(&[("trace", &arguments.trace), ("report", &arguments.report)], out)?;
+        written.say(out)?;
     }
-    Ok(if summary.faults.is_empty() { Outcome::Done } else { Outcome::Failed })
+    written.outcome(Outcome::of(&summary))
 }
 
 fn fit(points: &Points, arguments: &SplineArguments) -> Result<Spline, SplineError> {

@@ -353,6 +353,7 @@ impl<'a> Intervals<'a> {
         let start_mm = if is_step(&left, Role::Falling) { left.start_mm } else { left.end_mm };
         let end_mm = if is_step(&right, Role::Rising) { right.end_mm } else { right.start_mm };
         let nodes = self.nodes.get(inside.clone()).unwrap_or(&[]);
+        crate::work::add(nodes.len());
         let (mut rising, mut falling) = (Steps::NONE, Steps::NONE);
         for node in nodes.iter().filter(|node| node.role == Role::Rising) {
             rising.push(Step { end_mm: node.end_mm - start_mm, feed_mm_s: node.feed_mm_s });

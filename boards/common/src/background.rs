@@ -1,0 +1,474 @@
+//! The background: start button, console, streams, and what the log says.
+//!
+//! Consumes the [`Panel`] and what the tick has left in [`Control`]; produces items for the streams and a [`LogLine`] a turn
+//! at most. Runs in what the ticks leave of the processor: the board calls [`Background::turn`] right after a tick, logs its
+//! line, and calls [`Background::plan`], over and over.
+//!
+//! A turn begins right after a tick with what keeps interrupts off: taking figures out of [`Control`], and the line of log
+//! (defmt encodes it with interrupts masked). Both are over long before the next tick, so neither delays any. Then come
+//! planning and filling, which may take several ticks and keep nothing off.
+//!
+//! Fails by bringing the machine to rest and saying why; in a fault, with drives off.
+
+use motion_kernel::exec::ExecState;
+use motion_kernel::live::State;
+use motion_kernel::num::Real;
+use motion_kernel::program::{ProgramError, Reader, SupplyError};
+use motion_kernel::queue::LiveStreams;
+use motion_kernel::straight::StraightError;
+use motion_kernel::units::Position;
+use rtic_core::Mutex;
+
+use crate::console::Command;
+use crate::control::{Control, Seen};
+use crate::log::LogLine;
+use crate::operator::{Action, Asked, Phase, Settings};
+use crate::panel::{Button, Panel};
+use crate::parameters::BoardParameters;
+use crate::report::{FlightDump, Report};
+use crate::runs::Run;
+
+/// What the background knows and has under way. `PIECES` and `SEGMENTS` as of [`LiveStreams`], `PLACES` as of [`Run`].
+pub struct Background<
+    'a,
+    R: Real,
+    const AXES: usize,
+    const PIECES: usize,
+    const SEGMENTS: usize,
+    const PLACES: usize,
+> {
+    board: BoardParameters,
+    program: Reader<'a, AXES>,
+    phase: Phase,
+    settings: Settings,
+    /// Until the first start.
+    streams: Option<&'a mut LiveStreams<R, AXES, PIECES, SEGMENTS>>,
+    run: Option<Run<'a, R, AXES, PLACES>>,
+    /// Where the next run is to start from.
+    from: Option<[Position; AXES]>,
+    /// Why there is no way to the program's start.
+    no_way: Option<StraightError>,
+    /// Why the program ends early.
+    refused: Option<SupplyError<ProgramError>>,
+    /// The log has said that motion waits for somebody.
+    has_said: bool,
+    button: Button,
+    dump: FlightDump,
+    report: Report,
+}
+
+impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize, const PLACES: usize>
+    Background<'a, R, AXES, PIECES, SEGMENTS, PLACES>
+{
+    /// Ready for the first start of `program`.
+    #[must_use]
+    pub fn new(
+        board: BoardParameters,
+        program: Reader<'a, AXES>,
+        streams: &'a mut LiveStreams<R, AXES, PIECES, SEGMENTS>,
+    ) -> Self {
+        Self {
+            board,
+            program,
+            phase: Phase::Ready,
+            settings: Settings::NONE,
+            streams: Some(streams),
+            run: None,
+            from: None,
+            no_way: None,
+            refused: None,
+            has_said: false,
+            button: Button::default(),
+            dump: FlightDump::default(),
+            report: Report::default(),
+        }
+    }
+
+    /// The first part of a turn, right after tick `now`: what is asked for, and what the tick has left. What there is to
+    /// log of it.
+    // A frame of its own: what it takes is free again while motion is planned.
+    #[inline(never)]
+    pub fn turn<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        now: u32,
+        panel: &mut impl Panel,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) -> Option<LogLine<R, AXES>> {
+        let seen = control.lock(|control| control.seen());
+        let asked = if self.button.is_pressed(panel.is_button_down(), now, self.board.button_ticks()) {
+            Some(Asked::Press)
+        } else {
+            core::iter::from_fn(|| panel.next_byte()).find_map(Command::of).map(Asked::Command)
+        };
+        if let Some(line) = self.poll(&seen, asked, control) {
+            return Some(line);
+        }
+        if self.phase == Phase::Faulted
+            && let Some(line) = self.dump.line(now, &self.board, control)
+        {
+            return Some(line);
+        }
+        let counts = [self.run.as_ref().map_or(0, Run::starvations), panel.bytes_lost()];
+        self.report.line(now, &self.board, counts, control)
+    }
+
+    /// The second part of a turn, which may take several ticks. Also in a fault: it may end in a stop on the path.
+    pub fn plan(&mut self) {
+        let Some(run) = &mut self.run else { return };
+        if let Some(here) = self.from.take() {
+            self.no_way = run.start(here).err();
+        }
+        run.set(&self.settings);
+        self.refused = run.poll().err();
+    }
+
+    /// A turn took so many cycles of the board's counter, its log included.
+    pub fn note_turn(&mut self, cycles: u32) {
+        self.report.note_turn(cycles);
+    }
+
+    /// Follows what the tick has left, then what is asked for.
+    fn poll<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        seen: &Seen<R, AXES>,
+        asked: Option<Asked>,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) -> Option<LogLine<R, AXES>> {
+        if let Some(line) = self.ended(seen) {
+            return Some(line);
+        }
+        if let (Phase::Running { .. }, Some(run)) = (self.phase, &self.run) {
+            let is_stopped = seen.state == ExecState::Stopped;
+            self.phase = Phase::Running { is_held: run.is_held(), is_stopped };
+        }
+        match asked {
+            Some(asked) => self.act(Action::of(self.phase, asked), seen, control),
+            None => self.came_to_rest(seen),
+        }
+    }
+
+    /// Whether it has just come to what only a reset ends.
+    fn ended(&mut self, seen: &Seen<R, AXES>) -> Option<LogLine<R, AXES>> {
+        if matches!(self.phase, Phase::Ready | Phase::Faulted) {
+            return None;
+        }
+        if let Some(fault) = seen.fault {
+            self.phase = Phase::Faulted;
+            return Some(LogLine::Fault(fault));
+        }
+        if let (Phase::Running { .. }, Some(error), Some(run)) = (self.phase, self.refused, &mut self.run) {
+            run.hold();
+            self.phase = Phase::Refused;
+            return Some(LogLine::Refused(error));
+        }
+        let error = self.no_way.take()?;
+        self.phase = Phase::Refused;
+        Some(LogLine::NoWay(error))
+    }
+
+    /// Whether a run has just come to where it waits for somebody, or to its end.
+    fn came_to_rest(&mut self, seen: &Seen<R, AXES>) -> Option<LogLine<R, AXES>> {
+        let (Phase::Running { is_stopped, .. }, Some(run)) = (self.phase, &self.run) else { return None };
+        let state = run.state();
+        if state == State::Waiting && seen.state == ExecState::Idle {
+            self.phase = Phase::Done;
+            return Some(LogLine::Done);
+        }
+        let had_said = core::mem::replace(&mut self.has_said, is_stopped || state == State::Held);
+        if had_said || !self.has_said {
+            return None;
+        }
+        Some(if is_stopped { LogLine::ProgramStop } else { LogLine::Held })
+    }
+
+    /// Carries an action out.
+    fn act<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        action: Action,
+        seen: &Seen<R, AXES>,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) -> Option<LogLine<R, AXES>> {
+        Some(match (action, &mut self.run) {
+            (Action::Start, None) if !seen.is_healthy => LogLine::NotReady,
+            (Action::Start, None) => {
+                let here = self.first_start(control)?;
+                self.start(here)
+            }
+            // At rest the set position is exactly where the streams ended.
+            (Action::Start, Some(_)) => self.start(seen.position),
+            (Action::Hold, Some(run)) => {
+                run.hold();
+                LogLine::Holding
+            }
+            (Action::Resume, Some(run)) => {
+                if let Phase::Running { is_stopped: true, .. } = self.phase {
+                    control.lock(|control| control.kernel.resume());
+                }
+                run.resume();
+                self.has_said = false;
+                LogLine::Resumed
+            }
+            (Action::Override(step), _) => {
+                self.settings.feed_override = self.settings.feed_override.after(step);
+                LogLine::Override(self.settings.feed_override.percent())
+            }
+            (Action::SingleBlock(is_single), _) => {
+                self.settings.is_single = is_single;
+                LogLine::SingleBlock(is_single)
+            }
+            (Action::Nothing(why), _) => LogLine::Nothing(why),
+            // There is no run to hold in the phases before the first start.
+            (Action::Hold | Action::Resume, None) => return None,
+        })
+    }
+
+    /// Takes the actual position, which it returns, gives the streams to the tick and enables the drives.
+    fn first_start<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) -> Option<[Position; AXES]> {
+        // With the faults of a machine that was not ready yet.
+        let here = control.lock(|control| {
+            control.flight.clear();
+            control.kernel.clear_fault()
+        });
+        // Nothing has been enabled yet, so no reaction can be under way.
+        let (here, streams) = here.zip(self.streams.take())?;
+        let (feeder, intake) = streams.split(self.program.header().rules, here);
+        control.lock(|control| {
+            control.intake = intake;
+            control.kernel.enable(self.board.settle_ticks());
+        });
+        self.run = Some(Run::new(self.program, feeder, self.board.lead_ticks));
+        Some(here)
+    }
+
+    /// Starts a run from `here`, as soon as that is logged.
+    fn start(&mut self, here: [Position; AXES]) -> LogLine<R, AXES> {
+        self.from = Some(here);
+        self.phase = Phase::Running { is_held: false, is_stopped: false };
+        self.has_said = false;
+        LogLine::Started(here)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::convert::Infallible;
+
+    use motion_kernel::fault::FaultKind;
+    use motion_kernel::flight::FlightRecorder;
+    use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+    use motion_kernel::kernel::Kernel;
+    use motion_kernel::queue::Streams;
+    use motion_kernel::units::{Counts, DacCode};
+    use rtic_core::Exclusive;
+
+    use super::*;
+    use crate::fixture::{AXES, BOARD, end, machine};
+
+    /// Drives without inertia: a velocity is there in the tick that asks for it.
+    struct IdealDrives {
+        counts: [f64; AXES],
+        counts_per_code: [f64; AXES],
+        is_enabled: bool,
+    }
+
+    impl Encoder<AXES> for IdealDrives {
+        type Error = Infallible;
+        fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
+            Ok(self.counts.map(|counts| Counts(counts.round() as i64)))
+        }
+    }
+
+    impl Inputs<AXES> for IdealDrives {
+        type Error = Infallible;
+        fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
+            Ok(MachineInputs::HEALTHY)
+        }
+    }
+
+    impl VelocityChannel<AXES> for IdealDrives {
+        type Error = Infallible;
+        fn write(&mut self, codes: &[DacCode; AXES]) -> Result<(), Infallible> {
+            if self.is_enabled {
+                for ((counts, per_code), DacCode(code)) in
+                    self.counts.iter_mut().zip(self.counts_per_code).zip(codes)
+                {
+                    *counts += per_code * f64::from(*code);
+                }
+            }
+            Ok(())
+        }
+    }
+
+    impl DriveEnable<AXES> for IdealDrives {
+        type Error = Infallible;
+        fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
+            self.is_enabled = enabled;
+            Ok(())
+        }
+    }
+
+    /// What an operator does at which tick.
+    #[derive(Default)]
+    struct Hands {
+        down_from: u32,
+        now: u32,
+        byte: Option<u8>,
+    }
+
+    impl Panel for Hands {
+        fn is_button_down(&mut self) -> bool {
+            (self.down_from..self.down_from + 100).contains(&self.now)
+        }
+        fn next_byte(&mut self) -> Option<u8> {
+            self.byte.take()
+        }
+        fn bytes_lost(&self) -> u32 {
+            0
+        }
+    }
+
+    type Lines = Vec<(u32, LogLine<f32, AXES>)>;
+
+    /// A board from its start on, with a turn after every tick. Before tick `n` `script` does what it says in it; the lines
+    /// of its log without reports, its set position and whether its drives are enabled.
+    fn board(
+        ticks: u32,
+        mut script: impl FnMut(u32, &mut Hands, &mut Option<FaultKind<f32>>, &Lines),
+    ) -> (Lines, [Position; AXES], bool) {
+        let machine = machine();
+        let header = *machine.header();
+        let mut flight = FlightRecorder::<f32, AXES, 16, 8>::new();
+        let mut empty = Streams::<f32, AXES, 2, 2>::new();
+        let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+        let counts_per_code = header.axes.map(|axis| {
+            let mm_s_per_code = axis.mm_s_at_10_v / f64::from(DacCode::from_volts(10.0_f64).0);
+            mm_s_per_code * BOARD.tick_s() / axis.mm_per_count
+        });
+        let mut drives = IdealDrives { counts: [0.0; AXES], counts_per_code, is_enabled: false };
+        let kernel = Kernel::new(&machine.axes, header.start, [Counts(0); AXES]);
+        let (_, intake) = empty.split(header.rules, header.start);
+        let mut control = Control::new(kernel, intake, header.start, &mut flight);
+        let mut background = Background::<f32, AXES, 64, 16, 64>::new(BOARD, machine.program, &mut streams);
+        let (mut hands, mut lines) = (Hands::default(), Lines::new());
+        hands.down_from = u32::MAX - 100;
+        for now in 1..=ticks {
+            hands.now = now;
+            let mut unhealthy = None;
+            script(now, &mut hands, &mut unhealthy, &lines);
+            control.tick(unhealthy, None, &mut drives);
+            let line = background.turn(now, &mut hands, &mut Exclusive(&mut control));
+            lines.extend(line.filter(|line| !is_report(line)).map(|line| (now, line)));
+            background.plan();
+        }
+        (lines, control.seen().position, drives.is_enabled)
+    }
+
+    fn is_report(line: &LogLine<f32, AXES>) -> bool {
+        use LogLine::{Background, FollowingErrors, Ticks};
+        matches!(line, Ticks { .. } | FollowingErrors(_) | Background { .. })
+    }
+
+    fn said(lines: &Lines) -> Vec<LogLine<f32, AXES>> {
+        lines.iter().map(|&(_, line)| line).collect()
+    }
+
+    #[test]
+    fn a_press_starts_the_next_one_holds_the_third_resumes_and_it_comes_to_the_end() {
+        let start = machine().header().start;
+        let (lines, position, is_enabled) = board(8000, |now, hands, _, _| {
+            if matches!(now, 100 | 1500 | 2500) {
+                hands.down_from = now;
+            }
+        });
+        use LogLine::{Done, Held, Holding, Resumed, Started};
+        assert_eq!(said(&lines), [Started(start), Holding, Held, Resumed, Done]);
+        assert_eq!(lines[0].0, 100 + BOARD.button_ticks());
+        assert_eq!((position, is_enabled), (end(), true));
+    }
+
+    #[test]
+    fn the_console_does_what_its_letters_say_and_starts_nothing() {
+        let (lines, position, is_enabled) = board(500, |now, hands, _, _| {
+            hands.byte =
+                [b'r', b'h', b'u', b's', b'x'].get((now / 100) as usize).copied().filter(|_| now % 100 == 0);
+        });
+        use LogLine::{Nothing, Override, SingleBlock};
+        assert!(matches!(said(&lines)[..], [Nothing(_), Override(110), SingleBlock(true)]), "{lines:?}");
+        assert_eq!((position, is_enabled), (machine().header().start, false));
+    }
+
+    #[test]
+    fn a_board_that_is_not_ready_does_not_start_and_starts_once_it_is() {
+        let (lines, position, _) = board(8000, |now, hands, unhealthy, _| {
+            *unhealthy = (now < 1000).then_some(FaultKind::EmergencyStop);
+            if matches!(now, 500 | 1500) {
+                hands.down_from = now;
+            }
+        });
+        use LogLine::{Done, NotReady, Started};
+        assert!(matches!(said(&lines)[..], [NotReady, Started(_), Done]), "{lines:?}");
+        assert_eq!(position, end());
+    }
+
+    /// The rows are those around the fault, a line every 10 ms, and nothing starts any more.
+    #[test]
+    fn a_fault_is_said_once_its_rows_follow_and_only_a_reset_helps() {
+        let (lines, _, is_enabled) = board(4000, |now, hands, unhealthy, _| {
+            *unhealthy = (now == 1500).then_some(FaultKind::Drive { axis: 1 });
+            if matches!(now, 100 | 2500) {
+                hands.down_from = now;
+            }
+        });
+        assert!(
+            matches!(lines[1], (1500, LogLine::Fault(fault)) if fault.kind == FaultKind::Drive { axis: 1 })
+        );
+        let rows: Vec<_> = lines
+            .iter()
+            .filter_map(|(tick, line)| match line {
+                LogLine::Flight(row) => Some((*tick, row.tick)),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(rows.len(), 16, "{rows:?}");
+        assert!(
+            rows.windows(2)
+                .all(|two| two[1].0 - two[0].0 >= BOARD.flight_line_ticks() && two[1].1 == two[0].1 + 1)
+        );
+        let nothing = lines.iter().filter(|(_, line)| matches!(line, LogLine::Nothing(_)));
+        assert_eq!((nothing.count(), lines.len()), (1, 2 + 16 + 1));
+        assert!(!is_enabled);
+    }
+
+    #[test]
+    fn reports_come_once_a_second() {
+        let mut ticks = Vec::new();
+        let machine = machine();
+        let mut flight = FlightRecorder::<f32, AXES, 16, 8>::new();
+        let mut empty = Streams::<f32, AXES, 2, 2>::new();
+        let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+        let start = machine.header().start;
+        let kernel = Kernel::new(&machine.axes, start, [Counts(0); AXES]);
+        let (_, intake) = empty.split(machine.header().rules, start);
+        let mut control = Control::new(kernel, intake, start, &mut flight);
+        let mut background = Background::<f32, AXES, 64, 16, 64>::new(BOARD, machine.program, &mut streams);
+        let mut hands = Hands { down_from: u32::MAX - 100, ..Hands::default() };
+        for now in 1..=10_000 {
+            control.timing.add(100 + now, 20, now == 1);
+            background.note_turn(1_680_000);
+            match background.turn(now, &mut hands, &mut Exclusive(&mut control)) {
+                Some(LogLine::Ticks { timing, overruns }) => {
+                    assert_eq!(overruns, 1);
+                    ticks.push((now, timing.ticks));
+                }
+                Some(LogLine::Background { longest_turn_us, .. }) => assert_eq!(longest_turn_us, 10_000),
+                Some(LogLine::FollowingErrors(_)) => {}
+                other => assert_eq!(other, None),
+            }
+        }
+        let expected: Vec<_> = (0..5).map(|second| (2000 * second + 1, 2000)).collect();
+        assert_eq!(ticks[1..], expected[1..]);
+    }
+}

@@ -1,0 +1,83 @@
+//! What tick and background share, and the tick of every board.
+//!
+//! The tick has the higher priority and takes it freely; the background takes it for some tens of
+//! instructions, right after a tick.
+
+use motion_kernel::exec::ExecState;
+use motion_kernel::fault::{Fault, FaultKind};
+use motion_kernel::flight::FlightRecorder;
+use motion_kernel::hal::{DriveEnable, Encoder, Inputs, VelocityChannel};
+use motion_kernel::kernel::Kernel;
+use motion_kernel::num::Real;
+use motion_kernel::queue::Intake;
+use motion_kernel::units::Position;
+
+use crate::tick_timing::TickTiming;
+
+/// Shared by tick and background: the kernel, and what it last did. The flight recorder keeps `ROWS` ticks, `AFTER` of them
+/// after a fault.
+pub struct Control<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> {
+    pub(crate) kernel: Kernel<R, AXES>,
+    /// The kernel's end of the streams: empty ones until the first start.
+    pub(crate) intake: Intake<'a, R, AXES>,
+    /// What the tick keeps about itself: the board's interrupt adds to it.
+    pub timing: TickTiming,
+    pub(crate) flight: &'a mut FlightRecorder<R, AXES, ROWS, AFTER>,
+    state: ExecState,
+    position: [Position; AXES],
+    is_healthy: bool,
+}
+
+/// What the tick last left.
+#[derive(Clone, Copy)]
+pub(crate) struct Seen<R: Real, const AXES: usize> {
+    pub(crate) state: ExecState,
+    /// The set position.
+    pub(crate) position: [Position; AXES],
+    pub(crate) fault: Option<Fault<R>>,
+    /// The inputs allow a start.
+    pub(crate) is_healthy: bool,
+}
+
+impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
+    Control<'a, R, AXES, ROWS, AFTER>
+{
+    /// A kernel at rest at `position`, with streams that nothing ever enters: the first start brings others.
+    pub fn new(
+        kernel: Kernel<R, AXES>,
+        intake: Intake<'a, R, AXES>,
+        position: [Position; AXES],
+        flight: &'a mut FlightRecorder<R, AXES, ROWS, AFTER>,
+    ) -> Self {
+        let timing = TickTiming::new();
+        Self { kernel, intake, timing, flight, state: ExecState::Idle, position, is_healthy: false }
+    }
+
+    /// One control tick. `unhealthy` is what the board found in its inputs (the emergency stop, a drive that is not ready),
+    /// `late` is what its [`TickMonitor`](motion_kernel::tick_monitor::TickMonitor) says as the tick begins.
+    #[inline]
+    pub fn tick<H>(&mut self, unhealthy: Option<FaultKind<R>>, late: Option<FaultKind<R>>, hal: &mut H)
+    where
+        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
+    {
+        self.is_healthy = unhealthy.is_none();
+        for kind in unhealthy.into_iter().chain(late) {
+            self.kernel.trip(kind);
+        }
+        let trace = self.kernel.tick(&mut self.intake, hal);
+        self.flight.add(trace);
+        self.state = trace.executed.state;
+        self.position = trace.executed.setpoints.map(|setpoint| setpoint.position);
+    }
+
+    /// Latches a fault that the board found after the tick, in the tick to come.
+    #[inline]
+    pub fn trip(&mut self, kind: FaultKind<R>) {
+        self.kernel.trip(kind);
+    }
+
+    pub(crate) fn seen(&self) -> Seen<R, AXES> {
+        let &Self { state, position, is_healthy, .. } = self;
+        Seen { state, position, fault: self.kernel.fault(), is_healthy }
+    }
+}

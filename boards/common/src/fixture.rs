@@ -1,0 +1,29 @@
+//! A board and a program for the tests of this crate: those of the NUCLEO.
+
+use motion_kernel::units::Position;
+
+use crate::parameters::BoardParameters;
+
+pub(crate) const AXES: usize = 3;
+
+pub(crate) const BOARD: BoardParameters =
+    BoardParameters { tick_hz: 2000, cycles_hz: 168_000_000, counts_per_s_max: 6_000_000, lead_ticks: 8 };
+
+pub(crate) const TICK_S: f64 = 0.0005;
+
+/// Ticks of a long turn of the background.
+pub(crate) const TURN_TICKS_MAX: u32 = 66;
+
+/// The stringer, 2.320 s long.
+pub(crate) const PROGRAM: &[u8] = include_bytes!("../program/stringer.bin");
+
+pub(crate) type Machine<'a> = crate::machine::Machine<'a, f32, AXES>;
+
+pub(crate) fn machine() -> Machine<'static> {
+    Machine::new(PROGRAM, &BOARD).expect("suits")
+}
+
+/// Where the stringer ends, as `motion compile` prints it.
+pub(crate) fn end() -> [Position; AXES] {
+    [102.045_923_136, 0.0, 0.0].map(|mm| Position::from_mm(mm).expect("in range"))
+}

@@ -1,0 +1,60 @@
+//! What the firmware of every board does, whatever its processor: everything but pins, peripherals and interrupts.
+//!
+//! ```text
+//! tick    drives, encoders ─► Control::tick ─► converter      feeds the watchdog while Liveness allows
+//!                                  │
+//!                              rtic_core::Mutex
+//!                                  │
+//! idle    Panel: button, console ─► Background::turn ─► LogLine ─► log
+//!                                   Background::plan ─► streams of the tick
+//! ```
+//!
+//! A board implements the kernel's `hal` traits and [`Panel`], states its [`BoardParameters`], calls [`Control::tick`] in
+//! the interrupt of a timer and [`Background`] in its idle loop. `boards/README.md` has the steps.
+//!
+//! In the order the data travels:
+//!
+//! - [`parameters`]: what differs from board to board;
+//! - [`machine`]: the program in flash and the axes that it is for;
+//! - [`runs`]: what the start button runs, under live control;
+//! - [`panel`]: the start button and the console's bytes;
+//! - [`console`]: the commands of the console;
+//! - [`operator`]: what a press or a command does, in every phase;
+//! - [`control`]: what tick and background share, and the tick;
+//! - [`background`]: one turn after another;
+//! - [`report`]: figures of the last second;
+//! - [`log`]: what the log says;
+//! - [`tick_timing`] and [`liveness`]: what the tick knows of itself and of the background.
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+// No panic path in what runs on a board; tests may.
+#![cfg_attr(
+    not(test),
+    deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)
+)]
+
+pub mod parameters;
+pub mod machine;
+pub mod runs;
+pub mod panel;
+pub mod console;
+pub mod operator;
+pub mod control;
+pub mod background;
+pub mod report;
+pub mod log;
+pub mod tick_timing;
+pub mod liveness;
+
+#[cfg(test)]
+mod fixture;
+
+pub use background::Background;
+pub use control::Control;
+pub use liveness::Liveness;
+pub use log::LogLine;
+pub use machine::Machine;
+pub use panel::Panel;
+pub use parameters::BoardParameters;
+pub use runs::Run;
+pub use tick_timing::TickTiming;

@@ -1,0 +1,193 @@
+//! The machine that the board drives: the one that its program was compiled for.
+//!
+//! Consumes a compiled program, which `motion compile` wrote with the machine's scales, gains, limits
+//! and guards; produces the kernel's configuration, once, before the first tick. So there is one description of the
+//! machine, its file on the PC, and the board checks here what only it can know. A program that is damaged, does
+//! not suit the board, or holds an item anywhere that could not be executed is refused before anything is enabled.
+
+use motion_kernel::axis::{AxesConfig, AxesError};
+use motion_kernel::num::Real;
+use motion_kernel::program::{CheckError, Header, ProgramError, Reader, check_live};
+
+use crate::parameters::BoardParameters;
+
+/// Why the board can't run a program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum MachineError {
+    /// The bytes are no program for it.
+    Program(ProgramError),
+    /// The program is for another tick \[s\].
+    Tick {
+        /// The program's.
+        found: f64,
+        /// The board's.
+        expected: f64,
+    },
+    /// An axis would count faster than its input filter is sure to pass.
+    CountRate {
+        /// The axis, from 0.
+        axis: usize,
+        /// At twice the greatest feed, for what an axis does beyond its set-point \[1/s\].
+        counts_per_s: f64,
+        /// What passes \[1/s\].
+        limit: f64,
+    },
+    /// It does not say how faults are told and end.
+    Unguarded,
+    /// A figure of an axis is out of its range.
+    Axes(AxesError),
+    /// An item can't be executed, the program starts or ends where it can't, or it does not say what holds its feed, which
+    /// live control makes plans with: `motion compile --live` does.
+    Items(CheckError<ProgramError>),
+}
+
+/// A program that suits the board, and its machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Machine<'a, R: Real, const AXES: usize> {
+    /// All of the program's items.
+    pub program: Reader<'a, AXES>,
+    /// The kernel's axes.
+    pub axes: AxesConfig<R, AXES>,
+}
+
+impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
+    /// The machine of the program in `bytes`, on `board`.
+    ///
+    /// # Errors
+    /// [`MachineError`].
+    pub fn new(bytes: &'a [u8], board: &BoardParameters) -> Result<Self, MachineError> {
+        let program = Reader::new(bytes).map_err(MachineError::Program)?;
+        let Header { tick_s, rules, axes, .. } = program.header();
+        // To the bit: both are the same decimal, or they are different ticks.
+        let expected = board.tick_s();
+        if *tick_s != expected {
+            return Err(MachineError::Tick { found: *tick_s, expected });
+        }
+        let limit = f64::from(board.counts_per_s_max);
+        for (axis, figures) in axes.iter().enumerate() {
+            let counts_per_s = 2.0 * rules.feed_mm_s / figures.mm_per_count.abs();
+            if !(counts_per_s <= limit) {
+                return Err(MachineError::CountRate { axis, counts_per_s, limit });
+            }
+        }
+        let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
+        let axes = AxesConfig::new(axes, expected).and_then(|axes| axes.guarded(&guards, expected));
+        let axes = axes.map_err(MachineError::Axes)?;
+        check_live::<R, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
+        Ok(Self { program, axes })
+    }
+
+    /// What the program was planned for.
+    #[must_use]
+    pub fn header(&self) -> &Header<AXES> {
+        self.program.header()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motion_kernel::axis::{GuardFigures, Guards};
+    use motion_kernel::program::{Item, SupplyError, write};
+    use motion_kernel::units::Position;
+
+    use super::*;
+    use crate::fixture::{AXES, BOARD, Machine, PROGRAM, TICK_S, machine};
+
+    fn guards() -> Guards<AXES> {
+        machine().program.guards().expect("guards").expect("guarded")
+    }
+
+    fn of(
+        header: &Header<AXES>,
+        guards: Option<&Guards<AXES>>,
+        items: &[Item<AXES>],
+    ) -> Result<Machine<'static>, MachineError> {
+        let mut bytes = Vec::new();
+        write(header, guards, items, &mut bytes).expect("short");
+        Machine::new(bytes.leak(), &BOARD)
+    }
+
+    /// The machine of the program with a changed header.
+    fn with(change: impl Fn(&mut Header<AXES>)) -> Result<Machine<'static>, MachineError> {
+        let mut header = *machine().header();
+        change(&mut header);
+        of(&header, Some(&guards()), &[])
+    }
+
+    /// Its axes are guarded as the machine's file says, and its faults end so.
+    #[test]
+    fn the_program_in_flash_suits() {
+        let machine = machine();
+        let axes = AxesConfig::<f32, AXES>::new(&machine.header().axes, TICK_S).expect("axes");
+        assert_ne!(machine.axes, axes);
+        assert_eq!(machine.axes, axes.guarded(&guards(), TICK_S).expect("guarded"));
+        assert!(guards().axes.iter().all(Option::is_some));
+        // 0.1 s.
+        assert_eq!(guards().reactions.ramp_ticks, 200);
+    }
+
+    #[test]
+    fn guards_that_are_not_there_or_none_are_refused() {
+        let header = *machine().header();
+        assert_eq!(of(&header, None, &[]).map(|_| ()), Err(MachineError::Unguarded));
+        let mut none = guards();
+        none.axes[2] = none.axes[2].map(|figures| GuardFigures { jump_mm: 0.0, ..figures });
+        let refused = of(&header, Some(&none), &[]).map(|_| ());
+        assert!(matches!(refused, Err(MachineError::Axes(AxesError { axis: 2, .. }))), "{refused:?}");
+    }
+
+    /// The last item but one is damaged, behind a checksum that is right: nothing of the program starts.
+    #[test]
+    fn an_item_that_cannot_be_executed_is_found_before_the_start() {
+        let good = machine().program;
+        let header = *good.header();
+        let mut items: Vec<Item<AXES>> = good.items().map(|item| item.expect("an item")).collect();
+        let at = items.iter().rposition(|item| matches!(item, Item::Line { .. })).expect("a line");
+        if let Item::Line { direction, .. } = &mut items[at] {
+            direction[0] = f64::NAN;
+        }
+        let refused = of(&header, Some(&guards()), &items).map(|_| ());
+        assert!(
+            matches!(refused, Err(MachineError::Items(CheckError::Item { index, cause: SupplyError::Piece(_) }))
+                if index as usize == at),
+            "{refused:?}"
+        );
+        let far = with(|header| header.start[1] = Position::from_bits(i64::MAX)).map(|_| ());
+        assert!(matches!(far, Err(MachineError::Items(CheckError::Start { axis: 1, .. }))), "{far:?}");
+    }
+
+    /// Without any of its blocks, without its last one, with one that is longer, and with one behind its end.
+    #[test]
+    fn a_program_that_does_not_hold_its_feed_is_refused() {
+        let good = machine().program;
+        let items: Vec<Item<AXES>> = good.items().map(|item| item.expect("an item")).collect();
+        let is_block = |item: &Item<AXES>| matches!(item, Item::Block(_));
+        let last = items.iter().rposition(is_block).expect("blocks");
+        let mut longer = items.clone();
+        if let Item::Block(block) = &mut longer[last] {
+            block.length = block.length + Position::from_bits(1);
+        }
+        let without: Vec<_> = items.iter().filter(|item| !is_block(item)).copied().collect();
+        let but_last = [&items[..last], &items[last + 1..]].concat();
+        let behind = [&items[..], &[items[last]]].concat();
+        assert!(of(good.header(), Some(&guards()), &items).is_ok());
+        for items in [without, but_last, longer, behind] {
+            let refused = of(good.header(), Some(&guards()), &items).map(|_| ());
+            let is_found = matches!(refused, Err(MachineError::Items(CheckError::NotHeld { .. })));
+            assert!(is_found, "{refused:?}");
+        }
+    }
+
+    #[test]
+    fn others_are_refused() {
+        let slow = with(|header| header.tick_s = 0.001).map(|_| ());
+        assert_eq!(slow, Err(MachineError::Tick { found: 0.001, expected: TICK_S }));
+        let fine = with(|header| header.axes[1].mm_per_count = -5e-5).map(|_| ());
+        let expected = MachineError::CountRate { axis: 1, counts_per_s: 1.2e7, limit: 6e6 };
+        assert_eq!(fine, Err(expected));
+        let still = with(|header| header.axes[2].mm_s_at_10_v = 0.0).map(|_| ());
+        assert!(matches!(still, Err(MachineError::Axes(_))));
+        assert!(matches!(Machine::new(&PROGRAM[1..], &BOARD), Err(MachineError::Program(_))));
+    }
+}

@@ -1,0 +1,73 @@
+//! Where an operator stands: a button and the bytes of a serial console.
+//!
+//! Consumes the level of the button once a turn; produces presses.
+
+/// What a board has for its operator. The background asks once a turn.
+pub trait Panel {
+    /// Whether the start button is down now. Bounces are this crate's business.
+    fn is_button_down(&mut self) -> bool;
+
+    /// The next byte of the console, in the order of their coming.
+    fn next_byte(&mut self) -> Option<u8>;
+
+    /// How often bytes were lost since the start.
+    fn bytes_lost(&self) -> u32;
+}
+
+/// The button, debounced.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Button {
+    /// The tick since which it has been down.
+    since: Option<u32>,
+    samples: u8,
+    is_counted: bool,
+}
+
+/// So many samples at least make a press, however long turns take: one may be a bounce.
+const PRESS_SAMPLES: u8 = 3;
+
+impl Button {
+    /// Whether it has just been down for `button_ticks` at tick `now`, as far as turns have seen. A press counts once.
+    pub(crate) fn is_pressed(&mut self, is_down: bool, now: u32, button_ticks: u32) -> bool {
+        if !is_down {
+            *self = Self::default();
+            return false;
+        }
+        let since = *self.since.get_or_insert(now);
+        self.samples = self.samples.saturating_add(1);
+        let is_press = now.wrapping_sub(since) >= button_ticks && self.samples >= PRESS_SAMPLES;
+        is_press && !core::mem::replace(&mut self.is_counted, true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ticks at which a button that is down where `down` says so counts as pressed, with a turn every `turn` ticks.
+    fn presses(turn: u32, begin: u32, down: impl Fn(u32) -> bool) -> Vec<u32> {
+        let mut button = Button::default();
+        (0..400)
+            .step_by(turn as usize)
+            .filter(|&tick| button.is_pressed(down(tick), begin.wrapping_add(tick), 40))
+            .collect()
+    }
+
+    #[test]
+    fn a_press_counts_once_and_a_bounce_never() {
+        assert_eq!(presses(1, 0, |tick| (100..300).contains(&tick)), [140]);
+        assert!(presses(1, 0, |tick| (100..140).contains(&tick)).is_empty());
+        // Bounces at both edges.
+        let bouncing = |tick| (100..300).contains(&tick) && !matches!(tick, 103 | 110 | 290);
+        assert_eq!(presses(1, 0, bouncing), [151]);
+        assert_eq!(presses(1, 0, |tick| (50..100).contains(&tick) || tick >= 200), [90, 240]);
+        // The counter of ticks wraps.
+        assert_eq!(presses(1, u32::MAX - 120, |tick| tick >= 100), [140]);
+    }
+
+    /// Turns of 66 ticks: two samples are 66 ticks apart, and still no press.
+    #[test]
+    fn long_turns_need_three_samples() {
+        assert_eq!(presses(66, 0, |tick| tick >= 66), [198]);
+    }
+}

@@ -1,0 +1,99 @@
+//! Ctrl-C and the request to end: temporary files are removed, and the process ends with the signal's status.
+//!
+//! A thread of its own waits for the signals, so that files may be removed and work may be under way in whatever depth. It
+//! takes the lock that a rename holds: what is being committed is committed, everything else stays as it was.
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::NamedTempFile;
+
+/// Temporary files of outputs that are not committed, with the outputs' names.
+static PENDING: Mutex<Vec<(PathBuf, String)>> = Mutex::new(Vec::new());
+
+fn lock() -> MutexGuard<'static, Vec<(PathBuf, String)>> {
+    PENDING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A temporary file that a signal removes, until this is dropped.
+#[derive(Debug)]
+pub(super) struct PendingPath(PathBuf);
+
+impl PendingPath {
+    /// Of the file that `make` makes for the output `name`.
+    pub(super) fn made(
+        name: &str,
+        make: impl FnOnce() -> io::Result<NamedTempFile>,
+    ) -> io::Result<(NamedTempFile, Self)> {
+        let mut pending = lock();
+        let temporary = make()?;
+        let path = temporary.path().to_owned();
+        pending.push((path.clone(), name.to_owned()));
+        Ok((temporary, Self(path)))
+    }
+
+    /// Renames it with `rename`; a signal comes before or after that.
+    pub(super) fn end(self, rename: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+        let mut pending = lock();
+        let renamed = rename();
+        pending.retain(|(path, _)| *path != self.0);
+        drop(pending);
+        renamed
+    }
+}
+
+impl Drop for PendingPath {
+    fn drop(&mut self) {
+        lock().retain(|(path, _)| *path != self.0);
+    }
+}
+
+/// Ends the process on SIGINT (Ctrl-C, status 130) and SIGTERM (143), without losing a file. Call it once, first of all.
+///
+/// Elsewhere than on Unix the system ends the process, and a temporary file may stay.
+pub fn watch() {
+    #[cfg(unix)]
+    unix::watch();
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::io::{self, IsTerminal, Write};
+    use std::{fs, process, thread};
+
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+
+    /// What a shell adds to the number of a signal.
+    const STATUS_OF_SIGNALS: i32 = 128;
+
+    pub(super) fn watch() {
+        // Without it, a signal ends the process as ever.
+        let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
+        thread::spawn(move || {
+            if let Some(signal) = signals.forever().next() {
+                end(signal);
+            }
+        });
+    }
+
+    fn end(signal: i32) -> ! {
+        let pending = super::lock();
+        for (path, _) in pending.iter() {
+            let _ = fs::remove_file(path);
+        }
+        let names: Vec<&str> = pending.iter().map(|(_, name)| name.as_str()).collect();
+        let stays = match names.as_slice() {
+            [] => String::new(),
+            [name] => format!(": {name} stays as it was"),
+            names => format!(": {} stay as they were", names.join(", ")),
+        };
+        let mut error = io::stderr().lock();
+        // After the ^C that a terminal shows, or the progress bar.
+        let line = if error.is_terminal() { "\n" } else { "" };
+        let _ = writeln!(error, "{line}motion: interrupted{stays}");
+        // With the lock: nothing is committed any more.
+        process::exit(STATUS_OF_SIGNALS + signal)
+    }
+}

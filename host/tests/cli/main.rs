@@ -1,0 +1,10 @@
+//! The command line as users and scripts rely on it: exit statuses, keys, headers, errors, files.
+
+mod axes;
+mod drive;
+mod files;
+mod planning;
+mod running;
+mod spline;
+mod unfinished;
+mod workspace;

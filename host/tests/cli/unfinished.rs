@@ -1,0 +1,118 @@
+//! What did not finish says so: in its first line, in JSON, in the report, in its exit status.
+
+use serde_json::Value;
+
+use crate::workspace::{Workspace, number};
+
+/// 60 mm along X, on two lines.
+const PROGRAM: &str = "G1 X20 F2400\nX60\nM2\n";
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).expect("JSON")
+}
+
+/// Held, held by single block, by an override of 0, aborted: each with its words, its status and how far it came.
+#[test]
+fn a_run_says_how_far_it_came() {
+    let workspace = Workspace::new("unfinished");
+    workspace.put("part.ngc", PROGRAM);
+    for (at, status, stopped_by, words, line) in [
+        ("1500:hold", 3, "hold", "held at ", 2),
+        ("0:single", 3, "single block", "held by single block at 20.0000 of 60.0000 mm, line 1", 1),
+        ("1500:override=0", 3, "override", "held by an override of 0 at ", 2),
+        ("1500:abort", 4, "abort", "aborted at ", 2),
+        ("1500:hold,1501:override=0", 3, "hold", "held at ", 2),
+    ] {
+        let run = ["run", "part.ngc", "--at", at, "--report", "part.html", "--trace", "part.csv"];
+        let (said, error) = workspace.ending(status, &run);
+        assert_eq!(error, "", "{at}");
+        let first = said.lines().next().expect("a line");
+        assert!(first.trim_start().starts_with(words), "{at}: {said}");
+        let found = json(&workspace.ending(status, &[&run[..], &["--json"]].concat()).0);
+        assert_eq!(
+            (&found["finished"], found["stopped_by"].as_str()),
+            (&Value::Bool(false), Some(stopped_by))
+        );
+        assert_eq!(found["reached_line"], line, "{at}");
+        // Where the trace ends.
+        let trace = workspace.read("part.csv");
+        let last: Vec<&str> = trace.lines().last().expect("a row").split(',').collect();
+        let reached_mm: f64 = last[2].parse().expect("a number");
+        assert!(reached_mm > 0.0 && reached_mm < 60.0, "{at}: {reached_mm}");
+        assert!((number(&found["reached_mm"]) - reached_mm).abs() < 1e-9, "{at}: {found}");
+        assert!(first.contains(&format!(" at {reached_mm:.4} of 60.0000 mm, line {line}")), "{at}: {first}");
+        let page = workspace.read("part.html");
+        let words = words.split(" at ").next().expect("words");
+        assert!(page.contains(&format!("<strong>Not finished:</strong> {words} at ")), "{at}");
+        assert!(page.contains(&format!(" of 60 mm along the path, line {line}, after ")), "{at}");
+    }
+    let found = json(&workspace.ending(0, &["run", "part.ngc", "--json"]).0);
+    assert_eq!((&found["finished"], &found["stopped_by"]), (&Value::Bool(true), &Value::Null));
+    assert!((number(&found["reached_mm"]) - 60.0).abs() < 1e-9);
+    let (said, _) = workspace.ending(0, &["run", "part.ngc"]);
+    assert!(said.starts_with("  60.0000 mm in "), "{said}");
+}
+
+#[test]
+fn a_fault_says_how_far_it_came() {
+    let workspace = Workspace::new("faulted");
+    workspace.put("part.ngc", PROGRAM);
+    let run = [
+        "run",
+        "part.ngc",
+        "--inject",
+        "1500:emergency-stop",
+        "--report",
+        "part.html",
+        "--record",
+        "part.mrec",
+    ];
+    let (said, _) = workspace.ending(1, &run);
+    assert!(said.starts_with("  faulted at ") && said.contains(" of 60.0000 mm, line 2\n"), "{said}");
+    assert!(workspace.read("part.html").contains(" of 60 mm along the path, line 2."));
+    let found = json(&workspace.ending(1, &[&run[..], &["--json"]].concat()).0);
+    assert_eq!((&found["finished"], found["stopped_by"].as_str()), (&Value::Bool(false), Some("fault")));
+    // A replay judges whether it is identical, and says how the run ended.
+    let (said, _) = workspace.ending(0, &["replay", "part.mrec"]);
+    assert!(said.starts_with("  faulted at ") && said.contains("identical over"), "{said}");
+    let found = json(&workspace.ending(0, &["replay", "part.mrec", "--json"]).0);
+    assert_eq!(
+        (&found["finished"], &found["replay"]["identical"]),
+        (&Value::Bool(false), &Value::Bool(true))
+    );
+}
+
+/// Commands after the end of the run: named, and an error, after the results.
+#[test]
+fn a_command_that_is_not_reached_is_an_error() {
+    let workspace = Workspace::new("unreached");
+    workspace.put("part.ngc", PROGRAM);
+    let run = ["run", "part.ngc", "--at", "10:override=0.9,800000:hold,900000:resume"];
+    let (said, error) = workspace.ending(5, &run);
+    assert!(said.starts_with("  60.0000 mm in "), "{said}");
+    let expected = "motion: --at 800000:hold,900000:resume: found the end of the run in tick ";
+    assert!(error.starts_with(expected) && error.lines().count() == 1, "{error}");
+    let found = json(&workspace.ending(5, &[&run[..], &["--json"]].concat()).0);
+    assert_eq!(found["finished"], true);
+    assert_eq!(found["commands_not_reached"], Value::from(vec!["800000:hold", "900000:resume"]));
+    let last = number(&found["ticks"]) - 1.0;
+    assert!(error.contains(&format!("in tick {last}, expected")), "{error}");
+    // An abort has its own status, and the command is named all the same.
+    let (said, error) = workspace.ending(4, &["run", "part.ngc", "--at", "1500:abort,800000:resume"]);
+    assert!(said.starts_with("  aborted at ") && error.contains("--at 800000:resume: found"), "{error}");
+}
+
+/// A jog that a fault ends says where.
+#[test]
+fn a_jog_says_where_its_fault_was() {
+    let workspace = Workspace::new("jog-fault");
+    let file = workspace.stdout(&["machine"]);
+    let loose = file.replace("following_error_limit_mm = 1.0", "following_error_limit_mm = 0.002");
+    workspace.put("loose.toml", &loose);
+    let (_, error) = workspace.ending(1, &["jog", "X+0.01", "X+20", "--machine", "loose.toml"]);
+    let (_, place) = error.split_once(", at X ").expect("a place");
+    let (x_mm, _) = place.split_once(" mm").expect("a unit");
+    let x_mm: f64 = x_mm.parse().expect("a number");
+    assert!(x_mm > 0.01 && x_mm < 20.01, "{error}");
+    assert!(error.starts_with("motion: X+20: fault in tick "), "{error}");
+}

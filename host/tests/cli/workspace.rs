@@ -1,0 +1,96 @@
+//! What the suites share: a folder with `motion` in it, and looks at its JSON.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// A directory of a test's own, removed afterwards.
+pub(crate) struct Workspace(pub(crate) PathBuf);
+
+impl Workspace {
+    pub(crate) fn new(name: &str) -> Self {
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("cli-{name}"));
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).expect("a directory");
+        Self(path)
+    }
+
+    pub(crate) fn put(&self, name: &str, text: &str) {
+        fs::write(self.0.join(name), text).expect("a file");
+    }
+
+    pub(crate) fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.0.join(name)).expect("a file")
+    }
+
+    /// Runs `motion` in this directory.
+    pub(crate) fn motion(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_motion"));
+        command.args(arguments).current_dir(&self.0).output().expect("motion starts")
+    }
+
+    /// Runs `motion`, which must end with `status` and say something on standard output.
+    pub(crate) fn ending(&self, status: i32, arguments: &[&str]) -> (String, String) {
+        let output = self.motion(arguments);
+        let [said, error] =
+            [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {error}");
+        assert!(!said.is_empty(), "{arguments:?}");
+        (said, error)
+    }
+
+    /// Runs `motion`, which must succeed and say nothing on standard error.
+    pub(crate) fn stdout(&self, arguments: &[&str]) -> String {
+        let output = self.motion(arguments);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!((output.status.code(), error.as_ref()), (Some(0), ""), "{arguments:?}");
+        String::from_utf8(output.stdout).expect("UTF-8")
+    }
+
+    pub(crate) fn json(&self, arguments: &[&str]) -> Value {
+        serde_json::from_str(&self.stdout(arguments)).expect("JSON")
+    }
+
+    /// Runs `motion`, which must refuse its input in one line; that line without `motion: `.
+    pub(crate) fn refusal(&self, arguments: &[&str]) -> String {
+        let output = self.motion(arguments);
+        let error = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{arguments:?}: {error}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+        error.trim_end().strip_prefix("motion: ").expect("its name first").to_owned()
+    }
+}
+
+impl Drop for Workspace {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+pub(crate) const STRINGER: &str = include_str!("../../src/cli/stringer.ngc");
+
+const LIMITS: [&str; 6] = ["--accel", "500", "--jerk", "5000", "--snap", "400000"];
+
+pub(crate) fn keys(value: &Value) -> Vec<&str> {
+    let mut keys: Vec<&str> = value.as_object().expect("an object").keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    keys
+}
+
+pub(crate) fn assert_has(value: &Value, expected: &[&str]) {
+    let found = keys(value);
+    for key in expected {
+        assert!(found.contains(key), "{key} is not among {found:?}");
+    }
+}
+
+pub(crate) fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+pub(crate) fn profile<'a>(from: &'a str, to: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    [&["profile", "--from", from, "--to", to][..], &LIMITS, more].concat()
+}

@@ -1,0 +1,6 @@
+//! What background and tick hand over through: words and queues. A check may put its own in their place.
+
+pub(super) use core::sync::atomic::{AtomicU32, Ordering};
+
+#[cfg(feature = "live")]
+pub(super) use heapless::spsc::Consumer;

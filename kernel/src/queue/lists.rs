@@ -1,0 +1,162 @@
+//! The tick's end of the feed lists: follows the changes that the background asks for, or refuses them, and empties what
+//! it gave up.
+
+use super::change::{Change, LISTS, ListPlace};
+use super::handover::Consumer;
+use super::item::FeedItem;
+use super::mailbox::Mailbox;
+use crate::law::{Phase, Ticks};
+use crate::num::Real;
+
+/// The most items of a list that is given up that go in one tick. Each costs some twenty instructions; a list of sixteen
+/// places is empty eight ticks after it was given up.
+const DROPPED_PER_TICK: usize = 2;
+
+/// The lists, if feed comes in lists.
+pub(super) struct Lists<'a, R: Real>(Option<LiveLists<'a, R>>);
+
+/// The lists of live control; the one under way is the intake's feed.
+struct LiveLists<'a, R: Real> {
+    mailbox: &'a Mailbox,
+    /// The current list, and how many items of it are done.
+    place: ListPlace,
+    others: [(u8, Consumer<'a, FeedItem<R>>); LISTS as usize - 1],
+    /// The generation that has been dealt with.
+    seen: u32,
+    /// From here on a change is due; never reached if none is asked for.
+    due: ListPlace,
+    /// What is asked for, as of the tick's start, with its word.
+    change: Option<(u32, Change)>,
+    /// The word that came too late last.
+    refused: Option<u32>,
+}
+
+impl<'a, R: Real> Lists<'a, R> {
+    /// Feed is one stream.
+    pub(super) const NONE: Self = Self(None);
+
+    /// The first list is under way; these are the second and the third.
+    pub(super) fn new(mailbox: &'a Mailbox, [second, third]: [Consumer<'a, FeedItem<R>>; 2]) -> Self {
+        Self(Some(LiveLists {
+            mailbox,
+            place: ListPlace::new(0, 0),
+            others: [(1, second), (2, third)],
+            seen: mailbox.generation(),
+            due: ListPlace::NEVER,
+            change: None,
+            refused: None,
+        }))
+    }
+
+    #[inline]
+    pub(super) fn is_live(&self) -> bool {
+        self.0.is_some()
+    }
+
+    /// Asks the background for a stop; whether it can make one.
+    pub(super) fn want_stop(&self) -> bool {
+        let Some(lists) = &self.0 else { return false };
+        lists.mailbox.want_stop();
+        true
+    }
+
+    /// Reads what the background asks for now; what it gave up is dropped.
+    #[inline]
+    pub(super) fn poll(&mut self) {
+        if let Some(lists) = &mut self.0 {
+            let generation = lists.mailbox.generation();
+            if lists.seen != generation {
+                lists.poll(generation);
+            }
+        }
+    }
+
+    /// One more item of the list under way is done.
+    #[inline(never)]
+    pub(super) fn item_done(&mut self, feed: &mut Consumer<'a, FeedItem<R>>) {
+        let Some(lists) = &mut self.0 else { return };
+        lists.place = lists.place.next();
+        if lists.due == lists.place && lists.change.is_some_and(|(_, change)| !change.within) {
+            self.take_over(feed);
+        }
+    }
+
+    #[inline]
+    pub(super) fn is_change_due(&self) -> bool {
+        self.0.as_ref().is_some_and(|lists| lists.due <= lists.place)
+    }
+
+    pub(super) fn feed_after_change(&self) -> Option<&FeedItem<R>> {
+        let lists = self.0.as_ref()?;
+        let (_, change) = lists.change.filter(|(_, change)| change.within && lists.due == lists.place)?;
+        lists.others.iter().find(|(list, _)| *list == change.to)?.1.peek()
+    }
+
+    pub(super) fn takes_over_between_items(&self) -> bool {
+        self.0.as_ref().is_some_and(|lists| lists.due == lists.place)
+    }
+
+    #[cold]
+    #[inline(never)]
+    pub(super) fn take_over(&mut self, feed: &mut Consumer<'a, FeedItem<R>>) {
+        let Some(lists) = &mut self.0 else { return };
+        let Some((_, change)) = lists.forget() else { return };
+        for (list, queue) in &mut lists.others {
+            if *list == change.to {
+                *list = lists.place.list();
+                lists.place = ListPlace::new(change.to, 0);
+                core::mem::swap(queue, feed);
+                // What is given up already is emptied from the next tick on.
+                lists.seen = lists.seen.wrapping_sub(1);
+                return;
+            }
+        }
+    }
+
+    #[cold]
+    pub(super) fn refuse(&mut self) {
+        let Some(lists) = &mut self.0 else { return };
+        if let Some((word, _)) = lists.forget() {
+            lists.refused = Some(word);
+            lists.mailbox.refuse(word);
+        }
+    }
+
+    #[inline]
+    pub(super) fn publish(&self, inside: Option<(Phase, Ticks)>, waits: bool) {
+        if let Some(lists) = &self.0 {
+            lists.mailbox.publish(lists.place, inside, waits);
+        }
+    }
+}
+
+impl<R: Real> LiveLists<'_, R> {
+    /// Deals with what is new, in as many ticks as it takes to empty what was given up.
+    #[cold]
+    #[inline(never)]
+    fn poll(&mut self, generation: u32) {
+        let mailbox = self.mailbox;
+        self.change = mailbox
+            .asked()
+            .filter(|(word, change)| change.from == self.place.list() && self.refused != Some(*word));
+        self.due =
+            self.change.map_or(ListPlace::NEVER, |(_, change)| ListPlace::new(change.from, change.after));
+        for _ in 0..DROPPED_PER_TICK {
+            // First the item, then the owner: an item that entered after its list was owned anew shows it as owned.
+            let is_given_up = |(list, queue): &&mut (u8, Consumer<'_, _>)| {
+                queue.peek().is_some() && !mailbox.is_owned(*list)
+            };
+            let Some((_, queue)) = self.others.iter_mut().find(is_given_up) else {
+                self.seen = generation;
+                break;
+            };
+            queue.dequeue();
+        }
+    }
+
+    /// What is asked for no longer is.
+    fn forget(&mut self) -> Option<(u32, Change)> {
+        self.due = ListPlace::NEVER;
+        self.change.take()
+    }
+}

@@ -1,0 +1,29 @@
+//! What the two ends of the streams share besides the items.
+
+use core::sync::atomic::{AtomicBool, AtomicU32};
+
+/// What the feeder tells the intake besides the items. Written by the feeder only.
+#[derive(Debug)]
+pub(super) struct Shared {
+    /// Ends of stretch entered so far.
+    pub(super) stretches: AtomicU32,
+    /// Items entered so far, in either stream. The queue's own length takes a division.
+    pub(super) path_entered: AtomicU32,
+    pub(super) feed_entered: AtomicU32,
+    /// In the stretch being entered, the feed covers at least as much path as the pieces.
+    pub(super) feed_covers_path: AtomicBool,
+    /// And the pieces at least as much as the feed.
+    pub(super) path_covers_feed: AtomicBool,
+}
+
+impl Shared {
+    pub(super) const fn new() -> Self {
+        Self {
+            stretches: AtomicU32::new(0),
+            path_entered: AtomicU32::new(0),
+            feed_entered: AtomicU32::new(0),
+            feed_covers_path: AtomicBool::new(true),
+            path_covers_feed: AtomicBool::new(true),
+        }
+    }
+}

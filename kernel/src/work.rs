@@ -1,0 +1,26 @@
+//! Work of the planner, counted where a test holds it to an amount: tests read no clock.
+//!
+//! Counts evaluations of the law and ceilings that are visited, for each thread by itself. Without the feature `count-work`
+//! nothing is counted.
+
+#[cfg(feature = "count-work")]
+extern crate std;
+
+#[cfg(feature = "count-work")]
+std::thread_local! {
+    static DONE: core::cell::Cell<u64> = const { core::cell::Cell::new(0) };
+}
+
+/// Adds some steps of work.
+#[inline(always)]
+pub(crate) fn add(_steps: usize) {
+    #[cfg(feature = "count-work")]
+    DONE.set(DONE.get() + _steps as u64);
+}
+
+/// The steps of work that this thread has done.
+#[cfg(feature = "count-work")]
+#[must_use]
+pub fn done() -> u64 {
+    DONE.get()
+}
