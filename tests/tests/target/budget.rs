@@ -122,7 +122,7 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
     hold("stages", &stages, GROWTH)
 }
 
-/// What the README promises, whatever is committed.
+/// What docs/PROMISES.md promises, whatever is committed.
 fn promised(ticks: &[(Board, [u32; 4])]) -> Result<(), String> {
     let of = |board: Board| {
         ticks.iter().find(|(found, _)| *found == board).map_or([u32::MAX; 4], |(_, figures)| *figures)
