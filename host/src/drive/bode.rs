@@ -5,12 +5,12 @@
 
 use core::f64::consts::TAU;
 
+use super::circle_motion::{Circle, plane_of};
 use super::experiment::{DriveError, open_loop};
 use super::harmonic::{self, Response};
 use super::model;
 use super::spectrum::Spectrum;
 use super::step::{Step, StepFigures};
-use super::turning::{Turning, plane_of};
 use crate::machine::Machine;
 use crate::sine::as_lag_rad;
 
@@ -65,8 +65,8 @@ pub fn measure(
     let open = open_loop(machine);
     let mut points = Vec::with_capacity(frequencies_hz.len());
     for &frequency_hz in frequencies_hz {
-        let turning = Turning { plane: plane_of(axis), ..Turning::new(frequency_hz, feed_mm_s) };
-        let found = harmonic::measure(&open, &turning)?;
+        let circle = Circle { plane: plane_of(axis), ..Circle::new(frequency_hz, feed_mm_s) };
+        let found = harmonic::measure(&open, &circle)?;
         let harmonic = found.axes.into_iter().find(|found| found.axis == axis).unwrap_or(found.axes[0]);
         let drive = &machine.axes[axis].drive;
         points.push(BodePoint {

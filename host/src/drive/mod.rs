@@ -7,7 +7,7 @@
 //! if the machine can't do the motion, before anything moves, or if a fault ended it.
 //!
 //! - [`experiment`]: a program on a changed machine, and the [`Recording`] it leaves;
-//! - [`turning`]: circles of constant feed, the motion of two experiments;
+//! - [`circle_motion`]: circles of constant feed, the motion of two experiments;
 //! - [`step`]: the feed steps within one tick, open loop;
 //! - [`harmonic`]: amplitude and phase of the velocity;
 //! - [`identification`]: the runs that [`crate::identify`] asks for;
@@ -36,7 +36,7 @@ pub mod replay;
 
 pub mod spectrum;
 pub mod step;
-pub mod turning;
+pub mod circle_motion;
 
 pub use experiment::{DriveError, Recording, Terms};
 

@@ -4,9 +4,9 @@
 //! independent model of drive, converter and regulator in double precision; a run through planner, streams and kernel
 //! has to agree within the tolerances. The tests and the tables of `motion drive` read these same constants.
 
+use super::circle_motion::Circle;
 use super::experiment::DriveError;
 use super::step::Step;
-use super::turning::Turning;
 use super::{Terms, circle, experiment, harmonic, step};
 use crate::machine::Machine;
 
@@ -133,10 +133,9 @@ pub fn compare_step(machine: &Machine, step: &step::StepFigures) -> Result<Vec<C
 /// As [`harmonic::measure`].
 pub fn compare_harmonic(machine: &Machine) -> Result<Vec<Comparison>, DriveError> {
     let open = experiment::open_loop(machine);
-    let turning = Turning::new(28.0, BANDWIDTH_FEED_MM_S);
-    let bandwidth_hz =
-        harmonic::bandwidth(&open, &turning, (16.0, 40.0, 4.0), 0, harmonic::Amplitude::Swing)?;
-    let [x, _] = harmonic::measure(&open, &turning)?.axes;
+    let circle = Circle::new(28.0, BANDWIDTH_FEED_MM_S);
+    let bandwidth_hz = harmonic::bandwidth(&open, &circle, (16.0, 40.0, 4.0), 0, harmonic::Amplitude::Swing)?;
+    let [x, _] = harmonic::measure(&open, &circle)?.axes;
     Ok(vec![
         HARMONIC_BANDWIDTH.against(bandwidth_hz.unwrap_or(f64::NAN)),
         PHASE_AT_28_HZ.against(x.phase_rad.to_degrees()),

@@ -61,9 +61,9 @@ struct Crossing {
 }
 
 impl Crossing {
-    /// What it takes of either move \[mm\].
-    fn way_mm(&self) -> f64 {
-        self.blend.map_or(0.0, |(blend, ..)| blend.way_mm)
+    /// Its trim of either move \[mm\].
+    fn trim_mm(&self) -> f64 {
+        self.blend.map_or(0.0, |(blend, ..)| blend.trim_mm)
     }
 }
 
@@ -159,7 +159,7 @@ impl<'a> Junctions<'a> {
                     continue;
                 }
                 let room_mm =
-                    self.room_mm(junction, |junction| chosen[junction].way_mm()).min(alone_mm[junction]);
+                    self.room_mm(junction, |junction| chosen[junction].trim_mm()).min(alone_mm[junction]);
                 if room_mm != variants[junction].room_mm {
                     variants[junction] = self.variants(junction, room_mm, exact[junction])?;
                 }
@@ -174,17 +174,17 @@ impl<'a> Junctions<'a> {
         Ok(Some([longest, chosen]))
     }
 
-    /// The way of the longest blend of a junction, 0 if there is none \[mm\].
+    /// The trim of the longest blend of a junction, 0 if there is none \[mm\].
     fn longest_mm(&self, junction: usize) -> f64 {
         let room_mm = self.run.taken_mm_max(junction).min(self.run.taken_mm_max(junction + 1));
-        self.run.blend(junction, room_mm, &self.limits).map_or(0.0, |blend| blend.way_mm)
+        self.run.blend(junction, room_mm, &self.limits).map_or(0.0, |blend| blend.trim_mm)
     }
 
-    /// The room of a junction where the others take `way_mm`.
-    fn room_mm(&self, junction: usize, way_mm: impl Fn(usize) -> f64) -> f64 {
+    /// The room of a junction where the others trim `trim_mm`.
+    fn room_mm(&self, junction: usize, trim_mm: impl Fn(usize) -> f64) -> f64 {
         let after = junction + 1;
-        let after_mm = if after < self.run.junctions() { way_mm(after) } else { 0.0 };
-        self.run.room_mm(junction, [junction.checked_sub(1).map_or(0.0, way_mm), after_mm])
+        let after_mm = if after < self.run.junctions() { trim_mm(after) } else { 0.0 };
+        self.run.room_mm(junction, [junction.checked_sub(1).map_or(0.0, trim_mm), after_mm])
     }
 
     /// All as they are.
@@ -248,11 +248,11 @@ impl<'a> Junctions<'a> {
     fn window(&self, changed: usize, variant: &Crossing, chosen: &[Crossing]) -> Vec<Block<f64>> {
         let crossing =
             |junction: usize| if junction == changed { Some(variant) } else { chosen.get(junction) };
-        let way_mm = |junction: Option<usize>| junction.and_then(crossing).map_or(0.0, Crossing::way_mm);
+        let trim_mm = |junction: Option<usize>| junction.and_then(crossing).map_or(0.0, Crossing::trim_mm);
         let (first, last) = self.beside(changed);
         let mut blocks = Vec::with_capacity(BLOCKS);
         for index in first..=last {
-            let length_mm = self.run.length_mm(index) - way_mm(index.checked_sub(1)) - way_mm(Some(index));
+            let length_mm = self.run.length_mm(index) - trim_mm(index.checked_sub(1)) - trim_mm(Some(index));
             let after = crossing(index).filter(|_| index < last);
             let junction_mm_s = after.map_or(f64::INFINITY, |after| after.feed_mm_s);
             let block = |length_mm, ceiling: &Ceiling<f64>, junction_mm_s| Block {
@@ -272,11 +272,11 @@ impl<'a> Junctions<'a> {
     /// The blocks of the run.
     fn blocks(&self, crossings: &[Crossing]) -> Vec<StretchBlock> {
         let mut blocks: Vec<StretchBlock> = Vec::with_capacity(2 * self.ceilings.len());
-        let way_mm = |junction: Option<usize>| {
-            junction.and_then(|junction| crossings.get(junction)).map_or(0.0, Crossing::way_mm)
+        let trim_mm = |junction: Option<usize>| {
+            junction.and_then(|junction| crossings.get(junction)).map_or(0.0, Crossing::trim_mm)
         };
         for (index, (step, &ceilings)) in self.run.moves().iter().zip(&self.ceilings).enumerate() {
-            let (first_mm, last_mm) = (way_mm(index.checked_sub(1)), way_mm(Some(index)));
+            let (first_mm, last_mm) = (trim_mm(index.checked_sub(1)), trim_mm(Some(index)));
             let is_whole = first_mm == 0.0 && last_mm == 0.0;
             let element = if is_whole { step.element } else { step.element.trimmed(first_mm, last_mm) };
             let block = |element, feed_mm_s, ceilings: Ceilings, tolerance_share| StretchBlock {
@@ -399,8 +399,8 @@ mod tests {
             0.05 + 1e-9 * f64::from(line)
         }));
         assert_eq!(blocks.len(), 5, "{:?}", kinds(&blocks));
-        let way_mm = |index: usize, whole_mm: f64| whole_mm - blocks[index].element.length_mm();
-        let (first, second) = (way_mm(0, 10.0), way_mm(4, 10.0));
+        let trim_mm = |index: usize, whole_mm: f64| whole_mm - blocks[index].element.length_mm();
+        let (first, second) = (trim_mm(0, 10.0), trim_mm(4, 10.0));
         assert!(first > 0.5 && second > 0.2 && (first + second - 0.9).abs() < 1e-9, "{first} {second}");
     }
 

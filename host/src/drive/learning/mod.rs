@@ -19,12 +19,12 @@
 //! - `fourier`: the transform they are applied in.
 //!
 //! ```no_run
-//! use motion_host::drive::{Terms, learning, turning::Turning};
+//! use motion_host::drive::{Terms, learning, circle_motion::Circle};
 //! use motion_host::machine::Machine;
 //!
 //! let machine = Terms::Vaj.of(&Machine::reference());
 //! let models = machine.axes.each_ref().map(|axis| axis.drive.into());
-//! let circle = Turning::new(10.0, 2150.0 / 60.0);
+//! let circle = Circle::new(10.0, 2150.0 / 60.0);
 //! let learnt = learning::learn(&machine, &circle, &models, &learning::LearningOptions::default())?;
 //! let best = learnt.repeats[learnt.best_repeat];
 //! println!("{:.2} µm after {} repeats", best.contour_um, learnt.best_repeat);

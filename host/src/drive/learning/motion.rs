@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::drive::circle;
+use crate::drive::circle_motion::Circle;
 use crate::drive::experiment::{DriveError, Recording};
-use crate::drive::turning::Turning;
 use crate::machine::Machine;
 use crate::simulate::RunOptions;
 
@@ -46,7 +46,7 @@ pub trait Motion {
 }
 
 /// Measured as the circle test is: at constant feed, after settling.
-impl Motion for Turning {
+impl Motion for Circle {
     fn record(&self, options: &RunOptions<'_>, machine: &Machine) -> Result<Recording, DriveError> {
         self.record_with(options, machine)
     }
