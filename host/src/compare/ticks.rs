@@ -34,7 +34,7 @@ pub struct Ratios {
 /// Why a plan could not be executed.
 #[derive(Debug, thiserror::Error)]
 pub enum TicksError {
-    /// It is beyond what a tick can do.
+    /// The program is too dense for a tick.
     #[error(transparent)]
     Planning(#[from] PlanningError),
     /// The kernel refused what the planner made.

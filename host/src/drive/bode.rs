@@ -28,11 +28,12 @@ pub struct Point {
 pub struct BodePoint {
     /// Frequency \[Hz\].
     pub frequency_hz: f64,
-    /// From the step's spectrum; the command's half tick of holding is counted in, as in the others.
+    /// The response from the step's spectrum. It includes the half tick for which the output is held, like
+    /// the others.
     pub step: Point,
-    /// From harmonic motion.
+    /// The response from harmonic motion.
     pub harmonic: Response,
-    /// Of the linear model.
+    /// The response of the linear model.
     pub model: Point,
 }
 
@@ -43,7 +44,7 @@ pub struct Bode {
     pub axis: usize,
     /// Feed of the step and of the harmonics \[mm/s\].
     pub feed_mm_s: f64,
-    /// By frequency.
+    /// The responses, by frequency.
     pub points: Vec<BodePoint>,
     /// The step's figures.
     pub step: StepFigures,
@@ -52,7 +53,7 @@ pub struct Bode {
 /// Measures the curves of `axis` at the given frequencies, at one feed. `progress` is called after each.
 ///
 /// # Errors
-/// As [`Step::measure`] and [`harmonic::measure`].
+/// Those of [`Step::measure`] and [`harmonic::measure`].
 pub fn measure(
     machine: &Machine,
     axis: usize,

@@ -1,4 +1,4 @@
-//! The circle test of S4, closed loop: how far the machine is beside the circle.
+//! The circle test of S4, closed loop: the distance of the machine from the circle.
 //!
 //! Everything is read from the encoders over the last second at constant feed. The radius deviation is the distance of
 //! the actual point from the centre, less the programmed radius: the contour error δ is its extremes, the form
@@ -12,7 +12,7 @@ use crate::machine::Machine;
 /// A frequency at which the contour error passes a limit is found to this \[Hz\].
 const RESOLUTION_HZ: f64 = 0.01;
 
-/// What is read from a circle.
+/// The figures of a circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleFigures {
     /// The plane's first and second axis, from 0.
@@ -48,7 +48,7 @@ impl CircleFigures {
 /// Drives the circle on `machine` with its gains: 3 s to settle, the last second measured.
 ///
 /// # Errors
-/// As [`Circle::record`].
+/// Those of [`Circle::record`].
 pub fn measure(machine: &Machine, frequency_hz: f64, feed_mm_s: f64) -> Result<CircleFigures, DriveError> {
     let circle = Circle::new(frequency_hz, feed_mm_s);
     figures(&circle.record(machine)?, &circle)
@@ -102,7 +102,7 @@ fn check_limit(limit_um: f64) -> Result<(), DriveError> {
 /// \[Hz\]; none if it does not, or if it is beyond from the start.
 ///
 /// # Errors
-/// As [`measure`].
+/// Those of [`measure`].
 pub fn limit_frequency(
     machine: &Machine,
     feed_mm_s: f64,
@@ -117,11 +117,11 @@ pub fn limit_frequency(
 /// Circles over a list of frequencies, on one machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
-    /// What acted, in words.
+    /// The feedforward terms that acted, in words.
     pub name: &'static str,
     /// The machine as it ran.
     pub machine: Machine,
-    /// By frequency.
+    /// The circles, by frequency.
     pub circles: Vec<CircleFigures>,
     /// Where the contour error passes the limit \[Hz\]; none if it does not, or if it is beyond from the start.
     pub limit_hz: Option<f64>,
@@ -132,7 +132,7 @@ pub struct Sweep {
 /// of the list.
 ///
 /// # Errors
-/// As [`measure`].
+/// Those of [`measure`].
 pub fn sweep(
     machine: Machine,
     name: &'static str,

@@ -18,7 +18,7 @@ const RAMP_REVOLUTIONS: f64 = 6.0;
 const LIMIT_MARGIN: f64 = 1e-3;
 /// Least frequency \[Hz\]: a revolution of 20 s.
 const FREQUENCY_HZ_MIN: f64 = 0.05;
-/// At the greatest frequency a revolution has this many ticks.
+/// Ticks of a revolution at the greatest frequency.
 const TICKS_PER_REVOLUTION_MIN: f64 = 10.0;
 
 /// A circle to be driven.
@@ -80,7 +80,7 @@ impl Circle {
     /// [`Circle::record`], run as `options` say. All revolutions are one stretch.
     ///
     /// # Errors
-    /// As there, and a correction that can't be used.
+    /// Those of [`Circle::record`], and a correction that can't be used.
     pub fn record_with(&self, options: &RunOptions<'_>, machine: &Machine) -> Result<Recording, DriveError> {
         self.check(machine.tick_s)?;
         let &Self { frequency_hz, feed_mm_s, plane, .. } = self;
@@ -121,7 +121,7 @@ impl Circle {
         within("measuring time [s]", self.measured_s, (0.0, 60.0))
     }
 
-    /// What a circle takes at constant feed, over the share of it that planning uses.
+    /// The limits that a circle needs at constant feed, over the share of them that planning uses.
     fn demands(&self, curve_feed_share: f64) -> Demands {
         let omega_per_s = TAU * self.frequency_hz / curve_feed_share;
         let accel_mm_s2 = self.feed_mm_s / curve_feed_share * omega_per_s * (1.0 + LIMIT_MARGIN);

@@ -68,11 +68,11 @@ impl Choice {
         Self::Inverse,
     ];
 
-    /// Those that pictures show.
+    /// The regulators that pictures show.
     pub const SHOWN: [Self; 7] =
         [Self::P, Self::Pv, Self::Peer, Self::Vaj, Self::PeerFitted, Self::VajFitted, Self::Inverse];
 
-    /// As tables call it.
+    /// The name in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -103,7 +103,7 @@ impl Regulators {
     /// [`Regulators::STEPS`] steps.
     ///
     /// # Errors
-    /// As [`Circle::record`].
+    /// Those of [`Circle::record`].
     pub fn new(machine: &Machine, feed_mm_s: f64, progress: &mut dyn FnMut()) -> Result<Self, DriveError> {
         let machine = p_only(machine);
         let fitted = fit(&machine, feed_mm_s, Differences::Three, progress)?;
@@ -133,7 +133,7 @@ impl Regulators {
         machine
     }
 
-    /// What regulates.
+    /// The regulator.
     #[must_use]
     pub fn law(&self, choice: Choice) -> Law {
         match choice {
@@ -147,7 +147,7 @@ impl Regulators {
     /// `choice` on `motion` with set positions in steps of each of `resolutions_um` \[µm\].
     ///
     /// # Errors
-    /// As [`Circle::record`], and a resolution out of its range.
+    /// Those of [`Circle::record`], and a resolution out of its range.
     pub fn measure(
         &self,
         choice: Choice,
@@ -169,7 +169,7 @@ impl Regulators {
     /// of the measured part \[s\] and volts, for `duration_s`.
     ///
     /// # Errors
-    /// As [`Circle::record`], and a resolution out of its range.
+    /// Those of [`Circle::record`], and a resolution out of its range.
     pub fn output(
         &self,
         choice: Choice,
@@ -203,7 +203,7 @@ pub struct Row {
     pub choice: Choice,
     /// Steps of the set positions \[µm\]; 0 if they were exact.
     pub resolution_um: f64,
-    /// By motion.
+    /// The figures, by motion.
     pub measured: Vec<Measured>,
 }
 
@@ -211,7 +211,7 @@ pub struct Row {
 /// is called after each regulator.
 ///
 /// # Errors
-/// As [`Regulators::measure`].
+/// Those of [`Regulators::measure`].
 pub fn rows(
     regulators: &Regulators,
     motions: &[Motion],
@@ -238,7 +238,7 @@ pub fn rows(
 /// \[µm\]. `progress` is called after each regulator.
 ///
 /// # Errors
-/// As [`Regulators::measure`].
+/// Those of [`Regulators::measure`].
 pub fn sweeps(
     regulators: &Regulators,
     feed_mm_s: f64,
@@ -260,7 +260,7 @@ pub fn sweeps(
     Ok(sweeps)
 }
 
-/// What the axes are to do.
+/// The motion of the axes.
 #[derive(Clone, Debug)]
 pub enum Motion {
     /// A circle at constant feed; measured when it has settled.
@@ -270,7 +270,7 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// As tables call it.
+    /// The name in tables.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
@@ -298,7 +298,7 @@ impl Motion {
     }
 }
 
-/// What a regulator did on a motion.
+/// The figures of a regulator on a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// Steps of the set positions \[µm\]; 0 if they were exact.
@@ -374,7 +374,7 @@ fn peer_gains(machine: &Machine) -> [PeerGains; AXES] {
     })
 }
 
-/// Which differences a fit uses.
+/// The differences that a fit uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Differences {
     /// FF2; FF3 is 0.
@@ -387,7 +387,7 @@ pub enum Differences {
 /// FF1 stays the machine's. Axes that no circle moves keep the machine's gains.
 ///
 /// # Errors
-/// As [`Circle::record`].
+/// Those of [`Circle::record`].
 pub fn fit(
     machine: &Machine,
     feed_mm_s: f64,

@@ -37,7 +37,7 @@ pub struct Response {
     pub third_harmonic: f64,
 }
 
-/// Both axes at one frequency.
+/// The responses of both axes at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HarmonicFigures {
     /// Frequency \[Hz\].
@@ -48,12 +48,12 @@ pub struct HarmonicFigures {
     pub axes: [Response; 2],
 }
 
-/// Which amplitude a bandwidth is told by.
+/// The amplitude that a bandwidth is read from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Amplitude {
     /// Half the distance from peak to peak.
     Swing,
-    /// Of the fundamental.
+    /// The fundamental's amplitude.
     Fundamental,
 }
 
@@ -72,7 +72,7 @@ impl Response {
 /// [`open_loop`](super::experiment::open_loop)`(&machine)`.
 ///
 /// # Errors
-/// As [`Circle::record`]; an axis that does not move.
+/// Those of [`Circle::record`]; an axis that does not move.
 pub fn measure(machine: &Machine, circle: &Circle) -> Result<HarmonicFigures, DriveError> {
     figures(&circle.record(machine)?, circle)
 }
@@ -128,7 +128,7 @@ fn response(recording: &Recording, circle: &Circle, axis: usize) -> Result<Respo
 /// \[Hz\]; none if it does not. Looks in steps of `by_hz` and then halves.
 ///
 /// # Errors
-/// As [`measure`].
+/// Those of [`measure`].
 pub fn bandwidth(
     machine: &Machine,
     start: &Circle,

@@ -13,7 +13,7 @@ use crate::machine::Machine;
 const AVERAGED_S: f64 = 0.005;
 /// The share of the time for which the plateau is held at least when the velocity is a triangle, but for its corners.
 const PLATEAU_SHARE: f64 = 0.5;
-/// From this third harmonic on the velocity counts as a triangle; a triangle has 1/9, a sine none.
+/// The third harmonic from which the velocity counts as a triangle. A triangle has 1/9, a sine none.
 const TRIANGLE_FROM: f64 = 0.03;
 
 /// An axis under one load.

@@ -18,19 +18,19 @@ use motion_kernel::axis::Feedforward;
 /// Gains of the regulator; all of them finite.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PeerGains {
-    /// Of the error \[1/s\].
+    /// The gain of the error \[1/s\].
     pub p_per_s: f64,
-    /// Of the error's sum \[1/s²\].
+    /// The gain of the error's sum \[1/s²\].
     pub i_per_s2: f64,
-    /// Of the error's change \[1\].
+    /// The gain of the error's change \[1\].
     pub d: f64,
-    /// Of the position command \[1/s\].
+    /// The gain of the position command \[1/s\].
     pub ff0_per_s: f64,
-    /// Of its first difference \[1\].
+    /// The gain of its first difference \[1\].
     pub ff1: f64,
-    /// Of its second difference \[s\].
+    /// The gain of its second difference \[s\].
     pub ff2_s: f64,
-    /// Of its third difference \[s²\].
+    /// The gain of its third difference \[s²\].
     pub ff3_s2: f64,
 }
 

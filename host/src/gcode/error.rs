@@ -14,7 +14,7 @@ pub struct GcodeError {
     pub line: u32,
     /// Column in characters, from 1.
     pub column: u32,
-    /// What is wrong there.
+    /// The problem at that place.
     pub problem: Problem,
 }
 
@@ -23,7 +23,7 @@ pub struct GcodeError {
 pub(super) struct Located {
     /// Byte offset in the line.
     pub(super) offset: usize,
-    /// What is wrong there.
+    /// The problem at that place.
     pub(super) problem: Problem,
 }
 
@@ -43,7 +43,7 @@ impl GcodeError {
     }
 }
 
-/// What is wrong in a program. Words are quoted without blanks and in upper case.
+/// A problem in a program. Words are quoted without blanks and in upper case.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the variants and their fields are")]

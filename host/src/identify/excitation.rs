@@ -95,7 +95,7 @@ impl Excitation {
         }
     }
 
-    /// What to put into [`AxisRecording::harmonic_hz`](super::AxisRecording::harmonic_hz).
+    /// The value for [`AxisRecording::harmonic_hz`](super::AxisRecording::harmonic_hz).
     #[must_use]
     pub fn harmonic_hz(&self) -> Option<f64> {
         match *self {

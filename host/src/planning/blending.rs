@@ -69,7 +69,7 @@ impl Crossing {
 
 /// How a junction may be crossed; without a blend last.
 struct Variants {
-    /// What the blends may take of either move \[mm\].
+    /// The greatest trim of either move \[mm\].
     room_mm: f64,
     all: Vec<Crossing>,
 }
@@ -79,7 +79,7 @@ impl Variants {
         self.all.len() > 1
     }
 
-    /// With the longest blend.
+    /// The crossings with the longest blend, or the one without a blend.
     fn longest(&self) -> &[Crossing] {
         if self.are_blends() { &self.all[..2] } else { &self.all }
     }
@@ -116,7 +116,7 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlo
 /// The junctions of a run.
 struct Junctions<'a> {
     run: Run,
-    /// Of the moves.
+    /// The ceilings of the moves.
     ceilings: Vec<Ceilings>,
     machine: &'a Machine,
     /// Of the path in any direction.
@@ -244,7 +244,7 @@ impl<'a> Junctions<'a> {
         (junction.saturating_sub(BESIDE), (junction + 1 + BESIDE).min(self.ceilings.len() - 1))
     }
 
-    /// What is looked at for a junction, crossed as `variant` says.
+    /// The neighbourhood of a junction, which is crossed as `variant` says.
     fn window(&self, changed: usize, variant: &Crossing, chosen: &[Crossing]) -> Vec<Block<f64>> {
         let crossing =
             |junction: usize| if junction == changed { Some(variant) } else { chosen.get(junction) };

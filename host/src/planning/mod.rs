@@ -57,7 +57,7 @@ pub enum Mode {
 /// The feed over a length of path: a ramp, or a cruise with equal feeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeedRecord {
-    /// Where it starts, from the program's start \[mm\].
+    /// Its start, from the program's start \[mm\].
     pub start_mm: f64,
     /// Length \[mm\].
     pub length_mm: f64,
@@ -88,16 +88,16 @@ pub struct Plan {
     pub time_s: f64,
     /// Path length \[mm\].
     pub length_mm: f64,
-    /// What to execute, in order. Empty for a block list, which has no geometry.
+    /// The items to execute, in order. Empty for a block list, which has no geometry.
     pub items: Vec<Item>,
-    /// What was accepted and not acted on.
+    /// Words that were accepted and not acted on.
     pub notices: Vec<String>,
     /// The control tick it was planned for \[s\].
     pub tick_s: f64,
 }
 
 impl Plan {
-    /// Without anything to do.
+    /// A plan with nothing to do.
     fn empty(source: &str, tick_s: f64) -> Self {
         Self {
             source: source.to_owned(),

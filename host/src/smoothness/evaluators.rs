@@ -14,12 +14,12 @@ use crate::toolpath::{Vector, dot, norm, scale, septics, subtract};
 /// How many ways there are.
 pub const WAYS: usize = 5;
 
-/// A way to walk a curve, and how well it keeps the feed.
+/// A method of walking a curve, and how well it keeps the feed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evaluator {
-    /// Its name.
+    /// The evaluator's name.
     pub name: &'static str,
-    /// Greatest relative error of a tick's way.
+    /// Greatest relative error of a tick's travel.
     pub feed_error: f64,
 }
 
@@ -64,7 +64,7 @@ pub fn evaluators(course: &Course, feed_mm_s: f64, tick_s: f64) -> [Evaluator; W
     core::array::from_fn(|index| Evaluator { name: names[index], feed_error: errors[index] })
 }
 
-/// The greatest relative error of a tick's way, as far as whole ticks go.
+/// The greatest relative error of a tick's travel, over all whole ticks.
 fn walked(
     curve: &dyn Curve,
     end: f64,

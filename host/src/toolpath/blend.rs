@@ -29,7 +29,7 @@ use super::{Vector, add, angle, dot, norm, scale, subtract};
 /// The sharpest corner that is blended \[rad\]: a turn of 170°. The feed there is a hundredth of that at 10°.
 pub const ANGLE_MAX_RAD: f64 = 170.0 * core::f64::consts::PI / 180.0;
 
-/// The greatest part of an arc that one blend stands for \[rad\].
+/// The greatest part of an arc that one blend replaces \[rad\].
 const ARC_RAD_MAX: f64 = core::f64::consts::FRAC_PI_4;
 
 /// Corner angle \[°\], and a₁ a₂ a₃ for the greatest feed by jerk and by snap.
@@ -44,16 +44,16 @@ const SHAPES: [(f64, [f64; 3], [f64; 3]); 9] = [
     (160.0, [0.0945, 0.1689, 0.2941], [0.1287, 0.1694, 0.3275]),
     (170.0, [0.0883, 0.0985, 0.1883], [0.0756, 0.0915, 0.1881]),
 ];
-/// Parts of the way from the first to the second.
+/// The mixtures of the first and the second that are tried.
 const BETWEEN: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 /// Evenly spaced control points: the best for a jump of curvature without a corner.
 const EVEN: [f64; 3] = [2.0 / 7.0, 4.0 / 7.0, 6.0 / 7.0];
 
-/// In how many parts a blend is cut to compare shapes; ceilings look closer.
+/// The number of parts that a blend is cut into to compare shapes. Ceilings use more.
 const COMPARED_PARTS: usize = 24;
-/// In how many parts it is cut to measure its distance from the path.
+/// The number of parts that it is cut into to measure its distance from the path.
 const MEASURED_PARTS: usize = 64;
-/// Corrections of the way d until the distance fits the tolerance.
+/// Corrections of the trim d until the distance fits the tolerance.
 const CORRECTIONS_MAX: usize = 8;
 /// Part of the tolerance at which it fits.
 const CLOSE: f64 = 0.998;

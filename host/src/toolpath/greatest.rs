@@ -15,7 +15,7 @@ const PIECE_PARTS: usize = 16;
 /// The greatest derivatives by arc length, each where it is greatest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Greatest {
-    /// Of κ, |r'''| and |r''''|.
+    /// The greatest κ, |r'''| and |r''''|.
     pub bend: Bend<f64>,
     /// |component| of the tangent on each axis, at most 1.
     pub tangent: Vector,
@@ -43,7 +43,7 @@ impl Greatest {
     }
 }
 
-/// What is not a number is greater than any.
+/// A value that is not a number is greater than any.
 fn greater(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
 }

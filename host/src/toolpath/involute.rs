@@ -32,13 +32,13 @@ pub enum InvoluteError {
     /// The base circle is none.
     #[error("a base circle with a radius of {mm} mm, expected a finite number above 0")]
     Base {
-        /// Its radius \[mm\].
+        /// The base circle's radius \[mm\].
         mm: f64,
     },
     /// The frame is none.
     #[error("a frame that is not of two unit vectors at a right angle, expected one")]
     Frame,
-    /// It touches its base circle, or is unwound too far.
+    /// The involute touches its base circle, or is unwound too far.
     #[error(
         "an involute at an angle of {rad} rad, expected {ANGLE_RAD_MIN} to {ANGLE_RAD_MAX} rad: on the base circle, at 0, \
          curvature is infinite"
@@ -47,7 +47,7 @@ pub enum InvoluteError {
         /// The angle of unwinding \[rad\].
         rad: f64,
     },
-    /// It ends where it starts.
+    /// The involute ends where it starts.
     #[error("an involute from {rad} rad to the same angle, expected different ones")]
     Empty {
         /// Both angles \[rad\].
@@ -92,7 +92,7 @@ impl Involute {
         Ok(Self { outward, onward, base_mm, angles_rad })
     }
 
-    /// The involute `distance_mm` beside this one, to the outside if positive.
+    /// The involute at a distance of `distance_mm` from this one, to the outside if positive.
     ///
     /// # Errors
     /// It would touch the base circle, or be unwound too far.

@@ -115,7 +115,7 @@ pub enum FitError {
         span: (f64, f64),
         /// Its deviation \[mm\].
         error_mm: f64,
-        /// How many pieces there were so far.
+        /// The number of pieces up to there.
         pieces: usize,
     },
 }

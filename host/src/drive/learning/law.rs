@@ -32,7 +32,7 @@ pub const FILTER_ORDER: u32 = 3;
 const REGULARISATION: f64 = 0.05;
 /// Highest −3 dB point over the rate of the knots: straight lines between knots follow it to 19 %.
 const CORNER_OVER_KNOT_RATE: f64 = 0.25;
-/// From one −3 dB point that is tried to the next lower one.
+/// The ratio of one −3 dB point that is tried to the next lower one.
 const CORNER_STEP: f64 = 0.97;
 /// Lowest −3 dB point \[Hz\]. Below, nothing is learnt that a feedback could not do.
 pub(super) const CORNER_HZ_MIN: f64 = 1.0;
@@ -44,7 +44,7 @@ const REST_HZ: f64 = 1e-3;
 /// The robustness filter Q: a low-pass without phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
-    /// Where its amplitude is 1/√2 \[Hz\], above 0.
+    /// The frequency at which its amplitude is 1/√2 \[Hz\], above 0.
     pub corner_hz: f64,
 }
 
@@ -68,7 +68,7 @@ pub struct Robustness {
     /// Greatest |Q(1 − L·P)| up to half the tick's frequency, with Kv, Ti, Tc, τ and the bed's frequency each at
     /// 1 − [`SPREAD`], 1 and 1 + [`SPREAD`] of the model's.
     pub contraction: f64,
-    /// Where it is found \[Hz\].
+    /// The frequency of that \[Hz\].
     pub at_hz: f64,
 }
 
@@ -100,13 +100,13 @@ impl Loop<'_> {
         forward / (one + feedback * forward)
     }
 
-    /// What straight lines between knots leave of a sine: sinc².
+    /// The part of a sine that straight lines between knots keep: sinc².
     fn interpolation(&self, frequency_hz: f64) -> f64 {
         let angle = core::f64::consts::PI * frequency_hz * self.tick_s * f64::from(self.knot_ticks);
         if angle > 0.0 { (libm::sin(angle) / angle).powi(2) } else { 1.0 }
     }
 
-    /// From knots to position.
+    /// The response from knots to position.
     fn learnt(&self, drive: &DriveParameters, frequency_hz: f64) -> Complex {
         self.position(drive, frequency_hz) * Complex::new(self.interpolation(frequency_hz), 0.0)
     }

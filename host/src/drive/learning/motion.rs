@@ -11,9 +11,9 @@ use crate::simulate::RunOptions;
 /// The stretch to be corrected, in a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stretch {
-    /// Which of the program, from 0.
+    /// The stretch's index in the program, from 0.
     pub index: u32,
-    /// Its ticks, as indices into the recording: the first is the first in which it moves.
+    /// Its ticks, as indices into the recording. In the first one it moves.
     pub ticks: Range<usize>,
 }
 
@@ -36,7 +36,8 @@ pub trait Motion {
         Stretch { index: 0, ticks: from..from + length }
     }
 
-    /// How far the machine is beside the path \[µm\]; the greatest over all ticks, if it is not said otherwise.
+    /// The distance of the machine from the path \[µm\]; the greatest over all ticks, unless a motion says
+    /// otherwise.
     ///
     /// # Errors
     /// There is nothing to measure.

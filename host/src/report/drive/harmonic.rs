@@ -159,7 +159,7 @@ fn wave(circle: &Circle, recording: &Recording, axis: usize, is_set: bool) -> io
 /// Writes the page of the growing load: velocities and accelerations of one axis.
 ///
 /// # Errors
-/// As [`write_harmonic`].
+/// Those of [`write_harmonic`].
 pub fn write_inertia(
     machine: &Machine,
     circle: &Circle,
