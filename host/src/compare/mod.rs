@@ -1,4 +1,4 @@
-//! How long a program takes, in ways that can be held against each other.
+//! The time of a program, in forms that can be compared.
 //!
 //! Consumes a program and a machine; produces, for a path mode, the time of the plan, of S3's plan per block, and the
 //! least time that acceleration alone would allow on the same path, with what the path used of its tolerance and the

@@ -1,7 +1,7 @@
 //! Amplitude and phase of the drive over frequency, open loop: from a step, from harmonics, and of the linear model.
 //!
 //! The methods agree as long as the drive is linear. A step and a harmonic of the same feed meet the current limit in
-//! different ways, and the model knows none: where the curves part, the limit acts.
+//! different ways, and the model has no limit: where the curves part, the limit acts.
 
 use core::f64::consts::TAU;
 

@@ -1,7 +1,7 @@
 //! A program on a changed machine, and its recording.
 //!
 //! Limits of planning protect a machine in production. An experiment asks what the drive itself can do, so it raises
-//! them as far as its motion needs; the range of the output stays what it is.
+//! them as far as its motion needs. The range of the output stays unchanged.
 
 use std::ops::Range;
 

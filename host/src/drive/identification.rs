@@ -1,7 +1,7 @@
-//! The runs that identification asks for, through the kernel.
+//! The runs of identification, through the kernel.
 //!
-//! Steps there and back move one axis at a time, circles two. All are open loop, as in S4: what the drive does then is
-//! not bent by a regulator. Of each run only the converter's output and the encoder's readings are used.
+//! Steps there and back move one axis at a time, circles two. All are open loop, as in S4, so no
+//! regulator bends the drive's answer. Only the converter's output and the encoder's readings of each run are used.
 
 use std::thread;
 

@@ -1,8 +1,8 @@
 //! Harmonic motion under a growing load: the velocity turns triangular, the acceleration flat (S4).
 //!
 //! Where the current limit acts, the acceleration stays at what the limit gives the load. From this plateau the
-//! admissible acceleration is read, or the load that a motion admits. Only a simulated machine changes its load at a
-//! word.
+//! admissible acceleration is read, or the load that a motion admits. Only a simulated machine changes its load on
+//! request.
 
 use super::circle_motion::Circle;
 use super::experiment::{DriveError, Recording, open_loop};

@@ -1,4 +1,4 @@
-//! What S4 measured, and what the reference machine has to give.
+//! S4's measurements, and the figures that the reference machine has to reach.
 //!
 //! The reference drive was fitted so that S4's figures come out together. The expected values are those of an
 //! independent model of drive, converter and regulator in double precision; a run through planner, streams and kernel

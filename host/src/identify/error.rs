@@ -1,4 +1,4 @@
-//! Why recordings say nothing about an axis.
+//! Reasons why recordings do not determine an axis.
 
 /// Recordings that can't be evaluated: what was found, and what is needed. Runs are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

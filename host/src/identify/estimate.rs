@@ -1,4 +1,4 @@
-//! What identification finds out about an axis.
+//! The result of identification: estimates of an axis' parameters.
 
 use hal_sim::{BedMode, DriveParameters};
 
@@ -8,7 +8,7 @@ use super::step_reading::StepReading;
 /// Half an interval over the value, up to which a value counts as determined.
 pub const DETERMINED: f64 = 0.3;
 
-/// Intervals are wider than the scatter alone makes them: the search ends a little beside the optimum, because the
+/// Intervals are wider than the scatter alone makes them: the search ends close to the optimum but not in it, because the
 /// model is rough where it saturates. Over fifty simulated axes the true value lay within the interval in 80 to 100 of
 /// 100 cases, by parameter; for the acceleration limit in 76, with errors below 0.4 %.
 const MARGIN: f64 = 2.0;

@@ -47,7 +47,7 @@ const CORRELATION_MAX: f64 = 30.0;
 const MOMENTS: f64 = 4.0;
 
 /// Error of one such moment with [`SUBSTEPS`](super::simulation::SUBSTEPS) \[mm\]: the integrator of the drive stops or
-/// goes on a sub-step too early or too late.
+/// continues a sub-step too early or too late.
 const ROUGHNESS_MM: f64 = 0.5e-3;
 
 /// Dampings tried for one step.

@@ -1,4 +1,4 @@
-//! The ceilings of a move, and what a junction allows.
+//! The ceilings of a move and of a junction.
 
 use motion_kernel::plan::{Ceiling, Junction, MachineLimits, Reason, junction};
 

@@ -1,6 +1,6 @@
-//! Whether a plan is too dense for a tick, seen over the whole program.
+//! Refuses a plan that is too dense for a tick, over the whole program.
 //!
-//! However the ticks fall on it, at most [`PIECES_PER_TICK_MAX`] pieces and [`SEGMENTS_PER_TICK_MAX`]
+//! Wherever the ticks fall, at most [`PIECES_PER_TICK_MAX`] pieces and [`SEGMENTS_PER_TICK_MAX`]
 //! segments and dwells may end within one, whatever stretches they belong to.
 
 use std::collections::VecDeque;

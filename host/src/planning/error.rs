@@ -1,4 +1,4 @@
-//! What planning refuses.
+//! Refusals of planning, with file and line.
 
 use motion_kernel::law::{LimitError, SegmentError, Ticks};
 use motion_kernel::plan::PlanError;

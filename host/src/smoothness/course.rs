@@ -36,7 +36,7 @@ pub struct JunctionStep {
     pub time_s: f64,
     /// Step of the acceleration of every axis \[mm/s²\].
     pub accel_mm_s2: Vector,
-    /// Step of the jerk of every axis, where that is what it is: beside a step of acceleration there is none to be
+    /// Step of the jerk of every axis, where it is one: at a step of acceleration there is none to be
     /// had \[mm/s³\].
     pub jerk_mm_s3: Vector,
 }

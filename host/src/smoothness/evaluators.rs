@@ -1,6 +1,6 @@
-//! How constant the feed is that a control makes of a curve over a parameter.
+//! The evenness of the feed that a control gets from a curve over a parameter.
 //!
-//! Every tick has to find the parameter at which the path is F·τ longer, S2 (4). The common ways are a Taylor series
+//! Every tick has to find the parameter at which the path is F·τ longer, S2 (4). Common methods are a Taylor series
 //! of the parameter, of first or second order, and a polynomial of degree seven for the parameter over arc length,
 //! fitted span by span (the feed-correction polynomial), after which a Newton step may set the chord right. Septic
 //! pieces need none of it: they are over arc length already, and their error is how far

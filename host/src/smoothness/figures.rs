@@ -1,4 +1,4 @@
-//! The figures of one path: what S2 reads off its plots.
+//! The figures of one path that S2 reads off its plots.
 
 use super::course::{Course, JunctionStep};
 use super::deviation_mm;

@@ -2,20 +2,20 @@
 //! and derivative of curvature (G³), so that velocity, acceleration and jerk of every axis go through it without
 //! a step.
 //!
-//! Consumes two lines or arcs that meet, a tolerance and the room on either side; produces the blend and how much
-//! of both it stands for, or none where the path has to stay as it is: a corner sharper than [`ANGLE_MAX_RAD`], no
+//! Consumes two lines or arcs that meet, a tolerance and the room on either side; produces the blend and its
+//! trim of both, or none where the path has to stay unchanged: a corner sharper than [`ANGLE_MAX_RAD`], no
 //! tolerance, no room. A tangent junction whose curvature jumps (a line meets an arc) is a corner of 0° and is
 //! blended like the others. Background; a bounded number of steps per corner.
 //!
-//! **Shape.** Both ends give four control points each. On a line they stand at a₁, a₂, a₃ of the way d to the
-//! corner; on an arc the same speeds |r'|, s'', s''' by the parameter are used with the arc's own derivatives by
+//! **Shape.** Both ends give four control points each. On a line they stand at a₁, a₂, a₃ of the trim d before
+//! the corner; on an arc the same speeds |r'|, s'', s''' by the parameter are used with the arc's own derivatives by
 //! arc length. `SHAPES` holds the a's that allow the greatest feed at a given tolerance under a limit of jerk
 //! alone and of snap alone, by corner angle; of these, three between them and an evenly spaced one, that with the
 //! greatest feed under all limits is taken. They were found by searching all a₁ ≤ a₂ ≤ a₃ ≤ 1.
 //!
 //! **Tolerance.** The path before and after the corner and the blend are walked together: up to a place u* of the
 //! blend each of its points is held against the nearest of the element before, from there on against that of the
-//! element after, and u* itself against the corner. All pairs taken, the way is continuous on both curves and
+//! element after, and u* itself against the corner. Over all pairs the walk is continuous on both curves and
 //! leaves nothing out, so the greatest distance of a pair bounds that of any point of either curve from the other.
 //! For two lines it is the distance from the corner to the blend's middle.
 

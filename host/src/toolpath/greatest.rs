@@ -1,8 +1,8 @@
 //! The greatest derivatives of a curve by arc length, from which ceilings are made.
 //!
-//! What is driven are the pieces of a curve. They are within a millionth of a millimetre of it, which says little about
+//! The machine drives the pieces of a curve. They are within a millionth of a millimetre of it, which says little about
 //! the third and fourth derivative of a curve that is short: the third is up to a seventh greater than the curve's on
-//! corner blends, the fourth up to two thirds. So both are looked at, the curve and its pieces.
+//! corner blends, the fourth up to two thirds. So both are examined, the curve and its pieces.
 
 use motion_kernel::plan::Bend;
 

@@ -9,7 +9,7 @@
 //! length from 0 = r·φ²/2      curvature = 1/(r·φ)
 //! ```
 //!
-//! On the base circle itself, at φ = 0, curvature is infinite: an involute has to stay off it. At a distance d beside
+//! On the base circle itself, at φ = 0, curvature is infinite: an involute has to stay off it. At a distance d from
 //! an involute lies the same involute, turned by −d/r and run through at angles that are greater by d/r
 //! ([`Involute::offset_by`]), so that a cutter's radius needs nothing new.
 

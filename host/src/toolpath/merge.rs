@@ -3,7 +3,7 @@
 //! A curve that was cut into chords has a corner at every one of them, and no room for blends that are worth it.
 //! Consumes the points of such a run; produces the longest lines and arcs through some of them, first to last,
 //! from which the run is nowhere farther than a tolerance, nor they from the run. Background; greedy, with
-//! O(n log n) looks at a point.
+//! O(n log n) tests of a point.
 //!
 //! **Why both ways.** A segment of the run and the part of a line or arc that stands for it are walked together, by
 //! their projection on the line or by the angle about the arc's centre, which have to grow along the run. So

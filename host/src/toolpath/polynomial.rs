@@ -1,4 +1,4 @@
-//! Polynomial curves: what corner blends and splines are made of.
+//! Polynomial curves, of which corner blends and splines are made.
 //!
 //! A curve of degree seven at most in a parameter u from 0 to 1, kept relative to its start, so that a blend of
 //! a micrometre a kilometre out is as precise as one at the origin. Consumes control points or coefficients \[mm\];

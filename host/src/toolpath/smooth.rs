@@ -11,7 +11,7 @@
 //! from what they became.
 //!
 //! **Who gets the room.** Blends take at most nine tenths of an element together, and where motion starts or ends half of
-//! that: what the one at its other end does not need is a blend's own, else both get half. A tenth stays, so that the rest
+//! that. A blend gets what the one at the other end does not need; if both want more, each gets half. A tenth stays, so that the rest
 //! of a short element still has a direction of its own.
 
 use motion_kernel::law::Limits;
@@ -141,7 +141,7 @@ impl Run {
         self.lengths_mm[index] * if is_end { 0.5 * TAKEN_MAX } else { TAKEN_MAX }
     }
 
-    /// What a blend may take of either move at its junction where those at the junctions beside it take `trims_mm` \[mm\], at
+    /// The greatest trim of a blend where those at the neighbouring junctions trim `trims_mm` \[mm\], at
     /// least half of what is there.
     #[must_use]
     pub fn room_mm(&self, junction: usize, [before_mm, after_mm]: [f64; 2]) -> f64 {

@@ -1,4 +1,4 @@
-//! What a proposal is built on: what the recordings determine, and for the rest what the machine file has.
+//! The basis of a proposal: the parameters that the recordings determine, and the machine file's for the rest.
 
 use hal_sim::{BedMode, DriveParameters};
 use motion_kernel::axis::{BedInverse, DriveInverse};

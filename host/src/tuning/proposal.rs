@@ -1,4 +1,4 @@
-//! What an axis should be set to, and why, so that a technician can follow it number by number.
+//! The proposed settings of an axis with their reasons, so that a technician can follow them number by number.
 
 use motion_kernel::axis::{
     AxesConfig, AxisFigures, BedInverse, DriveInverse, Feedforward, Gains, PREVIEW_TICKS_MAX, ScaleError,
@@ -42,7 +42,7 @@ pub struct AxisTuning {
     pub margins: Margins,
     /// Every value that is set, changed or not, in the order of the file.
     pub changes: Vec<Change>,
-    /// What a technician should know beside: what was not determined, what else the axis' settings should respect.
+    /// Remarks for the technician: what was not determined, what else the axis' settings should respect.
     pub remarks: Vec<String>,
 }
 

@@ -9,8 +9,8 @@
 //! G is the drive with its bed and the scale of its commands, C the regulator's feedback. Following error is e = e₀ − P·u, so with
 //! u′ = Q·(u + L·e) the correction's distance from its fixed point shrinks from repeat to repeat by |Q(1 − L·P)| at
 //! every frequency (Bristow, Tharayil, Alleyne: A survey of iterative learning control, IEEE Control Systems Magazine,
-//! 2006, gives the condition that it is below 1). The P in L is the model's, the other one is the machine's: the greatest value over a whole range of
-//! machines is what [`Robustness`] states, and what fq is chosen by.
+//! 2006, gives the condition that it is below 1). The P in L is the model's, the other one the machine's. [`Robustness`] states the greatest value
+//! over a range of machines, and fq is chosen by it.
 
 use core::f64::consts::{SQRT_2, TAU};
 
@@ -252,7 +252,7 @@ impl Law {
     }
 }
 
-/// A signal of another length: where it ends it goes on to where it began, on half a cosine, so that its periodic
+/// A signal of another length: from its end it returns to its beginning on half a cosine, so that its periodic
 /// continuation has no step to be learnt.
 fn faded(signal: &[f64], length: usize) -> Vec<f64> {
     let mut longer = Vec::with_capacity(length);

@@ -11,7 +11,7 @@
 //! bound on divergence, which is stated in [`Robustness`]. Four more things keep it from diverging where the bound does
 //! not reach, at friction and at the current limit: no command is above the correction's bound; a repeat that made
 //! the error larger is taken back, and half the step is tried from the best one; learning stops when it does not get
-//! better; and what is returned is the best that was driven. On the way the contour error may rise while the following
+//! better; and the best correction that was driven is returned. Meanwhile the contour error may rise while the following
 //! error falls: two axes that lag alike leave little of it (up to four times as much after one repeat, at 40 Hz).
 //!
 //! - [`motion`](mod@motion): what can be repeated;

@@ -1,4 +1,4 @@
-//! What can be repeated: anything that makes a recording as run options say.
+//! A motion that can be repeated: anything that makes a recording as run options say.
 
 use std::ops::Range;
 
