@@ -306,7 +306,7 @@ fn changes(
         "regulator.inverse.viscous_friction_per_s",
         |drive| drive.viscous_friction_per_s,
         "1/s",
-        origin(known.viscous_friction, "torque that grows with velocity; small beside the rest".to_owned()),
+        origin(known.viscous_friction, "torque that grows with velocity; small compared with the rest".to_owned()),
     );
     inverse(
         "regulator.inverse.coulomb_friction_mm_s2",
@@ -314,14 +314,14 @@ fn changes(
         "mm/s²",
         origin(
             known.coulomb_friction,
-            interval(parameters.coulomb_friction_mm_s2, "torque that turns with the direction"),
+            interval(parameters.coulomb_friction_mm_s2, "torque that changes sign with the direction"),
         ),
     );
     inverse(
         "regulator.inverse.reversal_mm_s",
         |drive| drive.reversal_mm_s,
         "mm/s",
-        "over this velocity friction turns; less is sharper, more is gentler".to_owned(),
+        "over this velocity friction changes sign; less is sharper, more is gentler".to_owned(),
     );
     let bed = |drive: Option<&DriveInverse>| drive.and_then(|drive| drive.bed);
     let (was, is) = (bed(was), bed(is));
