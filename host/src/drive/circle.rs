@@ -123,7 +123,7 @@ pub struct Sweep {
     pub machine: Machine,
     /// The circles, by frequency.
     pub circles: Vec<CircleFigures>,
-    /// Where the contour error passes the limit \[Hz\]; none if it does not, or if it is beyond from the start.
+    /// Frequency at which the contour error passes the limit \[Hz\]; none if it does not, or if it starts beyond it.
     pub limit_hz: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Exact decimals: what a program writes is what is kept.
+//! Exact decimals: a number is kept as the program writes it.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! What was found, where, and what was expected instead.
+//! Errors of a program: what was found, where, and what was expected instead.
 
 use super::decimal::Length;
 use super::program::Plane;
@@ -135,9 +135,11 @@ pub enum Problem {
     SplineOutsidePlane { word: String },
     #[error("found {word} alone in a line of G5, expected {first} and {second}")]
     SplineControlIncomplete { word: String, first: char, second: char },
-    #[error("found a first G5 without I and J, expected the way from its start to its first control point")]
+    #[error(
+        "found a first G5 without I and J, expected the offset from its start to its first control point"
+    )]
     SplineWithoutStart,
-    #[error("found G5 without P and Q, expected the way from its end to its second control point")]
+    #[error("found G5 without P and Q, expected the offset from its end to its second control point")]
     SplineWithoutEnd,
 }
 

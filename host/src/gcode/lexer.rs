@@ -1,6 +1,6 @@
 //! The bytes of a line to its words.
 //!
-//! One pass, nothing looked at more than twice, no allocation unless it fails.
+//! One pass reads no byte more than twice and allocates nothing unless it fails.
 
 use super::decimal::{Decimal, NumberFault};
 use super::error::{Located, Problem, describe};

@@ -1,4 +1,4 @@
-//! What stays in force from line to line.
+//! The modes, which stay in force from line to line.
 
 use super::block::{Block, GGroup};
 use super::decimal::{Decimal, Length, LengthFault};

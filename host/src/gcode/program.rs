@@ -1,4 +1,4 @@
-//! What a program asks for, in the order it asks.
+//! The steps of a program, in its order.
 
 use super::decimal::Length;
 use std::fmt;
@@ -100,7 +100,7 @@ pub struct CubicMove {
     pub mode: PathMode,
 }
 
-/// The way to the next point of a quintic spline, which goes through all points of moves that follow each other.
+/// The move to the next point of a quintic spline, which passes through all points of consecutive moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThroughMove {
     /// The point before, X Y Z.

@@ -15,7 +15,7 @@ pub struct StepReading {
     pub time_constant_s: f64,
     /// The overshoot of the velocity, over its final value.
     pub overshoot: f64,
-    /// From the command's step to the last time outside of ±0.28 % of the final velocity, which is S4's
+    /// Time from the command's step to the last time outside of ±0.28 % of the final velocity, which is S4's
     /// ±0.02 m/min at 7.2 m/min \[s\]. `None` if the encoder does not resolve that, or it has not settled when the
     /// command changes again.
     pub settling_s: Option<f64>,

@@ -119,7 +119,7 @@ struct Junctions<'a> {
     /// The ceilings of the moves.
     ceilings: Vec<Ceilings>,
     machine: &'a Machine,
-    /// Of the path in any direction.
+    /// Limits of the path in any direction.
     limits: Limits<f64>,
 }
 
@@ -404,7 +404,7 @@ mod tests {
         assert!(first > 0.5 && second > 0.2 && (first + second - 0.9).abs() < 1e-9, "{first} {second}");
     }
 
-    /// From a small feed a right angle is rounded, from a high one stopping on it takes less time.
+    /// A right angle is rounded at a low feed. At a high feed stopping on it takes less time.
     #[test]
     fn a_corner_is_blended_where_that_is_faster() {
         let corner = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]];

@@ -17,7 +17,7 @@ use crate::toolpath::Placed;
 #[derive(Default)]
 pub(super) struct PiecePace {
     ends: VecDeque<(f64, f64)>,
-    /// When the stretch begins \[s\], and where \[mm\].
+    /// Start of the stretch: time \[s\] and position \[mm\].
     start: (f64, f64),
 }
 

@@ -53,7 +53,7 @@ fn push_unless_level(out: &mut Vec<(f64, f64)>, point: (f64, f64)) {
     out.push(point);
 }
 
-/// At most four points for each of `columns` equal parts of `from..to`, in their order, the extremes of every part
+/// Returns at most four points for each of `columns` equal parts of `from..to`, in their order, the extremes of every part
 /// among them. Points that are not finite are left out.
 pub(super) fn by_column(
     points: impl Iterator<Item = (f64, f64)>,
@@ -171,7 +171,7 @@ fn thinned(
 #[derive(Default)]
 struct Straight {
     start: (f64, f64),
-    /// First direction \[rad\], the turns from it that are still allowed, and the length so far.
+    /// First direction \[rad\], the deflections from it that are still allowed, and the length up to here.
     toward: Option<(f64, f64, f64, f64)>,
 }
 
@@ -194,12 +194,12 @@ impl Straight {
             self.toward = Some((direction, -spread, spread, length));
             return true;
         };
-        let turn = (direction - first + PI).rem_euclid(TAU) - PI;
-        // A path that comes back on itself turns at its far end, which has to stay a corner.
-        if turn < low || turn > high || length < longest {
+        let deflection = (direction - first + PI).rem_euclid(TAU) - PI;
+        // A path that comes back on itself reverses at its far end, which has to stay a corner.
+        if deflection < low || deflection > high || length < longest {
             return false;
         }
-        self.toward = Some((first, low.max(turn - spread), high.min(turn + spread), length));
+        self.toward = Some((first, low.max(deflection - spread), high.min(deflection + spread), length));
         true
     }
 }

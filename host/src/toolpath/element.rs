@@ -104,11 +104,11 @@ impl Element {
         let (x, y) =
             ((from[first] - step.centre_mm[0]) / radius_mm, (from[second] - step.centre_mm[1]) / radius_mm);
         let outward = add(scale(axis(first), x), scale(axis(second), y));
-        let turn = cross(axis(normal), outward);
+        let along = cross(axis(normal), outward);
         let sweep_rad = step.sweep_rad.abs();
         let shape = Spiral {
             outward,
-            onward: if step.sweep_rad < 0.0 { scale(turn, -1.0) } else { turn },
+            onward: if step.sweep_rad < 0.0 { scale(along, -1.0) } else { along },
             normal: axis(normal),
             radius_mm,
             radius_per_rad: (step.end_radius_mm - radius_mm) / sweep_rad,
@@ -173,7 +173,7 @@ impl Element {
                 Self::Arc {
                     from: add(from, shape.offset(0.0, first)),
                     to: add(to, shape.offset(sweep_rad, last)),
-                    shape: shape.turned(first),
+                    shape: shape.rotated(first),
                     sweep_rad: last - first,
                 }
             }

@@ -9,7 +9,7 @@ use motion_kernel::plan::Bend;
 use super::septic::Septic;
 use super::{Vector, norm};
 
-/// In how many parts a piece is cut: the square of its second derivative has eight extremes at most.
+/// The number of parts that a piece is cut into: the square of its second derivative has eight extremes at most.
 const PIECE_PARTS: usize = 16;
 
 /// The greatest derivatives by arc length, each where it is greatest.
@@ -24,7 +24,7 @@ pub struct Greatest {
 }
 
 impl Greatest {
-    /// Of a curve with these figures that is driven as `pieces`. Their tangents are unit vectors to a millionth.
+    /// The greatest derivatives of a curve with these figures that is driven as `pieces`. Their tangents are unit vectors to a millionth.
     #[must_use]
     pub fn driven_as(self, pieces: &[Septic]) -> Self {
         let mut norms = [0.0_f64; 3];

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! On the base circle itself, at φ = 0, curvature is infinite: an involute has to stay off it. At a distance d from
-//! an involute lies the same involute, turned by −d/r and run through at angles that are greater by d/r
+//! an involute lies the same involute, rotated by −d/r and traversed at angles that are greater by d/r
 //! ([`Involute::offset_by`]), so that a cutter's radius needs nothing new.
 
 use motion_kernel::plan::Bend;
@@ -97,10 +97,10 @@ impl Involute {
     /// # Errors
     /// It would touch the base circle, or be unwound too far.
     pub fn offset_by(&self, distance_mm: f64) -> Result<Self, InvoluteError> {
-        let turn = distance_mm / self.base_mm;
-        let (tangent, normal) = self.frame(-turn);
+        let rotation = distance_mm / self.base_mm;
+        let (tangent, normal) = self.frame(-rotation);
         let (start, end) = self.angles_rad;
-        Self::new((tangent, normal), self.base_mm, (start + turn, end + turn))
+        Self::new((tangent, normal), self.base_mm, (start + rotation, end + rotation))
     }
 
     /// Angle that is run through \[rad\], > 0.
@@ -159,11 +159,11 @@ impl Curve for Involute {
         let (start, end) = (self.angle(origin), self.angle(u));
         let (tangent, normal) = self.frame(start);
         // φ − φ₀ from the parameters, whose difference is exact; T − T₀ and N − N₀ without cancellation.
-        let turn = self.sense() * (u - origin);
-        let half = libm::sin(0.5 * turn);
-        let (sine, versed) = (libm::sin(turn), 2.0 * half * half);
+        let swept = self.sense() * (u - origin);
+        let half = libm::sin(0.5 * swept);
+        let (sine, versed) = (libm::sin(swept), 2.0 * half * half);
         let along = end * sine - versed;
-        let across = (sine - turn) + end * versed;
+        let across = (sine - swept) + end * versed;
         scale(add(scale(tangent, along), scale(normal, across)), self.base_mm)
     }
 

@@ -109,7 +109,7 @@ pub fn feedforward(
     })
 }
 
-/// To six significant digits: more than any identification knows, and what a file shows is what runs.
+/// Rounds to six significant digits. No identification knows more, and the file shows the value that runs.
 #[must_use]
 pub fn rounded(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)

@@ -17,7 +17,7 @@ use crate::machine::AxisSettings;
 /// A key of the machine file with its new value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// As in the file, below the axis: `regulator.kp_per_s`.
+    /// The key as in the file, below the axis: `regulator.kp_per_s`.
     pub key: &'static str,
     /// Before; none if the file did not have the key.
     pub before: Option<f64>,
@@ -121,7 +121,7 @@ fn interval(estimate: Estimate, from: &str) -> String {
     format!("{from}, ± {:.2} %", 100.0 * part)
 }
 
-/// To the four decimals that are shown; 0 without a sign.
+/// Rounds to the four decimals that are shown; 0 has no sign.
 fn rounded_to(value: f64) -> f64 {
     (value * 1e4).round() / 1e4 + 0.0
 }
@@ -306,7 +306,10 @@ fn changes(
         "regulator.inverse.viscous_friction_per_s",
         |drive| drive.viscous_friction_per_s,
         "1/s",
-        origin(known.viscous_friction, "torque that grows with velocity; small compared with the rest".to_owned()),
+        origin(
+            known.viscous_friction,
+            "torque that grows with velocity; small compared with the rest".to_owned(),
+        ),
     );
     inverse(
         "regulator.inverse.coulomb_friction_mm_s2",

@@ -1,4 +1,4 @@
-//! The page of the circle test: errors over frequency, around the circle, and over a turn.
+//! The page of the circle test: errors over frequency, around the circle, and over a revolution.
 
 use std::io::{self, Write};
 
@@ -153,7 +153,7 @@ fn over_frequency(
     writeln!(out, "</section>")
 }
 
-/// The circle with its error magnified, and the following error over two turns.
+/// The circle with its error magnified, and the following error over two revolutions.
 fn one_frequency(
     machine: &Machine,
     index: usize,
@@ -168,10 +168,10 @@ fn one_frequency(
     for (index, (_, circle, recording)) in shown.iter().enumerate() {
         let ink = palette::series(index);
         radius_mm = circle.radius_mm();
-        let turn = (1.0 / (frequency_hz * recording.tick_s())).round() as usize;
+        let revolution_ticks = (1.0 / (frequency_hz * recording.tick_s())).round() as usize;
         let points = deviations(recording, circle).map_err(io::Error::other)?;
-        // One turn, closed; the last one.
-        let last = points.len().saturating_sub(turn + 1);
+        // One revolution, closed; the last one.
+        let last = points.len().saturating_sub(revolution_ticks + 1);
         around.push(Series { ink, points: points[last..].to_vec() });
         let ticks = circle.measured(recording).map_err(io::Error::other)?;
         let [x, _] = circle.axes();

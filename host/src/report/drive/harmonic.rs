@@ -133,7 +133,7 @@ pub fn write_harmonic(
     super::close(out)
 }
 
-/// Graphs over the turns that are shown.
+/// Graphs over the revolutions that are shown.
 fn over_revolutions(circle: &Circle, graphs: Vec<Graph>) -> Stack {
     let end_ms = (TURNS_SHOWN / circle.frequency_hz).min(circle.span_s()) * 1e3;
     Stack { x: (0.0, end_ms), x_name: "time [ms]", is_logarithmic: false, graphs }
@@ -196,7 +196,7 @@ pub fn write_inertia(
     let caption = Caption {
         id: "inertia",
         title: "Velocity and acceleration under load",
-        description: "Two turns of the motion under each load: velocity and acceleration.",
+        description: "Two revolutions of the motion under each load: velocity and acceleration.",
     };
     let mut words: Vec<_> =
         legend(found.iter().map(|(figures, _)| format!("load {}", figure(figures.load_inertia_ratio, 3))));

@@ -1,4 +1,4 @@
-//! What all plots share: the layout they are drawn on, the panel with its axes, and the wrapping for the page.
+//! Shared by all plots: the layout they are drawn on, the panel with its axes, and the wrapping for the page.
 //!
 //! Every plot is drawn twice, for a wide and for a narrow page, because a picture scaled down to a phone takes its
 //! letters along. The style layout shows one of the two. The drawing library places things on whole units only, so a
