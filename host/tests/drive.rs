@@ -1,9 +1,9 @@
 //! The drive experiments through planner, streams and kernel in f32, against the reference machine's figures.
 
+use motion_host::drive::circle_motion::Circle;
 use motion_host::drive::inverse::inverse;
 use motion_host::drive::reference::{self, BANDWIDTH_FEED_MM_S, CIRCLE_FEED_MM_S, Comparison};
 use motion_host::drive::step::Step;
-use motion_host::drive::turning::Turning;
 use motion_host::drive::{DriveError, Terms, bode, circle, experiment, harmonic, identification, inertia};
 use motion_host::gcode::Plane;
 use motion_host::machine::Machine;
@@ -173,9 +173,9 @@ fn circles_of_every_size_reach_their_feed() {
     let open = experiment::open_loop(&Machine::reference());
     for feed_mm_s in [5.0, CIRCLE_FEED_MM_S, BANDWIDTH_FEED_MM_S, 330.0] {
         for frequency_hz in [0.1, 0.7, 8.0, 28.0, 55.0, 200.0] {
-            let turning = Turning::new(frequency_hz, feed_mm_s);
-            let recording = turning.record(&open).expect("a circle");
-            let ticks = turning.measured(&recording).expect("constant feed");
+            let circle = Circle::new(frequency_hz, feed_mm_s);
+            let recording = circle.record(&open).expect("a circle");
+            let ticks = circle.measured(&recording).expect("constant feed");
             let speed = |t: &motion_host::trace::TraceRow| t.axes[0].vel_mm_s.hypot(t.axes[1].vel_mm_s);
             assert!(
                 ticks.iter().all(|tick| (speed(tick) / feed_mm_s - 1.0).abs() < 1e-4),
@@ -203,8 +203,8 @@ fn a_slow_drive_is_its_linear_model() {
 #[test]
 fn the_z_axis_is_measured_in_its_own_plane() {
     let machine = Machine::reference();
-    let turning = Turning { plane: Plane::Zx, ..Turning::new(8.0, 50.0) };
-    let found = harmonic::measure(&experiment::open_loop(&machine), &turning).expect("harmonics");
+    let circle = Circle { plane: Plane::Zx, ..Circle::new(8.0, 50.0) };
+    let found = harmonic::measure(&experiment::open_loop(&machine), &circle).expect("harmonics");
     let [z, x] = found.axes;
     assert_eq!((z.axis, x.axis), (2, 0));
     // The reference machine's Z is like its X.
@@ -215,9 +215,9 @@ fn the_z_axis_is_measured_in_its_own_plane() {
 #[test]
 fn a_load_shows_the_current_limit() {
     let machine = Machine::reference();
-    let turning = Turning::new(8.0, BANDWIDTH_FEED_MM_S);
+    let circle = Circle::new(8.0, BANDWIDTH_FEED_MM_S);
     for (load, is_limited) in [(0.0, false), (1.0, true), (2.0, true)] {
-        let (found, _) = inertia::measure(&machine, &turning, 0, load).expect("a run");
+        let (found, _) = inertia::measure(&machine, &circle, 0, load).expect("a run");
         assert_eq!(found.is_limited, is_limited, "{found:?}");
         if is_limited {
             let limit_mm_s2 = machine.axes[0].drive.accel_limit_mm_s2 / (1.0 + load);
@@ -249,15 +249,15 @@ fn a_slow_axis_is_identified() {
 #[test]
 fn what_the_machine_cannot_do_is_refused_before_it_moves() {
     let machine = Machine::reference();
-    let refused = Turning::new(4.0, 400.0).record(&machine).expect_err("beyond 10 V");
+    let refused = Circle::new(4.0, 400.0).record(&machine).expect_err("beyond 10 V");
     assert!(matches!(refused, DriveError::Feed { ref axis, .. } if axis == "X"), "{refused}");
-    for turning in [Turning::new(0.0, 30.0), Turning::new(300.0, 30.0), Turning::new(f64::NAN, 30.0)] {
-        let refused = turning.record(&machine).expect_err("no circle");
+    for circle in [Circle::new(0.0, 30.0), Circle::new(300.0, 30.0), Circle::new(f64::NAN, 30.0)] {
+        let refused = circle.record(&machine).expect_err("no circle");
         assert!(matches!(refused, DriveError::Quantity { quantity: "frequency [Hz]", .. }), "{refused}");
     }
     let mut narrow = Machine::reference();
     narrow.axes[1].timer = hal_sim::TimerBits::Sixteen;
     narrow.axes[1].mm_per_count = 1e-6;
-    let refused = Turning::new(4.0, 100.0).record(&narrow).expect_err("a register too short");
+    let refused = Circle::new(4.0, 100.0).record(&narrow).expect_err("a register too short");
     assert!(matches!(refused, DriveError::Counter { ref axis, .. } if axis == "Y"), "{refused}");
 }

@@ -13,7 +13,7 @@ use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::law::{Law, Limits, Ramp};
+use motion_kernel::law::{Law, Limits, PlannedRamp, Ramp};
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::{PathRules, Streams};
 use motion_kernel::units::{Counts, DacCode, Position};
@@ -40,7 +40,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rise = Ramp::new(&Law::new(limits)?, 0.0, 50.0);
     let at = |mm| Position::from_mm(mm).ok_or("out of range");
     let (whole, ramp) = (at(20.0)?, at(rise.length_mm())?);
-    let cruise = Ramp::cruise(50.0, (whole - ramp - ramp).to_mm() / 50.0);
     // The path under it: lines of at most 16 mm. Both streams measure the same 20 mm.
     let line =
         |start, end: Position| Item::Line { line: 1, start: [start], direction: [1.0], length: end - start };
@@ -48,9 +47,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let items = [
         line(Position::ZERO, middle),
         line(middle, whole),
-        Item::Feed { ramp: rise, length: ramp },
-        Item::Feed { ramp: cruise, length: whole - ramp - ramp },
-        Item::Feed { ramp: rise.reversed(), length: ramp },
+        Item::Feed(PlannedRamp::new(&rise, ramp, TICK_S)?),
+        Item::Feed(PlannedRamp::cruise(50.0, whole - ramp - ramp, TICK_S)?),
+        Item::Feed(PlannedRamp::new(&rise.reversed(), ramp, TICK_S)?),
         Item::EndOfStretch([whole]),
     ];
 

@@ -16,7 +16,7 @@ use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{Ad5754Output, DriveEnable, Encoder, VelocityChannel};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::law::{Law, Limits, Ramp};
+use motion_kernel::law::{Law, Limits, PlannedRamp, Ramp};
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::{PathRules, Streams};
 use motion_kernel::units::{DacCode, Position};
@@ -52,12 +52,11 @@ fn greatest_error_mm(velocity: f64) -> Result<f64, Box<dyn Error>> {
     let rise = Ramp::new(&Law::new(limits)?, 0.0, 50.0);
     let at = |mm| Position::from_mm(mm).ok_or("out of range");
     let (whole, ramp) = (at(16.0)?, at(rise.length_mm())?);
-    let cruise = Ramp::cruise(50.0, (whole - ramp - ramp).to_mm() / 50.0);
     let items = [
         Item::Line { line: 1, start: [Position::ZERO], direction: [1.0], length: whole },
-        Item::Feed { ramp: rise, length: ramp },
-        Item::Feed { ramp: cruise, length: whole - ramp - ramp },
-        Item::Feed { ramp: rise.reversed(), length: ramp },
+        Item::Feed(PlannedRamp::new(&rise, ramp, TICK_S)?),
+        Item::Feed(PlannedRamp::cruise(50.0, whole - ramp - ramp, TICK_S)?),
+        Item::Feed(PlannedRamp::new(&rise.reversed(), ramp, TICK_S)?),
         Item::EndOfStretch([whole]),
     ];
     let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };

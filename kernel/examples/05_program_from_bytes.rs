@@ -10,7 +10,7 @@ use std::error::Error;
 
 use motion_kernel::axis::{AxisFigures, Feedforward, Gains};
 use motion_kernel::exec::{ExecState, Executor};
-use motion_kernel::law::{Law, Limits, Ramp};
+use motion_kernel::law::{Law, Limits, PlannedRamp, Ramp};
 use motion_kernel::program::{Header, Item, ProgramError, Reader, Supply, check, write};
 use motion_kernel::queue::{PathRules, Streams};
 use motion_kernel::units::Position;
@@ -75,7 +75,6 @@ fn compile() -> Result<Vec<u8>, Box<dyn Error>> {
     let at = |mm| Position::from_mm(mm).ok_or("out of range");
     let rise = Ramp::new(&Law::new(limits)?, 0.0, 50.0);
     let (whole, ramp) = (at(40.0)?, at(rise.length_mm())?);
-    let cruise = Ramp::cruise(50.0, (whole - ramp - ramp).to_mm() / 50.0);
     let line = |line: u32| {
         Ok::<_, &str>(Item::Line {
             line: line + 1,
@@ -85,14 +84,14 @@ fn compile() -> Result<Vec<u8>, Box<dyn Error>> {
         })
     };
     // In the order of the places where they begin, so that neither stream fills up while the other one starves.
-    let mut items = vec![Item::Feed { ramp: rise, length: ramp }];
+    let mut items = vec![Item::Feed(PlannedRamp::new(&rise, ramp, header.tick_s)?)];
     for number in 0..40 {
         items.push(line(number)?);
         if number == 5 {
-            items.push(Item::Feed { ramp: cruise, length: whole - ramp - ramp });
+            items.push(Item::Feed(PlannedRamp::cruise(50.0, whole - ramp - ramp, header.tick_s)?));
         }
         if number == 35 {
-            items.push(Item::Feed { ramp: rise.reversed(), length: ramp });
+            items.push(Item::Feed(PlannedRamp::new(&rise.reversed(), ramp, header.tick_s)?));
         }
     }
     items.push(Item::EndOfStretch([whole]));

@@ -15,14 +15,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// The documents that may show figures, from the repository's root.
-const DOCUMENTS: [&str; 6] = [
-    "README.md",
-    "ARCHITECTURE.md",
-    "host/AXIS.md",
-    "host/FAULTS.md",
-    "boards/README.md",
-    "boards/qemu-mps2/README.md",
-];
+const DOCUMENTS: [&str; 4] =
+    ["docs/FIGURES.md", "host/AXIS.md", "host/FAULTS.md", "boards/qemu-mps2/README.md"];
 const END: &str = "<!-- end of figures -->";
 
 /// A table of figures. A cell that reads as a number is compared with a tolerance, any other as text.

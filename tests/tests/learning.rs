@@ -6,12 +6,12 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hal_sim::DriveParameters;
+use motion_host::drive::circle_motion::Circle;
 use motion_host::drive::identification::identify_axes;
 use motion_host::drive::learning::{
     CONTRACTION_MAX, Ending, LearningOptions, Learnt, Model, Reason, RepeatFigures, learn,
 };
 use motion_host::drive::reference::CIRCLE_FEED_MM_S;
-use motion_host::drive::turning::Turning;
 use motion_host::drive::{DriveError, Recording, Terms};
 use motion_host::machine::Machine;
 use motion_host::simulate::RunOptions;
@@ -34,8 +34,8 @@ fn models(machine: &Machine) -> [Model; 3] {
 }
 
 /// Short enough for many repeats.
-fn short(frequency_hz: f64) -> Turning {
-    Turning { settle_s: 0.4, measured_s: 0.4, ..Turning::new(frequency_hz, CIRCLE_FEED_MM_S) }
+fn short(frequency_hz: f64) -> Circle {
+    Circle { settle_s: 0.4, measured_s: 0.4, ..Circle::new(frequency_hz, CIRCLE_FEED_MM_S) }
 }
 
 fn print(name: &str, learnt: &Learnt) {
@@ -92,7 +92,7 @@ fn assert_converged(name: &str, learnt: &Learnt, repeats: usize) {
 /// The reference: 19.8 µm, after one repeat 6.2, after two 2.1 µm.
 #[test]
 fn two_repeats_make_the_circle_of_10_hz() {
-    let (machine, circle) = (machine(), Turning::new(10.0, CIRCLE_FEED_MM_S));
+    let (machine, circle) = (machine(), Circle::new(10.0, CIRCLE_FEED_MM_S));
     let learnt = learn(&machine, &circle, &models(&machine), &LearningOptions::default()).expect("learns");
     print("10 Hz", &learnt);
     let first_um = learnt.repeats[0].contour_um;
@@ -110,7 +110,7 @@ fn identified_drives_are_learnt_by() {
         let parameters = &found.parameters;
         *model = Model { drive: parameters.drive(), command_gain: parameters.command_gain.value };
     }
-    let circle = Turning::new(10.0, CIRCLE_FEED_MM_S);
+    let circle = Circle::new(10.0, CIRCLE_FEED_MM_S);
     let learnt = learn(&machine, &circle, &models, &LearningOptions::default()).expect("learns");
     print("identified", &learnt);
     assert!(learnt.repeats[2].contour_um <= 2.5, "{}", learnt.repeats[2].contour_um);

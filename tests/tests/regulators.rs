@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use motion_host::cli::demo::STRINGER;
+use motion_host::drive::circle_motion::Circle;
 use motion_host::drive::compare::{Choice, Motion, Regulators, Row, rows, sweeps};
 use motion_host::drive::peer_regulator::PeerGains;
 use motion_host::drive::reference::CIRCLE_FEED_MM_S;
 use motion_host::drive::replay::{Law, replay};
-use motion_host::drive::turning::Turning;
 use motion_host::drive::{Recording, Terms};
 use motion_host::machine::Machine;
 use motion_host::report::drive::{picture_of_errors, picture_of_outputs};
@@ -21,8 +21,8 @@ fn regulators() -> Regulators {
     Regulators::new(&Machine::reference(), CIRCLE_FEED_MM_S, &mut || {}).expect("a fit")
 }
 
-fn circle(frequency_hz: f64) -> Turning {
-    Turning::new(frequency_hz, CIRCLE_FEED_MM_S)
+fn circle(frequency_hz: f64) -> Circle {
+    Circle::new(frequency_hz, CIRCLE_FEED_MM_S)
 }
 
 fn measured(regulators: &Regulators) -> Vec<Row> {
@@ -118,9 +118,9 @@ fn fitted_gains_are_the_best() {
     let circles = [4.0, 10.0, 16.0].map(|hz| (circle(hz), circle(hz).record(&machine).expect("a circle")));
     let squares = |change: &dyn Fn(&PeerGains) -> PeerGains| -> f64 {
         let law = Law::Peer(regulators.fitted.each_ref().map(change));
-        let of = |(turning, recording): &(Turning, Recording)| {
+        let of = |(circle, recording): &(Circle, Recording)| {
             let found = replay(recording, &law, 0.0).expect("a replay").recording;
-            let ticks = turning.measured(&found).expect("steady");
+            let ticks = circle.measured(&found).expect("steady");
             ticks.iter().map(|tick| tick.axes[0].err_um.powi(2) + tick.axes[1].err_um.powi(2)).sum::<f64>()
         };
         circles.iter().map(of).sum()

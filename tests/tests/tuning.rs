@@ -12,7 +12,7 @@ use motion_tests::figures::{Table, hold};
 use motion_tests::random::Random;
 
 const FEED_MM_S: f64 = 2150.0 / 60.0;
-/// What identification is off by at most, as a part; the README says so.
+/// What identification is off by at most, as a part, as docs/PROMISES.md states it.
 const PART_OFF_MAX: f64 = 0.02;
 
 /// `machine` with X and Y tuned.
@@ -88,7 +88,7 @@ fn changed(machine: &Machine, change: &dyn Fn(&mut hal_sim::DriveParameters)) ->
 
 /// Each of Kv, Ti, dead time and inertia off by a fifth, then all of them slow together. Y has three times the friction
 /// of X, whose compensation is off with Kv, and keeps more error: 2.0 µm where X has 1.3, beyond the 1.5 µm that both
-/// should keep. The README states these figures.
+/// should keep. docs/PROMISES.md states these figures.
 #[test]
 fn a_fifth_of_any_parameter_may_change() {
     type Change = fn(&mut hal_sim::DriveParameters, f64);

@@ -23,7 +23,7 @@ pub fn least_time_s(plan: &Plan) -> f64 {
 
 fn of_stretch_s(stretch: &Stretch) -> f64 {
     let blocks = stretch.for_lookahead();
-    // v² at every junction, at most as the ceilings beside it and the junction itself say; 0 at both ends.
+    // v² at every junction, at most what the two ceilings and the junction allow; 0 at both ends.
     let mut squares = vec![0.0_f64; blocks.len() + 1];
     for (index, pair) in blocks.windows(2).enumerate() {
         let feed_mm_s = pair[0].junction_mm_s.min(pair[0].cap_mm_s).min(pair[1].cap_mm_s);

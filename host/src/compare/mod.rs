@@ -1,4 +1,4 @@
-//! How long a program takes, in ways that can be held against each other.
+//! The time of a program, in forms that can be compared.
 //!
 //! Consumes a program and a machine; produces, for a path mode, the time of the plan, of S3's plan per block, and the
 //! least time that acceleration alone would allow on the same path, with what the path used of its tolerance and the
@@ -17,10 +17,10 @@ use crate::gcode::{PathMode, Program, StepKind};
 use crate::machine::Machine;
 use crate::planning::{Item, Mode, Plan, PlanningError, plan_program};
 
-/// Which path is driven.
+/// The path that is driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Path {
-    /// As the program says.
+    /// The path mode that the program sets.
     Written,
     /// G61 all over.
     Exact,
@@ -38,7 +38,7 @@ impl fmt::Display for Path {
     }
 }
 
-/// What a program comes to on one path.
+/// The figures of a program on one path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
     /// Blocks, blends among them.

@@ -1,7 +1,7 @@
 //! The ticks of a plan against the limits of its machine.
 //!
-//! Consumes a plan; executes it with the kernel's executor, in f64 and without axes; produces the greatest ratios of what
-//! was set to what is allowed.
+//! Consumes a plan; executes it with the kernel's executor, in f64 and without axes; produces the greatest ratios of set
+//! values to limits.
 
 use core::convert::Infallible;
 
@@ -34,7 +34,7 @@ pub struct Ratios {
 /// Why a plan could not be executed.
 #[derive(Debug, thiserror::Error)]
 pub enum TicksError {
-    /// It is beyond what a tick can do.
+    /// The program is too dense for a tick.
     #[error(transparent)]
     Planning(#[from] PlanningError),
     /// The kernel refused what the planner made.

@@ -1,16 +1,16 @@
 //! Amplitude and phase of the drive over frequency, open loop: from a step, from harmonics, and of the linear model.
 //!
 //! The methods agree as long as the drive is linear. A step and a harmonic of the same feed meet the current limit in
-//! different ways, and the model knows none: where the curves part, the limit acts.
+//! different ways, and the model has no limit: where the curves part, the limit acts.
 
 use core::f64::consts::TAU;
 
+use super::circle_motion::{Circle, plane_of};
 use super::experiment::{DriveError, open_loop};
 use super::harmonic::{self, Response};
 use super::model;
 use super::spectrum::Spectrum;
 use super::step::{Step, StepFigures};
-use super::turning::{Turning, plane_of};
 use crate::machine::Machine;
 use crate::sine::as_lag_rad;
 
@@ -28,11 +28,12 @@ pub struct Point {
 pub struct BodePoint {
     /// Frequency \[Hz\].
     pub frequency_hz: f64,
-    /// From the step's spectrum; the command's half tick of holding is counted in, as in the others.
+    /// The response from the step's spectrum. It includes the half tick for which the output is held, like
+    /// the others.
     pub step: Point,
-    /// From harmonic motion.
+    /// The response from harmonic motion.
     pub harmonic: Response,
-    /// Of the linear model.
+    /// The response of the linear model.
     pub model: Point,
 }
 
@@ -43,7 +44,7 @@ pub struct Bode {
     pub axis: usize,
     /// Feed of the step and of the harmonics \[mm/s\].
     pub feed_mm_s: f64,
-    /// By frequency.
+    /// The responses, by frequency.
     pub points: Vec<BodePoint>,
     /// The step's figures.
     pub step: StepFigures,
@@ -52,7 +53,7 @@ pub struct Bode {
 /// Measures the curves of `axis` at the given frequencies, at one feed. `progress` is called after each.
 ///
 /// # Errors
-/// As [`Step::measure`] and [`harmonic::measure`].
+/// Those of [`Step::measure`] and [`harmonic::measure`].
 pub fn measure(
     machine: &Machine,
     axis: usize,
@@ -65,8 +66,8 @@ pub fn measure(
     let open = open_loop(machine);
     let mut points = Vec::with_capacity(frequencies_hz.len());
     for &frequency_hz in frequencies_hz {
-        let turning = Turning { plane: plane_of(axis), ..Turning::new(frequency_hz, feed_mm_s) };
-        let found = harmonic::measure(&open, &turning)?;
+        let circle = Circle { plane: plane_of(axis), ..Circle::new(frequency_hz, feed_mm_s) };
+        let found = harmonic::measure(&open, &circle)?;
         let harmonic = found.axes.into_iter().find(|found| found.axis == axis).unwrap_or(found.axes[0]);
         let drive = &machine.axes[axis].drive;
         points.push(BodePoint {

@@ -1,18 +1,18 @@
-//! The circle test of S4, closed loop: how far the machine is beside the circle.
+//! The circle test of S4, closed loop: the distance of the machine from the circle.
 //!
 //! Everything is read from the encoders over the last second at constant feed. The radius deviation is the distance of
 //! the actual point from the centre, less the programmed radius: the contour error δ is its extremes, the form
 //! deviation Δδ their distance. The following error is set less actual position, tick by tick.
 
+use super::circle_motion::Circle;
 use super::experiment::{DriveError, Recording};
 use super::harmonic::first_crossing;
-use super::turning::Turning;
 use crate::machine::Machine;
 
 /// A frequency at which the contour error passes a limit is found to this \[Hz\].
 const RESOLUTION_HZ: f64 = 0.01;
 
-/// What is read from a circle.
+/// The figures of a circle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleFigures {
     /// The plane's first and second axis, from 0.
@@ -48,33 +48,33 @@ impl CircleFigures {
 /// Drives the circle on `machine` with its gains: 3 s to settle, the last second measured.
 ///
 /// # Errors
-/// As [`Turning::record`].
+/// Those of [`Circle::record`].
 pub fn measure(machine: &Machine, frequency_hz: f64, feed_mm_s: f64) -> Result<CircleFigures, DriveError> {
-    let turning = Turning::new(frequency_hz, feed_mm_s);
-    figures(&turning.record(machine)?, &turning)
+    let circle = Circle::new(frequency_hz, feed_mm_s);
+    figures(&circle.record(machine)?, &circle)
 }
 
 /// Reads a recording of the circle.
 ///
 /// # Errors
 /// The feed was not held long enough.
-pub fn figures(recording: &Recording, turning: &Turning) -> Result<CircleFigures, DriveError> {
+pub fn figures(recording: &Recording, circle: &Circle) -> Result<CircleFigures, DriveError> {
     let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
-    for (_, deviation_um) in deviations(recording, turning)? {
+    for (_, deviation_um) in deviations(recording, circle)? {
         least = least.min(deviation_um);
         greatest = greatest.max(deviation_um);
     }
     let mut following_um = [0.0_f64; 2];
-    for tick in turning.measured(recording)? {
-        for (greatest, axis) in following_um.iter_mut().zip(turning.axes()) {
+    for tick in circle.measured(recording)? {
+        for (greatest, axis) in following_um.iter_mut().zip(circle.axes()) {
             *greatest = greatest.max(tick.axes[axis].err_um.abs());
         }
     }
     Ok(CircleFigures {
-        axes: turning.axes(),
-        frequency_hz: turning.frequency_hz,
-        feed_mm_s: turning.feed_mm_s,
-        radius_mm: turning.radius_mm(),
+        axes: circle.axes(),
+        frequency_hz: circle.frequency_hz,
+        feed_mm_s: circle.feed_mm_s,
+        radius_mm: circle.radius_mm(),
         contour_um_max: greatest,
         contour_um_min: least,
         following_um,
@@ -85,13 +85,13 @@ pub fn figures(recording: &Recording, turning: &Turning) -> Result<CircleFigures
 ///
 /// # Errors
 /// The feed was not held long enough.
-pub fn deviations(recording: &Recording, turning: &Turning) -> Result<Vec<(f64, f64)>, DriveError> {
-    let radius_mm = turning.radius_mm();
+pub fn deviations(recording: &Recording, circle: &Circle) -> Result<Vec<(f64, f64)>, DriveError> {
+    let radius_mm = circle.radius_mm();
     let deviation = |tick: &crate::trace::TraceRow| {
-        let (set, actual) = turning.relative_to_centre(&tick.axes);
+        let (set, actual) = circle.relative_to_centre(&tick.axes);
         (libm::atan2(set[1], set[0]), (libm::hypot(actual[0], actual[1]) - radius_mm) * 1e3)
     };
-    Ok(turning.measured(recording)?.iter().map(deviation).collect())
+    Ok(circle.measured(recording)?.iter().map(deviation).collect())
 }
 
 fn check_limit(limit_um: f64) -> Result<(), DriveError> {
@@ -102,7 +102,7 @@ fn check_limit(limit_um: f64) -> Result<(), DriveError> {
 /// \[Hz\]; none if it does not, or if it is beyond from the start.
 ///
 /// # Errors
-/// As [`measure`].
+/// Those of [`measure`].
 pub fn limit_frequency(
     machine: &Machine,
     feed_mm_s: f64,
@@ -117,13 +117,13 @@ pub fn limit_frequency(
 /// Circles over a list of frequencies, on one machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
-    /// What acted, in words.
+    /// The feedforward terms that acted, in words.
     pub name: &'static str,
     /// The machine as it ran.
     pub machine: Machine,
-    /// By frequency.
+    /// The circles, by frequency.
     pub circles: Vec<CircleFigures>,
-    /// Where the contour error passes the limit \[Hz\]; none if it does not, or if it is beyond from the start.
+    /// Frequency at which the contour error passes the limit \[Hz\]; none if it does not, or if it starts beyond it.
     pub limit_hz: Option<f64>,
 }
 
@@ -132,7 +132,7 @@ pub struct Sweep {
 /// of the list.
 ///
 /// # Errors
-/// As [`measure`].
+/// Those of [`measure`].
 pub fn sweep(
     machine: Machine,
     name: &'static str,

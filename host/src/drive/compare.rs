@@ -17,11 +17,11 @@
 use motion_kernel::axis::{Feedforward, Gains};
 
 use super::circle;
+use super::circle_motion::Circle;
 use super::experiment::{CLOSED_LOOP_ERROR_MM, DriveError, Recording, Terms};
 use super::inverse::inverse;
 use super::peer_regulator::PeerGains;
 use super::replay::{Law, Replayed, replay};
-use super::turning::Turning;
 use crate::machine::Machine;
 use crate::trace::AXES;
 
@@ -68,11 +68,11 @@ impl Choice {
         Self::Inverse,
     ];
 
-    /// Those that pictures show.
+    /// The regulators that pictures show.
     pub const SHOWN: [Self; 7] =
         [Self::P, Self::Pv, Self::Peer, Self::Vaj, Self::PeerFitted, Self::VajFitted, Self::Inverse];
 
-    /// As tables call it.
+    /// The name in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -103,7 +103,7 @@ impl Regulators {
     /// [`Regulators::STEPS`] steps.
     ///
     /// # Errors
-    /// As [`Turning::record`].
+    /// Those of [`Circle::record`].
     pub fn new(machine: &Machine, feed_mm_s: f64, progress: &mut dyn FnMut()) -> Result<Self, DriveError> {
         let machine = p_only(machine);
         let fitted = fit(&machine, feed_mm_s, Differences::Three, progress)?;
@@ -133,7 +133,7 @@ impl Regulators {
         machine
     }
 
-    /// What regulates.
+    /// The regulator.
     #[must_use]
     pub fn law(&self, choice: Choice) -> Law {
         match choice {
@@ -147,7 +147,7 @@ impl Regulators {
     /// `choice` on `motion` with set positions in steps of each of `resolutions_um` \[µm\].
     ///
     /// # Errors
-    /// As [`Turning::record`], and a resolution out of its range.
+    /// Those of [`Circle::record`], and a resolution out of its range.
     pub fn measure(
         &self,
         choice: Choice,
@@ -169,19 +169,19 @@ impl Regulators {
     /// of the measured part \[s\] and volts, for `duration_s`.
     ///
     /// # Errors
-    /// As [`Turning::record`], and a resolution out of its range.
+    /// Those of [`Circle::record`], and a resolution out of its range.
     pub fn output(
         &self,
         choice: Choice,
-        turning: &Turning,
+        circle: &Circle,
         resolution_um: f64,
         duration_s: f64,
     ) -> Result<Vec<(f64, f64)>, DriveError> {
-        let recording = turning.record(&self.machine(choice))?;
+        let recording = circle.record(&self.machine(choice))?;
         let replayed = replay(&recording, &self.law(choice), resolution_um / 1e3)?.recording;
-        let [first, _] = turning.axes();
+        let [first, _] = circle.axes();
         let times = (0_u32..).map(|tick| f64::from(tick) * replayed.tick_s());
-        let ticks = turning.measured(&replayed)?;
+        let ticks = circle.measured(&replayed)?;
         let points = times.zip(ticks).map(|(time_s, tick)| (time_s, tick.axes[first].out_v));
         Ok(points.take_while(|point| point.0 <= duration_s).collect())
     }
@@ -203,7 +203,7 @@ pub struct Row {
     pub choice: Choice,
     /// Steps of the set positions \[µm\]; 0 if they were exact.
     pub resolution_um: f64,
-    /// By motion.
+    /// The figures, by motion.
     pub measured: Vec<Measured>,
 }
 
@@ -211,7 +211,7 @@ pub struct Row {
 /// is called after each regulator.
 ///
 /// # Errors
-/// As [`Regulators::measure`].
+/// Those of [`Regulators::measure`].
 pub fn rows(
     regulators: &Regulators,
     motions: &[Motion],
@@ -238,7 +238,7 @@ pub fn rows(
 /// \[µm\]. `progress` is called after each regulator.
 ///
 /// # Errors
-/// As [`Regulators::measure`].
+/// Those of [`Regulators::measure`].
 pub fn sweeps(
     regulators: &Regulators,
     feed_mm_s: f64,
@@ -250,7 +250,7 @@ pub fn sweeps(
     for choice in Choice::SHOWN {
         let mut circles = Vec::with_capacity(frequencies_hz.len());
         for &frequency_hz in frequencies_hz {
-            let circle = Motion::Circle(Turning::new(frequency_hz, feed_mm_s));
+            let circle = Motion::Circle(Circle::new(frequency_hz, feed_mm_s));
             let measured = regulators.measure(choice, &circle, &[resolution_um])?;
             circles.extend(measured.last().map(|&last| (frequency_hz, last)));
         }
@@ -260,22 +260,22 @@ pub fn sweeps(
     Ok(sweeps)
 }
 
-/// What the axes are to do.
+/// The motion of the axes.
 #[derive(Clone, Debug)]
 pub enum Motion {
     /// A circle at constant feed; measured when it has settled.
-    Circle(Turning),
+    Circle(Circle),
     /// A program (name, G-code), with the machine's own limits; measured from its first to its last tick.
     Program(&'static str, &'static str),
 }
 
 impl Motion {
-    /// As tables call it.
+    /// The name in tables.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
-            Self::Circle(turning) => {
-                format!("circle at {} Hz, {} mm/min", turning.frequency_hz, turning.feed_mm_s * 60.0)
+            Self::Circle(circle) => {
+                format!("circle at {} Hz, {} mm/min", circle.frequency_hz, circle.feed_mm_s * 60.0)
             }
             Self::Program(name, _) => (*name).to_owned(),
         }
@@ -283,7 +283,7 @@ impl Motion {
 
     fn record(&self, machine: &Machine) -> Result<Recording, DriveError> {
         match self {
-            Self::Circle(turning) => turning.record(machine),
+            Self::Circle(circle) => circle.record(machine),
             Self::Program(name, text) => {
                 Recording::of((*name).to_owned(), text, machine.clone(), machine.path.feed_mm_s)
             }
@@ -292,13 +292,13 @@ impl Motion {
 
     fn measured(&self, recording: &Recording) -> Result<core::ops::Range<usize>, DriveError> {
         match self {
-            Self::Circle(turning) => recording.steady(turning.settle_s, turning.span_s()),
+            Self::Circle(circle) => recording.steady(circle.settle_s, circle.span_s()),
             Self::Program(..) => Ok(0..recording.ticks.len()),
         }
     }
 }
 
-/// What a regulator did on a motion.
+/// The figures of a regulator on a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// Steps of the set positions \[µm\]; 0 if they were exact.
@@ -325,7 +325,7 @@ impl Measured {
         let exact_ticks = &exact.recording.ticks[range.clone()];
         let axes = || ticks.iter().flat_map(|tick| &tick.axes);
         let contour_um = match motion {
-            Motion::Circle(turning) => circle::figures(&found.recording, turning)?.contour_um(),
+            Motion::Circle(circle) => circle::figures(&found.recording, circle)?.contour_um(),
             Motion::Program(..) => ticks.iter().map(|tick| tick.contour_um).fold(0.0, f64::max),
         };
         let (mut output_noise_v, mut current_noise) = (0.0_f64, 0.0_f64);
@@ -374,7 +374,7 @@ fn peer_gains(machine: &Machine) -> [PeerGains; AXES] {
     })
 }
 
-/// Which differences a fit uses.
+/// The differences that a fit uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Differences {
     /// FF2; FF3 is 0.
@@ -387,7 +387,7 @@ pub enum Differences {
 /// FF1 stays the machine's. Axes that no circle moves keep the machine's gains.
 ///
 /// # Errors
-/// As [`Turning::record`].
+/// Those of [`Circle::record`].
 pub fn fit(
     machine: &Machine,
     feed_mm_s: f64,
@@ -401,13 +401,13 @@ pub fn fit(
     }
     let mut circles = Vec::with_capacity(FIT_HZ.len());
     for frequency_hz in FIT_HZ {
-        let turning = Turning::new(frequency_hz, feed_mm_s);
-        circles.push((turning, turning.record(&machine)?));
+        let circle = Circle::new(frequency_hz, feed_mm_s);
+        circles.push((circle, circle.record(&machine)?));
     }
     for _ in 0..FIT_ROUNDS {
         // Normal equations of ε + ∂ε/∂FF2·x + ∂ε/∂FF3·y = 0 for every axis: Σ of products of ε and its derivatives.
         let mut sums = [[[0.0_f64; 3]; 3]; AXES];
-        for (turning, recording) in &circles {
+        for (circle, recording) in &circles {
             let errors = |change: [f64; 2]| -> Result<Vec<[f64; AXES]>, DriveError> {
                 let changed = gains.map(|gains| PeerGains {
                     ff2_s: gains.ff2_s + change[0],
@@ -415,7 +415,7 @@ pub fn fit(
                     ..gains
                 });
                 let found = replay(recording, &Law::Peer(changed), 0.0)?.recording;
-                let ticks = turning.measured(&found)?;
+                let ticks = circle.measured(&found)?;
                 Ok(ticks.iter().map(|tick| tick.axes.map(|axis| axis.err_um)).collect())
             };
             let base = errors([0.0, 0.0])?;

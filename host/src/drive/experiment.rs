@@ -1,7 +1,7 @@
-//! A program on a changed machine, and what it leaves behind.
+//! A program on a changed machine, and its recording.
 //!
 //! Limits of planning protect a machine in production. An experiment asks what the drive itself can do, so it raises
-//! them as far as its motion needs; the range of the output stays what it is.
+//! them as far as its motion needs. The range of the output stays unchanged.
 
 use std::ops::Range;
 
@@ -32,9 +32,9 @@ pub enum DriveError {
     /// A quantity is out of its range.
     #[error("found {quantity} {value}, expected {expected}")]
     Quantity {
-        /// Its name and unit.
+        /// The quantity's name and unit.
         quantity: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: f64,
         /// The range.
         expected: String,
@@ -47,9 +47,9 @@ pub enum DriveError {
     Feed {
         /// The axis's name.
         axis: String,
-        /// What was asked for \[mm/min\].
+        /// The feed that was asked for \[mm/min\].
         feed_mm_min: f64,
-        /// What the output reaches \[mm/min\].
+        /// The greatest feed of the output \[mm/min\].
         reachable_mm_min: f64,
         /// The output's limit \[V\].
         limit_v: f64,
@@ -62,9 +62,9 @@ pub enum DriveError {
     Counter {
         /// The axis's name.
         axis: String,
-        /// What was asked for \[mm/min\].
+        /// The feed that was asked for \[mm/min\].
         feed_mm_min: f64,
-        /// What the register can follow \[mm/min\].
+        /// The greatest feed that the register can follow \[mm/min\].
         most_mm_min: f64,
     },
     /// The motion is no program.
@@ -79,7 +79,7 @@ pub enum DriveError {
     /// The run ended in a fault.
     #[error("{experiment}: {}{} in tick {}: {}", .fault.fault, on_axis(.fault), .fault.tick, .fault.detail)]
     Fault {
-        /// What was run.
+        /// The experiment.
         experiment: String,
         /// The fault.
         fault: TracedFault,
@@ -87,7 +87,7 @@ pub enum DriveError {
     /// The planned feed was not held long enough to be measured.
     #[error("{experiment}: found {found_s:.3} s at constant feed, expected {needed_s:.3} s")]
     NotSteady {
-        /// What was run.
+        /// The experiment.
         experiment: String,
         /// How long the feed was constant \[s\].
         found_s: f64,
@@ -99,13 +99,13 @@ pub enum DriveError {
     Identification {
         /// The axis's name.
         axis: String,
-        /// What was found.
+        /// The value that was found.
         source: IdentifyError,
     },
     /// The axis did not move, so there is nothing to relate.
     #[error("{experiment}: axis {axis} did not move")]
     NoMotion {
-        /// What was run.
+        /// The experiment.
         experiment: String,
         /// The axis's name.
         axis: String,
@@ -125,7 +125,7 @@ pub(super) fn within(quantity: &'static str, value: f64, range: (f64, f64)) -> R
     Err(DriveError::Quantity { quantity, value, expected })
 }
 
-/// Which feedforward terms of the machine act.
+/// The feedforward terms of the machine that act.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Terms {
     /// The velocity's only.
@@ -140,7 +140,7 @@ pub enum Terms {
 }
 
 impl Terms {
-    /// As figures and options call it.
+    /// The name in figures and options.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -200,7 +200,7 @@ pub(super) fn fastest_mm_s(machine: &Machine, axes: &[usize]) -> f64 {
     axes.iter().filter_map(|&axis| machine.axes.get(axis)).map(of).fold(f64::INFINITY, f64::min)
 }
 
-/// What an experiment's motion needs of a machine.
+/// The limits that an experiment's motion needs of a machine.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Demands {
     pub(super) feed_mm_s: f64,
@@ -252,7 +252,7 @@ pub(super) fn raised(machine: &Machine, demands: &Demands, moved: &[usize]) -> R
 /// A run of an experiment.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// What was run, for messages.
+    /// The experiment's name, for messages.
     pub experiment: String,
     /// The machine as it ran: gains and limits of the experiment.
     pub machine: Machine,
@@ -276,10 +276,10 @@ impl Recording {
         Self::with(&RunOptions::default(), experiment, program, machine, feed_mm_s)
     }
 
-    /// [`Recording::of`], run as `options` say, but unguarded: the axis is to be seen beyond what its guards take for sound.
+    /// [`Recording::of`], run as `options` say, but without guards: the axis may be driven beyond their bounds.
     ///
     /// # Errors
-    /// As there, and a correction that can't be used.
+    /// Those of [`Recording::of`], and a correction that can't be used.
     pub fn with(
         options: &RunOptions<'_>,
         experiment: String,

@@ -9,8 +9,8 @@
 use core::f64::consts::TAU;
 
 use super::HALF_POWER;
+use super::circle_motion::Circle;
 use super::experiment::{DriveError, Recording, differences};
-use super::turning::Turning;
 use crate::machine::Machine;
 use crate::sine::{Baseline, as_lag_rad, fit};
 
@@ -37,7 +37,7 @@ pub struct Response {
     pub third_harmonic: f64,
 }
 
-/// Both axes at one frequency.
+/// The responses of both axes at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HarmonicFigures {
     /// Frequency \[Hz\].
@@ -48,12 +48,12 @@ pub struct HarmonicFigures {
     pub axes: [Response; 2],
 }
 
-/// Which amplitude a bandwidth is told by.
+/// The amplitude that a bandwidth is read from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Amplitude {
     /// Half the distance from peak to peak.
     Swing,
-    /// Of the fundamental.
+    /// The fundamental's amplitude.
     Fundamental,
 }
 
@@ -72,33 +72,33 @@ impl Response {
 /// [`open_loop`](super::experiment::open_loop)`(&machine)`.
 ///
 /// # Errors
-/// As [`Turning::record`]; an axis that does not move.
-pub fn measure(machine: &Machine, turning: &Turning) -> Result<HarmonicFigures, DriveError> {
-    figures(&turning.record(machine)?, turning)
+/// Those of [`Circle::record`]; an axis that does not move.
+pub fn measure(machine: &Machine, circle: &Circle) -> Result<HarmonicFigures, DriveError> {
+    figures(&circle.record(machine)?, circle)
 }
 
 /// Reads a recording of the motion.
 ///
 /// # Errors
 /// The feed was not held long enough, or an axis did not move.
-pub fn figures(recording: &Recording, turning: &Turning) -> Result<HarmonicFigures, DriveError> {
-    let [first, second] = turning.axes();
+pub fn figures(recording: &Recording, circle: &Circle) -> Result<HarmonicFigures, DriveError> {
+    let [first, second] = circle.axes();
     Ok(HarmonicFigures {
-        frequency_hz: turning.frequency_hz,
-        feed_mm_s: turning.feed_mm_s,
-        axes: [response(recording, turning, first)?, response(recording, turning, second)?],
+        frequency_hz: circle.frequency_hz,
+        feed_mm_s: circle.feed_mm_s,
+        axes: [response(recording, circle, first)?, response(recording, circle, second)?],
     })
 }
 
-fn response(recording: &Recording, turning: &Turning, axis: usize) -> Result<Response, DriveError> {
-    let ticks = turning.measured(recording)?;
+fn response(recording: &Recording, circle: &Circle, axis: usize) -> Result<Response, DriveError> {
+    let ticks = circle.measured(recording)?;
     let tick_s = recording.tick_s();
     let set: Vec<f64> = ticks.iter().map(|tick| tick.axes[axis].set_mm).collect();
     let actual: Vec<f64> = ticks.iter().map(|tick| tick.axes[axis].act_mm).collect();
     let (set, actual) = (differences(&set, tick_s), differences(&actual, tick_s));
-    let omega_per_s = TAU * turning.frequency_hz;
+    let omega_per_s = TAU * circle.frequency_hz;
     // As many whole periods as there are: harmonics and drift then do not leak into the sine.
-    let period = 1.0 / (turning.frequency_hz * tick_s);
+    let period = 1.0 / (circle.frequency_hz * tick_s);
     let periods = ((set.len() as f64 + 0.5) / period).floor().max(1.0);
     let whole = ((periods * period).round() as usize).min(set.len());
     let [set, actual] = [&set[..whole], &actual[..whole]];
@@ -128,16 +128,16 @@ fn response(recording: &Recording, turning: &Turning, axis: usize) -> Result<Res
 /// \[Hz\]; none if it does not. Looks in steps of `by_hz` and then halves.
 ///
 /// # Errors
-/// As [`measure`].
+/// Those of [`measure`].
 pub fn bandwidth(
     machine: &Machine,
-    start: &Turning,
+    start: &Circle,
     (from_hz, to_hz, by_hz): (f64, f64, f64),
     axis: usize,
     amplitude: Amplitude,
 ) -> Result<Option<f64>, DriveError> {
     let is_below = |frequency_hz: f64| -> Result<bool, DriveError> {
-        let found = measure(machine, &Turning { frequency_hz, ..*start })?;
+        let found = measure(machine, &Circle { frequency_hz, ..*start })?;
         Ok(found.axes[axis.min(1)].ratio(amplitude) < HALF_POWER)
     };
     first_crossing((from_hz, to_hz, by_hz), RESOLUTION_HZ, is_below)

@@ -1,13 +1,13 @@
-//! The runs that identification asks for, through the kernel.
+//! The runs of identification, through the kernel.
 //!
-//! Steps there and back move one axis at a time, circles two. All are open loop, as in S4: what the drive does then is
-//! not bent by a regulator. Of each run only the converter's output and the encoder's readings are used.
+//! Steps there and back move one axis at a time, circles two. All are open loop, as in S4, so no
+//! regulator bends the drive's answer. Only the converter's output and the encoder's readings of each run are used.
 
 use std::thread;
 
+use super::circle_motion::{Circle, plane_of};
 use super::experiment::{DriveError, Recording, fastest_mm_s, open_loop, raised};
 use super::step;
-use super::turning::{Turning, plane_of};
 use crate::identify::{AxisRecording, Excitation, Identification, identification_plan, identify};
 use crate::machine::Machine;
 use crate::trace::AXES;
@@ -54,13 +54,13 @@ pub fn recordings(machine: &Machine, axis: usize) -> Result<Vec<AxisRecording>, 
                     steps(machine, axis, feed_mm_s, cruise_s, rest_s)?
                 }
                 Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods } => {
-                    let turning = Turning {
+                    let circle = Circle {
                         plane,
                         settle_s: 0.0,
                         measured_s: f64::from(periods) / frequency_hz,
-                        ..Turning::new(frequency_hz, amplitude_mm_s)
+                        ..Circle::new(frequency_hz, amplitude_mm_s)
                     };
-                    turning.record(&open_loop(machine))?
+                    circle.record(&open_loop(machine))?
                 }
             };
             Ok(of_axis(&recording, axis, excitation.harmonic_hz()))

@@ -1,19 +1,19 @@
 //! Harmonic motion under a growing load: the velocity turns triangular, the acceleration flat (S4).
 //!
 //! Where the current limit acts, the acceleration stays at what the limit gives the load. From this plateau the
-//! admissible acceleration is read, or the load that a motion admits. Only a simulated machine changes its load at a
-//! word.
+//! admissible acceleration is read, or the load that a motion admits. Only a simulated machine changes its load on
+//! request.
 
+use super::circle_motion::Circle;
 use super::experiment::{DriveError, Recording, open_loop};
 use super::harmonic::{self, Response};
-use super::turning::Turning;
 use crate::machine::Machine;
 
 /// Time over which accelerations are averaged \[s\]: second differences of readings are coarse.
 const AVERAGED_S: f64 = 0.005;
 /// The share of the time for which the plateau is held at least when the velocity is a triangle, but for its corners.
 const PLATEAU_SHARE: f64 = 0.5;
-/// From this third harmonic on the velocity counts as a triangle; a triangle has 1/9, a sine none.
+/// The third harmonic from which the velocity counts as a triangle. A triangle has 1/9, a sine none.
 const TRIANGLE_FROM: f64 = 0.03;
 
 /// An axis under one load.
@@ -47,16 +47,16 @@ pub fn loaded(machine: &Machine, axis: usize, load_inertia_ratio: f64) -> Machin
 /// A load below 0 or above 1000; otherwise as [`harmonic::measure`].
 pub fn measure(
     machine: &Machine,
-    turning: &Turning,
+    circle: &Circle,
     axis: usize,
     load_inertia_ratio: f64,
 ) -> Result<(InertiaFigures, Recording), DriveError> {
     super::experiment::within("load inertia ratio", load_inertia_ratio, (0.0, 1000.0))?;
-    let recording = turning.record(&open_loop(&loaded(machine, axis, load_inertia_ratio)))?;
-    let figures = harmonic::figures(&recording, turning)?;
+    let recording = circle.record(&open_loop(&loaded(machine, axis, load_inertia_ratio)))?;
+    let figures = harmonic::figures(&recording, circle)?;
     let response = figures.axes.into_iter().find(|found| found.axis == axis).unwrap_or(figures.axes[0]);
     let mut accel: Vec<f64> =
-        accelerations(&recording, turning, response.axis)?.into_iter().map(|(_, a)| a.abs()).collect();
+        accelerations(&recording, circle, response.axis)?.into_iter().map(|(_, a)| a.abs()).collect();
     accel.sort_unstable_by(f64::total_cmp);
     let at_share = |share: f64| {
         let last = accel.len().saturating_sub(1);
@@ -78,10 +78,10 @@ pub fn measure(
 /// The feed was not held long enough.
 pub fn accelerations(
     recording: &Recording,
-    turning: &Turning,
+    circle: &Circle,
     axis: usize,
 ) -> Result<Vec<(f64, f64)>, DriveError> {
-    let ticks = turning.measured(recording)?;
+    let ticks = circle.measured(recording)?;
     let tick_s = recording.tick_s();
     let half = ((0.5 * AVERAGED_S / tick_s).round() as usize).max(1);
     let span_s = half as f64 * tick_s;

@@ -3,7 +3,7 @@
 use hal_sim::DriveParameters;
 use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, PREVIEW_TICKS_MAX};
 
-/// From this velocity on the whole Coulomb friction is compensated \[mm/s\]: at 900 mm/s² (4 Hz in S4's circles) it is
+/// Velocity from which the whole Coulomb friction is compensated \[mm/s\]: at 900 mm/s² (4 Hz in S4's circles) it is
 /// passed within about a tick.
 pub const REVERSAL_MM_S: f64 = 0.5;
 

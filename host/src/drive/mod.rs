@@ -6,8 +6,8 @@
 //! knows as well: set positions, encoder readings, output voltages. Runs in the background. Fails with a [`DriveError`]
 //! if the machine can't do the motion, before anything moves, or if a fault ended it.
 //!
-//! - [`experiment`]: a program on a changed machine, and the [`Recording`] it leaves;
-//! - [`turning`]: circles of constant feed, the motion of two experiments;
+//! - [`experiment`]: a program on a changed machine, and its [`Recording`];
+//! - [`circle_motion`]: circles of constant feed, the motion of two experiments;
 //! - [`step`]: the feed steps within one tick, open loop;
 //! - [`harmonic`]: amplitude and phase of the velocity;
 //! - [`identification`]: the runs that [`crate::identify`] asks for;
@@ -17,8 +17,8 @@
 //!   values once more, under another regulator;
 //! - [`learning`]: a correction of a path that is driven again and again;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
-//! - [`spectrum`], [`model`]: the mathematics of it; [`inverse`](mod@inverse): what undoes it;
-//! - [`mod@reference`]: what S4 measured, and what the reference machine has to give.
+//! - [`spectrum`], [`model`]: the mathematics of it; [`inverse`](mod@inverse): the kernel's inverse of a drive;
+//! - [`mod@reference`]: S4's measurements, and the figures that the reference machine has to reach.
 
 pub mod bode;
 pub mod circle;
@@ -36,7 +36,7 @@ pub mod replay;
 
 pub mod spectrum;
 pub mod step;
-pub mod turning;
+pub mod circle_motion;
 
 pub use experiment::{DriveError, Recording, Terms};
 

@@ -1,4 +1,4 @@
-//! The drive's linear model: what it would do with a small signal, without Coulomb friction and current limit.
+//! The drive's linear model, for small signals: without Coulomb friction and current limit.
 
 use core::f64::consts::TAU;
 use core::ops::{Add, Div, Mul, Sub};

@@ -1,7 +1,7 @@
 //! A regulator as machine controllers commonly have it: it knows positions only, and differences them.
 //!
-//! Consumes a position command and a position per servo period; produces a velocity command. In words of this project,
-//! what LinuxCNC's HAL component `pid` computes with its default settings and without its limits on single terms:
+//! Consumes a position command and a position per servo period; produces a velocity command. It computes what
+//! LinuxCNC's HAL component `pid` does with its default settings and without its limits on single terms:
 //!
 //! ```text
 //! ε    = c[n−1] − x[n]                      its error-previous-target: the motion is to be at c[n] one period later
@@ -9,7 +9,7 @@
 //! U    = bias + P·ε + I·Σε·T + D·(D1 − (x[n] − x[n−1])/T) + FF0·c + FF1·D1 + FF2·D2 + FF3·D3,  within ±maxoutput
 //! ```
 //!
-//! **What its differences are of.** From c[n−1], to which the error refers, D1 is the velocity half a period later, D2
+//! **Its differences.** Seen from c[n−1], to which the error refers, D1 is the velocity half a period later, D2
 //! the acceleration then, D3 the jerk half a period before. With the period T the series of its feedforward is
 //! s·(FF1 + (FF1·T/2 + FF2)·s + (FF1·T²/6 + FF3)·s²): the gains of analytic feedforward, less what differencing adds.
 
@@ -18,19 +18,19 @@ use motion_kernel::axis::Feedforward;
 /// Gains of the regulator; all of them finite.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PeerGains {
-    /// Of the error \[1/s\].
+    /// The gain of the error \[1/s\].
     pub p_per_s: f64,
-    /// Of the error's sum \[1/s²\].
+    /// The gain of the error's sum \[1/s²\].
     pub i_per_s2: f64,
-    /// Of the error's change \[1\].
+    /// The gain of the error's change \[1\].
     pub d: f64,
-    /// Of the position command \[1/s\].
+    /// The gain of the position command \[1/s\].
     pub ff0_per_s: f64,
-    /// Of its first difference \[1\].
+    /// The gain of its first difference \[1\].
     pub ff1: f64,
-    /// Of its second difference \[s\].
+    /// The gain of its second difference \[s\].
     pub ff2_s: f64,
-    /// Of its third difference \[s²\].
+    /// The gain of its third difference \[s²\].
     pub ff3_s2: f64,
 }
 

@@ -1,21 +1,21 @@
-//! What S4 measured, and what the reference machine has to give.
+//! S4's measurements, and the figures that the reference machine has to reach.
 //!
 //! The reference drive was fitted so that S4's figures come out together. The expected values are those of an
 //! independent model of drive, converter and regulator in double precision; a run through planner, streams and kernel
 //! has to agree within the tolerances. The tests and the tables of `motion drive` read these same constants.
 
+use super::circle_motion::Circle;
 use super::experiment::DriveError;
 use super::step::Step;
-use super::turning::Turning;
 use super::{Terms, circle, experiment, harmonic, step};
 use crate::machine::Machine;
 
 /// A figure to be met.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figure {
-    /// What it is.
+    /// The figure's name.
     pub quantity: &'static str,
-    /// Its unit.
+    /// The figure's unit.
     pub unit: &'static str,
     /// S4's value.
     pub paper: f64,
@@ -45,9 +45,9 @@ impl Figure {
 /// A figure and what was measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
-    /// What had to be met.
+    /// The range that had to be met.
     pub figure: Figure,
-    /// What was measured, in the figure's unit; not a number if there was nothing to measure.
+    /// The measured value, in the figure's unit; not a number if there was nothing to measure.
     pub measured: f64,
 }
 
@@ -91,11 +91,11 @@ pub const PHASE_AT_28_HZ: Figure = Figure::new("phase at 28 Hz, 9549 mm/min", "�
 pub const FOLLOWING_V: Figure = Figure::new("following error of X at 4 Hz, V", "µm", 11.0, (10.491, 0.5));
 /// Following error of X with all three.
 pub const FOLLOWING_VAJ: Figure = Figure::new("following error of X at 4 Hz, VAJ", "µm", 4.0, (4.159, 0.5));
-/// Where the contour error passes 20 µm with velocity feedforward.
+/// The frequency at which the contour error passes 20 µm with velocity feedforward.
 pub const LIMIT_V: Figure = Figure::new("contour error ≤ 20 µm up to, V", "Hz", 5.5, (5.388, 0.2));
-/// Where it passes 20 µm with velocity and acceleration.
+/// The frequency at which it passes 20 µm with velocity and acceleration.
 pub const LIMIT_VA: Figure = Figure::new("contour error ≤ 20 µm up to, VA", "Hz", 9.0, (8.861, 0.3));
-/// Where it passes 20 µm with all three.
+/// The frequency at which it passes 20 µm with all three.
 pub const LIMIT_VAJ: Figure = Figure::new("contour error ≤ 20 µm up to, VAJ", "Hz", 10.0, (10.1, 0.3));
 /// Greatest form deviation at 1, 2, … 10 Hz.
 pub const FORM_TO_10_HZ: Figure = Figure::new("form deviation up to 10 Hz, VAJ", "µm", 9.0, (5.687, 0.6));
@@ -112,7 +112,7 @@ pub fn is_reference(machine: &Machine) -> bool {
 /// The figures of S4's step; `step` is what [`Step::reference`] gave.
 ///
 /// # Errors
-/// As [`Step::measure`].
+/// Those of [`Step::measure`].
 pub fn compare_step(machine: &Machine, step: &step::StepFigures) -> Result<Vec<Comparison>, DriveError> {
     let faster = Step { feed_mm_s: BANDWIDTH_FEED_MM_S, ..Step::reference() };
     let (fast, _) = faster.measure(machine)?;
@@ -130,13 +130,12 @@ pub fn compare_step(machine: &Machine, step: &step::StepFigures) -> Result<Vec<C
 /// The figures of S4's harmonic motion, of the first axis.
 ///
 /// # Errors
-/// As [`harmonic::measure`].
+/// Those of [`harmonic::measure`].
 pub fn compare_harmonic(machine: &Machine) -> Result<Vec<Comparison>, DriveError> {
     let open = experiment::open_loop(machine);
-    let turning = Turning::new(28.0, BANDWIDTH_FEED_MM_S);
-    let bandwidth_hz =
-        harmonic::bandwidth(&open, &turning, (16.0, 40.0, 4.0), 0, harmonic::Amplitude::Swing)?;
-    let [x, _] = harmonic::measure(&open, &turning)?.axes;
+    let circle = Circle::new(28.0, BANDWIDTH_FEED_MM_S);
+    let bandwidth_hz = harmonic::bandwidth(&open, &circle, (16.0, 40.0, 4.0), 0, harmonic::Amplitude::Swing)?;
+    let [x, _] = harmonic::measure(&open, &circle)?.axes;
     Ok(vec![
         HARMONIC_BANDWIDTH.against(bandwidth_hz.unwrap_or(f64::NAN)),
         PHASE_AT_28_HZ.against(x.phase_rad.to_degrees()),
@@ -146,7 +145,7 @@ pub fn compare_harmonic(machine: &Machine) -> Result<Vec<Comparison>, DriveError
 /// The figures of S4's circle test.
 ///
 /// # Errors
-/// As [`circle::measure`].
+/// Those of [`circle::measure`].
 pub fn compare_circle(machine: &Machine) -> Result<Vec<Comparison>, DriveError> {
     let feed_mm_s = CIRCLE_FEED_MM_S;
     let [v, va, vaj] = [Terms::V, Terms::Va, Terms::Vaj].map(|terms| terms.of(machine));

@@ -18,7 +18,7 @@ use crate::simulate::contour::Contour;
 use crate::simulate::hardware::{SimulatedHardware, simulated};
 use crate::trace::{AXES, TraceRow};
 
-/// What regulates.
+/// The regulator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
     /// The kernel's regulator in f32 with the gains of the recording's machine.

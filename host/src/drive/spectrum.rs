@@ -16,7 +16,7 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// From backward differences of positions: `velocities[i]` is the mean velocity over tick i after the step.
+    /// The spectrum from backward differences of positions: `velocities[i]` is the mean velocity over tick i after the step.
     #[must_use]
     pub fn new(velocities: &[f64], tick_s: f64) -> Self {
         let mut before = 0.0;

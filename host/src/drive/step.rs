@@ -33,7 +33,7 @@ pub struct Step {
     pub duration_s: f64,
 }
 
-/// What a step of the feed within one tick takes.
+/// The limits that a step of the feed within one tick needs.
 pub(super) fn demands(feed_mm_s: f64, tick_s: f64) -> Demands {
     let steeper = STEEPNESS / tick_s;
     let accel_mm_s2 = feed_mm_s * steeper;
@@ -45,7 +45,7 @@ pub(super) fn demands(feed_mm_s: f64, tick_s: f64) -> Demands {
     }
 }
 
-/// What is read from a step.
+/// The figures of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepFigures {
     /// Dead time by the tangent method \[s\].
@@ -54,7 +54,8 @@ pub struct StepFigures {
     pub time_constant_s: f64,
     /// Greatest velocity beyond the step, as a part of it; 0 if there is none.
     pub overshoot: f64,
-    /// When the velocity was last outside ± [`BAND_MM_S`] \[s\]; none if that was at the end of the recording.
+    /// The time when the velocity was last outside ± [`BAND_MM_S`] \[s\]; none if that was at the end of the
+    /// recording.
     pub settling_s: Option<f64>,
     /// Greatest second difference of encoder readings \[mm/s²\].
     pub peak_accel_mm_s2: f64,
@@ -90,7 +91,7 @@ impl Step {
     /// Runs it and reads the figures.
     ///
     /// # Errors
-    /// As [`Step::record`], and an axis that does not follow.
+    /// Those of [`Step::record`], and an axis that does not follow.
     pub fn measure(&self, machine: &Machine) -> Result<(StepFigures, StepResponse), DriveError> {
         let recording = self.record(machine)?;
         let response = self.response(&recording);
@@ -103,7 +104,7 @@ impl Step {
         }
     }
 
-    /// What the axis did from the tick of the step on, as long as the step was held.
+    /// The axis' motion from the tick of the step on, as long as the step was held.
     #[must_use]
     pub fn response(&self, recording: &Recording) -> StepResponse {
         let rest_v = recording.machine.axes[self.axis].output_offset_v;

@@ -1,7 +1,7 @@
-//! Arcs: from what the words give to centre, radii and sweep.
+//! Arcs: from words to centre, radii and sweep.
 //!
 //! Everything happens in the arc's plane, with exact integers \[10⁻¹⁰ mm\] relative to the start as long as the
-//! result is an integer. So a full circle is told from an arc of next to no length without a tolerance.
+//! result is an integer. So a full circle differs from an arc of next to no length without a tolerance.
 
 use super::decimal::Length;
 use super::error::Problem;

@@ -1,4 +1,4 @@
-//! Exact decimals: what a program writes is what is kept.
+//! Exact decimals: a number is kept as the program writes it.
 
 use std::fmt;
 
@@ -16,9 +16,9 @@ pub struct Decimal(i64);
 pub(super) enum NumberFault {
     /// No text at all.
     Missing,
-    /// Not `[+-]digits[.digits]`.
+    /// The text is not `[+-]digits[.digits]`.
     Malformed,
-    /// Beyond the range.
+    /// The number is beyond the range.
     TooLarge,
     /// Digits other than zero after the tenth decimal.
     TooManyDecimals,
@@ -96,7 +96,7 @@ pub struct Length(i64);
 /// Why a number is no [`Length`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LengthFault {
-    /// Beyond ±[`Length::LIMIT`].
+    /// The length is beyond ±[`Length::LIMIT`].
     OutOfRange,
     /// An inch value that is no whole count of 10⁻¹⁰ mm.
     Inexact,

@@ -1,4 +1,4 @@
-//! What was found, where, and what was expected instead.
+//! Errors of a program: what was found, where, and what was expected instead.
 
 use super::decimal::Length;
 use super::program::Plane;
@@ -14,7 +14,7 @@ pub struct GcodeError {
     pub line: u32,
     /// Column in characters, from 1.
     pub column: u32,
-    /// What is wrong there.
+    /// The problem at that place.
     pub problem: Problem,
 }
 
@@ -23,7 +23,7 @@ pub struct GcodeError {
 pub(super) struct Located {
     /// Byte offset in the line.
     pub(super) offset: usize,
-    /// What is wrong there.
+    /// The problem at that place.
     pub(super) problem: Problem,
 }
 
@@ -43,7 +43,7 @@ impl GcodeError {
     }
 }
 
-/// What is wrong in a program. Words are quoted without blanks and in upper case.
+/// A problem in a program. Words are quoted without blanks and in upper case.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the variants and their fields are")]
@@ -135,9 +135,11 @@ pub enum Problem {
     SplineOutsidePlane { word: String },
     #[error("found {word} alone in a line of G5, expected {first} and {second}")]
     SplineControlIncomplete { word: String, first: char, second: char },
-    #[error("found a first G5 without I and J, expected the way from its start to its first control point")]
+    #[error(
+        "found a first G5 without I and J, expected the offset from its start to its first control point"
+    )]
     SplineWithoutStart,
-    #[error("found G5 without P and Q, expected the way from its end to its second control point")]
+    #[error("found G5 without P and Q, expected the offset from its end to its second control point")]
     SplineWithoutEnd,
 }
 

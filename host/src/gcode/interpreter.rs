@@ -11,7 +11,7 @@ use super::program::{
 };
 use super::spline;
 
-/// State of a program being read: what it has asked for so far, and what is in force.
+/// State of a program being read: the steps up to here, and the modes in force.
 #[derive(Debug, Default)]
 pub(super) struct Interpreter {
     program: Program,

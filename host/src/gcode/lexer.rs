@@ -1,6 +1,6 @@
 //! The bytes of a line to its words.
 //!
-//! One pass, nothing looked at more than twice, no allocation unless it fails.
+//! One pass reads no byte more than twice and allocates nothing unless it fails.
 
 use super::decimal::{Decimal, NumberFault};
 use super::error::{Located, Problem, describe};
@@ -29,7 +29,7 @@ impl Word<'_> {
         Located::new(self.offset, problem(self.text()))
     }
 
-    /// For quantities that are 0 or more.
+    /// Refuses a negative number, for quantities that are 0 or more.
     pub(super) fn refuse_negative(&self) -> Result<(), Located> {
         if self.number.signum() < 0 { Err(self.problem(|word| Problem::Negative { word })) } else { Ok(()) }
     }
@@ -133,7 +133,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// What a byte that starts nothing is told.
+    /// The problem of a byte that starts no word.
     fn stray(&self, byte: u8) -> Located {
         let first = self.line.iter().take(self.next).all(|&before| is_blank(before));
         let problem = match byte {

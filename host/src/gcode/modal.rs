@@ -1,4 +1,4 @@
-//! What stays in force from line to line.
+//! The modes, which stay in force from line to line.
 
 use super::block::{Block, GGroup};
 use super::decimal::{Decimal, Length, LengthFault};
@@ -52,7 +52,7 @@ pub(super) enum Units {
     Inches,
 }
 
-/// What coordinates are counted from.
+/// The point that coordinates are counted from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Distance {
     /// The origin.
@@ -131,7 +131,7 @@ impl Modal {
         Ok(())
     }
 
-    /// Both P and Q are lengths.
+    /// The path mode of G64; P and Q are lengths.
     fn blend(&self, block: &Block<'_>) -> Result<PathMode, Located> {
         let mut lengths_mm = [None; 2];
         for (length_mm, letter) in lengths_mm.iter_mut().zip([b'P', b'Q']) {

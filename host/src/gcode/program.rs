@@ -1,4 +1,4 @@
-//! What a program asks for, in the order it asks.
+//! The steps of a program, in its order.
 
 use super::decimal::Length;
 use std::fmt;
@@ -6,9 +6,10 @@ use std::fmt;
 /// A program, read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Program {
-    /// What is to be done, in order. Moves of no length are not listed.
+    /// The steps, in order. Moves of no length are not listed.
     pub steps: Vec<Step>,
-    /// What was accepted and not acted on, at most one per kind, in the order of their first lines.
+    /// Words that were accepted and not acted on: at most one notice per kind, in the order of their first
+    /// lines.
     pub notices: Vec<Notice>,
 }
 
@@ -17,11 +18,11 @@ pub struct Program {
 pub struct Step {
     /// Line of the program that asks for it, from 1.
     pub line: u32,
-    /// What to do.
+    /// The action.
     pub kind: StepKind,
 }
 
-/// What a step does.
+/// The action of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepKind {
     /// G0 or G1.
@@ -37,7 +38,7 @@ pub enum StepKind {
         /// How long \[s\], 0 or more.
         seconds: f64,
     },
-    /// M0 or M1: stop until the operator goes on.
+    /// M0 or M1: stop until the operator resumes.
     Stop,
     /// M2, M30 or a closing `%`: nothing follows.
     End,
@@ -99,7 +100,7 @@ pub struct CubicMove {
     pub mode: PathMode,
 }
 
-/// The way to the next point of a quintic spline, which goes through all points of moves that follow each other.
+/// The move to the next point of a quintic spline, which passes through all points of consecutive moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThroughMove {
     /// The point before, X Y Z.
@@ -123,7 +124,7 @@ pub enum Feed {
     MmPerMin(f64),
 }
 
-/// What may happen to the path at a corner.
+/// The treatment of the path at a corner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PathMode {
     /// G61, and before either is programmed: the path is kept.
@@ -190,7 +191,7 @@ pub struct Notice {
     pub kind: NoticeKind,
     /// Line where it occurs first, from 1.
     pub first_line: u32,
-    /// In how many lines it occurs.
+    /// The number of lines in which it occurs.
     pub count: u32,
 }
 

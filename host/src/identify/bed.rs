@@ -1,8 +1,8 @@
 //! Is there a bed that moves?
 //!
 //! A bed of small mass ratio changes the axis' response in proportion to that ratio, at frequencies that can be tried
-//! one after the other. For each the part of the change that no other unknown could make is compared with what the
-//! best rigid model leaves; the frequency that would explain most of it is where the search starts.
+//! one after the other. For each the part of the change that no other unknown could make is compared with the residuals of
+//! the best rigid model. The search starts at the frequency that explains most of them.
 
 use super::parameters::{Unknown, Unknowns, without_bed};
 use super::search::{Found, Noise};

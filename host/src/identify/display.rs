@@ -127,7 +127,7 @@ impl Display for Figures {
     }
 }
 
-/// In µm, without the rounding of the readings.
+/// The residual in µm, without the rounding of the readings.
 fn round_micro(mm: f64) -> f64 {
     (mm * 1e3 * 1e6).round() / 1e6
 }

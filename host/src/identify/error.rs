@@ -1,4 +1,4 @@
-//! Why recordings say nothing about an axis.
+//! Reasons why recordings do not determine an axis.
 
 /// Recordings that can't be evaluated: what was found, and what is needed. Runs are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -9,25 +9,25 @@ pub enum IdentifyError {
     /// A tick length that no clock has.
     #[error("run {run}: tick of {tick_s} s, expected a positive finite number")]
     Tick {
-        /// Which recording.
+        /// The recording's index.
         run: usize,
-        /// What it says \[s\].
+        /// Its tick \[s\].
         tick_s: f64,
     },
     /// Runs of different clocks can't belong to one fit.
     #[error("run {run}: tick of {tick_s} s, expected {expected_s} s as in run 1")]
     DifferentTicks {
-        /// Which recording.
+        /// The recording's index.
         run: usize,
-        /// What it says \[s\].
+        /// Its tick \[s\].
         tick_s: f64,
-        /// What the first says \[s\].
+        /// The first recording's tick \[s\].
         expected_s: f64,
     },
-    /// Not one command for every position.
+    /// The recording does not have one command for every position.
     #[error("run {run}: {commands} commands and {positions} positions, expected as many of both")]
     Lengths {
-        /// Which recording.
+        /// The recording's index.
         run: usize,
         /// Ticks with a command.
         commands: usize,
@@ -37,7 +37,7 @@ pub enum IdentifyError {
     /// Too little to tell anything from.
     #[error("run {run}: {ticks} evaluated ticks, expected at least {needed}")]
     TooShort {
-        /// Which recording.
+        /// The recording's index.
         run: usize,
         /// Ticks after the lead-in.
         ticks: usize,
@@ -47,13 +47,13 @@ pub enum IdentifyError {
     /// A value that is not a number.
     #[error("run {run}: {quantity} {value} at tick {tick}, expected a finite number")]
     NotFinite {
-        /// Which recording.
+        /// The recording's index.
         run: usize,
-        /// By its field name.
+        /// The field's name.
         quantity: &'static str,
-        /// From 0.
+        /// The tick, from 0.
         tick: usize,
-        /// What stands there.
+        /// The value there.
         value: f64,
     },
     /// Commands without effect.
@@ -62,9 +62,9 @@ pub enum IdentifyError {
          is the drive enabled, the encoder connected?"
     )]
     NeverMoved {
-        /// Which recording.
+        /// The recording's index.
         run: usize,
-        /// From the smallest to the greatest reading \[mm\].
+        /// The difference of the greatest and the smallest reading \[mm\].
         travel_mm: f64,
         /// The same for the integral of the command \[mm\].
         commanded_mm: f64,
@@ -93,7 +93,7 @@ pub enum IdentifyError {
         run: usize,
         /// Root of the mean square \[mm\].
         error_mm: f64,
-        /// From the smallest to the greatest reading \[mm\].
+        /// The difference of the greatest and the smallest reading \[mm\].
         travel_mm: f64,
     },
 }

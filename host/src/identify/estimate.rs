@@ -1,4 +1,4 @@
-//! What identification finds out about an axis.
+//! The result of identification: estimates of an axis' parameters.
 
 use hal_sim::{BedMode, DriveParameters};
 
@@ -8,7 +8,7 @@ use super::step_reading::StepReading;
 /// Half an interval over the value, up to which a value counts as determined.
 pub const DETERMINED: f64 = 0.3;
 
-/// Intervals are wider than the scatter alone makes them: the search ends a little beside the optimum, because the
+/// Intervals are wider than the scatter alone makes them: the search ends close to the optimum but not in it, because the
 /// model is rough where it saturates. Over fifty simulated axes the true value lay within the interval in 80 to 100 of
 /// 100 cases, by parameter; for the acceleration limit in 76, with errors below 0.4 %.
 const MARGIN: f64 = 2.0;
@@ -17,7 +17,7 @@ const MARGIN: f64 = 2.0;
 /// contain what the model lacks: backlash, cogging, pitch errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// In the unit of the field that holds it.
+    /// The value, in the unit of the field that holds it.
     pub value: f64,
     /// The true value lies within value ± this in 95 of 100 cases, nominally; in the same unit. May be infinite.
     pub half_width_95: f64,
@@ -58,7 +58,8 @@ pub struct BedEstimate {
 }
 
 impl BedEstimate {
-    /// Where the machine shakes, with the moving mass on the bed: frequency/√(1 + mass ratio) \[Hz\].
+    /// The frequency at which the machine shakes with the moving mass on the bed: frequency/√(1 + mass ratio)
+    /// \[Hz\].
     #[must_use]
     pub fn resonance_hz(&self) -> f64 {
         self.frequency_hz.value / (1.0 + self.mass_ratio.value).sqrt()
@@ -144,7 +145,7 @@ pub struct Figures {
 pub struct RunMatch {
     /// Root of the mean square of recorded − simulated position \[mm\]. Rounding alone leaves 0.29 encoder steps.
     pub error_mm_rms: f64,
-    /// From the smallest to the greatest reading \[mm\].
+    /// The difference of the greatest and the smallest reading \[mm\].
     pub travel_mm: f64,
 }
 
@@ -153,9 +154,9 @@ pub struct RunMatch {
 pub struct Identification {
     /// The fitted model.
     pub parameters: AxisParametersFound,
-    /// Without model.
+    /// The figures that need no model.
     pub figures: Figures,
-    /// By run, in the order given.
+    /// The residuals by run, in the order given.
     pub runs: Vec<RunMatch>,
 }
 

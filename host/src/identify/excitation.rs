@@ -1,8 +1,8 @@
 //! Motions that show every parameter of an axis, and the set of them that identification asks for.
 //!
-//! What shows what: small steps the velocity controller and the delay; large steps the current limit, the
-//! viscous friction and, while the axis cruises, the bed that they left ringing; harmonic motion the bed once
-//! more and the split of the delay; slow motion the Coulomb friction.
+//! Small steps show the velocity controller and the delay. Large steps show the current limit, the viscous friction
+//! and, while the axis cruises, the ringing bed. Harmonic motion shows the bed again, and how the delay splits into
+//! dead time and lag. Slow motion shows the Coulomb friction.
 
 use core::f64::consts::PI;
 
@@ -95,7 +95,7 @@ impl Excitation {
         }
     }
 
-    /// What to put into [`AxisRecording::harmonic_hz`](super::AxisRecording::harmonic_hz).
+    /// The value for [`AxisRecording::harmonic_hz`](super::AxisRecording::harmonic_hz).
     #[must_use]
     pub fn harmonic_hz(&self) -> Option<f64> {
         match *self {

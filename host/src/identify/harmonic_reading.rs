@@ -15,7 +15,8 @@ pub struct HarmonicReading {
     pub amplitude_mm_s: f64,
     /// Actual over commanded amplitude.
     pub gain: f64,
-    /// Delay of the actual velocity behind a commanded one that is not held over ticks \[s\], below one period.
+    /// Delay of the actual velocity after a commanded one that is not held over ticks \[s\], below one
+    /// period.
     pub delay_s: f64,
 }
 

@@ -1,10 +1,10 @@
-//! Identification: what a servo axis is, from recordings of what was put out and what the encoder read.
+//! Identification: the parameters of a servo axis, from recordings of outputs and encoder readings.
 //!
 //! Consumes [`AxisRecording`]s of the motions in [`identification_plan`], or of any others that start at rest, from
 //! an open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, in about a second for
 //! ten seconds of recordings. It never sees the parameters of a simulation: a machine gives the same two columns.
 //!
-//! Two ways, side by side:
+//! Two methods:
 //!
 //! - **Figures without a model**: delay, time constant, overshoot and settling of steps, gain and delay of harmonic
 //!   motion, −3 dB bandwidth, sustained acceleration (S4).

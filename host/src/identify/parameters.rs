@@ -61,7 +61,7 @@ pub(super) const ALL: [Unknown; COUNT] = [
     BedMassRatio,
 ];
 
-/// Those of an axis on a rigid bed.
+/// The parameters of an axis on a rigid bed.
 pub(super) fn without_bed() -> &'static [Unknown] {
     &ALL[..COUNT - 3]
 }

@@ -1,7 +1,7 @@
-//! What a run leaves behind for identification: commands and encoder readings, tick by tick.
+//! The recording of a run for identification: commands and encoder readings, tick by tick.
 //!
-//! Nothing else is used: neither set-points nor gains of the regulator, and no parameter of a simulation. So a
-//! recording may come from an open or a closed loop.
+//! Identification uses nothing else: neither set-points nor gains of the regulator, and no parameter of a simulation.
+//! So a recording may come from an open or a closed loop.
 
 use super::IdentifyError;
 
@@ -60,7 +60,7 @@ impl AxisRecording {
         Ok(())
     }
 
-    /// Where an axis without any lag would be at the start of each tick \[mm\].
+    /// The position of an axis without any lag at the start of each tick \[mm\].
     pub(super) fn commanded_mm(&self) -> Vec<f64> {
         let mut position_mm = 0.0;
         let travelled = self.command_mm_s.iter().map(|command_mm_s| {
@@ -72,7 +72,7 @@ impl AxisRecording {
     }
 }
 
-/// From the smallest to the greatest value.
+/// The difference of the greatest and the smallest value.
 pub(super) fn span(values: &[f64]) -> f64 {
     let (least, most) =
         values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| (a.min(x), b.max(x)));

@@ -11,7 +11,7 @@ use super::confidence::correlation_factor;
 use super::parameters::{Unknown, Unknowns};
 use super::simulation::{Linearised, Residuals, Runs, squares};
 
-/// Where a search ended.
+/// The end of a search.
 #[derive(Clone, Debug)]
 pub(super) struct Found {
     pub(super) unknowns: Unknowns,
@@ -47,13 +47,13 @@ const CORRELATION_MAX: f64 = 30.0;
 const MOMENTS: f64 = 4.0;
 
 /// Error of one such moment with [`SUBSTEPS`](super::simulation::SUBSTEPS) \[mm\]: the integrator of the drive stops or
-/// goes on a sub-step too early or too late.
+/// continues a sub-step too early or too late.
 const ROUGHNESS_MM: f64 = 0.5e-3;
 
 /// Dampings tried for one step.
 const DAMPINGS: usize = 5;
 
-/// What the residuals of each run are worth: their variance, and how many independent readings they are.
+/// The weight of each run's residuals: their variance, and how many independent readings they are.
 #[derive(Clone, Debug)]
 pub(super) struct Noise {
     variances: Vec<f64>,
@@ -73,7 +73,7 @@ impl Noise {
         Self::with(runs, residuals, resolution_mm, independent)
     }
 
-    /// As if every reading were independent.
+    /// The weights as if every reading were independent.
     pub(super) fn uncorrelated(runs: &Runs, residuals: &Residuals, resolution_mm: f64) -> Self {
         Self::with(runs, residuals, resolution_mm, runs.readings())
     }

@@ -1,4 +1,4 @@
-//! The runs as the search sees them: recordings beside what the drive model makes of the same commands.
+//! The runs as the search sees them: recordings, and the drive model's answers to the same commands.
 
 use hal_sim::{DriveModel, DriveState};
 
@@ -20,7 +20,7 @@ const LAG_TICKS_MAX: f64 = 50.0;
 #[derive(Clone, Debug)]
 struct Run {
     command_mm_s: Vec<f64>,
-    /// From the first reading.
+    /// The position relative to the first reading.
     actual_mm: Vec<f64>,
     /// Per tick; 0 in the lead-in.
     weights: Vec<f64>,
@@ -41,7 +41,7 @@ pub(super) type Residuals = Vec<Vec<f64>>;
 #[derive(Clone, Debug)]
 pub(super) struct Linearised {
     pub(super) free: Vec<Unknown>,
-    /// By run, by free unknown.
+    /// The derivatives by run and by free unknown.
     pub(super) columns: Vec<Vec<Vec<f64>>>,
     /// JᵀJ by run.
     pub(super) normals: Vec<Symmetric>,
@@ -97,7 +97,7 @@ impl Runs {
         self.runs.iter().map(|run| run.weight_sum).collect()
     }
 
-    /// What the model leaves of each run; `None` if it can't be simulated.
+    /// The residuals of each run; `None` if it can't be simulated.
     pub(super) fn residuals(&self, unknowns: &Unknowns, substeps: u32) -> Option<Residuals> {
         let model = DriveModel::new(unknowns.drive(), self.tick_s, substeps).ok()?;
         let residuals: Residuals =

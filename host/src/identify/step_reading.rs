@@ -9,13 +9,13 @@ use super::recording::AxisRecording;
 pub struct StepReading {
     /// The command stepped to \[mm/s\].
     pub feed_mm_s: f64,
-    /// From the command's step to where the steepest tangent of the velocity leaves 0 \[s\].
+    /// The time from the command's step to where the steepest tangent of the velocity leaves 0 \[s\].
     pub delay_s: f64,
-    /// From there to where it reaches the final velocity \[s\].
+    /// The time from there to where the tangent reaches the final velocity \[s\].
     pub time_constant_s: f64,
-    /// By how much the velocity exceeds its final value, over that value.
+    /// The overshoot of the velocity, over its final value.
     pub overshoot: f64,
-    /// From the command's step to the last time outside of ±0.28 % of the final velocity, which is S4's
+    /// Time from the command's step to the last time outside of ±0.28 % of the final velocity, which is S4's
     /// ±0.02 m/min at 7.2 m/min \[s\]. `None` if the encoder does not resolve that, or it has not settled when the
     /// command changes again.
     pub settling_s: Option<f64>,

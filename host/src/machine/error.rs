@@ -15,7 +15,7 @@ pub struct MachineError {
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// What was found and what was expected.
+    /// The value that was found and what was expected.
     pub problem: String,
 }
 
@@ -25,7 +25,7 @@ pub struct MachineError {
 pub struct AxisError {
     /// The axis's name.
     pub axis: String,
-    /// What is wrong with it.
+    /// The problem.
     pub source: ScaleError,
 }
 

@@ -148,7 +148,7 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
     })
 }
 
-/// Where an axis has the keys that rules of several keys are about.
+/// The places of an axis' keys that rules of several keys are about.
 struct Places {
     name: Range<usize>,
     feed_mm_s: Range<usize>,
@@ -571,7 +571,7 @@ impl<'de> Deserialize<'de> for AxisName {
     }
 }
 
-/// What the emergency stop does.
+/// The reaction of the emergency stop.
 struct EmergencyStop(Reaction);
 
 impl<'de> Deserialize<'de> for EmergencyStop {

@@ -16,30 +16,30 @@ use super::range::{
 /// A table of the file with its keys, without its tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KeyTable {
-    /// Its name in dots; empty for what stands before the first table.
+    /// The table's name in dots; empty for the keys before the first table.
     pub name: &'static str,
-    /// It may be left out.
+    /// Whether the table may be left out.
     pub is_optional: bool,
-    /// What it is about.
+    /// The table's meaning.
     pub meaning: &'static str,
-    /// Its keys, in the order of the reference file.
+    /// The table's keys, in the order of the reference file.
     pub keys: &'static [Key],
 }
 
 /// A key of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key {
-    /// Its name.
+    /// The key's name.
     pub name: &'static str,
     /// Unit of its value; "1" for a number without one, empty for what is no number.
     pub unit: &'static str,
     /// How many values it has.
     pub values: usize,
-    /// What a value may be, in the words of refusals.
+    /// The range of a value, in the words of refusals.
     pub range: &'static str,
-    /// What holds if it is left out; none if it is required.
+    /// The value if the key is left out; none if it is required.
     pub default: Option<&'static str>,
-    /// What it means, and rules that join it with other keys.
+    /// The key's meaning, and rules that join it with other keys.
     pub meaning: &'static str,
 }
 

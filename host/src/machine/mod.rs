@@ -1,4 +1,4 @@
-//! The machine: what it may do, how its axes are wired and regulated, and what its drives are like.
+//! The machine: its limits, the wiring and regulation of its axes, and its drives.
 //!
 //! **Consumes** a TOML file (or nothing: [`Machine::reference`]). **Produces** a [`Machine`] from which every
 //! stage takes its own configuration: planning its limits, the kernel its rules and axes, the simulation its

@@ -17,7 +17,7 @@ pub(super) trait Range {
     fn contains(value: f64) -> bool;
 }
 
-/// What the name of an axis may be: it heads seven columns of a trace.
+/// The rule for the name of an axis, which heads seven columns of a trace.
 pub(super) const AXIS_NAME: &str = "1 to 8 letters and digits";
 /// Most characters of an axis's name.
 pub(super) const NAME_CHARACTERS_MAX: usize = 8;
@@ -27,7 +27,7 @@ pub(super) const TIMER_BITS: &str = "16 or 32";
 pub(super) const NOISE_COUNTS: &str = "a whole number from 0 to 1000";
 /// The greatest of them.
 pub(super) const NOISE_COUNTS_MAX: u16 = 1000;
-/// What an emergency stop may do.
+/// The reactions of an emergency stop.
 pub(super) const EMERGENCY_STOP: &str = "\"immediate\", \"ramp\" or \"stop\"";
 /// Seeds of an encoder's noise.
 pub(super) const NOISE_SEED: &str = "a whole number, 0 or more";

@@ -41,7 +41,7 @@ pub struct Machine {
     pub name: String,
     /// Control tick \[s\], 0.00002 to 0.02.
     pub tick_s: f64,
-    /// What holds along the path.
+    /// The limits along the path.
     pub path: PathSettings,
     /// The axes X, Y, Z of G-code, under their own names.
     pub axes: [AxisSettings; 3],
@@ -56,7 +56,7 @@ pub struct FaultSettings {
     pub ramp_s: f64,
     /// Time after which a stop on the path is given up \[s\], 0 to 60.
     pub stop_s: f64,
-    /// What the emergency stop does.
+    /// The reaction of the emergency stop.
     pub emergency_stop: Reaction,
 }
 
@@ -193,13 +193,13 @@ impl Machine {
         }
     }
 
-    /// Where the axes may go; an end beyond the kernel's range bounds nothing.
+    /// The travel of the axes. An end beyond the kernel's range bounds nothing.
     #[must_use]
     pub fn travel(&self) -> Travel<3> {
         self.guards().travel()
     }
 
-    /// What the kernel's queues hold the streams to.
+    /// The rules that the kernel's queues hold the streams to.
     #[must_use]
     pub fn rules(&self) -> PathRules {
         PathRules {

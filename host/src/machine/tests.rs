@@ -182,7 +182,7 @@ fn dead_times_fit() {
     }
 }
 
-/// The reference file with all its optional keys in use: a "#" without a blank behind it is taken away.
+/// The reference file with all its optional keys in use: a "#" without a blank after it is removed.
 fn with_optional_keys() -> String {
     let in_use = |line: &str| match line.strip_prefix('#') {
         Some(rest) if rest.starts_with(|c: char| c == '[' || c.is_ascii_lowercase()) => rest.to_owned(),
@@ -277,7 +277,7 @@ fn the_reader_refuses_values_with_the_explained_ranges() {
             };
             let (refused, row, column) = set(&text, table, key.name, &wrong);
             let error = Machine::from_toml("wrong.toml", &refused).expect_err(key.name).to_string();
-            // A value in a list stands behind those before it.
+            // A value in a list stands after those before it.
             let column = column + wrong.find("1e300").unwrap_or(0);
             assert!(error.starts_with(&format!("wrong.toml:{row}:{column}: found ")), "{error}");
             assert!(error.ends_with(&format!(", expected {}", key.range)), "{error}, {}", key.range);

@@ -1,21 +1,21 @@
-//! Which junctions are blended, and over which length.
+//! Chooses the junctions that are blended, and the length of each blend.
 //!
 //! Consumes a run of moves with their tolerances; produces blocks with ceiling, law and junction feed, ready for
 //! look-ahead. Background, a bounded number of plans of at most eleven blocks for each junction.
 //!
-//! **What pays.** Jerk and snap bound the way round a corner: within a small tolerance it may take longer than a stop
-//! on the corner, and between a slow and a fast move a blend keeps the fast one slow. So every junction is tried as
+//! **A blend has to pay.** Jerk and snap bound the motion round a corner: within a small tolerance it may take longer
+//! than a stop on the corner, and between a slow and a fast move a blend keeps the fast one slow. So every junction is tried as
 //! it is (a stop, or what the acceleration-step limit lets pass) and with blends of some lengths, each once with
 //! [`BLEND_FEED_SHARE`], which leaves nothing for changing the feed on it, and once as a curve like any other.
-//! They are compared by the time that look-ahead takes over both moves and one more on either side, with what has
-//! been chosen for the junctions beside. What is shortest is taken, but a junction without a blend has to gain
+//! They are compared by the time that look-ahead takes over both moves and one more on either side, with the
+//! choices for the neighbouring junctions. The shortest is taken, but a junction without a blend has to gain
 //! a five-hundredth of it: G64 asks for smooth motion. Looking at one junction after the other does not find the best of
 //! all; in the end the run is planned with every blend at its longest and as it was programmed, too, and the best of these is
 //! taken. So blends and merged lines cost at most that part of the time that the exact path takes.
 //!
 //! **Tangent junctions** whose curvature jumps are treated alike: passed without a blend they fall under the
 //! acceleration-step limit as under G61, because a path of bounded jerk through them can take longer (on the arcs of a
-//! few millimetres that a corner is rounded with, by a seventh). Where no such step is to be, the machine's limit
+//! few millimetres that a corner is rounded with, by a seventh). If no such step is wanted, the machine's limit
 //! says so: with a small one only the blend pays.
 
 use motion_kernel::law::Limits;
@@ -61,15 +61,15 @@ struct Crossing {
 }
 
 impl Crossing {
-    /// What it takes of either move \[mm\].
-    fn way_mm(&self) -> f64 {
-        self.blend.map_or(0.0, |(blend, ..)| blend.way_mm)
+    /// Its trim of either move \[mm\].
+    fn trim_mm(&self) -> f64 {
+        self.blend.map_or(0.0, |(blend, ..)| blend.trim_mm)
     }
 }
 
 /// How a junction may be crossed; without a blend last.
 struct Variants {
-    /// What the blends may take of either move \[mm\].
+    /// The greatest trim of either move \[mm\].
     room_mm: f64,
     all: Vec<Crossing>,
 }
@@ -79,7 +79,7 @@ impl Variants {
         self.all.len() > 1
     }
 
-    /// With the longest blend.
+    /// The crossings with the longest blend, or the one without a blend.
     fn longest(&self) -> &[Crossing] {
         if self.are_blends() { &self.all[..2] } else { &self.all }
     }
@@ -116,10 +116,10 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlo
 /// The junctions of a run.
 struct Junctions<'a> {
     run: Run,
-    /// Of the moves.
+    /// The ceilings of the moves.
     ceilings: Vec<Ceilings>,
     machine: &'a Machine,
-    /// Of the path in any direction.
+    /// Limits of the path in any direction.
     limits: Limits<f64>,
 }
 
@@ -151,7 +151,7 @@ impl<'a> Junctions<'a> {
             chosen[junction] = self.best(junction, &chosen, variants.longest());
         }
         let longest = chosen.clone();
-        // Looked at again are those beside which something changed.
+        // Junctions next to a change are planned again.
         let mut is_open = vec![true; chosen.len()];
         for _ in 0..SWEEPS {
             for junction in 0..chosen.len() {
@@ -159,7 +159,7 @@ impl<'a> Junctions<'a> {
                     continue;
                 }
                 let room_mm =
-                    self.room_mm(junction, |junction| chosen[junction].way_mm()).min(alone_mm[junction]);
+                    self.room_mm(junction, |junction| chosen[junction].trim_mm()).min(alone_mm[junction]);
                 if room_mm != variants[junction].room_mm {
                     variants[junction] = self.variants(junction, room_mm, exact[junction])?;
                 }
@@ -174,17 +174,17 @@ impl<'a> Junctions<'a> {
         Ok(Some([longest, chosen]))
     }
 
-    /// The way of the longest blend of a junction, 0 if there is none \[mm\].
+    /// The trim of the longest blend of a junction, 0 if there is none \[mm\].
     fn longest_mm(&self, junction: usize) -> f64 {
         let room_mm = self.run.taken_mm_max(junction).min(self.run.taken_mm_max(junction + 1));
-        self.run.blend(junction, room_mm, &self.limits).map_or(0.0, |blend| blend.way_mm)
+        self.run.blend(junction, room_mm, &self.limits).map_or(0.0, |blend| blend.trim_mm)
     }
 
-    /// The room of a junction where the others take `way_mm`.
-    fn room_mm(&self, junction: usize, way_mm: impl Fn(usize) -> f64) -> f64 {
+    /// The room of a junction where the others trim `trim_mm`.
+    fn room_mm(&self, junction: usize, trim_mm: impl Fn(usize) -> f64) -> f64 {
         let after = junction + 1;
-        let after_mm = if after < self.run.junctions() { way_mm(after) } else { 0.0 };
-        self.run.room_mm(junction, [junction.checked_sub(1).map_or(0.0, way_mm), after_mm])
+        let after_mm = if after < self.run.junctions() { trim_mm(after) } else { 0.0 };
+        self.run.room_mm(junction, [junction.checked_sub(1).map_or(0.0, trim_mm), after_mm])
     }
 
     /// All as they are.
@@ -244,15 +244,15 @@ impl<'a> Junctions<'a> {
         (junction.saturating_sub(BESIDE), (junction + 1 + BESIDE).min(self.ceilings.len() - 1))
     }
 
-    /// What is looked at for a junction, crossed as `variant` says.
+    /// The neighbourhood of a junction, which is crossed as `variant` says.
     fn window(&self, changed: usize, variant: &Crossing, chosen: &[Crossing]) -> Vec<Block<f64>> {
         let crossing =
             |junction: usize| if junction == changed { Some(variant) } else { chosen.get(junction) };
-        let way_mm = |junction: Option<usize>| junction.and_then(crossing).map_or(0.0, Crossing::way_mm);
+        let trim_mm = |junction: Option<usize>| junction.and_then(crossing).map_or(0.0, Crossing::trim_mm);
         let (first, last) = self.beside(changed);
         let mut blocks = Vec::with_capacity(BLOCKS);
         for index in first..=last {
-            let length_mm = self.run.length_mm(index) - way_mm(index.checked_sub(1)) - way_mm(Some(index));
+            let length_mm = self.run.length_mm(index) - trim_mm(index.checked_sub(1)) - trim_mm(Some(index));
             let after = crossing(index).filter(|_| index < last);
             let junction_mm_s = after.map_or(f64::INFINITY, |after| after.feed_mm_s);
             let block = |length_mm, ceiling: &Ceiling<f64>, junction_mm_s| Block {
@@ -272,11 +272,11 @@ impl<'a> Junctions<'a> {
     /// The blocks of the run.
     fn blocks(&self, crossings: &[Crossing]) -> Vec<StretchBlock> {
         let mut blocks: Vec<StretchBlock> = Vec::with_capacity(2 * self.ceilings.len());
-        let way_mm = |junction: Option<usize>| {
-            junction.and_then(|junction| crossings.get(junction)).map_or(0.0, Crossing::way_mm)
+        let trim_mm = |junction: Option<usize>| {
+            junction.and_then(|junction| crossings.get(junction)).map_or(0.0, Crossing::trim_mm)
         };
         for (index, (step, &ceilings)) in self.run.moves().iter().zip(&self.ceilings).enumerate() {
-            let (first_mm, last_mm) = (way_mm(index.checked_sub(1)), way_mm(Some(index)));
+            let (first_mm, last_mm) = (trim_mm(index.checked_sub(1)), trim_mm(Some(index)));
             let is_whole = first_mm == 0.0 && last_mm == 0.0;
             let element = if is_whole { step.element } else { step.element.trimmed(first_mm, last_mm) };
             let block = |element, feed_mm_s, ceilings: Ceilings, tolerance_share| StretchBlock {
@@ -399,12 +399,12 @@ mod tests {
             0.05 + 1e-9 * f64::from(line)
         }));
         assert_eq!(blocks.len(), 5, "{:?}", kinds(&blocks));
-        let way_mm = |index: usize, whole_mm: f64| whole_mm - blocks[index].element.length_mm();
-        let (first, second) = (way_mm(0, 10.0), way_mm(4, 10.0));
+        let trim_mm = |index: usize, whole_mm: f64| whole_mm - blocks[index].element.length_mm();
+        let (first, second) = (trim_mm(0, 10.0), trim_mm(4, 10.0));
         assert!(first > 0.5 && second > 0.2 && (first + second - 0.9).abs() < 1e-9, "{first} {second}");
     }
 
-    /// From a small feed a right angle is rounded, from a high one stopping on it takes less time.
+    /// A right angle is rounded at a low feed. At a high feed stopping on it takes less time.
     #[test]
     fn a_corner_is_blended_where_that_is_faster() {
         let corner = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]];
@@ -414,7 +414,7 @@ mod tests {
         assert_eq!(blocks(50.0)[0].junction_mm_s, 0.0);
     }
 
-    /// A slow move beside a fast one: the blend is at the slow one's feed, and shorter than the tolerance would allow.
+    /// A slow move next to a fast one: the blend is at the slow one's feed, and shorter than the tolerance would allow.
     #[test]
     fn beside_a_fast_move_a_slow_blend_is_short() {
         let corner = [[0.0, 0.0], [10.0, 0.0], [19.8, 2.0]];

@@ -1,4 +1,4 @@
-//! The ceilings of a move, and what a junction allows.
+//! The ceilings of a move and of a junction.
 
 use motion_kernel::plan::{Ceiling, Junction, MachineLimits, Reason, junction};
 
@@ -10,9 +10,9 @@ use crate::toolpath::{Element, Greatest, angle, norm, subtract};
 /// The ceilings of a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ceilings {
-    /// At the program's feed.
+    /// The ceiling at the programmed feed.
     pub programmed: Ceiling<f64>,
-    /// Whatever the program says.
+    /// The ceiling without a programmed feed.
     pub greatest: Ceiling<f64>,
 }
 

@@ -10,7 +10,7 @@ use crate::toolpath::smooth::Move;
 use crate::toolpath::spline::{Degree, Ends, chord_lengths, interpolate};
 use crate::toolpath::{Element, Polynomial, Role, Vector, add, scale, septics, subtract};
 
-/// A point of a spline, with what the program says of the way to it.
+/// A point of a spline, with feed and path mode of the move to it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     pub(super) line: u32,

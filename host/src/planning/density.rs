@@ -1,6 +1,6 @@
-//! Whether a plan is too dense for a tick, seen over the whole program.
+//! Refuses a plan that is too dense for a tick, over the whole program.
 //!
-//! However the ticks fall on it, at most [`PIECES_PER_TICK_MAX`] pieces and [`SEGMENTS_PER_TICK_MAX`]
+//! Wherever the ticks fall, at most [`PIECES_PER_TICK_MAX`] pieces and [`SEGMENTS_PER_TICK_MAX`]
 //! segments and dwells may end within one, whatever stretches they belong to.
 
 use std::collections::VecDeque;
@@ -17,7 +17,7 @@ use crate::toolpath::Placed;
 #[derive(Default)]
 pub(super) struct PiecePace {
     ends: VecDeque<(f64, f64)>,
-    /// When the stretch begins \[s\], and where \[mm\].
+    /// Start of the stretch: time \[s\] and position \[mm\].
     start: (f64, f64),
 }
 

@@ -1,4 +1,4 @@
-//! What planning refuses.
+//! Refusals of planning, with file and line.
 
 use motion_kernel::law::{LimitError, SegmentError, Ticks};
 use motion_kernel::plan::PlanError;
@@ -37,11 +37,11 @@ pub struct PlanningError {
     pub source_name: String,
     /// Where.
     pub place: Place,
-    /// What is wrong.
+    /// The problem.
     pub problem: Problem,
 }
 
-/// What is wrong: what was found, and what was expected.
+/// A problem: the value that was found, and what was expected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Problem {
     /// The geometry has no executable form.
@@ -59,7 +59,7 @@ pub enum Problem {
     /// A ramp or a cruise is beyond the tick's range.
     #[error("found {}", unmade(error, *tick_s))]
     Segment {
-        /// Which figure.
+        /// The segment's error.
         error: SegmentError,
         /// The tick \[s\].
         tick_s: f64,
@@ -67,13 +67,13 @@ pub enum Problem {
     /// A move leaves the travel of an axis.
     #[error("found {axis} at {found_mm:.4} mm, expected its travel, {low_mm} to {high_mm} mm")]
     Travel {
-        /// Its name.
+        /// The axis' name.
         axis: String,
-        /// Where it would be \[mm\].
+        /// The axis' position there \[mm\].
         found_mm: f64,
-        /// Its least position \[mm\].
+        /// The axis' least position \[mm\].
         low_mm: f64,
-        /// Its greatest position \[mm\].
+        /// The axis' greatest position \[mm\].
         high_mm: f64,
     },
     /// More pieces than the tick handles.
@@ -99,13 +99,13 @@ pub enum Problem {
     DenseSegments {
         /// The bound.
         segments: usize,
-        /// What they take \[ticks\].
+        /// The time that they take \[ticks\].
         ticks: f64,
     },
     /// A dwell that can't be executed.
     #[error("found a dwell of {seconds} s, expected {}", at_most_ticks(*tick_s))]
     Dwell {
-        /// Its duration \[s\].
+        /// The duration \[s\].
         seconds: f64,
         /// The tick \[s\].
         tick_s: f64,

@@ -20,10 +20,10 @@ use super::{Item as PlanItem, Plan};
 use crate::machine::Machine;
 use crate::toolpath::{Placed, compile, exact, on_path};
 
-/// What the two streams are fed with.
+/// The items of the two streams.
 #[derive(Clone, Debug)]
 pub struct Executable {
-    /// In order.
+    /// The items, in order.
     pub items: Vec<Item<3>>,
     /// The control tick they are for \[s\].
     pub tick_s: f64,
@@ -62,7 +62,7 @@ impl Executable {
         Ok(Self { items, tick_s: plan.tick_s })
     }
 
-    /// What a board without live control is given.
+    /// The bytes for a board without live control.
     pub fn without_blocks(&self) -> impl Iterator<Item = &Item<3>> {
         self.items.iter().filter(|item| !matches!(item, Item::Block(_)))
     }
@@ -170,7 +170,7 @@ fn block_ends(stretch: &Stretch) -> Result<Vec<Position>, (u32, Problem)> {
     ends.map(|(block, &end_mm)| on_path(end_mm).map_err(|error| (block.line, error.into()))).collect()
 }
 
-/// What holds the feed, along the path; neighbours that are held alike are one.
+/// The ceilings of the feed along the path. Neighbours with equal ceilings are one block.
 fn path_blocks(stretch: &Stretch, ends: &[Position], dense: &[Dense]) -> Vec<Placed> {
     let allowed = |ceiling: &Ceiling<f64>, most_mm_s: f64| Allowed {
         cap_mm_s: ceiling.feed_mm_s.min(most_mm_s),

@@ -6,11 +6,11 @@
 //!
 //! **Limits.** A dwell, and a part of a move at constant feed or acceleration, may last 2³¹ ticks: twelve days at
 //! 0.5 ms. Between two full stops there may be one kilometre of path (10⁶ mm), and every point of the path lies
-//! within one kilometre of the origin on each axis. What is beyond is refused, with the line of the block.
+//! within one kilometre of the origin on each axis. Anything beyond is refused, with the line of the block.
 //!
 //! - [`program`]: steps to stretches: where motion must stop;
-//! - `blending`: which junctions are blended: stretches to blocks;
-//! - `ceilings`: the ceiling of a move or a blend, what a junction allows;
+//! - `blending`: stretches to blocks: the choice of the junctions that are blended;
+//! - `ceilings`: the ceiling of a move or a blend, and of a junction;
 //! - `curves`: programmed curves to moves;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
 //! - [`stretch`]: ceilings, look-ahead and ramps of one stretch;
@@ -18,8 +18,8 @@
 //! - [`profile`]: feed and time at any path position of a planned stretch;
 //! - [`blocks`]: bare block lists, BLOCKS.json;
 //! - [`executable`]: a plan in the kernel's terms;
-//! - `density`: whether that is too dense for a tick;
-//! - [`error`]: what is refused, with file and line.
+//! - `density`: refuses what is too dense for a tick;
+//! - [`error`]: refusals, with file and line.
 
 pub mod blocks;
 mod blending;
@@ -68,16 +68,16 @@ pub struct Plan {
     pub time_s: f64,
     /// Path length \[mm\].
     pub length_mm: f64,
-    /// What to execute, in order. Empty for a block list, which has no geometry.
+    /// The items to execute, in order. Empty for a block list, which has no geometry.
     pub items: Vec<Item>,
-    /// What was accepted and not acted on.
+    /// Words that were accepted and not acted on.
     pub notices: Vec<String>,
     /// The control tick it was planned for \[s\].
     pub tick_s: f64,
 }
 
 impl Plan {
-    /// Without anything to do.
+    /// A plan with nothing to do.
     fn empty(source: &str, tick_s: f64) -> Self {
         Self {
             source: source.to_owned(),

@@ -82,7 +82,7 @@ pub fn plan_program(
 /// Plans moves that follow each other, from rest to rest.
 ///
 /// # Errors
-/// As [`plan_program`].
+/// Those of [`plan_program`].
 pub fn plan_moves(
     source_name: &str,
     mut moves: Vec<Move>,

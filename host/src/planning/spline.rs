@@ -9,7 +9,7 @@ use crate::toolpath::smooth::Move;
 use crate::toolpath::spline::Spline;
 use crate::toolpath::{Element, norm, septics};
 
-/// What the pieces of a path are like, as f32 takes them.
+/// The pieces of a path, as f32 takes them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pieces {
     /// How many there are.

@@ -30,7 +30,7 @@ pub struct StretchBlock {
 }
 
 impl StretchBlock {
-    /// What look-ahead needs of it.
+    /// The block as look-ahead sees it.
     pub(super) fn for_lookahead(&self) -> Block<f64> {
         let Ceiling { feed_mm_s: cap_mm_s, law, .. } = self.ceiling;
         Block { length_mm: self.element.length_mm(), cap_mm_s, junction_mm_s: self.junction_mm_s, law }
@@ -40,9 +40,9 @@ impl StretchBlock {
 /// A planned stretch.
 #[derive(Clone, Debug)]
 pub struct Stretch {
-    /// Where it starts, from the program's start \[mm\].
+    /// Its start, from the program's start \[mm\].
     pub start_mm: f64,
-    /// Its blocks, as programmed.
+    /// The stretch's blocks, as programmed.
     pub blocks: Vec<StretchBlock>,
     /// Path position of every block's end, from the stretch's start \[mm\].
     ends_mm: Vec<f64>,
@@ -78,13 +78,13 @@ impl Stretch {
         &self.ends_mm
     }
 
-    /// Its blocks, as look-ahead sees them.
+    /// The stretch's blocks, as look-ahead sees them.
     #[must_use]
     pub fn for_lookahead(&self) -> Vec<Block<f64>> {
         self.blocks.iter().map(StretchBlock::for_lookahead).collect()
     }
 
-    /// Its length \[mm\].
+    /// The stretch's length \[mm\].
     #[must_use]
     pub fn length_mm(&self) -> f64 {
         self.ends_mm.last().copied().unwrap_or(0.0)

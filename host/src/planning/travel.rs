@@ -1,4 +1,4 @@
-//! Whether a program stays within the travel of the axes.
+//! Refuses a program that leaves the travel of the axes.
 //!
 //! Consumes the pieces that would be executed; fails with the line of the first one that leaves the travel.
 

@@ -1,17 +1,18 @@
 //! A run as bytes: everything that the kernel consumed, from which it runs again to the same bits.
 //!
-//! Consumes a [`Job`] and what the [`Recorder`] saw of the hardware; produces bytes, and of bytes the run once more.
-//! Nothing of it depends on the simulated machine: [`Player`] answers in the hardware's place.
+//! Consumes a [`Job`] and what the [`Recorder`] saw of the hardware; produces bytes, and from bytes the same run again.
+//! It does not depend on the simulated machine: [`Player`] answers in the hardware's place.
 //!
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MREC` |
-//! | 1 | version of this format, 1 |
+//! | 1 | version of this format, 2 |
 //! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
-//! Inside it the program is a compiled program with the blocks of its path ([`motion_kernel::program`]), the commands
-//! are the text of a script, and each tick is an entry of some eight bytes ([`answers`]).
+//! A [`Recording`] holds, in this order: the number type; the compiled program with the blocks of its path and its guards
+//! ([`motion_kernel::program`]); the learnt correction and the commands as text, if there are any; what a report shows of
+//! the run; the counts before the first tick; and the answers of every tick, some eight bytes each ([`answers`]).
 //!
 //! - [`answers`]: what the hardware answered, tick by tick;
 //! - [`recorder`]: hardware that writes it down;

@@ -4,7 +4,7 @@
 //! what the reader looks for: a plot over time keeps the highest and the lowest value of every column, so no peak is
 //! lost; a path keeps its shape to a fraction of a pixel.
 
-/// What a column of the picture keeps: the first, the lowest, the highest and the last point, with their rank.
+/// The points that a column of the picture keeps: first, lowest, highest and last, with their rank.
 #[derive(Clone, Copy)]
 struct Column {
     index: usize,
@@ -42,7 +42,7 @@ impl Column {
     }
 }
 
-/// On a level stretch only the two ends are worth a point.
+/// Adds a point. On a level stretch only the two ends are kept.
 fn push_unless_level(out: &mut Vec<(f64, f64)>, point: (f64, f64)) {
     if let [.., a, b] = out.as_slice() {
         let same = |p: &(f64, f64)| p.1.total_cmp(&point.1).is_eq();
@@ -53,7 +53,7 @@ fn push_unless_level(out: &mut Vec<(f64, f64)>, point: (f64, f64)) {
     out.push(point);
 }
 
-/// At most four points for each of `columns` equal parts of `from..to`, in their order, the extremes of every part
+/// Returns at most four points for each of `columns` equal parts of `from..to`, in their order, the extremes of every part
 /// among them. Points that are not finite are left out.
 pub(super) fn by_column(
     points: impl Iterator<Item = (f64, f64)>,
@@ -82,7 +82,7 @@ pub(super) fn by_column(
 
 /// A stretch of path in one class of colour, in drawing units. It begins where the one before it ends.
 pub(super) struct Stretch {
-    /// Which colour.
+    /// The colour.
     pub(super) class: usize,
     /// Corners of the line.
     pub(super) points: Vec<(f64, f64)>,
@@ -91,7 +91,7 @@ pub(super) struct Stretch {
 /// How far the drawn path may lie from the true one, in drawing units.
 const DEVIATION: f64 = 0.25;
 
-/// What the beginning of a stretch costs in the file, counted in corners.
+/// The cost of a stretch's beginning in the file, counted in corners.
 const STRETCH_COST: usize = 10;
 
 /// A path in drawing units with a colour class per point, reduced to what can be seen: points closer than a unit are
@@ -171,7 +171,7 @@ fn thinned(
 #[derive(Default)]
 struct Straight {
     start: (f64, f64),
-    /// First direction \[rad\], the turns from it that are still allowed, and the length so far.
+    /// First direction \[rad\], the deflections from it that are still allowed, and the length up to here.
     toward: Option<(f64, f64, f64, f64)>,
 }
 
@@ -194,12 +194,12 @@ impl Straight {
             self.toward = Some((direction, -spread, spread, length));
             return true;
         };
-        let turn = (direction - first + PI).rem_euclid(TAU) - PI;
-        // A path that comes back on itself turns at its far end, which has to stay a corner.
-        if turn < low || turn > high || length < longest {
+        let deflection = (direction - first + PI).rem_euclid(TAU) - PI;
+        // A path that comes back on itself reverses at its far end, which has to stay a corner.
+        if deflection < low || deflection > high || length < longest {
             return false;
         }
-        self.toward = Some((first, low.max(turn - spread), high.min(turn + spread), length));
+        self.toward = Some((first, low.max(deflection - spread), high.min(deflection + spread), length));
         true
     }
 }

@@ -29,7 +29,7 @@ const FAULTS_IN_SENTENCE: usize = 3;
 /// Full stops that a plot of the feed can tell apart, even if they are not evenly spread.
 const STOPS_TOLD_APART: usize = 60;
 
-/// Below a plot with line numbers.
+/// The remark below a plot with line numbers.
 const LINE_NUMBERS: &str = "Numbers along the top, where there is room for them, are lines of the program. ";
 
 /// Notices shown.
@@ -255,7 +255,7 @@ fn path_section(
     writeln!(out, "</section>")
 }
 
-/// Where on the path faults were latched.
+/// The places on the path where faults were latched.
 fn faults_mm(trace: &RunTrace) -> Vec<f64> {
     let place = |fault: &TracedFault| {
         let index = trace.ticks.partition_point(|tick| tick.tick < fault.tick);
@@ -329,7 +329,7 @@ fn contour_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) ->
     writeln!(out, "</section>")
 }
 
-/// What the remarks below a plot over time have to say about limits that it does not show.
+/// The remark below a plot over time about limits that it does not show.
 fn limits_beyond<'a>(limits: impl Iterator<Item = (&'a str, Span, f64, &'a str)>) -> String {
     let mut words = String::new();
     for (quantity, span, limit, unit) in
@@ -345,7 +345,7 @@ fn limits_beyond<'a>(limits: impl Iterator<Item = (&'a str, Span, f64, &'a str)>
     words
 }
 
-/// What shaded stretches of a plot over time are; nothing if there are none.
+/// The remark about shaded stretches of a plot over time; nothing if there are none.
 fn rests_key(summary: &Summary) -> String {
     let kinds =
         [("dwell", "dwells"), ("stopped", "program stops"), ("held", "rests by command or for lack of data")];

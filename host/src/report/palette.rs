@@ -41,11 +41,11 @@ pub(super) const TEXT: Ink = solid(0x1C2530, 0xE4E9EF);
 pub(super) const AXIS: Ink = solid(0x6B7684, 0x8C98A6);
 /// Grid.
 pub(super) const GRID: Ink = solid(0xE1E5EA, 0x2C343E);
-/// Where blocks meet, and zero.
+/// Junctions of blocks, and zero.
 pub(super) const RULE: Ink = solid(0xBCC4CD, 0x47525F);
-/// Where the program lets the machine stand.
+/// Times at which the program lets the machine stand.
 pub(super) const REST: Ink = solid(0xF7EBCB, 0x38301C);
-/// What the machine allows.
+/// Limits of the machine.
 pub(super) const LIMIT: Ink = dashed(0x59636F, 0x9AA6B3, "16 12");
 /// Faults.
 pub(super) const FAULT: Ink = dashed(0xC4162A, 0xFF6B6B, "20 12");
@@ -80,10 +80,10 @@ const CEILINGS: [Ink; 8] = [
     dashed(0x39509E, 0x9DB1F7, "12 20"),
 ];
 
-/// What a ceiling is called that the feed does not reach.
+/// The name of a ceiling that the feed does not reach.
 pub(super) const NOT_REACHED: &str = "not reached";
 
-/// Its ink: it holds nothing back and stays behind the others.
+/// Its ink. It limits nothing, so it is paler than the others.
 const UNREACHED: Ink = dashed(0x6F7A88, 0x8F9BA9, "6 14");
 
 /// Ink of a ceiling. `known` are the reasons of this run in the order of their appearance; from the ninth on they

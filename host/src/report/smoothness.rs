@@ -72,7 +72,7 @@ pub fn write_smoothness(
     close(out)
 }
 
-/// Times at the knots beside the published ones, and what the jerk does there.
+/// A table of the times at the knots, the published ones, and the steps of the jerk there.
 fn knots(paths: &[(Course, Figures)], out: &mut impl Write) -> io::Result<()> {
     let [_, (_, cubic), (_, quintic)] = paths else { return Ok(()) };
     writeln!(out, "<h2>At the knots</h2>")?;

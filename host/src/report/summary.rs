@@ -8,7 +8,7 @@ const FINISHED_WITHIN_MM: f64 = 1e-3;
 /// An axis counts as moved when its set position spans more than this \[mm\].
 const MOVED_BEYOND_MM: f64 = 1e-6;
 
-/// An axis stands still beside the others when it moves at less than this part of the feed.
+/// The part of the feed below which an axis stands still compared with the others.
 const STILL_PART: f64 = 1e-3;
 
 /// How the run ended.

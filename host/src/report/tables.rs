@@ -10,7 +10,7 @@ use crate::trace::{AXES, RunTrace};
 /// Rows of a table on the page; the rest is in the trace file.
 pub(super) const ROWS_MAX: usize = 200;
 
-/// What did not fit into a table.
+/// The remark about rows that did not fit into a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct LeftOut {
     /// How many rows the table would have.

@@ -96,7 +96,7 @@ fn row<R>(kind: &FaultKind<R>) -> Row {
         FaultKind::EncoderLost { .. } => (
             "encoder lost",
             "no counts while commanded to move: its cable, or the axis is blocked",
-            "the tick above jump_mm a tick; else response_s + 2 rounds of looks while commanded above moving_mm_s",
+            "the tick above jump_mm a tick; else response_s + 2 rounds of samples while commanded above moving_mm_s",
             "the encoder, and homing",
         ),
         FaultKind::EncoderJump { .. } => (
@@ -109,19 +109,19 @@ fn row<R>(kind: &FaultKind<R>) -> Row {
             "runaway",
             "the axis loses velocity towards its command faster than by load, or counts the other way: reversed encoder \
              or drive, or a collision",
-            "with the following error, or response_s + 2 rounds of looks",
+            "with the following error, or response_s + 2 rounds of samples",
             "the wiring",
         ),
         FaultKind::Saturated { .. } => (
             "saturation",
-            "the output is at its limit at every look for too long",
-            "saturation_s + 2 rounds of looks",
+            "the output is at its limit in every sample for too long",
+            "saturation_s + 2 rounds of samples",
             "the load",
         ),
         FaultKind::SoftLimit { .. } => (
             "soft limit",
             "the set position is beyond the travel, and on its way farther out",
-            "1 round of looks",
+            "1 round of samples",
             "driving back, which is allowed",
         ),
         FaultKind::SetpointJump { .. } => (

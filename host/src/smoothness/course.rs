@@ -9,7 +9,7 @@ const NEWTON_STEPS: u32 = 8;
 /// Curves, one after the other.
 #[derive(Clone, Debug)]
 pub struct Course {
-    /// What it is made of.
+    /// The curve.
     pub name: &'static str,
     elements: Vec<Element>,
     /// Path position of every end \[mm\].
@@ -29,14 +29,14 @@ pub struct Local {
     pub third: Vector,
 }
 
-/// What a junction does to the axes at constant feed.
+/// The steps of the axes at a junction at constant feed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JunctionStep {
-    /// When it is passed \[s\].
+    /// The time when it is passed \[s\].
     pub time_s: f64,
     /// Step of the acceleration of every axis \[mm/s²\].
     pub accel_mm_s2: Vector,
-    /// Step of the jerk of every axis, where that is what it is: beside a step of acceleration there is none to be
+    /// Step of the jerk of every axis, where it is one: at a step of acceleration there is none to be
     /// had \[mm/s³\].
     pub jerk_mm_s3: Vector,
 }
@@ -56,7 +56,7 @@ pub struct AxisTicks {
 }
 
 impl Course {
-    /// Of arcs and polynomials, each of which starts where the one before ends; lines are left out.
+    /// A course of arcs and polynomials, each of which starts where the one before ends. Lines are left out.
     #[must_use]
     pub fn new(name: &'static str, elements: impl IntoIterator<Item = Element>) -> Self {
         let elements: Vec<Element> =
@@ -72,13 +72,13 @@ impl Course {
         Self { name, elements, ends_mm }
     }
 
-    /// Its length \[mm\].
+    /// The course's length \[mm\].
     #[must_use]
     pub fn length_mm(&self) -> f64 {
         self.ends_mm.last().copied().unwrap_or(0.0)
     }
 
-    /// Its curves.
+    /// The course's curves.
     #[must_use]
     pub fn elements(&self) -> &[Element] {
         &self.elements
@@ -90,7 +90,7 @@ impl Course {
         &self.ends_mm[..self.ends_mm.len().saturating_sub(1)]
     }
 
-    /// What is at `s_mm` of the path; at a junction, of the curve that begins there.
+    /// The motion at `s_mm` of the path; at a junction, that of the curve that begins there.
     #[must_use]
     pub fn at(&self, s_mm: f64) -> Option<Local> {
         let index = self.junctions_mm().partition_point(|&end_mm| end_mm <= s_mm);

@@ -1,4 +1,4 @@
-//! The figures of one path: what S2 reads off its plots.
+//! The figures of one path that S2 reads off its plots.
 
 use super::course::{Course, JunctionStep};
 use super::deviation_mm;
@@ -12,7 +12,7 @@ const DEVIATION_POINTS: u32 = 20_000;
 /// Figures of a path at constant feed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figures {
-    /// What the path is made of.
+    /// The path's curves.
     pub name: &'static str,
     /// Arc length \[mm\].
     pub length_mm: f64,
@@ -22,13 +22,13 @@ pub struct Figures {
     pub ticks: usize,
     /// The greatest distance from the arcs \[mm\].
     pub deviation_mm: f64,
-    /// What steps at the junctions: of the arcs, or of the polynomials.
+    /// The steps at the junctions of the arcs, or of the polynomials.
     pub junctions: Vec<JunctionStep>,
-    /// For every tick of [`TICKS_S`].
+    /// The figures for every tick of [`TICKS_S`].
     pub by_tick: [ByTick; TICKS_S.len()],
 }
 
-/// What depends on the tick.
+/// The figures that depend on the tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ByTick {
     /// The tick \[s\].
@@ -40,7 +40,7 @@ pub struct ByTick {
 }
 
 impl Figures {
-    /// Of a path at a feed \[mm/s\].
+    /// The figures of a path at a feed \[mm/s\].
     #[must_use]
     pub fn of(course: &Course, feed_mm_s: f64) -> Self {
         let length_mm = course.length_mm();

@@ -2,20 +2,20 @@
 //! and derivative of curvature (G³), so that velocity, acceleration and jerk of every axis go through it without
 //! a step.
 //!
-//! Consumes two lines or arcs that meet, a tolerance and the room on either side; produces the blend and how much
-//! of both it stands for, or none where the path has to stay as it is: a corner sharper than [`ANGLE_MAX_RAD`], no
+//! Consumes two lines or arcs that meet, a tolerance and the room on either side; produces the blend and its
+//! trim of both, or none where the path has to stay unchanged: a corner sharper than [`ANGLE_MAX_RAD`], no
 //! tolerance, no room. A tangent junction whose curvature jumps (a line meets an arc) is a corner of 0° and is
 //! blended like the others. Background; a bounded number of steps per corner.
 //!
-//! **Shape.** Both ends give four control points each. On a line they stand at a₁, a₂, a₃ of the way d to the
-//! corner; on an arc the same speeds |r'|, s'', s''' by the parameter are used with the arc's own derivatives by
+//! **Shape.** Both ends give four control points each. On a line they stand at a₁, a₂, a₃ of the trim d before
+//! the corner; on an arc the same speeds |r'|, s'', s''' by the parameter are used with the arc's own derivatives by
 //! arc length. `SHAPES` holds the a's that allow the greatest feed at a given tolerance under a limit of jerk
 //! alone and of snap alone, by corner angle; of these, three between them and an evenly spaced one, that with the
 //! greatest feed under all limits is taken. They were found by searching all a₁ ≤ a₂ ≤ a₃ ≤ 1.
 //!
 //! **Tolerance.** The path before and after the corner and the blend are walked together: up to a place u* of the
 //! blend each of its points is held against the nearest of the element before, from there on against that of the
-//! element after, and u* itself against the corner. All pairs taken, the way is continuous on both curves and
+//! element after, and u* itself against the corner. Over all pairs the walk is continuous on both curves and
 //! leaves nothing out, so the greatest distance of a pair bounds that of any point of either curve from the other.
 //! For two lines it is the distance from the corner to the blend's middle.
 
@@ -29,7 +29,7 @@ use super::{Vector, add, angle, dot, norm, scale, subtract};
 /// The sharpest corner that is blended \[rad\]: a turn of 170°. The feed there is a hundredth of that at 10°.
 pub const ANGLE_MAX_RAD: f64 = 170.0 * core::f64::consts::PI / 180.0;
 
-/// The greatest part of an arc that one blend stands for \[rad\].
+/// The greatest part of an arc that one blend replaces \[rad\].
 const ARC_RAD_MAX: f64 = core::f64::consts::FRAC_PI_4;
 
 /// Corner angle \[°\], and a₁ a₂ a₃ for the greatest feed by jerk and by snap.
@@ -44,16 +44,16 @@ const SHAPES: [(f64, [f64; 3], [f64; 3]); 9] = [
     (160.0, [0.0945, 0.1689, 0.2941], [0.1287, 0.1694, 0.3275]),
     (170.0, [0.0883, 0.0985, 0.1883], [0.0756, 0.0915, 0.1881]),
 ];
-/// Parts of the way from the first to the second.
+/// The mixtures of the first and the second that are tried.
 const BETWEEN: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 /// Evenly spaced control points: the best for a jump of curvature without a corner.
 const EVEN: [f64; 3] = [2.0 / 7.0, 4.0 / 7.0, 6.0 / 7.0];
 
-/// In how many parts a blend is cut to compare shapes; ceilings look closer.
+/// The number of parts that a blend is cut into to compare shapes. Ceilings use more.
 const COMPARED_PARTS: usize = 24;
-/// In how many parts it is cut to measure its distance from the path.
+/// The number of parts that it is cut into to measure its distance from the path.
 const MEASURED_PARTS: usize = 64;
-/// Corrections of the way d until the distance fits the tolerance.
+/// Corrections of the trim d until the distance fits the tolerance.
 const CORRECTIONS_MAX: usize = 8;
 /// Part of the tolerance at which it fits.
 const CLOSE: f64 = 0.998;
@@ -61,13 +61,13 @@ const CLOSE: f64 = 0.998;
 /// millionth of its length.
 const TOLERANCE_USED: f64 = 0.999;
 
-/// A blend, and what it stands for.
+/// A blend, and the path that it replaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
     /// The blend.
     pub element: Element,
-    /// Path it stands for on either side of the corner \[mm\].
-    pub way_mm: f64,
+    /// Length of path that it replaces on either side of the corner \[mm\].
+    pub trim_mm: f64,
     /// A bound on its distance from the path and the path's from it \[mm\].
     pub distance_mm: f64,
 }
@@ -90,26 +90,26 @@ impl Blend {
         }
         let mut best: Option<(f64, Self)> = None;
         for shape in shapes(corner.angle_rad) {
-            let Some((way_mm, curve, distance_mm)) = corner.within(tolerance_mm * TOLERANCE_USED, &shape)
+            let Some((trim_mm, curve, distance_mm)) = corner.within(tolerance_mm * TOLERANCE_USED, &shape)
             else {
                 continue;
             };
             let feed = feed_mm_s(&curve, limits);
             if best.is_none_or(|(most, _)| feed > most) && feed.is_finite() && feed > 0.0 {
-                let (start, _) = corner.before.at(way_mm);
-                let (end, _) = corner.after.at(way_mm);
+                let (start, _) = corner.before.at(trim_mm);
+                let (end, _) = corner.after.at(trim_mm);
                 let (from, to) = (add(corner.point, start), add(corner.point, end));
                 let element = Element::Polynomial { from, to, shape: curve, role: Role::Blend };
-                best = Some((feed, Self { element, way_mm, distance_mm }));
+                best = Some((feed, Self { element, trim_mm, distance_mm }));
             }
         }
         best.map(|(_, blend)| blend)
     }
 }
 
-/// The way that a corner of `angle_rad` between two lines takes of both within `tolerance_mm` \[mm\].
+/// The trim of both lines at a corner of `angle_rad` within `tolerance_mm` \[mm\].
 #[must_use]
-pub fn way_mm(angle_rad: f64, tolerance_mm: f64) -> f64 {
+pub fn trim_mm(angle_rad: f64, tolerance_mm: f64) -> f64 {
     let Some([a1, a2, a3]) = shapes(angle_rad).nth(BETWEEN.len() / 2) else { return 0.0 };
     // The middle of the blend, from the corner: control points on either line with the weights of u = 1/2.
     let part = (1.0 + 7.0 * (1.0 - a1) + 21.0 * (1.0 - a2) + 35.0 * (1.0 - a3)) / 128.0;
@@ -141,40 +141,40 @@ fn mix(a: [f64; 3], b: [f64; 3], part: f64) -> [f64; 3] {
     core::array::from_fn(|index| a[index] + (b[index] - a[index]) * part)
 }
 
-/// Two elements as seen from where they meet.
+/// Two elements, seen from the corner between them.
 struct Corner {
     point: Vector,
-    before: Leg,
-    after: Leg,
+    before: Side,
+    after: Side,
     angle_rad: f64,
     room_mm: f64,
 }
 
-/// One of them; what is measured along it counts from the corner.
-enum Leg {
+/// One element of a corner. Lengths along it count from the corner.
+enum Side {
     /// Away from the corner, and the tangent of the path.
     Line { away: Vector, tangent: Vector },
-    /// The angle at the corner, and how it goes with the way.
+    /// The angle at the corner, and how it changes with the length from it.
     Arc { shape: Spiral, corner_rad: f64, rad_per_mm: f64 },
 }
 
 impl Corner {
     fn new(before: &Element, after: &Element, room_mm: f64) -> Option<Self> {
-        let (before_leg, after_leg) = (Leg::new(before, true)?, Leg::new(after, false)?);
-        let angle_rad = angle(before_leg.at(0.0).1[0], after_leg.at(0.0).1[0]);
+        let (before_side, after_side) = (Side::new(before, true)?, Side::new(after, false)?);
+        let angle_rad = angle(before_side.at(0.0).1[0], after_side.at(0.0).1[0]);
         if !(angle_rad <= ANGLE_MAX_RAD) {
             return None;
         }
-        let room_mm = room_mm.min(before_leg.room_mm()).min(after_leg.room_mm());
-        Some(Self { point: after.ends_mm().0, before: before_leg, after: after_leg, angle_rad, room_mm })
+        let room_mm = room_mm.min(before_side.room_mm()).min(after_side.room_mm());
+        Some(Self { point: after.ends_mm().0, before: before_side, after: after_side, angle_rad, room_mm })
     }
 
-    /// The blend over `way_mm` on either side.
-    fn curve(&self, way_mm: f64, [a1, a2, a3]: &[f64; 3]) -> (Vector, Polynomial) {
-        let speed = 7.0 * a1 * way_mm;
-        let (s2, s3) = (42.0 * (a2 - 2.0 * a1) * way_mm, 210.0 * (a3 - 3.0 * a2 + 3.0 * a1) * way_mm);
-        let ends = [(&self.before, s2), (&self.after, -s2)].map(|(leg, s2)| {
-            let (point, [tangent, second, third]) = leg.at(way_mm);
+    /// The blend over `trim_mm` on either side.
+    fn curve(&self, trim_mm: f64, [a1, a2, a3]: &[f64; 3]) -> (Vector, Polynomial) {
+        let speed = 7.0 * a1 * trim_mm;
+        let (s2, s3) = (42.0 * (a2 - 2.0 * a1) * trim_mm, 210.0 * (a3 - 3.0 * a2 + 3.0 * a1) * trim_mm);
+        let ends = [(&self.before, s2), (&self.after, -s2)].map(|(side, s2)| {
+            let (point, [tangent, second, third]) = side.at(trim_mm);
             let by_parameter = [
                 scale(tangent, speed),
                 add(scale(second, speed * speed), scale(tangent, s2)),
@@ -198,34 +198,34 @@ impl Corner {
         (start, Polynomial::bezier([start, b1, b2, b3, b4, b5, b6, end]))
     }
 
-    /// The longest blend of a shape within a tolerance: its way, itself, its distance from the path.
+    /// The longest blend of a shape within a tolerance: its trim, itself, its distance from the path.
     fn within(&self, tolerance_mm: f64, shape: &[f64; 3]) -> Option<(f64, Polynomial, f64)> {
         let mut best: Option<(f64, Polynomial, f64)> = None;
-        // The distance of a corner goes with the way, that of a jump of curvature with its square; in between, the
-        // last two tries tell.
-        let (mut way_mm, mut power) = (self.room_mm, 1.0);
+        // The distance at a corner grows with the trim, at a jump of curvature with its square. In between, the last two
+        // tries tell the power.
+        let (mut trim_mm, mut power) = (self.room_mm, 1.0);
         let mut last: Option<(f64, f64)> = None;
         for _ in 0..CORRECTIONS_MAX {
-            let (start, curve) = self.curve(way_mm, shape);
-            let distance_mm = self.distance_mm(start, &curve, way_mm);
+            let (start, curve) = self.curve(trim_mm, shape);
+            let distance_mm = self.distance_mm(start, &curve, trim_mm);
             if distance_mm <= tolerance_mm {
-                if best.is_none_or(|(longest_mm, ..)| way_mm > longest_mm) {
-                    best = Some((way_mm, curve, distance_mm));
+                if best.is_none_or(|(longest_mm, ..)| trim_mm > longest_mm) {
+                    best = Some((trim_mm, curve, distance_mm));
                 }
-                if way_mm >= self.room_mm || distance_mm >= CLOSE * tolerance_mm {
+                if trim_mm >= self.room_mm || distance_mm >= CLOSE * tolerance_mm {
                     break;
                 }
             }
-            if let Some((last_way_mm, last_distance_mm)) = last {
-                let found = libm::log(distance_mm / last_distance_mm) / libm::log(way_mm / last_way_mm);
+            if let Some((last_trim_mm, last_distance_mm)) = last {
+                let found = libm::log(distance_mm / last_distance_mm) / libm::log(trim_mm / last_trim_mm);
                 if (0.5..=4.0).contains(&found) {
                     power = found;
                 }
             }
-            last = Some((way_mm, distance_mm));
+            last = Some((trim_mm, distance_mm));
             let aimed_at = 0.5 * (1.0 + CLOSE) * tolerance_mm;
-            way_mm = (way_mm * libm::pow(aimed_at / distance_mm, 1.0 / power)).min(self.room_mm);
-            if !(way_mm > 0.0) {
+            trim_mm = (trim_mm * libm::pow(aimed_at / distance_mm, 1.0 / power)).min(self.room_mm);
+            if !(trim_mm > 0.0) {
                 break;
             }
         }
@@ -233,11 +233,11 @@ impl Corner {
     }
 
     fn is_straight(&self) -> bool {
-        matches!((&self.before, &self.after), (Leg::Line { .. }, Leg::Line { .. }))
+        matches!((&self.before, &self.after), (Side::Line { .. }, Side::Line { .. }))
     }
 
     /// The greatest distance between the blend and what it stands for.
-    fn distance_mm(&self, start: Vector, curve: &Polynomial, way_mm: f64) -> f64 {
+    fn distance_mm(&self, start: Vector, curve: &Polynomial, trim_mm: f64) -> f64 {
         let point = |part: usize| add(start, curve.offset(0.0, part as f64 / MEASURED_PARTS as f64));
         if self.is_straight() {
             return norm(point(MEASURED_PARTS / 2));
@@ -246,12 +246,12 @@ impl Corner {
         let (mut before, mut after) = ([0.0; MEASURED_PARTS + 1], [0.0; MEASURED_PARTS + 1]);
         let mut greatest = 0.0_f64;
         for (part, &point) in points.iter().enumerate() {
-            greatest = greatest.max(self.before.distance_mm(point, way_mm));
+            greatest = greatest.max(self.before.distance_mm(point, trim_mm));
             before[part] = greatest;
         }
         greatest = 0.0;
         for (part, &point) in points.iter().enumerate().rev() {
-            greatest = greatest.max(self.after.distance_mm(point, way_mm));
+            greatest = greatest.max(self.after.distance_mm(point, trim_mm));
             after[part] = greatest;
         }
         let at = |part: usize| before[part].max(after[part]).max(norm(points[part]));
@@ -262,8 +262,8 @@ impl Corner {
     }
 }
 
-impl Leg {
-    /// The leg that `element` is, before or after the corner. None for a polynomial.
+impl Side {
+    /// The side that `element` is, before or after the corner. None for a polynomial.
     fn new(element: &Element, is_before: bool) -> Option<Self> {
         match element {
             Element::Line { from, to } => {
@@ -288,26 +288,26 @@ impl Leg {
         }
     }
 
-    /// The point `way_mm` from the corner, relative to it, and the path's derivatives by arc length there.
-    fn at(&self, way_mm: f64) -> (Vector, [Vector; 3]) {
+    /// The point `trim_mm` from the corner, relative to it, and the path's derivatives by arc length there.
+    fn at(&self, trim_mm: f64) -> (Vector, [Vector; 3]) {
         match self {
-            Self::Line { away, tangent } => (scale(*away, way_mm), [*tangent, [0.0; 3], [0.0; 3]]),
+            Self::Line { away, tangent } => (scale(*away, trim_mm), [*tangent, [0.0; 3], [0.0; 3]]),
             Self::Arc { shape, corner_rad, rad_per_mm } => {
-                let angle = corner_rad + rad_per_mm * way_mm;
+                let angle = corner_rad + rad_per_mm * trim_mm;
                 (shape.offset(*corner_rad, angle), by_arc_length(shape.derivatives(angle)))
             }
         }
     }
 
-    /// How far `point`, relative to the corner, is from the first `way_mm` of the leg.
-    fn distance_mm(&self, point: Vector, way_mm: f64) -> f64 {
+    /// How far `point`, relative to the corner, is from the first `trim_mm` of the side.
+    fn distance_mm(&self, point: Vector, trim_mm: f64) -> f64 {
         match self {
             Self::Line { away, .. } => {
-                let foot = dot(point, *away).clamp(0.0, way_mm);
+                let foot = dot(point, *away).clamp(0.0, trim_mm);
                 norm(subtract(point, scale(*away, foot)))
             }
             Self::Arc { shape, corner_rad, rad_per_mm } => {
-                let end = corner_rad + rad_per_mm * way_mm;
+                let end = corner_rad + rad_per_mm * trim_mm;
                 let (least, most) = (corner_rad.min(end), corner_rad.max(end));
                 let mut angle = 0.5 * (least + most);
                 // Newton; wherever it gets to is a point of the arc, so the distance is never too small.
@@ -365,14 +365,14 @@ mod tests {
             let middle = norm(add(from, shape.offset(0.0, 0.5)));
             assert!(middle <= 0.02 && middle > 0.0199, "{degrees}°: {middle}");
             assert!((blend.distance_mm - middle).abs() < 1e-12);
-            assert!((way_mm(degrees.to_radians(), 0.02) / blend.way_mm - 1.0).abs() < 0.3, "{degrees}°");
+            assert!((trim_mm(degrees.to_radians(), 0.02) / blend.trim_mm - 1.0).abs() < 0.3, "{degrees}°");
         }
     }
 
     #[test]
     fn room_and_tolerance_are_kept_and_needed() {
         let blend = blended(&corner(60.0), 1.0, 0.01).expect("a blend");
-        assert!((blend.way_mm - 0.01).abs() < 1e-15 && blend.distance_mm < 0.01);
+        assert!((blend.trim_mm - 0.01).abs() < 1e-15 && blend.distance_mm < 0.01);
         assert_eq!(blended(&corner(60.0), 0.0, 1.0), None);
         assert_eq!(blended(&corner(60.0), f64::NAN, 1.0), None);
         assert_eq!(blended(&corner(60.0), 1.0, 0.0), None);
@@ -386,7 +386,7 @@ mod tests {
         for pair in [corner(75.0), line_and_arc()] {
             let blend = blended(&pair, 0.01, 5.0).expect("a blend");
             let Element::Polynomial { from, to, shape, .. } = blend.element else { panic!("a polynomial") };
-            let rests = [pair[0].trimmed(0.0, blend.way_mm), pair[1].trimmed(blend.way_mm, 0.0)];
+            let rests = [pair[0].trimmed(0.0, blend.trim_mm), pair[1].trimmed(blend.trim_mm, 0.0)];
             assert_eq!((rests[0].ends_mm().1, rests[1].ends_mm().0), (from, to));
             let third = |element: &Element, is_end: bool| match element {
                 Element::Arc { shape, sweep_rad, .. } => {
@@ -412,7 +412,7 @@ mod tests {
     fn a_tangent_arc_is_entered_gradually() {
         let blend = blended(&line_and_arc(), 0.01, 5.0).expect("a blend");
         assert!(blend.distance_mm <= 0.01 && blend.distance_mm > 0.0099, "{blend:?}");
-        assert!(blend.way_mm > 0.5 && blend.way_mm < 3.0, "{}", blend.way_mm);
+        assert!(blend.trim_mm > 0.5 && blend.trim_mm < 3.0, "{}", blend.trim_mm);
         let Element::Polynomial { shape, .. } = blend.element else { panic!("a polynomial") };
         // Faster than the curvature's step lets pass, 500 mm/s² · 5 mm: 50 mm/s; the arc itself allows 50.
         assert!(feed_mm_s(&shape, &LIMITS) > 20.0, "{}", feed_mm_s(&shape, &LIMITS));

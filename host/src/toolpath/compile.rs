@@ -28,7 +28,7 @@ pub enum CompileError {
         /// The piece's length \[mm\].
         length_mm: f64,
     },
-    /// It leaves the space that the kernel has positions for.
+    /// The element leaves the space that the kernel has positions for.
     #[error(
         "a path through {} = {mm} mm, expected coordinates within ±{} mm",
         ["X", "Y", "Z"][*axis], Position::LIMIT_MM
@@ -45,10 +45,10 @@ pub enum CompileError {
         Position::LIMIT_MM
     )]
     StretchTooLong {
-        /// From the stretch's start to the element's end \[mm\].
+        /// The length from the stretch's start to the element's end \[mm\].
         length_mm: f64,
     },
-    /// It is not smooth.
+    /// The element is not smooth.
     #[error(transparent)]
     Fit(#[from] FitError),
     /// The kernel would not take the piece.
@@ -56,7 +56,7 @@ pub enum CompileError {
     Piece(#[from] PieceError),
 }
 
-/// What is wrong with a piece, and what was expected.
+/// The problem of a piece, and what was expected.
 fn unfit(error: &PieceError) -> String {
     match error {
         PieceError::NotFinite { .. } => format!("{error}, expected a unit vector"),
@@ -64,7 +64,7 @@ fn unfit(error: &PieceError) -> String {
     }
 }
 
-/// Where `mm` of a stretch lies on the path.
+/// The path position of `mm` of a stretch.
 ///
 /// # Errors
 /// The stretch is too long.
@@ -75,7 +75,7 @@ pub fn on_path(mm: f64) -> Result<Position, CompileError> {
 /// `point` in the kernel's positions.
 ///
 /// # Errors
-/// It lies too far out.
+/// A coordinate lies too far out.
 pub fn exact(point: Vector) -> Result<[Position; 3], CompileError> {
     let mut exact = [Position::ZERO; 3];
     for (axis, (exact, mm)) in exact.iter_mut().zip(point).enumerate() {
@@ -87,7 +87,7 @@ pub fn exact(point: Vector) -> Result<[Position; 3], CompileError> {
 /// A piece of path with its length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
-    /// Its length.
+    /// The piece's length.
     pub length: Position,
     /// The piece.
     pub item: Item<3>,

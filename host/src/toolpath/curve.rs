@@ -106,7 +106,7 @@ impl Spiral {
 
     /// The same spiral, its angle counted from `angle` on.
     #[must_use]
-    pub fn turned(&self, angle: f64) -> Self {
+    pub fn rotated(&self, angle: f64) -> Self {
         let (outward, onward) = self.frame(angle);
         let radius_mm = self.radius_mm + self.radius_per_rad * angle;
         Self { outward, onward, radius_mm, ..*self }
@@ -124,15 +124,16 @@ impl Spiral {
 
 impl Curve for Spiral {
     fn offset(&self, origin: f64, angle: f64) -> Vector {
-        let turn = angle - origin;
+        let swept = angle - origin;
         let (outward, onward) = self.frame(origin);
         let (here, _) = self.frame(angle);
         let radius = self.radius_mm + self.radius_per_rad * origin;
-        let half = libm::sin(0.5 * turn);
+        let half = libm::sin(0.5 * swept);
         // radius·(e(angle) − e(origin)) without cancellation, and what the radius grew by.
-        let round = add(scale(onward, radius * libm::sin(turn)), scale(outward, -2.0 * radius * half * half));
-        let grown = scale(here, self.radius_per_rad * turn);
-        add(add(round, grown), scale(self.normal, self.height_per_rad * turn))
+        let round =
+            add(scale(onward, radius * libm::sin(swept)), scale(outward, -2.0 * radius * half * half));
+        let grown = scale(here, self.radius_per_rad * swept);
+        add(add(round, grown), scale(self.normal, self.height_per_rad * swept))
     }
 
     fn derivatives(&self, angle: f64) -> [Vector; 3] {

@@ -31,7 +31,7 @@ pub enum Element {
         from: Vector,
         /// End \[mm\].
         to: Vector,
-        /// Its shape, the angle counted from the start.
+        /// The arc's shape; the angle counts from the start.
         shape: Spiral,
         /// The angle run through \[rad\], > 0.
         sweep_rad: f64,
@@ -42,9 +42,9 @@ pub enum Element {
         from: Vector,
         /// End \[mm\].
         to: Vector,
-        /// Its shape, from the start.
+        /// The polynomial's shape, from the start.
         shape: Polynomial,
-        /// What it is there for.
+        /// The purpose.
         role: Role,
     },
     /// A part of an involute.
@@ -53,17 +53,17 @@ pub enum Element {
         from: Vector,
         /// End \[mm\].
         to: Vector,
-        /// Its shape.
+        /// The involute's shape.
         shape: Involute,
     },
 }
 
-/// What a polynomial is there for.
+/// The purpose of a polynomial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// It rounds a corner.
+    /// The polynomial rounds a corner.
     Blend,
-    /// It was programmed.
+    /// The polynomial was programmed.
     Spline,
 }
 
@@ -104,11 +104,11 @@ impl Element {
         let (x, y) =
             ((from[first] - step.centre_mm[0]) / radius_mm, (from[second] - step.centre_mm[1]) / radius_mm);
         let outward = add(scale(axis(first), x), scale(axis(second), y));
-        let turn = cross(axis(normal), outward);
+        let along = cross(axis(normal), outward);
         let sweep_rad = step.sweep_rad.abs();
         let shape = Spiral {
             outward,
-            onward: if step.sweep_rad < 0.0 { scale(turn, -1.0) } else { turn },
+            onward: if step.sweep_rad < 0.0 { scale(along, -1.0) } else { along },
             normal: axis(normal),
             radius_mm,
             radius_per_rad: (step.end_radius_mm - radius_mm) / sweep_rad,
@@ -143,7 +143,7 @@ impl Element {
         }
     }
 
-    /// Its curve and the parameter at its end, 0 at its start; nothing for a line.
+    /// The element's curve and the parameter at its end, 0 at its start; nothing for a line.
     #[must_use]
     pub fn curve(&self) -> Option<(&dyn Curve, f64)> {
         match self {
@@ -173,7 +173,7 @@ impl Element {
                 Self::Arc {
                     from: add(from, shape.offset(0.0, first)),
                     to: add(to, shape.offset(sweep_rad, last)),
-                    shape: shape.turned(first),
+                    shape: shape.rotated(first),
                     sweep_rad: last - first,
                 }
             }
@@ -181,7 +181,7 @@ impl Element {
         }
     }
 
-    /// Where it starts and ends \[mm\].
+    /// The element's start and end \[mm\].
     #[must_use]
     pub fn ends_mm(&self) -> (Vector, Vector) {
         match *self {
@@ -226,7 +226,7 @@ impl Element {
     /// none of a line.
     ///
     /// # Errors
-    /// It is not smooth.
+    /// The element is not smooth.
     pub fn septics(&self, longest_mm: f64) -> Result<Vec<Septic>, FitError> {
         let Some((curve, end)) = self.curve() else {
             return Ok(Vec::new());

@@ -1,21 +1,21 @@
 //! The greatest derivatives of a curve by arc length, from which ceilings are made.
 //!
-//! What is driven are the pieces of a curve. They are within a millionth of a millimetre of it, which says little about
+//! The machine drives the pieces of a curve. They are within a millionth of a millimetre of it, which says little about
 //! the third and fourth derivative of a curve that is short: the third is up to a seventh greater than the curve's on
-//! corner blends, the fourth up to two thirds. So both are looked at, the curve and its pieces.
+//! corner blends, the fourth up to two thirds. So both are examined, the curve and its pieces.
 
 use motion_kernel::plan::Bend;
 
 use super::septic::Septic;
 use super::{Vector, norm};
 
-/// In how many parts a piece is cut: the square of its second derivative has eight extremes at most.
+/// The number of parts that a piece is cut into: the square of its second derivative has eight extremes at most.
 const PIECE_PARTS: usize = 16;
 
 /// The greatest derivatives by arc length, each where it is greatest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Greatest {
-    /// Of κ, |r'''| and |r''''|.
+    /// The greatest κ, |r'''| and |r''''|.
     pub bend: Bend<f64>,
     /// |component| of the tangent on each axis, at most 1.
     pub tangent: Vector,
@@ -24,7 +24,7 @@ pub struct Greatest {
 }
 
 impl Greatest {
-    /// Of a curve with these figures that is driven as `pieces`. Their tangents are unit vectors to a millionth.
+    /// The greatest derivatives of a curve with these figures that is driven as `pieces`. Their tangents are unit vectors to a millionth.
     #[must_use]
     pub fn driven_as(self, pieces: &[Septic]) -> Self {
         let mut norms = [0.0_f64; 3];
@@ -43,7 +43,7 @@ impl Greatest {
     }
 }
 
-/// What is not a number is greater than any.
+/// A value that is not a number is greater than any.
 fn greater(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
 }

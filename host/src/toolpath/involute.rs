@@ -9,8 +9,8 @@
 //! length from 0 = r·φ²/2      curvature = 1/(r·φ)
 //! ```
 //!
-//! On the base circle itself, at φ = 0, curvature is infinite: an involute has to stay off it. At a distance d beside
-//! an involute lies the same involute, turned by −d/r and run through at angles that are greater by d/r
+//! On the base circle itself, at φ = 0, curvature is infinite: an involute has to stay off it. At a distance d from
+//! an involute lies the same involute, rotated by −d/r and traversed at angles that are greater by d/r
 //! ([`Involute::offset_by`]), so that a cutter's radius needs nothing new.
 
 use motion_kernel::plan::Bend;
@@ -32,13 +32,13 @@ pub enum InvoluteError {
     /// The base circle is none.
     #[error("a base circle with a radius of {mm} mm, expected a finite number above 0")]
     Base {
-        /// Its radius \[mm\].
+        /// The base circle's radius \[mm\].
         mm: f64,
     },
     /// The frame is none.
     #[error("a frame that is not of two unit vectors at a right angle, expected one")]
     Frame,
-    /// It touches its base circle, or is unwound too far.
+    /// The involute touches its base circle, or is unwound too far.
     #[error(
         "an involute at an angle of {rad} rad, expected {ANGLE_RAD_MIN} to {ANGLE_RAD_MAX} rad: on the base circle, at 0, \
          curvature is infinite"
@@ -47,7 +47,7 @@ pub enum InvoluteError {
         /// The angle of unwinding \[rad\].
         rad: f64,
     },
-    /// It ends where it starts.
+    /// The involute ends where it starts.
     #[error("an involute from {rad} rad to the same angle, expected different ones")]
     Empty {
         /// Both angles \[rad\].
@@ -92,15 +92,15 @@ impl Involute {
         Ok(Self { outward, onward, base_mm, angles_rad })
     }
 
-    /// The involute `distance_mm` beside this one, to the outside if positive.
+    /// The involute at a distance of `distance_mm` from this one, to the outside if positive.
     ///
     /// # Errors
     /// It would touch the base circle, or be unwound too far.
     pub fn offset_by(&self, distance_mm: f64) -> Result<Self, InvoluteError> {
-        let turn = distance_mm / self.base_mm;
-        let (tangent, normal) = self.frame(-turn);
+        let rotation = distance_mm / self.base_mm;
+        let (tangent, normal) = self.frame(-rotation);
         let (start, end) = self.angles_rad;
-        Self::new((tangent, normal), self.base_mm, (start + turn, end + turn))
+        Self::new((tangent, normal), self.base_mm, (start + rotation, end + rotation))
     }
 
     /// Angle that is run through \[rad\], > 0.
@@ -159,11 +159,11 @@ impl Curve for Involute {
         let (start, end) = (self.angle(origin), self.angle(u));
         let (tangent, normal) = self.frame(start);
         // φ − φ₀ from the parameters, whose difference is exact; T − T₀ and N − N₀ without cancellation.
-        let turn = self.sense() * (u - origin);
-        let half = libm::sin(0.5 * turn);
-        let (sine, versed) = (libm::sin(turn), 2.0 * half * half);
+        let swept = self.sense() * (u - origin);
+        let half = libm::sin(0.5 * swept);
+        let (sine, versed) = (libm::sin(swept), 2.0 * half * half);
         let along = end * sine - versed;
-        let across = (sine - turn) + end * versed;
+        let across = (sine - swept) + end * versed;
         scale(add(scale(tangent, along), scale(normal, across)), self.base_mm)
     }
 

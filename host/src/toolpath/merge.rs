@@ -3,7 +3,7 @@
 //! A curve that was cut into chords has a corner at every one of them, and no room for blends that are worth it.
 //! Consumes the points of such a run; produces the longest lines and arcs through some of them, first to last,
 //! from which the run is nowhere farther than a tolerance, nor they from the run. Background; greedy, with
-//! O(n log n) looks at a point.
+//! O(n log n) tests of a point.
 //!
 //! **Why both ways.** A segment of the run and the part of a line or arc that stands for it are walked together, by
 //! their projection on the line or by the angle about the arc's centre, which have to grow along the run. So
@@ -113,7 +113,7 @@ fn arc(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
     let axis = scale(normal, 1.0 / square.sqrt());
     let outward = scale(to_centre, -1.0 / radius_mm);
     let onward = cross(axis, outward);
-    let (mut turned, mut distance_mm) = (0.0, 0.0_f64);
+    let (mut sweep_rad, mut distance_mm) = (0.0, 0.0_f64);
     let mut before: Option<(Vector, f64)> = None;
     for &point in points {
         let spoke = subtract(subtract(point, from), to_centre);
@@ -129,9 +129,9 @@ fn arc(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
                 off_mm = off_mm.max((norm(add(before, scale(segment, foot))) - radius_mm).abs());
             }
             let angle = libm::atan2(dot(cross(before, spoke), axis), dot(before, spoke));
-            turned += angle;
-            // A segment that turns back, or by a quarter at once, is no chord of this arc.
-            if !(0.0..core::f64::consts::FRAC_PI_2).contains(&angle) || turned > SWEEP_RAD_MAX {
+            sweep_rad += angle;
+            // A segment that reverses, or bends by a quarter of a circle at once, is no chord of this arc.
+            if !(0.0..core::f64::consts::FRAC_PI_2).contains(&angle) || sweep_rad > SWEEP_RAD_MAX {
                 return None;
             }
         }
@@ -143,7 +143,7 @@ fn arc(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
         distance_mm = distance_mm.max(point_mm);
     }
     let shape = Spiral { outward, onward, normal: axis, radius_mm, radius_per_rad: 0.0, height_per_rad: 0.0 };
-    Some((Element::Arc { from, to, shape, sweep_rad: turned }, distance_mm))
+    Some((Element::Arc { from, to, shape, sweep_rad }, distance_mm))
 }
 
 #[cfg(test)]
@@ -191,7 +191,7 @@ mod tests {
         assert!((merged[0].distance_mm - 1e-3).abs() < 1e-15);
     }
 
-    /// What turns back is not straight, however close: the reversal was programmed.
+    /// A reversal is not straight, however close: it was programmed.
     #[test]
     fn reversals_are_kept() {
         let points = [0.0, 1.0, 2.0, 1.5, 2.5, 3.5].map(|x| [x, 0.0, 0.0]);

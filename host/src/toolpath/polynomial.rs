@@ -1,4 +1,4 @@
-//! Polynomial curves: what corner blends and splines are made of.
+//! Polynomial curves, of which corner blends and splines are made.
 //!
 //! A curve of degree seven at most in a parameter u from 0 to 1, kept relative to its start, so that a blend of
 //! a micrometre a kilometre out is as precise as one at the origin. Consumes control points or coefficients \[mm\];
@@ -18,7 +18,7 @@ const HALVINGS_MAX: u32 = 20;
 /// Relative error at which a quadrature is good.
 const LENGTH_TOLERANCE: f64 = 1.0e-13;
 
-/// In how many parts a curve is cut to look for its greatest derivatives.
+/// The number of parts that a curve is cut into to search its greatest derivatives.
 const BEND_PARTS: usize = 64;
 
 /// A component of curvature below this part of the greatest is rounding.
@@ -59,7 +59,7 @@ impl Polynomial {
         &self.coefficients
     }
 
-    /// From the start to the end \[mm\].
+    /// The vector from the start to the end \[mm\].
     #[must_use]
     pub fn chord(&self) -> Vector {
         self.offset(0.0, 1.0)

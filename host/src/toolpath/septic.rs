@@ -15,7 +15,7 @@ pub const FEED_TOLERANCE: f64 = 1.0e-6;
 /// The greatest sum of k(k−1)(k−2)·|cₖ| as a part of the length, so that every number type's unit (below 4) holds
 /// the third derivative, and with it the lower ones.
 const STEEPNESS_MAX: f64 = 3.9;
-/// Of the k-th power in the second to fourth derivative: k·(k − 1), then times k − 2, then times k − 3.
+/// Factors of the k-th power in the second to fourth derivative: k·(k − 1), then times k − 2, then times k − 3.
 const FACTORS: [[f64; 7]; 3] = [
     [0.0, 2.0, 6.0, 12.0, 20.0, 30.0, 42.0],
     [0.0, 0.0, 6.0, 24.0, 60.0, 120.0, 210.0],
@@ -31,7 +31,7 @@ const BETWEEN: f64 = 1.25;
 /// A failed span is that of a cusp if the curve is slower there than this part of its greatest speed: on a cusp,
 /// where the speed grows linearly, it is some 2⁻¹⁶.
 const STILL: f64 = 1.0e-3;
-/// At how many parts of a curve its greatest speed is looked for.
+/// The number of parts of a curve at which its greatest speed is searched.
 const SPEEDS: u32 = 64;
 
 /// One piece: its span of the parameter, its length and its polynomial.
@@ -115,7 +115,7 @@ pub enum FitError {
         span: (f64, f64),
         /// Its deviation \[mm\].
         error_mm: f64,
-        /// How many pieces there were so far.
+        /// The number of pieces up to there.
         pieces: usize,
     },
 }

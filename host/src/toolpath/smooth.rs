@@ -11,12 +11,12 @@
 //! from what they became.
 //!
 //! **Who gets the room.** Blends take at most nine tenths of an element together, and where motion starts or ends half of
-//! that: what the one at its other end does not need is a blend's own, else both get half. A tenth stays, so that the rest
+//! that. A blend gets what the one at the other end does not need; if both want more, each gets half. A tenth stays, so that the rest
 //! of a short element still has a direction of its own.
 
 use motion_kernel::law::Limits;
 
-use super::blend::{Blend, way_mm};
+use super::blend::{Blend, trim_mm};
 use super::element::Element;
 use super::merge::{Merged, merge};
 use super::{Vector, angle, norm, subtract};
@@ -141,7 +141,7 @@ impl Run {
         self.lengths_mm[index] * if is_end { 0.5 * TAKEN_MAX } else { TAKEN_MAX }
     }
 
-    /// What a blend may take of either move at its junction where those at the junctions beside it take `ways_mm` \[mm\], at
+    /// The greatest trim of a blend where those at the neighbouring junctions trim `trims_mm` \[mm\], at
     /// least half of what is there.
     #[must_use]
     pub fn room_mm(&self, junction: usize, [before_mm, after_mm]: [f64; 2]) -> f64 {
@@ -234,14 +234,14 @@ enum Room {
 
 impl Room {
     fn of(run: &[Move], index: usize) -> Self {
-        let way_mm = |before: Option<&Move>, after: Option<&Move>| {
+        let trim_mm = |before: Option<&Move>, after: Option<&Move>| {
             let (before, after) = (before?, after?);
             let angle_rad = angle(before.element.ends()[1].tangent, after.element.ends()[0].tangent);
-            (angle_rad > TANGENT_ROUNDING_RAD).then(|| way_mm(angle_rad, before.tolerance_mm))
+            (angle_rad > TANGENT_ROUNDING_RAD).then(|| trim_mm(angle_rad, before.tolerance_mm))
         };
         let step = &run[index];
-        let before = way_mm(index.checked_sub(1).map(|before| &run[before]), Some(step));
-        let after = way_mm(Some(step), run.get(index + 1));
+        let before = trim_mm(index.checked_sub(1).map(|before| &run[before]), Some(step));
+        let after = trim_mm(Some(step), run.get(index + 1));
         match before.into_iter().chain(after).reduce(f64::max) {
             None => Self::Unneeded,
             Some(longest_mm) if 0.5 * TAKEN_MAX * step.element.length_mm() < longest_mm => Self::TooLittle,

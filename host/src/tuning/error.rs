@@ -1,4 +1,4 @@
-//! Why there is no proposal for an axis.
+//! Reasons why there is no proposal for an axis.
 
 use motion_kernel::axis::ScaleError;
 

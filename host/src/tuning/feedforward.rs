@@ -1,8 +1,8 @@
-//! Feedforward from a drive's parameters, in three ways.
+//! Feedforward from a drive's parameters, by three methods.
 //!
-//! The response G of the drive has an inverse 1/G = 1 + c₁·s + c₂·s² + …: V, A and J gains 1, c₁, c₂ are the series up
-//! to where S4 (1) ends. What the series leaves out grows with frequency; gains that leave the least error over a range
-//! of frequencies differ from it. The inverse itself has no such end, but needs a lead for the dead time.
+//! The response G of the drive has an inverse 1/G = 1 + c₁·s + c₂·s² + …: V, A and J gains 1, c₁, c₂ are the series as
+//! far as S4 (1). The omitted terms grow with frequency, so gains with the least error over a range of frequencies
+//! differ from the series. The inverse itself omits nothing, but it needs a lead for the dead time.
 
 use core::f64::consts::TAU;
 
@@ -109,7 +109,7 @@ pub fn feedforward(
     })
 }
 
-/// To six significant digits: more than any identification knows, and what a file shows is what runs.
+/// Rounds to six significant digits. No identification knows more, and the file shows the value that runs.
 #[must_use]
 pub fn rounded(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)

@@ -1,7 +1,7 @@
 //! The proportional gain.
 //!
-//! Feedforward moves the axis; feedback takes what feedforward does not know, the more the higher kp is. What bounds kp
-//! is lag: dead time, current loop, converter. ki and kd stay 0. The drive's own controller integrates already, so an
+//! Feedforward moves the axis. Feedback corrects what feedforward does not know; a higher kp corrects more. Lag bounds
+//! kp: dead time, current loop, converter. ki and kd stay 0. The drive's own controller integrates already, so an
 //! integral here would add lag and no accuracy in motion, and an offset at rest belongs into the output's trim; a
 //! derivative of encoder counts is noise at the frequencies where it would help.
 

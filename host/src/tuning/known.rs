@@ -1,4 +1,4 @@
-//! What a proposal is built on: what the recordings determine, and for the rest what the machine file has.
+//! The basis of a proposal: the parameters that the recordings determine, and the machine file's for the rest.
 
 use hal_sim::{BedMode, DriveParameters};
 use motion_kernel::axis::{BedInverse, DriveInverse};
@@ -10,11 +10,11 @@ use crate::machine::AxisSettings;
 /// Where a figure of the drive comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// From the recordings, which determine it.
+    /// The recordings determine it.
     Recorded,
-    /// Not determined: what the file has, as far as the recordings allow it.
+    /// Not determined: the file's value, as far as the recordings allow it.
     File,
-    /// Not determined, and not in the file: as little as the recordings allow.
+    /// Not determined and not in the file: the least that the recordings allow.
     Least,
 }
 
@@ -34,7 +34,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// Of the drive of `axis`.
+    /// The parameters of the drive of `axis`.
     ///
     /// # Errors
     /// The scale of commands, Kv, Ti or the total delay is not determined: nothing could be tuned by the rest.

@@ -16,16 +16,16 @@ const LEAST_HZ: f64 = 0.5;
 pub struct Margins {
     /// The last frequency at which the loop has a gain of 1 \[Hz\].
     pub crossover_hz: f64,
-    /// By how much it might lag more there, the least of all crossings \[°\].
+    /// Phase margin: the additional lag that it bears, the least of all crossings \[°\].
     pub phase_deg: f64,
-    /// By which factor its gain might be greater. Infinite if there is none.
+    /// Gain margin: the factor by which its gain might be greater. Infinite if there is none.
     pub gain: f64,
     /// Greatest magnification of an error, |1/(1 + L)|.
     pub sensitivity: f64,
 }
 
 impl Margins {
-    /// Of a loop with gain `kp_per_s` over `drive`, in ticks of `tick_s`.
+    /// The margins of a loop with gain `kp_per_s` over `drive`, in ticks of `tick_s`.
     #[must_use]
     pub fn of(drive: &DriveParameters, kp_per_s: f64, tick_s: f64) -> Self {
         let mut margins = Self { crossover_hz: 0.0, phase_deg: 180.0, gain: f64::INFINITY, sensitivity: 1.0 };
@@ -35,10 +35,10 @@ impl Margins {
             let frequency_hz = LEAST_HZ * libm::pow(10.0, f64::from(index) / PER_DECADE);
             let open = open_loop(drive, kp_per_s, tick_s, frequency_hz);
             let magnitude = open.magnitude();
-            // Unwrapped: the phase never turns by half a circle from one frequency to the next.
+            // Unwrapped: the phase never changes by half a circle from one frequency to the next.
             let phase = before.map_or(open.phase_rad(), |(_, _, last)| {
-                let turn = open.phase_rad() - last;
-                last + turn - TAU * libm::round(turn / TAU)
+                let change = open.phase_rad() - last;
+                last + change - TAU * libm::round(change / TAU)
             });
             let closed = Complex::new(1.0 + open.re, open.im).magnitude();
             margins.sensitivity = margins.sensitivity.max(1.0 / closed);

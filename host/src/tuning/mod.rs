@@ -1,14 +1,14 @@
-//! Tuning: regulator figures from what identification found, each with its reason.
+//! Tuning: regulator figures from identified parameters, each with its reason.
 //!
 //! Consumes an [`Identification`](crate::identify::Identification) and the axis' settings; produces an [`AxisTuning`].
-//! Background. Fails if the recordings do not determine what everything depends on; what else they do not determine
-//! stays as the machine file has it, or is left out, and that is said.
+//! Background. Fails if the recordings do not determine the parameters that everything depends on. Other undetermined
+//! parameters stay as in the machine file or are left out, and the proposal says so.
 //!
-//! - [`margins`]: how far a position loop is from swinging;
+//! - [`margins`]: the distance of a position loop from oscillation;
 //! - [`gains`]: the proportional gain that keeps margins;
 //! - [`feedforward`]: the drive's inverse, its series, or the gains that leave the least error;
-//! - [`known`]: the drive that all of it is made for, as far as it is known;
-//! - [`proposal`]: all of it for one axis, in words.
+//! - [`known`]: the drive as far as it is known;
+//! - [`proposal`]: the settings of one axis, in words.
 
 pub mod error;
 pub mod feedforward;

@@ -1,4 +1,4 @@
-//! What an axis should be set to, and why, so that a technician can follow it number by number.
+//! The proposed settings of an axis with their reasons, so that a technician can follow them number by number.
 
 use motion_kernel::axis::{
     AxesConfig, AxisFigures, BedInverse, DriveInverse, Feedforward, Gains, PREVIEW_TICKS_MAX, ScaleError,
@@ -17,7 +17,7 @@ use crate::machine::AxisSettings;
 /// A key of the machine file with its new value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// As in the file, below the axis: `regulator.kp_per_s`.
+    /// The key as in the file, below the axis: `regulator.kp_per_s`.
     pub key: &'static str,
     /// Before; none if the file did not have the key.
     pub before: Option<f64>,
@@ -42,7 +42,7 @@ pub struct AxisTuning {
     pub margins: Margins,
     /// Every value that is set, changed or not, in the order of the file.
     pub changes: Vec<Change>,
-    /// What a technician should know beside: what was not determined, what else the axis' settings should respect.
+    /// Remarks for the technician: what was not determined, what else the axis' settings should respect.
     pub remarks: Vec<String>,
 }
 
@@ -121,7 +121,7 @@ fn interval(estimate: Estimate, from: &str) -> String {
     format!("{from}, ± {:.2} %", 100.0 * part)
 }
 
-/// To the four decimals that are shown; 0 without a sign.
+/// Rounds to the four decimals that are shown; 0 has no sign.
 fn rounded_to(value: f64) -> f64 {
     (value * 1e4).round() / 1e4 + 0.0
 }
@@ -306,7 +306,10 @@ fn changes(
         "regulator.inverse.viscous_friction_per_s",
         |drive| drive.viscous_friction_per_s,
         "1/s",
-        origin(known.viscous_friction, "torque that grows with velocity; small beside the rest".to_owned()),
+        origin(
+            known.viscous_friction,
+            "torque that grows with velocity; small compared with the rest".to_owned(),
+        ),
     );
     inverse(
         "regulator.inverse.coulomb_friction_mm_s2",
@@ -314,14 +317,14 @@ fn changes(
         "mm/s²",
         origin(
             known.coulomb_friction,
-            interval(parameters.coulomb_friction_mm_s2, "torque that turns with the direction"),
+            interval(parameters.coulomb_friction_mm_s2, "torque that changes sign with the direction"),
         ),
     );
     inverse(
         "regulator.inverse.reversal_mm_s",
         |drive| drive.reversal_mm_s,
         "mm/s",
-        "over this velocity friction turns; less is sharper, more is gentler".to_owned(),
+        "over this velocity friction changes sign; less is sharper, more is gentler".to_owned(),
     );
     let bed = |drive: Option<&DriveInverse>| drive.and_then(|drive| drive.bed);
     let (was, is) = (bed(was), bed(is));

@@ -7,8 +7,8 @@ use motion_kernel::plan::{
 use motion_kernel::units::Position;
 
 use crate::spanning::{Span, legal, spans_between, unreachable};
-use motion_tests::random::Random;
 use crate::{block, from_rest, planned, random_blocks, time_s};
+use motion_tests::random::Random;
 
 /// The ramps of a plan, of which there is room for so many.
 fn ramps(

@@ -107,7 +107,7 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
         let most = row(&mut table, board, "3 axes, live control and guards", &reference["tick"])[3];
         let inverted =
             row(&mut table, board, "3 axes, live control and guards, drives inverted", &inverted["tick"])[3];
-        row(&mut stages, board, "background's turn under live control", &reference["turn"]);
+        row(&mut stages, board, "a poll of live control", &reference["turn"]);
         if board.number == "f32" && (most > 1500 || inverted > INVERTED) {
             return Err(format!(
                 "{}: {most} and {inverted} under live control, promised 1500 and {INVERTED}",
@@ -122,7 +122,7 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
     hold("stages", &stages, GROWTH)
 }
 
-/// What the README promises, whatever is committed.
+/// What docs/PROMISES.md promises, whatever is committed.
 fn promised(ticks: &[(Board, [u32; 4])]) -> Result<(), String> {
     let of = |board: Board| {
         ticks.iter().find(|(found, _)| *found == board).map_or([u32::MAX; 4], |(_, figures)| *figures)

@@ -15,8 +15,8 @@ use crate::cli::progress::Progress;
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
 use crate::drive::circle::{CircleFigures, Sweep, sweep};
+use crate::drive::circle_motion::Circle;
 use crate::drive::reference;
-use crate::drive::turning::Turning;
 use crate::machine::AxisSettings;
 use crate::report;
 
@@ -143,9 +143,9 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
     if report.is_some() {
         let mut shown = Vec::new();
         for &frequency_hz in &arguments.show {
-            let turning = Turning::new(frequency_hz, feed_mm_s);
+            let circle = Circle::new(frequency_hz, feed_mm_s);
             for sweep in &sweeps {
-                shown.push((sweep.name, turning, turning.record(&sweep.machine)?));
+                shown.push((sweep.name, circle, circle.record(&sweep.machine)?));
             }
         }
         arguments.common.write_report(report, out, |file| {

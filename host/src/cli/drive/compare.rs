@@ -11,9 +11,9 @@ use crate::cli::error::{CliError, Outcome};
 use crate::cli::progress::Progress;
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
+use crate::drive::circle_motion::Circle;
 use crate::drive::compare::{Choice, Measured, Motion, Regulators, Row, Sweep, rows, sweeps};
 use crate::drive::peer_regulator::PeerGains;
-use crate::drive::turning::Turning;
 use crate::machine::Machine;
 use crate::report;
 
@@ -127,7 +127,7 @@ pub fn run(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome,
     let report = arguments.common.report()?;
     let feed_mm_s = arguments.feed_mm_min / 60.0;
     let mut motions: Vec<Motion> =
-        SHOWN_HZ.iter().map(|&hz| Motion::Circle(Turning::new(hz, feed_mm_s))).collect();
+        SHOWN_HZ.iter().map(|&hz| Motion::Circle(Circle::new(hz, feed_mm_s))).collect();
     motions.push(Motion::Program("stringer.ngc", STRINGER));
     let steps = Regulators::STEPS + Choice::ALL.len() + Choice::SHOWN.len();
     let mut progress = Progress::new(steps as u64);
@@ -151,10 +151,10 @@ pub fn run(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome,
             .map_err(CliError::Output)?;
     }
     if report.is_some() {
-        let turning = Turning::new(SHOWN_HZ[1], feed_mm_s);
+        let circle = Circle::new(SHOWN_HZ[1], feed_mm_s);
         let mut outputs = Vec::new();
         for choice in [Choice::PeerFitted, Choice::VajFitted] {
-            outputs.push((choice, regulators.output(choice, &turning, last_um, OUTPUT_SPAN_S)?));
+            outputs.push((choice, regulators.output(choice, &circle, last_um, OUTPUT_SPAN_S)?));
         }
         arguments.common.write_report(report, out, |file| {
             let resolutions_um = [first_um, last_um];

@@ -13,8 +13,8 @@ use crate::cli::error::{CliError, Outcome};
 use crate::cli::progress::Progress;
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
+use crate::drive::circle_motion::Circle;
 use crate::drive::harmonic::{Amplitude, HarmonicFigures, bandwidth, measure};
-use crate::drive::turning::Turning;
 use crate::drive::{experiment, harmonic, model, reference};
 use crate::machine::Machine;
 use crate::report;
@@ -108,11 +108,11 @@ pub fn run(arguments: &HarmonicArguments, out: &mut dyn Write) -> Result<Outcome
     } else {
         experiment::open_loop(&machine)
     };
-    let turning = |frequency_hz| Turning::new(frequency_hz, feed_mm_s);
+    let circle = |frequency_hz| Circle::new(frequency_hz, feed_mm_s);
     let mut progress = Progress::new(frequencies_hz.len() as u64);
     let mut found = Vec::with_capacity(frequencies_hz.len());
     for &frequency_hz in &frequencies_hz {
-        found.push(measure(&ran, &turning(frequency_hz))?);
+        found.push(measure(&ran, &circle(frequency_hz))?);
         progress.step();
     }
     progress.finish();
@@ -120,7 +120,7 @@ pub fn run(arguments: &HarmonicArguments, out: &mut dyn Write) -> Result<Outcome
     let of_axis = |axis: usize| -> Result<Bandwidths, CliError> {
         let drive = &machine.axes[axis].drive;
         let limit_mm_s2 = drive.accel_limit_mm_s2 / (1.0 + drive.load_inertia_ratio);
-        let start = turning(arguments.from);
+        let start = circle(arguments.from);
         Ok(Bandwidths {
             swing_hz: bandwidth(&ran, &start, range_hz, axis, Amplitude::Swing)?,
             fundamental_hz: bandwidth(&ran, &start, range_hz, axis, Amplitude::Fundamental)?,
@@ -159,8 +159,8 @@ pub fn run(arguments: &HarmonicArguments, out: &mut dyn Write) -> Result<Outcome
         let mut places: Vec<usize> = (0..SHOWN).map(|i| i * last / (SHOWN - 1)).collect();
         places.dedup();
         for place in places {
-            let turning = turning(frequencies_hz[place]);
-            waves.push((turning, turning.record(&ran)?));
+            let circle = circle(frequencies_hz[place]);
+            waves.push((circle, circle.record(&ran)?));
         }
         let words = if arguments.closed_loop { "" } else { &explanation };
         arguments.common.write_report(report, out, |file| {
@@ -201,7 +201,7 @@ fn axis_json<'run>(
         let response = &figures.axes[axis];
         PointJson {
             frequency_hz: figures.frequency_hz,
-            radius_mm: Turning::new(figures.frequency_hz, figures.feed_mm_s).radius_mm(),
+            radius_mm: Circle::new(figures.frequency_hz, figures.feed_mm_s).radius_mm(),
             swing_ratio: response.swing_ratio,
             fundamental_ratio: response.fundamental_ratio,
             phase_deg: response.phase_rad.to_degrees(),
@@ -240,7 +240,7 @@ fn write_axes(
             .iter()
             .map(|figures| {
                 let response = &figures.axes[axis];
-                let radius_mm = Turning::new(figures.frequency_hz, figures.feed_mm_s).radius_mm();
+                let radius_mm = Circle::new(figures.frequency_hz, figures.feed_mm_s).radius_mm();
                 [
                     format!("{:.2}", figures.frequency_hz),
                     format!("{radius_mm:.4}"),

@@ -10,8 +10,8 @@ use crate::cli::error::{CliError, Outcome};
 use crate::cli::progress::Progress;
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
+use crate::drive::circle_motion::{Circle, plane_of};
 use crate::drive::inertia::{InertiaFigures, measure};
-use crate::drive::turning::{Turning, plane_of};
 use crate::report;
 
 const HELP: &str = "\
@@ -69,11 +69,11 @@ pub fn run(arguments: &InertiaArguments, out: &mut dyn Write) -> Result<Outcome,
     let axis = axis_named(&machine, &arguments.axis)?;
     let report = arguments.common.report()?;
     let feed_mm_s = arguments.feed_mm_min / 60.0;
-    let turning = Turning { plane: plane_of(axis), ..Turning::new(arguments.frequency, feed_mm_s) };
+    let circle = Circle { plane: plane_of(axis), ..Circle::new(arguments.frequency, feed_mm_s) };
     let mut progress = Progress::new(arguments.loads.len() as u64);
     let mut found = Vec::with_capacity(arguments.loads.len());
     for &load in &arguments.loads {
-        found.push(measure(&machine, &turning, axis, load)?);
+        found.push(measure(&machine, &circle, axis, load)?);
         progress.step();
     }
     progress.finish();
@@ -106,7 +106,7 @@ pub fn run(arguments: &InertiaArguments, out: &mut dyn Write) -> Result<Outcome,
     }
     arguments
         .common
-        .write_report(report, out, |file| report::drive::write_inertia(&machine, &turning, &found, file))?;
+        .write_report(report, out, |file| report::drive::write_inertia(&machine, &circle, &found, file))?;
     Ok(Outcome::Done)
 }
 

@@ -14,10 +14,10 @@ use crate::cli::error::{CliError, Outcome};
 use crate::cli::outputs::{self, Written};
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
+use crate::drive::circle_motion::Circle;
 use crate::drive::identification::identify_axes;
 use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, learn};
 use crate::drive::reference::CIRCLE_FEED_MM_S;
-use crate::drive::turning::Turning;
 use crate::files::Files;
 use crate::identify::{Estimate, Identification};
 use crate::machine::{AxisEdit, Machine, REFERENCE_TOML, edited};
@@ -134,11 +134,11 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     // Before the work: a wrong argument should not cost the user a long one.
     let plane = planes(&axes).first().copied().unwrap_or_default();
     let learning = arguments.learn.map(|repeats| Lesson {
-        turning: Turning { plane, ..Turning::new(arguments.learn_hz, CIRCLE_FEED_MM_S) },
+        circle: Circle { plane, ..Circle::new(arguments.learn_hz, CIRCLE_FEED_MM_S) },
         options: LearningOptions { repeats, ..LearningOptions::default() },
     });
     if let Some(lesson) = &learning {
-        lesson.turning.check(machine.tick_s)?;
+        lesson.circle.check(machine.tick_s)?;
         lesson.options.check(&machine)?;
     }
     let found = identify_axes(&machine, &axes)?;
@@ -254,7 +254,7 @@ fn write_words(
 
 /// A circle to be learnt.
 struct Lesson {
-    turning: Turning,
+    circle: Circle,
     options: LearningOptions,
 }
 
@@ -266,7 +266,7 @@ impl Lesson {
             let command_gain = found.parameters.command_gain.value;
             models[*axis] = Model { drive: found.parameters.drive(), command_gain };
         }
-        Ok(learn(tuned, &self.turning, &models, &self.options)?)
+        Ok(learn(tuned, &self.circle, &models, &self.options)?)
     }
 }
 

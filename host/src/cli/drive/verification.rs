@@ -8,8 +8,8 @@ use super::super::error::CliError;
 use super::super::progress::Progress;
 use super::super::table::{self, Align};
 use crate::drive::circle::{CircleFigures, Sweep, figures};
+use crate::drive::circle_motion::{Circle, plane_of};
 use crate::drive::reference::CIRCLE_FEED_MM_S;
-use crate::drive::turning::{Turning, plane_of};
 use crate::gcode::Plane;
 use crate::machine::Machine;
 use crate::report::{self, drive::Shown};
@@ -94,11 +94,11 @@ impl Verification {
         let mut sweep = |name: &'static str, machine: &Machine, plane: Plane| -> Result<Sweep, CliError> {
             let mut circles = Vec::with_capacity(VERIFIED_HZ.len());
             for frequency_hz in VERIFIED_HZ {
-                let turning = Turning { plane, ..Turning::new(frequency_hz, CIRCLE_FEED_MM_S) };
-                let recording = turning.record(machine)?;
-                circles.push(figures(&recording, &turning)?);
+                let circle = Circle { plane, ..Circle::new(frequency_hz, CIRCLE_FEED_MM_S) };
+                let recording = circle.record(machine)?;
+                circles.push(figures(&recording, &circle)?);
                 if SHOWN_HZ.contains(&frequency_hz) {
-                    shown.push((name, turning, recording));
+                    shown.push((name, circle, recording));
                 }
                 progress.step();
             }

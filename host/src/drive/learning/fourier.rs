@@ -35,7 +35,7 @@ fn transform(values: &mut [Complex]) {
             values.swap(index, mirrored);
         }
     }
-    let turns: Vec<Complex> = (0..length / 2)
+    let twiddles: Vec<Complex> = (0..length / 2)
         .map(|index| {
             let (sine, cosine) = libm::sincos(-TAU * index as f64 / length as f64);
             Complex::new(cosine, sine)
@@ -46,8 +46,8 @@ fn transform(values: &mut [Complex]) {
         let stride = length / (2 * half);
         for group in values.chunks_exact_mut(2 * half) {
             let (low, high) = group.split_at_mut(half);
-            for ((low, high), &turn) in low.iter_mut().zip(high).zip(turns.iter().step_by(stride)) {
-                let (even, odd) = (*low, *high * turn);
+            for ((low, high), &twiddle) in low.iter_mut().zip(high).zip(twiddles.iter().step_by(stride)) {
+                let (even, odd) = (*low, *high * twiddle);
                 (*low, *high) = (even + odd, even - odd);
             }
         }

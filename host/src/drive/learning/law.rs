@@ -9,8 +9,8 @@
 //! G is the drive with its bed and the scale of its commands, C the regulator's feedback. Following error is e = e₀ − P·u, so with
 //! u′ = Q·(u + L·e) the correction's distance from its fixed point shrinks from repeat to repeat by |Q(1 − L·P)| at
 //! every frequency (Bristow, Tharayil, Alleyne: A survey of iterative learning control, IEEE Control Systems Magazine,
-//! 2006, gives the condition that it is below 1). The P in L is the model's, the other one is the machine's: the greatest value over a whole range of
-//! machines is what [`Robustness`] states, and what fq is chosen by.
+//! 2006, gives the condition that it is below 1). The P in L is the model's, the other one the machine's. [`Robustness`] states the greatest value
+//! over a range of machines, and fq is chosen by it.
 
 use core::f64::consts::{SQRT_2, TAU};
 
@@ -32,7 +32,7 @@ pub const FILTER_ORDER: u32 = 3;
 const REGULARISATION: f64 = 0.05;
 /// Highest −3 dB point over the rate of the knots: straight lines between knots follow it to 19 %.
 const CORNER_OVER_KNOT_RATE: f64 = 0.25;
-/// From one −3 dB point that is tried to the next lower one.
+/// The ratio of one −3 dB point that is tried to the next lower one.
 const CORNER_STEP: f64 = 0.97;
 /// Lowest −3 dB point \[Hz\]. Below, nothing is learnt that a feedback could not do.
 pub(super) const CORNER_HZ_MIN: f64 = 1.0;
@@ -44,7 +44,7 @@ const REST_HZ: f64 = 1e-3;
 /// The robustness filter Q: a low-pass without phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
-    /// Where its amplitude is 1/√2 \[Hz\], above 0.
+    /// The frequency at which its amplitude is 1/√2 \[Hz\], above 0.
     pub corner_hz: f64,
 }
 
@@ -68,7 +68,7 @@ pub struct Robustness {
     /// Greatest |Q(1 − L·P)| up to half the tick's frequency, with Kv, Ti, Tc, τ and the bed's frequency each at
     /// 1 − [`SPREAD`], 1 and 1 + [`SPREAD`] of the model's.
     pub contraction: f64,
-    /// Where it is found \[Hz\].
+    /// The frequency of that \[Hz\].
     pub at_hz: f64,
 }
 
@@ -100,13 +100,13 @@ impl Loop<'_> {
         forward / (one + feedback * forward)
     }
 
-    /// What straight lines between knots leave of a sine: sinc².
+    /// The part of a sine that straight lines between knots keep: sinc².
     fn interpolation(&self, frequency_hz: f64) -> f64 {
         let angle = core::f64::consts::PI * frequency_hz * self.tick_s * f64::from(self.knot_ticks);
         if angle > 0.0 { (libm::sin(angle) / angle).powi(2) } else { 1.0 }
     }
 
-    /// From knots to position.
+    /// The response from knots to position.
     fn learnt(&self, drive: &DriveParameters, frequency_hz: f64) -> Complex {
         self.position(drive, frequency_hz) * Complex::new(self.interpolation(frequency_hz), 0.0)
     }
@@ -252,7 +252,7 @@ impl Law {
     }
 }
 
-/// A signal of another length: where it ends it goes on to where it began, on half a cosine, so that its periodic
+/// A signal of another length: from its end it returns to its beginning on half a cosine, so that its periodic
 /// continuation has no step to be learnt.
 fn faded(signal: &[f64], length: usize) -> Vec<f64> {
     let mut longer = Vec::with_capacity(length);

@@ -11,7 +11,7 @@
 //! bound on divergence, which is stated in [`Robustness`]. Four more things keep it from diverging where the bound does
 //! not reach, at friction and at the current limit: no command is above the correction's bound; a repeat that made
 //! the error larger is taken back, and half the step is tried from the best one; learning stops when it does not get
-//! better; and what is returned is the best that was driven. On the way the contour error may rise while the following
+//! better; and the best correction that was driven is returned. Meanwhile the contour error may rise while the following
 //! error falls: two axes that lag alike leave little of it (up to four times as much after one repeat, at 40 Hz).
 //!
 //! - [`motion`](mod@motion): what can be repeated;
@@ -19,12 +19,12 @@
 //! - `fourier`: the transform they are applied in.
 //!
 //! ```no_run
-//! use motion_host::drive::{Terms, learning, turning::Turning};
+//! use motion_host::drive::{Terms, learning, circle_motion::Circle};
 //! use motion_host::machine::Machine;
 //!
 //! let machine = Terms::Vaj.of(&Machine::reference());
 //! let models = machine.axes.each_ref().map(|axis| axis.drive.into());
-//! let circle = Turning::new(10.0, 2150.0 / 60.0);
+//! let circle = Circle::new(10.0, 2150.0 / 60.0);
 //! let learnt = learning::learn(&machine, &circle, &models, &learning::LearningOptions::default())?;
 //! let best = learnt.repeats[learnt.best_repeat];
 //! println!("{:.2} µm after {} repeats", best.contour_um, learnt.best_repeat);
@@ -49,7 +49,7 @@ pub use motion::{Motion, Stretch};
 
 use law::{CORNER_HZ_MIN, Law, Loop};
 
-/// What is known of an axis' drive.
+/// The knowledge of an axis' drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Model {
     /// The drive.
@@ -72,9 +72,9 @@ pub const STRETCH_TICKS_MAX: usize = 1 << 18;
 const MARGIN_S: f64 = 0.2;
 /// A total error that is larger by this part of an encoder step is larger; less is reading noise.
 const NOISE_STEPS: f64 = 0.25;
-/// After a repeat that made the error larger.
+/// The factor after a repeat that made the error larger.
 const STEP_BACK: f64 = 0.5;
-/// Learning stops after so many repeats, one after the other, that are no better than the best before.
+/// Learning stops after this many repeats in a row that are no better than the best before.
 const NO_BETTER: usize = 2;
 
 /// How to learn.
@@ -94,7 +94,7 @@ pub struct LearningOptions {
     /// −3 dB of Q \[Hz\], 1 to a quarter of the knots' rate; refused if the law does not converge with it for
     /// every machine within [`SPREAD`]. None: the highest with which a repeat leaves at most [`CONTRACTION_MAX`].
     pub corner_hz: Option<f64>,
-    /// When to end before all repeats are made.
+    /// The rule by which learning ends before all repeats are made.
     pub ending: Ending,
     /// The kernel's number type.
     pub number: Number,
@@ -115,13 +115,14 @@ impl Default for LearningOptions {
     }
 }
 
-/// When learning ends.
+/// The end of learning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Ending {
-    /// When the error is below the encoder's step, or two repeats in a row were no better than the best before.
+    /// Learning ends when the error is below the encoder's step, or two repeats in a row were no better than
+    /// the best before.
     #[default]
     Learnt,
-    /// After all repeats, whatever they bring: to see whether it would diverge.
+    /// Learning makes all repeats, to see whether it would diverge.
     Repeats,
 }
 
@@ -138,14 +139,14 @@ pub enum Reason {
     Fault(TracedFault),
 }
 
-/// What a run of the stretch was like.
+/// The figures of a run of the stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RepeatFigures {
     /// Root of the mean square of the following error over the whole stretch, by axis \[µm\].
     pub rms_um: [f64; AXES],
     /// The motion's contour error: see [`Motion::contour_um`] \[µm\].
     pub contour_um: f64,
-    /// In how many ticks the bound cut what was learnt for this run, by axis.
+    /// The number of ticks in which the bound cut the correction of this run, by axis.
     pub cut_ticks: [usize; AXES],
     /// The part of γ with which this run's correction was learnt: 1, halved by every repeat that had to be taken back.
     pub step: f64,
@@ -158,13 +159,13 @@ impl RepeatFigures {
         self.rms_um.iter().map(|rms_um| rms_um * rms_um).sum::<f64>().sqrt()
     }
 
-    /// Whether it is better than `other`, and no worse beside the path than `first`.
+    /// Whether it is better than `other`, and no farther from the path than `first`.
     fn is_better(&self, other: &Self, first: &Self) -> bool {
         self.total_um() < other.total_um() && self.contour_um <= first.contour_um
     }
 }
 
-/// What was learnt.
+/// The result of learning.
 #[derive(Clone, Debug)]
 pub struct Learnt {
     /// The figures of every run: the first one without correction, then by repeat.
@@ -366,7 +367,7 @@ impl Learning {
             let Some(law) = law else { continue };
             let mut commands_mm_s = law.next(&base.commands_mm_s[axis], &base.errors_mm[axis], self.step);
             self.cut_ticks[axis] = 0;
-            // What is cut is also forgotten: the next repeat goes on from what acted.
+            // A part that is cut is also forgotten: the next repeat continues from the correction that acted.
             for command_mm_s in &mut commands_mm_s {
                 if command_mm_s.abs() > self.bound_mm_s {
                     *command_mm_s = self.bound_mm_s.copysign(*command_mm_s);
@@ -377,7 +378,7 @@ impl Learning {
         }
     }
 
-    /// What the commands are as a table: a knot every few ticks, and one for the end.
+    /// The commands as a table: a knot every few ticks, and one for the end.
     fn correction(&self) -> StretchCorrection {
         let length = self.commands_mm_s[0].len();
         let at = |tick: usize| {

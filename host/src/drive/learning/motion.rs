@@ -1,19 +1,19 @@
-//! What can be repeated: anything that makes a recording as run options say.
+//! A motion that can be repeated: anything that makes a recording as run options say.
 
 use std::ops::Range;
 
 use crate::drive::circle;
+use crate::drive::circle_motion::Circle;
 use crate::drive::experiment::{DriveError, Recording};
-use crate::drive::turning::Turning;
 use crate::machine::Machine;
 use crate::simulate::RunOptions;
 
 /// The stretch to be corrected, in a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stretch {
-    /// Which of the program, from 0.
+    /// The stretch's index in the program, from 0.
     pub index: u32,
-    /// Its ticks, as indices into the recording: the first is the first in which it moves.
+    /// Its ticks, as indices into the recording. In the first one it moves.
     pub ticks: Range<usize>,
 }
 
@@ -36,7 +36,8 @@ pub trait Motion {
         Stretch { index: 0, ticks: from..from + length }
     }
 
-    /// How far the machine is beside the path \[µm\]; the greatest over all ticks, if it is not said otherwise.
+    /// The distance of the machine from the path \[µm\]; the greatest over all ticks, unless a motion says
+    /// otherwise.
     ///
     /// # Errors
     /// There is nothing to measure.
@@ -46,7 +47,7 @@ pub trait Motion {
 }
 
 /// Measured as the circle test is: at constant feed, after settling.
-impl Motion for Turning {
+impl Motion for Circle {
     fn record(&self, options: &RunOptions<'_>, machine: &Machine) -> Result<Recording, DriveError> {
         self.record_with(options, machine)
     }

@@ -1,4 +1,4 @@
-//! The page of the circle test: errors over frequency, around the circle, and over a turn.
+//! The page of the circle test: errors over frequency, around the circle, and over a revolution.
 
 use std::io::{self, Write};
 
@@ -10,12 +10,12 @@ use super::super::plots::{Caption, polar};
 use super::{legend, table};
 use crate::drive::Recording;
 use crate::drive::circle::{CircleFigures, Sweep, deviations};
+use crate::drive::circle_motion::Circle;
 use crate::drive::reference::Comparison;
-use crate::drive::turning::Turning;
 use crate::machine::Machine;
 
 /// A circle to be shown: what acted, the motion, its recording.
-pub type Shown = (&'static str, Turning, Recording);
+pub type Shown = (&'static str, Circle, Recording);
 
 /// Writes the page.
 ///
@@ -47,14 +47,14 @@ pub fn write_circle(
     super::open(&title, machine, &sentence, comparisons, out)?;
     over_frequency(machine, sweeps, limit_um, out)?;
     let mut frequencies_hz: Vec<f64> = Vec::new();
-    for (_, turning, _) in shown {
-        if !frequencies_hz.iter().any(|hz| hz.total_cmp(&turning.frequency_hz).is_eq()) {
-            frequencies_hz.push(turning.frequency_hz);
+    for (_, circle, _) in shown {
+        if !frequencies_hz.iter().any(|hz| hz.total_cmp(&circle.frequency_hz).is_eq()) {
+            frequencies_hz.push(circle.frequency_hz);
         }
     }
     for (index, hz) in frequencies_hz.into_iter().enumerate() {
         let of: Vec<&Shown> =
-            shown.iter().filter(|(_, turning, _)| turning.frequency_hz.total_cmp(&hz).is_eq()).collect();
+            shown.iter().filter(|(_, circle, _)| circle.frequency_hz.total_cmp(&hz).is_eq()).collect();
         one_frequency(machine, index, hz, limit_um, &of, out)?;
     }
     writeln!(out, "<section><h2>Figures</h2>")?;
@@ -153,7 +153,7 @@ fn over_frequency(
     writeln!(out, "</section>")
 }
 
-/// The circle with its error magnified, and the following error over two turns.
+/// The circle with its error magnified, and the following error over two revolutions.
 fn one_frequency(
     machine: &Machine,
     index: usize,
@@ -165,16 +165,16 @@ fn one_frequency(
     let hz = figure(frequency_hz, 4);
     let (mut around, mut following) = (Vec::new(), Vec::new());
     let mut radius_mm = 0.0;
-    for (index, (_, turning, recording)) in shown.iter().enumerate() {
+    for (index, (_, circle, recording)) in shown.iter().enumerate() {
         let ink = palette::series(index);
-        radius_mm = turning.radius_mm();
-        let turn = (1.0 / (frequency_hz * recording.tick_s())).round() as usize;
-        let points = deviations(recording, turning).map_err(io::Error::other)?;
-        // One turn, closed; the last one.
-        let last = points.len().saturating_sub(turn + 1);
+        radius_mm = circle.radius_mm();
+        let revolution_ticks = (1.0 / (frequency_hz * recording.tick_s())).round() as usize;
+        let points = deviations(recording, circle).map_err(io::Error::other)?;
+        // One revolution, closed; the last one.
+        let last = points.len().saturating_sub(revolution_ticks + 1);
         around.push(Series { ink, points: points[last..].to_vec() });
-        let ticks = turning.measured(recording).map_err(io::Error::other)?;
-        let [x, _] = turning.axes();
+        let ticks = circle.measured(recording).map_err(io::Error::other)?;
+        let [x, _] = circle.axes();
         let over_time = |(tick, trace): (usize, &crate::trace::TraceRow)| {
             (tick as f64 * recording.tick_s() * 1e3, trace.axes[x].err_um)
         };
@@ -189,7 +189,7 @@ fn one_frequency(
     rings.push((palette::LIMIT, format!("±{} µm", figure(limit_um, 3))));
     let remark = "The error is magnified, the circle is not to scale with it: the rings show how much.";
     figure_html(&polar::draw(&around, limit_um, &caption)?, &rings, remark, out)?;
-    let name = name_of(machine, shown.iter().map(|(_, turning, _)| turning.axes()[0]), "the first axis");
+    let name = name_of(machine, shown.iter().map(|(_, circle, _)| circle.axes()[0]), "the first axis");
     let graph = Graph {
         title: format!("Following error of {name} [µm]"),
         y: None,

@@ -10,11 +10,11 @@ use super::super::plots::graph::{Graph, Series, Stack};
 use super::legend;
 use crate::drive::Recording;
 use crate::drive::bode::{Bode, Point};
+use crate::drive::circle_motion::Circle;
 use crate::drive::experiment::{DriveError, differences};
 use crate::drive::harmonic::HarmonicFigures;
 use crate::drive::inertia::{InertiaFigures, accelerations};
 use crate::drive::reference::Comparison;
-use crate::drive::turning::Turning;
 use crate::machine::Machine;
 
 /// Amplitude at −3 dB.
@@ -41,7 +41,7 @@ fn measured<T>(result: Result<T, DriveError>) -> io::Result<T> {
 pub fn write_harmonic(
     machine: &Machine,
     found: &[HarmonicFigures],
-    waves: &[(Turning, Recording)],
+    waves: &[(Circle, Recording)],
     words: &str,
     comparisons: &[Comparison],
     out: &mut impl Write,
@@ -108,17 +108,19 @@ pub fn write_harmonic(
     writeln!(out, "<section><h2>Amplitude and phase</h2>")?;
     figure_html(&stack.draw(&caption)?, &legend(words.into_iter()), "", out)?;
     writeln!(out, "</section><section><h2>Velocities</h2>")?;
-    for (index, (turning, recording)) in waves.iter().enumerate() {
-        let hz = figure(turning.frequency_hz, 4);
-        let [x, y] = turning.axes();
+    for (index, (circle, recording)) in waves.iter().enumerate() {
+        let hz = figure(circle.frequency_hz, 4);
+        let [x, y] = circle.axes();
         let series = vec![
-            Series { ink: palette::LIMIT, points: wave(turning, recording, x, true)? },
-            Series { ink: palette::series(0), points: wave(turning, recording, x, false)? },
-            Series { ink: palette::series(1), points: wave(turning, recording, y, false)? },
+            Series { ink: palette::LIMIT, points: wave(circle, recording, x, true)? },
+            Series { ink: palette::series(0), points: wave(circle, recording, x, false)? },
+            Series { ink: palette::series(1), points: wave(circle, recording, y, false)? },
         ];
         let title = format!("Velocity at {hz} Hz [m/min]");
-        let stack =
-            over_turns(turning, vec![Graph { title: title.clone(), y: None, series, levels: Vec::new() }]);
+        let stack = over_revolutions(
+            circle,
+            vec![Graph { title: title.clone(), y: None, series, levels: Vec::new() }],
+        );
         let caption = Caption { id: &format!("wave{index}"), title: &title, description: &title };
         let words = [
             (palette::LIMIT, format!("{}, set", names[0])),
@@ -131,15 +133,15 @@ pub fn write_harmonic(
     super::close(out)
 }
 
-/// Graphs over the turns that are shown.
-fn over_turns(turning: &Turning, graphs: Vec<Graph>) -> Stack {
-    let end_ms = (TURNS_SHOWN / turning.frequency_hz).min(turning.span_s()) * 1e3;
+/// Graphs over the revolutions that are shown.
+fn over_revolutions(circle: &Circle, graphs: Vec<Graph>) -> Stack {
+    let end_ms = (TURNS_SHOWN / circle.frequency_hz).min(circle.span_s()) * 1e3;
     Stack { x: (0.0, end_ms), x_name: "time [ms]", is_logarithmic: false, graphs }
 }
 
 /// Set or actual velocity of an axis: time and velocity \[ms, m/min\].
-fn wave(turning: &Turning, recording: &Recording, axis: usize, is_set: bool) -> io::Result<Vec<(f64, f64)>> {
-    let ticks = measured(turning.measured(recording))?;
+fn wave(circle: &Circle, recording: &Recording, axis: usize, is_set: bool) -> io::Result<Vec<(f64, f64)>> {
+    let ticks = measured(circle.measured(recording))?;
     let tick_s = recording.tick_s();
     let over = if is_set { 1 } else { ((AVERAGED_S / tick_s).round() as usize).max(1) };
     let positions: Vec<f64> = ticks
@@ -157,16 +159,16 @@ fn wave(turning: &Turning, recording: &Recording, axis: usize, is_set: bool) -> 
 /// Writes the page of the growing load: velocities and accelerations of one axis.
 ///
 /// # Errors
-/// As [`write_harmonic`].
+/// Those of [`write_harmonic`].
 pub fn write_inertia(
     machine: &Machine,
-    turning: &Turning,
+    circle: &Circle,
     found: &[(InertiaFigures, Recording)],
     out: &mut impl Write,
 ) -> io::Result<()> {
     let axis = found.first().map_or(0, |(figures, _)| figures.response.axis);
     let name = &machine.axes[axis].name;
-    let title = format!("Axis {name} at {} Hz under load", figure(turning.frequency_hz, 4));
+    let title = format!("Axis {name} at {} Hz under load", figure(circle.frequency_hz, 4));
     let limited = found.iter().find(|(figures, _)| figures.is_limited);
     let sentence = match limited {
         None => "<strong>The velocity stays a sine:</strong> the current limit is not reached.".to_owned(),
@@ -180,21 +182,21 @@ pub fn write_inertia(
     super::open(&title, machine, &sentence, &[], out)?;
     let (mut velocity, mut accel) = (Vec::new(), Vec::new());
     if let Some((_, recording)) = found.first() {
-        velocity.push(Series { ink: palette::LIMIT, points: wave(turning, recording, axis, true)? });
+        velocity.push(Series { ink: palette::LIMIT, points: wave(circle, recording, axis, true)? });
     }
     for (index, (_, recording)) in found.iter().enumerate() {
         let ink = palette::series(index);
-        velocity.push(Series { ink, points: wave(turning, recording, axis, false)? });
-        let points = measured(accelerations(recording, turning, axis))?;
+        velocity.push(Series { ink, points: wave(circle, recording, axis, false)? });
+        let points = measured(accelerations(recording, circle, axis))?;
         accel.push(Series { ink, points: points.into_iter().map(|(t, a)| (t * 1e3, a / 1e3)).collect() });
     }
     let graph = |title: &str, series| Graph { title: title.to_owned(), y: None, series, levels: Vec::new() };
     let graphs = vec![graph("Velocity [m/min]", velocity), graph("Acceleration [m/s²]", accel)];
-    let stack = over_turns(turning, graphs);
+    let stack = over_revolutions(circle, graphs);
     let caption = Caption {
         id: "inertia",
         title: "Velocity and acceleration under load",
-        description: "Two turns of the motion under each load: velocity and acceleration.",
+        description: "Two revolutions of the motion under each load: velocity and acceleration.",
     };
     let mut words: Vec<_> =
         legend(found.iter().map(|(figures, _)| format!("load {}", figure(figures.load_inertia_ratio, 3))));

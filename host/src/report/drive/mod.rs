@@ -48,7 +48,7 @@ pub(super) fn close(out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "</main></body></html>")
 }
 
-/// Figures beside the expected and the published ones; nothing if there are none.
+/// A table of figures with the expected and the published ones; nothing if there are none.
 fn comparison_table(comparisons: &[Comparison], out: &mut impl Write) -> io::Result<()> {
     if comparisons.is_empty() {
         return Ok(());

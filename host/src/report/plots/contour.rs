@@ -1,4 +1,4 @@
-//! Contour error over path length, beside the feed that it may come from.
+//! Contour error over path length, with the feed that it may come from.
 
 use std::io;
 

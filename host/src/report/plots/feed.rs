@@ -42,7 +42,7 @@ impl Step<'_> {
     }
 }
 
-/// Whether blocks are so many that columns of the plot show a range of ceilings.
+/// Whether there are more blocks than columns, so that a column shows a range of ceilings.
 pub(in crate::report) fn is_crowded(trace: &RunTrace, summary: &Summary) -> bool {
     let (top_mm_s, _) = top(trace, summary);
     steps(&trace.blocks, top_mm_s, summary.path_length_mm, NARROW.columns).iter().any(Step::is_range)

@@ -18,7 +18,7 @@ const ROWS_MAX: usize = 6;
 /// An upright line with a word to it.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::report) struct Mark {
-    /// Where on the horizontal axis.
+    /// The place on the horizontal axis.
     at: f64,
     word: String,
     is_fault: bool,
@@ -76,7 +76,7 @@ pub(super) struct Words {
 }
 
 impl Words {
-    /// For a plot with `x` as the ends of its horizontal axis, and so much room on its right.
+    /// Marks for a plot with `x` as the ends of its horizontal axis, and this much room on its right.
     pub(super) fn new(marks: Vec<Mark>, layout: &Layout, x: (f64, f64), right: u32) -> Self {
         let width = f64::from(layout.width - layout.left - right);
         let gap = f64::from(layout.text) / 4.0;

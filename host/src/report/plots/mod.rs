@@ -1,4 +1,4 @@
-//! What all plots share: the layout they are drawn on, the panel with its axes, and the wrapping for the page.
+//! Shared by all plots: the layout they are drawn on, the panel with its axes, and the wrapping for the page.
 //!
 //! Every plot is drawn twice, for a wide and for a narrow page, because a picture scaled down to a phone takes its
 //! letters along. The style layout shows one of the two. The drawing library places things on whole units only, so a
@@ -60,7 +60,7 @@ pub(super) struct Layout {
     pub(super) stroke: u32,
 }
 
-/// For a screen or a printed page.
+/// The layout for a screen or a printed page.
 const WIDE: Layout = Layout {
     class: "wide",
     width: 960 * UNITS_PER_PX,
@@ -73,7 +73,7 @@ const WIDE: Layout = Layout {
     stroke: 7,
 };
 
-/// For a phone.
+/// The layout for a phone.
 const NARROW: Layout = Layout {
     class: "narrow",
     width: 358 * UNITS_PER_PX,
@@ -110,7 +110,7 @@ impl Layout {
     }
 }
 
-/// What a drawing is called and what it shows, for those who cannot see it.
+/// The title and the description of a drawing, for those who cannot see it.
 pub(super) struct Caption<'a> {
     /// Unique on the page.
     pub(super) id: &'a str,

@@ -28,7 +28,7 @@ pub(in crate::report) struct View {
     pub(in crate::report) up: usize,
 }
 
-/// Which class of colour a feed has.
+/// The class of colour of a feed.
 fn class_of(feed_mm_s: f64, feed_mm_s_max: f64) -> usize {
     let part = if feed_mm_s_max > 0.0 { feed_mm_s / feed_mm_s_max } else { 0.0 };
     ((part.max(0.0) * CLASSES.len() as f64) as usize).min(CLASSES.len() - 1)

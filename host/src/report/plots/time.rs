@@ -18,20 +18,20 @@ use crate::trace::{RunTrace, TraceRow, TracedCommand};
 /// Full scale of the output \[V\].
 const RAIL_V: f64 = 10.0;
 
-/// From this output on the plot shows the rails as well \[V\].
+/// The output from which the plot shows the rails too \[V\].
 const RAIL_SHOWN_FROM_V: f64 = 7.0;
 
 /// A quantity over time.
 struct Curve<V: Fn(&TraceRow) -> f64> {
     title: &'static str,
     span: Span,
-    /// What the machine allows, in both directions; 0 if that is not known.
+    /// The machine's limit in both directions; 0 if that is not known.
     limit: f64,
     ink: Ink,
     value: V,
 }
 
-/// Below this part of its limit a curve would be flat in a picture that shows the limit.
+/// The part of its limit below which a curve would be flat in a picture that shows the limit.
 const LIMIT_SHOWN_FROM: f64 = 0.2;
 
 /// Whether the plot of a curve shows its limit.
@@ -158,7 +158,7 @@ impl LiveControl {
         Self { x, words: marks::Words::new(marks::over_time(trace), layout, x, layout.right), course }
     }
 
-    /// Without words.
+    /// Height of the plot without its words.
     fn plot_height(layout: &Layout) -> u32 {
         layout.panel_height * 4 / 5
     }

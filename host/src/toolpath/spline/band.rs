@@ -78,7 +78,7 @@ mod tests {
         row
     }
 
-    /// A line through four points that lie beside it: by hand, 1.4·x + 0.4.
+    /// A line that fits four points which do not lie on it: by hand, 1.4·x + 0.4.
     #[test]
     fn overdetermined_rows_are_met_in_the_mean() {
         let mut band = Band::new(2);

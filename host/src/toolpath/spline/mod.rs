@@ -75,7 +75,7 @@ pub enum Ends {
 /// Why there is no spline. Points are counted from 0. Displays as "…, expected …".
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SplineError {
-    /// Not enough points.
+    /// There are not enough points.
     #[error("{points} points, expected at least {expected}")]
     TooFew {
         /// How many there are.
@@ -107,7 +107,7 @@ pub enum SplineError {
         /// The parameter of the point before.
         before: f64,
     },
-    /// As many parameters as points are needed.
+    /// The number of parameters differs from that of points.
     #[error("{parameters} parameters of {points} points, expected one for each")]
     Parameters {
         /// How many points.
@@ -128,7 +128,7 @@ pub enum SplineError {
     Uneven {
         /// The point that is missed most.
         index: usize,
-        /// By how much \[mm\].
+        /// The deviation \[mm\].
         deviation_mm: f64,
     },
 }
@@ -307,7 +307,7 @@ pub fn interpolate(
 /// points, and with a tolerance of 0, the spline goes through all points. The first and the last one are always met.
 ///
 /// # Errors
-/// As [`interpolate`]; the tolerance is negative or not finite.
+/// Those of [`interpolate`]; the tolerance is negative or not finite.
 pub fn fit(
     points: &[Vector],
     parameters: &[f64],

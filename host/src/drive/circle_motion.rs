@@ -1,7 +1,7 @@
 //! Circles of constant feed: R = F/(2πf) (S4 (2)).
 //!
 //! At constant feed both axes of the circle's plane move as sines, and the amplitude of their velocity is the feed at
-//! every frequency. The motion starts at rest on the circle, reaches its feed within about a turn, settles, and is
+//! every frequency. The motion starts at rest on the circle, reaches its feed within about a revolution, settles, and is
 //! measured last.
 
 use core::f64::consts::TAU;
@@ -12,19 +12,19 @@ use crate::machine::Machine;
 use crate::simulate::RunOptions;
 use crate::trace::{AXES, AxisTick, TraceRow};
 
-/// Turns for reaching the feed and for braking from it.
-const RAMP_TURNS: f64 = 6.0;
+/// Revolutions for reaching the feed and for braking from it.
+const RAMP_REVOLUTIONS: f64 = 6.0;
 /// The limits are this part above what the circle needs: radii are rounded.
 const LIMIT_MARGIN: f64 = 1e-3;
-/// Least frequency \[Hz\]: a turn of 20 s.
+/// Least frequency \[Hz\]: a revolution of 20 s.
 const FREQUENCY_HZ_MIN: f64 = 0.05;
-/// At the greatest frequency a turn has this many ticks.
-const TICKS_PER_TURN_MIN: f64 = 10.0;
+/// Ticks of a revolution at the greatest frequency.
+const TICKS_PER_REVOLUTION_MIN: f64 = 10.0;
 
 /// A circle to be driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turning {
-    /// Turns per second \[Hz\], 0.05 to a tenth of the tick's frequency.
+pub struct Circle {
+    /// Revolutions per second \[Hz\], 0.05 to a tenth of the tick's frequency.
     pub frequency_hz: f64,
     /// Feed \[mm/s\], above 0, within reach of the outputs.
     pub feed_mm_s: f64,
@@ -32,7 +32,7 @@ pub struct Turning {
     pub plane: Plane,
     /// Time at constant feed before measuring \[s\]. A bed of 13 Hz and 3 % damping needs 3 s.
     pub settle_s: f64,
-    /// Least time that is measured \[s\]; a whole turn if that is longer.
+    /// Least time that is measured \[s\]; a whole revolution if that is longer.
     pub measured_s: f64,
 }
 
@@ -42,7 +42,7 @@ pub fn plane_of(axis: usize) -> Plane {
     if axis == 2 { Plane::Zx } else { Plane::Xy }
 }
 
-impl Turning {
+impl Circle {
     /// 3 s to settle, 1 s to measure, in X and Y.
     #[must_use]
     pub fn new(frequency_hz: f64, feed_mm_s: f64) -> Self {
@@ -63,7 +63,7 @@ impl Turning {
         [first, second]
     }
 
-    /// What is measured of it at least \[s\]: a turn or more.
+    /// Time that is measured at least \[s\]: a revolution or more.
     #[must_use]
     pub fn span_s(&self) -> f64 {
         self.measured_s.max(1.0 / self.frequency_hz)
@@ -77,10 +77,10 @@ impl Turning {
         self.record_with(&RunOptions::default(), machine)
     }
 
-    /// [`Turning::record`], run as `options` say. All turns are one stretch.
+    /// [`Circle::record`], run as `options` say. All revolutions are one stretch.
     ///
     /// # Errors
-    /// As there, and a correction that can't be used.
+    /// Those of [`Circle::record`], and a correction that can't be used.
     pub fn record_with(&self, options: &RunOptions<'_>, machine: &Machine) -> Result<Recording, DriveError> {
         self.check(machine.tick_s)?;
         let &Self { frequency_hz, feed_mm_s, plane, .. } = self;
@@ -93,9 +93,9 @@ impl Turning {
             Plane::Yz => "G19",
         };
         let held_s = self.settle_s + self.span_s() + Recording::MARGIN_S;
-        let turns = (held_s * frequency_hz + RAMP_TURNS).ceil() as usize;
+        let revolutions = (held_s * frequency_hz + RAMP_REVOLUTIONS).ceil() as usize;
         // Counter-clockwise from the circle's outermost point on its first axis.
-        let turn = format!(
+        let revolution = format!(
             "G3 {}0 {}0 {}{:.10} {}0\n",
             letters[first],
             letters[second],
@@ -103,7 +103,8 @@ impl Turning {
             -self.radius_mm(),
             offsets[second],
         );
-        let program = format!("G21 G90 {select} F{:.10}\n{}M2\n", feed_mm_s * 60.0, turn.repeat(turns));
+        let program =
+            format!("G21 G90 {select} F{:.10}\n{}M2\n", feed_mm_s * 60.0, revolution.repeat(revolutions));
         let experiment = format!("circles at {frequency_hz} Hz and {} mm/min", feed_mm_s * 60.0);
         Recording::with(options, experiment, &program, machine, feed_mm_s)
     }
@@ -113,14 +114,14 @@ impl Turning {
     /// # Errors
     /// The first quantity that is not.
     pub fn check(&self, tick_s: f64) -> Result<(), DriveError> {
-        let fastest_hz = 1.0 / (TICKS_PER_TURN_MIN * tick_s);
+        let fastest_hz = 1.0 / (TICKS_PER_REVOLUTION_MIN * tick_s);
         within("frequency [Hz]", self.frequency_hz, (FREQUENCY_HZ_MIN, fastest_hz))?;
         within("feed [mm/min]", self.feed_mm_s * 60.0, (1.0, 1e6))?;
         within("settling time [s]", self.settle_s, (0.0, 60.0))?;
         within("measuring time [s]", self.measured_s, (0.0, 60.0))
     }
 
-    /// What a circle takes at constant feed, over the share of it that planning uses.
+    /// The limits that a circle needs at constant feed, over the share of them that planning uses.
     fn demands(&self, curve_feed_share: f64) -> Demands {
         let omega_per_s = TAU * self.frequency_hz / curve_feed_share;
         let accel_mm_s2 = self.feed_mm_s / curve_feed_share * omega_per_s * (1.0 + LIMIT_MARGIN);
