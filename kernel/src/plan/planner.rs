@@ -61,6 +61,9 @@ pub struct Planned {
     pub time_s: f64,
 }
 
+/// Times that differ by a smaller share are equal but for rounding; the pairs are taken then.
+const EQUAL: f64 = 1.0e-12;
+
 /// Plans `path` and hands the ramps of the faster plan to `put` in path order, each with its number from 0. A number that
 /// comes again replaces the ramp that had it, and all ramps after that one. `put` returns whether there was room; if not,
 /// the rest of that plan is left out.
@@ -104,7 +107,8 @@ pub fn plan_ramps(
     }
     if let Some(found) = spanning {
         let by_pairs = pairs(all.first(compared), plans, &mut |_, _| true);
-        if by_pairs.is_err() || by_pairs.is_ok_and(|by_pairs| found.time_s < by_pairs.time_s) {
+        if by_pairs.is_err() || by_pairs.is_ok_and(|by_pairs| found.time_s < by_pairs.time_s * (1.0 - EQUAL))
+        {
             return Ok(Planned { is_whole: found.is_whole && spans_all, ..found });
         }
     }
