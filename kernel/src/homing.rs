@@ -1,7 +1,7 @@
 //! Homing of an axis: switch and, where there is one, index pulse, at two speeds.
 //!
-//! Consumes, once a turn of the background, what the tick has seen of the axis ([`Seen`]); produces what is to be done next
-//! ([`Step`]): jogs, which are jerk-limited, and stops, which are controlled. The reference is where the switch closes on the
+//! Consumes, once a turn of the background, what the tick has seen of the axis ([`HomingInput`]); produces what is to be done next
+//! ([`HomingStep`]): jogs, which are jerk-limited, and stops, which are controlled. The reference is where the switch closes on the
 //! slow approach, or the first index behind that: its count is latched, so that however late the stop is the position is
 //! exact.
 //!
@@ -19,7 +19,7 @@
 //!
 //! Every stage is bounded by a length; what is not found within it is a [`HomingError`], which comes at rest.
 
-use crate::jog::{Direction, Jog, JogAxis, JogError, Way};
+use crate::jog::{Direction, Jog, JogAxis, JogError, JogTarget};
 use crate::live::State;
 use crate::units::{Counts, Position};
 
@@ -48,7 +48,7 @@ pub struct HomingConfig {
 
 /// What a tick has shown of the axis.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<const AXES: usize> {
+pub struct HomingInput<const AXES: usize> {
     /// Set positions of all axes.
     pub set: [Position; AXES],
     /// What its encoder read.
@@ -64,7 +64,7 @@ pub struct Seen<const AXES: usize> {
 /// What is to be done.
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "there is no heap to put a jog on")]
-pub enum Step<const AXES: usize> {
+pub enum HomingStep<const AXES: usize> {
     /// Nothing.
     Wait,
     /// Rest here, split the streams and drive this with a new live control.
@@ -207,19 +207,22 @@ impl Homing {
     ///
     /// # Errors
     /// The axis is not homed; it is at rest.
-    pub fn poll<const AXES: usize>(&mut self, seen: &Seen<AXES>) -> Result<Step<AXES>, HomingError> {
+    pub fn poll<const AXES: usize>(
+        &mut self,
+        seen: &HomingInput<AXES>,
+    ) -> Result<HomingStep<AXES>, HomingError> {
         let step = self.step(seen);
-        if matches!(step, Err(_) | Ok(Step::Done(_))) {
+        if matches!(step, Err(_) | Ok(HomingStep::Done(_))) {
             self.stage = Stage::Ended;
         }
         step
     }
 
-    fn step<const AXES: usize>(&mut self, seen: &Seen<AXES>) -> Result<Step<AXES>, HomingError> {
+    fn step<const AXES: usize>(&mut self, seen: &HomingInput<AXES>) -> Result<HomingStep<AXES>, HomingError> {
         let here = self.here(seen)?;
         let is_at_rest = matches!(seen.state, State::Done | State::Aborted);
         match self.stage {
-            Stage::Ended => return Ok(Step::Wait),
+            Stage::Ended => return Ok(HomingStep::Wait),
             Stage::Start if self.is_aborted => return Err(HomingError::Aborted),
             Stage::Start => {}
             _ if seen.state == State::Failed => return Err(HomingError::Failed),
@@ -239,12 +242,12 @@ impl Homing {
             Stage::BackOff { was_home: false } if is_at_rest => Err(HomingError::LostSwitch { back_off_mm }),
             Stage::BackOff { was_home } => {
                 self.stage = Stage::BackOff { was_home: was_home || seen.is_home };
-                Ok(Step::Wait)
+                Ok(HomingStep::Wait)
             }
             Stage::Approach if seen.is_home => {
                 if index_mm.is_some() {
                     self.stage = Stage::Index { edge: here, counts: seen.counts };
-                    Ok(Step::ArmIndex)
+                    Ok(HomingStep::ArmIndex)
                 } else {
                     Ok(self.stop(After::Reference(Homed { counts: seen.counts, index_counts: None })))
                 }
@@ -262,20 +265,20 @@ impl Homing {
                     None if is_at_rest || self.distance_mm(edge, here) > index_mm => {
                         Ok(self.stop(After::Error(HomingError::NoIndex { index_mm })))
                     }
-                    None => Ok(Step::Wait),
+                    None => Ok(HomingStep::Wait),
                 }
             }
             Stage::Stopping(after) if is_at_rest => self.after(after, seen),
             Stage::Referenced(homed) => match self.config.park {
                 Some(park) if park != here => {
                     self.stage = Stage::Park(homed);
-                    self.jog(Way::By(park - here), self.config.fast_mm_s, seen)
+                    self.jog(JogTarget::By(park - here), self.config.fast_mm_s, seen)
                 }
-                _ => Ok(Step::Done(homed)),
+                _ => Ok(HomingStep::Done(homed)),
             },
-            Stage::Park(homed) if is_at_rest => Ok(Step::Done(homed)),
+            Stage::Park(homed) if is_at_rest => Ok(HomingStep::Done(homed)),
             Stage::Seek | Stage::Approach | Stage::Stopping(_) | Stage::Park(_) | Stage::Ended => {
-                Ok(Step::Wait)
+                Ok(HomingStep::Wait)
             }
         }
     }
@@ -283,8 +286,8 @@ impl Homing {
     fn after<const AXES: usize>(
         &mut self,
         after: After,
-        seen: &Seen<AXES>,
-    ) -> Result<Step<AXES>, HomingError> {
+        seen: &HomingInput<AXES>,
+    ) -> Result<HomingStep<AXES>, HomingError> {
         match after {
             // A short switch may have been passed.
             After::BackOff => self.go(Stage::BackOff { was_home: seen.is_home }, seen),
@@ -293,13 +296,13 @@ impl Homing {
             After::Approach => self.go(Stage::Approach, seen),
             After::Reference(homed) => {
                 self.stage = Stage::Referenced(homed);
-                Ok(Step::Reference(homed.counts, self.config.position))
+                Ok(HomingStep::Reference(homed.counts, self.config.position))
             }
             After::Error(error) => Err(error),
         }
     }
 
-    fn here<const AXES: usize>(&self, seen: &Seen<AXES>) -> Result<Position, HomingError> {
+    fn here<const AXES: usize>(&self, seen: &HomingInput<AXES>) -> Result<Position, HomingError> {
         let here = seen.set.get(self.axis).copied();
         here.ok_or(HomingError::Move(JogError::Axis { axis: self.axis, axes: AXES }))
     }
@@ -312,13 +315,17 @@ impl Homing {
         }
     }
 
-    fn stop<const AXES: usize>(&mut self, after: After) -> Step<AXES> {
+    fn stop<const AXES: usize>(&mut self, after: After) -> HomingStep<AXES> {
         self.stage = Stage::Stopping(after);
-        Step::Stop
+        HomingStep::Stop
     }
 
     /// The move of a stage.
-    fn go<const AXES: usize>(&mut self, stage: Stage, seen: &Seen<AXES>) -> Result<Step<AXES>, HomingError> {
+    fn go<const AXES: usize>(
+        &mut self,
+        stage: Stage,
+        seen: &HomingInput<AXES>,
+    ) -> Result<HomingStep<AXES>, HomingError> {
         let HomingConfig { direction, fast_mm_s, slow_mm_s, travel_mm, back_off_mm, index_mm, .. } =
             self.config;
         let (direction, length_mm, feed_mm_s) = match stage {
@@ -330,17 +337,17 @@ impl Homing {
         let by =
             Position::from_mm(signed_mm).ok_or(HomingError::Move(JogError::End { end_mm: signed_mm }))?;
         (self.stage, self.from) = (stage, self.here(seen)?);
-        self.jog(Way::By(by), feed_mm_s, seen)
+        self.jog(JogTarget::By(by), feed_mm_s, seen)
     }
 
     fn jog<const AXES: usize>(
         &self,
-        way: Way,
+        target: JogTarget,
         feed_mm_s: f64,
-        seen: &Seen<AXES>,
-    ) -> Result<Step<AXES>, HomingError> {
-        let jog = Jog::new(&self.jog, self.axis, seen.set, way, feed_mm_s, self.tick_s);
-        jog.map(Step::Move).map_err(HomingError::Move)
+        seen: &HomingInput<AXES>,
+    ) -> Result<HomingStep<AXES>, HomingError> {
+        let jog = Jog::new(&self.jog, self.axis, seen.set, target, feed_mm_s, self.tick_s);
+        jog.map(HomingStep::Move).map_err(HomingError::Move)
     }
 }
 
@@ -370,31 +377,36 @@ mod tests {
 
     /// What a machine does that rests after every stop, and moves a millimetre a turn.
     struct Machine {
-        seen: Seen<1>,
+        seen: HomingInput<1>,
         direction: f64,
         end: Position,
     }
 
     impl Machine {
         fn new() -> Self {
-            let seen =
-                Seen { set: [at(0.0)], counts: Counts(0), is_home: false, index: None, state: State::Done };
+            let seen = HomingInput {
+                set: [at(0.0)],
+                counts: Counts(0),
+                is_home: false,
+                index: None,
+                state: State::Done,
+            };
             Self { seen, direction: 0.0, end: at(0.0) }
         }
 
         /// The switch is closed below -20 mm, an index lies at -22 mm.
-        fn poll(&mut self, homing: &mut Homing) -> Result<Step<1>, HomingError> {
+        fn poll(&mut self, homing: &mut Homing) -> Result<HomingStep<1>, HomingError> {
             let step = homing.poll(&self.seen);
             match &step {
-                Ok(Step::Move(jog)) => {
+                Ok(HomingStep::Move(jog)) => {
                     [self.end] = jog.end();
                     let way = self.end - self.seen.set[0];
                     (self.direction, self.seen.state) = (way.to_mm().signum(), State::Running);
                 }
-                Ok(Step::Stop) => (self.direction, self.seen.state) = (0.0, State::Aborted),
+                Ok(HomingStep::Stop) => (self.direction, self.seen.state) = (0.0, State::Aborted),
                 _ => {}
             }
-            let Seen { set: [set], counts, is_home, index, state } = &mut self.seen;
+            let HomingInput { set: [set], counts, is_home, index, state } = &mut self.seen;
             *set = *set + at(self.direction);
             if *state == State::Running && *set == self.end {
                 (self.direction, *state) = (0.0, State::Done);
@@ -416,11 +428,11 @@ mod tests {
                     homing.abort();
                 }
                 match machine.poll(&mut homing) {
-                    Ok(Step::Done(homed)) => {
+                    Ok(HomingStep::Done(homed)) => {
                         assert_eq!(homed, Homed { counts: Counts(-220), index_counts: Some(-20) });
                         return Ok(steps);
                     }
-                    Ok(Step::Reference(counts, position)) => {
+                    Ok(HomingStep::Reference(counts, position)) => {
                         assert_eq!((counts, position), (Counts(-220), at(-3.0)));
                         // From here on it is elsewhere.
                         machine.seen.set = [at(-5.0)];

@@ -11,7 +11,7 @@
 //!
 //! ```
 //! use motion_kernel::exec::Executor;
-//! use motion_kernel::jog::{Direction, Jog, JogAxis, Travel, Way};
+//! use motion_kernel::jog::{Direction, Jog, JogAxis, Travel, JogTarget};
 //! use motion_kernel::law::Limits;
 //! use motion_kernel::live::{LiveControl, State};
 //! use motion_kernel::queue::{LiveStreams, PathRules};
@@ -26,7 +26,7 @@
 //!
 //! // A key of the first of two axes is pressed, and released after 400 ticks.
 //! let start = [at(0.0), at(5.0)];
-//! let jog = Jog::new(&axis, 0, start, Way::Continuous(Direction::Positive), 20.0, tick_s).unwrap();
+//! let jog = Jog::new(&axis, 0, start, JogTarget::Continuous(Direction::Positive), 20.0, tick_s).unwrap();
 //! let mut streams = LiveStreams::<f32, 2, 32, 16>::new();
 //! let (mut feeder, mut intake) = streams.split(rules, start);
 //! let mut control = LiveControl::<f32, 2, _, _, 64>::new(jog, tick_s, 0);
@@ -120,7 +120,7 @@ pub struct JogAxis {
 
 /// How far a jog goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum JogTarget {
     /// As far as the soft limit, or until it is aborted.
     Continuous(Direction),
     /// By a signed distance, not 0; at most to the soft limit ([`Jog::ends_at_limit`]).
@@ -167,7 +167,7 @@ impl core::fmt::Display for JogError {
                 let (least_mm, greatest_mm) = (least.to_mm(), greatest.to_mm());
                 write!(f, "soft limits {least_mm} and {greatest_mm} mm: expected the lesser one first")
             }
-            Self::NoDistance => f.write_str("a distance of 0: expected a way to go"),
+            Self::NoDistance => f.write_str("a distance of 0: expected a distance to go"),
             Self::NoTravel => {
                 f.write_str("a jog without an end: expected soft limits, which the axis does not know yet")
             }
@@ -191,7 +191,7 @@ impl core::error::Error for JogError {}
 /// The items of a jog.
 #[derive(Clone, Debug)]
 pub struct Jog<const AXES: usize> {
-    way: Straight<AXES>,
+    motion: Straight<AXES>,
     ends_at_limit: bool,
 }
 
@@ -204,17 +204,17 @@ impl<const AXES: usize> Jog<AXES> {
         config: &JogAxis,
         axis: usize,
         start: [Position; AXES],
-        way: Way,
+        target: JogTarget,
         feed_mm_s: f64,
         tick_s: f64,
     ) -> Result<Self, JogError> {
         let &JogAxis { feed_mm_s: most_mm_s, limits, travel } = config;
         let &from = start.get(axis).ok_or(JogError::Axis { axis, axes: AXES })?;
-        let (direction, wanted) = match way {
-            Way::Continuous(direction) => (direction, None),
-            Way::By(by) if by > Position::ZERO => (Direction::Positive, Some(by)),
-            Way::By(by) if by < Position::ZERO => (Direction::Negative, Some(-by)),
-            Way::By(_) => return Err(JogError::NoDistance),
+        let (direction, wanted) = match target {
+            JogTarget::Continuous(direction) => (direction, None),
+            JogTarget::By(by) if by > Position::ZERO => (Direction::Positive, Some(by)),
+            JogTarget::By(by) if by < Position::ZERO => (Direction::Negative, Some(-by)),
+            JogTarget::By(_) => return Err(JogError::NoDistance),
         };
         let room = travel.map(|travel| room(from, direction, travel)).transpose()?;
         let length = match (wanted, room) {
@@ -231,15 +231,15 @@ impl<const AXES: usize> Jog<AXES> {
         if let Some(end) = end.get_mut(axis) {
             *end = ahead;
         }
-        let way =
+        let motion =
             Straight::new(start, end, limits, [feed_mm_s, most_mm_s], tick_s).map_err(JogError::Straight)?;
-        Ok(Self { way, ends_at_limit: room == Some(length) })
+        Ok(Self { motion, ends_at_limit: room == Some(length) })
     }
 
     /// Where it ends if it is not aborted.
     #[must_use]
     pub fn end(&self) -> [Position; AXES] {
-        self.way.end()
+        self.motion.end()
     }
 
     /// Whether it ends at the soft limit.
@@ -267,6 +267,6 @@ impl<const AXES: usize> Iterator for Jog<AXES> {
     type Item = Result<Item<AXES>, Infallible>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.way.next()
+        self.motion.next()
     }
 }

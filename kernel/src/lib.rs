@@ -114,6 +114,8 @@ pub mod jog;
 pub mod homing;
 
 #[doc(hidden)]
+pub mod internals;
+#[doc(hidden)]
 pub mod work;
 
 #[cfg(all(test, feature = "guards"))]

@@ -9,7 +9,7 @@ use core::convert::Infallible;
 
 use crate::law::{Law, LimitError, Limits, PlannedRamp, SegmentError};
 use crate::num::Root;
-use crate::plan::{Block, BlockPlan, plan};
+use crate::plan::{Block, BlockPlan, PlanError, plan};
 use crate::program::{Allowed, Item, PathBlock};
 use crate::units::Position;
 
@@ -34,6 +34,8 @@ pub enum StraightError {
         /// Its length.
         length_mm: f64,
     },
+    /// There is no plan from rest to rest over its length.
+    Plan(PlanError),
     /// There is no motion of the law over its length.
     Segment(SegmentError),
 }
@@ -48,6 +50,7 @@ impl core::fmt::Display for StraightError {
             Self::Length { length_mm } => {
                 write!(f, "a straight of {length_mm} mm: expected at most {} mm", Position::LIMIT_MM)
             }
+            Self::Plan(error) => error.fmt(f),
             Self::Segment(error) => error.fmt(f),
         }
     }
@@ -87,21 +90,21 @@ impl<const AXES: usize> Straight<AXES> {
         if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s && most_mm_s.is_finite()) {
             return Err(StraightError::Feed { feed_mm_s, most_mm_s });
         }
-        let mut way_mm = [0.0; AXES];
-        for ((way_mm, &start), &end) in way_mm.iter_mut().zip(&start).zip(&end) {
-            *way_mm = (end - start).to_mm();
+        let mut offset_mm = [0.0; AXES];
+        for ((offset_mm, &start), &end) in offset_mm.iter_mut().zip(&start).zip(&end) {
+            *offset_mm = (end - start).to_mm();
         }
         // Along one axis the root is exact, so the length is, too.
-        let length_mm = Root::sqrt(way_mm.iter().map(|mm| mm * mm).sum::<f64>());
+        let length_mm = Root::sqrt(offset_mm.iter().map(|mm| mm * mm).sum::<f64>());
         let length = Position::from_mm(length_mm).ok_or(StraightError::Length { length_mm })?;
         let law = Law::new(limits).map_err(StraightError::Limit)?;
         let (mut direction, mut ramps, mut block) = ([0.0; AXES], [None; 3], None);
         if length > Position::ZERO {
-            direction = way_mm.map(|mm| mm / length_mm);
+            direction = offset_mm.map(|mm| mm / length_mm);
             let planned = Block { length_mm: length.to_mm(), cap_mm_s: feed_mm_s, junction_mm_s: 0.0, law };
             let mut plans = [BlockPlan::default()];
-            // From rest to rest there always is a plan.
-            let _ = plan(&[planned], 0.0, 0.0, &mut plans);
+            // From rest to rest there is a plan for any length.
+            plan(&[planned], 0.0, 0.0, &mut plans).map_err(StraightError::Plan)?;
             let [of_block] = plans;
             let made = crate::plan::ramps(&planned, &of_block, Position::ZERO, length, tick_s);
             ramps = made.map_err(StraightError::Segment)?;

@@ -82,13 +82,13 @@ impl Position {
 
     /// Whether it is within ±[`Self::LIMIT_MM`].
     #[must_use]
-    pub fn is_within_limit(self) -> bool {
+    pub(crate) fn is_within_limit(self) -> bool {
         self.to_bits().unsigned_abs() <= (Self::LIMIT_MM * STEPS_PER_MM) as u64
     }
 
     /// A short local offset in mm as a step count, see [`Real::to_q32`].
     #[must_use]
-    pub fn from_offset<R: Real>(offset_mm: R) -> Self {
+    pub(crate) fn from_offset<R: Real>(offset_mm: R) -> Self {
         Self::from_bits(offset_mm.to_q32())
     }
 

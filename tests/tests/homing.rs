@@ -8,7 +8,7 @@ use motion_host::simulate::home::{HomeError, HomedAxis};
 use motion_host::simulate::session::Session;
 use motion_host::trace::TraceRow;
 use motion_kernel::homing::{HomingConfig, HomingError};
-use motion_kernel::jog::{Direction, Jog, JogAxis, Way};
+use motion_kernel::jog::{Direction, Jog, JogAxis, JogTarget};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::units::{Counts, Position};
 use motion_tests::check::bench::mm;
@@ -263,7 +263,7 @@ fn programs_go_on_from_the_new_position() {
                 assert_eq!(session.position(), [7.0, 0.0, 0.0].map(mm));
                 let moved_mm = simulated.truth()[AXIS].position_mm - origin_mm;
                 assert!((moved_mm - 7.0).abs() < 0.01, "{moved_mm}");
-                let back = Way::By(mm(-7.0));
+                let back = JogTarget::By(mm(-7.0));
                 let jog = Jog::new(&jog_axis(&machine), AXIS, session.position(), back, 30.0, machine.tick_s);
                 session.run(jog.expect("a jog"), &mut |row| judge.tick(row)).expect("a run");
                 assert_eq!(session.position(), [Position::ZERO; 3]);

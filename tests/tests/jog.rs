@@ -1,7 +1,7 @@
 //! Jog: keys pressed and released at random, checked from the executed positions alone.
 
 use motion_kernel::exec::{ExecState, Executed, Executor};
-use motion_kernel::jog::{Direction, Jog, JogAxis, JogError, Travel, Way};
+use motion_kernel::jog::{Direction, Jog, JogAxis, JogError, JogTarget, Travel};
 use motion_kernel::law::Limits;
 use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::{Fixed, Real};
@@ -86,13 +86,13 @@ enum Outcome {
 fn press<R: Real>(
     machine: &Machine,
     start: Place,
-    (axis, way, feed_mm_s): (usize, Way, f64),
+    (axis, target, feed_mm_s): (usize, JogTarget, f64),
     release: u64,
     random: &mut Random,
     rounding_mm: f64,
 ) -> Result<(Place, Outcome), String> {
-    let jog = Jog::new(&machine.axis, axis, start, way, feed_mm_s, machine.tick_s)
-        .map_err(|error| format!("{way:?}: {error}"))?;
+    let jog = Jog::new(&machine.axis, axis, start, target, feed_mm_s, machine.tick_s)
+        .map_err(|error| format!("{target:?}: {error}"))?;
     let end = jog.end();
     let mut streams = LiveStreams::<R, AXES, 32, 16>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
@@ -160,32 +160,32 @@ fn presses<R: Real>(seed: u64, rounding_mm: f64) -> Result<[usize; 4], String> {
     for _ in 0..12 {
         let axis = random.below(AXES);
         let positive = random.chance(0.5);
-        let way = if random.chance(0.5) {
-            Way::Continuous(if positive { Direction::Positive } else { Direction::Negative })
+        let target = if random.chance(0.5) {
+            JogTarget::Continuous(if positive { Direction::Positive } else { Direction::Negative })
         } else {
             let by = mm(random.log(1e-4, 50.0));
-            Way::By(if positive { by } else { -by })
+            JogTarget::By(if positive { by } else { -by })
         };
         let feed_mm_s = machine.axis.feed_mm_s * random.log(0.01, 1.0);
         let here = place[axis];
         let is_outwards = if positive { here >= greatest } else { here <= least };
         if is_outwards {
             let limit = if positive { greatest } else { least };
-            let refusal = Jog::new(&machine.axis, axis, place, way, feed_mm_s, machine.tick_s).map(|_| ());
+            let refusal = Jog::new(&machine.axis, axis, place, target, feed_mm_s, machine.tick_s).map(|_| ());
             assert_eq!(refusal, Err(JogError::AtLimit { position: here, limit }), "seed {seed}");
             refused += 1;
             continue;
         }
         let limit = if positive { greatest } else { least };
-        let end = match way {
-            Way::Continuous(_) => limit,
-            Way::By(by) if positive => (here + by).min(limit),
-            Way::By(by) => (here + by).max(limit),
+        let end = match target {
+            JogTarget::Continuous(_) => limit,
+            JogTarget::By(by) if positive => (here + by).min(limit),
+            JogTarget::By(by) => (here + by).max(limit),
         };
         // No key is held for minutes.
         let is_long = (end - here).to_mm().abs() / feed_mm_s > 30.0;
         let release = if is_long || random.chance(0.5) { random.log(1.0, 4000.0) as u64 } else { u64::MAX };
-        let asked = (axis, way, feed_mm_s);
+        let asked = (axis, target, feed_mm_s);
         let (now, outcome) = press::<R>(&machine, place, asked, release, &mut random, rounding_mm)
             .map_err(|error| format!("{machine:?} from {here:?}, {asked:?}: {error}"))?;
         match outcome {
@@ -227,14 +227,14 @@ fn what_can_not_be_jogged_is_refused() {
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
     let travel = Travel { least: mm(-10.0), greatest: mm(20.0) };
     let axis = JogAxis { feed_mm_s: 50.0, limits, travel: Some(travel) };
-    let up = Way::Continuous(Direction::Positive);
-    let jog = |config: &JogAxis, axis, from: f64, way, feed| {
-        Jog::new(config, axis, [mm(0.0), mm(from)], way, feed, 5e-4)
+    let up = JogTarget::Continuous(Direction::Positive);
+    let jog = |config: &JogAxis, axis, from: f64, target, feed| {
+        Jog::new(config, axis, [mm(0.0), mm(from)], target, feed, 5e-4)
             .map(|_| ())
             .map_err(|error| error.to_string())
     };
-    let refused = |config: &JogAxis, number, from, way, feed| {
-        jog(config, number, from, way, feed).expect_err("refused")
+    let refused = |config: &JogAxis, number, from, target, feed| {
+        jog(config, number, from, target, feed).expect_err("refused")
     };
     assert_eq!(jog(&axis, 1, 5.0, up, 50.0), Ok(()));
     assert_eq!(refused(&axis, 2, 5.0, up, 5.0), "axis 2: expected one of 2, from 0");
@@ -242,16 +242,19 @@ fn what_can_not_be_jogged_is_refused() {
         let expected = format!("feed {feed} mm/s: expected above 0, at most 50");
         assert_eq!(refused(&axis, 1, 5.0, up, feed), expected);
     }
-    assert_eq!(refused(&axis, 1, 5.0, Way::By(Position::ZERO), 5.0), "a distance of 0: expected a way to go");
+    assert_eq!(
+        refused(&axis, 1, 5.0, JogTarget::By(Position::ZERO), 5.0),
+        "a distance of 0: expected a distance to go"
+    );
     let outwards = |mm: f64| format!("at {mm} mm outwards: expected inwards only from the soft limit 20 mm");
     assert_eq!(refused(&axis, 1, 20.0, up, 5.0), outwards(20.0));
-    assert_eq!(refused(&axis, 1, 21.5, Way::By(mm(1.0)), 5.0), outwards(21.5));
-    assert_eq!(jog(&axis, 1, 21.5, Way::By(mm(-1.0)), 5.0), Ok(()));
+    assert_eq!(refused(&axis, 1, 21.5, JogTarget::By(mm(1.0)), 5.0), outwards(21.5));
+    assert_eq!(jog(&axis, 1, 21.5, JogTarget::By(mm(-1.0)), 5.0), Ok(()));
     let unknown = JogAxis { travel: None, ..axis };
     assert!(refused(&unknown, 1, 5.0, up, 5.0).starts_with("a jog without an end: expected soft limits"));
-    assert_eq!(jog(&unknown, 1, 5.0, Way::By(mm(100.0)), 5.0), Ok(()));
+    assert_eq!(jog(&unknown, 1, 5.0, JogTarget::By(mm(100.0)), 5.0), Ok(()));
     let end = "an end at 1000001 mm: expected within 1000000 mm";
-    assert_eq!(refused(&unknown, 1, 2.0, Way::By(mm(999_999.0)), 5.0), end);
+    assert_eq!(refused(&unknown, 1, 2.0, JogTarget::By(mm(999_999.0)), 5.0), end);
     let swapped = JogAxis { travel: Some(Travel { least: mm(20.0), greatest: mm(-10.0) }), ..axis };
     let order = "soft limits 20 and -10 mm: expected the lesser one first";
     assert_eq!(refused(&swapped, 1, 5.0, up, 5.0), order);

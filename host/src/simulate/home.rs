@@ -4,7 +4,7 @@
 //! count from where the machine was switched on.
 
 use motion_kernel::hal::IndexLatch;
-use motion_kernel::homing::{Homed, Homing, HomingError, Seen, Step};
+use motion_kernel::homing::{Homed, Homing, HomingError, HomingInput, HomingStep};
 use motion_kernel::jog::Jog;
 use motion_kernel::num::Real;
 
@@ -72,10 +72,10 @@ impl<R: Real> Session<'_, R> {
         let failed = |source: HomingError| HomeError::Axis { axis: name.clone(), source };
         let (mut jog, first) = (None::<Jog<AXES>>, self.ticks);
         loop {
-            let mut next = Step::Wait;
+            let mut next = HomingStep::Wait;
             self.drive(jog.take().into_iter().flatten(), observe, |trace, hardware, state| {
                 let Ok(index) = hardware.latched(axis);
-                let seen = Seen {
+                let seen = HomingInput {
                     set: trace.executed.setpoints.map(|setpoint| setpoint.position),
                     counts: trace.axes[axis].counts,
                     is_home: trace.inputs.axes[axis].is_home(),
@@ -83,9 +83,9 @@ impl<R: Real> Session<'_, R> {
                     state,
                 };
                 Ok::<_, HomeError>(match homing.poll(&seen).map_err(failed)? {
-                    Step::Wait => Then::GoOn,
-                    Step::Stop => Then::Abort,
-                    Step::ArmIndex => {
+                    HomingStep::Wait => Then::GoOn,
+                    HomingStep::Stop => Then::Abort,
+                    HomingStep::ArmIndex => {
                         let Ok(()) = hardware.arm(axis);
                         Then::GoOn
                     }
@@ -96,13 +96,13 @@ impl<R: Real> Session<'_, R> {
                 })
             })?;
             let rest = match next {
-                Step::Reference(counts, position) => self.kernel.reference(axis, counts, position),
+                HomingStep::Reference(counts, position) => self.kernel.reference(axis, counts, position),
                 _ => self.kernel.rest_here(),
             };
             self.set = rest.ok_or(SessionError::Moves)?;
             match next {
-                Step::Move(next) => jog = Some(next),
-                Step::Done(homed) => {
+                HomingStep::Move(next) => jog = Some(next),
+                HomingStep::Done(homed) => {
                     let position_mm = self.set[axis].to_mm();
                     let true_mm = self.simulated.truth()[axis].position_mm;
                     let ticks = self.ticks - first;

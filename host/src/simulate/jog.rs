@@ -9,7 +9,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use motion_kernel::exec::ExecState;
-use motion_kernel::jog::{Direction, Jog, JogAxis, Travel, Way};
+use motion_kernel::jog::{Direction, Jog, JogAxis, JogTarget, Travel};
 use motion_kernel::live::State;
 use motion_kernel::num::Real;
 use motion_kernel::straight::StraightError;
@@ -30,7 +30,7 @@ pub struct Press {
     /// The axis' name.
     pub axis: String,
     /// How far it is to go.
-    pub way: Way,
+    pub target: JogTarget,
     /// After how many ticks the key is released, at least 1.
     pub release: Option<u64>,
     text: String,
@@ -72,16 +72,16 @@ impl FromStr for Press {
             let whole = ticks.parse().ok().filter(|&whole: &u64| whole > 0 && is_plain(ticks, b""));
             whole.ok_or_else(|| PressError::Release(ticks.to_owned()))
         };
-        let way = if distance.is_empty() {
-            Way::Continuous(direction)
+        let target = if distance.is_empty() {
+            JogTarget::Continuous(direction)
         } else {
             let mm: f64 = distance.parse().ok().filter(|_| is_plain(distance, b".")).ok_or_else(form)?;
             let by = Position::from_mm(mm).filter(|_| mm >= LEAST_MM);
             let by = by.ok_or_else(|| PressError::Distance(distance.to_owned()))?;
-            Way::By(if direction == Direction::Negative { -by } else { by })
+            JogTarget::By(if direction == Direction::Negative { -by } else { by })
         };
         let release = ticks.map(release).transpose()?;
-        Ok(Self { axis: axis.to_owned(), way, release, text: text.to_owned() })
+        Ok(Self { axis: axis.to_owned(), target, release, text: text.to_owned() })
     }
 }
 
@@ -193,7 +193,7 @@ impl<R: Real> Session<'_, R> {
     ) -> Result<Jogged, JogError> {
         let travel = self.machine.travel()[axis].map(|[least, greatest]| Travel { least, greatest });
         let of_axis = JogAxis { travel, ..jog_axis(self.machine, axis) };
-        let jog = Jog::new(&of_axis, axis, self.set, press.way, feed_mm_s, self.machine.tick_s);
+        let jog = Jog::new(&of_axis, axis, self.set, press.target, feed_mm_s, self.machine.tick_s);
         let jog = jog.map_err(|source| {
             let press = press.to_string();
             match source {
@@ -261,7 +261,7 @@ impl<'a> Keys<'a> {
             if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s) {
                 return Err(JogError::Feed { press: press.to_string(), feed_mm_s, most_mm_s });
             }
-            if matches!(press.way, Way::Continuous(_)) && machine.travel()[axis].is_none() {
+            if matches!(press.target, JogTarget::Continuous(_)) && machine.travel()[axis].is_none() {
                 return Err(JogError::NoTravel(press.to_string()));
             }
             Ok((axis, feed_mm_s, press))
@@ -294,8 +294,8 @@ mod tests {
             assert_eq!(press.to_string(), text);
         }
         let press: Press = "X-2.5@7".parse().expect("a press");
-        let by = Way::By(-Position::from_mm(2.5).expect("in range"));
-        assert_eq!((press.axis.as_str(), press.way, press.release), ("X", by, Some(7)));
+        let by = JogTarget::By(-Position::from_mm(2.5).expect("in range"));
+        assert_eq!((press.axis.as_str(), press.target, press.release), ("X", by, Some(7)));
     }
 
     #[test]

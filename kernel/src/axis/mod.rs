@@ -3,11 +3,11 @@
 //! Consumes a [`Setpoint`] and [`Counts`]; produces a [`DacCode`]. In the tick, no loop, no failure: a
 //! fault is reported, not thrown.
 //!
-//! - [`scale`]: mm ↔ counts, mm/s ↔ volts;
-//! - [`preview`]: position set-points delayed, so that feedforward comes early;
-//! - [`feedforward`]: F_V, F_a, F_J of S4 (1), and the inverse of the drive;
-//! - [`regulator`]: S4 (1), P(ID) on the following error plus feedforward, with saturation and anti-windup;
-//! - [`correction`]: what was learnt of a stretch, added to feedforward;
+//! - `scale`: mm ↔ counts, mm/s ↔ volts;
+//! - `preview`: position set-points delayed, so that feedforward comes early;
+//! - `feedforward`: F_V, F_a, F_J of S4 (1), and the inverse of the drive;
+//! - `regulator`: S4 (1), P(ID) on the following error plus feedforward, with saturation and anti-windup;
+//! - `correction`: what was learnt of a stretch, added to feedforward;
 //! - `guard`: whether encoder, drive and set-point make sense together (feature `guards`).
 //!
 //! Configuration ([`AxesConfig`], [`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so gains can
@@ -38,24 +38,25 @@
 //! ```
 
 mod check;
-pub mod correction;
-pub mod feedforward;
+mod correction;
+pub(crate) mod feedforward;
 #[cfg(feature = "guards")]
 mod guard;
 #[cfg(not(feature = "guards"))]
 #[path = "limit_only.rs"]
 mod guard;
 mod guards;
-pub mod preview;
-pub mod regulator;
-pub mod scale;
+mod preview;
+mod regulator;
+mod scale;
 
-pub use correction::{Correction, CorrectionError};
+pub use correction::{Correction, CorrectionError, KNOT_TICKS_MAX};
 pub use feedforward::{
     BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, TABLE_POINTS, Table, Tables,
 };
 pub use guards::{GuardFigures, Guards};
-pub use preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX, Preview};
+pub(crate) use preview::Preview;
+pub use preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX};
 pub use regulator::{Command, Gains, Regulator, RegulatorState};
 pub use scale::{EncoderScale, OutputScale, ScaleError};
 
@@ -264,7 +265,7 @@ impl<R: Real> AxisState<R> {
     /// The output of an axis whose drive is off: the voltage at which it stands still. In and out as
     /// [`AxisState::tick`].
     #[inline]
-    pub fn stand_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) {
+    pub(crate) fn stand_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) {
         let error_mm = self.hold_still(config, output);
         self.guard.watch(error_mm - self.regulator.last_error_mm(), output.counts);
         self.regulator.watch(error_mm);

@@ -37,7 +37,7 @@ pub(super) fn preview_ticks(axes: &[AxisFigures], tick_s: f64) -> Result<u8, (us
 
 /// The positions of the last ticks.
 #[derive(Clone, Copy, Debug)]
-pub struct Preview<const AXES: usize> {
+pub(crate) struct Preview<const AXES: usize> {
     past: [[Position; AXES]; PREVIEW_TICKS_MAX as usize],
     ticks: u8,
     next: u8,
@@ -46,7 +46,7 @@ pub struct Preview<const AXES: usize> {
 impl<const AXES: usize> Preview<AXES> {
     /// A machine that has been at rest at `position`, delayed by `ticks`, at most [`PREVIEW_TICKS_MAX`].
     #[must_use]
-    pub fn new(ticks: u8, position: [Position; AXES]) -> Self {
+    pub(crate) fn new(ticks: u8, position: [Position; AXES]) -> Self {
         let past = [[Position::ZERO; AXES]; PREVIEW_TICKS_MAX as usize];
         let mut preview = Self { past, ticks: ticks.min(PREVIEW_TICKS_MAX), next: 0 };
         preview.rest_at(position);
@@ -55,13 +55,13 @@ impl<const AXES: usize> Preview<AXES> {
 
     /// The delay \[ticks\].
     #[must_use]
-    pub fn ticks(&self) -> u8 {
+    pub(crate) fn ticks(&self) -> u8 {
         self.ticks
     }
 
     /// As if the machine had always been at `position`.
     #[inline(never)]
-    pub fn rest_at(&mut self, position: [Position; AXES]) {
+    pub(crate) fn rest_at(&mut self, position: [Position; AXES]) {
         for past in rolled(self.past.as_mut_slice()) {
             *past = position;
         }

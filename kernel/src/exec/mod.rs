@@ -45,7 +45,7 @@ pub use walk::PIECES_PER_TICK_MAX;
 /// Greatest number of steps of the executor within one tick. A segment takes up to three for its phases, and one
 /// more to begin, where it is the first of a stretch or had not arrived in time; so do the segments that end in the
 /// tick and the one that begins in it. A dwell takes two.
-pub const STEPS_PER_TICK_MAX: usize = 4 * (SEGMENTS_PER_TICK_MAX + 1) + 1;
+pub(crate) const STEPS_PER_TICK_MAX: usize = 4 * (SEGMENTS_PER_TICK_MAX + 1) + 1;
 
 /// What the executor is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

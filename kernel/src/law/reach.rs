@@ -14,7 +14,7 @@ use crate::num::Root;
 
 /// Newton steps after which a solve ends whatever it has. Ten reach the last places in f64, nine in
 /// f32, over 20 000 random cases for each of four sets of limits; fewer are needed on most.
-pub const NEWTON_STEPS_MAX: usize = 12;
+pub(super) const NEWTON_STEPS_MAX: usize = 12;
 
 /// The highest feed that can be reached from `lower_mm_s` within `length_mm`; equally, the highest
 /// feed from which one can slow to `lower_mm_s` within it \[mm/s\]. Both arguments ≥ 0.

@@ -417,7 +417,7 @@ impl<R: Real> FeedSegment<R> {
     }
 
     /// Greatest |snap| inside \[mm/s⁴\].
-    pub fn peak_snap_mm_s4(&self) -> R {
+    pub(crate) fn peak_snap_mm_s4(&self) -> R {
         self.snap_mm_s4.abs()
     }
 
@@ -427,6 +427,7 @@ impl<R: Real> FeedSegment<R> {
     }
 
     /// The duration of a phase; phases that a segment does not have last no time.
+    #[doc(hidden)]
     #[inline]
     pub fn phase_duration(&self, phase: Phase) -> Ticks {
         self.clock(phase).duration
@@ -442,6 +443,7 @@ impl<R: Real> FeedSegment<R> {
     }
 
     /// The normalised time with which `phase` begins, in 2⁻⁶⁴.
+    #[doc(hidden)]
     #[inline]
     pub fn fraction_at_start(&self, phase: Phase) -> u64 {
         match phase {
@@ -452,6 +454,7 @@ impl<R: Real> FeedSegment<R> {
 
     /// What `time` ≤ 1 tick adds to the normalised time of `phase`, in 2⁻⁶⁴; a whole tick is for phases that are
     /// longer than it.
+    #[doc(hidden)]
     #[inline]
     pub fn fraction_in(&self, phase: Phase, time: Ticks) -> u64 {
         let clock = self.clock(phase);
@@ -459,7 +462,7 @@ impl<R: Real> FeedSegment<R> {
     }
 
     /// The normalised time `elapsed` after the start of `phase`, in 2⁻⁶⁴.
-    pub fn fraction_after(&self, phase: Phase, elapsed: Ticks) -> u64 {
+    pub(crate) fn fraction_after(&self, phase: Phase, elapsed: Ticks) -> u64 {
         let clock = self.clock(phase);
         let whole = clock.step.wrapping_mul(elapsed.0 >> 32);
         let part = Ticks(elapsed.0 & 0xFFFF_FFFF);

@@ -32,7 +32,7 @@
 //!   from a splice on) and `places` (where the list under way may be left);
 //! - `list`: a feed list as the background sees it, and `splice`, the places on the path that it leads to;
 //! - `timeline`: the list under way and the next; hands over, follows the tick, takes back;
-//! - [`control`]: the three that own all this, and `poll`.
+//! - `control`: the three that own all this, and `poll`.
 //!
 //! ```
 //! use motion_kernel::exec::Executor;
@@ -65,7 +65,7 @@
 
 mod brake;
 mod choose;
-pub mod control;
+mod control;
 #[cfg(test)]
 mod interrupted;
 mod list;

@@ -1,7 +1,7 @@
 //! Sine and cosine of a fraction of a half turn, by one of three backends.
 //!
 //! A backend is a type without values; what computes with it takes it as a parameter, as
-//! [`Shape::closed`](crate::law::shape::Shape::closed) does.
+//! `Shape::closed` does.
 //!
 //! | backend | for | what it is |
 //! |---|---|---|
@@ -12,7 +12,7 @@
 //! `tests/expected/functions.md` has the errors of each, and of the law's shapes evaluated with each. What
 //! follows from it:
 //!
-//! - The tick's default is no sine at all, but the series of [`Shape::at`](crate::law::shape::Shape::at).
+//! - The tick's default is no sine at all, but the series of `Shape::at`.
 //!   Whatever the sine, the closed forms lose acceleration, feed and length at a ramp's ends, where the series
 //!   keep their relative precision. In absolute error the closed forms with [`Own`] are the better ones for
 //!   jerk, acceleration and snap, most of all in fixed point.

@@ -1,6 +1,6 @@
 //! Geometry of the path.
 //!
-//! Consumes the motion along the path; produces a [`Setpoint`] for every axis. [`piece`] is one stretch
+//! Consumes the motion along the path; produces a [`Setpoint`] for every axis. `piece` is one stretch
 //! of geometry, a line or a polynomial of degree seven in arc length, and its evaluation by the chain
 //! rule. `travel` is where the axes may go.
 //!
@@ -16,7 +16,7 @@
 //! # Ok::<(), PieceError>(())
 //! ```
 
-pub mod piece;
+mod piece;
 mod travel;
 
 pub use piece::{Geometry, Piece, PieceError, Setpoint};

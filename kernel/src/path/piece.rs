@@ -209,7 +209,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     }
 
     /// The program line it came from.
-    pub fn program_line(&self) -> u32 {
+    pub(crate) fn program_line(&self) -> u32 {
         self.line
     }
 
@@ -230,7 +230,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     }
 
     /// The unit tangent at `s_mm` from the start.
-    pub fn tangent_at(&self, s_mm: R) -> [R; AXES] {
+    pub(crate) fn tangent_at(&self, s_mm: R) -> [R; AXES] {
         // Without the chain rule: what it makes of a piece that is too short for its feed may not fit.
         match &self.geometry {
             Geometry::Line { direction } => direction.map(|d| R::ONE.scaled(d)),

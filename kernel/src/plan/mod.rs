@@ -4,13 +4,13 @@
 //! background, on the host for a whole stretch or on the board for what is queued. Unchanged input
 //! gives the same bits.
 //!
-//! - [`ceiling`]: stage 1, the feed that a block's geometry and the machine allow, with the reason,
+//! - `ceiling`: stage 1, the feed that a block's geometry and the machine allow, with the reason,
 //!   and how much acceleration, jerk and snap are left for changing the feed on a curve;
-//! - [`mod@junction`]: what a junction between two blocks allows;
-//! - [`two_pass`]: stages 1 and 2 over the stretch: what can be reached, and from what one can brake;
-//! - [`mod@ramps`]: the pair of ramps of a planned block over exact path positions;
+//! - `junction`: what a junction between two blocks allows;
+//! - `two_pass`: stages 1 and 2 over the stretch: what can be reached, and from what one can brake;
+//! - `ramps`: the pair of ramps of a planned block over exact path positions;
 //! - `spanning`: ramps that begin and end between junctions and may span many blocks;
-//! - [`planner`]: the entry for all callers: the faster of the two, in the caller's memory.
+//! - `planner`: the entry for all callers: the faster of the two, in the caller's memory.
 //!
 //! ```
 //! use motion_kernel::plan::{Junction, junction};
@@ -23,12 +23,12 @@
 //! assert_eq!(junction(&Junction { angle_rad: 0.03, ..corner }, 0.02, 200.0, 0.0005), 0.0);
 //! ```
 
-pub mod ceiling;
-pub mod junction;
-pub mod planner;
-pub mod ramps;
+mod ceiling;
+mod junction;
+mod planner;
+mod ramps;
 mod spanning;
-pub mod two_pass;
+mod two_pass;
 
 pub use ceiling::{
     AxisLimits, BLEND_FEED_SHARE, Bend, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX, Ceiling, MachineLimits,

@@ -4,9 +4,9 @@
 //! into the two streams. Background.
 //!
 //! - [`Item`]: one item of a program, in f64 and position steps; made into the same bits on every target;
-//! - [`supply`]: keeps the two streams filled from items;
-//! - [`mod@check`]: whether all of a program can be executed, before any of it is;
-//! - [`mod@bytes`]: a program as bytes, with the machine it is for.
+//! - `supply`: keeps the two streams filled from items;
+//! - `check`: whether all of a program can be executed, before any of it is;
+//! - `bytes`: a program as bytes, with the machine it is for.
 //!
 //! ```
 //! use core::convert::Infallible;
@@ -36,10 +36,10 @@
 //! assert_eq!(states[4], ExecState::Stopped);
 //! ```
 
-pub mod bytes;
-pub mod check;
+mod bytes;
+mod check;
 mod checksum;
-pub mod supply;
+pub(crate) mod supply;
 mod wire;
 
 pub use bytes::{Header, Items, ProgramError, Reader, write};

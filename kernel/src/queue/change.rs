@@ -11,7 +11,7 @@
 use crate::law::{Phase, Ticks};
 
 /// How many feed lists there are: one under way, one to follow, one for what is more urgent.
-pub const LISTS: u8 = 3;
+pub(crate) const LISTS: u8 = 3;
 /// The most items of a feed list: its queue needs one place more.
 pub const LIST_ITEMS: usize = 15;
 

@@ -8,7 +8,7 @@ use crate::units::Position;
 
 /// An item of the path stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PathItem<R: Real, const AXES: usize> {
+pub(crate) enum PathItem<R: Real, const AXES: usize> {
     /// Geometry.
     Piece(Piece<R, AXES>),
     /// The stretch ends exactly here.
@@ -17,7 +17,7 @@ pub enum PathItem<R: Real, const AXES: usize> {
 
 /// An item of the feed stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FeedItem<R> {
+pub(crate) enum FeedItem<R> {
     /// A ramp or a cruise.
     Segment(FeedSegment<R>),
     /// Rest for a time, between stretches.

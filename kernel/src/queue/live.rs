@@ -127,7 +127,11 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     pub fn bound(&mut self, travel: crate::path::Travel<AXES>) {
         self.path_accept.bound(super::bounds::Bounds::new(travel));
     }
+}
 
+/// What live control does, and the tests of this seam.
+#[doc(hidden)]
+impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Enters a piece of path that is driven at `fastest_mm_s` at most.
     ///
     /// # Errors

@@ -36,7 +36,7 @@ mod bounds;
 #[cfg(not(feature = "guards"))]
 #[path = "unbounded.rs"]
 mod bounds;
-mod density;
+pub(crate) mod density;
 mod feeder;
 mod intake;
 mod item;
@@ -46,7 +46,7 @@ mod shared;
 mod streams;
 
 #[cfg(feature = "live")]
-mod change;
+pub(crate) mod change;
 #[cfg(feature = "live")]
 mod lists;
 #[cfg(not(feature = "live"))]
@@ -60,11 +60,18 @@ mod mailbox;
 pub(crate) use accept::Acceptance;
 pub use accept::PathRules;
 #[cfg(feature = "live")]
-pub use change::{Change, LIST_ITEMS, LISTS, Progress};
-pub use density::{Density, SEGMENTS_PER_TICK_MAX};
+pub use change::LIST_ITEMS;
+#[cfg(feature = "live")]
+pub(crate) use change::LISTS;
+#[cfg(feature = "live")]
+pub(crate) use change::{Change, Progress};
+#[cfg(feature = "live")]
+pub(crate) use density::Density;
+pub use density::SEGMENTS_PER_TICK_MAX;
 pub use feeder::Feeder;
 pub use intake::Intake;
-pub use item::{FeedItem, PathItem, Refused};
+pub use item::Refused;
+pub(crate) use item::{FeedItem, PathItem};
 #[cfg(feature = "live")]
 pub use live::{LiveFeeder, LiveStreams};
 pub use rejection::Rejection;

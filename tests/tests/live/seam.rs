@@ -3,10 +3,11 @@
 use motion_host::machine::Machine;
 use motion_kernel::axis::{Correction, CorrectionError};
 use motion_kernel::exec::{ExecState, Executor};
+use motion_kernel::internals::{Change, CutRamp, Density};
 use motion_kernel::kernel::CorrectedIntake;
-use motion_kernel::law::{CutRamp, FeedSegment, Law, Ramp, Ticks};
+use motion_kernel::law::{FeedSegment, Law, Ramp, Ticks};
 use motion_kernel::path::Piece;
-use motion_kernel::queue::{Change, Density, LiveStreams, Refused, Rejection, SEGMENTS_PER_TICK_MAX};
+use motion_kernel::queue::{LiveStreams, Refused, Rejection, SEGMENTS_PER_TICK_MAX};
 
 use motion_tests::check::bench::mm;
 

@@ -9,7 +9,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use motion_kernel::law::{Law, Limits, Passing, Ramp};
+use motion_kernel::internals::Passing;
+use motion_kernel::law::{Law, Limits, Ramp};
 use motion_kernel::plan::{Block, Node, PlanError, merge_equal, nodes_for, plan_spanning};
 
 use crate::{block, from_rest, law, planned, random_blocks, reference, time_s};

@@ -17,7 +17,7 @@ use motion_kernel::kernel::{CorrectedIntake, Kernel};
 use motion_kernel::law::{FeedSegment, PathMotion, Phase, Ticks};
 use motion_kernel::num::Scalar;
 use motion_kernel::path::{Piece, Setpoint};
-use motion_kernel::program::supply::Ready;
+use motion_kernel::internals::Ready;
 use motion_kernel::program::{Header, ProgramError, Reader};
 use motion_kernel::queue::Streams;
 use motion_kernel::trace::Trace;

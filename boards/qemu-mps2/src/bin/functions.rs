@@ -7,7 +7,7 @@ use core::hint::black_box;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use motion_kernel::law::shape::Shape;
+use motion_kernel::internals::Shape;
 use motion_kernel::num::sine::{Own, SineCosine};
 use motion_kernel::num::{Real, Scalar};
 use qemu_boards::count::Counter;

@@ -32,7 +32,7 @@
 //! ```
 
 use hal_sim::DriveParameters;
-use motion_kernel::axis::correction::KNOT_TICKS_MAX;
+use motion_kernel::axis::KNOT_TICKS_MAX;
 
 use super::experiment::{DriveError, Recording, within};
 use crate::machine::Machine;

@@ -4,7 +4,8 @@
 //! allowed if nothing is in its way, else later or softer.
 
 use super::ascent::{AscentRamp, Reached};
-use crate::law::{Limits, Passing, Ramp};
+use crate::law::passing::Passing;
+use crate::law::{Limits, Ramp};
 
 /// A ramp below steps is made softer by this factor, at most this often.
 const SOFTER: f64 = 3.0;

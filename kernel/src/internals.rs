@@ -1,0 +1,11 @@
+//! Parts of the rooms that the project's own tests, benches and instruction counts look into. Programs outside of it need
+//! none of them, and they may change at any time.
+
+pub use crate::axis::feedforward::{FeedforwardConfig, FeedforwardState};
+#[cfg(feature = "live")]
+pub use crate::law::segment::CutRamp;
+pub use crate::law::{passing::Passing, shape::Shape};
+pub use crate::program::supply::Ready;
+#[cfg(feature = "live")]
+pub use crate::queue::change::{Change, Progress};
+pub use crate::queue::density::Density;
