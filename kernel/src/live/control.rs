@@ -181,8 +181,9 @@ where
         }
         read?;
         self.note_starvation(feeder);
+        let is_to_rest = self.mode.is_to_rest() || self.error.is_some();
         if !self.timeline.has_next()
-            && !(self.mode.is_to_rest() || self.error.is_some())
+            && !is_to_rest
             && self.mode.request().is_none()
             && feeder.has_free_list()
             && !self.waits_at_block_end(feeder)

@@ -96,10 +96,12 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                     // It continues from here as from any stop.
                     return self.rest_before_more(&place, progress).unwrap_or(Choice::Nothing);
                 }
-            } else if !(cut == Cut::All && splice.feed_mm_s >= start.feed_mm_s)
-                && !inside.is_some_and(|(start, item)| self.is_worth_cutting(&start, &item, &splice))
-            {
-                continue;
+            } else {
+                let is_cut = cut == Cut::All && splice.feed_mm_s >= start.feed_mm_s
+                    || inside.is_some_and(|(start, item)| self.is_worth_cutting(&start, &item, &splice));
+                if !is_cut {
+                    continue;
+                }
             }
             // Whatever comes of it: what is ahead of this stretch is planned anew from here on.
             self.feed.replan_through(start.stretch);
