@@ -220,9 +220,9 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_takes_no_more_than_was_counted() {
+    fn a_poll_takes_no_more_than_was_counted() {
         let stages = include_str!("../../../tests/expected/stages.md");
-        let turn = "| Cortex-M4F | f32 | background's turn under live control |";
+        let turn = "| Cortex-M4F | f32 | a poll of live control |";
         let row = stages.lines().find(|row| row.starts_with(turn)).expect("counted");
         let most = row.trim_end_matches(" |").rsplit(' ').next().expect("a figure");
         let counted: u32 = most.parse().expect("a number");

@@ -5,7 +5,7 @@
 //! spent on what follows, so a program's duration is its plan's to the tick. Every stretch ends
 //! exactly at its end point, at rest.
 //!
-//! Bound: [`STEPS_PER_TICK_MAX`] phase changes, [`PIECES_PER_TICK_MAX`]
+//! Bound: `STEPS_PER_TICK_MAX` phase changes, [`PIECES_PER_TICK_MAX`]
 //! pieces; no solver, no division. Fails by [`ExecFault`] only.
 //!
 //! ```

@@ -18,7 +18,7 @@ pub const LIST_ITEMS: usize = 15;
 /// Where a list takes over from the one under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Change {
-    /// The list under way, below [`LISTS`].
+    /// The list under way, below `LISTS`.
     pub from: u8,
     /// The list that takes over.
     pub to: u8,

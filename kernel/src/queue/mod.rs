@@ -1,6 +1,6 @@
 //! The two bounded streams between background and tick: geometry, and feed over the same length.
 //!
-//! Consumes [`Piece`]s and [`FeedSegment`]s from the planner; hands them to the executor. Single
+//! Consumes [`Piece`](crate::path::Piece)s and [`FeedSegment`](crate::law::FeedSegment)s from the planner; hands them to the executor. Single
 //! producer, single consumer, lock-free. The producer's end, [`Feeder`], checks every item against
 //! its predecessor before it enters, so the tick never meets an item that can't be executed; a full
 //! queue returns the item. The consumer's end, [`Intake`], only takes.

@@ -591,9 +591,10 @@ fn plans(all: &mut Vec<Contender>, random: &mut Random) {
             calls: BLOCKS_PLANNED,
             run: Box::new(move || {
                 let start = Instant::now();
-                let time_s = plan_spanning(black_box(&blocks), 0.0, 0.0, &mut places, &mut |start_mm, ramp| {
-                    black_box((start_mm, ramp));
-                });
+                let time_s =
+                    plan_spanning(black_box(&blocks), 0.0, 0.0, &mut places, &mut |start_mm, ramp| {
+                        black_box((start_mm, ramp));
+                    });
                 assert!(time_s.is_ok_and(|time_s| time_s.is_some()), "from rest to rest");
                 start.elapsed()
             }),

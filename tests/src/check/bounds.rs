@@ -40,17 +40,17 @@ pub const LIMIT_SHARE: f64 = 1e-9;
 /// The normalised time of a phase is rounded to ε/2, and the shapes change by up to π per unit of it.
 pub const CONTINUITY_ROUNDING: f64 = 8.0;
 /// The path position against its prediction: the two ends of every segment are rounded to position steps,
-/// and a ramp's own length may be this far from the path it covers [mm].
+/// and a ramp's own length may be this far from the path it covers \[mm\].
 pub const LENGTH_ROUNDING_MM: f64 = 1.2e-8;
 
-/// How far rounding may set the path position back where the motion is slower than it [mm]: a few position
+/// How far rounding may set the path position back where the motion is slower than it \[mm\]: a few position
 /// steps, and twice the error of the sine's part of a ramp's length, Jp·t₁³/(16π³). The sine is 4π times the
 /// acceleration's shape, so it has 4π times that one's rounding, of about 2 `relative`.
 pub fn backward_mm(relative: f64, jerk_t1_cubed_mm: f64) -> f64 {
     2e-9 + 2.0 * 2.0 * 12.6 * relative * jerk_t1_cubed_mm / 496.1
 }
 
-/// Set positions against the programmed path [mm]: the curves' tolerance, a hundredth of a count of 0.1 µm …
+/// Set positions against the programmed path \[mm\]: the curves' tolerance, a hundredth of a count of 0.1 µm …
 pub const CURVE_MM: f64 = 1e-6;
 /// … and the offset from the start of a piece, of at most `PIECE_MM_MAX`: direction, length and product
 /// are each rounded to ε/2.

@@ -17,7 +17,7 @@ use super::path::Path;
 use super::program::Generated;
 use super::totals::Totals;
 
-/// Longer plans are not executed [ticks].
+/// Longer plans are not executed \[ticks\].
 const TICKS_MAX: f64 = 150_000.0;
 /// A board's capacities.
 pub const PIECES: usize = 64;

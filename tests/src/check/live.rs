@@ -61,7 +61,7 @@ pub struct Run {
     pub rests: u64,
     /// Commands given, without [`Command::Stall`].
     pub commands: u64,
-    /// Where the machine stands [mm].
+    /// Where the machine stands \[mm\].
     pub s_mm: f64,
 }
 

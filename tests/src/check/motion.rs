@@ -26,7 +26,7 @@ const HERMITE: [f64; 4] = [1.7059e-4, 2.7084e-3, 3.2076e-2, 0.25];
 /// on either side.
 const HERMITE_LIVE: [f64; 4] = [8.1e-3, 3.2076e-2, 0.25, 1.0];
 
-/// Within this of a junction both its moves count [mm]: segments end on position steps.
+/// Within this of a junction both its moves count \[mm\]: segments end on position steps.
 const JUNCTION_MM: f64 = 1e-7;
 
 /// The motion along the path: s, v, a, j, snap.
@@ -88,7 +88,7 @@ impl<'a> Checker<'a> {
         self.live = Some(feed_override);
     }
 
-    /// How far the machine has come, from the program's start [mm].
+    /// How far the machine has come, from the program's start \[mm\].
     pub fn s_mm(&self) -> f64 {
         self.before[0]
     }

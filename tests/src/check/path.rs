@@ -12,12 +12,12 @@ use motion_kernel::units::Position;
 #[derive(Clone, Copy, Debug)]
 pub struct Placed {
     pub element: Element,
-    /// From the stretch's start [mm].
+    /// From the stretch's start \[mm\].
     pub start_mm: f64,
     pub feed_mm_s: f64,
     /// Index of the move, and so of the plan's block.
     pub block: usize,
-    /// Angle [rad] and step of curvature [1/mm] at its start, if the motion does not stop there.
+    /// Angle \[rad\] and step of curvature [1/mm] at its start, if the motion does not stop there.
     pub junction: Option<(f64, f64)>,
 }
 

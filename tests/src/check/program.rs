@@ -21,7 +21,7 @@ pub struct Generated {
     pub asked: Vec<Asked>,
 }
 
-/// Programs stay within this cube [mm].
+/// Programs stay within this cube \[mm\].
 const REACH_MM: f64 = 7900.0;
 const PLANES: [([usize; 3], &str, [char; 2]); 3] =
     [([0, 1, 2], "G17", ['I', 'J']), ([2, 0, 1], "G18", ['K', 'I']), ([1, 2, 0], "G19", ['J', 'K'])];
@@ -38,7 +38,7 @@ struct Writer<'a> {
     /// Direction at the end of the last move.
     heading: [f64; 3],
     longest_mm: f64,
-    /// No move is programmed to take longer than this [s].
+    /// No move is programmed to take longer than this \[s\].
     move_s: f64,
 }
 

@@ -51,6 +51,15 @@ fn whole(blocks: &[Block<f64>], feeds_mm_s: [f64; 2], effort: Effort) -> Result<
     Ok(planned)
 }
 
+/// Random blocks whose ends are positions to the bit, as those of a caller are.
+fn exact_blocks(random: &mut Random, count: usize, least_mm: f64) -> Vec<Block<f64>> {
+    let mut blocks = random_blocks(random, count, least_mm);
+    for block in &mut blocks {
+        block.length_mm = Position::from_mm(block.length_mm).expect("in range").to_mm();
+    }
+    blocks
+}
+
 fn placed(ramps: &[PlannedRamp]) -> Vec<Span> {
     let mut at = Position::ZERO;
     let place = |&PlannedRamp { ramp, length }: &PlannedRamp| {
@@ -67,7 +76,7 @@ fn more_effort_is_faster() {
     let mut random = Random::of_stream(39);
     let (mut made, mut refused, mut faster, mut fallback) = (0, 0, 0, 0);
     for _ in 0..4000 {
-        let blocks = random_blocks(&mut random, 40, 1e-2);
+        let blocks = exact_blocks(&mut random, 40, 1e-2);
         let feed = blocks[0].cap_mm_s * random.log(0.01, 1.0);
         let feeds = [if random.once_in(2) { feed } else { 0.0 }, 0.0];
         let Ok(per_block) = whole(&blocks, feeds, Effort::PerBlock) else {
@@ -96,7 +105,7 @@ fn a_part_is_spanned() {
     let mut random = Random::of_stream(40);
     let mut parts = 0;
     for _ in 0..1000 {
-        let blocks = random_blocks(&mut random, 60, 1e-2);
+        let blocks = exact_blocks(&mut random, 60, 1e-2);
         let most = 1 + random.below(20);
         let (planned, found) =
             ramps(&blocks, [0.0; 2], Effort::Spanning { most }, usize::MAX).expect("a plan");
@@ -119,7 +128,7 @@ fn little_room_for_ramps() {
     let mut random = Random::of_stream(42);
     let mut cut = 0;
     for _ in 0..1000 {
-        let blocks = random_blocks(&mut random, 40, 1e-2);
+        let blocks = exact_blocks(&mut random, 40, 1e-2);
         let room = random.below(30);
         for effort in [Effort::PerBlock, Effort::SPANNING] {
             let (_, all) = ramps(&blocks, [0.0; 2], effort, usize::MAX).expect("a plan");

@@ -13,11 +13,11 @@ use hal_sim::closed_loop::{Closed, InMemory, LoopError, close, reference_machine
 use hal_sim::{MachineParameters, SimMachine};
 use motion_kernel::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState};
 use motion_kernel::exec::ExecState;
+use motion_kernel::internals::Ready;
 use motion_kernel::kernel::{CorrectedIntake, Kernel};
 use motion_kernel::law::{FeedSegment, PathMotion, Phase, Ticks};
 use motion_kernel::num::Scalar;
 use motion_kernel::path::{Piece, Setpoint};
-use motion_kernel::internals::Ready;
 use motion_kernel::program::{Header, ProgramError, Reader};
 use motion_kernel::queue::Streams;
 use motion_kernel::trace::Trace;
