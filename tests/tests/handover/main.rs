@@ -9,7 +9,7 @@
 //!   there but what was refused, and the tick's place is one word.
 //!
 //! In both, a list that takes over is complete, its items are done in their order, items are dropped only of a list that was
-//! given up, and the change that was asked for last is followed or refused.
+//! given up and all of those in the end, and the change that was asked for last is followed or refused.
 
 #![allow(dead_code, unreachable_pub, reason = "the kernel's files hold more than the checks use")]
 

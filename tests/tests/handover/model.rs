@@ -179,11 +179,15 @@ impl<'a> Tick<'a> {
     }
 }
 
-/// After the background has ended: a few more ticks, and what was asked for last is followed or refused.
-pub(super) fn finish(mut tick: Tick<'_>, mailbox: &Mailbox) {
+/// After the background has ended: a few more ticks, and what was asked for last is followed or refused, and what was given
+/// up is empty.
+pub(super) fn finish(mut tick: Tick<'_>, mailbox: &Mailbox, rings: &Rings) {
     for _ in 0..=ITEMS {
         tick.tick();
     }
     let is_followed = |change: Change| mailbox.is_refused() || tick.feed.list() == change.to;
     assert!(mailbox.asked().is_none_or(|(_, change)| is_followed(change)), "a change is forgotten");
+    for (list, ring) in (0..LISTS).zip(rings) {
+        assert!(mailbox.is_owned(list) || ring.is_empty(), "a list that was given up is not emptied");
+    }
 }

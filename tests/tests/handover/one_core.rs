@@ -114,7 +114,7 @@ fn check(ticks: u32, turns: impl Fn(&mut Background<'_>)) {
         INTERRUPTS.set(Some(Interrupts { tick, before: distribution, accesses: 0 }));
         turns(&mut background);
         let run = INTERRUPTS.take().expect("a run is under way");
-        model::finish(run.tick, mailbox);
+        model::finish(run.tick, mailbox, &rings);
         before = next(run.before, ticks);
     }
 }
@@ -133,8 +133,8 @@ fn three_changes_are_followed_or_refused() {
 fn a_change_that_was_taken_back_is_not_followed() {
     check(3, |background| {
         for number in 1..=3 {
-            background.take_back();
             background.ask(number);
+            background.take_back();
         }
     });
 }

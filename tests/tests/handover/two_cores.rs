@@ -132,7 +132,7 @@ fn check(changes: u32, ticks: u32, preemptions: Option<usize>) {
         for number in 1..=changes {
             background.ask(number);
         }
-        model::finish(ticking.join().expect("the ticks end"), mailbox);
+        model::finish(ticking.join().expect("the ticks end"), mailbox, &rings);
     });
 }
 
