@@ -11,6 +11,7 @@
 //! In both, a list that takes over is complete, its items are done in their order, items are dropped only of a list that was
 //! given up and all of those in the end, and the change that was asked for last is followed or refused.
 
+#![allow(clippy::duplicate_mod, reason = "the same files with the words of each check")]
 #![allow(dead_code, unreachable_pub, reason = "the kernel's files hold more than the checks use")]
 
 mod one_core;

@@ -50,7 +50,7 @@ fn fill(ring: &Ring<Item>, change: u32) {
 /// What the tick says of the time inside an item, so that it shows what belongs to different ticks.
 fn inside(tick: u32, list: u8, done: u32) -> Option<(Phase, Ticks)> {
     let bits = u64::from(tick) << 32 | u64::from(list) << 16 | u64::from(done);
-    Some((if tick % 2 == 0 { Phase::Rise } else { Phase::Fall }, Ticks::from_bits(bits)))
+    Some((if tick.is_multiple_of(2) { Phase::Rise } else { Phase::Fall }, Ticks::from_bits(bits)))
 }
 
 /// The background.

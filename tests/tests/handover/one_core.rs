@@ -51,7 +51,7 @@ mod handover {
 
     /// A tick is whole: memory is never read and written at a time.
     #[derive(Default)]
-    pub(super) struct Memory;
+    pub(super) struct Memory(());
 
     #[allow(clippy::unused_self, reason = "as the memory of two cores")]
     impl Memory {
