@@ -1,4 +1,4 @@
-//! What background and tick hand over through: words and queues. A check may put its own in their place.
+//! What background and tick hand over through: words and queues. The test `handover` puts its own in their place.
 
 pub(super) use core::sync::atomic::{AtomicU32, Ordering};
 

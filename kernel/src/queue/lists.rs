@@ -125,7 +125,7 @@ impl<'a, R: Real> Lists<'a, R> {
     #[inline]
     pub(super) fn publish(&self, inside: Option<(Phase, Ticks)>, waits: bool) {
         if let Some(lists) = &self.0 {
-            lists.mailbox.publish(lists.place, inside, waits);
+            lists.mailbox.progress.publish(lists.place, inside, waits);
         }
     }
 }

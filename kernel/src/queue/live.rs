@@ -172,7 +172,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     #[must_use]
     pub fn progress(&self) -> Progress {
         self.interruptible();
-        self.mailbox.progress()
+        self.mailbox.progress.progress()
     }
 
     /// Whether there is a list to begin now.

@@ -1,9 +1,18 @@
 //! The words that background and tick write for one another.
+//!
+//! The promise is for one core. The tick is an interrupt of it: it runs to its end, and may come between any two accesses of
+//! the background. Two things need that: the background takes a change back by asking for none, and then looks whether the
+//! tick was faster; and it reads several words of [`ProgressWords`].
+//!
+//! The rest holds for a tick on another core, too. Two pairs of release and acquire matter: `change`'s, so that a list that
+//! is followed is complete, and `generation`'s, so that no change is overlooked. Those of `owned` and `refused` do not: a
+//! list's own queue orders `owned` before its items, and nothing else is read because of `refused`. The test `handover`
+//! checks both promises in every interleaving.
 
-use super::change::{Change, ListPlace, Progress};
+use super::change::Change;
 use super::counter::count;
 use super::handover::{AtomicU32, Ordering};
-use crate::law::{Phase, Ticks};
+use super::progress::ProgressWords;
 
 /// The mailbox between the two.
 #[derive(Debug)]
@@ -17,20 +26,11 @@ pub(super) struct Mailbox {
     generation: AtomicU32,
     /// The tick asks for a stop on the path: 1.
     stop_wanted: AtomicU32,
-    tick: AtomicU32,
-    /// A [`ListPlace`] with the phase, and whether it waits, in the bits that it leaves.
-    place: AtomicU32,
-    left_high: AtomicU32,
-    left_low: AtomicU32,
+    /// Where the tick is.
+    pub(super) progress: ProgressWords,
 }
 
-/// Reads of [`Mailbox`] that a tick may interrupt; the second one is not interrupted, a tick apart.
-const READS: usize = 4;
-
 impl Mailbox {
-    const WAITS_BIT: u32 = ListPlace::DONE_BITS;
-    const PHASE_BIT: u32 = Self::WAITS_BIT + 1;
-
     pub(super) const fn new() -> Self {
         Self {
             change: AtomicU32::new(Change::NONE),
@@ -38,10 +38,7 @@ impl Mailbox {
             owned: AtomicU32::new(1),
             generation: AtomicU32::new(0),
             stop_wanted: AtomicU32::new(0),
-            tick: AtomicU32::new(0),
-            place: AtomicU32::new(0),
-            left_high: AtomicU32::new(0),
-            left_low: AtomicU32::new(0),
+            progress: ProgressWords::new(),
         }
     }
 
@@ -51,9 +48,8 @@ impl Mailbox {
             word.store(Change::NONE, Ordering::Relaxed);
         }
         self.owned.store(1, Ordering::Relaxed);
-        for word in [&self.generation, &self.tick, &self.place, &self.left_high, &self.left_low] {
-            word.store(0, Ordering::Relaxed);
-        }
+        self.generation.store(0, Ordering::Relaxed);
+        self.progress.reset();
         self.stop_wanted.store(0, Ordering::Relaxed);
     }
 
@@ -90,50 +86,6 @@ impl Mailbox {
     #[inline]
     pub(super) fn generation(&self) -> u32 {
         self.generation.load(Ordering::Acquire)
-    }
-
-    /// Where the executor is, as far as the background can know.
-    pub(super) fn progress(&self) -> Progress {
-        let mut progress = self.read();
-        for _ in 0..READS {
-            if progress.tick == self.tick.load(Ordering::Acquire) {
-                break;
-            }
-            progress = self.read();
-        }
-        progress
-    }
-
-    fn read(&self) -> Progress {
-        let tick = self.tick.load(Ordering::Acquire);
-        let place = self.place.load(Ordering::Acquire);
-        let (high, low) = (self.left_high.load(Ordering::Acquire), self.left_low.load(Ordering::Acquire));
-        let left = Ticks::from_bits(u64::from(high) << 32 | u64::from(low));
-        let phase = match place >> Self::PHASE_BIT & 3 {
-            1 => Some(Phase::Rise),
-            2 => Some(Phase::Hold),
-            3 => Some(Phase::Fall),
-            _ => None,
-        };
-        Progress {
-            tick,
-            list: ListPlace(place).list(),
-            done: ListPlace(place).done(),
-            waits: place >> Self::WAITS_BIT & 1 == 1,
-            inside: phase.map(|phase| (phase, left)),
-        }
-    }
-
-    /// The tick says where it is.
-    #[inline]
-    pub(super) fn publish(&self, ListPlace(place): ListPlace, inside: Option<(Phase, Ticks)>, waits: bool) {
-        let (phase, left) = inside.map_or((0, Ticks::ZERO), |(phase, left)| (phase as u32 + 1, left));
-        let place = place | phase << Self::PHASE_BIT | u32::from(waits) << Self::WAITS_BIT;
-        self.place.store(place, Ordering::Relaxed);
-        let bits = left.to_bits();
-        self.left_high.store((bits >> 32) as u32, Ordering::Relaxed);
-        self.left_low.store(bits as u32, Ordering::Relaxed);
-        self.tick.store(self.tick.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
     }
 
     /// What is asked for, with its word.

@@ -56,6 +56,8 @@ mod lists;
 mod live;
 #[cfg(feature = "live")]
 mod mailbox;
+#[cfg(feature = "live")]
+mod progress;
 
 pub(crate) use accept::Acceptance;
 pub use accept::PathRules;
