@@ -9,3 +9,4 @@ pub use crate::program::supply::Ready;
 #[cfg(feature = "live")]
 pub use crate::queue::change::{Change, Progress};
 pub use crate::queue::density::Density;
+pub use crate::queue::item::FeedItem;

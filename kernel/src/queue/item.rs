@@ -17,7 +17,7 @@ pub(crate) enum PathItem<R: Real, const AXES: usize> {
 
 /// An item of the feed stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum FeedItem<R> {
+pub enum FeedItem<R> {
     /// A ramp or a cruise.
     Segment(FeedSegment<R>),
     /// Rest for a time, between stretches.

@@ -39,7 +39,7 @@ mod bounds;
 pub(crate) mod density;
 mod feeder;
 mod intake;
-mod item;
+pub(crate) mod item;
 mod rejection;
 mod room;
 mod shared;

@@ -11,7 +11,7 @@ mod mailbox;
 #[path = "../../../kernel/src/queue/progress.rs"]
 mod progress;
 mod item {
-    pub(super) use motion_kernel::queue::FeedItem;
+    pub(super) use motion_kernel::internals::FeedItem;
 }
 #[path = "model.rs"]
 mod model;

@@ -9,7 +9,7 @@ mod lists;
 #[path = "../../../kernel/src/queue/mailbox.rs"]
 mod mailbox;
 mod item {
-    pub(super) use motion_kernel::queue::FeedItem;
+    pub(super) use motion_kernel::internals::FeedItem;
 }
 /// Here the place is one word: that several belong to one tick is a promise for one core.
 mod progress {
