@@ -20,7 +20,7 @@ use motion_kernel::hal::{
 use motion_kernel::kernel::{CorrectedIntake, Kernel};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Header, Items, ProgramError, Reader, Supply, SupplyError};
-use motion_kernel::queue::{Feeder, Streams};
+use motion_kernel::queue::{Feeder, Intake, Streams};
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
 
@@ -197,15 +197,23 @@ impl<'a, R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'a, R, AXES, 
     /// One tick of the kernel and of the machine. A program stop is resumed at once.
     #[inline(never)]
     pub fn tick(&mut self) -> Trace<R, AXES> {
-        self.tick_by(|kernel, intake, memory| *kernel.tick_corrected(intake, memory))
+        self.advance(|kernel, intake, memory| *kernel.tick_corrected(intake, memory))
     }
 
-    /// The same with the kernel's tick called by `tick`, to measure it.
+    /// The same with the kernel's tick called by `tick`, to measure it; without the correction.
     pub fn tick_by(
+        &mut self,
+        tick: impl FnOnce(&mut Kernel<R, AXES>, &mut Intake<'a, R, AXES>, &mut InMemory<AXES>) -> Trace<R, AXES>,
+    ) -> Trace<R, AXES> {
+        self.advance(|kernel, intake, memory| tick(kernel, intake.bare(), memory))
+    }
+
+    #[inline]
+    fn advance(
         &mut self,
         tick: impl FnOnce(
             &mut Kernel<R, AXES>,
-            &mut CorrectedIntake<'_, R, AXES>,
+            &mut CorrectedIntake<'a, R, AXES>,
             &mut InMemory<AXES>,
         ) -> Trace<R, AXES>,
     ) -> Trace<R, AXES> {

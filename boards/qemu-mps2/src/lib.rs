@@ -56,10 +56,10 @@ macro_rules! budgeted_tick {
         #[inline(never)]
         fn budgeted_tick<'a>(
             kernel: &'a mut motion_kernel::kernel::Kernel<$crate::Number, { $crate::AXES }>,
-            intake: &mut motion_kernel::kernel::CorrectedIntake<'_, $crate::Number, { $crate::AXES }>,
+            intake: &mut motion_kernel::queue::Intake<'_, $crate::Number, { $crate::AXES }>,
             memory: &mut hal_sim::closed_loop::InMemory<{ $crate::AXES }>,
         ) -> &'a motion_kernel::trace::Trace<$crate::Number, { $crate::AXES }> {
-            kernel.tick_corrected(intake, memory)
+            kernel.tick(intake, memory)
         }
     };
 }

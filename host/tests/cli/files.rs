@@ -174,6 +174,11 @@ mod unix {
     use super::{KEPT, THREE, folder, names};
     use crate::workspace::Workspace;
 
+    /// Sends a signal by the shell, which has `kill` itself.
+    fn send(signal: &str, id: u32) -> std::io::Result<std::process::ExitStatus> {
+        Command::new("sh").args(["-c", "kill -s \"$0\" \"$1\"", signal, &id.to_string()]).status()
+    }
+
     /// `motion` with its standard streams in pipes.
     fn spawn(workspace: &Workspace, arguments: &[&str]) -> Child {
         let mut command = Command::new(env!("CARGO_BIN_EXE_motion"));
@@ -324,7 +329,7 @@ mod unix {
             assert!(row.starts_with("98,"), "{row}");
             // The temporary files of report and recording.
             assert_eq!(names(&workspace).len(), 6, "{:?}", names(&workspace));
-            let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+            let sent = send(signal, child.id());
             assert!(sent.expect("kill").success());
             let ended = child.wait_with_output().expect("motion ends");
             rows.read_to_string(&mut row).expect("the rest");
@@ -347,7 +352,7 @@ mod unix {
         let mut child = spawn(&workspace, &["run", "-", "--report", "kept.html", "--trace", "pipe"]);
         // By now the signals are watched.
         let rows = File::open(workspace.0.join("pipe")).expect("a pipe");
-        let sent = Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status();
+        let sent = send("INT", child.id());
         assert!(sent.expect("kill").success());
         let input = child.stdin.take();
         let ended = child.wait_with_output().expect("motion ends");

@@ -26,6 +26,12 @@ impl<'a, R: Real, const AXES: usize> CorrectedIntake<'a, R, AXES> {
         self.correction = Some(correction);
         Ok(())
     }
+
+    /// The bare streams, for a tick that adds no correction.
+    #[inline]
+    pub fn bare(&mut self) -> &mut Intake<'a, R, AXES> {
+        &mut self.intake
+    }
 }
 
 impl<'a, R: Real, const AXES: usize> From<Intake<'a, R, AXES>> for CorrectedIntake<'a, R, AXES> {

@@ -547,7 +547,7 @@ pub(super) fn of_length<P: Root>(ramp: &Ramp<P>, length: Position) -> Result<Ram
 
 /// What every number type asks of a ramp over `length`; the first reason to refuse it is kept. Returns how long it rises
 /// and holds.
-#[inline(never)]
+#[inline]
 pub(super) fn check(
     refused: &mut Option<SegmentError>,
     ramp: &Ramp<f64>,

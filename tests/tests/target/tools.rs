@@ -165,7 +165,7 @@ impl Tools {
     pub(crate) fn emulator(&self, board: Board, name: &str, bundle: &Path) -> Result<Command, String> {
         let mut command = Command::new("timeout");
         command
-            .args(["300", "qemu-system-arm", "-M", board.machine, "-nographic"])
+            .args(["900", "qemu-system-arm", "-M", board.machine, "-nographic"])
             .args(["-monitor", "none", "-serial", "none"])
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-device")

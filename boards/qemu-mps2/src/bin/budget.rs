@@ -14,12 +14,12 @@ use hal_sim::{MachineParameters, SimMachine};
 use motion_kernel::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState};
 use motion_kernel::exec::ExecState;
 use motion_kernel::internals::Ready;
-use motion_kernel::kernel::{CorrectedIntake, Kernel};
+use motion_kernel::kernel::Kernel;
 use motion_kernel::law::{FeedSegment, PathMotion, Phase, Ticks};
 use motion_kernel::num::Scalar;
 use motion_kernel::path::{Piece, Setpoint};
 use motion_kernel::program::{Header, ProgramError, Reader};
-use motion_kernel::queue::Streams;
+use motion_kernel::queue::{Intake, Streams};
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, Position};
 use qemu_boards::count::Counter;
@@ -31,7 +31,7 @@ type Queues<const N: usize> = Streams<Number, N, PIECES, SEGMENTS>;
 /// The tick of a machine with `N` axes, called through something that is not inlined.
 type Tick<const N: usize> = for<'a> fn(
     &'a mut Kernel<Number, N>,
-    &mut CorrectedIntake<'_, Number, N>,
+    &mut Intake<'_, Number, N>,
     &mut InMemory<N>,
 ) -> &'a Trace<Number, N>;
 
@@ -51,9 +51,7 @@ fn main() -> ! {
         match refusal(bytes) {
             None => measure(&counter, bytes, streams, budgeted_tick),
             #[cfg(target_has_atomic = "8")]
-            Some(ProgramError::Axes { found: 1, .. }) => {
-                measure(&counter, bytes, one, Kernel::tick_corrected)
-            }
+            Some(ProgramError::Axes { found: 1, .. }) => measure(&counter, bytes, one, Kernel::tick),
             Some(error) => fail(&error),
         }
     }

@@ -10,9 +10,9 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt::{entry, exception};
 use critical_section::Mutex;
 use hal_sim::closed_loop::InMemory;
-use motion_kernel::axis::{AxesConfig, Correction};
+use motion_kernel::axis::AxesConfig;
 use motion_kernel::fault::FaultKind;
-use motion_kernel::kernel::{CorrectedIntake, Kernel};
+use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Scalar;
 use motion_kernel::program::{Items, ProgramError, Reader};
 use motion_kernel::units::{Counts, DacCode};
@@ -20,18 +20,18 @@ use qemu_boards::programs::programs;
 use qemu_boards::{AXES, Number};
 
 #[cfg(feature = "live")]
-use live::{Background, Feeder, Queues, background, poll};
+use live::{Background, Feeder, Queues, TickIntake, background, correct, poll, tick};
 #[cfg(not(feature = "live"))]
-use plain::{Background, Feeder, Queues, background, poll};
+use plain::{Background, Feeder, Queues, TickIntake, background, correct, poll, tick};
 
 /// The program's own plan fills the streams.
 #[cfg(not(feature = "live"))]
 mod plain {
     use motion_kernel::program::Supply;
-    use motion_kernel::queue::Streams;
+    use motion_kernel::queue::{Intake, Streams};
     use qemu_boards::{PIECES, SEGMENTS};
 
-    use super::{AXES, Items, Number, ProgramError};
+    use super::{AXES, InMemory, Items, Kernel, Number, ProgramError};
 
     pub(super) type Queues = Streams<Number, AXES, PIECES, SEGMENTS>;
     pub(super) type Feeder<'a> = motion_kernel::queue::Feeder<'a, Number, AXES>;
@@ -44,6 +44,19 @@ mod plain {
     pub(super) fn poll(supply: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {
         supply.fill(feeder).is_ok()
     }
+
+    pub(super) type TickIntake = Intake<'static, Number, AXES>;
+
+    /// Nothing is learnt.
+    pub(super) fn correct(_: &mut TickIntake) {}
+
+    pub(super) fn tick(
+        kernel: &mut Kernel<Number, AXES>,
+        intake: &mut TickIntake,
+        memory: &mut InMemory<AXES>,
+    ) {
+        kernel.tick(intake, memory);
+    }
 }
 
 /// Live control fills the streams.
@@ -51,11 +64,14 @@ mod plain {
 mod live {
     use core::sync::atomic::Ordering;
 
+    use motion_kernel::axis::Correction;
+    use motion_kernel::kernel::CorrectedIntake;
     use motion_kernel::live::LiveControl;
+    use motion_kernel::num::Scalar;
     use motion_kernel::queue::LiveFeeder;
     use qemu_boards::live::{PLACES, Streams};
 
-    use super::{AXES, COMMAND, Items, Number, ProgramError};
+    use super::{AXES, CODES, COMMAND, InMemory, Items, Kernel, Number, ProgramError};
 
     pub(super) type Queues = Streams;
     pub(super) type Feeder<'a> = LiveFeeder<'a, Number, AXES>;
@@ -77,12 +93,31 @@ mod live {
         }
         control.poll(feeder).is_ok()
     }
+
+    /// The larger image holds learnt corrections as well, so that the search for panics covers them.
+    pub(super) type TickIntake = CorrectedIntake<'static, Number, AXES>;
+
+    pub(super) fn correct(intake: &mut TickIntake) {
+        static KNOTS: [[Number; AXES]; 2] = [[Number::ZERO; AXES]; 2];
+        if let Ok(correction) = Correction::new(0, &KNOTS, 2, 1.0) {
+            // Live control refuses it, which the linker does not know.
+            CODES.store(u32::from(intake.correct(correction).is_ok()), Ordering::Relaxed);
+        }
+    }
+
+    pub(super) fn tick(
+        kernel: &mut Kernel<Number, AXES>,
+        intake: &mut TickIntake,
+        memory: &mut InMemory<AXES>,
+    ) {
+        kernel.tick_corrected(intake, memory);
+    }
 }
 
 /// What the tick owns.
 struct Foreground {
     kernel: Kernel<Number, AXES>,
-    intake: CorrectedIntake<'static, Number, AXES>,
+    intake: TickIntake,
     memory: InMemory<AXES>,
 }
 
@@ -145,12 +180,7 @@ fn SysTick() {
 /// The root of all that a board may call between two ticks.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn kernel_command(
-    command: u32,
-    kernel: &mut Kernel<Number, AXES>,
-    intake: &mut CorrectedIntake<'static, Number, AXES>,
-) {
-    static KNOTS: [[Number; AXES]; 2] = [[Number::ZERO; AXES]; 2];
+fn kernel_command(command: u32, kernel: &mut Kernel<Number, AXES>, intake: &mut TickIntake) {
     match command {
         1 => kernel.trip(FaultKind::Encoder),
         2 => CODES.store(
@@ -163,12 +193,7 @@ fn kernel_command(
             let peaks = kernel.take_peak_following_error_mm();
             CODES.store(peaks.iter().fold(0, |sum, mm| sum ^ mm.to_bits64() as u32), Ordering::Relaxed);
         }
-        6 => {
-            if let Ok(correction) = Correction::new(0, &KNOTS, 2, 1.0) {
-                // Refused under live control only.
-                let _ = intake.correct(correction);
-            }
-        }
+        6 => correct(intake),
         7 => kernel.enable(100),
         8 => CODES.store(u32::from(kernel.fault().is_some()), Ordering::Relaxed),
         _ => {}
@@ -178,10 +203,6 @@ fn kernel_command(
 /// The root of all that a tick may call.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn kernel_tick(
-    kernel: &mut Kernel<Number, AXES>,
-    intake: &mut CorrectedIntake<'static, Number, AXES>,
-    memory: &mut InMemory<AXES>,
-) {
-    kernel.tick_corrected(intake, memory);
+fn kernel_tick(kernel: &mut Kernel<Number, AXES>, intake: &mut TickIntake, memory: &mut InMemory<AXES>) {
+    tick(kernel, intake, memory);
 }

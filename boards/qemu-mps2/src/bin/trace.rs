@@ -22,8 +22,7 @@ fn main() -> ! {
     let config = AxesConfig::<Number, _>::new(axes, tick_s).unwrap_or_else(|error| fail(&error));
     let steps = config.axes.map(|config| config.encoder.position(Counts(1)).to_bits());
     let mut streams = Streams::<Number, AXES, PIECES, SEGMENTS>::new();
-    let (mut feeder, intake) = streams.split(rules, start);
-    let mut intake = intake.into();
+    let (mut feeder, mut intake) = streams.split(rules, start);
     let mut supply = Supply::new(program.items(), tick_s);
     let mut memory = InMemory { counts: [Counts(0); AXES], codes: [DacCode::ZERO; AXES], enabled: None };
     let mut kernel = Kernel::new(&config, start, memory.counts);
