@@ -7,7 +7,7 @@
 //! The rest holds for a tick on another core, too. Two pairs of release and acquire matter: `change`'s, so that a list that
 //! is followed is complete, and `generation`'s, so that no change is overlooked. Those of `owned` and `refused` do not: a
 //! list's own queue orders `owned` before its items, and nothing else is read because of `refused`. The test `handover`
-//! checks both promises in every interleaving.
+//! checks both promises; docs/PROMISES.md says in which interleavings.
 
 use super::change::Change;
 use super::counter::count;

@@ -1,4 +1,4 @@
-//! The hand-over between background and tick, in every interleaving of up to three changes.
+//! The hand-over between background and tick, in the interleavings of up to three changes that docs/PROMISES.md lists.
 //!
 //! Mailbox and lists are the kernel's own files, compiled with words that a checker controls. The queue of a list and the
 //! two that use all that are models of theirs (`ring`, `model`).

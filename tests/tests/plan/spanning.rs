@@ -114,10 +114,12 @@ fn feed_at(spans: &[Span], s_mm: f64) -> f64 {
     if span.ramp.peak_jerk_mm_s3 <= 0.0 {
         return span.ramp.from_mm_s;
     }
+    // Over the length of path that it is driven on, which is the ramp's own but for rounding.
+    let s_mm = (s_mm - span.start_mm) * (span.ramp.length_mm() / span.length_mm);
     let (mut early, mut late) = (0.0, span.ramp.duration_s());
     for _ in 0..80 {
         let middle = 0.5 * (early + late);
-        if span.start_mm + span.ramp.at(middle).s_mm < s_mm { early = middle } else { late = middle }
+        if span.ramp.at(middle).s_mm < s_mm { early = middle } else { late = middle }
     }
     span.ramp.at(late).v_mm_s
 }
