@@ -20,9 +20,9 @@ use qemu_boards::programs::programs;
 use qemu_boards::{AXES, Number};
 
 #[cfg(feature = "live")]
-use live::{Background, Feeder, Queues, TickIntake, background, correct, poll, tick};
+use live::{Background, Feeder, Queues, TickIntake, background, correct, for_tick, poll, tick};
 #[cfg(not(feature = "live"))]
-use plain::{Background, Feeder, Queues, TickIntake, background, correct, poll, tick};
+use plain::{Background, Feeder, Queues, TickIntake, background, correct, for_tick, poll, tick};
 
 /// The program's own plan fills the streams.
 #[cfg(not(feature = "live"))]
@@ -47,6 +47,10 @@ mod plain {
 
     pub(super) type TickIntake = Intake<'static, Number, AXES>;
 
+    pub(super) fn for_tick(intake: Intake<'static, Number, AXES>) -> TickIntake {
+        intake
+    }
+
     /// Nothing is learnt.
     pub(super) fn correct(_: &mut TickIntake) {}
 
@@ -68,7 +72,7 @@ mod live {
     use motion_kernel::kernel::CorrectedIntake;
     use motion_kernel::live::LiveControl;
     use motion_kernel::num::Scalar;
-    use motion_kernel::queue::LiveFeeder;
+    use motion_kernel::queue::{Intake, LiveFeeder};
     use qemu_boards::live::{PLACES, Streams};
 
     use super::{AXES, CODES, COMMAND, InMemory, Items, Kernel, Number, ProgramError};
@@ -96,6 +100,10 @@ mod live {
 
     /// The larger image holds learnt corrections as well, so that the search for panics covers them.
     pub(super) type TickIntake = CorrectedIntake<'static, Number, AXES>;
+
+    pub(super) fn for_tick(intake: Intake<'static, Number, AXES>) -> TickIntake {
+        intake.into()
+    }
 
     pub(super) fn correct(intake: &mut TickIntake) {
         static KNOTS: [[Number; AXES]; 2] = [[Number::ZERO; AXES]; 2];
@@ -148,7 +156,7 @@ fn run() -> Option<()> {
     kernel.enable(100);
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
     let foreground =
-        cortex_m::singleton!(: Foreground = Foreground { kernel, intake: intake.into(), memory })?;
+        cortex_m::singleton!(: Foreground = Foreground { kernel, intake: for_tick(intake), memory })?;
     critical_section::with(|cs| {
         *FOREGROUND.borrow(cs).try_borrow_mut().ok()? = Some(foreground);
         Some(())
