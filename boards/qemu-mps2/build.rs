@@ -10,20 +10,42 @@ const MPS2: &str = "MEMORY
 }
 ";
 
-/// microbit (nRF51822): the last quarter of its flash is for programs.
+/// microbit (nRF51822): the last quarter of its flash is for programs. The stack lies at the bottom of the memory: where it
+/// overflows there is nothing to overwrite, and the emulator stops at once.
 const MICROBIT: &str = "MEMORY
+{
+  FLASH : ORIGIN = 0x00000000, LENGTH = 192K
+  STACK : ORIGIN = 0x20000000, LENGTH = 13552
+  RAM   : ORIGIN = 0x20000000 + 13552, LENGTH = 16K - 13552
+}
+_stack_end = ORIGIN(STACK);
+_stack_start = ORIGIN(STACK) + LENGTH(STACK);
+";
+
+/// The same for images that have more in memory, and are not run there.
+const MICROBIT_LARGE: &str = "MEMORY
 {
   FLASH : ORIGIN = 0x00000000, LENGTH = 192K
   RAM   : ORIGIN = 0x20000000, LENGTH = 16K
 }
 ";
+const LARGE: [&str; 2] = ["interrupt", "kernel_only"];
 
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("set by cargo"));
     let target = env::var("TARGET").expect("set by cargo");
-    let map = if target.starts_with("thumbv6m") { MICROBIT } else { MPS2 };
-    fs::write(out.join("memory.x"), map).expect("OUT_DIR can be written");
-    println!("cargo:rustc-link-search={}", out.display());
+    let (map, large) = if target.starts_with("thumbv6m") { (MICROBIT, MICROBIT_LARGE) } else { (MPS2, MPS2) };
+    for (folder, map) in [("small", map), ("large", large)] {
+        fs::create_dir_all(out.join(folder)).expect("OUT_DIR can be written");
+        fs::write(out.join(folder).join("memory.x"), map).expect("OUT_DIR can be written");
+    }
+    for bin in fs::read_dir("src/bin").expect("the package has images") {
+        let bin = bin.expect("a readable folder").path();
+        let bin = bin.file_stem().expect("a file").to_str().expect("a name");
+        let folder = out.join(if LARGE.contains(&bin) { "large" } else { "small" });
+        println!("cargo:rustc-link-arg-bin={bin}=-L{}", folder.display());
+    }
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
     println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=src/bin");
 }

@@ -38,7 +38,7 @@ const IS_SMALL: bool = false;
 /// Axes of the machine.
 pub const AXES: usize = 3;
 /// Capacity of the path stream.
-pub const PIECES: usize = if IS_SMALL { 10 } else { 64 };
+pub const PIECES: usize = if IS_SMALL { 8 } else { 64 };
 /// Capacity of the feed stream.
 pub const SEGMENTS: usize = if IS_SMALL { 8 } else { 64 };
 /// Cells for the dead time of a simulated axis.

@@ -11,7 +11,7 @@ use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use hal_sim::closed_loop::{Closed, InMemory, LoopError, close, reference_machine};
 use hal_sim::{MachineParameters, SimMachine};
-use motion_kernel::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState};
+use motion_kernel::axis::{AxesConfig, AxisConfig, AxisFigures, AxisOutput, AxisState};
 use motion_kernel::exec::ExecState;
 use motion_kernel::internals::Ready;
 use motion_kernel::kernel::Kernel;
@@ -67,7 +67,7 @@ qemu_boards::budgeted_tick!();
 
 #[inline(never)]
 fn measure<const N: usize>(counter: &Counter, bytes: &[u8], streams: &mut Queues<N>, tick: Tick<N>) {
-    looped(counter, bytes, &parameters(bytes), streams, tick);
+    looped(counter, bytes, &parameters(bytes), &first_axis::<N>(bytes), streams, tick);
     stages::<N>(counter, bytes);
 }
 
@@ -82,6 +82,7 @@ fn looped<const N: usize>(
     counter: &Counter,
     bytes: &[u8],
     parameters: &MachineParameters<N>,
+    first: &FirstAxis,
     streams: &mut Queues<N>,
     tick: Tick<N>,
 ) {
@@ -89,18 +90,18 @@ fn looped<const N: usize>(
     let mut closed = closed(bytes, streams, &machine);
     // In place: the microbit has no room for another one.
     let closed = closed.as_mut().unwrap_or_else(|error| fail(error));
-    ticks(counter, bytes, closed, tick);
+    ticks(counter, first, closed, tick);
 }
 
 #[inline(never)]
 fn ticks<const N: usize>(
     counter: &Counter,
-    bytes: &[u8],
+    first: &FirstAxis,
     (producer, closed_loop): &mut Closed<'_, Number, N, LINE>,
     tick: Tick<N>,
 ) {
     // A regulator of its own beside the kernel's, fed with the same.
-    let (config, mut axis) = beside::<N>(bytes);
+    let (config, mut axis) = first.regulated();
     let mut deepest = 0;
     loop {
         let is_all = producer.fill().unwrap_or_else(|error| fail(&error));
@@ -147,19 +148,32 @@ fn closed<'a, const N: usize>(
     close(Reader::<N>::new(bytes).as_ref().unwrap_or_else(|error| fail(error)), streams, machine)
 }
 
-/// The first axis and its state at the program's start.
+/// The first axis of a program, and where it starts.
+struct FirstAxis {
+    figures: AxisFigures,
+    preview_ticks: u8,
+    tick_s: f64,
+    start: Position,
+}
+
 #[inline(never)]
-fn beside<const N: usize>(bytes: &[u8]) -> (AxisConfig<Number>, Axis) {
+fn first_axis<const N: usize>(bytes: &[u8]) -> FirstAxis {
     let read = Reader::<N>::new(bytes);
-    let header = program(&read).header();
-    let preview_ticks = AxesConfig::<Number, N>::preview_ticks(&header.axes, header.tick_s);
-    let config = preview_ticks
-        .map_err(|error| error.cause)
-        .and_then(|preview_ticks| AxisConfig::new(&header.axes[0], preview_ticks, header.tick_s));
-    let config = config.unwrap_or_else(|error| fail(&error));
-    let mut axis = Axis::default();
-    axis.set_position(&config, Counts::default(), header.start[0]);
-    (config, axis)
+    let &Header { ref axes, tick_s, start, .. } = program(&read).header();
+    let preview_ticks = AxesConfig::<Number, N>::preview_ticks(axes, tick_s).unwrap_or_else(|error| fail(&error));
+    FirstAxis { figures: axes[0], preview_ticks, tick_s, start: start[0] }
+}
+
+impl FirstAxis {
+    /// The axis, and its state at the program's start.
+    #[inline(never)]
+    fn regulated(&self) -> (AxisConfig<Number>, Axis) {
+        let config = AxisConfig::new(&self.figures, self.preview_ticks, self.tick_s);
+        let config = config.unwrap_or_else(|error| fail(&error));
+        let mut axis = Axis::default();
+        axis.set_position(&config, Counts::default(), self.start);
+        (config, axis)
+    }
 }
 
 /// The stages by themselves, over all that the program contains.
