@@ -160,7 +160,8 @@ struct FirstAxis {
 fn first_axis<const N: usize>(bytes: &[u8]) -> FirstAxis {
     let read = Reader::<N>::new(bytes);
     let &Header { ref axes, tick_s, start, .. } = program(&read).header();
-    let preview_ticks = AxesConfig::<Number, N>::preview_ticks(axes, tick_s).unwrap_or_else(|error| fail(&error));
+    let preview_ticks =
+        AxesConfig::<Number, N>::preview_ticks(axes, tick_s).unwrap_or_else(|error| fail(&error));
     FirstAxis { figures: axes[0], preview_ticks, tick_s, start: start[0] }
 }
 
