@@ -17,8 +17,8 @@ use motion_kernel::straight::Straight;
 use motion_kernel::units::Position;
 
 const TICK_S: f64 = 0.0005;
-/// Ticks between two turns of the background: 5 ms.
-const TURN_TICKS: u32 = 10;
+/// Ticks between two polls of the background: 5 ms.
+const POLL_TICKS: u32 = 10;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let program = Straight::new(start, end, limits, [40.0, 50.0], TICK_S)?;
     let mut streams = LiveStreams::<f32, 2, 64, 16>::new();
     let (mut feeder, mut intake) = streams.split(rules, start);
-    let mut control = LiveControl::<f32, 2, _, _, 64>::new(program, TICK_S, TURN_TICKS);
+    let mut control = LiveControl::<f32, 2, _, _, 64>::new(program, TICK_S, POLL_TICKS);
     let mut executor = Executor::new(start);
 
     let (mut path_mm, mut held_mm, mut greatest_mm_s) = (0.0_f64, None, 0.0_f64);
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             4000 => control.set_override(1.25).map_err(|share| format!("override {share}"))?,
             _ => {}
         }
-        if tick.is_multiple_of(TURN_TICKS) {
+        if tick.is_multiple_of(POLL_TICKS) {
             control.poll(&mut feeder)?;
         }
         let state = control.state(&feeder);

@@ -1,6 +1,6 @@
 //! Homing of an axis: switch and, where there is one, index pulse, at two speeds.
 //!
-//! Consumes, once a turn of the background, what the tick has seen of the axis ([`HomingInput`]); produces what is to be done next
+//! Consumes, once a poll of the background, what the tick has seen of the axis ([`HomingInput`]); produces what is to be done next
 //! ([`HomingStep`]): jogs, which are jerk-limited, and stops, which are controlled. The reference is where the switch closes on the
 //! slow approach, or the first index behind that: its count is latched, so that however late the stop is the position is
 //! exact.
@@ -14,7 +14,7 @@
 //! ```
 //!
 //! Without an index the reference is as good as the moment when the switch is seen: the slow feed times the time between
-//! two turns, and the switch itself. With one it is the same count from wherever homing starts, as long as the index does not
+//! two polls, and the switch itself. With one it is the same count from wherever homing starts, as long as the index does not
 //! lie where the switch closes: [`Homed::index_counts`] says how far behind it was found.
 //!
 //! Every stage is bounded by a length; what is not found within it is a [`HomingError`], which comes at rest.
@@ -203,7 +203,7 @@ impl Homing {
         self.is_aborted = true;
     }
 
-    /// One turn, after a tick: what is to be done before the next.
+    /// One poll, after a tick: what is to be done before the next.
     ///
     /// # Errors
     /// The axis is not homed; it is at rest.
@@ -375,7 +375,7 @@ mod tests {
         Homing::new(config, &jog, 0, 5e-4)
     }
 
-    /// What a machine does that rests after every stop, and moves a millimetre a turn.
+    /// What a machine does that rests after every stop, and moves a millimetre a poll.
     struct Machine {
         seen: HomingInput<1>,
         direction: f64,
@@ -450,7 +450,7 @@ mod tests {
         let whole = steps(usize::MAX).expect("homed");
         assert!(whole > 25, "{whole}");
         for given_up in 0..whole {
-            assert_eq!(steps(given_up), Err(HomingError::Aborted), "in turn {given_up}");
+            assert_eq!(steps(given_up), Err(HomingError::Aborted), "in poll {given_up}");
         }
     }
 

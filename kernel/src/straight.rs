@@ -200,13 +200,13 @@ mod tests {
                 *end = *end + at(part / size * length_mm);
             }
             let feed_mm_s = random.log(1.0, RULES.feed_mm_s);
-            let way = Straight::new(start, end, LIMITS, [feed_mm_s; 2], TICK_S).expect("a way");
-            let ramps = way.ramps.iter().flatten();
+            let straight = Straight::new(start, end, LIMITS, [feed_mm_s; 2], TICK_S).expect("a straight");
+            let ramps = straight.ramps.iter().flatten();
             let planned_s = ramps.map(|planned| planned.ramp.duration_s()).sum::<f64>();
             let mut streams = LiveStreams::<f64, 3, 64, 16>::new();
             let (mut feeder, mut intake) = streams.split(RULES, start);
             let mut executor = Executor::new(start);
-            let mut control = LiveControl::<f64, 3, _, Infallible, 64>::new(way, TICK_S, 0);
+            let mut control = LiveControl::<f64, 3, _, Infallible, 64>::new(straight, TICK_S, 0);
             let (mut ticks, mut place) = (0_u32, start);
             loop {
                 control.poll(&mut feeder).expect("accepted");
@@ -228,18 +228,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_way_is_refused() {
-        let way = |end_mm: f64, limits, feeds_mm_s| {
+    fn what_is_no_straight_is_refused() {
+        let items = |end_mm: f64, limits, feeds_mm_s| {
             let made = Straight::new([at(-6e5)], [at(end_mm)], limits, feeds_mm_s, TICK_S);
-            made.map(|way| way.count()).map_err(|error| format!("{error}"))
+            made.map(|straight| straight.count()).map_err(|error| format!("{error}"))
         };
-        assert_eq!(way(-6e5, LIMITS, [10.0; 2]), Ok(0));
+        assert_eq!(items(-6e5, LIMITS, [10.0; 2]), Ok(0));
         for feed_mm_s in [0.0, -1.0, 50.5, f64::NAN] {
             let expected = format!("feed {feed_mm_s} mm/s: expected above 0, at most 50");
-            assert_eq!(way(0.0, LIMITS, [feed_mm_s, 50.0]), Err(expected));
+            assert_eq!(items(0.0, LIMITS, [feed_mm_s, 50.0]), Err(expected));
         }
-        let long = way(6e5, LIMITS, [10.0; 2]);
+        let long = items(6e5, LIMITS, [10.0; 2]);
         assert_eq!(long, Err("a straight of 1200000 mm: expected at most 1000000 mm".into()));
-        assert!(way(0.0, Limits { jerk_mm_s3: 0.0, ..LIMITS }, [10.0; 2]).is_err());
+        assert!(items(0.0, Limits { jerk_mm_s3: 0.0, ..LIMITS }, [10.0; 2]).is_err());
     }
 }

@@ -200,8 +200,8 @@ fn record_and_replay(seed: u64) -> Option<(Recording, Option<String>)> {
     };
     let job = Job::new(&options, &plan, &machine).expect("a job");
     let mut ticks = Vec::new();
-    let (summary, recording) = simulate::on_simulated(&machine, injections.as_ref(), |rig| {
-        let mut breaking = Breaking { hardware: rig, breakage, at, tick: 0 };
+    let (summary, recording) = simulate::on_simulated(&machine, injections.as_ref(), |hardware| {
+        let mut breaking = Breaking { hardware, breakage, at, tick: 0 };
         let mut recorder = Recorder::new(&mut breaking);
         let summary = simulate::run_on(&job, &mut recorder, &mut |tick| ticks.push(words(tick)))?;
         Ok((summary, recorder.finish(&job)))

@@ -1,10 +1,10 @@
 //! The background: start button, console, streams, and what the log says.
 //!
-//! Consumes the [`Panel`] and what the tick has left in [`Control`]; produces items for the streams and a [`LogLine`] a turn
-//! at most. Runs in what the ticks leave of the processor: the board calls [`Background::turn`] right after a tick, logs its
+//! Consumes the [`Panel`] and what the tick has left in [`Control`]; produces items for the streams and a [`LogLine`] a poll
+//! at most. Runs in what the ticks leave of the processor: the board calls [`Background::poll`] right after a tick, logs its
 //! line, and calls [`Background::plan`], over and over.
 //!
-//! A turn begins right after a tick with what keeps interrupts off: taking figures out of [`Control`], and the line of log
+//! A poll begins right after a tick with what keeps interrupts off: taking figures out of [`Control`], and the line of log
 //! (defmt encodes it with interrupts masked). Both are over long before the next tick, so neither delays any. Then come
 //! planning and filling, which may take several ticks and keep nothing off.
 //!
@@ -84,11 +84,11 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         }
     }
 
-    /// The first part of a turn, right after tick `now`: what is asked for, and what the tick has left. What there is to
+    /// The first part of a poll, right after tick `now`: what is asked for, and what the tick has left. What there is to
     /// log of it.
     // A frame of its own: what it takes is free again while motion is planned.
     #[inline(never)]
-    pub fn turn<const ROWS: usize, const AFTER: usize>(
+    pub fn poll<const ROWS: usize, const AFTER: usize>(
         &mut self,
         now: u32,
         panel: &mut impl Panel,
@@ -100,7 +100,7 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         } else {
             core::iter::from_fn(|| panel.next_byte()).find_map(Command::of).map(Asked::Command)
         };
-        if let Some(line) = self.poll(&seen, asked, control) {
+        if let Some(line) = self.follow(&seen, asked, control) {
             return Some(line);
         }
         if self.phase == Phase::Faulted
@@ -112,7 +112,7 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         self.report.line(now, &self.board, counts, control)
     }
 
-    /// The second part of a turn, which may take several ticks. Also in a fault: it may end in a stop on the path.
+    /// The second part of a poll, which may take several ticks. Also in a fault: it may end in a stop on the path.
     pub fn plan(&mut self) {
         let Some(run) = &mut self.run else { return };
         if let Some(here) = self.from.take() {
@@ -122,13 +122,13 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         self.refused = run.poll().err();
     }
 
-    /// A turn took so many cycles of the board's counter, its log included.
-    pub fn note_turn(&mut self, cycles: u32) {
-        self.report.note_turn(cycles);
+    /// A poll took so many cycles of the board's counter, its log included.
+    pub fn note_poll(&mut self, cycles: u32) {
+        self.report.note_poll(cycles);
     }
 
     /// Follows what the tick has left, then what is asked for.
-    fn poll<const ROWS: usize, const AFTER: usize>(
+    fn follow<const ROWS: usize, const AFTER: usize>(
         &mut self,
         seen: &Seen<R, AXES>,
         asked: Option<Asked>,
@@ -332,7 +332,7 @@ mod tests {
 
     type Lines = Vec<(u32, LogLine<f32, AXES>)>;
 
-    /// A board from its start on, with a turn after every tick. Before tick `n` `script` does what it says in it; the lines
+    /// A board from its start on, with a poll after every tick. Before tick `n` `script` does what it says in it; the lines
     /// of its log without reports, its set position and whether its drives are enabled.
     fn board(
         ticks: u32,
@@ -359,7 +359,7 @@ mod tests {
             let mut unhealthy = None;
             script(now, &mut hands, &mut unhealthy, &lines);
             control.tick(unhealthy, None, &mut drives);
-            let line = background.turn(now, &mut hands, &mut Exclusive(&mut control));
+            let line = background.poll(now, &mut hands, &mut Exclusive(&mut control));
             lines.extend(line.filter(|line| !is_report(line)).map(|line| (now, line)));
             background.plan();
         }
@@ -457,8 +457,8 @@ mod tests {
         let mut hands = Hands { down_from: u32::MAX - 100, ..Hands::default() };
         for now in 1..=10_000 {
             control.timing.add(100 + now, 20, now == 1);
-            background.note_turn(1_680_000);
-            match background.turn(now, &mut hands, &mut Exclusive(&mut control)) {
+            background.note_poll(1_680_000);
+            match background.poll(now, &mut hands, &mut Exclusive(&mut control)) {
                 Some(LogLine::Ticks { timing, overruns }) => {
                     assert_eq!(overruns, 1);
                     ticks.push((now, timing.ticks));

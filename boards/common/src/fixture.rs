@@ -11,8 +11,8 @@ pub(crate) const BOARD: BoardParameters =
 
 pub(crate) const TICK_S: f64 = 0.0005;
 
-/// Ticks of a long turn of the background.
-pub(crate) const TURN_TICKS_MAX: u32 = 66;
+/// Ticks of a long poll of the background.
+pub(crate) const POLL_TICKS_MAX: u32 = 66;
 
 /// The stringer, 2.320 s long.
 pub(crate) const PROGRAM: &[u8] = include_bytes!("../program/stringer.bin");

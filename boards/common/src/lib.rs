@@ -5,7 +5,7 @@
 //!                                  │
 //!                              rtic_core::Mutex
 //!                                  │
-//! idle    Panel: button, console ─► Background::turn ─► LogLine ─► log
+//! idle    Panel: button, console ─► Background::poll ─► LogLine ─► log
 //!                                   Background::plan ─► streams of the tick
 //! ```
 //!
@@ -21,7 +21,7 @@
 //! - [`console`]: the commands of the console;
 //! - [`operator`]: what a press or a command does, in every phase;
 //! - [`control`]: what tick and background share, and the tick;
-//! - [`background`]: one turn after another;
+//! - [`background`]: one poll after another;
 //! - [`report`]: figures of the last second;
 //! - [`log`]: what the log says;
 //! - [`tick_timing`] and [`liveness`]: what the tick knows of itself and of the background.

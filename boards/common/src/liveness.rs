@@ -1,6 +1,6 @@
 //! Whether the watchdog may be fed: only while tick and background are both alive.
 //!
-//! Consumes the background's count of its turns, each tick. The tick feeds the watchdog, so a tick that
+//! Consumes the background's count of its polls, each tick. The tick feeds the watchdog, so a tick that
 //! has stopped ends in a reset within the watchdog's time. A
 //! background that has stopped no longer counts, and the tick then stops feeding. Either alone would miss
 //! half: a tick goes on regulating with nobody to stop it, a background would go on logging while an output
@@ -9,7 +9,7 @@
 /// What the tick knows of the background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Liveness {
-    turns: u32,
+    polls: u32,
     silent_ticks: u32,
     silent_ticks_max: u32,
 }
@@ -18,15 +18,15 @@ impl Liveness {
     /// The background has just been seen, and may be silent for `silent_ticks_max`.
     #[must_use]
     pub const fn new(silent_ticks_max: u32) -> Self {
-        Self { turns: 0, silent_ticks: 0, silent_ticks_max }
+        Self { polls: 0, silent_ticks: 0, silent_ticks_max }
     }
 
-    /// One tick, in which the background has counted `turns`: whether to feed the watchdog.
-    pub fn may_feed(&mut self, turns: u32) -> bool {
-        if turns == self.turns {
+    /// One tick, in which the background has counted `polls`: whether to feed the watchdog.
+    pub fn may_feed(&mut self, polls: u32) -> bool {
+        if polls == self.polls {
             self.silent_ticks = self.silent_ticks.saturating_add(1);
         } else {
-            (self.turns, self.silent_ticks) = (turns, 0);
+            (self.polls, self.silent_ticks) = (polls, 0);
         }
         self.silent_ticks <= self.silent_ticks_max
     }
@@ -39,8 +39,8 @@ mod tests {
     #[test]
     fn feeds_only_while_the_background_counts() {
         let mut liveness = Liveness::new(200);
-        for turns in 1..10_000 {
-            assert!(liveness.may_feed(turns));
+        for polls in 1..10_000 {
+            assert!(liveness.may_feed(polls));
         }
         for _ in 0..200 {
             assert!(liveness.may_feed(9_999));

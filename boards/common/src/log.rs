@@ -1,6 +1,6 @@
 //! What the log says, a line at a time.
 //!
-//! Consumes what the background has done; produces lines for people. A turn makes one line at most, because a log may keep
+//! Consumes what the background has done; produces lines for people. A poll makes one line at most, because a log may keep
 //! interrupts off while it takes one in.
 
 use motion_kernel::fault::Fault;
@@ -56,7 +56,7 @@ pub enum LogLine<R: Real, const AXES: usize> {
     FollowingErrors([R; AXES]),
     /// The background.
     Background {
-        /// Longest turn of the last second \[µs\].
+        /// Longest poll of the last second \[µs\].
         longest_turn_us: u32,
         /// Stops for want of data, since the start.
         starvations: u32,
@@ -114,7 +114,7 @@ pub fn write<R: Real + defmt::Format, const AXES: usize>(line: &LogLine<R, AXES>
             info!("peak following error {=[?]} um", peaks_mm.map(|mm| R::from_f64(1e3) * mm));
         }
         LogLine::Background { longest_turn_us, starvations, bytes_lost } => info!(
-            "longest background turn {=u32} us, {=u32} stops for want of data, {=u32} console bytes lost",
+            "longest background poll {=u32} us, {=u32} stops for want of data, {=u32} console bytes lost",
             longest_turn_us, starvations, bytes_lost
         ),
     }

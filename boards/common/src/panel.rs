@@ -1,8 +1,8 @@
 //! Where an operator stands: a button and the bytes of a serial console.
 //!
-//! Consumes the level of the button once a turn; produces presses.
+//! Consumes the level of the button once a poll; produces presses.
 
-/// What a board has for its operator. The background asks once a turn.
+/// What a board has for its operator. The background asks once a poll.
 pub trait Panel {
     /// Whether the start button is down now. Bounces are this crate's business.
     fn is_button_down(&mut self) -> bool;
@@ -23,11 +23,11 @@ pub(crate) struct Button {
     is_counted: bool,
 }
 
-/// So many samples at least make a press, however long turns take: one may be a bounce.
+/// So many samples at least make a press, however long polls take: one may be a bounce.
 const PRESS_SAMPLES: u8 = 3;
 
 impl Button {
-    /// Whether it has just been down for `button_ticks` at tick `now`, as far as turns have seen. A press counts once.
+    /// Whether it has just been down for `button_ticks` at tick `now`, as far as polls have seen. A press counts once.
     pub(crate) fn is_pressed(&mut self, is_down: bool, now: u32, button_ticks: u32) -> bool {
         if !is_down {
             *self = Self::default();
@@ -44,11 +44,11 @@ impl Button {
 mod tests {
     use super::*;
 
-    /// Ticks at which a button that is down where `down` says so counts as pressed, with a turn every `turn` ticks.
-    fn presses(turn: u32, begin: u32, down: impl Fn(u32) -> bool) -> Vec<u32> {
+    /// Ticks at which a button that is down where `down` says so counts as pressed, with a poll every `poll` ticks.
+    fn presses(poll: u32, begin: u32, down: impl Fn(u32) -> bool) -> Vec<u32> {
         let mut button = Button::default();
         (0..400)
-            .step_by(turn as usize)
+            .step_by(poll as usize)
             .filter(|&tick| button.is_pressed(down(tick), begin.wrapping_add(tick), 40))
             .collect()
     }
@@ -65,7 +65,7 @@ mod tests {
         assert_eq!(presses(1, u32::MAX - 120, |tick| tick >= 100), [140]);
     }
 
-    /// Turns of 66 ticks: two samples are 66 ticks apart, and still no press.
+    /// Polls of 66 ticks: two samples are 66 ticks apart, and still no press.
     #[test]
     fn long_turns_need_three_samples() {
         assert_eq!(presses(66, 0, |tick| tick >= 66), [198]);

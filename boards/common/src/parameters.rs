@@ -5,11 +5,11 @@
 pub struct BoardParameters {
     /// Control ticks a second \[Hz\]. A program is compiled for it.
     pub tick_hz: u32,
-    /// Clock of the counter that times the background's turns \[Hz\], a multiple of 1 MHz.
+    /// Clock of the counter that times the background's polls \[Hz\], a multiple of 1 MHz.
     pub cycles_hz: u32,
     /// Counts a second that every encoder input is sure to pass \[1/s\].
     pub counts_per_s_max: u32,
-    /// So far ahead of what it saw the background changes a ramp \[ticks\]: what an ordinary turn with a plan takes.
+    /// So far ahead of what it saw the background changes a ramp \[ticks\]: what an ordinary poll with a plan takes.
     /// Where that was too late, live control tries again, a tick further ahead each time, and stays there.
     pub lead_ticks: u32,
 }

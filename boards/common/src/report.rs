@@ -1,4 +1,4 @@
-//! The figures that the log gets once a second, and the flight recorder's rows after a fault, a line a turn.
+//! The figures that the log gets once a second, and the flight recorder's rows after a fault, a line a poll.
 
 use motion_kernel::num::Real;
 use rtic_core::Mutex;
@@ -54,8 +54,8 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// A turn of the background took so long.
-    pub(crate) fn note_turn(&mut self, cycles: u32) {
+    /// A poll of the background took so long.
+    pub(crate) fn note_poll(&mut self, cycles: u32) {
         self.longest_turn_cycles = self.longest_turn_cycles.max(cycles);
     }
 

@@ -85,8 +85,8 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
 
     /// Applies `settings` to this run and those to come.
     pub fn set(&mut self, settings: &Settings) {
-        // The range of overrides is within live control's.
-        let _ = self.control.set_override(settings.feed_override.share());
+        let set = self.control.set_override(settings.feed_override.share());
+        debug_assert!(set.is_ok(), "an operator's range of overrides is within live control's");
         self.control.set_single_block(settings.is_single);
     }
 
@@ -118,27 +118,27 @@ mod tests {
 
     use super::*;
     use crate::console::{FeedOverride, Step};
-    use crate::fixture::{AXES, BOARD, TICK_S, TURN_TICKS_MAX, end, machine};
+    use crate::fixture::{AXES, BOARD, TICK_S, POLL_TICKS_MAX, end, machine};
 
     type Run<'a> = super::Run<'a, f32, AXES, 64>;
 
-    /// A board whose background has turns every so many ticks.
+    /// A board whose background has polls every so many ticks.
     struct TestBoard<'a> {
         run: Run<'a>,
         intake: Intake<'a, f32, AXES>,
         executor: Executor<f32, AXES>,
         here: [Position; AXES],
-        turn_ticks: u32,
+        poll_ticks: u32,
     }
 
     /// What `work` does with a board that stands at the program's start.
-    fn on_a_board<T>(turn_ticks: u32, work: impl FnOnce(&mut TestBoard<'_>) -> T) -> T {
+    fn on_a_board<T>(poll_ticks: u32, work: impl FnOnce(&mut TestBoard<'_>) -> T) -> T {
         let machine = machine();
         let here = machine.header().start;
         let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
         let (feeder, intake) = streams.split(machine.header().rules, here);
         let run = Run::new(machine.program, feeder, BOARD.lead_ticks);
-        work(&mut TestBoard { run, intake, executor: Executor::new(here), here, turn_ticks })
+        work(&mut TestBoard { run, intake, executor: Executor::new(here), here, poll_ticks })
     }
 
     impl TestBoard<'_> {
@@ -148,7 +148,7 @@ mod tests {
             self.run.start(self.here).expect("a way");
             for tick in 0..1_000_000 {
                 command(tick, &mut self.run);
-                if tick % self.turn_ticks == 0 {
+                if tick % self.poll_ticks == 0 {
                     self.run.poll().expect("accepted");
                     if self.run.state() == State::Waiting {
                         return (tick, self.here);
@@ -164,10 +164,10 @@ mod tests {
     /// Runs the program as the board does, twice: from its start, and from where it ended. The ticks of each run, where it
     /// ended, and how often it had to stop for want of data.
     fn two_runs(
-        turn_ticks: u32,
+        poll_ticks: u32,
         mut command: impl FnMut(u32, &mut Run<'_>),
     ) -> ([(u32, [Position; AXES]); 2], u32) {
-        on_a_board(turn_ticks, |board| {
+        on_a_board(poll_ticks, |board| {
             (core::array::from_fn(|_| board.program(&mut command)), board.run.starvations())
         })
     }
@@ -190,17 +190,17 @@ mod tests {
         assert_eq!(starvations, 0);
     }
 
-    /// Turns as seldom as the longest one would let them be: what is under way is no slower for it, only what begins.
+    /// Polls as seldom as the longest one would let them be: what is under way is no slower for it, only what begins.
     #[test]
     fn seldom_turns_cost_no_stop() {
-        let (runs, starvations) = two_runs(TURN_TICKS_MAX, |_, _| {});
+        let (runs, starvations) = two_runs(POLL_TICKS_MAX, |_, _| {});
         let items = machine().program.items();
         let stretches = items.filter(|item| matches!(item, Ok(Item::EndOfStretch(_)))).count() as u32;
         let most_ticks = [STRINGER_TICKS, STRINGER_TICKS + back_ticks()];
         for (((ticks, at), most), ways) in runs.into_iter().zip(most_ticks).zip([0, 1]) {
             assert_eq!(at, end());
-            // A turn for each stretch to begin after, and one to see the end in.
-            assert!(ticks <= most + (stretches + ways + 1) * TURN_TICKS_MAX, "{ticks} {most}");
+            // A poll for each stretch to begin after, and one to see the end in.
+            assert!(ticks <= most + (stretches + ways + 1) * POLL_TICKS_MAX, "{ticks} {most}");
         }
         assert_eq!(starvations, 0);
     }
@@ -208,12 +208,12 @@ mod tests {
     /// The button every so many ticks of both runs, and as soon as it is at rest again.
     #[test]
     fn held_again_and_again_it_ends_where_it_should() {
-        for (turn_ticks, every) in [1, TURN_TICKS_MAX]
+        for (poll_ticks, every) in [1, POLL_TICKS_MAX]
             .into_iter()
-            .flat_map(|turn| (100..3000).step_by(97).map(move |every| (turn, every)))
+            .flat_map(|poll| (100..3000).step_by(97).map(move |every| (poll, every)))
         {
             let mut held = 0;
-            let (runs, starvations) = two_runs(turn_ticks, |tick, run| {
+            let (runs, starvations) = two_runs(poll_ticks, |tick, run| {
                 if tick % every == every - 1 {
                     run.hold();
                 }

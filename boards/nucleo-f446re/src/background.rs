@@ -1,4 +1,4 @@
-//! The idle loop: a turn of the background after a tick, over and over.
+//! The idle loop: a poll of the background after a tick, over and over.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -14,8 +14,8 @@ use crate::console_port::LOST;
 
 /// Ticks since the start; counted by the tick.
 pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
-/// Turns of the background; the tick feeds the watchdog only while they are counted.
-pub(crate) static TURNS: AtomicU32 = AtomicU32::new(0);
+/// Polls of the background; the tick feeds the watchdog only while they are counted.
+pub(crate) static POLLS: AtomicU32 = AtomicU32::new(0);
 
 /// The blue button and ST-LINK's serial port.
 pub(crate) struct Panel {
@@ -49,13 +49,13 @@ pub(crate) fn run(
     log::write(&LogLine::<Number, AXES>::Ready);
     loop {
         wait_for_tick();
-        TURNS.store(TURNS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        POLLS.store(POLLS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         let begin = DWT::cycle_count();
-        if let Some(line) = background.turn(TICKS.load(Ordering::Relaxed), panel, &mut control) {
+        if let Some(line) = background.poll(TICKS.load(Ordering::Relaxed), panel, &mut control) {
             log::write(&line);
         }
         background.plan();
-        background.note_turn(DWT::cycle_count().wrapping_sub(begin));
+        background.note_poll(DWT::cycle_count().wrapping_sub(begin));
     }
 }
 

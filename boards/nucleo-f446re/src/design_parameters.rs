@@ -105,7 +105,7 @@ pub const WATCHDOG_MIN_NS: u32 =
 pub const WATCHDOG_MAX_NS: u32 =
     (WATCHDOG_COUNTS as u64 * WATCHDOG_PRESCALER as u64 * 1_000_000_000 / LSI_MIN_HZ as u64) as u32;
 /// What an item of a program takes the background \[cycles\]: some 20 000, double precision in software.
-/// Assumed, not measured; the log's "background turn" is the measurement.
+/// Assumed, not measured; the log's "background poll" is the measurement.
 pub const ITEM_CYCLES: u32 = 20_000;
 /// What a tick takes from the background \[cycles\]: twice what is estimated for one with slow memory.
 pub const TICK_CYCLES_TAKEN: u32 = 4_000;
@@ -114,32 +114,32 @@ pub const TICK_CYCLES_TAKEN: u32 = 4_000;
 pub const ITEMS_PER_S: u32 = (SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) / ITEM_CYCLES;
 /// Blocks and ramps that live control knows ahead, each.
 pub const PLACES: usize = 64;
-/// The most instructions that a turn of the background was seen to take on an emulated Cortex-M4F, under random commands
-/// and behind turns that were lost, rounded up.
-pub const TURN_INSTRUCTIONS_MAX: u32 = 2_600_000;
-/// The longest turn of the background \[cycles\], at two an instruction: assumed, not measured, as the items' above.
-pub const TURN_CYCLES_MAX: u32 = 2 * TURN_INSTRUCTIONS_MAX;
+/// The most instructions that a poll of the background was seen to take on an emulated Cortex-M4F, under random commands
+/// and behind polls that were lost, rounded up.
+pub const POLL_INSTRUCTIONS_MAX: u32 = 2_600_000;
+/// The longest poll of the background \[cycles\], at two an instruction: assumed, not measured, as the items' above.
+pub const POLL_CYCLES_MAX: u32 = 2 * POLL_INSTRUCTIONS_MAX;
 /// The same in ticks, which take their part of the processor: some 33 ms.
-pub const TURN_TICKS_MAX: u32 = (TURN_CYCLES_MAX as u64 * TICK_HZ as u64)
+pub const POLL_TICKS_MAX: u32 = (POLL_CYCLES_MAX as u64 * TICK_HZ as u64)
     .div_ceil((SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) as u64) as u32;
-/// So far ahead of what it saw the background changes a ramp \[ticks\]: 4 ms, what an ordinary turn with a plan takes.
+/// So far ahead of what it saw the background changes a ramp \[ticks\]: 4 ms, what an ordinary poll with a plan takes.
 pub const LEAD_TICKS: u32 = 8;
 
 const _: () = assert!(
-    3 * TURN_TICKS_MAX < BOARD.silent_ticks_max(),
-    "the longest turn is close to what the watchdog takes for silence"
+    3 * POLL_TICKS_MAX < BOARD.silent_ticks_max(),
+    "the longest poll is close to what the watchdog takes for silence"
 );
 
 /// Bits a second of the serial console. A byte is ten bits, two ticks long, so that the tick, which takes one byte, leaves
 /// none behind, however late it is within its tolerance.
 pub const CONSOLE_BAUD: u32 = 9600;
-/// Bytes between tick and background: as many as may come in the longest turn, and one place that stays empty.
+/// Bytes between tick and background: as many as may come in the longest poll, and one place that stays empty.
 pub const CONSOLE_BYTES: usize = 64;
 
 const _: () = assert!(CONSOLE_BAUD <= 5 * TICK_HZ, "a byte may be lost between two ticks");
 const _: () = assert!(
-    (TURN_TICKS_MAX as u64 * CONSOLE_BAUD as u64).div_ceil(10 * TICK_HZ as u64) < CONSOLE_BYTES as u64,
-    "more bytes may come in a turn of the background than there are places"
+    (POLL_TICKS_MAX as u64 * CONSOLE_BAUD as u64).div_ceil(10 * TICK_HZ as u64) < CONSOLE_BYTES as u64,
+    "more bytes may come in a poll of the background than there are places"
 );
 
 /// Ticks that the flight recorder keeps: a twelfth of a second, 28 KB. What it takes, the stack has less.
@@ -215,18 +215,18 @@ mod tests {
         assert_eq!(ITEMS_PER_S, 8000);
         let readme = include_str!("../README.md");
         assert!(readme.contains("8000 items a second"));
-        assert_eq!((TURN_TICKS_MAX * 1000).div_ceil(TICK_HZ), 33);
+        assert_eq!((POLL_TICKS_MAX * 1000).div_ceil(TICK_HZ), 33);
         assert!(readme.contains("up to 33 ms"));
     }
 
     #[test]
     fn a_poll_takes_no_more_than_was_counted() {
         let stages = include_str!("../../../tests/expected/stages.md");
-        let turn = "| Cortex-M4F | f32 | a poll of live control |";
-        let row = stages.lines().find(|row| row.starts_with(turn)).expect("counted");
+        let poll = "| Cortex-M4F | f32 | a poll of live control |";
+        let row = stages.lines().find(|row| row.starts_with(poll)).expect("counted");
         let most = row.trim_end_matches(" |").rsplit(' ').next().expect("a figure");
         let counted: u32 = most.parse().expect("a number");
-        assert!((TURN_INSTRUCTIONS_MAX / 2..=TURN_INSTRUCTIONS_MAX).contains(&counted), "{counted}");
+        assert!((POLL_INSTRUCTIONS_MAX / 2..=POLL_INSTRUCTIONS_MAX).contains(&counted), "{counted}");
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //!         drives: emergency stop, ready   ── Control ──  button, log
 //!         console ── bytes ────────────────────────────  commands
 //!         encoders ─► kernel ─► converter ◄─ streams ──  program
-//!         watchdog ◄───────────────────────── turns ───
+//!         watchdog ◄───────────────────────── polls ───
 //! ```
 //!
 //! The tick is a hardware task with a static priority and nothing above it: its latest end is its own
@@ -49,7 +49,7 @@ mod app {
     use stm32f4xx_hal::serial::Rx;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-    use crate::background::{self, Panel, TICKS, TURNS};
+    use crate::background::{self, Panel, TICKS, POLLS};
     use crate::board::Board;
     use crate::console_port;
     use crate::hal::Hardware;
@@ -128,7 +128,7 @@ mod app {
         cx.shared.control.lock(|control| {
             let unhealthy = hardware.drives.check();
             control.tick(unhealthy, cx.local.monitor.began(begin), hardware);
-            if cx.local.liveness.may_feed(TURNS.load(Ordering::Relaxed)) {
+            if cx.local.liveness.may_feed(POLLS.load(Ordering::Relaxed)) {
                 cx.local.watchdog.feed();
             }
             console_port::receive(cx.local.console, cx.local.received);

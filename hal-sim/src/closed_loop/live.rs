@@ -25,30 +25,30 @@ enum Command {
 }
 
 /// Commands that no operator would give: in any order, one every hundred ticks, with times between them in which the
-/// background gets no turn.
+/// background does not poll.
 #[derive(Clone, Debug)]
 struct Commands {
     random: SplitMix64,
-    turns_left: u32,
-    /// Turns that the background still loses.
+    polls_left: u32,
+    /// Polls that the background still loses.
     lost: u32,
 }
 
-/// So many turns have commands; then the program is let go on to its end.
-const COMMANDED_TURNS: u32 = 8000;
-/// In the share of 2⁻³² of all turns.
+/// So many polls have commands; then the program is let go on to its end.
+const COMMANDED_POLLS: u32 = 8000;
+/// In the share of 2⁻³² of all polls.
 const ONE_IN_100: u32 = u32::MAX / 100;
 const ONE_IN_400: u32 = u32::MAX / 400;
-/// A turn is late by less than so many ticks.
+/// A poll is late by less than so many ticks.
 const LATE_TICKS: u32 = 256;
 
 impl Commands {
-    /// What is commanded in this turn; `None` if the background does not get it.
+    /// What is commanded in this poll; `None` if the background does not get it.
     fn next(&mut self) -> Option<Option<Command>> {
-        if self.turns_left == 0 {
+        if self.polls_left == 0 {
             return Some(None);
         }
-        self.turns_left -= 1;
+        self.polls_left -= 1;
         if self.lost > 0 {
             self.lost -= 1;
             return None;
@@ -70,7 +70,7 @@ impl Commands {
     }
 
     fn are_over(&self) -> bool {
-        self.turns_left == 0
+        self.polls_left == 0
     }
 }
 
@@ -149,7 +149,7 @@ pub fn close<
     let mut kernel = Kernel::new(&axes, header.start, counts);
     kernel.enable(0);
     let control = LiveControl::new(program.items(), header.tick_s, 0);
-    let commands = Commands { random: SplitMix64::new(seed), turns_left: COMMANDED_TURNS, lost: 0 };
+    let commands = Commands { random: SplitMix64::new(seed), polls_left: COMMANDED_POLLS, lost: 0 };
     let producer = LiveProducer { feeder, control, commands };
     Ok((producer, ClosedLoop { kernel, intake: intake.into(), machine, outputs, memory }))
 }
@@ -160,10 +160,10 @@ mod tests {
 
     #[test]
     fn commands_of_every_kind_come_and_end() {
-        let mut commands = Commands { random: SplitMix64::new(3), turns_left: COMMANDED_TURNS, lost: 0 };
+        let mut commands = Commands { random: SplitMix64::new(3), polls_left: COMMANDED_POLLS, lost: 0 };
         let mut kinds = [0_u32; 4];
         let mut lost = 0;
-        for _ in 0..COMMANDED_TURNS {
+        for _ in 0..COMMANDED_POLLS {
             match commands.next() {
                 None => lost += 1,
                 Some(None) => {}

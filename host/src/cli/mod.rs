@@ -31,7 +31,7 @@
 //! - [`machine`]: the reference machine's file, and what its keys mean;
 //! - [`demo`]: what `motion` alone does;
 //! - [`error`]: errors and exit statuses;
-//! - `input`, `outputs`, `table`, `trace`, `progress`: what the commands share.
+//! - `input`, `outputs`, `until_closed`, `table`, `trace`, `progress`: what the commands share.
 
 pub mod compare;
 pub mod compile;
@@ -53,13 +53,15 @@ mod outputs;
 mod progress;
 mod table;
 mod trace;
+mod until_closed;
 
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, Write};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
 use self::error::{CliError, Outcome};
+use self::until_closed::UntilClosed;
 use crate::files::interrupt;
 
 const EXAMPLES: &str = "\
@@ -120,16 +122,11 @@ enum Command {
 pub fn main() -> ExitCode {
     interrupt::watch();
     let cli = Cli::parse();
-    let mut out = BufWriter::new(io::stdout().lock());
+    let mut out = BufWriter::new(UntilClosed::new(io::stdout().lock()));
     let done = execute(&cli, &mut out);
     // What was printed before an error belongs before it.
     let flushed = out.flush();
     let failure = match (done, flushed) {
-        // Whoever reads us has seen enough (`motion plan part.ngc | head`).
-        (Err(CliError::Output(error)), _) if error.kind() == ErrorKind::BrokenPipe => {
-            return ExitCode::SUCCESS;
-        }
-        (Ok(outcome), Err(error)) if error.kind() == ErrorKind::BrokenPipe => return outcome.exit_code(),
         (Ok(outcome), Ok(())) => return outcome.exit_code(),
         (Ok(_), Err(error)) => CliError::Output(error),
         (Err(error), _) => error,

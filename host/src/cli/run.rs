@@ -104,8 +104,15 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
         write_summary(&summary, out).map_err(CliError::Output)?;
         written.say(out)?;
     }
-    let outcome = written.outcome(Outcome::of(&summary))?;
-    CliError::of_unreached(&summary, outcome)
+    let outcome = Outcome::of(&summary);
+    match (written.outcome(outcome), CliError::of_unreached(&summary, outcome)) {
+        // Both are said.
+        (Err(CliError::Unwritten(mut messages)), Err(unreached)) => {
+            messages.push(unreached.to_string());
+            Err(CliError::Unwritten(messages))
+        }
+        (written, reached) => written.and(reached),
+    }
 }
 
 /// Runs a plan; writes the trace as it goes, report and recording afterwards.

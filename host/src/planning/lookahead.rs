@@ -21,7 +21,7 @@ pub(super) fn lookahead(
         ends.push(on_path(end_mm).map_err(|error| (index, error.into()))?);
     }
     let (effort, nodes) = match mode {
-        Mode::Spanning => (Effort::SPANNING, nodes_for(blocks.len())),
+        Mode::Spanning => (Effort::Spanning, nodes_for(blocks.len())),
         Mode::PerBlock => (Effort::PerBlock, 0),
     };
     let path = Path {

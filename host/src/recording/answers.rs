@@ -115,7 +115,7 @@ impl AnswerWriter {
             *moved = now.0.wrapping_sub(before.0);
             *before = *now;
         }
-        let news = answers.inputs.filter(|inputs| *inputs != self.inputs);
+        let changed = answers.inputs.filter(|inputs| *inputs != self.inputs);
         let flag = |is_set: bool, flag: u8| if is_set { flag } else { 0 };
         let flags = flag(answers.counts.is_none(), UNREAD)
             | flag(!answers.is_written, UNWRITTEN)
@@ -123,11 +123,11 @@ impl AnswerWriter {
             | flag(answers.told.is_some_and(|(enable, _)| enable), TOLD_ENABLE)
             | flag(answers.told.is_some_and(|(_, is_taken)| !is_taken), TOLD_IN_VAIN)
             | flag(answers.inputs.is_none(), INPUTS_UNREAD)
-            | flag(news.is_some(), INPUTS_FOLLOW);
+            | flag(changed.is_some(), INPUTS_FOLLOW);
         let mut buffer = [0; ENTRY_MAX];
         let entry = postcard::to_slice(&Entry { flags, moved, check }, &mut buffer);
         self.recorded.entries.extend_from_slice(entry.expect("room for the longest"));
-        if let Some(inputs) = news {
+        if let Some(inputs) = changed {
             self.recorded.entries.extend_from_slice(&input_bytes(&inputs));
             self.inputs = inputs;
         }

@@ -123,7 +123,7 @@ impl<'a, R: Real> Session<'a, R> {
         &mut self,
         items: impl Iterator<Item = Result<Item<AXES>, Infallible>>,
         observe: &mut Observer<'_>,
-        mut look: impl FnMut(&Trace<R, AXES>, &mut SimulatedHardware<'a>, State) -> Result<Then, E>,
+        mut after_tick: impl FnMut(&Trace<R, AXES>, &mut SimulatedHardware<'a>, State) -> Result<Then, E>,
     ) -> Result<(), E> {
         let (mut feeder, mut intake) = self.streams.split(self.machine.rules(), self.set);
         let mut control = LiveControl::<R, AXES, _, _, PLACES>::new(items, self.machine.tick_s, 0);
@@ -142,7 +142,7 @@ impl<'a, R: Real> Session<'a, R> {
                 let at = at.collect::<Vec<_>>().join(", ");
                 return Err(SessionError::Fault { fault, at }.into());
             }
-            match look(&trace, &mut self.hardware, control.state(&feeder))? {
+            match after_tick(&trace, &mut self.hardware, control.state(&feeder))? {
                 Then::GoOn => {}
                 Then::Abort => control.abort(),
                 Then::End => return Ok(()),

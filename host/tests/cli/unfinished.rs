@@ -102,6 +102,36 @@ fn a_command_that_is_not_reached_is_an_error() {
     assert!(said.starts_with("  aborted at ") && error.contains("--at 800000:resume: found"), "{error}");
 }
 
+/// A file that can't be written hides no command that was not reached.
+#[test]
+fn an_unwritten_file_and_an_unreached_command_are_both_said() {
+    let workspace = Workspace::new("both");
+    workspace.put("part.ngc", PROGRAM);
+    if std::path::Path::new("/dev/full").exists() {
+        let run = ["run", "part.ngc", "--at", "800000:hold", "--trace", "/dev/full"];
+        let (_, error) = workspace.ending(6, &run);
+        let [file, command] = error.lines().collect::<Vec<_>>()[..] else { panic!("{error}") };
+        assert!(file.starts_with("motion: /dev/full: found "), "{error}");
+        assert!(command.starts_with("motion: --at 800000:hold: found "), "{error}");
+    }
+}
+
+/// Whoever reads the summary may leave: the run ends as it would have.
+#[test]
+fn a_reader_that_left_hides_no_ending() {
+    let workspace = Workspace::new("left");
+    workspace.put("part.ngc", PROGRAM);
+    for (at, status) in [("1500:hold", 3), ("1500:abort", 4), ("800000:resume", 5)] {
+        for json in [&[][..], &["--json"]] {
+            let (reader, writer) = std::io::pipe().expect("a pipe");
+            drop(reader);
+            let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_motion"));
+            command.args(["run", "part.ngc", "--at", at]).args(json).current_dir(&workspace.0).stdout(writer);
+            assert_eq!(command.status().expect("started").code(), Some(status), "{at}");
+        }
+    }
+}
+
 /// A jog that a fault ends says where.
 #[test]
 fn a_jog_says_where_its_fault_was() {

@@ -131,7 +131,7 @@ pub struct MachineInputs<const AXES: usize> {
 
 impl<const AXES: usize> MachineInputs<AXES> {
     /// What a board without inputs reads: every drive ready, no switch reached, no emergency stop. Where it is returned
-    /// as a constant, the kernel's look at it compiles to nothing.
+    /// as a constant, reading it compiles to nothing.
     pub const HEALTHY: Self = Self { axes: [AxisInputs::HEALTHY; AXES], emergency_stop: false };
 
     /// Nothing but home switches differs from [`MachineInputs::HEALTHY`].

@@ -287,7 +287,7 @@ mod tests {
     fn a_ramp_is_given_up_where_it_gets_to_a_feed() {
         let random = Random::new(2);
         let tick_s = 5e-4;
-        let mut turned = 0;
+        let mut cuts = 0;
         for number in 0..10_000 {
             let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
             let (from_mm_s, change_mm_s) = (200.0 * random.unit(), random.log(0.1, 200.0));
@@ -303,11 +303,11 @@ mod tests {
                 let found_mm_s = cut.end(&start, tick_s).feed_mm_s;
                 let is_close = found_mm_s <= feed_mm_s && found_mm_s >= feed_mm_s - 1e-5;
                 assert!(is_close, "{number}: {found_mm_s}, expected {feed_mm_s}, {ramp:?}");
-                turned += usize::from(matches!(cut, Item::Cut { .. }));
+                cuts += usize::from(matches!(cut, Item::Cut { .. }));
                 item = cut;
             }
         }
-        assert!(turned > 5_000, "{turned}");
+        assert!(cuts > 5_000, "{cuts}");
     }
 
     /// However great the feeds are beside their change.

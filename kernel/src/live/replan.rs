@@ -152,7 +152,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
             })
         };
         let effort = match ramps {
-            Ramps::Spanning if self.blocks.len() > 1 => Effort::Spanning { most: SPANNED },
+            Ramps::Spanning if self.blocks.len() > 1 => Effort::SpanningFirst { most: SPANNED },
             Ramps::Spanning | Ramps::PerBlock => Effort::PerBlock,
         };
         match plan(&mut self.blocks, effort) {

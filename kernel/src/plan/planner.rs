@@ -12,7 +12,7 @@ use crate::units::Position;
 
 /// What is to be planned.
 pub struct Path<'a> {
-    /// The blocks, in order. Equal neighbours may be merged here.
+    /// The blocks, in order.
     pub blocks: &'a mut [Block<f64>],
     /// Where each one ends.
     pub ends: &'a mut [Position],
@@ -24,24 +24,22 @@ pub struct Path<'a> {
     pub tick_s: f64,
 }
 
-/// How much is done for a fast plan.
+/// How much is done for a fast plan. [`Effort::Merged`] and [`Effort::Spanning`] merge equal neighbours in the caller's memory;
+/// what is in it afterwards means nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
     /// One pair of ramps a block.
     PerBlock,
     /// One pair of ramps for equal neighbours together.
     Merged,
-    /// Ramps that span blocks, where that is faster than one pair for equal neighbours together.
-    Spanning {
-        /// So many blocks may be spanned. Where there are more, no neighbours are merged; and where spanning is faster, the
-        /// plan ends after these blocks, at the feed with which the pairs of the others begin.
+    /// Ramps that span any number of blocks, where that is faster than one pair for equal neighbours together.
+    Spanning,
+    /// Ramps that span blocks, where that is faster than one pair a block.
+    SpanningFirst {
+        /// So many blocks may be spanned. Where there are more, and spanning is faster, the plan ends after these blocks, at the
+        /// feed with which the pairs of the others begin.
         most: usize,
     },
-}
-
-impl Effort {
-    /// Ramps may span all blocks.
-    pub const SPANNING: Self = Self::Spanning { most: usize::MAX };
 }
 
 /// The planner's working memory. What is in it before and after means nothing.
@@ -79,7 +77,11 @@ pub fn plan_ramps(
 ) -> Result<Planned, PlanError> {
     let Path { blocks, ends, start, feeds_mm_s: [start_mm_s, end_mm_s], tick_s } = path;
     let Memory { plans, nodes } = memory;
-    let most = if let Effort::Spanning { most } = effort { most.min(blocks.len()) } else { 0 };
+    let most = match effort {
+        Effort::PerBlock | Effort::Merged => 0,
+        Effort::Spanning => blocks.len(),
+        Effort::SpanningFirst { most } => most.min(blocks.len()),
+    };
     let spans_all = most > 0 && most == blocks.len();
     let mut spanning = None;
     // The lengths of merged blocks are rounded: where all may be spanned, that comes first.
@@ -87,7 +89,7 @@ pub fn plan_ramps(
         spanning = span(Stretch { blocks, ends, start, tick_s }, [start_mm_s, end_mm_s], nodes, put)?;
     }
     let mut count = blocks.len();
-    if spans_all || effort == Effort::Merged {
+    if matches!(effort, Effort::Merged | Effort::Spanning) {
         check(blocks, start_mm_s, end_mm_s)?;
         count = merge_each(blocks, |from, to| {
             if let Some(&end) = ends.get(from)
@@ -196,7 +198,7 @@ fn span(
         }
     };
     let found = plan_spanning(stretch.blocks, start_mm_s, end_mm_s, nodes, &mut |start_mm, ramp| {
-        end_at(Position::from_mm(start_mm).map(|way| stretch.start + way), Some(*ramp));
+        end_at(Position::from_mm(start_mm).map(|length| stretch.start + length), Some(*ramp));
     })?;
     end_at(stretch.ends.last().copied(), None);
     Ok(found.filter(|_| is_made).map(|_| out.planned))

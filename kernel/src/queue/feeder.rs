@@ -93,10 +93,9 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
         if !(has_room(&self.path) && has_room(&self.feed)) {
             return Err(Refused::Full(position));
         }
-        // Room was there and only this end fills the queues: neither can fail.
-        let path = enter(&mut self.path, PathItem::EndOfStretch(position));
-        let feed = enter(&mut self.feed, FeedItem::EndOfStretch);
-        debug_assert!(path.is_ok() && feed.is_ok());
+        // Both have room, and only this end fills them.
+        enter(&mut self.path, PathItem::EndOfStretch(position)).map_err(|_| Refused::Full(position))?;
+        enter(&mut self.feed, FeedItem::EndOfStretch).map_err(|_| Refused::Full(position))?;
         self.accept = next;
         self.publish();
         count(&self.shared.path_entered);

@@ -107,7 +107,7 @@ pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
     filled: Option<u8>,
     /// Changes asked for so far.
     changes: u32,
-    /// What happens between any two operations of a turn: ticks.
+    /// What happens between any two operations of a poll: ticks.
     #[cfg(test)]
     pub(crate) between: Option<&'a dyn Fn()>,
 }

@@ -94,8 +94,8 @@ impl Background<'_> {
         }
     }
 
-    /// Looks where the tick is.
-    pub(super) fn look(&mut self) {
+    /// Reads where the tick is.
+    pub(super) fn read_progress(&mut self) {
         self.follow();
     }
 

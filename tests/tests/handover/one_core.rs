@@ -102,8 +102,8 @@ fn next(mut before: Vec<u32>, ticks: u32) -> Option<Vec<u32>> {
     None
 }
 
-/// Up to `ticks` ticks in every distribution over the accesses of `turns`.
-fn check(ticks: u32, turns: impl Fn(&mut Background<'_>)) {
+/// Up to `ticks` ticks in every distribution over the accesses of `polls`.
+fn check(ticks: u32, polls: impl Fn(&mut Background<'_>)) {
     let mailbox: &'static Mailbox = Box::leak(Box::new(Mailbox::new()));
     let mut before = Some(Vec::new());
     while let Some(distribution) = before {
@@ -112,7 +112,7 @@ fn check(ticks: u32, turns: impl Fn(&mut Background<'_>)) {
         let tick = Tick::new(mailbox, &rings, true);
         let mut background = Background { mailbox, rings: &rings, current: 0, next: None };
         INTERRUPTS.set(Some(Interrupts { tick, before: distribution, accesses: 0 }));
-        turns(&mut background);
+        polls(&mut background);
         let run = INTERRUPTS.take().expect("a run is under way");
         model::finish(run.tick, mailbox, &rings);
         before = next(run.before, ticks);
@@ -121,7 +121,7 @@ fn check(ticks: u32, turns: impl Fn(&mut Background<'_>)) {
 
 #[test]
 fn a_place_is_that_of_one_tick_if_up_to_four_come_while_it_is_read() {
-    check(4, |background| background.look());
+    check(4, |background| background.read_progress());
 }
 
 #[test]

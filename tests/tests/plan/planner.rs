@@ -86,7 +86,7 @@ fn more_effort_is_faster() {
             continue;
         };
         let merged = whole(&blocks, feeds, Effort::Merged).expect("a plan");
-        let spanning = whole(&blocks, feeds, Effort::SPANNING).expect("a plan");
+        let spanning = whole(&blocks, feeds, Effort::Spanning).expect("a plan");
         assert!(spanning.time_s <= merged.time_s, "{spanning:?} {merged:?}\n{blocks:?}");
         assert!(merged.time_s <= per_block.time_s * 1.01, "{merged:?} {per_block:?}\n{blocks:?}");
         made += 1;
@@ -108,7 +108,7 @@ fn a_part_is_spanned() {
         let blocks = exact_blocks(&mut random, 60, 1e-2);
         let most = 1 + random.below(20);
         let (planned, found) =
-            ramps(&blocks, [0.0; 2], Effort::Spanning { most }, usize::MAX).expect("a plan");
+            ramps(&blocks, [0.0; 2], Effort::SpanningFirst { most }, usize::MAX).expect("a plan");
         let spans = placed(&found);
         if planned.is_whole {
             assert_eq!(legal(&blocks, 0.0, 0.0, &spans), Ok(()));
@@ -130,7 +130,7 @@ fn little_room_for_ramps() {
     for _ in 0..1000 {
         let blocks = exact_blocks(&mut random, 40, 1e-2);
         let room = random.below(30);
-        for effort in [Effort::PerBlock, Effort::SPANNING] {
+        for effort in [Effort::PerBlock, Effort::Spanning] {
             let (_, all) = ramps(&blocks, [0.0; 2], effort, usize::MAX).expect("a plan");
             let (planned, found) = ramps(&blocks, [0.0; 2], effort, room).expect("a plan");
             assert_eq!(planned.is_whole, all.len() <= room);
@@ -149,7 +149,7 @@ fn a_bad_block_is_counted_as_given() {
         let bad = random.below(50);
         let mut blocks: Vec<_> = (0..50).map(|_| block(1.0, 10.0 + random.below(2) as f64)).collect();
         blocks[bad].cap_mm_s = -1.0;
-        for effort in [Effort::PerBlock, Effort::Merged, Effort::SPANNING] {
+        for effort in [Effort::PerBlock, Effort::Merged, Effort::Spanning] {
             match ramps(&blocks, [0.0; 2], effort, usize::MAX) {
                 Err(PlanError::Block { block, value, .. }) => assert_eq!((block, value), (bad, -1.0)),
                 other => panic!("{other:?}"),
@@ -163,7 +163,7 @@ fn a_bad_block_is_counted_as_given() {
 fn one_pair_of_ramps_a_block_is_the_last_resort() {
     let blocks = unreachable(1.0, -0.5, 1.0);
     assert_eq!(spans_between(&blocks, 0.0, 0.0), Ok(None));
-    let planned = whole(&blocks, [0.0; 2], Effort::SPANNING).expect("a plan");
+    let planned = whole(&blocks, [0.0; 2], Effort::Spanning).expect("a plan");
     let per_block = time_s(&blocks, &from_rest(&blocks));
     assert!(planned.time_s <= per_block * (1.0 + 1e-6), "{planned:?} {per_block}");
 }

@@ -109,7 +109,7 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
         let most = row(&mut table, board, "3 axes, live control and guards", &reference["tick"])[3];
         let inverted =
             row(&mut table, board, "3 axes, live control and guards, drives inverted", &inverted["tick"])[3];
-        row(&mut stages, board, "a poll of live control", &reference["turn"]);
+        row(&mut stages, board, "a poll of live control", &reference["poll"]);
         if board.number == "f32" && (most > LIVE || inverted > INVERTED) {
             return Err(format!(
                 "{}: {most} and {inverted} under live control, promised {LIVE} and {INVERTED}",

@@ -1,4 +1,4 @@
-//! Counts the instructions of every tick of every program of the bundle under live control, and of every turn of the
+//! Counts the instructions of every tick of every program of the bundle under live control, and of every poll of the
 //! background between them; says how much memory both take.
 //!
 //! One line a figure, as `budget` prints them.
@@ -22,8 +22,8 @@ fn main() -> ! {
     let mut deepest = 0;
     for (seed, bytes) in (0..).zip(programs()) {
         let is_fault = live::run(bytes, seed, |producer, closed| {
-            let (turned, turn) = counter.count(|| producer.poll());
-            turned.unwrap_or_else(|error| fail(&error));
+            let (polled, instructions) = counter.count(|| producer.poll());
+            polled.unwrap_or_else(|error| fail(&error));
             let mut spent = 0;
             let trace = closed.tick_by(|kernel, intake, memory| {
                 let top = stack::paint();
@@ -32,7 +32,7 @@ fn main() -> ! {
                 spent = instructions;
                 *trace
             });
-            hprintln!("turn {}\ntick {}", turn, spent);
+            hprintln!("poll {}\ntick {}", instructions, spent);
             trace
         });
         if is_fault {

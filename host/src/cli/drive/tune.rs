@@ -172,8 +172,8 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
             write_learnt(&tuned, learnt, arguments.learn_hz, out).map_err(CliError::Output)?;
         }
         let end = match (&arguments.output, is_better) {
-            (_, false) => Some("  a circle got worse: nothing is written"),
-            (None, true) => Some("  nothing is written; --output FILE writes the machine file"),
+            (_, false) => Some("  a circle got worse: no machine file is written"),
+            (None, true) => Some("  no machine file is written; --output FILE writes it"),
             (Some(_), true) => None,
         };
         end.map_or(Ok(()), |end| writeln!(out, "{end}")).map_err(CliError::Output)?;

@@ -151,8 +151,8 @@ fn blocks_that_contradict_their_path_are_refused() {
         let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
         let mut refused = 0;
         for _ in 0..20_000 {
-            let turned = control.poll(&mut feeder);
-            refused += usize::from(matches!(turned, Err(SupplyError::Rejected(Rejection::Blocks { .. }))));
+            let polled = control.poll(&mut feeder);
+            refused += usize::from(matches!(polled, Err(SupplyError::Rejected(Rejection::Blocks { .. }))));
             executor.tick(&mut intake).expect("no fault");
         }
         assert_eq!((refused, control.state(&feeder)), (20_000, State::Failed), "{steps}");

@@ -220,7 +220,7 @@ mod tests {
 
     /// Against peaks tried one by one, over all that there are: by how much longer the interval takes, beyond what a scan can tell.
     #[test]
-    fn no_top_of_a_scan_is_much_better() {
+    fn no_peak_of_a_scan_is_much_better() {
         let (mut lost, seed) = (Vec::new(), 20_261);
         for case in 0..2000 {
             let random = Random::new(seed + 7919 * case as u64);
