@@ -52,7 +52,7 @@ pub struct Fault<R> {
     pub kind: FaultKind<R>,
 }
 
-/// The kinds of fault.
+/// The kinds of fault. Exhaustive on purpose: a program that reacts to faults should not build with one that it does not know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FaultKind<R> {

@@ -216,6 +216,7 @@ impl<R: Scalar, const AXES: usize> FlightRow<R, AXES> {
 
 /// Why bytes are no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FrameError {
     /// It is shorter than the shortest.
     Short,

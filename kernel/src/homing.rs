@@ -92,6 +92,7 @@ pub struct Homed {
 
 /// Why an axis is not homed. It is at rest, and has the position that it had before, but on the way to where it is parked.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum HomingError {
     /// A move is refused: a feed, a length or an axis is out of range.
     Move(JogError),

@@ -10,3 +10,5 @@ pub use crate::program::supply::Ready;
 pub use crate::queue::change::{Change, Progress};
 pub use crate::queue::density::Density;
 pub use crate::queue::item::FeedItem;
+#[cfg(feature = "count-work")]
+pub use crate::work::work_done;

@@ -129,6 +129,7 @@ pub enum JogTarget {
 
 /// Why a jog is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum JogError {
     /// There is no such axis.
     Axis {

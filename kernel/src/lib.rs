@@ -115,8 +115,7 @@ pub mod homing;
 
 #[doc(hidden)]
 pub mod internals;
-#[doc(hidden)]
-pub mod work;
+mod work;
 
 #[cfg(all(test, feature = "guards"))]
 mod corrupted;

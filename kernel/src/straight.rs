@@ -19,6 +19,7 @@ const PIECE: Position = Position::from_bits(16 << 32);
 /// Why there is no straight stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum StraightError {
     /// The feed is not above 0, finite and at most the greatest one \[mm/s\].
     Feed {

@@ -21,6 +21,6 @@ pub(crate) fn add(_steps: usize) {
 /// The steps of work that this thread has done.
 #[cfg(feature = "count-work")]
 #[must_use]
-pub fn done() -> u64 {
+pub fn work_done() -> u64 {
     DONE.get()
 }

@@ -118,7 +118,7 @@ mod tests {
 
     use super::*;
     use crate::console::{FeedOverride, Step};
-    use crate::fixture::{AXES, BOARD, TICK_S, POLL_TICKS_MAX, end, machine};
+    use crate::fixture::{AXES, BOARD, POLL_TICKS_MAX, TICK_S, end, machine};
 
     type Run<'a> = super::Run<'a, f32, AXES, 64>;
 

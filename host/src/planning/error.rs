@@ -131,7 +131,8 @@ fn unplannable(error: &PlanError) -> String {
         PlanError::TooShortToAccelerate { end_mm_s, greatest_mm_s } => format!(
             "end feed {end_mm_s} mm/s, expected at most {greatest_mm_s} mm/s: the path is too short to reach more"
         ),
-        PlanError::Ramp { .. } | PlanError::Room { .. } => error.to_string(),
+        // A ramp or room, of which the kernel says all there is.
+        _ => error.to_string(),
     }
 }
 
@@ -163,7 +164,7 @@ fn unmade(error: &SegmentError, tick_s: f64) -> String {
         SegmentError::LengthMismatch { ramp_mm, path_mm } => {
             format!("a ramp of {ramp_mm} mm, expected the length of its path, {path_mm} mm")
         }
-        SegmentError::FeedStep { .. } => error.to_string().replacen(": expected", ", expected", 1),
+        _ => error.to_string().replacen(": expected", ", expected", 1),
     }
 }
 

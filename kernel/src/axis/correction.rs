@@ -25,6 +25,7 @@ pub struct Correction<'a, R, const AXES: usize> {
 /// Why a correction can't be used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum CorrectionError {
     /// A knot is not a number or beyond the bound.
     OutOfBound {

@@ -112,6 +112,7 @@ pub struct PathMotion<R> {
 /// Why a segment can't be made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum SegmentError {
     /// A quantity is not finite or below zero, or is beyond the kernel's range.
     OutOfRange {

@@ -59,6 +59,7 @@ pub struct Piece<R: Real, const AXES: usize> {
 /// Why a piece can't be made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum PieceError {
     /// A direction is not finite.
     NotFinite {

@@ -53,6 +53,7 @@ impl<R: Root> BlockPlan<R> {
 /// Why there is no plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum PlanError {
     /// A figure of a block is not a number, is negative, or is beyond the range of the number type.
     Block {

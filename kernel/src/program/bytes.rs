@@ -50,6 +50,7 @@ pub struct Header<const AXES: usize> {
 /// Why bytes are not a program for this kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum ProgramError {
     /// It does not begin with `MOTN`, or is shorter than the shortest program.
     NotAProgram,

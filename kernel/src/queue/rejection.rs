@@ -6,6 +6,7 @@ use crate::units::Position;
 /// Why an item may not enter. Each names the quantity and its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Rejection {
     /// A piece does not start where its predecessor ends.
     Gap {

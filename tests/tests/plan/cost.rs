@@ -1,8 +1,8 @@
 //! What planning takes: memory from sizes, work as the planner counts it, in evaluations of the law and visits to a ceiling.
 
+use motion_kernel::internals::work_done;
 use motion_kernel::law::{Law, Limits};
 use motion_kernel::plan::{Block, Node, nodes_for};
-use motion_kernel::work;
 
 use crate::spanning::spans;
 use motion_tests::block_lists::{block, lists, reference};
@@ -21,9 +21,9 @@ fn memory_of_a_million_blocks() {
 
 /// Steps of work to plan a list, a block.
 fn steps(blocks: &[Block<f64>]) -> f64 {
-    let before = work::done();
+    let before = work_done();
     spans(blocks);
-    (work::done() - before) as f64 / blocks.len() as f64
+    (work_done() - before) as f64 / blocks.len() as f64
 }
 
 #[test]
