@@ -5,7 +5,7 @@
 
 use super::lookahead::{AheadBlock, FEED_ROUNDING, Lookahead};
 use super::splice::{SLIVER, Splice};
-use crate::law::{Law, Ramp};
+use crate::law::{Law, PlannedRamp, Ramp};
 use crate::units::Position;
 
 /// Rounding that is no violation, of a length \[mm\].
@@ -15,7 +15,7 @@ const LIMITS_STEPS: usize = 8;
 
 impl<const PLACES: usize> Lookahead<PLACES> {
     /// The fastest braking from a splice of motion under `feed_override` to `to_mm_s` that keeps the ceilings, junctions
-    /// and limits of all the blocks that it crosses, before `end`, with the length it is driven over; `None` if there is
+    /// and limits of all the blocks that it crosses, before `end`; `None` if there is
     /// none.
     pub(super) fn brake(
         &self,
@@ -23,7 +23,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         to_mm_s: f64,
         end: Position,
         feed_override: f64,
-    ) -> Option<(Ramp<f64>, Position)> {
+    ) -> Option<PlannedRamp> {
         let mut limits = self.from(from).next()?.limits_at(from.feed_mm_s);
         for _ in 0..LIMITS_STEPS {
             let ramp = Ramp::new(&Law::new(limits).ok()?, from.feed_mm_s, to_mm_s);
@@ -41,7 +41,9 @@ impl<const PLACES: usize> Lookahead<PLACES> {
                 .take_while(crossed)
                 .fold(limits, |least, block| least.least(&block.limits_at(from.feed_mm_s)));
             if least == limits {
-                return self.is_below_ceilings(from, &ramp, feed_override).then_some((ramp, length));
+                return self
+                    .is_below_ceilings(from, &ramp, feed_override)
+                    .then_some(PlannedRamp { ramp, length });
             }
             limits = least;
         }

@@ -21,6 +21,7 @@ use super::reader::QueuedPath;
 use super::replan::{Ramps, Reach, replan};
 use super::splice::{BlockEnd, Extent, Splice};
 use super::timeline::Timeline;
+use crate::law::PlannedRamp;
 use crate::units::Position;
 
 /// How many blocks ahead are tried for a feed to continue with under a lower override.
@@ -161,12 +162,14 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
     /// Of a cruise that is longer than the path that is queued, what leaves room to stop.
     fn gather_cruise(&mut self, list: &mut List, path_end: Position) {
         let start = list.end();
-        let Some(&Item::Feed { ramp, length }) = self.feed.peek() else { return };
+        let Some(&Item::Feed(PlannedRamp { ramp, length })) = self.feed.peek() else { return };
         if !ramp.is_cruise() {
             return;
         }
         let feed_mm_s = ramp.from_mm_s;
-        let Some((_, stop)) = self.lookahead.brake(&Splice { feed_mm_s, ..start }, 0.0, path_end, 1.0) else {
+        let Some(PlannedRamp { length: stop, .. }) =
+            self.lookahead.brake(&Splice { feed_mm_s, ..start }, 0.0, path_end, 1.0)
+        else {
             return;
         };
         let room_mm = CRUISE_SHARE * (path_end - start.at - stop).to_mm();
@@ -243,10 +246,10 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                 continue;
             }
             least_mm_s = cap_mm_s;
-            let Some((ramp, length)) = lookahead.brake(&from, cap_mm_s, path_end, driven_override) else {
+            let Some(ramp) = lookahead.brake(&from, cap_mm_s, path_end, driven_override) else {
                 continue;
             };
-            list.push(Item::Feed { ramp, length });
+            list.push(Item::Feed(ramp));
             if self.gather_replanned(list, to_its_end, ramps) {
                 return true;
             }
@@ -269,10 +272,10 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
             let place = list.after(exit);
             let waits = list.get(exit - 1).is_some_and(|(_, item)| item.is_rest());
             let stop = if !place.is_at_rest() {
-                let Some((ramp, length)) = self.lookahead.brake(&place, 0.0, path_end, feed_override) else {
+                let Some(ramp) = self.lookahead.brake(&place, 0.0, path_end, feed_override) else {
                     continue;
                 };
-                Some(Item::Feed { ramp, length })
+                Some(Item::Feed(ramp))
             } else if waits {
                 None
             } else {

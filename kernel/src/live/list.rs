@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use super::splice::Splice;
-use crate::law::{CutRamp, Phase, Ramp, Ticks, segment};
+use crate::law::{CutRamp, Phase, PlannedRamp, Ramp, Ticks, segment};
 pub use crate::queue::LIST_ITEMS;
 use crate::units::Position;
 
@@ -17,7 +17,7 @@ const CUT_STEPS: usize = 40;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Item {
     /// A ramp or a cruise.
-    Feed { ramp: Ramp<f64>, length: Position },
+    Feed(PlannedRamp),
     /// A ramp that is cut in its rise, this long after its start.
     Cut { ramp: Ramp<f64>, at: Ticks, length: Position },
     /// The end of the stretch.
@@ -31,7 +31,7 @@ pub(super) enum Item {
 impl Item {
     /// Whether it is a part of the feed over a stretch.
     pub(super) fn is_feed(&self) -> bool {
-        matches!(self, Self::Feed { .. } | Self::Cut { .. })
+        matches!(self, Self::Feed(_) | Self::Cut { .. })
     }
 
     /// Whether it is a rest between stretches.
@@ -42,7 +42,7 @@ impl Item {
     /// The splice at its end, if it begins at `start`.
     pub(super) fn end(&self, start: &Splice, tick_s: f64) -> Splice {
         match *self {
-            Self::Feed { ramp, length } => {
+            Self::Feed(PlannedRamp { ramp, length }) => {
                 Splice { at: start.at + length, feed_mm_s: ramp.to_mm_s, ..*start }
             }
             Self::Cut { ramp, at, length } => {
@@ -59,7 +59,7 @@ impl Item {
     /// How long it takes; `None` of what takes no place in time.
     pub(super) fn duration(&self, tick_s: f64) -> Option<Ticks> {
         match *self {
-            Self::Feed { ramp, .. } => Ticks::from_seconds(ramp.duration_s(), tick_s),
+            Self::Feed(PlannedRamp { ramp, .. }) => Ticks::from_seconds(ramp.duration_s(), tick_s),
             Self::Cut { ramp, at, .. } => {
                 let cut = CutRamp { ramp, cut_s: at.to_f64() * tick_s };
                 Ticks::from_seconds(cut.duration_s(), tick_s)
@@ -76,7 +76,7 @@ impl Item {
         let elapsed_s = elapsed.to_f64() * tick_s;
         let ramp = match self {
             // As its segment was made.
-            Self::Feed { ramp, .. } => segment::to_f64(ramp),
+            Self::Feed(PlannedRamp { ramp, .. }) => segment::to_f64(ramp),
             &Self::Cut { ramp, .. } if phase == Phase::Rise => {
                 let cut = CutRamp { ramp, cut_s: elapsed_s };
                 return Some(Self::Cut { ramp, at: elapsed, length: length(cut.length_mm())? });
@@ -86,7 +86,7 @@ impl Item {
         match phase {
             Phase::Hold if ramp.is_cruise() => {
                 let ramp = Ramp::cruise(ramp.from_mm_s, elapsed_s);
-                Some(Self::Feed { ramp, length: length(ramp.length_mm())? })
+                Some(Self::Feed(PlannedRamp { ramp, length: length(ramp.length_mm())? }))
             }
             // Over before it could be cut.
             Phase::Rise if ramp.t1_s <= tick_s => None,
@@ -98,7 +98,7 @@ impl Item {
                 let t2_s = if phase == Phase::Rise { ramp.t1_s } else { ramp.t1_s + elapsed_s };
                 let change_mm_s = (ramp.to_mm_s - ramp.from_mm_s) * (t2_s / ramp.t2_s);
                 let ramp = Ramp { to_mm_s: changed(ramp.from_mm_s, change_mm_s), t2_s, ..ramp };
-                Some(Self::Feed { ramp, length: length(ramp.length_mm())? })
+                Some(Self::Feed(PlannedRamp { ramp, length: length(ramp.length_mm())? }))
             }
             Phase::Fall => None,
         }
@@ -111,7 +111,7 @@ impl Item {
         let step = Ticks::from_bits(1);
         let before = |s: f64| Ticks::from_seconds(s, tick_s).map(|at| at.minus(step).unwrap_or(Ticks::ZERO));
         let (ramp, most_s) = match *self {
-            Self::Feed { ramp, .. } => {
+            Self::Feed(PlannedRamp { ramp, .. }) => {
                 let ramp = segment::to_f64(&ramp);
                 let share = (feed_mm_s - ramp.from_mm_s) / (ramp.to_mm_s - ramp.from_mm_s);
                 let held_s = ramp.t2_s * share - ramp.t1_s;
@@ -135,7 +135,7 @@ impl Item {
     /// The duration of a phase of its [`FeedSegment`](crate::law::FeedSegment), of an item that can be cut.
     pub(super) fn phase_duration(&self, phase: Phase, tick_s: f64) -> Option<Ticks> {
         let ramp = match self {
-            Self::Feed { ramp, .. } => ramp,
+            Self::Feed(PlannedRamp { ramp, .. }) => ramp,
             Self::Cut { at, .. } if phase == Phase::Rise => return Some(*at),
             _ => return None,
         };
@@ -227,7 +227,7 @@ impl List {
     /// which is taken off: the item as appended.
     pub(super) fn push(&mut self, mut item: Item) -> Item {
         let end = self.end();
-        if let Item::Feed { ramp, .. } = &mut item
+        if let Item::Feed(PlannedRamp { ramp, .. }) = &mut item
             && libm::fabs(ramp.from_mm_s - end.feed_mm_s) <= FEED_ROUNDING_MM_S * (1.0 + end.feed_mm_s)
         {
             if ramp.is_cruise() {
@@ -294,7 +294,7 @@ mod tests {
             let ramp = Ramp::within(&limits, from_mm_s, from_mm_s + change_mm_s);
             let length = Position::from_mm(ramp.length_mm()).expect("in range");
             let start = Splice { stretch: 0, at: Position::ZERO, feed_mm_s: from_mm_s };
-            let mut item = Item::Feed { ramp, length };
+            let mut item = Item::Feed(PlannedRamp { ramp, length });
             // Once, and then once more.
             for _ in 0..2 {
                 let whole_mm_s = item.end(&start, tick_s).feed_mm_s;
@@ -322,13 +322,17 @@ mod tests {
             let from_mm_s = 1000.0 * random.unit();
             let to_mm_s = libm::fabs(from_mm_s + 100.0 * (random.unit() - 0.5));
             let ramp = Ramp::within(&limits, from_mm_s, to_mm_s);
-            let item = Item::Feed { ramp, length: Position::from_mm(ramp.length_mm()).expect("in range") };
+            let item = Item::Feed(PlannedRamp {
+                ramp,
+                length: Position::from_mm(ramp.length_mm()).expect("in range"),
+            });
             let held_s = ramp.t2_s - ramp.t1_s;
             let elapsed = Ticks::from_seconds(held_s * random.unit(), tick_s).expect("in range");
             for (phase, elapsed) in
                 [(Phase::Rise, Ticks::from_seconds(ramp.t1_s, tick_s)), (Phase::Hold, Some(elapsed))]
             {
-                let Some(Item::Feed { ramp: cut, .. }) = item.cut(phase, elapsed.expect("in range"), tick_s)
+                let Some(Item::Feed(PlannedRamp { ramp: cut, .. })) =
+                    item.cut(phase, elapsed.expect("in range"), tick_s)
                 else {
                     continue;
                 };

@@ -7,7 +7,7 @@ use heapless::Deque;
 
 use super::list::{Item, LIST_ITEMS, List};
 use super::splice::is_before;
-use crate::law::Ramp;
+use crate::law::{PlannedRamp, Ramp};
 use crate::queue::Rejection;
 use crate::units::Position;
 
@@ -91,12 +91,12 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
     /// Splits the cruise at the cursor after a part of it, which is at the cursor then; `None` if there is none, or no
     /// place for the rest.
     pub(super) fn split_cruise(&mut self, part: Position) -> Option<Item> {
-        let &Item::Feed { ramp: Ramp { from_mm_s: feed_mm_s, .. }, length } = self.peek()? else {
+        let &Item::Feed(PlannedRamp { ramp: Ramp { from_mm_s: feed_mm_s, .. }, length }) = self.peek()?
+        else {
             return None;
         };
-        let cruise = |length: Position| Item::Feed {
-            ramp: Ramp::cruise(feed_mm_s, length.to_mm() / feed_mm_s),
-            length,
+        let cruise = |length: Position| {
+            Item::Feed(PlannedRamp { ramp: Ramp::cruise(feed_mm_s, length.to_mm() / feed_mm_s), length })
         };
         let (first, rest) = (cruise(part), cruise(length - part));
         // The items before it are fewer than those after it: they move.
@@ -175,7 +175,7 @@ mod tests {
 
     fn feed(mm: f64) -> Item {
         let length = Position::from_mm(mm).expect("in range");
-        Item::Feed { ramp: Ramp::cruise(1.0, mm), length }
+        Item::Feed(PlannedRamp { ramp: Ramp::cruise(1.0, mm), length })
     }
 
     /// A list of the first items, under way.

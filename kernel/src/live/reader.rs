@@ -10,7 +10,6 @@ use super::lookahead::Lookahead;
 use super::program_feed::ProgramFeed;
 use super::source::Source;
 use super::splice::{BlockEnd, Extent, Splice};
-use crate::law::PlannedRamp;
 use crate::num::Real;
 use crate::program::supply::{Ready, is_taken};
 use crate::program::{Item, SupplyError};
@@ -198,7 +197,7 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
                 Ok(())
             }
             Item::Feed(_) if self.feed.replans(self.path.stretch) => Ok(()),
-            Item::Feed(PlannedRamp { ramp, length }) => self.feed.push(ListItem::Feed { ramp, length }),
+            Item::Feed(ramp) => self.feed.push(ListItem::Feed(ramp)),
             Item::Dwell(duration) => self.feed.push(ListItem::Dwell(duration)),
             Item::Stop => self.feed.push(ListItem::Stop),
         };

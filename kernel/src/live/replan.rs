@@ -10,7 +10,7 @@ use super::brake::LENGTH_ROUNDING_MM;
 use super::list::{Item, List};
 use super::lookahead::Lookahead;
 use super::splice::{SLIVER, Splice};
-use crate::law::{Law, Limits, PlannedRamp};
+use crate::law::{Law, Limits};
 use crate::plan::{Block, BlockPlan, Effort, Memory, Node, Path, PlanError, nodes_for, plan_ramps};
 use crate::units::Position;
 
@@ -142,11 +142,11 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
             let path =
                 Path { blocks, ends: &mut *ends, start: from.at, feeds_mm_s: [from.feed_mm_s, 0.0], tick_s };
             let memory = Memory { plans: &mut plans, nodes: &mut nodes };
-            plan_ramps(path, effort, memory, &mut |index, PlannedRamp { ramp, length }| {
+            plan_ramps(path, effort, memory, &mut |index, ramp| {
                 list.truncate(heads + index);
                 let has_room = !list.is_full();
                 if has_room {
-                    list.push(Item::Feed { ramp, length });
+                    list.push(Item::Feed(ramp));
                 }
                 has_room
             })

@@ -9,7 +9,7 @@ use super::mode::Request;
 use super::places::{Places, Takeover};
 use super::program_feed::ProgramFeed;
 use super::splice::{BlockEnd, Splice};
-use crate::law::{FeedSegment, Ticks};
+use crate::law::{FeedSegment, PlannedRamp, Ticks};
 use crate::num::Real;
 use crate::program::SupplyError;
 use crate::program::supply::is_taken;
@@ -261,7 +261,7 @@ impl Timeline {
         let mut has_room = !list.is_overfull();
         for (start, item) in list.placed() {
             let is_taken = match *item {
-                Item::Feed { ramp, length } => {
+                Item::Feed(PlannedRamp { ramp, length }) => {
                     let segment = FeedSegment::ramp(&ramp, length, self.tick_s);
                     is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
                 }

@@ -46,10 +46,10 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
             }
             let path_end = self.extent_of(splice.stretch).end();
             let driven_override = self.timeline.driven_override();
-            let Some((ramp, length)) = self.lookahead.brake(&splice, 0.0, path_end, driven_override) else {
+            let Some(ramp) = self.lookahead.brake(&splice, 0.0, path_end, driven_override) else {
                 continue;
             };
-            list.push(Item::Feed { ramp, length });
+            list.push(Item::Feed(ramp));
             if self.timeline.keeps_up(list, place.takeover()) {
                 return self.rest_at_end_of(list, &place);
             }

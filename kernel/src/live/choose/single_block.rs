@@ -5,7 +5,7 @@
 
 use super::command::Cut;
 use super::{Choice, Chooser};
-use crate::law::Ramp;
+use crate::law::{PlannedRamp, Ramp};
 use crate::live::list::{Item, LIST_ITEMS, List};
 use crate::live::places::Places;
 use crate::live::replan::Ramps;
@@ -32,8 +32,8 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         }
         let path_end = self.extent_of(from.stretch).end();
         let driven_override = self.timeline.driven_override();
-        let (ramp, length) = self.lookahead.brake(from, 0.0, path_end, driven_override)?;
-        Some((from.at + length, Some(Item::Feed { ramp, length })))
+        let ramp = self.lookahead.brake(from, 0.0, path_end, driven_override)?;
+        Some((from.at + ramp.length, Some(Item::Feed(ramp))))
     }
 
     /// The first block ends of `stretch` from `nearest` on.
@@ -57,10 +57,10 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         let driven_override = self.timeline.driven_override();
         let mut begin = from;
         for _ in 0..MOVES {
-            let Some((ramp, length)) = self.lookahead.brake(&begin, 0.0, end, driven_override) else {
+            let Some(ramp) = self.lookahead.brake(&begin, 0.0, end, driven_override) else {
                 return false;
             };
-            let left = end - (begin.at + length);
+            let left = end - (begin.at + ramp.length);
             if left == Position::ZERO {
                 let kept = begin.at - from.at;
                 if !self.lookahead.may_keep(&from, begin.at, driven_override) || list.len() + 2 > LIST_ITEMS {
@@ -68,9 +68,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                 }
                 if kept > Position::ZERO {
                     let cruise = Ramp::cruise(from.feed_mm_s, kept.to_mm() / from.feed_mm_s);
-                    list.push(Item::Feed { ramp: cruise, length: kept });
+                    list.push(Item::Feed(PlannedRamp { ramp: cruise, length: kept }));
                 }
-                list.push(Item::Feed { ramp, length });
+                list.push(Item::Feed(ramp));
                 return true;
             }
             begin.at = begin.at + left;

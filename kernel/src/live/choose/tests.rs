@@ -48,9 +48,9 @@ impl Ahead {
         let length = at(up.length_mm());
         let cruise = Ramp::cruise(FEED_MM_S, CRUISE_MM / FEED_MM_S);
         [
-            Item::Feed { ramp: up, length },
-            Item::Feed { ramp: cruise, length: at(CRUISE_MM) },
-            Item::Feed { ramp: up.reversed(), length },
+            Item::Feed(PlannedRamp { ramp: up, length }),
+            Item::Feed(PlannedRamp { ramp: cruise, length: at(CRUISE_MM) }),
+            Item::Feed(PlannedRamp { ramp: up.reversed(), length }),
             Item::End,
         ]
     }
@@ -118,7 +118,9 @@ fn a_list_ends_in_a_stop_on_queued_path() {
     assert_eq!((list.exit(), list.len()), (2, 3));
     assert!(list.exit_splice().feed_mm_s == FEED_MM_S && list.end().is_at_rest(), "{list:?}");
     assert!(list.end().at <= queued);
-    let Some(Item::Feed { length, .. }) = ahead.feed.peek() else { panic!("the rest of the cruise") };
+    let Some(Item::Feed(PlannedRamp { length, .. })) = ahead.feed.peek() else {
+        panic!("the rest of the cruise")
+    };
     assert_eq!(list.exit_splice().at + *length + at(ahead.up.length_mm()), ahead.whole);
     // Taken back, it is ahead as a whole.
     ahead.feed.roll_back();
