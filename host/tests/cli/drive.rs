@@ -197,7 +197,7 @@ fn drive_tune_writes_what_it_has_verified() {
     let output = workspace.motion(&worse);
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8_lossy(&output.stdout);
-    assert!(said.contains("a circle got worse: nothing is written"), "{said}");
+    assert!(said.contains("a circle got worse: no machine file is written"), "{said}");
     // All axes were tuned, and all of them moved.
     assert!(said.contains("Circles of X and Y at") && said.contains("Circles of Z and X at"), "{said}");
     assert!(!workspace.0.join("worse.toml").exists());
