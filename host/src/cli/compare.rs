@@ -1,4 +1,5 @@
-//! `motion compare`: how long programs take, exact and blended, beside what acceleration alone would allow.
+//! `motion compare`: how long programs take, exact and blended, compared with what acceleration alone would
+//! allow.
 
 use std::fs;
 use std::io::{self, Write};
@@ -27,7 +28,7 @@ may use; `feed` to `step` are the executed ticks over the limits of axes and pat
 acceleration where a junction is passed without a blend. Programs that are refused are listed; then the exit
 status is 2.";
 
-/// Compare the times of programs: exact path, blends, plan per block, and the least there is.
+/// Compare the times of programs: exact path, blends, plan per block, and the least possible.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct CompareArguments {
@@ -37,7 +38,7 @@ pub struct CompareArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
-    /// Blend within this, from 0 to 10 mm; may be given several times. Without it, the machine's tolerance.
+    /// Tolerance of blends, from 0 to 10 mm; may be given several times. Without it, the machine's tolerance.
     #[arg(long = "tolerance", value_name = "MM", value_parser = tolerance, allow_negative_numbers = true)]
     tolerances: Vec<f64>,
     /// Print JSON: rows, refused.
@@ -103,8 +104,8 @@ struct CompareJson<'a> {
 /// Compares and prints.
 ///
 /// # Errors
-/// A program can't be read or is refused (after the others are printed), the machine file is refused, or `out` can't be
-/// written.
+/// A program can't be read or is refused (after the others are printed), the machine file is refused, or
+/// `out` can't be written.
 pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(arguments.machine.as_ref())?;
     let programs = programs(&arguments.programs)?;
@@ -132,7 +133,7 @@ pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outc
     if refused.is_empty() { Ok(Outcome::Done) } else { Err(CliError::Refused { programs: refused }) }
 }
 
-/// The programs themselves, and those of folders in the order of their names.
+/// The given programs, and those in folders in the order of their names.
 fn programs(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
     let mut programs = Vec::new();
     for path in paths {

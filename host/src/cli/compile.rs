@@ -30,7 +30,7 @@ Its format is documented with motion_kernel::program.";
 pub struct CompileArguments {
     /// G-code (`-`: standard input).
     program: PathBuf,
-    /// Where to write.
+    /// The file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Machine file (`motion machine` prints one); without it, the reference machine.
@@ -42,7 +42,7 @@ pub struct CompileArguments {
     /// One pair of ramps per block; without it, ramps may span blocks.
     #[arg(long)]
     per_block: bool,
-    /// For a board with live control: with what holds the feed along the path, to plan anew by.
+    /// For a board with live control: include the path's blocks, so that the board can plan anew.
     #[arg(long)]
     live: bool,
 }
@@ -97,7 +97,7 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
     written.outcome(Outcome::Done)
 }
 
-/// The program in the board's numbers, if they hold its axes, too.
+/// The program in the board's number type, if that holds its axes, too.
 fn executable<R: Root>(plan: &Plan, machine: &Machine) -> Result<Executable, CliError> {
     machine.axes_config::<R>().map_err(|source| CliError::Axis { machine: machine.name.clone(), source })?;
     Ok(Executable::new::<R>(plan)?)

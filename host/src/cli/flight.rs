@@ -1,4 +1,4 @@
-//! `motion flight`: what a board's flight recorder kept, from the board's log.
+//! `motion flight`: the ticks kept by a board's flight recorder, from the board's log.
 
 use std::io::Write;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! `motion machine`: the reference machine's file, to copy and change, and what its keys mean.
+//! `motion machine`: the reference machine's file, to copy and change, and the meaning of its keys.
 
 use std::io::{self, Write};
 
@@ -20,7 +20,7 @@ Examples:
 JSON: list of {table (in dots; empty: before the first table), table_is_optional, key, unit, values (how many), range,
 default (null: required), meaning}.";
 
-/// Print the built-in reference machine as a commented machine file, or what its keys mean.
+/// Print the built-in reference machine as a commented machine file, or the meaning of its keys.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct MachineArguments {

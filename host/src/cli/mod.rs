@@ -1,7 +1,8 @@
 //! The command line: what users and scripts rely on.
 //!
-//! Consumes arguments, files and standard input; produces text for people, `--json` for scripts, CSV for tables. An error
-//! is one line on standard error that names file, line and column, what was found and what was expected.
+//! Consumes arguments, files and standard input; produces text for people, `--json` for scripts, CSV for
+//! tables. An error is one line on standard error that names file, line and column, what was found and what
+//! was expected.
 //!
 //! | exit status | meaning |
 //! |---:|---|
@@ -14,24 +15,24 @@
 //! | 6 | results could not be written: a file, or standard output |
 //! | 130, 143 | interrupted: Ctrl-C (SIGINT), SIGTERM |
 //!
-//! With 1, 3, 4, 5 and 6 the results are printed. A file that is not written whole stays as it was, in all cases
-//! ([`files`](crate::files)).
+//! With 1, 3, 4, 5 and 6 the results are printed. In all cases, a file that can't be written completely stays
+//! as it was ([`files`](crate::files)).
 //!
 //! - [`profile`]: one ramp of the feed law, in figures;
 //! - [`plan`]: the feed plan of a program or a block list;
-//! - [`compare`]: the times of programs, exact and blended, beside the least there is;
+//! - [`compare`]: the times of programs, exact and blended, compared with the least possible;
 //! - [`run`]: a program through plan, kernel and simulated machine;
-//! - [`replay`]: a recorded run once more;
+//! - [`replay`]: runs a recording again;
 //! - [`flight`]: the ticks around a fault, from a board's log;
 //! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
 //! - [`home`]: the simulated axes find their references;
-//! - [`jog`]: keys of the simulated machine pressed and released;
-//! - [`machine`]: the reference machine's file, and what its keys mean;
-//! - [`demo`]: what `motion` alone does;
+//! - [`jog`]: presses and releases jog keys of the simulated machine;
+//! - [`machine`]: the reference machine's file, and the meaning of its keys;
+//! - [`demo`]: `motion` without a command;
 //! - [`error`]: errors and exit statuses;
-//! - `input`, `outputs`, `until_closed`, `table`, `trace`, `progress`: what the commands share.
+//! - `input`, `outputs`, `until_closed`, `table`, `trace`, `progress`: shared by the commands.
 
 pub mod compare;
 pub mod compile;
@@ -91,7 +92,7 @@ Exit status:
   130, 143  interrupted by Ctrl-C or SIGTERM
 With 1, 3, 4, 5 and 6 the results are printed. A file that is not written whole stays as it was.";
 
-/// G-code to motion: plans the feed, runs the real-time kernel, and shows what simulated ±10 V axes make of it.
+/// G-code to motion: plans the feed, runs the real-time kernel, and shows how simulated ±10 V axes follow.
 ///
 /// Without a command, plans and runs a built-in program on the built-in machine and writes a report.
 #[derive(Debug, Parser)]
@@ -124,7 +125,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let mut out = BufWriter::new(UntilClosed::new(io::stdout().lock()));
     let done = execute(&cli, &mut out);
-    // What was printed before an error belongs before it.
+    // Output printed before an error must appear before it.
     let flushed = out.flush();
     let failure = match (done, flushed) {
         (Ok(outcome), Ok(())) => return outcome.exit_code(),
@@ -159,7 +160,7 @@ fn write_json(value: &impl serde::Serialize, out: &mut dyn Write) -> Result<(), 
     writeln!(out).map_err(CliError::Output)
 }
 
-/// The cause of a failed write, with its kind: a closed pipe must stay one.
+/// The cause of a failed write, with its kind: a closed pipe must stay recognisable.
 fn csv_failure(error: csv::Error) -> io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(cause) => cause,

@@ -1,4 +1,4 @@
-//! `motion replay`: a recorded run once more, from the recording alone.
+//! `motion replay`: runs a recording again, from the recording alone.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -27,7 +27,7 @@ Exit status: 0 identical, even if the run was held, aborted or ended by a fault;
 recording, or damaged; 6 a file could not be written.
 JSON: that of `motion run`, and replay: identical, ticks (those of settling included), digest, difference.";
 
-/// Replay a recorded run: the same kernel on what it was told then, compared tick by tick.
+/// Replay a recorded run: the same kernel with the recorded inputs, compared tick by tick.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct ReplayArguments {

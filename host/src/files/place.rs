@@ -1,6 +1,7 @@
 //! Which file a path means, whether it exists or not.
 //!
-//! Two paths mean one file if both lead to the same node of the file system, or to the same name in the same folder.
+//! Two paths mean one file if both lead to the same node of the file system, or to the same name in the same
+//! folder.
 
 use std::ffi::OsString;
 use std::fs::{self, Metadata};
@@ -9,17 +10,17 @@ use std::path::{self, Path, PathBuf};
 
 use super::{FilesError, Known};
 
-/// Links from one to the next, as systems allow them.
+/// Greatest number of links in a row, as in operating systems.
 const LINKS_MAX: usize = 40;
 
-/// Which file it is.
+/// The identity of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
     /// One that exists.
     File(Node),
     /// One that does not exist: its folder and its name there.
     New(Node, OsString),
-    /// None that holds what is written: a pipe, a terminal, a device.
+    /// Not a file that keeps its content: a pipe, a terminal, a device.
     Stream,
 }
 

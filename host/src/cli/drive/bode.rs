@@ -1,4 +1,4 @@
-//! `motion drive bode`: amplitude and phase from step, harmonics and the linear model.
+//! `motion drive bode`: amplitude and phase from step, harmonics and linear model.
 
 use std::io::{self, Write};
 
@@ -14,7 +14,7 @@ use crate::drive::bode::{Bode, Point, measure};
 use crate::drive::{HALF_POWER, model};
 use crate::report;
 
-/// Most frequencies.
+/// Greatest number of frequencies.
 const POINTS_MAX: u32 = 1000;
 
 const HELP: &str = "\
@@ -38,7 +38,7 @@ pub struct BodeArguments {
     /// Last frequency, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 100.0, allow_negative_numbers = true)]
     to: f64,
-    /// How many frequencies, in equal ratios.
+    /// Number of frequencies, in equal ratios.
     #[arg(long, value_name = "NUMBER", default_value_t = 41)]
     points: u32,
     /// Feed of the step and of the harmonics, mm/min.

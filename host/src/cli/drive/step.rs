@@ -31,7 +31,7 @@ pub struct StepArguments {
     /// Velocity after the step, mm/min.
     #[arg(long, value_name = "MM_MIN", default_value_t = 7200.0, allow_negative_numbers = true)]
     feed_mm_min: f64,
-    /// How long it is held and recorded, in seconds.
+    /// Time for which it is held and recorded, in seconds.
     #[arg(long, value_name = "S", default_value_t = 0.4, allow_negative_numbers = true)]
     duration_s: f64,
     #[command(flatten)]
