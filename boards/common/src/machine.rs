@@ -138,7 +138,7 @@ mod tests {
         assert!(matches!(refused, Err(MachineError::Axes(AxesError { axis: 2, .. }))), "{refused:?}");
     }
 
-    /// The last item but one is damaged, behind a checksum that is right: nothing of the program starts.
+    /// The last item but one is damaged, with a right checksum: nothing of the program starts.
     #[test]
     fn an_item_that_cannot_be_executed_is_found_before_the_start() {
         let good = machine().program;
@@ -158,7 +158,7 @@ mod tests {
         assert!(matches!(far, Err(MachineError::Items(CheckError::Start { axis: 1, .. }))), "{far:?}");
     }
 
-    /// Without any of its blocks, without its last one, with one that is longer, and with one behind its end.
+    /// Without any of its blocks, without its last one, with one that is longer, and with one after its end.
     #[test]
     fn a_program_that_does_not_hold_its_feed_is_refused() {
         let good = machine().program;

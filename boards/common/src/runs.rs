@@ -125,7 +125,7 @@ mod tests {
 
     type Run<'a> = super::Run<'a, f32, AXES, 64>;
 
-    /// A board whose background has polls every so many ticks.
+    /// A board whose background polls every given number of ticks.
     struct TestBoard<'a> {
         run: Run<'a>,
         intake: Intake<'a, f32, AXES>,

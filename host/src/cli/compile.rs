@@ -17,12 +17,11 @@ use crate::planning::{Executable, Mode, Plan, plan_program};
 const EXAMPLES: &str = "\
 Examples:
   motion compile part.ngc --machine mine.toml --output part.bin
-  motion compile part.ngc --live --output part.bin            for a board with live control, as the NUCLEO
+  motion compile part.ngc --live --output part.bin            for a board with live control, like the NUCLEO
   motion compile part.ngc --number fixed --output part.bin    for a board without an FPU
 
-The file holds the machine's scales, gains, guards and path limits, every piece of path and every ramp, with --live
-what holds the feed along the path, and a checksum.
-Its format is documented with motion_kernel::program.";
+The file holds the machine's scales, gains, guards and path limits, every piece of path, every ramp, with --live
+the blocks that limit the feed along the path, and a checksum. Its format is documented with motion_kernel::program.";
 
 /// Plan a program and write it for a board, with the machine it is for.
 #[derive(Debug, Args)]

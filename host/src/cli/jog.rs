@@ -23,9 +23,9 @@ Examples:
   motion jog X+20 --trace jog.csv     every tick, for a spreadsheet
 
 JSON: list of {press, from_mm, to_mm, time_s, feed_mm_s (the greatest), ended (\"distance\", \"soft limit\" or \"released\"),
-stop_s, stop_mm (from the key's release to rest; null where it was not released on the way)}.
+stop_s, stop_mm (from the key's release to rest; null if it was not released on the way)}.
 
-Exit status: 1 where a fault ended a jog, 2 where a key is refused; what came before is printed.";
+Exit status: 1 if a fault ended a jog, 2 if a key is refused; the jogs before it are printed.";
 
 /// Jog axes of the simulated machine: one key after the other, each until it rests.
 ///

@@ -12,7 +12,7 @@ use crate::machine::keys::{KEY_TABLES, Key, KeyTable};
 
 const EXAMPLES: &str = "\
 Examples:
-  motion machine                      read about every value
+  motion machine                      the file, with a comment on every value
   motion machine --explain            every key with unit, range, default and meaning
   motion machine > mine.toml          a machine of your own; edit it, then
   motion run part.ngc --machine mine.toml

@@ -68,8 +68,8 @@ use crate::files::interrupt;
 const EXAMPLES: &str = "\
 Examples:
   motion                                         the built-in demonstration; writes stringer.html
-  motion run part.ngc --report part.html         run a program, look at what the axes did
-  motion replay part.mrec                        a recorded run once more, to the same bits
+  motion run part.ngc --report part.html         run a program, with a report on the axes
+  motion replay part.mrec                        run a recording again, to the same bits
   motion plan part.ngc                           what limits the feed, block by block
   motion compare parts/                          how long programs take, exact and blended
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
@@ -77,9 +77,9 @@ Examples:
   motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
   motion home --machine mine.toml                the axes find their references
-  motion jog X+20 Y-2.5@300 --feed 50            keys pressed, and one released after 300 ticks
+  motion jog X+20 Y-2.5@300 --feed 50            press keys, release one after 300 ticks
   motion machine > mine.toml                     a machine file to start from
-  motion machine --explain                       what every key of it means
+  motion machine --explain                       the meaning of its keys
 
 Exit status:
   0  done: a run came to the end of its program
@@ -90,7 +90,7 @@ Exit status:
   5  the run finished before a command of --at was due
   6  results could not be written: a file, or standard output
   130, 143  interrupted by Ctrl-C or SIGTERM
-With 1, 3, 4, 5 and 6 the results are printed. A file that is not written whole stays as it was.";
+With 1, 3, 4, 5 and 6 the results are printed. A file that can't be written completely stays as it was.";
 
 /// G-code to motion: plans the feed, runs the real-time kernel, and shows how simulated ±10 V axes follow.
 ///

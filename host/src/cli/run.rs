@@ -24,16 +24,16 @@ use crate::trace::{RunEnd, TracedCommand, TracedFault};
 const EXAMPLES: &str = "\
 Examples:
   motion run part.ngc                                run on the reference machine, print a summary
-  motion run part.ngc --report part.html             and a page with the pictures of the run
+  motion run part.ngc --report part.html             and write a page with plots of the run
   motion run part.ngc --machine mine.toml --trace part.csv
                                                      every tick of every axis, for a spreadsheet
   motion run part.ngc --at 2000:hold,2600:resume,3000:override=0.5
-                                                     with commands given before those ticks
-  motion run part.ngc --record part.mrec             and everything that `motion replay` needs to run it again
+                                                     with commands before these ticks
+  motion run part.ngc --record part.mrec             and record it for `motion replay`
   generate-part | motion run - --json                for a script
 
 Exit status: 0 the program finished, 1 a fault, 3 held, 4 aborted, 5 a command of --at was not reached, 6 a file could not
-be written. The summary is printed, and the files are written, in all of these cases.
+be written. In all these cases the summary is printed, and the files are written.
 
 JSON: finished, stopped_by (null, \"hold\", \"single block\", \"override\", \"abort\" or \"fault\"), reached_mm, reached_line
 (how far the run came), commands_not_reached, and the figures of the run.";

@@ -48,7 +48,7 @@ pub(super) struct Place {
     pub(super) identity: Identity,
     /// The path without links.
     pub(super) target: PathBuf,
-    /// Of the file that exists there.
+    /// The metadata of the file, if it exists.
     pub(super) metadata: Option<Metadata>,
 }
 
@@ -72,7 +72,7 @@ impl Place {
         }
     }
 
-    /// Of a file that does not exist, or a link to such a one.
+    /// The place of a file that does not exist, or of a link to one.
     fn of_new(path: &Path, name: String) -> Result<Self, FilesError> {
         let mut target = path.to_owned();
         for _ in 0..LINKS_MAX {
@@ -88,7 +88,7 @@ impl Place {
         let Some(node) = of_folder.and_then(|metadata| node(&folder, &metadata).ok()) else {
             return Err(FilesError::NoFolder { path: name, folder: folder.display().to_string() });
         };
-        // Systems whose users know a file by its name in any case.
+        // Systems whose file names ignore case.
         let ignores_case = cfg!(any(windows, target_os = "macos"));
         let file_name = if ignores_case { file_name.to_ascii_lowercase() } else { file_name.to_owned() };
         Ok(Self { identity: Identity::New(node, file_name), target, metadata: None })

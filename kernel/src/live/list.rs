@@ -310,7 +310,7 @@ mod tests {
         assert!(cuts > 5_000, "{cuts}");
     }
 
-    /// However great the feeds are beside their change.
+    /// However great the feeds are compared with their change.
     #[test]
     fn a_ramp_that_is_given_up_asks_for_no_more_than_the_whole() {
         let random = Random::new(1);

@@ -20,7 +20,7 @@ const POINTS_MAX: u32 = 1000;
 const HELP: &str = "\
 The linear model is that of the machine file's drive with viscous friction and bed, without Coulomb friction and current
 limit. Where the curves part, the current limit acts: a lower feed brings them together. At a very low feed Coulomb
-friction does.
+friction parts them.
 
 JSON: axis, feed_mm_min, step_bandwidth_hz, linear_bandwidth_hz, points: list of {frequency_hz, step_ratio,
 step_phase_deg, swing_ratio, fundamental_ratio, harmonic_phase_deg, linear_ratio, linear_phase_deg}.";

@@ -21,8 +21,8 @@ use crate::machine::AxisSettings;
 use crate::report;
 
 const HELP: &str = "\
-Read from encoder positions over the last second at constant feed: the contour error is the actual radius less the
-programmed one, the form deviation its greatest less its least value.
+Read from encoder positions over the last second at constant feed: the contour error is the actual minus the
+programmed radius, the form deviation its greatest minus its least value.
 
 JSON: feed_mm_min, limit_um, feedforward: list of {name, axes: list of {axis, velocity, accel_s, jerk_s2, lead_s,
 has_inverse, has_tables}, limit_hz (null: not passed within the range), circles: list of {frequency_hz, radius_mm, contour_error_um, contour_error_um_max,

@@ -49,8 +49,8 @@ Examples:
   motion drive tune --machine mine.toml --output mine.toml
                                                      identify the axes and set their regulators
 
-On the reference machine at the published settings, the published figures stand beside; exit status 1 if the run
-misses what the machine has to give.";
+On the reference machine at the published settings, the published figures are shown, too; exit status 1 if the run
+misses the figures expected of the machine.";
 
 /// Experiments with the drives: velocity step, harmonic motion, circle test. All run through planner and
 /// kernel.
@@ -201,7 +201,7 @@ fn comparisons_json(comparisons: &[Comparison]) -> Vec<ComparisonJson> {
         .collect()
 }
 
-/// The figures beside what was published and what the machine has to give; nothing if there are none.
+/// Writes the figures next to the published and the expected ones; nothing if there are none.
 fn write_comparisons(comparisons: &[Comparison], out: &mut dyn Write) -> io::Result<()> {
     if comparisons.is_empty() {
         return Ok(());

@@ -15,11 +15,11 @@ use crate::drive::step::{Step, StepFigures};
 use crate::report;
 
 const HELP: &str = "\
-Read with the tangent method from encoder readings: the tangent at the steepest rise crosses 0 at the delay and
+By the tangent method, from encoder readings: the tangent at the steepest rise crosses 0 at the delay and
 reaches the step within the time constant. The peaks are backward differences of readings, as published.
 
 JSON: axis, feed_mm_min, delay_ms, time_constant_ms, overshoot_percent, settling_ms (null: never), peak_accel_m_s2,
-peak_jerk_m_s3, bandwidth_hz, reference (figures beside the published ones; empty on other machines).";
+peak_jerk_m_s3, bandwidth_hz, reference (figures with the published ones; empty on other machines).";
 
 /// Step the velocity from rest within one tick, open loop.
 #[derive(Debug, Args)]

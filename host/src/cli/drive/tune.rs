@@ -25,8 +25,8 @@ use crate::simulate::StretchCorrection;
 use crate::tuning::{self, AxisTuning, TuningError, propose};
 
 const HELP: &str = "\
-What moves are simulated axes: those of the machine file, with its [axis.drive]. No axis of a real machine is moved, and
-none is identified.
+All axes are simulated: those of the machine file, with its [axis.drive]. No axis of a real machine is moved or
+identified.
 
 The command runs velocity steps and circles in open loop. From the converter's outputs and the encoders' counts it
 estimates the parameters of each drive. From these it derives a position gain, with its margins, and a feedforward. Then
@@ -37,7 +37,7 @@ Examples:
   motion drive tune                                  see what the reference machine could do
   motion drive tune --machine mine.toml --output mine.toml
                                                      write the figures into the file; its comments stay
-  motion drive tune --method series --learn 5        and see what learning from repeats adds
+  motion drive tune --method series --learn 5        and the gain by learning from repeats
   motion drive tune --axis X --method fit --json     V, A and J gains only, for a script
 
 JSON: axes: list of {name, found: {velocity_gain_per_s…: {value, half_width_95, determined}}, margins: {crossover_hz, phase_deg, gain,
@@ -46,12 +46,12 @@ sensitivity}, changes: list of {key, before, after, unit, reason}, remarks}, ver
 following_error_second_um}}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
 axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}}, output.
 
---learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, what feedforward is
-to be given in addition, straight between rows; the kernel takes it as CorrectedIntake::correct. Without a row if nothing was
-better than no correction. Without this option what was learnt is only shown.
+--learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, added to
+feedforward and linear between rows; CorrectedIntake::correct hands it to the kernel. It has no rows if no correction was
+better than none. Without this option the learnt correction is only shown.
 
-Exit status 1, and the machine file stays as it was: the tuned machine is worse on a circle than it was, or the recordings
-do not determine what everything depends on (command gain, Kv, Ti, total delay).";
+Exit status 1, and the machine file stays as it was: the tuned machine is worse on a circle than before, or the recordings
+do not determine the parameters that everything depends on (command gain, Kv, Ti, total delay).";
 
 /// Tune the simulated axes: identify them, propose gains and feedforward with reasons, verify them on
 /// circles.

@@ -22,10 +22,10 @@ use crate::simulate::RunOptions;
 use crate::toolpath::spline::{self, Degree, Spline, SplineError};
 
 const HELP: &str = "\
-POINTS.csv has the heading x_mm,y_mm,z_mm or x_mm,y_mm,z_mm,u and a point a line; without u, the parameter grows by the
-distance from point to point. The spline goes through all points, or, with a tolerance, no farther from each than that and
+POINTS.csv has the heading x_mm,y_mm,z_mm or x_mm,y_mm,z_mm,u and one point per line; without u, the parameter grows by the
+distance from point to point. The spline goes through all points or, with a tolerance, within that distance of each and
 with fewer knots. A quintic one has continuous derivatives up to the fourth, so the jerk of every axis is continuous; a cubic
-one steps in jerk at its knots. The machine comes from the origin by a rapid.
+one steps in jerk at its knots. The machine moves from the origin to the first point by a rapid.
 
 Examples:
   motion spline points.csv --feed 3000               through all points, on the reference machine
