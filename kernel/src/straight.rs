@@ -1,7 +1,8 @@
 //! One straight stretch from rest to rest, as the items of a program.
 //!
 //! Consumes where the machine stands, where it is to go and what holds the feed; produces what the
-//! [`LiveControl`](crate::live::LiveControl) drives as any other program: a jog, or the way to a program's start.
+//! [`LiveControl`](crate::live::LiveControl) drives as any other program: a jog, or the way to a program's
+//! start.
 //!
 //! Background; an item at a time, no memory for the path.
 
@@ -75,8 +76,8 @@ pub struct Straight<const AXES: usize> {
 }
 
 impl<const AXES: usize> Straight<AXES> {
-    /// From rest at `start` to rest at `end` with ramps within `limits`, at a feed of `feed_mm_s` above 0, at most
-    /// `most_mm_s` under an override, for ticks of `tick_s`.
+    /// From rest at `start` to rest at `end` with ramps within `limits`, at a feed of `feed_mm_s` above 0, at
+    /// most `most_mm_s` under an override, for ticks of `tick_s`.
     ///
     /// # Errors
     /// It can't be driven; nothing else fails once it is made, in a number type that holds its limits.
@@ -145,7 +146,8 @@ impl<const AXES: usize> Straight<AXES> {
 impl<const AXES: usize> Iterator for Straight<AXES> {
     type Item = Result<Item<AXES>, Infallible>;
 
-    /// Path and feed in the order of where they start, so that whichever queue is full, the other one is as far.
+    /// Path and feed in the order of where they start, so that whichever queue is full, the other one is as
+    /// far.
     fn next(&mut self) -> Option<Self::Item> {
         if let Some(block) = self.block.take() {
             return Some(Ok(Item::Block(block)));
@@ -186,7 +188,8 @@ mod tests {
         Position::from_mm(mm).expect("in range")
     }
 
-    /// From anywhere to anywhere, from a step to metres: ends exactly, within its feed, in the time of its plan.
+    /// From anywhere to anywhere, from a step to metres: ends exactly, within its feed, in the time of its
+    /// plan.
     #[test]
     fn any_way_is_driven_in_its_time() {
         let random = Random::new(1);

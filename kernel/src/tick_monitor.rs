@@ -1,11 +1,11 @@
 //! Whether ticks come in time and end in time.
 //!
-//! Consumes readings of a free-running counter of any width at the beginning and end of each tick; produces a fault for
-//! [`Kernel::trip`](crate::kernel::Kernel::trip). A few operations; cannot fail.
+//! Consumes readings of a free-running counter of any width at the beginning and end of each tick; produces a
+//! fault for [`Kernel::trip`](crate::kernel::Kernel::trip). A few operations; cannot fail.
 //!
-//! A tick that begins more than half a period late has missed at least the better part of one: the distance between two
-//! beginnings, rounded to whole periods, tells how many did not come. Ticks that begin late because an interrupt was held
-//! up are no fault as long as they end before the next one is due.
+//! A tick that begins more than half a period late has missed at least the better part of one: the distance
+//! between two beginnings, rounded to whole periods, tells how many did not come. Ticks that begin late
+//! because an interrupt was held up are no fault as long as they end before the next one is due.
 
 use crate::fault::FaultKind;
 
@@ -43,8 +43,8 @@ impl TickMonitor {
         Ok(Self { mask, period, began: None })
     }
 
-    /// A tick begins, with the counter at `now`. The missed ticks are told that the counter's range holds; it should hold
-    /// the longest time for which nothing else would stop the machine.
+    /// A tick begins, with the counter at `now`. The missed ticks are told that the counter's range holds; it
+    /// should hold the longest time for which nothing else would stop the machine.
     pub fn began<R>(&mut self, now: u32) -> Option<FaultKind<R>> {
         let before = self.began.replace(now)?;
         let elapsed = now.wrapping_sub(before) & self.mask;
@@ -70,8 +70,8 @@ mod tests {
 
     type Kind = FaultKind<f32>;
 
-    /// Counters of every width, at every phase of their wrap: jitter is no fault, a missed tick is counted, an overrun is
-    /// told. The oracle counts in 64 bits.
+    /// Counters of every width, at every phase of their wrap: jitter is no fault, a missed tick is counted,
+    /// an overrun is told. The oracle counts in 64 bits.
     #[test]
     fn ticks_are_told_late_missed_and_too_long_across_every_wrap() {
         let random = Random::new(0x5EED);

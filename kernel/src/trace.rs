@@ -16,7 +16,8 @@ pub struct Trace<R, const AXES: usize> {
     pub executed: Executed<R, AXES>,
     /// What the encoders read, actual values and outputs. In a fault the outputs are 0 V.
     pub axes: [AxisOutput<R>; AXES],
-    /// The digital inputs as the tick read them; without the feature `guards` as last read when something was amiss.
+    /// The digital inputs as the tick read them; without the feature `guards` as last read when something was
+    /// amiss.
     pub inputs: MachineInputs<AXES>,
     /// The latched fault, if there is one.
     pub fault: Option<Fault<R>>,

@@ -1,5 +1,5 @@
-//! What the kernel asks of a board: a velocity output, an encoder, digital inputs and a drive enable for all axes
-//! at once.
+//! What the kernel asks of a board: a velocity output, an encoder, digital inputs and a drive enable for all
+//! axes at once.
 //!
 //! All axes at once, because they have to be sampled and latched in the same instant: a circle is
 //! only round if both its axes were read at the same time. A board implements these traits in the

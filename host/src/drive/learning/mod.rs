@@ -1,11 +1,11 @@
 //! Iterative learning: a path that is driven repeatedly is followed better every time.
 //!
 //! **Consumes** a [`Motion`] that can be repeated, a model of every axis's drive and [`LearningOptions`].
-//! **Produces**
-//! [`Learnt`]: the figures of every repeat and the best correction, a bounded table of velocity commands that the
-//! kernel adds over the stretch ([`StretchCorrection`]). **Runs** in the background, between repeats.
-//! **Fails** with a [`DriveError`] before anything moves if a quantity is out of its range or the law would
-//! not converge, and if the first run fails; a fault in a later run ends learning with the best correction.
+//! **Produces** [`Learnt`]: the figures of every repeat and the best correction, a bounded table of velocity
+//! commands that the kernel adds over the stretch ([`StretchCorrection`]). **Runs** in the background,
+//! between repeats. **Fails** with a [`DriveError`] before anything moves if a quantity is out of its range
+//! or the law would not converge, and if the first run fails; a fault in a later run ends learning with the
+//! best correction.
 //!
 //! After each repeat u′ = Q·(u + L·e) for every axis over the whole stretch, including its start and end: e
 //! is the recorded following error, L the model's inverse, Q a zero-phase low-pass. `law` has the formulas
