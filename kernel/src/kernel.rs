@@ -363,7 +363,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         peaks
     }
 
-    /// Latches a fault unless there is one, and begins its reaction.
+    /// Begins the reaction to a fault, and latches the fault unless there is one already.
     #[cold]
     fn latch_fault(&mut self, kind: FaultKind<R>) {
         self.latch_fault_in(self.trace.tick, kind);

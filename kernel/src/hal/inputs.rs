@@ -90,7 +90,7 @@ impl AxisInputs {
         self.0
     }
 
-    /// The inputs of a record's byte; bits that mean nothing are dropped.
+    /// The inputs of a recorded byte; unused bits are dropped.
     #[must_use]
     pub const fn from_bits(bits: u8) -> Self {
         Self(bits & (Self::READY | Self::FAULT | Self::LIMIT_LOW | Self::LIMIT_HIGH | Self::HOME))
@@ -130,11 +130,11 @@ pub struct MachineInputs<const AXES: usize> {
 }
 
 impl<const AXES: usize> MachineInputs<AXES> {
-    /// What a board without inputs reads: every drive ready, no switch reached, no emergency stop. Where it
-    /// is returned as a constant, reading it compiles to nothing.
+    /// The inputs of a board without any: every drive ready, no switch reached, no emergency stop. Returned
+    /// as a constant, it compiles to nothing.
     pub const HEALTHY: Self = Self { axes: [AxisInputs::HEALTHY; AXES], emergency_stop: false };
 
-    /// Nothing but home switches differs from [`MachineInputs::HEALTHY`].
+    /// Whether nothing except home switches differs from [`MachineInputs::HEALTHY`].
     #[inline]
     #[must_use]
     pub fn is_healthy(&self) -> bool {
@@ -153,7 +153,7 @@ pub trait Inputs<const AXES: usize> {
     /// What can go wrong when the inputs are read.
     type Error;
 
-    /// All inputs as they are now, debounced as far as they need it. A board without inputs returns
+    /// All inputs as they are now, debounced as far as needed. A board without inputs returns
     /// [`MachineInputs::HEALTHY`].
     ///
     /// # Errors
