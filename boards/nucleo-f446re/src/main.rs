@@ -49,7 +49,7 @@ mod app {
     use stm32f4xx_hal::serial::Rx;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-    use crate::background::{self, Panel, TICKS, POLLS};
+    use crate::background::{self, POLLS, Panel, TICKS};
     use crate::board::Board;
     use crate::console_port;
     use crate::hal::Hardware;
