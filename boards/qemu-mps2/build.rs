@@ -10,8 +10,8 @@ const MPS2: &str = "MEMORY
 }
 ";
 
-/// microbit (nRF51822): the last quarter of its flash is for programs. The stack lies at the bottom of the memory: where it
-/// overflows there is nothing to overwrite, and the emulator stops at once.
+/// microbit (nRF51822): the last quarter of its flash is for programs. The stack lies at the bottom of the
+/// memory: where it overflows there is nothing to overwrite, and the emulator stops at once.
 const MICROBIT: &str = "MEMORY
 {
   FLASH : ORIGIN = 0x00000000, LENGTH = 192K

@@ -1,7 +1,7 @@
 //! One simulated axis: a voltage in, an encoder count out.
 //!
-//! Consumes the DAC's voltage and the drive enable, once a tick; produces the encoder's count and, for
-//! tests and records, what no encoder shows: true position, velocity and torque.
+//! Consumes the DAC's voltage and the drive enable, once per tick; produces the encoder's count and, for
+//! tests and records, the true position, velocity and torque.
 
 use motion_kernel::units::Counts;
 
@@ -20,8 +20,7 @@ pub struct AxisParameters {
     pub drive: DriveParameters,
     /// Position feedback.
     pub encoder: EncoderParameters,
-    /// Velocity that the drive makes of one volt \[mm/s/V\]; negative if it is wired the other way round,
-    /// not 0.
+    /// Velocity of the drive per volt \[mm/s/V\], not 0; negative if it is wired the other way round.
     pub mm_s_per_volt: f64,
     /// True position at the start \[mm\]; the axis is at rest there.
     pub start_position_mm: f64,
@@ -45,7 +44,7 @@ impl AxisParameters {
     }
 }
 
-/// An axis in motion. `LINE` as in [`DriveState`].
+/// An axis in motion. `LINE` is that of [`DriveState`].
 #[derive(Clone, Debug)]
 pub struct SimAxis<const LINE: usize> {
     model: DriveModel,

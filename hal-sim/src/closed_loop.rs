@@ -1,11 +1,11 @@
 //! A compiled program in closed loop: supply, streams, kernel and simulated machine, tick by tick.
 //!
-//! The same code on a PC and inside an emulated board, so that two digests can be compared. The converter
-//! is driven after the tick, from memory, so that a tick alone can be measured and a loop's cost is the
-//! kernel's: [`InMemory`] is what a board's interrupt would exchange with its peripherals.
+//! The same code on a PC and inside an emulated board, so that two digests can be compared. The converter is
+//! driven after the tick, from memory, so that a tick can be measured alone and its cost is the kernel's:
+//! [`InMemory`] holds what a board's interrupt would exchange with its peripherals.
 //!
-//! [`Producer::fill`] is the background's part, [`ClosedLoop::tick`] the interrupt's. The module `live` has another background:
-//! the same program under live control.
+//! [`Producer::fill`] is the background's part, [`ClosedLoop::tick`] the interrupt's. The module `live` has
+//! another background, with the same program under live control.
 
 #[cfg(feature = "live")]
 pub mod live;
@@ -30,8 +30,8 @@ use crate::drive_parameters::{REFERENCE_X, REFERENCE_Y};
 use crate::encoder::{EncoderParameters, REFERENCE_ENCODER};
 use crate::machine::{MachineParameters, SimMachine};
 
-/// The reference drives behind a program's scales: the first axis is S4's X, the second its Y, all others are like
-/// X.
+/// The reference drives with a program's scales: the first axis is S4's X, the second its Y, all others are
+/// like X.
 #[must_use]
 pub fn reference_machine<const AXES: usize>(header: &Header<AXES>, substeps: u32) -> MachineParameters<AXES> {
     let mut drives = [REFERENCE_X; AXES];
@@ -47,14 +47,14 @@ pub fn reference_machine<const AXES: usize>(header: &Header<AXES>, substeps: u32
     MachineParameters { axes, tick_s: header.tick_s, substeps }
 }
 
-/// What a tick exchanges with its peripherals.
+/// The values that a tick exchanges with its peripherals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InMemory<const AXES: usize> {
-    /// As the encoders read when the tick began.
+    /// The encoders' readings when the tick began.
     pub counts: [Counts; AXES],
-    /// As the tick wrote.
+    /// The codes that the tick wrote.
     pub codes: [DacCode; AXES],
-    /// As the tick told the drives, if it did.
+    /// The last command to the drives, if any.
     pub enabled: Option<bool>,
 }
 
@@ -102,7 +102,7 @@ impl<const AXES: usize> DriveEnable<AXES> for InMemory<AXES> {
 pub enum LoopError {
     /// An axis can't be regulated.
     Axes(AxesError),
-    /// What the program says of its guards can't be read.
+    /// The program's guards can't be read.
     #[cfg(feature = "live")]
     Program(ProgramError),
     /// The converter refused its configuration.
@@ -120,7 +120,7 @@ impl<R: Real, const AXES: usize> Producer<'_, R, AXES> {
     ///
     /// # Errors
     /// The program holds an item that can't be executed.
-    // A frame of its own, as the tick's: both at once are more than 16 KiB hold.
+    // In its own stack frame, like the tick: 16 KiB have no room for both at once.
     #[inline(never)]
     pub fn fill(&mut self) -> Result<bool, SupplyError<ProgramError>> {
         self.supply.fill(&mut self.feeder).map(|()| self.supply.is_empty())
@@ -142,7 +142,7 @@ pub type Closed<'a, R, const AXES: usize, const LINE: usize> =
 
 /// Closes the loop of a program over `machine`, drives enabled.
 ///
-/// In steps of their own frames: a board with 16 KiB has no room for copies that lie beside each other.
+/// In steps with their own stack frames: a board with 16 KiB has no room for several copies at once.
 ///
 /// # Errors
 /// The program's machine can't be regulated or simulated.
@@ -178,7 +178,7 @@ fn regulated<R: Real, const AXES: usize>(header: &Header<AXES>) -> Result<AxesCo
     AxesConfig::new(&header.axes, header.tick_s).map_err(LoopError::Axes)
 }
 
-/// Knots of a correction that no learning has made: for runs that are compared with one another \[mm/s\].
+/// Arbitrary knots of a correction, for runs that are compared with each other \[mm/s\].
 #[must_use]
 pub fn some_knots<R: Real, const AXES: usize>() -> [[R; AXES]; 4] {
     [0.0, 0.625, -0.375, 0.25]
@@ -224,7 +224,7 @@ impl<'a, R: Real, const AXES: usize, const LINE: usize> ClosedLoop<'a, R, AXES, 
         if let Some(enabled) = self.memory.enabled.take() {
             let Ok(()) = machine.set_enabled(enabled);
         }
-        // The emulated bus fails only where a test tells it to.
+        // The emulated bus fails only if a test tells it to.
         let written = self.outputs.write(&self.memory.codes);
         debug_assert!(written.is_ok());
         machine.advance();

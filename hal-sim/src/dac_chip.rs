@@ -4,13 +4,13 @@
 //! driver holds `&chip` as its `SpiDevice` while the simulation reads the voltages through the same
 //! reference, so the registers are `Cell`s. One frame costs a constant number of operations.
 //!
-//! Follows the data sheet in what a velocity output can meet:
+//! Follows the data sheet in everything that a velocity output uses:
 //!
 //! - Codes wait in input registers until a load command; outputs change only then (LDAC high).
 //! - A channel starts switched off. Off, its output is clamped to 0 V and codes written to it are
 //!   ignored.
-//! - A clear command puts the output registers to their clear code and leaves the input registers alone.
-//!   That it, and a load, reach the registers of channels that are off is an assumption.
+//! - A clear command puts the output registers to their clear code and leaves the input registers alone. It
+//!   is an assumption that a clear and a load reach the registers of channels that are off.
 //! - A chip select around anything but 24 bits is no frame.
 //!
 //! Stricter than the chip, so that tests see a mistake: undefined frames, and a load during the 10 µs
@@ -30,7 +30,7 @@ pub const CHANNELS: usize = 4;
 /// Time from power-up until a channel may be loaded \[ns\] (AD5754 data sheet, power control register).
 pub const POWER_UP_TIME_NS: u64 = 10_000;
 
-/// What the chip, or its bus, objects to.
+/// An error of the chip or its bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChipError {
     /// The chip select enclosed another number of bytes than three.
@@ -65,7 +65,7 @@ pub enum ChipError {
     },
     /// A load came while a channel was powering up.
     LoadDuringPowerUp {
-        /// Time that the channel would have needed yet \[ns\].
+        /// Time that the channel would still have needed \[ns\].
         remaining_ns: u64,
     },
     /// The failure that [`Ad5754Chip::fail_bus_after`] asked for.
@@ -163,7 +163,7 @@ impl Ad5754Chip {
         self.frames_until_failure.set(frames);
     }
 
-    /// Takes what stood on the bus while the chip select was low.
+    /// Takes the bytes sent while the chip select was low.
     fn take(&self, bytes: [u8; 3]) -> Result<(), ChipError> {
         let frame = Frame::decode(bytes)?;
         let mut channels = self.channels.get();

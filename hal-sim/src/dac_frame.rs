@@ -1,8 +1,8 @@
 //! The 24-bit frames of the AD5754.
 //!
-//! Consumes the bytes between two edges of the chip select; produces a [`Frame`], or says what is wrong
-//! with them. Layout (AD5754 data sheet, input shift register): read bit, a zero, three register bits,
-//! three address bits, sixteen data bits.
+//! Consumes the bytes between two edges of the chip select; produces a [`Frame`], or an error that says what
+//! is wrong. Layout (AD5754 data sheet, input shift register): read bit, a zero, three register bits, three
+//! address bits, sixteen data bits.
 
 use crate::dac_chip::ChipError;
 
@@ -70,7 +70,7 @@ impl Target {
     }
 }
 
-/// What one frame asks of the chip.
+/// The command in one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Frame {
     Code { target: Target, code: u16 },

@@ -20,7 +20,7 @@ impl DeadTime {
         Self { whole_steps, fraction: dead_time_s / step_s - whole_steps as f64 }
     }
 
-    /// Cells for the newest command, the whole steps behind it and one more to interpolate with.
+    /// Cells for the newest command, the whole steps before it and one more to interpolate with.
     pub(crate) fn cells_needed(&self) -> usize {
         self.whole_steps.saturating_add(2)
     }
@@ -34,7 +34,7 @@ pub(crate) struct DeadTimeLine<const LINE: usize> {
 }
 
 impl<const LINE: usize> DeadTimeLine<LINE> {
-    /// A line on which `command_mm_s` has been standing for at least the dead time.
+    /// A line on which `command_mm_s` has been constant for at least the dead time.
     pub(crate) fn standing(dead_time: &DeadTime, command_mm_s: f64) -> Result<Self, ParameterError> {
         let cells_needed = dead_time.cells_needed();
         if cells_needed > LINE {
@@ -43,7 +43,7 @@ impl<const LINE: usize> DeadTimeLine<LINE> {
         Ok(Self { cells: [command_mm_s; LINE], newest: 0 })
     }
 
-    /// Takes the command of this sub-step and gives the one that comes out of the dead time.
+    /// Takes the command of this sub-step and returns the one that comes out of the dead time.
     pub(crate) fn pass(&mut self, dead_time: &DeadTime, command_mm_s: f64) -> f64 {
         self.newest = (self.newest + 1) % LINE;
         self.cells[self.newest] = command_mm_s;

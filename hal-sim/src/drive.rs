@@ -52,8 +52,8 @@ pub struct DriveModel {
     bed: Option<BedModel>,
 }
 
-/// What an axis remembers from sub-step to sub-step. `LINE` is the number of cells for the dead time:
-/// at least dead time / sub-step + 2.
+/// The state of an axis from sub-step to sub-step. `LINE` is the number of cells for the dead time: at least
+/// dead time / sub-step + 2.
 #[derive(Clone, Debug)]
 pub struct DriveState<const LINE: usize> {
     line: DeadTimeLine<LINE>,
@@ -67,8 +67,8 @@ pub struct DriveState<const LINE: usize> {
     bed_accel_mm_s2: f64,
 }
 
-/// The part of the distance to its input that a first-order lag covers in a step, exact for an input
-/// held over the step. No lag covers all of it.
+/// The fraction of the distance to its input that a first-order lag covers in a step, exact for an input held
+/// over the step. Without lag it is 1.
 fn lag_share(step_s: f64, lag_s: f64) -> f64 {
     if lag_s > 0.0 { 1.0 - libm::exp(-step_s / lag_s) } else { 1.0 }
 }
@@ -117,15 +117,14 @@ impl DriveModel {
         &self.parameters
     }
 
-    /// Another current limit \[mm/s²\], > 0.
+    /// Sets another current limit \[mm/s²\], > 0.
     pub(crate) fn limit(&mut self, accel_limit_mm_s2: f64) {
         self.parameters.accel_limit_mm_s2 = accel_limit_mm_s2;
     }
 
     /// Advances `state` by one tick with `command_mm_s` held over it.
     ///
-    /// A command that is not a number is the caller's error and stays in the state; a converter
-    /// cannot put one out.
+    /// A NaN command is the caller's error and stays in the state; a converter can't put one out.
     pub fn tick<const LINE: usize>(&self, state: &mut DriveState<LINE>, command_mm_s: f64) {
         for _ in 0..self.substeps {
             self.step(state, command_mm_s);
@@ -173,7 +172,7 @@ impl DriveModel {
 }
 
 impl<const LINE: usize> DriveState<LINE> {
-    /// At rest at `position_mm`, command 0.
+    /// The state at rest at `position_mm`, command 0.
     ///
     /// # Errors
     /// `position_mm` is not finite, or the dead time does not fit into `LINE` cells.
@@ -181,7 +180,7 @@ impl<const LINE: usize> DriveState<LINE> {
         Self::in_motion(model, position_mm, 0.0)
     }
 
-    /// At `position_mm`, moving steadily: the torque balances the friction and the command has been
+    /// The state at `position_mm`, moving steadily: the torque balances the friction and the command has been
     /// `velocity_mm_s` for long. The bed is at rest.
     ///
     /// # Errors

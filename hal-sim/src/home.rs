@@ -1,29 +1,29 @@
 //! Home switch and index pulse of a simulated axis.
 //!
-//! Consumes, once a tick, the axis' true position and its count; produces the state of the switch, and the count at the first
-//! index since the latch was armed. Constant cost, cannot fail.
+//! Consumes, once per tick, the axis' true position and its count; produces the state of the switch, and the
+//! count at the first index since the latch was armed. Constant cost, cannot fail.
 
 use motion_kernel::units::Counts;
 
 /// A switch that is closed over a length of the travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwitchParameters {
-    /// Where it closes, from either side \[mm\]: the lesser position first.
+    /// The range in which it is closed \[mm\], lesser position first.
     pub closes_mm: (f64, f64),
-    /// How far outside of that it opens \[mm\], 0 or more.
+    /// How far outside of that range it opens \[mm\], 0 or more.
     pub hysteresis_mm: f64,
 }
 
-/// An index pulse every so many counts.
+/// A periodic index pulse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IndexParameters {
-    /// Counts a revolution, above 0.
+    /// Counts per revolution, above 0.
     pub counts: i64,
-    /// Where one of them is.
+    /// The count at one of the pulses.
     pub at: Counts,
 }
 
-/// Switch and index of an axis; what is broken is not there.
+/// Switch and index of an axis; a broken one is `None`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HomeParameters {
     /// The switch; without it the input stays open.
@@ -32,7 +32,7 @@ pub struct HomeParameters {
     pub index: Option<IndexParameters>,
 }
 
-/// Both in the course of time.
+/// The state of switch and index.
 #[derive(Clone, Debug)]
 pub struct SimHome {
     parameters: HomeParameters,
@@ -51,7 +51,7 @@ impl SimHome {
         home
     }
 
-    /// A tick that ended at `position_mm`, where the encoder reads `counts`.
+    /// Advances by a tick that ended at `position_mm`, where the encoder reads `counts`.
     pub fn advance(&mut self, position_mm: f64, counts: Counts) {
         if let Some(SwitchParameters { closes_mm: (least, greatest), hysteresis_mm }) = self.parameters.switch
         {

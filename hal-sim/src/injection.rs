@@ -1,7 +1,7 @@
 //! Breaks the simulated machine on demand: one thing at a time, at any tick.
 //!
-//! Consumes the counts that the encoders read and the true positions; produces the counts and digital inputs that a
-//! broken machine shows. Faults of a drive change the machine itself. What is broken stays broken until
+//! Consumes the counts that the encoders read and the true positions; produces the counts and digital inputs
+//! that a broken machine shows. Faults of a drive change the machine itself. A broken part stays broken until
 //! [`Injector::repair`]. Constant cost, cannot fail.
 
 use motion_kernel::hal::{AxisInputs, MachineInputs};
@@ -9,21 +9,21 @@ use motion_kernel::units::Counts;
 
 use crate::machine::SimMachine;
 
-/// What breaks.
+/// The part that breaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Injection {
-    /// The encoder's cable is cut: its counts stay what they are.
+    /// The encoder's cable is cut: its counts no longer change.
     EncoderLost,
-    /// The encoder counts so many that were none, once.
+    /// The encoder makes extra counts, once.
     EncoderJump {
-        /// The counts.
+        /// The extra counts.
         counts: i32,
     },
     /// The encoder counts the other way from here on.
     EncoderReversed,
     /// The drive turns the other way.
     DriveReversed,
-    /// The load is too great: so much acceleration is left of the drive's.
+    /// The load is too great: this limits the drive's acceleration.
     Overload {
         /// Its current limit \[mm/s²\], above 0.
         accel_limit_mm_s2: f64,
@@ -47,9 +47,9 @@ pub enum Injection {
 /// One axis' encoder and lines.
 #[derive(Clone, Copy, Debug)]
 struct Broken {
-    /// What the encoder read last; none before the first time.
+    /// The encoder's last reading; `None` before the first one.
     read: Option<i64>,
-    /// What was made of it.
+    /// The count shown for it.
     shown: i64,
     /// Counts shown per count read.
     gain: i64,
@@ -67,7 +67,7 @@ impl Broken {
     };
 }
 
-/// Stands between a simulated machine and what reads it.
+/// Sits between a simulated machine and its readers.
 #[derive(Clone, Copy, Debug)]
 pub struct Injector<const AXES: usize> {
     axes: [Broken; AXES],
@@ -82,7 +82,7 @@ impl<const AXES: usize> Injector<AXES> {
         Self { axes: [Broken::NOTHING; AXES], emergency_stop: false }
     }
 
-    /// Breaks something of an axis, counted from 0; nothing of an axis that there is not.
+    /// Breaks a part of an axis, counted from 0; without effect if there is no such axis.
     pub fn inject<const LINE: usize>(
         &mut self,
         machine: &SimMachine<AXES, LINE>,
@@ -103,8 +103,8 @@ impl<const AXES: usize> Injector<AXES> {
         }
     }
 
-    /// Mends encoders, lines and switches: encoders count on from where they are. What a drive lost it gets back by the
-    /// same injection with the opposite effect.
+    /// Repairs encoders, lines and switches; encoders continue to count from where they are. A drive is
+    /// repaired by the same injection with the opposite effect.
     pub fn repair(&mut self) {
         for broken in &mut self.axes {
             *broken = Broken { read: broken.read, shown: broken.shown, ..Broken::NOTHING };
@@ -112,11 +112,11 @@ impl<const AXES: usize> Injector<AXES> {
         self.emergency_stop = false;
     }
 
-    /// What the encoders show of what they read.
+    /// The counts that the encoders show for their readings.
     pub fn counts(&mut self, read: [Counts; AXES]) -> [Counts; AXES] {
         let mut shown = read;
         for ((broken, Counts(read)), shown) in self.axes.iter_mut().zip(read).zip(&mut shown) {
-            // A jump before the first reading is one from there.
+            // A jump before the first reading counts from there.
             let moved = broken.read.map_or(read, |before| broken.gain * (read - before));
             broken.shown += moved;
             broken.read = Some(read);
@@ -125,7 +125,7 @@ impl<const AXES: usize> Injector<AXES> {
         shown
     }
 
-    /// What the inputs read of a machine where it is.
+    /// The inputs of a machine in its present state.
     #[must_use]
     pub fn inputs<const LINE: usize>(&self, machine: &SimMachine<AXES, LINE>) -> MachineInputs<AXES> {
         let mut axes = [AxisInputs::HEALTHY; AXES];

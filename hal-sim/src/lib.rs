@@ -54,7 +54,7 @@
 //! # Ok::<(), Box<dyn core::error::Error>>(())
 //! ```
 //!
-//! # What the drive model is worth
+//! # Accuracy of the drive model
 //!
 //! S4 published measurements of a machine and no model. [`REFERENCE_X`] and [`REFERENCE_Y`] were fitted so
 //! that the measurements come out together; the crate's tests hold the fit's figures:
@@ -66,7 +66,8 @@
 //! | following error at 4 Hz and 2.150 m/min, V / V+A+J feedforward \[µm\] | 11 / 4 | 10.5 / 4.2 |
 //! | form deviation of a circle at 13 Hz \[µm\] | 32 | 31.5 |
 //!
-//! Missing: backlash, pitch error, cogging, coupling of the axes through the bed, thermal limits of the motor.
+//! Missing: backlash, pitch error, cogging, coupling of the axes through the bed, thermal limits of the
+//! motor.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 

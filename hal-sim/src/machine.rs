@@ -3,8 +3,8 @@
 //! Consumes the chip's voltages and the drive enable; produces encoder counts, all axes at once. One
 //! [`SimMachine::advance`] is one control tick; its cost is constant: axes × sub-steps.
 //!
-//! Everything goes through a shared reference, as on a board where the same machine hangs on several
-//! peripherals: `&machine` is the kernel's encoder and its drive enable, `machine.chip()` is the SPI device of
+//! Everything goes through a shared reference, as on a board where several peripherals connect to the same
+//! machine: `&machine` is the kernel's encoder and its drive enable, `machine.chip()` is the SPI device of
 //! its DAC driver, and the simulation advances the machine between two ticks. It is meant for one thread.
 
 use core::cell::{Cell, RefCell};
@@ -23,7 +23,7 @@ pub const REFERENCE_TICK_S: f64 = 0.0005;
 /// Sub-steps of the reference machine's tick.
 pub const REFERENCE_SUBSTEPS: u32 = 20;
 
-/// Cells for the dead time that suffice for the reference machine's 1.42 ms in steps of 25 µs.
+/// Number of cells that is enough for the reference machine's dead time of 1.42 ms in steps of 25 µs.
 pub const REFERENCE_LINE: usize = 64;
 
 /// A machine. Immutable once given to a [`SimMachine`].
@@ -62,7 +62,7 @@ impl core::fmt::Display for MachineError {
 
 impl core::error::Error for MachineError {}
 
-/// What only a simulation knows of an axis.
+/// The true state of an axis, which only a simulation knows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisTruth {
     /// Position \[mm\].
@@ -148,21 +148,21 @@ impl<const AXES: usize, const LINE: usize> SimMachine<AXES, LINE> {
         self.is_enabled.get()
     }
 
-    /// Turns the drive of an axis the other way; again, and it is as before.
+    /// Reverses the drive of an axis; a second call restores it.
     pub fn reverse_drive(&self, axis: usize) {
         if let Some(axis) = self.axes.borrow_mut().get_mut(axis) {
             axis.reverse_drive();
         }
     }
 
-    /// The drive of an axis has another current limit from now on \[mm/s²\], > 0.
+    /// Sets another current limit of an axis' drive \[mm/s²\], > 0.
     pub fn limit_drive(&self, axis: usize, accel_limit_mm_s2: f64) {
         if let Some(axis) = self.axes.borrow_mut().get_mut(axis) {
             axis.limit_drive(accel_limit_mm_s2);
         }
     }
 
-    /// What no encoder shows, for tests and records.
+    /// The true state of all axes, for tests and records.
     #[must_use]
     pub fn truth(&self) -> [AxisTruth; AXES] {
         let axes = self.axes.borrow();

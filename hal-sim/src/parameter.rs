@@ -7,21 +7,21 @@ pub enum ParameterError {
     NotFinite {
         /// The parameter, by its field name.
         quantity: &'static str,
-        /// What was given, in the unit of the name.
+        /// The value given, in the unit of the name.
         value: f64,
     },
     /// The value is finite but outside its documented range.
     OutOfRange {
         /// The parameter, by its field name.
         quantity: &'static str,
-        /// What was given, in the unit of the name.
+        /// The value given, in the unit of the name.
         value: f64,
     },
     /// The dead time spans more sub-steps than the line has cells for.
     LineTooShort {
         /// Cells that the dead time needs at this sub-step.
         cells_needed: usize,
-        /// Cells that there are.
+        /// Number of cells.
         capacity: usize,
     },
 }

@@ -1,9 +1,9 @@
 //! The circle test of S4 on the simulated X and Y axes, closed loop, through the real DAC driver.
 //!
 //! The regulator here is a test oracle of S4 (1), plain P with feedforward, written apart from the kernel's.
-//! Contour error: largest deviation of the radius read from the encoders; form deviation: largest minus smallest
-//! radius; following error: largest difference of set-point and reading of X. All over the last second of four, when the
-//! bed has come to rest. Expected figures and tolerances: the reference model of S4.
+//! Contour error: largest deviation of the radius read from the encoders; form deviation: largest minus
+//! smallest radius; following error: largest difference of set-point and reading of X. All over the last
+//! second of four, when the bed has come to rest. Expected figures and tolerances: the reference model of S4.
 
 use core::f64::consts::PI;
 

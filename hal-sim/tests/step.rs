@@ -1,10 +1,11 @@
 //! The velocity step of S4 on the simulated X axis: 0 to 7.2 m/min, open loop, through the real DAC
 //! driver.
 //!
-//! Delay, time constant, overshoot and settling are read from the velocity as backward differences of the true
-//! positions at the tick, stamped with the later tick: tangent at the steepest difference, crossing 0 at the delay
-//! and rising to the command within the time constant. The peaks are backward differences of encoder readings, as
-//! the paper's machine records them. Expected figures and tolerances: the reference model of S4.
+//! Delay, time constant, overshoot and settling are read from the velocity as backward differences of the
+//! true positions at the tick, stamped with the later tick: tangent at the steepest difference, crossing 0 at
+//! the delay and rising to the command within the time constant. The peaks are backward differences of
+//! encoder readings, as the paper's machine records them. Expected figures and tolerances: the reference
+//! model of S4.
 
 use hal_sim::{AxisParameters, MachineParameters, REFERENCE_MM_S_PER_VOLT, SimMachine};
 use motion_kernel::hal::{Ad5754Output, DriveEnable, Encoder, VelocityChannel};

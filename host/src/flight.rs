@@ -1,8 +1,8 @@
 //! What a board's flight recorder kept, read from the board's log.
 //!
 //! Consumes text in which a frame of [`motion_kernel::flight`] stands in a line as `flight [01, 03, …]`, in
-//! hexadecimal, whatever is before or behind it; produces the ticks as those of a run. Lines without a frame are passed
-//! over. Fails at the first frame that is damaged, with its line.
+//! hexadecimal, whatever is before or behind it; produces the ticks as those of a run. Lines without a frame
+//! are passed over. Fails at the first frame that is damaged, with its line.
 
 use motion_kernel::flight::{FlightRow, FrameError};
 

@@ -1,9 +1,9 @@
 //! Lists of points, which splines go through: CSV.
 //!
-//! Consumes text with the heading `x_mm,y_mm,z_mm` or `x_mm,y_mm,z_mm,u` and a row of numbers for every point;
-//! produces the points, their parameters if there are any, and their lines. Blank lines, and lines that start with
-//! `#`, are left out. Nothing is guessed: what is not a finite number is refused with line and column. Background;
-//! linear.
+//! Consumes text with the heading `x_mm,y_mm,z_mm` or `x_mm,y_mm,z_mm,u` and a row of numbers for every
+//! point; produces the points, their parameters if there are any, and their lines. Blank lines, and lines
+//! that start with `#`, are left out. Nothing is guessed: what is not a finite number is refused with line
+//! and column. Background; linear.
 
 use csv::{ByteRecord, ReaderBuilder};
 
@@ -123,7 +123,8 @@ pub fn read(source_name: &str, text: &[u8]) -> Result<Points, PointsError> {
     Ok(points)
 }
 
-/// The column, from 1, where field `index` of a line begins; of one that is not there, just past the last one.
+/// The column, from 1, where field `index` of a line begins; of one that is not there, just past the last
+/// one.
 fn column_of(fields: &[String], index: usize) -> usize {
     let before: usize = fields.iter().take(index).map(|field| field.chars().count() + 1).sum();
     if index < fields.len() { before + 1 } else { before.max(1) }

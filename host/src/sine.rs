@@ -24,8 +24,9 @@ pub enum Baseline {
 
 /// The sine of ω \[rad/s\] nearest to `values`, which follow each other by `tick_s` from t = 0 on.
 ///
-/// The normal equations are solved whole, so that the values need not cover whole periods; over less than half a
-/// period the baseline and the sine can't be told apart. No or equal values make a sine of no amplitude.
+/// The normal equations are solved whole, so that the values need not cover whole periods; over less than
+/// half a period the baseline and the sine can't be told apart. No or equal values make a sine of no
+/// amplitude.
 #[must_use]
 pub fn fit(values: &[f64], omega_per_s: f64, tick_s: f64, baseline: Baseline) -> Sine {
     let unknowns = if baseline == Baseline::Line { 4 } else { 3 };

@@ -123,8 +123,8 @@ pub struct TracedBlock {
     pub length_mm: f64,
     /// Ceiling of the feed \[mm/s\].
     pub cap_mm_s: f64,
-    /// What holds the feed down: what set the ceiling, or "accelerating" or "braking" where the block is too short
-    /// for the feed to reach it.
+    /// What holds the feed down: what set the ceiling, or "accelerating" or "braking" where the block is too
+    /// short for the feed to reach it.
     pub cap_reason: Cow<'static, str>,
     /// Feed at the start \[mm/s\].
     pub enter_mm_s: f64,

@@ -1,4 +1,5 @@
-//! `motion compare` against an independent least time, found by stepping along the path, and against the plans themselves.
+//! `motion compare` against an independent least time, found by stepping along the path, and against the
+//! plans themselves.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -24,8 +25,8 @@ fn json(arguments: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
-/// The fastest motion without limits of jerk and snap, by small steps of path: forward as far as acceleration goes,
-/// backward as far as braking goes, and the time between neighbours from their mean feed.
+/// The fastest motion without limits of jerk and snap, by small steps of path: forward as far as acceleration
+/// goes, backward as far as braking goes, and the time between neighbours from their mean feed.
 fn stepped_s(stretch: &Stretch, steps: usize) -> f64 {
     let (mut lengths, mut accels, mut caps) = (Vec::new(), Vec::new(), Vec::new());
     for block in &stretch.blocks {
@@ -55,8 +56,8 @@ fn plan(text: &str, mode: Mode) -> Plan {
     plan_program("sample.ngc", &program, &Machine::reference(), mode).expect("a plan")
 }
 
-/// Each figure is what planning the program by itself gives, and their order is what it has to be: no plan is faster than
-/// acceleration allows, and the default none slower than one pair of ramps per block.
+/// Each figure is what planning the program by itself gives, and their order is what it has to be: no plan is
+/// faster than acceleration allows, and the default none slower than one pair of ramps per block.
 #[test]
 fn the_times_of_the_samples_are_in_order() {
     let found = json(&[".", "--tolerance", "0.02", "--tolerance", "0.2", "--json"]);

@@ -1,4 +1,5 @@
-//! G5 and G5.5 against what they mean: de Casteljau's construction, the programmed points, exact stops at corners.
+//! G5 and G5.5 against what they mean: de Casteljau's construction, the programmed points, exact stops at
+//! corners.
 
 use motion_host::compare::ticks::ratios;
 use motion_host::gcode;

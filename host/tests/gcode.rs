@@ -1,5 +1,5 @@
-//! The G-code reader from outside: whole programs, against a second, simple-minded interpreter written for this
-//! test alone, and against plane geometry. Every random case replays from the seed it prints; set
+//! The G-code reader from outside: whole programs, against a second, simple-minded interpreter written for
+//! this test alone, and against plane geometry. Every random case replays from the seed it prints; set
 //! `MOTION_TEST_SEED` to search elsewhere.
 
 #![allow(clippy::float_cmp, reason = "exact values are the point")]
@@ -25,7 +25,8 @@ fn read(name: &str, text: &str) -> Program {
     gcode::read(name, text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-// ---- the second interpreter --------------------------------------------------------------------------------------
+// ---- the second interpreter
+// --------------------------------------------------------------------------------------
 
 /// A step as the second interpreter expects it; lengths in 10⁻¹⁰ mm.
 #[derive(Debug)]
@@ -328,7 +329,8 @@ fn check(text: &[u8], seed: u64) -> bool {
     outcome.unwrap_or_else(|_| panic!("seed {seed}, program:\n{}", String::from_utf8_lossy(text)))
 }
 
-// ---- samples -----------------------------------------------------------------------------------------------------
+// ---- samples
+// -----------------------------------------------------------------------------------------------------
 
 #[test]
 fn samples_read_as_the_second_interpreter_reads_them() {
@@ -376,7 +378,8 @@ fn a_dwell_names_its_seconds_and_an_arc_its_centre() {
     assert_near(arc.sweep_rad, -1.5 * PI, 1e-15, "sweep");
 }
 
-// ---- random programs ---------------------------------------------------------------------------------------------
+// ---- random programs
+// ---------------------------------------------------------------------------------------------
 
 fn number(random: &mut Random, mm_max: i64, decimals: u32) -> (i64, String) {
     let scale = 10_i64.pow(decimals);
@@ -501,7 +504,8 @@ fn random_valid_programs_are_read_as_written() {
     }
 }
 
-// ---- mutations ---------------------------------------------------------------------------------------------------
+// ---- mutations
+// ---------------------------------------------------------------------------------------------------
 
 fn mutate(text: &mut Vec<u8>, random: &mut Random) {
     const ALPHABET: &[u8] = b"GMXYZIJKRFPQSNTAGMXYZ0123456789012345..--+ \t();%/#[]\n\r\xb5\0";

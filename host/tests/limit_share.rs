@@ -1,5 +1,5 @@
-//! `limit_active_share` of `motion run` against a calculation of its own, from the trace of the run: velocity,
-//! acceleration, jerk and snap by differences, each of what it is the rate of.
+//! `limit_active_share` of `motion run` against a calculation of its own, from the trace of the run:
+//! velocity, acceleration, jerk and snap by differences, each of what it is the rate of.
 
 use std::fs;
 use std::path::Path;
@@ -37,8 +37,8 @@ fn columns(text: &str, names: &[&str]) -> Vec<Vec<f64>> {
     columns
 }
 
-/// On which part of the length the feed is at its block's ceiling, or a limit of the path or of an axis is reached; and
-/// the parts where the ceiling alone, or one of the other limits, is the reason.
+/// On which part of the length the feed is at its block's ceiling, or a limit of the path or of an axis is
+/// reached; and the parts where the ceiling alone, or one of the other limits, is the reason.
 fn share(trace: &str, plan: &Value, machine: &Machine) -> [f64; 3] {
     let of_axes = |figure: &str| {
         let names = ["X", "Y", "Z"].map(|axis| format!("{axis}_{figure}"));

@@ -96,8 +96,8 @@ fn the_cubics_jerk_steps_and_the_quintics_does_not() {
     assert_near(fine, 53.8, 0.05);
 }
 
-/// The jerk of a quintic between two knots, differenced, is the derivative of the path: what is called a step is none of
-/// the differencing.
+/// The jerk of a quintic between two knots, differenced, is the derivative of the path: what is called a step
+/// is none of the differencing.
 #[test]
 fn differences_converge_to_the_derivatives() {
     let course = smoothness::course(&smoothness::spline(Degree::Quintic).expect("a spline"));

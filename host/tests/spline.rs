@@ -1,5 +1,5 @@
-//! Splines, involutes and their pieces, against what knows nothing of them: their definitions, finite differences and
-//! quadrature of its own.
+//! Splines, involutes and their pieces, against what knows nothing of them: their definitions, finite
+//! differences and quadrature of its own.
 
 use motion_host::machine::Machine;
 use motion_host::planning::spline::plan_spline;
@@ -32,7 +32,8 @@ fn plus(a: Vector, b: Vector) -> Vector {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// Zeroth to fourth derivative by the spline's parameter, at the end of every span and at the start of the next.
+/// Zeroth to fourth derivative by the spline's parameter, at the end of every span and at the start of the
+/// next.
 fn at_knots(spline: &Spline) -> Vec<[[Vector; 5]; 2]> {
     let spans: Vec<(Vector, &Polynomial)> =
         spline.elements().map(|(_, element)| element.ends_mm().0).zip(spline.spans()).collect();
@@ -146,7 +147,8 @@ fn the_order_of_accuracy_is_the_degree_and_one() {
     }
 }
 
-/// What is stated is what an independent look finds, within the tolerance, with fewer knots than points, C³ throughout.
+/// What is stated is what an independent look finds, within the tolerance, with fewer knots than points, C³
+/// throughout.
 #[test]
 fn a_fit_keeps_its_tolerance_and_says_how_well() {
     let mut random = Random::of_stream(3);
@@ -219,7 +221,8 @@ fn what_is_no_spline_is_refused() {
     for mm in [-1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(fit(&good, &even, Degree::Cubic, mm), Err(SplineError::Tolerance { .. })));
     }
-    // Steps that differ by up to ten decades: solved to the stated digits, or refused; never wrong, never a panic.
+    // Steps that differ by up to ten decades: solved to the stated digits, or refused; never wrong, never a
+    // panic.
     let mut random = Random::of_stream(4);
     let (mut solved, mut refused) = (0, 0);
     for _ in 0..500 {
@@ -261,8 +264,8 @@ fn measured(curve: &dyn Curve, from: f64, to: f64, steps: u32) -> Vec<(f64, Vect
         .collect()
 }
 
-/// Pieces are where the curve is at the same length, and as fast, within what they state and a quarter; they follow
-/// each other, and are as long as the curve.
+/// Pieces are where the curve is at the same length, and as fast, within what they state and a quarter; they
+/// follow each other, and are as long as the curve.
 #[test]
 fn pieces_are_as_close_as_they_say() {
     let mut random = Random::of_stream(5);
@@ -410,7 +413,8 @@ fn endless_curves_hit_the_cap() {
     assert!((400..=4200).contains(&fewer.len()), "{}", fewer.len());
 }
 
-/// Random polynomials of every kind, cusps and loops among them: pieces or a typed error, and nothing that is not finite.
+/// Random polynomials of every kind, cusps and loops among them: pieces or a typed error, and nothing that is
+/// not finite.
 #[test]
 fn random_polynomials_have_pieces_or_an_error() {
     let mut random = Random::of_stream(6);
@@ -443,7 +447,8 @@ fn random_polynomials_have_pieces_or_an_error() {
     assert!(good > 150 && bad > 20, "{good} {bad}");
 }
 
-/// Through the real kernel: the set positions of every tick lie on the spline, and the axes' jerk is that of the path.
+/// Through the real kernel: the set positions of every tick lie on the spline, and the axes' jerk is that of
+/// the path.
 #[test]
 fn a_spline_runs_as_it_was_programmed() {
     let points: Vec<Vector> = (0..24)
@@ -469,8 +474,8 @@ fn a_spline_runs_as_it_was_programmed() {
     let summary = simulate::run(&plan, &machine, &mut |tick| {
         let there = course.at(tick.s_mm).expect("on the path");
         let set = tick.axes.map(|axis| axis.set_mm);
-        // Set positions of the record are those of the axes, which preview may delay: on the reference machine it
-        // does not.
+        // Set positions of the record are those of the axes, which preview may delay: on the reference
+        // machine it does not.
         farthest = farthest.max(norm(minus(set, there.point)));
         let velocity = tick.axes.map(|axis| axis.vel_mm_s);
         fastest = fastest.max(norm(minus(velocity, there.tangent.map(|t| t * tick.v_mm_s))));

@@ -23,7 +23,8 @@ const MM_PER_COUNT: f64 = 0.0001;
 const MM_S_AT_10_V: f64 = 100.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // What a machine's file says of the axis. With a perfect feedforward of velocity the gain has nothing to do.
+    // What a machine's file says of the axis. With a perfect feedforward of velocity the gain has nothing to
+    // do.
     let axis = AxisFigures {
         mm_per_count: MM_PER_COUNT,
         mm_s_at_10_v: MM_S_AT_10_V,

@@ -4,8 +4,8 @@
 //! cargo run -p motion-kernel --example 02_three_axes
 //! ```
 //!
-//! The corner is passed at a feed that its angle allows, and the plan brakes for it in time. Here the set-points are what
-//! matters, so there is an executor and no machine.
+//! The corner is passed at a feed that its angle allows, and the plan brakes for it in time. Here the
+//! set-points are what matters, so there is an executor and no machine.
 
 use std::error::Error;
 

@@ -4,8 +4,9 @@
 //! cargo run -p motion-kernel --example 03_closed_loop
 //! ```
 //!
-//! The drive model was fitted to measurements: dead time, velocity controller, friction. Below the kernel's traits there is
-//! the driver of the converter that a board uses, and a simulated chip in place of the SPI bus.
+//! The drive model was fitted to measurements: dead time, velocity controller, friction. Below the kernel's
+//! traits there is the driver of the converter that a board uses, and a simulated chip in place of the SPI
+//! bus.
 
 use std::convert::Infallible;
 use std::error::Error;
@@ -27,7 +28,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let without = greatest_error_mm(0.0)?;
     let with = greatest_error_mm(1.0)?;
     println!("greatest following error: {without:.3} mm without feedforward, {with:.3} mm with it");
-    // P control needs an error of v / kp to ask for a velocity: 50 mm/s / 50/s = 1 mm. Feedforward asks without one.
+    // P control needs an error of v / kp to ask for a velocity: 50 mm/s / 50/s = 1 mm. Feedforward asks
+    // without one.
     assert!((without - 1.0).abs() < 0.1, "expected v / kp, found {without} mm");
     assert!(with < 0.25 * without, "feedforward leaves {with} of {without} mm");
     Ok(())

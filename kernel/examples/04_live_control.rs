@@ -4,8 +4,8 @@
 //! cargo run -p motion-kernel --features live --example 04_live_control
 //! ```
 //!
-//! The background may be late: whatever the tick has ends at rest on the path, within the program's limits. A command is
-//! another such motion, which takes over where the feed does not change.
+//! The background may be late: whatever the tick has ends at rest on the path, within the program's limits. A
+//! command is another such motion, which takes over where the feed does not change.
 
 use std::error::Error;
 

@@ -4,7 +4,8 @@
 //! cargo run -p motion-kernel --example 05_program_from_bytes
 //! ```
 //!
-//! The bytes carry the machine that they were planned for, so that a program can't run on another one by mistake.
+//! The bytes carry the machine that they were planned for, so that a program can't run on another one by
+//! mistake.
 
 use std::error::Error;
 
@@ -83,7 +84,8 @@ fn compile() -> Result<Vec<u8>, Box<dyn Error>> {
             length: at(1.0)?,
         })
     };
-    // In the order of the places where they begin, so that neither stream fills up while the other one starves.
+    // In the order of the places where they begin, so that neither stream fills up while the other one
+    // starves.
     let mut items = vec![Item::Feed(PlannedRamp::new(&rise, ramp, header.tick_s)?)];
     for number in 0..40 {
         items.push(line(number)?);

@@ -4,8 +4,8 @@
 //! cargo run -p motion-kernel --example 06_board_skeleton
 //! ```
 //!
-//! Replace the two fakes at the end by the SPI device and the timer of a board, and call `Board::tick` in the interrupt of
-//! another timer. `boards/README.md` has the steps of a port.
+//! Replace the two fakes at the end by the SPI device and the timer of a board, and call `Board::tick` in the
+//! interrupt of another timer. `boards/README.md` has the steps of a port.
 
 use std::convert::Infallible;
 use std::error::Error;

@@ -1,5 +1,5 @@
-//! Arrays whose length is a parameter, which serde itself does not know: as tuples, element by element, without a
-//! panic path.
+//! Arrays whose length is a parameter, which serde itself does not know: as tuples, element by element,
+//! without a panic path.
 
 use core::fmt;
 use core::marker::PhantomData;

@@ -1,7 +1,7 @@
 //! Tests: pieces and segments whose bits were changed after they were accepted.
 //!
-//! Whatever comes of them, a set-point that jumps is a fault in the tick it jumps in, and outputs are ramped; what is not a
-//! number never reaches a converter.
+//! Whatever comes of them, a set-point that jumps is a fault in the tick it jumps in, and outputs are ramped;
+//! what is not a number never reaches a converter.
 
 use crate::axis::{AxesConfig, GuardFigures};
 use crate::exec::ExecState;

@@ -1,6 +1,6 @@
-//! What can go wrong on the machine: typed, with its tick and its figures, and how it ends.
+//! Faults of the machine: their kinds and figures, and the reaction to each.
 //!
-//! Rejections of bad input are another matter: [`crate::queue::Rejection`].
+//! Bad input is not a fault; see [`crate::queue::Rejection`].
 //!
 //! ```
 //! # use hal_sim::closed_loop::InMemory;
@@ -42,21 +42,22 @@ pub(crate) mod reaction;
 use crate::exec::ExecFault;
 pub use reaction::{Reaction, Reactions};
 
-/// What went wrong, where and when.
+/// What went wrong, and when.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fault<R> {
     /// The tick in which it was found.
     pub tick: u64,
-    /// What.
+    /// What went wrong.
     pub kind: FaultKind<R>,
 }
 
-/// The kinds of fault. Exhaustive on purpose: a program that reacts to faults should not build with one that it does not know.
+/// The kinds of fault. Exhaustive on purpose: a program that reacts to faults should not build with one that
+/// it does not know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FaultKind<R> {
-    /// The executor could not go on.
+    /// The executor could not continue.
     Executor(ExecFault),
     /// The following error of an axis is beyond its limit.
     FollowingError {
@@ -70,7 +71,7 @@ pub enum FaultKind<R> {
         /// The axis, from 0.
         axis: usize,
     },
-    /// The encoder of an axis counted what no motor moves in a tick.
+    /// The encoder of an axis counted more than any motor moves in a tick.
     EncoderJump {
         /// The axis, from 0.
         axis: usize,
@@ -82,7 +83,7 @@ pub enum FaultKind<R> {
         /// The axis, from 0.
         axis: usize,
     },
-    /// The output of an axis is at its limit for too long.
+    /// The output of an axis was at its limit for too long.
     Saturated {
         /// The axis, from 0.
         axis: usize,
@@ -129,9 +130,10 @@ pub enum FaultKind<R> {
         /// The axis, from 0.
         axis: usize,
     },
-    /// A tick took longer than its period. Reported by the board, see [`TickMonitor`](crate::tick_monitor::TickMonitor).
+    /// A tick took longer than its period. Reported by the board, see
+    /// [`TickMonitor`](crate::tick_monitor::TickMonitor).
     TickOverrun,
-    /// Ticks did not come. Reported by the board.
+    /// Ticks were missed. Reported by the board.
     TickMissed {
         /// How many.
         ticks: u32,
@@ -139,16 +141,16 @@ pub enum FaultKind<R> {
 }
 
 impl<R> FaultKind<R> {
-    /// How it ends; the emergency stop as the machine says.
+    /// The reaction to it; `emergency_stop` is the machine's reaction to the emergency stop.
     #[must_use]
     pub const fn reaction(&self, emergency_stop: Reaction) -> Reaction {
         match self {
             Self::EmergencyStop => emergency_stop,
-            // Feedback, drives and set-points are good.
+            // Feedback, drives and set-points are still good.
             Self::Saturated { .. } | Self::SoftLimit { .. } | Self::TickOverrun | Self::TickMissed { .. } => {
                 Reaction::Stop
             }
-            // The drives obey, but set-points or feedback are not to be trusted, or the path is left already.
+            // The drives obey, but set-points or feedback can't be trusted, or the path is already left.
             Self::Executor(_)
             | Self::FollowingError { .. }
             | Self::EncoderJump { .. }
@@ -158,7 +160,7 @@ impl<R> FaultKind<R> {
             | Self::Drive { .. }
             | Self::DriveNotReady { .. }
             | Self::LimitSwitch { .. } => Reaction::Ramp,
-            // Nobody knows what a drive does, or no voltage reaches it.
+            // It is unknown what a drive does, or no voltage reaches it.
             Self::EncoderLost { .. } | Self::Runaway { .. } | Self::Encoder | Self::Output | Self::Enable => {
                 Reaction::Immediate
             }

@@ -1,4 +1,5 @@
-//! What unit tests share: an axis like the reference machine's X, what is watched of it, and the rules of its path.
+//! What unit tests share: an axis like the reference machine's X, what is watched of it, and the rules of its
+//! path.
 
 #[cfg(feature = "guards")]
 mod guarded;

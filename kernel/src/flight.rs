@@ -1,10 +1,10 @@
 //! Flight recorder: the last ticks, kept when a fault comes.
 //!
-//! Consumes each tick's [`Trace`], in the tick: one [`FlightRow`] is copied, and nothing else depends on how many there are. A
-//! fault freezes it: `AFTER` ticks behind the fault's are kept still, so that one sees how the machine came to rest, and
-//! then nothing is written until [`FlightRecorder::clear`]. Read from the background, oldest first.
+//! Consumes each tick's [`Trace`], in the tick: one [`FlightRow`] is copied, whatever the number of rows. A
+//! fault freezes the recorder: it still keeps the next `AFTER` ticks, to show how the machine came to rest,
+//! and then writes nothing until [`FlightRecorder::clear`]. Read from the background, oldest first.
 //!
-//! A row leaves a board as a frame of bytes of its own, so that a frame that is lost on the way costs one row:
+//! A row leaves a board as a frame of its own, so that a lost frame costs one row:
 //!
 //! | bytes | content |
 //! |---|---|
@@ -13,7 +13,7 @@
 //! | … | [`FlightRow`] of f64, whatever the kernel's number type, in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
-//! Memory is that of the rows: 168 bytes each for three axes in f32.
+//! Its memory is the rows: 168 bytes each for three axes in f32.
 //!
 //! ```
 //! # use hal_sim::closed_loop::InMemory;
@@ -73,25 +73,25 @@ const VERSION: u8 = 1;
 const PREFIX: usize = 2;
 const CHECKSUM: usize = 4;
 
-/// A frame of a row of `axes` axes is no longer \[bytes\].
+/// Greatest length of the frame of a row of `axes` axes \[bytes\].
 #[must_use]
 pub const fn frame_max(axes: usize) -> usize {
     // Numbers of 64 bits take ten bytes at most, of 32 five, of 16 three, figures eight.
     PREFIX + 10 + (10 + 4 * 8) + 5 + 5 + 1 + 1 + 1 + axes * (10 + 10 + 4 * 8 + 3 + 1 + 1) + CHECKSUM
 }
 
-/// What is kept of a tick.
+/// A tick's row.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FlightRow<R, const AXES: usize> {
     /// Tick number since the start.
     pub tick: u64,
     /// The motion along the path; `s` counts from the stretch's start.
     pub motion: PathMotion<R>,
-    /// Stretches finished since the start.
+    /// Number of stretches finished since the start.
     pub stretches: u32,
     /// Program line of the current piece; 0 at rest.
     pub line: u32,
-    /// What the executor was doing.
+    /// The executor's state.
     pub state: ExecState,
     /// The emergency stop was open.
     pub emergency_stop: bool,
@@ -102,10 +102,10 @@ pub struct FlightRow<R, const AXES: usize> {
     pub axes: [FlightAxis<R>; AXES],
 }
 
-/// What is kept of an axis.
+/// An axis in a row.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FlightAxis<R> {
-    /// What the encoder read at the start of the tick.
+    /// The encoder's reading at the start of the tick.
     pub counts: Counts,
     /// The position set-point that was regulated to.
     pub set: Position,
@@ -117,7 +117,7 @@ pub struct FlightAxis<R> {
     pub jerk_mm_s3: R,
     /// Following error: set − actual \[mm\].
     pub following_error_mm: R,
-    /// What the converter was to put out.
+    /// The code for the converter.
     pub code: DacCode,
     /// The output reached the limit.
     pub saturated: bool,
@@ -126,7 +126,7 @@ pub struct FlightAxis<R> {
 }
 
 impl<R: Scalar, const AXES: usize> FlightRow<R, AXES> {
-    /// Of a tick.
+    /// The row of a tick.
     #[must_use]
     #[inline]
     pub fn new(trace: &Trace<R, AXES>) -> Self {
@@ -169,7 +169,7 @@ impl<R: Scalar, const AXES: usize> FlightRow<R, AXES> {
         }
     }
 
-    /// The same in f64: exactly for floats, to the nearest for fixed point.
+    /// The same row in f64: exact for floats, rounded to nearest for fixed point.
     #[must_use]
     pub fn to_f64(&self) -> FlightRow<f64, AXES> {
         let Self { tick, motion, stretches, line, state, emergency_stop, is_faulted, .. } = *self;
@@ -201,8 +201,8 @@ impl<R: Scalar, const AXES: usize> FlightRow<R, AXES> {
         }
     }
 
-    /// The row as a frame, at the start of `buffer`; none if that is shorter than the frame, which is at most
-    /// [`frame_max`] long. Background.
+    /// Writes the row as a frame at the start of `buffer`; `None` if the buffer is shorter than the frame,
+    /// which is at most [`frame_max`] long. Background.
     pub fn to_frame<'a>(&self, buffer: &'a mut [u8]) -> Option<&'a [u8]> {
         let (prefix, rest) = buffer.split_first_chunk_mut()?;
         *prefix = [VERSION, u8::try_from(AXES).ok()?];
@@ -218,9 +218,9 @@ impl<R: Scalar, const AXES: usize> FlightRow<R, AXES> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// It is shorter than the shortest.
+    /// It is shorter than the shortest frame.
     Short,
-    /// It is of another version of the format.
+    /// It has another version of the format.
     Version {
         /// Its version; 1 is expected.
         found: u8,
@@ -234,12 +234,12 @@ pub enum FrameError {
     },
     /// It has been damaged.
     Checksum {
-        /// Of the bytes as they are.
+        /// The checksum of the bytes received.
         found: u32,
-        /// As written.
+        /// The checksum in the frame.
         expected: u32,
     },
-    /// Behind an intact checksum there is no row.
+    /// The checksum is right, but the content is no row.
     Malformed,
 }
 
@@ -260,10 +260,10 @@ impl core::fmt::Display for FrameError {
 impl core::error::Error for FrameError {}
 
 impl<const AXES: usize> FlightRow<f64, AXES> {
-    /// The row in `frame`.
+    /// Reads the row in `frame`.
     ///
     /// # Errors
-    /// Nothing but a whole, undamaged frame of `AXES` axes is accepted.
+    /// The bytes are not one whole, undamaged frame of `AXES` axes.
     pub fn from_frame(frame: &[u8]) -> Result<Self, FrameError> {
         let (content, sum) = frame.split_last_chunk().ok_or(FrameError::Short)?;
         let (&[version, axes], body) = content.split_first_chunk().ok_or(FrameError::Short)?;
@@ -284,25 +284,25 @@ impl<const AXES: usize> FlightRow<f64, AXES> {
     }
 }
 
-/// The last `ROWS` ticks, of which `AFTER` behind that of a fault.
+/// The last `ROWS` ticks; with a fault, `AFTER` of them come after its tick.
 #[derive(Debug)]
 pub struct FlightRecorder<R, const AXES: usize, const ROWS: usize, const AFTER: usize> {
     rows: Deque<FlightRow<R, AXES>, ROWS>,
-    /// The fault that freezes it, and how many ticks are to be kept still.
+    /// The fault that freezes it, and the number of ticks still to be kept.
     fault: Option<(Fault<R>, usize)>,
 }
 
 impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> FlightRecorder<R, AXES, ROWS, AFTER> {
     const HAS_ROOM: () = assert!(AFTER < ROWS, "no room for the tick of the fault");
 
-    /// Without a tick.
+    /// An empty recorder.
     #[must_use]
     pub const fn new() -> Self {
         let () = Self::HAS_ROOM;
         Self { rows: Deque::new(), fault: None }
     }
 
-    /// Adds a tick, unless it is frozen. Call it in the tick.
+    /// Adds a tick, unless the recorder is frozen. Call it in the tick.
     #[inline]
     pub fn add(&mut self, trace: &Trace<R, AXES>) {
         match (&mut self.fault, &trace.fault) {
@@ -318,19 +318,19 @@ impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> FlightRe
         debug_assert!(kept.is_ok(), "the oldest row has made room");
     }
 
-    /// Whether a fault has frozen it: nothing is added any more.
+    /// Whether a fault has frozen it: no more ticks are added.
     #[must_use]
     pub fn is_frozen(&self) -> bool {
         matches!(self.fault, Some((_, 0)))
     }
 
-    /// The fault that freezes it, from its tick on.
+    /// The fault that freezes it; known from the fault's tick on.
     #[must_use]
     pub fn fault(&self) -> Option<Fault<R>> {
         self.fault.map(|(fault, _)| fault)
     }
 
-    /// The row so many behind the oldest.
+    /// The row `index` ticks after the oldest.
     #[must_use]
     pub fn row(&self, index: usize) -> Option<&FlightRow<R, AXES>> {
         self.rows.get(index)
@@ -341,8 +341,8 @@ impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> FlightRe
         self.rows.iter()
     }
 
-    /// Forgets everything, and records again. Clear the kernel's fault first: one that is still latched freezes the
-    /// recorder once more.
+    /// Forgets everything, and records again. Clear the kernel's fault first: one that is still latched
+    /// freezes the recorder once more.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.fault = None;

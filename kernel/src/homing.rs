@@ -1,9 +1,9 @@
 //! Homing of an axis: switch and, where there is one, index pulse, at two speeds.
 //!
-//! Consumes, once a poll of the background, what the tick has seen of the axis ([`HomingInput`]); produces what is to be done next
-//! ([`HomingStep`]): jogs, which are jerk-limited, and stops, which are controlled. The reference is where the switch closes on the
-//! slow approach, or the first index behind that: its count is latched, so that however late the stop is the position is
-//! exact.
+//! Consumes, once per poll of the background, what the tick has seen of the axis ([`HomingInput`]); produces
+//! the next step ([`HomingStep`]): jogs, which are jerk-limited, and stops, which are controlled. The
+//! reference is where the switch closes on the slow approach, or the first index after that: its count is
+//! latched, so the position is exact however late the stop is.
 //!
 //! ```text
 //!              on already ┌──────────────────────┐
@@ -13,11 +13,13 @@
 //!          closes, at rest└──────────────────────┘
 //! ```
 //!
-//! Without an index the reference is as good as the moment when the switch is seen: the slow feed times the time between
-//! two polls, and the switch itself. With one it is the same count from wherever homing starts, as long as the index does not
-//! lie where the switch closes: [`Homed::index_counts`] says how far behind it was found.
+//! Without an index the reference is off by up to the slow feed times the time between two polls, plus the
+//! switch's own repeatability. With an index it is the same count wherever homing starts, as long as the
+//! index does not lie where the switch closes: [`Homed::index_counts`] says how far beyond the switch it was
+//! found.
 //!
-//! Every stage is bounded by a length; what is not found within it is a [`HomingError`], which comes at rest.
+//! Every stage is bounded by a length; if nothing is found within it, homing ends at rest with a
+//! [`HomingError`].
 
 use crate::jog::{Direction, Jog, JogAxis, JogError, JogTarget};
 use crate::live::State;
@@ -34,11 +36,11 @@ pub struct HomingConfig {
     pub slow_mm_s: f64,
     /// Greatest length of the search \[mm\].
     pub travel_mm: f64,
-    /// Greatest length of backing off, and of the approach after it \[mm\]: the switch's length and hysteresis, and the
-    /// way to stop at the fast feed, twice.
+    /// Greatest length of backing off, and of the approach after it \[mm\]: the switch's length and
+    /// hysteresis, plus twice the stopping distance at the fast feed.
     pub back_off_mm: f64,
-    /// Greatest length from where the switch closes to the index \[mm\], a little more than a revolution; without it the
-    /// switch is the reference.
+    /// Greatest length from where the switch closes to the index \[mm\], a little more than a revolution; if
+    /// `None`, the switch is the reference.
     pub index_mm: Option<f64>,
     /// Position of the reference.
     pub position: Position,
@@ -46,22 +48,22 @@ pub struct HomingConfig {
     pub park: Option<Position>,
 }
 
-/// What a tick has shown of the axis.
+/// What a tick has seen of the axis.
 #[derive(Clone, Copy, Debug)]
 pub struct HomingInput<const AXES: usize> {
     /// Set positions of all axes.
     pub set: [Position; AXES],
-    /// What its encoder read.
+    /// Its encoder's reading.
     pub counts: Counts,
     /// Its home switch, as read in the same tick.
     pub is_home: bool,
-    /// What its index latch holds ([`IndexLatch`](crate::hal::IndexLatch)).
+    /// The count in its index latch ([`IndexLatch`](crate::hal::IndexLatch)).
     pub index: Option<Counts>,
-    /// What becomes of the move that was asked for last; anything before the first one.
+    /// The state of the move asked for last; before the first one it is ignored.
     pub state: State,
 }
 
-/// What is to be done.
+/// The next thing to do.
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "there is no heap to put a jog on")]
 pub enum HomingStep<const AXES: usize> {
@@ -80,17 +82,18 @@ pub enum HomingStep<const AXES: usize> {
     Done(Homed),
 }
 
-/// What was found.
+/// The reference that was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Homed {
     /// The encoder's counts at the reference.
     pub counts: Counts,
-    /// How many counts behind where the switch was seen closing the index was latched.
+    /// Number of counts from where the switch was seen closing to the latched index.
     pub index_counts: Option<i64>,
 }
 
-/// Why an axis is not homed. It is at rest, and has the position that it had before, but on the way to where it is parked.
+/// Why an axis is not homed. It is at rest and keeps its old position, unless homing failed on the way to the
+/// park position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum HomingError {
@@ -106,17 +109,18 @@ pub enum HomingError {
         /// Within this length \[mm\].
         back_off_mm: f64,
     },
-    /// The switch, which was seen closed, did not close again: in the slow approach, or where it was passed at the fast feed.
+    /// The switch was seen closed but did not close again: in the slow approach, or after it was passed at
+    /// the fast feed.
     LostSwitch {
         /// Within this length \[mm\].
         back_off_mm: f64,
     },
     /// No index was latched.
     NoIndex {
-        /// Within this length behind the switch \[mm\].
+        /// Within this length beyond the switch \[mm\].
         index_mm: f64,
     },
-    /// It was given up.
+    /// Homing was aborted.
     Aborted,
     /// The move could not be executed.
     Failed,
@@ -146,22 +150,22 @@ impl core::fmt::Display for HomingError {
 
 impl core::error::Error for HomingError {}
 
-/// What is under way.
+/// The stage under way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Start,
     Seek,
-    /// Over a switch that has been seen closed, or is still to be.
+    /// Backing off a switch that has been seen closed, or is still to be.
     BackOff {
         was_home: bool,
     },
     Approach,
-    /// Behind the place where the switch closed, at which the encoder read so much.
+    /// Looking for the index beyond the place `edge` where the switch closed, at `counts`.
     Index {
         edge: Position,
         counts: Counts,
     },
-    /// Coming to rest; then this.
+    /// Coming to rest; then the stage given.
     Stopping(After),
     /// At rest, with its new position.
     Referenced(Homed),
@@ -192,19 +196,20 @@ pub struct Homing {
 }
 
 impl Homing {
-    /// Homing of `axis`, which may do what `jog` says; its soft limits do not count, it does not know yet where it is.
+    /// Homing of `axis` within the feed and limits of `jog`. Soft limits are ignored: the axis does not know
+    /// yet where it is.
     #[must_use]
     pub fn new(config: HomingConfig, jog: &JogAxis, axis: usize, tick_s: f64) -> Self {
         let jog = JogAxis { travel: None, ..*jog };
         Self { config, jog, axis, tick_s, stage: Stage::Start, from: Position::ZERO, is_aborted: false }
     }
 
-    /// Gives up: comes to rest, and then is [`HomingError::Aborted`].
+    /// Aborts: the axis comes to rest, then [`Homing::poll`] returns [`HomingError::Aborted`].
     pub fn abort(&mut self) {
         self.is_aborted = true;
     }
 
-    /// One poll, after a tick: what is to be done before the next.
+    /// One poll, after a tick: returns what to do before the next one.
     ///
     /// # Errors
     /// The axis is not homed; it is at rest.
@@ -292,7 +297,7 @@ impl Homing {
         match after {
             // A short switch may have been passed.
             After::BackOff => self.go(Stage::BackOff { was_home: seen.is_home }, seen),
-            // A switch that bounces.
+            // The switch bounces.
             After::Approach if seen.is_home => self.go(Stage::BackOff { was_home: true }, seen),
             After::Approach => self.go(Stage::Approach, seen),
             After::Reference(homed) => {

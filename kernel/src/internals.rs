@@ -1,5 +1,5 @@
-//! Parts of the rooms that the project's own tests, benches and instruction counts look into. Programs outside of it need
-//! none of them, and they may change at any time.
+//! Parts of the rooms that the project's own tests, benches and instruction counts look into. Programs
+//! outside of it need none of them, and they may change at any time.
 
 pub use crate::axis::feedforward::{FeedforwardConfig, FeedforwardState};
 #[cfg(feature = "live")]

@@ -1,13 +1,15 @@
-//! Jog: one axis straight on, as far as an increment or to the soft limit.
+//! Jog: moves one axis by an increment or to the soft limit.
 //!
-//! Consumes where the machine stands, an axis and a feed; produces the items of a program of one straight stretch, which
-//! the [`LiveControl`](crate::live::LiveControl) drives as any other. So a jog is jerk-limited, and stops exactly at the
-//! increment's end or at the soft limit, by construction. Releasing the key is
-//! [`LiveControl::abort`](crate::live::LiveControl::abort), another feed [`LiveControl::set_override`](crate::live::LiveControl::set_override),
-//! both at any tick; what was not driven is then dropped, and the next jog begins from where the axis stands
+//! Consumes the machine's position, an axis and a feed; produces the items of a program of one straight
+//! stretch, which [`LiveControl`](crate::live::LiveControl) drives like any other. So a jog is jerk-limited,
+//! and stops exactly at the increment's end or at the soft limit, by construction. Releasing the key is
+//! [`LiveControl::abort`](crate::live::LiveControl::abort), another feed
+//! [`LiveControl::set_override`](crate::live::LiveControl::set_override), both at any tick. The rest is then
+//! dropped, and the next jog begins where the axis stands
 //! ([`Kernel::rest_here`](crate::kernel::Kernel::rest_here)).
 //!
-//! Background; an item at a time, no memory for the path. Bad requests are a [`JogError`], and nothing moves.
+//! Background; one item at a time, no memory for the path. A bad request is a [`JogError`], and nothing
+//! moves.
 //!
 //! ```
 //! use motion_kernel::exec::Executor;
@@ -53,7 +55,7 @@ use crate::program::Item;
 use crate::straight::{Straight, StraightError};
 use crate::units::Position;
 
-/// Which way along an axis.
+/// A direction along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Direction {
@@ -64,7 +66,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// The other one.
+    /// The opposite direction.
     #[must_use]
     pub fn reversed(self) -> Self {
         match self {
@@ -80,7 +82,7 @@ impl Direction {
         }
     }
 
-    /// The position `length` further on.
+    /// The position `length` ahead of `from`.
     fn ahead(self, from: Position, length: Position) -> Position {
         match self {
             Self::Positive => from + length,
@@ -88,7 +90,7 @@ impl Direction {
         }
     }
 
-    /// How far `to` is ahead of `from`; negative if it lies behind.
+    /// How far `to` is ahead of `from`; negative if it lies behind it.
     fn distance(self, from: Position, to: Position) -> Position {
         match self {
             Self::Positive => to - from,
@@ -106,7 +108,7 @@ pub struct Travel {
     pub greatest: Position,
 }
 
-/// What an axis may do in a jog.
+/// The limits of an axis in a jog.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JogAxis {
     /// Greatest feed \[mm/s\], of the jog and under any override; above 0, at most the queue's
@@ -135,16 +137,16 @@ pub enum JogError {
     Axis {
         /// The axis, from 0.
         axis: usize,
-        /// How many there are.
+        /// Number of axes.
         axes: usize,
     },
-    /// The soft limits are not in their order.
+    /// The soft limits are in the wrong order.
     Travel(Travel),
     /// The distance is 0.
     NoDistance,
-    /// Without an end: the axis has no soft limits.
+    /// A continuous jog would have no end: the axis has no soft limits.
     NoTravel,
-    /// The axis stands at the soft limit or beyond it: it goes inwards only.
+    /// The axis stands at the soft limit or beyond it: it may only move inwards.
     AtLimit {
         /// Where it stands.
         position: Position,
@@ -200,7 +202,8 @@ impl<const AXES: usize> Jog<AXES> {
     /// A jog of `axis` from rest at `start`, at `feed_mm_s`, for ticks of `tick_s`.
     ///
     /// # Errors
-    /// The request is refused; nothing else fails once it is made, in a number type that holds its limits.
+    /// The request is refused. Once a jog is made, nothing else fails, in a number type that holds its
+    /// limits.
     pub fn new(
         config: &JogAxis,
         axis: usize,

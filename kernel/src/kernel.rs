@@ -1,18 +1,18 @@
-//! The rooms assembled: one call a tick.
+//! The modules assembled: one call per tick.
 //!
 //! ```text
 //! encoders, inputs ─► latch ─► executor ─► axis regulators ─► converter codes ─► outputs
 //! ```
 //!
-//! The kernel starts disabled and does nothing to the drives until [`Kernel::enable`]; then it holds the
+//! The kernel starts disabled and does nothing to the drives until [`Kernel::enable`]. Then it holds the
 //! machine where it stands for the time that drives and brakes need, and only then executes the streams.
 //!
-//! A fault ends in one defined way: it is latched with the tick it was found in, every output goes to
-//! the voltage of standing still (0 V plus trim), the drives are disabled, and both stay so until
-//! [`Kernel::clear_fault`]. A fault that is found in writing the outputs shows in them from the next tick on.
-//! How outputs come to 0 V is the fault's [reaction](crate::fault::Reaction): with the feature `guards` and where the
-//! machine gives it time, on the path or along a ramp; else at once. The first fault stays, but a later one
-//! may ask for a more urgent end.
+//! A fault ends in one defined way: it is latched with the tick it was found in, every output goes to the
+//! voltage of standing still (0 V plus trim), the drives are disabled, and both stay so until
+//! [`Kernel::clear_fault`]. A fault raised while writing the outputs takes effect on them one tick later. How
+//! the outputs come to 0 V is the fault's [reaction](crate::fault::Reaction): on the path or along a ramp,
+//! with the feature `guards` and if the machine allows time for it; else at once. The first fault stays
+//! latched, but a later one may ask for a more urgent reaction.
 
 mod corrected_intake;
 #[cfg(all(test, feature = "guards"))]
@@ -41,7 +41,7 @@ use guarded::{Ending, Guards};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Power {
     Off,
-    /// Enabled and held still for so many more ticks.
+    /// Enabled, and still held for this many ticks.
     Starting {
         ticks_left: u32,
     },
@@ -51,7 +51,7 @@ enum Power {
 }
 
 impl Power {
-    /// The executor goes on.
+    /// Whether the executor continues.
     #[inline]
     fn executes(self) -> bool {
         match self {
@@ -61,7 +61,7 @@ impl Power {
         }
     }
 
-    /// The axes are regulated.
+    /// Whether the axes are regulated.
     #[inline]
     fn regulates(self) -> bool {
         match self {
@@ -73,15 +73,15 @@ impl Power {
 }
 
 /// The real-time motion kernel of a machine with `AXES` axes.
-// In this order: what a tick touches most lies within reach of the core's short addresses.
+// In this order: the fields that a tick uses most lie within reach of the core's short addresses.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel<R: Real, const AXES: usize> {
     power: Power,
-    /// What the drives were last told; `None` before the first time and where that failed.
+    /// What the drives were last told; `None` before the first time and after a failure.
     told: Option<bool>,
     executor: Executor<R, AXES>,
-    /// What the latest tick did; the next one goes on from it.
+    /// The trace of the latest tick; the next one continues from it.
     trace: Trace<R, AXES>,
     axes: [AxisState<R>; AXES],
     config: [AxisConfig<R>; AXES],
@@ -101,8 +101,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             axis.set_position(config, counts, position);
         }
         let executor = Executor::new(position);
-        // The first tick is number 0.
-        // In one: 16 KiB hold no copy of what it rests with.
+        // The first tick is number 0. In one expression: 16 KiB have no room for a copy.
         let trace = Trace {
             tick: u64::MAX,
             executed: executor.resting(),
@@ -122,10 +121,10 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
     }
 
-    /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (what
-    /// brakes and relays need), then executes the streams. Without effect in a fault.
+    /// Enables the drives with the next tick, holds the machine still for `settle_ticks` ticks (for brakes
+    /// and relays), then executes the streams. Without effect in a fault.
     ///
-    /// What was cut off in the middle of a stretch is given up, as by [`Kernel::stand_here`].
+    /// Drops a stretch that was cut off in the middle, as [`Kernel::stand_here`] does.
     pub fn enable(&mut self, settle_ticks: u32) {
         if self.trace.fault.is_none() && self.power == Power::Off {
             if !self.executor.is_at_rest() {
@@ -139,19 +138,19 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     }
 
     /// Disables the drives with the next tick, wherever the machine is. The motion under way is lost:
-    /// go on with [`Kernel::stand_here`] and new streams.
+    /// continue with [`Kernel::stand_here`] and new streams.
     pub fn disable(&mut self) {
         self.power = Power::Off;
     }
 
-    /// Latches a fault that the board has found (an input, a missed tick), in the tick to come: its
-    /// outputs already are those of a fault. Without effect if there is one.
+    /// Latches a fault that the board has found (an input, a missed tick), in the next tick, whose outputs
+    /// already are those of a fault. Without effect if there is a fault already.
     pub fn trip(&mut self, kind: FaultKind<R>) {
         self.latch_fault_in(self.trace.tick.wrapping_add(1), kind);
     }
 
-    /// One control tick: reads the encoders and inputs, executes the streams, regulates every axis, writes the
-    /// outputs. Call it from the tick's interrupt and nowhere else. What it did stays readable until the next.
+    /// One control tick: reads the encoders and inputs, executes the streams, regulates every axis, writes
+    /// the outputs. Call it only from the tick's interrupt. Its trace stays readable until the next tick.
     #[inline]
     pub fn tick<H>(&mut self, intake: &mut Intake<'_, R, AXES>, hal: &mut H) -> &Trace<R, AXES>
     where
@@ -160,7 +159,8 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.tick_with(intake, None, hal)
     }
 
-    /// [`Kernel::tick`] with what was learnt of a stretch added to feedforward while that is driven.
+    /// [`Kernel::tick`] with the learnt correction of a stretch added to feedforward while that stretch is
+    /// driven.
     #[inline]
     pub fn tick_corrected<H>(
         &mut self,
@@ -195,7 +195,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
         match hal.read_inputs() {
             Ok(inputs) => {
-                // Without guards, what is healthy is not worth the instructions.
+                // Without guards, keeping healthy inputs is not worth the instructions.
                 if Guards::<AXES>::KEEP_INPUTS || !inputs.is_healthy() {
                     let before = core::mem::replace(&mut self.trace.inputs, inputs);
                     if !inputs.is_healthy() {
@@ -215,7 +215,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         if hal.write(codes).is_err() {
             self.latch_fault(FaultKind::Output);
         }
-        // Repeated until the drives have taken it, above all when they are to be disabled.
+        // Repeated until the drives have accepted it, which matters most when they are to be disabled.
         let enable = self.power != Power::Off;
         if self.told != Some(enable) {
             self.told = hal.set_enabled(enable).is_ok().then_some(enable);
@@ -241,8 +241,8 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.continue_stop(intake);
     }
 
-    /// The outputs of all axes. Where the drives are off they stand still, and regulators and peaks
-    /// keep what they had.
+    /// The outputs of all axes. With the drives off they stand still, and regulators and peaks keep their
+    /// values.
     #[inline]
     fn regulate(&mut self, correction: Option<&mut Correction<'_, R, AXES>>) {
         let Trace { executed, axes: outputs, .. } = &mut self.trace;
@@ -277,20 +277,20 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
     fn judge_inputs(&mut self, before: &MachineInputs<AXES>) {
         let inputs = self.trace.inputs;
         if inputs.emergency_stop {
-            // Not the last word where it is a stop: the others may be more urgent.
+            // If its reaction is a stop, other faults may be more urgent.
             self.latch_fault(FaultKind::EmergencyStop);
         }
         if let Some(axis) = inputs.axes.iter().position(|axis| axis.is_fault()) {
             return self.latch_fault(FaultKind::Drive { axis });
         }
-        // Drives that are off, or have not settled, need not be ready, and stand still wherever they are.
+        // Drives that are off or not settled need not be ready, and they stand still anyway.
         if !self.power.executes() {
             return;
         }
         if let Some(axis) = inputs.axes.iter().position(|axis| !axis.is_ready()) {
             return self.latch_fault(FaultKind::DriveNotReady { axis });
         }
-        // One can drive off a switch, not farther onto it.
+        // An axis may drive off a switch, but not farther onto it.
         let moves = self.trace.executed.setpoints.iter().map(|setpoint| setpoint.velocity_mm_s);
         let is_driven_on = |((now, before), velocity_mm_s): ((&AxisInputs, &AxisInputs), R)| {
             now.is_limit_low() && (velocity_mm_s < R::ZERO || !before.is_limit_low())
@@ -326,9 +326,10 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.trace.fault
     }
 
-    /// Clears the fault, if there is one, and stands at the actual position, as [`Kernel::stand_here`], which it returns.
-    /// The drives stay disabled until [`Kernel::enable`]. `None` while the reaction to a fault is under way: nothing cuts it
-    /// short but a more urgent one, [`Kernel::disable`] and [`Kernel::stand_here`].
+    /// Clears the fault, if there is one, and stands at the actual position as [`Kernel::stand_here`] does;
+    /// returns that position. The drives stay disabled until [`Kernel::enable`]. `None` while the reaction to
+    /// a fault is under way: only a more urgent one, [`Kernel::disable`] and [`Kernel::stand_here`] cut it
+    /// short.
     pub fn clear_fault(&mut self) -> Option<[Position; AXES]> {
         if self.reaction().is_some_and(|reaction| reaction < Reaction::Immediate) {
             return None;
@@ -337,9 +338,8 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         Some(self.stand_here())
     }
 
-    /// Gives up the motion that is under way or queued and takes the actual position for the set
-    /// position; the drives are disabled at once. Returns the position: split the streams anew for it, which
-    /// drops what is queued.
+    /// Drops all motion under way or queued, takes the actual position as the set position, and disables the
+    /// drives at once. Returns the position: split the streams anew for it, which empties the queues.
     pub fn stand_here(&mut self) -> [Position; AXES] {
         self.power = Power::Off;
         let mut position = [Position::ZERO; AXES];
@@ -363,7 +363,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         peaks
     }
 
-    /// The first fault stays, and the drives go off.
+    /// Begins the reaction to a fault, and latches the fault unless there is one already.
     #[cold]
     fn latch_fault(&mut self, kind: FaultKind<R>) {
         self.latch_fault_in(self.trace.tick, kind);

@@ -9,23 +9,22 @@
 //! ```text
 //!   background                                   what it hands on
 //!   ──────────                                   ────────────────
-//!   plan    ceilings, junctions, look-ahead         Block, Path, PlannedRamp
-//!   law     ramps; inverse problems              Ramp ─► FeedSegment ┐ two streams that measure
-//!   path    lines and septic pieces              Piece ──────────────┤ the same path length
-//!                                                                    │
+//!   plan    ceilings, junctions, look-ahead      Block, Path, PlannedRamp
+//!   law     ramps; inverse problems              Ramp ─► FeedSegment ─┐ two streams that measure
+//!   path    lines and septic pieces              Piece ───────────────┤ the same path length
 //!   program both as data; keeps the queues full  Item ─► Feeder       │
 //!   live    hold, override, abort (optional)     feed lists           │
 //!   straight, jog, homing (optional)             Item ─► live         │
-//!   queue   bounded, checked on entry            Feeder ─► Intake ◄──┘
-//!   ─────── tick ──────────────────────────────────────────────────────
+//!   queue   bounded, checked on entry            Feeder ─► Intake ◄───┘
+//!   ─────── tick ───────────────────────────────────────────────────────
 //!   exec    feed law ─► s, v, a, j, snap         PathMotion
 //!   path    piece ─► position, V, A, J           Setpoint per axis
 //!   axis    following error, regulator           DacCode per axis
 //!   hal     ±10 V outputs, encoders, enable      Counts back to axis
 //! ```
 //!
-//! [`kernel`] assembles the tick, [`trace`] is what a tick records, [`flight`] keeps the last of them, [`units`] and [`num`] are what
-//! all of them compute with.
+//! [`kernel`] assembles the tick, [`trace`] is the record of a tick, [`flight`] keeps the last records, and
+//! all modules compute in [`units`] and [`num`].
 //!
 //! Units are mm, s and V throughout. Equations are cited by paper and number: S1 is the sin² law,
 //! S3 the feed planning, S4 the servo axis (full titles in the project's README).
@@ -79,9 +78,9 @@
 // Which feature an item needs, on docs.rs.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
-// Some of what all kernels share is called by guards or by live control only; the linker drops it where they are absent.
+// Some shared code is called only by guards or live control; without them the linker drops it.
 #![cfg_attr(not(all(feature = "guards", feature = "live")), allow(dead_code))]
-// No panic path in what runs on a board; tests may.
+// No panic path in code that runs on a board; tests may panic.
 #![cfg_attr(
     not(test),
     deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)
@@ -109,7 +108,7 @@ pub mod kernel;
 pub mod straight;
 #[cfg(feature = "live")]
 pub mod jog;
-// Without guards a tick does not keep the inputs of a healthy machine, so nobody would see the switch.
+// Without guards a tick does not keep a healthy machine's inputs, so homing would not see the switch.
 #[cfg(all(feature = "live", feature = "guards"))]
 pub mod homing;
 

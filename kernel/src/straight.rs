@@ -1,9 +1,9 @@
 //! One straight stretch from rest to rest, as the items of a program.
 //!
-//! Consumes where the machine stands, where it is to go and what holds the feed; produces what the
-//! [`LiveControl`](crate::live::LiveControl) drives as any other program: a jog, or the way to a program's start.
+//! Consumes start, end, feed and limits; produces a program that [`LiveControl`](crate::live::LiveControl)
+//! drives like any other: a jog, or the move to a program's start.
 //!
-//! Background; an item at a time, no memory for the path.
+//! Background; one item at a time, no memory for the path.
 
 use core::convert::Infallible;
 
@@ -13,7 +13,7 @@ use crate::plan::{Block, BlockPlan, PlanError, plan};
 use crate::program::{Allowed, Item, PathBlock};
 use crate::units::Position;
 
-/// Pieces of path are at most so long, in every number type.
+/// Greatest length of a piece of path, in every number type.
 const PIECE: Position = Position::from_bits(16 << 32);
 
 /// Why there is no straight stretch.
@@ -25,14 +25,14 @@ pub enum StraightError {
     Feed {
         /// The feed.
         feed_mm_s: f64,
-        /// The greatest under an override.
+        /// The greatest feed under an override.
         most_mm_s: f64,
     },
     /// A limit is not a positive number.
     Limit(LimitError),
-    /// It is longer than the kernel's range \[mm\].
+    /// It is longer than the kernel's range.
     Length {
-        /// Its length.
+        /// Its length \[mm\].
         length_mm: f64,
     },
     /// There is no plan from rest to rest over its length.
@@ -59,7 +59,7 @@ impl core::fmt::Display for StraightError {
 
 impl core::error::Error for StraightError {}
 
-/// The items of a straight stretch; none where it has no length.
+/// The items of a straight stretch; none if it has no length.
 #[derive(Clone, Debug)]
 pub struct Straight<const AXES: usize> {
     start: [Position; AXES],
@@ -67,7 +67,7 @@ pub struct Straight<const AXES: usize> {
     direction: [f64; AXES],
     length: Position,
     block: Option<PathBlock>,
-    /// How far pieces and feed are given out.
+    /// Path positions up to which pieces and feed have been returned.
     path: Position,
     feed: Position,
     ramps: [Option<PlannedRamp>; 3],
@@ -75,11 +75,11 @@ pub struct Straight<const AXES: usize> {
 }
 
 impl<const AXES: usize> Straight<AXES> {
-    /// From rest at `start` to rest at `end` with ramps within `limits`, at a feed of `feed_mm_s` above 0, at most
-    /// `most_mm_s` under an override, for ticks of `tick_s`.
+    /// A stretch from rest at `start` to rest at `end` with ramps within `limits`, at a feed of `feed_mm_s`
+    /// above 0, at most `most_mm_s` under an override, for ticks of `tick_s`.
     ///
     /// # Errors
-    /// It can't be driven; nothing else fails once it is made, in a number type that holds its limits.
+    /// It can't be driven. Once it is made, nothing else fails, in a number type that holds its limits.
     pub fn new(
         start: [Position; AXES],
         end: [Position; AXES],
@@ -87,7 +87,7 @@ impl<const AXES: usize> Straight<AXES> {
         [feed_mm_s, most_mm_s]: [f64; 2],
         tick_s: f64,
     ) -> Result<Self, StraightError> {
-        // Written so that what is not a number is refused.
+        // Written so that NaN is refused.
         if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s && most_mm_s.is_finite()) {
             return Err(StraightError::Feed { feed_mm_s, most_mm_s });
         }
@@ -135,7 +135,7 @@ impl<const AXES: usize> Straight<AXES> {
     fn after(&self, path: Position) -> [Position; AXES] {
         let (mut position, path_mm) = (self.start, path.to_mm());
         for (position, direction) in position.iter_mut().zip(&self.direction) {
-            // Within what it is a part of.
+            // In range, as a part of a length in range.
             *position = *position + Position::from_mm(direction * path_mm).unwrap_or(Position::ZERO);
         }
         position
@@ -145,7 +145,8 @@ impl<const AXES: usize> Straight<AXES> {
 impl<const AXES: usize> Iterator for Straight<AXES> {
     type Item = Result<Item<AXES>, Infallible>;
 
-    /// Path and feed in the order of where they start, so that whichever queue is full, the other one is as far.
+    /// Returns path and feed in the order of where they start, so that both queues are always filled equally
+    /// far.
     fn next(&mut self) -> Option<Self::Item> {
         if let Some(block) = self.block.take() {
             return Some(Ok(Item::Block(block)));
@@ -186,7 +187,8 @@ mod tests {
         Position::from_mm(mm).expect("in range")
     }
 
-    /// From anywhere to anywhere, from a step to metres: ends exactly, within its feed, in the time of its plan.
+    /// From anywhere to anywhere, from a step to metres: ends exactly, within its feed, in the time of its
+    /// plan.
     #[test]
     fn any_way_is_driven_in_its_time() {
         let random = Random::new(1);

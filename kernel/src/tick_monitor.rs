@@ -1,11 +1,11 @@
-//! Whether ticks come in time and end in time.
+//! Watches whether ticks begin and end in time.
 //!
-//! Consumes readings of a free-running counter of any width at the beginning and end of each tick; produces a fault for
-//! [`Kernel::trip`](crate::kernel::Kernel::trip). A few operations; cannot fail.
+//! Consumes readings of a free-running counter of any width at the beginning and end of each tick; produces a
+//! fault for [`Kernel::trip`](crate::kernel::Kernel::trip). A few operations; cannot fail.
 //!
-//! A tick that begins more than half a period late has missed at least the better part of one: the distance between two
-//! beginnings, rounded to whole periods, tells how many did not come. Ticks that begin late because an interrupt was held
-//! up are no fault as long as they end before the next one is due.
+//! The time between two beginnings, rounded to whole periods, tells how many ticks were missed; so a tick
+//! that begins more than half a period late counts as a missed one. Ticks that begin late because an
+//! interrupt was masked are no fault as long as they end before the next one is due.
 
 use crate::fault::FaultKind;
 
@@ -17,7 +17,7 @@ pub struct TickMonitor {
     began: Option<u32>,
 }
 
-/// A counter or period that ticks can't be watched with.
+/// The counter or period can't be used to watch ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TickMonitorError {
@@ -28,7 +28,7 @@ pub struct TickMonitorError {
 }
 
 impl TickMonitor {
-    /// For ticks every `period` counts of a counter of `bits` bits, 1 to 32.
+    /// A monitor for ticks every `period` counts of a counter of `bits` bits, 1 to 32.
     ///
     /// # Errors
     /// A period is less than 2 counts or more than a quarter of the counter's range.
@@ -43,8 +43,9 @@ impl TickMonitor {
         Ok(Self { mask, period, began: None })
     }
 
-    /// A tick begins, with the counter at `now`. The missed ticks are told that the counter's range holds; it should hold
-    /// the longest time for which nothing else would stop the machine.
+    /// Begins a tick, with the counter at `now`; returns the fault of missed ticks, if any. Misses longer
+    /// than the counter's range are not seen in full: the range should cover the longest time for which
+    /// nothing else would stop the machine.
     pub fn began<R>(&mut self, now: u32) -> Option<FaultKind<R>> {
         let before = self.began.replace(now)?;
         let elapsed = now.wrapping_sub(before) & self.mask;
@@ -56,7 +57,7 @@ impl TickMonitor {
         Some(FaultKind::TickMissed { ticks: periods.saturating_sub(1).max(1) })
     }
 
-    /// The tick ends, with the counter at `now`.
+    /// Ends the tick, with the counter at `now`; returns the fault of an overrun, if any.
     pub fn ended<R>(&self, now: u32) -> Option<FaultKind<R>> {
         let elapsed = now.wrapping_sub(self.began?) & self.mask;
         (elapsed >= self.period).then_some(FaultKind::TickOverrun)
@@ -70,8 +71,8 @@ mod tests {
 
     type Kind = FaultKind<f32>;
 
-    /// Counters of every width, at every phase of their wrap: jitter is no fault, a missed tick is counted, an overrun is
-    /// told. The oracle counts in 64 bits.
+    /// Counters of every width, at every phase of their wrap: jitter is no fault, a missed tick is counted,
+    /// an overrun is told. The oracle counts in 64 bits.
     #[test]
     fn ticks_are_told_late_missed_and_too_long_across_every_wrap() {
         let random = Random::new(0x5EED);

@@ -1,4 +1,4 @@
-//! What a tick records: everything S4 wants to see of a run.
+//! The record of a tick: everything that S4 shows of a run.
 
 use crate::axis::AxisOutput;
 use crate::exec::ExecState;
@@ -12,11 +12,12 @@ use crate::num::Scalar;
 pub struct Trace<R, const AXES: usize> {
     /// Tick number since the start.
     pub tick: u64,
-    /// Set values along the path and per axis. In a fault the last ones before it.
+    /// Set values along the path and per axis; the last ones if a fault has stopped the executor.
     pub executed: Executed<R, AXES>,
-    /// What the encoders read, actual values and outputs. In a fault the outputs are 0 V.
+    /// Encoder readings, actual values and outputs; with the drives off, the outputs stand still.
     pub axes: [AxisOutput<R>; AXES],
-    /// The digital inputs as the tick read them; without the feature `guards` as last read when something was amiss.
+    /// The digital inputs as the tick read them; without the feature `guards` those of the last tick with
+    /// unhealthy inputs.
     pub inputs: MachineInputs<AXES>,
     /// The latched fault, if there is one.
     pub fault: Option<Fault<R>>,
@@ -24,13 +25,13 @@ pub struct Trace<R, const AXES: usize> {
 
 /// A fingerprint of a run: 64 bits over everything that its ticks set, read and put out.
 ///
-/// Two runs with the same digest had the same bits, but for one chance in 2⁶⁴; two runs that differ in a
+/// Two runs with the same digest had the same bits, except for one chance in 2⁶⁴; two runs that differ in a
 /// single word of a single tick always have different digests, because every step is a bijection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Digest(u64);
 
 impl Digest {
-    /// Of no tick.
+    /// The digest of no ticks.
     #[must_use]
     pub const fn new() -> Self {
         // The offset of the FNV-1a hash.
@@ -57,7 +58,7 @@ impl Digest {
             ExecState::Moving => 1,
             ExecState::Dwell => 2,
             ExecState::Stopped => 3,
-            // The next bit is the fault's.
+            // The next bit is for the fault.
             ExecState::Held => 8,
         };
         self.word(state | u64::from(trace.fault.is_some()) << 2 | u64::from(trace.executed.line) << 32);

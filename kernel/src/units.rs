@@ -62,8 +62,8 @@ impl Position {
         if !(libm::fabs(mm) <= Self::LIMIT_MM) {
             return None;
         }
-        // Below 2⁵² steps. With 2⁵² on top the float's last place is a step: the sum is rounded to it, halves to even,
-        // and its lower bits are the number of steps.
+        // Below 2⁵² steps. With 2⁵² on top the float's last place is a step: the sum is rounded to it, halves
+        // to even, and its lower bits are the number of steps.
         const STEP_IS_LAST: f64 = 4_503_599_627_370_496.0;
         let steps = (libm::fabs(mm) * STEPS_PER_MM + STEP_IS_LAST).to_bits() - STEP_IS_LAST.to_bits();
         let steps = steps.cast_signed();

@@ -1,7 +1,7 @@
 //! Work of the planner, counted where a test holds it to an amount: tests read no clock.
 //!
-//! Counts evaluations of the law and ceilings that are visited, for each thread by itself. Without the feature `count-work`
-//! nothing is counted.
+//! Counts evaluations of the law and ceilings that are visited, for each thread by itself. Without the
+//! feature `count-work` nothing is counted.
 
 #[cfg(feature = "count-work")]
 extern crate std;

@@ -1,14 +1,14 @@
-//! The background: start button, console, streams, and what the log says.
+//! The background: start button, console, streams and log.
 //!
-//! Consumes the [`Panel`] and what the tick has left in [`Control`]; produces items for the streams and a [`LogLine`] a poll
-//! at most. Runs in what the ticks leave of the processor: the board calls [`Background::poll`] right after a tick, logs its
-//! line, and calls [`Background::plan`], over and over.
+//! Consumes the [`Panel`] and the tick's results in [`Control`]; produces items for the streams and at most
+//! one [`LogLine`] per poll. Runs in the time that the ticks leave: the board calls [`Background::poll`]
+//! right after a tick, logs its line, and calls [`Background::plan`], over and over.
 //!
-//! A poll begins right after a tick with what keeps interrupts off: taking figures out of [`Control`], and the line of log
-//! (defmt encodes it with interrupts masked). Both are over long before the next tick, so neither delays any. Then come
-//! planning and filling, which may take several ticks and keep nothing off.
+//! A poll begins right after a tick with the parts that mask interrupts: taking figures out of [`Control`],
+//! and the log line (defmt encodes it with interrupts masked). Both are over long before the next tick, so
+//! neither delays it. Then come planning and filling, which may take several ticks and mask nothing.
 //!
-//! Fails by bringing the machine to rest and saying why; in a fault, with drives off.
+//! On failure it brings the machine to rest and logs why; in a fault, with drives off.
 
 use motion_kernel::exec::ExecState;
 use motion_kernel::live::State;
@@ -28,7 +28,8 @@ use crate::parameters::BoardParameters;
 use crate::report::{FlightDump, Report};
 use crate::runs::Run;
 
-/// What the background knows and has under way. `PIECES` and `SEGMENTS` as of [`LiveStreams`], `PLACES` as of [`Run`].
+/// The state of the background. `PIECES` and `SEGMENTS` are those of [`LiveStreams`], `PLACES` that of
+/// [`Run`].
 pub struct Background<
     'a,
     R: Real,
@@ -41,16 +42,16 @@ pub struct Background<
     program: Reader<'a, AXES>,
     phase: Phase,
     settings: Settings,
-    /// Until the first start.
+    /// The streams, until the first start.
     streams: Option<&'a mut LiveStreams<R, AXES, PIECES, SEGMENTS>>,
     run: Option<Run<'a, R, AXES, PLACES>>,
-    /// Where the next run is to start from.
+    /// Where the next run starts from.
     from: Option<[Position; AXES]>,
     /// Why there is no way to the program's start.
     no_way: Option<StraightError>,
     /// Why the program ends early.
     refused: Option<SupplyError<ProgramError>>,
-    /// The log has said that motion waits for somebody.
+    /// The log has said that motion waits for the operator.
     has_said: bool,
     button: Button,
     dump: FlightDump,
@@ -84,9 +85,9 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         }
     }
 
-    /// The first part of a poll, right after tick `now`: what is asked for, and what the tick has left. What there is to
-    /// log of it.
-    // A frame of its own: what it takes is free again while motion is planned.
+    /// The first part of a poll, right after tick `now`: handles the operator's requests and the tick's
+    /// results. Returns a line to log, if any.
+    // In its own stack frame, which is free again while motion is planned.
     #[inline(never)]
     pub fn poll<const ROWS: usize, const AFTER: usize>(
         &mut self,
@@ -112,7 +113,8 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         self.report.line(now, &self.board, counts, control)
     }
 
-    /// The second part of a poll, which may take several ticks. Also in a fault: it may end in a stop on the path.
+    /// The second part of a poll, which may take several ticks. Also in a fault: it may end in a stop on the
+    /// path.
     pub fn plan(&mut self) {
         let Some(run) = &mut self.run else { return };
         if let Some(here) = self.from.take() {
@@ -122,12 +124,12 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         self.refused = run.poll().err();
     }
 
-    /// A poll took so many cycles of the board's counter, its log included.
+    /// Notes the duration of a poll, log included, in cycles of the board's counter.
     pub fn note_poll(&mut self, cycles: u32) {
         self.report.note_poll(cycles);
     }
 
-    /// Follows what the tick has left, then what is asked for.
+    /// Handles the tick's results, then the operator's requests.
     fn follow<const ROWS: usize, const AFTER: usize>(
         &mut self,
         seen: &Seen<R, AXES>,
@@ -147,7 +149,7 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         }
     }
 
-    /// Whether it has just come to what only a reset ends.
+    /// Returns the line to log if the board has just reached a state that only a reset ends.
     fn ended(&mut self, seen: &Seen<R, AXES>) -> Option<LogLine<R, AXES>> {
         if matches!(self.phase, Phase::Ready | Phase::Faulted) {
             return None;
@@ -166,7 +168,7 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         Some(LogLine::NoWay(error))
     }
 
-    /// Whether a run has just come to where it waits for somebody, or to its end.
+    /// Returns the line to log if a run has just ended, or waits for the operator.
     fn came_to_rest(&mut self, seen: &Seen<R, AXES>) -> Option<LogLine<R, AXES>> {
         let (Phase::Running { is_stopped, .. }, Some(run)) = (self.phase, &self.run) else { return None };
         let state = run.state();
@@ -227,7 +229,7 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         &mut self,
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) -> Option<[Position; AXES]> {
-        // With the faults of a machine that was not ready yet.
+        // Also clears the faults of a machine that was not ready yet.
         let here = control.lock(|control| {
             control.flight.clear();
             control.kernel.clear_fault()
@@ -332,8 +334,8 @@ mod tests {
 
     type Lines = Vec<(u32, LogLine<f32, AXES>)>;
 
-    /// A board from its start on, with a poll after every tick. Before tick `n` `script` does what it says in it; the lines
-    /// of its log without reports, its set position and whether its drives are enabled.
+    /// A board from its start on, with a poll after every tick. Before tick `n` `script` does what it says in
+    /// it; the lines of its log without reports, its set position and whether its drives are enabled.
     fn board(
         ticks: u32,
         mut script: impl FnMut(u32, &mut Hands, &mut Option<FaultKind<f32>>, &Lines),

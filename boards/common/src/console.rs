@@ -1,25 +1,25 @@
-//! Commands of the serial console: one character each, so that none can come in half.
+//! Commands of the serial console: one character each, so none can arrive in part.
 //!
-//! Consumes bytes; produces [`Command`]s. Other bytes are ignored. What programs on a PC write to ports that they take for
-//! modems (`AT…`, frames between 0x7E) has none of these letters.
+//! Consumes bytes; produces [`Command`]s. Other bytes are ignored. Bytes that PC programs send to what they
+//! take for a modem (`AT…`, frames between 0x7E) contain none of these letters.
 
 use motion_kernel::live::{OVERRIDE_MAX, OVERRIDE_MIN};
 
-/// What is commanded.
+/// A command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// Come to rest on the path.
     Hold,
     /// Resume after a hold, or after a block in single block.
     Resume,
-    /// Another feed override.
+    /// Change the feed override.
     Override(Step),
-    /// Come to rest at the end of every program line, or do so no more.
+    /// Come to rest at the end of every program line, or stop doing so.
     SingleBlock(bool),
 }
 
 impl Command {
-    /// Of a byte.
+    /// The command of a byte.
     #[must_use]
     pub fn of(byte: u8) -> Option<Self> {
         Some(match byte {
@@ -38,9 +38,9 @@ impl Command {
 /// How the feed override changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// By [`STEP_PERCENT`] up.
+    /// Up by [`STEP_PERCENT`].
     Up,
-    /// By as much down.
+    /// Down by [`STEP_PERCENT`].
     Down,
     /// To 100 %.
     AsProgrammed,
@@ -54,15 +54,15 @@ pub const MOST_PERCENT: u8 = 200;
 const _: () =
     assert!(MOST_PERCENT as f64 <= 100.0 * OVERRIDE_MAX && STEP_PERCENT as f64 >= 100.0 * OVERRIDE_MIN);
 
-/// A feed override \[%\], from [`STEP_PERCENT`] to [`MOST_PERCENT`]: 0 is a hold's.
+/// A feed override \[%\], from [`STEP_PERCENT`] to [`MOST_PERCENT`]; for 0 there is the hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FeedOverride(u8);
 
 impl FeedOverride {
-    /// As programmed.
+    /// The feed as programmed.
     pub const NONE: Self = Self(100);
 
-    /// The next one.
+    /// The override after a step.
     #[must_use]
     pub fn after(self, step: Step) -> Self {
         match step {

@@ -1,6 +1,6 @@
 //! What tick and background share, and the tick of every board.
 //!
-//! The tick has the higher priority and takes it freely; the background takes it for some tens of
+//! The tick has the higher priority and uses it freely; the background locks it for some tens of
 //! instructions, right after a tick.
 
 use motion_kernel::exec::ExecState;
@@ -14,13 +14,13 @@ use motion_kernel::units::Position;
 
 use crate::tick_timing::TickTiming;
 
-/// Shared by tick and background: the kernel, and what it last did. The flight recorder keeps `ROWS` ticks, `AFTER` of them
-/// after a fault.
+/// Shared by tick and background: the kernel, and its last results. The flight recorder keeps `ROWS` ticks,
+/// `AFTER` of them after a fault.
 pub struct Control<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> {
     pub(crate) kernel: Kernel<R, AXES>,
     /// The kernel's end of the streams: empty ones until the first start.
     pub(crate) intake: Intake<'a, R, AXES>,
-    /// What the tick keeps about itself: the board's interrupt adds to it.
+    /// The tick's own figures; the board's interrupt adds to them.
     pub timing: TickTiming,
     pub(crate) flight: &'a mut FlightRecorder<R, AXES, ROWS, AFTER>,
     state: ExecState,
@@ -28,7 +28,7 @@ pub struct Control<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTE
     is_healthy: bool,
 }
 
-/// What the tick last left.
+/// The tick's last results.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen<R: Real, const AXES: usize> {
     pub(crate) state: ExecState,
@@ -53,8 +53,9 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         Self { kernel, intake, timing, flight, state: ExecState::Idle, position, is_healthy: false }
     }
 
-    /// One control tick. `unhealthy` is what the board found in its inputs (the emergency stop, a drive that is not ready),
-    /// `late` is what its [`TickMonitor`](motion_kernel::tick_monitor::TickMonitor) says as the tick begins.
+    /// One control tick. `unhealthy` is the fault found in the inputs (the emergency stop, a drive that is
+    /// not ready), `late` is that of the board's [`TickMonitor`](motion_kernel::tick_monitor::TickMonitor)
+    /// when the tick begins.
     #[inline]
     pub fn tick<H>(&mut self, unhealthy: Option<FaultKind<R>>, late: Option<FaultKind<R>>, hal: &mut H)
     where
@@ -70,7 +71,7 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         self.position = trace.executed.setpoints.map(|setpoint| setpoint.position);
     }
 
-    /// Latches a fault that the board found after the tick, in the tick to come.
+    /// Latches a fault that the board found after the tick; it takes effect in the next tick.
     #[inline]
     pub fn trip(&mut self, kind: FaultKind<R>) {
         self.kernel.trip(kind);

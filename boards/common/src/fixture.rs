@@ -1,4 +1,4 @@
-//! A board and a program for the tests of this crate: those of the NUCLEO.
+//! The NUCLEO's board parameters and program, for the tests of this crate.
 
 use motion_kernel::units::Position;
 

@@ -1,4 +1,4 @@
-//! What the firmware of every board does, whatever its processor: everything but pins, peripherals and interrupts.
+//! The part of the firmware that all boards share: everything except pins, peripherals and interrupts.
 //!
 //! ```text
 //! tick    drives, encoders ─► Control::tick ─► converter      feeds the watchdog while Liveness allows
@@ -9,25 +9,26 @@
 //!                                   Background::plan ─► streams of the tick
 //! ```
 //!
-//! A board implements the kernel's `hal` traits and [`Panel`], states its [`BoardParameters`], calls [`Control::tick`] in
-//! the interrupt of a timer and [`Background`] in its idle loop. `boards/README.md` has the steps.
+//! A board implements the kernel's `hal` traits and [`Panel`], states its [`BoardParameters`], calls
+//! [`Control::tick`] in the interrupt of a timer and [`Background`] in its idle loop. `boards/README.md` has
+//! the steps.
 //!
-//! In the order the data travels:
+//! Modules in the order the data travels:
 //!
-//! - [`parameters`]: what differs from board to board;
-//! - [`machine`]: the program in flash and the axes that it is for;
-//! - [`runs`]: what the start button runs, under live control;
+//! - [`parameters`]: the figures that differ from board to board;
+//! - [`machine`]: the program in flash and its axes;
+//! - [`runs`]: the runs that the start button begins, under live control;
 //! - [`panel`]: the start button and the console's bytes;
 //! - [`console`]: the commands of the console;
-//! - [`operator`]: what a press or a command does, in every phase;
+//! - [`operator`]: the effect of a press or a command in every phase;
 //! - [`control`]: what tick and background share, and the tick;
 //! - [`background`]: one poll after another;
 //! - [`report`]: figures of the last second;
-//! - [`log`]: what the log says;
-//! - [`tick_timing`] and [`liveness`]: what the tick knows of itself and of the background.
+//! - [`log`]: the lines of the log;
+//! - [`tick_timing`] and [`liveness`]: the tick's figures about itself and about the background.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
-// No panic path in what runs on a board; tests may.
+// No panic path in code that runs on a board; tests may panic.
 #![cfg_attr(
     not(test),
     deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)

@@ -1,12 +1,11 @@
 //! Whether the watchdog may be fed: only while tick and background are both alive.
 //!
-//! Consumes the background's count of its polls, each tick. The tick feeds the watchdog, so a tick that
-//! has stopped ends in a reset within the watchdog's time. A
-//! background that has stopped no longer counts, and the tick then stops feeding. Either alone would miss
-//! half: a tick goes on regulating with nobody to stop it, a background would go on logging while an output
-//! stays at its last voltage.
+//! Consumes the background's count of its polls, each tick. The tick feeds the watchdog, so if the tick
+//! stops, the watchdog resets the board. If the background stops, it no longer counts, and the tick stops
+//! feeding. One check alone would not do: a tick could continue to regulate with nobody to stop it, or a
+//! background could continue to log while an output stays at its last voltage.
 
-/// What the tick knows of the background.
+/// The tick's view of the background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Liveness {
     polls: u32,
@@ -15,13 +14,13 @@ pub struct Liveness {
 }
 
 impl Liveness {
-    /// The background has just been seen, and may be silent for `silent_ticks_max`.
+    /// Begins with the background just seen; it may be silent for `silent_ticks_max`.
     #[must_use]
     pub const fn new(silent_ticks_max: u32) -> Self {
         Self { polls: 0, silent_ticks: 0, silent_ticks_max }
     }
 
-    /// One tick, in which the background has counted `polls`: whether to feed the watchdog.
+    /// One tick, with the background's count `polls`: returns whether to feed the watchdog.
     pub fn may_feed(&mut self, polls: u32) -> bool {
         if polls == self.polls {
             self.silent_ticks = self.silent_ticks.saturating_add(1);

@@ -1,7 +1,7 @@
-//! What the log says, a line at a time.
+//! The log, one line at a time.
 //!
-//! Consumes what the background has done; produces lines for people. A poll makes one line at most, because a log may keep
-//! interrupts off while it takes one in.
+//! Consumes the background's events; produces lines for people. A poll makes at most one line, because a log
+//! may mask interrupts while it takes one in.
 
 use motion_kernel::fault::Fault;
 use motion_kernel::flight::FlightRow;
@@ -31,7 +31,7 @@ pub enum LogLine<R: Real, const AXES: usize> {
     Holding,
     /// A hold or a program stop ends.
     Resumed,
-    /// The feed override is another one \[%\].
+    /// The new feed override \[%\].
     Override(u8),
     /// Single block is on or off.
     SingleBlock(bool),
@@ -47,29 +47,29 @@ pub enum LogLine<R: Real, const AXES: usize> {
     Flight(FlightRow<R, AXES>),
     /// Ticks of the last second, and all overruns.
     Ticks {
-        /// Of the last second.
+        /// The ticks of the last second.
         timing: TickTiming,
-        /// Since the start.
+        /// Number of overruns since the start.
         overruns: u32,
     },
     /// Peaks of the following errors in the last second \[mm\].
     FollowingErrors([R; AXES]),
-    /// The background.
+    /// Figures of the background.
     Background {
         /// Longest poll of the last second \[µs\].
         longest_turn_us: u32,
-        /// Stops for want of data, since the start.
+        /// Number of stops for want of data since the start.
         starvations: u32,
-        /// Console bytes lost since the start.
+        /// Number of console bytes lost since the start.
         bytes_lost: u32,
     },
 }
 
-/// The most axes whose rows the log has room for.
+/// Greatest number of axes whose rows fit the log.
 #[cfg(feature = "defmt")]
 const FLIGHT_AXES_MAX: usize = 6;
 
-/// Writes the line to defmt's log, with its level. What defmt's transport has no room for is lost.
+/// Writes the line to defmt's log, with its level. A line that defmt's transport has no room for is lost.
 #[cfg(feature = "defmt")]
 #[inline(never)]
 pub fn write<R: Real + defmt::Format, const AXES: usize>(line: &LogLine<R, AXES>) {

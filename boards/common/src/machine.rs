@@ -1,9 +1,10 @@
-//! The machine that the board drives: the one that its program was compiled for.
+//! The machine that the board drives: the one its program was compiled for.
 //!
-//! Consumes a compiled program, which `motion compile` wrote with the machine's scales, gains, limits
-//! and guards; produces the kernel's configuration, once, before the first tick. So there is one description of the
-//! machine, its file on the PC, and the board checks here what only it can know. A program that is damaged, does
-//! not suit the board, or holds an item anywhere that could not be executed is refused before anything is enabled.
+//! Consumes a compiled program, which `motion compile` wrote with the machine's scales, gains, limits and
+//! guards; produces the kernel's configuration, once, before the first tick. So there is one description of
+//! the machine, its file on the PC, and here the board checks what only it can know. A program that is
+//! damaged, does not suit the board, or contains an item that could not be executed is refused before
+//! anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
 use motion_kernel::num::Real;
@@ -15,7 +16,7 @@ use crate::parameters::BoardParameters;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MachineError {
-    /// The bytes are no program for it.
+    /// The bytes are no program for this board.
     Program(ProgramError),
     /// The program is for another tick \[s\].
     Tick {
@@ -24,21 +25,21 @@ pub enum MachineError {
         /// The board's.
         expected: f64,
     },
-    /// An axis would count faster than its input filter is sure to pass.
+    /// An axis would count faster than its input filter passes for certain.
     CountRate {
         /// The axis, from 0.
         axis: usize,
-        /// At twice the greatest feed, for what an axis does beyond its set-point \[1/s\].
+        /// The rate at twice the greatest feed \[1/s\], as a margin for motion beyond the set-point.
         counts_per_s: f64,
-        /// What passes \[1/s\].
+        /// The rate that passes \[1/s\].
         limit: f64,
     },
-    /// It does not say how faults are told and end.
+    /// It has no guards and reactions to faults.
     Unguarded,
     /// A figure of an axis is out of its range.
     Axes(AxesError),
-    /// An item can't be executed, the program starts or ends where it can't, or it does not say what holds its feed, which
-    /// live control makes plans with: `motion compile --live` does.
+    /// An item can't be executed, the program starts or ends where it can't, or it has no blocks for live
+    /// control to plan with (`motion compile --live` writes them).
     Items(CheckError<ProgramError>),
 }
 
@@ -59,7 +60,7 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
     pub fn new(bytes: &'a [u8], board: &BoardParameters) -> Result<Self, MachineError> {
         let program = Reader::new(bytes).map_err(MachineError::Program)?;
         let Header { tick_s, rules, axes, .. } = program.header();
-        // To the bit: both are the same decimal, or they are different ticks.
+        // Compared to the bit: both are the same decimal, or they are different ticks.
         let expected = board.tick_s();
         if *tick_s != expected {
             return Err(MachineError::Tick { found: *tick_s, expected });
@@ -78,7 +79,7 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
         Ok(Self { program, axes })
     }
 
-    /// What the program was planned for.
+    /// The program's header: what it was planned for.
     #[must_use]
     pub fn header(&self) -> &Header<AXES> {
         self.program.header()
@@ -137,7 +138,7 @@ mod tests {
         assert!(matches!(refused, Err(MachineError::Axes(AxesError { axis: 2, .. }))), "{refused:?}");
     }
 
-    /// The last item but one is damaged, behind a checksum that is right: nothing of the program starts.
+    /// The last item but one is damaged, with a right checksum: nothing of the program starts.
     #[test]
     fn an_item_that_cannot_be_executed_is_found_before_the_start() {
         let good = machine().program;
@@ -157,7 +158,7 @@ mod tests {
         assert!(matches!(far, Err(MachineError::Items(CheckError::Start { axis: 1, .. }))), "{far:?}");
     }
 
-    /// Without any of its blocks, without its last one, with one that is longer, and with one behind its end.
+    /// Without any of its blocks, without its last one, with one that is longer, and with one after its end.
     #[test]
     fn a_program_that_does_not_hold_its_feed_is_refused() {
         let good = machine().program;

@@ -1,42 +1,42 @@
-//! What is done about what the button and the console ask for.
+//! The effect of the button and the console.
 //!
-//! Consumes the phase that the machine is in and what is asked for; produces an [`Action`], or why there is none. Only the
-//! button starts motion, from standing ready and from a program stop, where hands may be in the machine: no noise on the
-//! console's line can. The console ends holds, whoever asked for them.
+//! Consumes the machine's phase and a request; produces an [`Action`], or why there is none. Only the button
+//! starts motion when the machine is ready or at a program stop, where hands may be in the machine: noise on
+//! the console's line can't. The console ends holds, whoever asked for them.
 
 use crate::console::{Command, FeedOverride, Step};
 
-/// Where the machine is in its day.
+/// The machine's phase of operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Drives off, never started.
     Ready,
     /// The program is under way.
     Running {
-        /// In a hold, or on the way there.
+        /// Held, or coming to rest for a hold.
         is_held: bool,
         /// At rest at a program stop.
         is_stopped: bool,
     },
     /// The program is done, the machine is held at its end.
     Done,
-    /// An item of the program is refused, or there is no way to its start; motion comes to rest, and is held there until
-    /// reset.
+    /// An item of the program is refused, or there is no way to its start; motion comes to rest, and is held
+    /// there until reset.
     Refused,
     /// In a fault: drives off until reset, or on the way there.
     Faulted,
 }
 
-/// What is asked for.
+/// A request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
-    /// By the button: to start, to hold or to resume, whichever there is to do.
+    /// A press of the button: to start, hold or resume, depending on the phase.
     Press,
-    /// By the console.
+    /// A command from the console.
     Command(Command),
 }
 
-/// What there is to do.
+/// The action to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// Start a run.
@@ -45,16 +45,16 @@ pub enum Action {
     Hold,
     /// Resume from a hold or a program stop.
     Resume,
-    /// Another feed override, for this run and those to come.
+    /// Change the feed override, for this run and later ones.
     Override(Step),
-    /// Single block, for this run and those to come.
+    /// Switch single block, for this run and later ones.
     SingleBlock(bool),
     /// Nothing, and why.
     Nothing(&'static str),
 }
 
 impl Action {
-    /// For what is asked for in a phase.
+    /// The action for a request in a phase.
     #[must_use]
     pub fn of(phase: Phase, asked: Asked) -> Self {
         match (phase, asked) {
@@ -83,7 +83,7 @@ impl Action {
     }
 }
 
-/// What holds for this run and those to come.
+/// The settings for this run and later ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The feed override.

@@ -1,16 +1,16 @@
-//! Where an operator stands: a button and the bytes of a serial console.
+//! The operator's panel: a button and the bytes of a serial console.
 //!
-//! Consumes the level of the button once a poll; produces presses.
+//! Consumes the level of the button once per poll; produces presses.
 
-/// What a board has for its operator. The background asks once a poll.
+/// The board's panel. The background asks it once per poll.
 pub trait Panel {
-    /// Whether the start button is down now. Bounces are this crate's business.
+    /// Whether the start button is down now. This crate debounces it.
     fn is_button_down(&mut self) -> bool;
 
-    /// The next byte of the console, in the order of their coming.
+    /// The next byte of the console, in order of arrival.
     fn next_byte(&mut self) -> Option<u8>;
 
-    /// How often bytes were lost since the start.
+    /// Number of times that bytes were lost since the start.
     fn bytes_lost(&self) -> u32;
 }
 
@@ -23,11 +23,12 @@ pub(crate) struct Button {
     is_counted: bool,
 }
 
-/// So many samples at least make a press, however long polls take: one may be a bounce.
+/// Least number of samples for a press, however long polls take: one may be a bounce.
 const PRESS_SAMPLES: u8 = 3;
 
 impl Button {
-    /// Whether it has just been down for `button_ticks` at tick `now`, as far as polls have seen. A press counts once.
+    /// Whether it has just been down for `button_ticks` at tick `now`, as seen by the polls. A press counts
+    /// once.
     pub(crate) fn is_pressed(&mut self, is_down: bool, now: u32, button_ticks: u32) -> bool {
         if !is_down {
             *self = Self::default();
@@ -44,7 +45,8 @@ impl Button {
 mod tests {
     use super::*;
 
-    /// Ticks at which a button that is down where `down` says so counts as pressed, with a poll every `poll` ticks.
+    /// Ticks at which a button that is down where `down` says so counts as pressed, with a poll every `poll`
+    /// ticks.
     fn presses(poll: u32, begin: u32, down: impl Fn(u32) -> bool) -> Vec<u32> {
         let mut button = Button::default();
         (0..400)

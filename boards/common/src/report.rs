@@ -1,4 +1,4 @@
-//! The figures that the log gets once a second, and the flight recorder's rows after a fault, a line a poll.
+//! The figures logged once per second, and the flight recorder's rows after a fault; one line per poll.
 
 use motion_kernel::num::Real;
 use rtic_core::Mutex;
@@ -7,7 +7,7 @@ use crate::control::Control;
 use crate::log::LogLine;
 use crate::parameters::BoardParameters;
 
-/// Reads the flight recorder out, a row at a time.
+/// Reads out the flight recorder, one row at a time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FlightDump {
     rows: usize,
@@ -15,7 +15,7 @@ pub(crate) struct FlightDump {
 }
 
 impl FlightDump {
-    /// The next row, if it is time for one at tick `now`.
+    /// The next row, if one is due at tick `now`.
     pub(crate) fn line<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>(
         &mut self,
         now: u32,
@@ -44,7 +44,7 @@ enum Next {
     Background,
 }
 
-/// What was found since the last report.
+/// The figures since the last report.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Report {
     due_ticks: u32,
@@ -54,7 +54,7 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// A poll of the background took so long.
+    /// Notes the duration of a poll of the background.
     pub(crate) fn note_poll(&mut self, cycles: u32) {
         self.longest_turn_cycles = self.longest_turn_cycles.max(cycles);
     }
@@ -69,7 +69,7 @@ impl Report {
     ) -> Option<LogLine<R, AXES>> {
         match self.next {
             Next::Ticks => {
-                // Across the wrap of the counter too.
+                // Also across the wrap of the counter.
                 if self.due_ticks.wrapping_sub(now).wrapping_sub(1) < board.report_ticks() {
                     return None;
                 }

@@ -1,7 +1,7 @@
-//! What the start button runs, under live control: from where the machine stands to the program's start, then the program;
-//! and once more with every start.
+//! The runs that the start button begins, under live control: a move from where the machine stands to the
+//! program's start, then the program; again with every start.
 //!
-//! Consumes the machine's position, the items in flash and what is commanded on the way; keeps the streams filled. Background.
+//! Consumes the machine's position, the items in flash and commands; keeps the streams filled. Background.
 
 use core::task::Poll;
 
@@ -14,10 +14,10 @@ use motion_kernel::units::Position;
 
 use crate::operator::Settings;
 
-/// How fast the machine goes to the program's start, at most \[mm/s\]: slowly, it may come from anywhere.
+/// Greatest feed to the program's start \[mm/s\]: slow, because the machine may come from anywhere.
 const TO_START_MM_S: f64 = 20.0;
 
-/// The items of one run after the other; none for now where no run has been started.
+/// The items of one run after the other; pending while no run is started.
 #[derive(Debug)]
 struct Runs<'a, const AXES: usize> {
     program: Reader<'a, AXES>,
@@ -39,21 +39,23 @@ impl<const AXES: usize> Source<AXES> for Runs<'_, AXES> {
     }
 }
 
-/// The program's runs, and how much of them is in the streams. Live control knows `PLACES` blocks and ramps ahead, each.
+/// The program's runs, under live control, which knows `PLACES` blocks and as many ramps ahead.
 pub struct Run<'a, R: Real, const AXES: usize, const PLACES: usize> {
     feeder: LiveFeeder<'a, R, AXES>,
     control: LiveControl<R, AXES, Runs<'a, AXES>, ProgramError, PLACES>,
 }
 
 impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACES> {
-    /// No run yet, for streams that were split where the machine stands, and changes `lead_ticks` ahead.
+    /// Begins without a run, with streams that were split where the machine stands, and with changes
+    /// `lead_ticks` ahead.
     #[must_use]
     pub fn new(program: Reader<'a, AXES>, feeder: LiveFeeder<'a, R, AXES>, lead_ticks: u32) -> Self {
         let runs = Runs { program, to_start: None, items: None };
         Self { feeder, control: LiveControl::new(runs, program.header().tick_s, lead_ticks) }
     }
 
-    /// Starts a run on a machine that stands at `here`, where the streams were split or the run before it ended.
+    /// Starts a run on a machine that stands at `here`, where the streams were split or the previous run
+    /// ended.
     ///
     /// # Errors
     /// There is no way to the program's start.
@@ -77,34 +79,35 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
         self.control.resume();
     }
 
-    /// Whether it is at rest in a hold, or on the way there.
+    /// Whether it is held, or coming to rest for a hold.
     #[must_use]
     pub fn is_held(&self) -> bool {
         matches!(self.state(), State::Holding | State::Held)
     }
 
-    /// Applies `settings` to this run and those to come.
+    /// Applies `settings` to this run and later ones.
     pub fn set(&mut self, settings: &Settings) {
         let set = self.control.set_override(settings.feed_override.share());
         debug_assert!(set.is_ok(), "an operator's range of overrides is within live control's");
         self.control.set_single_block(settings.is_single);
     }
 
-    /// Reads and plans what there is room for. Ticks may come meanwhile, and do: it may take many of them.
+    /// Reads and plans as far as there is room. Ticks come meanwhile: it may take many of them.
     ///
     /// # Errors
-    /// An item can't be executed, as from now on. What has entered before it ends at rest ([`State::Failed`]).
+    /// An item can't be executed; every later call returns the same error. The items entered before it end at
+    /// rest ([`State::Failed`]).
     pub fn poll(&mut self) -> Result<(), SupplyError<ProgramError>> {
         self.control.poll(&mut self.feeder)
     }
 
-    /// What it is doing; [`State::Waiting`] before, between and after runs.
+    /// The state of live control; [`State::Waiting`] before, between and after runs.
     #[must_use]
     pub fn state(&self) -> State {
         self.control.state(&self.feeder)
     }
 
-    /// How often motion had to stop because the background was too slow.
+    /// Number of stops because the background was too slow.
     #[must_use]
     pub fn starvations(&self) -> u32 {
         self.control.starvations()
@@ -122,7 +125,7 @@ mod tests {
 
     type Run<'a> = super::Run<'a, f32, AXES, 64>;
 
-    /// A board whose background has polls every so many ticks.
+    /// A board whose background polls every given number of ticks.
     struct TestBoard<'a> {
         run: Run<'a>,
         intake: Intake<'a, f32, AXES>,
@@ -142,8 +145,8 @@ mod tests {
     }
 
     impl TestBoard<'_> {
-        /// The program from where the machine stands; before each tick `command` may say something. Its ticks, and where it
-        /// ended.
+        /// The program from where the machine stands; before each tick `command` may say something. Its
+        /// ticks, and where it ended.
         fn program(&mut self, command: &mut dyn FnMut(u32, &mut Run<'_>)) -> (u32, [Position; AXES]) {
             self.run.start(self.here).expect("a way");
             for tick in 0..1_000_000 {
@@ -161,8 +164,8 @@ mod tests {
         }
     }
 
-    /// Runs the program as the board does, twice: from its start, and from where it ended. The ticks of each run, where it
-    /// ended, and how often it had to stop for want of data.
+    /// Runs the program as the board does, twice: from its start, and from where it ended. The ticks of each
+    /// run, where it ended, and how often it had to stop for want of data.
     fn two_runs(
         poll_ticks: u32,
         mut command: impl FnMut(u32, &mut Run<'_>),
@@ -190,7 +193,8 @@ mod tests {
         assert_eq!(starvations, 0);
     }
 
-    /// Polls as seldom as the longest one would let them be: what is under way is no slower for it, only what begins.
+    /// Polls as seldom as the longest one would let them be: what is under way is no slower for it, only what
+    /// begins.
     #[test]
     fn seldom_turns_cost_no_stop() {
         let (runs, starvations) = two_runs(POLL_TICKS_MAX, |_, _| {});
@@ -249,8 +253,8 @@ mod tests {
         assert!(slower > STRINGER_TICKS + 1000 && faster < STRINGER_TICKS - 40, "{slower} {faster}");
     }
 
-    /// In single block it is held after every line of the program, the last one too, because more may come. Switched on
-    /// between two runs it is held after the way to the start first.
+    /// In single block it is held after every line of the program, the last one too, because more may come.
+    /// Switched on between two runs it is held after the way to the start first.
     #[test]
     fn in_single_block_it_is_held_after_every_line() {
         let items = machine().program.items();
@@ -292,7 +296,8 @@ mod tests {
         });
     }
 
-    /// From one encoder count to the whole machine, longer than the streams hold, in any direction, at the feed there is.
+    /// From one encoder count to the whole machine, longer than the streams hold, in any direction, at the
+    /// feed there is.
     #[test]
     fn the_way_to_the_start_is_any() {
         let machine = machine();

@@ -1,25 +1,25 @@
-//! What the tick keeps about itself: cycles, latency, overruns.
+//! The tick's figures about itself: cycles, latency, overruns.
 //!
-//! Consumes three figures a tick, in the tick, a few operations; the background takes the sum of them once
-//! a second.
+//! Consumes three figures per tick, in the tick, with a few operations; the background takes the summary once
+//! per second.
 
 /// Figures of the ticks since they were last taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TickTiming {
-    /// Ticks.
+    /// Number of ticks.
     pub ticks: u32,
     /// Core cycles of the shortest tick.
     pub min_cycles: u32,
-    /// Of the longest.
+    /// Core cycles of the longest tick.
     pub max_cycles: u32,
-    /// Of the last.
+    /// Core cycles of the last tick.
     pub last_cycles: u32,
-    /// Longest time from the timer's event to the tick's first instruction \[core cycles\]. What of it is more
-    /// than the least is the jitter of the sampling.
+    /// Longest time from the timer's event to the tick's first instruction \[core cycles\]. Its excess over
+    /// the least latency is the jitter of the sampling.
     pub max_latency_cycles: u32,
-    /// The least.
+    /// Shortest such time \[core cycles\].
     pub min_latency_cycles: u32,
-    /// Ticks that were not done when the next was due.
+    /// Number of ticks that were not done when the next one was due.
     pub overruns: u32,
 }
 
@@ -49,7 +49,7 @@ impl TickTiming {
         self.overruns = self.overruns.saturating_add(u32::from(overrun));
     }
 
-    /// The figures so far; begins anew.
+    /// Returns the figures so far and begins anew.
     pub fn take(&mut self) -> Self {
         core::mem::take(self)
     }

@@ -12,9 +12,9 @@ use stm32f4xx_hal::gpio::{Input, PC13};
 
 use crate::console_port::LOST;
 
-/// Ticks since the start; counted by the tick.
+/// Number of ticks since the start; counted by the tick.
 pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
-/// Polls of the background; the tick feeds the watchdog only while they are counted.
+/// Number of polls of the background; the tick feeds the watchdog only while it increases.
 pub(crate) static POLLS: AtomicU32 = AtomicU32::new(0);
 
 /// The blue button and ST-LINK's serial port.
@@ -38,7 +38,7 @@ impl motion_board::Panel for Panel {
     }
 }
 
-/// Runs for ever.
+/// Runs forever.
 pub(crate) fn run(
     mut control: impl Mutex<T = Control>,
     streams: &'static mut Streams,

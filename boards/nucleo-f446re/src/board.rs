@@ -1,9 +1,9 @@
 //! The board from reset to its first tick: pins, clocks, peripherals.
 //!
-//! Consumes the peripherals, once; produces what the tick and the background own. Before anything else the
-//! enables become outputs and low, which their pull-downs have held them at since reset. Panics where the
-//! hardware is not as `design_parameters.rs` says; nothing is enabled then. Without the ST-LINK's clock it
-//! waits for it for ever, with everything off.
+//! Consumes the peripherals, once; produces what the tick and the background own. First of all the enables
+//! become outputs at low, the level at which their pull-downs have held them since reset. Panics if the
+//! hardware differs from `design_parameters.rs`; nothing is enabled then. Without the ST-LINK's clock it
+//! waits forever, with everything off.
 
 use defmt::{info, unwrap};
 use embedded_hal_bus::spi::ExclusiveDevice;
@@ -116,7 +116,7 @@ impl Board {
         };
 
         let watchdog = IndependentWatchdog::new(device.IWDG);
-        // Not even the debugger stops it: a halted processor with drives enabled is just what it is for.
+        // Not even the debugger stops it: a halted processor with drives enabled is exactly its case.
         watchdog.stop_on_debug(&device.DBGMCU, false);
 
         Self {

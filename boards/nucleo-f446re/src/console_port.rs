@@ -8,10 +8,10 @@ use stm32f4xx_hal::pac::USART2;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::serial::Rx;
 
-/// Times that bytes came garbled, behind others that nobody had taken, or found no room.
+/// Number of times that bytes were garbled, overrun, or found no room.
 pub(crate) static LOST: AtomicU32 = AtomicU32::new(0);
 
-/// Takes the byte that has come since the tick before, if there is one: no two can.
+/// Takes the byte that has come since the tick before, if any: two can't come within a tick.
 pub(crate) fn receive(port: &mut Rx<USART2>, bytes: &mut Producer<'static, u8>) {
     let is_lost = match port.read() {
         Ok(byte) => bytes.enqueue(byte).is_err(),

@@ -1,9 +1,9 @@
 //! The AD5754 on SPI2: bus, chip select, and the kernel's adapter over them.
 //!
-//! Consumes nothing but pins; produces the outputs of three axes at 0 V. Four frames a tick, each with its own
-//! SYNC; the last one loads all outputs at once (LDAC is wired high). Polled: while a burst runs the processor
-//! has nothing else to do in the tick, and a transfer by DMA would cost as much to set up. It can't hang
-//! the board: the bus is clocked by this side, and behind it is the watchdog.
+//! Consumes pins; produces the outputs of three axes, at 0 V. Four frames per tick, each with its own SYNC;
+//! the last one loads all outputs at once (LDAC is wired high). Polled: during a burst the processor has
+//! nothing else to do in the tick, and setting up DMA would cost as much. It can't hang the board: this side
+//! clocks the bus, and the watchdog backs it up.
 
 use core::convert::Infallible;
 
@@ -18,11 +18,11 @@ use stm32f4xx_hal::pac::SPI2;
 use stm32f4xx_hal::spi::Spi;
 
 /// The converter takes a bit at every falling edge of SCLK, 24 of them while SYNC is low (AD5754, serial
-/// interface, standalone operation). Both modes 1 and 2 give that. Mode 1 it is: the clock rests low, so the
-/// 24th falling edge is the last edge of all and nothing is left of the clock when SYNC rises.
+/// interface, standalone operation). Modes 1 and 2 both do that. Mode 1 is used: its clock rests low, so the
+/// 24th falling edge is the last edge, and no clock edge is left when SYNC rises.
 pub(crate) const MODE: Mode = MODE_1;
 
-/// SCLK. One for both `Mode` types.
+/// Frequency of SCLK \[Hz\].
 pub(crate) const CLOCK_HZ: u32 = SPI_HZ;
 
 /// SYNC, which stays high for as long as the converter needs between two frames.

@@ -1,8 +1,8 @@
 //! Every number of the firmware, with its derivation.
 //!
-//! Consumes the manuals: RM0390 (reference manual of the STM32F446), DS10693 (its data sheet), UM1724
-//! (the board), AD5754 (the converter's data sheet). Produces constants. What one constant must be to
-//! another is asserted at compile time; margins are in the tests below.
+//! Consumes the manuals: RM0390 (reference manual of the STM32F446), DS10693 (its data sheet), UM1724 (the
+//! board), AD5754 (the converter's data sheet). Produces constants. Relations between constants are asserted
+//! at compile time; the tests below check margins.
 //!
 //! To change the tick, change [`TICK_HZ`]: the rest follows or does not compile.
 
@@ -16,9 +16,9 @@ pub const HSE_HZ: u32 = 8_000_000;
 pub const SYSCLK_HZ: u32 = 168_000_000;
 /// APB1: SPI2 \[Hz\]. At most 45 MHz; AHB / 4.
 pub const APB1_HZ: u32 = 42_000_000;
-/// APB2 \[Hz\]. At most 90 MHz; AHB / 2. Nothing here uses it; it is set so that it is known.
+/// APB2 \[Hz\]. At most 90 MHz; AHB / 2. Nothing here uses it; it is set to a defined value.
 pub const APB2_HZ: u32 = 84_000_000;
-/// Timers on APB1: TIM2, TIM3, TIM5, TIM7 \[Hz\]. Twice the bus where its prescaler is not 1 (RM0390
+/// Timers on APB1: TIM2, TIM3, TIM5, TIM7 \[Hz\]. Twice the bus clock if its prescaler is not 1 (RM0390
 /// section 6.2, TIMPRE = 0).
 pub const APB1_TIMER_HZ: u32 = 2 * APB1_HZ;
 /// Timers on APB2 \[Hz\].
@@ -29,7 +29,7 @@ const _: () = assert!(APB1_HZ <= 45_000_000 && APB2_HZ <= 90_000_000);
 
 // --- Tick ------------------------------------------------------------------------------------------
 
-/// Control ticks a second \[Hz\]: the measured machine's 0.5 ms, a twentieth of its axis's time constant of
+/// Control ticks per second \[Hz\]: the measured machine's 0.5 ms, a twentieth of its axis's time constant of
 /// 9.83 ms (S4).
 pub const TICK_HZ: u32 = 2_000;
 /// The same as a duration \[s\].
@@ -39,10 +39,10 @@ pub const TICK_S: f64 = 1.0 / TICK_HZ as f64;
 pub const TICK_TIMER_PRESCALER: u16 = 0;
 /// Reload register: period − 1.
 pub const TICK_TIMER_RELOAD: u16 = (APB1_TIMER_HZ / TICK_HZ - 1) as u16;
-/// Core cycles a tick.
+/// Core cycles per tick.
 pub const TICK_CYCLES: u32 = SYSCLK_HZ / TICK_HZ;
-/// Priority of the tick's interrupt as RTIC counts it: 16 is the highest of the processor's 16 levels,
-/// the NVIC's 0 (DS10693: 4 bits). The only interrupt; `main.rs` repeats it, where only a literal may stand.
+/// Priority of the tick's interrupt as RTIC counts it: 16 is the highest of the processor's 16 levels, the
+/// NVIC's 0 (DS10693: 4 bits). The only interrupt; `main.rs` repeats it where only a literal is allowed.
 pub const TICK_PRIORITY: u8 = 16;
 
 const _: () = assert!(APB1_TIMER_HZ.is_multiple_of(TICK_HZ), "the period would not be exact");
@@ -55,12 +55,12 @@ const _: () = assert!(APB1_TIMER_HZ / TICK_HZ <= 1 << 16, "the period does not f
 pub const SPI_HZ: u32 = APB1_HZ / 2;
 /// The converter's greatest SPI clock \[Hz\].
 pub const SPI_MAX_HZ: u32 = 30_000_000;
-/// Frames a tick: one for each axis and the load command.
+/// Frames per tick: one for each axis and the load command.
 pub const DAC_FRAMES_PER_TICK: u32 = 3 + 1;
 /// Bits of a frame.
 pub const DAC_FRAME_BITS: u32 = 24;
 /// Time the clock runs for the frames of one tick \[ns\]: 96 bits at 21 MHz, 4.57 µs. The processor feeds the
-/// bytes and switches SYNC; with that the burst takes about twice as long (to be seen on SYNC with a scope).
+/// bytes and switches SYNC; with that the burst takes about twice as long (visible on SYNC with a scope).
 pub const DAC_BURST_CLOCK_NS: u32 =
     (1_000_000_000_u64 * (DAC_FRAMES_PER_TICK * DAC_FRAME_BITS) as u64 / SPI_HZ as u64) as u32;
 /// Least time that SYNC must be high between two frames \[ns\] (AD5754, t6 in write mode).
@@ -76,11 +76,11 @@ const _: () = assert!(SPI_HZ <= SPI_MAX_HZ);
 pub const ENCODER_FILTER_SAMPLES: u32 = 6;
 /// Sampling clock of that filter \[Hz\]: f_DTS / 2, where f_DTS is the timer's clock (CKD = 0).
 pub const ENCODER_FILTER_HZ: u32 = APB1_TIMER_HZ / 2;
-/// The longest pulse that the filter is sure to remove \[ns\]: shorter than N − 1 sampling periods.
+/// The longest pulse that the filter removes for certain \[ns\]: shorter than N − 1 sampling periods.
 pub const ENCODER_FILTER_REMOVES_NS: u32 =
     ((ENCODER_FILTER_SAMPLES - 1) as u64 * 1_000_000_000 / ENCODER_FILTER_HZ as u64) as u32;
-/// Counts a second that are sure to pass \[1/s\]: one count lasts N + 1 sampling periods, so that A and B
-/// may be any part of a count out of step. An ideal encoder passes at twice that rate.
+/// Count rate that passes for certain \[1/s\]: one count lasts N + 1 sampling periods, so A and B may be out
+/// of step by any part of a count. An ideal encoder passes at twice that rate.
 pub const ENCODER_COUNTS_PER_S_MAX: u32 = ENCODER_FILTER_HZ / (ENCODER_FILTER_SAMPLES + 1);
 /// Bits of the narrowest counter: TIM3's.
 pub const ENCODER_BITS_MIN: u32 = 16;
@@ -88,9 +88,9 @@ pub const ENCODER_BITS_MIN: u32 = 16;
 // --- Watchdog and background -----------------------------------------------------------------------
 
 /// Nominal timeout of the independent watchdog \[ms\], at 32 kHz. Nothing else stops the outputs when the
-/// processor stops, so it is short: a drive at full speed goes on for at most [`WATCHDOG_MAX_NS`].
+/// processor stops, so it is short: a drive at full speed continues for at most [`WATCHDOG_MAX_NS`].
 pub const WATCHDOG_MS: u32 = 5;
-/// What the HAL makes of it: prescaler and counts.
+/// The watchdog's prescaler, as the HAL computes it.
 pub const WATCHDOG_PRESCALER: u32 = 32;
 /// Counts of the watchdog until it resets.
 pub const WATCHDOG_COUNTS: u32 = 5;
@@ -104,25 +104,28 @@ pub const WATCHDOG_MIN_NS: u32 =
 /// Greatest time to the reset \[ns\].
 pub const WATCHDOG_MAX_NS: u32 =
     (WATCHDOG_COUNTS as u64 * WATCHDOG_PRESCALER as u64 * 1_000_000_000 / LSI_MIN_HZ as u64) as u32;
-/// What an item of a program takes the background \[cycles\]: some 20 000, double precision in software.
+/// Cycles that the background takes per item of a program: some 20 000, double precision in software.
 /// Assumed, not measured; the log's "background poll" is the measurement.
 pub const ITEM_CYCLES: u32 = 20_000;
-/// What a tick takes from the background \[cycles\]: twice what is estimated for one with slow memory.
+/// Cycles that a tick takes from the background: twice the estimate for slow memory.
 pub const TICK_CYCLES_TAKEN: u32 = 4_000;
-/// Items that the background sustains \[1/s\]: 8000, four a tick. What the streams accept at most is 16 pieces and 8
-/// segments a tick, 48 000; beyond what it sustains motion brakes to rest on the path, and goes on when there is more.
+/// Items that the background sustains \[1/s\]: 8000, four per tick. The streams accept at most 16 pieces and
+/// 8 segments per tick, 48 000 per second; beyond the sustained rate motion brakes to rest on the path, and
+/// continues when there is more.
 pub const ITEMS_PER_S: u32 = (SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) / ITEM_CYCLES;
-/// Blocks and ramps that live control knows ahead, each.
+/// Number of blocks, and of ramps, that live control knows ahead.
 pub const PLACES: usize = 64;
-/// The most instructions that a poll of the background was seen to take on an emulated Cortex-M4F, under random commands
-/// and behind polls that were lost, rounded up.
+/// Greatest number of instructions counted for a poll of the background on an emulated Cortex-M4F, under
+/// random commands and after lost polls, rounded up.
 pub const POLL_INSTRUCTIONS_MAX: u32 = 2_600_000;
-/// The longest poll of the background \[cycles\], at two an instruction: assumed, not measured, as the items' above.
+/// The longest poll of the background \[cycles\], at two per instruction: assumed, not measured, like the
+/// items' above.
 pub const POLL_CYCLES_MAX: u32 = 2 * POLL_INSTRUCTIONS_MAX;
-/// The same in ticks, which take their part of the processor: some 33 ms.
+/// The same in ticks, which take their share of the processor: some 33 ms.
 pub const POLL_TICKS_MAX: u32 = (POLL_CYCLES_MAX as u64 * TICK_HZ as u64)
     .div_ceil((SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) as u64) as u32;
-/// So far ahead of what it saw the background changes a ramp \[ticks\]: 4 ms, what an ordinary poll with a plan takes.
+/// How far ahead of the progress last seen the background changes a ramp \[ticks\]: 4 ms, the duration of an
+/// ordinary poll with a plan.
 pub const LEAD_TICKS: u32 = 8;
 
 const _: () = assert!(
@@ -130,10 +133,11 @@ const _: () = assert!(
     "the longest poll is close to what the watchdog takes for silence"
 );
 
-/// Bits a second of the serial console. A byte is ten bits, two ticks long, so that the tick, which takes one byte, leaves
-/// none behind, however late it is within its tolerance.
+/// Bits per second of the serial console. A byte is ten bits, two ticks long, so the tick, which takes one
+/// byte, never misses one, however late it is within its tolerance.
 pub const CONSOLE_BAUD: u32 = 9600;
-/// Bytes between tick and background: as many as may come in the longest poll, and one place that stays empty.
+/// Places for bytes between tick and background: as many as may come in the longest poll, plus one that stays
+/// empty.
 pub const CONSOLE_BYTES: usize = 64;
 
 const _: () = assert!(CONSOLE_BAUD <= 5 * TICK_HZ, "a byte may be lost between two ticks");
@@ -142,9 +146,9 @@ const _: () = assert!(
     "more bytes may come in a poll of the background than there are places"
 );
 
-/// Ticks that the flight recorder keeps: a twelfth of a second, 28 KB. What it takes, the stack has less.
+/// Ticks that the flight recorder keeps: a twelfth of a second, 28 KB. It reduces the stack by as much.
 pub const FLIGHT_ROWS: usize = TICK_HZ as usize / 12;
-/// Of these, behind that of the fault: 25 ms, in which one sees the axes coast.
+/// Ticks of these after the fault's: 25 ms, which show the axes coasting.
 pub const FLIGHT_AFTER: usize = TICK_HZ as usize / 40;
 
 // --- What the crate of all boards asks for -----------------------------------------------------------

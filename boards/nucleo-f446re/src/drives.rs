@@ -1,7 +1,7 @@
 //! The digital side of the drives: enables, their ready contacts, the emergency stop.
 //!
-//! Consumes four inputs a tick; produces three outputs. A few register accesses. Inputs have pull-ups and
-//! healthy is low: a broken wire, a missing connector and a drive without supply all read as stop.
+//! Consumes four inputs per tick; produces three outputs. A few register accesses. Inputs have pull-ups and
+//! low is healthy: a broken wire, a missing connector and a drive without supply all read as stop.
 //!
 //! This is not a safety function: the emergency stop must cut the drives' power by itself, and only tells the
 //! firmware that it has.
@@ -18,7 +18,7 @@ pub(crate) struct Drives {
 }
 
 impl Drives {
-    /// What there is to stop for, the emergency stop first. If there is anything, the drives are off when this
+    /// The reason to stop, if any, the emergency stop first. If there is one, the drives are off when this
     /// returns, whatever else happens in the tick.
     pub(crate) fn check(&mut self) -> Option<FaultKind<f32>> {
         let fault = if self.emergency_stop.is_high() {

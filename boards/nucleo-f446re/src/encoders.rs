@@ -1,7 +1,7 @@
-//! Three encoders on timers that count quadrature in hardware, four counts a line.
+//! Three encoders on timers that count quadrature in hardware, four counts per line.
 //!
-//! Consumes A and B of each; produces 64-bit counts, once a tick. Three register reads one after the other,
-//! some 0.1 µs apart in all: at 300 mm/s 0.03 µm. Can't fail: a broken encoder shows as following error.
+//! Consumes A and B of each; produces 64-bit counts, once per tick. Three register reads in a row, within
+//! some 0.1 µs: 0.03 µm at 300 mm/s. Can't fail: a broken encoder shows as following error.
 //!
 //! X and Y are 32 bits wide, Z has 16; how far Z is from wrapping unseen, and what the input filter passes,
 //! is in `design_parameters.rs`. Registers: RM0390, general-purpose timers, encoder interface mode.
@@ -25,12 +25,12 @@ pub(crate) struct Encoders {
     z: (TIM3, CountExtender<u16>),
 }
 
-/// A timer that counts both edges of both inputs, filtered. The HAL sets the mode; the filter has its bits in
-/// a register of which the HAL leaves them 0.
+/// A timer that counts both edges of both inputs, filtered. The HAL sets the mode and leaves the filter's
+/// bits at 0.
 macro_rules! counting {
     ($timer:expr, $pins:expr, $rcc:expr) => {{
         let (timer, _) = Qei::new($timer, $pins, $rcc).release();
-        // ENCODER_FILTER_SAMPLES and ENCODER_FILTER_HZ are this value's.
+        // ENCODER_FILTER_SAMPLES and ENCODER_FILTER_HZ describe this value.
         timer.ccmr1_input().modify(|_, w| w.ic1f().fdts_div2_n6().ic2f().fdts_div2_n6());
         let raw = timer.cnt().read().cnt().bits();
         (timer, CountExtender::new(raw))
@@ -38,7 +38,7 @@ macro_rules! counting {
 }
 
 impl Encoders {
-    /// Counting from 0.
+    /// The encoders, counting from 0.
     pub(crate) fn new(
         x: (TIM5, A<TIM5>, B<TIM5>),
         y: (TIM2, A<TIM2>, B<TIM2>),
@@ -54,7 +54,7 @@ impl Encoders {
 
     /// All counts, read at once.
     pub(crate) fn latch(&mut self) -> [Counts; AXES] {
-        // First read, then extend, so that the readings are as close as can be.
+        // First read, then extend, so that the readings are as close as possible.
         let x = self.x.0.cnt().read().cnt().bits();
         let y = self.y.0.cnt().read().cnt().bits();
         let z = self.z.0.cnt().read().cnt().bits();

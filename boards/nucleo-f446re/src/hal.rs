@@ -1,6 +1,6 @@
 //! The kernel's four traits on this board's hardware.
 //!
-//! In the tick. Encoders and enables can't fail, inputs it has none; the converter fails with its bus.
+//! In the tick. Encoders and enables can't fail; there are no axis inputs; the converter fails with its bus.
 
 use core::convert::Infallible;
 
@@ -12,7 +12,7 @@ use crate::dac::Outputs;
 use crate::drives::Drives;
 use crate::encoders::Encoders;
 
-/// What the tick drives.
+/// The hardware that the tick drives.
 pub(crate) struct Hardware {
     pub(crate) encoders: Encoders,
     pub(crate) outputs: Outputs,

@@ -1,12 +1,12 @@
-//! The board's axes and memory: how many of what, in the types of `motion_board`.
+//! The board's number of axes and memory sizes, for the types of `motion_board`.
 
 use crate::design_parameters::{FLIGHT_AFTER, FLIGHT_ROWS, PLACES};
 
 /// Number of axes: X, Y, Z.
 pub const AXES: usize = 3;
 
-/// The program in flash: the host's `stringer.ngc` for the reference machine, or what `MOTION_PROGRAM` named when this was
-/// built.
+/// The program in flash: the host's `stringer.ngc` for the reference machine, or the file that
+/// `MOTION_PROGRAM` named when this was built.
 pub static PROGRAM: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/program.bin"));
 
 /// The kernel's numbers: the processor has an FPU for them.

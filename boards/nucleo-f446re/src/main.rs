@@ -8,9 +8,9 @@
 //!         watchdog ◄───────────────────────── polls ───
 //! ```
 //!
-//! The tick is a hardware task with a static priority and nothing above it: its latest end is its own
-//! longest time after the timer's event, plus the longest time for which the background keeps interrupts off.
-//! `README.md` has wiring, bring-up and what to expect; `design_parameters.rs` every number.
+//! The tick is a hardware task with a static priority and nothing above it: it ends at the latest its own
+//! longest time after the timer's event, plus the longest time for which the background masks interrupts.
+//! `README.md` has wiring, bring-up and what to expect; `design_parameters.rs` has every number.
 #![no_std]
 #![no_main]
 // No panic path in the tick.
@@ -49,7 +49,7 @@ mod app {
     use stm32f4xx_hal::serial::Rx;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-    use crate::background::{self, Panel, TICKS, POLLS};
+    use crate::background::{self, POLLS, Panel, TICKS};
     use crate::board::Board;
     use crate::console_port;
     use crate::hal::Hardware;
@@ -81,14 +81,14 @@ mod app {
         storage: Streams = Streams::new(),
         flight: Flight = Flight::new(),
         console_bytes: Queue<u8, CONSOLE_BYTES> = Queue::new(),
-        // Nothing ever enters it: what the kernel looks at until there is a program.
+        // The kernel's streams until there is a program; nothing ever enters them.
         empty: motion_kernel::queue::Streams<Number, AXES, 2, 2> = motion_kernel::queue::Streams::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let Board { mut hardware, mut tick_timer, mut watchdog, scope, button, console } =
             Board::new(cx.device, cx.core);
         let machine = defmt::unwrap!(Machine::new(PROGRAM, &BOARD));
-        // Where the machine stands is called the program's start.
+        // The machine's position becomes the program's start.
         let start = machine.header().start;
         let kernel = Kernel::new(&machine.axes, start, hardware.encoders.latch());
         let (_, intake) = cx.local.empty.split(machine.header().rules, start);

@@ -1,13 +1,14 @@
 //! Which signal is on which pin: the wiring of the board.
 //!
-//! Produces a table; `README.md` shows the same rows and `board.rs` takes the same pins, whose alternate
-//! functions the HAL's types check (a wrong one does not compile). Connector pins are UM1724's tables of the
-//! ST morpho (CN7, CN10) and Arduino (CN5, CN8, CN9) connectors, alternate functions DS10693's table.
+//! Produces a table; `README.md` shows the same rows, and `board.rs` takes the same pins, whose alternate
+//! functions are checked by the HAL's types (a wrong one does not compile). Connector pins are UM1724's
+//! tables of the ST morpho (CN7, CN10) and Arduino (CN5, CN8, CN9) connectors, alternate functions DS10693's
+//! table.
 
 /// One row of the wiring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pin {
-    /// What it is for.
+    /// The signal.
     pub signal: &'static str,
     /// The processor's pin.
     pub pin: &'static str,
@@ -62,8 +63,8 @@ pub const PINS: [Pin; 19] = [
     ),
 ];
 
-/// Pins of the board that have a use already: the way to ST-LINK's serial port, the green LED, SWD and its trace output,
-/// clocks.
+/// Pins of the board that are already in use: the line to ST-LINK's serial port, the green LED, SWD and its
+/// trace output, clocks.
 pub const RESERVED: [&str; 9] = ["PA2", "PA5", "PA13", "PA14", "PB3", "PC14", "PC15", "PH0", "PH1"];
 
 #[cfg(test)]

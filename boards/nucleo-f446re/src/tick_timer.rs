@@ -1,13 +1,13 @@
 //! The timer that makes the tick: TIM7, a basic timer that can do nothing else.
 //!
-//! Produces an interrupt every period. Its counter goes on from the event, so it tells the tick how late
-//! it began; a second event before the tick is done is an overrun. Registers: RM0390, basic timers.
+//! Produces an interrupt every period. Its counter continues from the event, so it tells the tick how late it
+//! began; a second event before the tick is done is an overrun. Registers: RM0390, basic timers.
 
 use nucleo_f446re::design_parameters::{APB1_TIMER_HZ, SYSCLK_HZ, TICK_TIMER_PRESCALER, TICK_TIMER_RELOAD};
 use stm32f4xx_hal::pac::TIM7;
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-/// Core cycles a count of the timer.
+/// Core cycles per count of the timer.
 const CYCLES_PER_COUNT: u32 = SYSCLK_HZ / APB1_TIMER_HZ;
 
 /// The tick's timer.
@@ -16,7 +16,7 @@ pub(crate) struct TickTimer {
 }
 
 impl TickTimer {
-    /// Configured and stopped.
+    /// The timer, configured and stopped.
     pub(crate) fn new(timer: TIM7, rcc: &mut Rcc) -> Self {
         TIM7::enable(rcc);
         TIM7::reset(rcc);
@@ -29,13 +29,13 @@ impl TickTimer {
         Self { timer }
     }
 
-    /// The first tick comes one period from now.
+    /// Starts it; the first tick comes one period from now.
     pub(crate) fn start(&mut self) {
         self.timer.cr1().modify(|_, w| w.cen().set_bit());
     }
 
-    /// Takes the event: core cycles since it happened. At the beginning of the tick, so that the interrupt is
-    /// no longer pending long before the tick returns.
+    /// Takes the event; returns the core cycles since it happened. Called at the beginning of the tick, so
+    /// that the interrupt is no longer pending long before the tick returns.
     pub(crate) fn take(&mut self) -> u32 {
         let counts = u32::from(self.timer.cnt().read().cnt().bits());
         self.timer.sr().write(|w| w.uif().clear_bit());

@@ -46,9 +46,9 @@ pub const LINE: usize = 16;
 /// Sub-steps of a simulated tick: the dead time of 1.42 ms fits the cells.
 pub const SUBSTEPS: u32 = 4;
 
-/// Defines `budgeted_tick`, the whole tick of the kernel, outlined under this name: by it a trace of executed instructions
-/// is cut. In the image's own crate: in a function of the library other parts of the tick are inlined, and the counts are
-/// others.
+/// Defines `budgeted_tick`, the whole tick of the kernel, outlined under this name: by it a trace of executed
+/// instructions is cut. In the image's own crate: in a function of the library other parts of the tick are
+/// inlined, and the counts are others.
 #[macro_export]
 macro_rules! budgeted_tick {
     () => {

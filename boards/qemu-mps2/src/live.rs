@@ -21,8 +21,8 @@ pub type Closed<'a> = ClosedLoop<'a, Number, AXES, LINE>;
 /// The memory of path and feed lists.
 pub type Streams = LiveStreams<Number, AXES, PIECES, SEGMENTS>;
 
-/// Runs `bytes` under the commands of `seed`; `tick` has the background's poll and the kernel's tick done. Whether it
-/// ended in a fault.
+/// Runs `bytes` under the commands of `seed`; `tick` has the background's poll and the kernel's tick done.
+/// Whether it ended in a fault.
 pub fn run(
     bytes: &[u8],
     seed: u64,

@@ -1,10 +1,10 @@
-//! The compiled programs that the emulator was given: a bundle at a fixed address, loaded beside the image as
-//! if it had been flashed there.
+//! The compiled programs that the emulator was given: a bundle at a fixed address, loaded next to the image
+//! as if it had been flashed there.
 //!
 //! A bundle is the number of programs, then each one's length and bytes, padded to four; all numbers are
 //! 32 bits, least significant byte first.
 
-/// Where the bundle lies: behind the image's own memory (`build.rs`).
+/// The bundle's address: after the image's own memory (`build.rs`).
 pub const ADDRESS: usize = if super::IS_SMALL { 192 << 10 } else { 2 << 20 };
 /// How much memory there is from there.
 const LENGTH: usize = if super::IS_SMALL { 64 << 10 } else { 2 << 20 };

@@ -1,4 +1,4 @@
-//! A compiled program under live control in closed loop: the background obeys commands that a seed makes.
+//! A compiled program under live control in closed loop: the background obeys commands generated from a seed.
 //!
 //! The same seed gives the same commands on a PC and inside an emulated board.
 
@@ -15,7 +15,7 @@ use super::{ClosedLoop, InMemory, LoopError, regulated};
 use crate::machine::SimMachine;
 use crate::noise::SplitMix64;
 
-/// What is commanded before a tick.
+/// A command before a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Command {
     Hold,
@@ -24,26 +24,26 @@ enum Command {
     Override(f64),
 }
 
-/// Commands that no operator would give: in any order, one every hundred ticks, with times between them in which the
-/// background does not poll.
+/// Commands that no operator would give: in any order, one every hundred ticks, with times between them in
+/// which the background does not poll.
 #[derive(Clone, Debug)]
 struct Commands {
     random: SplitMix64,
     polls_left: u32,
-    /// Polls that the background still loses.
+    /// Number of polls that the background still loses.
     lost: u32,
 }
 
-/// So many polls have commands; then the program is let go on to its end.
+/// Number of polls with commands; then the program continues to its end.
 const COMMANDED_POLLS: u32 = 8000;
-/// In the share of 2⁻³² of all polls.
+/// A share of all polls, in 2⁻³².
 const ONE_IN_100: u32 = u32::MAX / 100;
 const ONE_IN_400: u32 = u32::MAX / 400;
-/// A poll is late by less than so many ticks.
+/// A poll is late by less than this many ticks.
 const LATE_TICKS: u32 = 256;
 
 impl Commands {
-    /// What is commanded in this poll; `None` if the background does not get it.
+    /// The command in this poll, if any; `None` if the background loses the poll.
     fn next(&mut self) -> Option<Option<Command>> {
         if self.polls_left == 0 {
             return Some(None);
@@ -74,7 +74,7 @@ impl Commands {
     }
 }
 
-/// The background under live control: keeps the streams full and obeys. `PLACES` as of [`LiveControl`].
+/// The background under live control: keeps the streams full and obeys. `PLACES` is that of [`LiveControl`].
 pub struct LiveProducer<'a, R: Real, const AXES: usize, const PLACES: usize> {
     feeder: LiveFeeder<'a, R, AXES>,
     control: LiveControl<R, AXES, Items<'a, AXES>, ProgramError, PLACES>,
@@ -104,7 +104,7 @@ impl<R: Real, const AXES: usize, const PLACES: usize> LiveProducer<'_, R, AXES, 
         self.control.poll(&mut self.feeder)
     }
 
-    /// Whether nothing is left to do for a tick that ended in `state`.
+    /// Whether nothing is left to do after a tick that ended in `state`.
     pub fn is_over(&self, state: ExecState) -> bool {
         state == ExecState::Idle && self.control.state(&self.feeder) == State::Done
             || self.control.state(&self.feeder) == State::Aborted
@@ -134,8 +134,8 @@ pub fn close<
     machine: &'a SimMachine<AXES, LINE>,
     seed: u64,
 ) -> Result<LiveClosed<'a, R, AXES, PLACES, LINE>, LoopError> {
-    // As the other `close`, line by line: a constructor for both costs copies of the kernel, and a board with 16 KiB has no
-    // room for them.
+    // As the other `close`, line by line: a constructor for both costs copies of the kernel, and a board with
+    // 16 KiB has no room for them.
     let header = program.header();
     let (feeder, intake) = streams.split(header.rules, header.start);
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;

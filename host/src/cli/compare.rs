@@ -1,4 +1,5 @@
-//! `motion compare`: how long programs take, exact and blended, beside what acceleration alone would allow.
+//! `motion compare`: how long programs take, exact and blended, compared with what acceleration alone would
+//! allow.
 
 use std::fs;
 use std::io::{self, Write};
@@ -21,13 +22,12 @@ Examples:
   motion compare parts/ --tolerance 0.01 --tolerance 0.05 --csv > times.csv
       every .ngc file of a folder, with blends of two tolerances
 
-Columns: `per block` is the time with one pair of ramps per block; `least` is what the same path would take
-with no limit of jerk and snap, below which no plan of it can be; `tolerance` is the greatest part of it that the path
-may use; `feed` to `step` are the executed ticks over the limits of axes and path, `step` that of
-acceleration where a junction is passed without a blend. Programs that are refused are listed; then the exit
-status is 2.";
+Columns: `per block` is the time with one pair of ramps per block; `least` is the time on the same path
+without limits of jerk and snap, a lower bound for every plan; `tolerance` is the greatest share of the tolerance that
+the path uses; `feed` to `step` are the executed ticks over the limits of axes and path, `step` for the
+acceleration step at a junction without a blend. Refused programs are listed; then the exit status is 2.";
 
-/// Compare the times of programs: exact path, blends, plan per block, and the least there is.
+/// Compare the times of programs: exact path, blends, plan per block, and the least possible.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct CompareArguments {
@@ -37,7 +37,7 @@ pub struct CompareArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
-    /// Blend within this, from 0 to 10 mm; may be given several times. Without it, the machine's tolerance.
+    /// Tolerance of blends, from 0 to 10 mm; may be given several times. Without it, the machine's tolerance.
     #[arg(long = "tolerance", value_name = "MM", value_parser = tolerance, allow_negative_numbers = true)]
     tolerances: Vec<f64>,
     /// Print JSON: rows, refused.
@@ -103,8 +103,8 @@ struct CompareJson<'a> {
 /// Compares and prints.
 ///
 /// # Errors
-/// A program can't be read or is refused (after the others are printed), the machine file is refused, or `out` can't be
-/// written.
+/// A program can't be read or is refused (after the others are printed), the machine file is refused, or
+/// `out` can't be written.
 pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(arguments.machine.as_ref())?;
     let programs = programs(&arguments.programs)?;
@@ -132,7 +132,7 @@ pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outc
     if refused.is_empty() { Ok(Outcome::Done) } else { Err(CliError::Refused { programs: refused }) }
 }
 
-/// The programs themselves, and those of folders in the order of their names.
+/// The given programs, and those in folders in the order of their names.
 fn programs(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
     let mut programs = Vec::new();
     for path in paths {

@@ -17,12 +17,11 @@ use crate::planning::{Executable, Mode, Plan, plan_program};
 const EXAMPLES: &str = "\
 Examples:
   motion compile part.ngc --machine mine.toml --output part.bin
-  motion compile part.ngc --live --output part.bin            for a board with live control, as the NUCLEO
+  motion compile part.ngc --live --output part.bin            for a board with live control, like the NUCLEO
   motion compile part.ngc --number fixed --output part.bin    for a board without an FPU
 
-The file holds the machine's scales, gains, guards and path limits, every piece of path and every ramp, with --live
-what holds the feed along the path, and a checksum.
-Its format is documented with motion_kernel::program.";
+The file holds the machine's scales, gains, guards and path limits, every piece of path, every ramp, with --live
+the blocks that limit the feed along the path, and a checksum. Its format is documented with motion_kernel::program.";
 
 /// Plan a program and write it for a board, with the machine it is for.
 #[derive(Debug, Args)]
@@ -30,7 +29,7 @@ Its format is documented with motion_kernel::program.";
 pub struct CompileArguments {
     /// G-code (`-`: standard input).
     program: PathBuf,
-    /// Where to write.
+    /// The file to write.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Machine file (`motion machine` prints one); without it, the reference machine.
@@ -42,7 +41,7 @@ pub struct CompileArguments {
     /// One pair of ramps per block; without it, ramps may span blocks.
     #[arg(long)]
     per_block: bool,
-    /// For a board with live control: with what holds the feed along the path, to plan anew by.
+    /// For a board with live control: include the path's blocks, so that the board can plan anew.
     #[arg(long)]
     live: bool,
 }
@@ -97,7 +96,7 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
     written.outcome(Outcome::Done)
 }
 
-/// The program in the board's numbers, if they hold its axes, too.
+/// The program in the board's number type, if that holds its axes, too.
 fn executable<R: Root>(plan: &Plan, machine: &Machine) -> Result<Executable, CliError> {
     machine.axes_config::<R>().map_err(|source| CliError::Axis { machine: machine.name.clone(), source })?;
     Ok(Executable::new::<R>(plan)?)

@@ -14,7 +14,7 @@ use crate::simulate::RunOptions;
 /// The program: line, arc R4, arc R10, arc R4, line, tangent to each other.
 pub const STRINGER: &str = include_str!("stringer.ngc");
 const STRINGER_NAME: &str = "stringer.ngc";
-/// Where the report goes, in the current directory.
+/// The report's name, in the current directory.
 const REPORT: &str = "stringer.html";
 
 /// Plans and runs the built-in program on the reference machine, writes its report.

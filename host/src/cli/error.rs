@@ -24,7 +24,7 @@ use crate::tuning::TuningError;
 /// How a command that printed its results ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Everything is as it should be.
+    /// Everything is right.
     Done,
     /// The run ended in a fault, or a check failed.
     Failed,
@@ -35,7 +35,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// That of a run.
+    /// The outcome of a run.
     #[must_use]
     pub fn of(summary: &RunSummary) -> Self {
         match summary.end {
@@ -64,12 +64,12 @@ pub enum CliError {
     /// A file can't be read.
     #[error("{path}: found {source}, expected a readable file")]
     Read {
-        /// As the user gave it.
+        /// The path, as the user gave it.
         path: String,
         /// The system's reason.
         source: io::Error,
     },
-    /// A file is not to be written, or can't be opened: found before the work.
+    /// A file must not be written, or can't be opened: found before the work.
     #[error(transparent)]
     Files(#[from] FilesError),
     /// Files could not be written; the results were printed.
@@ -107,12 +107,12 @@ pub enum CliError {
     /// The machine file is refused.
     #[error(transparent)]
     Machine(#[from] MachineError),
-    /// The number type that was asked for does not hold an axis.
+    /// The number type asked for does not hold an axis.
     #[error("machine {machine:?}: {source}")]
     Axis {
         /// The machine's name.
         machine: String,
-        /// Which axis, and why.
+        /// The axis, and why.
         source: AxisError,
     },
     /// There is no plan.
@@ -129,7 +129,7 @@ pub enum CliError {
     /// The file is no recording.
     #[error("{path}: {source}")]
     Recording {
-        /// As the user gave it.
+        /// The path, as the user gave it.
         path: String,
         /// Why.
         source: RecordingError,
@@ -137,7 +137,7 @@ pub enum CliError {
     /// The log has no good frames of a flight recorder.
     #[error("{path}{source}")]
     Flight {
-        /// As the user gave it.
+        /// The path, as the user gave it.
         path: String,
         /// Why.
         source: FlightError,
@@ -145,7 +145,7 @@ pub enum CliError {
     /// The machine is not homed.
     #[error("{machine}: {source}")]
     Home {
-        /// Its file.
+        /// The machine's file.
         machine: String,
         /// Why.
         source: HomeError,
@@ -156,7 +156,7 @@ pub enum CliError {
     /// The drive experiment can't be made, or a fault ended it.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// There is nothing to tune an axis by.
+    /// There is too little to tune an axis by.
     #[error(transparent)]
     Tuning(#[from] TuningError),
     /// Programs among several are refused.
@@ -165,10 +165,10 @@ pub enum CliError {
         /// Why, one by one.
         programs: Vec<String>,
     },
-    /// Arguments that are right one by one and don't fit together.
+    /// Arguments that are right one by one but don't fit together.
     #[error("found {found}, expected {expected}")]
     Arguments {
-        /// What they amount to.
+        /// The combination found.
         found: String,
         /// What would fit.
         expected: &'static str,
@@ -188,9 +188,10 @@ impl CliError {
         Err(Self::Unreached { commands, last_tick, outcome })
     }
 
-    /// 2 where the user's input is wrong. Where it is not: 6 for results that could not be written; 5 for commands that
-    /// were not reached by a run that finished; 1 for a fault, for a plan or a motion that the kernel refuses, for an
-    /// experiment that found nothing to measure or too little to tune by, and for an axis that found no reference.
+    /// 2 if the user's input is wrong. Otherwise 6 for results that could not be written; 5 for commands that
+    /// a finished run did not reach; 1 for a fault, for a plan or a motion that the kernel refuses, for an
+    /// experiment that found nothing to measure or too little to tune by, and for an axis that found no
+    /// reference.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
@@ -213,7 +214,7 @@ impl CliError {
     }
 }
 
-/// A fault, or motion that the kernel refuses, is not the user's input.
+/// A fault, or motion that the kernel refuses, is not wrong input.
 fn ended_badly(error: &SessionError) -> ExitCode {
     match error {
         SessionError::Fault { .. } | SessionError::Moves | SessionError::Run(RunError::Rejected(_)) => {

@@ -1,4 +1,4 @@
-//! `motion flight`: what a board's flight recorder kept, from the board's log.
+//! `motion flight`: the ticks kept by a board's flight recorder, from the board's log.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ Examples:
   motion flight board.log --machine mine.toml --report flight.html
                                                      the ticks around the fault, as pictures
 
-A board writes the last ticks before a fault, and some behind it, into its log, one in a line, as `flight [01, 03, …]`. The
+A board writes the last ticks before a fault, and some after it, to its log, one per line, as `flight [01, 03, …]`. The
 path position counts from the start of each stretch.";
 
 /// Read the ticks around a fault from a board's log.

@@ -17,21 +17,22 @@ use crate::simulate::job::RunInfo;
 
 const EXAMPLES: &str = "\
 Examples:
-  motion machine > mine.toml          then take away the # in front of the keys of [axis.homing]
+  motion machine > mine.toml          then remove the # before the keys of [axis.homing]
   motion home --machine mine.toml
   motion home --machine mine.toml --trace home.csv
                                       every tick of every axis, for a spreadsheet
 
-JSON: list of {axis, counts, index_counts (how far the index was behind the switch; null: the switch is the reference),
+JSON: list of {axis, counts, index_counts (how far the index was beyond the switch; null: the switch is the reference),
 time_s, position_mm (where the axis stands now), true_mm (the same from where it was switched on)}.
 
-Exit status: 1 where an axis was not homed, 2 where the machine file homes none; those before it are printed.";
+Exit status: 1 if an axis was not homed, 2 if the machine file homes none; the axes before it are printed.";
 
-/// Home the axes that have [axis.homing] in the machine file, one after the other: search the switch, back off, approach.
+/// Home the axes that have [axis.homing] in the machine file, one after the other: search the switch, back
+/// off, approach.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct HomeArguments {
-    /// Machine file; `motion machine` prints one, with the keys of homing behind a `#`.
+    /// Machine file; `motion machine` prints one, with the keys of homing commented out.
     #[arg(long, value_name = "FILE")]
     machine: PathBuf,
     /// Write every tick as a row of CSV; an existing file is replaced.
@@ -66,7 +67,7 @@ pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let mut homed = Vec::new();
     let info = RunInfo::of_machine(&machine);
     let (ended, ticks) = outputs.of_ticks(&info, |observe| homes.home(&mut homed, observe));
-    // What was homed is written and shown, whatever became of the next axis.
+    // Axes already homed are written and shown, even if the next axis failed.
     let written = ticks.write(|_| info.empty_trace());
     if arguments.json {
         let axes: Vec<AxisJson<'_>> = homed.iter().map(|axis| axis_json(axis, &machine)).collect();

@@ -8,7 +8,7 @@ use super::error::CliError;
 use crate::files::STANDARD_INPUT;
 use crate::machine::Machine;
 
-/// A text and the name it goes by in errors and reports.
+/// A text and its name in errors and reports.
 pub(super) struct Source {
     pub(super) name: String,
     pub(super) text: Vec<u8>,

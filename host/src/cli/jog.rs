@@ -1,4 +1,4 @@
-//! `motion jog`: keys of the simulated machine pressed and released.
+//! `motion jog`: presses and releases jog keys of the simulated machine.
 
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -23,23 +23,24 @@ Examples:
   motion jog X+20 --trace jog.csv     every tick, for a spreadsheet
 
 JSON: list of {press, from_mm, to_mm, time_s, feed_mm_s (the greatest), ended (\"distance\", \"soft limit\" or \"released\"),
-stop_s, stop_mm (from the key's release to rest; null where it was not released on the way)}.
+stop_s, stop_mm (from the key's release to rest; null if it was not released on the way)}.
 
-Exit status: 1 where a fault ended a jog, 2 where a key is refused; what came before is printed.";
+Exit status: 1 if a fault ended a jog, 2 if a key is refused; the jogs before it are printed.";
 
 /// Jog axes of the simulated machine: one key after the other, each until it rests.
 ///
-/// Positions, and so soft limits, count from where the machine is switched on, as they do for programs.
+/// Positions and soft limits count from where the machine is switched on, as in programs.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct JogArguments {
-    /// Keys: axis, + or -, a distance in mm or none for the soft limit, and @TICKS until it is released.
+    /// Keys: axis, + or -, a distance in mm (without one: to the soft limit), and @TICKS for the key's
+    /// release.
     #[arg(value_name = "KEY", required = true)]
     presses: Vec<Press>,
-    /// Feed in mm/s; otherwise the axis' greatest.
+    /// Feed, mm/s; without it, the axis' greatest.
     #[arg(long, value_name = "MM_S")]
     feed: Option<f64>,
-    /// Machine file; otherwise the built-in reference machine.
+    /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
     /// Write every tick as a row of CSV; an existing file is replaced.
@@ -95,7 +96,7 @@ pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let mut jogged = Vec::new();
     let info = RunInfo::of_machine(&machine);
     let (ended, ticks) = outputs.of_ticks(&info, |observe| keys.jog(&mut jogged, observe));
-    // What was jogged is written and shown, whatever became of the next key.
+    // Finished jogs are written and shown, even if the next key failed.
     let written = ticks.write(|_| info.empty_trace());
     let presses: Vec<PressJson> =
         jogged.iter().map(|jogged| PressJson::new(jogged, machine.tick_s)).collect();

@@ -1,4 +1,4 @@
-//! `motion machine`: the reference machine's file, to copy and change, and what its keys mean.
+//! `motion machine`: the reference machine's file, to copy and change, and the meaning of its keys.
 
 use std::io::{self, Write};
 
@@ -12,7 +12,7 @@ use crate::machine::keys::{KEY_TABLES, Key, KeyTable};
 
 const EXAMPLES: &str = "\
 Examples:
-  motion machine                      read about every value
+  motion machine                      the file, with a comment on every value
   motion machine --explain            every key with unit, range, default and meaning
   motion machine > mine.toml          a machine of your own; edit it, then
   motion run part.ngc --machine mine.toml
@@ -20,7 +20,7 @@ Examples:
 JSON: list of {table (in dots; empty: before the first table), table_is_optional, key, unit, values (how many), range,
 default (null: required), meaning}.";
 
-/// Print the built-in reference machine as a commented machine file, or what its keys mean.
+/// Print the built-in reference machine as a commented machine file, or the meaning of its keys.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct MachineArguments {

@@ -1,7 +1,8 @@
 //! The command line: what users and scripts rely on.
 //!
-//! Consumes arguments, files and standard input; produces text for people, `--json` for scripts, CSV for tables. An error
-//! is one line on standard error that names file, line and column, what was found and what was expected.
+//! Consumes arguments, files and standard input; produces text for people, `--json` for scripts, CSV for
+//! tables. An error is one line on standard error that names file, line and column, what was found and what
+//! was expected.
 //!
 //! | exit status | meaning |
 //! |---:|---|
@@ -14,24 +15,24 @@
 //! | 6 | results could not be written: a file, or standard output |
 //! | 130, 143 | interrupted: Ctrl-C (SIGINT), SIGTERM |
 //!
-//! With 1, 3, 4, 5 and 6 the results are printed. A file that is not written whole stays as it was, in all cases
-//! ([`files`](crate::files)).
+//! With 1, 3, 4, 5 and 6 the results are printed. In all cases, a file that can't be written completely stays
+//! as it was ([`files`](crate::files)).
 //!
 //! - [`profile`]: one ramp of the feed law, in figures;
 //! - [`plan`]: the feed plan of a program or a block list;
-//! - [`compare`]: the times of programs, exact and blended, beside the least there is;
+//! - [`compare`]: the times of programs, exact and blended, compared with the least possible;
 //! - [`run`]: a program through plan, kernel and simulated machine;
-//! - [`replay`]: a recorded run once more;
+//! - [`replay`]: runs a recording again;
 //! - [`flight`]: the ticks around a fault, from a board's log;
 //! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
 //! - [`home`]: the simulated axes find their references;
-//! - [`jog`]: keys of the simulated machine pressed and released;
-//! - [`machine`]: the reference machine's file, and what its keys mean;
-//! - [`demo`]: what `motion` alone does;
+//! - [`jog`]: presses and releases jog keys of the simulated machine;
+//! - [`machine`]: the reference machine's file, and the meaning of its keys;
+//! - [`demo`]: `motion` without a command;
 //! - [`error`]: errors and exit statuses;
-//! - `input`, `outputs`, `until_closed`, `table`, `trace`, `progress`: what the commands share.
+//! - `input`, `outputs`, `until_closed`, `table`, `trace`, `progress`: shared by the commands.
 
 pub mod compare;
 pub mod compile;
@@ -67,8 +68,8 @@ use crate::files::interrupt;
 const EXAMPLES: &str = "\
 Examples:
   motion                                         the built-in demonstration; writes stringer.html
-  motion run part.ngc --report part.html         run a program, look at what the axes did
-  motion replay part.mrec                        a recorded run once more, to the same bits
+  motion run part.ngc --report part.html         run a program, with a report on the axes
+  motion replay part.mrec                        run a recording again, to the same bits
   motion plan part.ngc                           what limits the feed, block by block
   motion compare parts/                          how long programs take, exact and blended
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
@@ -76,9 +77,9 @@ Examples:
   motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
   motion home --machine mine.toml                the axes find their references
-  motion jog X+20 Y-2.5@300 --feed 50            keys pressed, and one released after 300 ticks
+  motion jog X+20 Y-2.5@300 --feed 50            press keys, release one after 300 ticks
   motion machine > mine.toml                     a machine file to start from
-  motion machine --explain                       what every key of it means
+  motion machine --explain                       the meaning of its keys
 
 Exit status:
   0  done: a run came to the end of its program
@@ -89,9 +90,9 @@ Exit status:
   5  the run finished before a command of --at was due
   6  results could not be written: a file, or standard output
   130, 143  interrupted by Ctrl-C or SIGTERM
-With 1, 3, 4, 5 and 6 the results are printed. A file that is not written whole stays as it was.";
+With 1, 3, 4, 5 and 6 the results are printed. A file that can't be written completely stays as it was.";
 
-/// G-code to motion: plans the feed, runs the real-time kernel, and shows what simulated ±10 V axes make of it.
+/// G-code to motion: plans the feed, runs the real-time kernel, and shows how simulated ±10 V axes follow.
 ///
 /// Without a command, plans and runs a built-in program on the built-in machine and writes a report.
 #[derive(Debug, Parser)]
@@ -124,7 +125,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let mut out = BufWriter::new(UntilClosed::new(io::stdout().lock()));
     let done = execute(&cli, &mut out);
-    // What was printed before an error belongs before it.
+    // Output printed before an error must appear before it.
     let flushed = out.flush();
     let failure = match (done, flushed) {
         (Ok(outcome), Ok(())) => return outcome.exit_code(),
@@ -159,7 +160,7 @@ fn write_json(value: &impl serde::Serialize, out: &mut dyn Write) -> Result<(), 
     writeln!(out).map_err(CliError::Output)
 }
 
-/// The cause of a failed write, with its kind: a closed pipe must stay one.
+/// The cause of a failed write, with its kind: a closed pipe must stay recognisable.
 fn csv_failure(error: csv::Error) -> io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(cause) => cause,

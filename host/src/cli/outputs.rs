@@ -1,4 +1,4 @@
-//! Files about a run: the trace, written as it goes, and the report afterwards.
+//! Files about a run: the trace, written during the run, and the report, written afterwards.
 
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -20,8 +20,8 @@ pub(super) fn open(
     path.map(|path| files.output(option, path)).transpose()
 }
 
-/// What became of the files of a command. They are written before the results are printed, and nothing that happens to a
-/// file swallows the results.
+/// The outcome of writing a command's files. They are written before the results are printed, and the results
+/// are printed even if a file fails.
 #[derive(Debug, Default)]
 pub(super) struct Written {
     files: Vec<(&'static str, String)>,
@@ -49,7 +49,7 @@ impl Written {
         }
     }
 
-    /// Where the file went, if it was written.
+    /// The path of the file, if it was written.
     pub(super) fn place_of(&self, what: &str) -> Option<&str> {
         self.files.iter().find(|(of, _)| *of == what).map(|(_, name)| name.as_str())
     }
@@ -62,7 +62,7 @@ impl Written {
         Ok(())
     }
 
-    /// That of the command, unless a file was not written.
+    /// The command's outcome, unless a file was not written.
     pub(super) fn outcome(self, outcome: Outcome) -> Result<Outcome, CliError> {
         if self.failures.is_empty() {
             Ok(outcome)
@@ -72,7 +72,7 @@ impl Written {
     }
 }
 
-/// Files that are asked for, opened: a wrong path should not cost the user a long run.
+/// The files asked for, opened early: a wrong path should not cost the user a long run.
 pub(super) struct Outputs {
     trace: Option<OutputFile>,
     report: Option<OutputFile>,
@@ -87,12 +87,12 @@ impl Outputs {
         Ok(Self { trace: open(files, "--trace", trace)?, report: open(files, "--report", report)? })
     }
 
-    /// Only with the report, by what names it.
+    /// Only the report; `role` names its option.
     pub(super) fn report(files: &mut Files, role: &'static str, path: PathBuf) -> Result<Self, FilesError> {
         Ok(Self { trace: None, report: open(files, role, Some(&path))? })
     }
 
-    /// What `run` makes of a job, with the files about it. A run that can't be made leaves no files.
+    /// Runs a job with `run` and writes the files about it. A run that can't be made leaves no files.
     pub(super) fn of_run<T>(
         self,
         job: &Job,
@@ -113,13 +113,13 @@ impl Outputs {
         Ok((ran, written))
     }
 
-    /// The files about a trace that was not made by a run of now.
+    /// Writes the files about an existing trace.
     pub(super) fn of_trace(self, info: &RunInfo, trace: &RunTrace) -> Written {
         let ((), ticks) = self.of_ticks(info, |observe| trace.ticks.iter().for_each(observe));
         ticks.write(|ticks| RunTrace { ticks, ..trace.clone() })
     }
 
-    /// What `run` returns, and its ticks, of which the files are to be written.
+    /// Returns the result of `run`, and its ticks, from which the files are to be written.
     pub(super) fn of_ticks<T>(self, info: &RunInfo, run: impl FnOnce(&mut Observer<'_>) -> T) -> (T, Ticks) {
         let trace = self.trace.map(|output| {
             let (name, failure) = (output.name().to_owned(), output.failure());
@@ -148,7 +148,7 @@ impl Ticks {
         }
     }
 
-    /// Writes the trace, and the report of what `trace` makes of the ticks.
+    /// Writes the trace, and the report of the ticks as converted by `trace`.
     pub(super) fn write(self, trace: impl FnOnce(Vec<TraceRow>) -> RunTrace) -> Written {
         let mut written = Written::default();
         if let Some((name, failure, writer)) = self.trace {

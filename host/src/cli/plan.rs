@@ -134,7 +134,7 @@ fn json<'plan>(plan: &'plan Plan) -> PlanJson<'plan> {
     }
 }
 
-/// The plan as people read it.
+/// Writes the plan for people.
 pub(super) fn write_plan(plan: &Plan, out: &mut dyn Write) -> io::Result<()> {
     let columns = [
         ("block", "", Align::Right),

@@ -10,9 +10,9 @@ use super::error::{CliError, Outcome};
 use super::table::{self, Align};
 use super::{csv_failure, write_json};
 
-/// More rows than this are a mistyped tick rather than a table.
+/// More rows than this mean a mistyped tick.
 const ROWS_MAX: f64 = 1e8;
-/// A last tick this close to the ramp's end, in ticks, is the end.
+/// A last tick this close to the ramp's end, in ticks, is taken as the end.
 const SAME_TICK: f64 = 1e-6;
 
 const EXAMPLES: &str = "\
@@ -103,7 +103,7 @@ impl Row {
 /// Computes and prints the ramp.
 ///
 /// # Errors
-/// The figures are beyond the range of numbers, the table would be absurdly long, or `out` can't be written.
+/// The figures are beyond the range of numbers, the table would be too long, or `out` can't be written.
 pub fn profile(arguments: &ProfileArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let ramp = ramp(arguments)?;
     if arguments.csv {
@@ -154,7 +154,7 @@ fn write_csv(ramp: &Ramp<f64>, tick_s: f64, out: &mut dyn Write) -> Result<(), C
         let found = format!("{end_s} s in ticks of {tick_s} s");
         return Err(CliError::Arguments { found, expected: "at most 1e8 ticks" });
     }
-    // The tick that falls on tp but for rounding is the last row.
+    // A tick that coincides with tp, but for rounding, is the last row.
     let before_end = (end_s / tick_s - SAME_TICK).ceil().max(0.0) as u64;
     let mut csv = csv::Writer::from_writer(out);
     let times_s = (0..before_end).map(|tick| tick as f64 * tick_s).chain([end_s]);
@@ -224,8 +224,8 @@ mod tests {
         json(&ramp(&arguments).expect("a ramp"))
     }
 
-    /// The three worked examples of S1, in mm, to half of the last digit the paper prints. The third prints tp and
-    /// A(t1) as made from its printed t1 and Jp, whose roundings they carry: 2·0.05 ms and 0.13 mm/s².
+    /// The three worked examples of S1, in mm, to half of the last digit the paper prints. The third prints
+    /// tp and A(t1) as made from its printed t1 and Jp, whose roundings they carry: 2·0.05 ms and 0.13 mm/s².
     #[test]
     fn worked_examples_of_the_paper() {
         let check = |name: &str, found: f64, printed: f64, digit: f64| {

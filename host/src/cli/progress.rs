@@ -4,7 +4,7 @@ use std::io::{self, IsTerminal};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Ticks between two updates: a run makes millions a second.
+/// Ticks between two updates: a run makes millions per second.
 const STRIDE: u64 = 4096;
 
 /// Progress through a run of an expected number of ticks.
@@ -18,7 +18,7 @@ impl Progress {
         let is_terminal = io::stderr().is_terminal();
         let target = if is_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(ticks_expected), target);
-        // A template that does not parse would only cost the looks of the bar.
+        // A template that does not parse would only change the look of the bar.
         if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} %  {eta} left") {
             bar.set_style(style);
         }
@@ -32,7 +32,7 @@ impl Progress {
         }
     }
 
-    /// One of few steps is done.
+    /// Advances by one step of a few.
     pub(super) fn step(&mut self) {
         self.ticks += 1;
         self.bar.set_position(self.ticks);

@@ -1,4 +1,4 @@
-//! `motion replay`: a recorded run once more, from the recording alone.
+//! `motion replay`: runs a recording again, from the recording alone.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -18,16 +18,16 @@ Examples:
   motion run part.ngc --record part.mrec             record a run, with its faults and commands
   motion replay part.mrec                            run it again and compare every tick
   motion replay part.mrec --trace part.csv --report part.html
-                                                     with what was not written at the time
+                                                     with files that were not written then
 
 The kernel gets the recorded program, machine, commands and answers of the hardware; nothing is simulated. Trace and
 report are those of the run.
 
 Exit status: 0 identical, even if the run was held, aborted or ended by a fault; 1 a tick differs; 2 the file is no
-recording, or damaged; 6 a file could not be written.
+recording, or is damaged; 6 a file could not be written.
 JSON: that of `motion run`, and replay: identical, ticks (those of settling included), digest, difference.";
 
-/// Replay a recorded run: the same kernel on what it was told then, compared tick by tick.
+/// Replay a recorded run: the same kernel with the recorded inputs, compared tick by tick.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct ReplayArguments {

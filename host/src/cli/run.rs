@@ -24,16 +24,16 @@ use crate::trace::{RunEnd, TracedCommand, TracedFault};
 const EXAMPLES: &str = "\
 Examples:
   motion run part.ngc                                run on the reference machine, print a summary
-  motion run part.ngc --report part.html             and a page with the pictures of the run
+  motion run part.ngc --report part.html             and write a page with plots of the run
   motion run part.ngc --machine mine.toml --trace part.csv
                                                      every tick of every axis, for a spreadsheet
   motion run part.ngc --at 2000:hold,2600:resume,3000:override=0.5
-                                                     with commands given before those ticks
-  motion run part.ngc --record part.mrec             and everything that `motion replay` needs to run it again
+                                                     with commands before these ticks
+  motion run part.ngc --record part.mrec             and record it for `motion replay`
   generate-part | motion run - --json                for a script
 
 Exit status: 0 the program finished, 1 a fault, 3 held, 4 aborted, 5 a command of --at was not reached, 6 a file could not
-be written. The summary is printed, and the files are written, in all of these cases.
+be written. In all these cases the summary is printed, and the files are written.
 
 JSON: finished, stopped_by (null, \"hold\", \"single block\", \"override\", \"abort\" or \"fault\"), reached_mm, reached_line
 (how far the run came), commands_not_reached, and the figures of the run.";
@@ -54,25 +54,27 @@ pub struct RunArguments {
     /// Write a self-contained HTML page about the run; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Write what the kernel was told, tick by tick, for `motion replay`; an existing file is replaced.
+    /// Record the kernel's inputs, tick by tick, for `motion replay`; an existing file is replaced.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Live control: commands before given ticks, such as `2000:hold,2600:resume,3000:override=0.5`.
     ///
-    /// A command is `hold` (come to rest on the path), `resume`, `abort` (come to rest and give up the rest),
-    /// `override=SHARE` (drive at so many times the program's feed, from 0 to 2, never above what the machine allows),
-    /// `single` (come to rest at the end of every program line and wait there for a resume) or `continuous` (no more).
+    /// A command is `hold` (come to rest on the path), `resume`, `abort` (come to rest and drop the rest of
+    /// the program), `override=SHARE` (feed override: 0 to 2 times the program's feed, never above the
+    /// machine's limits), `single` (single block: come to rest at the end of every program line and wait
+    /// there for a resume) or `continuous` (single block off).
     #[arg(long, value_name = "TICK:COMMAND,…")]
     at: Option<Script>,
     /// Break the simulated machine before given ticks, such as `2000:encoder-lost=X`.
     ///
-    /// What can break: `encoder-lost=AXIS`, `encoder-jump=AXIS:COUNTS`, `encoder-reversed=AXIS`, `drive-reversed=AXIS`,
-    /// `overload=AXIS:ACCELERATION` (what is left of the drive's, in mm/s²), `drive-not-ready=AXIS`, `drive-fault=AXIS`,
-    /// `limit-low=AXIS:POSITION` and `limit-high=AXIS:POSITION` (a limit switch up to or from there, in mm), and
-    /// `emergency-stop`.
+    /// What can break: `encoder-lost=AXIS`, `encoder-jump=AXIS:COUNTS`, `encoder-reversed=AXIS`,
+    /// `drive-reversed=AXIS`, `overload=AXIS:ACCELERATION` (the drive's remaining acceleration, in mm/s²),
+    /// `drive-not-ready=AXIS`, `drive-fault=AXIS`, `limit-low=AXIS:POSITION` and `limit-high=AXIS:POSITION`
+    /// (a limit switch up to or from this position, in mm), and `emergency-stop`.
     #[arg(long, value_name = "TICK:FAULT,…")]
     inject: Option<Injections>,
-    /// Print JSON: ticks, times, maxima along the path, share of it on which a limit is active, errors of the axes, faults.
+    /// Print JSON: ticks, times, maxima along the path, share of the path with an active limit, errors of the
+    /// axes, faults.
     #[arg(long)]
     json: bool,
 }
@@ -106,7 +108,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     }
     let outcome = Outcome::of(&summary);
     match (written.outcome(outcome), CliError::of_unreached(&summary, outcome)) {
-        // Both are said.
+        // Report both.
         (Err(CliError::Unwritten(mut messages)), Err(unreached)) => {
             messages.push(unreached.to_string());
             Err(CliError::Unwritten(messages))
@@ -115,7 +117,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     }
 }
 
-/// Runs a plan; writes the trace as it goes, report and recording afterwards.
+/// Runs a plan; writes the trace during the run, report and recording afterwards.
 pub(super) fn execute(
     options: &RunOptions<'_>,
     plan: &Plan,
@@ -231,7 +233,7 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
     }
 }
 
-/// The run as people read it.
+/// Writes the run for people.
 pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Result<()> {
     let RunSummary { ticks, tick_s, planned_time_s, time_s, path_length_mm, .. } = summary;
     let tick_ms = tick_s * 1e3;

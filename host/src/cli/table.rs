@@ -5,7 +5,7 @@ use std::io::{self, Write};
 /// Blanks between two columns.
 const GAP: usize = 2;
 
-/// A column's place for its text.
+/// The alignment of a column's text.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Align {
     Left,
@@ -15,7 +15,7 @@ pub(super) enum Align {
 /// A column: heading, unit (may be empty), alignment.
 pub(super) type Column = (&'static str, &'static str, Align);
 
-/// Writes a table with as many cells a row as there are columns.
+/// Writes a table with one cell per column in every row.
 pub(super) fn write<const COLUMNS: usize>(
     columns: &[Column; COLUMNS],
     rows: &[[String; COLUMNS]],

@@ -1,4 +1,4 @@
-//! The trace file: one row per tick, written as the run goes.
+//! The trace file: one row per tick, written during the run.
 
 use std::io::{self, Write};
 
@@ -23,14 +23,14 @@ const VOLTS: usize = 6;
 pub(super) struct TraceWriter<W: Write> {
     csv: csv::Writer<W>,
     tick_s: f64,
-    /// The text of one field, kept for its memory.
+    /// The text of one field, kept to reuse its memory.
     field: Vec<u8>,
     /// The first failure; nothing is written after it.
     failure: Option<io::Error>,
 }
 
 impl<W: Write> TraceWriter<W> {
-    /// Writes the header. A failure is kept for [`Self::finish`]: a run is not stopped for it.
+    /// Writes the header. A failure is kept for [`Self::finish`]: it does not stop the run.
     pub(super) fn new(out: W, info: &RunInfo) -> Self {
         let csv = csv::Writer::from_writer(out);
         let mut writer = Self { csv, tick_s: info.tick_s, field: Vec::new(), failure: None };

@@ -1,8 +1,9 @@
-//! Standard output whose reader may have seen enough (`motion plan part.ngc | head`).
+//! Standard output that its reader may close early (`motion plan part.ngc | head`).
 
 use std::io::{ErrorKind, Result, Write};
 
-/// Drops what is written after the reader is gone: the command goes through its work, and ends with its own exit status.
+/// Drops all output after the reader is gone: the command completes its work and ends with its own exit
+/// status.
 pub(super) struct UntilClosed<W> {
     out: W,
     is_closed: bool,

@@ -1,8 +1,8 @@
 //! The least time that a plan's path can take.
 //!
-//! Consumes a plan; produces the time of the fastest motion over its blocks that keeps their ceilings, their junction
-//! feeds and the acceleration of their laws, with no limit of jerk and snap. Every plan of these blocks keeps all that
-//! too, so none is faster.
+//! Consumes a plan; produces the time of the fastest motion over its blocks that keeps their ceilings, their
+//! junction feeds and the acceleration of their laws, with no limit of jerk and snap. Every plan of these
+//! blocks keeps all that too, so none is faster.
 
 use motion_kernel::plan::Block;
 

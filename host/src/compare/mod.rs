@@ -1,8 +1,9 @@
 //! The time of a program, in forms that can be compared.
 //!
-//! Consumes a program and a machine; produces, for a path mode, the time of the plan, of S3's plan per block, and the
-//! least time that acceleration alone would allow on the same path, with what the path used of its tolerance and the
-//! executed ticks of the machine's limits. Background; two plans and one pass over all ticks.
+//! Consumes a program and a machine; produces, for a path mode, the time of the plan, of S3's plan per block,
+//! and the least time that acceleration alone would allow on the same path, with what the path used of its
+//! tolerance and the executed ticks of the machine's limits. Background; two plans and one pass over all
+//! ticks.
 //!
 //! - [`bound`]: the least time;
 //! - [`ticks`]: the executed ticks against the limits.

@@ -1,7 +1,7 @@
 //! The ticks of a plan against the limits of its machine.
 //!
-//! Consumes a plan; executes it with the kernel's executor, in f64 and without axes; produces the greatest ratios of set
-//! values to limits.
+//! Consumes a plan; executes it with the kernel's executor, in f64 and without axes; produces the greatest
+//! ratios of set values to limits.
 
 use core::convert::Infallible;
 

@@ -1,7 +1,8 @@
-//! Amplitude and phase of the drive over frequency, open loop: from a step, from harmonics, and of the linear model.
+//! Amplitude and phase of the drive over frequency, open loop: from a step, from harmonics, and of the linear
+//! model.
 //!
-//! The methods agree as long as the drive is linear. A step and a harmonic of the same feed meet the current limit in
-//! different ways, and the model has no limit: where the curves part, the limit acts.
+//! The methods agree as long as the drive is linear. A step and a harmonic of the same feed meet the current
+//! limit in different ways, and the model has no limit: where the curves part, the limit acts.
 
 use core::f64::consts::TAU;
 
@@ -53,7 +54,7 @@ pub struct Bode {
 /// Measures the curves of `axis` at the given frequencies, at one feed. `progress` is called after each.
 ///
 /// # Errors
-/// Those of [`Step::measure`] and [`harmonic::measure`].
+/// The errors of [`Step::measure`] and [`harmonic::measure`].
 pub fn measure(
     machine: &Machine,
     axis: usize,

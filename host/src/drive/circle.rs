@@ -1,15 +1,16 @@
 //! The circle test of S4, closed loop: the distance of the machine from the circle.
 //!
-//! Everything is read from the encoders over the last second at constant feed. The radius deviation is the distance of
-//! the actual point from the centre, less the programmed radius: the contour error δ is its extremes, the form
-//! deviation Δδ their distance. The following error is set less actual position, tick by tick.
+//! Everything is read from the encoders over the last second at constant feed. The radius deviation is the
+//! distance of the actual point from the centre, less the programmed radius: the contour error δ is its
+//! extreme values, the form deviation Δδ their difference. The following error is set less actual position,
+//! tick by tick.
 
 use super::circle_motion::Circle;
 use super::experiment::{DriveError, Recording};
 use super::harmonic::first_crossing;
 use crate::machine::Machine;
 
-/// A frequency at which the contour error passes a limit is found to this \[Hz\].
+/// Resolution of the frequency at which the contour error passes a limit \[Hz\].
 const RESOLUTION_HZ: f64 = 0.01;
 
 /// The figures of a circle.
@@ -98,8 +99,8 @@ fn check_limit(limit_um: f64) -> Result<(), DriveError> {
     super::experiment::within("contour limit [µm]", limit_um, (1e-3, 1e6))
 }
 
-/// The lowest frequency in `range_hz` (from, to, steps of the search) at which the contour error passes `limit_um`
-/// \[Hz\]; none if it does not, or if it is beyond from the start.
+/// The lowest frequency in `range_hz` (from, to, steps of the search) at which the contour error passes
+/// `limit_um` \[Hz\]; `None` if it does not, or if it is above the limit from the start.
 ///
 /// # Errors
 /// Those of [`measure`].
@@ -123,13 +124,14 @@ pub struct Sweep {
     pub machine: Machine,
     /// The circles, by frequency.
     pub circles: Vec<CircleFigures>,
-    /// Frequency at which the contour error passes the limit \[Hz\]; none if it does not, or if it starts beyond it.
+    /// Frequency at which the contour error passes the limit \[Hz\]; `None` if it does not, or if it starts
+    /// above it.
     pub limit_hz: Option<f64>,
 }
 
-/// Drives the circles of `frequencies_hz` on `machine`, called `name`, and looks within
-/// `range_hz` for the frequency at which the contour error passes `limit_um`. `progress` is called after each circle
-/// of the list.
+/// Drives the circles of `frequencies_hz` on `machine`, called `name`, and searches `range_hz` for the
+/// frequency at which the contour error passes `limit_um`. `progress` is called after each circle of the
+/// list.
 ///
 /// # Errors
 /// Those of [`measure`].

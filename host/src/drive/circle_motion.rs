@@ -1,8 +1,8 @@
 //! Circles of constant feed: R = F/(2πf) (S4 (2)).
 //!
-//! At constant feed both axes of the circle's plane move as sines, and the amplitude of their velocity is the feed at
-//! every frequency. The motion starts at rest on the circle, reaches its feed within about a revolution, settles, and is
-//! measured last.
+//! At constant feed both axes of the circle's plane move as sines, and the amplitude of their velocity is the
+//! feed at every frequency. The motion starts at rest on the circle, reaches its feed within about a
+//! revolution, settles, and is measured last.
 
 use core::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use crate::trace::{AXES, AxisTick, TraceRow};
 
 /// Revolutions for reaching the feed and for braking from it.
 const RAMP_REVOLUTIONS: f64 = 6.0;
-/// The limits are this part above what the circle needs: radii are rounded.
+/// Relative margin of the limits above what the circle needs: radii are rounded.
 const LIMIT_MARGIN: f64 = 1e-3;
 /// Least frequency \[Hz\]: a revolution of 20 s.
 const FREQUENCY_HZ_MIN: f64 = 0.05;
@@ -28,11 +28,11 @@ pub struct Circle {
     pub frequency_hz: f64,
     /// Feed \[mm/s\], above 0, within reach of the outputs.
     pub feed_mm_s: f64,
-    /// Where: X and Y, or another pair.
+    /// The plane: X and Y, or another pair.
     pub plane: Plane,
     /// Time at constant feed before measuring \[s\]. A bed of 13 Hz and 3 % damping needs 3 s.
     pub settle_s: f64,
-    /// Least time that is measured \[s\]; a whole revolution if that is longer.
+    /// Least measured time \[s\]; a whole revolution if that is longer.
     pub measured_s: f64,
 }
 
@@ -49,7 +49,7 @@ impl Circle {
         Self { frequency_hz, feed_mm_s, plane: Plane::Xy, settle_s: 3.0, measured_s: 1.0 }
     }
 
-    /// R = F/(2πf) (S4 (2)), rounded to what a program can say \[mm\].
+    /// R = F/(2πf) (S4 (2)), rounded to the digits of a program \[mm\].
     #[must_use]
     pub fn radius_mm(&self) -> f64 {
         let radius_mm = self.feed_mm_s / (TAU * self.frequency_hz);
@@ -63,13 +63,13 @@ impl Circle {
         [first, second]
     }
 
-    /// Time that is measured at least \[s\]: a revolution or more.
+    /// Measured time \[s\]: at least one revolution.
     #[must_use]
     pub fn span_s(&self) -> f64 {
         self.measured_s.max(1.0 / self.frequency_hz)
     }
 
-    /// Runs it on `machine`, with the machine's gains and with limits as far raised as needed.
+    /// Runs it on `machine`, with the machine's gains and with limits raised as far as needed.
     ///
     /// # Errors
     /// A quantity is out of its range, the machine can't reach the feed, or a fault ended the run.
@@ -77,10 +77,10 @@ impl Circle {
         self.record_with(&RunOptions::default(), machine)
     }
 
-    /// [`Circle::record`], run as `options` say. All revolutions are one stretch.
+    /// [`Circle::record`] with run options. All revolutions are one stretch.
     ///
     /// # Errors
-    /// Those of [`Circle::record`], and a correction that can't be used.
+    /// The errors of [`Circle::record`], and a correction that can't be used.
     pub fn record_with(&self, options: &RunOptions<'_>, machine: &Machine) -> Result<Recording, DriveError> {
         self.check(machine.tick_s)?;
         let &Self { frequency_hz, feed_mm_s, plane, .. } = self;
@@ -109,7 +109,7 @@ impl Circle {
         Recording::with(options, experiment, &program, machine, feed_mm_s)
     }
 
-    /// Whether all of it is in range in ticks of `tick_s`.
+    /// Checks that all its quantities are in range, for ticks of `tick_s`.
     ///
     /// # Errors
     /// The first quantity that is not.

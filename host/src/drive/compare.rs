@@ -1,18 +1,21 @@
 //! Regulators side by side, on the same axes and the same path.
 //!
-//! Every regulator has the machine's kp and nothing else of feedback, the machine's output limits, and set values of
-//! the same plan. They differ in feedforward only:
+//! Every regulator has the machine's kp as its only feedback, the machine's output limits, and set values of
+//! the same plan. They differ only in feedforward:
 //!
 //! - [`Choice::P`] has none, [`Choice::Pv`] the velocity's;
-//! - [`Choice::Peer`] differences position commands ([`peer_regulator`](super::peer_regulator)); its gains are those of
-//!   [`Choice::Vaj`], less what differencing adds, so that with exact set positions it does the same;
+//! - [`Choice::Peer`] differences position commands ([`peer_regulator`](super::peer_regulator)); its gains
+//!   are those of [`Choice::Vaj`], less what differencing adds, so that with exact set positions it does the
+//!   same;
 //! - [`Choice::Vaj`] has the set-points' own velocity, acceleration and jerk, with the machine's gains;
-//! - [`Choice::PeerFitted`] and [`Choice::VajFitted`] have the gains that follow best ([`fit`]), one fit for both;
-//!   [`Choice::PeerFittedTwo`] does without the third difference, as one does whose set-points are coarse;
-//! - [`Choice::Inverse`] inverts the drive: with the machine file's inverse, or, if it has none, with the simulated
-//!   drive's own figures, which identification finds within a few per cent.
+//! - [`Choice::PeerFitted`] and [`Choice::VajFitted`] have the gains with the least following error
+//!   ([`fit`]), one fit for both; [`Choice::PeerFittedTwo`] omits the third difference, as is usual with
+//!   coarse set-points;
+//! - [`Choice::Inverse`] inverts the drive: with the machine file's inverse, or, if it has none, with the
+//!   simulated drive's own figures, which identification finds within a few per cent.
 //!
-//! The kernel's regulators run through the kernel. In coarser set-points all of them are [replayed](super::replay).
+//! The kernel's regulators run in the kernel. With coarser set-points all of them are
+//! [replayed](super::replay).
 
 use motion_kernel::axis::{Feedforward, Gains};
 
@@ -39,7 +42,7 @@ const AT_REST_MM: f64 = 1e-6;
 pub enum Choice {
     /// Following error only.
     P,
-    /// And the set-point's velocity.
+    /// Following error and the set-point's velocity.
     Pv,
     /// Differenced position commands, gains as [`Choice::Vaj`].
     Peer,
@@ -56,7 +59,7 @@ pub enum Choice {
 }
 
 impl Choice {
-    /// All of them, in the order of tables.
+    /// All choices, in the order of tables.
     pub const ALL: [Self; 8] = [
         Self::P,
         Self::Pv,
@@ -94,13 +97,13 @@ pub struct Regulators {
     machine: Machine,
     /// Fitted gains of each axis.
     pub fitted: [PeerGains; AXES],
-    /// And without the third difference.
+    /// Fitted gains without the third difference.
     pub fitted_two: [PeerGains; AXES],
 }
 
 impl Regulators {
-    /// Those of `machine`, fitted on circles of `feed_mm_s` \[mm/s\]. `progress` is called after each of
-    /// [`Regulators::STEPS`] steps.
+    /// The regulators of `machine`, fitted on circles of `feed_mm_s` \[mm/s\]. `progress` is called after
+    /// each of [`Regulators::STEPS`] steps.
     ///
     /// # Errors
     /// Those of [`Circle::record`].
@@ -165,8 +168,8 @@ impl Regulators {
         Ok(all)
     }
 
-    /// Output of the axis that moves first, with set positions in steps of `resolution_um` \[µm\]: time from the start
-    /// of the measured part \[s\] and volts, for `duration_s`.
+    /// Output of the axis that moves first, with set positions in steps of `resolution_um` \[µm\]: time from
+    /// the start of the measured part \[s\] and volts, for `duration_s`.
     ///
     /// # Errors
     /// Those of [`Circle::record`], and a resolution out of its range.
@@ -192,7 +195,7 @@ impl Regulators {
 pub struct Sweep {
     /// The regulator.
     pub choice: Choice,
-    /// Frequency \[Hz\], and what it did on that circle.
+    /// Frequency \[Hz\], and the figures on that circle.
     pub circles: Vec<(f64, Measured)>,
 }
 
@@ -207,8 +210,8 @@ pub struct Row {
     pub measured: Vec<Measured>,
 }
 
-/// All regulators on `motions`, with exact set positions and in steps of each of `resolutions_um` \[µm\]. `progress`
-/// is called after each regulator.
+/// All regulators on `motions`, with exact set positions and in steps of each of `resolutions_um` \[µm\].
+/// `progress` is called after each regulator.
 ///
 /// # Errors
 /// Those of [`Regulators::measure`].
@@ -234,8 +237,8 @@ pub fn rows(
     Ok(rows)
 }
 
-/// The regulators of [`Choice::SHOWN`] on circles of `frequencies_hz` with set positions in steps of `resolution_um`
-/// \[µm\]. `progress` is called after each regulator.
+/// The regulators of [`Choice::SHOWN`] on circles of `frequencies_hz` with set positions in steps of
+/// `resolution_um` \[µm\]. `progress` is called after each regulator.
 ///
 /// # Errors
 /// Those of [`Regulators::measure`].
@@ -307,9 +310,9 @@ pub struct Measured {
     pub following_um: f64,
     /// Greatest contour error \[µm\].
     pub contour_um: f64,
-    /// Greatest rms, over the axes that move, of the output less that with exact set positions \[V\].
+    /// Greatest rms, over the axes that move, of the output minus the output with exact set positions \[V\].
     pub output_noise_v: f64,
-    /// The same of the drive's current, as a part of its limit.
+    /// The same for the drive's current, as a fraction of its limit.
     pub current_noise: f64,
 }
 
@@ -383,8 +386,8 @@ pub enum Differences {
     Three,
 }
 
-/// FF2 and FF3 of every axis with the least rms following error, over circles of [`FIT_HZ`] with exact set positions;
-/// FF1 stays the machine's. Axes that no circle moves keep the machine's gains.
+/// FF2 and FF3 of every axis with the least rms following error, over circles of [`FIT_HZ`] with exact set
+/// positions; FF1 stays the machine's. Axes that no circle moves keep the machine's gains.
 ///
 /// # Errors
 /// Those of [`Circle::record`].
@@ -405,7 +408,8 @@ pub fn fit(
         circles.push((circle, circle.record(&machine)?));
     }
     for _ in 0..FIT_ROUNDS {
-        // Normal equations of ε + ∂ε/∂FF2·x + ∂ε/∂FF3·y = 0 for every axis: Σ of products of ε and its derivatives.
+        // Normal equations of ε + ∂ε/∂FF2·x + ∂ε/∂FF3·y = 0 for every axis: Σ of products of ε and its
+        // derivatives.
         let mut sums = [[[0.0_f64; 3]; 3]; AXES];
         for (circle, recording) in &circles {
             let errors = |change: [f64; 2]| -> Result<Vec<[f64; AXES]>, DriveError> {

@@ -1,7 +1,7 @@
 //! A program on a changed machine, and its recording.
 //!
-//! Limits of planning protect a machine in production. An experiment asks what the drive itself can do, so it raises
-//! them as far as its motion needs. The range of the output stays unchanged.
+//! Limits of planning protect a machine in production. An experiment asks what the drive itself can do, so it
+//! raises them as far as its motion needs. The range of the output stays unchanged.
 
 use std::ops::Range;
 
@@ -14,16 +14,16 @@ use crate::planning::{Mode, PlanningError, plan_program};
 use crate::simulate::{self, RunError, RunOptions};
 use crate::trace::{AXES, AxisTick, TraceRow, TracedFault};
 
-/// Feeds and limits are compared in f32: this much more is the same.
+/// Relative tolerance for comparing feeds and limits in f32.
 pub(super) const ROUNDING: f64 = 1e-6;
 /// Following error that an open loop may reach \[mm\]: nothing holds the axis to its path.
 const OPEN_LOOP_ERROR_MM: f64 = 1000.0;
-/// And a closed one, which is thrown into full motion from rest \[mm\].
+/// Following error that a closed loop may reach, when it starts at full motion from rest \[mm\].
 pub(super) const CLOSED_LOOP_ERROR_MM: f64 = 10.0;
-/// Counter registers are followed up to this part of their range in a tick, as for machine files: an axis may be
-/// twice as fast as its feed while it catches up.
+/// Fraction of a counter register's range that a tick may cover, as for machine files: an axis may be twice
+/// as fast as its feed while it catches up.
 const COUNTER_SHARE: f64 = 0.25;
-/// Between the end of constant feed and the last tick that is measured \[s\]: set-points may lag the feed.
+/// Time between the last measured tick and the end of constant feed \[s\]: set-points may lag the feed.
 const END_MARGIN_S: f64 = 0.05;
 
 /// Why an experiment could not be made.
@@ -89,9 +89,9 @@ pub enum DriveError {
     NotSteady {
         /// The experiment.
         experiment: String,
-        /// How long the feed was constant \[s\].
+        /// Time for which the feed was constant \[s\].
         found_s: f64,
-        /// How long it had to be \[s\].
+        /// Time needed \[s\].
         needed_s: f64,
     },
     /// The axis does not answer like a velocity servo.
@@ -134,7 +134,7 @@ pub enum Terms {
     Va,
     /// Velocity, acceleration and jerk.
     Vaj,
-    /// All that the machine has: lead, tables, and the drive's inverse, too.
+    /// Everything the machine has, including lead, tables and the drive's inverse.
     #[default]
     AsIs,
 }
@@ -158,7 +158,7 @@ impl Terms {
         for axis in &mut machine.axes {
             let all = axis.feedforward;
             let Feedforward { velocity, accel_s, jerk_s2, .. } = all;
-            // The paper's terms: neither lead nor anything else.
+            // The paper's terms only, without lead.
             let vaj = Feedforward { velocity, accel_s, jerk_s2, ..Feedforward::default() };
             axis.feedforward = match self {
                 Self::V => Feedforward { accel_s: 0.0, jerk_s2: 0.0, ..vaj },
@@ -193,8 +193,8 @@ fn countable_mm_s(axis: &AxisSettings, tick_s: f64) -> f64 {
     COUNTER_SHARE * range_counts * axis.mm_per_count.abs() / tick_s
 }
 
-/// The greatest feed of an experiment that moves all of `axes` \[mm/s\]: what their outputs reach and their encoders
-/// can follow.
+/// The greatest feed of an experiment that moves all of `axes` \[mm/s\]: what their outputs reach and their
+/// encoders can follow.
 pub(super) fn fastest_mm_s(machine: &Machine, axes: &[usize]) -> f64 {
     let of = |axis: &AxisSettings| axis.reachable_mm_s().min(countable_mm_s(axis, machine.tick_s));
     axes.iter().filter_map(|&axis| machine.axes.get(axis)).map(of).fold(f64::INFINITY, f64::min)
@@ -237,7 +237,7 @@ pub(super) fn raised(machine: &Machine, demands: &Demands, moved: &[usize]) -> R
     path.accel_mm_s2 = path.accel_mm_s2.max(demands.accel_mm_s2);
     path.jerk_mm_s3 = path.jerk_mm_s3.max(demands.jerk_mm_s3);
     path.snap_mm_s4 = path.snap_mm_s4.max(demands.snap_mm_s4);
-    // Turns of a circle meet without a step but for rounding.
+    // Turns of a circle meet without a step, except for rounding.
     path.accel_step_mm_s2 = path.accel_step_mm_s2.max(demands.accel_mm_s2);
     for axis in &mut machine.axes {
         axis.feed_mm_s = axis.feed_mm_s.max(demands.feed_mm_s * more);
@@ -276,7 +276,7 @@ impl Recording {
         Self::with(&RunOptions::default(), experiment, program, machine, feed_mm_s)
     }
 
-    /// [`Recording::of`], run as `options` say, but without guards: the axis may be driven beyond their bounds.
+    /// [`Recording::of`] with run options, but without guards: the axis may be driven beyond their bounds.
     ///
     /// # Errors
     /// Those of [`Recording::of`], and a correction that can't be used.
@@ -331,7 +331,7 @@ impl Recording {
         Ok(end - in_ticks(measured_s)..end)
     }
 
-    /// How much longer than settling and measuring a run has to hold its feed \[s\].
+    /// Additional time that a run has to hold its feed, beyond settling and measuring \[s\].
     pub(super) const MARGIN_S: f64 = 2.0 * END_MARGIN_S;
 }
 

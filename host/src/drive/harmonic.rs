@@ -1,10 +1,10 @@
 //! Harmonic motion: amplitude and phase of the actual against the commanded velocity (S4).
 //!
-//! Circles of constant feed ask both axes for the same velocity at every frequency. Two amplitudes are read, because
-//! they differ as soon as the current limit bends the sine into a triangle: the *swing*, half the distance from the
-//! greatest to the least velocity, which is what a plot shows, and the *fundamental*, which a least-squares sine has.
-//! A triangle's fundamental is 8/π² of its swing. Set and actual velocities are differences of positions from tick to
-//! tick, so that what a difference does to a sine cancels.
+//! Circles of constant feed ask both axes for the same velocity at every frequency. Two amplitudes are read,
+//! because they differ as soon as the current limit bends the sine into a triangle: the *swing*, half the
+//! distance from the greatest to the least velocity, which is what a plot shows, and the *fundamental*, which
+//! a least-squares sine has. A triangle's fundamental is 8/π² of its swing. Set and actual velocities are
+//! differences of positions from tick to tick, so the effect of differencing on a sine cancels.
 
 use core::f64::consts::TAU;
 
@@ -14,9 +14,9 @@ use super::experiment::{DriveError, Recording, differences};
 use crate::machine::Machine;
 use crate::sine::{Baseline, as_lag_rad, fit};
 
-/// The phase is not told of a velocity below this part of the commanded one.
+/// No phase is given for a velocity below this fraction of the commanded one.
 const LEAST_RATIO: f64 = 1e-3;
-/// A −3 dB frequency is found to this \[Hz\].
+/// Resolution of a −3 dB frequency \[Hz\].
 const RESOLUTION_HZ: f64 = 0.01;
 
 /// One axis at one frequency.
@@ -32,8 +32,8 @@ pub struct Response {
     pub phase_rad: f64,
     /// The lag as a time \[s\].
     pub delay_s: f64,
-    /// Third harmonic over the fundamental, positive where it makes the velocity more pointed: 0 for a sine, 1/9 for a
-    /// triangle.
+    /// Third harmonic over the fundamental, positive where it makes the velocity more pointed: 0 for a sine,
+    /// 1/9 for a triangle.
     pub third_harmonic: f64,
 }
 
@@ -58,7 +58,7 @@ pub enum Amplitude {
 }
 
 impl Response {
-    /// One of the two ratios.
+    /// The ratio of this amplitude.
     #[must_use]
     pub fn ratio(&self, amplitude: Amplitude) -> f64 {
         match amplitude {
@@ -97,7 +97,7 @@ fn response(recording: &Recording, circle: &Circle, axis: usize) -> Result<Respo
     let actual: Vec<f64> = ticks.iter().map(|tick| tick.axes[axis].act_mm).collect();
     let (set, actual) = (differences(&set, tick_s), differences(&actual, tick_s));
     let omega_per_s = TAU * circle.frequency_hz;
-    // As many whole periods as there are: harmonics and drift then do not leak into the sine.
+    // As many whole periods as possible, so that harmonics and drift do not leak into the sine.
     let period = 1.0 / (circle.frequency_hz * tick_s);
     let periods = ((set.len() as f64 + 0.5) / period).floor().max(1.0);
     let whole = ((periods * period).round() as usize).min(set.len());
@@ -124,8 +124,8 @@ fn response(recording: &Recording, circle: &Circle, axis: usize) -> Result<Respo
     })
 }
 
-/// The lowest frequency from `from_hz` to `to_hz` at which an axis of the plane (0: its first) falls below −3 dB
-/// \[Hz\]; none if it does not. Looks in steps of `by_hz` and then halves.
+/// The lowest frequency from `from_hz` to `to_hz` at which an axis of the plane (0: its first) falls below −3
+/// dB \[Hz\]; `None` if it does not. Searches in steps of `by_hz`, then by bisection.
 ///
 /// # Errors
 /// Those of [`measure`].
@@ -169,7 +169,8 @@ pub(super) fn first_crossing(
 }
 
 /// The frequency at which a current limit alone makes a triangle of −3 dB out of the velocity \[Hz\]:
-/// a/(4·0.707·F), because the velocity crosses from −0.707·F to 0.707·F within half a period at the acceleration a.
+/// a/(4·0.707·F), because the velocity crosses from −0.707·F to 0.707·F within half a period at the
+/// acceleration a.
 #[must_use]
 pub fn current_limited_hz(accel_limit_mm_s2: f64, feed_mm_s: f64) -> f64 {
     accel_limit_mm_s2 / (4.0 * HALF_POWER * feed_mm_s)

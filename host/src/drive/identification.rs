@@ -1,7 +1,8 @@
 //! The runs of identification, through the kernel.
 //!
-//! Steps there and back move one axis at a time, circles two. All are open loop, as in S4, so no
-//! regulator bends the drive's answer. Only the converter's output and the encoder's readings of each run are used.
+//! Steps there and back move one axis at a time, circles two. All are open loop, as in S4, so no regulator
+//! distorts the drive's response. Only the converter's output and the encoder's readings of each run are
+//! used.
 
 use std::thread;
 

@@ -1,8 +1,8 @@
 //! Harmonic motion under a growing load: the velocity turns triangular, the acceleration flat (S4).
 //!
-//! Where the current limit acts, the acceleration stays at what the limit gives the load. From this plateau the
-//! admissible acceleration is read, or the load that a motion admits. Only a simulated machine changes its load on
-//! request.
+//! Where the current limit acts, the acceleration stays at what the limit gives the load. This plateau gives
+//! the admissible acceleration, or the load that a motion admits. Only a simulated machine changes its load
+//! on request.
 
 use super::circle_motion::Circle;
 use super::experiment::{DriveError, Recording, open_loop};
@@ -11,7 +11,7 @@ use crate::machine::Machine;
 
 /// Time over which accelerations are averaged \[s\]: second differences of readings are coarse.
 const AVERAGED_S: f64 = 0.005;
-/// The share of the time for which the plateau is held at least when the velocity is a triangle, but for its corners.
+/// Least share of the time for which a triangular velocity, except at its corners, holds the plateau.
 const PLATEAU_SHARE: f64 = 0.5;
 /// The third harmonic from which the velocity counts as a triangle. A triangle has 1/9, a sine none.
 const TRIANGLE_FROM: f64 = 0.03;
@@ -44,7 +44,7 @@ pub fn loaded(machine: &Machine, axis: usize, load_inertia_ratio: f64) -> Machin
 /// Runs the motion in open loop with one axis of its plane under the load.
 ///
 /// # Errors
-/// A load below 0 or above 1000; otherwise as [`harmonic::measure`].
+/// A load is below 0 or above 1000; otherwise as [`harmonic::measure`].
 pub fn measure(
     machine: &Machine,
     circle: &Circle,

@@ -3,13 +3,13 @@
 use hal_sim::DriveParameters;
 use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, PREVIEW_TICKS_MAX};
 
-/// Velocity from which the whole Coulomb friction is compensated \[mm/s\]: at 900 mm/s² (4 Hz in S4's circles) it is
-/// passed within about a tick.
+/// Velocity from which the whole Coulomb friction is compensated \[mm/s\]: at 900 mm/s² (4 Hz in S4's
+/// circles) it is passed within about a tick.
 pub const REVERSAL_MM_S: f64 = 0.5;
 
-/// The inverse of `drive`, per unit of the inertia that it moves, for ticks of `tick_s`. Dead time, command filter and the
-/// half tick for which outputs are held are the lead. What of them the kernel's preview has no room for, φ, is made up
-/// for by the series V(t + φ) = V + φ·a + φ²/2·J.
+/// The inverse of `drive`, per unit of the inertia that it moves, for ticks of `tick_s`. The lead is dead
+/// time, command filter and the half tick for which outputs are held. The part φ of it for which the kernel's
+/// preview has no room is compensated by the series V(t + φ) = V + φ·a + φ²/2·J.
 #[must_use]
 pub fn inverse(drive: &DriveParameters, tick_s: f64) -> Feedforward {
     let inertia = 1.0 + drive.load_inertia_ratio;

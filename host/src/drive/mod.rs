@@ -1,10 +1,12 @@
-//! The drive experiments of S4: what a ±10 V axis does with a velocity step, with harmonic motion and on a circle.
+//! The drive experiments of S4: the response of a ±10 V axis to a velocity step, to harmonic motion and on a
+//! circle.
 //!
-//! Consumes a [`Machine`](crate::machine::Machine); produces figures and the recordings they were taken from. Every
-//! experiment is a program that is planned, fed through the streams, executed and regulated by the kernel in f32 and put
-//! out through the converter's adapter, as on a board; only the drive is a model. The figures come from what a board
-//! knows as well: set positions, encoder readings, output voltages. Runs in the background. Fails with a [`DriveError`]
-//! if the machine can't do the motion, before anything moves, or if a fault ended it.
+//! Consumes a [`Machine`](crate::machine::Machine); produces figures and the recordings they were taken from.
+//! Every experiment is a program that is planned, fed through the streams, executed and regulated by the
+//! kernel in f32 and put out through the converter's adapter, as on a board; only the drive is a model. The
+//! figures are made only of values that a board has, too: set positions, encoder readings, output voltages.
+//! Runs in the background. Fails with a [`DriveError`] if the machine can't do the motion, before anything
+//! moves, or if a fault ended it.
 //!
 //! - [`experiment`]: a program on a changed machine, and its [`Recording`];
 //! - [`circle_motion`]: circles of constant feed, the motion of two experiments;
@@ -13,11 +15,12 @@
 //! - [`identification`]: the runs that [`crate::identify`] asks for;
 //! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
-//! - [`compare`]: regulators side by side; [`peer_regulator`]: one that differences positions; [`replay`](mod@replay): set
-//!   values once more, under another regulator;
-//! - [`learning`]: a correction of a path that is driven again and again;
+//! - [`compare`]: regulators side by side; [`peer_regulator`]: one that differences positions;
+//!   [`replay`](mod@replay): recorded set values under another regulator;
+//! - [`learning`]: a correction of a path that is driven repeatedly;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
-//! - [`spectrum`], [`model`]: the mathematics of it; [`inverse`](mod@inverse): the kernel's inverse of a drive;
+//! - [`spectrum`], [`model`]: the mathematics of it; [`inverse`](mod@inverse): the kernel's inverse of a
+//!   drive;
 //! - [`mod@reference`]: S4's measurements, and the figures that the reference machine has to reach.
 
 pub mod bode;

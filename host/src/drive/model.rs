@@ -98,8 +98,8 @@ pub fn response(drive: &DriveParameters, tick_s: f64, frequency_hz: f64) -> Comp
     Complex::new(cosine, sine) / filter * (open / (one + open))
 }
 
-/// The frequency at which the linear model's amplitude falls below `ratio` for good \[Hz\], to 0.1 Hz; none up to half
-/// the tick's frequency.
+/// The frequency at which the linear model's amplitude falls below `ratio` for good \[Hz\], to 0.1 Hz; none
+/// up to half the tick's frequency.
 #[must_use]
 pub fn bandwidth_hz(drive: &DriveParameters, tick_s: f64, ratio: f64) -> Option<f64> {
     let at = |tenths: u32| f64::from(tenths) / 10.0;

@@ -1,4 +1,4 @@
-//! A regulator as machine controllers commonly have it: it knows positions only, and differences them.
+//! A regulator of the kind common in machine controllers: it knows only positions, and differences them.
 //!
 //! Consumes a position command and a position per servo period; produces a velocity command. It computes what
 //! LinuxCNC's HAL component `pid` does with its default settings and without its limits on single terms:
@@ -9,9 +9,10 @@
 //! U    = bias + P·ε + I·Σε·T + D·(D1 − (x[n] − x[n−1])/T) + FF0·c + FF1·D1 + FF2·D2 + FF3·D3,  within ±maxoutput
 //! ```
 //!
-//! **Its differences.** Seen from c[n−1], to which the error refers, D1 is the velocity half a period later, D2
-//! the acceleration then, D3 the jerk half a period before. With the period T the series of its feedforward is
-//! s·(FF1 + (FF1·T/2 + FF2)·s + (FF1·T²/6 + FF3)·s²): the gains of analytic feedforward, less what differencing adds.
+//! **Its differences.** Seen from c[n−1], to which the error refers, D1 is the velocity half a period later,
+//! D2 the acceleration then, D3 the jerk half a period before. With the period T the series of its
+//! feedforward is s·(FF1 + (FF1·T/2 + FF2)·s + (FF1·T²/6 + FF3)·s²): the gains of analytic feedforward, less
+//! what differencing adds.
 
 use motion_kernel::axis::Feedforward;
 
@@ -35,8 +36,8 @@ pub struct PeerGains {
 }
 
 impl PeerGains {
-    /// The gains with which it does what `feedforward`'s gains of velocity, acceleration and jerk do, up to the jerk,
-    /// if positions are exact. Nothing of the rest of `feedforward`, and no feedback.
+    /// The gains with which it does what `feedforward`'s gains of velocity, acceleration and jerk do, up to
+    /// the jerk, if positions are exact. Ignores the rest of `feedforward`; has no feedback.
     #[must_use]
     pub fn like(feedforward: &Feedforward, tick_s: f64) -> Self {
         let &Feedforward { velocity, accel_s, jerk_s2, .. } = feedforward;

@@ -1,8 +1,9 @@
 //! S4's measurements, and the figures that the reference machine has to reach.
 //!
 //! The reference drive was fitted so that S4's figures come out together. The expected values are those of an
-//! independent model of drive, converter and regulator in double precision; a run through planner, streams and kernel
-//! has to agree within the tolerances. The tests and the tables of `motion drive` read these same constants.
+//! independent model of drive, converter and regulator in double precision; a run through planner, streams
+//! and kernel has to agree within the tolerances. The tests and the tables of `motion drive` read these same
+//! constants.
 
 use super::circle_motion::Circle;
 use super::experiment::DriveError;
@@ -21,7 +22,7 @@ pub struct Figure {
     pub paper: f64,
     /// The reference machine's.
     pub expected: f64,
-    /// How far a run may be from `expected`.
+    /// Greatest difference of a run from `expected`.
     pub tolerance: f64,
 }
 
@@ -35,14 +36,14 @@ impl Figure {
         Self { quantity, unit, paper, expected, tolerance }
     }
 
-    /// The figure with what was measured.
+    /// The figure with its measured value.
     #[must_use]
     pub fn against(self, measured: f64) -> Comparison {
         Comparison { figure: self, measured }
     }
 }
 
-/// A figure and what was measured.
+/// A figure and its measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
     /// The range that had to be met.

@@ -1,8 +1,8 @@
-//! The set values of a recording once more, under another regulator or in coarser steps.
+//! The set values of a recording again, under another regulator or in coarser steps.
 //!
-//! Consumes a [`Recording`]; produces one with the same set values and another actual motion. The drives, encoders and
-//! converters are those of a run; executor and streams are not run again. Fails with a [`DriveError`] if the machine
-//! can't be built.
+//! Consumes a [`Recording`]; produces one with the same set values and another actual motion. The drives,
+//! encoders and converters are those of a run; executor and streams are not run again. Fails with a
+//! [`DriveError`] if the machine can't be built.
 
 use motion_kernel::axis::{AxesConfig, AxisOutput, AxisState};
 use motion_kernel::hal::{DriveEnable, Encoder, VelocityChannel};
@@ -23,20 +23,20 @@ use crate::trace::{AXES, TraceRow};
 pub enum Law {
     /// The kernel's regulator in f32 with the gains of the recording's machine.
     Kernel,
-    /// One that differences positions, with these gains; nothing else of the machine's gains.
+    /// A regulator that differences positions, with these gains and none of the machine's.
     Peer([PeerGains; AXES]),
 }
 
 /// A recording under another law.
 #[derive(Clone, Debug)]
 pub struct Replayed {
-    /// The set positions are those that the error refers to, exact.
+    /// The recording; its set positions are the exact ones that the error refers to.
     pub recording: Recording,
     /// Torque of every axis in every tick, as the acceleration it gives the unloaded axis \[mm/s²\].
     pub torque_mm_s2: Vec<[f64; AXES]>,
 }
 
-/// A regulator of three axes at work.
+/// The regulator of three axes, with its state.
 enum Regulator<'a> {
     Kernel(Box<(AxesConfig<f32, AXES>, [AxisState<f32>; AXES])>),
     Peer(Box<AxesConfig<f64, AXES>>, &'a [PeerGains; AXES], [PeerRegulator; AXES]),
@@ -56,8 +56,8 @@ impl<'a> Regulator<'a> {
         })
     }
 
-    /// One tick: `tick` comes with exact set values and leaves with what the axes did; `set` is what the regulator is
-    /// told of the positions.
+    /// One tick: on entry `tick` has the exact set values, on return also the axes' results; `set` has the
+    /// positions that the regulator gets.
     fn tick(
         &mut self,
         tick: &mut TraceRow,
@@ -99,8 +99,9 @@ impl<'a> Regulator<'a> {
     }
 }
 
-/// Closes the loop over the recording's machine with `law`, told set positions in steps of `resolution_mm` \[mm\],
-/// 0 (exact) to 1. The following error is that against the exact set positions, and no error is a fault.
+/// Closes the loop over the recording's machine with `law`, told set positions in steps of `resolution_mm`
+/// \[mm\], 0 (exact) to 1. The following error is relative to the exact set positions, and no error is a
+/// fault.
 ///
 /// # Errors
 /// The resolution is out of its range, or the machine can't be built.

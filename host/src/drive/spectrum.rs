@@ -2,9 +2,9 @@
 
 use super::model::Complex;
 
-/// Greatest frequency at which −3 dB is looked for, as a part of the tick's frequency.
+/// Greatest frequency at which −3 dB is searched, as a fraction of the tick's frequency.
 const NYQUIST: f64 = 0.5;
-/// Steps in which it is looked for \[Hz\].
+/// Steps of that search \[Hz\].
 const SEARCH_HZ: f64 = 0.25;
 const BISECTIONS: u32 = 40;
 
@@ -16,7 +16,8 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// The spectrum from backward differences of positions: `velocities[i]` is the mean velocity over tick i after the step.
+    /// The spectrum from backward differences of positions: `velocities[i]` is the mean velocity over tick i
+    /// after the step.
     #[must_use]
     pub fn new(velocities: &[f64], tick_s: f64) -> Self {
         let mut before = 0.0;
@@ -24,8 +25,8 @@ impl Spectrum {
         Self { impulses, tick_s }
     }
 
-    /// Response at a frequency, relative to that at rest. Impulse i is centred on the start of tick i, because each
-    /// velocity is the mean over its tick.
+    /// Response at a frequency, relative to that at rest. Impulse i is centred on the start of tick i,
+    /// because each velocity is the mean over its tick.
     #[must_use]
     pub fn at(&self, frequency_hz: f64) -> Complex {
         let omega_tick = core::f64::consts::TAU * frequency_hz * self.tick_s;
@@ -38,7 +39,7 @@ impl Spectrum {
         if rest.abs() > 0.0 { sum * Complex::new(1.0 / rest, 0.0) } else { Complex::ZERO }
     }
 
-    /// The lowest frequency at which the amplitude is below `ratio` of that at rest \[Hz\].
+    /// The lowest frequency at which the amplitude is below `ratio` times that at rest \[Hz\].
     #[must_use]
     pub fn passes(&self, ratio: f64) -> Option<f64> {
         let amplitude = |frequency_hz: f64| self.at(frequency_hz).magnitude();

@@ -1,35 +1,37 @@
 //! The velocity step of S4: open loop, the feed jumps from rest within one tick.
 //!
-//! Time counts from the tick that puts the step out. Delay and time constant are read with the tangent at the steepest
-//! rise of the velocity: it crosses 0 at the delay and rises to the step within the time constant. Velocities come from
-//! encoder readings. One count in a tick is a coarse velocity (0.2 mm/s at 0.1 µm and 0.5 ms), so velocities are
-//! means over [`AVERAGED_S`]; the peaks of acceleration and jerk are plain backward differences, as S4 gives them.
+//! Time counts from the tick that puts the step out. Delay and time constant are read from the tangent at the
+//! steepest rise of the velocity: it crosses 0 at the delay and rises to the step within the time constant.
+//! Velocities come from encoder readings. One count in a tick is a coarse velocity (0.2 mm/s at 0.1 µm and
+//! 0.5 ms), so velocities are means over [`AVERAGED_S`]; the peaks of acceleration and jerk are plain
+//! backward differences, as S4 gives them.
 
 use super::experiment::{Demands, DriveError, Recording, differences, open_loop, raised, within};
 use super::spectrum::Spectrum;
 use crate::machine::Machine;
 use crate::trace::AXES;
 
-/// Time over which velocities are averaged \[s\]: rounding of 0.1 µm is then 0.04 mm/s, a thirtieth of a per cent of
-/// S4's step, and the overshoot loses half of a hundredth of it.
+/// Time over which velocities are averaged \[s\]: rounding of 0.1 µm is then 0.04 mm/s, a thirtieth of a per
+/// cent of S4's step, and the overshoot loses half a per cent of itself.
 pub const AVERAGED_S: f64 = 0.0025;
-/// Time over which the steepest rise is looked for \[s\].
+/// Time over which the steepest rise is searched \[s\].
 const SLOPE_S: f64 = 0.0015;
 /// The band in which the velocity counts as settled \[mm/s\]: ±0.02 m/min (S4).
 pub const BAND_MM_S: f64 = 20.0 / 60.0;
 /// Least output that counts as the step \[V\]: two steps of a 16-bit converter.
 const STEP_V_MIN: f64 = 6e-4;
-/// The ramp is over in less than a tick if the limits are this much more than S4's F·f_c, each in its turn.
+/// Factor of each limit over the one before, from F·f_c of S4 on, with which the ramp is over in less than a
+/// tick.
 const STEEPNESS: f64 = 100.0;
 
-/// A step to be made.
+/// A step to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// The axis, from 0.
     pub axis: usize,
     /// Velocity after the step \[mm/s\], 1/60 and more, within reach of the output.
     pub feed_mm_s: f64,
-    /// How long it is held and recorded \[s\], 0.05 to 60.
+    /// Time for which it is held and recorded \[s\], 0.05 to 60.
     pub duration_s: f64,
 }
 
@@ -61,7 +63,7 @@ pub struct StepFigures {
     pub peak_accel_mm_s2: f64,
     /// Greatest third difference of encoder readings \[mm/s³\].
     pub peak_jerk_mm_s3: f64,
-    /// −3 dB of the step's spectrum \[Hz\]; none if the recording ends before it can be told.
+    /// −3 dB of the step's spectrum \[Hz\]; `None` if the recording is too short to tell.
     pub bandwidth_hz: Option<f64>,
 }
 
@@ -72,7 +74,8 @@ impl Step {
         Self { axis: 0, feed_mm_s: 120.0, duration_s: 0.4 }
     }
 
-    /// Runs it on `machine`, open loop: a straight move with limits so high that the feed steps within one tick.
+    /// Runs it on `machine`, open loop: a straight move with limits so high that the feed steps within one
+    /// tick.
     ///
     /// # Errors
     /// A quantity is out of its range, the output does not reach the feed, or a fault ended the run.
@@ -129,13 +132,13 @@ pub struct StepResponse {
 }
 
 impl StepResponse {
-    /// How many ticks a time is, at least one.
+    /// A time in ticks, at least one.
     fn ticks(&self, seconds: f64) -> usize {
         ((seconds / self.tick_s).round() as usize).max(1)
     }
 
-    /// Velocities over `ticks` ticks: the time in the middle of each, with the half tick of a backward difference
-    /// stamped with its end, and the velocity \[s, mm/s\].
+    /// Velocities over `ticks` ticks: the time in the middle of each, with the half tick of a backward
+    /// difference stamped with its end, and the velocity \[s, mm/s\].
     fn velocities_over(&self, ticks: usize) -> Vec<(f64, f64)> {
         let span_s = ticks as f64 * self.tick_s;
         let middle = |index: usize| (index as f64 + 0.5 * ticks as f64 + 0.5) * self.tick_s;
@@ -149,8 +152,8 @@ impl StepResponse {
         self.velocities_over(self.ticks(AVERAGED_S))
     }
 
-    /// Differences of neighbouring encoder readings: velocity, acceleration and jerk \[mm/s, mm/s², mm/s³\]. Each
-    /// begins with the tick after the step.
+    /// Differences of neighbouring encoder readings: velocity, acceleration and jerk \[mm/s, mm/s², mm/s³\].
+    /// Each begins with the tick after the step.
     #[must_use]
     pub fn rates(&self) -> [Vec<f64>; 3] {
         let velocity = differences(&self.positions_mm, self.tick_s);
@@ -164,13 +167,13 @@ impl StepResponse {
         [velocity, accel, jerk]
     }
 
-    /// The frequency response in it.
+    /// Its frequency response.
     #[must_use]
     pub fn spectrum(&self) -> Spectrum {
         Spectrum::new(&differences(&self.positions_mm, self.tick_s), self.tick_s)
     }
 
-    /// The figures; none if the axis did not move in the direction of the step.
+    /// The figures; `None` if the axis did not move in the direction of the step.
     #[must_use]
     pub fn figures(&self) -> Option<StepFigures> {
         let velocities = self.velocities();

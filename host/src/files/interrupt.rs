@@ -1,7 +1,7 @@
 //! Ctrl-C and the request to end: temporary files are removed, and the process ends with the signal's status.
 //!
-//! A thread of its own waits for the signals, so that files may be removed and work may be under way in whatever depth. It
-//! takes the lock that a rename holds: what is being committed is committed, everything else stays as it was.
+//! A separate thread waits for the signals, so it can remove files whatever the main thread is doing. It
+//! takes the lock that a rename holds: a commit under way is completed, everything else stays as it was.
 
 use std::io;
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ fn lock() -> MutexGuard<'static, Vec<(PathBuf, String)>> {
 pub(super) struct PendingPath(PathBuf);
 
 impl PendingPath {
-    /// Of the file that `make` makes for the output `name`.
+    /// Registers the file that `make` makes for the output `name`.
     pub(super) fn made(
         name: &str,
         make: impl FnOnce() -> io::Result<NamedTempFile>,
@@ -49,9 +49,10 @@ impl Drop for PendingPath {
     }
 }
 
-/// Ends the process on SIGINT (Ctrl-C, status 130) and SIGTERM (143), without losing a file. Call it once, first of all.
+/// Ends the process on SIGINT (Ctrl-C, status 130) and SIGTERM (143), without losing a file. Call it once,
+/// first of all.
 ///
-/// Elsewhere than on Unix the system ends the process, and a temporary file may stay.
+/// On systems other than Unix, the system ends the process, and a temporary file may stay.
 pub fn watch() {
     #[cfg(unix)]
     unix::watch();
@@ -65,11 +66,11 @@ mod unix {
     use signal_hook::consts::{SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
 
-    /// What a shell adds to the number of a signal.
+    /// The offset that a shell adds to the number of a signal.
     const STATUS_OF_SIGNALS: i32 = 128;
 
     pub(super) fn watch() {
-        // Without it, a signal ends the process as ever.
+        // Without the handler, a signal ends the process as usual.
         let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
         thread::spawn(move || {
             if let Some(signal) = signals.forever().next() {
@@ -93,7 +94,7 @@ mod unix {
         // After the ^C that a terminal shows, or the progress bar.
         let line = if error.is_terminal() { "\n" } else { "" };
         let _ = writeln!(error, "{line}motion: interrupted{stays}");
-        // With the lock: nothing is committed any more.
+        // The lock is still held: nothing more is committed.
         process::exit(STATUS_OF_SIGNALS + signal)
     }
 }

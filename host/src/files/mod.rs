@@ -1,15 +1,17 @@
 //! Files that a command reads and writes: none is ever lost.
 //!
-//! Consumes the paths that a command reads, then those that it writes; produces an [`OutputFile`] for each of the latter.
+//! Consumes the paths that a command reads, then the paths that it writes; produces an [`OutputFile`] for
+//! each of these.
 //!
-//! - Before the work: an output that is an input or another output is refused, whatever links and spellings lead to it
-//!   (`place`), and so is one in a folder that does not exist or that can't be written.
+//! - Before the work: an output that is an input or another output is refused, whatever links and spellings
+//!   lead to it (`place`); so is an output in a folder that does not exist or can't be written.
 //! - During the work: everything goes to a temporary file in the same folder ([`OutputFile`]).
-//! - At its end: [`OutputFile::commit`] renames it. What is not committed, be it for an error, a panic or a signal
-//!   ([`interrupt`]), leaves what was there before and no other file.
+//! - At its end: [`OutputFile::commit`] renames it. If it is not committed, because of an error, a panic or a
+//!   signal ([`interrupt`]), the previous file stays and the temporary one is removed.
 //!
-//! A link is written through to the file that it names. A file that is replaced keeps its permissions; other hard links to
-//! it keep the old content. What is no regular file (a pipe, a terminal, `/dev/null`) is written directly.
+//! A link is followed to the file that it names. A replaced file keeps its permissions; other hard links to
+//! it keep the old content. Anything but a regular file (a pipe, a terminal, `/dev/null`) is written
+//! directly.
 
 mod error;
 pub mod interrupt;
@@ -34,18 +36,18 @@ pub struct Files {
 /// A file that is read or written.
 #[derive(Debug)]
 struct Known {
-    /// What it is for: an option, an argument or a standard stream.
+    /// Its role: an option, an argument or a standard stream.
     role: &'static str,
-    /// As the user gave it.
+    /// The path, as the user gave it.
     path: String,
     identity: Identity,
 }
 
 impl Files {
-    /// Of a command that reads `inputs`, each with its argument. One that does not exist is no error here.
+    /// The files of a command that reads `inputs`, each with its argument. A missing input is no error here.
     #[must_use]
     pub fn reading<'a>(inputs: impl IntoIterator<Item = (&'static str, Option<&'a Path>)>) -> Self {
-        // What is printed would be lost in a file that is replaced.
+        // Printed output would be lost in a file that is replaced.
         let mut known = place::standard_outputs();
         for (role, path) in inputs {
             match path {
@@ -63,12 +65,13 @@ impl Files {
     /// Opens the file that `option` names.
     ///
     /// # Errors
-    /// It is an input or another output, it is a folder or read-only, or its folder does not exist or can't be written.
+    /// It is an input or another output, it is a folder or read-only, or its folder does not exist or can't
+    /// be written.
     pub fn output(&mut self, option: &'static str, path: &Path) -> Result<OutputFile, FilesError> {
         self.open(option, path, None)
     }
 
-    /// As [`Self::output`], of a file that may be the input `of`: an edited copy that replaces it.
+    /// As [`Self::output`], for a file that may be the input `of`: an edited copy that replaces it.
     ///
     /// # Errors
     /// As [`Self::output`].

@@ -1,4 +1,4 @@
-//! A file being written: a temporary one in the same folder, renamed when it is whole.
+//! A file being written: a temporary one in the same folder, renamed when it is complete.
 
 use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, Write};
@@ -10,10 +10,10 @@ use super::FilesError;
 use super::interrupt::PendingPath;
 use super::place::{self, Identity, Place};
 
-/// A file being written. Dropped before [`Self::commit`], it leaves what was there before.
+/// A file being written. If dropped before [`Self::commit`], it leaves the previous file.
 #[derive(Debug)]
 pub struct OutputFile {
-    /// As the user gave it.
+    /// The path, as the user gave it.
     name: String,
     sink: Sink,
 }
@@ -24,7 +24,7 @@ enum Sink {
     Stream(BufWriter<File>),
 }
 
-/// What is to replace a file. The temporary file is removed when it is dropped, and forgotten after that.
+/// The replacement of a file. When dropped, it removes the temporary file and then unregisters it.
 #[derive(Debug)]
 struct Replacement {
     temporary: BufWriter<NamedTempFile>,
@@ -62,10 +62,10 @@ impl OutputFile {
         &self.name
     }
 
-    /// Writes what `write` writes, and commits it.
+    /// Writes the content with `write`, and commits it.
     ///
     /// # Errors
-    /// It can't be written whole.
+    /// It can't be written completely.
     pub fn write_whole(mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) -> Result<(), FilesError> {
         match write(&mut self) {
             Ok(()) => self.commit(),
@@ -73,10 +73,10 @@ impl OutputFile {
         }
     }
 
-    /// Makes what was written the file, in one step.
+    /// Replaces the file by what was written, in one step.
     ///
     /// # Errors
-    /// It can't be written whole.
+    /// It can't be written completely.
     pub fn commit(self) -> Result<(), FilesError> {
         let failure = self.failure();
         let done = match self.sink {
@@ -86,14 +86,14 @@ impl OutputFile {
         done.map_err(|source| failure.of(source))
     }
 
-    /// What to say where writing it fails.
+    /// The message for a failure of writing it.
     #[must_use]
     pub fn failure(&self) -> Failure {
         Failure { path: self.name.clone(), is_stream: matches!(self.sink, Sink::Stream(_)) }
     }
 }
 
-/// A file that was not written, before it is known why.
+/// A file that was not written, before the cause is known.
 #[derive(Clone, Debug)]
 pub struct Failure {
     path: String,
@@ -101,7 +101,7 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// Not written because of `source`.
+    /// The error with its cause `source`.
     #[must_use]
     pub fn of(self, source: io::Error) -> FilesError {
         let Self { path, is_stream } = self;
@@ -113,7 +113,7 @@ impl Replacement {
     fn new(target: PathBuf, permissions: Option<Permissions>, name: &str) -> io::Result<Self> {
         let mut builder = tempfile::Builder::new();
         builder.prefix(".motion-").suffix(".tmp");
-        // As a new file has them: what the user's mask leaves.
+        // As for a new file: the user's mask applies.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let (temporary, pending) =
@@ -127,7 +127,8 @@ impl Replacement {
         if let Some(permissions) = permissions {
             temporary.as_file().set_permissions(permissions)?;
         }
-        // Whole on the disk before it has its name: after a power failure there is the old file or the new one.
+        // Completely on disk before it gets its name: after a power failure there is the old file or the new
+        // one.
         temporary.as_file().sync_all()?;
         pending.end(|| temporary.persist(target).map(drop).map_err(|error| error.error))
     }

@@ -1,6 +1,7 @@
 //! Which file a path means, whether it exists or not.
 //!
-//! Two paths mean one file if both lead to the same node of the file system, or to the same name in the same folder.
+//! Two paths mean one file if both lead to the same node of the file system, or to the same name in the same
+//! folder.
 
 use std::ffi::OsString;
 use std::fs::{self, Metadata};
@@ -9,17 +10,17 @@ use std::path::{self, Path, PathBuf};
 
 use super::{FilesError, Known};
 
-/// Links from one to the next, as systems allow them.
+/// Greatest number of links in a row, as in operating systems.
 const LINKS_MAX: usize = 40;
 
-/// Which file it is.
+/// The identity of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
     /// One that exists.
     File(Node),
     /// One that does not exist: its folder and its name there.
     New(Node, OsString),
-    /// None that holds what is written: a pipe, a terminal, a device.
+    /// Not a file that keeps its content: a pipe, a terminal, a device.
     Stream,
 }
 
@@ -47,7 +48,7 @@ pub(super) struct Place {
     pub(super) identity: Identity,
     /// The path without links.
     pub(super) target: PathBuf,
-    /// Of the file that exists there.
+    /// The metadata of the file, if it exists.
     pub(super) metadata: Option<Metadata>,
 }
 
@@ -71,7 +72,7 @@ impl Place {
         }
     }
 
-    /// Of a file that does not exist, or a link to such a one.
+    /// The place of a file that does not exist, or of a link to one.
     fn of_new(path: &Path, name: String) -> Result<Self, FilesError> {
         let mut target = path.to_owned();
         for _ in 0..LINKS_MAX {
@@ -87,7 +88,7 @@ impl Place {
         let Some(node) = of_folder.and_then(|metadata| node(&folder, &metadata).ok()) else {
             return Err(FilesError::NoFolder { path: name, folder: folder.display().to_string() });
         };
-        // Systems whose users know a file by its name in any case.
+        // Systems whose file names ignore case.
         let ignores_case = cfg!(any(windows, target_os = "macos"));
         let file_name = if ignores_case { file_name.to_ascii_lowercase() } else { file_name.to_owned() };
         Ok(Self { identity: Identity::New(node, file_name), target, metadata: None })

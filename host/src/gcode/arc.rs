@@ -1,7 +1,7 @@
 //! Arcs: from words to centre, radii and sweep.
 //!
-//! Everything happens in the arc's plane, with exact integers \[10⁻¹⁰ mm\] relative to the start as long as the
-//! result is an integer. So a full circle differs from an arc of next to no length without a tolerance.
+//! Everything happens in the arc's plane, with exact integers \[10⁻¹⁰ mm\] relative to the start as long as
+//! the result is an integer. So a full circle differs from an arc of next to no length without a tolerance.
 
 use super::decimal::Length;
 use super::error::Problem;
@@ -56,8 +56,8 @@ fn difference(a: Offset, b: Offset) -> Offset {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// An arc from `start` to `end` about `centre`; clockwise if `clockwise`. Start and end in one direction from the
-/// centre mean a full turn.
+/// An arc from `start` to `end` about `centre`; clockwise if `clockwise`. Start and end in one direction from
+/// the centre mean a full turn.
 pub(super) fn about_centre(
     start: [Length; 2],
     end: [Length; 2],
@@ -96,8 +96,8 @@ pub(super) fn about_centre(
     })
 }
 
-/// An arc from `start` to `end` of `radius`: the shorter of the two, or the longer if it is negative. `word` is the R
-/// word, for errors.
+/// An arc from `start` to `end` of `radius`: the shorter of the two, or the longer if it is negative. `word`
+/// is the R word, for errors.
 pub(super) fn of_radius(
     start: [Length; 2],
     end: [Length; 2],

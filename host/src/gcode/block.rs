@@ -1,7 +1,7 @@
 //! The words of one line, each in its slot.
 //!
-//! A slot holds one word. So a word given twice, two words of one modal group, and words without a slot are refused
-//! here, the leftmost first. The interpreter acts on the words.
+//! A slot holds one word. So a word given twice, two words of one modal group, and words without a slot are
+//! refused here, the leftmost first. The interpreter acts on the words.
 
 use super::error::{Located, Problem};
 use super::lexer::{Word, Words};

@@ -107,8 +107,8 @@ impl Length {
     pub const ZERO: Self = Self(0);
     /// Units in a millimetre.
     pub const UNITS_PER_MM: i64 = UNITS_PER_ONE;
-    /// The largest length, 1 000 000 mm; its negative is the smallest. The distance of any two lengths, and the
-    /// products an arc needs, then fit their integers without overflow checks.
+    /// The largest length, 1 000 000 mm; its negative is the smallest. The distance of any two lengths, and
+    /// the products an arc needs, then fit their integers without overflow checks.
     pub const LIMIT: Self = Self(1_000_000 * Self::UNITS_PER_MM);
 
     /// A count of 10⁻¹⁰ mm; `None` beyond ±[`Length::LIMIT`].
@@ -123,7 +123,8 @@ impl Length {
         self.0
     }
 
-    /// \[mm\], the f64 nearest to the exact value up to ±900 000 mm, within one unit in the last place beyond.
+    /// \[mm\], the f64 nearest to the exact value up to ±900 000 mm, within one unit in the last place
+    /// beyond.
     #[must_use]
     pub fn to_mm(self) -> f64 {
         self.0 as f64 / Self::UNITS_PER_MM as f64

@@ -51,15 +51,15 @@
 //!
 //! # At the start
 //!
-//! The position is 0, 0, 0. The modes are the power-on modes of RS-274/NGC: G17, G21, G90, G91.1, G94, no motion
-//! mode, no feed. Interpreters differ in the path mode; here it is [`PathMode::ExactPath`] (G61), the one that
-//! never leaves the programmed path.
+//! The position is 0, 0, 0. The modes are the power-on modes of RS-274/NGC: G17, G21, G90, G91.1, G94, no
+//! motion mode, no feed. Interpreters differ in the path mode; here it is [`PathMode::ExactPath`] (G61), the
+//! one that never leaves the programmed path.
 //!
 //! # Exactness
 //!
-//! A [`Length`] counts 10⁻¹⁰ mm, so ten decimals of a millimetre and nine of an inch are exact, and incremental
-//! programs do not drift. More decimals are an error unless they are zeros. Floating point begins only with what
-//! is irrational anyhow: the centre of an R arc, radii and sweeps.
+//! A [`Length`] counts 10⁻¹⁰ mm, so ten decimals of a millimetre and nine of an inch are exact, and
+//! incremental programs do not drift. More decimals are an error unless they are zeros. Floating point begins
+//! only with what is irrational anyhow: the centre of an R arc, radii and sweeps.
 
 mod arc;
 mod block;

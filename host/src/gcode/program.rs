@@ -59,9 +59,9 @@ pub struct LineMove {
 
 /// An arc, or a helix if start and end differ along the plane's normal.
 ///
-/// Where the radii differ (within the tolerance of [`RADIUS_MISMATCH_RATIO`](super::RADIUS_MISMATCH_RATIO)), the
-/// curve from the exact start to the exact end is a spiral: the radius, like the height, goes linearly with the
-/// angle.
+/// Where the radii differ (within the tolerance of [`RADIUS_MISMATCH_RATIO`](super::RADIUS_MISMATCH_RATIO)),
+/// the curve from the exact start to the exact end is a spiral: the radius, like the height, goes linearly
+/// with the angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArcMove {
     /// Start, X Y Z.
@@ -76,8 +76,8 @@ pub struct ArcMove {
     pub start_radius_mm: f64,
     /// Distance of the end from the centre in the plane \[mm\], greater than 0.
     pub end_radius_mm: f64,
-    /// Angle run through \[rad\], in ±(0, 2π]: counter-clockwise positive, seen from the positive end of the plane's
-    /// normal; a full circle is ±2π.
+    /// Angle run through \[rad\], in ±(0, 2π]: counter-clockwise positive, seen from the positive end of the
+    /// plane's normal; a full circle is ±2π.
     pub sweep_rad: f64,
     /// Feed along the path, the height of a helix included.
     pub feed: Feed,
@@ -134,8 +134,8 @@ pub enum PathMode {
     Blend {
         /// Greatest distance from the programmed path \[mm\], 0 or more; the machine's choice if absent.
         tolerance_mm: Option<f64>,
-        /// How far short lines may be from what stands for them \[mm\], 0 or more, on top of the tolerance; if absent,
-        /// a part of the tolerance.
+        /// How far short lines may be from what stands for them \[mm\], 0 or more, on top of the tolerance;
+        /// if absent, a part of the tolerance.
         merging_mm: Option<f64>,
     },
 }
@@ -146,8 +146,8 @@ pub enum Plane {
     /// G17: X, Y, normal Z; offsets I, J.
     #[default]
     Xy,
-    /// G18: Z, X, normal Y; offsets K, I. In the usual drawing with X to the right and Z up, Y points away from the
-    /// reader, so that a clockwise arc looks counter-clockwise.
+    /// G18: Z, X, normal Y; offsets K, I. In the usual drawing with X to the right and Z up, Y points away
+    /// from the reader, so that a clockwise arc looks counter-clockwise.
     Zx,
     /// G19: Y, Z, normal X; offsets J, K.
     Yz,

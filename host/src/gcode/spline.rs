@@ -5,8 +5,8 @@ use super::error::{Located, Problem};
 use super::modal::Modal;
 use super::program::Plane;
 
-/// The control points of a G5 \[mm\]: I J from the start, P Q from the end. Without I and J the first is what continues the
-/// G5 before, whose P Q are `before_mm`. `offset` is where the line asks for the move.
+/// The control points of a G5 \[mm\]: I J from the start, P Q from the end. Without I and J the first is what
+/// continues the G5 before, whose P Q are `before_mm`. `offset` is where the line asks for the move.
 pub(super) fn controls_mm(
     block: &Block<'_>,
     modal: &Modal,

@@ -1,8 +1,8 @@
 //! Is there a bed that moves?
 //!
-//! A bed of small mass ratio changes the axis' response in proportion to that ratio, at frequencies that can be tried
-//! one after the other. For each the part of the change that no other unknown could make is compared with the residuals of
-//! the best rigid model. The search starts at the frequency that explains most of them.
+//! A bed of small mass ratio changes the axis' response in proportion to that ratio, at frequencies that can
+//! be tried one after the other. For each the part of the change that no other unknown could make is compared
+//! with the residuals of the best rigid model. The search starts at the frequency that explains most of them.
 
 use super::parameters::{Unknown, Unknowns, without_bed};
 use super::search::{Found, Noise};
@@ -13,12 +13,13 @@ const LEAST_HZ: f64 = 4.0;
 const MOST_HZ: f64 = 60.0;
 const TRIED: usize = 28;
 
-/// Damping and mass ratio of the tried beds. The damping is wide enough to be seen from the neighbouring frequency.
+/// Damping and mass ratio of the tried beds. The damping is wide enough to be seen from the neighbouring
+/// frequency.
 const TRIED_DAMPING: f64 = 0.05;
 const TRIED_MASS_RATIO: f64 = 0.02;
 
-/// The bed that explains most of what the rigid model `found` leaves, as a start of a search, with the gain in misfit
-/// that a linear estimate promises.
+/// The bed that explains most of what the rigid model `found` leaves, as a start of a search, with the gain
+/// in misfit that a linear estimate promises.
 pub(super) fn likeliest_bed(
     runs: &Runs,
     resolution_mm: f64,

@@ -1,8 +1,8 @@
 //! How well the recordings fix the unknowns.
 //!
-//! Residuals of neighbouring ticks resemble each other, so n of them tell as little as n/γ independent ones; γ is one
-//! plus twice the sum of their autocorrelation. The covariance of the unknowns is the inverse of the information that
-//! is left.
+//! Residuals of neighbouring ticks resemble each other, so n of them tell as little as n/γ independent ones;
+//! γ is one plus twice the sum of their autocorrelation. The covariance of the unknowns is the inverse of the
+//! information that is left.
 
 use super::cholesky::Symmetric;
 use super::parameters::{COUNT, Unknown};
@@ -83,7 +83,8 @@ mod tests {
 
     #[test]
     fn repeated_residuals_count_once() {
-        // An aperiodic sequence of signs, each standing for ten ticks: between 1 + 2·(9 + … + 1)/10 = 10 and noise.
+        // An aperiodic sequence of signs, each standing for ten ticks: between 1 + 2·(9 + … + 1)/10 = 10 and
+        // noise.
         let mut state = 12345_u32;
         let mut signs = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -1,7 +1,7 @@
 //! Velocity and acceleration from encoder readings: local parabolas.
 //!
-//! Plain differences of a 1 µm encoder at 0.5 ms step by 2 mm/s and 4000 mm/s². A parabola fitted to n readings about
-//! a tick has errors smaller by about n^1.5 and n^2.5, and no lag.
+//! Plain differences of a 1 µm encoder at 0.5 ms step by 2 mm/s and 4000 mm/s². A parabola fitted to n
+//! readings about a tick has errors smaller by about n^1.5 and n^2.5, and no lag.
 
 /// Parabolas through `half` readings to either side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +16,8 @@ impl Parabolas {
         Self { half: ((time_s / tick_s / 2.0) as usize).clamp(2, 1000), tick_s }
     }
 
-    /// The shortest whose acceleration is good to `accel_mm_s2` for an encoder of this resolution, within 10 ms.
+    /// The shortest whose acceleration is good to `accel_mm_s2` for an encoder of this resolution, within 10
+    /// ms.
     pub(super) fn resolving(accel_mm_s2: f64, resolution_mm: f64, tick_s: f64) -> Self {
         let longest = Self::over(10e-3, tick_s);
         let all = (2..=longest.half).map(|half| Self { half, tick_s });
@@ -45,7 +46,8 @@ impl Parabolas {
         rounding(resolution_mm) / self.moments().0.sqrt() / self.tick_s
     }
 
-    /// Velocity and acceleration at every tick that has enough readings on both sides, as (tick, mm/s, mm/s²).
+    /// Velocity and acceleration at every tick that has enough readings on both sides, as (tick, mm/s,
+    /// mm/s²).
     pub(super) fn of<'a>(&self, positions: &'a [f64]) -> impl Iterator<Item = (usize, f64, f64)> + use<'a> {
         let Self { half, tick_s } = *self;
         let (second, fourth) = self.moments();

@@ -8,9 +8,10 @@ use super::step_reading::StepReading;
 /// Half an interval over the value, up to which a value counts as determined.
 pub const DETERMINED: f64 = 0.3;
 
-/// Intervals are wider than the scatter alone makes them: the search ends close to the optimum but not in it, because the
-/// model is rough where it saturates. Over fifty simulated axes the true value lay within the interval in 80 to 100 of
-/// 100 cases, by parameter; for the acceleration limit in 76, with errors below 0.4 %.
+/// Intervals are wider than the scatter alone makes them: the search ends close to the optimum but not in it,
+/// because the model is rough where it saturates. Over fifty simulated axes the true value lay within the
+/// interval in 80 to 100 of 100 cases, by parameter; for the acceleration limit in 76, with errors below 0.4
+/// %.
 const MARGIN: f64 = 2.0;
 
 /// A value with its 95 % confidence interval, from the scatter of the recordings about the model. It does not
@@ -19,7 +20,8 @@ const MARGIN: f64 = 2.0;
 pub struct Estimate {
     /// The value, in the unit of the field that holds it.
     pub value: f64,
-    /// The true value lies within value ± this in 95 of 100 cases, nominally; in the same unit. May be infinite.
+    /// The true value lies within value ± this in 95 of 100 cases, nominally; in the same unit. May be
+    /// infinite.
     pub half_width_95: f64,
 }
 
@@ -68,12 +70,12 @@ impl BedEstimate {
 
 /// Parameters of a servo axis, of the model in [`DriveParameters`].
 ///
-/// **Inertia.** All of it is per unit of the inertia that was moved: with a load inertia ratio ρ, gains and limits
-/// stand for Kv/(1+ρ), a_lim/(1+ρ), a_c/(1+ρ) and b/(1+ρ). Commands and positions can't tell ρ, and nothing that is
-/// built on them needs it.
+/// **Inertia.** All of it is per unit of the inertia that was moved: with a load inertia ratio ρ, gains and
+/// limits stand for Kv/(1+ρ), a_lim/(1+ρ), a_c/(1+ρ) and b/(1+ρ). Commands and positions can't tell ρ, and
+/// nothing that is built on them needs it.
 ///
-/// **Lags.** A command filter of the drive is not told apart from the current loop; it appears in the current lag.
-/// Dead time and current lag are found together: their sum is sharper than either.
+/// **Lags.** A command filter of the drive is not told apart from the current loop; it appears in the current
+/// lag. Dead time and current lag are found together: their sum is sharper than either.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisParametersFound {
     /// Actual over nominal scale of the command: velocity = gain·command + offset, in the steady state.
@@ -143,7 +145,8 @@ pub struct Figures {
 /// How well the model follows one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunMatch {
-    /// Root of the mean square of recorded − simulated position \[mm\]. Rounding alone leaves 0.29 encoder steps.
+    /// Root of the mean square of recorded − simulated position \[mm\]. Rounding alone leaves 0.29 encoder
+    /// steps.
     pub error_mm_rms: f64,
     /// The difference of the greatest and the smallest reading \[mm\].
     pub travel_mm: f64,

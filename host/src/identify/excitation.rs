@@ -1,8 +1,8 @@
 //! Motions that show every parameter of an axis, and the set of them that identification asks for.
 //!
-//! Small steps show the velocity controller and the delay. Large steps show the current limit, the viscous friction
-//! and, while the axis cruises, the ringing bed. Harmonic motion shows the bed again, and how the delay splits into
-//! dead time and lag. Slow motion shows the Coulomb friction.
+//! Small steps show the velocity controller and the delay. Large steps show the current limit, the viscous
+//! friction and, while the axis cruises, the ringing bed. Harmonic motion shows the bed again, and how the
+//! delay splits into dead time and lag. Slow motion shows the Coulomb friction.
 
 use core::f64::consts::PI;
 
@@ -36,8 +36,9 @@ pub enum Excitation {
 
 /// The motions to run, in any order: about 9 s of machine time and 50 mm of travel to one side.
 ///
-/// They were chosen for axes like those of S4 (Kv 300 … 600 /s, 8 … 16 m/s², bed at 9 … 18 Hz), which are faster than
-/// the plan. An axis that reaches no more than `fastest_mm_s` \[mm/s\], > 0, gets all of it slower in proportion.
+/// They were chosen for axes like those of S4 (Kv 300 … 600 /s, 8 … 16 m/s², bed at 9 … 18 Hz), which are
+/// faster than the plan. An axis that reaches no more than `fastest_mm_s` \[mm/s\], > 0, gets all of it
+/// slower in proportion.
 #[must_use]
 pub fn identification_plan(fastest_mm_s: f64) -> Vec<Excitation> {
     let part = (REACH_SHARE * fastest_mm_s / (FASTEST_M_MIN * 1000.0 / 60.0)).min(1.0);

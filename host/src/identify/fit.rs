@@ -1,5 +1,5 @@
-//! The fit of the drive model, in stages: from a coarse grid on the steps to everything on all runs, and the question
-//! whether there is a bed.
+//! The fit of the drive model, in stages: from a coarse grid on the steps to everything on all runs, and the
+//! question whether there is a bed.
 
 use super::confidence::covariance;
 use super::differences::Parabolas;
@@ -41,8 +41,8 @@ const BED_GAIN_PER_READING: f64 = 0.02;
 /// ... and have a mass ratio of this many standard deviations.
 const BED_DEVIATIONS: f64 = 4.0;
 
-/// Gain in misfit for each reading from which a bed needs no comparison at full effort: it halves the errors, more
-/// than coarser sub-steps can.
+/// Gain in misfit for each reading from which a bed needs no comparison at full effort: it halves the errors,
+/// more than coarser sub-steps can.
 const OBVIOUS: f64 = 1.4;
 
 /// Root mean square of the residuals over the travel, above which the model is none.
@@ -78,7 +78,8 @@ pub(super) fn fit(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Fi
     Ok(Fit { parameters, runs: matches })
 }
 
-/// The first stage, on runs that are not harmonic if there are such: a grid, and a search from its best points.
+/// The first stage, on runs that are not harmonic if there are such: a grid, and a search from its best
+/// points.
 fn coarse(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Option<Unknowns>, IdentifyError> {
     let steps: Vec<AxisRecording> =
         recordings.iter().filter(|run| run.harmonic_hz.is_none()).cloned().collect();

@@ -5,8 +5,8 @@ use core::f64::consts::PI;
 use super::recording::AxisRecording;
 use crate::sine::{Baseline, fit};
 
-/// Amplitude and delay of one harmonic motion, of positions. What is commanded is what the converter puts out, in a closed loop too: the
-/// figures are the drive's.
+/// Amplitude and delay of one harmonic motion, of positions. What is commanded is what the converter puts
+/// out, in a closed loop too: the figures are the drive's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HarmonicReading {
     /// Frequency \[Hz\].

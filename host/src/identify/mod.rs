@@ -1,16 +1,17 @@
 //! Identification: the parameters of a servo axis, from recordings of outputs and encoder readings.
 //!
-//! Consumes [`AxisRecording`]s of the motions in [`identification_plan`], or of any others that start at rest, from
-//! an open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, in about a second for
-//! ten seconds of recordings. It never sees the parameters of a simulation: a machine gives the same two columns.
+//! Consumes [`AxisRecording`]s of the motions in [`identification_plan`], or of any others that start at
+//! rest, from an open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, in
+//! about a second for ten seconds of recordings. It never sees the parameters of a simulation: a machine
+//! gives the same two columns.
 //!
 //! Two methods:
 //!
-//! - **Figures without a model**: delay, time constant, overshoot and settling of steps, gain and delay of harmonic
-//!   motion, −3 dB bandwidth, sustained acceleration (S4).
-//! - **The drive model of hal-sim**, run on the recorded commands. Its parameters are moved until its positions are
-//!   those that were recorded (output error, least squares). Noise of the encoder thus enters once, is not
-//!   differentiated, and does not bend the result.
+//! - **Figures without a model**: delay, time constant, overshoot and settling of steps, gain and delay of
+//!   harmonic motion, −3 dB bandwidth, sustained acceleration (S4).
+//! - **The drive model of hal-sim**, run on the recorded commands. Its parameters are moved until its
+//!   positions are those that were recorded (output error, least squares). Noise of the encoder thus enters
+//!   once, is not differentiated, and does not bend the result.
 //!
 //! The model knows nothing of backlash, cogging and pitch errors. Where these matter, the error of the runs
 //! ([`RunMatch`]) stays far above the rounding of the encoder, and intervals are too narrow.

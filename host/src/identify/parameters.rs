@@ -74,8 +74,8 @@ impl Unknown {
 
     /// Step of the difference quotients, in the search's coordinate.
     ///
-    /// Large: the model's limits act from sub-step to sub-step, so its positions are rough by about 1 µm where a run
-    /// saturates. Roughness over a small step would pass for sensitivity.
+    /// Large: the model's limits act from sub-step to sub-step, so its positions are rough by about 1 µm
+    /// where a run saturates. Roughness over a small step would pass for sensitivity.
     pub(super) fn difference(self) -> f64 {
         match self {
             Gain => 1e-3,

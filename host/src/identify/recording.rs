@@ -1,7 +1,7 @@
 //! The recording of a run for identification: commands and encoder readings, tick by tick.
 //!
-//! Identification uses nothing else: neither set-points nor gains of the regulator, and no parameter of a simulation.
-//! So a recording may come from an open or a closed loop.
+//! Identification uses nothing else: neither set-points nor gains of the regulator, and no parameter of a
+//! simulation. So a recording may come from an open or a closed loop.
 
 use super::IdentifyError;
 

@@ -1,10 +1,10 @@
 //! The search: Levenberg and Marquardt's steps on the residuals of all runs.
 //!
-//! The variance of a run's residuals is unknown and differs: rounding of the encoder, and in runs that saturate the
-//! sub-steps of the model. So every run is weighted by one over the variance that it had last, and by how many
-//! independent readings its correlated residuals are worth, which ends where the likelihood of normally distributed
-//! residuals is greatest. A Jacobian costs a dozen simulations and serves for
-//! several steps while they gain.
+//! The variance of a run's residuals is unknown and differs: rounding of the encoder, and in runs that
+//! saturate the sub-steps of the model. So every run is weighted by one over the variance that it had last,
+//! and by how many independent readings its correlated residuals are worth, which ends where the likelihood
+//! of normally distributed residuals is greatest. A Jacobian costs a dozen simulations and serves for several
+//! steps while they gain.
 
 use super::cholesky::Symmetric;
 use super::confidence::correlation_factor;
@@ -26,8 +26,8 @@ pub(super) struct Effort {
     pub(super) substeps: u32,
     /// Most Jacobians.
     pub(super) jacobians: usize,
-    /// Whether the start is close. Far from it all residuals are correlated, and weights by that would give up runs
-    /// that the model does not follow yet.
+    /// Whether the start is close. Far from it all residuals are correlated, and weights by that would give
+    /// up runs that the model does not follow yet.
     pub(super) is_near: bool,
     /// The gain in misfit below which it ends.
     pub(super) least_gain: f64,
@@ -39,15 +39,15 @@ const STEPS_PER_JACOBIAN: usize = 6;
 /// Correlation factor from which residuals are the model's and not the encoder's.
 const CORRELATED: f64 = 3.0;
 
-/// The most that correlation takes from a run during the search: one that the model does not follow yet must still
-/// outweigh the last digit of the others.
+/// The most that correlation takes from a run during the search: one that the model does not follow yet must
+/// still outweigh the last digit of the others.
 const CORRELATION_MAX: f64 = 30.0;
 
 /// Moments of a run at which the model is rough.
 const MOMENTS: f64 = 4.0;
 
-/// Error of one such moment with [`SUBSTEPS`](super::simulation::SUBSTEPS) \[mm\]: the integrator of the drive stops or
-/// continues a sub-step too early or too late.
+/// Error of one such moment with [`SUBSTEPS`](super::simulation::SUBSTEPS) \[mm\]: the integrator of the
+/// drive stops or continues a sub-step too early or too late.
 const ROUGHNESS_MM: f64 = 0.5e-3;
 
 /// Dampings tried for one step.
@@ -98,8 +98,8 @@ impl Noise {
         self.variances.iter().zip(&self.independent).zip(&self.readings).map(of_run).collect()
     }
 
-    /// The same for runs that the model does not quite follow, careful: what is left of them are the few errors of the
-    /// moments at which they saturate or reverse, whatever their autocorrelation promises.
+    /// The same for runs that the model does not quite follow, careful: what is left of them are the few
+    /// errors of the moments at which they saturate or reverse, whatever their autocorrelation promises.
     pub(super) fn careful(mut self) -> Self {
         let runs = self.independent.iter_mut().zip(&mut self.variances).zip(&self.readings);
         for ((independent, variance), n) in runs {
@@ -116,8 +116,8 @@ impl Noise {
         self.independent.iter().sum()
     }
 
-    /// Σ n·ln(variance) over the runs, n their independent readings here: −2 × the logarithm of the likelihood, up to
-    /// a constant.
+    /// Σ n·ln(variance) over the runs, n their independent readings here: −2 × the logarithm of the
+    /// likelihood, up to a constant.
     pub(super) fn misfit(&self, residuals: &Residuals) -> f64 {
         self.variances_of(residuals)
             .iter()

@@ -9,8 +9,8 @@ use super::recording::AxisRecording;
 /// Cells of the simulated dead time, one per sub-step.
 const LINE: usize = 1024;
 
-/// Sub-steps of a tick in the last stage of the search: those of the reference machine. Stages before it are content
-/// with half of them.
+/// Sub-steps of a tick in the last stage of the search: those of the reference machine. Stages before it are
+/// content with half of them.
 pub(super) const SUBSTEPS: u32 = 20;
 
 /// The longest lag that is looked for \[ticks\]; the line has room for it.

@@ -3,8 +3,8 @@
 use super::differences::Parabolas;
 use super::recording::AxisRecording;
 
-/// A step response. Velocities and accelerations come from local parabolas, which have no lag; backward differences,
-/// as S4 has them, find delays longer by about half a tick.
+/// A step response. Velocities and accelerations come from local parabolas, which have no lag; backward
+/// differences, as S4 has them, find delays longer by about half a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReading {
     /// The command stepped to \[mm/s\].
@@ -16,8 +16,8 @@ pub struct StepReading {
     /// The overshoot of the velocity, over its final value.
     pub overshoot: f64,
     /// Time from the command's step to the last time outside of ±0.28 % of the final velocity, which is S4's
-    /// ±0.02 m/min at 7.2 m/min \[s\]. `None` if the encoder does not resolve that, or it has not settled when the
-    /// command changes again.
+    /// ±0.02 m/min at 7.2 m/min \[s\]. `None` if the encoder does not resolve that, or it has not settled
+    /// when the command changes again.
     pub settling_s: Option<f64>,
     /// Greatest acceleration \[mm/s²\].
     pub peak_accel_mm_s2: f64,

@@ -32,8 +32,8 @@ use super::settings::{
 /// Seconds per minute: feeds in mm/min exist in this file only.
 const S_PER_MIN: f64 = 60.0;
 /// An encoder's register tells a move from its complement only while the axis moves by less than half the
-/// register from one tick to the next. An axis may be faster than its feed, while it overshoots or catches up,
-/// and readings have noise: it is held to twice its feed.
+/// register from one tick to the next. An axis may be faster than its feed, while it overshoots or catches
+/// up, and readings have noise: it is held to twice its feed.
 const TIMER_MARGIN: f64 = 2.0;
 
 pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineError> {
@@ -122,7 +122,8 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
             return Err(refuse(at.clone(), format!("at most following_error_limit_mm = {limit_mm}")));
         }
     }
-    // What only the kernel's numbers can't hold, or does not go together, has no key of its own: it stands at the axis.
+    // What only the kernel's numbers can't hold, or does not go together, has no key of its own: it stands at
+    // the axis.
     let figures = [0, 1, 2].map(|index: usize| axes[index].1.figures());
     let faults = file.faults.map_or_else(FaultSettings::default, |faults| faults.settings());
     let guards = Guards {

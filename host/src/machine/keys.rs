@@ -1,7 +1,8 @@
 //! Every key of a machine file: unit, range, default, meaning.
 //!
-//! The ranges are the words that the reader refuses values with. The tests hold the rest to the reader: it must know
-//! exactly these keys, require exactly those without a default, and refuse a value with the range that stands here.
+//! The ranges are the words that the reader refuses values with. The tests hold the rest to the reader: it
+//! must know exactly these keys, require exactly those without a default, and refuse a value with the range
+//! that stands here.
 
 use motion_kernel::axis::TABLE_POINTS;
 

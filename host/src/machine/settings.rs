@@ -24,13 +24,16 @@ const JUNCTION_ANGLE_ROUNDING_RAD: f64 = 2.0e-6;
 /// Greatest gap between two pieces \[mm\]: pieces are rounded, to a twentieth of a count of 0.1 µm.
 const JUNCTION_GAP_MM: f64 = 5e-6;
 
-/// Tolerance of a G64 without P \[mm\]: so little that a program written for another controller still makes its part.
+/// Tolerance of a G64 without P \[mm\]: so little that a program written for another controller still makes
+/// its part.
 pub(super) const BLEND_TOLERANCE_MM: f64 = 0.01;
 
-/// The simulation's step \[s\]; a tick is divided into as many as come closest to it, so a step is at least 3/4 of it.
+/// The simulation's step \[s\]; a tick is divided into as many as come closest to it, so a step is at least
+/// 3/4 of it.
 const SUBSTEP_S: f64 = 25e-6;
 
-/// Cells of a simulated axis's dead time: for the longest dead time that a file may give, in the shortest steps.
+/// Cells of a simulated axis's dead time: for the longest dead time that a file may give, in the shortest
+/// steps.
 pub const DEAD_TIME_CELLS: usize = 640;
 
 /// A machine of three axes. Made by [`Machine::from_toml`] or [`Machine::reference`]; whoever changes a value
@@ -77,12 +80,13 @@ pub struct PathSettings {
     pub jerk_mm_s3: f64,
     /// Greatest snap \[mm/s⁴\].
     pub snap_mm_s4: f64,
-    /// Greatest change of direction at a junction that is driven through \[rad\]; 0 to 30° (in the file in degrees).
+    /// Greatest change of direction at a junction that is driven through \[rad\]; 0 to 30° (in the file in
+    /// degrees).
     pub junction_angle_rad: f64,
     /// Greatest jump of acceleration at a junction \[mm/s²\]; from 0.001 to 10¹².
     pub accel_step_mm_s2: f64,
-    /// Part of a curve's greatest feed that is planned with, 0.1 to 0.85; what it leaves of acceleration, jerk and
-    /// snap is for changing the feed on the curve.
+    /// Part of a curve's greatest feed that is planned with, 0.1 to 0.85; what it leaves of acceleration,
+    /// jerk and snap is for changing the feed on the curve.
     pub curve_feed_share: f64,
     /// How far blends may leave the path under a G64 without P \[mm\]; 0 to 10, 0 for exact path.
     pub blend_tolerance_mm: f64,
@@ -103,13 +107,13 @@ pub struct AxisSettings {
     pub snap_mm_s4: f64,
     /// Greatest following error at which the axis faults \[mm\], 0.0001 to 1000.
     pub following_error_limit_mm: f64,
-    /// What else is watched; `None` for figures of the drive, see [`AxisSettings::guard_figures`]. Noise and travel are the
-    /// axis' own.
+    /// What else is watched; `None` for figures of the drive, see [`AxisSettings::guard_figures`]. Noise and
+    /// travel are the axis' own.
     pub guard: Option<GuardFigures>,
     /// Least and greatest position \[mm\], if it is bounded.
     pub travel_mm: Option<[f64; 2]>,
-    /// Travel per encoder count \[mm\], between 10⁻⁸ and 0.5; so much that a tick at twice `feed_mm_s` is less than
-    /// half the register of `timer`.
+    /// Travel per encoder count \[mm\], between 10⁻⁸ and 0.5; so much that a tick at twice `feed_mm_s` is
+    /// less than half the register of `timer`.
     pub mm_per_count: f64,
     /// Width of the encoder's counter register.
     pub timer: TimerBits,
@@ -245,8 +249,8 @@ impl Machine {
         AxisError { axis: self.axes[error.axis].name.clone(), source: error.cause }
     }
 
-    /// What a compiled program carries: everything that the kernel has to know of the machine, which stands at
-    /// the origin when the program starts.
+    /// What a compiled program carries: everything that the kernel has to know of the machine, which stands
+    /// at the origin when the program starts.
     #[must_use]
     pub fn header(&self) -> Header<3> {
         Header { tick_s: self.tick_s, rules: self.rules(), axes: self.figures(), start: [Position::ZERO; 3] }
@@ -334,14 +338,17 @@ impl AxisSettings {
         }
     }
 
-    /// What is watched of the axis with ticks of `tick_s`: what the file says, or what follows from drive and regulator.
+    /// What is watched of the axis with ticks of `tick_s`: what the file says, or what follows from drive and
+    /// regulator.
     ///
-    /// With the drive's response T = dead time + filter + current lag + 3 time constants of its velocity controller,
-    /// feedforward that is off by a tenth, and loads of a tenth of its torque:
+    /// With the drive's response T = dead time + filter + current lag + 3 time constants of its velocity
+    /// controller, feedforward that is off by a tenth, and loads of a tenth of its torque:
     ///
-    /// - following error: at rest a quarter of the limit; (|1 − F_V| + 0.1)/kp for velocity, T/kp for acceleration;
+    /// - following error: at rest a quarter of the limit; (|1 − F_V| + 0.1)/kp for velocity, T/kp for
+    ///   acceleration;
     /// - jump: twice (axis' + drive's acceleration)·tick² + (2 + 4·noise) counts;
-    /// - moving: a hundredth of the feed, twice what friction holds and what noise commands, together; within T and 2 more time constants;
+    /// - moving: a hundredth of the feed, twice what friction holds and what noise commands, together; within
+    ///   T and 2 more time constants;
     /// - load: a tenth of the drive's acceleration, or twice the axis' or friction.
     #[must_use]
     pub fn guard_figures(&self, tick_s: f64) -> GuardFigures {

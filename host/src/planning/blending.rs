@@ -1,22 +1,23 @@
 //! Chooses the junctions that are blended, and the length of each blend.
 //!
-//! Consumes a run of moves with their tolerances; produces blocks with ceiling, law and junction feed, ready for
-//! look-ahead. Background, a bounded number of plans of at most eleven blocks for each junction.
+//! Consumes a run of moves with their tolerances; produces blocks with ceiling, law and junction feed, ready
+//! for look-ahead. Background, a bounded number of plans of at most eleven blocks for each junction.
 //!
-//! **A blend has to pay.** Jerk and snap bound the motion round a corner: within a small tolerance it may take longer
-//! than a stop on the corner, and between a slow and a fast move a blend keeps the fast one slow. So every junction is tried as
-//! it is (a stop, or what the acceleration-step limit lets pass) and with blends of some lengths, each once with
-//! [`BLEND_FEED_SHARE`], which leaves nothing for changing the feed on it, and once as a curve like any other.
-//! They are compared by the time that look-ahead takes over both moves and one more on either side, with the
-//! choices for the neighbouring junctions. The shortest is taken, but a junction without a blend has to gain
-//! a five-hundredth of it: G64 asks for smooth motion. Looking at one junction after the other does not find the best of
-//! all; in the end the run is planned with every blend at its longest and as it was programmed, too, and the best of these is
-//! taken. So blends and merged lines cost at most that part of the time that the exact path takes.
+//! **A blend has to pay.** Jerk and snap bound the motion round a corner: within a small tolerance it may
+//! take longer than a stop on the corner, and between a slow and a fast move a blend keeps the fast one slow.
+//! So every junction is tried as it is (a stop, or what the acceleration-step limit lets pass) and with
+//! blends of some lengths, each once with [`BLEND_FEED_SHARE`], which leaves nothing for changing the feed on
+//! it, and once as a curve like any other. They are compared by the time that look-ahead takes over both
+//! moves and one more on either side, with the choices for the neighbouring junctions. The shortest is taken,
+//! but a junction without a blend has to gain a five-hundredth of it: G64 asks for smooth motion. Looking at
+//! one junction after the other does not find the best of all; in the end the run is planned with every blend
+//! at its longest and as it was programmed, too, and the best of these is taken. So blends and merged lines
+//! cost at most that part of the time that the exact path takes.
 //!
 //! **Tangent junctions** whose curvature jumps are treated alike: passed without a blend they fall under the
-//! acceleration-step limit as under G61, because a path of bounded jerk through them can take longer (on the arcs of a
-//! few millimetres that a corner is rounded with, by a seventh). If no such step is wanted, the machine's limit
-//! says so: with a small one only the blend pays.
+//! acceleration-step limit as under G61, because a path of bounded jerk through them can take longer (on the
+//! arcs of a few millimetres that a corner is rounded with, by a seventh). If no such step is wanted, the
+//! machine's limit says so: with a small one only the blend pays.
 
 use motion_kernel::law::Limits;
 use motion_kernel::plan::{
@@ -85,8 +86,8 @@ impl Variants {
     }
 }
 
-/// The blocks of a run that starts and ends at rest; the junction feed of the last one is 0. An error comes with the
-/// program line.
+/// The blocks of a run that starts and ends at rest; the junction feed of the last one is 0. An error comes
+/// with the program line.
 pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlock>> {
     let junctions = Junctions::new(Run::new(moves), machine)?;
     let is_merged = junctions.run.moves().len() < moves.len();
@@ -133,8 +134,8 @@ impl<'a> Junctions<'a> {
         Ok(Self { run, ceilings: all, machine, limits: machine.limits().in_any_direction() })
     }
 
-    /// The crossings with all blends at their longest, and those that were found best one by one; none where there
-    /// is nothing to blend.
+    /// The crossings with all blends at their longest, and those that were found best one by one; none where
+    /// there is nothing to blend.
     fn choose(&self, exact: &[Crossing]) -> AtLine<Option<[Vec<Crossing>; 2]>> {
         // First as if each were alone, then those that touch within what the other leaves.
         let alone_mm: Vec<f64> = (0..exact.len()).map(|junction| self.longest_mm(junction)).collect();
@@ -414,7 +415,8 @@ mod tests {
         assert_eq!(blocks(50.0)[0].junction_mm_s, 0.0);
     }
 
-    /// A slow move next to a fast one: the blend is at the slow one's feed, and shorter than the tolerance would allow.
+    /// A slow move next to a fast one: the blend is at the slow one's feed, and shorter than the tolerance
+    /// would allow.
     #[test]
     fn beside_a_fast_move_a_slow_blend_is_short() {
         let corner = [[0.0, 0.0], [10.0, 0.0], [19.8, 2.0]];

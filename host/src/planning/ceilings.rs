@@ -16,8 +16,8 @@ pub(super) struct Ceilings {
     pub greatest: Ceiling<f64>,
 }
 
-/// The ceilings of a move that bends as `greatest` says, driven at most at `curve_feed_share` of what its curvature
-/// allows. An error comes with the program line.
+/// The ceilings of a move that bends as `greatest` says, driven at most at `curve_feed_share` of what its
+/// curvature allows. An error comes with the program line.
 pub(super) fn ceilings(
     step: &Move,
     greatest: &Greatest,

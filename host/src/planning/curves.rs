@@ -1,7 +1,8 @@
 //! Programmed curves to moves: G5 and G5.5.
 //!
-//! Consumes control points, or the points that a spline goes through; produces polynomials that the kernel's pieces can
-//! follow within their stated errors. A curve that is not smooth, or that has no pieces, is refused with its line.
+//! Consumes control points, or the points that a spline goes through; produces polynomials that the kernel's
+//! pieces can follow within their stated errors. A curve that is not smooth, or that has no pieces, is
+//! refused with its line.
 
 use super::error::Problem;
 use crate::gcode::{CubicMove, PathMode};
@@ -34,8 +35,8 @@ pub(super) fn cubic(step: &CubicMove) -> Result<Element, Problem> {
     checked(Element::Polynomial { from, to, shape, role: Role::Spline })
 }
 
-/// The spans of the quintic spline from `from` through all `points`, which are taken. An error comes with the program
-/// line.
+/// The spans of the quintic spline from `from` through all `points`, which are taken. An error comes with the
+/// program line.
 pub(super) fn through(
     from: Vector,
     points: &mut Vec<Point>,

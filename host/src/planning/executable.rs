@@ -67,7 +67,8 @@ impl Executable {
         self.items.iter().filter(|item| !matches!(item, Item::Block(_)))
     }
 
-    /// The program with the machine it was planned for, as bytes for a board without live control: without blocks.
+    /// The program with the machine it was planned for, as bytes for a board without live control: without
+    /// blocks.
     #[must_use]
     pub fn to_bytes(&self, machine: &Machine) -> Vec<u8> {
         bytes(machine, self.without_blocks())
@@ -128,8 +129,8 @@ fn stretch_items<R: Real>(
     Ok(())
 }
 
-/// A piece's place on the path, and the greatest feed \[mm/s\] at which no more pieces end in a tick around it than the
-/// executor's bound.
+/// A piece's place on the path, and the greatest feed \[mm/s\] at which no more pieces end in a tick around
+/// it than the executor's bound.
 struct Dense {
     start: Position,
     end: Position,

@@ -4,9 +4,10 @@
 //! reason for it, the feed over the path, and what the kernel needs to execute it. Plans whole
 //! stretches, from one full stop to the next, in f64.
 //!
-//! **Limits.** A dwell, and a part of a move at constant feed or acceleration, may last 2³¹ ticks: twelve days at
-//! 0.5 ms. Between two full stops there may be one kilometre of path (10⁶ mm), and every point of the path lies
-//! within one kilometre of the origin on each axis. Anything beyond is refused, with the line of the block.
+//! **Limits.** A dwell, and a part of a move at constant feed or acceleration, may last 2³¹ ticks: twelve
+//! days at 0.5 ms. Between two full stops there may be one kilometre of path (10⁶ mm), and every point of the
+//! path lies within one kilometre of the origin on each axis. Anything beyond is refused, with the line of
+//! the block.
 //!
 //! - [`program`]: steps to stretches: where motion must stop;
 //! - `blending`: stretches to blocks: the choice of the junctions that are blended;

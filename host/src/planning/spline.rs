@@ -18,13 +18,14 @@ pub struct Pieces {
     pub deviation: Deviation,
 }
 
-/// Plans a spline at a feed \[mm/s\], and states how far its pieces are from it. `lines` are those of its points.
+/// Plans a spline at a feed \[mm/s\], and states how far its pieces are from it. `lines` are those of its
+/// points.
 ///
 /// The machine comes from the origin by a rapid, unless the spline starts there.
 ///
 /// # Errors
-/// A span has no pieces (it has a cusp, for one), the kernel can't execute it, or the plan would exceed what a tick
-/// can do; the error names the line of the span's last point.
+/// A span has no pieces (it has a cusp, for one), the kernel can't execute it, or the plan would exceed what
+/// a tick can do; the error names the line of the span's last point.
 pub fn plan_spline(
     source_name: &str,
     spline: &Spline,

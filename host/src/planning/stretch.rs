@@ -24,8 +24,8 @@ pub struct StretchBlock {
     pub feed_mm_s: f64,
     /// Greatest feed through the junction at its end \[mm/s\].
     pub junction_mm_s: f64,
-    /// Greatest distance from the programmed path and of it from the block, over its tolerance: a bound, 0 where the
-    /// path is exact.
+    /// Greatest distance from the programmed path and of it from the block, over its tolerance: a bound, 0
+    /// where the path is exact.
     pub tolerance_share: f64,
 }
 

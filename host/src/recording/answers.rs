@@ -1,9 +1,10 @@
 //! What the hardware answered, tick by tick, and what the kernel made of it.
 //!
-//! Each tick is one entry in the postcard wire format: a byte of flags, for each axis by how many counts its encoder
-//! moved since the tick before, and a byte of the digest of all ticks up to here; where the digital inputs are not those of
-//! the tick before, a byte of them for each axis and one for the machine follow. A replay that goes another way is found in
-//! the very tick, but for one chance in 256 in each of the ticks that follow; the whole digest at the end leaves one in 2⁶⁴.
+//! Each tick is one entry in the postcard wire format: a byte of flags, for each axis by how many counts its
+//! encoder moved since the tick before, and a byte of the digest of all ticks up to here; where the digital
+//! inputs are not those of the tick before, a byte of them for each axis and one for the machine follow. A
+//! replay that goes another way is found in the very tick, but for one chance in 256 in each of the ticks
+//! that follow; the whole digest at the end leaves one in 2⁶⁴.
 
 use motion_kernel::hal::{AxisInputs, MachineInputs};
 use motion_kernel::num::Scalar;
@@ -159,7 +160,7 @@ impl RecordedAnswers {
     }
 }
 
-/// Recorded answers being read: the answers of each tick, and the check byte behind it.
+/// Recorded answers being read: the answers of each tick, and the check byte after them.
 #[derive(Clone, Debug)]
 pub(super) struct AnswerReader<'a> {
     left: &'a [u8],

@@ -1,7 +1,7 @@
 //! A run as bytes: everything that the kernel consumed, from which it runs again to the same bits.
 //!
-//! Consumes a [`Job`] and what the [`Recorder`] saw of the hardware; produces bytes, and from bytes the same run again.
-//! It does not depend on the simulated machine: [`Player`] answers in the hardware's place.
+//! Consumes a [`Job`] and what the [`Recorder`] saw of the hardware; produces bytes, and from bytes the same
+//! run again. It does not depend on the simulated machine: [`Player`] answers in the hardware's place.
 //!
 //! | bytes | content |
 //! |---|---|
@@ -10,9 +10,10 @@
 //! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
-//! A [`Recording`] holds, in this order: the number type; the compiled program with the blocks of its path and its guards
-//! ([`motion_kernel::program`]); the learnt correction and the commands as text, if there are any; what a report shows of
-//! the run; the counts before the first tick; and the answers of every tick, some eight bytes each ([`answers`]).
+//! A [`Recording`] holds, in this order: the number type; the compiled program with the blocks of its path
+//! and its guards ([`motion_kernel::program`]); the learnt correction and the commands as text, if there are
+//! any; what a report shows of the run; the counts before the first tick; and the answers of every tick, some
+//! eight bytes each ([`answers`]).
 //!
 //! - [`answers`]: what the hardware answered, tick by tick;
 //! - [`recorder`]: hardware that writes it down;

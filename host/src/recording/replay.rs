@@ -31,7 +31,7 @@ pub enum Difference {
         /// The tick, from 0.
         tick: u64,
     },
-    /// The replay goes on behind the recording's last tick.
+    /// The replay continues after the recording's last tick.
     Longer {
         /// Ticks of the recording.
         ticks: u64,

@@ -1,8 +1,8 @@
 //! Fewer points, the same picture.
 //!
-//! A run may hold millions of ticks, a plot only about a thousand columns. Both reductions are O(n), and both keep
-//! what the reader looks for: a plot over time keeps the highest and the lowest value of every column, so no peak is
-//! lost; a path keeps its shape to a fraction of a pixel.
+//! A run may hold millions of ticks, a plot only about a thousand columns. Both reductions are O(n), and both
+//! keep what the reader looks for: a plot over time keeps the highest and the lowest value of every column,
+//! so no peak is lost; a path keeps its shape to a fraction of a pixel.
 
 /// The points that a column of the picture keeps: first, lowest, highest and last, with their rank.
 #[derive(Clone, Copy)]
@@ -53,8 +53,8 @@ fn push_unless_level(out: &mut Vec<(f64, f64)>, point: (f64, f64)) {
     out.push(point);
 }
 
-/// Returns at most four points for each of `columns` equal parts of `from..to`, in their order, the extremes of every part
-/// among them. Points that are not finite are left out.
+/// Returns at most four points for each of `columns` equal parts of `from..to`, in their order, the extremes
+/// of every part among them. Points that are not finite are left out.
 pub(super) fn by_column(
     points: impl Iterator<Item = (f64, f64)>,
     (from, to): (f64, f64),
@@ -94,9 +94,9 @@ const DEVIATION: f64 = 0.25;
 /// The cost of a stretch's beginning in the file, counted in corners.
 const STRETCH_COST: usize = 10;
 
-/// A path in drawing units with a colour class per point, reduced to what can be seen: points closer than a unit are
-/// one, straight stretches are two. If it still costs more than
-/// `corners_max`, points are taken farther apart until they fit.
+/// A path in drawing units with a colour class per point, reduced to what can be seen: points closer than a
+/// unit are one, straight stretches are two. If it still costs more than `corners_max`, points are taken
+/// farther apart until they fit.
 pub(super) fn path<I>(points: impl Fn() -> I, corners_max: usize) -> Vec<Stretch>
 where
     I: Iterator<Item = (f64, f64, usize)>,
@@ -166,8 +166,8 @@ fn thinned(
     Some(stretches)
 }
 
-/// A straight line growing from `start`: the range of directions in which it passes every point taken so far within
-/// [`DEVIATION`].
+/// A straight line growing from `start`: the range of directions in which it passes every point taken so far
+/// within [`DEVIATION`].
 #[derive(Default)]
 struct Straight {
     start: (f64, f64),

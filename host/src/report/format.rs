@@ -1,7 +1,7 @@
 //! Numbers and text as people read them.
 //!
-//! Everything that reaches the page goes through here: text is escaped, figures are rounded to the digits that
-//! carry meaning, and thousands are set apart by a narrow space.
+//! Everything that reaches the page goes through here: text is escaped, figures are rounded to the digits
+//! that carry meaning, and thousands are set apart by a narrow space.
 
 /// Narrow no-break space: sets thousands apart without inviting a comma to be read as a decimal point.
 const GROUP: char = '\u{202f}';
@@ -40,7 +40,8 @@ pub(super) fn figure(value: f64, digits: i32) -> String {
     trimmed(value, digits - 1 - magnitude)
 }
 
-/// `value` with a fixed number of decimals, so that the numbers of a column line up; a dash if it is not finite.
+/// `value` with a fixed number of decimals, so that the numbers of a column line up; a dash if it is not
+/// finite.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return "–".to_string();
@@ -67,8 +68,8 @@ pub(super) fn counted(number: usize, one: &str, many: &str) -> String {
     format!("{} {}", count(number as u64), if number == 1 { one } else { many })
 }
 
-/// `value` as a part of `limit`, in percent; `None` if there is no limit. Never rounds an excess away that a reader
-/// should see.
+/// `value` as a part of `limit`, in percent; `None` if there is no limit. Never rounds an excess away that a
+/// reader should see.
 pub(super) fn share(value: f64, limit: f64) -> Option<String> {
     let percent = 100.0 * value / limit;
     if !(limit > 0.0 && percent.is_finite()) {

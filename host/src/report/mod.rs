@@ -1,9 +1,9 @@
 //! The report of a run: one HTML file for the engineer who wants to see what the machine did.
 //!
-//! Consumes a [`RunTrace`], produces a page that needs nothing else: no script, no font, no picture from elsewhere.
-//! It opens on a desk, on a phone and in ten years, and prints on paper. Time and memory grow with the number of
-//! ticks; the size of the page does not: plots keep the extremes of every column, tables end after a number of rows
-//! and say what they left out. Fails only if the output cannot be written.
+//! Consumes a [`RunTrace`], produces a page that needs nothing else: no script, no font, no picture from
+//! elsewhere. It opens on a desk, on a phone and in ten years, and prints on paper. Time and memory grow with
+//! the number of ticks; the size of the page does not: plots keep the extremes of every column, tables end
+//! after a number of rows and say what they left out. Fails only if the output cannot be written.
 
 mod decimate;
 pub mod drive;
@@ -211,8 +211,8 @@ fn figure_html(
     writeln!(out, "</figure>")
 }
 
-/// The planes in which there is something to see: of two axes that moved theirs, of three the first with each of
-/// the others, and the third plane if the tool moved within it (G19), which the other two show as a line.
+/// The planes in which there is something to see: of two axes that moved theirs, of three the first with each
+/// of the others, and the third plane if the tool moved within it (G19), which the other two show as a line.
 fn views(summary: &Summary) -> Vec<View> {
     let view = |right, up| View { right, up };
     match [0, 1, 2].map(|axis: usize| summary.axes[axis].moved()) {

@@ -1,8 +1,9 @@
 //! One colour per idea, on light and on dark paper.
 //!
-//! The plots are drawn in the light colours; the style sheet generated here replaces them by their dark partners.
-//! A drawn colour is therefore also a name and must be unique. Lines keep a contrast of at least 3:1 to the paper,
-//! text of at least 4.5:1, and where several lines share a plot they also differ in their dashes.
+//! The plots are drawn in the light colours; the style sheet generated here replaces them by their dark
+//! partners. A drawn colour is therefore also a name and must be unique. Lines keep a contrast of at least
+//! 3:1 to the paper, text of at least 4.5:1, and where several lines share a plot they also differ in their
+//! dashes.
 
 use plotters::style::RGBColor;
 
@@ -86,8 +87,8 @@ pub(super) const NOT_REACHED: &str = "not reached";
 /// Its ink. It limits nothing, so it is paler than the others.
 const UNREACHED: Ink = dashed(0x6F7A88, 0x8F9BA9, "6 14");
 
-/// Ink of a ceiling. `known` are the reasons of this run in the order of their appearance; from the ninth on they
-/// share the last ink.
+/// Ink of a ceiling. `known` are the reasons of this run in the order of their appearance; from the ninth on
+/// they share the last ink.
 pub(super) fn ceiling(reason: &str, known: &[&str]) -> Ink {
     if reason == NOT_REACHED {
         return UNREACHED;

@@ -15,8 +15,8 @@ use crate::toolpath::Vector;
 
 const AXES: [&str; 2] = ["X", "Y"];
 
-/// Writes the page: `paths` are the arcs, then the splines; `evaluators` those of a well and of a badly parametrised
-/// spline.
+/// Writes the page: `paths` are the arcs, then the splines; `evaluators` those of a well and of a badly
+/// parametrised spline.
 ///
 /// # Errors
 /// Whatever `out` reports.

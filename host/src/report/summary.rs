@@ -2,7 +2,8 @@
 
 use crate::trace::{AXES, RunEnd, RunTrace, TraceRow};
 
-/// A path counts as finished when less than this is left of it \[mm\]. Far above rounding, far below any tolerance.
+/// A path counts as finished when less than this is left of it \[mm\]. Far above rounding, far below any
+/// tolerance.
 const FINISHED_WITHIN_MM: f64 = 1e-3;
 
 /// An axis counts as moved when its set position spans more than this \[mm\].

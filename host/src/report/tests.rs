@@ -18,8 +18,8 @@ const FEED: [(f64, f64, f64); 10] = [
     (0.341_061, 72.7017, 0.0),
 ];
 
-/// Blocks of the sample: line, kind, length \[mm\], curvature \[1/mm\], ceiling \[mm/s\] and its reason, feed at
-/// entry, peak and exit \[mm/s\], duration \[s\].
+/// Blocks of the sample: line, kind, length \[mm\], curvature \[1/mm\], ceiling \[mm/s\] and its reason, feed
+/// at entry, peak and exit \[mm/s\], duration \[s\].
 type SampleBlock = (u32, &'static str, f64, f64, f64, &'static str, [f64; 3], f64);
 const BLOCKS: [SampleBlock; 5] = [
     (10, "line", 50.0, 0.0, 83.3333, "programmed", [0.0, 83.3333, 43.0887], 0.843_848),

@@ -113,7 +113,8 @@ impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_,
         }
     }
 
-    /// How the run ends with a tick that ended in `state`, if it does: no item is left, or no command to resume.
+    /// How the run ends with a tick that ended in `state`, if it does: no item is left, or no command to
+    /// resume.
     pub(super) fn ended(&self, state: ExecState) -> Option<RunEnd> {
         match self {
             Self::Plain(plain) => {

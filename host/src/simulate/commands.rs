@@ -1,7 +1,7 @@
 //! What became of the commands of a run.
 //!
-//! Consumes a script and the executed ticks; produces a [`TracedCommand`] for each command that was given, with the rest
-//! that it led to.
+//! Consumes a script and the executed ticks; produces a [`TracedCommand`] for each command that was given,
+//! with the rest that it led to.
 
 use super::live::{Command, Script, Timed};
 use crate::trace::{TraceRow, TracedCommand, TracedStop};
@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(stops(&records("1:single,2:continuous", &feeds)), [None, None]);
         assert_eq!(stops(&records("1:single,5:resume", &feeds)), [Some((3, 3, 0.2)), None]);
         assert_eq!(stops(&records("2:abort,2:resume", &feeds)), [Some((3, 2, 0.1)), None]);
-        // What comes behind the last tick was not given.
+        // Commands after the last tick were not given.
         assert!(records("6:hold", &feeds).is_empty());
     }
 }

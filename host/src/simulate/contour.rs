@@ -1,4 +1,4 @@
-//! The contour error: how far the machine is beside its path.
+//! The contour error: how far the machine is off its path.
 
 use crate::trace::{AXES, AxisTick};
 
@@ -12,8 +12,9 @@ pub(crate) struct Contour {
 }
 
 impl Contour {
-    /// The part of the following error across the path \[µm\], 0 or more. The path is taken as straight over the
-    /// error's length, which at 20 µm on a radius of 1 mm hides 0.2 µm. At rest the last direction counts.
+    /// The part of the following error across the path \[µm\], 0 or more. The path is taken as straight over
+    /// the error's length, which at 20 µm on a radius of 1 mm hides 0.2 µm. At rest the last direction
+    /// counts.
     pub(crate) fn error_um(&mut self, axes: &[AxisTick; AXES]) -> f64 {
         let velocity = axes.map(|axis| axis.vel_mm_s);
         let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();

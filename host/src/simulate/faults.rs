@@ -222,7 +222,8 @@ pub fn table() -> String {
 mod tests {
     use super::*;
 
-    /// Every kind has a row, and no two have the same name: the match in `row` knows them all, and so must the list.
+    /// Every kind has a row, and no two have the same name: the match in `row` knows them all, and so must
+    /// the list.
     #[test]
     fn every_kind_has_its_row() {
         let mut names: Vec<_> = kinds().iter().map(name).collect();

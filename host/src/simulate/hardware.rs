@@ -1,5 +1,6 @@
 //! The simulated machine as the kernel's hardware: encoders, inputs and enable from hal-sim, the velocity
-//! outputs through the converter's adapter and real SPI frames; with home switches and index latches where they are asked for.
+//! outputs through the converter's adapter and real SPI frames; with home switches and index latches where
+//! they are asked for.
 //!
 //! [`Hardware`] is what a run asks of any machine.
 
@@ -64,7 +65,8 @@ impl<'a> SimulatedHardware<'a> {
         Ok(Self { machine, outputs, injector: Injector::new(), breaks: Vec::new(), homes, ticks: 0 })
     }
 
-    /// Adds home switches and index latches of the axes that have settings for them, where encoders read `counts`.
+    /// Adds home switches and index latches of the axes that have settings for them, where encoders read
+    /// `counts`.
     pub(super) fn add_homes(&mut self, machine: &Machine, counts: [Counts; AXES]) {
         let truth = self.machine.truth();
         self.homes = core::array::from_fn(|axis| {

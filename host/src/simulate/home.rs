@@ -1,7 +1,7 @@
 //! Homing of the simulated machine, axis by axis.
 //!
-//! Consumes a machine whose axes have homing settings; produces what was found, and every tick's record. Positions of switches
-//! count from where the machine was switched on.
+//! Consumes a machine whose axes have homing settings; produces what was found, and every tick's record.
+//! Positions of switches count from where the machine was switched on.
 
 use motion_kernel::hal::IndexLatch;
 use motion_kernel::homing::{Homed, Homing, HomingError, HomingInput, HomingStep};

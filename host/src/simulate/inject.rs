@@ -1,7 +1,7 @@
 //! Faults of a run: what breaks before given ticks.
 //!
-//! As text `TICK:FAULT,TICK:FAULT,…`, in the order of their ticks; a fault is `NAME=AXIS`, with `:VALUE` where one belongs
-//! to it, or `emergency-stop`.
+//! As text `TICK:FAULT,TICK:FAULT,…`, in the order of their ticks; a fault is `NAME=AXIS`, with `:VALUE`
+//! where one belongs to it, or `emergency-stop`.
 
 use std::str::FromStr;
 

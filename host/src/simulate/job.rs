@@ -1,7 +1,7 @@
 //! What a run executes, and what its records call it by.
 //!
-//! Consumes a [`Plan`] and a [`Machine`]; produces a [`Job`]: everything that the kernel of a run consumes but the
-//! answers of its hardware. Fails where the plan or the machine can't be executed in the number type.
+//! Consumes a [`Plan`] and a [`Machine`]; produces a [`Job`]: everything that the kernel of a run consumes
+//! but the answers of its hardware. Fails where the plan or the machine can't be executed in the number type.
 
 use motion_kernel::axis::{AxesConfig, Guards};
 use motion_kernel::num::{Fixed, Real};
@@ -27,7 +27,8 @@ pub enum Number {
     Fixed,
 }
 
-/// A correction of one stretch of a program, for the kernel's [`Correction`](motion_kernel::axis::Correction).
+/// A correction of one stretch of a program, for the kernel's
+/// [`Correction`](motion_kernel::axis::Correction).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StretchCorrection {
     /// Which stretch, from 0.
@@ -51,7 +52,8 @@ pub struct RunOptions<'a> {
     pub script: Option<&'a Script>,
     /// What breaks.
     pub injections: Option<&'a Injections>,
-    /// An experiment that may drive axes as no program does: nothing but the limits of their following errors is watched.
+    /// An experiment that may drive axes as no program does: nothing but the limits of their following errors
+    /// is watched.
     pub is_unguarded: bool,
 }
 
@@ -74,7 +76,7 @@ pub struct Job {
     pub info: RunInfo,
 }
 
-/// What records say of a run beside its ticks. The kernel has nothing of it.
+/// The data of a run in its records, apart from the ticks. The kernel does not use it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunInfo {
     /// The program's name.

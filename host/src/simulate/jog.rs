@@ -1,7 +1,7 @@
 //! Jog of the simulated machine: keys pressed one after the other, each released after some ticks or never.
 //!
-//! A [`Press`] as text is the axis, the direction, a distance in mm unless it goes on to the soft limit, and the ticks after
-//! which the key is released: `X+`, `X-2.5`, `Y+@800`. It displays as the text it is read from.
+//! A [`Press`] as text is the axis, the direction, a distance in mm unless it goes to the soft limit, and the
+//! ticks after which the key is released: `X+`, `X-2.5`, `Y+@800`. It displays as the text it is read from.
 //!
 //! Consumes a machine and presses; produces what became of each, and every tick's record.
 
@@ -114,7 +114,7 @@ pub struct Jogged {
     pub press: Press,
     /// Set position before it \[mm\].
     pub from_mm: f64,
-    /// Set position behind it \[mm\].
+    /// Set position after it \[mm\].
     pub to_mm: f64,
     /// How long it took \[ticks\].
     pub ticks: u64,
@@ -269,7 +269,8 @@ impl<'a> Keys<'a> {
         Ok(Self { machine, presses: presses.iter().map(key).collect::<Result<_, _>>()? })
     }
 
-    /// Presses them one after the other, from where the machine is switched on; what came of each into `jogged`.
+    /// Presses them one after the other, from where the machine is switched on; what came of each into
+    /// `jogged`.
     ///
     /// # Errors
     /// A press is refused, there was a fault, or the machine can't be simulated.

@@ -1,9 +1,10 @@
 //! On how much of the path some limit holds the motion back.
 //!
-//! Consumes the executed ticks; produces the share of the path length on which the feed is at its block's ceiling,
-//! or acceleration, jerk or snap along the path, as vectors or of an axis, are at their limit. The rest of the length
-//! is what a better plan could still gain on. The law's jerk and snap touch their limits only at the top of their
-//! curves, so that ramps count for little; a plan that wastes nothing is still below 1.
+//! Consumes the executed ticks; produces the share of the path length on which the feed is at its block's
+//! ceiling, or acceleration, jerk or snap along the path, as vectors or of an axis, are at their limit. The
+//! rest of the length is what a better plan could still gain on. The law's jerk and snap touch their limits
+//! only at the top of their curves, so that ramps count for little; a plan that wastes nothing is still
+//! below 1.
 
 use super::job::RunInfo;
 use crate::trace::{TraceRow, TracedBlock};

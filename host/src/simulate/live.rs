@@ -1,7 +1,7 @@
 //! Live control of a run: commands before given ticks.
 //!
-//! As text `TICK:COMMAND,TICK:COMMAND,…`, in the order of their ticks; commands are `hold`, `resume`, `abort`,
-//! `override=SHARE`, `single` and `continuous`. A script displays as the text it is read from.
+//! As text `TICK:COMMAND,TICK:COMMAND,…`, in the order of their ticks; commands are `hold`, `resume`,
+//! `abort`, `override=SHARE`, `single` and `continuous`. A script displays as the text it is read from.
 
 use std::fmt;
 use std::str::FromStr;
@@ -18,7 +18,7 @@ pub enum Command {
     Resume,
     /// Come to rest on the path and give up the rest of the program.
     Abort,
-    /// Drive at so many times the program's feed, from 0 to 2.
+    /// Drive at this multiple of the program's feed, from 0 to 2.
     Override(f64),
     /// Come to rest at the end of every program block and wait there for a resume, or do so no more.
     SingleBlock(bool),

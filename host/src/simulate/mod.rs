@@ -1,8 +1,8 @@
 //! A plan executed by the kernel on the simulated machine, tick by tick.
 //!
-//! Consumes a [`Plan`](crate::planning::Plan) and a [`Machine`](crate::machine::Machine), as a [`Job`]; produces one
-//! [`TraceRow`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter and
-//! the encoder's count extension are the ones a board runs; only the drive is a model.
+//! Consumes a [`Plan`](crate::planning::Plan) and a [`Machine`](crate::machine::Machine), as a [`Job`];
+//! produces one [`TraceRow`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter
+//! and the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
 //! - [`error`]: why a run could not be made;
 //! - [`job`]: what is executed, and what its records call it by;
@@ -12,7 +12,7 @@
 //! - `background`: what fills the streams, with commands or without;
 //! - [`hardware`]: the simulated machine as the kernel's hardware;
 //! - `commands`: what became of them;
-//! - `contour`: how far the machine is beside its path;
+//! - `contour`: how far the machine is off its path;
 //! - `limit_share`: on how much of the path a limit is active;
 //! - [`run`](mod@run): the ticks;
 //! - [`summary`]: maxima, following and contour error;

@@ -1,7 +1,7 @@
 //! The ticks of a run.
 //!
-//! Consumes a [`Job`] and [`Hardware`]; whatever the hardware is, kernel, streams and background are the same, and so
-//! is what they do, to the bit, as long as the hardware's answers are.
+//! Consumes a [`Job`] and [`Hardware`]; whatever the hardware is, kernel, streams and background are the
+//! same, and so is what they do, to the bit, as long as the hardware's answers are.
 
 use motion_kernel::axis::Correction;
 use motion_kernel::exec::ExecState;

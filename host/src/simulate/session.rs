@@ -1,7 +1,8 @@
-//! A simulated machine that goes from one motion to the next: kernel, streams and closed loop, switched on once.
+//! A simulated machine that goes from one motion to the next: kernel, streams and closed loop, switched on
+//! once.
 //!
-//! Consumes a machine, then items of motion, one motion after the other, each under live control; produces every tick's
-//! record. The machine stands at 0 as far as it knows, until an axis is homed.
+//! Consumes a machine, then items of motion, one motion after the other, each under live control; produces
+//! every tick's record. The machine stands at 0 as far as it knows, until an axis is homed.
 
 use std::convert::Infallible;
 

@@ -29,8 +29,8 @@ pub struct RunSummary {
     pub max_jerk_mm_s3: f64,
     /// Greatest |snap| along the path \[mm/s⁴\].
     pub max_snap_mm_s4: f64,
-    /// Share of the path length on which some limit holds the motion back: the feed is at its block's ceiling, or
-    /// acceleration, jerk or snap of the path or of an axis at 98 % of their limit or more.
+    /// Share of the path length on which some limit holds the motion back: the feed is at its block's
+    /// ceiling, or acceleration, jerk or snap of the path or of an axis at 98 % of their limit or more.
     pub limit_active_share: f64,
     /// Per axis.
     pub axes: [AxisSummary; AXES],

@@ -41,8 +41,8 @@ pub struct JunctionStep {
     pub jerk_mm_s3: Vector,
 }
 
-/// Velocity, acceleration and jerk of every axis, tick by tick. Accelerations and jerks are differences over ticks,
-/// S2 (7): the first acceleration is that of tick 1, the first jerk that of tick 2.
+/// Velocity, acceleration and jerk of every axis, tick by tick. Accelerations and jerks are differences over
+/// ticks, S2 (7): the first acceleration is that of tick 1, the first jerk that of tick 2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisTicks {
     /// The control tick τ \[s\].

@@ -1,9 +1,9 @@
 //! The evenness of the feed that a control gets from a curve over a parameter.
 //!
-//! Every tick has to find the parameter at which the path is F·τ longer, S2 (4). Common methods are a Taylor series
-//! of the parameter, of first or second order, and a polynomial of degree seven for the parameter over arc length,
-//! fitted span by span (the feed-correction polynomial), after which a Newton step may set the chord right. Septic
-//! pieces need none of it: they are over arc length already, and their error is how far
+//! Every tick has to find the parameter at which the path is F·τ longer, S2 (4). Common methods are a Taylor
+//! series of the parameter, of first or second order, and a polynomial of degree seven for the parameter over
+//! arc length, fitted span by span (the feed-correction polynomial), after which a Newton step may set the
+//! chord right. Septic pieces need none of it: they are over arc length already, and their error is how far
 //! |r'| is from 1.
 
 use super::Course;
@@ -23,8 +23,8 @@ pub struct Evaluator {
     pub feed_error: f64,
 }
 
-/// The errors of all ways over a path of polynomials, at a feed \[mm/s\] and a tick \[s\]. Each span is walked from
-/// its start.
+/// The errors of all ways over a path of polynomials, at a feed \[mm/s\] and a tick \[s\]. Each span is
+/// walked from its start.
 #[must_use]
 pub fn evaluators(course: &Course, feed_mm_s: f64, tick_s: f64) -> [Evaluator; WAYS] {
     let travel_mm = feed_mm_s * tick_s;

@@ -1,15 +1,16 @@
 //! S2's experiment: what the degree of a path's curves does to the axes.
 //!
-//! Two quarter circles, radius 10 and then 8 mm, S2 (6), are run through at 56.5 mm/s; the axes' acceleration steps
-//! where the radius does. Ten points of them (S2's table 1) are then interpolated by a cubic and by a quintic spline.
-//! With the cubic one the jerk steps at the knots, with the quintic one it is continuous.
+//! Two quarter circles, radius 10 and then 8 mm, S2 (6), are run through at 56.5 mm/s; the axes' acceleration
+//! steps where the radius does. Ten points of them (S2's table 1) are then interpolated by a cubic and by a
+//! quintic spline. With the cubic one the jerk steps at the knots, with the quintic one it is continuous.
 //!
-//! All is computed here, off-line and in f64: arc length by quadrature, derivatives by arc length from those by the
-//! parameter, and the differences over ticks that S2 (7) plots. The ends of the splines are clamped to the arcs'
-//! derivatives by u, which S2 does not say; free ends change the figures a little and the conclusion not at all.
+//! All is computed here, off-line and in f64: arc length by quadrature, derivatives by arc length from those
+//! by the parameter, and the differences over ticks that S2 (7) plots. The ends of the splines are clamped to
+//! the arcs' derivatives by u, which S2 does not say; free ends change the figures a little and the
+//! conclusion not at all.
 //!
-//! The honest statement is "a continuous third derivative": a quartic spline has one too, and the quintic is the
-//! practical odd degree.
+//! The honest statement is "a continuous third derivative": a quartic spline has one too, and the quintic is
+//! the practical odd degree.
 //!
 //! - [`mod@course`]: a path at constant feed, tick by tick;
 //! - [`figures`]: what is read off it;
@@ -52,9 +53,9 @@ pub const TABLE_1: [(f64, f64, f64); 10] = [
     (1.0, 8.0, 2.0),
 ];
 
-/// Table 2: when the inner points are passed, as printed \[s\]. No curve through the points that is run through at
-/// constant feed passes all of them then: five equal chords from the start take equal times, 55.6 ms each, to 0.278
-/// s.
+/// Table 2: when the inner points are passed, as printed \[s\]. No curve through the points that is run
+/// through at constant feed passes all of them then: five equal chords from the start take equal times, 55.6
+/// ms each, to 0.278 s.
 pub const TABLE_2_S: [f64; 8] = [0.055, 0.11, 0.165, 0.222, 0.279, 0.336, 0.393, 0.448];
 
 /// The two arcs.
@@ -86,15 +87,16 @@ pub fn spline(degree: Degree) -> Result<Spline, SplineError> {
     interpolate(&points, &parameters, degree, &Ends::Clamped(end_derivatives()))
 }
 
-/// Splines that evaluators are compared on: the quintic one, and one through the same points over a u that grows by
-/// steps of four and five in turn, which is run through at a speed that goes up and down.
+/// Splines that evaluators are compared on: the quintic one, and one through the same points over a u that
+/// grows by steps of four and five in turn, which is run through at a speed that goes up and down.
 ///
 /// # Errors
 /// None: the points have both.
 pub fn well_and_badly_parametrised() -> Result<[Course; 2], SplineError> {
     let points = TABLE_1.map(|(_, x, y)| [x, y, 0.0]);
     let uneven: Vec<f64> = (0..TABLE_1.len()).map(|index| (9 * index / 2) as f64).collect();
-    // The same tangents and curvatures at the ends, by the new parameter: its first and its last step are four.
+    // The same tangents and curvatures at the ends, by the new parameter: its first and its last step are
+    // four.
     let [first, last] = end_derivatives();
     let over = |Derivatives { first, second }: Derivatives, rate: f64| Derivatives {
         first: first.map(|mm| mm * rate),

@@ -1,23 +1,24 @@
-//! A corner blend: the septic curve that leaves one element and enters the next with the same tangent, curvature
-//! and derivative of curvature (G³), so that velocity, acceleration and jerk of every axis go through it without
-//! a step.
+//! A corner blend: the septic curve that leaves one element and enters the next with the same tangent,
+//! curvature and derivative of curvature (G³), so that velocity, acceleration and jerk of every axis go
+//! through it without a step.
 //!
 //! Consumes two lines or arcs that meet, a tolerance and the room on either side; produces the blend and its
 //! trim of both, or none where the path has to stay unchanged: a corner sharper than [`ANGLE_MAX_RAD`], no
-//! tolerance, no room. A tangent junction whose curvature jumps (a line meets an arc) is a corner of 0° and is
-//! blended like the others. Background; a bounded number of steps per corner.
+//! tolerance, no room. A tangent junction whose curvature jumps (a line meets an arc) is a corner of 0° and
+//! is blended like the others. Background; a bounded number of steps per corner.
 //!
-//! **Shape.** Both ends give four control points each. On a line they stand at a₁, a₂, a₃ of the trim d before
-//! the corner; on an arc the same speeds |r'|, s'', s''' by the parameter are used with the arc's own derivatives by
-//! arc length. `SHAPES` holds the a's that allow the greatest feed at a given tolerance under a limit of jerk
-//! alone and of snap alone, by corner angle; of these, three between them and an evenly spaced one, that with the
-//! greatest feed under all limits is taken. They were found by searching all a₁ ≤ a₂ ≤ a₃ ≤ 1.
+//! **Shape.** Both ends give four control points each. On a line they stand at a₁, a₂, a₃ of the trim d
+//! before the corner; on an arc the same speeds |r'|, s'', s''' by the parameter are used with the arc's own
+//! derivatives by arc length. `SHAPES` holds the a's that allow the greatest feed at a given tolerance under
+//! a limit of jerk alone and of snap alone, by corner angle; of these, three between them and an evenly
+//! spaced one, that with the greatest feed under all limits is taken. They were found by searching all a₁ ≤
+//! a₂ ≤ a₃ ≤ 1.
 //!
-//! **Tolerance.** The path before and after the corner and the blend are walked together: up to a place u* of the
-//! blend each of its points is held against the nearest of the element before, from there on against that of the
-//! element after, and u* itself against the corner. Over all pairs the walk is continuous on both curves and
-//! leaves nothing out, so the greatest distance of a pair bounds that of any point of either curve from the other.
-//! For two lines it is the distance from the corner to the blend's middle.
+//! **Tolerance.** The path before and after the corner and the blend are walked together: up to a place u* of
+//! the blend each of its points is held against the nearest of the element before, from there on against that
+//! of the element after, and u* itself against the corner. Over all pairs the walk is continuous on both
+//! curves and leaves nothing out, so the greatest distance of a pair bounds that of any point of either curve
+//! from the other. For two lines it is the distance from the corner to the blend's middle.
 
 use motion_kernel::law::Limits;
 
@@ -57,8 +58,8 @@ const MEASURED_PARTS: usize = 64;
 const CORRECTIONS_MAX: usize = 8;
 /// Part of the tolerance at which it fits.
 const CLOSE: f64 = 0.998;
-/// Part of the tolerance that is made use of: the pieces are a little off their curve, by 10⁻⁶ mm at most, and a
-/// millionth of its length.
+/// Part of the tolerance that is made use of: the pieces are a little off their curve, by 10⁻⁶ mm at most,
+/// and a millionth of its length.
 const TOLERANCE_USED: f64 = 0.999;
 
 /// A blend, and the path that it replaces.
@@ -73,8 +74,8 @@ pub struct Blend {
 }
 
 impl Blend {
-    /// The blend of the corner between `before` and `after`, within `tolerance_mm` and with at most `room_mm` of
-    /// either element, that allows the greatest feed under `limits`.
+    /// The blend of the corner between `before` and `after`, within `tolerance_mm` and with at most `room_mm`
+    /// of either element, that allows the greatest feed under `limits`.
     #[must_use]
     pub fn new(
         before: &Element,
@@ -201,8 +202,8 @@ impl Corner {
     /// The longest blend of a shape within a tolerance: its trim, itself, its distance from the path.
     fn within(&self, tolerance_mm: f64, shape: &[f64; 3]) -> Option<(f64, Polynomial, f64)> {
         let mut best: Option<(f64, Polynomial, f64)> = None;
-        // The distance at a corner grows with the trim, at a jump of curvature with its square. In between, the last two
-        // tries tell the power.
+        // The distance at a corner grows with the trim, at a jump of curvature with its square. In between,
+        // the last two tries tell the power.
         let (mut trim_mm, mut power) = (self.room_mm, 1.0);
         let mut last: Option<(f64, f64)> = None;
         for _ in 0..CORRECTIONS_MAX {

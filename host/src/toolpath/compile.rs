@@ -98,7 +98,8 @@ fn longest_mm<R: Real>() -> f64 {
     R::PIECE_MM_MAX * (1.0 - 1e-9)
 }
 
-/// The curved pieces of `element` for the number type `R`, with how far each is from the curve; none of a line.
+/// The curved pieces of `element` for the number type `R`, with how far each is from the curve; none of a
+/// line.
 ///
 /// # Errors
 /// The element is not smooth.
@@ -106,12 +107,12 @@ pub fn septics<R: Real>(element: &Element) -> Result<Vec<Septic>, FitError> {
     element.septics(longest_mm::<R>())
 }
 
-/// Appends the pieces of `element`, which starts at `start_mm` of the stretch, to `pieces`, cut for the number
-/// type `R`; returns where it ends on the path. `line` is the program line.
+/// Appends the pieces of `element`, which starts at `start_mm` of the stretch, to `pieces`, cut for the
+/// number type `R`; returns where it ends on the path. `line` is the program line.
 ///
 /// # Errors
-/// The element is too short, too far out, ends too far along the stretch, is not smooth, or makes a piece that
-/// the kernel refuses.
+/// The element is too short, too far out, ends too far along the stretch, is not smooth, or makes a piece
+/// that the kernel refuses.
 pub fn compile<R: Real>(
     element: &Element,
     line: u32,

@@ -47,8 +47,8 @@ pub fn by_arc_length([d1, d2, d3]: [Vector; 3]) -> [Vector; 3] {
 
 /// Fourth derivative by arc length, from the first four by a parameter.
 ///
-/// With σ, s2, s3, s4 the derivatives of the arc length: r4 = x4·σ⁴ + 6x3·σ²·s2 + x2·(4σ·s3 + 3s2²) + t·s4, and
-/// t·x4 = −3x2·x3 because |t| = 1.
+/// With σ, s2, s3, s4 the derivatives of the arc length: r4 = x4·σ⁴ + 6x3·σ²·s2 + x2·(4σ·s3 + 3s2²) + t·s4,
+/// and t·x4 = −3x2·x3 because |t| = 1.
 #[must_use]
 pub fn fourth_by_arc_length([d1, d2, d3, d4]: [Vector; 4]) -> Vector {
     let speed = norm(d1);

@@ -11,8 +11,8 @@ use super::septic::{FitError, Septic, fit};
 use super::{Vector, add, cross, norm, scale, subtract};
 use crate::gcode::{ArcMove, LineMove};
 
-/// Widest piece of an arc or an involute \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off, and their third
-/// derivative 2·10⁻⁵ of itself.
+/// Widest piece of an arc or an involute \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off,
+/// and their third derivative 2·10⁻⁵ of itself.
 const WIDEST_RAD: f64 = core::f64::consts::FRAC_PI_4;
 
 /// A block's geometry.
@@ -154,8 +154,8 @@ impl Element {
         }
     }
 
-    /// What is left of a line or an arc without the first and the last millimetres, on an arc by the speed at its
-    /// start and end. Polynomials and involutes stay whole.
+    /// What is left of a line or an arc without the first and the last millimetres, on an arc by the speed at
+    /// its start and end. Polynomials and involutes stay whole.
     #[must_use]
     pub fn trimmed(&self, first_mm: f64, last_mm: f64) -> Self {
         match *self {
@@ -222,8 +222,8 @@ impl Element {
         }
     }
 
-    /// The curved pieces that it is driven as, none longer than `longest_mm`, with how far each is from the curve;
-    /// none of a line.
+    /// The curved pieces that it is driven as, none longer than `longest_mm`, with how far each is from the
+    /// curve; none of a line.
     ///
     /// # Errors
     /// The element is not smooth.

@@ -1,15 +1,17 @@
 //! The greatest derivatives of a curve by arc length, from which ceilings are made.
 //!
-//! The machine drives the pieces of a curve. They are within a millionth of a millimetre of it, which says little about
-//! the third and fourth derivative of a curve that is short: the third is up to a seventh greater than the curve's on
-//! corner blends, the fourth up to two thirds. So both are examined, the curve and its pieces.
+//! The machine drives the pieces of a curve. They are within a millionth of a millimetre of it, which says
+//! little about the third and fourth derivative of a curve that is short: the third is up to a seventh
+//! greater than the curve's on corner blends, the fourth up to two thirds. So both are examined, the curve
+//! and its pieces.
 
 use motion_kernel::plan::Bend;
 
 use super::septic::Septic;
 use super::{Vector, norm};
 
-/// The number of parts that a piece is cut into: the square of its second derivative has eight extremes at most.
+/// The number of parts that a piece is cut into: the square of its second derivative has eight extremes at
+/// most.
 const PIECE_PARTS: usize = 16;
 
 /// The greatest derivatives by arc length, each where it is greatest.
@@ -24,7 +26,8 @@ pub struct Greatest {
 }
 
 impl Greatest {
-    /// The greatest derivatives of a curve with these figures that is driven as `pieces`. Their tangents are unit vectors to a millionth.
+    /// The greatest derivatives of a curve with these figures that is driven as `pieces`. Their tangents are
+    /// unit vectors to a millionth.
     #[must_use]
     pub fn driven_as(self, pieces: &[Septic]) -> Self {
         let mut norms = [0.0_f64; 3];
@@ -65,8 +68,8 @@ pub(super) fn bend([second, third, fourth]: [f64; 3]) -> Bend<f64> {
     Bend { curvature_per_mm: second, third_root_per_mm: third.sqrt(), fourth_root_per_mm: libm::cbrt(fourth) }
 }
 
-/// The greatest value of a sampled function, between its samples too: between two of them a smooth function rises
-/// above both by an eighth of its second difference; twice that is added.
+/// The greatest value of a sampled function, between its samples too: between two of them a smooth function
+/// rises above both by an eighth of its second difference; twice that is added.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Peak {
     greatest: f64,

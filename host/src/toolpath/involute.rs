@@ -1,7 +1,8 @@
-//! The involute of a circle: flanks of gears, scrolls, and spiral paths that open a hole. S3 names it among its blocks.
+//! The involute of a circle: flanks of gears, scrolls, and spiral paths that open a hole. S3 names it among
+//! its blocks.
 //!
-//! With the base circle's radius r and the angle of unwinding φ, in a frame (e₁, e₂) of the plane about the circle's
-//! centre,
+//! With the base circle's radius r and the angle of unwinding φ, in a frame (e₁, e₂) of the plane about the
+//! circle's centre,
 //!
 //! ```text
 //! T = e₁·cos φ + e₂·sin φ     N = e₂·cos φ − e₁·sin φ
@@ -9,8 +10,8 @@
 //! length from 0 = r·φ²/2      curvature = 1/(r·φ)
 //! ```
 //!
-//! On the base circle itself, at φ = 0, curvature is infinite: an involute has to stay off it. At a distance d from
-//! an involute lies the same involute, rotated by −d/r and traversed at angles that are greater by d/r
+//! On the base circle itself, at φ = 0, curvature is infinite: an involute has to stay off it. At a distance
+//! d from an involute lies the same involute, rotated by −d/r and traversed at angles that are greater by d/r
 //! ([`Involute::offset_by`]), so that a cutter's radius needs nothing new.
 
 use motion_kernel::plan::Bend;
@@ -19,7 +20,8 @@ use super::curve::Curve;
 use super::greatest::Greatest;
 use super::{Vector, add, cross, dot, norm, scale, subtract};
 
-/// The least angle that an involute may reach \[rad\]: a radius of curvature of a thousandth of its base circle's.
+/// The least angle that an involute may reach \[rad\]: a radius of curvature of a thousandth of its base
+/// circle's.
 pub const ANGLE_RAD_MIN: f64 = 1.0e-3;
 /// The greatest \[rad\]: some 159 turns.
 pub const ANGLE_RAD_MAX: f64 = 1.0e3;
@@ -63,7 +65,8 @@ pub struct Involute {
     /// e₂: unit vector a quarter turn on, in the direction of unwinding.
     onward: Vector,
     base_mm: f64,
-    /// Angles of unwinding at the start and at the end \[rad\]; from the greater to the smaller one it winds up.
+    /// Angles of unwinding at the start and at the end \[rad\]; from the greater to the smaller one it winds
+    /// up.
     angles_rad: (f64, f64),
 }
 

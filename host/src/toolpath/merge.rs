@@ -1,13 +1,14 @@
 //! Runs of short lines to fewer lines and arcs.
 //!
-//! A curve that was cut into chords has a corner at every one of them, and no room for blends that are worth it.
-//! Consumes the points of such a run; produces the longest lines and arcs through some of them, first to last,
-//! from which the run is nowhere farther than a tolerance, nor they from the run. Background; greedy, with
-//! O(n log n) tests of a point.
+//! A curve that was cut into chords has a corner at every one of them, and no room for blends that are worth
+//! it. Consumes the points of such a run; produces the longest lines and arcs through some of them, first to
+//! last, from which the run is nowhere farther than a tolerance, nor they from the run. Background; greedy,
+//! with O(n log n) tests of a point.
 //!
-//! **Why both ways.** A segment of the run and the part of a line or arc that stands for it are walked together, by
-//! their projection on the line or by the angle about the arc's centre, which have to grow along the run. So
-//! every point of either has a partner on the other, and the greatest distance between partners bounds both.
+//! **Why both ways.** A segment of the run and the part of a line or arc that stands for it are walked
+//! together, by their projection on the line or by the angle about the arc's centre, which have to grow along
+//! the run. So every point of either has a partner on the other, and the greatest distance between partners
+//! bounds both.
 
 use super::curve::Spiral;
 use super::element::Element;
@@ -67,7 +68,8 @@ pub fn merge(points: &[Vector], tolerance_mm: f64) -> Vec<Merged> {
     merged
 }
 
-/// The line from the first point to the last, or the arc through one in the middle too, if it is close enough.
+/// The line from the first point to the last, or the arc through one in the middle too, if it is close
+/// enough.
 fn fit(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
     line(points, tolerance_mm).or_else(|| arc(points, tolerance_mm))
 }
@@ -121,7 +123,8 @@ fn arc(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
         let spoke = subtract(spoke, scale(axis, height_mm));
         let (mut off_mm, mut high_mm) = ((norm(spoke) - radius_mm).abs(), height_mm.abs());
         if let Some((before, before_high_mm)) = before {
-            // Along a segment the distance from the axis has its greatest at the ends, and its least at the foot.
+            // Along a segment the distance from the axis has its greatest at the ends, and its least at the
+            // foot.
             high_mm = high_mm.max(before_high_mm);
             let segment = subtract(spoke, before);
             let foot = -dot(before, segment) / dot(segment, segment);

@@ -1,10 +1,10 @@
 //! Polynomial curves, of which corner blends and splines are made.
 //!
-//! A curve of degree seven at most in a parameter u from 0 to 1, kept relative to its start, so that a blend of
-//! a micrometre a kilometre out is as precise as one at the origin. Consumes control points or coefficients \[mm\];
-//! produces what every [`Curve`] has, parts of itself, and its greatest derivatives by arc length. Any finite
-//! coefficients are accepted; a curve that stands still somewhere (|r'| = 0) has no tangent there and is refused when
-//! it is made into pieces.
+//! A curve of degree seven at most in a parameter u from 0 to 1, kept relative to its start, so that a blend
+//! of a micrometre a kilometre out is as precise as one at the origin. Consumes control points or
+//! coefficients \[mm\]; produces what every [`Curve`] has, parts of itself, and its greatest derivatives by
+//! arc length. Any finite coefficients are accepted; a curve that stands still somewhere (|r'| = 0) has no
+//! tangent there and is refused when it is made into pieces.
 
 use super::curve::{Curve, by_arc_length, fourth_by_arc_length};
 use super::greatest::{Greatest, Peak, bend};
@@ -122,8 +122,8 @@ impl Polynomial {
         if origin == 0.0 {
             return shifted;
         }
-        // Horner's scheme, applied to its own results. Its first pass makes the point itself, which is left out,
-        // and the second c₁ at index 0.
+        // Horner's scheme, applied to its own results. Its first pass makes the point itself, which is left
+        // out, and the second c₁ at index 0.
         for pass in 0..DEGREE {
             for index in (pass.saturating_sub(1)..DEGREE - 1).rev() {
                 shifted[index] = add(shifted[index], scale(shifted[index + 1], origin));

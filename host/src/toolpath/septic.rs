@@ -12,10 +12,11 @@ use super::{norm, subtract};
 pub const POSITION_TOLERANCE_MM: f64 = 1.0e-6;
 /// Greatest deviation of a piece's |r'| from 1, which is the relative error of the feed.
 pub const FEED_TOLERANCE: f64 = 1.0e-6;
-/// The greatest sum of k(k−1)(k−2)·|cₖ| as a part of the length, so that every number type's unit (below 4) holds
-/// the third derivative, and with it the lower ones.
+/// The greatest sum of k(k−1)(k−2)·|cₖ| as a part of the length, so that every number type's unit (below 4)
+/// holds the third derivative, and with it the lower ones.
 const STEEPNESS_MAX: f64 = 3.9;
-/// Factors of the k-th power in the second to fourth derivative: k·(k − 1), then times k − 2, then times k − 3.
+/// Factors of the k-th power in the second to fourth derivative: k·(k − 1), then times k − 2, then times k
+/// − 3.
 const FACTORS: [[f64; 7]; 3] = [
     [0.0, 2.0, 6.0, 12.0, 20.0, 30.0, 42.0],
     [0.0, 0.0, 6.0, 24.0, 60.0, 120.0, 210.0],
@@ -25,11 +26,11 @@ const FACTORS: [[f64; 7]; 3] = [
 pub const HALVINGS_MAX: u32 = 16;
 /// Halvings of one part for the sake of the deviation, not of the length, after which a curve is given up.
 pub const REFINEMENTS_MAX: usize = 4096;
-/// What lies between the points at which a deviation is measured may exceed it by this factor: 1.14 was found over
-/// 8566 pieces of random splines.
+/// What lies between the points at which a deviation is measured may exceed it by this factor: 1.14 was found
+/// over 8566 pieces of random splines.
 const BETWEEN: f64 = 1.25;
-/// A failed span is that of a cusp if the curve is slower there than this part of its greatest speed: on a cusp,
-/// where the speed grows linearly, it is some 2⁻¹⁶.
+/// A failed span is that of a cusp if the curve is slower there than this part of its greatest speed: on a
+/// cusp, where the speed grows linearly, it is some 2⁻¹⁶.
 const STILL: f64 = 1.0e-3;
 /// The number of parts of a curve at which its greatest speed is searched.
 const SPEEDS: u32 = 64;
@@ -124,8 +125,8 @@ pub enum FitError {
 /// in the parameter than `widest`.
 ///
 /// # Errors
-/// The curve is not finite, too long, stands still somewhere, or is missed after [`HALVINGS_MAX`] halvings or with
-/// [`REFINEMENTS_MAX`] pieces more than its length asks for.
+/// The curve is not finite, too long, stands still somewhere, or is missed after [`HALVINGS_MAX`] halvings or
+/// with [`REFINEMENTS_MAX`] pieces more than its length asks for.
 pub fn fit(
     curve: &(impl Curve + ?Sized),
     from: f64,
@@ -195,7 +196,8 @@ fn hermite(curve: &(impl Curve + ?Sized), from: f64, a: f64, b: f64) -> Septic {
     piece
 }
 
-/// c₁ … c₇ over 0 … 1 of the septic that rises by `rise` and has these first to third derivatives at its ends.
+/// c₁ … c₇ over 0 … 1 of the septic that rises by `rise` and has these first to third derivatives at its
+/// ends.
 pub(crate) fn between(rise: f64, start: [f64; 3], end: [f64; 3]) -> [f64; 7] {
     let (c1, c2, c3) = (start[0], start[1] / 2.0, start[2] / 6.0);
     // What the upper four must add at the end: position and three derivatives.

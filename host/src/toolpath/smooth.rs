@@ -1,18 +1,18 @@
 //! A run of moves made ready for blends.
 //!
 //! Consumes moves that follow each other without a stop, each with the tolerance that its ends may be rounded
-//! within; produces fewer moves where lines are short, and the blend of any junction within any length. Which junctions are
-//! blended is up to planning. Background, in time linear in the moves.
+//! within; produces fewer moves where lines are short, and the blend of any junction within any length. Which
+//! junctions are blended is up to planning. Background, in time linear in the moves.
 //!
-//! **Short lines.** Where lines are shorter than the blends at their ends would be, three fifths of the tolerance are spent
-//! on making fewer lines and arcs of them, the rest on blends between these. One that stays alone among longer
-//! ones is made part of the line before it, if that can be led past their corner. Where the program gives merging a
-//! tolerance of its own (Q of G64), all lines of one feed are merged within it, and the whole tolerance of blends counts
-//! from what they became.
+//! **Short lines.** Where lines are shorter than the blends at their ends would be, three fifths of the
+//! tolerance are spent on making fewer lines and arcs of them, the rest on blends between these. One that
+//! stays alone among longer ones is made part of the line before it, if that can be led past their corner.
+//! Where the program gives merging a tolerance of its own (Q of G64), all lines of one feed are merged within
+//! it, and the whole tolerance of blends counts from what they became.
 //!
-//! **Who gets the room.** Blends take at most nine tenths of an element together, and where motion starts or ends half of
-//! that. A blend gets what the one at the other end does not need; if both want more, each gets half. A tenth stays, so that the rest
-//! of a short element still has a direction of its own.
+//! **Who gets the room.** Blends take at most nine tenths of an element together, and where motion starts or
+//! ends half of that. A blend gets what the one at the other end does not need; if both want more, each gets
+//! half. A tenth stays, so that the rest of a short element still has a direction of its own.
 
 use motion_kernel::law::Limits;
 
@@ -27,8 +27,8 @@ const TAKEN_MAX: f64 = 0.9;
 /// Part of the tolerance that short lines are merged within.
 const MERGED_SHARE: f64 = 0.6;
 
-/// Directions computed from coordinates that are exact to 10⁻¹⁰ mm agree to this where they are meant to \[rad\];
-/// curvatures agree to the same part of themselves.
+/// Directions computed from coordinates that are exact to 10⁻¹⁰ mm agree to this where they are meant to
+/// \[rad\]; curvatures agree to the same part of themselves.
 pub const TANGENT_ROUNDING_RAD: f64 = 1.0e-9;
 
 /// An element of the path with what the program says of it.
@@ -40,11 +40,11 @@ pub struct Move {
     pub element: Element,
     /// Programmed feed \[mm/s\], infinite for a rapid.
     pub feed_mm_s: f64,
-    /// Greatest distance that the path may be led past the move and its ends \[mm\]; 0 for exact path. At a junction the
-    /// smaller one of both moves holds.
+    /// Greatest distance that the path may be led past the move and its ends \[mm\]; 0 for exact path. At a
+    /// junction the smaller one of both moves holds.
     pub tolerance_mm: f64,
-    /// How far a line may be from what stands for it and others \[mm\], on top of the tolerance; without it, a part of
-    /// the tolerance.
+    /// How far a line may be from what stands for it and others \[mm\], on top of the tolerance; without it,
+    /// a part of the tolerance.
     pub merging_mm: Option<f64>,
 }
 
@@ -55,8 +55,8 @@ impl Move {
     }
 }
 
-/// A run of moves, its short lines merged, ready to be blended junction by junction. Junction `i` is that between the moves
-/// `i` and `i + 1`.
+/// A run of moves, its short lines merged, ready to be blended junction by junction. Junction `i` is that
+/// between the moves `i` and `i + 1`.
 #[derive(Clone, Debug)]
 pub struct Run {
     moves: Vec<Move>,
@@ -133,8 +133,8 @@ impl Run {
         Blend::new(&before.element, &after.element, tolerance_mm, room_mm, limits)
     }
 
-    /// What blends may take of a move together \[mm\]. At the start and the end of the run motion needs room of its
-    /// own, to set out and to stop.
+    /// What blends may take of a move together \[mm\]. At the start and the end of the run motion needs room
+    /// of its own, to set out and to stop.
     #[must_use]
     pub fn taken_mm_max(&self, index: usize) -> f64 {
         let is_end = index == 0 || index + 1 == self.moves.len();
@@ -156,7 +156,8 @@ fn share(distance_mm: f64, tolerance_mm: f64) -> f64 {
     if distance_mm > 0.0 { distance_mm / tolerance_mm } else { 0.0 }
 }
 
-/// The moves, with fewer in place of runs of short lines, and each one's distance from the moves it stands for.
+/// The moves, with fewer in place of runs of short lines, and each one's distance from the moves it stands
+/// for.
 fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
     let (mut merged, mut distances_mm) = (Vec::with_capacity(moves.len()), Vec::with_capacity(moves.len()));
     let mut rest = moves;

@@ -1,8 +1,9 @@
 //! Feedforward from a drive's parameters, by three methods.
 //!
-//! The response G of the drive has an inverse 1/G = 1 + c₁·s + c₂·s² + …: V, A and J gains 1, c₁, c₂ are the series as
-//! far as S4 (1). The omitted terms grow with frequency, so gains with the least error over a range of frequencies
-//! differ from the series. The inverse itself omits nothing, but it needs a lead for the dead time.
+//! The response G of the drive has an inverse 1/G = 1 + c₁·s + c₂·s² + …: V, A and J gains 1, c₁, c₂ are the
+//! series as far as S4 (1). The omitted terms grow with frequency, so gains with the least error over a range
+//! of frequencies differ from the series. The inverse itself omits nothing, but it needs a lead for the dead
+//! time.
 
 use core::f64::consts::TAU;
 
@@ -42,11 +43,12 @@ pub fn series(drive: &DriveParameters, tick_s: f64) -> [f64; 2] {
     [late_s + h1, second + late_s * h1 + h2]
 }
 
-/// A \[s\] and J \[s²\] gain that leave the least following error under a position loop of gain `kp_per_s`, in the least
-/// squares over harmonic motion of one velocity amplitude.
+/// A \[s\] and J \[s²\] gain that leave the least following error under a position loop of gain `kp_per_s`,
+/// in the least squares over harmonic motion of one velocity amplitude.
 #[must_use]
 pub fn fit(drive: &DriveParameters, kp_per_s: f64, tick_s: f64) -> [f64; 2] {
-    // The normal equations of e = (1 − G·(1 + A·s + J·s²))/(s + kp·G), real and imaginary part for each frequency.
+    // The normal equations of e = (1 − G·(1 + A·s + J·s²))/(s + kp·G), real and imaginary part for each
+    // frequency.
     let (mut aa, mut ab, mut bb, mut ay, mut by) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for frequency_hz in FITTED_HZ.map(f64::from) {
         let s = Complex::new(0.0, TAU * frequency_hz);

@@ -1,9 +1,9 @@
 //! The proportional gain.
 //!
-//! Feedforward moves the axis. Feedback corrects what feedforward does not know; a higher kp corrects more. Lag bounds
-//! kp: dead time, current loop, converter. ki and kd stay 0. The drive's own controller integrates already, so an
-//! integral here would add lag and no accuracy in motion, and an offset at rest belongs into the output's trim; a
-//! derivative of encoder counts is noise at the frequencies where it would help.
+//! Feedforward moves the axis. Feedback corrects what feedforward does not know; a higher kp corrects more.
+//! Lag bounds kp: dead time, current loop, converter. ki and kd stay 0. The drive's own controller integrates
+//! already, so an integral here would add lag and no accuracy in motion, and an offset at rest belongs into
+//! the output's trim; a derivative of encoder counts is noise at the frequencies where it would help.
 
 use hal_sim::DriveParameters;
 

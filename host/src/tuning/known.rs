@@ -1,4 +1,5 @@
-//! The basis of a proposal: the parameters that the recordings determine, and the machine file's for the rest.
+//! The basis of a proposal: the parameters that the recordings determine, and the machine file's for the
+//! rest.
 
 use hal_sim::{BedMode, DriveParameters};
 use motion_kernel::axis::{BedInverse, DriveInverse};
@@ -37,7 +38,8 @@ impl Known {
     /// The parameters of the drive of `axis`.
     ///
     /// # Errors
-    /// The scale of commands, Kv, Ti or the total delay is not determined: nothing could be tuned by the rest.
+    /// The scale of commands, Kv, Ti or the total delay is not determined: nothing could be tuned by the
+    /// rest.
     pub fn new(axis: &AxisSettings, found: &AxisParametersFound, tick_s: f64) -> Result<Self, TuningError> {
         for (quantity, estimate) in [
             ("command gain", found.command_gain),

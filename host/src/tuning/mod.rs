@@ -1,8 +1,9 @@
 //! Tuning: regulator figures from identified parameters, each with its reason.
 //!
-//! Consumes an [`Identification`](crate::identify::Identification) and the axis' settings; produces an [`AxisTuning`].
-//! Background. Fails if the recordings do not determine the parameters that everything depends on. Other undetermined
-//! parameters stay as in the machine file or are left out, and the proposal says so.
+//! Consumes an [`Identification`](crate::identify::Identification) and the axis' settings; produces an
+//! [`AxisTuning`]. Background. Fails if the recordings do not determine the parameters that everything
+//! depends on. Other undetermined parameters stay as in the machine file or are left out, and the proposal
+//! says so.
 //!
 //! - [`margins`]: the distance of a position loop from oscillation;
 //! - [`gains`]: the proportional gain that keeps margins;

@@ -1,4 +1,5 @@
-//! The proposed settings of an axis with their reasons, so that a technician can follow them number by number.
+//! The proposed settings of an axis with their reasons, so that a technician can follow them number by
+//! number.
 
 use motion_kernel::axis::{
     AxesConfig, AxisFigures, BedInverse, DriveInverse, Feedforward, Gains, PREVIEW_TICKS_MAX, ScaleError,
@@ -133,9 +134,9 @@ fn command_gain(parameters: &AxisParametersFound) -> f64 {
     if is_told && gain.value > 0.0 { gain.value } else { 1.0 }
 }
 
-/// The trim that takes the drift away. The recordings' commands are whole outputs, the old trim included, so what stands
-/// still is an output by itself and no change of the old one. That stays if a converter step or the recordings do not
-/// tell it from the new one.
+/// The trim that takes the drift away. The recordings' commands are whole outputs, the old trim included, so
+/// what stands still is an output by itself and no change of the old one. That stays if a converter step or
+/// the recordings do not tell it from the new one.
 fn offset_v(axis: &AxisSettings, parameters: &AxisParametersFound) -> f64 {
     let v_per_mm_s = DacCode::FULL_SCALE_V / parameters.command_gain.value / axis.mm_s_at_10_v;
     let still = parameters.command_offset_mm_s.times(-v_per_mm_s);
@@ -377,8 +378,8 @@ mod tests {
 
     const TICK_S: f64 = 5e-4;
 
-    /// What identification finds of S4's X axis with a drift of `drift_mm_s` at 0 V and the trim of `axis`, open loop
-    /// through the output's scale.
+    /// What identification finds of S4's X axis with a drift of `drift_mm_s` at 0 V and the trim of `axis`,
+    /// open loop through the output's scale.
     fn found(axis: &AxisSettings, drift_mm_s: f64) -> Identification {
         let model = DriveModel::new(axis.drive, TICK_S, 20).expect("a drive");
         let trim_mm_s = axis.output_offset_v / DacCode::FULL_SCALE_V * axis.mm_s_at_10_v;
@@ -399,7 +400,8 @@ mod tests {
             .expect("an identification")
     }
 
-    /// What everything depends on has to be known; what the rest is not known to be stays, as far as the recordings allow.
+    /// What everything depends on has to be known; what the rest is not known to be stays, as far as the
+    /// recordings allow.
     #[test]
     fn what_is_not_determined_is_not_tuned_by() {
         let mut axis = Machine::reference().axes[1].clone();

@@ -2,7 +2,8 @@
 
 use crate::workspace::{Workspace, assert_has, number};
 
-/// The machine file's homing in use: the reference is the index behind the switch; what is not found is named.
+/// The machine file's homing in use: the reference is the index behind the switch; what is not found is
+/// named.
 #[test]
 fn home_finds_the_reference() {
     let workspace = Workspace::new("home");
@@ -36,7 +37,8 @@ fn home_finds_the_reference() {
     assert!(error.contains(expected), "{error}");
 }
 
-/// Keys pressed one after the other: by a distance, to the soft limit, released on the way; and what is refused.
+/// Keys pressed one after the other: by a distance, to the soft limit, released on the way; and what is
+/// refused.
 #[test]
 fn jog_goes_as_far_as_its_key_says() {
     let workspace = Workspace::new("jog");
@@ -61,7 +63,8 @@ fn jog_goes_as_far_as_its_key_says() {
     assert!((number(&first["feed_mm_s"]) - 50.0).abs() < 1e-3, "{first}");
     assert_eq!((number(&second["from_mm"]), number(&second["to_mm"])), (0.0, -2.5));
     assert_eq!((number(&third["from_mm"]), number(&third["to_mm"])), (20.0, 30.0));
-    // Released after 0.2 s, in the ramp's second half, which jerk limits: it and braking from 50 mm/s take all of their times.
+    // Released after 0.2 s, in the ramp's second half, which jerk limits: it and braking from 50 mm/s take
+    // all of their times.
     let (stop_s, stop_mm) = (number(&fourth["stop_s"]), number(&fourth["stop_mm"]));
     assert!((number(&fourth["time_s"]) - stop_s - 0.2).abs() < 1e-9, "{fourth}");
     let ramp_s = 2.0 * (2.0 * 50.0 / 5000.0_f64).sqrt();

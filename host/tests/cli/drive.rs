@@ -218,8 +218,8 @@ fn drive_tune_writes_what_it_has_verified() {
     assert!(refusal.contains("missing.toml"), "{refusal}");
 }
 
-/// One axis alone is judged by its own error, in a plane that it moves in: beside an untuned one the contour gets worse,
-/// because axes that lag alike leave none.
+/// One axis alone is judged by its own error, in a plane that it moves in: beside an untuned one the contour
+/// gets worse, because axes that lag alike leave none.
 #[test]
 fn drive_tune_judges_one_axis_by_itself() {
     let workspace = Workspace::new("tune-one");

@@ -288,7 +288,8 @@ mod unix {
         assert!(text(&ended.stdout).starts_with("tick,t_s,"), "{ended:?}");
     }
 
-    /// A disk that is full, as a limit on the size of files and as a device: the summary is printed, the file stays.
+    /// A disk that is full, as a limit on the size of files and as a device: the summary is printed, the file
+    /// stays.
     #[test]
     fn a_full_disk_swallows_no_result() {
         let workspace = folder("full");

@@ -192,7 +192,8 @@ const TICKS: &str = "expected at most 1073741.824 s (2147483648 ticks)";
 
 const KILOMETRE: &str = "expected at most 1000000 mm between two full stops";
 
-/// Every refusal of a plan, to the letter: the line of the block concerned, what was found, what was expected.
+/// Every refusal of a plan, to the letter: the line of the block concerned, what was found, what was
+/// expected.
 #[test]
 fn what_planning_refuses() {
     let workspace = Workspace::new("planning");
@@ -276,7 +277,8 @@ fn what_a_block_list_refuses() {
     assert!(found.ends_with(" mm/s: the path is too short to reach more"), "{found}");
 }
 
-/// What a board gets is a program to it; what is wrong with the input is said with file and line, and nothing is written.
+/// What a board gets is a program to it; what is wrong with the input is said with file and line, and nothing
+/// is written.
 #[test]
 fn compile_writes_a_program_or_says_why_not() {
     let workspace = Workspace::new("compile");

@@ -11,7 +11,8 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("JSON")
 }
 
-/// Held, held by single block, by an override of 0, aborted: each with its words, its status and how far it came.
+/// Held, held by single block, by an override of 0, aborted: each with its words, its status and how far it
+/// came.
 #[test]
 fn a_run_says_how_far_it_came() {
     let workspace = Workspace::new("unfinished");

@@ -1,12 +1,13 @@
-//! Whether an axis' figures can be used.
+//! Checks whether an axis' figures can be used.
 //!
-//! Background. An axis has some thirty figures, each with a range. Whatever is made of them is made to its end and the
-//! first figure that was refused is kept: a way out at each of them would take more flash than all that is computed.
+//! Background. An axis has some thirty figures, each with a range. The configuration is always computed to
+//! its end, and the first refused figure is kept: an early return at each figure would take more flash than
+//! the computation.
 
 use super::ScaleError;
 use crate::num::{Real, is_within};
 
-/// Checks so far.
+/// The checks so far.
 #[derive(Debug, Default)]
 pub(super) struct Check {
     /// The first figure that was out of its range.
@@ -14,7 +15,7 @@ pub(super) struct Check {
 }
 
 impl Check {
-    /// What `make` makes of figures, if it refuses none.
+    /// Returns what `make` computes, or the first figure that it refuses.
     pub(super) fn all<T>(make: impl FnOnce(&mut Self) -> T) -> Result<T, ScaleError> {
         let mut check = Self::default();
         let made = make(&mut check);
@@ -29,7 +30,7 @@ impl Check {
         }
     }
 
-    /// Refuses a value that is not a number from `least` to `most`.
+    /// Refuses a value that is not from `least` to `most`, or not a number.
     #[inline(never)]
     pub(super) fn within(
         &mut self,

@@ -1,15 +1,15 @@
-//! A correction of a stretch: velocity commands that were learnt from earlier runs of the same path.
+//! A correction of a stretch: velocity commands learnt from earlier runs of the same path.
 //!
-//! Made in the background from what a run left of following error, added to feedforward in the tick. A
-//! correction belongs to one stretch, and to the time in it: it begins with the stretch's first tick and is 0
-//! before, after, and beyond its last knot. It is bounded when it is made; nothing it holds can be larger.
+//! Made in the background from the following error of a run, added to feedforward in the tick. A correction
+//! belongs to one stretch and to the time within it: it begins with the stretch's first tick and is 0 before,
+//! after, and beyond its last knot. Its values are bounded when it is made.
 
 use crate::num::Real;
 
-/// Greatest number of ticks from knot to knot.
+/// Greatest number of ticks between knots.
 pub const KNOT_TICKS_MAX: u16 = 1000;
 
-/// Velocity commands over the time in a stretch, straight between knots.
+/// Velocity commands over the time in a stretch, interpolated linearly between knots.
 #[derive(Clone, Copy, Debug)]
 pub struct Correction<'a, R, const AXES: usize> {
     knots_mm_s: &'a [[R; AXES]],
@@ -36,12 +36,12 @@ pub enum CorrectionError {
     },
     /// From 1 to [`KNOT_TICKS_MAX`] ticks are allowed from knot to knot.
     KnotTicks {
-        /// As given.
+        /// The number given.
         found: u16,
     },
     /// The bound is not positive, or beyond the kernel's range.
     Bound,
-    /// Under live control: what was learnt belongs to the times of the program's own plan.
+    /// Live control is on: a correction belongs to the times of the program's own plan.
     LiveControl,
 }
 
@@ -66,8 +66,8 @@ impl core::fmt::Display for CorrectionError {
 impl core::error::Error for CorrectionError {}
 
 impl<'a, R: Real, const AXES: usize> Correction<'a, R, AXES> {
-    /// For the stretch that begins after `stretch` others have ended: a knot every `knot_ticks` ticks, the first at
-    /// the stretch's first tick, none of a magnitude above `bound_mm_s`. Background.
+    /// A correction for the stretch that begins after `stretch` others have ended: a knot every `knot_ticks`
+    /// ticks, the first at the stretch's first tick, none greater than `bound_mm_s` in magnitude. Background.
     ///
     /// # Errors
     /// A knot, their distance or the bound is out of range.
@@ -84,7 +84,7 @@ impl<'a, R: Real, const AXES: usize> Correction<'a, R, AXES> {
             .filter(|_| bound_mm_s > 0.0 && bound_mm_s < 1e6)
             .ok_or(CorrectionError::Bound)?;
         for (knot, values) in knots_mm_s.iter().enumerate() {
-            // Written so that what is not a number is out of bound.
+            // Written so that NaN is out of bound.
             if let Some(axis) = values.iter().position(|value| !(value.abs() <= bound)) {
                 return Err(CorrectionError::OutOfBound { knot, axis });
             }
@@ -93,7 +93,7 @@ impl<'a, R: Real, const AXES: usize> Correction<'a, R, AXES> {
         Ok(Self { knots_mm_s, knot_ticks, per_knot, stretch, knot: 0, ticks: 0 })
     }
 
-    /// The correction in the next tick, which belongs to motion in stretch `stretch`, or to none.
+    /// The correction for the next tick, in which motion is in stretch `stretch` or in none.
     pub(crate) fn next(&mut self, stretch: Option<u32>) -> [R; AXES] {
         if stretch != Some(self.stretch) {
             return [R::ZERO; AXES];

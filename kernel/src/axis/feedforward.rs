@@ -1,4 +1,4 @@
-//! Feedforward: what the drive has to be told so that the axis moves as commanded, before any error shows.
+//! Feedforward: the command that makes the axis move as commanded before any error shows.
 //!
 //! Consumes the set-point's velocity, acceleration and jerk, produces a velocity command. In the tick.
 //!
@@ -7,18 +7,20 @@
 //!   + HP{ (1 + Tc·s)·(a + b·V) + a_c·sgn V + z″ } / Kv            the drive's inverse
 //! ```
 //!
-//! **Lead.** Drive and converter take time: dead time, and half a tick for holding the output. Feedforward can't
-//! undo that after the fact, but it can come early: position set-points are delayed by a few ticks, all axes alike,
-//! so that the path does not change ([`Preview`](super::preview::Preview)), and feedforward is not. The longest lead
-//! decides by how many. What another one is short of them is taken off again: whole ticks by delaying the command,
-//! which is exact, the rest by the series V(t − φ) = V − φ·a + φ²/2·J, which costs nothing: it is in the gains. φ is
-//! below a tick; of half a millisecond the terms left out are 10⁻⁴ of the velocity at 28 Hz.
+//! **Lead.** Drive and converter take time: dead time, and half a tick for holding the output. Feedforward
+//! can't undo that after the fact, but it can come early: position set-points are delayed by a few ticks, all
+//! axes alike, so that the path does not change ([`Preview`](super::preview::Preview)), and feedforward is
+//! not. The longest lead decides by how many. An axis with a shorter lead is delayed by the difference: whole
+//! ticks by delaying the command, which is exact, the rest by the series V(t − φ) = V − φ·a + φ²/2·J, which
+//! costs nothing: it is in the gains. φ is below a tick; with half a millisecond, the omitted terms are 10⁻⁴
+//! of the velocity at 28 Hz.
 //!
-//! **The drive's inverse.** A velocity drive is a PI controller with gain Kv and integral time Ti over a current loop
-//! with lag Tc. To make acceleration a against friction it needs the torque a + b·V + a_c·sgn V, (1 + Tc·s) of it
-//! because of the lag, and its controller makes that of the velocity difference torque/Kv, until the integral part
-//! has taken over: a high-pass HP with Ti. A bed that the axis shakes accelerates by z″ under it; the axis pushes
-//! that, too. Coulomb friction turns where the axis will, Tc early, over a small range of velocity.
+//! **The drive's inverse.** A velocity drive is a PI controller with gain Kv and integral time Ti over a
+//! current loop with lag Tc. To make acceleration a against friction it needs the torque a + b·V + a_c·sgn V,
+//! multiplied by (1 + Tc·s) because of the lag. Its controller makes that of the velocity difference
+//! torque/Kv, until the integral part has taken over: a high-pass HP with Ti. A bed that the axis shakes
+//! accelerates by z″ under it; the axis has to follow that, too. The Coulomb term changes sign Tc before the
+//! axis does, over a small range of velocity.
 
 use serde::{Deserialize, Serialize};
 
@@ -37,11 +39,12 @@ pub struct Feedforward {
     pub accel_s: f64,
     /// Gain of jerk \[s²\].
     pub jerk_s2: f64,
-    /// How far it comes before the position set-point \[s\], 0 or more: the drive's dead time plus half a tick.
+    /// How long it comes before the position set-point \[s\], 0 or more: the drive's dead time plus half a
+    /// tick.
     pub lead_s: f64,
     /// Added to the gains.
     pub tables: Tables,
-    /// The drive to be inverted.
+    /// The drive to invert.
     pub drive: Option<DriveInverse>,
 }
 
@@ -59,21 +62,21 @@ pub struct Tables {
 /// Points of a [`Table`].
 pub const TABLE_POINTS: usize = 9;
 
-/// A velocity command over a quantity, straight between points. In 16 bits a point, because every axis keeps room for
-/// three: a table of ±5 mm/s has steps of 0.15 µm/s.
+/// A velocity command over a quantity, interpolated linearly between points. A point has 16 bits, because
+/// every axis keeps room for three tables: one of ±5 mm/s has steps of 0.15 µm/s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
-    /// The points lie evenly from −reach to +reach, in the quantity's unit: above 10⁻⁶, in fixed point below 2³¹. Beyond,
-    /// the end points hold.
+    /// The points lie evenly from −reach to +reach, in the quantity's unit: above 10⁻⁶, in fixed point below
+    /// 2³¹. Beyond, the end points hold.
     pub reach: f64,
-    /// Velocity of a step \[mm/s\], 0 to 10.
+    /// Velocity per step \[mm/s\], 0 to 10.
     pub mm_s_per_step: f64,
     /// Velocity commands in steps.
     pub steps: [i16; TABLE_POINTS],
 }
 
 impl Table {
-    /// The table of `mm_s` \[mm/s\]. What is not a number makes its step one that is refused.
+    /// The table of `mm_s` \[mm/s\]. A value that is not a number leads to a refusal of the table.
     #[must_use]
     pub fn new(reach: f64, mm_s: &[f64; TABLE_POINTS]) -> Self {
         let greatest = mm_s.iter().fold(0.0_f64, |greatest, point| greatest.max(libm::fabs(*point)));
@@ -91,7 +94,7 @@ impl Table {
     }
 }
 
-/// A drive with its mechanics, to be inverted. Everything is per unit of the inertia that it moves.
+/// A drive with its mechanics, to be inverted. All figures are per unit of the inertia that it moves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveInverse {
     /// Proportional gain of the velocity controller \[1/s\], 10⁻³ to 10⁶.
@@ -102,17 +105,18 @@ pub struct DriveInverse {
     pub current_lag_s: f64,
     /// Viscous friction \[1/s\], 0 to 10⁶.
     pub viscous_friction_per_s: f64,
-    /// Coulomb friction \[mm/s²\], 0 to 10⁶; over Kv and the next one it must fit the number type.
+    /// Coulomb friction \[mm/s²\], 0 to 10⁶; divided by Kv and by [`reversal_mm_s`](Self::reversal_mm_s) it
+    /// must fit the number type.
     pub coulomb_friction_mm_s2: f64,
-    /// Velocity from which on all of Coulomb friction is compensated \[mm/s\], 10⁻³ to 10⁶; below, a part in
-    /// proportion.
+    /// Velocity above which Coulomb friction is fully compensated \[mm/s\], 10⁻³ to 10⁶; below, in proportion
+    /// to the velocity.
     pub reversal_mm_s: f64,
     /// The machine bed, if the axis shakes it.
     pub bed: Option<BedInverse>,
 }
 
 impl DriveInverse {
-    /// Whether every figure is within its range.
+    /// Checks that every figure is within its range.
     fn check(&self, check: &mut Check, tick_s: f64) {
         const GAINS: [f64; 2] = [1e-3, 1e6];
         const FRICTIONS: [f64; 2] = [0.0, 1e6];
@@ -132,19 +136,20 @@ impl DriveInverse {
 /// One mode of the machine bed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BedInverse {
-    /// Natural frequency of the bed alone \[Hz\], above 0, below [`BED_TICK_SHARE_MAX`] of the tick's frequency.
+    /// Natural frequency of the bed alone \[Hz\], above 0, below [`BED_TICK_SHARE_MAX`] of the tick's
+    /// frequency.
     pub frequency_hz: f64,
     /// Fraction of critical damping, from 0.001 to 1.
     pub damping_ratio: f64,
-    /// Moving mass over the bed's modal mass, above 0; a resonance with it must fit the number type.
+    /// Moving mass over the bed's modal mass, above 0; a resonance with that mass must fit the number type.
     pub mass_ratio: f64,
 }
 
-/// The bed's inverse steps once a tick: its frequency is below this part of the tick's.
+/// The bed's frequency is below this fraction of the tick's frequency: its inverse steps once per tick.
 pub const BED_TICK_SHARE_MAX: f64 = 0.25;
 
-/// Greatest velocity, acceleration and jerk that room is kept for: a set-point's where numbers have a range, and as much
-/// in floats.
+/// Greatest velocity, acceleration and jerk that the figures must leave room for: a set-point's greatest ones
+/// in fixed point, and the same in floats.
 fn reach<R: Real>() -> [f64; 3] {
     R::SETPOINT_MAX.or(Fixed::SETPOINT_MAX).unwrap_or_default()
 }
@@ -159,8 +164,9 @@ fn versine(x: f64) -> f64 {
     series(-1.0, x, 12, |n| 2.0 * n * (1.0 - 2.0 * n))
 }
 
-/// Terms 1 to `terms` of a power series whose term n is the one before, the first of them `term`, times x/divisor(n). A
-/// loop of a few operations: general functions in f64 are kilobytes on a core without it.
+/// Sum of the terms 1 to `terms` of a power series: term n is the one before, at first `term`, times
+/// x/divisor(n). A loop of a few operations: general f64 functions take kilobytes on a core without f64
+/// hardware.
 #[inline(never)]
 fn series(mut term: f64, x: f64, terms: u8, divisor: fn(f64) -> f64) -> f64 {
     let mut sum = 0.0;
@@ -180,7 +186,7 @@ struct Linear<R> {
 }
 
 impl<R: Real> Linear<R> {
-    /// `gains` at what the set-point was `late_s` ago.
+    /// `gains` applied to the set-point of `late_s` ago.
     #[inline(never)]
     fn new(check: &mut Check, quantity: &'static str, gains: [f64; 3], late_s: f64) -> Self {
         let [velocity, accel, jerk] = gains;
@@ -190,8 +196,8 @@ impl<R: Real> Linear<R> {
         let most = libm::fabs(velocity) * velocity_mm_s
             + libm::fabs(accel) * accel_mm_s2
             + libm::fabs(jerk) * jerk_mm_s3;
-        // With room for the sum of all that is added to it. Reaches are above 1: a gain that does not fit makes the sum
-        // one that does not.
+        // Leaves room for the sum of all terms. Reaches are above 1: if a gain does not fit, neither does the
+        // sum.
         let culprit = [velocity, accel, jerk].into_iter().find(|&gain| !is_finite(gain)).unwrap_or(most);
         check.that(fits::<R>(8.0 * most), quantity, culprit, "numbers within the kernel's range");
         Self { velocity: R::from_f64(velocity), accel: R::from_f64(accel), jerk: R::from_f64(jerk) }
@@ -209,19 +215,19 @@ impl<R: Real> Linear<R> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Lookup<R> {
     reach: R,
-    /// A power of two that brings the reach to at most 1, and from there to points: in fixed point the quotient of both
-    /// in one has no digits left at a long reach.
+    /// A power of two that scales the reach to at most 1; a second factor leads from there to points. In
+    /// fixed point a single quotient would have no digits left at a long reach.
     scale: R,
     per_scaled: R,
     mm_s_per_step: R,
     steps: [i16; TABLE_POINTS],
 }
 
-/// The least power of two from 1 to 2³¹, as far as a reach goes in fixed point, that is not below `x`; 2³¹ if there is
-/// none.
+/// The least power of two from 1 to 2³¹ that is not below `x`; 2³¹, the longest reach in fixed point, if
+/// there is none.
 fn power_of_two_above(x: f64) -> f64 {
     const EXPONENT: u32 = f64::MANTISSA_DIGITS - 1;
-    // One on top of the exponent, unless all digits behind the first are 0.
+    // The exponent plus one, unless all digits after the first are 0.
     let next = x.to_bits().saturating_add((1 << EXPONENT) - 1) >> EXPONENT;
     f64::from_bits(next.clamp(1023, 1023 + 31) << EXPONENT)
 }
@@ -267,7 +273,7 @@ struct LookupTables<R> {
     velocity: Option<Lookup<R>>,
     accel: Option<Lookup<R>>,
     jerk: Option<Lookup<R>>,
-    /// How late the tables' arguments are taken \[s\].
+    /// How far back the tables' arguments are taken \[s\].
     late: R,
 }
 
@@ -296,10 +302,10 @@ impl<R: Real> LookupTables<R> {
     }
 }
 
-/// The bed's acceleration that the commanded one will cause.
+/// The bed's acceleration caused by the commanded motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bed<R> {
-    /// What displacement, velocity, and the axis' acceleration and jerk make of acceleration.
+    /// Factors of displacement, velocity, and the axis' acceleration and jerk, in the bed's acceleration.
     displacement: R,
     velocity: R,
     drive: [R; 2],
@@ -320,15 +326,15 @@ impl<R: Real> Bed<R> {
         let expected = "more than 0, less than a quarter of the tick's frequency";
         check.that(is_slow, "bed frequency [Hz]", frequency_hz, expected);
         check.within([0.001, 1.0], "bed damping ratio", damping_ratio, "a number from 0.001 to 1");
-        // Shaken as badly as can be, to and fro at the resonance, the bed's acceleration is 2/π·μ/ζ of the axis', and
-        // μ at first.
+        // At worst, shaken to and fro at the resonance, the bed's acceleration is 2/π·μ/ζ of the axis', and μ
+        // at first.
         let [_, accel_mm_s2, _] = reach::<R>();
         let peak = accel_mm_s2 * mass_ratio * (2.0 + 0.75 / damping_ratio);
         let expected = "more than 0, and a resonance within the kernel's range";
         check.that(mass_ratio > 0.0 && fits::<R>(peak), "bed mass ratio", mass_ratio, expected);
-        // With the moving mass on it: z″ + 2σ·z′ + ω²·z = −share·a. Steps of a tick have the poles of this, and its
-        // displacement under a constant acceleration; at a resonance of 16 a part in a thousand of the frequency
-        // would be a part in thirty of the motion.
+        // With the moving mass on it: z″ + 2σ·z′ + ω²·z = −share·a. Steps of a tick have its exact poles and
+        // its exact displacement under constant acceleration: at a resonance of 16, a frequency error of a
+        // thousandth would be a thirtieth of the motion.
         let omega = 2.0 * core::f64::consts::PI * frequency_hz;
         let share = mass_ratio / (1.0 + mass_ratio);
         let decay = damping_ratio * omega / (1.0 + mass_ratio) * tick_s;
@@ -346,7 +352,7 @@ impl<R: Real> Bed<R> {
         }
     }
 
-    /// The bed's acceleration now; its motion to the next tick.
+    /// Returns the bed's acceleration now, and moves its state to the next tick.
     #[inline]
     fn tick(&self, state: &mut BedState<R>, setpoint: &Setpoint<R>) -> R {
         let [of_accel, of_jerk] = self.drive;
@@ -365,11 +371,11 @@ impl<R: Real> Bed<R> {
 struct Inverse<R> {
     /// (1 + Tc·s)·(a + b·V).
     torque: Linear<R>,
-    /// The velocity that Coulomb friction turns with.
+    /// The velocity that decides the sign of Coulomb friction.
     turning: Linear<R>,
     reversal_mm_s: R,
     friction: R,
-    /// What the high-pass takes of a change, and forgets in a tick.
+    /// The share of a change that the high-pass takes, and the share that it forgets per tick.
     takes: R,
     forgets: R,
     bed: Option<(Bed<R>, R)>,
@@ -435,23 +441,24 @@ pub struct FeedforwardConfig<R> {
     more: Option<More<R>>,
 }
 
-/// What is beyond gains.
+/// The parts that gains alone don't cover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct More<R> {
     tables: Option<LookupTables<R>>,
     inverse: Option<Inverse<R>>,
-    /// By how many ticks the command is delayed.
+    /// Number of ticks by which the command is delayed.
     delay_ticks: u8,
 }
 
-/// What feedforward remembers. At rest: the default.
+/// The state of feedforward. The default is at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeedforwardState<R> {
     inverse: InverseState<R>,
     delay: Delay<R>,
 }
 
-/// The commands of the last ticks. Delaying what comes out is delaying what goes in, and is one number instead of three.
+/// The commands of the last ticks. Delaying the output equals delaying the input, and is one number instead
+/// of three.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Delay<R> {
     past_mm_s: [R; PREVIEW_TICKS_MAX as usize],
@@ -459,7 +466,7 @@ struct Delay<R> {
 }
 
 impl<R: Real> Delay<R> {
-    /// The command of `ticks` ago, 1 or more; remembers that of now.
+    /// Returns the command of `ticks` ago, 1 or more; remembers the present one.
     fn tick(&mut self, ticks: u8, command_mm_s: R) -> R {
         // The ring is as long as the delay: the place read is the one written.
         let Some(place) = self.past_mm_s.get_mut(usize::from(self.next)) else { return command_mm_s };
@@ -471,19 +478,19 @@ impl<R: Real> Delay<R> {
 }
 
 impl<R: Real> FeedforwardConfig<R> {
-    /// Feedforward by itself, for a control tick of `tick_s` and position set-points that are delayed by
-    /// `preview_ticks`. Background.
+    /// Feedforward alone, for a control tick of `tick_s` and position set-points delayed by `preview_ticks`.
+    /// Background.
     ///
     /// # Errors
-    /// The first figure that is out of its range or beyond the number type's.
+    /// The first figure that is out of its range or beyond the number type.
     pub fn new(feedforward: &Feedforward, preview_ticks: u8, tick_s: f64) -> Result<Self, ScaleError> {
         Check::all(|check| Self::checked(check, feedforward, preview_ticks, tick_s))
     }
 
-    /// For a tick of `tick_s`, where position set-points are delayed by `preview_ticks` ticks.
+    /// Feedforward for a tick of `tick_s`, with position set-points delayed by `preview_ticks` ticks.
     ///
-    /// Refused where a figure is not finite, out of its range or beyond the number type's, or a lead longer than the
-    /// preview.
+    /// Refused if a figure is not finite, out of its range or beyond the number type, or if the lead is
+    /// longer than the preview.
     pub(super) fn checked(
         check: &mut Check,
         feedforward: &Feedforward,
@@ -493,7 +500,7 @@ impl<R: Real> FeedforwardConfig<R> {
         let &Feedforward { velocity, accel_s, jerk_s2, lead_s, .. } = feedforward;
         let preview_s = f64::from(preview_ticks) * tick_s;
         let early_s = preview_s - lead_s;
-        // A whole tick is not one less for rounding, nor is what is left less than nothing.
+        // Rounding must neither turn a whole tick into one less nor make the remainder negative.
         let leads = [0.0, preview_s + LEAD_ROUNDING_TICKS * tick_s];
         check.within(leads, "feedforward lead [s]", lead_s, "a number from 0 to the machine's preview");
         let early_ticks = early_s / tick_s + LEAD_ROUNDING_TICKS;
@@ -521,7 +528,7 @@ impl<R: Real> FeedforwardConfig<R> {
 }
 
 impl<R: Real> More<R> {
-    // A function of its own, so that axes without it don't pay for its registers.
+    // A separate function, so that axes without it don't pay for its registers.
     #[inline(never)]
     fn tick(&self, state: &mut FeedforwardState<R>, setpoint: &Setpoint<R>, gained: R) -> R {
         let mut command = gained;

@@ -1,22 +1,23 @@
-//! What is watched of an axis: whether encoder, drive and set-point make sense together.
+//! Guards of an axis: whether encoder, drive and set-point make sense together.
 //!
-//! In the tick, behind the feature `guards`. Two comparisons an axis and tick; what they find suspicious is judged in a
-//! path of its own, as is one axis that is sampled in every [`SAMPLE_TICKS`] ticks. No loop, no failure: a fault is reported.
+//! In the tick, with the feature `guards`. Two comparisons per axis and tick; a suspicious axis is judged in
+//! a separate path. Every [`SAMPLE_TICKS`] ticks one axis is sampled, also in a separate path. No loop, no
+//! failure: a fault is reported.
 //!
-//! With the following error ε, the set velocity v and acceleration a of the tick, the drive's greatest acceleration a_d,
-//! the axis' greatest A, and a noise of n counts of the size q:
+//! With the following error ε, the set velocity v and acceleration a of the tick, the drive's greatest
+//! acceleration a_d, the axis' greatest A, and a noise of n counts of the size q:
 //!
-//! - **following error**: |ε| ≤ min(limit, rest + τv·|v| + τa·|a|). A drive that follows its command T_d late gives
-//!   ε = ((1 − F_V)·v + (T_d − F_a)·a)/kp, so τv is some part of 1/kp and τa some part of T_d/kp;
-//! - **jump**: |Δ²ε| ≤ 2·((A + a_d)·T² + (2 + 4n)·q). No motor and no accepted set-point can do more than half of it, so
-//!   more than half of it in the counts is the encoder's, and otherwise the set-point is what jumped;
+//! - **following error**: |ε| ≤ min(limit, rest + τv·|v| + τa·|a|). A drive that follows its command T_d late
+//!   gives ε = ((1 − F_V)·v + (T_d − F_a)·a)/kp, so τv is a fraction of 1/kp and τa a fraction of T_d/kp;
+//! - **jump**: |Δ²ε| ≤ 2·((A + a_d)·T² + (2 + 4n)·q). A motor or an accepted set-point can cause at most half
+//!   of it each. If more than half of it shows in the counts, the encoder jumped, otherwise the set-point;
 //! - **encoder lost**: no counts while the command is above `moving_mm_s`, over `response_s`;
-//! - **runaway**: the axis loses velocity towards its command at more than `load_accel_mm_s2`, which no load does, or
-//!   moves against its command without braking for longer than `response_s`;
-//! - **saturation**: the output at its limit in every sample over `saturation_s`;
-//! - **soft limit**: the set position beyond the travel, and on its way farther out.
+//! - **runaway**: the axis loses velocity towards its command at more than `load_accel_mm_s2`, which no load
+//!   does, or moves against its command without braking for longer than `response_s`;
+//! - **saturation**: the output is at its limit in every sample over `saturation_s`;
+//! - **soft limit**: the set position is beyond the travel and moves farther out.
 //!
-//! Comparisons are written so that what is not a number is a fault.
+//! Comparisons are written so that NaN is a fault.
 
 use super::check::{Check, fits};
 use super::{AxesConfig, AxesError, AxisConfig, AxisOutput, AxisState, GuardFigures, Guards};
@@ -24,16 +25,16 @@ use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, Position};
 
-/// From one axis being sampled to the next \[ticks\].
+/// Time from one axis' sample to the next axis' \[ticks\].
 pub(crate) const SAMPLE_TICKS: u8 = 8;
-/// Beyond the travel by so little is no fault \[mm\]: positions are rounded.
+/// Being beyond the travel by less is no fault \[mm\]: positions are rounded.
 const TRAVEL_ROUNDING_MM: f64 = 2.0e-3;
-/// Least of figures that are not 0.
+/// Least value of a figure that is not 0.
 const LEAST: f64 = 1.0e-9;
-/// Commanded to move by so many counts in a tick, an axis that stands still for two has lost its encoder.
+/// Command in counts per tick at which an axis that stands still for two ticks has lost its encoder.
 const COUNTS_A_TICK: i32 = 4;
 
-/// What is fixed while the axis runs.
+/// The configuration, fixed while the axis runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GuardConfig<R> {
     at_rest_mm: R,
@@ -42,20 +43,20 @@ pub(super) struct GuardConfig<R> {
     jump_mm: R,
     tick_s: R,
     moving_mm_s: R,
-    /// Change of the distance over two ticks by load, in a tick and from sample to sample \[mm\].
+    /// Change by load, per tick and per sample, of the distance moved in two ticks \[mm\].
     load_mm: R,
     load_sample_mm: R,
-    /// What noise makes of the distance over two ticks \[mm\].
+    /// Error by noise of the distance moved in two ticks \[mm\].
     noise_mm: R,
     noise_counts: i32,
-    /// In samples of this axis; 0: not watched.
+    /// Response time in samples of this axis; 0: not watched.
     response_samples: u16,
     saturation_samples: u16,
     travel: Option<[Position; 2]>,
 }
 
 impl<R: Real> GuardConfig<R> {
-    /// Nothing but the limit of the following error, whatever the axis does.
+    /// Watches only the limit of the following error, the same in motion as at rest.
     pub(super) fn limit_only(limit_mm: f64) -> Self {
         Self {
             at_rest_mm: R::from_f64(limit_mm),
@@ -74,7 +75,7 @@ impl<R: Real> GuardConfig<R> {
         }
     }
 
-    /// For an axis that is sampled every `sample_ticks` ticks of `tick_s`. Background.
+    /// The guards of an axis that is sampled every `sample_ticks` ticks of `tick_s`. Background.
     pub(super) fn new(
         check: &mut Check,
         figures: &GuardFigures,
@@ -102,7 +103,7 @@ impl<R: Real> GuardConfig<R> {
         figure("acceleration by load [mm/s²]", figures.load_accel_mm_s2, least);
         figure("response [s]", response_s, least);
         figure("saturation [s]", saturation_s, least);
-        // The tick compares with the limit in motion only beyond the one at rest.
+        // The tick compares with the limit in motion only above the limit at rest.
         let is_within = at_rest_mm <= config.following_error_limit_mm;
         let expected = "at most the limit of the following error";
         check.that(is_within, "following error at rest [mm]", figures.following_error_at_rest_mm, expected);
@@ -116,7 +117,7 @@ impl<R: Real> GuardConfig<R> {
             check.that(low_mm < high_mm, "travel [mm]", high_mm - low_mm, expected);
             [low, high]
         });
-        // Two readings, each off by half a count and the noise.
+        // The difference of two readings, each off by half a count plus the noise.
         let noise_mm = libm::fabs(config.encoder.mm_per_count()) * (1.0 + 2.0 * f64::from(noise_counts));
         Self {
             at_rest_mm,
@@ -129,14 +130,14 @@ impl<R: Real> GuardConfig<R> {
             load_sample_mm: R::from_f64(load_mm * f64::from(sample_ticks)),
             noise_mm: R::from_f64(2.0 * noise_mm),
             noise_counts: 2 * i32::from(noise_counts),
-            // One more: the first sample may come just before there is something to see.
+            // One more: the first sample may come just before the failure.
             response_samples: samples(response_s).saturating_add(1),
             saturation_samples: samples(saturation_s).saturating_add(1),
             travel,
         }
     }
 
-    /// The limit of the following error in a motion; not a number where the motion is none.
+    /// The limit of the following error in a motion; NaN if a set value is NaN.
     pub(super) fn limit_mm(&self, most_mm: R, setpoint: &Setpoint<R>) -> R {
         let grown_mm = self.at_rest_mm
             + self.per_velocity_s * setpoint.velocity_mm_s.abs()
@@ -146,10 +147,10 @@ impl<R: Real> GuardConfig<R> {
 }
 
 impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
-    /// The same axes for a control tick of `tick_s`, guarded by all of `guards`, with its reactions. Background.
+    /// The same axes with all guards and reactions of `guards`, for a control tick of `tick_s`. Background.
     ///
     /// # Errors
-    /// The first figure that is out of its range or beyond the number type's.
+    /// The first figure that is out of its range or beyond the number type.
     pub fn guarded(mut self, guards: &Guards<AXES>, tick_s: f64) -> Result<Self, AxesError> {
         let sample_ticks = u32::from(SAMPLE_TICKS) * AXES as u32;
         self.reactions = guards.reactions;
@@ -163,7 +164,7 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
 }
 
 impl<R: Real> AxisState<R> {
-    /// What broke in an axis that is lost, `since` ticks after it was sampled.
+    /// Finds what broke in a lost axis, `since` ticks after its last sample.
     pub(crate) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> AxisFault<R> {
         self.guard.judge(config, setpoint, since)
     }
@@ -179,7 +180,7 @@ impl<R: Real> AxisState<R> {
     }
 }
 
-/// What was found.
+/// What broke in an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum AxisFault<R> {
     FollowingError { error_mm: R },
@@ -192,7 +193,7 @@ pub(crate) enum AxisFault<R> {
     NotFinite,
 }
 
-/// Why an axis may not go on, before it is clear what broke.
+/// Why an axis may not continue, before it is judged what broke.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Alarm<R> {
     #[default]
@@ -206,22 +207,22 @@ enum Alarm<R> {
     NotFinite,
 }
 
-/// What an axis was like when it was sampled.
+/// A sample of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sample<R> {
-    /// There was one since the axis was enabled.
+    /// There was a sample since the axis was enabled.
     is_taken: bool,
     counts: i32,
-    /// Over the two ticks before \[mm\].
+    /// Distance moved in the two ticks before \[mm\].
     moved_mm: R,
     /// The command's direction; 0 below the least velocity.
     commanded: i8,
 }
 
-/// What changes from tick to tick.
+/// The state, which changes from tick to tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Guard<R> {
-    /// Of the following error \[mm\].
+    /// Last change of the following error \[mm\].
     change_mm: R,
     /// The velocity command of the tick before \[mm/s\].
     command_mm_s: R,
@@ -231,25 +232,25 @@ pub(super) struct Guard<R> {
     last: Sample<R>,
     still_samples: u16,
     against_samples: u16,
-    /// What it moved by at the sample before the first of them \[mm\].
+    /// Distance moved at the sample before the first of these \[mm\].
     against_from_mm: R,
     saturated_samples: u16,
-    /// The next jump is that of a machine that was moving where it was told to stand.
+    /// The next jump is no fault: the machine was told to stand while it was moving.
     is_excused: bool,
 }
 
 impl<R: Real> Guard<R> {
-    /// An axis whose encoder reads `counts`.
+    /// The state for an axis whose encoder reads `counts`.
     pub(super) fn at(counts: Counts) -> Self {
         Self { counts: [counts.0 as i32; 3], ..Self::default() }
     }
 
-    /// The actual position has become the set position.
+    /// Restarts after the actual position has become the set position.
     pub(super) fn stand_here(&mut self) {
         *self = Self { counts: self.counts, is_excused: true, ..Self::default() };
     }
 
-    /// What was seen before the drives were off says nothing.
+    /// Forgets everything seen before the drives were off.
     pub(super) fn restart(&mut self) {
         (self.last, self.still_samples, self.against_samples, self.saturated_samples) =
             (Sample::default(), 0, 0, 0);
@@ -262,7 +263,7 @@ impl<R: Real> Guard<R> {
         self.counts = [counts.0 as i32, latest, before];
     }
 
-    /// A tick without a command.
+    /// Notes a tick without a command.
     #[inline]
     pub(super) fn watch(&mut self, change_mm: R, counts: Counts) {
         self.read(counts);
@@ -270,8 +271,8 @@ impl<R: Real> Guard<R> {
         self.command_mm_s = R::ZERO;
     }
 
-    /// Whether the axis may be regulated: its following error and how it changed, which is asked for only where the
-    /// error is within `most_mm`.
+    /// Whether the axis may be regulated: checks its following error and, if that is within its limit, the
+    /// error's jump.
     #[inline]
     pub(super) fn allows(
         &mut self,
@@ -307,7 +308,7 @@ impl<R: Real> Guard<R> {
         let most_mm = config.following_error_limit_mm;
         let is_allowed = error_mm.abs() <= config.guard.limit_mm(most_mm, setpoint);
         if !is_allowed {
-            // What is farther than twice the limit need not be told apart, and may be beyond the number type.
+            // Beyond twice the limit the value does not matter, and may exceed the number type.
             let far_mm = most_mm + most_mm;
             let jump_mm = error_mm.max(-far_mm).min(far_mm) - last_error_mm - self.change_mm;
             let is_jump = !(jump_mm.abs() <= config.guard.jump_mm);
@@ -336,11 +337,11 @@ impl<R: Real> Guard<R> {
         is_number
     }
 
-    /// What broke in an axis that was not allowed to go on, `since` ticks after it was sampled.
+    /// Finds what broke in an axis that was not allowed to continue, `since` ticks after its last sample.
     #[cold]
     pub(super) fn judge(&self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, since: u8) -> AxisFault<R> {
         let &Setpoint { velocity_mm_s, accel_mm_s2, jerk_mm_s3, .. } = setpoint;
-        // What is not finite times 0 is not 0.
+        // A value that is not finite gives NaN when multiplied by 0.
         let is_number = |value: R| value * R::ZERO == R::ZERO;
         if ![velocity_mm_s, accel_mm_s2, jerk_mm_s3].into_iter().all(is_number) {
             return AxisFault::NotFinite;
@@ -371,7 +372,7 @@ impl<R: Real> Guard<R> {
         } else if step == 0 {
             AxisFault::EncoderLost
         } else if !is_more(step_mm + before_mm) {
-            // It counts the other way, as fast.
+            // It counts the other way, equally fast.
             AxisFault::Runaway
         } else {
             AxisFault::EncoderJump { jump_mm: step_mm - before_mm }
@@ -390,28 +391,28 @@ impl<R: Real> Guard<R> {
         (-config.guard.noise_counts..=config.guard.noise_counts).contains(&moved)
     }
 
-    /// Whether the axis, which moved by `now_mm` over two ticks, has since the last sample lost velocity towards its command
-    /// faster than by load.
+    /// Whether the axis, which moved by `now_mm` in two ticks, has lost velocity towards its command since
+    /// the last sample, and more than load can explain.
     fn runs_away(&self, config: &AxisConfig<R>, now_mm: R, by_load_mm: R) -> bool {
         let [latest, before, first] = self.counts;
-        // Counts that stand still are another fault's.
+        // Counts that stand still are another fault.
         if !self.last.is_taken || latest == before && before == first {
             return false;
         }
         let guard = &config.guard;
-        // Over two ticks, as what it moved by.
+        // In two ticks, like the distance moved.
         let wanted_mm = (self.command_mm_s + self.command_mm_s) * guard.tick_s - now_mm;
         let gained_mm = now_mm - self.last.moved_mm;
         let lost_mm = if wanted_mm < R::ZERO { gained_mm } else { -gained_mm };
         lost_mm > by_load_mm + guard.noise_mm + guard.noise_mm
     }
 
-    /// What load changes in `since` ticks, of the distance over two \[mm\].
+    /// Change by load, in `since` ticks, of the distance moved in two ticks \[mm\].
     fn by_load_mm(&self, config: &AxisConfig<R>, since: u8) -> R {
         config.guard.load_mm * R::from_q32(i64::from(since) << 32)
     }
 
-    /// Over the last two ticks \[mm\].
+    /// Distance moved in the last two ticks \[mm\].
     fn moved_mm(&self, config: &AxisConfig<R>) -> R {
         let [latest, _, first] = self.counts;
         mm(config, latest.wrapping_sub(first))
@@ -438,7 +439,8 @@ impl<R: Real> Guard<R> {
         let moved_mm = self.moved_mm(config);
         let moving_mm = guard.moving_mm_s * guard.tick_s + guard.noise_mm;
         let is_against = commanded > 0 && moved_mm < -moving_mm || commanded < 0 && moved_mm > moving_mm;
-        // A load that is too great brakes slowly, but brakes: if it doesn't show from one sample to the next, then over some.
+        // A load that is too great brakes slowly, but brakes: if not visible from one sample to the next,
+        // then over several.
         if self.against_samples == 0 {
             self.against_from_mm = self.last.moved_mm;
         }
@@ -459,7 +461,7 @@ impl<R: Real> Guard<R> {
         } else if self.saturated_samples >= guard.saturation_samples {
             Some(AxisFault::Saturated)
         } else if guard.travel.is_some_and(|travel| drives_out(travel, setpoint, output)) {
-            // The least urgent, so the last.
+            // The least urgent fault, so the last.
             Some(AxisFault::SoftLimit)
         } else {
             None
@@ -467,7 +469,7 @@ impl<R: Real> Guard<R> {
     }
 }
 
-/// Whether an axis is beyond its travel and goes on: one can drive back.
+/// Whether an axis is beyond its travel and moves farther out: it may drive back.
 fn drives_out<R: Real>([low, high]: [Position; 2], setpoint: &Setpoint<R>, output: &AxisOutput<R>) -> bool {
     output.set < low && setpoint.velocity_mm_s < R::ZERO
         || output.set > high && setpoint.velocity_mm_s > R::ZERO
@@ -600,8 +602,8 @@ mod tests {
         assert_eq!(found(5), [AxisFault::SoftLimit]);
     }
 
-    /// Thrown back by a load, an axis brakes by less than a sample can see, but by more than some of them; one that does not
-    /// brake at all runs away.
+    /// Thrown back by a load, an axis brakes by less than a sample can see, but by more than some of them;
+    /// one that does not brake at all runs away.
     #[test]
     fn what_brakes_slowly_does_not_run_away() {
         let found = |brake_mm_s2: f64| {

@@ -1,6 +1,6 @@
-//! What a machine says of its guards and of how its faults end.
+//! A machine's figures for its guards, and its reactions to faults.
 //!
-//! Data only: with the feature `guards` the kernel acts on it.
+//! Data only: the kernel acts on it with the feature `guards`.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,24 +8,24 @@ use crate::fault::reaction::Reactions;
 use crate::path::Travel;
 use crate::units::Position;
 
-/// Guards of a machine: a compiled program carries them.
+/// Guards of a machine; a compiled program carries them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Guards<const AXES: usize> {
-    /// Of each axis; `None` to watch nothing of it but the limit of its following error.
+    /// Figures of each axis; `None` to watch only the limit of its following error.
     #[serde(with = "crate::array")]
     pub axes: [Option<GuardFigures>; AXES],
-    /// How faults end.
+    /// The reactions to faults.
     pub reactions: Reactions,
 }
 
 impl<const AXES: usize> Guards<AXES> {
-    /// The same reactions to fewer faults.
+    /// The same reactions, watching only the limits of the following error.
     #[must_use]
     pub fn limits_only(self) -> Self {
         Self { axes: [None; AXES], ..self }
     }
 
-    /// Where the axes may go; an end beyond the kernel's range bounds nothing.
+    /// The travel of the axes; an end beyond the kernel's range bounds nothing.
     #[must_use]
     pub fn travel(&self) -> Travel<AXES> {
         self.axes.map(|axis| {
@@ -35,24 +35,24 @@ impl<const AXES: usize> Guards<AXES> {
     }
 }
 
-/// What is watched, in figures of any number type.
+/// The figures of an axis' guards, for any number type.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GuardFigures {
     /// Greatest following error at rest \[mm\], > 0, at most the axis' limit.
     pub following_error_at_rest_mm: f64,
-    /// What it may be greater for velocity \[mm per mm/s\], 0 or more.
+    /// Additional following error allowed per velocity \[mm per mm/s\], 0 or more.
     pub following_error_per_velocity_s: f64,
-    /// What it may be greater for acceleration \[mm per mm/s²\], 0 or more.
+    /// Additional following error allowed per acceleration \[mm per mm/s²\], 0 or more.
     pub following_error_per_accel_s2: f64,
     /// Greatest second difference of the following error from tick to tick \[mm\], > 0.
     pub jump_mm: f64,
-    /// The axis has to move where it is commanded to at this velocity \[mm/s\], > 0.
+    /// Commanded velocity at which the axis has to move \[mm/s\], > 0.
     pub moving_mm_s: f64,
-    /// After so long at the latest \[s\], > 0.
+    /// Time after which it has to move at the latest \[s\], > 0.
     pub response_s: f64,
-    /// Friction and load change the axis' velocity by less \[mm/s²\], > 0.
+    /// Acceleration that friction and load never exceed \[mm/s²\], > 0.
     pub load_accel_mm_s2: f64,
-    /// Encoder's noise in either direction \[counts\].
+    /// The encoder's noise in either direction \[counts\].
     pub noise_counts: u16,
     /// How long the output may be at its limit \[s\], > 0.
     pub saturation_s: f64,

@@ -1,4 +1,4 @@
-//! What is watched of an axis in a kernel without guards: the limit of its following error, and nothing is remembered.
+//! Guards of an axis in a kernel without the feature: only the limit of its following error, without state.
 
 use core::marker::PhantomData;
 
@@ -7,7 +7,7 @@ use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::Counts;
 
-/// No figures but the axis' limit.
+/// No figures apart from the axis' limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GuardConfig<R>(PhantomData<R>);
 
@@ -43,7 +43,7 @@ impl<R: Real> Guard<R> {
     #[inline]
     pub(super) fn watch(&mut self, _: R, _: Counts) {}
 
-    /// Whether the axis may be regulated. Written so that what is not a number is a fault.
+    /// Whether the axis may be regulated. Written so that NaN is a fault.
     #[inline]
     pub(super) fn allows(
         &mut self,

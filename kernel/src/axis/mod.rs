@@ -7,11 +7,11 @@
 //! - `preview`: position set-points delayed, so that feedforward comes early;
 //! - `feedforward`: F_V, F_a, F_J of S4 (1), and the inverse of the drive;
 //! - `regulator`: S4 (1), P(ID) on the following error plus feedforward, with saturation and anti-windup;
-//! - `correction`: what was learnt of a stretch, added to feedforward;
+//! - `correction`: the learnt correction of a stretch, added to feedforward;
 //! - `guard`: whether encoder, drive and set-point make sense together (feature `guards`).
 //!
-//! Configuration ([`AxesConfig`], [`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so gains can
-//! change without a bump.
+//! Configuration ([`AxesConfig`], [`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so
+//! gains can change without a bump.
 //!
 //! ```
 //! use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
@@ -72,11 +72,11 @@ use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, DacCode, Position};
 
-/// An axis in figures of any number type: what a machine's file says of it.
+/// An axis' figures for any number type, as in the machine file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisFigures {
-    /// Travel per encoder count \[mm\], a magnitude from 10⁻⁸ to 0.5, exclusive; negative for an encoder that counts the
-    /// other way.
+    /// Travel per encoder count \[mm\], a magnitude from 10⁻⁸ to 0.5, exclusive; negative for an encoder that
+    /// counts the other way.
     pub mm_per_count: f64,
     /// Velocity at +10 V \[mm/s\], not 0; negative if +10 V moves in negative direction.
     pub mm_s_at_10_v: f64,
@@ -92,7 +92,7 @@ pub struct AxisFigures {
     pub following_error_limit_mm: f64,
 }
 
-/// What is fixed about an axis while it runs.
+/// The configuration of an axis, fixed while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisConfig<R> {
     /// Encoder counts to position.
@@ -101,19 +101,19 @@ pub struct AxisConfig<R> {
     pub output: OutputScale<R>,
     /// The regulator.
     pub regulator: Regulator<R>,
-    /// Greatest following error at which the axis faults \[mm\].
+    /// Following error above which the axis faults \[mm\].
     pub following_error_limit_mm: R,
     guard: GuardConfig<R>,
 }
 
-/// What is fixed about all axes of a machine while they run.
+/// The configuration of all axes of a machine, fixed while they run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxesConfig<R, const AXES: usize> {
     /// Each axis.
     pub axes: [AxisConfig<R>; AXES],
-    /// By how many ticks position set-points are delayed.
+    /// Number of ticks by which position set-points are delayed.
     pub preview_ticks: u8,
-    /// How faults end; without the feature `guards` immediately.
+    /// The reactions to faults; without the feature `guards` all are immediate.
     pub reactions: Reactions,
 }
 
@@ -138,7 +138,8 @@ impl core::error::Error for AxesError {}
 impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
     const ONE_AT_LEAST: () = assert!(AXES > 0, "a machine has an axis");
 
-    /// The axes for a control tick of `tick_s`, guarded by the limits of their following errors alone. Background.
+    /// The axes for a control tick of `tick_s`, guarded only by the limits of their following errors.
+    /// Background.
     ///
     /// # Errors
     /// The first figure that is out of its range or beyond the number type's.
@@ -156,17 +157,18 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
         check.refused.map_or(Ok(made), |cause| Err(AxesError { axis, cause }))
     }
 
-    /// By how many ticks these axes need their position set-points delayed: as the longest lead asks for.
+    /// Number of ticks by which these axes need their position set-points delayed, for the longest lead.
     ///
     /// # Errors
-    /// The first lead that is not from 0 to [`PREVIEW_TICKS_MAX`] ticks.
+    /// A lead is not from 0 to [`PREVIEW_TICKS_MAX`] ticks; the first such.
     pub fn preview_ticks(figures: &[AxisFigures; AXES], tick_s: f64) -> Result<u8, AxesError> {
         preview::preview_ticks(figures, tick_s).map_err(|(axis, cause)| AxesError { axis, cause })
     }
 }
 
 impl<R: Real> AxisConfig<R> {
-    /// The axis for a control tick of `tick_s`, with position set-points delayed by `preview_ticks`. Background.
+    /// The axis for a control tick of `tick_s`, with position set-points delayed by `preview_ticks`.
+    /// Background.
     ///
     /// # Errors
     /// The first figure that is out of its range or beyond the number type's.
@@ -202,12 +204,12 @@ impl<R: Real> AxisConfig<R> {
     }
 }
 
-/// What changes about an axis from tick to tick.
+/// The state of an axis, which changes from tick to tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisState<R> {
     /// Added to the encoder's position: set by homing.
     pub offset: Position,
-    /// The regulator's.
+    /// The regulator's state.
     pub regulator: RegulatorState<R>,
     /// Largest |following error| since it was last cleared \[mm\].
     pub peak_following_error_mm: R,
@@ -217,20 +219,20 @@ pub struct AxisState<R> {
 /// The outcome of one tick of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisOutput<R> {
-    /// What the encoder read at the start of the tick.
+    /// The encoder's reading at the start of the tick.
     pub counts: Counts,
-    /// The position set-point that is regulated to: the present one, or a past one where there is a preview.
+    /// The position set-point that is regulated to: the present one, or a past one if there is a preview.
     pub set: Position,
     /// Actual position from the encoder.
     pub actual: Position,
     /// Following error: set-point − actual \[mm\].
     pub following_error_mm: R,
-    /// What the converter is to put out.
+    /// The code for the converter.
     pub code: DacCode,
     /// The output reached the limit.
     pub saturated: bool,
-    /// The following error is beyond its limit, or another guard found the axis broken. Then no gain is applied to it: the
-    /// output is that of standing still.
+    /// The following error is beyond its limit, or another guard found the axis broken. Then no gain is
+    /// applied to it: the output is that of standing still.
     pub lost: bool,
 }
 
@@ -241,7 +243,8 @@ impl<R: Real> AxisState<R> {
         self.guard = Guard::at(counts);
     }
 
-    /// Declares a reading of the encoder, not the present one, to be `position`. What guards remember are counts, and stays.
+    /// Declares a reading of the encoder, not the present one, to be `position`. The guards remember counts,
+    /// so their state stays valid.
     #[inline]
     pub(crate) fn refer(&mut self, config: &AxisConfig<R>, counts: Counts, position: Position) {
         self.offset = position - config.encoder.position(counts);
@@ -253,7 +256,7 @@ impl<R: Real> AxisState<R> {
         config.encoder.position(counts) + self.offset
     }
 
-    /// Gives up what the regulator remembers and takes the actual position for the set position, which it returns.
+    /// Resets the regulator and takes the actual position as the set position, which it returns.
     #[inline(never)]
     pub(crate) fn stand_here(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) -> Position {
         output.set = self.position(config, output.counts);
@@ -262,7 +265,7 @@ impl<R: Real> AxisState<R> {
         output.set
     }
 
-    /// The output of an axis whose drive is off: the voltage at which it stands still. In and out as
+    /// The output of an axis whose drive is off: the voltage at which it stands still. `output` is used as in
     /// [`AxisState::tick`].
     #[inline]
     pub(crate) fn stand_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) {
@@ -271,7 +274,7 @@ impl<R: Real> AxisState<R> {
         self.regulator.watch(error_mm);
     }
 
-    /// The output of [`AxisState::stand_still`]; returns the error that the regulator is to remember.
+    /// Makes the output of [`AxisState::stand_still`]; returns the error that the regulator is to remember.
     #[inline]
     fn hold_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) -> R {
         let AxisOutput { counts, set, .. } = *output;
@@ -285,16 +288,16 @@ impl<R: Real> AxisState<R> {
             saturated: false,
             lost: false,
         };
-        // No change from here to the next tick is beyond what the gains were accepted for.
+        // Clamped, so that the change to the next tick is within what the gains were accepted for.
         let limit_mm = config.following_error_limit_mm;
         output.following_error_mm.max(-limit_mm).min(limit_mm)
     }
 
-    /// One control tick: `setpoint` is the present one, of which feedforward is made; `output` comes with what the
-    /// encoder read and the position to regulate to, and leaves with the rest.
+    /// One control tick. Feedforward is made of `setpoint`, the present one. On entry `output` has the
+    /// encoder's reading and the position to regulate to; on return it is complete.
     ///
-    /// Beyond the limit of the following error the axis is lost and its regulator does not move: what a broken encoder
-    /// makes of the gains may be beyond the number type.
+    /// Beyond the limit of the following error the axis is lost and its regulator does not move: with a
+    /// broken encoder, the gains' products may exceed the number type.
     // Not inlined: three copies of it would fight for the registers.
     #[inline(never)]
     pub fn tick(&mut self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, output: &mut AxisOutput<R>) {
@@ -325,7 +328,7 @@ impl<R: Real> AxisState<R> {
         output.lost = true;
     }
 
-    /// Forgets what was seen of the axis before its drive was enabled.
+    /// Forgets what the guard saw before the drive was enabled.
     pub(crate) fn restart_guard(&mut self) {
         self.guard.restart();
     }

@@ -1,7 +1,7 @@
 //! Preview: position set-points are delayed, feedforward is not, so it comes before the position.
 //!
-//! All axes are delayed alike, by the same whole number of ticks: the path stays what it is, and is driven later by a
-//! few milliseconds. In the tick, one place read and written.
+//! All axes are delayed alike, by the same whole number of ticks: the path stays the same and is driven a few
+//! milliseconds later. In the tick; one place is read and written.
 
 use super::AxisFigures;
 use super::scale::ScaleError;
@@ -11,13 +11,14 @@ use crate::units::Position;
 
 /// Greatest delay \[ticks\].
 pub const PREVIEW_TICKS_MAX: u8 = 24;
-/// A lead of so many ticks exactly is not one more, or less, for rounding \[ticks\].
+/// Tolerance \[ticks\], so that rounding does not turn a lead of whole ticks into one tick more or less.
 pub const LEAD_ROUNDING_TICKS: f64 = 1e-6;
 
-/// The delay that all axes share: the whole ticks that the longest lead needs.
+/// The delay that all axes share, in whole ticks: as many as the longest lead needs.
 ///
 /// # Errors
-/// A lead is not finite, negative, or longer than [`PREVIEW_TICKS_MAX`] ticks; with the axis, from 0.
+/// A lead is not finite, negative, or longer than [`PREVIEW_TICKS_MAX`] ticks; returned with its axis,
+/// from 0.
 pub(super) fn preview_ticks(axes: &[AxisFigures], tick_s: f64) -> Result<u8, (usize, ScaleError)> {
     let mut most = 0;
     for (axis, figures) in rolled(axes).iter().enumerate() {
@@ -44,7 +45,8 @@ pub(crate) struct Preview<const AXES: usize> {
 }
 
 impl<const AXES: usize> Preview<AXES> {
-    /// A machine that has been at rest at `position`, delayed by `ticks`, at most [`PREVIEW_TICKS_MAX`].
+    /// The preview of a machine that has been at rest at `position`, delayed by `ticks`, at most
+    /// [`PREVIEW_TICKS_MAX`].
     #[must_use]
     pub(crate) fn new(ticks: u8, position: [Position; AXES]) -> Self {
         let past = [[Position::ZERO; AXES]; PREVIEW_TICKS_MAX as usize];
@@ -59,7 +61,7 @@ impl<const AXES: usize> Preview<AXES> {
         self.ticks
     }
 
-    /// As if the machine had always been at `position`.
+    /// Resets as if the machine had always been at `position`.
     #[inline(never)]
     pub(crate) fn rest_at(&mut self, position: [Position; AXES]) {
         for past in rolled(self.past.as_mut_slice()) {
@@ -75,7 +77,7 @@ impl<const AXES: usize> Preview<AXES> {
         }
     }
 
-    /// The positions of `ticks` ago, into `set`; remembers those of now.
+    /// Writes the positions of `ticks` ago to `set`; remembers the present ones.
     #[inline]
     pub(crate) fn delay<'a, R: 'a>(
         &mut self,

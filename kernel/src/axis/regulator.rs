@@ -4,10 +4,10 @@
 //! U = kp·ε + kd·Δε + ki·Σε + F_V(V) + F_a(a) + F_J(J)
 //! ```
 //!
-//! ε is the following error; V, a, J are the commanded velocity, acceleration and jerk of this tick; the F are
-//! [`super::feedforward`].
-//! P, PI, PD, PID and open loop are choices of the gains. Gains are given in units of time, so they
-//! keep their meaning when the tick changes; [`AxesConfig`](super::AxesConfig) turns them into per-tick factors.
+//! ε is the following error; V, a, J are the commanded velocity, acceleration and jerk of this tick; the F
+//! are [`super::feedforward`]. P, PI, PD, PID and open loop are choices of the gains. Gains have units of
+//! time, so they keep their meaning when the tick changes; [`AxesConfig`](super::AxesConfig) turns them into
+//! per-tick factors.
 //!
 //! **Anti-windup**: while the output is at its limit, the sum takes no error that would drive the
 //! output farther out.
@@ -39,7 +39,7 @@ pub struct Regulator<R> {
     feedforward: FeedforwardConfig<R>,
 }
 
-/// What the regulator remembers.
+/// The regulator's state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RegulatorState<R> {
     /// ki·Σε \[mm/s\]: in units of the output, so that a new ki does not move it.
@@ -47,7 +47,7 @@ pub struct RegulatorState<R> {
     /// ε of the tick before \[mm\].
     last_error_mm: R,
     feedforward: FeedforwardState<R>,
-    /// Added to the command \[mm/s\]: what was learnt of this stretch.
+    /// The learnt correction of this stretch, added to the command \[mm/s\].
     pub correction_mm_s: R,
 }
 
@@ -56,12 +56,12 @@ pub struct RegulatorState<R> {
 pub struct Command<R> {
     /// Velocity command \[mm/s\].
     pub velocity_mm_s: R,
-    /// It was cut at a limit.
+    /// The command was cut at a limit.
     pub saturated: bool,
 }
 
 impl<R: Real> RegulatorState<R> {
-    /// A tick without output: the next one has no derivative kick.
+    /// Notes a tick without output, so that the next one has no derivative kick.
     #[inline]
     pub fn watch(&mut self, error_mm: R) {
         self.last_error_mm = error_mm;
@@ -78,8 +78,8 @@ impl<R: Real> Regulator<R> {
     /// The regulator for a control tick of `tick_s`, position set-points delayed by `preview_ticks`, and
     /// following errors up to `error_limit_mm`, beyond which the axis faults.
     ///
-    /// Refused where a gain or the tick is not finite, kp, ki or kd is negative, the tick is not positive, a gain at
-    /// the error limit is beyond the number type's range, or feedforward is.
+    /// Refused if a gain or the tick is not finite, kp, ki or kd is negative, the tick is not positive, or a
+    /// gain at the error limit or feedforward is beyond the number type's range.
     pub(super) fn new(
         check: &mut Check,
         gains: Gains,
@@ -126,10 +126,10 @@ impl<R: Real> Regulator<R> {
     }
 }
 
-/// A gain that what it is applied to takes to `per_mm` times itself at most.
+/// A gain whose product with the input is at most `per_mm` times the gain.
 #[inline(never)]
 fn gain<R: Real>(check: &mut Check, quantity: &'static str, value: f64, per_mm: f64) -> R {
-    // With room for the sum of all the terms.
+    // Leaves room for the sum of all terms.
     let fits = is_within(value, 0.0, f64::MAX) && fits::<R>(value) && fits::<R>(8.0 * value * per_mm);
     check.that(fits, quantity, value, "a number within the kernel's range, not below 0");
     R::from_f64(value)

@@ -1,6 +1,6 @@
 //! Units of an axis: encoder counts ↔ mm, velocity command ↔ volts ↔ converter code.
 //!
-//! The only place where these meet. Configuration, made in the background from f64 figures.
+//! The only place where these units meet. Configuration, made in the background from f64 figures.
 
 use super::check::{Check, fits};
 use crate::num::{Real, whole};
@@ -12,7 +12,7 @@ use crate::units::{Counts, DacCode, Position};
 pub struct ScaleError {
     /// The quantity, with its unit.
     pub quantity: &'static str,
-    /// What was given.
+    /// The value given.
     pub value: f64,
     /// What is expected.
     pub expected: &'static str,
@@ -30,14 +30,13 @@ impl core::error::Error for ScaleError {}
 /// position step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderScale {
-    /// mm per count in 2⁻⁶⁴ mm, in halves; the sign is the upper one's.
+    /// mm per count in 2⁻⁶⁴ mm, in two halves; the upper one has the sign.
     step_high: i32,
     step_low: u32,
 }
 
 impl EncoderScale {
-    /// `mm_per_count` mm a count, positive counts in positive direction; negative for an encoder that
-    /// counts the other way.
+    /// A scale of `mm_per_count` mm per count; negative for an encoder that counts in the negative direction.
     ///
     /// Refused unless |mm_per_count| is from 10⁻⁸ to 0.5 mm, exclusive.
     pub(super) fn new(check: &mut Check, mm_per_count: f64) -> Self {
@@ -47,7 +46,7 @@ impl EncoderScale {
         let (upper, rest) = digits(size);
         let (lower, rest) = digits(rest);
         let step = (upper << 32 | lower).cast_signed();
-        // Rounded down: what is left of a negative one makes it the next lower.
+        // Rounded down: the remainder of a negative value makes it the next lower one.
         let step = match (mm_per_count < 0.0, rest > 0.0) {
             (false, _) => step,
             (true, false) => step.wrapping_neg(),
@@ -60,7 +59,7 @@ impl EncoderScale {
     #[inline]
     #[must_use]
     pub fn position(&self, counts: Counts) -> Position {
-        // Halves times halves; what is beyond 64 bits is beyond the range.
+        // Halves times halves; a product beyond 64 bits is beyond the range.
         let (counts_high, counts_low) = (counts.0 >> 32, counts.0 & 0xFFFF_FFFF);
         let (step_high, step_low) = (i64::from(self.step_high), i64::from(self.step_low));
         let lowest = ((counts_low as u64).wrapping_mul(step_low as u64) >> 32) as i64;
@@ -76,7 +75,7 @@ impl EncoderScale {
     }
 }
 
-/// The first 32 binary digits of a fraction, and what is behind them.
+/// The first 32 binary digits of a fraction, and the rest.
 fn digits(fraction: f64) -> (u64, f64) {
     let scaled = fraction * 4_294_967_296.0;
     let digits = whole(scaled);
@@ -97,8 +96,8 @@ impl<R: Real> OutputScale<R> {
     /// `offset_v` is added to every output so that a command of 0 holds the drive still;
     /// `limit_v` bounds the output.
     ///
-    /// Refused where the gain is 0, not finite or beyond the number type, the limit is not in (0, 10\] V, or the trim
-    /// is not below the limit.
+    /// Refused if the gain is 0, not finite or beyond the number type, the limit is not in (0, 10\] V, or the
+    /// trim is not below the limit.
     pub(super) fn new(check: &mut Check, mm_s_at_10_v: f64, offset_v: f64, limit_v: f64) -> Self {
         let full = DacCode::FULL_SCALE_V;
         let is_limit = limit_v > 0.0 && limit_v <= full;
@@ -109,7 +108,7 @@ impl<R: Real> OutputScale<R> {
         let (codes_per_mm_s, offset_codes) =
             (volts_per_mm_s * DacCode::PER_VOLT, offset_v * DacCode::PER_VOLT);
         let (down, up) = ((limit_v + offset_v) / volts_per_mm_s, (limit_v - offset_v) / volts_per_mm_s);
-        // Where the gain is not finite, limits are not.
+        // If the gain is not finite, neither are the limits.
         let fits = fits::<R>(codes_per_mm_s) && fits::<R>(offset_codes) && fits::<R>(down) && fits::<R>(up);
         let expected = "a number other than 0 within the kernel's range";
         check.that(fits, "velocity at 10 V [mm/s]", mm_s_at_10_v, expected);

@@ -1,9 +1,9 @@
 //! The tick's first half: from the two streams to set-points.
 //!
-//! Consumes feed segments and pieces; produces the motion along the path and a [`Setpoint`] for every
-//! axis, each tick. Everything ends at its exact time inside a tick: what is left of the tick is
-//! spent on what follows, so a program's duration is its plan's to the tick. Every stretch ends
-//! exactly at its end point, at rest.
+//! Consumes feed segments and pieces; produces the motion along the path and a [`Setpoint`] for every axis,
+//! each tick. Everything ends at its exact time inside a tick: the rest of the tick is spent on the next
+//! item, so a program's duration equals its plan's to the tick. Every stretch ends exactly at its end point,
+//! at rest.
 //!
 //! Bound: `STEPS_PER_TICK_MAX` phase changes, [`PIECES_PER_TICK_MAX`]
 //! pieces; no solver, no division. Fails by [`ExecFault`] only.
@@ -42,12 +42,12 @@ use walk::{WalkError, Walker};
 
 pub use walk::PIECES_PER_TICK_MAX;
 
-/// Greatest number of steps of the executor within one tick. A segment takes up to three for its phases, and one
-/// more to begin, where it is the first of a stretch or had not arrived in time; so do the segments that end in the
-/// tick and the one that begins in it. A dwell takes two.
+/// Greatest number of steps of the executor within one tick. A segment takes up to three for its phases, and
+/// one more to begin if it is the first of a stretch or was late. This holds for the segments that end in the
+/// tick and for the one that begins in it. A dwell takes two.
 pub(crate) const STEPS_PER_TICK_MAX: usize = 4 * (SEGMENTS_PER_TICK_MAX + 1) + 1;
 
-/// What the executor is doing.
+/// The executor's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ExecState {
@@ -63,7 +63,7 @@ pub enum ExecState {
     Held,
 }
 
-/// Why the executor can't go on. Latched by the kernel.
+/// Why the executor can't continue. Latched by the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ExecFault {
@@ -82,11 +82,11 @@ pub enum ExecFault {
 /// The result of one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Executed<R, const AXES: usize> {
-    /// What the executor is doing at the end of the tick.
+    /// The executor's state at the end of the tick.
     pub state: ExecState,
     /// The motion along the path; `s` counts from the stretch's start, 0 at rest between stretches.
     pub motion: PathMotion<R>,
-    /// Stretches finished since the start.
+    /// Number of stretches finished since the start.
     pub stretches: u32,
     /// Program line of the current piece; 0 at rest.
     pub line: u32,
@@ -120,7 +120,7 @@ pub struct Executor<R: Real, const AXES: usize> {
 }
 
 impl<R: Real, const AXES: usize> Executor<R, AXES> {
-    /// At rest at `position`.
+    /// An executor at rest at `position`.
     #[must_use]
     pub fn new(position: [Position; AXES]) -> Self {
         Self { activity: Activity::Rest, walker: Walker::new(position), stretches: 0 }
@@ -139,7 +139,7 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         executed
     }
 
-    /// Whether nothing is under way: at rest between stretches, dwelling or stopped.
+    /// Whether no stretch is under way: at rest between stretches, dwelling or stopped.
     pub fn is_at_rest(&self) -> bool {
         !matches!(self.activity, Activity::Moving(_) | Activity::Between { .. })
     }
@@ -154,15 +154,15 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     /// One control tick.
     ///
     /// # Errors
-    /// The streams ran dry inside a stretch, or held more than the tick's bound. The executor's state
-    /// is then of no further use; the kernel latches the fault.
+    /// The streams ran dry inside a stretch, or held more than the tick's bound. The executor's state is then
+    /// invalid; the kernel latches the fault.
     pub fn tick(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<Executed<R, AXES>, ExecFault> {
         let mut executed = self.resting();
         self.tick_into(intake, &mut executed)?;
         Ok(executed)
     }
 
-    /// [`Executor::tick`] into `executed`, whose set-points are those of the tick before.
+    /// [`Executor::tick`] into `executed`, which holds the set-points of the tick before.
     #[inline]
     pub(crate) fn tick_into(
         &mut self,
@@ -176,7 +176,8 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         }
         match self.advance(intake)? {
             Some(motion) => {
-                // In this order: where the path has run dry, motion and set-points stay those of the tick before.
+                // In this order: if the path has run dry, motion and set-points stay those of the tick
+                // before.
                 executed.line =
                     self.walker.follow(&motion, intake, &mut executed.setpoints).map_err(walk_fault)?;
                 executed.motion = motion;
@@ -198,8 +199,8 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         Ok(())
     }
 
-    /// Goes over to the feed list that is asked for: between two items, or within one that the new list repeats. What
-    /// can't be followed any more is refused.
+    /// Changes to the feed list asked for: between two items, or within one that the new list repeats.
+    /// Refuses a change that is too late.
     #[cold]
     fn change_over(&mut self, intake: &mut Intake<'_, R, AXES>) {
         let carried = match (&self.activity, intake.feed(), intake.feed_after_change()) {
@@ -230,7 +231,7 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         }
     }
 
-    /// Spends one tick's time on what is queued: the motion at the tick's end, inside a stretch.
+    /// Spends one tick's time on the queued items; returns the motion at the tick's end, if inside a stretch.
     #[inline]
     fn advance(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<Option<PathMotion<R>>, ExecFault> {
         let mut left = Ticks::ONE;
@@ -244,7 +245,7 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
                     if !moving.next_phase(segment) {
                         self.activity = moving.ended(segment);
                         intake.drop_feed();
-                        // What follows is most often there; where it is not, the next step sees to it.
+                        // The next item is usually there; if not, the next step handles it.
                         self.go_on(intake)?;
                     }
                 }
@@ -288,7 +289,7 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
         Err(ExecFault::TooManySegments)
     }
 
-    /// From between two segments to the next one, or to the stretch's end, if it is there.
+    /// Continues from between two segments to the next one, or to the stretch's end, if it is there.
     #[inline]
     fn go_on(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), ExecFault> {
         match (&self.activity, intake.feed()) {

@@ -1,4 +1,4 @@
-//! A feed segment under way: which phase, and how far into it. The segment itself stays in its queue.
+//! A feed segment under way: its phase, and the time in it. The segment itself stays in its queue.
 
 use super::Activity;
 use crate::law::{FeedSegment, PathMotion, Phase, Ticks};
@@ -10,9 +10,9 @@ pub(super) struct Moving {
     /// Path position of the segment's start.
     start: Position,
     phase: Phase,
-    /// Time that the phase still takes.
+    /// Time left in the phase.
     left: Ticks,
-    /// The normalised time in it, in 2⁻⁶⁴.
+    /// The normalised time in the phase, in 2⁻⁶⁴.
     fraction: u64,
 }
 
@@ -29,7 +29,7 @@ impl Moving {
         Self { start, phase, left, fraction: 0 }
     }
 
-    /// Spends `time` ≤ 1 tick in the phase. If the phase ends by then: what is left of the time.
+    /// Spends `time` ≤ 1 tick in the phase. If the phase ends by then, returns the rest of the time.
     #[inline]
     pub(super) fn spend<R: Real>(&mut self, segment: &FeedSegment<R>, time: Ticks) -> Option<Ticks> {
         let over = time.minus(self.left);
@@ -42,7 +42,7 @@ impl Moving {
         over
     }
 
-    /// Goes on to the next phase that takes time; false if that was the last one.
+    /// Continues with the next phase that takes time; false if that was the last one.
     #[inline]
     pub(super) fn next_phase<R: Real>(&mut self, segment: &FeedSegment<R>) -> bool {
         let next = |phase| (phase, segment.phase_duration(phase));
@@ -55,7 +55,8 @@ impl Moving {
         left > Ticks::ZERO
     }
 
-    /// The same place in `segment`, which repeats the beginning of `before`; `None` if that ends here already.
+    /// The same place in `segment`, which repeats the beginning of `before`; `None` if `segment` has already
+    /// ended here.
     #[cold]
     pub(super) fn carried_over<R: Real>(
         &self,
@@ -65,26 +66,26 @@ impl Moving {
         let elapsed = before.phase_duration(self.phase).minus(self.left)?;
         let left = segment.phase_duration(self.phase).minus(elapsed)?;
         let fraction = match self.phase {
-            // As long a phase in both, but for where it ends.
+            // The same phase in both, except where it ends.
             Phase::Rise => self.fraction,
-            // The turn that the other one was to make has been passed.
+            // The place where `segment` is cut has been passed.
             Phase::Hold if before.phase_duration(Phase::Rise) != segment.phase_duration(Phase::Rise) => {
                 return None;
             }
             Phase::Hold => segment.fraction_after(Phase::Hold, elapsed),
-            // What falls back can't be ended earlier.
+            // A falling acceleration can't be ended earlier.
             Phase::Fall => return None,
         };
         Some(Self { start: self.start, phase: self.phase, left, fraction })
     }
 
-    /// The phase, and the time that it still takes.
+    /// The phase, and the time left in it.
     #[inline]
     pub(super) fn inside(&self) -> (Phase, Ticks) {
         (self.phase, self.left)
     }
 
-    /// What follows the segment's end.
+    /// The activity after the segment's end.
     #[inline]
     pub(super) fn ended<R: Real>(&self, segment: &FeedSegment<R>) -> Activity<R> {
         Activity::Between { s: self.start + segment.length(), v_mm_s: segment.as_ramp().to_mm_s }

@@ -1,7 +1,7 @@
 //! Walking from piece to piece.
 //!
-//! Consumes the path stream, up to [`PIECES_PER_TICK_MAX`] pieces a tick; produces the set-points at
-//! a path position. In the tick.
+//! Consumes the path stream, up to [`PIECES_PER_TICK_MAX`] pieces per tick; produces the set-points at a path
+//! position. In the tick.
 
 use crate::law::PathMotion;
 use crate::num::Real;
@@ -9,15 +9,15 @@ use crate::path::Setpoint;
 use crate::queue::{Intake, PathItem};
 use crate::units::Position;
 
-/// How many pieces may end within one tick, whatever stretches they belong to. At 20 m/min and 0.5 ms
-/// a tick that is pieces of 10 µm. Planning must refuse a denser program; the executor's fault is the
-/// last line of defence.
+/// Greatest number of pieces that may end within one tick, across stretches. At 20 m/min and ticks of 0.5 ms
+/// these are pieces of 10 µm. Planning must refuse a denser program; the executor's fault is the last line of
+/// defence.
 pub const PIECES_PER_TICK_MAX: usize = 16;
 
 /// How far a stretch may start from where the machine stands \[mm\]: rounding of f32 over a piece.
 const START_TOLERANCE: Position = Position::from_bits(1 << 16);
 
-/// Why the walk can't go on.
+/// Why the walk can't continue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WalkError {
     /// The next piece has not arrived.
@@ -28,7 +28,7 @@ pub(super) enum WalkError {
     NotHere,
 }
 
-/// Where on the path the machine is. The piece itself stays in its queue, at the head.
+/// The machine's place on the path. The piece itself stays at the head of its queue.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Walker<const AXES: usize> {
     /// The head of the path stream is the piece under way.
@@ -37,7 +37,7 @@ pub(super) struct Walker<const AXES: usize> {
     piece_start: Position,
     /// Where the machine rests between stretches.
     rest: [Position; AXES],
-    /// How many more pieces may end in this tick.
+    /// Number of pieces that may still end in this tick.
     ends_left: usize,
 }
 
@@ -46,14 +46,14 @@ impl<const AXES: usize> Walker<AXES> {
         Self { is_on_piece: false, piece_start: Position::ZERO, rest, ends_left: PIECES_PER_TICK_MAX }
     }
 
-    /// A new tick: the bound starts anew.
+    /// Begins a tick: resets the bound.
     #[inline]
     pub(super) fn start_tick(&mut self) {
         self.ends_left = PIECES_PER_TICK_MAX;
     }
 
-    /// Goes forward to the piece that contains path position `s`: the set-points there, into `setpoints`, and
-    /// the piece's program line.
+    /// Moves forward to the piece that contains path position `s`; writes the set-points there to `setpoints`
+    /// and returns the piece's program line.
     #[inline]
     pub(super) fn follow<R: Real>(
         &mut self,
@@ -71,7 +71,7 @@ impl<const AXES: usize> Walker<AXES> {
             }
             let local = motion.s - self.piece_start;
             if local <= piece.length() {
-                // A rounding step back over the junction is still its piece's start.
+                // A rounding step back over the junction still is the piece's start.
                 piece.set(local.max(Position::ZERO).to_offset(), motion, setpoints);
                 return Ok(piece.program_line());
             }
@@ -81,7 +81,7 @@ impl<const AXES: usize> Walker<AXES> {
         Err(WalkError::TooManyPieces)
     }
 
-    /// Ends the stretch: what is left of its pieces is passed, and the machine rests at its end.
+    /// Ends the stretch: passes the rest of its pieces; the machine rests at its end.
     #[inline]
     pub(super) fn finish<R: Real>(&mut self, intake: &mut Intake<'_, R, AXES>) -> Result<(), WalkError> {
         for _ in 0..PIECES_PER_TICK_MAX + 1 {

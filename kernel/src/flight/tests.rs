@@ -50,7 +50,7 @@ impl Random {
     }
 }
 
-/// Every figure of the row beside what the tick says.
+/// Every figure of the row compared with the tick's trace.
 fn is_of<R: Real>(row: &FlightRow<R, 2>, trace: &Trace<R, 2>) -> bool {
     let executed = &trace.executed;
     row.tick == trace.tick
@@ -69,7 +69,8 @@ fn is_of<R: Real>(row: &FlightRow<R, 2>, trace: &Trace<R, 2>) -> bool {
         })
 }
 
-/// A history of random length with a fault somewhere or nowhere, cleared and gone on with; the oracle keeps all of it.
+/// A history of random length with a fault somewhere or nowhere, cleared and gone on with; the oracle keeps
+/// all of it.
 fn keeps_what_a_list_keeps<R: Real, const ROWS: usize, const AFTER: usize>(seed: u64) -> (bool, bool) {
     let random = Random::new(seed);
     let mut recorder = FlightRecorder::<R, 2, ROWS, AFTER>::new();
@@ -93,7 +94,7 @@ fn keeps_what_a_list_keeps<R: Real, const ROWS: usize, const AFTER: usize>(seed:
             tick += 1;
             recorder.add(&trace);
             all.push(trace);
-            // What is kept: all up to so many behind the fault, of those the last.
+            // Kept rows: the last of those up to `AFTER` ticks after the fault.
             let end = all.len().min(usize::try_from(faulty).expect("few").saturating_add(1 + AFTER));
             let kept = &all[end.saturating_sub(ROWS)..end];
             assert_eq!(recorder.rows().len(), kept.len(), "seed {seed}, tick {index}");

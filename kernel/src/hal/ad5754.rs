@@ -1,8 +1,8 @@
 //! AD5754-class quad 16-bit ±10 V converter on an SPI bus, as velocity output.
 //!
-//! Consumes [`DacCode`]s, once a tick; produces 24-bit frames through the `ad57xx` driver. A tick
-//! costs `AXES + 1` frames, each its own chip-select cycle: with three axes 96 bits, 3.2 µs at 30 MHz
-//! plus the chip-select gaps. [`Ad5754Output::setup`] runs in the background, before the first tick.
+//! Consumes [`DacCode`]s, once per tick; produces 24-bit frames through the `ad57xx` driver. A tick costs
+//! `AXES + 1` frames, each its own chip-select cycle: with three axes 96 bits, 3.2 µs at 30 MHz plus the
+//! chip-select gaps. [`Ad5754Output::setup`] runs in the background, before the first tick.
 //!
 //! # Wiring this relies on
 //!
@@ -138,7 +138,7 @@ impl<SPI: SpiDevice, const AXES: usize> Ad5754Output<SPI, AXES> {
     pub fn setup<D: DelayNs>(spi: SPI, delay: &mut D) -> Result<Self, Ad5754Error<SPI::Error>> {
         let () = Self::AXES_FIT;
         let mut chip = Ad57xxShared::new_ad57x4(spi);
-        // Clear code 0 V; CLR_SELECT would make it the negative end of the range.
+        // Clear code 0 V; With CLR_SELECT it would be the negative end of the range.
         let configuration =
             Config::new().with_sdo_disable(false).with_clr_select(false).with_clamp_enable(true);
         chip.set_config(configuration).map_err(in_frame(Ad5754Frame::Configuration))?;

@@ -1,7 +1,7 @@
 //! The machine's digital inputs: drives' ready and fault lines, switches, emergency stop.
 //!
-//! Produced by a board once a tick, all axes at once; one byte an axis. Every input is said as what it means: a switch
-//! that opens where it is reached is inverted by the board, so a broken wire reads as reached.
+//! Produced by a board once per tick, all axes at once; one byte per axis. Every input has its logical
+//! meaning: the board inverts a switch that opens when it is reached, so a broken wire reads as reached.
 
 /// The digital inputs of one axis.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -15,7 +15,7 @@ impl AxisInputs {
     const LIMIT_HIGH: u8 = 1 << 3;
     const HOME: u8 = 1 << 4;
 
-    /// A drive that is ready, and no switch that is reached.
+    /// The drive is ready, and no switch is reached.
     pub const HEALTHY: Self = Self(Self::READY);
 
     /// The same with the drive's ready line as given.
@@ -48,7 +48,7 @@ impl AxisInputs {
         self.with(Self::HOME, is_reached)
     }
 
-    /// The drive is ready to move. Looked at only while it is enabled and settled.
+    /// The drive is ready to move. Checked only while the drive is enabled and settled.
     #[must_use]
     pub const fn is_ready(self) -> bool {
         self.0 & Self::READY != 0
@@ -90,7 +90,7 @@ impl AxisInputs {
         self.0
     }
 
-    /// The inputs of a record's byte; bits that mean nothing are dropped.
+    /// The inputs of a recorded byte; unused bits are dropped.
     #[must_use]
     pub const fn from_bits(bits: u8) -> Self {
         Self(bits & (Self::READY | Self::FAULT | Self::LIMIT_LOW | Self::LIMIT_HIGH | Self::HOME))
@@ -130,11 +130,11 @@ pub struct MachineInputs<const AXES: usize> {
 }
 
 impl<const AXES: usize> MachineInputs<AXES> {
-    /// What a board without inputs reads: every drive ready, no switch reached, no emergency stop. Where it is returned
-    /// as a constant, reading it compiles to nothing.
+    /// The inputs of a board without any: every drive ready, no switch reached, no emergency stop. Returned
+    /// as a constant, it compiles to nothing.
     pub const HEALTHY: Self = Self { axes: [AxisInputs::HEALTHY; AXES], emergency_stop: false };
 
-    /// Nothing but home switches differs from [`MachineInputs::HEALTHY`].
+    /// Whether nothing except home switches differs from [`MachineInputs::HEALTHY`].
     #[inline]
     #[must_use]
     pub fn is_healthy(&self) -> bool {
@@ -153,7 +153,7 @@ pub trait Inputs<const AXES: usize> {
     /// What can go wrong when the inputs are read.
     type Error;
 
-    /// All inputs as they are now, debounced as far as they need it. A board without inputs returns
+    /// All inputs as they are now, debounced as far as needed. A board without inputs returns
     /// [`MachineInputs::HEALTHY`].
     ///
     /// # Errors

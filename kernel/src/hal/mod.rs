@@ -1,9 +1,9 @@
-//! What the kernel asks of a board: a velocity output, an encoder, digital inputs and a drive enable for all axes
-//! at once.
+//! The traits that a board implements: a velocity output, an encoder, digital inputs and a drive enable, for
+//! all axes at once.
 //!
-//! All axes at once, because they have to be sampled and latched in the same instant: a circle is
-//! only round if both its axes were read at the same time. A board implements these traits in the
-//! tick's interrupt, so each call must have a bounded duration.
+//! All axes at once, because they have to be sampled and latched in the same instant: a circle is only round
+//! if both its axes are read at the same time. The tick's interrupt calls these traits, so each call must
+//! have a bounded duration.
 
 mod ad5754;
 mod extend;

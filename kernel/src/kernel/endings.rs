@@ -1,4 +1,4 @@
-//! Tests: how faults end, at the ends of what numbers hold.
+//! Tests: reactions to faults at the limits of the number types.
 
 use super::Kernel;
 use crate::axis::AxesConfig;
@@ -56,7 +56,7 @@ fn any_of_many_axes_is_judged() {
     }
 }
 
-/// What goes wrong between the order to enable the drives and the tick that would do it.
+/// A fault between the order to enable the drives and the tick that would do it.
 #[test]
 fn drives_that_are_not_on_are_not_enabled_for_a_ramp() {
     let reactions = Reactions { ramp_ticks: 20, stop_ticks: 40, emergency_stop: Reaction::Ramp };

@@ -1,4 +1,4 @@
-//! Guards of the axes, and faults that end on the path or along a ramp.
+//! Guards of the axes, and reactions on the path or along a ramp.
 
 use super::{Kernel, Power};
 use crate::axis::{AxisFault, SAMPLE_TICKS};
@@ -8,7 +8,7 @@ use crate::num::Real;
 use crate::queue::Intake;
 use crate::units::DacCode;
 
-/// How a fault ends where that takes time.
+/// A reaction that takes time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
     /// Coming to rest on the path; at rest, until the preview has passed.
@@ -31,15 +31,15 @@ impl Ending {
     }
 }
 
-/// Remembers what guards and reactions need.
+/// The state that guards and reactions need.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guards<const AXES: usize> {
     reactions: Reactions,
-    /// What was put out last.
+    /// The codes written last.
     pub(super) written: [DacCode; AXES],
-    /// What was put out when the ramp began.
+    /// The codes when the ramp began.
     ramp_from: [DacCode; AXES],
-    /// Place in the round in which the axes are sampled.
+    /// Place in the round of the axes' samples.
     pub(super) sample_ticks: u8,
 }
 
@@ -52,7 +52,7 @@ impl<const AXES: usize> Guards<AXES> {
         Self { reactions, written: still, ramp_from: still, sample_ticks: 0 }
     }
 
-    /// Where the codes of a tick are written: they are remembered for a ramp.
+    /// Where the codes of a tick are written; they are remembered for a ramp.
     #[inline]
     pub(super) fn written<'a>(&'a mut self, _: &'a mut [DacCode; AXES]) -> &'a mut [DacCode; AXES] {
         &mut self.written
@@ -66,8 +66,8 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         SAMPLE_TICKS * AXES as u8
     };
 
-    /// How the fault is ending, in the order of urgency: on the path, along a ramp, or with the drives off, which is the end
-    /// of every fault. `None` without a fault.
+    /// The reaction under way, in order of urgency: on the path, along a ramp, or with the drives off, which
+    /// ends every reaction. `None` without a fault.
     pub fn reaction(&self) -> Option<Reaction> {
         self.trace.fault.map(|_| match self.power {
             Power::Ending(Ending::Stopping { .. }) => Reaction::Stop,
@@ -103,7 +103,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
     /// Latches what broke in an axis that is lost.
     pub(super) fn judge(&mut self, axis: usize, error_mm: R) {
-        // Since its place in the round, or in the round before.
+        // Ticks since its place in this round, or in the round before.
         let place = SAMPLE_TICKS.saturating_mul(axis as u8 + 1);
         let now = self.guards.sample_ticks + 1;
         let since = if now > place { now - place } else { now + (Self::ROUND_TICKS - place) };
@@ -132,7 +132,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             (Power::On, Reaction::Stop) if self.trace.executed.state == ExecState::Moving => {
                 Power::Ending(Ending::Stopping { ticks_left: stop_ticks, is_at_rest: false })
             }
-            // What rests does not begin to move.
+            // A machine at rest does not begin to move.
             (Power::On, Reaction::Stop) => self.at_rest(),
             (Power::On | Power::Starting { .. } | Power::Ending(Ending::Stopping { .. }), _) => {
                 self.guards.ramp_from = self.guards.written;
@@ -141,7 +141,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         };
     }
 
-    /// The end of a stop: what is delayed is still to come.
+    /// The end of a stop, in which delayed set-points are still to come.
     fn at_rest(&self) -> Power {
         Power::Ending(Ending::Stopping { ticks_left: u32::from(self.preview.ticks()), is_at_rest: true })
     }

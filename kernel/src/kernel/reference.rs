@@ -1,5 +1,5 @@
-//! From one motion to the next without switching the drives: at rest inside a stretch that is given up, and at a place
-//! that gets another position. Background, between two ticks.
+//! From one motion to the next without switching the drives: at rest inside an aborted stretch, and at a
+//! place that gets another position. Background, between two ticks.
 
 use super::Kernel;
 use crate::exec::{ExecState, Executor};
@@ -7,8 +7,9 @@ use crate::num::Real;
 use crate::units::{Counts, Position};
 
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {
-    /// Gives up what is left of the motion and of the streams, drives on: behind an abort, or at a motion's end. Returns the
-    /// set position: split the streams anew for it. `None` while the machine moves, and nothing is changed.
+    /// Drops the rest of the motion and of the streams, with the drives on: after an abort, or at a motion's
+    /// end. Returns the set position: split the streams anew for it. `None` while the machine moves; then
+    /// nothing is changed.
     pub fn rest_here(&mut self) -> Option<[Position; AXES]> {
         if self.trace.executed.state == ExecState::Moving {
             return None;
@@ -18,9 +19,9 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         Some(position)
     }
 
-    /// Declares an axis to have been at `position` where its encoder read `counts`, at rest: set and actual position move
-    /// together, so that no output changes. Returns the set position: split the streams anew for it. `None` while the
-    /// machine moves, or if there is no such axis; then nothing is changed.
+    /// Declares an axis to have been at `position` where its encoder read `counts`, at rest: set and actual
+    /// position move together, so that no output changes. Returns the set position: split the streams anew
+    /// for it. `None` while the machine moves, or if there is no such axis; then nothing is changed.
     pub fn reference(&mut self, axis: usize, counts: Counts, position: Position) -> Option<[Position; AXES]> {
         let (state, config) = (self.axes.get_mut(axis)?, self.config.get(axis)?);
         let mut set = self.trace.executed.setpoints.each_ref().map(|setpoint| setpoint.position);

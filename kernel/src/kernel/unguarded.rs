@@ -1,4 +1,5 @@
-//! A kernel without guards: the limit of the following error alone is watched, and every fault is an immediate stop.
+//! A kernel without guards: only the limit of the following error is watched, and every reaction is
+//! immediate.
 
 use super::{Kernel, Power};
 use crate::fault::{FaultKind, Reaction, Reactions};
@@ -6,7 +7,7 @@ use crate::num::Real;
 use crate::queue::Intake;
 use crate::units::DacCode;
 
-/// How a fault ends where that takes time: none does.
+/// A reaction that takes time: there is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {}
 
@@ -22,12 +23,12 @@ impl Ending {
     }
 }
 
-/// Nothing is remembered.
+/// No state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guards<const AXES: usize>;
 
 impl<const AXES: usize> Guards<AXES> {
-    /// What is healthy is not worth the instructions.
+    /// Keeping healthy inputs is not worth the instructions.
     pub(super) const KEEP_INPUTS: bool = false;
 
     pub(super) fn new(_: Reactions) -> Self {
@@ -43,7 +44,7 @@ impl<const AXES: usize> Guards<AXES> {
 }
 
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {
-    /// How the fault is ending: with the drives off. `None` without a fault.
+    /// The reaction under way: drives off. `None` without a fault.
     pub fn reaction(&self) -> Option<Reaction> {
         self.trace.fault.map(|_| Reaction::Immediate)
     }

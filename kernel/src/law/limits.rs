@@ -23,15 +23,15 @@ pub struct Limits<R> {
     pub snap_mm_s4: R,
 }
 
-/// A limit that is not a positive finite number, or that the number type makes no plans with.
+/// A limit that is not positive and finite, or beyond what the number type can plan with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LimitError {
     /// The quantity: "acceleration", "jerk" or "snap".
     pub quantity: &'static str,
-    /// What was given.
+    /// The value given.
     pub value: f64,
-    /// Least and greatest that is accepted: [`Root::LIMITS`].
+    /// Least and greatest value accepted: [`Root::LIMITS`].
     pub range: (f64, f64),
 }
 
@@ -67,7 +67,7 @@ impl<R: Root> Limits<R> {
         }
     }
 
-    /// Whether plans can be made with them.
+    /// Checks whether plans can be made with them.
     ///
     /// # Errors
     /// A limit is not positive and finite, or beyond [`Root::LIMITS`].
@@ -84,8 +84,8 @@ impl<R: Root> Limits<R> {
         Ok(())
     }
 
-    /// J' = min(J_max, √(2·A_max·DJ_max/π)): the peak jerk of every ramp large enough for it; the first two terms of
-    /// (22) \[mm/s³\].
+    /// J' = min(J_max, √(2·A_max·DJ_max/π)): the peak jerk of every ramp large enough for it; the first two
+    /// terms of (22) \[mm/s³\].
     pub(super) fn peak_jerk_mm_s3(&self) -> R {
         self.jerk_mm_s3.min(self.accel_mm_s2.sqrt_product(self.snap_mm_s4 * R::from_f64(2.0 / PI)))
     }
@@ -98,9 +98,9 @@ pub struct Law<R> {
     /// J' = min(J_max, √(2·A_max·DJ_max/π)): the peak jerk of every ramp large enough for it; the
     /// first two terms of (22) \[mm/s³\].
     pub(super) jerk_mm_s3: R,
-    /// x₁ = π²J'³/(2·DJ²): up to this change of feed snap fixes the ramp \[mm/s\].
+    /// x₁ = π²J'³/(2·DJ²): up to this change of feed, snap fixes the ramp \[mm/s\].
     pub(super) snap_limited_to_mm_s: R,
-    /// x₂ = 2A²/J': from this change of feed on acceleration fixes the ramp \[mm/s\].
+    /// x₂ = 2A²/J': from this change of feed on, acceleration fixes the ramp \[mm/s\].
     pub(super) accel_limited_from_mm_s: R,
     /// (DJ/2π)^⅓: t₁ = x^⅓/(DJ/2π)^⅓ when snap fixes the ramp.
     pub(super) snap_root: R,
@@ -150,9 +150,9 @@ impl<R: Root> Law<R> {
     }
 
     /// (t₁, t₂) of a ramp that changes the feed by `change_mm_s` ≥ 0 \[s\], and what fixed them: (13), (22),
-    /// (23). Fixed point makes them up to 8 steps (1.9 ns) too long, never too short: then the limits hold
-    /// whatever the rounding. The regime is found by comparing times, because the changes of feed where
-    /// one takes over from another may be a few steps only.
+    /// (23). In fixed point they are up to 8 steps (1.9 ns) too long, never too short, so the limits hold
+    /// whatever the rounding. The regime is found by comparing times, because regimes may meet at changes of
+    /// feed of only a few steps.
     pub(super) fn times_s(&self, change_mm_s: R) -> (R, R, LimitedBy) {
         work::add(1);
         if change_mm_s <= R::ZERO {
@@ -172,8 +172,8 @@ impl<R: Root> Law<R> {
         }
     }
 
-    /// The length of path a ramp between the two feeds takes \[mm\], the same up and down: (12). Saturates
-    /// in fixed point.
+    /// The length of a ramp between the two feeds \[mm\], the same up and down: (12). Saturates in fixed
+    /// point.
     pub fn ramp_length_mm(&self, from_mm_s: R, to_mm_s: R) -> R {
         let time_s = self.ramp_time_s((to_mm_s - from_mm_s).abs());
         (from_mm_s + to_mm_s).times_per(time_s, R::from_f64(2.0))

@@ -2,16 +2,16 @@
 //!
 //! In the order it is used:
 //!
-//! - `limits`: acceleration, jerk and snap limits, and what follows from them once;
+//! - `limits`: acceleration, jerk and snap limits, and the constants that follow from them;
 //! - `shape`: the law in normalised time, the same for every ramp, evaluated in the tick;
 //! - `ramp`: one change of feed: choice of peak jerk and times, S1 (22) and (23);
-//! - `passing`: about where a ramp passes a feed, for the planner;
+//! - `passing`: bounds on where a ramp passes a feed, for the planner;
 //! - `reach`: the inverse problems, background only: highest feed reachable in a length, and
 //!   highest peak between two feeds;
 //! - `planned`: a ramp or a cruise over an exact length of path, as plans hand it on;
-//! - `segment`: the same made ready for the tick: no division is left to do.
+//! - `segment`: the same made ready for the tick, with no division left to do.
 //!
-//! Feeds are magnitudes along the path and never negative. All the functions here are pure.
+//! Feeds are magnitudes along the path and never negative. All functions here are pure.
 //!
 //! ```
 //! use motion_kernel::law::{Law, Limits, Ramp};

@@ -1,17 +1,17 @@
-//! About where an accelerating ramp passes a feed.
+//! Bounds on where an accelerating ramp passes a feed.
 //!
-//! Consumes a ramp, once, and feeds; produces two lengths between which [`Ramp::length_to_feed_mm`] lies, at a fraction of
-//! its cost: no division, two square roots. Background: the planner of ramps that span blocks asks it of every
-//! ceiling that a ramp may pass.
+//! Consumes a ramp, then feeds; produces two lengths between which [`Ramp::length_to_feed_mm`] lies, at a
+//! fraction of its cost: no division, two square roots. Background: the planner of spanning ramps uses it for
+//! every ceiling that a ramp may pass.
 
 use super::Ramp;
 use super::shape::{ABOUT_WITHIN, Shape};
 use crate::work;
 
-/// While acceleration is held the formula is exact but for its rounding, as a part of the length.
+/// Relative rounding of the length while acceleration is held, where the formula is exact.
 const HELD_WITHIN: f64 = 1.0e-12;
 
-/// What is the same for every feed that a ramp passes.
+/// The values of a ramp that are the same for every feed it passes.
 #[derive(Clone, Copy, Debug)]
 pub struct Passing {
     from_mm_s: f64,
@@ -20,7 +20,7 @@ pub struct Passing {
     length_mm: f64,
     /// The feed gained while acceleration rises \[mm/s\]: a quarter of the scale of feeds.
     curved_mm_s: f64,
-    /// One over that.
+    /// 1 / `curved_mm_s`.
     per_curved: f64,
     /// The scale of lengths: Jp·t₁³ \[mm\].
     curve_mm: f64,
@@ -29,7 +29,7 @@ pub struct Passing {
 }
 
 impl Passing {
-    /// What `ramp`, from a lower feed to a higher one, has for all of them.
+    /// Prepares `ramp`, which goes from a lower feed to a higher one.
     #[must_use]
     pub fn new(ramp: &Ramp<f64>) -> Self {
         let accel = ramp.peak_accel_mm_s2();
@@ -47,7 +47,8 @@ impl Passing {
         }
     }
 
-    /// Two lengths between which [`Ramp::length_to_feed_mm`] lies \[mm\]: less than a thousandth of the ramp's length apart.
+    /// Two lengths between which [`Ramp::length_to_feed_mm`] lies \[mm\], less than a thousandth of the
+    /// ramp's length apart.
     #[must_use]
     pub fn length_to_feed_mm(&self, feed_mm_s: f64) -> (f64, f64) {
         work::add(1);

@@ -1,7 +1,8 @@
 //! A ramp or a cruise over an exact length of path.
 //!
-//! Consumes a [`Ramp`] of any number type and the path it covers; produces the one form in which plans, programs and live
-//! control hand feed on, in f64. The tick runs it as a [`FeedSegment`] of its own number type. Background.
+//! Consumes a [`Ramp`] of any number type and the path it covers; produces the one form in which plans,
+//! programs and live control hand feed on, in f64. The tick runs it as a [`FeedSegment`] of its own number
+//! type. Background.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,12 +16,13 @@ use crate::units::Position;
 pub struct PlannedRamp {
     /// The ramp; a cruise has equal feeds and t₂ = its duration.
     pub ramp: Ramp<f64>,
-    /// The length of path, which is the ramp's own but for rounding.
+    /// The length of path: the ramp's own, but for rounding.
     pub length: Position,
 }
 
 impl PlannedRamp {
-    /// `ramp` over `length`, for ticks of `tick_s`. Number types narrower than f64 may still refuse its segment.
+    /// `ramp` over `length`, for ticks of `tick_s`. Number types narrower than f64 may still refuse its
+    /// segment.
     ///
     /// # Errors
     /// A figure is not finite, negative or too large, the lengths differ, or the feed steps.
@@ -42,10 +44,10 @@ impl PlannedRamp {
         refused.map_or(Ok(Self { ramp, length }), Err)
     }
 
-    /// What the tick runs, for ticks of `tick_s`.
+    /// The segment that the tick runs, for ticks of `tick_s`.
     ///
     /// # Errors
-    /// As [`FeedSegment::ramp`]: what was read as data is checked here.
+    /// As [`FeedSegment::ramp`]: a ramp that was read as data is checked here.
     pub fn segment<R: Real>(&self, tick_s: f64) -> Result<FeedSegment<R>, SegmentError> {
         FeedSegment::ramp(&self.ramp, self.length, tick_s)
     }

@@ -1,7 +1,7 @@
-//! One change of feed: its peak jerk, its times, and the state at any time inside it.
+//! One change of feed: its peak jerk, its times, and its state at any time.
 //!
-//! Background: the planner chooses ramps with it and reports evaluate it. The tick evaluates the
-//! same shapes through [`FeedSegment`](super::FeedSegment), which has nothing left to divide.
+//! Background: the planner chooses ramps with it, and reports evaluate it. The tick evaluates the same shapes
+//! through [`FeedSegment`](super::FeedSegment), which has nothing left to divide.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,7 @@ pub struct Ramp<R> {
     pub t1_s: R,
     /// t₂, the end of the phase of constant acceleration \[s\], ≥ t₁.
     pub t2_s: R,
-    /// What fixed J_p and t₁.
+    /// The limit that fixed J_p and t₁.
     pub limited_by: LimitedBy,
 }
 
@@ -75,15 +75,15 @@ impl<R: Root> Ramp<R> {
         let (t1_s, t2_s, limited_by) = law.times_s(change);
         let peak_jerk_mm_s3 = match limited_by {
             LimitedBy::Snap if change <= R::ZERO => R::ZERO,
-            // Divided one at a time: the square of a short time loses its digits in fixed point.
+            // Divided twice: the square of a short time loses its digits in fixed point.
             LimitedBy::Snap => (change.times_per(R::from_f64(2.0), t1_s) / t1_s).min(law.jerk_mm_s3),
             LimitedBy::Jerk | LimitedBy::Acceleration => law.jerk_mm_s3,
         };
         Self { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by }
     }
 
-    /// As [`new`](Self::new) for the law of `limits` > 0, but for rounding: cheaper than making that law for one ramp, above
-    /// all where acceleration fixes it.
+    /// As [`new`](Self::new) for the law of `limits` > 0, but for rounding. Cheaper than making that law for
+    /// one ramp, most of all if acceleration fixes the ramp.
     #[must_use]
     pub fn within(limits: &Limits<R>, from_mm_s: R, to_mm_s: R) -> Self {
         work::add(1);
@@ -114,7 +114,7 @@ impl<R: Root> Ramp<R> {
         Self { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s: rise_s, t2_s: rise_s, limited_by }
     }
 
-    /// No change of feed for `time_s`.
+    /// A constant feed for `time_s`.
     #[must_use]
     pub fn cruise(feed_mm_s: R, time_s: R) -> Self {
         Self {
@@ -132,7 +132,7 @@ impl<R: Root> Ramp<R> {
         self.peak_jerk_mm_s3 <= R::ZERO
     }
 
-    /// The same change of feed the other way.
+    /// The same change of feed in the other direction.
     #[must_use]
     pub fn reversed(self) -> Self {
         Self { from_mm_s: self.to_mm_s, to_mm_s: self.from_mm_s, ..self }
@@ -159,7 +159,7 @@ impl<R: Root> Ramp<R> {
     }
 
     /// How far into an accelerating ramp its feed passes `feed_mm_s` \[mm\]: 0 at its start and below, its
-    /// length at its end and above. Never too short but by rounding.
+    /// length at its end and above. Never too short except by rounding.
     #[must_use]
     pub fn length_to_feed_mm(&self, feed_mm_s: R) -> R {
         work::add(1);
@@ -189,9 +189,9 @@ impl<R: Root> Ramp<R> {
         }
     }
 
-    /// The motion at `t_s` after the ramp's start: (1)–(6). Before the start it is the start's,
-    /// after the end the end's, continued at constant feed. For reports; fixed point needs J_p·t₁³ below
-    /// 2³¹ mm.
+    /// The motion at `t_s` after the ramp's start: (1)–(6). Before the start it is the state at the start,
+    /// after the end the state at the end, continued at constant feed. For reports; fixed point needs J_p·t₁³
+    /// below 2³¹ mm.
     #[must_use]
     pub fn at(&self, t_s: R) -> FeedState<R> {
         let rest = |s_mm, v_mm_s| FeedState {
@@ -223,7 +223,7 @@ impl<R: Root> Ramp<R> {
                 snap_mm_s4: snap_scale.scaled(shape.snap),
             }
         } else if remaining_s < rise_s {
-            // The rising phase run backwards from the end.
+            // The rising phase, run backwards from the end.
             let shape = Shape::at((remaining_s / rise_s).to_unit());
             FeedState {
                 s_mm: self.length_mm() - (self.to_mm_s * remaining_s - length_scale.scaled(shape.length)),

@@ -5,15 +5,15 @@
 //! ever solved for. Newton's method on increasing convex functions, started above the root, falls
 //! monotonically: no bracket, no bisection, and a constant bound on the iterations.
 //!
-//! Background only; pure; generic. In f32 one unit in the last place of a feed is a ramp of up to 82 µm: that
-//! is for tests. In fixed point the solution is as good as its times are long in steps of 0.23 ns.
+//! Background only; pure; generic. In f32 one unit in the last place of a feed is a ramp of up to 82 µm, so
+//! f32 is for tests only. In fixed point the solution's precision is that of its times, in steps of 0.23 ns.
 
 use super::limits::Law;
 use super::ramp::LimitedBy;
 use crate::num::Root;
 
-/// Newton steps after which a solve ends whatever it has. Ten reach the last places in f64, nine in
-/// f32, over 20 000 random cases for each of four sets of limits; fewer are needed on most.
+/// Newton steps after which a solve ends in any case. Ten reach the last places in f64, nine in f32, over 20
+/// 000 random cases for each of four sets of limits; most need fewer.
 pub(super) const NEWTON_STEPS_MAX: usize = 12;
 
 /// The highest feed that can be reached from `lower_mm_s` within `length_mm`; equally, the highest
@@ -24,10 +24,11 @@ pub fn reach<R: Root>(law: &Law<R>, lower_mm_s: R, length_mm: R) -> R {
     fit(reached, lower_mm_s, |feed| law.ramp_length_mm(lower_mm_s, feed) <= length_mm)
 }
 
-/// Most steps down to a feed that fits, each twice as long as the one before.
+/// Greatest number of steps down to a feed that fits, each twice as long as the one before.
 const FIT_STEPS_MAX: usize = 48;
 
-/// `feed`, or the next lower one that fits, `least` if none does: an ulp of feed may be a long ramp.
+/// Returns `feed`, or the next lower one that fits, or `least` if none does: an ulp of feed may be a long
+/// ramp.
 fn fit<R: Root>(feed: R, least: R, fits: impl Fn(R) -> bool) -> R {
     let (mut low, mut high, mut step) = (feed, feed, feed.spacing());
     let mut steps = 0;
@@ -39,7 +40,7 @@ fn fit<R: Root>(feed: R, least: R, fits: impl Fn(R) -> bool) -> R {
         steps += 1;
     }
     low = low.max(least);
-    // The last step was as long as all before it together; it took as many to get there.
+    // The last step was as long as all steps before it together, and it may have gone too far: bisect it.
     for _ in 1..steps {
         let middle = low + R::from_f64(0.5) * (high - low);
         if fits(middle) {
@@ -51,14 +52,14 @@ fn fit<R: Root>(feed: R, least: R, fits: impl Fn(R) -> bool) -> R {
     low
 }
 
-/// The change of feed that [`reach`] adds; it keeps its digits where the sum would lose them.
+/// The change of feed that [`reach`] adds. It keeps digits that the sum would lose.
 fn change_within<R: Root>(law: &Law<R>, lower: R, length: R) -> R {
     if length <= R::ZERO {
         return R::ZERO;
     }
     let double_lower = lower + lower;
     let x2 = law.accel_limited_from_mm_s;
-    // The ramp by x₁ is (2F + x₁)·t₁ long with t₁ = πJ'/DJ, the one by x₂ with t₁ = 2A/J'.
+    // The ramp by x₁ has the length (2F + x₁)·t₁ with t₁ = πJ'/DJ, the one by x₂ likewise with t₁ = 2A/J'.
     if length / law.snap_time_s - double_lower <= law.snap_limited_to_mm_s {
         // x = w³, t₁ = w/k with k = (DJ/2π)^⅓:  w·(x + 2F) = k·L
         let w = root_of_power::<R, 4>(double_lower, law.snap_root, length);
@@ -84,16 +85,16 @@ fn root_of_power<R: Root, const N: usize>(p: R, k: R, length: R) -> R {
         3 => length.cbrt() * k.cbrt(),
         _ => length.sqrt_product(k).sqrt(),
     };
-    // Both are above the root sought.
+    // Both starts are above the root.
     let mut w = if p > R::ZERO { length.times_per(k, p).min(power) } else { power };
     let n = R::from_f64(N as f64);
     for step in 0..NEWTON_STEPS_MAX {
         let change = if N == 3 { w * w } else { w * w * w };
-        // Of the equation divided by w: both sides are feeds.
+        // The residual of the equation divided by w: both sides are feeds.
         let residual = change + p - length.times_per(k, w);
         let next = w - w.times_per(residual, n * change + p);
-        // The start may be below the root for its rounding; the first step lands above, the others fall.
-        // `>` and `<` also end on what is not a number.
+        // By rounding, the start may be below the root; the first step lands above it, and the others fall.
+        // `>` and `<` also end on NaN.
         if !(next > R::ZERO && (step == 0 || next < w)) {
             break;
         }
@@ -110,7 +111,7 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     let half = R::from_f64(0.5);
     let (higher, lower) = (from_mm_s.max(to_mm_s), from_mm_s.min(to_mm_s));
     let step = higher - lower;
-    // Room of no more than rounding is none: with the cube of it, the peak rises by less than that.
+    // Room within rounding counts as none: the peak would rise by less than that.
     let rounding = R::from_f64(4.0) * length_mm.spacing();
     if length_mm - law.ramp_length_mm(lower, higher) <= rounding {
         return higher;
@@ -129,7 +130,7 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     for _ in 0..NEWTON_STEPS_MAX {
         let square = y * y;
         let (change, by_y) = (square * y, three * square);
-        // While snap limits the shorter ramp, y is the cube root that its time takes.
+        // While snap limits the shorter ramp, y is the cube root in its time.
         let short_time = if change <= law.snap_limited_to_mm_s {
             ((y + y) / law.snap_root, two / law.snap_root)
         } else {
@@ -150,7 +151,7 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     fit(higher + y * y * y, higher, fits)
 }
 
-/// Duration of the ramp by `change` > 0, and its derivative by y where the change's is `by_y`.
+/// Duration of the ramp by `change` > 0, and its derivative by y; the derivative of the change is `by_y`.
 fn time<R: Root>(law: &Law<R>, change: R, by_y: R) -> (R, R) {
     let (rise, fall_start, limited_by) = law.times_s(change);
     let time = rise + fall_start;
@@ -163,7 +164,7 @@ fn time<R: Root>(law: &Law<R>, change: R, by_y: R) -> (R, R) {
     (time, slope)
 }
 
-/// Length of the ramp from `lower` by `change`, and its derivative by y, from those of its time.
+/// Length of the ramp from `lower` by `change`, and its derivative by y, from its time and that derivative.
 fn length<R: Root>(lower: R, change: R, (time, time_slope): (R, R), by_y: R) -> (R, R) {
     let half = R::from_f64(0.5);
     let mean = lower + half * change;

@@ -1,15 +1,15 @@
 //! A ramp or a cruise made ready for the tick.
 //!
-//! Consumes a [`Ramp`] of any number type and the control tick; produces a [`FeedSegment`]: the feed
-//! stream's item. All divisions and roots happen here, in the background, in f64. What is left to the
-//! tick is one [`Shape`] and a handful of products.
+//! Consumes a [`Ramp`] of any number type and the control tick; produces a [`FeedSegment`]: the feed stream's
+//! item. All divisions and roots happen here, in the background, in f64. The tick is left with one [`Shape`]
+//! and a handful of products.
 //!
-//! **Time** is counted in ticks with 32 fractional bits and divided by nothing: a phase keeps the
-//! part of itself that passes in one tick, with 64 fractional bits, and adds it up.
+//! **Time** is counted in ticks with 32 fractional bits, and the tick never divides by it: a phase adds up
+//! the fraction of itself that passes per tick, with 64 fractional bits.
 //!
-//! **Position** in a rise is F₀·t + Jp·t₁³·(x³/12 − x/(8π²) + sin 2πx/(16π³)) with x = t/t₁. All but the
-//! sine is fixed point times fractions, good to a few position steps and length·2⁻³² (1.9 nm over 8 m)
-//! whatever the number type; the sine's part, a five-hundredth of Jp·t₁³, is a `Real`.
+//! **Position** in a rise is F₀·t + Jp·t₁³·(x³/12 − x/(8π²) + sin 2πx/(16π³)) with x = t/t₁. All but the sine
+//! is fixed point times fractions, accurate to a few position steps and length·2⁻³² (1.9 nm over 8 m) in any
+//! number type; the sine's term, a five-hundredth of Jp·t₁³, is a `Real`.
 
 #[cfg(feature = "live")]
 mod cut;
@@ -60,19 +60,19 @@ impl Ticks {
         Self(self.0.saturating_add(other.0))
     }
 
-    /// So many steps of 2⁻³² tick.
+    /// A duration of `bits` steps of 2⁻³² tick.
     #[must_use]
     pub const fn from_bits(bits: u64) -> Self {
         Self(bits)
     }
 
-    /// Steps of 2⁻³² tick.
+    /// The number of steps of 2⁻³² tick.
     #[must_use]
     pub const fn to_bits(self) -> u64 {
         self.0
     }
 
-    /// What is left of `self` after `other`, or `None` if `other` is longer.
+    /// The rest of `self` after `other`, or `None` if `other` is longer.
     #[must_use]
     pub const fn minus(self, other: Self) -> Option<Self> {
         match self.0.checked_sub(other.0) {
@@ -82,13 +82,14 @@ impl Ticks {
     }
 }
 
-/// The parts of a segment, in order. A cruise has only a hold, and a ramp that is cut early has the way back there.
+/// The parts of a segment, in order. A cruise has only a hold; a ramp that is cut early returns within its
+/// hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
     /// 0 … t₁: acceleration builds up.
     Rise,
-    /// t₁ … t₂: constant acceleration, or cruise; in a cut ramp from the cut to its image.
+    /// t₁ … t₂: constant acceleration, or cruise; in a cut ramp, from the cut to its mirror image.
     Hold,
     /// t₂ … t_p: acceleration falls back to 0.
     Fall,
@@ -114,9 +115,9 @@ pub struct PathMotion<R> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum SegmentError {
-    /// A quantity is not finite or below zero, or is beyond the kernel's range.
+    /// A quantity is not finite, below zero, or beyond the kernel's range.
     OutOfRange {
-        /// Which one, with its unit.
+        /// The quantity, with its unit.
         quantity: &'static str,
         /// Its value.
         value: f64,
@@ -156,12 +157,12 @@ impl core::fmt::Display for SegmentError {
 
 impl core::error::Error for SegmentError {}
 
-/// How a phase turns ticks into its normalised time.
+/// Turns ticks into the normalised time of a phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Clock {
     duration: Ticks,
-    /// The part of the phase that passes in one tick, in 2⁻⁶⁴; for a phase shorter than a tick,
-    /// the part that passes in 2⁻³² tick.
+    /// The fraction of the phase that passes in one tick, in 2⁻⁶⁴; for a phase shorter than a tick, the
+    /// fraction that passes in 2⁻³² tick.
     step: u64,
 }
 
@@ -176,7 +177,8 @@ impl Clock {
         Self { duration, step }
     }
 
-    /// The part of the phase that passes in `time` ≤ 1 tick; in a phase that is no longer than that, less.
+    /// The fraction of the phase that passes in `time` ≤ 1 tick; `time` is less than a tick in a phase that
+    /// is not longer.
     #[inline]
     fn part(&self, time: Ticks, is_long: bool) -> u64 {
         if time == Ticks::ONE {
@@ -189,14 +191,14 @@ impl Clock {
     }
 }
 
-/// (high·2⁶⁴ + low)/by, rounded down, for high < by ≤ 2⁶³. Bit by bit: it is for the background, and a division of 128
-/// bits takes a kilobyte of flash.
+/// (high·2⁶⁴ + low)/by, rounded down, for high < by ≤ 2⁶³. Bit by bit: it is for the background, and a
+/// 128-bit division takes a kilobyte of flash.
 fn quotient(high: u64, low: u64, by: u64) -> u64 {
     (0..u64::BITS).fold([high, low], |digits, _| next_digit(digits, by))[1]
 }
 
-/// The next digit of a quotient, behind the others in the place of the dividend's digits that are used up.
-// A call, or the loop around it is unrolled.
+/// Appends the next digit of a quotient, in place of the dividend's digits that are used up.
+// Not inlined, because the loop around it would be unrolled.
 #[inline(never)]
 fn next_digit([remainder, quotient]: [u64; 2], by: u64) -> [u64; 2] {
     let (remainder, quotient) = (remainder << 1 | quotient >> 63, quotient << 1);
@@ -209,7 +211,7 @@ const fn multiply_q32(a: u64, b: u64) -> u64 {
     (a >> 32).wrapping_mul(b).wrapping_add(((a & 0xFFFF_FFFF).wrapping_mul(b)) >> 32)
 }
 
-/// `length` times a fraction in 2⁻³²: two 32×32-bit products.
+/// `length` times a fraction in 2⁻³²; two 32×32-bit products.
 #[inline]
 #[allow(clippy::cast_possible_wrap)]
 const fn portion(length: i64, fraction: u32) -> i64 {
@@ -218,7 +220,7 @@ const fn portion(length: i64, fraction: u32) -> i64 {
     high.wrapping_add(low as i64)
 }
 
-/// The product of two fractions in 2⁻³², rounded up: the fractions themselves have been rounded down.
+/// The product of two fractions in 2⁻³², rounded up, because the fractions themselves were rounded down.
 #[inline]
 #[allow(clippy::cast_possible_truncation)]
 const fn times(a: u32, b: u32) -> u32 {
@@ -232,7 +234,7 @@ pub struct FeedSegment<R> {
     ramp: Ramp<R>,
     rise: Clock,
     hold: Clock,
-    /// Where in the rise it is cut, counted from 1 downwards in 2⁻⁶⁴; 0 if it is not, see `cut`.
+    /// Where in the rise it is cut, counted from 1 downwards in 2⁻⁶⁴; 0 if it is not cut, see `cut`.
     #[cfg(feature = "live")]
     cut_at: u64,
     /// F₀·t₁ and −F·t₁ less Jp·t₁³/(8π²), and Jp·t₁³/12, in position steps.
@@ -254,10 +256,10 @@ pub struct FeedSegment<R> {
     snap_mm_s4: R,
 }
 
-/// What memory may do to a segment.
+/// Corruption of a segment in memory.
 #[cfg(all(test, feature = "guards"))]
 impl FeedSegment<f32> {
-    /// With one bit of one of its figures another one.
+    /// Flips one bit of one of its figures.
     pub(crate) fn with_flipped_bit(mut self, bit: u32) -> Self {
         let mut wide = [
             &mut self.rise_bits,
@@ -289,7 +291,7 @@ impl FeedSegment<f32> {
     }
 }
 
-/// How far a ramp's own length may be from the path it covers \[mm\]: rounding of both ends to
+/// Greatest difference between a ramp's own length and the path it covers \[mm\]: rounding of both ends to
 /// position steps, and of the ramp's figures in f64 at a kilometre.
 const LENGTH_TOLERANCE_MM: f64 = 1.0e-8;
 
@@ -314,8 +316,8 @@ impl<R: Real> FeedSegment<R> {
     fn new(ramp: &Ramp<f64>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
         let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by } = *ramp;
         let hold_s = t2_s - t1_s;
-        // The first reason why it can't be made. What follows goes on with what it has: a way out at each figure would
-        // take more flash than all that is computed.
+        // The first reason to refuse it. The computation still continues to its end: an early return at each
+        // figure would take more flash than the computation.
         let mut refused = None;
         let [rise, hold] = check(&mut refused, ramp, length, tick_s, R::RAMP_MM_MAX).map(Clock::new);
         let jerk = ramp.signed_jerk_mm_s3();
@@ -357,7 +359,7 @@ impl<R: Real> FeedSegment<R> {
             "peak snap [mm/s⁴]",
         ];
         let sine = length_scale / (16.0 * PI * PI * PI);
-        // What a narrow type can't hold must be refused here, not overflow in a tick.
+        // A value that a narrow type can't hold must be refused here, not overflow in a tick.
         let scales = made(
             &mut refused,
             scales,
@@ -427,14 +429,14 @@ impl<R: Real> FeedSegment<R> {
         self.rise.duration.plus(self.hold.duration).plus(self.rise.duration)
     }
 
-    /// The duration of a phase; phases that a segment does not have last no time.
+    /// The duration of a phase; 0 for a phase that the segment does not have.
     #[doc(hidden)]
     #[inline]
     pub fn phase_duration(&self, phase: Phase) -> Ticks {
         self.clock(phase).duration
     }
 
-    /// Only live control cuts ramps.
+    /// 0: only live control cuts ramps.
     #[inline]
     fn cut_at(&self) -> u64 {
         #[cfg(feature = "live")]
@@ -443,7 +445,7 @@ impl<R: Real> FeedSegment<R> {
         0
     }
 
-    /// The normalised time with which `phase` begins, in 2⁻⁶⁴.
+    /// The normalised time at the start of `phase`, in 2⁻⁶⁴.
     #[doc(hidden)]
     #[inline]
     pub fn fraction_at_start(&self, phase: Phase) -> u64 {
@@ -453,8 +455,8 @@ impl<R: Real> FeedSegment<R> {
         }
     }
 
-    /// What `time` ≤ 1 tick adds to the normalised time of `phase`, in 2⁻⁶⁴; a whole tick is for phases that are
-    /// longer than it.
+    /// The normalised time of `phase` that passes in `time` ≤ 1 tick, in 2⁻⁶⁴. A whole tick is allowed only
+    /// in longer phases.
     #[doc(hidden)]
     #[inline]
     pub fn fraction_in(&self, phase: Phase, time: Ticks) -> u64 {
@@ -478,8 +480,8 @@ impl<R: Real> FeedSegment<R> {
         }
     }
 
-    /// The motion at a normalised time of a phase; `s` counts from the segment's start and is never beyond its
-    /// end. In the tick.
+    /// The motion at a normalised time of a phase; `s` counts from the segment's start and is never beyond
+    /// its end. In the tick.
     #[inline(always)]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
         let is_cut = phase == Phase::Hold && self.cut_at() != 0;
@@ -488,7 +490,7 @@ impl<R: Real> FeedSegment<R> {
             let s = self
                 .hold_start_bits
                 .wrapping_add(portion(self.hold_linear_bits, x))
-                // One factor after the other: in a braking hold its error adds to that of twice the length.
+                // Multiplied twice: in a braking hold its error adds to that of twice the length.
                 .wrapping_add(portion(portion(self.hold_square_bits, x), x));
             return PathMotion {
                 s: Position::from_bits(s).min(self.length),
@@ -498,8 +500,8 @@ impl<R: Real> FeedSegment<R> {
                 snap_mm_s4: R::ZERO,
             };
         }
-        // The fall is the rise run backwards from the end, and before the middle of a cut ramp time counts towards it: the
-        // same shape, once, for all.
+        // The fall is the rise run backwards from the end, and in a cut ramp time before the middle counts
+        // towards it: one evaluation of the shape serves all cases.
         let falling = phase == Phase::Fall;
         let before = is_cut && fraction.cast_signed() < 0;
         let fraction = match (falling, before) {
@@ -546,8 +548,8 @@ pub(super) fn of_length<P: Root>(ramp: &Ramp<P>, length: Position) -> Result<Ram
     Ok(ramp)
 }
 
-/// What every number type asks of a ramp over `length`; the first reason to refuse it is kept. Returns how long it rises
-/// and holds.
+/// The checks of a ramp over `length` for every number type; the first reason to refuse it is kept. Returns
+/// the durations of rise and hold.
 #[inline]
 pub(super) fn check(
     refused: &mut Option<SegmentError>,
@@ -570,7 +572,7 @@ pub(super) fn check(
             "tick [s]",
         ],
         [from_mm_s, to_mm_s, peak_jerk_mm_s3, length.to_mm(), t1_s, hold_s, tick_s],
-        // Any type will do; with that of lengths there is no function more in the image.
+        // Any type will do; the type of lengths needs no extra function in the image.
         |value| is_within(value, 0.0, f64::MAX).then_some(Position::ZERO),
     );
     if t1_s <= 0.0 && from_mm_s != to_mm_s {
@@ -590,7 +592,7 @@ pub(super) fn check(
     phases
 }
 
-/// Each of `values` made by `make`; the first that can't be is refused by its name.
+/// Converts each of `values` by `make`; the first that can't be converted is refused by name.
 fn made<T: Copy + Default, const N: usize>(
     refused: &mut Option<SegmentError>,
     quantities: &[&'static str; N],
@@ -621,8 +623,8 @@ fn make_each<T>(
     }
 }
 
-/// The ramp in f64. Its peak jerk is what takes one feed to the other in its times, 2·|F − F₀|/(t₁·t₂): that
-/// of `P` carries the rounding of `P`, which would be a step of the feed in the middle.
+/// The ramp in f64. Its peak jerk is recomputed from its feeds and times, 2·|F − F₀|/(t₁·t₂): the rounding of
+/// `P` in the original would be a step of the feed in the middle.
 pub(crate) fn to_f64<P: Root>(ramp: &Ramp<P>) -> Ramp<f64> {
     let (from_mm_s, to_mm_s) = (ramp.from_mm_s.to_f64(), ramp.to_mm_s.to_f64());
     let (t1_s, t2_s) = (ramp.t1_s.to_f64(), ramp.t2_s.to_f64());

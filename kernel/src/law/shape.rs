@@ -10,25 +10,25 @@
 //! | length gained | Jp·t₁³ | x³/12 − x/(8π²) + sin 2πx/(16π³) |
 //! | snap | π·Jp/t₁ | sin 2πx |
 //!
-//! The middle three are differences of nearly equal terms when x is small: with a sine in f32, the
-//! length has lost every digit at x = 0.005. So it goes the other way round: feed and length are
-//! power series, and what is left of them is the sine. With y = 2x, C = 4π² times the feed gained and
-//! B = 4π² times the length gained,
+//! The middle three are differences of nearly equal terms when x is small: with a sine in f32, the length has
+//! lost every digit at x = 0.005. So it is done the other way round: feed and length are power series, and
+//! the sine follows from them. With y = 2x, C = 4π² times the feed gained and B = 4π² times the length
+//! gained,
 //!
 //! ```text
 //! jerk = π²y²/4 − C     acceleration = π²y³/24 − B     snap = π·(y − 4·acceleration)
 //! ```
 //!
-//! (the coefficients are those of [`Coefficients`](crate::num::Coefficients)), where cancelling costs jerk and acceleration less than two bits, and snap keeps its absolute error.
-//! The series run up to x = 1/2; beyond, the shapes are those at 1 − x mirrored. The falling phase is
-//! the rising one run backwards from the ramp's end, so both ends of a ramp have the full relative
-//! precision. All the coefficients and all that is computed stay below 4: fixed point of 32 bits
-//! will do.
+//! (the coefficients are those of [`Coefficients`](crate::num::Coefficients)), where cancellation costs jerk
+//! and acceleration less than two bits, and snap keeps its absolute error. The series run up to x = 1/2;
+//! beyond, the shapes are those at 1 − x mirrored. The falling phase is the rising one run backwards from the
+//! ramp's end, so both ends of a ramp have the full relative precision. All coefficients and intermediate
+//! results stay below 4, so 32-bit fixed point is enough.
 //!
-//! In the tick: two series of constant length side by side, a dozen multiplications more, no
-//! division, and no branch that depends on the time but the mirror, which is a choice of values.
+//! In the tick: two series of constant length side by side, a dozen more multiplications, no division, and no
+//! branch that depends on the time; the mirror is a selection of values.
 //!
-//! The closed forms are there too, [`Shape::closed`], with any sine of [`crate::num::sine`].
+//! [`Shape::closed`] has the closed forms, with any sine of [`crate::num::sine`].
 
 use crate::num::sine::SineCosine;
 use crate::num::{Root, SERIES_TERMS_MAX, Unit};
@@ -36,9 +36,10 @@ use crate::num::{Root, SERIES_TERMS_MAX, Unit};
 /// Newton steps after which [`Shape::where_speed_is`] has its last digit in f64.
 const SPEED_STEPS_MAX: usize = 8;
 
-/// How far [`Shape::about_where_speed_is`] may be off, in time and in length, as parts of them.
+/// Relative error of [`Shape::about_where_speed_is`], in time and in length.
 pub(super) const ABOUT_WITHIN: [f64; 2] = [1.0e-4, 6.0e-4];
-/// x/√w and the length gained over x·w² as polynomials of w = √(4·speed), interpolated in Chebyshev's nodes of \[0, 1\].
+/// x/√w and the length gained over x·w² as polynomials of w = √(4·speed), interpolated in Chebyshev's nodes
+/// of \[0, 1\].
 const ABOUT_TIME: [f64; 5] = [0.742_574_33, 0.131_734_09, 0.080_664_49, -0.031_184_95, 0.076_290_74];
 const ABOUT_LENGTH: [f64; 5] = [0.049_999_16, 0.010_402_43, 0.004_873_61, 0.002_285_99, 0.003_136_08];
 
@@ -69,18 +70,20 @@ impl Shape<f64> {
 }
 
 impl<U: Unit> Shape<U> {
-    /// Where in the phase the feed gained is `speed` of its scale, 0 … 1/4, and the shapes there. Background.
+    /// The place in the phase where the feed gained is `speed` of its scale, 0 … 1/4, and the shapes there.
+    /// Background.
     ///
-    /// Newton's method on a convex function from above: the result is never below the root but by rounding.
+    /// Newton's method on a convex function from above: the result is never below the root except by
+    /// rounding.
     pub(super) fn where_speed_is<R: Root<Unit = U>>(speed: R) -> (R, Self) {
-        // Above the root, but hardly.
+        // Just above the root.
         let above = R::from_f64(1.0 + ABOUT_WITHIN[0]);
         let mut x = (Self::about_where_speed_is(speed).0 * above).min(R::ONE);
         let mut shape = Self::at(x.to_unit());
         for _ in 0..SPEED_STEPS_MAX {
             let accel = R::ONE.scaled(shape.accel);
             let next = x - (R::ONE.scaled(shape.speed) - speed) / accel;
-            // `<` also ends on what is not a number.
+            // `<` also ends on NaN.
             if !(next < x && next > R::ZERO) {
                 break;
             }
@@ -90,9 +93,9 @@ impl<U: Unit> Shape<U> {
         (x, shape)
     }
 
-    /// About [`where_speed_is`](Self::where_speed_is), and the length gained there: both are, but for a factor, powers of
-    /// w = √(4·`speed`) near 0, and those factors are polynomials of w. They are right to
-    /// [`ABOUT_WITHIN`] of themselves.
+    /// Approximates [`where_speed_is`](Self::where_speed_is) and the length gained there, to the relative
+    /// errors [`ABOUT_WITHIN`]. Near 0 both are powers of w = √(4·`speed`) but for a factor, and these
+    /// factors are polynomials of w.
     pub(super) fn about_where_speed_is<R: Root<Unit = U>>(speed: R) -> (R, R) {
         let w = (speed * R::from_f64(4.0)).sqrt();
         let polynomial = |coefficients: &[f64; 5]| {
@@ -142,7 +145,7 @@ impl<U: Unit> Shape<U> {
     /// The shapes at `x` in \[0, 1\] as S1 writes them, with the sine of `B`: `Shape::closed::<Own>(x)`.
     ///
     /// [`Shape::at`] is better at the ramp's ends; `tests/expected/functions.md` shows by how much. In
-    /// absolute error these are the better ones for jerk, acceleration and snap.
+    /// absolute error these are better for jerk, acceleration and snap.
     #[inline]
     #[must_use]
     pub fn closed<B: SineCosine<U>>(x: U) -> Self {

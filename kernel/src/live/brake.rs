@@ -1,22 +1,22 @@
 //! Braking over the blocks ahead.
 //!
-//! Consumes a splice and the [`Lookahead`]; produces a ramp under the ceilings, junctions and limits of all the blocks that
-//! it crosses. Background.
+//! Consumes a splice and the [`Lookahead`]; produces a ramp under the ceilings, junctions and limits of all
+//! the blocks that it crosses. Background.
 
 use super::lookahead::{AheadBlock, FEED_ROUNDING, Lookahead};
 use super::splice::{SLIVER, Splice};
 use crate::law::{Law, PlannedRamp, Ramp};
 use crate::units::Position;
 
-/// Rounding that is no violation, of a length \[mm\].
+/// Tolerated rounding of a length \[mm\].
 pub(super) const LENGTH_ROUNDING_MM: f64 = 4.0e-9;
-/// How often a ramp is made anew because it crosses blocks with other limits: as often as there are limits to lower.
+/// How often a ramp is made anew because it crosses blocks with lower limits.
 const LIMITS_STEPS: usize = 8;
 
 impl<const PLACES: usize> Lookahead<PLACES> {
-    /// The fastest braking from a splice of motion under `feed_override` to `to_mm_s` that keeps the ceilings, junctions
-    /// and limits of all the blocks that it crosses, before `end`; `None` if there is
-    /// none.
+    /// The fastest braking ramp from a splice to `to_mm_s`: under `feed_override`, ending no
+    /// later than `end`, and within the ceilings, junctions and limits of all blocks it crosses. `None` if
+    /// there is none.
     pub(super) fn brake(
         &self,
         from: &Splice,
@@ -50,7 +50,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         None
     }
 
-    /// Whether the feed of a splice may be kept as far as `end` under `feed_override`.
+    /// Whether the feed of a splice may be kept up to `end` under `feed_override`.
     pub(super) fn may_keep(&self, from: &Splice, end: Position, feed_override: f64) -> bool {
         let mut junction_mm_s = f64::INFINITY;
         self.from(from).take_while(|block| block.start() < end).all(|block| {
@@ -60,14 +60,15 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         })
     }
 
-    /// Whether a braking ramp is slow enough wherever a block begins.
+    /// Whether a braking ramp is below every ceiling and junction on its way. It only falls, so block starts
+    /// are enough.
     fn is_below_ceilings(&self, from: &Splice, ramp: &Ramp<f64>, feed_override: f64) -> bool {
         let rising = ramp.reversed();
         let length_mm = ramp.length_mm();
         let mut junction_mm_s = f64::INFINITY;
         for block in self.from(from) {
             let at_mm = (block.start() - from.at).to_mm();
-            // Where it begins the feed is what it is; it only falls from there.
+            // At the ramp's start the feed is given and can't be lowered.
             let cap_mm_s = if at_mm > 0.0 { block.allowed(feed_override).0 } else { f64::INFINITY };
             let most_mm_s = f64::min(cap_mm_s, junction_mm_s) * (1.0 + FEED_ROUNDING);
             let is_slow = ramp.from_mm_s <= most_mm_s

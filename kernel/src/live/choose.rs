@@ -1,10 +1,11 @@
-//! What comes next: the list that follows the one under way, or takes over from it.
+//! Chooses the next list: one that follows the list under way, or takes over from it.
 //!
-//! Consumes what is known ahead, the mode, the timeline's lists and where they end; produces a list and a [`Choice`] that
-//! says what to do with it. Touches neither queue nor tick: all that it changes is the cursor in the program's feed.
+//! Consumes the lookahead, the mode and the timeline; produces a list and a [`Choice`] that says what to do
+//! with it. Touches neither queue nor tick; it changes nothing but the program's feed and its cursor.
 //!
-//! - here: what follows, which is the program's own feed, or a plan made anew, and a fallback stop after it;
-//! - `command`: what takes over from the motion under way, and where;
+//! - here: the list that follows, made of the program's own feed or of a new plan, with a fallback stop at
+//!   its end;
+//! - `command`: the list that takes over from the motion under way, and where;
 //! - `single_block`: a rest at the end of every program block.
 
 mod command;
@@ -24,10 +25,10 @@ use super::timeline::Timeline;
 use crate::law::PlannedRamp;
 use crate::units::Position;
 
-/// How many blocks ahead are tried for a feed to continue with under a lower override.
+/// Number of blocks ahead that are tried for a feed to continue with under a lower override.
 const BLOCKS_AHEAD: usize = 8;
 
-/// Of the path that is queued beyond a stop, how much a cruise takes at once: limits further ahead may be lower.
+/// Share of the path queued beyond a stop that a cruise takes at once: limits further ahead may be lower.
 const CRUISE_SHARE: f64 = 0.75;
 
 /// What to do with the list that was made.
@@ -37,19 +38,19 @@ pub(super) enum Choice {
     Nothing,
     /// It follows the list under way.
     Follow {
-        /// Of its motion.
+        /// The override of its motion.
         feed_override: f64,
     },
     /// It takes over; what comes after it is planned anew.
     TakeOver {
         /// Where.
         takeover: Takeover,
-        /// Of its motion.
+        /// The override of its motion.
         feed_override: f64,
     },
-    /// No more than this many items of the list under way are driven.
+    /// The list under way ends early, after this many items.
     Rest {
-        /// The items, at the end of which the machine is at rest.
+        /// Number of items; the machine is at rest after them.
         after: usize,
         /// Whether a program block ends there.
         ends_block: bool,
@@ -58,7 +59,7 @@ pub(super) enum Choice {
     DriveToEnd,
     /// The list under way ends a block.
     EndBlock,
-    /// What comes after the list under way is planned anew.
+    /// The rest of the stretch after the list under way is planned anew.
     Replan,
 }
 
@@ -66,9 +67,9 @@ pub(super) enum Choice {
 pub(super) struct Chooser<'a, const PLACES: usize> {
     pub(super) lookahead: &'a Lookahead<PLACES>,
     pub(super) feed: &'a mut ProgramFeed<PLACES>,
-    /// The path that is queued.
+    /// The queued path.
     pub(super) path: QueuedPath,
-    /// There is no room for more of the program to be read.
+    /// There is no room to read more of the program.
     pub(super) is_full: bool,
     pub(super) mode: Mode,
     pub(super) timeline: &'a Timeline,
@@ -78,7 +79,7 @@ pub(super) struct Chooser<'a, const PLACES: usize> {
 }
 
 impl<const PLACES: usize> Chooser<'_, PLACES> {
-    /// The list that follows the one under way.
+    /// Makes the list that follows the one under way.
     pub(super) fn next(&mut self, list: &mut List) -> Choice {
         self.block_end = None;
         let splice = *self.timeline.splice();
@@ -93,14 +94,15 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
             return Choice::Follow { feed_override: 1.0 };
         }
         self.feed.roll_back();
-        // At rest with no room for more path: the program's feed needs more of it to stop than there will be.
+        // At rest with no room for more path: the program's own feed needs more path to stop than there will
+        // be.
         if self.is_full && splice.is_at_rest() {
             self.feed.replan_from(splice.stretch);
         }
         Choice::Nothing
     }
 
-    /// The list that follows, planned anew.
+    /// Makes the list that follows, planned anew.
     fn next_replanned(&mut self, begins: bool, list: &mut List) -> Choice {
         let feed_override = self.mode.feed_override();
         for ramps in Ramps::IN_ORDER {
@@ -109,7 +111,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
             let is_found = if !self.mode.is_single_block() {
                 self.gather_under_override(list, true, ramps)
             } else if begins && self.feed.peek().is_some_and(Item::is_rest) {
-                // By itself: it is a block.
+                // Alone, because it is a block.
                 self.gather_rests(list);
                 true
             } else {
@@ -126,26 +128,28 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         Choice::Nothing
     }
 
-    /// Ends a list that follows the one under way at rest; whether it can be handed over.
+    /// Ends a following list at rest; returns whether it can be handed over.
     fn is_complete(&mut self, list: &mut List, feed_override: f64) -> bool {
         let takeover = Takeover::After(self.timeline.list().exit());
-        // From rest there is no other place to begin: what is too dense then is refused.
+        // From rest there is no other place to begin: a list that is too dense is refused when it is handed
+        // over.
         self.end_in_a_stop(list, feed_override)
             && (self.timeline.splice().is_at_rest() || self.timeline.keeps_up(list, takeover))
     }
 
-    /// How far the path of a stretch is known; not beyond the block end to rest at.
+    /// How far the path of a stretch is known, at most to the block end to rest at.
     fn extent_of(&self, stretch: u32) -> Extent {
         self.path.extent_of(stretch, self.block_end, self.lookahead)
     }
 
-    /// The program's own feed, as far as a list and the path reach. False if there is none.
+    /// Gathers the program's own feed, as far as the list has room and path is queued. False if there is
+    /// none.
     fn gather(&mut self, list: &mut List) -> bool {
         let path_end = self.extent_of(list.start().stretch).end();
-        // A place is left for the stop.
+        // Leaves a place for the stop.
         while list.len() + 1 < LIST_ITEMS {
             let Some(&item) = self.feed.peek() else { break };
-            // One stretch a list.
+            // A list has one stretch.
             if list.contains(&Item::End) && (item.is_feed() || item == Item::End) {
                 break;
             }
@@ -159,7 +163,8 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         list.len() > 0
     }
 
-    /// Of a cruise that is longer than the path that is queued, what leaves room to stop.
+    /// Gathers the part of a cruise that leaves room to stop, where the cruise is longer than the queued
+    /// path.
     fn gather_cruise(&mut self, list: &mut List, path_end: Position) {
         let start = list.end();
         let Some(&Item::Feed(PlannedRamp { ramp, length })) = self.feed.peek() else { return };
@@ -183,11 +188,12 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         }
     }
 
-    /// The rests that come first, and a plan from where the list ends; to the end of its stretch, and what comes after it,
-    /// if that is wanted and there is room. False if there is neither.
+    /// Gathers the rests that come first and a plan from the list's end. With `to_its_end`, and if there is
+    /// room, also the end of the stretch and the rests after it. False if there is neither rest nor plan.
     fn gather_replanned(&mut self, list: &mut List, to_its_end: bool, ramps: Ramps) -> bool {
         let (from, heads) = (list.end(), list.len());
-        // What takes over from a list under way is not at the cursor, even where it has hardly begun.
+        // A list that takes over from the one under way does not begin at the cursor, even at the start of a
+        // stretch.
         if to_its_end && from.at == Position::ZERO {
             self.gather_rests(list);
             self.feed.drop_feed();
@@ -201,7 +207,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
             // The end of the stretch, or of what is known of it.
             (extent.is_whole() && from.is_at_rest()).then_some(Reach::Whole)
         };
-        // They need no path after them.
+        // Rests need no path after them.
         let Some(reach) = reach else { return rests };
         if to_its_end
             && reach == Reach::Whole
@@ -218,7 +224,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         list.len() > 0
     }
 
-    /// The dwells and stops that come first in the program's feed; one of them in single block.
+    /// Gathers the dwells and stops that come first in the program's feed; only one of them in single block.
     fn gather_rests(&mut self, list: &mut List) {
         while let Some(&item) = self.feed.peek().filter(|item| item.is_rest())
             && !list.is_full()
@@ -231,7 +237,8 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         }
     }
 
-    /// A plan from where the list ends; where that is too fast for the override, after a ramp down to it.
+    /// Gathers a plan from the list's end. Where the feed is too high for the override, a ramp down comes
+    /// first.
     fn gather_under_override(&mut self, list: &mut List, to_its_end: bool, ramps: Ramps) -> bool {
         if self.gather_replanned(list, to_its_end, ramps) {
             return true;
@@ -258,9 +265,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         false
     }
 
-    /// Ends a list at rest: with its stretch, or else in a stop after as many of its items as possible, which is driven
-    /// only if nothing follows in time; the program's feed that was gathered after that is ahead again. False if there is
-    /// no such place.
+    /// Ends a list at rest: with its stretch, or else in a fallback stop after as many items as possible,
+    /// driven only if nothing follows in time. The program's feed gathered beyond the stop is ahead again.
+    /// False if there is no place to stop.
     fn end_in_a_stop(&mut self, list: &mut List, feed_override: f64) -> bool {
         if list.contains(&Item::End) || self.is_block_end(&list.end()) {
             list.set_exit_to_end();

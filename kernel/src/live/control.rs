@@ -1,4 +1,5 @@
-//! Live control's background: every call of [`LiveControl::poll`] reads, obeys commands and hands over the next list.
+//! Live control, background side: every [`LiveControl::poll`] reads the program, applies commands and hands
+//! the next feed list to the tick.
 
 use super::choose::{Choice, Chooser};
 use super::list::List;
@@ -23,27 +24,27 @@ pub enum State {
     Holding,
     /// Held, at rest.
     Held,
-    /// Told to give up, and not at rest yet.
+    /// Told to abort, and not at rest yet.
     Aborting,
-    /// Given up, at rest: stand here and split the streams anew.
+    /// Aborted, at rest: the machine stands here; split the streams anew to continue.
     Aborted,
-    /// Everything that came so far is done, at rest and between two stretches; the source has no more for now.
+    /// Everything read so far is done, at rest between two stretches; the source has no more items for now.
     Waiting,
     /// Everything is done.
     Done,
-    /// An item can't be executed; at rest after what came before it.
+    /// An item can't be executed; the machine is at rest after the items before it.
     Failed,
 }
 
-/// The background of live control, with room for `PLACES` blocks and as many planned ramps.
+/// The background side of live control, with room for `PLACES` blocks and as many planned ramps.
 #[derive(Debug)]
 pub struct LiveControl<R: Real, const AXES: usize, I, E, const PLACES: usize> {
     reader: Reader<R, AXES, I, PLACES>,
     timeline: Timeline,
     mode: Mode,
-    /// Where single block is to come to rest within a stretch, by the last choice.
+    /// Where single block is to come to rest within a stretch; set by the last choice.
     block_end: Option<BlockEnd>,
-    /// Why nothing is read any more.
+    /// The error that ended reading.
     error: Option<SupplyError<E>>,
     tick_s: f64,
     starvations: u32,
@@ -55,8 +56,9 @@ where
     E: Clone,
     I: Source<AXES, Error = E>,
 {
-    /// All of `items` still to do, at rest, for ticks of `tick_s`; with freshly split streams. Where ticks come while the
-    /// background works, `lead_ticks` is how far ahead of what it saw it may change a ramp: as many as may pass meanwhile.
+    /// Starts at rest with all of `items` still to do, for ticks of `tick_s` and freshly split streams. If
+    /// ticks can interrupt the background, `lead_ticks` is the number that may pass during one poll: a ramp
+    /// is changed no sooner than that after the progress last seen.
     pub fn new(items: I, tick_s: f64, lead_ticks: u32) -> Self {
         Self {
             reader: Reader::new(items, tick_s),
@@ -74,7 +76,7 @@ where
         self.mode.hold();
     }
 
-    /// Continues after a hold, from rest; also one that is not at rest yet.
+    /// Continues after a hold, from rest. A hold that has not reached rest yet may be resumed too.
     pub fn resume(&mut self) {
         self.mode.resume();
     }
@@ -88,25 +90,25 @@ where
     /// [`OVERRIDE_MAX`](super::OVERRIDE_MAX), under all ceilings; 0 is a hold of its own.
     ///
     /// # Errors
-    /// It is not within that range; the value.
+    /// The value is outside that range; it is returned.
     pub fn set_override(&mut self, feed_override: f64) -> Result<(), f64> {
         self.mode.set_override(feed_override)
     }
 
-    /// Single block: comes to rest exactly at the end of the program block under way (what has the same program line; a
-    /// dwell or a stop is one too), or of the next one that it can still stop at, and is held there until
-    /// [`LiveControl::resume`], which lets it run one block more. At rest, it is the next block that is run. Switched off, a
-    /// hold that has come about remains one until the resume.
+    /// Single block: motion comes to rest exactly at the end of the program block under way, or of the next
+    /// one that it can still stop at, and is held there until [`LiveControl::resume`], which runs one more
+    /// block. A program block is all that has the same program line; a dwell or a stop is one too. If
+    /// switched on at rest, the next block is run. Switching it off does not end a hold; only a resume does.
     pub fn set_single_block(&mut self, is_single: bool) {
         self.mode.set_blocks(if is_single { Blocks::Single } else { Blocks::All });
     }
 
-    /// Where items come from, for a source that is to be told something. What was read of it is under way.
+    /// The source of the items, for sources that take instructions. Items already read from it are under way.
     pub fn source_mut(&mut self) -> &mut I {
         self.reader.source_mut()
     }
 
-    /// How often motion had to stop because data came too late.
+    /// Number of stops because data came too late.
     pub fn starvations(&self) -> u32 {
         self.starvations
     }
@@ -116,7 +118,7 @@ where
         self.mode.feed_override() <= 0.0 && self.rests(feeder)
     }
 
-    /// What it is doing.
+    /// Returns what live control is doing.
     pub fn state(&self, feeder: &LiveFeeder<'_, R, AXES>) -> State {
         let rests = self.rests(feeder);
         match self.mode.run() {
@@ -132,17 +134,17 @@ where
         }
     }
 
-    /// Whether all that was handed over has been driven, and nothing is asked of it.
+    /// Whether everything handed over has been driven and no request is pending.
     fn rests(&self, feeder: &LiveFeeder<'_, R, AXES>) -> bool {
         self.timeline.is_driven(&feeder.progress()) && self.mode.request().is_none()
     }
 
-    /// One call of the background: reads what there is room for, obeys what was commanded, hands over what follows. A fault
-    /// that ends in a stop on the path is obeyed as a hold that is not resumed.
+    /// One poll of the background: reads while there is room, applies commands, hands over the next list. A
+    /// fault whose reaction is a stop on the path acts as a hold that is not resumed.
     ///
     /// # Errors
-    /// An item can't be executed. Nothing is read any more, every later call returns the same error, and what was handed
-    /// over ends at rest; a hold or an abort is still obeyed, but for one that itself can't be.
+    /// An item can't be executed. Nothing more is read, every later call returns the same error, and what was
+    /// handed over ends at rest. A hold or an abort is still obeyed where possible.
     pub fn poll(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
         self.advance(feeder).unwrap_or_else(|error| {
             self.error.get_or_insert(error);
@@ -158,7 +160,7 @@ where
             self.mode.hold();
         }
         if feeder.is_refused() {
-            // The tick had passed the place: once more, further ahead.
+            // The tick had passed the place: try again, further ahead.
             self.timeline.lead_more();
             self.mode.renew(self.timeline.request_of_next());
             self.timeline.take_back_next(self.reader.feed_mut(), feeder);
@@ -174,7 +176,7 @@ where
             && feeder.has_free_list()
         {
             let progress = self.timeline.take_back_next(self.reader.feed_mut(), feeder);
-            // What was taken back may have been the last free one.
+            // The list taken back may have been the last free one.
             if feeder.has_free_list() {
                 self.obey(request, &progress, feeder)?;
             }
@@ -193,7 +195,7 @@ where
         Ok(())
     }
 
-    /// Hands over what obeys a request to motion that is as far as `progress` says.
+    /// Hands over a list that obeys `request`, with motion at `progress`.
     fn obey(
         &mut self,
         request: Request,
@@ -201,14 +203,15 @@ where
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
         let obeyed = self.choose(Some((request, progress)), feeder);
-        // What can't be done now can't be done in the next call either: motion ends at rest without.
+        // What can't be done now can't be done in the next poll either; motion ends at rest anyway.
         self.mode.clear_request();
         obeyed?;
         self.timeline.set_request_of_next(request);
         Ok(())
     }
 
-    /// Makes a choice, for a request to motion that is as far as that or for what follows, and acts on it.
+    /// Chooses a list and acts on the choice: for a request with motion at that progress, or else to follow
+    /// the list under way.
     fn choose(
         &mut self,
         request: Option<(Request, &Progress)>,
@@ -235,7 +238,7 @@ where
         self.act(choice, list, feeder)
     }
 
-    /// Acts on a choice: hands the list over, and has the program's feed follow.
+    /// Acts on a choice: hands the list over and moves the program's feed accordingly.
     fn act(
         &mut self,
         choice: Choice,
@@ -276,8 +279,8 @@ where
         Ok(())
     }
 
-    /// Where data came too late motion is in a fallback stop: what follows begins at its end. A stop where the stretch ends is
-    /// none: motion was to end there.
+    /// If data came too late, motion is in a fallback stop: the next list begins at its end. A stop at the
+    /// end of the stretch is no starvation: motion was to end there.
     fn note_starvation(&mut self, feeder: &LiveFeeder<'_, R, AXES>) {
         if self.timeline.is_in_fallback(&feeder.progress()) && self.timeline.drive_to_end() {
             let end = *self.timeline.splice();
@@ -289,7 +292,8 @@ where
         }
     }
 
-    /// Whether motion is to wait at the end of a block. At rest there it is held, if there is more to come.
+    /// Whether motion is to wait at the end of a block. Once at rest there, it is held if more items are to
+    /// come.
     fn waits_at_block_end(&mut self, feeder: &LiveFeeder<'_, R, AXES>) -> bool {
         if !(self.mode.is_single_block() && self.timeline.waits_at_block_end(self.reader.lookahead())) {
             return false;
@@ -303,7 +307,7 @@ where
         true
     }
 
-    /// At rest in a hold, or without single block, there is nothing more to wait for: it is the next block that is run.
+    /// At rest in a hold, or without single block, the wait is over: the next block is run.
     fn note_rest(&mut self, feeder: &LiveFeeder<'_, R, AXES>) {
         if (self.mode.run() != Run::On || !self.mode.is_single_block()) && self.rests(feeder) {
             self.timeline.has_waited();

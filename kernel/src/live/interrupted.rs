@@ -1,4 +1,4 @@
-//! Ticks that come between any two operations of one poll of the background, under any commands.
+//! Ticks between any two operations of one poll of the background, under random commands.
 
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
@@ -14,10 +14,10 @@ use crate::units::Position;
 
 const TICK_S: f64 = 0.0005;
 const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 4e5 };
-/// Longer ones are cut \[mm\].
+/// Longer lines are cut \[mm\].
 const PIECE_MM: f64 = 4.0;
 
-/// Blocks straight on, with a ceiling each, from rest to rest: their ends with their ceilings, and the items of their plan.
+/// Adds the items of a straight stretch of blocks from rest to rest; returns each block's end and ceiling.
 fn stretch(random: &Random, from: Position, items: &mut Vec<Item<1>>) -> Vec<(Position, f64)> {
     let law = Law::new(LIMITS).expect("limits");
     let count = 1 + (random.unit() * 8.0) as usize;
@@ -56,7 +56,7 @@ fn stretch(random: &Random, from: Position, items: &mut Vec<Item<1>>) -> Vec<(Po
     caps
 }
 
-/// What ticks, and holds each tick against the one before.
+/// Ticks, and compares each tick with the one before.
 struct TestMachine<'a> {
     executor: Executor<f64, 1>,
     intake: Intake<'a, f64, 1>,
@@ -84,13 +84,13 @@ impl TestMachine<'_> {
         let stretch = executed.stretches as usize;
         let mut then = self.before;
         if stretch != self.stretch {
-            // It has ended in this tick, and perhaps the next one has begun: lengths go on.
+            // The stretch has ended in this tick, and perhaps the next one has begun: lengths continue.
             assert_eq!(stretch, self.stretch + 1, "one at a time");
             let (_, caps) = &self.stretches[self.stretch];
             then.s = then.s - caps[caps.len() - 1].0;
             self.stretch = stretch;
         }
-        // Hermite's rules, with snap that may step within its limit.
+        // Hermite quadrature, with snap that may step within its limit.
         let snap = LIMITS.snap_mm_s4;
         let d = (now.s - then.s).to_mm() - h * ((now.v_mm_s + then.v_mm_s) / 2.0)
             + h * h * (now.a_mm_s2 - then.a_mm_s2) / 12.0;
@@ -119,7 +119,7 @@ impl TestMachine<'_> {
     }
 }
 
-/// A refused word or a late one costs time, never a limit: what is handed over is legal whenever the tick finds it.
+/// A refused or late word costs time, but never breaks a limit: a list is legal whenever the tick finds it.
 #[test]
 fn ticks_between_any_two_operations_of_a_poll() {
     let (mut ticks, mut inside, mut starvations, mut commands) = (0, 0_u64, 0, 0_u64);
@@ -161,7 +161,7 @@ fn ticks_between_any_two_operations_of_a_poll() {
         loop {
             let ticks = machine.borrow().ticks;
             assert!(ticks < 400_000, "seed {seed}: no end, {:?}", control.state(&feeder));
-            // In the end everything is let go.
+            // In the end every command is withdrawn.
             if ticks > 60_000 {
                 control.resume();
                 control.set_override(1.0).expect("in range");

@@ -7,10 +7,10 @@ use crate::law::{CutRamp, Phase, PlannedRamp, Ramp, Ticks, segment};
 pub use crate::queue::LIST_ITEMS;
 use crate::units::Position;
 
-/// Feeds that are calculated differently differ by rounding: of 1 mm/s, and of themselves.
+/// Rounding between feeds that are calculated differently: of 1 mm/s, plus relative to the feed.
 const FEED_ROUNDING_MM_S: f64 = 1.0e-12;
 
-/// Halvings that find where a ramp is cut: to a millionth of a millionth.
+/// Bisection steps that find where a ramp is cut: to a millionth of a millionth.
 const CUT_STEPS: usize = 40;
 
 /// An item of a feed list.
@@ -18,7 +18,7 @@ const CUT_STEPS: usize = 40;
 pub(super) enum Item {
     /// A ramp or a cruise.
     Feed(PlannedRamp),
-    /// A ramp that is cut in its rise, this long after its start.
+    /// A ramp cut in its rise, `at` after its start.
     Cut { ramp: Ramp<f64>, at: Ticks, length: Position },
     /// The end of the stretch.
     End,
@@ -29,7 +29,7 @@ pub(super) enum Item {
 }
 
 impl Item {
-    /// Whether it is a part of the feed over a stretch.
+    /// Whether it is part of a stretch's feed.
     pub(super) fn is_feed(&self) -> bool {
         matches!(self, Self::Feed(_) | Self::Cut { .. })
     }
@@ -56,7 +56,7 @@ impl Item {
         }
     }
 
-    /// How long it takes; `None` of what takes no place in time.
+    /// How long it takes; `None` for an item that has no duration of its own.
     pub(super) fn duration(&self, tick_s: f64) -> Option<Ticks> {
         match *self {
             Self::Feed(PlannedRamp { ramp, .. }) => Ticks::from_seconds(ramp.duration_s(), tick_s),
@@ -69,13 +69,13 @@ impl Item {
         }
     }
 
-    /// The same item, given up `elapsed` after the start of `phase`: the shortest with that beginning that ends at a
-    /// feed that does not change. `None` where it can only be finished.
+    /// The same item cut `elapsed` after the start of `phase`: the shortest item with that beginning that
+    /// ends at a constant feed. `None` if it can only be driven to its end.
     pub(super) fn cut(&self, phase: Phase, elapsed: Ticks, tick_s: f64) -> Option<Self> {
         let length = |mm: f64| Position::from_mm(mm);
         let elapsed_s = elapsed.to_f64() * tick_s;
         let ramp = match self {
-            // As its segment was made.
+            // The ramp as its segment has it.
             Self::Feed(PlannedRamp { ramp, .. }) => segment::to_f64(ramp),
             &Self::Cut { ramp, .. } if phase == Phase::Rise => {
                 let cut = CutRamp { ramp, cut_s: elapsed_s };
@@ -88,7 +88,7 @@ impl Item {
                 let ramp = Ramp::cruise(ramp.from_mm_s, elapsed_s);
                 Some(Self::Feed(PlannedRamp { ramp, length: length(ramp.length_mm())? }))
             }
-            // Over before it could be cut.
+            // The rise is over before it could be cut.
             Phase::Rise if ramp.t1_s <= tick_s => None,
             Phase::Rise if 2.0 * elapsed_s <= ramp.t1_s => {
                 let cut = CutRamp { ramp, cut_s: elapsed_s };
@@ -104,10 +104,10 @@ impl Item {
         }
     }
 
-    /// The same item, which accelerates, given up where that makes it end at `feed_mm_s`, which lies between the feeds of its
-    /// ends: the later it is given up, the faster it gets.
+    /// The same accelerating item, cut so that it ends at `feed_mm_s`, which lies between the feeds of its
+    /// ends: the later the cut, the higher the final feed.
     pub(super) fn cut_to(&self, feed_mm_s: f64, tick_s: f64) -> Option<Self> {
-        // Never beyond that feed: times are rounded to their steps.
+        // Times are rounded to their steps; one step less never exceeds that feed.
         let step = Ticks::from_bits(1);
         let before = |s: f64| Ticks::from_seconds(s, tick_s).map(|at| at.minus(step).unwrap_or(Ticks::ZERO));
         let (ramp, most_s) = match *self {
@@ -132,7 +132,7 @@ impl Item {
         self.cut(Phase::Rise, before(low_s)?, tick_s)
     }
 
-    /// The duration of a phase of its [`FeedSegment`](crate::law::FeedSegment), of an item that can be cut.
+    /// The duration of a phase of its [`FeedSegment`](crate::law::FeedSegment), if the item can be cut there.
     pub(super) fn phase_duration(&self, phase: Phase, tick_s: f64) -> Option<Ticks> {
         let ramp = match self {
             Self::Feed(PlannedRamp { ramp, .. }) => ramp,
@@ -147,8 +147,8 @@ impl Item {
     }
 }
 
-/// A feed changed by no more than `change_mm_s`, however it is rounded: where feeds are great and their change is small, what
-/// is rounded up asks for an acceleration beyond the limit.
+/// Changes a feed by no more than `change_mm_s`, rounding included: at high feeds with small changes,
+/// rounding up would ask for an acceleration beyond the limit.
 fn changed(from_mm_s: f64, change_mm_s: f64) -> f64 {
     let to_mm_s = from_mm_s + change_mm_s;
     match to_mm_s - from_mm_s {
@@ -164,7 +164,7 @@ pub(super) struct List {
     start: Splice,
     tick_s: f64,
     items: Vec<(Splice, Item), LIST_ITEMS>,
-    /// An item was appended that had no place.
+    /// An item was appended for which there was no place.
     is_overfull: bool,
     exit: usize,
     ends_block: bool,
@@ -175,7 +175,7 @@ impl List {
         Self { start, tick_s, items: Vec::new(), is_overfull: false, exit: 0, ends_block: false }
     }
 
-    /// As a new one from `start`.
+    /// Empties the list and lets it begin at `start`.
     pub(super) fn restart(&mut self, start: Splice) {
         self.truncate(0);
         (self.start, self.exit, self.ends_block) = (start, 0, false);
@@ -196,7 +196,7 @@ impl List {
         self.after(self.exit)
     }
 
-    /// The successor takes over where it ends: there is no fallback stop, or that is driven.
+    /// The successor takes over at the list's end: there is no fallback stop, or it is driven.
     pub(super) fn set_exit_to_end(&mut self) {
         self.exit = self.len();
     }
@@ -223,8 +223,8 @@ impl List {
         self.items.len()
     }
 
-    /// Appends an item, for which who makes the list has left a place. Its feed continues the list's but for rounding,
-    /// which is taken off: the item as appended.
+    /// Appends an item; the caller has left a place for it. Removes the rounding between its feed and the
+    /// list's; returns the item as appended.
     pub(super) fn push(&mut self, mut item: Item) -> Item {
         let end = self.end();
         if let Item::Feed(PlannedRamp { ramp, .. }) = &mut item
@@ -253,7 +253,7 @@ impl List {
         self.placed().map(|(_, item)| item)
     }
 
-    /// The items with where they start.
+    /// The items, each with the splice where it starts.
     pub(super) fn placed(&self) -> impl Iterator<Item = &(Splice, Item)> {
         self.items.iter()
     }
@@ -310,7 +310,7 @@ mod tests {
         assert!(cuts > 5_000, "{cuts}");
     }
 
-    /// However great the feeds are beside their change.
+    /// However great the feeds are compared with their change.
     #[test]
     fn a_ramp_that_is_given_up_asks_for_no_more_than_the_whole() {
         let random = Random::new(1);

@@ -1,8 +1,8 @@
-//! Blocks and block ends ahead, of the stretch under way and of those after it.
+//! Blocks and block ends ahead, in the stretch under way and the ones after it.
 //!
-//! Consumes [`PathBlock`]s as they are read, and the program lines of pieces as they are queued: a program block ends where
-//! the next piece is of another line, and where the stretch ends. Answers which feed the path ahead allows, and where single
-//! block may come to rest. Background; bounded by its places.
+//! Consumes [`PathBlock`]s as they are read, and the program lines of pieces as they are queued: a program
+//! block ends where the next piece has another line, and where the stretch ends. Answers which feed the path
+//! ahead allows, and where single block may come to rest. Background; bounded by its places.
 
 use heapless::Deque;
 
@@ -12,7 +12,7 @@ use crate::program::PathBlock;
 use crate::queue::Rejection;
 use crate::units::Position;
 
-/// Rounding that is no violation, a part of a feed.
+/// Tolerated rounding of a feed, relative.
 pub(super) const FEED_ROUNDING: f64 = 1.0e-9;
 
 /// A block on the path of its stretch.
@@ -35,7 +35,7 @@ impl AheadBlock {
         self.end
     }
 
-    /// The ceiling under a feed override, and the limits of ramps below it. Rapids are not faster for it.
+    /// The ceiling under a feed override, and the limits of ramps below it. It does not make rapids faster.
     pub(super) fn allowed(&self, feed_override: f64) -> (f64, Limits<f64>) {
         let (feed_mm_s, most_mm_s) = (self.block.feed_mm_s(), self.block.greatest().cap_mm_s);
         let asked_mm_s = if feed_mm_s.is_finite() {
@@ -63,18 +63,18 @@ impl AheadBlock {
     }
 }
 
-/// What is known of the path ahead.
+/// The known path ahead.
 #[derive(Debug)]
 pub(super) struct Lookahead<const PLACES: usize> {
     blocks: Deque<AheadBlock, PLACES>,
-    /// The stretch and the end of the last block that was appended, which may have been passed since.
+    /// The stretch and end of the last block appended, which may have been passed since.
     last: (u32, Position),
-    /// Ends of program blocks on queued path, each with the number of the piece before it. With as many places as the
-    /// path's queue has it is never full.
+    /// Ends of program blocks on queued path, each with the number of the piece after it. Never full if it
+    /// has as many places as the path queue.
     ends: Deque<(BlockEnd, u32), PLACES>,
     /// The program line of the last piece, within a stretch.
     line: Option<u32>,
-    /// Items of path that were queued.
+    /// Number of path items queued so far.
     queued: u32,
 }
 
@@ -88,7 +88,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         self.blocks.is_full() || self.ends.is_full()
     }
 
-    /// Appends a block of `stretch`. One without a length holds nothing.
+    /// Appends a block of `stretch`. Blocks without length are ignored.
     pub(super) fn push(&mut self, stretch: u32, block: PathBlock) -> Result<(), Rejection> {
         if block.length <= Position::ZERO {
             return Ok(());
@@ -101,7 +101,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         pushed.map_err(|_| Rejection::full("blocks ahead", PLACES))
     }
 
-    /// A piece of `line` was queued that begins at `start` of its stretch.
+    /// Notes a queued piece of program line `line` that begins at `start` of its stretch.
     pub(super) fn queued_piece(&mut self, stretch: u32, start: Position, line: u32) -> Result<(), Rejection> {
         let number = self.queued;
         self.queued = number.wrapping_add(1);
@@ -112,13 +112,14 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         pushed.map_err(|_| Rejection::full("block ends ahead", PLACES))
     }
 
-    /// The end of a stretch's path was queued.
+    /// Notes that the end of a stretch's path was queued.
     pub(super) fn queued_end_of_stretch(&mut self) {
         self.line = None;
         self.queued = self.queued.wrapping_add(1);
     }
 
-    /// Forgets the blocks before a place, and the block ends of pieces that are not among the last `in_queue` items.
+    /// Forgets the blocks before a place, and the block ends of pieces that are no longer among the last
+    /// `in_queue` items.
     pub(super) fn pass(&mut self, place: &Splice, in_queue: usize) {
         let &Splice { stretch, at, .. } = place;
         while let Some(first) = self.blocks.front()
@@ -132,7 +133,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         }
     }
 
-    /// The blocks of its stretch from a splice on, the first one cut there.
+    /// The blocks of its stretch from a splice on; the first one is cut there.
     pub(super) fn from(&self, splice: &Splice) -> impl Iterator<Item = AheadBlock> + '_ {
         let &Splice { stretch, at, .. } = splice;
         let ahead = self.blocks.iter().filter(move |block| block.stretch == stretch && block.end > at);
@@ -144,7 +145,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         self.ends.iter().map(|&(end, _)| end).filter(move |end| end.stretch == stretch)
     }
 
-    /// Where the blocks of `stretch` end, as far as they are known.
+    /// Where the known blocks of `stretch` end.
     pub(super) fn end_of(&self, stretch: u32) -> Option<Position> {
         let (last, end) = self.last;
         if last == stretch {
@@ -153,8 +154,8 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         self.blocks.iter().rev().find(|block| block.stretch == stretch).map(|block| block.end)
     }
 
-    /// The greatest feed \[mm/s\] on the path of `stretch` from `start` to `end`; `None` if there are no blocks as far as
-    /// that.
+    /// The greatest feed \[mm/s\] on the path of `stretch` from `start` to `end`; `None` if the known blocks
+    /// do not reach `end`.
     pub(super) fn fastest_mm_s(&self, stretch: u32, start: Position, end: Position) -> Option<f64> {
         let known = self.end_of(stretch).is_some_and(|known| known + SLIVER >= end);
         let here = |block: &&AheadBlock| {

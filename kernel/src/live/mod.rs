@@ -10,29 +10,31 @@
 //!                         └───────── places ───────────┴──── where it is ◄─┘
 //! ```
 //!
-//! Consumes [`Item`](crate::program::Item)s and commands; produces pieces and **feed lists**, each a complete motion that
-//! ends at rest on path that is queued. All of it runs in the background: the tick only changes from one list to the
-//! next where it was told to (see [`Change`](crate::queue::Change)). So motion is legal whatever the background does and
-//! however long it takes, and where it takes too long, the list under way ends in a stop on the path.
+//! Consumes [`Item`](crate::program::Item)s and commands; produces pieces and **feed lists**, each a complete
+//! motion that ends at rest on path that is queued. All of it runs in the background: the tick only changes
+//! from one list to the next where it is told to (see [`Change`](crate::queue::Change)). So motion is legal
+//! whatever the background does and however long it takes; if it takes too long, the list under way ends in a
+//! stop on the path.
 //!
-//! A command is a list that begins at the next **splice**, a place where the feed does not change: anywhere in a
-//! cruise; a little later in a ramp that accelerates, which is cut in the shortest way (`Item::cut`), or for an override
-//! where it gets to the feed that this allows (`Item::cut_to`); at the end of a ramp that brakes, because ceilings ahead
-//! may need all of it. From there on it brakes to rest or to another feed under the ceilings and limits of all the blocks
-//! it crosses; where a ceiling ahead does not let it begin, at the next splice that does. What follows a stop or an override
-//! is planned anew, to the end of the stretch; a stretch in which nothing was changed is driven by the program's own plan.
+//! A command is a list that begins at the next **splice**, a place where the feed does not change: anywhere
+//! in a cruise; a little later in a ramp that accelerates, which is cut in the shortest way (`Item::cut`), or
+//! for an override where it reaches the feed that this allows (`Item::cut_to`); at the end of a ramp that
+//! brakes, because ceilings ahead may need all of it. From there on it brakes to rest or to another feed
+//! under the ceilings and limits of all the blocks it crosses; where a ceiling ahead forbids that, it begins
+//! at the next splice that allows it. After a stop or an override the rest of the stretch is planned anew; an
+//! unchanged stretch is driven by the program's own plan.
 //!
-//! In the order in which data travel:
+//! Modules in the order the data travels:
 //!
 //! - [`Source`]: where items come from, perhaps later;
-//! - `reader`: reads them; enters path into its queue, and keeps what is ahead:
-//!   `lookahead` the blocks and block ends, `program_feed` the program's own feed with a cursor to what is handed over next;
-//! - `mode`: what was commanded;
-//! - `choose`: what comes next, a function of all that, with `brake` (how to brake on the blocks ahead), `replan` (a plan
-//!   from a splice on) and `places` (where the list under way may be left);
-//! - `list`: a feed list as the background sees it, and `splice`, the places on the path that it leads to;
+//! - `reader`: reads them, enters path into its queue, and keeps what is ahead: `lookahead` the blocks and
+//!   block ends, `program_feed` the program's own feed with a cursor to what is handed over next;
+//! - `mode`: the commands;
+//! - `choose`: the next list, a function of all that, with `brake` (braking over the blocks ahead), `replan`
+//!   (a plan from a splice) and `places` (where the list under way may be left);
+//! - `list`: a feed list as the background sees it, and `splice`, the places where lists begin and end;
 //! - `timeline`: the list under way and the next; hands over, follows the tick, takes back;
-//! - `control`: the three that own all this, and `poll`.
+//! - `control`: owns reader, mode and timeline; has `poll`.
 //!
 //! ```
 //! use motion_kernel::exec::Executor;

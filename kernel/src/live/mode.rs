@@ -1,14 +1,14 @@
-//! How the operator wants the program driven. Owns no motion.
+//! The operator's commands: how the program is to be driven. Owns no motion.
 
 /// The greatest feed override.
 pub const OVERRIDE_MAX: f64 = 2.0;
-/// The least that is not 0.
+/// The least feed override that is not 0.
 pub const OVERRIDE_MIN: f64 = 1.0e-3;
 
 /// Whether the program is to be driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Run {
-    /// As long as there are items.
+    /// Driven as long as there are items.
     On,
     /// At rest until resumed.
     Hold,
@@ -78,7 +78,7 @@ impl Mode {
     pub(super) fn resume(&mut self) {
         if self.run == Run::Hold {
             self.run = Run::On;
-            // A stop that is not handed over yet is not made; the override may be another one by now.
+            // A stop not handed over yet is dropped; the override may have changed by now.
             self.request = self.request.map(|_| self.request_of_override());
         }
     }
@@ -88,7 +88,7 @@ impl Mode {
         self.run = Run::Abort;
     }
 
-    /// At rest at the end of a block: held without a request.
+    /// Holds at rest at the end of a block; no request is needed.
     pub(super) fn hold_at_block_end(&mut self) {
         self.run = Run::Hold;
     }
@@ -111,17 +111,17 @@ impl Mode {
         }
     }
 
-    /// The request has been obeyed, or can't be.
+    /// Clears a request that has been obeyed or can't be.
     pub(super) fn clear_request(&mut self) {
         self.request = None;
     }
 
-    /// What was asked for is to be asked for again, unless something else was since.
+    /// Asks again for `request`, unless there is a newer one.
     pub(super) fn renew(&mut self, request: Option<Request>) {
         self.request = self.request.or(request);
     }
 
-    /// Motion that is not held is to continue in another way.
+    /// Requests a change of motion that is not held.
     fn request_change(&mut self) {
         if self.run == Run::On {
             self.request = Some(self.request_of_override());

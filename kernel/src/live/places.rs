@@ -1,7 +1,7 @@
 //! Where another list may take over from the one under way.
 //!
-//! Consumes the list under way and how far the tick is; produces the places that a command may use, in the order of time:
-//! here or within the item under way, and after each item that is still to be driven. Background.
+//! Consumes the list under way and the tick's progress; produces the places that a command may use, in order
+//! of time: here or within the item under way, then after each item still to be driven. Background.
 
 use super::list::{Item, List};
 use super::splice::Splice;
@@ -13,12 +13,12 @@ use crate::queue::Progress;
 pub(super) enum Takeover {
     /// After this many items of the list under way.
     After(usize),
-    /// Within the item that follows as many: the first item of the list is that one with another end.
+    /// Within the item after this many: the new list's first item repeats that item with another end.
     Within(usize),
 }
 
 impl Takeover {
-    /// The items of the list under way that are driven whole.
+    /// Number of items of the list under way that are driven whole.
     pub(super) fn driven(self) -> usize {
         match self {
             Self::After(count) | Self::Within(count) => count,
@@ -39,17 +39,17 @@ impl Place {
         self.takeover
     }
 
-    /// Where the list begins that takes over.
+    /// Where the list that takes over begins.
     pub(super) fn start(&self) -> &Splice {
         &self.start
     }
 
-    /// The splice from which on it may do something else.
+    /// The splice from which it may do something else.
     pub(super) fn splice(&self, tick_s: f64) -> Splice {
         self.head.map_or(self.start, |head| head.end(&self.start, tick_s))
     }
 
-    /// Restarts a list with the item under way and nothing else.
+    /// Restarts a list with the cut item under way, if there is one, and nothing else.
     pub(super) fn begin(&self, list: &mut List) {
         list.restart(self.start);
         if let Some(head) = self.head {
@@ -62,15 +62,16 @@ impl Place {
 #[derive(Clone, Debug)]
 pub(super) struct Places<'a> {
     list: &'a List,
-    /// Within the item under way, instead of where it can be cut soonest.
+    /// A later cut of the item under way, tried instead of the soonest one.
     later: Option<Place>,
     first: Option<Place>,
-    /// After so many items is the next one.
+    /// The next place is after this many items.
     count: usize,
 }
 
 impl<'a> Places<'a> {
-    /// Where a list may be left by motion that is as far as `progress` says. Motion is cut no sooner than `lead` after that.
+    /// The places where `list` may be left, with motion at `progress`. Items are cut no sooner than `lead`
+    /// after that.
     pub(super) fn new(list: &'a List, progress: &Progress, lead: Ticks, tick_s: f64) -> Self {
         let done = progress.done as usize;
         let mut places = Self { list, later: None, first: None, count: done + 1 };
@@ -94,7 +95,7 @@ impl<'a> Places<'a> {
         Some((start, item, place))
     }
 
-    /// Adds a place within the item under way, with another end of it.
+    /// Replaces the cut of the item under way by `head`, a later one.
     pub(super) fn with_head(self, head: Item) -> Self {
         let later = self.first.map(|first| Place { head: Some(head), ..first });
         Self { later, ..self }
@@ -108,7 +109,7 @@ impl<'a> Places<'a> {
     fn within(&self, done: usize, phase: Phase, left: Ticks, lead: Ticks, tick_s: f64) -> Option<Place> {
         let (start, item) = self.list.get(done)?;
         let duration = item.phase_duration(phase, tick_s)?;
-        // Not where it begins: there is no beginning to repeat yet.
+        // Not at its very start: there is no beginning to repeat yet.
         let lead = if left >= duration { lead.max(Ticks::ONE) } else { lead };
         let elapsed = duration.minus(left)?.plus(lead);
         if elapsed > duration {

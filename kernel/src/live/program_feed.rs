@@ -1,7 +1,7 @@
-//! The program's own feed: what was read of it, with a cursor to what is handed over next.
+//! The program's own feed as read so far, with a cursor to the item that is handed over next.
 //!
-//! What lists hold stays here until it is driven, so that a list that is taken back moves the cursor and nothing else.
-//! Background; bounded by its places.
+//! Items in lists stay here until they are driven, so taking back a list only moves the cursor. Background;
+//! bounded by its places.
 
 use heapless::Deque;
 
@@ -11,15 +11,16 @@ use crate::law::{PlannedRamp, Ramp};
 use crate::queue::Rejection;
 use crate::units::Position;
 
-/// Feed, ends of stretch and rests in the program's order. Of a stretch that is planned anew only its end is of use.
+/// Feed, ends of stretch and rests in the program's order. Of a stretch that is planned anew, only its end is
+/// used.
 #[derive(Debug)]
 pub(super) struct ProgramFeed<const PLACES: usize> {
     items: Deque<Item, PLACES>,
-    /// How many of the first items the list under way holds.
+    /// Number of first items that the list under way holds.
     under_way: usize,
     /// The next item to hand over, counted from the first.
     cursor: usize,
-    /// The last stretch that is planned anew; those before it are, too, as far as they are still ahead.
+    /// The last stretch that is planned anew; all stretches before it are, too.
     replanned: Option<u32>,
 }
 
@@ -28,11 +29,11 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
         Self { items: Deque::new(), under_way: 0, cursor: 0, replanned: None }
     }
 
-    /// Whether there is a place for one more item, and for an end of stretch that waits for the path's queue.
+    /// Whether there is a place for one more item, and for an end of stretch that waits for the path queue.
     pub(super) fn has_room(&self) -> bool {
         const { assert!(PLACES >= 4 * LIST_ITEMS, "places for what lies ahead, and for two lists") };
         let ahead = self.items.len().saturating_sub(self.cursor);
-        // Two lists hold the others.
+        // Two lists hold the other items.
         ahead + 2 * LIST_ITEMS < PLACES
     }
 
@@ -46,19 +47,19 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
         self.items.get(self.cursor)
     }
 
-    /// Whether all that was read is in lists.
+    /// Whether everything read is in lists.
     pub(super) fn is_empty(&self) -> bool {
         self.peek().is_none()
     }
 
-    /// Moves the cursor over an item that a list holds: as it holds it, should that be taken back.
+    /// Moves the cursor over an item that a list holds, and keeps the list's version of it in case that is
+    /// taken back.
     pub(super) fn advance(&mut self, item: Item) {
         self.set(self.cursor, item);
         self.cursor += 1;
     }
 
-    /// Moves the cursor back over what a list holds of this from its item `from` to `to`. Feed that is planned anew is
-    /// dropped on the way.
+    /// Moves the cursor back over the list's items `from..to`. Drops feed that is planned anew on the way.
     pub(super) fn take_back(&mut self, list: &List, from: usize, to: usize) {
         let keeps_feed = !self.replans(list.start().stretch);
         let items = list.items().take(to).skip(from);
@@ -73,12 +74,12 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
         }
     }
 
-    /// Moves the cursor to where the list under way is left.
+    /// Moves the cursor back to the end of the items that the list under way holds.
     pub(super) fn roll_back(&mut self) {
         self.cursor = self.under_way;
     }
 
-    /// Another list is under way: what it does not hold of the items before the cursor is driven or planned anew.
+    /// Another list is under way: drops the items before it, which are driven or planned anew.
     pub(super) fn follow(&mut self) {
         let gone = self.under_way.min(self.cursor);
         for _ in 0..gone {
@@ -88,8 +89,8 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
         self.under_way = self.cursor;
     }
 
-    /// Splits the cruise at the cursor after a part of it, which is at the cursor then; `None` if there is none, or no
-    /// place for the rest.
+    /// Splits the cruise at the cursor after `part` and returns that part, which is then at the cursor.
+    /// `None` if there is no cruise, or no place for the rest.
     pub(super) fn split_cruise(&mut self, part: Position) -> Option<Item> {
         let &Item::Feed(PlannedRamp { ramp: Ramp { from_mm_s: feed_mm_s, .. }, length }) = self.peek()?
         else {
@@ -99,7 +100,7 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
             Item::Feed(PlannedRamp { ramp: Ramp::cruise(feed_mm_s, length.to_mm() / feed_mm_s), length })
         };
         let (first, rest) = (cruise(part), cruise(length - part));
-        // The items before it are fewer than those after it: they move.
+        // The items before the cursor are fewer than those after it, so those move.
         self.items.push_front(first).ok()?;
         for index in 0..self.cursor {
             self.copy(index + 1, index);
@@ -114,14 +115,14 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
         self.replanned.is_some_and(|last| !is_before(last, stretch))
     }
 
-    /// From now on the stretches up to this one are planned anew.
+    /// Marks the stretches up to this one as planned anew.
     pub(super) fn replan_through(&mut self, stretch: u32) {
         if !self.replans(stretch) {
             self.replanned = Some(stretch);
         }
     }
 
-    /// The rest of a stretch, which is at the cursor, is planned anew.
+    /// Marks the rest of a stretch, which is at the cursor, as planned anew.
     pub(super) fn replan_from(&mut self, stretch: u32) {
         self.replan_through(stretch);
         self.drop_feed();
@@ -136,7 +137,7 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
         self.drop(dropped);
     }
 
-    /// Drops as many items at the cursor. Those before it are the fewer ones: they move.
+    /// Drops `count` items at the cursor. The items before it are fewer, so those move.
     fn drop(&mut self, count: usize) {
         if count == 0 {
             return;
@@ -178,7 +179,7 @@ mod tests {
         Item::Feed(PlannedRamp { ramp: Ramp::cruise(1.0, mm), length })
     }
 
-    /// A list of the first items, under way.
+    /// The first `count` items in a list under way.
     fn handed(items: &[Item], count: usize) -> (ProgramFeed<64>, List) {
         let mut program = ProgramFeed::new();
         for item in items {
@@ -192,12 +193,13 @@ mod tests {
         (program, list)
     }
 
-    /// What comes from the cursor on.
+    /// The items from the cursor on.
     fn ahead(program: &ProgramFeed<64>) -> Vec<Item> {
         program.items.iter().skip(program.cursor).copied().collect()
     }
 
-    /// A command takes the items of the list under way back that it replaces; when it is refused they are under way again.
+    /// A command takes back the items it replaces in the list under way; if it is refused, they are under way
+    /// again.
     #[test]
     fn what_is_taken_back_comes_again() {
         let items = [feed(1.0), feed(2.0), Item::End, DWELL, feed(3.0)];
@@ -208,8 +210,8 @@ mod tests {
         assert_eq!(ahead(&program), items[4..]);
     }
 
-    /// Of a stretch that is planned anew only its end and the rests come again; the feed among them is dropped, and counts
-    /// no more.
+    /// Of a stretch that is planned anew, only its end and the rests come again; its feed is dropped and no
+    /// longer counts.
     #[test]
     fn feed_that_is_planned_anew_does_not_come_again() {
         let items = [DWELL, DWELL, feed(1.0), feed(2.0), Item::End, feed(3.0), Item::End];
@@ -224,7 +226,7 @@ mod tests {
         assert_eq!(program.under_way, program.cursor);
     }
 
-    /// Only what the list under way no longer needs makes room.
+    /// Only items that the list under way no longer needs make room.
     #[test]
     fn there_is_room_for_what_two_lists_may_take_back() {
         let mut program = ProgramFeed::<64>::new();

@@ -1,7 +1,8 @@
-//! Reads the program: its path into the queue, its blocks into the lookahead, its feed to where lists are made of it.
+//! Reads the program: path into the queue, blocks into the lookahead, feed into the program feed that lists
+//! are made of.
 //!
-//! Consumes the items of a [`Source`]; keeps what was read and not yet handed over. The only part of live control that talks
-//! to the path queue. Background; reads as far as its places and the queue's last.
+//! Consumes the items of a [`Source`]; keeps the items that are read but not handed over yet. The only part
+//! of live control that talks to the path queue. Background; reads as long as it and the queue have places.
 
 use core::task::Poll;
 
@@ -16,18 +17,18 @@ use crate::program::{Item, SupplyError};
 use crate::queue::{LiveFeeder, Rejection};
 use crate::units::Position;
 
-/// What the source said when it was asked last.
+/// The source's last answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Answer {
     /// An item, or it has not been asked yet.
     Item,
     /// Nothing for now.
     Late,
-    /// That there are no more.
+    /// No more items.
     End,
 }
 
-/// The path that is queued of the stretch being read.
+/// The queued path of the stretch being read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct QueuedPath {
     stretch: u32,
@@ -35,12 +36,12 @@ pub(super) struct QueuedPath {
 }
 
 impl QueuedPath {
-    /// As far as `end` of `stretch`.
+    /// Path queued up to `end` of `stretch`.
     pub(super) fn new(stretch: u32, end: Position) -> Self {
         Self { stretch, end }
     }
 
-    /// How far the path of `stretch` is known to a plan that does not go beyond `block_end`.
+    /// How far a plan may use the path of `stretch`, at most to `block_end`.
     pub(super) fn extent_of<const PLACES: usize>(
         &self,
         stretch: u32,
@@ -55,13 +56,13 @@ impl QueuedPath {
     }
 }
 
-/// What was read, and where reading stands.
+/// The items read, and the state of reading.
 #[derive(Debug)]
 pub(super) struct Reader<R: Real, const AXES: usize, I, const PLACES: usize> {
     source: I,
     tick_s: f64,
     answer: Answer,
-    /// Made ready, and not yet taken by the path queue.
+    /// An item made ready but not yet taken by the path queue.
     pending: Option<Ready<R, AXES>>,
     /// There is no room for the next item.
     is_full: bool,
@@ -100,22 +101,23 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
         &mut self.feed
     }
 
-    /// What is known ahead: the lookahead, and the program's feed.
+    /// The lookahead and the program's feed.
     pub(super) fn ahead(&mut self) -> (&Lookahead<PLACES>, &mut ProgramFeed<PLACES>) {
         (&self.lookahead, &mut self.feed)
     }
 
-    /// Whether there is no room for more to be read.
+    /// Whether there is no room to read more.
     pub(super) fn is_full(&self) -> bool {
         self.is_full
     }
 
-    /// Whether there is nothing more to come.
+    /// Whether the program is read to its end and everything read is in lists.
     pub(super) fn is_read(&self) -> bool {
         self.answer == Answer::End && self.pending.is_none() && self.feed.is_empty()
     }
 
-    /// Whether the source has nothing for now, and nothing is left of what it gave, up to the end of a stretch.
+    /// Whether the source has nothing for now, and everything it gave is handed over, up to the end of a
+    /// stretch.
     pub(super) fn is_waiting(&self) -> bool {
         self.answer == Answer::Late
             && self.pending.is_none()
@@ -124,12 +126,12 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
             && self.lookahead.end_of(self.path.stretch).is_none_or(|end| end == Position::ZERO)
     }
 
-    /// Forgets what lies before a place.
+    /// Forgets the blocks before a place.
     pub(super) fn pass(&mut self, place: &Splice, feeder: &LiveFeeder<'_, R, AXES>) {
         self.lookahead.pass(place, feeder.path_queued());
     }
 
-    /// Reads items while there is room for them; if the program is given up, only what is pending.
+    /// Reads items while there is room; if the program is aborted, only the pending one is entered.
     pub(super) fn read(
         &mut self,
         is_given_up: bool,
@@ -159,7 +161,7 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
         }
     }
 
-    /// Enters what is pending; whether the path queue had room for it.
+    /// Enters the pending item; returns whether the path queue had room for it.
     fn enter(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<bool, Rejection> {
         let QueuedPath { stretch, end: start } = self.path;
         match &self.pending {
@@ -204,7 +206,8 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
         taken.map_err(SupplyError::Rejected)
     }
 
-    /// The blocks of the stretch that has been read end where its path does: plans are made for the blocks.
+    /// Checks that the blocks of the stretch just read end where its path does: plans are made for the
+    /// blocks.
     fn check_blocks(&self) -> Result<(), Rejection> {
         let QueuedPath { stretch, end: path } = self.path;
         let blocks = self.lookahead.end_of(stretch).unwrap_or(Position::ZERO);

@@ -1,8 +1,8 @@
-//! The feed from a splice on, planned anew over the blocks that are known.
+//! Plans the feed anew from a splice, over the known blocks.
 //!
-//! Consumes a splice, a feed override and the [`Lookahead`]; produces ramps and cruises to rest where the known path ends.
-//! Background. One pair of ramps for neighbours that are alike; over the blocks that come first with ramps that span them,
-//! where that is faster.
+//! Consumes a splice, a feed override and the [`Lookahead`]; produces ramps and cruises to rest where the
+//! known path ends. Background. Similar neighbours are merged and share one pair of ramps; over the first
+//! blocks, ramps may span blocks where that is faster.
 
 use heapless::Vec;
 
@@ -14,9 +14,11 @@ use crate::law::{Law, Limits};
 use crate::plan::{Block, BlockPlan, Effort, Memory, Node, Path, PlanError, nodes_for, plan_ramps};
 use crate::units::Position;
 
-/// Over so many blocks ramps may span: a list seldom reaches farther, and what they need goes with it.
+/// Number of blocks that ramps may span: a list seldom reaches farther, and the planner's memory grows with
+/// it.
 const SPANNED: usize = 16;
-/// By such a part limits may differ within a block: those of chords of an arc do, and many blocks are much slower than one.
+/// Relative difference of limits up to which blocks are merged: the chords of an arc differ by less, and many
+/// short blocks are much slower than one.
 const ALIKE: f64 = 0.02;
 
 /// How a stretch is planned anew.
@@ -29,16 +31,16 @@ pub(super) enum Ramps {
 }
 
 impl Ramps {
-    /// In the order in which they are tried: one without a place to stop from does not rule out the other.
+    /// The order in which they are tried: if one leaves no place to stop from, the other still may.
     pub(super) const IN_ORDER: [Self; 2] = [Self::Spanning, Self::PerBlock];
 }
 
 /// How much of a plan a list has taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reach {
-    /// All of it.
+    /// The whole plan.
     Whole,
-    /// What there was room for.
+    /// As much as there was room for.
     Part,
 }
 
@@ -48,8 +50,8 @@ impl Reach {
     }
 }
 
-/// The first items of a plan from `from` to rest at `end`, into `list`, as many as it has room for. `None` if there is no
-/// plan: the feed is above the ceiling, or the path too short to brake.
+/// Appends a plan from `from` to rest at `end` to `list`, as many items as it has room for. `None` if there
+/// is no plan: the feed is above the ceiling, or the path is too short to brake.
 pub(super) fn replan<const BLOCKS: usize>(
     lookahead: &Lookahead<BLOCKS>,
     from: &Splice,
@@ -60,7 +62,8 @@ pub(super) fn replan<const BLOCKS: usize>(
     list: &mut List,
 ) -> Option<Reach> {
     let heads = list.len();
-    // What is alike may be too soft where one has to brake at once.
+    // Merged blocks share their lowest limits, which may be too low to brake immediately; then retry
+    // unmerged.
     for alike in [ALIKE, 0.0] {
         let mut blocks = Blocks::<BLOCKS>::new(lookahead, from, feed_override, end, alike)?;
         let planned = blocks.plan(from, ramps, tick_s, list);
@@ -79,13 +82,13 @@ pub(super) fn replan<const BLOCKS: usize>(
 struct Blocks<const BLOCKS: usize> {
     blocks: Vec<Block<f64>, BLOCKS>,
     ends: Vec<Position, BLOCKS>,
-    /// One of them has limits below its own.
+    /// A merged block has limits below the ones of its parts.
     are_softer: bool,
 }
 
 impl<const BLOCKS: usize> Blocks<BLOCKS> {
-    /// Those from a splice to `end`. Neighbours with one ceiling are one block, with the least limits of all of them, if
-    /// none of these are `alike` parts below another's.
+    /// Blocks from a splice to `end`. Neighbours with the same ceiling are merged and get their least limits,
+    /// if these are less than the fraction `alike` below the greatest ones.
     #[inline(never)]
     fn new(
         lookahead: &Lookahead<BLOCKS>,
@@ -95,7 +98,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
         alike: f64,
     ) -> Option<Self> {
         let mut found = Self { blocks: Vec::new(), ends: Vec::new(), are_softer: false };
-        // A sliver of a block belongs to the one behind it.
+        // A sliver of a block belongs to the next block.
         let (mut start, mut most) = (from.at, None::<Limits<f64>>);
         for block in lookahead.from(from).take_while(|block| block.start() < end) {
             let (cap_mm_s, limits) = block.allowed(feed_override);
@@ -130,7 +133,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
     }
 
     /// See [`replan`].
-    // In a frame of its own: what the planner works with takes kilobytes.
+    // In its own stack frame: the planner's memory takes kilobytes.
     #[inline(never)]
     fn plan(&mut self, from: &Splice, ramps: Ramps, tick_s: f64, list: &mut List) -> Option<Reach> {
         let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
@@ -159,7 +162,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
             Ok(planned) => Some(Reach::of(planned.is_whole)),
             Err(PlanError::Ramp { .. }) => None,
             Err(_) => {
-                // Where one has to brake at once the feed may be a rounding too high for the length.
+                // If it must brake immediately, the feed may be too high for the length by a rounding error.
                 self.blocks.first_mut()?.length_mm += LENGTH_ROUNDING_MM;
                 plan(&mut self.blocks, Effort::PerBlock).ok().map(|planned| Reach::of(planned.is_whole))
             }
@@ -167,7 +170,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
     }
 }
 
-/// Whether none is `alike` parts below the other.
+/// Whether no limit of `least` is more than the fraction `alike` below that of `greatest`.
 fn is_alike(least: &Limits<f64>, greatest: &Limits<f64>, alike: f64) -> bool {
     let is_near = |least: f64, greatest: f64| least >= greatest * (1.0 - alike);
     is_near(least.accel_mm_s2, greatest.accel_mm_s2)

@@ -1,17 +1,17 @@
-//! Where items come from, perhaps later.
+//! The source of items, which may be late.
 
 use core::task::Poll;
 
 use crate::program::Item;
 
-/// What the items of a program are read from. A sender that is late says so, and is asked again in the next poll of the
-/// background; every iterator is a source whose items are all there.
+/// Source of a program's items. A source that has none for now is asked again in the next poll of the
+/// background. Every iterator is a source that is never late.
 pub trait Source<const AXES: usize> {
     /// Why an item can't be had.
     type Error;
 
-    /// The next item: [`Poll::Pending`] where there is none for now, `None` behind the last one, after which it is not
-    /// asked any more. Does not wait.
+    /// Returns the next item, [`Poll::Pending`] if there is none for now, or `None` after the last one; then
+    /// it is not asked again. Does not wait.
     fn poll_next(&mut self) -> Poll<Option<Result<Item<AXES>, Self::Error>>>;
 }
 

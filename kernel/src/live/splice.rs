@@ -2,8 +2,8 @@
 
 use crate::units::Position;
 
-/// What is shorter is no path to plan on but rounding: a ramp over it would have no length in position steps. Less than
-/// what a segment's length may be off.
+/// A shorter path is only rounding, not path to plan on: a ramp over it would have no length in position
+/// steps. Less than the error that a segment's length may have.
 pub(super) const SLIVER: Position = Position::from_bits(32);
 
 /// A place where a plan may begin: on the path of a stretch, at a feed that does not change.
@@ -11,7 +11,7 @@ pub(super) const SLIVER: Position = Position::from_bits(32);
 pub(super) struct Splice {
     /// The stretch, from 0.
     pub(super) stretch: u32,
-    /// Path position from its start.
+    /// Path position from the start of the stretch.
     pub(super) at: Position,
     /// Feed \[mm/s\].
     pub(super) feed_mm_s: f64,
@@ -24,7 +24,8 @@ impl Splice {
     }
 }
 
-/// The end of a program block: a path position of its stretch, or the start of the next stretch for one that ends it.
+/// The end of a program block: a path position of its stretch, or the start of the next stretch for one that
+/// ends it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BlockEnd {
     pub(super) stretch: u32,
@@ -32,7 +33,7 @@ pub(super) struct BlockEnd {
 }
 
 impl BlockEnd {
-    /// Whether a place is there but for rounding: no nearer path can be driven over.
+    /// Whether a place is at this end, but for rounding (a [`SLIVER`]).
     pub(super) fn is_at(&self, place: &Splice) -> bool {
         let gap = self.at - place.at;
         self.stretch == place.stretch && gap <= SLIVER && -gap <= SLIVER
@@ -62,13 +63,13 @@ impl Extent {
         }
     }
 
-    /// Whether that is all of it.
+    /// Whether that is the whole stretch.
     pub(super) fn is_whole(self) -> bool {
         matches!(self, Self::Whole(_))
     }
 }
 
-/// Whether a stretch comes before another one. Counts of stretches wrap.
+/// Whether a stretch comes before another one. Stretch numbers wrap.
 pub(super) fn is_before(stretch: u32, other: u32) -> bool {
     stretch.wrapping_sub(other).cast_signed() < 0
 }

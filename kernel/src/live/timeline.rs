@@ -1,7 +1,8 @@
 //! The feed lists in time: the one under way, and the next.
 //!
-//! Consumes lists with the place where each takes over; hands them to the tick, follows it, and takes back what it has not
-//! reached. The only part of live control that talks to the feed lists. Background.
+//! Consumes lists, each with the place where it takes over; hands them to the tick, follows the tick, and
+//! takes back lists that it has not reached. The only part of live control that talks to the feed lists.
+//! Background.
 
 use super::list::{Item, LIST_ITEMS, List};
 use super::lookahead::Lookahead;
@@ -16,7 +17,7 @@ use crate::program::supply::is_taken;
 use crate::queue::{Change, Density, LISTS, LiveFeeder, Progress, Rejection};
 use crate::units::Position;
 
-/// A ramp is cut at most so many ticks after where the tick was seen.
+/// A ramp is cut at most this many ticks after the progress last seen.
 const LEAD_TICKS_MAX: u64 = 64;
 
 /// A list that the tick has or will have.
@@ -24,7 +25,7 @@ const LEAD_TICKS_MAX: u64 = 64;
 struct Handed {
     id: u8,
     list: List,
-    /// Of what is driven before it.
+    /// The density of the items driven before it.
     before: Density,
 }
 
@@ -32,13 +33,13 @@ struct Handed {
 #[derive(Debug)]
 struct Next {
     handed: Handed,
-    /// What it was made for, if that was a command.
+    /// The command it was made for, if any.
     request: Option<Request>,
     /// The override of the motion before it.
     before_override: f64,
 }
 
-/// What the tick has, and what it will have.
+/// The lists that the tick has and will have.
 #[derive(Debug)]
 pub(super) struct Timeline {
     tick_s: f64,
@@ -48,9 +49,9 @@ pub(super) struct Timeline {
     splice: Splice,
     /// The override of the motion that was handed over last.
     driven_override: f64,
-    /// How far ahead of where the tick was seen a ramp is cut.
+    /// How long after the progress last seen a ramp is cut.
     lead: Ticks,
-    /// Where motion was held last, or has waited at the end of a block.
+    /// Where motion was last held, or last waited at the end of a block.
     waited_at: Option<Splice>,
 }
 
@@ -69,7 +70,7 @@ impl Timeline {
         }
     }
 
-    /// With a list under way that was never handed over.
+    /// A timeline with `list` under way, without handing it over.
     #[cfg(test)]
     pub(super) fn driving(list: List, tick_s: f64) -> Self {
         let splice = list.exit_splice();
@@ -96,24 +97,24 @@ impl Timeline {
         self.next.is_some()
     }
 
-    /// What the list that follows was made for.
+    /// The request that the next list was made for.
     pub(super) fn request_of_next(&self) -> Option<Request> {
         self.next.as_ref()?.request
     }
 
-    /// What the list that follows, if there is one, was made for.
+    /// Notes the request that the next list, if there is one, was made for.
     pub(super) fn set_request_of_next(&mut self, request: Request) {
         if let Some(next) = &mut self.next {
             next.request = Some(request);
         }
     }
 
-    /// Where the list under way may be left by motion that is as far as `progress` says.
+    /// The places where the list under way may be left, with motion at `progress`.
     pub(super) fn places(&self, progress: &Progress) -> Places<'_> {
         Places::new(&self.under_way.list, progress, self.lead, self.tick_s)
     }
 
-    /// Whether all that was handed over has been driven.
+    /// Whether everything handed over has been driven.
     pub(super) fn is_driven(&self, progress: &Progress) -> bool {
         progress.list == self.under_way.id
             && self.next.is_none()
@@ -122,13 +123,13 @@ impl Timeline {
             && progress.done as usize >= self.under_way.list.len()
     }
 
-    /// The end of the list under way has been waited at.
+    /// Notes that motion has waited at the end of the list under way.
     pub(super) fn has_waited(&mut self) {
         self.waited_at = Some(self.under_way.list.end());
         self.under_way.list.set_ends_block(false);
     }
 
-    /// Whether motion is to wait where the next list begins: at the end of a block, which it has not waited at.
+    /// Whether motion is to wait where the next list begins: at a block end where it has not waited yet.
     pub(super) fn waits_at_block_end<const PLACES: usize>(&self, lookahead: &Lookahead<PLACES>) -> bool {
         let splice = &self.splice;
         let has_waited = || self.waited_at.is_some_and(|waited| BlockEnd::from(waited).is_at(splice));
@@ -136,12 +137,12 @@ impl Timeline {
         self.under_way.list.ends_block() || splice.is_at_rest() && !has_waited() && is_block_end()
     }
 
-    /// The list under way ends a block.
+    /// Marks the list under way as ending a block.
     pub(super) fn end_block(&mut self) {
         self.under_way.list.set_ends_block(true);
     }
 
-    /// Where the tick is; the list that follows is the one under way as soon as it is on it.
+    /// Returns the tick's progress. Once the tick is on the next list, that is the list under way.
     pub(super) fn follow<R: Real, const AXES: usize, const PLACES: usize>(
         &mut self,
         feed: &mut ProgramFeed<PLACES>,
@@ -156,7 +157,7 @@ impl Timeline {
         progress
     }
 
-    /// Takes back the list that follows: motion is as before. What the tick does in between counts.
+    /// Takes back the next list: motion is as before. If the tick has already changed to it, that counts.
     pub(super) fn take_back_next<R: Real, const AXES: usize, const PLACES: usize>(
         &mut self,
         feed: &mut ProgramFeed<PLACES>,
@@ -173,7 +174,7 @@ impl Timeline {
         progress
     }
 
-    /// The tick had passed the place of a change: the next one is made further ahead.
+    /// The tick had passed the place of a change: increases the lead for the next one.
     pub(super) fn lead_more(&mut self) {
         if self.lead.to_bits() < LEAD_TICKS_MAX << 32 {
             self.lead = self.lead.plus(Ticks::ONE);
@@ -188,8 +189,8 @@ impl Timeline {
         self.next.is_none() && progress.list == *id && is_in_stop && exit < list.len()
     }
 
-    /// The list under way is driven to its end, fallback stop included, and what follows begins there. False if it was to be
-    /// driven to there anyway.
+    /// Lets the list under way be driven to its end, fallback stop included; the next list begins there.
+    /// False if it would be driven to its end anyway.
     pub(super) fn drive_to_end(&mut self) -> bool {
         let list = &mut self.under_way.list;
         if list.exit() >= list.len() {
@@ -211,15 +212,15 @@ impl Timeline {
         density
     }
 
-    /// Whether the executor keeps up with a list that takes over there.
+    /// Whether the executor keeps up with `list` if it takes over at `takeover`.
     pub(super) fn keeps_up(&self, list: &List, takeover: Takeover) -> bool {
         let mut density = self.density_before(takeover);
         let mut durations = list.items().filter_map(|item| item.duration(self.tick_s));
         durations.all(|duration| density.follow(duration).is_ok())
     }
 
-    /// Hands over a list, for which there is a free one, with motion under `feed_override`, and asks for the change to it.
-    /// What follows it begins at its exit.
+    /// Hands over a list whose motion is under `feed_override`, and asks the tick to change to it. There must
+    /// be a free feed list. The next list begins at its exit.
     pub(super) fn hand_over<R: Real, E, const AXES: usize, const PLACES: usize>(
         &mut self,
         list: List,
@@ -270,7 +271,7 @@ impl Timeline {
                     is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
                 }
                 Item::End => {
-                    // Where all its blocks have been passed, its end has.
+                    // If all blocks of the stretch have been passed, so has its end.
                     let path = lookahead.end_of(start.stretch).unwrap_or(start.at);
                     is_taken(feeder.end_of_feed(id, path))
                 }

@@ -15,7 +15,8 @@
 //! A product of two `Unit`s is one 32×32→64-bit multiplication; of a [`Fixed`] and a `Unit` two; of
 //! two [`Fixed`] four, of which the tick has a few dozen: the chain rule's and the regulator's.
 //!
-//! Products are rounded down. Sums and products of accepted input don't overflow, because of what is refused before:
+//! Products are rounded down. Sums and products of accepted input don't overflow, because of what is refused
+//! before:
 //!
 //! | what | where | how |
 //! |---|---|---|
@@ -31,8 +32,9 @@
 //! # Planning
 //!
 //! Plans ([`Law`](crate::law::Law), [`reach`](crate::law::reach()), [`plan`](crate::plan::plan()),
-//! [`Ceiling`](crate::plan::Ceiling), [`junction`](crate::plan::junction())) run in 32.32 too. What is accepted is bounded
-//! so that everything made of it fits; the bounds are [`Root::LIMITS`], [`Root::FEEDS_MM_S`], [`Root::LENGTH_MIN_MM`] and
+//! [`Ceiling`](crate::plan::Ceiling), [`junction`](crate::plan::junction())) run in 32.32 too. What is
+//! accepted is bounded so that everything made of it fits; the bounds are [`Root::LIMITS`],
+//! [`Root::FEEDS_MM_S`], [`Root::LENGTH_MIN_MM`] and
 //! [`Position::LIMIT_MM`](crate::units::Position::LIMIT_MM). The step is 2⁻³² throughout, s below.
 //!
 //! | quantity | accepted or at most | why it fits, and what its step is worth |
@@ -53,11 +55,11 @@
 //! | κ, √κ', ∛κ'' and their inverses | 2·10⁹ per mm, 5·10⁸ mm | R⁻³ itself has no digits left at 1 m; up to 9 s too much |
 //! | κ·v, √κ'·v, ∛κ''·v | 1/s | multiplied by v, a, j one at a time, so that products end below a limit |
 //!
-//! What follows, and is tested: no ramp exceeds a limit of acceleration, jerk or snap by more than a part of 10⁻⁹ (its
-//! times are too long rather than too short; the rest is the rounding of constants), no ramp is longer than its block,
-//! no ceiling or junction is exceeded. Ceilings and junctions keep their limits to 10⁻⁸. A stretch takes at most a part of
-//! 10⁻⁶ longer than planned in f64, plus the part that s is of its shortest block. Planned lengths are position steps, so that
-//! they add up exactly.
+//! What follows, and is tested: no ramp exceeds a limit of acceleration, jerk or snap by more than a part of
+//! 10⁻⁹ (its times are too long rather than too short; the rest is the rounding of constants), no ramp is
+//! longer than its block, no ceiling or junction is exceeded. Ceilings and junctions keep their limits to
+//! 10⁻⁸. A stretch takes at most a part of 10⁻⁶ longer than planned in f64, plus the part that s is of its
+//! shortest block. Planned lengths are position steps, so that they add up exactly.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 

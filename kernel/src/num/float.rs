@@ -128,8 +128,8 @@ float!(f32, libm::sqrtf, libm::cbrtf, terms: 7, piece_mm: 16.0, ramp_mm: 16.0e3,
 float!(f64, libm::sqrt, libm::cbrt, terms: 12, piece_mm: 1.0e6, ramp_mm: 1.0e9, q32: f64_from_q32, f64_to_q32,
     fraction: |fraction| (fraction >> 11) as Self * (1.0 / 9_007_199_254_740_992.0));
 
-/// Whether `x` is a number, and not infinite. By its bits: the library's becomes a hundred bytes wherever it is asked on a
-/// core without f64.
+/// Whether `x` is a number, and not infinite. By its bits: the library's becomes a hundred bytes wherever it
+/// is asked on a core without f64.
 pub(crate) fn is_finite(x: f64) -> bool {
     x.to_bits() << 1 < f64::INFINITY.to_bits() << 1
 }
@@ -140,8 +140,8 @@ pub(crate) fn is_within(x: f64, least: f64, most: f64) -> bool {
     least <= x && x <= most
 }
 
-/// `x` without its fraction, for 0 ≤ x < 2⁶⁴; of anything else some number. The language's casts of f64 saturate, which
-/// takes a core without f64 four comparisons in software wherever one is.
+/// `x` without its fraction, for 0 ≤ x < 2⁶⁴; of anything else some number. The language's casts of f64
+/// saturate, which takes a core without f64 four comparisons in software wherever one is.
 #[inline(never)]
 pub(crate) fn whole(x: f64) -> u64 {
     const FRACTION_BITS: u32 = f64::MANTISSA_DIGITS - 1;
@@ -158,9 +158,9 @@ pub(crate) fn whole(x: f64) -> u64 {
     }
 }
 
-/// A 32-bit core converts i32 to f32 in one instruction and i64 in a subroutine of fifty, so every core goes by
-/// halves. The lower half is taken with its sign: a small value is all in it, and is rounded once; a larger one is
-/// off by 2⁻²⁶ mm before its own rounding.
+/// A 32-bit core converts i32 to f32 in one instruction and i64 in a subroutine of fifty, so every core goes
+/// by halves. The lower half is taken with its sign: a small value is all in it, and is rounded once; a
+/// larger one is off by 2⁻²⁶ mm before its own rounding.
 #[inline]
 #[allow(clippy::cast_possible_truncation)]
 fn f32_from_q32(bits: i64) -> f32 {
@@ -174,8 +174,8 @@ fn f64_from_q32(bits: i64) -> f64 {
     bits as f64 * (1.0 / 4_294_967_296.0)
 }
 
-/// The other way likewise, in whole millimetres and what is left: both conversions are one instruction on a 32-bit
-/// core, and both steps between them are exact. Truncated to steps of 2⁻³¹.
+/// The other way likewise, in whole millimetres and what is left: both conversions are one instruction on a
+/// 32-bit core, and both steps between them are exact. Truncated to steps of 2⁻³¹.
 #[inline]
 #[allow(clippy::cast_possible_truncation)]
 fn f32_to_q32(x: f32) -> i64 {
@@ -194,7 +194,8 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Positions of all sizes and signs: rounded once below half a millimetre, within one last place above it.
+    /// Positions of all sizes and signs: rounded once below half a millimetre, within one last place above
+    /// it.
     #[test]
     fn f32_from_q32_is_the_plain_conversion_to_a_last_place() {
         let random = Random::new(1);
@@ -209,8 +210,8 @@ mod tests {
         }
     }
 
-    /// Every f32 whose bits are a multiple of an odd stride, so all exponents and both signs, as far as positions
-    /// go; the ends of the range; and what is no number.
+    /// Every f32 whose bits are a multiple of an odd stride, so all exponents and both signs, as far as
+    /// positions go; the ends of the range; and what is no number.
     #[test]
     fn f32_to_q32_truncates_to_two_steps() {
         let ends = [0.0, 1.0, 32_768.0, 32_767.998, 2_147_483_500.0];

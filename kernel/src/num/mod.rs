@@ -46,9 +46,10 @@ use core::fmt::Debug;
 use core::hint::black_box;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// `slices` for a loop of the background that is not to be unrolled: the optimiser does not see how long they are. In
-/// software a few operations of f64 are a hundred bytes, and flash is worth more than the background's time. A loop
-/// that calls nothing is unrolled all the same, unless what it works on goes through here, too.
+/// `slices` for a loop of the background that is not to be unrolled: the optimiser does not see how long they
+/// are. In software a few operations of f64 are a hundred bytes, and flash is worth more than the
+/// background's time. A loop that calls nothing is unrolled all the same, unless what it works on goes
+/// through here, too.
 #[inline(always)]
 pub(crate) fn rolled<T>(slices: T) -> T {
     black_box(slices)
@@ -126,9 +127,9 @@ pub trait Real: Scalar {
     /// float and 70 steps of 2⁻²⁹ in fixed point. Reached by limits so soft that a ramp takes a minute.
     const RAMP_MM_MAX: f64;
 
-    /// Greatest velocity, acceleration and jerk that an axis may be asked for \[mm/s, mm/s², mm/s³\], and with the
-    /// last the greatest number on the way to them, whatever its unit; none for floats, whose range is out of reach.
-    /// Feedforward is accepted with room for as much.
+    /// Greatest velocity, acceleration and jerk that an axis may be asked for \[mm/s, mm/s², mm/s³\], and
+    /// with the last the greatest number on the way to them, whatever its unit; none for floats, whose range
+    /// is out of reach. Feedforward is accepted with room for as much.
     const SETPOINT_MAX: Option<[f64; 3]>;
 
     /// The nearest value to `value`; `None` if it is not finite or beyond the type's range.

@@ -12,19 +12,20 @@
 //! `tests/expected/functions.md` has the errors of each, and of the law's shapes evaluated with each. What
 //! follows from it:
 //!
-//! - The tick's default is no sine at all, but the series of `Shape::at`.
-//!   Whatever the sine, the closed forms lose acceleration, feed and length at a ramp's ends, where the series
-//!   keep their relative precision. In absolute error the closed forms with [`Own`] are the better ones for
-//!   jerk, acceleration and snap, most of all in fixed point.
-//! - Where a sine is wanted, it is [`Own`]: as good as libm's, the only one in fixed point, exact at 0 and 1/2,
-//!   and its f32 needs no f64, which a single-precision FPU does not have.
-//! - [`Libm`] is the independent implementation that [`Own`] is held against, and serves where a core has f64.
-//! - `Micromath` is 10⁴ times worse than [`Own`] in f32: no part of a position. It would do for a jerk that is
-//!   only fed forward, to a drive that is known to a percent.
+//! - The tick's default is no sine at all, but the series of `Shape::at`. Whatever the sine, the closed forms
+//!   lose acceleration, feed and length at a ramp's ends, where the series keep their relative precision. In
+//!   absolute error the closed forms with [`Own`] are the better ones for jerk, acceleration and snap, most
+//!   of all in fixed point.
+//! - Where a sine is wanted, it is [`Own`]: as good as libm's, the only one in fixed point, exact at 0 and
+//!   1/2, and its f32 needs no f64, which a single-precision FPU does not have.
+//! - [`Libm`] is the independent implementation that [`Own`] is held against, and serves where a core has
+//!   f64.
+//! - `Micromath` is 10⁴ times worse than [`Own`] in f32: no part of a position. It would do for a jerk that
+//!   is only fed forward, to a drive that is known to a percent.
 //!
 //! The argument counts half turns (x = θ/π), so that [`Own`] reduces it exactly: the octant comes from
-//! comparing x with 1/4. It computes with y = 2x, so that all coefficients stay below 2. The series are cut off
-//! where the first term left out is below half a unit in the last place:
+//! comparing x with 1/4. It computes with y = 2x, so that all coefficients stay below 2. The series are cut
+//! off where the first term left out is below half a unit in the last place:
 //!
 //! | type | sine to | omitted at π/4 | cosine to | omitted at π/4 |
 //! |---|---|---|---|---|

@@ -1,5 +1,6 @@
-//! Tables of coefficients in a number's own type, converted when the kernel is compiled: on a core that has no
-//! f64, each conversion in the tick would be a subroutine, and the optimiser is not to be relied upon for it.
+//! Tables of coefficients in a number's own type, converted when the kernel is compiled: on a core that has
+//! no f64, each conversion in the tick would be a subroutine, and the optimiser is not to be relied upon for
+//! it.
 
 use fixed::types::I3F29;
 

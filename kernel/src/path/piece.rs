@@ -15,7 +15,7 @@ use crate::law::PathMotion;
 use crate::num::{Real, Scalar, Unit, is_finite, rolled};
 use crate::units::Position;
 
-/// What one axis is asked to do in one tick.
+/// The motion of one axis in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Setpoint<R> {
     /// Position.
@@ -116,12 +116,12 @@ impl core::fmt::Display for PieceError {
 
 impl core::error::Error for PieceError {}
 
-/// In how many parts a piece is cut to check its tangent.
+/// Number of parts of a piece whose ends are checked for their tangents.
 const TANGENT_CHECKS: u8 = 13;
-/// How far the tangent's magnitude may be from 1: a part in 10⁵ of the feed.
+/// Greatest difference of the tangent's magnitude from 1: 10⁻⁵ of the feed.
 const TANGENT_TOLERANCE: f64 = 1.0e-5;
-/// What rounding may add to a derivative of a septic in a unit of fixed point: 512 steps of 2⁻²⁹, of which
-/// [`derivatives`] makes some 300.
+/// Room for rounding in a derivative of a septic in fixed point: 512 steps of 2⁻²⁹, of which [`derivatives`]
+/// needs some 300.
 const ROUNDING: f64 = 1.0 / 1_048_576.0;
 
 impl<R: Real, const AXES: usize> Piece<R, AXES> {
@@ -152,8 +152,8 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     /// u = s/length, as parts of the length.
     ///
     /// # Errors
-    /// A coefficient is not finite, the length is out of range, a derivative could outgrow the number type, or
-    /// a tangent is not a unit vector.
+    /// A coefficient is not finite, the length is out of range, a derivative could outgrow the number type,
+    /// or a tangent is not a unit vector.
     pub fn septic(
         line: u32,
         start: [Position; AXES],
@@ -174,8 +174,8 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         }
         if R::Unit::LIMIT.is_finite() {
             for (axis, coefficients) in coefficients.iter().enumerate() {
-                // With all coefficients positive, every partial sum of Horner's scheme is at most its end, and
-                // greatest at u = 1.
+                // With all coefficients positive, every partial sum of Horner's scheme is at most its end,
+                // and greatest at u = 1.
                 let sum = derivatives(&coefficients.map(libm::fabs), 1.0).into_iter().fold(0.0, f64::max);
                 if !(sum < R::Unit::LIMIT - ROUNDING) {
                     return Err(PieceError::Bent { axis, sum });
@@ -197,7 +197,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
             return Err(PieceError::Length { length_mm: length.to_mm(), longest_mm });
         }
         let piece = Self { line, length, start, geometry };
-        // |r'| is a polynomial of degree 12: at the ends and in between, so that none hides a bulge.
+        // |r'| is a polynomial of degree 12: checked at the ends and in between, so no bulge is missed.
         for part in 0..=TANGENT_CHECKS {
             let s_mm = length.to_mm() * f64::from(part) / f64::from(TANGENT_CHECKS);
             let tangent = piece.tangent_at(R::from_f64(s_mm));
@@ -232,7 +232,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
 
     /// The unit tangent at `s_mm` from the start.
     pub(crate) fn tangent_at(&self, s_mm: R) -> [R; AXES] {
-        // Without the chain rule: what it makes of a piece that is too short for its feed may not fit.
+        // Without the chain rule: on a piece too short for its feed, its products may not fit.
         match &self.geometry {
             Geometry::Line { direction } => direction.map(|d| R::ONE.scaled(d)),
             Geometry::Septic { coefficients, per_mm, .. } => {
@@ -245,7 +245,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         }
     }
 
-    /// How steep it is at most.
+    /// Bounds of its derivatives.
     pub(crate) fn steepness(&self) -> Steepness {
         let Geometry::Septic { coefficients, per_mm, .. } = &self.geometry else {
             return Steepness::STRAIGHT;
@@ -270,7 +270,8 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
         setpoints
     }
 
-    /// [`Piece::at`] into `setpoints`. In the tick: no division, no loop but those over axes and coefficients.
+    /// [`Piece::at`] into `setpoints`. In the tick: no division, no loop but those over axes and
+    /// coefficients.
     #[inline]
     pub fn set(&self, s_mm: R, motion: &PathMotion<R>, setpoints: &mut [Setpoint<R>; AXES]) {
         let (v, a, j) = (motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3);
@@ -306,10 +307,10 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     }
 }
 
-/// What memory may do to a piece.
+/// Corruption of a piece in memory.
 #[cfg(test)]
 impl<const AXES: usize> Piece<f32, AXES> {
-    /// Of a line, with one bit of start, length or direction another one.
+    /// Flips one bit of a line's start, length or direction.
     pub(crate) fn with_flipped_bit(mut self, bit: u32) -> Self {
         let Geometry::Line { direction } = &mut self.geometry else { return self };
         let axis = (bit >> 16) as usize % AXES;
@@ -321,7 +322,7 @@ impl<const AXES: usize> Piece<f32, AXES> {
         self
     }
 
-    /// Of a line, with another part of its direction.
+    /// Replaces one component of a line's direction.
     pub(crate) fn with_direction(mut self, axis: usize, value: f32) -> Self {
         if let Geometry::Line { direction } = &mut self.geometry {
             direction[axis] = value;
@@ -330,33 +331,33 @@ impl<const AXES: usize> Piece<f32, AXES> {
     }
 }
 
-/// Of a vector.
+/// The magnitude of a vector.
 #[inline(never)]
 pub(crate) fn magnitude<const AXES: usize>(vector: &[f64; AXES]) -> f64 {
     libm::sqrt(vector.iter().map(|part| part * part).sum())
 }
 
-/// Bounds of what [`Piece::set`] multiplies a motion with, of any axis.
+/// Bounds of the factors that [`Piece::set`] multiplies a motion with, for any axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Steepness {
     /// 1/length.
     per_mm: f64,
-    /// Of |x'|, |x''|, |x'''| by arc length.
+    /// Bounds of |x'|, |x''|, |x'''| by arc length.
     slope: f64,
     bend_per_mm: f64,
     twist_per_mm2: f64,
 }
 
 impl Steepness {
-    /// Of a line.
+    /// The bounds of a line.
     pub(crate) const STRAIGHT: Self = Self { per_mm: 0.0, slope: 1.0, bend_per_mm: 0.0, twist_per_mm2: 0.0 };
 
-    /// Of |x''| by arc length \[1/mm\].
+    /// The bound of |x''| by arc length \[1/mm\].
     pub(crate) fn bend_per_mm(&self) -> f64 {
         self.bend_per_mm
     }
 
-    /// Of two pieces.
+    /// The bounds of two pieces together.
     pub(crate) fn max(&self, other: &Self) -> Self {
         Self {
             per_mm: f64::max(self.per_mm, other.per_mm),
@@ -369,7 +370,7 @@ impl Steepness {
     /// The greatest velocity, acceleration and jerk of any axis under a motion of at most `v`, `a`, `j`
     /// \[mm/s, mm/s², mm/s³\]. The last also bounds every other product on the way, whatever its unit.
     pub(crate) fn setpoint_max(&self, v: f64, a: f64, j: f64) -> [f64; 3] {
-        // In the order of `set`.
+        // In the same order as `set`.
         let w = v * self.per_mm;
         let bend = v * self.bend_per_mm;
         let twist = v * v * self.twist_per_mm2;
@@ -380,8 +381,8 @@ impl Steepness {
     }
 }
 
-/// Σ qₖ·uᵏ, k = 1 … 7, and its first three derivatives by u: Horner's scheme on all four at once, each as far as
-/// it has terms.
+/// Σ qₖ·uᵏ, k = 1 … 7, and its first three derivatives by u: Horner's scheme on all four at once, each as far
+/// as it has terms.
 #[inline]
 fn derivatives<U: Unit>(&[q1, q2, q3, q4, q5, q6, q7]: &[U; 7], u: U) -> [U; 4] {
     // The sum, its derivative, a half of its second and a sixth of its third.

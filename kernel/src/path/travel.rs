@@ -1,17 +1,19 @@
-//! Where the axes may go, and whether a piece stays there.
+//! The travel of the axes, and whether a piece stays within it.
 //!
-//! Background: what is beyond is refused before it is queued. A piece may leave the travel between its ends, as an arc
-//! does that bulges, so all of it is looked at: in [`PARTS`] parts, each of which lies within a bend of its chord.
+//! Background: a piece beyond it is refused before it is queued. A piece may leave the travel between its
+//! ends, like an arc that bulges, so all of it is checked: in [`PARTS`] parts, each of which is close to its
+//! chord.
 
 use super::Piece;
 use crate::law::PathMotion;
 use crate::num::Real;
 use crate::units::Position;
 
-/// Parts of a piece. A part of the length h of a curve with |x''| ≤ κ leaves its chord by κ·h²/8 at most: 0.2 µm for 8 mm
-/// of an arc of 10 mm, 2 µm for the longest and most bent piece there is.
+/// Parts of a piece. A part of the length h of a curve with |x''| ≤ κ leaves its chord by κ·h²/8 at most: 0.2
+/// µm for 8 mm of an arc of 10 mm, 2 µm for the longest and most bent piece possible.
 const PARTS: u8 = 64;
-/// Farther out by so little is not beyond \[mm\]: pieces are rounded. Below what the kernel's guard allows.
+/// A piece farther out by less is not beyond \[mm\]: pieces are rounded. Less than the kernel's guard
+/// tolerates.
 const ROUNDING_MM: f64 = 1.0e-3;
 
 /// Least and greatest position of every axis that has them.

@@ -9,11 +9,10 @@
 //! snap           s − 6κ'·v²·a            κ''·v⁴ − 3κ·a² − 4κ·v·j
 //! ```
 //!
-//! At v = √(A/κ) nothing is left to change the feed with, so the budget has to be **shared**: a curve
-//! may be driven at a share of the feed that would use it up
-//! ([`MachineLimits::curve_feed_share`]), and ramps on it get limits
-//! for which the sums above stay within the machine's even at that feed. All the terms grow with v,
-//! a, j, so they stay within it everywhere below.
+//! At v = √(A/κ) nothing is left to change the feed with, so the budget has to be **shared**: a curve is
+//! driven at a share of the feed that would use it up ([`MachineLimits::curve_feed_share`]), and ramps on it
+//! get limits with which the sums above stay within the machine's limits even at that feed. All terms grow
+//! with v, a and j, so the sums are smaller at any lower feed.
 
 use crate::law::{Law, LimitError, Limits};
 use crate::num::Root;
@@ -23,15 +22,15 @@ use crate::num::Root;
 pub const CURVE_FEED_SHARE: f64 = 0.8;
 /// The greatest share that leaves enough of every limit for ramps on curves of any length.
 pub const CURVE_FEED_SHARE_MAX: f64 = 0.85;
-/// The share for a short curve between straighter ones, which is to be passed rather than used for a change of
-/// feed: a hundredth of the limits is left for ramps.
+/// The share for a short curve between straighter ones, where the feed need not change: a hundredth of the
+/// limits is left for ramps.
 pub const BLEND_FEED_SHARE: f64 = 0.995;
-/// Part of the jerk limit that ramps may use across the path, 3κ·v·a.
+/// Share of the jerk limit that ramps may use across the path, 3κ·v·a.
 const NORMAL_JERK_SHARE: f64 = 0.55;
-/// Parts of the snap limit that ramps may use: 3κ·a² and 4κ·v·j across, 6κ'·v²·a along the path.
+/// Shares of the snap limit that ramps may use: 3κ·a² and 4κ·v·j across, 6κ'·v²·a along the path.
 const NORMAL_SNAP_SHARES: (f64, f64) = (0.1, 0.3);
 const TANGENTIAL_SNAP_SHARE: f64 = 0.2;
-/// The same across the path, of what constant feed leaves, where that is less.
+/// The same shares across the path, of what constant feed leaves, where that is less.
 const NORMAL_SNAP_REST_SHARES: (f64, f64) = (0.21, 0.63);
 
 /// The limits of one axis.
@@ -46,25 +45,25 @@ pub struct AxisLimits<R> {
 /// The limits of the machine: along the path, and of each axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineLimits<R, const AXES: usize> {
-    /// Of the path: feed, and the magnitudes of acceleration, jerk and snap as vectors.
+    /// The path's: feed, and the magnitudes of the vectors of acceleration, jerk and snap.
     pub path: AxisLimits<R>,
-    /// Of each axis.
+    /// Each axis'.
     pub axes: [AxisLimits<R>; AXES],
-    /// Part of a curve's greatest feed that blocks are planned with, above 0 and at most
+    /// Share of a curve's greatest feed that blocks are planned with, above 0 and at most
     /// [`CURVE_FEED_SHARE_MAX`]; the rest of the limits is for changing the feed on the curve.
     pub curve_feed_share: R,
 }
 
 impl<R: Root, const AXES: usize> MachineLimits<R, AXES> {
-    /// Acceleration, jerk and snap that the path and every axis allow in any direction.
+    /// The acceleration, jerk and snap that the path and every axis allow in any direction.
     #[must_use]
     pub fn in_any_direction(&self) -> Limits<R> {
         self.axes.iter().fold(self.path.limits, |limits, axis| least(&limits, &axis.limits, R::ONE))
     }
 }
 
-/// How a block bends. The derivatives' roots stand for them, because R⁻³ of a radius of 1 m has no digits
-/// left in fixed point.
+/// How a block bends. It holds the derivatives' roots, because R⁻³ of a radius of 1 m has no digits left in
+/// fixed point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bend<R> {
     /// κ, greatest |r''| \[1/mm\]; 0 for a line. R⁻¹ for an arc.
@@ -76,13 +75,13 @@ pub struct Bend<R> {
 }
 
 impl<R: Root> Bend<R> {
-    /// A circle of `radius_mm` > 0, driven with `planar` (0 … 1] of the path's length in its plane:
-    /// 1 for an arc, less for a helix. Fixed point makes it up to 2·10⁻⁹ per mm more, never less: a
-    /// ceiling comes out lower by a part of 10⁻⁶ at a radius of 1 m.
+    /// A circle of `radius_mm` > 0, driven with `planar` (0 … 1] of the path's length in its plane: 1 for an
+    /// arc, less for a helix. In fixed point the bend is up to 2·10⁻⁹ per mm larger, never smaller: at a
+    /// radius of 1 m a ceiling is lower by 10⁻⁶, relative.
     #[must_use]
     pub fn circle(radius_mm: R, planar: R) -> Self {
         let turn = planar / radius_mm;
-        // A quotient beyond the type's range is its greatest value already.
+        // A quotient beyond the type's range has already saturated.
         let is_small = turn <= R::from_f64(R::LIMITS.1);
         let more = |bend: R| if is_small { bend + R::MARGIN } else { bend };
         Self {
@@ -93,7 +92,7 @@ impl<R: Root> Bend<R> {
     }
 }
 
-/// What keeps a block's feed where it is.
+/// The reason for a block's feed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reason {
@@ -137,9 +136,9 @@ impl Reason {
 pub struct Ceiling<R> {
     /// Greatest feed \[mm/s\].
     pub feed_mm_s: R,
-    /// What set it.
+    /// The reason for it.
     pub reason: Reason,
-    /// What is left for changing the feed.
+    /// The limits left for changing the feed.
     pub law: Law<R>,
 }
 
@@ -150,8 +149,8 @@ impl<R: Root> Ceiling<R> {
     /// |component| of the unit tangent on each axis, `curved` whether the axis takes part in the bend.
     ///
     /// # Errors
-    /// A limit of the machine, or what a bend leaves of it for ramps, is not positive and finite, or beyond
-    /// [`Root::LIMITS`].
+    /// A limit of the machine, or the part of it that a bend leaves for ramps, is not positive and finite, or
+    /// beyond [`Root::LIMITS`].
     pub fn new<const AXES: usize>(
         machine: &MachineLimits<R, AXES>,
         feed_mm_s: R,
@@ -189,7 +188,7 @@ impl<R: Root> Ceiling<R> {
         let along = least(&along, &across, R::ONE);
         let (accel, jerk, snap) = (across.accel_mm_s2, across.jerk_mm_s3, across.snap_mm_s4);
         let share = machine.curve_feed_share;
-        // Radii: v² = A·R, v³ = J·R², v⁴ = DJ·R³, each product with its root taken.
+        // With radii, v² = A·R, v³ = J·R², v⁴ = DJ·R³; the root of each product is taken.
         let bends = [kappa, bend.third_root_per_mm, bend.fourth_root_per_mm];
         let [r1, r2, r3] = bends.map(|bend| R::ONE / bend);
         lower(share * accel.sqrt_product(r1), Reason::Acceleration);
@@ -197,14 +196,14 @@ impl<R: Root> Ceiling<R> {
         lower(share * snap.sqrt_product(r3).sqrt_product(r3), Reason::Snap);
 
         // The ramps' budget at the ceiling itself, where it is smallest. κ·v, √κ'·v and ∛κ''·v are angular
-        // speeds; multiplied by a feed or an acceleration one at a time, no product outgrows a limit.
+        // speeds; multiplied by one feed or acceleration at a time, no product exceeds a limit.
         let constant = R::from_f64;
         let [w1, w2, w3] = bends.map(|bend| bend * feed + R::MARGIN);
         let normal_accel = w1 * feed;
         let along_jerk = w2 * (w2 * feed);
         let across_snap = w3 * (w3 * (w3 * feed));
-        // Where constant feed leaves little, ramps get parts of what it leaves: across, what keeps half of the jerk
-        // along the path, and parts of the snap; along, half of the snap that these leave.
+        // Where constant feed leaves little, ramps get shares of the rest: across, enough to keep half of the
+        // jerk along the path, and shares of the snap; along, half of the snap that is then left.
         let half = constant(0.5);
         let middle_jerk = half * (jerk + along_jerk);
         let rest_jerk = (jerk - middle_jerk).sqrt_product(jerk + middle_jerk);

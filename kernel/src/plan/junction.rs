@@ -1,10 +1,10 @@
-//! What a junction between two blocks allows.
+//! The greatest feed through a junction of two blocks.
 //!
-//! A junction is passed without stopping if its tangents agree to a stated angle; otherwise the machine
-//! stops exactly on the corner. Passing it at feed v, two things step from one tick to the next: the
-//! velocity by the angle, v·φ, which is an acceleration of v·φ/τ for one tick, and the acceleration by
-//! the jump of curvature, v²·|Δ(κN)|. No limit on jerk per tick can be honest there (it grows as 1/τ),
-//! so their sum is held to an **acceleration-step limit** of its own:
+//! A junction is passed without stopping if the angle between its tangents is small enough; otherwise the
+//! machine stops exactly on the corner. When it is passed at feed v, two things step from one tick to the
+//! next: the velocity by the angle, v·φ, which is an acceleration of v·φ/τ for one tick, and the acceleration
+//! by the jump of curvature, v²·|Δ(κN)|. No limit on jerk per tick can be honest there (it grows as 1/τ), so
+//! their sum has its own limit, the **acceleration-step limit**:
 //!
 //! ```text
 //! v·φ/τ + v²·|Δ(κN)| ≤ step
@@ -21,19 +21,20 @@ pub struct Junction<R> {
     pub curvature_step_per_mm: R,
 }
 
-/// The greatest feed through a junction \[mm/s\]: 0 if the angle exceeds `angle_max_rad`, infinite if
-/// nothing steps (in fixed point the greatest value). `accel_step_mm_s2` is the acceleration-step limit, `tick_s` the control tick τ.
+/// The greatest feed through a junction \[mm/s\]: 0 if the angle exceeds `angle_max_rad`, infinite if nothing
+/// steps (in fixed point, the greatest value). `accel_step_mm_s2` is the acceleration-step limit, `tick_s`
+/// the control tick τ.
 pub fn junction<R: Root>(junction: &Junction<R>, angle_max_rad: R, accel_step_mm_s2: R, tick_s: R) -> R {
     let (kink, bend) = (junction.angle_rad / tick_s, junction.curvature_step_per_mm);
-    // What is beyond the range of fixed point stops, and no greater step is made use of.
+    // A junction beyond the range of fixed point stops, and no greater step is used.
     let most = R::from_f64(R::LIMITS.1);
     if junction.angle_rad > angle_max_rad || kink > most || bend > most {
         return R::ZERO;
     }
-    // The root of Δκ·v² + (φ/τ)·v = step, in the form that has no cancellation.
+    // The root of Δκ·v² + (φ/τ)·v = step, in the form without cancellation.
     let step = accel_step_mm_s2.min(most);
     let two_step = step + step;
-    // Made larger, not smaller, by the rounding of fixed point.
+    // Rounding of fixed point makes it larger, not smaller.
     let sum = kink + kink.root_of_squares((bend + bend).sqrt_product(two_step));
     two_step / if sum > R::ZERO { sum + R::MARGIN } else { sum }
 }

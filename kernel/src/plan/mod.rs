@@ -1,13 +1,13 @@
 //! The feed plan (S3): how fast each block may be, and how to get there.
 //!
-//! Consumes blocks of path; produces ramps over exact lengths of it. Works on slices, allocates nothing, runs in the
-//! background, on the host for a whole stretch or on the board for what is queued. Unchanged input
-//! gives the same bits.
+//! Consumes blocks of path; produces ramps over exact lengths of it. Works on slices, allocates nothing, runs
+//! in the background: on the host for a whole stretch, on the board for the queued path. The same input gives
+//! the same bits.
 //!
 //! - `ceiling`: stage 1, the feed that a block's geometry and the machine allow, with the reason,
 //!   and how much acceleration, jerk and snap are left for changing the feed on a curve;
-//! - `junction`: what a junction between two blocks allows;
-//! - `two_pass`: stages 1 and 2 over the stretch: what can be reached, and from what one can brake;
+//! - `junction`: the greatest feed through a junction of two blocks;
+//! - `two_pass`: stages 1 and 2 over the stretch: the feeds that can be reached, and from which it can brake;
 //! - `ramps`: the pair of ramps of a planned block over exact path positions;
 //! - `spanning`: ramps that begin and end between junctions and may span many blocks;
 //! - `planner`: the entry for all callers: the faster of the two, in the caller's memory.

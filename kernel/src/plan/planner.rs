@@ -1,8 +1,9 @@
-//! The planner's one entry: blocks, from a feed to a feed, as ramps over exact lengths of path.
+//! The planner's entry: plans blocks, from feed to feed, as ramps over exact lengths of path.
 //!
-//! Consumes blocks with their exact ends and the caller's memory; produces [`PlannedRamp`]s. It makes a plan with ramps that
-//! span blocks and one with a pair of ramps a block, and takes the faster. Both are legal; which is faster depends on how
-//! often the ceilings change. Where no ramps that span blocks are found the pairs are the fallback.
+//! Consumes blocks with their exact ends and the caller's memory; produces [`PlannedRamp`]s. It makes one
+//! plan with ramps that span blocks and one with a pair of ramps per block, and takes the faster. Both are
+//! legal; which one is faster depends on how often the ceilings change. If no spanning plan is found, the
+//! pairs are the fallback.
 
 use super::ramps::ramps;
 use super::spanning::{Node, plan_spanning};
@@ -10,65 +11,66 @@ use super::two_pass::{Block, BlockPlan, PlanError, check, merge_each, plan};
 use crate::law::{PlannedRamp, Ramp, SegmentError};
 use crate::units::Position;
 
-/// What is to be planned.
+/// The path to be planned.
 pub struct Path<'a> {
     /// The blocks, in order.
     pub blocks: &'a mut [Block<f64>],
-    /// Where each one ends.
+    /// The end of each block.
     pub ends: &'a mut [Position],
-    /// Where the first one starts.
+    /// The start of the first block.
     pub start: Position,
-    /// The feeds at the start of the first one and at the end of the last \[mm/s\].
+    /// The feeds at the start of the first block and at the end of the last \[mm/s\].
     pub feeds_mm_s: [f64; 2],
     /// The control tick that the ramps are for \[s\].
     pub tick_s: f64,
 }
 
-/// How much is done for a fast plan. [`Effort::Merged`] and [`Effort::Spanning`] merge equal neighbours in the caller's memory;
-/// what is in it afterwards means nothing.
+/// The effort spent on a fast plan. [`Effort::Merged`] and [`Effort::Spanning`] merge equal neighbours in the
+/// caller's memory, whose content is then meaningless.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// One pair of ramps a block.
+    /// One pair of ramps per block.
     PerBlock,
-    /// One pair of ramps for equal neighbours together.
+    /// One pair of ramps per group of equal neighbours.
     Merged,
-    /// Ramps that span any number of blocks, where that is faster than one pair for equal neighbours together.
+    /// Ramps that span any number of blocks, where that is faster than one pair per group of equal
+    /// neighbours.
     Spanning,
-    /// Ramps that span blocks, where that is faster than one pair a block.
+    /// Ramps that span the first blocks, where that is faster than one pair per block.
     SpanningFirst {
-        /// So many blocks may be spanned. Where there are more, and spanning is faster, the plan ends after these blocks, at the
-        /// feed with which the pairs of the others begin.
+        /// Number of blocks that may be spanned. If there are more and spanning is faster, the plan ends
+        /// after these blocks, at the feed where the pairs of the other blocks begin.
         most: usize,
     },
 }
 
-/// The planner's working memory. What is in it before and after means nothing.
+/// The planner's working memory. Its content before and after is meaningless.
 pub struct Memory<'a> {
-    /// One for each block.
+    /// One place per block.
     pub plans: &'a mut [BlockPlan<f64>],
-    /// [`nodes_for`](super::nodes_for) the blocks that may be spanned.
+    /// As many as [`nodes_for`](super::nodes_for) the blocks that may be spanned.
     pub nodes: &'a mut [Node],
 }
 
-/// What was planned.
+/// The result of planning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Planned {
     /// There was room for all ramps, and they cover all blocks.
     pub is_whole: bool,
-    /// The time that they take, if so \[s\].
+    /// The time that they take \[s\], if so.
     pub time_s: f64,
 }
 
-/// Times that differ by a smaller share are equal but for rounding; the pairs are taken then.
+/// Times whose relative difference is smaller are equal but for rounding; then the pairs are taken.
 const EQUAL: f64 = 1.0e-12;
 
-/// Plans `path` and hands the ramps of the faster plan to `put` in path order, each with its number from 0. A number that
-/// comes again replaces the ramp that had it, and all ramps after that one. `put` returns whether there was room; if not,
-/// the rest of that plan is left out.
+/// Plans `path` and hands the ramps of the faster plan to `put` in path order, each with its number from 0.
+/// If a number comes again, it replaces the ramp that had it and all ramps after that one. `put` returns
+/// whether there was room; if not, the rest of that plan is omitted.
 ///
 /// # Errors
-/// A figure is out of range, the path is too short for its start or end feed, a ramp is beyond the tick's range, or there is
-/// too little working memory.
+/// A figure is out of range, the path is too short for its start or end feed, a ramp is beyond the tick's
+/// range, or there is too little working memory.
 pub fn plan_ramps(
     path: Path<'_>,
     effort: Effort,
@@ -84,7 +86,7 @@ pub fn plan_ramps(
     };
     let spans_all = most > 0 && most == blocks.len();
     let mut spanning = None;
-    // The lengths of merged blocks are rounded: where all may be spanned, that comes first.
+    // Merging rounds the blocks' lengths: if all blocks may be spanned, span them before merging.
     if spans_all {
         spanning = span(Stretch { blocks, ends, start, tick_s }, [start_mm_s, end_mm_s], nodes, put)?;
     }
@@ -152,7 +154,7 @@ impl<'a, F: FnMut(usize, PlannedRamp) -> bool> Out<'a, F> {
     }
 }
 
-/// One pair of ramps a block, as `plans` say.
+/// Puts one pair of ramps per block, according to `plans`.
 fn pairs(
     stretch: Stretch<'_>,
     plans: &[BlockPlan<f64>],
@@ -172,8 +174,8 @@ fn pairs(
     Ok(out.planned)
 }
 
-/// Ramps that span blocks; `None` where there is no such plan in the tick's range.
-// In a frame of its own: what it works with takes many kilobytes.
+/// Puts ramps that span blocks; `None` if there is no such plan in the tick's range.
+// In its own stack frame: its working memory takes many kilobytes.
 #[inline(never)]
 fn span(
     stretch: Stretch<'_>,
@@ -182,7 +184,7 @@ fn span(
     put: &mut impl FnMut(usize, PlannedRamp) -> bool,
 ) -> Result<Option<Planned>, PlanError> {
     let mut out = Out::new(put);
-    // A ramp ends where the next one starts: one waits until that is known.
+    // A ramp ends where the next one starts, so it waits until that is known.
     let (mut waiting, mut start, mut is_made) = (None, stretch.start, true);
     let mut end_at = |end: Option<Position>, next: Option<Ramp<f64>>| {
         let Some(end) = end else {
@@ -204,7 +206,7 @@ fn span(
     Ok(found.filter(|_| is_made).map(|_| out.planned))
 }
 
-/// `ramp` over `length`; `None` of a cruise that rounding leaves no length.
+/// `ramp` over `length`; `None` for a cruise that has no length after rounding.
 fn placed(ramp: &Ramp<f64>, length: Position, tick_s: f64) -> Result<Option<PlannedRamp>, SegmentError> {
     if !ramp.is_cruise() {
         PlannedRamp::new(ramp, length, tick_s).map(Some)

@@ -1,7 +1,7 @@
 //! The ramps of one planned block.
 //!
 //! Consumes a block's plan and its exact start and end on the path; produces up to three ramps and cruises
-//! that fill it without a gap of a single position step: accelerate, cruise, brake.
+//! that fill it without a gap of even one position step: accelerate, cruise, brake.
 
 use super::two_pass::{Block, BlockPlan};
 use crate::law::{PlannedRamp, Ramp, SegmentError};
@@ -29,7 +29,7 @@ pub fn ramps<P: Root>(
             .ok_or(SegmentError::OutOfRange { quantity: "ramp length [mm]", value: mm })
     };
     let &BlockPlan { enter_mm_s, mut peak_mm_s, exit_mm_s, .. } = plan;
-    // A ramp that is shorter than a position step is none, and must leave no step of the feed where it was.
+    // A ramp shorter than a position step is dropped, and must leave no step of the feed in its place.
     let mut fall = ramp(peak_mm_s, exit_mm_s)?;
     if fall.1 == Position::ZERO && peak_mm_s != exit_mm_s {
         peak_mm_s = exit_mm_s;
@@ -42,7 +42,7 @@ pub fn ramps<P: Root>(
     }
     let ((rise, rise_length), (fall, fall_length)) = (rise, fall);
     let (peak, brake) = (start + rise_length, end - fall_length);
-    // With no room to cruise the two ramps meet but for rounding: they are made to meet.
+    // With no room to cruise, the two ramps meet but for rounding: they are made to meet exactly.
     let rounding_mm = block.length_mm.spacing().to_f64();
     let meets = (brake - peak).to_mm() <= GAP_MM + 16.0 * rounding_mm;
     let (peak, brake) = match (meets, rise.duration_s() > P::ZERO, fall.duration_s() > P::ZERO) {
@@ -60,7 +60,7 @@ pub fn ramps<P: Root>(
     Ok([made(&rise, peak - start)?, cruise, made(&fall, end - brake)?])
 }
 
-/// Less than this between two ramps is rounding \[mm\].
+/// A smaller gap between two ramps is rounding \[mm\].
 const GAP_MM: f64 = 4.0e-9;
 
 #[cfg(test)]
@@ -70,8 +70,8 @@ mod tests {
     use crate::law::{Law, Limits};
     use crate::random::Random;
 
-    /// Whatever the length, down to a position step: feeds meet to the bit, and lengths to the step. Blocks are driven from
-    /// a feed to rest, as when a stop begins where hardly any path is left.
+    /// Whatever the length, down to a position step: feeds meet to the bit, and lengths to the step. Blocks
+    /// are driven from a feed to rest, as when a stop begins where hardly any path is left.
     #[test]
     fn nothing_is_lost_in_ramps_without_a_step() {
         let law = Law::new(Limits { accel_mm_s2: 2000.0, jerk_mm_s3: 5e4, snap_mm_s4: 4e6 }).expect("limits");

@@ -1,12 +1,12 @@
 //! Stages 1 and 2: a feed for every junction of a stretch.
 //!
-//! Forward, each block's exit is what its ceiling, the next one's, their junction and the length allow;
-//! backward from the stop, each block's entry is what one can brake from ("block 9" of S3). Then each
-//! block gets the peak its length allows ("block 12").
+//! Forward, each block's exit feed is the greatest that its ceiling, the next one's, their junction and the
+//! length allow; backward from the stop, each block's entry feed is the greatest from which it can brake
+//! ("block 9" of S3). Then each block gets the peak that its length allows ("block 12").
 //!
-//! One pass each way, constant work a block. The result is feasible, and Pareto-maximal: no feasible
-//! plan has every junction feed at least as high and one higher. It is *not* always the fastest, because
-//! a ramp's length is not monotone in its lower feed.
+//! One pass each way, constant work per block. The result is feasible, and Pareto-maximal: no feasible plan
+//! has every junction feed at least as high and one higher. It is *not* always the fastest, because a ramp's
+//! length is not monotone in its lower feed.
 
 use super::ceiling::Reason;
 use crate::law::{Law, SegmentError, peak, reach};
@@ -30,16 +30,16 @@ pub struct Block<R> {
 /// The planned feeds of a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BlockPlan<R> {
-    /// At its start \[mm/s\].
+    /// Feed at its start \[mm/s\].
     pub enter_mm_s: R,
-    /// Greatest inside; it cruises there if there is length left \[mm/s\].
+    /// Greatest feed inside \[mm/s\]; it cruises at this feed if there is length left.
     pub peak_mm_s: R,
-    /// At its end \[mm/s\].
+    /// Feed at its end \[mm/s\].
     pub exit_mm_s: R,
 }
 
 impl<R: Root> BlockPlan<R> {
-    /// What limits a block whose ceiling was set for `ceiling`: that, or its length.
+    /// What limits a block whose ceiling has the reason `ceiling`: that, or its length.
     pub fn reason(&self, block: &Block<R>, ceiling: Reason) -> Reason {
         let reached = self.peak_mm_s >= block.cap_mm_s * (R::ONE - R::from_f64(1.0e-9));
         match (reached, self.peak_mm_s > self.exit_mm_s) {
@@ -59,11 +59,11 @@ pub enum PlanError {
     Block {
         /// The block, from 0.
         block: usize,
-        /// Which figure, with its unit.
+        /// The figure, with its unit.
         quantity: &'static str,
         /// Its value.
         value: f64,
-        /// Least and greatest that is accepted, besides a length of 0.
+        /// Least and greatest value accepted; a length may also be 0.
         range: (f64, f64),
     },
     /// The start or end feed is negative, above the ceiling of its block, or not 0 and below the least of
@@ -80,14 +80,14 @@ pub enum PlanError {
     TooShortToBrake {
         /// The start feed \[mm/s\].
         start_mm_s: f64,
-        /// The greatest from which one can brake \[mm/s\].
+        /// The greatest feed from which it can brake \[mm/s\].
         greatest_mm_s: f64,
     },
     /// The stretch is too short to accelerate to its end feed.
     TooShortToAccelerate {
         /// The end feed \[mm/s\].
         end_mm_s: f64,
-        /// The greatest that can be reached \[mm/s\].
+        /// The greatest feed that can be reached \[mm/s\].
         greatest_mm_s: f64,
     },
     /// The ramps of a block are beyond the tick's range.
@@ -97,13 +97,13 @@ pub enum PlanError {
         /// Why.
         error: SegmentError,
     },
-    /// The caller's memory has another number of places than are needed.
+    /// The caller's memory has the wrong number of places.
     Room {
         /// What they are for.
         of: &'static str,
-        /// How many are needed.
+        /// Number needed.
         needed: usize,
-        /// How many there are.
+        /// Number there.
         places: usize,
     },
 }
@@ -139,8 +139,8 @@ impl core::fmt::Display for PlanError {
 
 impl core::error::Error for PlanError {}
 
-/// Plans a stretch from `start_mm_s` to `end_mm_s` into `plans`, one for each block. The junction at the
-/// end of the last block is not looked at.
+/// Plans a stretch from `start_mm_s` to `end_mm_s` into `plans`, one for each block. The junction at the end
+/// of the last block is ignored.
 ///
 /// # Errors
 /// A figure is out of range, or the stretch is too short for its start or end feed.
@@ -157,8 +157,8 @@ pub fn plan<R: Root>(
     forward(blocks, start_mm_s, end_mm_s, plans)?;
     backward(blocks, start_mm_s, plans)?;
     for (block, plan) in blocks.iter().zip(plans) {
-        // The junctions' feeds are below the ceiling already. Most often there is room to reach it, or
-        // the block is passed at it: that is cheaper to see than to solve for.
+        // The junctions' feeds are below the ceiling already. Most often there is room to reach the ceiling,
+        // or the block is passed at it; checking that is cheaper than solving.
         let (enter, exit, cap) = (plan.enter_mm_s, plan.exit_mm_s, block.cap_mm_s);
         // Subtracted, because the sum may be beyond fixed point.
         let left = block.length_mm - block.law.ramp_length_mm(cap, exit);
@@ -175,7 +175,7 @@ pub(super) fn check<R: Root>(blocks: &[Block<R>], start: R, end: R) -> Result<()
     let (slowest, fastest) = R::FEEDS_MM_S;
     for (index, block) in blocks.iter().enumerate() {
         let (length, cap, junction) = (block.length_mm, block.cap_mm_s, block.junction_mm_s);
-        // A length of 0 is as good as one in its range, a ceiling of 0 is not.
+        // A length of 0 is accepted, a ceiling of 0 is not.
         for (quantity, value, least, greatest, good) in [
             ("length [mm]", length, R::LENGTH_MIN_MM, Position::LIMIT_MM, length == R::ZERO),
             ("ceiling [mm/s]", cap, slowest, fastest, false),
@@ -258,16 +258,16 @@ fn backward<R: Root>(blocks: &[Block<R>], start: R, plans: &mut [BlockPlan<R>]) 
     }
 }
 
-/// Merges neighbours that look like one block: same ceiling, same law, and a junction that does not
-/// slow them. The plan is hardly ever slower for it (by 1.4·10⁻³ in two of 20 000 random lists: a
-/// higher feed at one junction can mean a lower one at the next). The merged blocks are at the front of the
-/// slice; returns how many they are.
+/// Merges neighbours that are like one block: same ceiling, same law, and a junction that does not slow them.
+/// This hardly ever makes the plan slower (by 1.4·10⁻³ in two of 20 000 random lists: a higher feed at one
+/// junction can mean a lower one at the next). The merged blocks are at the front of the slice; returns their
+/// number.
 #[must_use]
 pub fn merge_equal<R: Root>(blocks: &mut [Block<R>]) -> usize {
     merge_each(blocks, |_, _| ())
 }
 
-/// As [`merge_equal`]; `moved` is told for every block the index that it had and that of the merged one which it is in.
+/// As [`merge_equal`]; calls `moved` for every block with its old index and the index of its merged block.
 pub(super) fn merge_each<R: Root>(blocks: &mut [Block<R>], mut moved: impl FnMut(usize, usize)) -> usize {
     let mut merged: usize = 0;
     let longest = R::from_f64(Position::LIMIT_MM);
@@ -279,7 +279,7 @@ pub(super) fn merge_each<R: Root>(blocks: &mut [Block<R>], mut moved: impl FnMut
                 if last.cap_mm_s == next.cap_mm_s
                     && last.law == next.law
                     && last.junction_mm_s >= next.cap_mm_s
-                    // Neither was checked yet, nor may the sum be refused for being one.
+                    // Neither length is checked yet, and merging must not make a sum that is refused.
                     && next.length_mm <= longest
                     && last.length_mm <= longest - next.length_mm =>
             {

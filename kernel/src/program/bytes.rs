@@ -10,9 +10,9 @@
 //! | … | [`Header`], then [`Item`]s to the end, each in the same format |
 //! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
 //!
-//! A [`Reader`] is made of a whole and undamaged program only; whether its items can be executed is what
-//! [`check`](super::check()) tells a board before anything moves. f64 figures are kept, so that the program runs in any
-//! number type, and gives the same bits wherever it is read.
+//! A [`Reader`] is made only of a whole and undamaged program. [`check`](super::check()) tells a board
+//! whether its items can be executed, before anything moves. Figures are kept in f64, so the program runs in
+//! any number type and gives the same bits wherever it is read.
 
 use core::marker::PhantomData;
 
@@ -29,15 +29,15 @@ const VERSION: u8 = 3;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 8;
-/// No header and no item of so many axes is longer.
+/// Greatest length of a header or an item with that many axes \[bytes\].
 const ENTRY_MAX: usize = 4096;
 
-/// What a program was planned for. A board executes it with this or not at all.
+/// The machine and tick that a program was planned for. A board executes it with these or not at all.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header<const AXES: usize> {
     /// The control tick \[s\].
     pub tick_s: f64,
-    /// What the streams are held to.
+    /// The limits that the streams check items against.
     pub rules: PathRules,
     /// The machine's axes.
     #[serde(with = "crate::array")]
@@ -54,7 +54,7 @@ pub struct Header<const AXES: usize> {
 pub enum ProgramError {
     /// It does not begin with `MOTN`, or is shorter than the shortest program.
     NotAProgram,
-    /// It is of another version of the format.
+    /// It has another version of the format.
     Version {
         /// Its version; 3 is expected.
         found: u8,
@@ -68,12 +68,12 @@ pub enum ProgramError {
     },
     /// It has been damaged.
     Checksum {
-        /// Of the bytes as they are.
+        /// The checksum of the bytes received.
         found: u32,
-        /// As written.
+        /// The checksum in the program.
         expected: u32,
     },
-    /// Behind an intact checksum there is no header, guards or item where one should be.
+    /// The checksum is right, but there is no header, guards or item where one should be.
     Malformed {
         /// Bytes from the start of the program.
         at: usize,
@@ -99,7 +99,7 @@ impl core::error::Error for ProgramError {}
 /// Appends a program to `out`.
 ///
 /// # Errors
-/// There are more axes than eight, for which an entry may be longer than the format's bound.
+/// There are more than eight axes, for which an entry may exceed the format's bound.
 pub fn write<'a, const AXES: usize>(
     header: &Header<AXES>,
     guards: Option<&Guards<AXES>>,
@@ -132,7 +132,7 @@ pub fn write<'a, const AXES: usize>(
     Ok(())
 }
 
-/// A program in bytes that stay where they are.
+/// A program, read from bytes that stay in place.
 #[derive(Clone, Copy, Debug)]
 pub struct Reader<'a, const AXES: usize> {
     header: Header<AXES>,
@@ -141,7 +141,7 @@ pub struct Reader<'a, const AXES: usize> {
     items: Items<'a, AXES>,
 }
 
-/// A program's items, in order. Some words; the header, a kilobyte, stays with the [`Reader`].
+/// A program's items, in order. A few words in size; the header, a kilobyte, stays with the [`Reader`].
 #[derive(Clone, Copy, Debug)]
 pub struct Items<'a, const AXES: usize> {
     left: &'a [u8],
@@ -154,7 +154,7 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
     /// The program in `bytes`, which end with it.
     ///
     /// # Errors
-    /// Nothing but a whole, undamaged program for `AXES` axes is accepted.
+    /// The bytes are not one whole, undamaged program for `AXES` axes.
     pub fn new(bytes: &'a [u8]) -> Result<Self, ProgramError> {
         let (summed, checksum) = bytes.split_last_chunk().ok_or(ProgramError::NotAProgram)?;
         let (magic, rest) = summed.split_first_chunk().ok_or(ProgramError::NotAProgram)?;
@@ -186,15 +186,15 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
         })
     }
 
-    /// What the program was planned for.
+    /// The machine and tick that the program was planned for.
     pub fn header(&self) -> &Header<AXES> {
         &self.header
     }
 
-    /// What the machine's axes are guarded by, and how its faults end; none where the program does not say.
+    /// The guards of the machine's axes and the reactions to faults; `None` if the program has none.
     ///
     /// # Errors
-    /// There is something else in their place.
+    /// The bytes in their place are something else.
     #[cfg(feature = "guards")]
     pub fn guards(&self) -> Result<Option<Guards<AXES>>, ProgramError> {
         if self.guards.is_empty() {

@@ -1,10 +1,10 @@
-//! A whole program against all that the streams would refuse, without streams; for live control also against what it
-//! needs to plan with.
+//! Checks a whole program for everything that the streams would refuse, without streams; for live control
+//! also for the blocks that it plans with.
 //!
-//! Consumes items; produces nothing but the first refusal. Background: as much work as filling the streams, and
-//! nothing is kept. What it accepts, [`Supply`](super::Supply) hands over without an error. What only time tells is
-//! left to the tick: how many pieces end in one ([`PIECES_PER_TICK_MAX`](crate::exec::PIECES_PER_TICK_MAX)), and
-//! whether the streams are filled fast enough.
+//! Consumes items; produces the first refusal. Background: as much work as filling the streams, and nothing
+//! is kept. If it accepts a program, [`Supply`](super::Supply) hands it over without an error. Only the tick
+//! can tell the rest: how many pieces end in one ([`PIECES_PER_TICK_MAX`](crate::exec::PIECES_PER_TICK_MAX)),
+//! and whether the streams are filled fast enough.
 
 use super::supply::{Ready, SupplyError};
 use super::{Header, Item};
@@ -16,21 +16,21 @@ use crate::units::Position;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CheckError<E> {
-    /// It starts farther out than positions reach.
+    /// It starts beyond the range of positions.
     Start {
         /// The axis, from 0.
         axis: usize,
-        /// Where \[mm\].
+        /// The start position \[mm\].
         mm: f64,
     },
     /// An item can't be executed.
     Item {
-        /// Which, from 0.
+        /// The item, from 0.
         index: u32,
         /// Why.
         cause: SupplyError<E>,
     },
-    /// Up to an item, or behind the last one, path is not held by blocks, or blocks hold what is no path.
+    /// Up to an item, or after the last one, path is not covered by blocks, or blocks cover no path.
     #[cfg(feature = "live")]
     NotHeld {
         /// The item, from 0.
@@ -61,7 +61,7 @@ impl<E: core::fmt::Display> core::fmt::Display for CheckError<E> {
 
 impl<E: core::fmt::Debug + core::fmt::Display> core::error::Error for CheckError<E> {}
 
-/// Whether a kernel of the number type `R` can execute all of `items`, which are of the program with `header`.
+/// Checks that a kernel of the number type `R` can execute all of `items`, from the program with `header`.
 ///
 /// # Errors
 /// The first thing that is wrong.
@@ -72,8 +72,8 @@ pub fn check<R: Real, const AXES: usize, E>(
     each::<R, AXES, E>(header, items, |_, _| Ok(()))
 }
 
-/// The same for a kernel under live control: in every stretch blocks come before the path that they hold the feed of, and end
-/// with it.
+/// The same for a kernel under live control: in every stretch, blocks come before the path that they cover,
+/// and end with it.
 ///
 /// # Errors
 /// The first thing that is wrong.
@@ -113,7 +113,7 @@ fn each<R: Real, const AXES: usize, E>(
     accept.at_rest().map_err(|_| CheckError::Unfinished)
 }
 
-/// How much of a stretch there is, and how much of it is held by blocks.
+/// The length of a stretch, and how much of it is covered by blocks.
 #[cfg(feature = "live")]
 #[derive(Clone, Copy, Debug, Default)]
 struct Held {
@@ -147,7 +147,7 @@ impl Held {
     }
 }
 
-// In a frame of its own: an item takes hundreds of bytes.
+// In its own stack frame: an item takes hundreds of bytes.
 #[inline(never)]
 fn take<R: Real, const AXES: usize, E>(
     accept: &mut Acceptance<R, AXES>,

@@ -1,15 +1,15 @@
-//! CRC-32, by which damaged bytes are known: of programs, and of what is recorded of a run.
+//! CRC-32, which detects damaged bytes: of programs, and of recordings.
 
-/// CRC-32 (ISO-HDLC) of what has been seen so far. Four bits at a time: a kilobyte of flash for a table of bytes is
+/// CRC-32 (ISO-HDLC) of the bytes so far. Four bits at a time: the kilobyte of flash for a byte-wise table is
 /// worth more than the milliseconds.
 #[derive(Clone, Copy, Debug)]
 pub struct Checksum(u32);
 
 impl Checksum {
-    /// Of nothing.
+    /// The checksum of no bytes.
     pub const NONE: Self = Self(u32::MAX);
-    /// What four bits that leave make of the rest, by the polynomial with its least significant bit first.
-    // For a constant: an index beyond the table does not compile.
+    /// The remainders of the four bits that leave, for the polynomial with its least significant bit first.
+    // In a constant: an index beyond the table does not compile.
     #[allow(clippy::indexing_slicing)]
     const REST: [u32; 16] = {
         let (mut rest, mut index) = ([0; 16], 0);
@@ -42,7 +42,7 @@ impl Checksum {
         }
     }
 
-    // A call, or the loop over bytes is unrolled.
+    // Not inlined, because the loop over bytes would be unrolled.
     #[inline(never)]
     fn leave(&mut self) {
         // The index is below the length.
@@ -61,7 +61,8 @@ impl Checksum {
 mod tests {
     use super::*;
 
-    /// The value that the catalogue of parametrised CRC algorithms gives for CRC-32/ISO-HDLC, in one part and in two.
+    /// The value that the catalogue of parametrised CRC algorithms gives for CRC-32/ISO-HDLC, in one part and
+    /// in two.
     #[test]
     fn the_checksum_is_the_one_of_zip_and_ethernet() {
         for split in 0..=9 {

@@ -1,9 +1,9 @@
-//! Planned motion as data: what a board has in flash, or is sent.
+//! Planned motion as data: a program in a board's flash, or sent to it.
 //!
-//! Consumes what a planner made, for whatever number type; produces pieces and segments of the kernel's,
+//! Consumes a planner's output for any number type; produces pieces and segments of the kernel's number type,
 //! into the two streams. Background.
 //!
-//! - [`Item`]: one item of a program, in f64 and position steps; made into the same bits on every target;
+//! - [`Item`]: one item of a program, in f64 and position steps; converted to the same bits on every target;
 //! - `supply`: keeps the two streams filled from items;
 //! - `check`: whether all of a program can be executed, before any of it is;
 //! - `bytes`: a program as bytes, with the machine it is for.
@@ -56,8 +56,8 @@ use crate::law::{Limits, PlannedRamp, Ticks};
 use crate::num::Real;
 use crate::units::Position;
 
-/// One thing for the streams. Within a stretch, pieces and ramps come in the order of the path positions
-/// where they start, so that whichever queue is full, the other one is as far.
+/// One item of a program. Within a stretch, pieces and ramps come in the order of the path positions where
+/// they start, so that both queues are always filled equally far.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Item<const AXES: usize> {
     /// A straight piece of path, see [`Piece::line`](crate::path::Piece::line).
@@ -80,7 +80,7 @@ pub enum Item<const AXES: usize> {
         /// Where it starts.
         #[serde(with = "crate::array")]
         start: [Position; AXES],
-        /// q₁ … q₇ of every axis, parts of the length.
+        /// q₁ … q₇ of every axis, as fractions of the length.
         #[serde(with = "crate::array")]
         coefficients: [[f64; 7]; AXES],
         /// Its length.
@@ -94,13 +94,13 @@ pub enum Item<const AXES: usize> {
     Dwell(Ticks),
     /// Rest until told to resume, between stretches.
     Stop,
-    /// What the feed over the next length of path is held to; the path's blocks follow each other without a gap. What
-    /// live control makes other plans with; a kernel without it reads no programs with blocks.
+    /// The limits of the feed over the next length of path; blocks follow each other without a gap. Live
+    /// control plans anew with them; a kernel without it reads no programs with blocks.
     #[cfg_attr(not(feature = "live"), serde(skip))]
     Block(PathBlock),
 }
 
-/// What geometry and machine allow on a block.
+/// The feed and limits that geometry and machine allow on a block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allowed {
     /// Greatest feed \[mm/s\].
@@ -109,20 +109,21 @@ pub struct Allowed {
     pub limits: Limits<f64>,
 }
 
-/// A length of path with what holds its feed.
-// Figures of one kind: they take less flash to read than a struct of structs.
+/// A length of path with the limits of its feed.
+// All figures of one kind: reading them takes less flash than a struct of structs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PathBlock {
     /// Its length.
     pub length: Position,
-    /// The program's feed, then cap and limits at up to it, then cap and limits whatever it is, then the junction's feed.
+    /// The program's feed, then cap and limits up to that feed, then cap and limits at any feed, then the
+    /// junction's feed.
     #[serde(with = "crate::array")]
     figures: [f64; 10],
 }
 
 impl PathBlock {
-    /// A block of `length` with the program's feed \[mm/s\], infinite for a rapid; what is allowed at up to that feed,
-    /// and whatever it is.
+    /// A block of `length` with the program's feed \[mm/s\], infinite for a rapid; with what is allowed up to
+    /// that feed, and at any feed.
     #[must_use]
     pub fn new(
         length: Position,
@@ -138,7 +139,7 @@ impl PathBlock {
         Self { length, figures }
     }
 
-    /// Whether the feed on another block is held to the same figures, whatever their lengths and junctions.
+    /// Whether another block limits the feed to the same figures, whatever their lengths and junctions.
     #[must_use]
     pub fn holds_like(&self, other: &Self) -> bool {
         let [held @ .., _] = self.figures;
@@ -154,7 +155,7 @@ impl PathBlock {
         Self { length: self.length + next.length, figures: [feed, a, b, c, d, e, f, g, h, junction_mm_s] }
     }
 
-    /// The same block with limits as far as the number type holds them, for plans that are driven in it.
+    /// The same block with limits clamped to the number type, for plans that are driven in it.
     #[cfg(feature = "live")]
     #[must_use]
     pub(crate) fn within_range<R: Real>(self) -> Self {
@@ -181,14 +182,14 @@ impl PathBlock {
         feed_mm_s
     }
 
-    /// What is allowed at up to the program's feed.
+    /// What is allowed up to the program's feed.
     #[must_use]
     pub fn programmed(&self) -> Allowed {
         let [_, cap_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, ..] = self.figures;
         Allowed { cap_mm_s, limits: Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 } }
     }
 
-    /// What is allowed whatever the program says.
+    /// What is allowed at any feed.
     #[must_use]
     pub fn greatest(&self) -> Allowed {
         let [.., cap_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, _] = self.figures;

@@ -1,7 +1,7 @@
 //! Keeps the two streams filled.
 //!
-//! Consumes [`Item`]s; offers them to the [`Feeder`] until it says it is full, whenever it is called. Here
-//! an item becomes the kernel's number type, so that a board needs room for one item besides its queues.
+//! Consumes [`Item`]s; at every call it offers them to the [`Feeder`] until that is full. Here an item is
+//! converted to the kernel's number type, so a board needs room for only one item in addition to its queues.
 
 use super::Item;
 use crate::law::{FeedSegment, SegmentError, Ticks};
@@ -14,13 +14,13 @@ use crate::units::Position;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SupplyError<E> {
-    /// The item could not be had.
+    /// The source failed to provide the item.
     Source(E),
-    /// It is no piece of path in this number type.
+    /// The item is no piece of path in this number type.
     Piece(PieceError),
-    /// It is no feed segment in this number type.
+    /// The item is no feed segment in this number type.
     Segment(SegmentError),
-    /// It does not belong where it stands.
+    /// The item may not follow the ones before it.
     Rejected(Rejection),
 }
 
@@ -40,11 +40,11 @@ impl<E: core::fmt::Debug + core::fmt::Display> core::error::Error for SupplyErro
 /// An item in the kernel's number type.
 #[derive(Clone, Copy, Debug)]
 pub enum Ready<R: Real, const AXES: usize> {
-    /// Of the path stream.
+    /// For the path stream.
     Piece(Piece<R, AXES>),
-    /// Of the feed stream.
+    /// For the feed stream.
     Segment(FeedSegment<R>),
-    /// Of both.
+    /// For both streams.
     EndOfStretch([Position; AXES]),
     /// Rest for a time.
     Dwell(Ticks),
@@ -77,20 +77,20 @@ impl<const AXES: usize> Item<AXES> {
     }
 }
 
-/// Where the supply stands.
+/// The state of the supply.
 #[derive(Debug)]
 pub struct Supply<R: Real, const AXES: usize, I, E> {
     items: I,
     tick_s: f64,
-    /// Made ready, and not yet taken by the queues.
+    /// An item made ready but not yet taken by the queues.
     pending: Option<Ready<R, AXES>>,
     is_at_end: bool,
-    /// What ended it. The item it was for is gone, and what follows it would not continue what is queued.
+    /// The error that ended it. The failed item is gone, and the next one would not continue the queued path.
     error: Option<SupplyError<E>>,
 }
 
 impl<R: Real, const AXES: usize, E: Clone, I: Iterator<Item = Result<Item<AXES>, E>>> Supply<R, AXES, I, E> {
-    /// All of `items` still to do, for ticks of `tick_s`.
+    /// A supply with all of `items` still to do, for ticks of `tick_s`.
     pub fn new(items: I, tick_s: f64) -> Self {
         Self { items, tick_s, pending: None, is_at_end: false, error: None }
     }
@@ -103,8 +103,8 @@ impl<R: Real, const AXES: usize, E: Clone, I: Iterator<Item = Result<Item<AXES>,
     /// Fills the streams.
     ///
     /// # Errors
-    /// The next item can't be executed; what is queued before it is untouched. So it stays: every later call
-    /// returns the same error.
+    /// The next item can't be executed; items queued before it are untouched. Every later call returns the
+    /// same error.
     pub fn fill(&mut self, feeder: &mut Feeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
         if let Some(error) = &self.error {
             return Err(error.clone());

@@ -1,15 +1,15 @@
 //! A reader of the [postcard](https://postcard.jamesmunns.com) wire format that takes little flash.
 //!
-//! Consumes bytes; produces what serde derives for a program's entries. Background. It accepts what `postcard` itself
-//! accepts, but does not look for an error at every number: one that is not there or not a number is 0, is noted, and
-//! makes the whole entry none at its end. Every entry has a bounded number of numbers. That saves a branch and a way
-//! out at each of them, which is most of what a reader of programs is made of.
+//! Consumes bytes; produces a program's entries through serde's derives. Background. It accepts what
+//! `postcard` itself accepts, but does not return an error at every number: a missing or malformed number
+//! reads as 0, is noted, and makes the whole entry `None` at its end. Every entry has a bounded number of
+//! numbers. That saves a branch and an early return at each of them, which would be most of a reader's code.
 
 use serde::de::value::U32Deserializer;
 use serde::de::{self, DeserializeSeed, Deserializer, IntoDeserializer, Visitor};
 
-/// A value at the start of `bytes`, and what is behind it; `None` if there is none.
-// In its caller's frame: a header is a kilobyte, and two beside each other are more than the smallest core holds.
+/// A value at the start of `bytes`, and the bytes after it; `None` if there is none.
+// In its caller's stack frame: a header is a kilobyte, and the smallest core has no room for two.
 #[inline(always)]
 pub(super) fn take<'de, T: de::Deserialize<'de>>(bytes: &'de [u8]) -> Option<(T, &'de [u8])> {
     let mut wire = Wire { left: bytes, is_sound: true };
@@ -17,14 +17,14 @@ pub(super) fn take<'de, T: de::Deserialize<'de>>(bytes: &'de [u8]) -> Option<(T,
     wire.is_sound.then_some((value, wire.left))
 }
 
-/// What has not been read yet.
+/// The bytes not read yet.
 struct Wire<'de> {
     left: &'de [u8],
-    /// All numbers were there so far.
+    /// All numbers so far were sound.
     is_sound: bool,
 }
 
-// Each in one place of the image, whatever asks for it.
+// Not inlined: each is in the image once.
 impl Wire<'_> {
     #[inline(never)]
     fn byte(&mut self) -> u8 {
@@ -46,8 +46,8 @@ impl Wire<'_> {
         f64::from_le_bytes(bytes)
     }
 
-    /// An unsigned number of at most `bits` bits: seven in a byte, the least significant first, the eighth says that
-    /// another byte follows.
+    /// An unsigned number of at most `bits` bits: seven in a byte, the least significant first, the eighth
+    /// says that another byte follows.
     #[inline(never)]
     fn unsigned(&mut self, bits: u32) -> u64 {
         let mut value = 0;
@@ -72,7 +72,7 @@ impl Wire<'_> {
     }
 }
 
-/// Why an entry is none.
+/// The error of a malformed entry.
 #[derive(Debug)]
 struct Malformed;
 
@@ -93,7 +93,7 @@ impl de::Error for Malformed {
 impl<'de> Deserializer<'de> for &mut Wire<'de> {
     type Error = Malformed;
 
-    // The format does not say what there is.
+    // The format is not self-describing.
     fn deserialize_any<V: Visitor<'de>>(self, _: V) -> Result<V::Value, Malformed> {
         Err(Malformed)
     }
@@ -166,7 +166,7 @@ impl<'de> Deserializer<'de> for &mut Wire<'de> {
         visitor.visit_enum(self)
     }
 
-    // What no program has.
+    // Types that no program has.
     serde::forward_to_deserialize_any! {
         bool i8 i32 i128 u8 u128 f32 char str string bytes byte_buf unit unit_struct seq tuple_struct map
         identifier ignored_any
@@ -245,8 +245,8 @@ mod tests {
         found.is_some()
     }
 
-    /// Random bytes, most of which are near those of an entry: with few kinds of it at the start, numbers of all
-    /// lengths, too long ones, and cut anywhere.
+    /// Random bytes, most of which are near those of an entry: with few kinds of it at the start, numbers of
+    /// all lengths, too long ones, and cut anywhere.
     #[test]
     fn reads_what_postcard_reads_and_nothing_else() {
         for seed in 1..=20 {

@@ -1,8 +1,8 @@
-//! What may follow what in the streams.
+//! Which item may follow which in the streams.
 //!
-//! Every check costs the producer a few operations and spares the tick from ever meeting an item it
-//! could not execute. Each method goes on to the state after the item; a copy does, where the item may find
-//! its queue full, and an item that is rejected leaves a state of no further use.
+//! Every check costs the producer a few operations and spares the tick from ever meeting an item it could not
+//! execute. Each method moves to the state after the item. Where the queue may be full, call it on a copy; a
+//! rejected item leaves a state that must be discarded.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ use crate::num::{Real, Scalar, is_within, rolled};
 use crate::path::{Piece, Steepness, magnitude};
 use crate::units::Position;
 
-/// What the streams are held to. Immutable; the machine's configuration.
+/// The limits that every item is checked against. Immutable; part of the machine's configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PathRules {
     /// Limits along the path.
@@ -32,14 +32,14 @@ pub struct PathRules {
 pub(crate) struct Acceptance<R: Real, const AXES: usize> {
     rules: PathRules,
     position: [Position; AXES],
-    /// Of the last piece of this stretch.
+    /// The tangent at the end of the stretch's last piece.
     tangent: Option<[R; AXES]>,
     path_length: Position,
     feed_length: Position,
     feed_mm_s: R,
     density: Density,
-    /// Of what one stream has beyond the other's end: the steepest of its curves and where the last of them ends, the
-    /// greatest feed. A fast ramp may follow a sharp curve, but must not be on it.
+    /// For the part of a stream beyond the other's end: the steepest curve, where the last curve ends, and
+    /// the greatest feed. A fast ramp may follow a sharp curve, but must not be on it.
     steepness: Steepness,
     curved_until: Position,
     ahead_mm_s: f64,
@@ -80,7 +80,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
             for (after, before) in chord.iter_mut().zip(before) {
                 *after -= before.to_f64();
             }
-            // The chord between unit vectors is below the angle by a part in 24·angle².
+            // The chord between unit vectors is shorter than the angle by the fraction angle²/24.
             let angle_rad = magnitude(&chord);
             let rounding = 4.0 * R::EPSILON;
             if !(angle_rad <= self.rules.junction_angle_rad + rounding) {
@@ -147,8 +147,8 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         Ok(())
     }
 
-    /// Whether the number type holds what a feed of up to `v_mm_s` on a piece of this steepness asks of the axes,
-    /// and what is computed on the way.
+    /// Whether the number type holds what a feed of up to `v_mm_s` on a piece of this steepness asks of the
+    /// axes, and what is computed on the way.
     fn fits(&self, steepness: &Steepness, v_mm_s: f64) -> Result<(), Rejection> {
         let Some(most) = R::SETPOINT_MAX else { return Ok(()) };
         let Limits { accel_mm_s2, jerk_mm_s3, .. } = self.rules.limits;
@@ -162,13 +162,14 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         Ok(())
     }
 
-    /// For feed that goes on from here, at `feed_mm_s` and behind what `density` says, whatever was accepted before.
+    /// The state for feed that continues at `feed_length`, at `feed_mm_s` and after `density`, whatever was
+    /// accepted before.
     pub(crate) fn feed_from(&self, feed_length: Position, feed_mm_s: R, density: Density) -> Self {
         Self {
             feed_length,
             feed_mm_s,
             density,
-            // What the curves ask for is checked where they enter.
+            // Curves are checked when they enter.
             steepness: Steepness::STRAIGHT,
             curved_until: Position::ZERO,
             ..*self
@@ -180,7 +181,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         if R::SETPOINT_MAX.is_some() { self.fits(&piece.steepness(), fastest_mm_s) } else { Ok(()) }
     }
 
-    /// Behind the end of a stretch's feed.
+    /// The state after the end of a stretch's feed.
     pub(crate) fn feed_after_stretch(&self) -> Self {
         self.feed_from(Position::ZERO, R::ZERO, self.density)
     }
@@ -199,7 +200,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         self.feed_mm_s
     }
 
-    /// The end of the path of a stretch, whose feed is accepted in lists of its own.
+    /// Accepts the end of a stretch's path; its feed is accepted separately, in lists.
     pub(crate) fn end_of_path(&mut self, position: [Position; AXES]) -> Result<(), Rejection> {
         self.continuous(&position)?;
         if self.path_length == Position::ZERO {
@@ -219,7 +220,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         Ok(())
     }
 
-    /// Whether the feed has come to rest where its path, `path` long, ends.
+    /// Checks that the feed has come to rest at the end of its path, which is `path` long.
     pub(crate) fn feed_ends(&self, path: Position) -> Result<(), Rejection> {
         if self.feed_mm_s > R::ZERO {
             return Err(Rejection::Moving { feed_mm_s: self.feed_mm_s.to_f64() });

@@ -1,10 +1,10 @@
-//! Whether pieces stay within the travel of the axes.
+//! Checks that pieces stay within the travel of the axes.
 
 use super::rejection::Rejection;
 use crate::num::Real;
 use crate::path::{Piece, Travel};
 
-/// The travel that pieces are held to.
+/// The travel that pieces are checked against.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds<const AXES: usize>(Travel<AXES>);
 

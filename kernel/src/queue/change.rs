@@ -1,16 +1,17 @@
-//! From one feed list to another: what background and tick tell each other.
+//! Changes from one feed list to another, and what background and tick tell each other about them.
 //!
-//! A *feed list* holds a complete motion: it ends at rest. Motion is changed by making another list ready and saying
-//! where in the list under way it takes over, in one word ([`Change`]): after so many items of it, or inside the next
-//! one, whose beginning the other list's first segment then repeats. The tick follows that word exactly, whenever it
-//! finds it, or refuses it if it has passed the place; until then it is on a motion that ends at rest. So the background
-//! may take as long as it likes.
+//! A *feed list* holds a complete motion: it ends at rest. Motion is changed by making another list ready and
+//! saying where in the list under way it takes over, in one word ([`Change`]): after a number of its items,
+//! or inside the next one, whose beginning the other list's first segment then repeats. The tick follows that
+//! word exactly, whenever it finds it, or refuses it if it has passed the place; until then it is on a motion
+//! that ends at rest. So the background may take as long as it likes.
 //!
-//! The other way go a count of ticks, where the executor is ([`Progress`]), and whether a fault asks for a stop.
+//! The tick in turn tells its count, where the executor is ([`Progress`]), and whether a fault asks for a
+//! stop.
 
 use crate::law::{Phase, Ticks};
 
-/// How many feed lists there are: one under way, one to follow, one for what is more urgent.
+/// Number of feed lists: one under way, one to follow, one for a more urgent command.
 pub(crate) const LISTS: u8 = 3;
 /// The most items of a feed list: its queue needs one place more.
 pub const LIST_ITEMS: usize = 15;
@@ -22,21 +23,21 @@ pub struct Change {
     pub from: u8,
     /// The list that takes over.
     pub to: u8,
-    /// After so many items of `from`.
+    /// After this many items of `from`.
     pub after: u32,
     /// Within the item that follows them: the first segment of `to` is that item with another end.
     pub within: bool,
 }
 
 impl Change {
-    /// More than a list has items.
+    /// Enough for the number of items in a list.
     const AFTER_BITS: u32 = 8;
     /// The greatest [`Change::after`].
     pub const AFTER_MAX: u32 = (1 << Self::AFTER_BITS) - 1;
     /// No change is asked for.
     pub(super) const NONE: u32 = u32::MAX;
 
-    /// As the word of the `number`th change: no two that the tick may compare are equal.
+    /// The word of the `number`th change: no two words that the tick may compare are equal.
     pub(super) fn to_word(self, number: u32) -> u32 {
         u32::from(self.from) << 30
             | u32::from(self.to) << 28
@@ -55,24 +56,24 @@ impl Change {
 /// Where the executor was at the end of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Ticks so far.
+    /// Number of ticks so far.
     pub tick: u32,
     /// The list under way.
     pub list: u8,
-    /// Items of it that are done.
+    /// Number of its items that are done.
     pub done: u32,
-    /// Inside a segment: its phase, and how long that still takes.
+    /// Inside a segment: its phase, and the time left in it.
     pub inside: Option<(Phase, Ticks)>,
     /// Inside a dwell or a program stop, which are done as soon as they begin.
     pub waits: bool,
 }
 
-/// A list, and how many items of it are done, as one number that goes up with them.
+/// A list and the number of its items done, as one number that increases with them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct ListPlace(pub(super) u32);
 
 impl ListPlace {
-    /// No list has so many items.
+    /// A place that no list reaches.
     pub(super) const NEVER: Self = Self(u32::MAX);
     const LIST_BIT: u32 = 30;
     pub(super) const DONE_BITS: u32 = 27;
@@ -89,7 +90,7 @@ impl ListPlace {
         self.0 & ((1 << Self::DONE_BITS) - 1)
     }
 
-    /// One more is done. A list holds far fewer than there is room for.
+    /// The place after one more item. A list holds far fewer items than the number has room for.
     pub(super) fn next(self) -> Self {
         Self(self.0.wrapping_add(1))
     }

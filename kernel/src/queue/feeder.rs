@@ -1,4 +1,4 @@
-//! The background's end of two streams: every item is checked against its predecessor before it enters.
+//! The background's end of the two streams: every item is checked against its predecessor before it enters.
 
 use core::sync::atomic::Ordering;
 
@@ -22,7 +22,7 @@ pub struct Feeder<'a, R: Real, const AXES: usize> {
     pub(super) accept: Acceptance<R, AXES>,
 }
 
-/// Into the queues without any check, as if memory had changed behind it.
+/// Enters items without any check, as if memory had been corrupted.
 #[cfg(test)]
 impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
     pub(crate) fn piece_unchecked(&mut self, piece: Piece<R, AXES>) {
@@ -45,7 +45,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
 }
 
 impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
-    /// Refuses pieces that leave `travel` from now on, all of each, not only its ends.
+    /// From now on refuses pieces that leave `travel` anywhere, not only at their ends.
     #[cfg(feature = "guards")]
     pub fn bound(&mut self, travel: crate::path::Travel<AXES>) {
         self.accept.bound(super::bounds::Bounds::new(travel));
@@ -93,7 +93,7 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
         if !(has_room(&self.path) && has_room(&self.feed)) {
             return Err(Refused::Full(position));
         }
-        // Both have room, and only this end fills them.
+        // Both queues have room, and only this end fills them.
         enter(&mut self.path, PathItem::EndOfStretch(position)).map_err(|_| Refused::Full(position))?;
         enter(&mut self.feed, FeedItem::EndOfStretch).map_err(|_| Refused::Full(position))?;
         self.accept = next;
@@ -104,9 +104,9 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
         Ok(())
     }
 
-    /// Tells the intake which stream is ahead: after the item that changes it, and before that is counted. A tick
-    /// that comes in between finds what is said to be ahead in its queue, and that queue, which had room, not full yet.
-    /// Counted first, a queue would be full while the other one was still said to cover it.
+    /// Tells the intake which stream is ahead: after the item that changes it has entered, and before it is
+    /// counted. A tick in between finds the announced item in its queue, and that queue not full yet. If the
+    /// item were counted first, its queue could be full while the other one was still said to cover it.
     #[inline(never)]
     pub(super) fn publish(&mut self) {
         let ahead = self.accept.feed_ahead_of_path();

@@ -1,4 +1,4 @@
-//! What background and tick hand over through: words and queues. The test `handover` puts its own in their place.
+//! The words and queues between background and tick. The test `handover` replaces them by its own.
 
 pub(super) use core::sync::atomic::{AtomicU32, Ordering};
 

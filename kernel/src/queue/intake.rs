@@ -1,4 +1,4 @@
-//! The tick's end of the streams: it only takes.
+//! The tick's end of the streams; it only takes.
 
 use core::sync::atomic::Ordering;
 
@@ -14,10 +14,10 @@ use crate::num::Real;
 /// The tick's end of the streams.
 pub struct Intake<'a, R: Real, const AXES: usize> {
     pub(super) path: Consumer<'a, PathItem<R, AXES>>,
-    /// The feed; under live control the list under way.
+    /// The feed stream; under live control the list under way.
     pub(super) feed: Consumer<'a, FeedItem<R>>,
     pub(super) shared: &'a Shared,
-    /// Stretches whose path is done.
+    /// Number of stretches whose path is done.
     pub(super) finished: u32,
     pub(super) path_fill: Fill,
     pub(super) feed_fill: Fill,
@@ -31,7 +31,7 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         self.lists.is_live()
     }
 
-    /// Asks the background for a stop on the path; whether it can make one, under live control.
+    /// Asks the background for a stop on the path; returns whether it can make one (under live control).
     pub(crate) fn want_stop(&self) -> bool {
         self.lists.want_stop()
     }
@@ -80,9 +80,9 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         self.finished = self.finished.wrapping_add(1);
     }
 
-    /// Whether a stretch may begin: its end is queued; or a queue was full when the tick began, so that no more of it can
-    /// be had, and the other queue was full too or covers as much path. What live control hands over ends at rest on path
-    /// that is queued, and may always begin.
+    /// Whether a stretch may begin: its end is queued, or a queue was full when the tick began, so that no
+    /// more can enter it, and the other queue was full too or covers as much path. A list of live control
+    /// ends at rest on queued path and may always begin.
     #[inline]
     pub(crate) fn may_start(&self) -> bool {
         let feed_full = || self.feed_fill.was_full(&self.shared.feed_entered);
@@ -93,19 +93,19 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
             || (feed_full() && self.shared.path_covers_feed.load(Ordering::Acquire))
     }
 
-    /// Whether a change is asked for inside the item that is under way, or at a place that has been passed, or is due with
+    /// Whether a change is asked for inside the item under way, or at a place already passed, or is due with
     /// nothing under way.
     #[inline]
     pub(crate) fn is_change_due(&self) -> bool {
         self.lists.is_change_due()
     }
 
-    /// The first item of the list that is asked for, if the place where it takes over lies within the item under way.
+    /// The first item of the list asked for, if that takes over within the item under way.
     pub(crate) fn feed_after_change(&self) -> Option<&FeedItem<R>> {
         self.lists.feed_after_change()
     }
 
-    /// Whether the change that is due takes over where no segment is under way.
+    /// Whether the change that is due takes over between items.
     pub(crate) fn takes_over_between_items(&self) -> bool {
         self.lists.takes_over_between_items()
     }

@@ -1,4 +1,4 @@
-//! What the two streams carry.
+//! The items of the two streams.
 
 use super::rejection::Rejection;
 use crate::law::{FeedSegment, Ticks};

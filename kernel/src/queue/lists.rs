@@ -1,5 +1,5 @@
-//! The tick's end of the feed lists: follows the changes that the background asks for, or refuses them, and empties what
-//! it gave up.
+//! The tick's end of the feed lists: follows or refuses the changes that the background asks for, and empties
+//! the lists that it gave up.
 
 use super::change::{Change, LISTS, ListPlace};
 use super::handover::Consumer;
@@ -8,8 +8,8 @@ use super::mailbox::Mailbox;
 use crate::law::{Phase, Ticks};
 use crate::num::Real;
 
-/// The most items of a list that is given up that go in one tick. Each costs some twenty instructions; a list of sixteen
-/// places is empty eight ticks after it was given up.
+/// Number of items of a given-up list that are dropped per tick. Each costs some twenty instructions; a list
+/// of sixteen places is empty eight ticks after it was given up.
 const DROPPED_PER_TICK: usize = 2;
 
 /// The lists, if feed comes in lists.
@@ -18,24 +18,24 @@ pub(super) struct Lists<'a, R: Real>(Option<LiveLists<'a, R>>);
 /// The lists of live control; the one under way is the intake's feed.
 struct LiveLists<'a, R: Real> {
     mailbox: &'a Mailbox,
-    /// The current list, and how many items of it are done.
+    /// The current list, and the number of its items done.
     place: ListPlace,
     others: [(u8, Consumer<'a, FeedItem<R>>); LISTS as usize - 1],
     /// The generation that has been dealt with.
     seen: u32,
-    /// From here on a change is due; never reached if none is asked for.
+    /// The place from which a change is due; never reached if none is asked for.
     due: ListPlace,
-    /// What is asked for, as of the tick's start, with its word.
+    /// The change asked for, as of the tick's start, with its word.
     change: Option<(u32, Change)>,
-    /// The word that came too late last.
+    /// The last word that came too late.
     refused: Option<u32>,
 }
 
 impl<'a, R: Real> Lists<'a, R> {
-    /// Feed is one stream.
+    /// No lists: feed is one stream.
     pub(super) const NONE: Self = Self(None);
 
-    /// The first list is under way; these are the second and the third.
+    /// Begins with the first list under way; takes the second and the third.
     pub(super) fn new(mailbox: &'a Mailbox, [second, third]: [Consumer<'a, FeedItem<R>>; 2]) -> Self {
         Self(Some(LiveLists {
             mailbox,
@@ -53,14 +53,14 @@ impl<'a, R: Real> Lists<'a, R> {
         self.0.is_some()
     }
 
-    /// Asks the background for a stop; whether it can make one.
+    /// Asks the background for a stop; returns whether it can make one.
     pub(super) fn want_stop(&self) -> bool {
         let Some(lists) = &self.0 else { return false };
         lists.mailbox.want_stop();
         true
     }
 
-    /// Reads what the background asks for now; what it gave up is dropped.
+    /// Reads what the background asks for, and drops items of lists that it gave up.
     #[inline]
     pub(super) fn poll(&mut self) {
         if let Some(lists) = &mut self.0 {
@@ -71,7 +71,7 @@ impl<'a, R: Real> Lists<'a, R> {
         }
     }
 
-    /// One more item of the list under way is done.
+    /// Counts one more item of the list under way as done.
     #[inline(never)]
     pub(super) fn item_done(&mut self, feed: &mut Consumer<'a, FeedItem<R>>) {
         let Some(lists) = &mut self.0 else { return };
@@ -106,7 +106,7 @@ impl<'a, R: Real> Lists<'a, R> {
                 *list = lists.place.list();
                 lists.place = ListPlace::new(change.to, 0);
                 core::mem::swap(queue, feed);
-                // What is given up already is emptied from the next tick on.
+                // Lists already given up are emptied from the next tick on.
                 lists.seen = lists.seen.wrapping_sub(1);
                 return;
             }
@@ -131,7 +131,7 @@ impl<'a, R: Real> Lists<'a, R> {
 }
 
 impl<R: Real> LiveLists<'_, R> {
-    /// Deals with what is new, in as many ticks as it takes to empty what was given up.
+    /// Handles a new generation, in as many ticks as it takes to empty the lists given up.
     #[cold]
     #[inline(never)]
     fn poll(&mut self, generation: u32) {
@@ -142,7 +142,8 @@ impl<R: Real> LiveLists<'_, R> {
         self.due =
             self.change.map_or(ListPlace::NEVER, |(_, change)| ListPlace::new(change.from, change.after));
         for _ in 0..DROPPED_PER_TICK {
-            // First the item, then the owner: an item that entered after its list was owned anew shows it as owned.
+            // First the item, then the owner: if an item entered after its list was taken again, the list
+            // reads as owned.
             let is_given_up = |(list, queue): &&mut (u8, Consumer<'_, _>)| {
                 queue.peek().is_some() && !mailbox.is_owned(*list)
             };
@@ -154,7 +155,7 @@ impl<R: Real> LiveLists<'_, R> {
         }
     }
 
-    /// What is asked for no longer is.
+    /// Forgets the change asked for, and returns it.
     fn forget(&mut self) -> Option<(u32, Change)> {
         self.due = ListPlace::NEVER;
         self.change.take()

@@ -1,8 +1,8 @@
 //! Streams whose feed can be changed while it is under way: one path, three feed lists.
 //!
-//! Consumes pieces, and lists of feed items that each end at rest; hands them to the executor. What a list may hold is
-//! checked as in [`Feeder`](super::Feeder); that it ends at rest, on path that is queued, is what who fills it answers for
-//! (`kernel/live`).
+//! Consumes pieces, and lists of feed items that each end at rest; hands them to the executor. What a list
+//! may hold is checked as in [`Feeder`](super::Feeder); that it ends at rest on queued path is the
+//! responsibility of the one who fills it (`kernel/live`).
 
 use heapless::spsc::{Producer, Queue};
 
@@ -41,8 +41,8 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
         Self { first: Streams::new(), second: Queue::new(), third: Queue::new(), mailbox: Mailbox::new() }
     }
 
-    /// The two ends, for a machine that stands at `position`; the first list is under way, and empty. What was queued
-    /// before is dropped.
+    /// Splits into the two ends, for a machine that stands at `position`; the first list is under way and
+    /// empty. Everything queued before is dropped.
     pub fn split(
         &mut self,
         rules: PathRules,
@@ -102,18 +102,18 @@ pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
     shared: &'a Shared,
     mailbox: &'a Mailbox,
     path_accept: Acceptance<R, AXES>,
-    /// Of the list being filled.
+    /// Acceptance of the list being filled.
     feed_accept: Acceptance<R, AXES>,
     filled: Option<u8>,
-    /// Changes asked for so far.
+    /// Number of changes asked for so far.
     changes: u32,
-    /// What happens between any two operations of a poll: ticks.
+    /// Called between any two operations of a poll: ticks.
     #[cfg(test)]
     pub(crate) between: Option<&'a dyn Fn()>,
 }
 
 impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
-    /// Ticks may come before any operation, in tests.
+    /// Lets ticks come before any operation, in tests.
     #[inline]
     fn interruptible(&self) {
         #[cfg(test)]
@@ -122,21 +122,21 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         }
     }
 
-    /// Refuses pieces that leave `travel` from now on, all of each, not only its ends.
+    /// From now on refuses pieces that leave `travel` anywhere, not only at their ends.
     #[cfg(feature = "guards")]
     pub fn bound(&mut self, travel: crate::path::Travel<AXES>) {
         self.path_accept.bound(super::bounds::Bounds::new(travel));
     }
 }
 
-/// What live control does, and the tests of this seam.
+/// Used by live control, and by the tests of this seam.
 #[doc(hidden)]
 impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Enters a piece of path that is driven at `fastest_mm_s` at most.
     ///
     /// # Errors
-    /// The queue is full, the piece does not continue its predecessor, or at that feed it asks an axis for more than the
-    /// number type holds.
+    /// The queue is full, the piece does not continue its predecessor, or at that feed it asks an axis for
+    /// more than the number type holds.
     pub fn piece(&mut self, piece: Piece<R, AXES>, fastest_mm_s: f64) -> Result<(), Refused<Piece<R, AXES>>> {
         self.interruptible();
         let mut next = self.path_accept;
@@ -162,20 +162,20 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         Ok(())
     }
 
-    /// Pieces and ends of stretch that are queued, with the one under way.
+    /// Number of pieces and ends of stretch that are queued, including the one under way.
     #[must_use]
     pub fn path_queued(&self) -> usize {
         length(&self.path)
     }
 
-    /// Where the executor is.
+    /// The executor's progress.
     #[must_use]
     pub fn progress(&self) -> Progress {
         self.interruptible();
         self.mailbox.progress.progress()
     }
 
-    /// Whether there is a list to begin now.
+    /// Whether a list can be begun now.
     #[must_use]
     pub fn has_free_list(&self) -> bool {
         self.free_list().is_some()
@@ -188,8 +188,8 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         (0..LISTS).zip(&self.lists).find(is_free).map(|(list, _)| list)
     }
 
-    /// A list that is empty and not under way nor asked for, owned for what goes on from path position `start` at
-    /// `feed_mm_s`, behind what `density` says; `None` if there is none now.
+    /// Takes an empty list that is neither under way nor asked for, to be filled from path position `start`
+    /// at `feed_mm_s`, after `density`. `None` if there is none now.
     pub fn begin(&mut self, start: Position, feed_mm_s: R, density: Density) -> Option<u8> {
         let free = self.free_list()?;
         self.mailbox.own(free, true);
@@ -198,7 +198,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         Some(free)
     }
 
-    /// Appends a segment to a list that was begun.
+    /// Appends a segment to the list that was begun.
     ///
     /// # Errors
     /// The list is full, or the segment does not continue it or exceeds a limit.
@@ -213,7 +213,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Appends the end of the stretch, whose path is `path` long and complete in the queue.
     ///
     /// # Errors
-    /// The list is full, the feed is not 0, or it has come to another length.
+    /// The list is full, the feed is not 0, or its length differs from the path's.
     pub fn end_of_feed(&mut self, list: u8, path: Position) -> Result<(), Refused<()>> {
         self.feed_accept.feed_ends(path).map_err(Refused::Invalid)?;
         self.append(list, FeedItem::EndOfStretch).map_err(|_| Refused::Full(()))?;
@@ -224,7 +224,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Appends a rest, between stretches.
     ///
     /// # Errors
-    /// The list is full, a stretch is under way, or too much would fall into one tick.
+    /// The list is full, a stretch is under way, or too many items would end within one tick.
     pub fn dwell(&mut self, list: u8, duration: Ticks) -> Result<(), Refused<Ticks>> {
         let mut next = self.feed_accept;
         next.feed_dwell(duration).map_err(Refused::Invalid)?;
@@ -250,17 +250,17 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         }
     }
 
-    /// How many more items a list takes.
+    /// Number of items that a list still has room for.
     #[must_use]
     pub fn room(&self, list: u8) -> usize {
         self.lists.get(usize::from(list)).map_or(0, |queue| queue.capacity().saturating_sub(length(queue)))
     }
 
-    /// Asks for a change to the list that was begun last, in place of one that was asked for before. That it begins where
-    /// it takes over, and that its path is queued, is what who filled it answers for.
+    /// Asks for a change to the list begun last; replaces a change asked for before. The caller must ensure
+    /// that the list begins where it takes over and that its path is queued.
     ///
     /// # Errors
-    /// The list is another one, or does not end at rest. Nothing is asked for then.
+    /// The list is not the one begun last, or does not end at rest. Then nothing is asked for.
     pub fn change(&mut self, change: Change) -> Result<(), Rejection> {
         self.interruptible();
         let Change { from, to, after, .. } = change;
@@ -276,7 +276,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         Ok(())
     }
 
-    /// Takes back what was asked for. The tick may have followed it already.
+    /// Takes back the change asked for. The tick may have followed it already.
     pub fn no_change(&mut self) {
         self.interruptible();
         self.mailbox.ask(None, 0);

@@ -1,30 +1,31 @@
-//! The words that background and tick write for one another.
+//! The words that background and tick write for each other.
 //!
-//! The promise is for one core. The tick is an interrupt of it: it runs to its end, and may come between any two accesses of
-//! the background. Two things need that: the background takes a change back by asking for none, and then looks whether the
-//! tick was faster; and it reads several words of [`ProgressWords`].
+//! The promise is for one core. The tick is an interrupt of it: it runs to its end, and may come between any
+//! two accesses of the background. Two things rely on that: the background takes a change back by asking for
+//! none and then checks whether the tick was faster; and it reads several words of [`ProgressWords`].
 //!
-//! The rest holds for a tick on another core, too. Two pairs of release and acquire matter: `change`'s, so that a list that
-//! is followed is complete, and `generation`'s, so that no change is overlooked. Those of `owned` and `refused` do not: a
-//! list's own queue orders `owned` before its items, and nothing else is read because of `refused`. The test `handover`
-//! checks both promises; docs/PROMISES.md says in which interleavings.
+//! The rest also holds for a tick on another core. Two release/acquire pairs matter: `change`'s, so that a
+//! list that is followed is complete, and `generation`'s, so that no change is overlooked. Those of `owned`
+//! and `refused` do not matter: a list's own queue orders `owned` before its items, and no other read depends
+//! on `refused`. The test `handover` checks both promises; docs/PROMISES.md says in which interleavings.
 
 use super::change::Change;
 use super::counter::count;
 use super::handover::{AtomicU32, Ordering};
 use super::progress::ProgressWords;
 
-/// The mailbox between the two.
+/// The mailbox between background and tick.
 #[derive(Debug)]
 pub(super) struct Mailbox {
     change: AtomicU32,
-    /// A change that came too late.
+    /// The word of a change that came too late.
     refused: AtomicU32,
     /// A bit for each list that the background fills or has filled; the tick empties the others.
     owned: AtomicU32,
-    /// Counts what the background writes of the words above, so that the tick looks at one where there is nothing new.
+    /// Counts the background's writes to the words above, so that the tick reads only this one if there is
+    /// nothing new.
     generation: AtomicU32,
-    /// The tick asks for a stop on the path: 1.
+    /// 1 if the tick asks for a stop on the path.
     stop_wanted: AtomicU32,
     /// Where the tick is.
     pub(super) progress: ProgressWords,
@@ -42,7 +43,7 @@ impl Mailbox {
         }
     }
 
-    /// As after [`Mailbox::new`]. Neither end is in use.
+    /// Resets to the state after [`Mailbox::new`]. Neither end may be in use.
     pub(super) fn reset(&self) {
         for word in [&self.change, &self.refused] {
             word.store(Change::NONE, Ordering::Relaxed);
@@ -53,7 +54,7 @@ impl Mailbox {
         self.stop_wanted.store(0, Ordering::Relaxed);
     }
 
-    /// The tick asks for a stop, until the streams are split anew.
+    /// Asks for a stop, from the tick, until the streams are split anew.
     pub(super) fn want_stop(&self) {
         self.stop_wanted.store(1, Ordering::Release);
     }
@@ -63,7 +64,7 @@ impl Mailbox {
         self.stop_wanted.load(Ordering::Acquire) != 0
     }
 
-    /// The background asks for a change, in place of one that has not come about.
+    /// Asks for a change, from the background; replaces one that has not been followed yet.
     pub(super) fn ask(&self, change: Option<Change>, number: u32) {
         let word = change.map_or(Change::NONE, |change| change.to_word(number));
         self.change.store(word, Ordering::Release);
@@ -82,13 +83,13 @@ impl Mailbox {
         count(&self.generation);
     }
 
-    /// Another number than before if the background has written.
+    /// A number that differs from before if the background has written.
     #[inline]
     pub(super) fn generation(&self) -> u32 {
         self.generation.load(Ordering::Acquire)
     }
 
-    /// What is asked for, with its word.
+    /// The change asked for, with its word.
     #[inline]
     pub(super) fn asked(&self) -> Option<(u32, Change)> {
         let word = self.change.load(Ordering::Acquire);

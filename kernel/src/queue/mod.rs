@@ -1,9 +1,9 @@
 //! The two bounded streams between background and tick: geometry, and feed over the same length.
 //!
-//! Consumes [`Piece`](crate::path::Piece)s and [`FeedSegment`](crate::law::FeedSegment)s from the planner; hands them to the executor. Single
-//! producer, single consumer, lock-free. The producer's end, [`Feeder`], checks every item against
-//! its predecessor before it enters, so the tick never meets an item that can't be executed; a full
-//! queue returns the item. The consumer's end, [`Intake`], only takes.
+//! Consumes [`Piece`](crate::path::Piece)s and [`FeedSegment`](crate::law::FeedSegment)s from the planner;
+//! hands them to the executor. Single producer, single consumer, lock-free. The producer's end, [`Feeder`],
+//! checks every item against its predecessor before it enters, so the tick never meets an item that can't be
+//! executed; a full queue returns the item. The consumer's end, [`Intake`], only takes.
 //!
 //! A *stretch* is the motion from one full stop to the next. Both streams mark its end with an item
 //! of their own; [`Feeder::end_stretch`] enters the two together and only if both streams have

@@ -1,4 +1,4 @@
-//! [`Lists`] of a kernel without live control: there are none, and no room is taken to say so.
+//! [`Lists`] of a kernel without live control: there are none, and they take no memory.
 
 use core::marker::PhantomData;
 
@@ -13,7 +13,7 @@ pub(super) struct Lists<'a, R: Real>(PhantomData<&'a R>);
 
 #[allow(clippy::unused_self, reason = "as the lists of live control")]
 impl<R: Real> Lists<'_, R> {
-    /// Feed is one stream.
+    /// No lists: feed is one stream.
     pub(super) const NONE: Self = Self(PhantomData);
 
     #[inline]

@@ -1,7 +1,7 @@
-//! Where the tick says that it is, in several words.
+//! The tick's progress, in several words.
 //!
-//! They belong to one tick for a reader on the tick's core: a tick is whole for it, and a reader that was interrupted reads
-//! again. A reader on another core may see words of two ticks.
+//! A reader on the tick's core sees the words of one tick: it never sees half a tick, and reads again if it
+//! was interrupted. A reader on another core may see words of two ticks.
 
 use super::change::{ListPlace, Progress};
 use super::handover::{AtomicU32, Ordering};
@@ -11,13 +11,13 @@ use crate::law::{Phase, Ticks};
 #[derive(Debug)]
 pub(super) struct ProgressWords {
     tick: AtomicU32,
-    /// A [`ListPlace`] with the phase, and whether it waits, in the bits that it leaves.
+    /// A [`ListPlace`]; its spare bits hold the phase and whether motion waits.
     place: AtomicU32,
     left_high: AtomicU32,
     left_low: AtomicU32,
 }
 
-/// Reads that a tick may interrupt: more ticks do not come in so few accesses.
+/// Number of repeated reads: no more ticks can come within so few accesses.
 const READS: usize = 4;
 
 impl ProgressWords {
@@ -33,14 +33,14 @@ impl ProgressWords {
         }
     }
 
-    /// As after [`ProgressWords::new`].
+    /// Resets to the state after [`ProgressWords::new`].
     pub(super) fn reset(&self) {
         for word in [&self.tick, &self.place, &self.left_high, &self.left_low] {
             word.store(0, Ordering::Relaxed);
         }
     }
 
-    /// Where the executor is, as far as the background can know.
+    /// The executor's progress, as far as the background can know.
     pub(super) fn progress(&self) -> Progress {
         let mut progress = self.read();
         for _ in 0..READS {
@@ -72,7 +72,7 @@ impl ProgressWords {
         }
     }
 
-    /// The tick says where it is.
+    /// Publishes the tick's progress.
     #[inline]
     pub(super) fn publish(&self, ListPlace(place): ListPlace, inside: Option<(Phase, Ticks)>, waits: bool) {
         let (phase, left) = inside.map_or((0, Ticks::ZERO), |(phase, left)| (phase as u32 + 1, left));

@@ -3,7 +3,7 @@
 use super::density::SEGMENTS_PER_TICK_MAX;
 use crate::units::Position;
 
-/// Why an item may not enter. Each names the quantity and its value.
+/// Why an item may not enter. Each variant names the quantity and its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -15,7 +15,7 @@ pub enum Rejection {
         /// The gap \[mm\].
         gap_mm: f64,
     },
-    /// A piece does not go on in the direction in which its predecessor ends.
+    /// A piece does not continue in the direction in which its predecessor ends.
     Corner {
         /// The angle between the tangents \[rad\].
         angle_rad: f64,
@@ -27,9 +27,9 @@ pub enum Rejection {
         /// The segment's \[mm/s\].
         to_mm_s: f64,
     },
-    /// A segment exceeds a limit, or on its piece of path asks an axis for more than the number type holds.
+    /// A segment exceeds a limit, or asks an axis on its piece of path for more than the number type holds.
     Limit {
-        /// Which one, with its unit.
+        /// The quantity, with its unit.
         quantity: &'static str,
         /// The segment's value, or an axis' where piece and segment meet.
         value: f64,
@@ -38,11 +38,11 @@ pub enum Rejection {
     },
     /// More segments or dwells than the executor handles would end within one tick.
     Dense {
-        /// How long this segment and its predecessors, as many as the executor handles in a tick,
-        /// take together \[ticks\]; at least 1 is needed.
+        /// Total duration \[ticks\] of this segment and its predecessors, as many as the executor handles in
+        /// a tick; it must be at least 1.
         ticks: f64,
     },
-    /// A stretch would end before it is at rest.
+    /// A stretch would end before motion is at rest.
     Moving {
         /// The feed \[mm/s\].
         feed_mm_s: f64,
@@ -58,12 +58,12 @@ pub enum Rejection {
     Travel {
         /// The axis, from 0.
         axis: usize,
-        /// Where it is beyond \[mm\].
+        /// A position outside the travel \[mm\].
         mm: f64,
     },
-    /// A stretch without any length.
+    /// A stretch has no length.
     Empty,
-    /// Dwells and stops belong between stretches.
+    /// A dwell or stop is inside a stretch; they belong between stretches.
     InsideStretch,
     /// The blocks of a stretch are longer or shorter than its path.
     Blocks {
@@ -72,26 +72,26 @@ pub enum Rejection {
         /// The pieces' \[mm\].
         path_mm: f64,
     },
-    /// Path that no block says the feed of: live control could not brake on it.
+    /// No block gives the feed of this path: live control could not brake on it.
     NoBlock,
-    /// More is to be kept than there are places for, where room had been left: an error of live control, not of the program.
+    /// There is no place, although room had been left: an error of live control, not of the program.
     Full {
-        /// Of which there are too many.
+        /// What there is no place for.
         what: &'static str,
-        /// As many as there are places for.
+        /// Number of places.
         places: usize,
     },
-    /// A change to or from a feed list that is not the one it may be: to the one that was filled last, from another,
-    /// after fewer items than that word holds.
+    /// A change between the wrong feed lists. It must go to the list filled last, from another list, after no
+    /// more items than the word holds.
     NoChange {
         /// The list under way.
         from: u8,
         /// The list asked for.
         to: u8,
-        /// Items of `from` that are driven before.
+        /// Number of items of `from` driven before.
         after: u32,
     },
-    /// The stretch is longer, or a position farther out, than the kernel's range.
+    /// A stretch's length or a position is beyond the kernel's range.
     Range {
         /// The length or coordinate \[mm\].
         mm: f64,
@@ -100,7 +100,7 @@ pub enum Rejection {
 
 #[cfg(feature = "live")]
 impl Rejection {
-    /// There are no more than `places` for `what`.
+    /// The rejection for more `what` than `places`.
     #[cold]
     pub(crate) fn full(what: &'static str, places: usize) -> Self {
         Self::Full { what, places }

@@ -1,11 +1,11 @@
-//! Room in a queue: what enters where it is, and how full a queue was as a tick began.
+//! Room in a queue: entering items, and how full the queue was when a tick began.
 
 use heapless::spsc::Producer;
 
 use super::handover::{AtomicU32, Ordering};
 
-/// Always true. A queue takes remainders by its places, and where the compiler does not know that there are any it links
-/// a panic; their number less one is the capacity.
+/// Always true. A queue divides by its number of places, which is its capacity plus one; if the compiler does
+/// not know that it is not 0, it links a panic.
 #[inline]
 fn has_places<T>(queue: &Producer<'_, T>) -> bool {
     queue.capacity() != usize::MAX
@@ -22,12 +22,12 @@ pub(super) fn has_room<T>(queue: &Producer<'_, T>) -> bool {
     has_places(queue) && queue.ready()
 }
 
-/// How many items are queued.
+/// Number of items queued.
 pub(super) fn length<T>(queue: &Producer<'_, T>) -> usize {
     if has_places(queue) { queue.len() } else { 0 }
 }
 
-/// How full a queue was as the tick began.
+/// How full a queue was when the tick began.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fill {
     so_far: u32,
@@ -36,28 +36,28 @@ pub(super) struct Fill {
 }
 
 impl Fill {
-    /// Of an empty queue.
+    /// The fill of an empty queue.
     #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
     pub(super) fn new(entered: &AtomicU32, capacity: usize) -> Self {
         let so_far = entered.load(Ordering::Relaxed);
         Self { so_far, before_tick: so_far, capacity: capacity as i32 }
     }
 
-    /// A new tick: the producer has had its turn.
+    /// Begins a tick: the producer has had its turn.
     #[inline]
     pub(super) fn start_tick(&mut self) {
         self.before_tick = self.so_far;
     }
 
-    /// One item is taken.
+    /// Counts one item taken.
     #[inline]
     pub(super) fn take_one(&mut self) {
         self.so_far = self.so_far.wrapping_add(1);
     }
 
-    /// Whether the queue was full as the tick began: the producer has not had its turn since.
+    /// Whether the queue was full when the tick began: the producer has not had its turn since.
     pub(super) fn was_full(&self, entered: &AtomicU32) -> bool {
-        // Below 0 where the tick has met the producer between an item and its count.
+        // Negative if the tick came between the entry of an item and its count.
         entered.load(Ordering::Acquire).wrapping_sub(self.before_tick).cast_signed() >= self.capacity
     }
 }

@@ -1,18 +1,18 @@
-//! What the two ends of the streams share besides the items.
+//! What the two ends of the streams share, apart from the items.
 
 use core::sync::atomic::{AtomicBool, AtomicU32};
 
-/// What the feeder tells the intake besides the items. Written by the feeder only.
+/// What the feeder tells the intake, apart from the items. Only the feeder writes it.
 #[derive(Debug)]
 pub(super) struct Shared {
-    /// Ends of stretch entered so far.
+    /// Number of ends of stretch entered so far.
     pub(super) stretches: AtomicU32,
-    /// Items entered so far, in either stream. The queue's own length takes a division.
+    /// Number of items entered so far, per stream. The queue's own length needs a division.
     pub(super) path_entered: AtomicU32,
     pub(super) feed_entered: AtomicU32,
     /// In the stretch being entered, the feed covers at least as much path as the pieces.
     pub(super) feed_covers_path: AtomicBool,
-    /// And the pieces at least as much as the feed.
+    /// In the stretch being entered, the pieces cover at least as much path as the feed.
     pub(super) path_covers_feed: AtomicBool,
 }
 

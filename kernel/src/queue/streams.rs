@@ -14,10 +14,10 @@ use super::shared::Shared;
 use crate::num::Real;
 use crate::units::Position;
 
-/// Storage of both streams: `PIECES` − 1 and `SEGMENTS` − 1 items (one place tells full from empty). What is being
-/// executed stays where it is: nothing is copied in the tick. With fewer than 18 pieces or 10 segments a program
-/// that uses the tick's bounds to the full can starve, because a queue is refilled between ticks only; with 64 and
-/// 64 the streams of a machine with three f32 axes take 17 KiB.
+/// Storage of both streams: `PIECES` − 1 and `SEGMENTS` − 1 items (one place distinguishes full from empty).
+/// The item being executed stays in its place: nothing is copied in the tick. With fewer than 18 pieces or 10
+/// segments a program that uses the tick's bounds fully can starve, because a queue is only refilled between
+/// ticks; with 64 and 64 the streams of a machine with three f32 axes take 17 KiB.
 #[derive(Debug)]
 pub struct Streams<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> {
     pub(super) path: Queue<PathItem<R, AXES>, PIECES>,
@@ -34,7 +34,8 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
         Self { path: Queue::new(), feed: Queue::new(), shared: Shared::new() }
     }
 
-    /// The two ends, for a machine that stands at `position`. What was queued before is dropped.
+    /// Splits into the two ends, for a machine that stands at `position`. Everything queued before is
+    /// dropped.
     #[inline(never)]
     pub fn split(
         &mut self,

@@ -1,4 +1,4 @@
-//! [`Bounds`] of a kernel without guards: pieces may go anywhere, and no room is taken to say so.
+//! [`Bounds`] of a kernel without guards: pieces may go anywhere, and it takes no memory.
 
 use super::rejection::Rejection;
 use crate::num::Real;

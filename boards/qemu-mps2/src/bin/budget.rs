@@ -71,7 +71,8 @@ fn measure<const N: usize>(counter: &Counter, bytes: &[u8], streams: &mut Queues
     stages::<N>(counter, bytes);
 }
 
-/// The program, which is accepted. A header is a kilobyte: looked at where it is, and gone before the ticks begin.
+/// The program, which is accepted. A header is a kilobyte: looked at where it is, and gone before the ticks
+/// begin.
 fn program<'a, const N: usize>(read: &'a Result<Reader<'a, N>, ProgramError>) -> &'a Reader<'a, N> {
     read.as_ref().unwrap_or_else(|error| fail(error))
 }

@@ -1,5 +1,5 @@
-//! Executes every program of the bundle in closed loop with the simulated machine, one tick after the other, its second
-//! stretch with a correction, and prints a digest of each run.
+//! Executes every program of the bundle in closed loop with the simulated machine, one tick after the other,
+//! its second stretch with a correction, and prints a digest of each run.
 #![no_std]
 #![no_main]
 

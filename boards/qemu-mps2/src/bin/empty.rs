@@ -1,4 +1,5 @@
-//! What every image has without the kernel: start-up and vectors. Its size is subtracted from `kernel_only`'s.
+//! What every image has without the kernel: start-up and vectors. Its size is subtracted from
+//! `kernel_only`'s.
 #![no_std]
 #![no_main]
 

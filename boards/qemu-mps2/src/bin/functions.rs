@@ -1,5 +1,5 @@
-//! Counts the instructions of the law's shapes by every backend that this core's number type has, over the span
-//! of a phase.
+//! Counts the instructions of the law's shapes by every backend that this core's number type has, over the
+//! span of a phase.
 #![no_std]
 #![no_main]
 

@@ -1,9 +1,9 @@
 //! Executes the first program of the bundle as a board does: the tick in an interrupt, the streams filled in
 //! the background, which the interrupt stops anywhere. The digest is that of the stepped run.
 //!
-//! The timer is set anew in every tick: after a short time that is never the same, so that the next tick comes
-//! somewhere in the middle of a fill, and after that for long enough that the fill comes to its end. How many ticks
-//! came in the middle of one is printed too.
+//! The timer is set anew in every tick: after a short time that is never the same, so that the next tick
+//! comes somewhere in the middle of a fill, and after that for long enough that the fill comes to its end.
+//! How many ticks came in the middle of one is printed too.
 #![no_std]
 #![no_main]
 

@@ -1,6 +1,6 @@
-//! The kernel as a board links it, with nothing around it: the program's bytes read, the streams filled, the tick
-//! in SysTick with all that a board may tell the kernel between ticks, and peripherals that are plain memory. Its
-//! size is the kernel's, and its symbols tell whether any of it can panic. It is linked, not run.
+//! The kernel as a board links it, with nothing around it: the program's bytes read, the streams filled, the
+//! tick in SysTick with all that a board may tell the kernel between ticks, and peripherals that are plain
+//! memory. Its size is the kernel's, and its symbols tell whether any of it can panic. It is linked, not run.
 #![no_std]
 #![no_main]
 

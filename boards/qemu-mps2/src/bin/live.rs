@@ -1,5 +1,5 @@
-//! Executes every program of the bundle under live control, with commands that its number in the bundle makes, and prints
-//! a digest of each run.
+//! Executes every program of the bundle under live control, with commands that its number in the bundle
+//! makes, and prints a digest of each run.
 #![no_std]
 #![no_main]
 

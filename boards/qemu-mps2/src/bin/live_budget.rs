@@ -1,5 +1,5 @@
-//! Counts the instructions of every tick of every program of the bundle under live control, and of every poll of the
-//! background between them; says how much memory both take.
+//! Counts the instructions of every tick of every program of the bundle under live control, and of every poll
+//! of the background between them; says how much memory both take.
 //!
 //! One line a figure, as `budget` prints them.
 #![no_std]

@@ -1,4 +1,4 @@
-//! `motion drive bode`: amplitude and phase from step, harmonics and the linear model.
+//! `motion drive bode`: amplitude and phase from step, harmonics and linear model.
 
 use std::io::{self, Write};
 
@@ -14,13 +14,13 @@ use crate::drive::bode::{Bode, Point, measure};
 use crate::drive::{HALF_POWER, model};
 use crate::report;
 
-/// Most frequencies.
+/// Greatest number of frequencies.
 const POINTS_MAX: u32 = 1000;
 
 const HELP: &str = "\
 The linear model is that of the machine file's drive with viscous friction and bed, without Coulomb friction and current
 limit. Where the curves part, the current limit acts: a lower feed brings them together. At a very low feed Coulomb
-friction does.
+friction parts them.
 
 JSON: axis, feed_mm_min, step_bandwidth_hz, linear_bandwidth_hz, points: list of {frequency_hz, step_ratio,
 step_phase_deg, swing_ratio, fundamental_ratio, harmonic_phase_deg, linear_ratio, linear_phase_deg}.";
@@ -38,7 +38,7 @@ pub struct BodeArguments {
     /// Last frequency, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 100.0, allow_negative_numbers = true)]
     to: f64,
-    /// How many frequencies, in equal ratios.
+    /// Number of frequencies, in equal ratios.
     #[arg(long, value_name = "NUMBER", default_value_t = 41)]
     points: u32,
     /// Feed of the step and of the harmonics, mm/min.

@@ -21,8 +21,8 @@ use crate::machine::AxisSettings;
 use crate::report;
 
 const HELP: &str = "\
-Read from encoder positions over the last second at constant feed: the contour error is the actual radius less the
-programmed one, the form deviation its greatest less its least value.
+Read from encoder positions over the last second at constant feed: the contour error is the actual minus the
+programmed radius, the form deviation its greatest minus its least value.
 
 JSON: feed_mm_min, limit_um, feedforward: list of {name, axes: list of {axis, velocity, accel_s, jerk_s2, lead_s,
 has_inverse, has_tables}, limit_hz (null: not passed within the range), circles: list of {frequency_hz, radius_mm, contour_error_um, contour_error_um_max,
@@ -44,7 +44,7 @@ pub struct CircleArguments {
     /// Feed on the circle, mm/min.
     #[arg(long, value_name = "MM_MIN", default_value_t = 2150.0, allow_negative_numbers = true)]
     feed_mm_min: f64,
-    /// Which feedforward terms of the machine act, one choice after another.
+    /// Feedforward terms of the machine that act; circles are driven with each choice.
     #[arg(
         long,
         value_enum,
@@ -52,10 +52,10 @@ pub struct CircleArguments {
         default_values_t = [Feedforward::V, Feedforward::Va, Feedforward::Vaj]
     )]
     feedforward: Vec<Feedforward>,
-    /// Contour error whose frequency is looked for, µm.
+    /// Contour error for which the frequency is searched, µm.
     #[arg(long, value_name = "UM", default_value_t = 20.0, allow_negative_numbers = true)]
     limit_um: f64,
-    /// Frequencies that the report draws around the circle and over a turn, Hz.
+    /// Frequencies for which the report draws the error around the circle and over a turn, Hz.
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', default_values_t = [4.0, 13.0])]
     show: Vec<f64>,
     #[command(flatten)]
@@ -197,7 +197,7 @@ fn gains_json(axis: &AxisSettings) -> GainsJson {
     }
 }
 
-/// All that feedforward of an axis has.
+/// The feedforward of an axis, in words.
 fn gains_words(axis: &AxisSettings) -> String {
     let feedforward = &axis.feedforward;
     let KernelFeedforward { velocity, accel_s, jerk_s2, lead_s, .. } = feedforward;

@@ -17,19 +17,19 @@ use crate::drive::peer_regulator::PeerGains;
 use crate::machine::Machine;
 use crate::report;
 
-/// Frequencies of the circles whose figures stand in the table \[Hz\].
+/// Frequencies of the circles whose figures are in the table \[Hz\].
 const SHOWN_HZ: [f64; 2] = [4.0, 10.0];
-/// What the report shows of the outputs \[s\].
+/// Duration of the outputs that the report shows \[s\].
 const OUTPUT_SPAN_S: f64 = 0.1;
-/// Coarsest and most set positions.
+/// Greatest number of resolutions.
 const RESOLUTIONS_MAX: usize = 10;
 
 const HELP: &str = "\
-All regulators have the machine's kp and output limits and are given set values of the same plans; they differ in
-feedforward. FF1–FF3 are differences of set positions, as LinuxCNC's component pid takes them, an error against the
-command before included; its gains are those of P + V + A + J, less what differencing adds, or fitted to the least
+All regulators have the machine's kp and output limits and get set values of the same plans; they differ only in
+feedforward. FF1–FF3 are differences of set positions, as in LinuxCNC's component pid, including an error relative to
+the previous command; its gains are those of P + V + A + J, less what differencing adds, or fitted to the least
 following error. The inverse is the machine file's; without one, that of the simulated drive. Following errors are
-against exact set positions. Noise is the rms of what differs from the run with exact set positions.
+relative to exact set positions. Noise is the rms difference from the run with exact set positions.
 
 JSON: feed_mm_min, motions, fitted (of each axis: ff1, ff2_s, ff3_s2), regulators: list of {name, set_resolution_um
 (0: exact), motions: list of {following_error_um, contour_error_um, output_noise_mv, current_noise_percent}},
@@ -52,7 +52,7 @@ pub struct CompareArguments {
     /// Feed on the circles, mm/min.
     #[arg(long, value_name = "MM_MIN", default_value_t = 2150.0, allow_negative_numbers = true)]
     feed_mm_min: f64,
-    /// Steps of set positions, µm; the sweep has the first, the picture of outputs the last.
+    /// Resolutions of set positions, µm; the sweep uses the first, the picture of outputs the last.
     #[arg(long, value_name = "UM,…", value_delimiter = ',', default_values_t = [0.1, 1.0], num_args = 1..)]
     resolutions_um: Vec<f64>,
     #[command(flatten)]
@@ -164,7 +164,7 @@ pub fn run(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome,
     Ok(Outcome::Done)
 }
 
-/// The first and the last of them.
+/// The first and the last resolution.
 fn resolutions(all_um: &[f64]) -> Result<(f64, f64), CliError> {
     let refused = || CliError::Arguments {
         found: format!("set-point resolutions {all_um:?} µm"),

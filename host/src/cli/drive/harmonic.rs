@@ -19,7 +19,7 @@ use crate::drive::{experiment, harmonic, model, reference};
 use crate::machine::Machine;
 use crate::report;
 
-/// Frequencies whose velocities the report shows, as places in the list.
+/// Number of frequencies whose velocities the report shows.
 const SHOWN: usize = 3;
 
 const HELP: &str = "\
@@ -86,7 +86,7 @@ struct PointJson {
     third_harmonic_ratio: f64,
 }
 
-/// What is said of an axis beside its curve.
+/// The figures given for an axis besides its curve.
 struct Bandwidths {
     swing_hz: Option<f64>,
     fundamental_hz: Option<f64>,
@@ -94,7 +94,7 @@ struct Bandwidths {
     linear_hz: Option<f64>,
 }
 
-/// Runs the circles and prints what the axes made of them.
+/// Runs the circles and prints the axes' responses.
 ///
 /// # Errors
 /// An argument is refused, a fault ended a run, or a file can't be written.
@@ -170,7 +170,7 @@ pub fn run(arguments: &HarmonicArguments, out: &mut dyn Write) -> Result<Outcome
     Ok(outcome(&comparisons))
 }
 
-/// Why bandwidths of one drive differ.
+/// Explains why the bandwidths of a drive differ.
 fn explanation(bandwidths: &Bandwidths, feed_mm_min: f64, name: &str) -> String {
     if bandwidths.linear_hz.is_some_and(|linear_hz| linear_hz < bandwidths.current_limited_hz) {
         return format!(

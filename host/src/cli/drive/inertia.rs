@@ -21,7 +21,7 @@ acceleration under that load. Open loop, simulated drives only.
 JSON: axis, frequency_hz, feed_mm_min, loads: list of {load_inertia_ratio, swing_ratio, phase_deg,
 third_harmonic_ratio (sine 0, triangle 0.111), peak_accel_m_s2, plateau_accel_m_s2, is_limited}.";
 
-/// Load an axis more and more at one frequency, and read its current limit.
+/// Load an axis more and more at one frequency, and read off its current limit.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct InertiaArguments {
@@ -34,7 +34,7 @@ pub struct InertiaArguments {
     /// Feed on the circle, mm/min.
     #[arg(long, value_name = "MM_MIN", default_value_t = 9549.0, allow_negative_numbers = true)]
     feed_mm_min: f64,
-    /// Added inertia over the unloaded axis's, one number after another.
+    /// Added inertia over the unloaded axis's; the motion is run with each.
     #[arg(long, value_name = "RATIO,…", value_delimiter = ',', default_values_t = [0.0, 0.5, 1.0, 2.0])]
     loads: Vec<f64>,
     #[command(flatten)]
@@ -110,7 +110,7 @@ pub fn run(arguments: &InertiaArguments, out: &mut dyn Write) -> Result<Outcome,
     Ok(Outcome::Done)
 }
 
-/// What the plateau says, from the heaviest limited load.
+/// The reading of the plateau, from the heaviest limited load.
 fn reading<'run>(found: impl Iterator<Item = &'run InertiaFigures>, asked_mm_s2: f64) -> String {
     let limited = found
         .filter(|figures| figures.is_limited)

@@ -33,9 +33,9 @@ use crate::drive::reference::Comparison;
 use crate::files::{Files, OutputFile};
 use crate::machine::Machine;
 
-/// More frequencies than this are a mistyped step.
+/// More frequencies than this mean a mistyped step.
 const FREQUENCIES_MAX: f64 = 1000.0;
-/// A last frequency this close to the end, in steps, is the end.
+/// A last frequency this close to the end, in steps, is taken as the end.
 const SAME_STEP: f64 = 1e-6;
 
 const EXAMPLES: &str = "\
@@ -49,10 +49,11 @@ Examples:
   motion drive tune --machine mine.toml --output mine.toml
                                                      identify the axes and set their regulators
 
-On the reference machine at the published settings, the published figures stand beside; exit status 1 if the run
-misses what the machine has to give.";
+On the reference machine at the published settings, the published figures are shown, too; exit status 1 if the run
+misses the figures expected of the machine.";
 
-/// Experiments with the drives: velocity step, harmonic motion, circle test. All run through planner and kernel.
+/// Experiments with the drives: velocity step, harmonic motion, circle test. All run through planner and
+/// kernel.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct DriveArguments {
@@ -87,7 +88,7 @@ pub fn drive(arguments: &DriveArguments, out: &mut dyn Write) -> Result<Outcome,
     }
 }
 
-/// What every experiment takes.
+/// The options of every experiment.
 #[derive(Debug, Args)]
 pub(super) struct Common {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
@@ -106,13 +107,13 @@ impl Common {
         input::machine(self.machine.as_ref())
     }
 
-    /// Opened before the experiment: a wrong path should not cost the user a long one.
+    /// Opened before the experiment: a wrong path should not cost the user a long run.
     fn report(&self) -> Result<Option<OutputFile>, CliError> {
         let mut files = Files::reading([("--machine", self.machine.as_deref())]);
         Ok(outputs::open(&mut files, "--report", self.report.as_ref())?)
     }
 
-    /// Writes the page, and says where unless a script reads.
+    /// Writes the page, and says where, except in JSON output.
     fn write_report(
         &self,
         report: Option<OutputFile>,
@@ -200,7 +201,7 @@ fn comparisons_json(comparisons: &[Comparison]) -> Vec<ComparisonJson> {
         .collect()
 }
 
-/// The figures beside what was published and what the machine has to give; nothing if there are none.
+/// Writes the figures next to the published and the expected ones; nothing if there are none.
 fn write_comparisons(comparisons: &[Comparison], out: &mut dyn Write) -> io::Result<()> {
     if comparisons.is_empty() {
         return Ok(());

@@ -15,11 +15,11 @@ use crate::drive::step::{Step, StepFigures};
 use crate::report;
 
 const HELP: &str = "\
-Read with the tangent method from encoder readings: the tangent at the steepest rise crosses 0 at the delay and
+By the tangent method, from encoder readings: the tangent at the steepest rise crosses 0 at the delay and
 reaches the step within the time constant. The peaks are backward differences of readings, as published.
 
 JSON: axis, feed_mm_min, delay_ms, time_constant_ms, overshoot_percent, settling_ms (null: never), peak_accel_m_s2,
-peak_jerk_m_s3, bandwidth_hz, reference (figures beside the published ones; empty on other machines).";
+peak_jerk_m_s3, bandwidth_hz, reference (figures with the published ones; empty on other machines).";
 
 /// Step the velocity from rest within one tick, open loop.
 #[derive(Debug, Args)]
@@ -31,7 +31,7 @@ pub struct StepArguments {
     /// Velocity after the step, mm/min.
     #[arg(long, value_name = "MM_MIN", default_value_t = 7200.0, allow_negative_numbers = true)]
     feed_mm_min: f64,
-    /// How long it is held and recorded, in seconds.
+    /// Time for which it is held and recorded, in seconds.
     #[arg(long, value_name = "S", default_value_t = 0.4, allow_negative_numbers = true)]
     duration_s: f64,
     #[command(flatten)]

@@ -1,5 +1,5 @@
-//! `motion drive tune`: identify the axes, propose regulator figures with their reasons, verify them on circles, and
-//! write them into the machine file.
+//! `motion drive tune`: identify the axes, propose regulator figures with their reasons, verify them on
+//! circles, and write them into the machine file.
 
 use std::fs;
 use std::io::{self, Write};
@@ -25,8 +25,8 @@ use crate::simulate::StretchCorrection;
 use crate::tuning::{self, AxisTuning, TuningError, propose};
 
 const HELP: &str = "\
-What moves are simulated axes: those of the machine file, with its [axis.drive]. No axis of a real machine is moved, and
-none is identified.
+All axes are simulated: those of the machine file, with its [axis.drive]. No axis of a real machine is moved or
+identified.
 
 The command runs velocity steps and circles in open loop. From the converter's outputs and the encoders' counts it
 estimates the parameters of each drive. From these it derives a position gain, with its margins, and a feedforward. Then
@@ -37,7 +37,7 @@ Examples:
   motion drive tune                                  see what the reference machine could do
   motion drive tune --machine mine.toml --output mine.toml
                                                      write the figures into the file; its comments stay
-  motion drive tune --method series --learn 5        and see what learning from repeats adds
+  motion drive tune --method series --learn 5        and the gain by learning from repeats
   motion drive tune --axis X --method fit --json     V, A and J gains only, for a script
 
 JSON: axes: list of {name, found: {velocity_gain_per_s…: {value, half_width_95, determined}}, margins: {crossover_hz, phase_deg, gain,
@@ -46,24 +46,25 @@ sensitivity}, changes: list of {key, before, after, unit, reason}, remarks}, ver
 following_error_second_um}}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
 axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}}, output.
 
---learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, what feedforward is
-to be given in addition, straight between rows; the kernel takes it as CorrectedIntake::correct. Without a row if nothing was
-better than no correction. Without this option what was learnt is only shown.
+--learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, added to
+feedforward and linear between rows; CorrectedIntake::correct hands it to the kernel. It has no rows if no correction was
+better than none. Without this option the learnt correction is only shown.
 
-Exit status 1, and the machine file stays as it was: the tuned machine is worse on a circle than it was, or the recordings
-do not determine what everything depends on (command gain, Kv, Ti, total delay).";
+Exit status 1, and the machine file stays as it was: the tuned machine is worse on a circle than before, or the recordings
+do not determine the parameters that everything depends on (command gain, Kv, Ti, total delay).";
 
-/// Tune the simulated axes: identify them, propose gains and feedforward with reasons, verify them on circles.
+/// Tune the simulated axes: identify them, propose gains and feedforward with reasons, verify them on
+/// circles.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct TuneArguments {
     /// Axes to tune; without it, all.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     axis: Vec<String>,
-    /// How feedforward is made.
+    /// The method for feedforward.
     #[arg(long, value_enum, default_value_t = Method::Inverse)]
     method: Method,
-    /// Then drive a circle so many times, and learn from each repeat; off without it.
+    /// Then drive a circle this many times and learn from each repeat; without it, no learning.
     #[arg(long, value_name = "REPEATS")]
     learn: Option<usize>,
     /// Frequency of the circle that is learnt, Hz.
@@ -75,10 +76,10 @@ pub struct TuneArguments {
         requires = "learn"
     )]
     learn_hz: f64,
-    /// Write the best correction that was learnt: CSV, velocity commands over the time in the stretch.
+    /// Write the best learnt correction: CSV, velocity commands over the time in the stretch.
     #[arg(long, value_name = "FILE", requires = "learn")]
     learn_output: Option<PathBuf>,
-    /// Write the machine file with the new figures. It may be the one that is read.
+    /// Write the machine file with the new figures. It may be the file that is read.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Machine file (`motion machine` prints one); without it, the reference machine.
@@ -92,7 +93,7 @@ pub struct TuneArguments {
     json: bool,
 }
 
-/// How feedforward is made, as the option says it.
+/// The method for feedforward, as an option.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Method {
     /// The drive's inverse with friction and bed, led by its dead time.
@@ -131,7 +132,7 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         [] => (0..machine.axes.len()).collect(),
         names => names.iter().map(|name| axis_named(&machine, name)).collect::<Result<Vec<_>, _>>()?,
     };
-    // Before the work: a wrong argument should not cost the user a long one.
+    // Before the work: a wrong argument should not cost the user a long run.
     let plane = planes(&axes).first().copied().unwrap_or_default();
     let learning = arguments.learn.map(|repeats| Lesson {
         circle: Circle { plane, ..Circle::new(arguments.learn_hz, CIRCLE_FEED_MM_S) },
@@ -150,7 +151,7 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
             Ok(Tuned { axis, found, tuning })
         })
         .collect::<Result<_, TuningError>>()?;
-    // What is verified is what the file will say.
+    // Verify exactly what the file will say.
     let edits: Vec<AxisEdit> = tunings.iter().map(Tuned::edit).collect();
     let text = edited(&source.name, &source.text, &edits)?;
     let tuned = Machine::from_toml(&source.name, &text)?;
@@ -182,7 +183,7 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     written.outcome(if is_better { Outcome::Done } else { Outcome::Failed })
 }
 
-/// The machine file's text: of a file, or the reference machine's.
+/// The text of the machine file, or that of the reference machine.
 struct Source {
     name: String,
     text: String,
@@ -201,7 +202,7 @@ impl Source {
     }
 }
 
-/// An axis, what was found of it, what it should be set to.
+/// An axis with its identified drive and its new settings.
 struct Tuned {
     axis: usize,
     found: Identification,
@@ -259,7 +260,8 @@ struct Lesson {
 }
 
 impl Lesson {
-    /// On the tuned machine, by the drives that were found; an axis that was not tuned is taken as the machine file has it.
+    /// Learns on the tuned machine, with the identified drives; an axis that was not tuned is taken from the
+    /// machine file.
     fn learn(&self, tuned: &Machine, tunings: &[Tuned]) -> Result<Learnt, CliError> {
         let mut models = tuned.axes.each_ref().map(|axis| Model::from(axis.drive));
         for Tuned { axis, found, .. } in tunings {
@@ -335,12 +337,12 @@ fn ended(reason: &Reason) -> String {
     }
 }
 
-/// A value of a file, or that it is not in it.
+/// A value of the file, or words that it is missing.
 fn number(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), toml_number)
 }
 
-/// As Rust prints the shortest number that reads back, small ones with an exponent.
+/// The shortest number that reads back to the same value; small ones with an exponent.
 fn toml_number(value: f64) -> String {
     if value != 0.0 && value.abs() < 1e-3 { format!("{value:e}") } else { value.to_string() }
 }
@@ -409,7 +411,7 @@ struct BedJson {
 #[derive(Serialize)]
 struct EstimateJson {
     value: f64,
-    /// Null where it has no end.
+    /// Null if it is unbounded.
     half_width_95: Option<f64>,
     determined: bool,
 }

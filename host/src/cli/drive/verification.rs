@@ -20,7 +20,7 @@ const VERIFIED_HZ: [f64; 6] = [1.0, 4.0, 10.0, 13.0, 16.0, 28.0];
 const SHOWN_HZ: [f64; 2] = [4.0, 13.0];
 /// The contour error that S4 asks for \[µm\].
 const LIMIT_UM: f64 = 20.0;
-/// What a circle may get worse by, in counts of the encoder.
+/// How much worse a circle may get, in counts of the encoder.
 const WORSE_COUNTS: f64 = 2.0;
 
 /// The planes whose circles move every axis of `tuned`, those in which both axes are tuned first.
@@ -49,7 +49,7 @@ pub(super) struct Verification {
     shown: Vec<Shown>,
 }
 
-/// Those of one plane.
+/// The circles of one plane.
 struct Verified {
     /// Which of the plane's axes were tuned.
     is_tuned: [bool; 2],
@@ -62,8 +62,8 @@ impl Verified {
         self.before.circles.iter().zip(&self.after.circles)
     }
 
-    /// Where both axes were tuned the contour counts. Where one was, its following error does: the contour error is the
-    /// difference of two axes, and of a pair that lags alike a better one leaves more.
+    /// If both axes were tuned, the contour error counts. If only one was, its following error counts: the
+    /// contour error is the difference of two axes, so improving one of two that lag alike may increase it.
     fn judged_um(&self, circle: &CircleFigures) -> f64 {
         match self.is_tuned {
             [true, false] => circle.following_um[0],
@@ -83,7 +83,7 @@ impl Verified {
 }
 
 impl Verification {
-    /// Drives them on the machine `before` and `after` the axes `tuned` were.
+    /// Drives the circles on the machine `before` and `after` tuning the axes `tuned`.
     ///
     /// # Errors
     /// A circle can't be driven.
@@ -178,7 +178,7 @@ impl Verification {
         Ok(())
     }
 
-    /// For scripts.
+    /// The figures as JSON.
     pub(super) fn json(&self) -> VerificationJson {
         let circle = |figures: &CircleFigures| CircleJson {
             contour_error_um: figures.contour_um(),

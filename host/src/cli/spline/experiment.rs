@@ -41,7 +41,8 @@ pub(super) fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Ou
     written.outcome(Outcome::Done)
 }
 
-/// A row a tick: velocity, acceleration and jerk of X and Y on every path; empty where there is no difference yet.
+/// Writes a row per tick: velocity, acceleration and jerk of X and Y on every path; empty where there is no
+/// difference yet.
 fn write_trace(paths: &[(Course, Figures)], out: &mut impl Write) -> io::Result<()> {
     let all: Vec<AxisTicks> = paths.iter().map(|(course, _)| course.ticks(FEED_MM_S, TICK_S)).collect();
     let mut writer = csv::Writer::from_writer(out);
@@ -102,7 +103,7 @@ struct PathJson {
 #[derive(Serialize)]
 struct JunctionJson {
     time_s: f64,
-    /// Of a spline.
+    /// The published time; for splines only.
     published_s: Option<f64>,
     accel_step_mm_s2: [f64; 2],
     jerk_step_mm_s3: f64,
@@ -257,7 +258,7 @@ fn write_tables(paths: &[(Course, Figures); 3], out: &mut dyn Write) -> io::Resu
     )
 }
 
-/// How constant the feed is that ways to walk a spline make.
+/// Writes how constant the feed is for each way to walk a spline.
 fn write_evaluators([well, badly]: &[[Evaluator; WAYS]; 2], out: &mut dyn Write) -> io::Result<()> {
     writeln!(
         out,

@@ -1,4 +1,5 @@
-//! `motion spline`: points to a spline, to pieces, to a run; without points, the experiment on path smoothness.
+//! `motion spline`: from points to a spline, to pieces and to a run; without points, the experiment on path
+//! smoothness.
 
 mod experiment;
 
@@ -21,10 +22,10 @@ use crate::simulate::RunOptions;
 use crate::toolpath::spline::{self, Degree, Spline, SplineError};
 
 const HELP: &str = "\
-POINTS.csv has the heading x_mm,y_mm,z_mm or x_mm,y_mm,z_mm,u and a point a line; without u, the parameter grows by the
-distance from point to point. The spline goes through all points, or, with a tolerance, no farther from each than that and
+POINTS.csv has the heading x_mm,y_mm,z_mm or x_mm,y_mm,z_mm,u and one point per line; without u, the parameter grows by the
+distance from point to point. The spline goes through all points or, with a tolerance, within that distance of each and
 with fewer knots. A quintic one has continuous derivatives up to the fourth, so the jerk of every axis is continuous; a cubic
-one steps in jerk at its knots. The machine comes from the origin by a rapid.
+one steps in jerk at its knots. The machine moves from the origin to the first point by a rapid.
 
 Examples:
   motion spline points.csv --feed 3000               through all points, on the reference machine
@@ -40,8 +41,8 @@ evaluators: list of name, feed_error, feed_error_badly_parametrised.";
 
 /// Run a spline through points, or compare arcs, cubic and quintic splines.
 ///
-/// Without POINTS.csv: two arcs of 10 and 8 mm radius, and cubic and quintic splines through ten of their points, at
-/// constant feed; velocity, acceleration and jerk of the axes.
+/// Without POINTS.csv: two arcs of 10 and 8 mm radius, and cubic and quintic splines through ten of their
+/// points, at constant feed; velocity, acceleration and jerk of the axes.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct SplineArguments {
@@ -60,7 +61,7 @@ pub struct SplineArguments {
         allow_negative_numbers = true
     )]
     feed: f64,
-    /// How far a point may lie beside the spline, mm; 0: the spline goes through all.
+    /// Greatest distance of a point from the spline, mm; 0: the spline goes through all.
     #[arg(
         long,
         value_name = "MM",
@@ -105,7 +106,8 @@ impl DegreeArgument {
 /// Runs the points' spline, or makes the experiment.
 ///
 /// # Errors
-/// An argument, the points or the machine file is refused, there is no spline or no plan, or a file can't be written.
+/// An argument, the points or the machine file is refused, there is no spline or no plan, or a file can't be
+/// written.
 pub fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     match &arguments.points {
         Some(path) => run_points(path, arguments, out),
@@ -130,7 +132,7 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
         let line = error.point().and_then(|point| points.lines.get(point));
         let place = line.map_or_else(|| source.name.clone(), |line| format!("{}:{line}", source.name));
         match error {
-            // An argument's, not the file's.
+            // The error is in an argument, not in the file.
             SplineError::Tolerance { mm } => CliError::Arguments {
                 found: format!("--tolerance {mm}"),
                 expected: "a finite number of mm that is not below 0",

@@ -6,11 +6,12 @@
 //! Q = 1/(1 + (√2 − 1)(f/fq)⁶) zero phase, −3 dB at fq
 //! ```
 //!
-//! G is the drive with its bed and the scale of its commands, C the regulator's feedback. Following error is e = e₀ − P·u, so with
-//! u′ = Q·(u + L·e) the correction's distance from its fixed point shrinks from repeat to repeat by |Q(1 − L·P)| at
-//! every frequency (Bristow, Tharayil, Alleyne: A survey of iterative learning control, IEEE Control Systems Magazine,
-//! 2006, gives the condition that it is below 1). The P in L is the model's, the other one the machine's. [`Robustness`] states the greatest value
-//! over a range of machines, and fq is chosen by it.
+//! G is the drive with its bed and the scale of its commands, C the regulator's feedback. Following error is
+//! e = e₀ − P·u, so with u′ = Q·(u + L·e) the correction's distance from its fixed point shrinks from repeat
+//! to repeat by |Q(1 − L·P)| at every frequency (Bristow, Tharayil, Alleyne: A survey of iterative learning
+//! control, IEEE Control Systems Magazine, 2006, gives the condition that it is below 1). The P in L is the
+//! model's, the other P the machine's. [`Robustness`] states the greatest value over a range of machines, and
+//! fq is chosen by it.
 
 use core::f64::consts::{SQRT_2, TAU};
 
@@ -20,10 +21,11 @@ use motion_kernel::axis::Gains;
 use super::fourier;
 use crate::drive::model::{Complex, response};
 
-/// What the machine's drive may differ by from the model, as a part: Kv, Ti, Tc, τ and the bed's frequency, in every
+/// Relative deviation of the machine's drive from the model: Kv, Ti, Tc, τ and the bed's frequency, in every
 /// combination.
 pub const SPREAD: f64 = 0.2;
-/// The law's filter is chosen so that a repeat leaves at most this part of a distance, whatever the machine.
+/// The law's filter is chosen so that a repeat leaves at most this fraction of a distance, on any machine in
+/// the range.
 pub const CONTRACTION_MAX: f64 = 0.8;
 /// Order of the filter: that of the Butterworth low-pass which, run forward and backward, has its shape.
 pub const FILTER_ORDER: u32 = 3;
@@ -32,11 +34,11 @@ pub const FILTER_ORDER: u32 = 3;
 const REGULARISATION: f64 = 0.05;
 /// Highest −3 dB point over the rate of the knots: straight lines between knots follow it to 19 %.
 const CORNER_OVER_KNOT_RATE: f64 = 0.25;
-/// The ratio of one −3 dB point that is tried to the next lower one.
+/// Ratio of successive −3 dB points that are tried.
 const CORNER_STEP: f64 = 0.97;
-/// Lowest −3 dB point \[Hz\]. Below, nothing is learnt that a feedback could not do.
+/// Lowest −3 dB point \[Hz\]. Below it, feedback is as good as learning.
 pub(super) const CORNER_HZ_MIN: f64 = 1.0;
-/// Distance of the frequencies at which the bound is computed \[Hz\].
+/// Spacing of the frequencies at which the bound is computed \[Hz\].
 const GRID_HZ: f64 = 0.5;
 /// Stands for 0 Hz, where velocity over position has no value.
 const REST_HZ: f64 = 1e-3;
@@ -57,16 +59,16 @@ impl Filter {
     }
 }
 
-/// How much of a distance from what can be learnt is left by one repeat, in the linear model.
+/// The fraction of the distance from the learnable correction that one repeat leaves, in the linear model.
 ///
-/// Below 1 at every frequency, learning can't diverge; it supposes that each of the machines in the range is stable
-/// in closed loop, and knows neither friction nor the current limit.
+/// If it is below 1 at every frequency, learning can't diverge. It assumes that each machine in the range is
+/// stable in closed loop, and ignores friction and the current limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Robustness {
     /// Q.
     pub filter: Filter,
-    /// Greatest |Q(1 − L·P)| up to half the tick's frequency, with Kv, Ti, Tc, τ and the bed's frequency each at
-    /// 1 − [`SPREAD`], 1 and 1 + [`SPREAD`] of the model's.
+    /// Greatest |Q(1 − L·P)| up to half the tick's frequency, with Kv, Ti, Tc, τ and the bed's frequency each
+    /// at 1 − [`SPREAD`], 1 and 1 + [`SPREAD`] of the model's.
     pub contraction: f64,
     /// The frequency of that \[Hz\].
     pub at_hz: f64,
@@ -83,8 +85,8 @@ pub(super) struct Loop<'a> {
 }
 
 impl Loop<'_> {
-    /// P \[s\] for another drive: from a correction in every tick to the position that the encoder reads at the
-    /// ticks' starts.
+    /// P \[s\] for another drive: from a correction in every tick to the position that the encoder reads at
+    /// the ticks' starts.
     fn position(&self, drive: &DriveParameters, frequency_hz: f64) -> Complex {
         let one = Complex::new(1.0, 0.0);
         let frequency_hz = frequency_hz.max(REST_HZ);
@@ -100,7 +102,7 @@ impl Loop<'_> {
         forward / (one + feedback * forward)
     }
 
-    /// The part of a sine that straight lines between knots keep: sinc².
+    /// The fraction of a sine that straight lines between knots keep: sinc².
     fn interpolation(&self, frequency_hz: f64) -> f64 {
         let angle = core::f64::consts::PI * frequency_hz * self.tick_s * f64::from(self.knot_ticks);
         if angle > 0.0 { (libm::sin(angle) / angle).powi(2) } else { 1.0 }
@@ -143,8 +145,8 @@ impl Loop<'_> {
             .collect()
     }
 
-    /// The bound with the filter given, or with the highest one that keeps [`CONTRACTION_MAX`]; if none does, with the
-    /// lowest.
+    /// The bound with the filter given, or with the highest one that keeps [`CONTRACTION_MAX`]; if none does,
+    /// with the lowest.
     pub(super) fn robustness(&self, gain: f64, corner_hz: Option<f64>) -> Robustness {
         let distances = self.distances(gain);
         let with = |corner_hz: f64| {
@@ -152,7 +154,7 @@ impl Loop<'_> {
             let (mut contraction, mut at_hz) = (0.0_f64, 0.0);
             for &(hz, distance) in &distances {
                 let left = filter.at(hz) * distance;
-                // Written so that what is not a number is the greatest.
+                // Written so that NaN is the greatest.
                 if !(left <= contraction) {
                     (contraction, at_hz) = (left, hz);
                 }
@@ -200,7 +202,7 @@ fn varied(drive: &DriveParameters) -> Vec<DriveParameters> {
                 })
             })
             .collect();
-        // Without a bed, the last change is none.
+        // Without a bed, the last change has no effect.
         drives.dedup();
     }
     drives
@@ -235,8 +237,8 @@ impl Law {
         Self { inverse, filter: amplitudes }
     }
 
-    /// Q·(u + `step`·L·e) \[mm/s\] from the correction that acted and the error that it left \[mm\]. A step from 0 to 1
-    /// keeps the bound: |1 − step·L·P| is at most 1 − step + step·|1 − L·P|.
+    /// Q·(u + `step`·L·e) \[mm/s\] from the correction that acted and the error that it left \[mm\]. A step
+    /// from 0 to 1 keeps the bound: |1 − step·L·P| is at most 1 − step + step·|1 − L·P|.
     pub(super) fn next(&self, correction_mm_s: &[f64], error_mm: &[f64], step: f64) -> Vec<f64> {
         let length = self.inverse.len();
         let correction = fourier::spectrum(&faded(correction_mm_s, length));
@@ -252,8 +254,8 @@ impl Law {
     }
 }
 
-/// A signal of another length: from its end it returns to its beginning on half a cosine, so that its periodic
-/// continuation has no step to be learnt.
+/// A signal of another length: from its end it returns to its beginning on half a cosine, so that its
+/// periodic continuation has no step to be learnt.
 fn faded(signal: &[f64], length: usize) -> Vec<f64> {
     let mut longer = Vec::with_capacity(length);
     longer.extend_from_slice(signal);
@@ -293,7 +295,8 @@ mod tests {
         assert!((inverse.magnitude() - 230.0).abs() < 0.5, "{inverse:?}");
     }
 
-    /// A drive that moves twice as far as its commands say is held by half the gain, and learns from half the command.
+    /// A drive that moves twice as far as its commands say is held by half the gain, and learns from half the
+    /// command.
     #[test]
     fn the_scale_of_commands_is_a_part_of_the_loop() {
         let once = reference(&hal_sim::REFERENCE_X);

@@ -1,20 +1,22 @@
-//! Iterative learning: a path that is driven again and again is followed better every time.
+//! Iterative learning: a path that is driven repeatedly is followed better every time.
 //!
-//! **Consumes** a [`Motion`] that can be repeated, a model of every axis's drive and [`LearningOptions`]. **Produces**
-//! [`Learnt`]: the figures of every repeat and the best correction, a bounded table of velocity commands that the
-//! kernel adds over the stretch ([`StretchCorrection`]). **Runs** in the background, between repeats. **Fails** with a
-//! [`DriveError`] before anything moves if a quantity is out of its range or the law would not converge, and if the
-//! first run fails; a fault in a later one ends learning with what was best.
+//! **Consumes** a [`Motion`] that can be repeated, a model of every axis's drive and [`LearningOptions`].
+//! **Produces** [`Learnt`]: the figures of every repeat and the best correction, a bounded table of velocity
+//! commands that the kernel adds over the stretch ([`StretchCorrection`]). **Runs** in the background,
+//! between repeats. **Fails** with a [`DriveError`] before anything moves if a quantity is out of its range
+//! or the law would not converge, and if the first run fails; a fault in a later run ends learning with the
+//! best correction.
 //!
-//! After each repeat u′ = Q·(u + L·e) for every axis over the whole stretch, its start and its end included: e is the
-//! recorded following error, L the model's inverse, Q a zero-phase low-pass. `law` has the formulas and the
-//! bound on divergence, which is stated in [`Robustness`]. Four more things keep it from diverging where the bound does
-//! not reach, at friction and at the current limit: no command is above the correction's bound; a repeat that made
-//! the error larger is taken back, and half the step is tried from the best one; learning stops when it does not get
-//! better; and the best correction that was driven is returned. Meanwhile the contour error may rise while the following
-//! error falls: two axes that lag alike leave little of it (up to four times as much after one repeat, at 40 Hz).
+//! After each repeat u′ = Q·(u + L·e) for every axis over the whole stretch, including its start and end: e
+//! is the recorded following error, L the model's inverse, Q a zero-phase low-pass. `law` has the formulas
+//! and the bound on divergence, which is stated in [`Robustness`]. Four more rules keep it from diverging
+//! where the bound does not hold, at friction and at the current limit: no command is above the correction's
+//! bound; a repeat that made the error larger is undone, and half the step is tried from the best one;
+//! learning stops when it no longer improves; and the best correction that was driven is returned. The
+//! contour error may rise while the following error falls, because it is small when two axes lag alike (up to
+//! four times as much after one repeat, at 40 Hz).
 //!
-//! - [`motion`](mod@motion): what can be repeated;
+//! - [`motion`](mod@motion): motions that can be repeated;
 //! - `law`: L, Q and the bound;
 //! - `fourier`: the transform they are applied in.
 //!
@@ -59,7 +61,7 @@ pub struct Model {
 }
 
 impl From<DriveParameters> for Model {
-    /// A drive whose scale is what the machine file says.
+    /// A drive whose scale is that of the machine file.
     fn from(drive: DriveParameters) -> Self {
         Self { drive, command_gain: 1.0 }
     }
@@ -68,11 +70,12 @@ impl From<DriveParameters> for Model {
 /// Longest stretch that is learnt \[ticks\]: 131 s at 0.5 ms.
 pub const STRETCH_TICKS_MAX: usize = 1 << 18;
 
-/// Transforms are longer than the stretch by this: the inverse reaches some periods of the loop to either side \[s\].
+/// Transforms are longer than the stretch by this: the inverse reaches some periods of the loop to either
+/// side \[s\].
 const MARGIN_S: f64 = 0.2;
-/// A total error that is larger by this part of an encoder step is larger; less is reading noise.
+/// Fraction of an encoder step by which a total error must grow to count as larger; less is reading noise.
 const NOISE_STEPS: f64 = 0.25;
-/// The factor after a repeat that made the error larger.
+/// The factor of the step after a repeat that made the error larger.
 const STEP_BACK: f64 = 0.5;
 /// Learning stops after this many repeats in a row that are no better than the best before.
 const NO_BETTER: usize = 2;
@@ -82,17 +85,19 @@ const NO_BETTER: usize = 2;
 pub struct LearningOptions {
     /// Most repeats with a correction, 1 to 1000.
     pub repeats: usize,
-    /// γ: part of the error that a repeat takes away, 0.01 to 1. With less than 1 what differs from repeat to repeat is
-    /// averaged, and a drive at its current limit is not thrown about by the first step.
+    /// γ: fraction of the error that a repeat removes, 0.01 to 1. Below 1, random differences between repeats
+    /// are averaged, and the first step does not overdrive a drive at its current limit.
     pub gain: f64,
     /// Ticks from knot to knot of the correction, 1 to 1000.
     pub knot_ticks: u16,
-    /// Greatest velocity command of the correction \[mm/s\], above 0, below 10⁶; what is beyond is cut and counted in
-    /// [`RepeatFigures::cut_ticks`]. None: the greatest command of the run without correction, of any axis, so that all
-    /// of feedforward could be undone, and what Coulomb friction takes at reversal, 2·a_c/Kv.
+    /// Greatest velocity command of the correction \[mm/s\], above 0, below 10⁶; larger commands are cut and
+    /// counted in [`RepeatFigures::cut_ticks`]. None: the greatest command of the run without correction, of
+    /// any axis, so that all of feedforward could be undone, plus the command that Coulomb friction takes at
+    /// reversal, 2·a_c/Kv.
     pub bound_mm_s: Option<f64>,
     /// −3 dB of Q \[Hz\], 1 to a quarter of the knots' rate; refused if the law does not converge with it for
-    /// every machine within [`SPREAD`]. None: the highest with which a repeat leaves at most [`CONTRACTION_MAX`].
+    /// every machine within [`SPREAD`]. None: the highest with which a repeat leaves at most
+    /// [`CONTRACTION_MAX`].
     pub corner_hz: Option<f64>,
     /// The rule by which learning ends before all repeats are made.
     pub ending: Ending,
@@ -148,7 +153,8 @@ pub struct RepeatFigures {
     pub contour_um: f64,
     /// The number of ticks in which the bound cut the correction of this run, by axis.
     pub cut_ticks: [usize; AXES],
-    /// The part of γ with which this run's correction was learnt: 1, halved by every repeat that had to be taken back.
+    /// The part of γ with which this run's correction was learnt: 1, halved by every repeat that had to be
+    /// taken back.
     pub step: f64,
 }
 
@@ -170,19 +176,19 @@ impl RepeatFigures {
 pub struct Learnt {
     /// The figures of every run: the first one without correction, then by repeat.
     pub repeats: Vec<RepeatFigures>,
-    /// Which of them was best: least total error among those whose contour error is not above the first one's. 0:
-    /// none was better than no correction.
+    /// The best of them: the least total error among those whose contour error is not above the first one's.
+    /// 0: none was better than no correction.
     pub best_repeat: usize,
-    /// The correction that it was driven with; without knots if it is none.
+    /// The correction of that run; without knots if there was none.
     pub best: StretchCorrection,
-    /// How certain it is that learning converges, by axis; none for an axis that did not move.
+    /// The bound on convergence, by axis; `None` for an axis that did not move.
     pub robustness: [Option<Robustness>; AXES],
     /// Why learning ended.
     pub stopped: Reason,
 }
 
-/// Repeats `motion` on `machine` and learns a correction of its stretch, by the drives' `models`: identified ones, or
-/// those of the machine file. They may be ± 20 % off.
+/// Repeats `motion` on `machine` and learns a correction of its stretch, by the drives' `models`: identified
+/// ones, or those of the machine file. They may be ± 20 % off.
 ///
 /// # Errors
 /// A quantity is out of its range, the law would not converge with the filter or with any, or the run without
@@ -253,7 +259,7 @@ fn check_model(model: &Model) -> Result<(), DriveError> {
 }
 
 impl LearningOptions {
-    /// Whether all of it is in range on `machine`; [`learn`] does the same.
+    /// Checks that all options are in range on `machine`; [`learn`] does the same.
     ///
     /// # Errors
     /// The first quantity that is not.
@@ -276,7 +282,7 @@ impl LearningOptions {
     }
 }
 
-/// Between two repeats.
+/// The state between two repeats.
 struct Learning {
     stretch: Stretch,
     knot_ticks: u16,
@@ -285,11 +291,11 @@ struct Learning {
     robustness: [Option<Robustness>; AXES],
     /// The encoders' steps \[µm\].
     steps_um: [f64; AXES],
-    /// The correction in every tick of the stretch, before it is made knots.
+    /// The correction in every tick of the stretch, before it is reduced to knots.
     commands_mm_s: [Vec<f64>; AXES],
     cut_ticks: [usize; AXES],
     step: f64,
-    /// The run with the least total error: what is learnt from.
+    /// The run with the least total error, from which the next correction is made.
     base: Option<Base>,
 }
 
@@ -316,7 +322,7 @@ impl Learning {
         for (axis, (model, settings)) in models.iter().zip(&first.machine.axes).enumerate() {
             let velocity_mm_s = |tick: &TraceRow| tick.axes[axis].vel_mm_s.abs();
             let fastest_mm_s = ticks.iter().map(velocity_mm_s).fold(0.0, f64::max);
-            // An axis that stands has nothing to learn but its encoder's noise.
+            // An axis at rest could only learn its encoder's noise.
             if fastest_mm_s <= 0.0 {
                 continue;
             }
@@ -360,14 +366,15 @@ impl Learning {
         })
     }
 
-    /// The next correction, from what the base left.
+    /// Makes the next correction, from the base's error.
     fn update(&mut self) {
         let Some(base) = &self.base else { return };
         for (axis, law) in self.laws.iter().enumerate() {
             let Some(law) = law else { continue };
             let mut commands_mm_s = law.next(&base.commands_mm_s[axis], &base.errors_mm[axis], self.step);
             self.cut_ticks[axis] = 0;
-            // A part that is cut is also forgotten: the next repeat continues from the correction that acted.
+            // The part that is cut is also forgotten: the next repeat continues from the correction that
+            // acted.
             for command_mm_s in &mut commands_mm_s {
                 if command_mm_s.abs() > self.bound_mm_s {
                     *command_mm_s = self.bound_mm_s.copysign(*command_mm_s);
@@ -378,7 +385,7 @@ impl Learning {
         }
     }
 
-    /// The commands as a table: a knot every few ticks, and one for the end.
+    /// The commands as a table: a knot every few ticks, and one at the end.
     fn correction(&self) -> StretchCorrection {
         let length = self.commands_mm_s[0].len();
         let at = |tick: usize| {
@@ -394,7 +401,8 @@ impl Learning {
         }
     }
 
-    /// The figures of a run with the correction at hand, which becomes the base unless it made the error larger.
+    /// The figures of a run with the correction at hand, which becomes the base unless it made the error
+    /// larger.
     fn take<M: Motion + ?Sized>(
         &mut self,
         recording: &Recording,
@@ -402,7 +410,7 @@ impl Learning {
     ) -> Result<RepeatFigures, DriveError> {
         let ticks = stretch_ticks(recording, &motion.stretch(recording));
         let expected = self.commands_mm_s[0].len() as f64;
-        // Another length is another motion: nothing learnt belongs to it.
+        // A different length is a different motion, to which the correction does not apply.
         within("ticks of the repeated stretch", ticks.len() as f64, (expected, expected))?;
         let errors_mm: [Vec<f64>; AXES] =
             core::array::from_fn(|axis| ticks.iter().map(|tick| tick.axes[axis].err_um * 1e-3).collect());
@@ -417,7 +425,8 @@ impl Learning {
         if self.base.as_ref().is_some_and(|base| total_um > base.total_um + noise_um) {
             self.step *= STEP_BACK;
         } else {
-            // Within the noise the base moves on, but its error stays the least there was: it can't creep upwards.
+            // Within the noise the base moves on, but keeps the least error so far, which therefore can't
+            // creep upwards.
             let total_um = self.base.as_ref().map_or(total_um, |base| base.total_um.min(total_um));
             self.base = Some(Base { total_um, commands_mm_s: self.commands_mm_s.clone(), errors_mm });
         }

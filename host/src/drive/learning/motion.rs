@@ -1,4 +1,4 @@
-//! A motion that can be repeated: anything that makes a recording as run options say.
+//! A motion that can be repeated: anything that makes a recording with run options.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::simulate::RunOptions;
 pub struct Stretch {
     /// The stretch's index in the program, from 0.
     pub index: u32,
-    /// Its ticks, as indices into the recording. In the first one it moves.
+    /// Its ticks, as indices into the recording. It moves in the first of them.
     pub ticks: Range<usize>,
 }
 
@@ -27,8 +27,8 @@ pub trait Motion {
     /// The motion can't be made, or a fault ended it.
     fn record(&self, options: &RunOptions<'_>, machine: &Machine) -> Result<Recording, DriveError>;
 
-    /// The stretch to be corrected: the first one, if it is not said otherwise, which has to be the only one or be
-    /// followed by a tick at rest.
+    /// The stretch to be corrected: by default the first one, which must be the only one or be followed by a
+    /// tick at rest.
     fn stretch(&self, recording: &Recording) -> Stretch {
         let is_moving = |state: &str| state == "moving";
         let from = recording.ticks.iter().position(|tick| is_moving(tick.state)).unwrap_or(0);
@@ -36,8 +36,7 @@ pub trait Motion {
         Stretch { index: 0, ticks: from..from + length }
     }
 
-    /// The distance of the machine from the path \[µm\]; the greatest over all ticks, unless a motion says
-    /// otherwise.
+    /// The distance of the machine from the path \[µm\]; by default the greatest over all ticks.
     ///
     /// # Errors
     /// There is nothing to measure.
@@ -46,7 +45,7 @@ pub trait Motion {
     }
 }
 
-/// Measured as the circle test is: at constant feed, after settling.
+/// Measured like the circle test: at constant feed, after settling.
 impl Motion for Circle {
     fn record(&self, options: &RunOptions<'_>, machine: &Machine) -> Result<Recording, DriveError> {
         self.record_with(options, machine)

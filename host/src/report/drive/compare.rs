@@ -11,7 +11,8 @@ use super::table;
 use crate::drive::compare::{Choice, Measured, Motion, Row, Sweep};
 use crate::machine::Machine;
 
-/// The graphs end this far above the greatest error of velocity feedforward: it is what the others are to better.
+/// The graphs end this far above the greatest error of velocity feedforward: it is what the others are to
+/// better.
 const AIR: f64 = 1.3;
 
 /// Outputs over time by regulator \[s, V\].

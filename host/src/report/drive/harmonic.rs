@@ -33,8 +33,8 @@ fn measured<T>(result: Result<T, DriveError>) -> io::Result<T> {
     result.map_err(io::Error::other)
 }
 
-/// Writes the page of harmonic motion: amplitude and phase of both axes over frequency, and velocities of the given
-/// motions. `words` explain the figures.
+/// Writes the page of harmonic motion: amplitude and phase of both axes over frequency, and velocities of the
+/// given motions. `words` explain the figures.
 ///
 /// # Errors
 /// Whatever `out` reports; a recording without its steady part.

@@ -1,7 +1,7 @@
 //! Reports of the drive experiments: the curves from which their figures are read.
 //!
-//! Consumes recordings and figures of [`drive`](crate::drive); produces one self-contained page each, like the report of
-//! a run. Fails only if the output cannot be written.
+//! Consumes recordings and figures of [`drive`](crate::drive); produces one self-contained page each, like
+//! the report of a run. Fails only if the output cannot be written.
 
 mod circle;
 mod compare;

@@ -9,7 +9,8 @@ use crate::report::palette;
 use crate::report::summary::Summary;
 use crate::trace::RunTrace;
 
-/// Draws the contour error on the path axis of the feed. `faults_mm` is where on the path a fault was latched.
+/// Draws the contour error on the path axis of the feed. `faults_mm` is where on the path a fault was
+/// latched.
 pub(in crate::report) fn draw(
     trace: &RunTrace,
     summary: &Summary,

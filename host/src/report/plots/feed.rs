@@ -15,8 +15,8 @@ use crate::report::palette::{self, NOT_REACHED};
 use crate::report::summary::Summary;
 use crate::trace::{RunTrace, TracedBlock};
 
-/// A ceiling may lie far above any feed (a rapid over a short way). The axis ends at this many times the highest
-/// feed, planned or run; a higher ceiling holds nothing back and is left out.
+/// A ceiling may lie far above any feed (a rapid over a short way). The axis ends at this many times the
+/// highest feed, planned or run; a higher ceiling holds nothing back and is left out.
 const CEILING_TO_FEED_MAX: f64 = 1.3;
 
 /// Line width of the ceilings: wide enough to show on both sides of a feed that runs along them.
@@ -48,8 +48,8 @@ pub(in crate::report) fn is_crowded(trace: &RunTrace, summary: &Summary) -> bool
     steps(&trace.blocks, top_mm_s, summary.path_length_mm, NARROW.columns).iter().any(Step::is_range)
 }
 
-/// What set a block's ceiling. A block that is too short to reach it names what keeps the feed below instead; what
-/// set its ceiling is then not known, and does not matter.
+/// What set a block's ceiling. A block that is too short to reach it names what keeps the feed below instead;
+/// what set its ceiling is then not known, and does not matter.
 fn reason(block: &TracedBlock) -> &str {
     match &*block.cap_reason {
         "accelerating" | "braking" => NOT_REACHED,
@@ -79,8 +79,8 @@ pub(in crate::report) fn top(trace: &RunTrace, summary: &Summary) -> (f64, bool)
     (if highest > 0.0 { highest } else { 1.0 }, beyond)
 }
 
-/// The ceilings up to the top as steps, at most about two for each of `columns`. A column with many blocks shows their range in
-/// the ink of the lowest, the one that holds the feed down.
+/// The ceilings up to the top as steps, at most about two for each of `columns`. A column with many blocks
+/// shows their range in the ink of the lowest, the one that holds the feed down.
 fn steps<'a>(blocks: &'a [TracedBlock], top_mm_s: f64, length_mm: f64, columns: usize) -> Vec<Step<'a>> {
     let column_mm = length_mm / columns.max(1) as f64;
     let mut steps: Vec<Step<'a>> = Vec::new();
@@ -138,7 +138,8 @@ fn numbered(layout: &Layout, blocks: &[TracedBlock], length_mm: f64) -> Vec<(Str
     stretches.filter(|(word, from, to)| (to - from) * units_per_mm > layout.width_of(word) + 16.0).collect()
 }
 
-/// Where the lines of the program meet, with their numbers at the height `at`; `y_top` is the end of the axis.
+/// Where the lines of the program meet, with their numbers at the height `at`; `y_top` is the end of the
+/// axis.
 pub(super) fn line_numbers(
     chart: &mut Chart<'_>,
     layout: &Layout,

@@ -113,7 +113,8 @@ impl Words {
         self.rows as u32 * Self::row_height(layout)
     }
 
-    /// Draws lines as high as the plot, and words into the room at its top. `top` is the upper end of the plot in `area`.
+    /// Draws lines as high as the plot, and words into the room at its top. `top` is the upper end of the
+    /// plot in `area`.
     pub(super) fn draw(
         &self,
         chart: &mut Chart<'_>,

@@ -1,8 +1,8 @@
 //! Shared by all plots: the layout they are drawn on, the panel with its axes, and the wrapping for the page.
 //!
-//! Every plot is drawn twice, for a wide and for a narrow page, because a picture scaled down to a phone takes its
-//! letters along. The style layout shows one of the two. The drawing library places things on whole units only, so a
-//! layout has [`UNITS_PER_PX`] of them to a pixel, and a smooth curve stays smooth.
+//! Every plot is drawn twice, for a wide and for a narrow page, because a picture scaled down to a phone
+//! takes its letters along. The style layout shows one of the two. The drawing library places things on whole
+//! units only, so a layout has [`UNITS_PER_PX`] of them to a pixel, and a smooth curve stays smooth.
 
 pub(super) mod contour;
 pub(super) mod feed;
@@ -104,7 +104,8 @@ impl Layout {
         self.text * 5 / 2
     }
 
-    /// Width of `text` in drawing units, on the safe side: letters are at most 0.62 of the font size on average.
+    /// Width of `text` in drawing units, on the safe side: letters are at most 0.62 of the font size on
+    /// average.
     pub(super) fn width_of(&self, text: &str) -> f64 {
         text.chars().count() as f64 * f64::from(self.text) / 1.24 * 0.62
     }
@@ -202,8 +203,8 @@ pub(super) struct Panel<'a> {
 }
 
 impl Panel<'_> {
-    /// Draws title, grid and axes. A panel without a horizontal axis leaves a gap below, so that the lowest number
-    /// keeps clear of the next title.
+    /// Draws title, grid and axes. A panel without a horizontal axis leaves a gap below, so that the lowest
+    /// number keeps clear of the next title.
     pub(super) fn draw<'a>(&self, area: &Area<'a>, layout: &Layout) -> Drawn<Chart<'a>> {
         let title = layout.letters(palette::TEXT, HPos::Left, VPos::Top);
         area.draw(&Text::new(self.title.to_string(), (layout.left as i32, 4), title))?;

@@ -68,7 +68,8 @@ impl<V: Fn(&TraceRow) -> f64> Curve<V> {
 /// Columns that a shaded stretch has at least, so that it is seen.
 const SHADE_COLUMNS: f64 = 3.0;
 
-/// The rests to shade, at most one for each of `columns`: motion too short to be seen between two of them is left out.
+/// The rests to shade, at most one for each of `columns`: motion too short to be seen between two of them is
+/// left out.
 fn shades(rests: &[Rest], x: (f64, f64), columns: usize) -> Vec<(f64, f64)> {
     let column = (x.1 - x.0) / columns.max(1) as f64;
     let mut shades: Vec<(f64, f64)> = Vec::new();

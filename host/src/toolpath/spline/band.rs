@@ -1,7 +1,7 @@
 //! Least squares with banded rows.
 //!
-//! Each row is rotated into an upper triangle by Givens rotations as it comes: backward stable for square systems and
-//! for overdetermined ones, and linear in the number of rows.
+//! Each row is rotated into an upper triangle by Givens rotations as it comes: backward stable for square
+//! systems and for overdetermined ones, and linear in the number of rows.
 
 use super::DEGREE_MAX;
 use super::basis::Row;

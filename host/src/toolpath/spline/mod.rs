@@ -1,15 +1,16 @@
 //! Splines through points, or within a stated deviation of them.
 //!
-//! Consumes points \[mm\] over increasing parameters; produces one [`Polynomial`] for every span between two knots.
-//! Cubic splines have continuous second derivatives by the parameter (C²), quintic ones continuous fourth (C⁴), so
-//! that on a quintic path the jerk of every axis is continuous at constant feed, which S2 asks for. Background, f64;
-//! linear in the number of points but for the search for knots, which takes the logarithm of it more.
+//! Consumes points \[mm\] over increasing parameters; produces one [`Polynomial`] for every span between two
+//! knots. Cubic splines have continuous second derivatives by the parameter (C²), quintic ones continuous
+//! fourth (C⁴), so that on a quintic path the jerk of every axis is continuous at constant feed, which S2
+//! asks for. Background, f64; linear in the number of points but for the search for knots, which takes the
+//! logarithm of it more.
 //!
 //! - `basis`: B-splines and their derivatives;
 //! - `band`: the equations.
 //!
-//! At the ends the derivatives are given ([`Ends`]: S2's experiment), or the spline has no knot at the points next to
-//! its ends, which keeps its order of accuracy where nothing is known ("not-a-knot").
+//! At the ends the derivatives are given ([`Ends`]: S2's experiment), or the spline has no knot at the points
+//! next to its ends, which keeps its order of accuracy where nothing is known ("not-a-knot").
 
 mod band;
 mod basis;
@@ -22,8 +23,8 @@ use super::{Vector, add, norm, scale, subtract};
 /// Highest degree.
 const DEGREE_MAX: usize = 5;
 
-/// An interpolating spline must not miss its points by more than this part of their greatest distance from the first.
-/// It does where steps of the parameter differ so much that the equations have no digits left.
+/// An interpolating spline must not miss its points by more than this part of their greatest distance from
+/// the first. It does where steps of the parameter differ so much that the equations have no digits left.
 const ROUNDING: f64 = 1.0e-10;
 
 /// Degree of a spline.
@@ -221,8 +222,8 @@ impl Spline {
     }
 }
 
-/// Parameters from 0 that grow by the distance from point to point \[mm\], so that the spline is run through at about
-/// constant speed.
+/// Parameters from 0 that grow by the distance from point to point \[mm\], so that the spline is run through
+/// at about constant speed.
 ///
 /// # Errors
 /// A coordinate is not finite, or a point is the one before.
@@ -274,8 +275,8 @@ fn check(points: &[Vector], parameters: &[f64], degree: Degree) -> Result<(), Sp
 /// The spline through all points, which lie at `parameters`.
 ///
 /// # Errors
-/// There are too few points (also for clamped ends), a number is not finite, a point is the one before, or the
-/// parameters don't grow, or so unevenly that double precision can't solve for the spline.
+/// There are too few points (also for clamped ends), a number is not finite, a point is the one before, or
+/// the parameters don't grow, or so unevenly that double precision can't solve for the spline.
 pub fn interpolate(
     points: &[Vector],
     parameters: &[f64],
@@ -302,9 +303,10 @@ pub fn interpolate(
     }
 }
 
-/// A spline no farther than `tolerance_mm` from any point, with as few knots as halving finds: where a span is too
-/// far from one of its points, it gets a knot at the point in its middle. Where that takes as many knots as there are
-/// points, and with a tolerance of 0, the spline goes through all points. The first and the last one are always met.
+/// A spline no farther than `tolerance_mm` from any point, with as few knots as halving finds: where a span
+/// is too far from one of its points, it gets a knot at the point in its middle. Where that takes as many
+/// knots as there are points, and with a tolerance of 0, the spline goes through all points. The first and
+/// the last one are always met.
 ///
 /// # Errors
 /// Those of [`interpolate`]; the tolerance is negative or not finite.
@@ -348,8 +350,8 @@ pub fn fit(
     through_all()
 }
 
-/// The spline with knots at `breaks` that comes closest to the points and meets the first and the last one; before
-/// it, the point it misses most, and by how much \[mm\]. Nothing if the points don't determine it.
+/// The spline with knots at `breaks` that comes closest to the points and meets the first and the last one;
+/// before it, the point it misses most, and by how much \[mm\]. Nothing if the points don't determine it.
 fn least_squares(
     points: &[Vector],
     parameters: &[f64],

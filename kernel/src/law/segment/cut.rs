@@ -1,12 +1,14 @@
-//! A ramp that is given up while its acceleration still rises: the jerk goes back the way it came.
+//! A ramp that is cut while its acceleration still rises: the jerk returns the way it came.
 //!
-//! Consumes a ramp under way and where in its rise it is cut; produces a [`FeedSegment`] whose rise is that ramp's,
-//! but for rounding, up to there. With x = t/t₁, and a cut at x₁ ≤ 1/2, the jerk Jp·sin²πx runs up to x₁, back to 0, and the
-//! whole mirrored: the change of feed is symmetric about its middle like any ramp's, 4·x₁·t₁ long, and its limits are the
-//! ramp's, because jerk and snap only take values that they have in it. Snap steps at the cut and at its image.
+//! Consumes a ramp under way and where in its rise it is cut; produces a [`FeedSegment`] with the same rise
+//! up to there, but for rounding. With x = t/t₁ and a cut at x₁ ≤ 1/2, the jerk Jp·sin²πx runs up to x₁ and
+//! back to 0, and then the same mirrored: the change of feed is symmetric about its middle like any ramp's
+//! and takes 4·x₁·t₁. It keeps the ramp's limits, because jerk and snap only take values that they have in
+//! the ramp. Snap steps at the cut and at its mirror image.
 //!
-//! Between the cut and its image lies one expression about the middle, where acceleration is greatest: with u the time from there in
-//! parts of t₁, V, A and S the feed, acceleration and position in the middle,
+//! Between the cut and its image one expression holds, about the middle, where acceleration is greatest. With
+//! u the time from the middle as a fraction of t₁, and V, A and S the feed, acceleration and position in the
+//! middle,
 //!
 //! ```text
 //! s = S + V·u·t₁ + A·(u·t₁)²/2 − Jp·t₁³·(x³/12 − x/(8π²) + sin 2πx/(16π³)),  x = |u|
@@ -22,10 +24,10 @@ use crate::law::shape::Shape;
 use crate::num::Real;
 use crate::units::Position;
 
-/// A ramp that is cut at `cut_s` of its rise, which is at most half of it.
+/// A ramp that is cut `cut_s` into its rise, at most half of the rise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutRamp {
-    /// As it was begun.
+    /// The ramp as it was begun.
     pub ramp: Ramp<f64>,
     /// When it is cut \[s\].
     pub cut_s: f64,
@@ -58,17 +60,18 @@ impl CutRamp {
     }
 }
 
-/// Where a ramp is cut may be off by half a step of time \[ticks\].
+/// Error of the time of a cut, half a step of time \[ticks\].
 const ROUNDING_TICKS: f64 = 1.0 / 4_294_967_296.0;
 
 impl<R: Real> FeedSegment<R> {
-    /// A ramp that is cut `cut_at` after its start, over `length` of path, which must be its own to 10⁻⁸ mm.
+    /// A ramp that is cut `cut_at` after its start, over `length` of path, which must be its own length to
+    /// 10⁻⁸ mm.
     ///
     /// # Errors
-    /// The ramp is not cut in the first half of its rise, or rises in less than a tick; a figure is not finite or too
-    /// large; the lengths differ.
+    /// The ramp is not cut in the first half of its rise, or rises in less than a tick; a figure is not
+    /// finite or too large; the lengths differ.
     pub fn cut(ramp: &Ramp<f64>, cut_at: Ticks, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
-        // As for the whole ramp: what is rounded here would be a step there.
+        // As for the whole ramp: rounding here would be a step there.
         let ramp = &super::to_f64(ramp);
         let cut = CutRamp { ramp: *ramp, cut_s: cut_at.to_f64() * tick_s };
         let CutRamp { cut_s, .. } = cut;
@@ -80,7 +83,7 @@ impl<R: Real> FeedSegment<R> {
         if !(libm::fabs(ramp_mm - path_mm) <= super::LENGTH_TOLERANCE_MM) {
             return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
         }
-        // What is the same as in the whole ramp is made the same way: its rise must be equal to the bit.
+        // Computed in the same way as for the whole ramp: the rise must be equal to the bit.
         let whole_mm = Position::from_mm(ramp.length_mm())
             .ok_or(SegmentError::OutOfRange { quantity: "length [mm]", value: ramp.length_mm() })?;
         let mut segment = Self::new(ramp, whole_mm, tick_s)?;
@@ -100,7 +103,7 @@ impl<R: Real> FeedSegment<R> {
         let cut_mm = ramp.from_mm_s * cut_s + scale_mm * Shape::at(cut_s / t1_s).length;
         let middle_mm = 2.0 * cut_mm + 0.5 * peak * cut_s * cut_s;
         let step = segment.rise.step;
-        // x₁ as the tick counts it: so many steps.
+        // x₁ as the tick counts it, in steps.
         let cut_part = (u128::from(step) * u128::from(cut_at.0)) >> 32;
         segment.cut_at = (cut_part as u64).wrapping_neg();
         segment.rise.duration = cut_at;
@@ -117,8 +120,8 @@ impl<R: Real> FeedSegment<R> {
         Ok(segment)
     }
 
-    /// Between the cut and its image, at `x` parts of t₁ from the middle, of which a rise would have made `rise`: its bent length and
-    /// what it gained of each. In the tick.
+    /// The motion between the cut and its image, at the fraction `x` of t₁ from the middle. `rise` is a
+    /// rise's motion at `x`: its bent length and its gains. In the tick.
     #[cold]
     #[inline(never)]
     pub(super) fn at_cut(&self, rise: &PathMotion<R>, unit: R::Unit, x: u32, before: bool) -> PathMotion<R> {

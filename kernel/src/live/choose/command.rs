@@ -1,4 +1,4 @@
-//! Commands: what takes over from the motion under way, and where.
+//! Commands: the list that takes over from the motion under way, and where.
 
 use super::{Choice, Chooser};
 use crate::live::list::{Item, List};
@@ -9,17 +9,17 @@ use crate::live::splice::Splice;
 use crate::queue::Progress;
 use crate::units::Position;
 
-/// Which ramps that accelerate are cut.
+/// Which accelerating ramps are cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cut {
-    /// Those that get too fast for the override.
+    /// Those that would exceed the override's feed.
     TooFast,
     /// All of them.
     All,
 }
 
 impl<const PLACES: usize> Chooser<'_, PLACES> {
-    /// What obeys a request to motion that is as far as `progress` says.
+    /// Makes a list that obeys `request`, with motion at `progress`.
     pub(in crate::live) fn obey(&mut self, request: Request, progress: &Progress, list: &mut List) -> Choice {
         let places = self.timeline.places(progress);
         match request {
@@ -34,11 +34,11 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
             place.begin(list);
             let splice = list.end();
             if splice.feed_mm_s < place.start().feed_mm_s {
-                // What brakes continues to brake.
+                // A ramp that brakes is driven to its end.
                 continue;
             }
             if splice.is_at_rest() {
-                // What follows in this list must not.
+                // The rest of this list must not be driven.
                 if let Some(rest) = self.rest_before_more(&place, progress) {
                     return rest;
                 }
@@ -57,14 +57,14 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         Choice::DriveToEnd
     }
 
-    /// A list that ends at rest takes over.
+    /// Lets a list that ends at rest take over.
     pub(super) fn rest_at_end_of(&self, list: &mut List, place: &Place) -> Choice {
         list.set_exit_to_end();
         Choice::TakeOver { takeover: place.takeover(), feed_override: self.timeline.driven_override() }
     }
 
-    /// Continues under another override, or to the end of a block, from the first place that allows it; if there is none,
-    /// from where the list under way is left.
+    /// Continues under another override, or to the end of a block, from the first place that allows it; if
+    /// there is none, from the exit of the list under way.
     fn change_override(&mut self, places: Places<'_>, progress: &Progress, list: &mut List) -> Choice {
         self.block_end = None;
         if self.mode.is_single_block() {
@@ -93,7 +93,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
             let (start, splice) = (*place.start(), place.splice(self.tick_s));
             if let Takeover::After(_) = place.takeover() {
                 if start.is_at_rest() {
-                    // It continues from here as from any stop.
+                    // The next list continues from here as from any stop.
                     return self.rest_before_more(&place, progress).unwrap_or(Choice::Nothing);
                 }
             } else {
@@ -103,7 +103,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                     continue;
                 }
             }
-            // Whatever comes of it: what is ahead of this stretch is planned anew from here on.
+            // Even if no list comes of it, the rest of this stretch is planned anew.
             self.feed.replan_through(start.stretch);
             for ramps in Ramps::IN_ORDER {
                 place.begin(list);
@@ -123,8 +123,8 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         Choice::Nothing
     }
 
-    /// The places for another override: a ramp that would exceed it is cut where it gets to the feed that is allowed, or
-    /// else at once. So an override that keeps falling by little does not hold up an acceleration.
+    /// The places for another override. A ramp that would exceed it is cut where it reaches the allowed feed,
+    /// or else at once. So an override that keeps falling slightly does not hold up an acceleration.
     fn places_for_override<'a>(&self, places: Places<'a>) -> Places<'a> {
         let Some((start, item, place)) = places.inside() else { return places };
         let cut_mm_s = place.splice(self.tick_s).feed_mm_s;
@@ -145,15 +145,16 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         caps_mm_s.reduce(f64::min).unwrap_or(0.0)
     }
 
-    /// Where the machine is at rest at a place, perhaps in a dwell, and more of the list under way would follow: a rest there.
+    /// Returns a rest at `place` if the machine rests there now, perhaps in a dwell, and the list under way
+    /// has more items.
     fn rest_before_more(&self, place: &Place, progress: &Progress) -> Option<Choice> {
         let after = place.takeover().driven();
         let is_here = progress.inside.is_none() && after == progress.done as usize;
         (is_here && after < self.timeline.list().len()).then_some(Choice::Rest { after, ends_block: false })
     }
 
-    /// Whether an item, cut at a splice, does not change the feed, or as a whole takes it to where the override does not
-    /// allow it.
+    /// Whether cutting an item helps: the cut leaves the feed unchanged, or the whole item would accelerate
+    /// above the override.
     fn is_worth_cutting(&self, start: &Splice, item: &Item, cut: &Splice) -> bool {
         let whole_mm_s = item.end(start, self.tick_s).feed_mm_s;
         let cap_mm_s = self.least_cap_mm_s(start, item);

@@ -1,7 +1,7 @@
 //! Single block: motion comes to rest at the end of every program block and is held there.
 //!
-//! The end that is stopped at is the end of the known path as far as plans go: a list that ends there is a complete motion
-//! as any other, under all the ceilings on the way. A hold at a block's end is the hold that a resume ends.
+//! Plans take that block end for the end of the known path, so a list that ends there is a complete motion
+//! like any other, under all ceilings. The hold at a block end is an ordinary hold: a resume ends it.
 
 use super::command::Cut;
 use super::{Choice, Chooser};
@@ -13,10 +13,10 @@ use crate::live::splice::{BlockEnd, SLIVER, Splice};
 use crate::queue::Progress;
 use crate::units::Position;
 
-/// How many block ends in reach are tried: nearly always the first one can be stopped at. Where none can, motion brakes to
-/// rest before them and continues from there.
+/// Number of block ends tried: nearly always motion can stop at the first. Where it can stop at none, it
+/// brakes to rest before them and continues from there.
 const ENDS_TRIED: usize = 2;
-/// How often a braking ramp is moved on to end where it should: limits may be others further ahead.
+/// How often a braking ramp is moved to end where it should: limits may differ further ahead.
 const MOVES: usize = 4;
 
 impl<const PLACES: usize> Chooser<'_, PLACES> {
@@ -36,7 +36,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         Some((from.at + ramp.length, Some(Item::Feed(ramp))))
     }
 
-    /// The first block ends of `stretch` from `nearest` on.
+    /// The first block ends of `stretch` at or after `nearest`.
     fn block_ends(&self, stretch: u32, nearest: Position) -> [Option<BlockEnd>; ENDS_TRIED] {
         let mut first = [None; ENDS_TRIED];
         let ends = self.lookahead.block_ends(stretch).filter(|end| end.at >= nearest);
@@ -46,8 +46,8 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         first
     }
 
-    /// Keeps the feed at the list's end as long as possible and brakes, to rest at the block end; false where that is not
-    /// legal. A ramp crosses blocks that a plan has no ramps for.
+    /// Keeps the feed at the list's end as long as possible, then brakes to rest at the block end; false
+    /// where that is not legal. Such a ramp may cross several blocks, where a plan per block finds none.
     fn brake_at_block_end(&self, list: &mut List) -> bool {
         let from = list.end();
         if from.is_at_rest() {
@@ -78,12 +78,12 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         false
     }
 
-    /// A plan from where the next list begins to the first block end that can be stopped at, or else to the end of the
-    /// stretch or of what is known of it.
+    /// Gathers a plan from the next list's start to the first block end that motion can stop at, or else to
+    /// the end of the stretch, as far as it is known.
     pub(super) fn gather_block(&mut self, list: &mut List, ramps: Ramps) -> bool {
         let splice = *self.timeline.splice();
         if let Some((nearest, brake)) = self.nearest_rest(&splice) {
-            // At rest, not what it rests at.
+            // At rest, the block end it rests at doesn't count.
             let nearest = if brake.is_none() { nearest + SLIVER + SLIVER } else { nearest };
             let ends = self.block_ends(splice.stretch, nearest);
             for end in ends.into_iter().flatten() {
@@ -105,7 +105,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         self.gather_under_override(list, true, ramps)
     }
 
-    /// Continues to the first block end that can be stopped at from within the list under way.
+    /// Continues, from within the list under way, to the first block end that motion can stop at.
     pub(super) fn change_to_block_end(
         &mut self,
         places: &Places<'_>,
@@ -142,7 +142,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                 return self.stop(places.clone(), progress, list);
             }
         }
-        // The end of the stretch, or of what is waited for between two: after it, if that is to come in this list.
+        // The first end of a stretch or rest that is still to come in this list ends a block.
         let is_no_feed = |&index: &usize| under_way.get(index).is_some_and(|(_, item)| !item.is_feed());
         match (done..under_way.exit()).find(is_no_feed) {
             Some(last) => self.end_block_after(last + 1),
@@ -165,7 +165,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         Choice::Nothing
     }
 
-    /// Ends the list under way after this many of its items, which end a block there.
+    /// Ends the list under way after this many items, at the end of a block.
     fn end_block_after(&self, after: usize) -> Choice {
         if after < self.timeline.list().len() {
             Choice::Rest { after, ends_block: true }

@@ -15,7 +15,7 @@ fn at(mm: f64) -> Position {
     Position::from_mm(mm).expect("in range")
 }
 
-/// A stretch of one ramp, a cruise and a ramp, with what is known of it.
+/// A stretch of a ramp, a cruise and a ramp, with everything that a choice depends on.
 struct Ahead {
     up: Ramp<f64>,
     whole: Position,
@@ -55,7 +55,7 @@ impl Ahead {
         ]
     }
 
-    /// The stretch is driven, or a dwell before it.
+    /// The stretch is under way, or a dwell before it.
     fn under_way(mut self, dwell: Option<Item>) -> Self {
         let mut list = List::new(*self.timeline.splice(), TICK_S);
         for item in dwell.into_iter().chain(Self::items(self.up)) {
@@ -107,7 +107,8 @@ fn a_stretch_that_is_known_is_driven_by_its_own_plan() {
     assert_eq!(ahead.choose(None).0, Choice::Nothing, "there is no more");
 }
 
-/// Only path that is queued is driven on: the rest of the cruise is ahead, after a stop in case that nothing follows.
+/// Motion continues on queued path only: the rest of the cruise stays ahead, and a fallback stop ends the
+/// list.
 #[test]
 fn a_list_ends_in_a_stop_on_queued_path() {
     let mut ahead = Ahead::new();
@@ -150,7 +151,7 @@ fn single_block_comes_to_rest_at_the_end_of_the_block() {
     assert!(list.end().is_at_rest() && ahead.feed.peek() == Some(&Item::End), "{list:?}");
 }
 
-/// A cruise is cut at once; a ramp that brakes goes to its end; a dwell is the last that is driven.
+/// A cruise is cut at once; a ramp that brakes goes to its end; a dwell is the last item driven.
 #[test]
 fn a_stop_takes_over_as_soon_as_the_feed_does_not_change() {
     let left = Ticks::from_seconds(1.0, TICK_S).expect("in range");

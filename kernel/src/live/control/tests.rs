@@ -1,4 +1,5 @@
-//! Live control with an executor: commands that come too late, items that come later, blocks that contradict their path.
+//! Live control with an executor: commands that come too late, items that come later, blocks that contradict
+//! their path.
 
 use core::convert::Infallible;
 use core::task::Poll;
@@ -20,7 +21,7 @@ fn at(mm: f64) -> Position {
 
 const RULES: PathRules = PathRules { feed_mm_s: 20.0, ..fixture::RULES };
 
-/// A hundred millimetres of cruise between two ramps, on a block that is so much longer.
+/// A hundred millimetres of cruise between two ramps, on a block that is `longer` than the path by that much.
 fn line(longer: Position) -> [Item<1>; 6] {
     let up = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, 20.0);
     let (ramp, cruise) = (at(up.length_mm()), at(100.0));
@@ -37,13 +38,13 @@ fn line(longer: Position) -> [Item<1>; 6] {
     ]
 }
 
-/// Ticks that come between reading where the tick is and asking for a change make it too late: the command is made again, from where
-/// motion is by then.
+/// Ticks that come between reading where the tick is and asking for a change make it too late: the command is
+/// made again, from where motion is by then.
 #[test]
 fn a_refused_command_is_made_again() {
     let items = line(Position::ZERO);
     let ramp_s = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, 20.0).duration_s();
-    // In the rise, the hold of a cruise, and just before a ramp ends.
+    // In the rise, in a cruise, and just before a ramp ends.
     for seen in [50, 2000, (ramp_s / TICK_S) as u32 - 2] {
         let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
         let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
@@ -71,7 +72,7 @@ fn a_refused_command_is_made_again() {
     }
 }
 
-/// Three programs from one source, which has nothing for a while before, between and behind them.
+/// Three programs from one source, which has nothing for a while before, between and after them.
 #[test]
 fn a_source_may_go_on_later() {
     struct Late {
@@ -140,7 +141,8 @@ fn a_stop_asks_for_no_more_than_the_number_type_holds() {
     assert_eq!(control.state(&feeder), State::Held);
 }
 
-/// A block that is a step longer or shorter than its path: what was handed over ends at rest, and the rest is refused.
+/// A block that is a step longer or shorter than its path: what was handed over ends at rest, and the rest is
+/// refused.
 #[test]
 fn blocks_that_contradict_their_path_are_refused() {
     for steps in [-1, 1, 1 << 30] {

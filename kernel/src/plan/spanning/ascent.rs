@@ -1,19 +1,19 @@
-//! From one feed up to another below rising steps of the ceiling.
+//! The ascent from one feed to another, below rising steps of the ceiling.
 //!
-//! Consumes the steps of one side of an interval, the lowest first, and the feed to be reached; produces a chain of
-//! ramps, each resting (a = 0) on a step or passing some with acceleration. A ramp that would pass a step's feed
-//! before the step ends starts later or accelerates less, whichever loses less time. The other side of an interval is
-//! the same, looked at from its end.
+//! Consumes the steps of one side of an interval, lowest first, and the feed to be reached; produces a chain
+//! of ramps, each resting (a = 0) on a step or passing some with acceleration. A ramp that would pass a
+//! step's feed before the step ends starts later or accelerates less, whichever loses less time. The other
+//! side of an interval is the same, seen from its end.
 
 use super::ramp_fit::{Fit, RampFit};
 use crate::law::{Limits, Ramp};
 
-/// Steps that are looked at one by one; of more, those are joined that lose the least by it.
+/// Number of steps considered one by one; if there are more, those that lose least by it are joined.
 const STEPS_MAX: usize = 48;
-/// A chain's ramps, and where each one starts.
+/// Greatest number of ramps in a chain.
 const RAMPS_MAX: usize = STEPS_MAX + 1;
 
-/// A ceiling that holds up to a position, counted from where the ascent begins.
+/// A ceiling that holds up to a position, counted from the start of the ascent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Step {
     /// Where it ends \[mm\].
@@ -27,12 +27,12 @@ pub(super) struct Step {
 pub(super) struct Steps {
     steps: [Step; STEPS_MAX],
     count: usize,
-    /// The time lost by joining some, at most \[s\].
+    /// Greatest time lost by joining steps \[s\].
     pub(super) lost_s: f64,
 }
 
 impl Steps {
-    /// Level ground.
+    /// No steps.
     pub(super) const NONE: Self =
         Self { steps: [Step { end_mm: 0.0, feed_mm_s: 0.0 }; STEPS_MAX], count: 0, lost_s: 0.0 };
 
@@ -47,7 +47,7 @@ impl Steps {
         }
     }
 
-    /// Makes one of the two neighbours that lose the least time by being one: the lower feed up to the later end.
+    /// Joins the two neighbours that lose the least time by it: the lower feed up to the later end.
     fn join(&mut self) {
         let mut least = (f64::INFINITY, 0);
         for (index, pair) in self.steps.windows(2).enumerate() {
@@ -81,24 +81,24 @@ impl Steps {
 /// A ramp of a chain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AscentRamp {
-    /// Where it starts, from where the ascent begins \[mm\].
+    /// Where it starts, from the start of the ascent \[mm\].
     pub(super) start_mm: f64,
     /// The ramp.
     pub(super) ramp: Ramp<f64>,
 }
 
-/// What is known of the best chain to one feed.
+/// The best chain known to one feed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reached {
     pub(super) feed_mm_s: f64,
-    /// No ramp may leave it before.
+    /// No ramp may leave it before this place \[mm\].
     pub(super) ready_mm: f64,
     /// Where and when it is reached.
     length_mm: f64,
     time_s: f64,
-    /// That time less what the length takes at this feed: less is better.
+    /// That time minus the time that the length takes at this feed; less is better.
     lag_s: f64,
-    /// What a ramp from it may use where it starts, if one was asked for.
+    /// The limits of a ramp from its start, if they were asked for.
     within: Option<Limits<f64>>,
     /// The feed before, and the ramp from there.
     from: usize,
@@ -118,25 +118,25 @@ impl Reached {
     };
 }
 
-/// The best chains of ramps up one side. Working memory, used again and again.
+/// The best chains of ramps up one side. Working memory, reused.
 ///
-/// A chain to a step is the same whatever feed is to be reached in the end, so it is looked for once.
+/// A chain to a step is the same whatever feed is to be reached in the end, so it is searched once.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ascent {
     /// The start, then every step above it.
     reached: [Reached; STEPS_MAX + 1],
     steps: usize,
-    /// Steps whose chain is known, from the lowest on.
+    /// Number of steps whose chain is known, from the lowest.
     known: usize,
-    /// What was asked for last.
+    /// The chain asked for last.
     peak: Reached,
     room_mm: f64,
-    /// Where the ramps of that chain are kept.
+    /// The ramps of that chain, as indices.
     chain: [u8; RAMPS_MAX],
 }
 
 impl Ascent {
-    /// None yet.
+    /// No chains yet.
     pub(super) const NONE: Self = Self {
         reached: [Reached::NOT; STEPS_MAX + 1],
         steps: 0,
@@ -146,7 +146,8 @@ impl Ascent {
         chain: [0; RAMPS_MAX],
     };
 
-    /// Stands before `steps` at `from_mm_s`, with `room_mm` for the ascent. What is not above the start only delays it.
+    /// Begins before `steps` at `from_mm_s`, with `room_mm` for the ascent. Steps not above the start only
+    /// delay it.
     pub(super) fn start(&mut self, steps: &Steps, from_mm_s: f64, room_mm: f64) {
         let mut start = Reached { feed_mm_s: from_mm_s, lag_s: 0.0, ..Reached::NOT };
         let mut count = 0;
@@ -164,8 +165,9 @@ impl Ascent {
         (self.steps, self.known, self.peak, self.room_mm) = (count, 0, start, room_mm);
     }
 
-    /// Finds the chain to `to_mm_s` that keeps below the steps, within the room; returns its length \[mm\]. `limits` says
-    /// what may be used between two positions, always the same for one start. `None` if there is no chain.
+    /// Finds the chain to `to_mm_s` that keeps below the steps, within the room; returns its length \[mm\].
+    /// `limits` gives the limits between two positions, always the same for one start. `None` if there is no
+    /// chain.
     pub(super) fn find(&mut self, to_mm_s: f64, limits: impl Fn(f64, f64) -> Limits<f64>) -> Option<f64> {
         let start = *self.reached.first()?;
         if !(to_mm_s > start.feed_mm_s) {
@@ -175,7 +177,7 @@ impl Ascent {
         let steps = self.reached.get(1..=self.steps)?;
         let below = steps.partition_point(|step| step.feed_mm_s < to_mm_s);
         let mut peak = Reached { feed_mm_s: to_mm_s, ..Reached::NOT };
-        // All at once first: if nothing is in the way there is nothing better.
+        // First a single ramp: if nothing is in its way, there is nothing better.
         if self.extend(&mut peak, 0, below, &limits) != Some(Fit::Free) {
             while self.known < below {
                 let mut next = *self.reached.get(self.known + 1)?;
@@ -189,9 +191,9 @@ impl Ascent {
         (peak.lag_s < f64::INFINITY).then_some(peak.length_mm)
     }
 
-    /// Finds the best chain to `target`, which is above so many steps.
+    /// Finds the best chain to `target`, which is above the first `below` steps.
     fn best(&mut self, target: &mut Reached, below: usize, limits: &impl Fn(f64, f64) -> Limits<f64>) {
-        // From the steps just below first: it takes a good chain to see early that others are worse.
+        // The steps just below come first: a good chain shows early that others are worse.
         let (mut back, mut more) = (0, 1);
         while back <= below {
             self.extend(target, below - back, below, limits);
@@ -200,7 +202,8 @@ impl Ascent {
         }
     }
 
-    /// Takes the chain to step `from` and a ramp from there to `target`, if it is better than what is known.
+    /// Takes the chain to step `from` plus a ramp from there to `target`, if it is better than the best
+    /// known.
     fn extend(
         &mut self,
         target: &mut Reached,
@@ -219,7 +222,7 @@ impl Ascent {
             if to_mm > from_mm { (to_mm - from_mm) / start.feed_mm_s } else { 0.0 }
         };
         let waited_s = rested_s(start.length_mm, start_mm);
-        // What is lost before the ramp, as seen from the target.
+        // The time lost before the ramp, as seen from the target.
         let before_s = start.time_s + waited_s - start_mm / target.feed_mm_s;
         let mut wanted = RampFit {
             start_mm,
@@ -244,17 +247,17 @@ impl Ascent {
         Some(fit)
     }
 
-    /// The time that the chain takes that was found last \[s\].
+    /// The time of the chain found last \[s\].
     pub(super) fn time_s(&self) -> f64 {
         self.peak.time_s
     }
 
-    /// The last ramp of the chain that was found last.
+    /// The last ramp of the chain found last.
     pub(super) fn last_ramp(&self) -> Option<&AscentRamp> {
         self.peak.ramp.as_ref()
     }
 
-    /// The ramps of the chain that was found last, in order.
+    /// The ramps of the chain found last, in order.
     pub(super) fn ramps(&mut self) -> impl DoubleEndedIterator<Item = &AscentRamp> {
         let (mut at, mut count) = (self.peak.from, 0);
         while at > 0 {

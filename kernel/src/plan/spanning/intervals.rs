@@ -1,14 +1,15 @@
 //! The intervals of a stretch, from one minimum of its ceilings to the next.
 //!
-//! Consumes the ceilings of a stretch; divides it into **intervals**: from one minimum to the next the feed rises, holds
-//! and falls again, once. A minimum is a ceiling that is worth coming down to from both sides; all others are steps
-//! on the way up or down, the peak of their interval, or too high to matter.
+//! Consumes the ceilings of a stretch; divides it into **intervals**: from one minimum to the next the feed
+//! rises, holds and falls again, once. A minimum is a ceiling that the feed should come down to from both
+//! sides. All other ceilings are steps on the way up or down, the peak of their interval, or too high to
+//! matter.
 //!
-//! The ceilings are looked at from the lowest up, in the tree of their minima: what lies next to a step and is higher
-//! need not be looked at any more, so that the work is proportional to the number of ceilings.
+//! The ceilings are visited from the lowest up, in the tree of their minima. Higher ceilings next to a step
+//! need not be visited any more, so the work is proportional to the number of ceilings.
 //!
 //! - `least`: the least limits between two positions;
-//! - `settle`: whether the minima can be reached, and which of them are given up.
+//! - `settle`: which minima can be reached, and which are given up.
 
 mod least;
 mod settle;
@@ -20,7 +21,7 @@ use crate::plan::Block;
 /// No node.
 const NONE: u32 = u32::MAX;
 
-/// What a ceiling is in the plan.
+/// The role of a ceiling in the plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Role {
     /// It limits nothing.
@@ -30,28 +31,28 @@ enum Role {
     Rising,
     /// Held from its start, on the way down.
     Falling,
-    /// Rested in: the feed comes down to it, or starts or ends there.
+    /// The feed comes down to it and rests in it, or starts or ends there.
     Minimum,
 }
 
-/// A ceiling: a block's, that of several equal ones, or that of a junction. Working memory of the planner.
+/// A ceiling: of a block, of several equal ones, or of a junction. Working memory of the planner.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
     start_mm: f64,
     end_mm: f64,
     feed_mm_s: f64,
-    /// The time from the stretch's start to its end, everything driven at its ceiling \[s\].
+    /// The time from the stretch's start to this node's end, if everything is driven at its ceiling \[s\].
     ideal_s: f64,
-    /// The block whose law it has.
+    /// The block that its law is from.
     block: u32,
     /// The least limits of some nodes up to this one: see `least`.
     least: Limits<f64>,
-    /// The lowest of the ceilings to its left, and to its right, that are not below it.
+    /// The lowest of the ceilings to its left and to its right that are not below it.
     left: u32,
     right: u32,
-    /// The next lower one to the left; the minimum that waits after it; the minimum before it.
+    /// In turn: the next lower node to the left; the next waiting minimum; the minimum before it.
     link: u32,
-    /// For a minimum that waits: what its right side reaches to.
+    /// For a waiting minimum: how far its right side reaches.
     bounds: (u32, u32),
     /// For a minimum: the ceiling of the interval after it \[mm/s\].
     peak_mm_s: f64,
@@ -61,7 +62,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// Memory not used yet.
+    /// Unused memory.
     pub const EMPTY: Self = Self {
         start_mm: 0.0,
         end_mm: 0.0,
@@ -90,17 +91,17 @@ pub(super) struct Interval {
     pub(super) enter_mm_s: f64,
     /// The feed at its end \[mm/s\].
     pub(super) exit_mm_s: f64,
-    /// Its ceiling \[mm/s\], as far as known.
+    /// Its ceiling \[mm/s\], as far as it is known.
     pub(super) peak_mm_s: f64,
     /// Steps on the way up, from its start.
     pub(super) rising: Steps,
     /// Steps on the way down, from its end.
     pub(super) falling: Steps,
-    /// Nodes inside, from and up to.
+    /// The range of nodes inside.
     nodes: (usize, usize),
 }
 
-/// The ceilings of a stretch and what has been found out about them.
+/// The ceilings of a stretch and their roles found so far.
 pub(super) struct Intervals<'a> {
     blocks: &'a [Block<f64>],
     nodes: &'a mut [Node],
@@ -108,18 +109,18 @@ pub(super) struct Intervals<'a> {
     accel_mm_s2: f64,
 }
 
-/// A part of the stretch that is looked at: the minima it lies between, and the nodes next to what is left of it.
+/// A part of the stretch still to be visited: the minima it lies between, and the nodes next to its rest.
 #[derive(Clone, Copy)]
 struct Open {
     left_minimum: u32,
     left_bound: u32,
     right_minimum: u32,
     right_bound: u32,
-    /// The lowest ceiling that is left.
+    /// The lowest remaining ceiling.
     root: u32,
 }
 
-/// What a ceiling means for the interval it lies in.
+/// The effect of a ceiling on its interval.
 enum Class {
     /// It is not reached from the left.
     BelowLeft,
@@ -127,19 +128,19 @@ enum Class {
     BelowRight,
     /// The feed holds there.
     Top,
-    /// It is passed, or rested in.
+    /// It limits the feed in this role: it is passed, or rested in.
     Limits(Role),
 }
 
-/// What lies between two ceilings.
+/// The gap between two ceilings.
 struct Gap {
     length_mm: f64,
-    /// The time with everything driven at its ceiling \[s\].
+    /// The time if everything is driven at its ceiling \[s\].
     ideal_s: f64,
 }
 
 impl<'a> Intervals<'a> {
-    /// Makes the nodes. `None` if there are too few places for them.
+    /// Makes the nodes. `None` if there are too few places.
     pub(super) fn new(
         blocks: &'a [Block<f64>],
         start_mm_s: f64,
@@ -228,7 +229,7 @@ impl<'a> Intervals<'a> {
                 node.role = Role::Minimum;
             }
         }
-        // Minima whose right side waits, linked, the last one first.
+        // Minima whose right side waits, linked, last one first.
         let (mut open, mut waiting) = (all, NONE);
         loop {
             let mut peak_mm_s = f64::INFINITY;
@@ -284,12 +285,12 @@ impl<'a> Intervals<'a> {
         }
     }
 
-    /// What the lowest ceiling that is left means.
+    /// The class of the lowest remaining ceiling.
     fn classify(&self, open: &Open, root: &Node) -> Class {
         let (left, right) = (self.node(open.left_bound), self.node(open.right_bound));
         let squared = |feed: f64, length_mm: f64| feed * feed + 2.0 * self.accel_mm_s2 * length_mm;
         let ceiling = root.feed_mm_s * root.feed_mm_s;
-        // Acceleration alone does not reach it, nor anything before it.
+        // Even with acceleration alone, neither it nor anything before it is reached.
         if squared(left.feed_mm_s, root.end_mm - left.end_mm) <= ceiling {
             return Class::BelowLeft;
         }
@@ -297,7 +298,7 @@ impl<'a> Intervals<'a> {
             return Class::BelowRight;
         }
         let (before, after) = (self.gap(&left, root), self.gap(root, &right));
-        // What can be gained counts from the minimum itself too: a step before this one may not be reached.
+        // The gain is counted from the minimum itself, too: a step before this one may not be reached.
         let (first, last) = (self.node(open.left_minimum), self.node(open.right_minimum));
         let all_before = (first.feed_mm_s, root.start_mm - first.end_mm);
         let all_after = (last.feed_mm_s, last.start_mm - root.end_mm);
@@ -305,7 +306,7 @@ impl<'a> Intervals<'a> {
         let can_fall = root.feed_mm_s >= right.feed_mm_s;
         let lost_left = self.lost(root, &left, &before, all_before, root.left, can_rise);
         let lost_right = self.lost(root, &right, &after, all_after, root.right, can_fall);
-        // Nothing is lost by it: no need to know what resting in it would.
+        // Nothing is lost by it, so the cost of resting in it does not matter.
         let rises = can_rise
             && (lost_left <= 0.0
                 || lost_left <= self.broken(root, &left, &before, &right, &after, root.right));
@@ -346,7 +347,8 @@ impl<'a> Intervals<'a> {
     fn interval(&self, left: u32, right: u32) -> Interval {
         let (first, last) = (left as usize, right as usize);
         let (left, right) = (self.node(left), self.node(right));
-        // A step that divides a series is rested in at its far end only, and belongs to the interval before that.
+        // A step that divides a series is rested in only at its far end, and belongs to the interval before
+        // it.
         let is_step = |node: &Node, role: Role| node.divides == Some(role);
         let inside = first + usize::from(!is_step(&left, Role::Falling))
             ..last + usize::from(is_step(&right, Role::Rising));
@@ -373,7 +375,7 @@ impl<'a> Intervals<'a> {
         }
     }
 
-    /// What lies between two nodes.
+    /// The gap between two nodes.
     fn gap(&self, left: &Node, right: &Node) -> Gap {
         let length_mm = right.start_mm - left.end_mm;
         let own_s = if right.end_mm > right.start_mm {
@@ -384,7 +386,7 @@ impl<'a> Intervals<'a> {
         Gap { length_mm, ideal_s: right.ideal_s - own_s - left.ideal_s }
     }
 
-    /// At most so much time is lost by not rising above `root` in the gap between it and `bound` \[s\]. Infinite if
+    /// Greatest time lost by not rising above `root` in the gap between it and `bound` \[s\]. Infinite if
     /// `bound` is above the root.
     fn lost(
         &self,
@@ -411,8 +413,8 @@ impl<'a> Intervals<'a> {
         (left_mm / feed - time_s).min(gap.length_mm / feed - gap.ideal_s)
     }
 
-    /// About the time lost by resting in `root` \[s\] on the way from `bound` over `gap` to what is beyond, towards
-    /// `other`.
+    /// Approximate time lost \[s\] by resting in `root` on the way from `bound` over `gap` and further, over
+    /// `beyond`, towards `other`.
     fn broken(&self, root: &Node, bound: &Node, gap: &Gap, other: &Node, beyond: &Gap, next: u32) -> f64 {
         let Some(law) = self.law(next).filter(|_| next != NONE) else { return 0.0 };
         let feed = root.feed_mm_s;
@@ -420,7 +422,7 @@ impl<'a> Intervals<'a> {
         if !(mean_mm_s > feed) {
             return 0.0;
         }
-        // The highest there is room for, if that is below the mean of the ceilings.
+        // The highest peak that there is room for, or the mean of the ceilings if that is lower.
         let is_reached = mean_mm_s > other.feed_mm_s
             && law.ramp_length_mm(feed, mean_mm_s) + law.ramp_length_mm(other.feed_mm_s, mean_mm_s)
                 < beyond.length_mm;
@@ -455,7 +457,8 @@ impl<'a> Intervals<'a> {
     }
 }
 
-/// Links every node but the first and the last to the lowest ones beside it; returns the lowest of all.
+/// Links every node, except the first and the last, to the lowest nodes on either side of it; returns the
+/// lowest of all.
 fn tree(nodes: &mut [Node]) -> u32 {
     let last = nodes.len().saturating_sub(1);
     let mut root = NONE;

@@ -1,16 +1,16 @@
 //! Ramps that span blocks.
 //!
-//! Consumes the same blocks as [`plan`](super::plan()); produces ramps and cruises over path length that begin and end
-//! wherever it is best, not at junctions. Every ceiling is kept at every point, and a ramp uses no more than the least
-//! limits of all the blocks it crosses.
+//! Consumes the same blocks as [`plan`](super::plan()); produces ramps and cruises over path length that
+//! begin and end wherever it is best, not at junctions. Every ceiling is kept at every point, and a ramp
+//! stays within the least limits of all blocks it crosses.
 //!
 //! - `intervals`: divides the stretch at the minima of its ceilings;
 //! - `ascent`: the ramps up one side of an interval, below its steps;
 //! - `ramp_fit`: one of these ramps;
 //! - `peak`: the greatest feed of an interval, between its two sides.
 //!
-//! Works in f64 on slices of the caller, allocates nothing. Time goes with the number of blocks; chains of minima
-//! that cannot be reached cost more, up to a bound beyond which there is no such plan.
+//! Works in f64 on slices of the caller, allocates nothing. Its time is proportional to the number of blocks;
+//! chains of minima that can't be reached cost more, up to a bound beyond which there is no spanning plan.
 
 mod ascent;
 mod intervals;
@@ -25,18 +25,18 @@ use self::peak::{Sides, lowest_fits};
 use super::two_pass::{Block, PlanError, check};
 use crate::law::Ramp;
 
-/// Places for nodes that are enough for any list of so many blocks.
+/// Number of places for nodes that is enough for any list of `blocks` blocks.
 #[must_use]
 pub const fn nodes_for(blocks: usize) -> usize {
     2 * blocks + 2
 }
 
-/// Lengths that differ by no more are equal \[mm\].
+/// Lengths that differ by no more than this are equal \[mm\].
 const ROUNDING_MM: f64 = 1.0e-9;
 
-/// Plans a stretch with ramps that may span blocks, and hands every ramp and cruise to `put` with the place where it
-/// starts \[mm\], in path order. Returns the time it takes \[s\], or `None` where no such plan was found: one pair of ramps
-/// a block may still be possible.
+/// Plans a stretch with ramps that may span blocks, and hands every ramp and cruise to `put` with the place
+/// where it starts \[mm\], in path order. Returns the time it takes \[s\], or `None` if no such plan was
+/// found: one pair of ramps per block may still be possible.
 ///
 /// # Errors
 /// A figure is out of range, or `places` is shorter than [`nodes_for`] says.
@@ -52,7 +52,7 @@ pub fn plan_spanning(
     let Some(mut intervals) = Intervals::new(blocks, start_mm_s, end_mm_s, places) else {
         return Err(PlanError::Room { of: "nodes", needed: nodes_for(blocks.len()), places: room });
     };
-    // Several kilobytes each: used for all intervals.
+    // Several kilobytes each, so used for all intervals.
     let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
     if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, &mut up, &mut down)) {
         return Ok(None);
@@ -67,7 +67,7 @@ pub fn plan_spanning(
     Ok(Some(out.time_s))
 }
 
-/// Where ramps go, and where the next one starts.
+/// The receiver of ramps, and where the next one starts.
 struct Out<'a, F> {
     at_mm: f64,
     time_s: f64,
@@ -93,7 +93,7 @@ impl<F: FnMut(f64, &Ramp<f64>)> Out<'_, F> {
     }
 }
 
-/// Up, along and down.
+/// Drives an interval: up, along and down.
 fn drive<F: FnMut(f64, &Ramp<f64>)>(
     interval: &Interval,
     intervals: &Intervals<'_>,

@@ -1,7 +1,7 @@
 //! The peak of an interval: its greatest feed.
 //!
-//! Consumes an interval, with chains of ramps up both its sides to any peak; produces the peak with which the interval
-//! takes the least time. The time is no smooth function of the peak: just above a step a chain may need one more rest.
+//! Consumes an interval, with chains of ramps up both its sides to any peak; produces the peak with the least
+//! time. The time is not a smooth function of the peak: just above a step a chain may need one more rest.
 
 use super::ROUNDING_MM;
 use super::ascent::{Ascent, AscentRamp};
@@ -10,19 +10,20 @@ use crate::law::{Law, LimitedBy, Limits, peak};
 
 /// Solver steps for the feed at the peak of an interval.
 const PEAK_STEPS: usize = 24;
-/// Of them, so many aim at where the ramps next to the peak would meet, and the steps to find that.
+/// Number of them that aim at where the ramps next to the peak would meet, and the number of steps to find
+/// that.
 const AIMED_STEPS: usize = 4;
 const AIM_STEPS: usize = 6;
-/// No more steps once another could gain so small a part of the time.
+/// Relative gain in time below which no more steps are taken.
 const PEAK_GAIN: f64 = 2.0e-5;
-/// No more steps once so small a part of the interval is left to cruise at its peak.
+/// Share of the interval left to cruise at its peak below which no more steps are taken.
 const PEAK_GAP: f64 = 1.0e-3;
 
 /// The two sides of an interval, for any peak.
 pub(super) struct Sides<'a> {
     interval: &'a Interval,
     intervals: &'a Intervals<'a>,
-    /// The law of all its blocks, if it is one.
+    /// The law of all its blocks, if they share one.
     uniform: Option<Law<f64>>,
 }
 
@@ -35,13 +36,13 @@ impl<'a> Sides<'a> {
         Some(Self { interval, intervals, uniform })
     }
 
-    /// The lowest peak there is.
+    /// The lowest possible peak.
     pub(super) fn lowest(&self) -> f64 {
         self.interval.enter_mm_s.max(self.interval.exit_mm_s)
     }
 
-    /// The highest peak that is worth trying: the ceiling, or what the law would reach without steps, or with several laws,
-    /// what their greatest acceleration alone would.
+    /// The highest peak worth trying: the ceiling, or the feed that the law would reach without steps, or,
+    /// with several laws, the feed that their greatest acceleration alone would reach.
     fn highest(&self) -> f64 {
         let Interval { enter_mm_s, exit_mm_s, start_mm, end_mm, peak_mm_s, .. } = *self.interval;
         let accel = self.intervals.laws_of(self.interval).map(|law| law.limits().accel_mm_s2);
@@ -52,8 +53,8 @@ impl<'a> Sides<'a> {
         peak_mm_s.min(reached).max(self.lowest())
     }
 
-    /// The least limits of the blocks between two positions; of a position by itself, of the block that comes next on
-    /// the way on, or on the way back.
+    /// The least limits of the blocks between two positions. For a single position, the limits of the block
+    /// after it, or on the way back the block before it.
     fn limits(&self, low_mm: f64, high_mm: f64, is_back: bool) -> Limits<f64> {
         match self.uniform {
             Some(law) => law.limits(),
@@ -61,19 +62,19 @@ impl<'a> Sides<'a> {
         }
     }
 
-    /// Length of the interval, and a rounding: a ramp that was planned before to end just there still does.
+    /// Length of the interval plus a rounding, so that a ramp planned before to end just there still fits.
     fn room_mm(&self) -> f64 {
         self.interval.end_mm - self.interval.start_mm + ROUNDING_MM
     }
 
-    /// Puts both ascents before their steps.
+    /// Starts both ascents before their steps.
     pub(super) fn start(&self, up: &mut Ascent, down: &mut Ascent) {
         up.start(&self.interval.rising, self.interval.enter_mm_s, self.room_mm());
         down.start(&self.interval.falling, self.interval.exit_mm_s, self.room_mm());
     }
 
-    /// Both sides up to `peak`; returns what is left between them \[mm\], less than 0 if there is no room. `None` if there
-    /// is none for one side by itself.
+    /// Plans both sides up to `peak`; returns the length left between them \[mm\], negative if there is no
+    /// room. `None` if there is no room even for one side alone.
     pub(super) fn fit(&self, peak: f64, up: &mut Ascent, down: &mut Ascent) -> Option<f64> {
         let (start_mm, end_mm) = (self.interval.start_mm, self.interval.end_mm);
         let up_mm = up.find(peak, |a, b| self.limits(start_mm + a, start_mm + b, false))?;
@@ -81,7 +82,7 @@ impl<'a> Sides<'a> {
         Some(self.room_mm() - up_mm - down_mm)
     }
 
-    /// Up to the peak with which the interval takes the least time, which is returned.
+    /// Plans both sides up to the peak with the least time, and returns that peak.
     pub(super) fn best(&self, up: &mut Ascent, down: &mut Ascent) -> Option<f64> {
         self.start(up, down);
         let (mut low, mut high) = (self.lowest(), self.highest());
@@ -93,9 +94,10 @@ impl<'a> Sides<'a> {
         };
         // That the lowest one fits is known.
         let (mut left_low, mut gap_mm, mut last) = (room_mm, room_mm, high);
-        // The best need not be the highest that fits: just above a step a chain may lose more than its peak gains.
+        // The best peak need not be the highest that fits: just above a step a chain may lose more than its
+        // peak gains.
         let (mut best, mut best_s) = (low, f64::INFINITY);
-        // False position, with halving where that stands still; aimed a little short, so that there is room.
+        // False position, with bisection where that stalls; aimed a little short, so that there is room.
         let aim_mm = 0.5 * PEAK_GAP * room_mm;
         for step in 0..PEAK_STEPS {
             let gains = best_s == f64::INFINITY || gap_mm * (high - low) > PEAK_GAIN * best_s * high * low;
@@ -129,7 +131,7 @@ impl<'a> Sides<'a> {
     }
 }
 
-/// Whether an interval can be driven at all: with the lowest peak there is.
+/// Whether an interval can be driven at all, that is, with the lowest possible peak.
 pub(super) fn lowest_fits(
     interval: &Interval,
     intervals: &Intervals<'_>,
@@ -191,7 +193,8 @@ mod tests {
     use crate::plan::{Block, Node, nodes_for};
     use crate::random::Random;
 
-    /// An interval's list of blocks: rising steps, random feeds, up and down, or a random walk; one law or one for each block.
+    /// An interval's list of blocks: rising steps, random feeds, up and down, or a random walk; one law or
+    /// one for each block.
     fn blocks(random: &Random, case: usize) -> Vec<Block<f64>> {
         let count = 1 + random.below(60) as usize;
         let (step_mm, mut walk_mm_s) = (random.log(1e-3, 50.0), 50.0);
@@ -218,7 +221,8 @@ mod tests {
             .collect()
     }
 
-    /// Against peaks tried one by one, over all that there are: by how much longer the interval takes, beyond what a scan can tell.
+    /// Against peaks tried one by one, over all that there are: by how much longer the interval takes, beyond
+    /// what a scan can tell.
     #[test]
     fn no_peak_of_a_scan_is_much_better() {
         let (mut lost, seed) = (Vec::new(), 20_261);

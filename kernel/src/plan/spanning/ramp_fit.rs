@@ -1,20 +1,20 @@
 //! One ramp of a chain, past the steps between its feeds.
 //!
-//! Consumes where it may start and the steps that it passes; produces the ramp that loses the least time: as hard as
-//! allowed if nothing is in its way, else later or softer.
+//! Consumes the place where it may start and the steps it passes; produces the ramp that loses the least
+//! time: as hard as allowed if nothing is in its way, else later or softer.
 
 use super::ascent::{AscentRamp, Reached};
 use crate::law::passing::Passing;
 use crate::law::{Limits, Ramp};
 
-/// A ramp below steps is made softer by this factor, at most this often.
+/// Factor by which a ramp below steps is made softer at a time, and how often at most.
 const SOFTER: f64 = 3.0;
 const SOFTER_STEPS: usize = 9;
 /// Steps of the search for its best acceleration.
 const GOLDEN_STEPS: usize = 5;
 /// The golden section.
 const GOLDEN: f64 = 0.618_033_988_749_895;
-/// How often a ramp may get longer because of what it passes.
+/// How often a ramp may get longer because of the blocks it passes.
 const LIMITS_STEPS: usize = 8;
 
 /// How a ramp fits below the steps that it passes.
@@ -28,25 +28,26 @@ pub(super) enum Fit {
 
 /// One ramp to be found.
 pub(super) struct RampFit<'a, L> {
-    /// It may start here.
+    /// The place where it may start \[mm\].
     pub(super) start_mm: f64,
     pub(super) from_mm_s: f64,
     pub(super) to_mm_s: f64,
-    /// It must end here.
+    /// The place by which it must end \[mm\].
     pub(super) room_mm: f64,
-    /// What is lost by a millimetre of waiting \[s/mm\]: infinite at rest, where nothing can be waited for.
+    /// Time lost per millimetre of waiting \[s/mm\]; infinite at rest, where waiting covers no path.
     pub(super) wait_s_mm: f64,
     /// The steps it passes.
     pub(super) between: &'a [Reached],
-    /// What it is made with: the limits where it may start, then those of what the last one passed, too.
+    /// The limits it is made with: those where it may start, later also those of the blocks that the last one
+    /// passed.
     pub(super) within: Limits<f64>,
-    /// What may be used between two positions.
+    /// The limits between two positions.
     pub(super) limits: &'a L,
-    /// The step that hindered a ramp last: most often it hinders the next one too.
+    /// The step that hindered the last ramp: most often it hinders the next one, too.
     pub(super) hinders: usize,
 }
 
-/// What a ramp with one acceleration loses.
+/// The result of a ramp with one acceleration.
 enum Tried {
     Lost(f64, AscentRamp),
     /// It loses too much before anything is in its way.
@@ -56,7 +57,7 @@ enum Tried {
 }
 
 impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
-    /// The ramp that loses the least, if it is less than `most_s`.
+    /// The ramp that loses the least time, if that is less than `most_s`.
     pub(super) fn best(&mut self, most_s: f64) -> Option<(AscentRamp, Fit)> {
         let mut most_s = most_s;
         // As hard as allowed.
@@ -71,15 +72,16 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
             Tried::TooSoft => return None,
             Tried::TooHard => {}
         }
-        // The softest that might lose little enough: by itself a ramp loses its time × change/(2·to), and it takes no less
-        // than change/acceleration. If the hardest is one to be beaten, the step that makes it wait says what softer ones lose.
+        // The softest ramp that might lose little enough: a ramp alone loses its time × change/(2·to), and
+        // takes no less than change/acceleration. If the hardest one must wait for a step, that step shows
+        // how much softer ones lose.
         let change = self.to_mm_s - self.from_mm_s;
         let known = best.map_or(hard, |(ramp, _): (AscentRamp, Fit)| ramp.ramp);
         if self.is_hopeless(&known, change * change / (2.0 * self.to_mm_s * most_s), most_s) {
             return best;
         }
         let all_s = most_s;
-        // Softer by factors, from what the ramp would reach, as long as it helps.
+        // Softer by factors, from the acceleration that the ramp would reach, as long as it helps.
         let hardest = hard.peak_accel_mm_s2();
         let mut try_at = |fit: &mut Self, accel: f64| {
             let tried = fit.with(accel, most_s);
@@ -106,7 +108,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         if good_s == f64::INFINITY && self.is_hopeless(&known, hardest / SOFTER, all_s) {
             return best;
         }
-        // Golden section around the best of them.
+        // Golden-section search around the best of them.
         let (mut low, mut high) = (good / SOFTER, (good * SOFTER).min(hardest));
         let at = |low: f64, high: f64| (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
         let (mut softer, mut harder) = (try_at(self, at(low, high).0), try_at(self, at(low, high).1));
@@ -133,11 +135,11 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         Limits { accel_mm_s2: accel_mm_s2.min(self.within.accel_mm_s2), ..self.within }
     }
 
-    /// `ramp`, which is the fastest within `limits`, placed after what it may not pass earlier, and made softer by what it
-    /// passes.
+    /// Places `ramp`, the fastest within `limits`, after the steps that it may not pass earlier, and softens
+    /// it by the limits of the blocks it passes.
     fn below_steps(&mut self, ramp: Ramp<f64>, limits: Limits<f64>, most_s: f64) -> Tried {
         let (mut ramp, mut limits) = (ramp, limits);
-        // What is passed later may allow less; the ramp gets longer by it.
+        // Blocks passed later may allow less, which makes the ramp longer.
         for _ in 0..LIMITS_STEPS {
             let length_mm = ramp.length_mm();
             let own_s = ramp.duration_s() - length_mm / self.to_mm_s;
@@ -162,10 +164,11 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         Tried::TooSoft
     }
 
-    /// Whether no ramp between `hard` and the one with so much acceleration loses less than `most_s`, as far as one step
-    /// can tell: what a ramp loses by itself and where it passes the step both grow with its time, nearly in
-    /// proportion, so that between two that lose too much because of the same step there is none that does not. That goes
-    /// on as it does where the step hinders no more: what is lost is never less than that.
+    /// Whether no ramp between `hard` and the one with `accel_mm_s2` loses less than `most_s`, as far as one
+    /// step can tell. The time that a ramp loses by itself and the place where it passes the step both grow
+    /// with its duration, nearly in proportion; so if two ramps lose too much because of the same step, all
+    /// ramps between them do. The estimate is continued where the step no longer hinders; the real loss is
+    /// never less.
     fn is_hopeless(&self, hard: &Ramp<f64>, accel_mm_s2: f64, most_s: f64) -> bool {
         if !(accel_mm_s2 > 0.0) {
             return false;
@@ -183,12 +186,13 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         self.between.get(self.hinders).is_some_and(is_late) || self.between.iter().any(is_late)
     }
 
-    /// The first place from where the ramp passes no step's feed before the step ends, if it is not after `latest_mm`.
+    /// The first start from which the ramp passes no step's feed before the step ends, if it is not after
+    /// `latest_mm`.
     fn earliest_mm(&mut self, ramp: &Ramp<f64>, latest_mm: f64) -> Option<f64> {
         if self.between.is_empty() {
             return (self.start_mm <= latest_mm).then_some(self.start_mm);
         }
-        // Where exactly a feed is passed is dear to find out: only for steps that come into question.
+        // Finding exactly where a feed is passed is expensive: done only for steps that matter.
         let passing = Passing::new(ramp);
         let about_mm = |step: &Reached| {
             let (low_mm, high_mm) = passing.length_to_feed_mm(step.feed_mm_s);
@@ -198,7 +202,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         if self.between.get(self.hinders).is_some_and(|step| about_mm(step).0 > latest_mm) {
             return None;
         }
-        // The step that surely makes it wait longest, and what others might.
+        // The longest wait that is certain, and the longest that other steps might cause.
         let (mut first_mm, mut last_mm, mut longest) = (self.start_mm, self.start_mm, None);
         let mut others_mm = self.start_mm;
         for (index, step) in self.between.iter().enumerate() {

@@ -1,8 +1,8 @@
-//! The least limits of what lies between two positions.
+//! The least limits between two positions.
 //!
-//! Consumes the nodes of a stretch; every node keeps the least limits of itself and of some before it: of as many as the
-//! lowest bit of its place, counted from 1, says (a Fenwick tree). Any range is a few of those: work goes with the square
-//! of the logarithm of its length.
+//! Consumes the nodes of a stretch; every node keeps the least limits of itself and of some nodes before it;
+//! their number is the lowest set bit of its place, counted from 1 (a Fenwick tree). Any range is composed of
+//! a few of those; the work grows with the square of the logarithm of its length.
 
 use super::{Interval, Intervals, Node};
 use crate::law::Limits;
@@ -12,18 +12,18 @@ use crate::plan::Block;
 pub(super) const NONE: Limits<f64> =
     Limits { accel_mm_s2: f64::INFINITY, jerk_mm_s3: f64::INFINITY, snap_mm_s4: f64::INFINITY };
 
-/// A junction has no limits of its own, nor has a block of no length.
+/// The node's own limits. A junction has none, nor has a block without length.
 fn own(node: &Node, blocks: &[Block<f64>]) -> Limits<f64> {
     let block = blocks.get(node.block as usize).filter(|_| node.end_mm > node.start_mm);
     block.map_or(NONE, |block| block.law.limits())
 }
 
-/// How many nodes the one at `place`, counted from 1, stands for.
+/// Number of nodes that the one at `place`, counted from 1, stands for.
 fn reach(place: usize) -> usize {
     place & place.wrapping_neg()
 }
 
-/// Gives every node the least limits of those it stands for.
+/// Gives every node the least limits of the nodes it stands for.
 pub(super) fn collect(nodes: &mut [Node], blocks: &[Block<f64>]) {
     for node in nodes.iter_mut() {
         node.least = own(node, blocks);
@@ -37,8 +37,8 @@ pub(super) fn collect(nodes: &mut [Node], blocks: &[Block<f64>]) {
 }
 
 impl Intervals<'_> {
-    /// The least limits in an interval from `low_mm` to `high_mm`; of a position by itself, of the block that comes next on the
-    /// way on, or on the way back.
+    /// The least limits in an interval from `low_mm` to `high_mm`. For a single position, the limits of the
+    /// block after it, or on the way back the block before it.
     pub(in crate::plan::spanning) fn least(
         &self,
         interval: &Interval,
@@ -56,11 +56,11 @@ impl Intervals<'_> {
             (from, nodes.partition_point(|node| node.start_mm <= high_mm))
         };
         let least = self.least_of(first + from, first + to);
-        // Beyond the interval's end, by rounding, those of all of it hold.
+        // If rounding leads beyond the interval's end, the limits of the whole interval hold.
         if least == NONE { self.least_of(first, last) } else { least }
     }
 
-    /// The least limits of the nodes from `first` to before `last`.
+    /// The least limits of the nodes `first..last`.
     fn least_of(&self, first: usize, last: usize) -> Limits<f64> {
         let (mut least, mut place) = (NONE, last);
         while place > first {

@@ -1,32 +1,33 @@
 //! Which minima stay.
 //!
-//! Consumes the roles of all nodes; gives up minima that the law does not reach below the steps next to them, and makes
-//! new ones where steps are too many for one ascent.
+//! Consumes the roles of all nodes; gives up minima that the law can't reach below the steps next to them,
+//! and makes new ones where there are too many steps for one ascent.
 
 use super::{Interval, Intervals, NONE, Node, Role, Steps};
 
-/// Joining steps may lose so much of the time of a ramp over all of them; otherwise they are divided.
+/// Share of the time of a ramp over all steps that joining them may lose; otherwise they are divided.
 const DIVIDE_SHARE: f64 = 0.05;
 
-/// Of a chain of minima given up one after the other as many are given up before looking again as it is long, over this.
+/// A chain of minima given up one after the other: its length divided by this is the number given up before
+/// looking again.
 const CHAIN_LOOKED_AT: usize = 64;
 
-/// How often all nodes may be looked at to settle which minima are reached; a list that takes more has no plan.
+/// How often all nodes may be visited to settle which minima are reached; a list that takes more has no plan.
 const LOOKS_MAX: usize = 256;
 
 impl Intervals<'_> {
-    /// Gives up minima that cannot be reached below the steps from the one before, or left for the one after;
-    /// `fits` says whether an interval can be driven. Returns whether all intervals that are left can.
+    /// Gives up minima that can't be reached below the steps from the minimum before, or left for the one
+    /// after; `fits` says whether an interval can be driven. Returns whether all remaining intervals can.
     pub(in crate::plan::spanning) fn settle(
         &mut self,
         mut fits: impl FnMut(&Self, &Interval) -> bool,
     ) -> bool {
         let (mut left, mut right) = (0, self.next_minimum(0));
         let mut looked_at = 0;
-        // Minima given up since an interval could be driven.
+        // Number of minima given up since an interval could be driven.
         let mut chain = 0;
         while right != NONE {
-            // Minima that are given up one after the other make ever longer intervals.
+            // Minima given up one after the other make ever longer intervals.
             looked_at += (right - left) as usize;
             if looked_at > LOOKS_MAX * self.nodes.len() {
                 return false;
@@ -67,8 +68,8 @@ impl Intervals<'_> {
                     right = self.next_minimum(right);
                 }
             } else if interval.enter_mm_s > interval.exit_mm_s && right as usize != last {
-                // From the start, where the minimum must be passed on the way down to a lower one: a ramp to a lower feed
-                // passes a feed earlier than one that ends at it.
+                // From the start, where the minimum must be passed on the way down to a lower one: a ramp to
+                // a lower feed passes a feed earlier than one that ends at it.
                 let next = self.next_minimum(right);
                 if self.node(next).feed_mm_s > interval.exit_mm_s {
                     return false;
@@ -82,7 +83,7 @@ impl Intervals<'_> {
         true
     }
 
-    /// Rests in the middle of steps that are too many for one ascent; returns the new minimum.
+    /// Rests in the middle of too many steps for one ascent; returns the new minimum.
     fn divide(&mut self, interval: &Interval, left: u32, right: u32) -> Option<u32> {
         let is_long = |steps: &Steps| {
             let (low, high) = steps.range_mm_s();
@@ -95,7 +96,7 @@ impl Intervals<'_> {
             _ => return None,
         };
         let inside = left as usize + 1..right as usize;
-        // Where a dividing step was given up there is no better one.
+        // If a dividing step was given up, there is no better one.
         if self.nodes.get(inside.clone())?.iter().any(|node| node.divides.is_some()) {
             return None;
         }
@@ -105,7 +106,7 @@ impl Intervals<'_> {
         let (feed_mm_s, peak_mm_s) = (self.node(middle).feed_mm_s, self.node(left).peak_mm_s);
         let node = self.node_mut(middle)?;
         (node.role, node.divides) = (Role::Minimum, Some(role));
-        // What lies towards the foot of the steps stays below its middle.
+        // The steps towards the foot stay below the middle.
         if role == Role::Rising {
             node.peak_mm_s = peak_mm_s;
             self.node_mut(left)?.peak_mm_s = feed_mm_s;
@@ -115,8 +116,8 @@ impl Intervals<'_> {
         Some(middle)
     }
 
-    /// Makes a step of a minimum; what lies on the side where it is passed at its feed or below limits no more, up to the
-    /// next lower step: beyond that there are only lower ones.
+    /// Makes a minimum a step. On the side where it is passed, ceilings not below its feed no longer limit,
+    /// up to the next lower step; beyond that there are only lower ones.
     fn give_up(&mut self, minimum: u32, role: Role, passed: core::ops::Range<usize>) {
         let feed_mm_s = self.node(minimum).feed_mm_s;
         if let Some(node) = self.node_mut(minimum) {
