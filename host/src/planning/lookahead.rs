@@ -8,6 +8,9 @@ use super::Mode;
 use super::error::Problem;
 use crate::toolpath::on_path;
 
+/// Halvings of the feed at an end between one that is reached and one that is not: to 10⁻⁹ of their difference.
+const HALVINGS: usize = 30;
+
 /// Plans blocks that end at `ends_mm`, from one feed to another. An error comes with the index of the block.
 pub(super) fn lookahead(
     blocks: &[Block<f64>],
@@ -20,13 +23,28 @@ pub(super) fn lookahead(
     for (index, &end_mm) in ends_mm.iter().enumerate() {
         ends.push(on_path(end_mm).map_err(|error| (index, error.into()))?);
     }
+    let plan = |feeds_mm_s| planned(blocks, &ends, feeds_mm_s, mode, tick_s);
+    plan(feeds_mm_s).map_err(|error| match error {
+        PlanError::Ramp { start, error } => (block_at(&ends, start), Problem::Segment { error, tick_s }),
+        PlanError::Block { block, .. } => (block, error.into()),
+        _ => (0, greatest(error, feeds_mm_s, |feeds_mm_s| plan(feeds_mm_s).is_ok()).into()),
+    })
+}
+
+fn planned(
+    blocks: &[Block<f64>],
+    ends: &[Position],
+    feeds_mm_s: [f64; 2],
+    mode: Mode,
+    tick_s: f64,
+) -> Result<Vec<PlannedRamp>, PlanError> {
     let (effort, nodes) = match mode {
         Mode::Spanning => (Effort::Spanning, nodes_for(blocks.len())),
         Mode::PerBlock => (Effort::PerBlock, 0),
     };
     let path = Path {
         blocks: &mut blocks.to_vec(),
-        ends: &mut ends.clone(),
+        ends: &mut ends.to_vec(),
         start: Position::ZERO,
         feeds_mm_s,
         tick_s,
@@ -34,16 +52,33 @@ pub(super) fn lookahead(
     let memory =
         Memory { plans: &mut vec![BlockPlan::default(); blocks.len()], nodes: &mut vec![Node::EMPTY; nodes] };
     let mut ramps: Vec<PlannedRamp> = Vec::new();
-    let planned = plan_ramps(path, effort, memory, &mut |index, ramp| {
+    plan_ramps(path, effort, memory, &mut |index, ramp| {
         ramps.truncate(index);
         ramps.push(ramp);
         true
-    });
-    planned.map(|_| ramps).map_err(|error| match error {
-        PlanError::Ramp { start, error } => (block_at(&ends, start), Problem::Segment { error, tick_s }),
-        PlanError::Block { block, .. } => (block, error.into()),
-        _ => (0, error.into()),
     })
+    .map(|_| ramps)
+}
+
+/// A refusal of the feed at an end with the greatest feed there that has a plan: the planner names the one that a pair of
+/// ramps for each block has, which ramps over several blocks may exceed.
+fn greatest(mut error: PlanError, feeds_mm_s: [f64; 2], has_plan: impl Fn([f64; 2]) -> bool) -> PlanError {
+    let [start_mm_s, end_mm_s] = feeds_mm_s;
+    let (greatest_mm_s, refused_mm_s, is_start) = match &mut error {
+        PlanError::TooShortToBrake { greatest_mm_s, .. } => (greatest_mm_s, start_mm_s, true),
+        PlanError::TooShortToAccelerate { greatest_mm_s, .. } => (greatest_mm_s, end_mm_s, false),
+        _ => return error,
+    };
+    let mut refused_mm_s = refused_mm_s;
+    for _ in 0..HALVINGS {
+        let feed_mm_s = 0.5 * (*greatest_mm_s + refused_mm_s);
+        if has_plan(if is_start { [feed_mm_s, end_mm_s] } else { [start_mm_s, feed_mm_s] }) {
+            *greatest_mm_s = feed_mm_s;
+        } else {
+            refused_mm_s = feed_mm_s;
+        }
+    }
+    error
 }
 
 /// The index of the block, of those that end at `ends`, on which a ramp starts at `start`.

@@ -269,11 +269,12 @@ fn what_a_block_list_refuses() {
     assert_eq!(refusal(torn), "7:4: found the end of the file, expected the rest of a value");
 
     let short = BLOCKS.replace(": 50,", ": 0.5,").replace(": 25,", ": 0.5,");
+    // One ramp over both blocks: v·√(2v/J) = 1 mm for v = 50^(2/3) mm/s.
     let found = refusal(&short.replace("start_feed_mm_s\": 0", "start_feed_mm_s\": 80"));
-    assert!(found.starts_with("3: found start feed 80 mm/s, expected at most 9.83124"), "{found}");
+    assert!(found.starts_with("3: found start feed 80 mm/s, expected at most 13.57208"), "{found}");
     assert!(found.ends_with(" mm/s: the path is too short to brake from more"), "{found}");
     let found = refusal(&short.replace("end_feed_mm_s\": 0", "end_feed_mm_s\": 40"));
-    assert!(found.starts_with("4: found end feed 40 mm/s, expected at most 9.83124"), "{found}");
+    assert!(found.starts_with("4: found end feed 40 mm/s, expected at most 13.57208"), "{found}");
     assert!(found.ends_with(" mm/s: the path is too short to reach more"), "{found}");
 }
 

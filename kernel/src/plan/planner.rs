@@ -104,7 +104,14 @@ pub fn plan_ramps(
     let places = plans.len();
     let plans = plans.get_mut(..count).ok_or(PlanError::Room { of: "plans", needed: count, places })?;
     let all = Stretch { blocks, ends, start, tick_s }.first(count);
-    plan(all.blocks, start_mm_s, end_mm_s, plans)?;
+    match (plan(all.blocks, start_mm_s, end_mm_s, plans), spanning) {
+        (Ok(()), _) => {}
+        // Ramps over several blocks reach feeds at the ends that pairs don't.
+        (Err(PlanError::TooShortToBrake { .. } | PlanError::TooShortToAccelerate { .. }), Some(found)) => {
+            return Ok(found);
+        }
+        (Err(error), _) => return Err(error),
+    }
     let compared = if spans_all { count } else { most };
     if let (false, Some(BlockPlan { exit_mm_s, .. })) = (spans_all, plans.get(..most).and_then(<[_]>::last)) {
         spanning = span(all.first(most), [start_mm_s, *exit_mm_s], nodes, put)?;

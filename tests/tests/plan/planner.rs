@@ -1,13 +1,13 @@
 //! The planner's one entry: the faster of two plans, over exact positions, from rest or from a feed.
 
-use motion_kernel::law::PlannedRamp;
+use motion_kernel::law::{PlannedRamp, reach};
 use motion_kernel::plan::{
     Block, BlockPlan, Effort, Memory, Node, Path, PlanError, Planned, nodes_for, plan_ramps,
 };
 use motion_kernel::units::Position;
 
 use crate::spanning::{Span, legal, spans_between, unreachable};
-use crate::{block, from_rest, planned, random_blocks, time_s};
+use crate::{block, from_rest, laws, planned, random_blocks, time_s};
 use motion_tests::random::Random;
 
 /// The ramps of a plan, of which there is room for so many.
@@ -97,6 +97,52 @@ fn more_effort_is_faster() {
         "{made} planned, {faster} faster with spans, {fallback} without any; {refused} too short to stop"
     );
     assert!(made > 2000 && refused > 100 && faster > 1000 && fallback > 0);
+}
+
+/// With one law for all blocks and ceilings that don't matter, the greatest feed at an end is what one ramp over all blocks
+/// reaches, however many there are.
+#[test]
+fn a_feed_at_an_end_is_refused_only_where_no_ramp_reaches_it() {
+    let mut random = Random::of_stream(43);
+    let (mut reached, mut only_by_spans, mut refused) = (0, 0, 0);
+    for _ in 0..4000 {
+        let law = *random.pick(&laws());
+        let mut blocks = exact_blocks(&mut random, 12, 1e-2);
+        let length_mm: f64 = blocks.iter().map(|block| block.length_mm).sum();
+        let greatest_mm_s = reach(&law, 0.0, length_mm);
+        for block in &mut blocks {
+            let cap_mm_s = greatest_mm_s * random.between(1.0, 2.0);
+            *block = Block { cap_mm_s, junction_mm_s: f64::INFINITY, law, ..*block };
+        }
+        let share = random.between(0.5, 1.5);
+        if (share - 1.0).abs() < 1e-6 || !(0.01..900.0).contains(&greatest_mm_s) {
+            continue;
+        }
+        let feed_mm_s = greatest_mm_s * share;
+        for (feeds, cap_mm_s) in
+            [([feed_mm_s, 0.0], blocks[0].cap_mm_s), ([0.0, feed_mm_s], blocks[blocks.len() - 1].cap_mm_s)]
+        {
+            if feed_mm_s > cap_mm_s {
+                continue;
+            }
+            match whole(&blocks, feeds, Effort::Spanning) {
+                Ok(_) => {
+                    assert!(share < 1.0, "{feeds:?} {share}\n{blocks:?}");
+                    reached += 1;
+                    only_by_spans += u32::from(whole(&blocks, feeds, Effort::PerBlock).is_err());
+                }
+                Err(PlanError::TooShortToBrake { .. } | PlanError::TooShortToAccelerate { .. }) => {
+                    assert!(share > 1.0, "{feeds:?} {share}\n{blocks:?}");
+                    refused += 1;
+                }
+                Err(error) => panic!("{error}\n{blocks:?}"),
+            }
+        }
+    }
+    println!(
+        "{reached} reached, {only_by_spans} of them only by ramps over several blocks; {refused} refused"
+    );
+    assert!(reached > 1000 && only_by_spans > 500 && refused > 500);
 }
 
 /// Where there are more blocks than may be spanned, what is put is the begin of a motion that can be finished from there.
