@@ -10,16 +10,17 @@ const MPS2: &str = "MEMORY
 }
 ";
 
-/// microbit (nRF51822): the last quarter of its flash is for programs. The stack lies at the bottom of the
-/// memory: where it overflows there is nothing to overwrite, and the emulator stops at once.
+/// microbit (nRF51822): the last quarter of its flash is for programs. The stack lies at the bottom of the memory:
+/// where it overflows there is nothing to overwrite, and the emulator stops at once. Above it there is room for the
+/// streams and the semihosting's handle (2804 bytes), a multiple of 8.
 const MICROBIT: &str = "MEMORY
 {
   FLASH : ORIGIN = 0x00000000, LENGTH = 192K
-  STACK : ORIGIN = 0x20000000, LENGTH = 13552
-  RAM   : ORIGIN = 0x20000000 + 13552, LENGTH = 16K - 13552
+  STACK : ORIGIN = 0x20000000, LENGTH = 16K - 2832
+  RAM   : ORIGIN = 0x20004000 - 2832, LENGTH = 2832
 }
 _stack_end = ORIGIN(STACK);
-_stack_start = ORIGIN(STACK) + LENGTH(STACK);
+_stack_start = ORIGIN(RAM);
 ";
 
 /// The same for images that have more in memory, and are not run there.

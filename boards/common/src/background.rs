@@ -465,7 +465,7 @@ mod tests {
                     assert_eq!(overruns, 1);
                     ticks.push((now, timing.ticks));
                 }
-                Some(LogLine::Background { longest_turn_us, .. }) => assert_eq!(longest_turn_us, 10_000),
+                Some(LogLine::Background { longest_poll_us, .. }) => assert_eq!(longest_poll_us, 10_000),
                 Some(LogLine::FollowingErrors(_)) => {}
                 other => assert_eq!(other, None),
             }

@@ -57,7 +57,7 @@ pub enum LogLine<R: Real, const AXES: usize> {
     /// Figures of the background.
     Background {
         /// Longest poll of the last second \[µs\].
-        longest_turn_us: u32,
+        longest_poll_us: u32,
         /// Number of stops for want of data since the start.
         starvations: u32,
         /// Number of console bytes lost since the start.
@@ -113,9 +113,9 @@ pub fn write<R: Real + defmt::Format, const AXES: usize>(line: &LogLine<R, AXES>
         LogLine::FollowingErrors(peaks_mm) => {
             info!("peak following error {=[?]} um", peaks_mm.map(|mm| R::from_f64(1e3) * mm));
         }
-        LogLine::Background { longest_turn_us, starvations, bytes_lost } => info!(
+        LogLine::Background { longest_poll_us, starvations, bytes_lost } => info!(
             "longest background poll {=u32} us, {=u32} stops for want of data, {=u32} console bytes lost",
-            longest_turn_us, starvations, bytes_lost
+            longest_poll_us, starvations, bytes_lost
         ),
     }
 }

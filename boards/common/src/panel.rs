@@ -69,7 +69,7 @@ mod tests {
 
     /// Polls of 66 ticks: two samples are 66 ticks apart, and still no press.
     #[test]
-    fn long_turns_need_three_samples() {
+    fn long_polls_need_three_samples() {
         assert_eq!(presses(66, 0, |tick| tick >= 66), [198]);
     }
 }

@@ -50,13 +50,13 @@ pub(crate) struct Report {
     due_ticks: u32,
     next: Next,
     overruns: u32,
-    longest_turn_cycles: u32,
+    longest_poll_cycles: u32,
 }
 
 impl Report {
     /// Notes the duration of a poll of the background.
     pub(crate) fn note_poll(&mut self, cycles: u32) {
-        self.longest_turn_cycles = self.longest_turn_cycles.max(cycles);
+        self.longest_poll_cycles = self.longest_poll_cycles.max(cycles);
     }
 
     /// The next line, if a report is due at tick `now` or under way.
@@ -87,9 +87,9 @@ impl Report {
             Next::Background => {
                 self.next = Next::Ticks;
                 let cycles_per_us = board.cycles_hz / 1_000_000;
-                let longest = core::mem::take(&mut self.longest_turn_cycles);
-                let longest_turn_us = longest.checked_div(cycles_per_us).unwrap_or(longest);
-                Some(LogLine::Background { longest_turn_us, starvations, bytes_lost })
+                let longest = core::mem::take(&mut self.longest_poll_cycles);
+                let longest_poll_us = longest.checked_div(cycles_per_us).unwrap_or(longest);
+                Some(LogLine::Background { longest_poll_us, starvations, bytes_lost })
             }
         }
     }

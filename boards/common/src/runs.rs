@@ -196,7 +196,7 @@ mod tests {
     /// Polls as seldom as the longest one would let them be: what is under way is no slower for it, only what
     /// begins.
     #[test]
-    fn seldom_turns_cost_no_stop() {
+    fn seldom_polls_cost_no_stop() {
         let (runs, starvations) = two_runs(POLL_TICKS_MAX, |_, _| {});
         let items = machine().program.items();
         let stretches = items.filter(|item| matches!(item, Ok(Item::EndOfStretch(_)))).count() as u32;

@@ -58,7 +58,7 @@ impl Outcome {
     }
 }
 
-/// Why a command could not do its work. Displays as one line.
+/// Why a command could not do its work. Displays as one line, and several errors as a line each.
 #[derive(Debug, Error)]
 pub enum CliError {
     /// A file can't be read.
@@ -75,6 +75,9 @@ pub enum CliError {
     /// Files could not be written; the results were printed.
     #[error("{}", .0.join("\nmotion: "))]
     Unwritten(Vec<String>),
+    /// More than one, the one with the command's exit status first.
+    #[error("{}", .0.iter().map(Self::to_string).collect::<Vec<_>>().join("\nmotion: "))]
+    Several(Vec<Self>),
     /// The run ended before commands were due; its results were printed.
     #[error(
         "--at {commands}: found the end of the run in tick {last_tick}, expected commands within the run"
@@ -188,6 +191,25 @@ impl CliError {
         Err(Self::Unreached { commands, last_tick, outcome })
     }
 
+    /// The last outcome of `parts`, or all their errors; the first of these has the exit status.
+    ///
+    /// # Errors
+    /// A part failed.
+    pub fn all(parts: impl IntoIterator<Item = Result<Outcome, Self>>) -> Result<Outcome, Self> {
+        let (mut outcome, mut errors) = (Outcome::Done, Vec::new());
+        for part in parts {
+            match part {
+                Ok(found) => outcome = found,
+                Err(error) => errors.push(error),
+            }
+        }
+        match errors.len() {
+            0 => Ok(outcome),
+            1 => Err(errors.remove(0)),
+            _ => Err(Self::Several(errors)),
+        }
+    }
+
     /// 2 if the user's input is wrong. Otherwise 6 for results that could not be written; 5 for commands that
     /// a finished run did not reach; 1 for a fault, for a plan or a motion that the kernel refuses, for an
     /// experiment that found nothing to measure or too little to tune by, and for an axis that found no
@@ -195,6 +217,7 @@ impl CliError {
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
+            Self::Several(errors) => errors.first().map_or(ExitCode::FAILURE, Self::exit_code),
             Self::Output(_) | Self::Unwritten(_) => ExitCode::from(6),
             Self::Unreached { outcome: Outcome::Done, .. } => ExitCode::from(5),
             Self::Unreached { outcome, .. } => outcome.exit_code(),

@@ -15,7 +15,8 @@
 //! | 6 | results could not be written: a file, or standard output |
 //! | 130, 143 | interrupted: Ctrl-C (SIGINT), SIGTERM |
 //!
-//! With 1, 3, 4, 5 and 6 the results are printed. In all cases, a file that can't be written completely stays
+//! With 1, 3, 4, 5 and 6 the results are printed, as far as standard output takes them. A reader who leaves
+//! early (`| head`) changes no status. In all cases, a file that can't be written completely stays
 //! as it was ([`files`](crate::files)).
 //!
 //! - [`profile`]: one ramp of the feed law, in figures;
@@ -127,13 +128,14 @@ pub fn main() -> ExitCode {
     let done = execute(&cli, &mut out);
     // Output printed before an error must appear before it.
     let flushed = out.flush();
-    let failure = match (done, flushed) {
-        (Ok(outcome), Ok(())) => return outcome.exit_code(),
-        (Ok(_), Err(error)) => CliError::Output(error),
-        (Err(error), _) => error,
-    };
-    eprintln!("motion: {failure}");
-    failure.exit_code()
+    match CliError::all([flushed.map(|()| Outcome::Done).map_err(CliError::Output), done]) {
+        Ok(outcome) => outcome.exit_code(),
+        Err(failure) => {
+            // Nobody may be left to read it, which changes no status.
+            let _ = writeln!(io::stderr(), "motion: {failure}");
+            failure.exit_code()
+        }
+    }
 }
 
 fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
@@ -160,7 +162,7 @@ fn write_json(value: &impl serde::Serialize, out: &mut dyn Write) -> Result<(), 
     writeln!(out).map_err(CliError::Output)
 }
 
-/// The cause of a failed write, with its kind: a closed pipe must stay recognisable.
+/// The cause of a failed write, in the system's words.
 fn csv_failure(error: csv::Error) -> io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(cause) => cause,

@@ -100,21 +100,16 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
         ..RunOptions::default()
     };
     let (summary, written) = execute(&options, &plan, &machine, outputs, record)?;
-    if arguments.json {
-        write_json(&json(&summary), out)?;
+    let printed = if arguments.json {
+        write_json(&json(&summary), out)
     } else {
-        write_summary(&summary, out).map_err(CliError::Output)?;
-        written.say(out)?;
-    }
-    let outcome = Outcome::of(&summary);
-    match (written.outcome(outcome), CliError::of_unreached(&summary, outcome)) {
-        // Report both.
-        (Err(CliError::Unwritten(mut messages)), Err(unreached)) => {
-            messages.push(unreached.to_string());
-            Err(CliError::Unwritten(messages))
-        }
-        (written, reached) => written.and(reached),
-    }
+        write_summary(&summary, out).map_err(CliError::Output).and_then(|()| written.say(out))
+    };
+    CliError::all([
+        printed.map(|()| Outcome::Done),
+        written.outcome(Outcome::Done),
+        CliError::of_unreached(&summary, Outcome::of(&summary)),
+    ])
 }
 
 /// Runs a plan; writes the trace during the run, report and recording afterwards.

@@ -117,20 +117,43 @@ fn an_unwritten_file_and_an_unreached_command_are_both_said() {
     }
 }
 
-/// Whoever reads the summary may leave: the run ends as it would have.
+/// Whoever reads summary and errors may leave: the run ends as it would have, and its files are whole.
 #[test]
 fn a_reader_that_left_hides_no_ending() {
     let workspace = Workspace::new("left");
     workspace.put("part.ngc", PROGRAM);
+    let dead_pipe = || {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        writer
+    };
     for (at, status) in [("1500:hold", 3), ("1500:abort", 4), ("800000:resume", 5)] {
         for json in [&[][..], &["--json"]] {
-            let (reader, writer) = std::io::pipe().expect("a pipe");
-            drop(reader);
+            let trace = format!("{status}.csv");
             let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_motion"));
-            command.args(["run", "part.ngc", "--at", at]).args(json).current_dir(&workspace.0).stdout(writer);
+            command.args(["run", "part.ngc", "--at", at, "--trace", &trace]).args(json);
+            command.current_dir(&workspace.0).stdout(dead_pipe()).stderr(dead_pipe());
             assert_eq!(command.status().expect("started").code(), Some(status), "{at}");
+            let rows = workspace.read(&trace).lines().count();
+            assert!(rows > 1000 && workspace.read(&trace).ends_with('\n'), "{rows}");
         }
     }
+}
+
+/// A summary that can't be written is said beside a command that was not reached.
+#[test]
+fn an_unprinted_summary_is_said() {
+    let workspace = Workspace::new("unprinted");
+    workspace.put("part.ngc", PROGRAM);
+    let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") else { return };
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_motion"));
+    command.args(["run", "part.ngc", "--at", "800000:hold"]).current_dir(&workspace.0).stdout(full);
+    let ended = command.output().expect("started");
+    let error = String::from_utf8(ended.stderr).expect("UTF-8");
+    assert_eq!(ended.status.code(), Some(6), "{error}");
+    let [output, command] = error.lines().collect::<Vec<_>>()[..] else { panic!("{error}") };
+    assert!(output.starts_with("motion: standard output: found "), "{error}");
+    assert!(command.starts_with("motion: --at 800000:hold: found "), "{error}");
 }
 
 /// A jog that a fault ends says where.

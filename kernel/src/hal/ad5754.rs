@@ -68,6 +68,7 @@ pub enum Ad5754Frame {
 /// The converter could not be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Ad5754Error<E> {
     /// The bus failed in `frame`.
     ///

@@ -57,8 +57,9 @@ where
     I: Source<AXES, Error = E>,
 {
     /// Starts at rest with all of `items` still to do, for ticks of `tick_s` and freshly split streams. If
-    /// ticks can interrupt the background, `lead_ticks` is the number that may pass during one poll: a ramp
-    /// is changed no sooner than that after the progress last seen.
+    /// ticks can interrupt the background, `lead_ticks` is the number that pass during an ordinary poll with
+    /// a plan: a ramp is changed no sooner than that after the progress last seen. Where that was too late,
+    /// the lead grows by a tick, and stays.
     pub fn new(items: I, tick_s: f64, lead_ticks: u32) -> Self {
         Self {
             reader: Reader::new(items, tick_s),

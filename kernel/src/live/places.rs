@@ -62,7 +62,7 @@ impl Place {
 #[derive(Clone, Debug)]
 pub(super) struct Places<'a> {
     list: &'a List,
-    /// A later cut of the item under way, tried instead of the soonest one.
+    /// A later cut of the item under way, tried before `first`.
     later: Option<Place>,
     first: Option<Place>,
     /// The next place is after this many items.
@@ -95,7 +95,7 @@ impl<'a> Places<'a> {
         Some((start, item, place))
     }
 
-    /// Replaces the cut of the item under way by `head`, a later one.
+    /// Adds `head`, a later cut of the item under way, which is tried before the soonest one.
     pub(super) fn with_head(self, head: Item) -> Self {
         let later = self.first.map(|first| Place { head: Some(head), ..first });
         Self { later, ..self }

@@ -89,8 +89,8 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
         self.under_way = self.cursor;
     }
 
-    /// Splits the cruise at the cursor after `part` and returns that part, which is then at the cursor.
-    /// `None` if there is no cruise, or no place for the rest.
+    /// Splits the item at the cursor, which must be a cruise, after `part` and returns that part, which is then
+    /// at the cursor. `None` if there is no feed, or no place for the rest.
     pub(super) fn split_cruise(&mut self, part: Position) -> Option<Item> {
         let &Item::Feed(PlannedRamp { ramp: Ramp { from_mm_s: feed_mm_s, .. }, length }) = self.peek()?
         else {

@@ -62,8 +62,8 @@ pub(super) fn replan<const BLOCKS: usize>(
     list: &mut List,
 ) -> Option<Reach> {
     let heads = list.len();
-    // Merged blocks share their lowest limits, which may be too low to brake immediately; then retry
-    // unmerged.
+    // Merged blocks share their lowest limits, which may be too low to brake immediately; then retry with
+    // equal ones merged only.
     for alike in [ALIKE, 0.0] {
         let mut blocks = Blocks::<BLOCKS>::new(lookahead, from, feed_override, end, alike)?;
         let planned = blocks.plan(from, ramps, tick_s, list);
@@ -88,7 +88,7 @@ struct Blocks<const BLOCKS: usize> {
 
 impl<const BLOCKS: usize> Blocks<BLOCKS> {
     /// Blocks from a splice to `end`. Neighbours with the same ceiling are merged and get their least limits,
-    /// if these are less than the fraction `alike` below the greatest ones.
+    /// if these are at most the fraction `alike` below the greatest ones.
     #[inline(never)]
     fn new(
         lookahead: &Lookahead<BLOCKS>,

@@ -15,6 +15,7 @@ use crate::units::Position;
 /// What is wrong with a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum CheckError<E> {
     /// It starts beyond the range of positions.
     Start {

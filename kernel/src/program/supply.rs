@@ -13,6 +13,7 @@ use crate::units::Position;
 /// Why an item can't be executed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum SupplyError<E> {
     /// The source failed to provide the item.
     Source(E),

@@ -93,9 +93,13 @@ impl<R: Real, const AXES: usize> Feeder<'_, R, AXES> {
         if !(has_room(&self.path) && has_room(&self.feed)) {
             return Err(Refused::Full(position));
         }
-        // Both queues have room, and only this end fills them.
-        enter(&mut self.path, PathItem::EndOfStretch(position)).map_err(|_| Refused::Full(position))?;
-        enter(&mut self.feed, FeedItem::EndOfStretch).map_err(|_| Refused::Full(position))?;
+        // Both queues have room, and only this end fills them: neither can fail.
+        let path = enter(&mut self.path, PathItem::EndOfStretch(position));
+        let feed = enter(&mut self.feed, FeedItem::EndOfStretch);
+        debug_assert!(path.is_ok() && feed.is_ok(), "room for both ends");
+        if path.is_err() || feed.is_err() {
+            return Err(Refused::Full(position));
+        }
         self.accept = next;
         self.publish();
         count(&self.shared.path_entered);

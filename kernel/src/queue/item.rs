@@ -28,7 +28,7 @@ pub enum FeedItem<R> {
     EndOfStretch,
 }
 
-/// An item that did not enter its queue.
+/// An item that did not enter its queue. Exhaustive on purpose: there is no third way to stay out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refused<T> {
     /// The queue is full; here is the item back. Offer it again later.

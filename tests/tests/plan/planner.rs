@@ -176,7 +176,7 @@ fn little_room_for_ramps() {
     for _ in 0..1000 {
         let blocks = exact_blocks(&mut random, 40, 1e-2);
         let room = random.below(30);
-        for effort in [Effort::PerBlock, Effort::Spanning] {
+        for effort in [Effort::PerBlock, Effort::Spanning, Effort::SpanningFirst { most: usize::MAX }] {
             let (_, all) = ramps(&blocks, [0.0; 2], effort, usize::MAX).expect("a plan");
             let (planned, found) = ramps(&blocks, [0.0; 2], effort, room).expect("a plan");
             assert_eq!(planned.is_whole, all.len() <= room);
@@ -195,12 +195,38 @@ fn a_bad_block_is_counted_as_given() {
         let bad = random.below(50);
         let mut blocks: Vec<_> = (0..50).map(|_| block(1.0, 10.0 + random.below(2) as f64)).collect();
         blocks[bad].cap_mm_s = -1.0;
-        for effort in [Effort::PerBlock, Effort::Merged, Effort::Spanning] {
+        let first = [10, 50].map(|most| Effort::SpanningFirst { most });
+        for effort in [Effort::PerBlock, Effort::Merged, Effort::Spanning].into_iter().chain(first) {
             match ramps(&blocks, [0.0; 2], effort, usize::MAX) {
                 Err(PlanError::Block { block, value, .. }) => assert_eq!((block, value), (bad, -1.0)),
                 other => panic!("{other:?}"),
             }
         }
+    }
+}
+
+/// Blocks that may be planned once more, as live control does after a refusal, are not merged.
+#[test]
+fn spanning_first_leaves_the_blocks() {
+    let equal = [block(1.0, 10.0); 6];
+    for (feeds_mm_s, is_refused) in [([0.0; 2], false), ([10.0, 0.0], true)] {
+        let (mut blocks, mut plans) = (equal, [BlockPlan::default(); 6]);
+        if is_refused {
+            blocks.iter_mut().for_each(|block| block.length_mm = 1e-3);
+        }
+        let mut end_mm = 0.0;
+        let mut ends = blocks.map(|block| {
+            end_mm += block.length_mm;
+            Position::from_mm(end_mm).expect("in range")
+        });
+        let before = (blocks, ends);
+        let mut nodes = [Node::EMPTY; nodes_for(6)];
+        let path =
+            Path { blocks: &mut blocks, ends: &mut ends, start: Position::ZERO, feeds_mm_s, tick_s: 5e-4 };
+        let memory = Memory { plans: &mut plans, nodes: &mut nodes };
+        let planned = plan_ramps(path, Effort::SpanningFirst { most: 16 }, memory, &mut |_, _| true);
+        assert_eq!(planned.is_err(), is_refused, "{planned:?}");
+        assert_eq!((blocks, ends), before);
     }
 }
 

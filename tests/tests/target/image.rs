@@ -63,8 +63,8 @@ pub(crate) fn sizes(tools: &Tools) -> Result<(), String> {
         let figures = by_name(&tools.run(board, "budget", &programs::worst_ticks(), Clock::Counting)?);
         let greatest = |name: &str| figures.get(name).and_then(|sorted| sorted.last().copied()).unwrap_or(0);
         let (ram, stack) = (greatest("ram"), greatest("stack"));
-        let capacity = if board.room < 1 << 20 { "8, 8" } else { "64, 64" };
-        let cells = [flash.to_string(), ram.to_string(), capacity.to_owned(), stack.to_string()];
+        let capacity = format!("{}, {}", greatest("pieces"), greatest("segments"));
+        let cells = [flash.to_string(), ram.to_string(), capacity, stack.to_string()];
         table.row(&[&[board.core.to_owned(), board.number.to_owned()], &cells[..]].concat());
         if board == M4F && (flash > FLASH_MAX || u64::from(stack) > STACK_MAX || stack == 0) {
             return Err(format!(

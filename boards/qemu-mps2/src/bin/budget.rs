@@ -1,7 +1,7 @@
 //! Counts the instructions of every tick of every program of the bundle, and of the tick's stages; paints the
 //! stack below the tick; says how much memory kernel and streams take.
 //!
-//! One line a figure: what, and how many instructions (for `stack` and `ram`: bytes).
+//! One line a figure: what, and how many instructions (for `stack` and `ram`: bytes; `pieces` and `segments`: places).
 #![no_std]
 #![no_main]
 
@@ -41,6 +41,7 @@ fn main() -> ! {
     let counter = Counter::new(core.SYST);
     let kernel = size_of::<Kernel<Number, AXES>>();
     hprintln!("ram {}", kernel + size_of::<Streams<Number, AXES, PIECES, SEGMENTS>>());
+    hprintln!("pieces {}\nsegments {}", PIECES, SEGMENTS);
     // Not on the stack, where the one that is measured needs the room.
     let streams = cortex_m::singleton!(: Queues<AXES> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     // 16 KiB hold one machine only.
