@@ -140,7 +140,7 @@ pub(in crate::report) fn of_axis(
 struct LiveControl {
     x: (f64, f64),
     words: marks::Words,
-    /// Time \[s\], override \[%\]: a stair.
+    /// Time \[s\], override \[%\]: a step curve.
     course: Vec<(f64, f64)>,
 }
 
