@@ -10,18 +10,25 @@ const MPS2: &str = "MEMORY
 }
 ";
 
+/// Bytes for the streams and the semihosting's handle of an image that runs on the microbit: 2804 are used. A multiple of
+/// 8, because the stack begins below.
+const STATICS: u32 = 2832;
+
 /// microbit (nRF51822): the last quarter of its flash is for programs. The stack lies at the bottom of the memory:
-/// where it overflows there is nothing to overwrite, and the emulator stops at once. Above it there is room for the
-/// streams and the semihosting's handle (2804 bytes), a multiple of 8.
-const MICROBIT: &str = "MEMORY
-{
+/// where it overflows there is nothing to overwrite, and the emulator stops at once.
+fn microbit() -> String {
+    format!(
+        "MEMORY
+{{
   FLASH : ORIGIN = 0x00000000, LENGTH = 192K
-  STACK : ORIGIN = 0x20000000, LENGTH = 16K - 2832
-  RAM   : ORIGIN = 0x20004000 - 2832, LENGTH = 2832
-}
+  STACK : ORIGIN = 0x20000000, LENGTH = 16K - {STATICS}
+  RAM   : ORIGIN = 0x20004000 - {STATICS}, LENGTH = {STATICS}
+}}
 _stack_end = ORIGIN(STACK);
 _stack_start = ORIGIN(RAM);
-";
+"
+    )
+}
 
 /// The same for images that have more in memory, and are not run there.
 const MICROBIT_LARGE: &str = "MEMORY
@@ -35,7 +42,8 @@ const LARGE: [&str; 2] = ["interrupt", "kernel_only"];
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("set by cargo"));
     let target = env::var("TARGET").expect("set by cargo");
-    let (map, large) = if target.starts_with("thumbv6m") { (MICROBIT, MICROBIT_LARGE) } else { (MPS2, MPS2) };
+    let is_small = target.starts_with("thumbv6m");
+    let (map, large) = if is_small { (&*microbit(), MICROBIT_LARGE) } else { (MPS2, MPS2) };
     for (folder, map) in [("small", map), ("large", large)] {
         fs::create_dir_all(out.join(folder)).expect("OUT_DIR can be written");
         fs::write(out.join(folder).join("memory.x"), map).expect("OUT_DIR can be written");

@@ -72,9 +72,9 @@ pub enum CliError {
     /// A file must not be written, or can't be opened: found before the work.
     #[error(transparent)]
     Files(#[from] FilesError),
-    /// Files could not be written; the results were printed.
-    #[error("{}", .0.join("\nmotion: "))]
-    Unwritten(Vec<String>),
+    /// A file could not be written; the results were printed.
+    #[error(transparent)]
+    Unwritten(FilesError),
     /// More than one, the one with the command's exit status first.
     #[error("{}", .0.iter().map(Self::to_string).collect::<Vec<_>>().join("\nmotion: "))]
     Several(Vec<Self>),

@@ -64,11 +64,8 @@ impl Written {
 
     /// The command's outcome, unless a file was not written.
     pub(super) fn outcome(self, outcome: Outcome) -> Result<Outcome, CliError> {
-        if self.failures.is_empty() {
-            Ok(outcome)
-        } else {
-            Err(CliError::Unwritten(self.failures.iter().map(FilesError::to_string).collect()))
-        }
+        let failures = self.failures.into_iter().map(|failure| Err(CliError::Unwritten(failure)));
+        CliError::all(failures.chain([Ok(outcome)]))
     }
 }
 

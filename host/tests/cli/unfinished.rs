@@ -103,18 +103,32 @@ fn a_command_that_is_not_reached_is_an_error() {
     assert!(said.starts_with("  aborted at ") && error.contains("--at 800000:resume: found"), "{error}");
 }
 
-/// A file that can't be written hides no command that was not reached.
+/// A file and a summary that can't be written hide neither each other nor a command that was not reached.
 #[test]
-fn an_unwritten_file_and_an_unreached_command_are_both_said() {
-    let workspace = Workspace::new("both");
+fn every_failed_write_and_an_unreached_command_are_said() {
+    let workspace = Workspace::new("all-said");
     workspace.put("part.ngc", PROGRAM);
-    if std::path::Path::new("/dev/full").exists() {
-        let run = ["run", "part.ngc", "--at", "800000:hold", "--trace", "/dev/full"];
-        let (_, error) = workspace.ending(6, &run);
-        let [file, command] = error.lines().collect::<Vec<_>>()[..] else { panic!("{error}") };
-        assert!(file.starts_with("motion: /dev/full: found "), "{error}");
-        assert!(command.starts_with("motion: --at 800000:hold: found "), "{error}");
+    if !std::path::Path::new("/dev/full").exists() {
+        return;
     }
+    for (trace, stdout, expected) in [
+        ("/dev/full", "said.txt", &["/dev/full: found "][..]),
+        ("part.csv", "/dev/full", &["standard output: found "]),
+        ("/dev/full", "/dev/full", &["standard output: found ", "/dev/full: found "]),
+    ] {
+        let printed = std::fs::File::create(workspace.0.join(stdout)).expect("opened");
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_motion"));
+        command.args(["run", "part.ngc", "--at", "800000:hold", "--trace", trace]);
+        let ended = command.current_dir(&workspace.0).stdout(printed).output().expect("started");
+        let error = String::from_utf8(ended.stderr).expect("UTF-8");
+        assert_eq!(ended.status.code(), Some(6), "{error}");
+        let expected = [expected, &["--at 800000:hold: found "]].concat();
+        assert_eq!(error.lines().count(), expected.len(), "{error}");
+        for (line, begin) in error.lines().zip(expected) {
+            assert!(line.starts_with(&format!("motion: {begin}")), "{error}");
+        }
+    }
+    assert!(workspace.read("said.txt").starts_with("  60.0000 mm in "));
 }
 
 /// Whoever reads summary and errors may leave: the run ends as it would have, and its files are whole.
@@ -138,22 +152,6 @@ fn a_reader_that_left_hides_no_ending() {
             assert!(rows > 1000 && workspace.read(&trace).ends_with('\n'), "{rows}");
         }
     }
-}
-
-/// A summary that can't be written is said beside a command that was not reached.
-#[test]
-fn an_unprinted_summary_is_said() {
-    let workspace = Workspace::new("unprinted");
-    workspace.put("part.ngc", PROGRAM);
-    let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") else { return };
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_motion"));
-    command.args(["run", "part.ngc", "--at", "800000:hold"]).current_dir(&workspace.0).stdout(full);
-    let ended = command.output().expect("started");
-    let error = String::from_utf8(ended.stderr).expect("UTF-8");
-    assert_eq!(ended.status.code(), Some(6), "{error}");
-    let [output, command] = error.lines().collect::<Vec<_>>()[..] else { panic!("{error}") };
-    assert!(output.starts_with("motion: standard output: found "), "{error}");
-    assert!(command.starts_with("motion: --at 800000:hold: found "), "{error}");
 }
 
 /// A jog that a fault ends says where.

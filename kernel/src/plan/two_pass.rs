@@ -80,14 +80,16 @@ pub enum PlanError {
     TooShortToBrake {
         /// The start feed \[mm/s\].
         start_mm_s: f64,
-        /// The greatest feed from which it can brake \[mm/s\].
+        /// The greatest feed from which a pair of ramps for each block brakes \[mm/s\]. Ramps over several blocks
+        /// may brake from more.
         greatest_mm_s: f64,
     },
     /// The stretch is too short to accelerate to its end feed.
     TooShortToAccelerate {
         /// The end feed \[mm/s\].
         end_mm_s: f64,
-        /// The greatest feed that can be reached \[mm/s\].
+        /// The greatest feed that a pair of ramps for each block reaches \[mm/s\]. Ramps over several blocks may
+        /// reach more.
         greatest_mm_s: f64,
     },
     /// The ramps of a block are beyond the tick's range.
