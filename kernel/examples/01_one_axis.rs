@@ -13,7 +13,7 @@ use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::law::{Law, Limits, PlannedRamp, Ramp};
+use motion_kernel::law::{Law, Limits, PlannedRamp, Pulse, Ramp};
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::{PathRules, Streams};
 use motion_kernel::units::{Counts, DacCode, Position};
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // The feed over the path: a ramp up, a cruise, the same ramp down.
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
-    let rise = Ramp::new(&Law::new(limits)?, 0.0, 50.0);
+    let rise = Ramp::new(&Law::new(Pulse::Plateau, limits)?, 0.0, 50.0);
     let at = |mm| Position::from_mm(mm).ok_or("out of range");
     let (whole, ramp) = (at(20.0)?, at(rise.length_mm())?);
     // The path under it: lines of at most 16 mm. Both streams measure the same 20 mm.

@@ -10,7 +10,7 @@
 use std::error::Error;
 
 use motion_kernel::exec::{ExecState, Executor};
-use motion_kernel::law::{Law, Limits};
+use motion_kernel::law::{Law, Limits, Pulse};
 use motion_kernel::path::Piece;
 use motion_kernel::plan::{Block, BlockPlan, plan, ramps};
 use motion_kernel::queue::{PathRules, Streams};
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Feed: both lines at up to 40 mm/s, the corner between them at 12 mm/s, at rest at both ends.
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 2e4, snap_mm_s4: 2e6 };
-    let law = Law::new(limits)?;
+    let law = Law::new(Pulse::Plateau, limits)?;
     let block = |junction_mm_s| Block { length_mm: 10.0, cap_mm_s: 40.0, junction_mm_s, law };
     let blocks = [block(CORNER_MM_S), block(0.0)];
     let mut plans = [BlockPlan::default(); 2];

@@ -17,7 +17,7 @@ use motion_kernel::axis::{AxesConfig, AxisFigures, Feedforward, Gains};
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{Ad5754Output, DriveEnable, Encoder, VelocityChannel};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::law::{Law, Limits, PlannedRamp, Ramp};
+use motion_kernel::law::{Law, Limits, PlannedRamp, Pulse, Ramp};
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::{PathRules, Streams};
 use motion_kernel::units::{DacCode, Position};
@@ -51,7 +51,7 @@ fn greatest_error_mm(velocity: f64) -> Result<f64, Box<dyn Error>> {
     };
 
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
-    let rise = Ramp::new(&Law::new(limits)?, 0.0, 50.0);
+    let rise = Ramp::new(&Law::new(Pulse::Plateau, limits)?, 0.0, 50.0);
     let at = |mm| Position::from_mm(mm).ok_or("out of range");
     let (whole, ramp) = (at(16.0)?, at(rise.length_mm())?);
     let items = [

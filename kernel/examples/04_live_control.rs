@@ -10,7 +10,7 @@
 use std::error::Error;
 
 use motion_kernel::exec::Executor;
-use motion_kernel::law::Limits;
+use motion_kernel::law::{Limits, Pulse};
 use motion_kernel::live::{LiveControl, State};
 use motion_kernel::queue::{LiveStreams, PathRules};
 use motion_kernel::straight::Straight;
@@ -27,10 +27,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let end = [60.0, 80.0].map(|mm| Position::from_mm(mm).expect("within a million millimetres"));
 
     // The program: 100 mm at 40 mm/s, at most 50 mm/s under an override. Any source of items will do.
-    let program = Straight::new(start, end, limits, [40.0, 50.0], TICK_S)?;
+    let program = Straight::new(start, end, Pulse::Plateau, limits, [40.0, 50.0], TICK_S)?;
     let mut streams = LiveStreams::<f32, 2, 64, 16>::new();
     let (mut feeder, mut intake) = streams.split(rules, start);
-    let mut control = LiveControl::<f32, 2, _, _, 64>::new(program, TICK_S, POLL_TICKS);
+    let mut control = LiveControl::<f32, 2, _, _, 64>::new(program, Pulse::Plateau, TICK_S, POLL_TICKS);
     let mut executor = Executor::new(start);
 
     let (mut path_mm, mut held_mm, mut greatest_mm_s) = (0.0_f64, None, 0.0_f64);

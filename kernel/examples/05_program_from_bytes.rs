@@ -11,7 +11,7 @@ use std::error::Error;
 
 use motion_kernel::axis::{AxisFigures, Feedforward, Gains};
 use motion_kernel::exec::{ExecState, Executor};
-use motion_kernel::law::{Law, Limits, PlannedRamp, Ramp};
+use motion_kernel::law::{Law, Limits, PlannedRamp, Pulse, Ramp};
 use motion_kernel::program::{Header, Item, ProgramError, Reader, Supply, check, write};
 use motion_kernel::queue::{PathRules, Streams};
 use motion_kernel::units::Position;
@@ -71,10 +71,11 @@ fn compile() -> Result<Vec<u8>, Box<dyn Error>> {
         following_error_limit_mm: 0.5,
     };
     let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
-    let header = Header { tick_s: 0.0005, rules, axes: [axis], start: [Position::ZERO] };
+    let header =
+        Header { tick_s: 0.0005, rules, pulse: Pulse::Plateau, axes: [axis], start: [Position::ZERO] };
 
     let at = |mm| Position::from_mm(mm).ok_or("out of range");
-    let rise = Ramp::new(&Law::new(limits)?, 0.0, 50.0);
+    let rise = Ramp::new(&Law::new(Pulse::Plateau, limits)?, 0.0, 50.0);
     let (whole, ramp) = (at(40.0)?, at(rise.length_mm())?);
     let line = |line: u32| {
         Ok::<_, &str>(Item::Line {

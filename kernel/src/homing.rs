@@ -361,6 +361,7 @@ impl Homing {
 mod tests {
     use super::*;
     use crate::fixture::LIMITS;
+    use crate::law::Pulse;
 
     fn at(mm: f64) -> Position {
         Position::from_mm(mm).expect("in range")
@@ -377,7 +378,7 @@ mod tests {
             position: at(-3.0),
             park: Some(at(0.0)),
         };
-        let jog = JogAxis { feed_mm_s: 50.0, limits: LIMITS, travel: None };
+        let jog = JogAxis { feed_mm_s: 50.0, limits: LIMITS, pulse: Pulse::Plateau, travel: None };
         Homing::new(config, &jog, 0, 5e-4)
     }
 

@@ -14,7 +14,7 @@
 //! ```
 //! use motion_kernel::exec::Executor;
 //! use motion_kernel::jog::{Direction, Jog, JogAxis, Travel, JogTarget};
-//! use motion_kernel::law::Limits;
+//! use motion_kernel::law::{Limits, Pulse};
 //! use motion_kernel::live::{LiveControl, State};
 //! use motion_kernel::queue::{LiveStreams, PathRules};
 //! use motion_kernel::units::Position;
@@ -23,7 +23,7 @@
 //! let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
 //! let rules = PathRules { limits, feed_mm_s: 100.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
 //! let travel = Some(Travel { least: at(-200.0), greatest: at(300.0) });
-//! let axis = JogAxis { feed_mm_s: 100.0, limits, travel };
+//! let axis = JogAxis { feed_mm_s: 100.0, limits, pulse: Pulse::Plateau, travel };
 //! let tick_s = 0.0005;
 //!
 //! // A key of the first of two axes is pressed, and released after 400 ticks.
@@ -31,7 +31,7 @@
 //! let jog = Jog::new(&axis, 0, start, JogTarget::Continuous(Direction::Positive), 20.0, tick_s).unwrap();
 //! let mut streams = LiveStreams::<f32, 2, 32, 16>::new();
 //! let (mut feeder, mut intake) = streams.split(rules, start);
-//! let mut control = LiveControl::<f32, 2, _, _, 64>::new(jog, tick_s, 0);
+//! let mut control = LiveControl::<f32, 2, _, _, 64>::new(jog, Pulse::Plateau, tick_s, 0);
 //! let mut executor = Executor::new(start);
 //! let mut rest = start;
 //! for tick in 0.. {
@@ -50,7 +50,7 @@
 
 use core::convert::Infallible;
 
-use crate::law::Limits;
+use crate::law::{Limits, Pulse};
 use crate::program::Item;
 use crate::straight::{Straight, StraightError};
 use crate::units::Position;
@@ -116,6 +116,8 @@ pub struct JogAxis {
     pub feed_mm_s: f64,
     /// Limits of its ramps; at most the queue's.
     pub limits: Limits<f64>,
+    /// The shape of their pulses of jerk.
+    pub pulse: Pulse,
     /// Its soft limits; `None` as long as the axis does not know where it is.
     pub travel: Option<Travel>,
 }
@@ -212,7 +214,7 @@ impl<const AXES: usize> Jog<AXES> {
         feed_mm_s: f64,
         tick_s: f64,
     ) -> Result<Self, JogError> {
-        let &JogAxis { feed_mm_s: most_mm_s, limits, travel } = config;
+        let &JogAxis { feed_mm_s: most_mm_s, limits, pulse, travel } = config;
         let &from = start.get(axis).ok_or(JogError::Axis { axis, axes: AXES })?;
         let (direction, wanted) = match target {
             JogTarget::Continuous(direction) => (direction, None),
@@ -235,8 +237,8 @@ impl<const AXES: usize> Jog<AXES> {
         if let Some(end) = end.get_mut(axis) {
             *end = ahead;
         }
-        let motion =
-            Straight::new(start, end, limits, [feed_mm_s, most_mm_s], tick_s).map_err(JogError::Straight)?;
+        let motion = Straight::new(start, end, pulse, limits, [feed_mm_s, most_mm_s], tick_s)
+            .map_err(JogError::Straight)?;
         Ok(Self { motion, ends_at_limit: room == Some(length) })
     }
 

@@ -1,6 +1,6 @@
 //! Real-time motion for boards that drive ±10 V velocity servos.
 //!
-//! Every control tick the kernel evaluates the sin² jerk feed law, walks the path,
+//! Every control tick the kernel evaluates a feed law of smooth jerk, walks the path,
 //! regulates every axis with P(ID) and feedforward of velocity, acceleration and jerk, and writes a
 //! voltage. No allocation, no unsafe code, no panic, no loop without a constant bound.
 //!
@@ -35,7 +35,7 @@
 //!
 //! ```
 //! use motion_kernel::exec::{ExecState, Executor};
-//! use motion_kernel::law::{Law, Limits};
+//! use motion_kernel::law::{Law, Limits, Pulse};
 //! use motion_kernel::path::Piece;
 //! use motion_kernel::plan::{Block, BlockPlan, plan, ramps};
 //! use motion_kernel::queue::{PathRules, Streams};
@@ -47,7 +47,7 @@
 //!     length_mm: 20.0,
 //!     cap_mm_s: 50.0,
 //!     junction_mm_s: f64::INFINITY,
-//!     law: Law::new(limits).unwrap(),
+//!     law: Law::new(Pulse::Plateau, limits).unwrap(),
 //! };
 //! let mut plans = [BlockPlan::default()];
 //! plan(&[block], 0.0, 0.0, &mut plans).unwrap();

@@ -7,7 +7,7 @@
 
 use core::convert::Infallible;
 
-use crate::law::{Law, LimitError, Limits, PlannedRamp, SegmentError};
+use crate::law::{Law, LimitError, Limits, PlannedRamp, Pulse, SegmentError};
 use crate::num::Root;
 use crate::plan::{Block, BlockPlan, PlanError, plan};
 use crate::program::{Allowed, Item, PathBlock};
@@ -75,14 +75,15 @@ pub struct Straight<const AXES: usize> {
 }
 
 impl<const AXES: usize> Straight<AXES> {
-    /// A stretch from rest at `start` to rest at `end` with ramps within `limits`, at a feed of `feed_mm_s`
-    /// above 0, at most `most_mm_s` under an override, for ticks of `tick_s`.
+    /// A stretch from rest at `start` to rest at `end` with ramps of `pulse`s within `limits`, at a feed of
+    /// `feed_mm_s` above 0, at most `most_mm_s` under an override, for ticks of `tick_s`.
     ///
     /// # Errors
     /// It can't be driven. Once it is made, nothing else fails, in a number type that holds its limits.
     pub fn new(
         start: [Position; AXES],
         end: [Position; AXES],
+        pulse: Pulse,
         limits: Limits<f64>,
         [feed_mm_s, most_mm_s]: [f64; 2],
         tick_s: f64,
@@ -98,7 +99,7 @@ impl<const AXES: usize> Straight<AXES> {
         // Along one axis the root is exact, so the length is, too.
         let length_mm = Root::sqrt(offset_mm.iter().map(|mm| mm * mm).sum::<f64>());
         let length = Position::from_mm(length_mm).ok_or(StraightError::Length { length_mm })?;
-        let law = Law::new(limits).map_err(StraightError::Limit)?;
+        let law = Law::new(pulse, limits).map_err(StraightError::Limit)?;
         let (mut direction, mut ramps, mut block) = ([0.0; AXES], [None; 3], None);
         if length > Position::ZERO {
             direction = offset_mm.map(|mm| mm / length_mm);
@@ -203,13 +204,15 @@ mod tests {
                 *end = *end + at(part / size * length_mm);
             }
             let feed_mm_s = random.log(1.0, RULES.feed_mm_s);
-            let straight = Straight::new(start, end, LIMITS, [feed_mm_s; 2], TICK_S).expect("a straight");
+            let straight = Straight::new(start, end, Pulse::Plateau, LIMITS, [feed_mm_s; 2], TICK_S)
+                .expect("a straight");
             let ramps = straight.ramps.iter().flatten();
             let planned_s = ramps.map(|planned| planned.ramp.duration_s()).sum::<f64>();
             let mut streams = LiveStreams::<f64, 3, 64, 16>::new();
             let (mut feeder, mut intake) = streams.split(RULES, start);
             let mut executor = Executor::new(start);
-            let mut control = LiveControl::<f64, 3, _, Infallible, 64>::new(straight, TICK_S, 0);
+            let mut control =
+                LiveControl::<f64, 3, _, Infallible, 64>::new(straight, Pulse::Plateau, TICK_S, 0);
             let (mut ticks, mut place) = (0_u32, start);
             loop {
                 control.poll(&mut feeder).expect("accepted");
@@ -233,7 +236,7 @@ mod tests {
     #[test]
     fn what_is_no_straight_is_refused() {
         let items = |end_mm: f64, limits, feeds_mm_s| {
-            let made = Straight::new([at(-6e5)], [at(end_mm)], limits, feeds_mm_s, TICK_S);
+            let made = Straight::new([at(-6e5)], [at(end_mm)], Pulse::Plateau, limits, feeds_mm_s, TICK_S);
             made.map(|straight| straight.count()).map_err(|error| format!("{error}"))
         };
         assert_eq!(items(-6e5, LIMITS, [10.0; 2]), Ok(0));

@@ -1,17 +1,17 @@
 //! Lists of blocks by which the cost of planning is measured: from those that cost nothing to those where every ceiling is in the way.
 
-use motion_kernel::law::{Law, Limits};
+use motion_kernel::law::{Law, Limits, Pulse};
 use motion_kernel::plan::Block;
 
 use crate::random::Random;
 
-/// S1's limits.
+/// S1's law and limits.
 pub fn reference() -> Law<f64> {
     law(Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 })
 }
 
 fn law(limits: Limits<f64>) -> Law<f64> {
-    Law::new(limits).expect("positive")
+    Law::new(Pulse::Sin2, limits).expect("positive")
 }
 
 /// A block of the reference law that stops at neither end.

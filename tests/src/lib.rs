@@ -24,3 +24,17 @@ pub fn from_env(name: &str) -> Option<u64> {
     let text = std::env::var(name).ok()?;
     Some(text.parse().unwrap_or_else(|_| panic!("{name}={text}: expected a whole number")))
 }
+
+/// Every file and folder in a package's `tests` is a module of its `suite.rs`, or one of `alone`: cargo builds none by itself.
+///
+/// # Panics
+/// One is not.
+pub fn assert_all_are_in(package: &str, suite: &str, alone: &[&str]) {
+    let folder = std::path::Path::new(package).join("tests");
+    for entry in std::fs::read_dir(&folder).expect("a folder") {
+        let path = entry.expect("a readable folder").path();
+        let name = path.file_stem().and_then(|name| name.to_str()).expect("a name");
+        let is_built = suite.lines().any(|line| line == format!("mod {name};"));
+        assert!(is_built || name == "suite" || alone.contains(&name), "suite.rs has no `mod {name};`");
+    }
+}

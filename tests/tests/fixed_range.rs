@@ -56,7 +56,7 @@ fn to_the_curve(
     }
     items.push(Item::Septic { line: 1, start: at(whole), coefficients, length });
     let t2_s = length.to_mm() / feed_mm_s;
-    let cruise = Ramp { from_mm_s: feed_mm_s, t1_s: 0.0, t2_s, peak_jerk_mm_s3: 0.0, ..ramp };
+    let cruise = Ramp::cruise(feed_mm_s, t2_s);
     items.push(Item::Feed(PlannedRamp { ramp: cruise, length }));
     items
 }

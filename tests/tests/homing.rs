@@ -50,7 +50,12 @@ impl Place {
 }
 
 fn jog_axis(machine: &Machine) -> JogAxis {
-    JogAxis { feed_mm_s: machine.path.feed_mm_s, limits: machine.path.limits(), travel: None }
+    JogAxis {
+        feed_mm_s: machine.path.feed_mm_s,
+        limits: machine.path.limits(),
+        pulse: machine.path.pulse,
+        travel: None,
+    }
 }
 
 fn config(direction: Direction, has_index: bool) -> HomingConfig {

@@ -2,7 +2,7 @@
 
 use motion_kernel::exec::{ExecState, Executed, Executor};
 use motion_kernel::jog::{Direction, Jog, JogAxis, JogError, JogTarget, Travel};
-use motion_kernel::law::Limits;
+use motion_kernel::law::{Limits, Pulse};
 use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::queue::{LiveStreams, PathRules};
@@ -31,7 +31,11 @@ impl Machine {
         let least = mm(-random.log(0.1, 300.0));
         let travel = Travel { least, greatest: least + mm(random.log(0.2, 600.0)) };
         let feed_mm_s = random.log(5.0, 300.0);
-        Self { axis: JogAxis { feed_mm_s, limits, travel: Some(travel) }, travel, tick_s: 5e-4 }
+        Self {
+            axis: JogAxis { feed_mm_s, limits, pulse: Pulse::Plateau, travel: Some(travel) },
+            travel,
+            tick_s: 5e-4,
+        }
     }
 
     fn rules(&self) -> PathRules {
@@ -96,7 +100,7 @@ fn press<R: Real>(
     let end = jog.end();
     let mut streams = LiveStreams::<R, AXES, 32, 16>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
-    let mut control = LiveControl::<R, AXES, _, _, 64>::new(jog, machine.tick_s, 0);
+    let mut control = LiveControl::<R, AXES, _, _, 64>::new(jog, Pulse::Plateau, machine.tick_s, 0);
     let mut executor = Executor::<R, AXES>::new(start);
     // Feed positions are products with 32 bits of the length that they are parts of.
     let rounding_mm = rounding_mm + 2.0_f64.powi(-32) * (end[axis] - start[axis]).to_mm().abs();
@@ -226,7 +230,7 @@ fn keys_pressed_at_random_move_within_limits_to_exact_ends() {
 fn what_can_not_be_jogged_is_refused() {
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
     let travel = Travel { least: mm(-10.0), greatest: mm(20.0) };
-    let axis = JogAxis { feed_mm_s: 50.0, limits, travel: Some(travel) };
+    let axis = JogAxis { feed_mm_s: 50.0, limits, pulse: Pulse::Plateau, travel: Some(travel) };
     let up = JogTarget::Continuous(Direction::Positive);
     let jog = |config: &JogAxis, axis, from: f64, target, feed| {
         Jog::new(config, axis, [mm(0.0), mm(from)], target, feed, 5e-4)

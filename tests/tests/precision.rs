@@ -1,7 +1,8 @@
 //! Set positions against the exact law on the exact path, in counts of 0.1 µm, in f32.
 //!
-//! The law is written out here from S1 (1)–(6), in f64 with what cancels rearranged; time is a whole number of
-//! ticks, so its only error is its last place. Path lengths are exact to 2⁻³² mm.
+//! The law is written out here from S1 (1)–(6), in f64 with what cancels rearranged, for an edge; a plateau
+//! is a cubic, and a closing edge the opening one run backwards from the pulse's end. Time is a whole number
+//! of ticks, so its only error is its last place. Path lengths are exact to 2⁻³² mm.
 
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -34,15 +35,43 @@ fn law(placed: &PlacedRamp, t: f64) -> [f64; 4] {
     if t1 <= 0.0 {
         return [record.from_mm_s * t, record.from_mm_s, 0.0, 0.0];
     }
-    let rise = |from: f64, t: f64| {
-        let w = 2.0 * PI * t / t1;
-        let k = t1 / (2.0 * PI);
+    let edge = record.edge_s;
+    let opening = |t: f64| {
+        let w = PI * t / edge;
+        let k = edge / PI;
         [
-            from * t + 0.5 * jerk * (t * t * t / 6.0 - k * k * (t - k * w.sin())),
-            from + 0.5 * jerk * (t * t / 2.0 - 2.0 * k * k * (0.5 * w).sin().powi(2)),
+            0.5 * jerk * (t * t * t / 6.0 - k * k * (t - k * w.sin())),
+            0.5 * jerk * (t * t / 2.0 - 2.0 * k * k * (0.5 * w).sin().powi(2)),
             0.5 * jerk * (t - k * w.sin()),
             jerk * (0.5 * w).sin().powi(2),
         ]
+    };
+    let plateau = |t: f64| {
+        let [s, v, a, _] = opening(edge);
+        let u = t - edge;
+        [s + u * (v + u * (a / 2.0 + u * jerk / 6.0)), v + u * (a + u * jerk / 2.0), a + u * jerk, jerk]
+    };
+    // From the plateau's end with the acceleration that an edge still adds, less what it does not.
+    let closing = |t: f64| {
+        let [s, v, a, _] = plateau(t1 - edge);
+        let [edge_s, edge_v, edge_a, _] = opening(edge);
+        let (u, [rest_s, rest_v, rest_a, j]) = (t - t1 + edge, opening(t1 - t));
+        [
+            s + u * (v + u * (a + edge_a) / 2.0) - (rest_s - edge_s + u * edge_v),
+            v + u * (a + edge_a) - (edge_v - rest_v),
+            a + edge_a - rest_a,
+            j,
+        ]
+    };
+    let rise = |from: f64, t: f64| {
+        let [s, v, a, j] = if t <= edge {
+            opening(t)
+        } else if t < t1 - edge {
+            plateau(t)
+        } else {
+            closing(t)
+        };
+        [from * t + s, from + v, a, j]
     };
     if t <= t1 {
         return rise(record.from_mm_s, t);
@@ -101,7 +130,7 @@ fn compare(text: &str, element: &Element, from: [i64; 3], machine: &Machine) -> 
 /// Greatest feed, acceleration and jerk of the plan.
 fn peaks(records: &[&PlacedRamp]) -> [f64; 3] {
     records.iter().map(|record| &record.planned.ramp).fold([0.0; 3], |peaks, record| {
-        let values = [record.to_mm_s, 0.5 * record.peak_jerk_mm_s3 * record.t1_s, record.peak_jerk_mm_s3];
+        let values = [record.to_mm_s, record.peak_accel_mm_s2(), record.peak_jerk_mm_s3];
         core::array::from_fn(|k| f64::max(peaks[k], values[k]))
     })
 }

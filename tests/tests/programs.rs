@@ -1,7 +1,7 @@
 //! Random programs through the whole pipeline, every tick checked against the promises.
 //!
 //! `cargo test` runs some thousand; the long form runs ten thousand and prints the totals:
-//! `cargo test --release -p motion-tests --test programs -- --ignored --nocapture`.
+//! `cargo test --release -p motion-tests --test suite programs:: -- --ignored --nocapture`.
 //! `MOTION_TEST_SEED` is the first seed, `MOTION_TEST_PROGRAMS` how many; with a single program its
 //! text is printed.
 

@@ -75,10 +75,11 @@ fn figures_of_the_regulators() {
         let found_v = of(choice, 1.0)[1].output_noise_v;
         assert!((found_v / expected_v - 1.0).abs() < 0.2, "{choice:?}: {found_v}, expected {expected_v}");
     }
-    // Exact set positions: differencing is not the worse regulator.
+    // Exact set positions: differencing is not the worse regulator. Where jerk begins and ends within 20 ms,
+    // what it lags behind by shows.
     for (differenced, analytic) in [(Choice::Peer, Choice::Vaj), (Choice::PeerFitted, Choice::VajFitted)] {
         for (differenced, analytic) in of(differenced, 0.0).iter().zip(of(analytic, 0.0)) {
-            assert!((differenced.following_um - analytic.following_um).abs() < 0.6);
+            assert!((differenced.following_um - analytic.following_um).abs() < 0.8);
         }
         for resolution_um in RESOLUTIONS_UM {
             let ratio = of(differenced, resolution_um)[1].output_noise_v

@@ -9,7 +9,7 @@ use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Problem};
 use motion_kernel::exec::{ExecFault, ExecState, Executed, Executor, PIECES_PER_TICK_MAX};
 use motion_kernel::internals::Ready;
-use motion_kernel::law::{FeedSegment, Limits, Ticks};
+use motion_kernel::law::{FeedSegment, Limits, Pulse, Ticks};
 use motion_kernel::path::{Piece, PieceError};
 use motion_kernel::program::{self, CheckError, Header, Item, Supply, SupplyError};
 use motion_kernel::queue::{Feeder, PathRules, Refused, Rejection, SEGMENTS_PER_TICK_MAX, Streams};
@@ -270,7 +270,8 @@ fn a_tick_after_every_item_starves_nothing() {
         }
     }
     for pieces_first in [true, false] {
-        let mut streams = Box::new(Streams::<f32, 3, 64, 2>::new());
+        // One segment under way, which ends inside a tick, and one that waits.
+        let mut streams = Box::new(Streams::<f32, 3, 64, 3>::new());
         let start = [Position::ZERO; 3];
         let (mut feeder, mut intake) = streams.split(Machine::reference().rules(), start);
         let mut executor = Executor::<f32, 3>::new(start);
@@ -378,7 +379,7 @@ fn stretches_shorter_than_a_tick_stay_within_the_step_bound() {
         let length_mm = 2e-4 * 1.05_f64.powi(part);
         let mut streams = Box::new(Streams::<f32, 2, 256, 512>::new());
         let (mut feeder, mut intake) = streams.split(rules, point([0.0, 0.0]));
-        let law = motion_kernel::law::Law::new(limits).expect("limits");
+        let law = motion_kernel::law::Law::new(Pulse::Plateau, limits).expect("limits");
         let top = motion_kernel::law::peak(&law, 0.0, 0.0, length_mm);
         let length = mm(length_mm);
         let mut at = point([0.0, 0.0]);

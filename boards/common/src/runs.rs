@@ -50,8 +50,10 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
     /// `lead_ticks` ahead.
     #[must_use]
     pub fn new(program: Reader<'a, AXES>, feeder: LiveFeeder<'a, R, AXES>, lead_ticks: u32) -> Self {
+        let header = program.header();
+        let (pulse, tick_s) = (header.pulse, header.tick_s);
         let runs = Runs { program, to_start: None, items: None };
-        Self { feeder, control: LiveControl::new(runs, program.header().tick_s, lead_ticks) }
+        Self { feeder, control: LiveControl::new(runs, pulse, tick_s, lead_ticks) }
     }
 
     /// Starts a run on a machine that stands at `here`, where the streams were split or the previous run
@@ -63,7 +65,8 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
         let runs = self.control.source_mut();
         let header = runs.program.header();
         let feed_mm_s = TO_START_MM_S.min(header.rules.feed_mm_s);
-        let to_start = Straight::new(here, header.start, header.rules.limits, [feed_mm_s; 2], header.tick_s)?;
+        let (limits, feeds_mm_s) = (header.rules.limits, [feed_mm_s; 2]);
+        let to_start = Straight::new(here, header.start, header.pulse, limits, feeds_mm_s, header.tick_s)?;
         runs.to_start = Some(to_start);
         runs.items = Some(runs.program.items());
         Ok(())
@@ -176,10 +179,13 @@ mod tests {
     }
 
     /// As `motion compile` prints: 2.320 s to (102.045923136, 0, 0).
-    const STRINGER_TICKS: u32 = 4640;
+    const STRINGER_TICKS: u32 = 4330;
     /// And back at 20 mm/s before the second: with a ramp's time 2·√(2·20/5000) s on top.
     fn back_ticks() -> u32 {
-        let back_s = end()[0].to_mm() / TO_START_MM_S + 2.0 * (2.0 * TO_START_MM_S / 5.0e3).sqrt();
+        // Half an edge, and the pulse of jerk that makes the feed.
+        let half_edge_s = 0.25 * core::f64::consts::PI * 5.0e3 / 4.0e5;
+        let pulse_s = half_edge_s + (half_edge_s * half_edge_s + TO_START_MM_S / 5.0e3).sqrt();
+        let back_s = end()[0].to_mm() / TO_START_MM_S + 2.0 * pulse_s;
         (back_s / TICK_S) as u32
     }
 

@@ -40,7 +40,7 @@ pub const AXES: usize = 3;
 /// Capacity of the path stream.
 pub const PIECES: usize = if IS_SMALL { 8 } else { 64 };
 /// Capacity of the feed stream.
-pub const SEGMENTS: usize = if IS_SMALL { 8 } else { 64 };
+pub const SEGMENTS: usize = if IS_SMALL { 5 } else { 64 };
 /// Cells for the dead time of a simulated axis.
 pub const LINE: usize = 16;
 /// Sub-steps of a simulated tick: the dead time of 1.42 ms fits the cells.

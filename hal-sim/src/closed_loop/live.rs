@@ -148,7 +148,7 @@ pub fn close<
     };
     let mut kernel = Kernel::new(&axes, header.start, counts);
     kernel.enable(0);
-    let control = LiveControl::new(program.items(), header.tick_s, 0);
+    let control = LiveControl::new(program.items(), header.pulse, header.tick_s, 0);
     let commands = Commands { random: SplitMix64::new(seed), polls_left: COMMANDED_POLLS, lost: 0 };
     let producer = LiveProducer { feeder, control, commands };
     Ok((producer, ClosedLoop { kernel, intake: intake.into(), machine, outputs, memory }))

@@ -38,7 +38,8 @@ pub struct CompileArguments {
     /// The number type of the board's kernel.
     #[arg(long, value_enum, default_value_t = Number::F32)]
     number: Number,
-    /// One pair of ramps per block; without it, ramps may span blocks.
+    /// One pair of sin² ramps per block, whatever the machine's law is; without it, ramps follow it and may
+    /// span blocks.
     #[arg(long)]
     per_block: bool,
     /// For a board with live control: include the path's blocks, so that the board can plan anew.

@@ -18,12 +18,12 @@ const EXAMPLES: &str = "\
 Examples:
   motion plan part.ngc                           a table: ceiling, its reason, feeds and time of every block
   motion plan part.ngc --machine mine.toml       for a machine of your own
-  motion plan part.ngc --per-block               one pair of ramps per block
+  motion plan part.ngc --per-block               one pair of sin² ramps per block
   motion plan blocks.json --json                 lengths and feeds without geometry
   generate-part | motion plan -                  G-code from standard input
 
-A block list holds its own limits:
-  {\"limits\": {\"accel_mm_s2\": 500, \"jerk_mm_s3\": 5000, \"snap_mm_s4\": 400000},
+A block list holds its own limits and its law, \"sin2\" or \"plateau\" (also if it is left out):
+  {\"law\": \"plateau\", \"limits\": {\"accel_mm_s2\": 500, \"jerk_mm_s3\": 5000, \"snap_mm_s4\": 400000},
    \"start_feed_mm_s\": 0, \"end_feed_mm_s\": 0,
    \"blocks\": [{\"length_mm\": 50, \"feed_mm_s\": 80}, {\"length_mm\": 25, \"feed_mm_s\": 40}]}";
 
@@ -37,7 +37,7 @@ pub struct PlanArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
-    /// One pair of ramps per block; without it, ramps may span blocks.
+    /// One pair of sin² ramps per block, whatever `law` is; without it, ramps follow it and may span blocks.
     #[arg(long)]
     per_block: bool,
     /// Print JSON: time_s, blocks, feed.
@@ -74,7 +74,10 @@ struct FeedJson {
     length_mm: f64,
     from_mm_s: f64,
     to_mm_s: f64,
+    law: &'static str,
     peak_jerk_mm_s3: f64,
+    edge_s: f64,
+    plateau_s: f64,
     t1_s: f64,
     t2_s: f64,
     time_s: f64,
@@ -121,9 +124,20 @@ fn json<'plan>(plan: &'plan Plan) -> PlanJson<'plan> {
         time_s: block.time_s,
     };
     let feed = |placed: &PlacedRamp| {
-        let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, .. } = placed.planned.ramp;
-        let (start_mm, length_mm, time_s) = (placed.start_mm, placed.length_mm(), placed.time_s());
-        FeedJson { start_mm, length_mm, from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, time_s }
+        let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, edge_s, t1_s, t2_s, .. } = placed.planned.ramp;
+        FeedJson {
+            start_mm: placed.start_mm,
+            length_mm: placed.length_mm(),
+            from_mm_s,
+            to_mm_s,
+            law: plan.pulse.name(),
+            peak_jerk_mm_s3,
+            edge_s,
+            plateau_s: placed.planned.ramp.plateau_s(),
+            t1_s,
+            t2_s,
+            time_s: placed.time_s(),
+        }
     };
     PlanJson {
         time_s: plan.time_s,

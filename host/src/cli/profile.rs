@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 
-use clap::Args;
-use motion_kernel::law::{FeedState, Law, Limits, Ramp};
+use clap::{Args, ValueEnum};
+use motion_kernel::law::{FeedState, Law, Limits, Pulse, Ramp};
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
@@ -23,9 +23,12 @@ Examples:
       a braking ramp, for a script
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000 --tick 0.001 --csv > ramp.csv
       a row per millisecond
+  motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000 --law plateau
+      the same change of feed with all the snap that is allowed: 0.52 s
 
-Symbols: S path length, V feed, A acceleration, J jerk, DJ snap; Jp peak jerk; t1 end of the rising phase,
-t2 end of the phase of constant acceleration, tp end of the ramp.";
+Symbols: S path length, V feed, A acceleration, J jerk, DJ snap; Jp peak jerk; e edge of a pulse of jerk, p its
+plateau; snap is greatest at e/2, which is t1/4 without a plateau; t1 end of the rising phase, t2 end of the phase
+of constant acceleration, tp end of the ramp.";
 
 /// Compute one change of feed: peak jerk, times, length, and the motion inside it.
 #[derive(Debug, Args)]
@@ -46,15 +49,36 @@ pub struct ProfileArguments {
     /// Snap limit [mm/s⁴], above 0.
     #[arg(long, value_name = "DJ", value_parser = positive, allow_negative_numbers = true)]
     snap: f64,
+    /// Shape of the pulses of jerk: one sin² arch as in the papers, or two halves of one as short as snap
+    /// allows with a plateau between them, which is what machine files have where they do not say.
+    #[arg(long, value_enum, default_value_t = LawChoice::Sin2)]
+    law: LawChoice,
     /// Time between two rows of --csv, in seconds, above 0.
     #[arg(long, value_name = "S", default_value = "0.0005", value_parser = positive, allow_negative_numbers = true)]
     tick: f64,
-    /// Print JSON: peak_jerk_mm_s3, t1_s, t2_s, tp_s, length_mm, limited_by, and `at` t1/4, t1, t2, tp.
+    /// Print JSON: law, peak_jerk_mm_s3, edge_s, plateau_s, t1_s, t2_s, tp_s, length_mm, limited_by, and `at`
+    /// e/2, t1, t2, tp.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
     /// Print CSV: t_s,s_mm,v_mm_s,a_mm_s2,j_mm_s3,snap_mm_s4, a row per tick from 0 and one at tp.
     #[arg(long)]
     csv: bool,
+}
+
+/// The shapes of a pulse of jerk.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum LawChoice {
+    Sin2,
+    Plateau,
+}
+
+impl From<LawChoice> for Pulse {
+    fn from(law: LawChoice) -> Self {
+        match law {
+            LawChoice::Sin2 => Self::Sin2,
+            LawChoice::Plateau => Self::Plateau,
+        }
+    }
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {
@@ -73,7 +97,10 @@ fn positive(text: &str) -> Result<f64, String> {
 
 #[derive(Serialize)]
 struct ProfileJson {
+    law: &'static str,
     peak_jerk_mm_s3: f64,
+    edge_s: f64,
+    plateau_s: f64,
     t1_s: f64,
     t2_s: f64,
     tp_s: f64,
@@ -109,7 +136,7 @@ pub fn profile(arguments: &ProfileArguments, out: &mut dyn Write) -> Result<Outc
     if arguments.csv {
         write_csv(&ramp, arguments.tick, out)?;
     } else if arguments.json {
-        write_json(&json(&ramp), out)?;
+        write_json(&json(arguments.law.into(), &ramp), out)?;
     } else {
         write_table(&ramp, out).map_err(CliError::Output)?;
     }
@@ -121,7 +148,7 @@ fn ramp(arguments: &ProfileArguments) -> Result<Ramp<f64>, CliError> {
         |found: String| CliError::Arguments { found, expected: "limits nearer to those of a machine" };
     let limits =
         Limits { accel_mm_s2: arguments.accel, jerk_mm_s3: arguments.jerk, snap_mm_s4: arguments.snap };
-    let law = Law::new(limits).map_err(|error| beyond(error.to_string()))?;
+    let law = Law::new(arguments.law.into(), limits).map_err(|error| beyond(error.to_string()))?;
     let ramp = Ramp::new(&law, arguments.from, arguments.to);
     let figures = [ramp.peak_jerk_mm_s3, ramp.t1_s, ramp.t2_s, ramp.duration_s(), ramp.length_mm()];
     if figures.iter().all(|figure| figure.is_finite()) {
@@ -131,9 +158,12 @@ fn ramp(arguments: &ProfileArguments) -> Result<Ramp<f64>, CliError> {
     }
 }
 
-fn json(ramp: &Ramp<f64>) -> ProfileJson {
+fn json(law: Pulse, ramp: &Ramp<f64>) -> ProfileJson {
     ProfileJson {
+        law: law.name(),
         peak_jerk_mm_s3: ramp.peak_jerk_mm_s3,
+        edge_s: ramp.edge_s,
+        plateau_s: ramp.plateau_s(),
         t1_s: ramp.t1_s,
         t2_s: ramp.t2_s,
         tp_s: ramp.duration_s(),
@@ -143,9 +173,9 @@ fn json(ramp: &Ramp<f64>) -> ProfileJson {
     }
 }
 
-/// t1/4, t1, t2, tp: where the papers give their figures.
+/// e/2, t1, t2, tp: where the papers, in which e/2 is t1/4, give their figures.
 fn corner_times_s(ramp: &Ramp<f64>) -> [f64; 4] {
-    [ramp.t1_s / 4.0, ramp.t1_s, ramp.t2_s, ramp.duration_s()]
+    [ramp.edge_s / 2.0, ramp.t1_s, ramp.t2_s, ramp.duration_s()]
 }
 
 fn write_csv(ramp: &Ramp<f64>, tick_s: f64, out: &mut dyn Write) -> Result<(), CliError> {
@@ -176,8 +206,12 @@ fn write_table(ramp: &Ramp<f64>, out: &mut dyn Write) -> io::Result<()> {
     let (jerk, tp_s, length_mm) = (ramp.peak_jerk_mm_s3, ramp.duration_s(), ramp.length_mm());
     writeln!(
         out,
-        "Jp = {jerk:.3} mm/s³, t1 = {t1_s:.6} s, t2 = {t2_s:.6} s, tp = {tp_s:.6} s, S = {length_mm:.6} mm\n"
+        "Jp = {jerk:.3} mm/s³, t1 = {t1_s:.6} s, t2 = {t2_s:.6} s, tp = {tp_s:.6} s, S = {length_mm:.6} mm"
     )?;
+    if ramp.plateau_s() > 0.0 {
+        writeln!(out, "e = {:.6} s, p = {:.6} s", ramp.edge_s, ramp.plateau_s())?;
+    }
+    writeln!(out)?;
     let columns = [
         ("at", "", Align::Left),
         ("t", "s", Align::Right),
@@ -187,7 +221,8 @@ fn write_table(ramp: &Ramp<f64>, out: &mut dyn Write) -> io::Result<()> {
         ("J", "mm/s³", Align::Right),
         ("DJ", "mm/s⁴", Align::Right),
     ];
-    let names = ["t1/4", "t1", "t2", "tp"];
+    let middle_of_the_edge = if ramp.plateau_s() > 0.0 { "e/2" } else { "t1/4" };
+    let names = [middle_of_the_edge, "t1", "t2", "tp"];
     let rows: Vec<[String; 7]> = names
         .iter()
         .zip(corner_times_s(ramp).map(|t_s| Row::new(ramp, t_s)))
@@ -211,17 +246,22 @@ mod tests {
     use super::*;
 
     fn of(from: f64, to: f64) -> ProfileJson {
+        under(LawChoice::Sin2, from, to)
+    }
+
+    fn under(law: LawChoice, from: f64, to: f64) -> ProfileJson {
         let arguments = ProfileArguments {
             from,
             to,
             accel: 500.0,
             jerk: 5e3,
             snap: 4e5,
+            law,
             tick: 1e-3,
             json: false,
             csv: false,
         };
-        json(&ramp(&arguments).expect("a ramp"))
+        json(law.into(), &ramp(&arguments).expect("a ramp"))
     }
 
     /// The three worked examples of S1, in mm, to half of the last digit the paper prints. The third prints
@@ -313,24 +353,56 @@ mod tests {
         }
     }
 
+    /// The papers' examples with a plateau: an edge takes π·J/(2·DJ), and a pulse is the box of jerk that
+    /// makes the acceleration, widened by an edge.
+    #[test]
+    fn worked_examples_with_a_plateau() {
+        let near = |found: f64, expected: f64| (found - expected).abs() <= 1e-12 * expected;
+        let edge_s = core::f64::consts::PI * 5e3 / (2.0 * 4e5);
+        let found = under(LawChoice::Plateau, 0.0, 200.0);
+        assert_eq!((found.law, found.limited_by), ("plateau", "acceleration"));
+        assert!(near(found.peak_jerk_mm_s3, 5e3) && near(found.edge_s, edge_s));
+        assert!(near(found.plateau_s, 0.1 - edge_s) && near(found.t1_s, 0.1 + edge_s));
+        assert!(near(found.t2_s, 0.4) && near(found.tp_s, 0.5 + edge_s));
+        assert!(near(found.length_mm, 100.0 * (0.5 + edge_s)));
+        let [middle, t1, t2, tp] = found.at;
+        assert!(near(middle.snap_mm_s4, 4e5) && near(middle.j_mm_s3, 2500.0), "{}", middle.snap_mm_s4);
+        assert!(near(t1.a_mm_s2, 500.0) && near(t1.v_mm_s, 250.0 * (0.1 + edge_s)));
+        assert!(near(t2.v_mm_s, 200.0 - t1.v_mm_s) && near(tp.v_mm_s, 200.0));
+        // Jerk limits: J·P·(P − e) = 40 mm/s. Snap limits: as in the papers.
+        let found = under(LawChoice::Plateau, 19.0, 59.0);
+        assert_eq!(found.limited_by, "jerk");
+        assert!(near(found.edge_s, edge_s) && near(found.t2_s, found.t1_s));
+        assert!(near(5e3 * found.t1_s * (found.t1_s - edge_s), 40.0));
+        let (found, arch) = (under(LawChoice::Plateau, 18.0, 20.0), of(18.0, 20.0));
+        assert_eq!(found.limited_by, "snap");
+        assert!(near(found.t1_s, arch.t1_s) && near(found.edge_s, arch.t1_s / 2.0) && found.plateau_s <= 0.0);
+    }
+
     #[test]
     fn braking_is_the_mirror() {
-        let (up, down) = (of(19.0, 100.0), of(100.0, 19.0));
-        assert!((up.length_mm - down.length_mm).abs() < 1e-12);
-        assert!((up.at[1].a_mm_s2 + down.at[1].a_mm_s2).abs() < 1e-9);
+        for law in [LawChoice::Sin2, LawChoice::Plateau] {
+            let (up, down) = (under(law, 19.0, 100.0), under(law, 100.0, 19.0));
+            assert!((up.length_mm - down.length_mm).abs() < 1e-12);
+            assert!((up.at[1].a_mm_s2 + down.at[1].a_mm_s2).abs() < 1e-9);
+        }
     }
 
     #[test]
     fn equal_feeds_take_no_time() {
-        let none = of(100.0, 100.0);
-        assert!(none.tp_s <= 0.0 && none.length_mm <= 0.0 && none.peak_jerk_mm_s3 <= 0.0);
-        assert!(none.at.iter().all(|row| (row.v_mm_s - 100.0).abs() < 1e-12 && row.snap_mm_s4.abs() <= 0.0));
+        for law in [LawChoice::Sin2, LawChoice::Plateau] {
+            let none = under(law, 100.0, 100.0);
+            assert!(none.tp_s <= 0.0 && none.length_mm <= 0.0 && none.peak_jerk_mm_s3 <= 0.0);
+            let is_at_rest = |row: &Row| (row.v_mm_s - 100.0).abs() < 1e-12 && row.snap_mm_s4.abs() <= 0.0;
+            assert!(none.at.iter().all(is_at_rest));
+        }
     }
 
     #[test]
     fn the_csv_ends_at_the_end() {
         for (tick_s, rows) in [(0.001, 601), (0.0007, 859), (1.0, 2), (0.6, 2)] {
-            let law = Law::new(Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 }).expect("law");
+            let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+            let law = Law::new(Pulse::Sin2, limits).expect("law");
             let ramp = Ramp::new(&law, 0.0, 200.0);
             let mut text = Vec::new();
             write_csv(&ramp, tick_s, &mut text).expect("memory");

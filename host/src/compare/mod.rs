@@ -50,7 +50,7 @@ pub struct Figures {
     pub length_mm: f64,
     /// Time of the plan \[s\]; of all times, dwells are part and stops are not.
     pub time_s: f64,
-    /// Time with one pair of ramps per block \[s\].
+    /// Time with one pair of sin² ramps per block, whatever the machine's law is \[s\].
     pub per_block_s: f64,
     /// The least time \[s\]: [`bound::least_time_s`].
     pub least_s: f64,

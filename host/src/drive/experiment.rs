@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use motion_kernel::axis::{Feedforward, Gains};
+use motion_kernel::law::Pulse;
 
 use crate::gcode::{self, GcodeError};
 use crate::identify::IdentifyError;
@@ -233,6 +234,8 @@ pub(super) fn raised(machine: &Machine, demands: &Demands, moved: &[usize]) -> R
     }
     let mut machine = machine.clone();
     let (path, more) = (&mut machine.path, 1.0 + ROUNDING);
+    // What is found from an experiment was proven with the papers' law.
+    path.pulse = Pulse::Sin2;
     path.feed_mm_s = path.feed_mm_s.max(demands.feed_mm_s * more);
     path.accel_mm_s2 = path.accel_mm_s2.max(demands.accel_mm_s2);
     path.jerk_mm_s3 = path.jerk_mm_s3.max(demands.jerk_mm_s3);

@@ -12,12 +12,14 @@ use motion_kernel::axis::{
 use motion_kernel::fault::Reaction;
 use motion_kernel::homing::HomingConfig;
 use motion_kernel::jog::Direction;
+use motion_kernel::law::Pulse;
 use motion_kernel::units::{Counts, Position};
 use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
 use toml::Spanned;
 
 use super::error::{MachineError, quote};
+use super::law_name::{LAW_NAMES, law_named};
 use super::range::{
     AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
     FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle,
@@ -187,6 +189,7 @@ struct PathTable {
     accel_mm_s2: Within<Limit>,
     jerk_mm_s3: Within<Limit>,
     snap_mm_s4: Within<Limit>,
+    law: Option<LawName>,
     junction_angle_deg: Within<JunctionAngle>,
     accel_step_mm_s2: Within<Limit>,
     curve_feed_share: Within<CurveShare>,
@@ -448,6 +451,7 @@ impl PathTable {
             accel_mm_s2: self.accel_mm_s2.0,
             jerk_mm_s3: self.jerk_mm_s3.0,
             snap_mm_s4: self.snap_mm_s4.0,
+            pulse: self.law.as_ref().map_or_else(Pulse::default, |law| law.0),
             junction_angle_rad: self.junction_angle_deg.0.to_radians(),
             accel_step_mm_s2: self.accel_step_mm_s2.0,
             curve_feed_share: self.curve_feed_share.0,
@@ -584,6 +588,17 @@ impl<'de> Deserialize<'de> for EmergencyStop {
             Some("stop") => Ok(Self(Reaction::Stop)),
             _ => Err(D::Error::custom(format!("emergency_stop = {value}, expected {EMERGENCY_STOP}"))),
         }
+    }
+}
+
+/// The shape of the pulses of jerk.
+struct LawName(Pulse);
+
+impl<'de> Deserialize<'de> for LawName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = toml::Value::deserialize(deserializer)?;
+        let refused = || D::Error::custom(format!("law = {value}, expected {LAW_NAMES}"));
+        law_named(value.as_str()).map(Self).ok_or_else(refused)
     }
 }
 

@@ -6,6 +6,7 @@
 
 use motion_kernel::axis::TABLE_POINTS;
 
+use super::law_name::LAW_NAMES;
 use super::range::{
     AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
     FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle,
@@ -89,6 +90,14 @@ pub const KEY_TABLES: &[KeyTable] = &[
             Key::new("accel_mm_s2", "mm/s²", Limit::EXPECTED, "Greatest acceleration, as a vector."),
             Key::new("jerk_mm_s3", "mm/s³", Limit::EXPECTED, "Greatest jerk, as a vector."),
             Key::new("snap_mm_s4", "mm/s⁴", Limit::EXPECTED, "Greatest rate of change of jerk."),
+            Key::new(
+                "law",
+                "",
+                LAW_NAMES,
+                "Shape of the pulses of jerk that change the feed: one sin² arch, or two halves of one as short as snap \
+                 allows with a plateau of constant jerk between them, which is faster.",
+            )
+            .or("\"plateau\""),
             Key::new(
                 "junction_angle_deg",
                 "°",

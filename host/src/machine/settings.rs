@@ -7,7 +7,7 @@ use hal_sim::{
 use motion_kernel::axis::{AxesConfig, AxesError, AxisFigures, Feedforward, Gains, GuardFigures, Guards};
 use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::homing::HomingConfig;
-use motion_kernel::law::Limits;
+use motion_kernel::law::{Limits, Pulse};
 use motion_kernel::num::Real;
 use motion_kernel::path::Travel;
 use motion_kernel::plan::{AxisLimits, CURVE_FEED_SHARE, MachineLimits};
@@ -80,6 +80,8 @@ pub struct PathSettings {
     pub jerk_mm_s3: f64,
     /// Greatest snap \[mm/s⁴\].
     pub snap_mm_s4: f64,
+    /// The shape of the pulses of jerk that change the feed.
+    pub pulse: Pulse,
     /// Greatest change of direction at a junction that is driven through \[rad\]; 0 to 30° (in the file in
     /// degrees).
     pub junction_angle_rad: f64,
@@ -157,6 +159,7 @@ impl Machine {
                 accel_mm_s2: 500.0,
                 jerk_mm_s3: 5e3,
                 snap_mm_s4: 4e5,
+                pulse: Pulse::Plateau,
                 junction_angle_rad: 0.5_f64.to_radians(),
                 accel_step_mm_s2: 500.0,
                 curve_feed_share: CURVE_FEED_SHARE,
@@ -186,6 +189,7 @@ impl Machine {
         MachineLimits {
             curve_feed_share: path.curve_feed_share,
             path: AxisLimits { feed_mm_s: path.feed_mm_s, limits: path.limits() },
+            pulse: path.pulse,
             axes: self.axes.each_ref().map(|axis| AxisLimits {
                 feed_mm_s: axis.feed_mm_s,
                 limits: Limits {
@@ -253,7 +257,8 @@ impl Machine {
     /// at the origin when the program starts.
     #[must_use]
     pub fn header(&self) -> Header<3> {
-        Header { tick_s: self.tick_s, rules: self.rules(), axes: self.figures(), start: [Position::ZERO; 3] }
+        let (axes, start) = (self.figures(), [Position::ZERO; 3]);
+        Header { tick_s: self.tick_s, rules: self.rules(), pulse: self.path.pulse, axes, start }
     }
 
     /// The simulated machine: the same drives, encoders and scales, at rest at the origin. Its dead times

@@ -3,6 +3,7 @@
 use hal_sim::{HomeParameters, IndexParameters, SwitchParameters};
 use motion_kernel::axis::{AxesConfig, PREVIEW_TICKS_MAX};
 use motion_kernel::jog::Direction;
+use motion_kernel::law::Pulse;
 use motion_kernel::units::{Counts, Position};
 
 use super::keys::{KEY_TABLES, KeyTable};
@@ -285,6 +286,28 @@ fn the_reader_refuses_values_with_the_explained_ranges() {
     }
 }
 
+/// The feed law by its name, and a wrong one in the project's words.
+#[test]
+fn the_law_has_a_name() {
+    let text = with_optional_keys();
+    let table = KEY_TABLES.iter().find(|table| table.name == "path").expect("known");
+    let read = |value: &str| {
+        let (text, row, column) = set(&text, table, "law", value);
+        let found = Machine::from_toml("law.toml", &text).map_err(|error| error.to_string());
+        (
+            found.map(|machine| machine.path.pulse),
+            format!("law.toml:{row}:{column}: found law = {value}, expected "),
+        )
+    };
+    for pulse in [Pulse::Sin2, Pulse::Plateau] {
+        assert_eq!(read(&format!("\"{}\"", pulse.name())).0, Ok(pulse));
+    }
+    for wrong in ["-1", "true", "\"other\"", "\"Sin2\"", "\"\""] {
+        let (found, place) = read(wrong);
+        assert_eq!(found, Err(format!("{place}\"sin2\" or \"plateau\"")));
+    }
+}
+
 #[test]
 fn defaults_and_only_they_may_be_left_out() {
     let text = with_optional_keys();
@@ -341,6 +364,7 @@ fn ranges_of_optional_keys_are_kept() {
         ("axis.regulator.inverse.bed", "frequency_hz", &["0", "-13", "2e9"]),
         ("axis.regulator.inverse.bed", "damping_ratio", &["0", "0.0009", "1.1"]),
         ("axis.regulator.inverse.bed", "mass_ratio", &["0", "-0.06", "101"]),
+        ("path", "law", &["\"sin\"", "\"Plateau\"", "\"\"", "[\"sin2\"]"]),
         ("axis.homing", "search_mm_s", &["0", "0.0009", "-2e9"]),
         ("axis.homing", "approach_mm_s", &["0", "-2"]),
         ("axis.homing", "travel_mm", &["0", "-600", "100001"]),

@@ -1,14 +1,16 @@
 //! A block list, BLOCKS.json: a bare list of lengths and feeds, planned like a stretch.
 
-use motion_kernel::law::{Law, Limits};
+use motion_kernel::law::{Law, Limits, Pulse};
 use motion_kernel::plan::{Block, PlanError, Reason};
 use serde::Deserialize;
+use serde::de::{Deserializer, Error as _};
 
 use super::error::{Place, PlanningError, Problem};
 use super::lookahead::lookahead;
 use super::profile::FeedProfile;
 use super::{Mode, Plan};
 use crate::gcode;
+use crate::machine::{LAW_NAMES, law_named};
 use crate::trace::TracedBlock;
 
 /// The tick that durations are counted in where no machine says one \[s\].
@@ -17,6 +19,8 @@ const TICK_S: f64 = 0.0005;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, expecting = "an object with the keys of a block list")]
 struct BlockList {
+    #[serde(default)]
+    law: LawName,
     limits: JsonLimits,
     start_feed_mm_s: NotNegative,
     end_feed_mm_s: NotNegative,
@@ -58,6 +62,18 @@ impl<const MAY_BE_ZERO: bool> TryFrom<f64> for Figure<MAY_BE_ZERO> {
     }
 }
 
+/// The shape of the pulses of jerk.
+#[derive(Default)]
+struct LawName(Pulse);
+
+impl<'de> Deserialize<'de> for LawName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = serde_json::Value::deserialize(deserializer)?;
+        let refused = || D::Error::custom(format!("found {value}, expected {LAW_NAMES}"));
+        law_named(value.as_str()).map(Self).ok_or_else(refused)
+    }
+}
+
 /// Plans a block list.
 ///
 /// # Errors
@@ -75,12 +91,13 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
         let place = Place { line: number(error.line()), column };
         fail(place, Problem::Json(found_expected(&error, text)))
     })?;
-    let law = Law::new(Limits {
+    let pulse = mode.pulse(list.law.0);
+    let limits = Limits {
         accel_mm_s2: list.limits.accel_mm_s2.0,
         jerk_mm_s3: list.limits.jerk_mm_s3.0,
         snap_mm_s4: list.limits.snap_mm_s4.0,
-    })
-    .map_err(|error| fail(line_of(text, "limits"), error.into()))?;
+    };
+    let law = Law::new(pulse, limits).map_err(|error| fail(line_of(text, "limits"), error.into()))?;
     let blocks: Vec<Block<f64>> = list
         .blocks
         .iter()
@@ -133,6 +150,7 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
         length_mm: ends_mm.last().copied().unwrap_or(0.0),
         items: Vec::new(),
         notices: Vec::new(),
+        pulse,
         tick_s: TICK_S,
     })
 }
@@ -141,7 +159,7 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
 fn found_expected(error: &serde_json::Error, text: &[u8]) -> String {
     // Its own text ends with the place, which stands in front here.
     let message = error.to_string();
-    let what = message.split(" at line ").next().unwrap_or(&message);
+    let what = message.rsplit_once(" at line ").map_or(message.as_str(), |(what, _)| what);
     if what.starts_with("found ") {
         return what.to_owned();
     }

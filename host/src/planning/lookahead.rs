@@ -88,15 +88,15 @@ pub(super) fn block_at(ends: &[Position], start: Position) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use motion_kernel::law::{Law, Limits};
+    use motion_kernel::law::{Law, Limits, Pulse};
 
     use super::*;
 
     /// Blocks of no length have no ramps.
     #[test]
     fn a_ramp_belongs_to_the_block_on_which_it_starts() {
-        let law = Law::new(Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 })
-            .expect("positive limits");
+        let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+        let law = Law::new(Pulse::Plateau, limits).expect("positive limits");
         let block = |length_mm, cap_mm_s| Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law };
         let blocks = [block(0.0, 80.0), block(50.0, 80.0), block(0.0, 40.0), block(25.0, 40.0)];
         let ends_mm = [0.0, 50.0, 50.0, 75.0];

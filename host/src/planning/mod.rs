@@ -44,6 +44,8 @@ pub use program::{plan_moves, plan_program};
 pub use spline::plan_spline;
 pub use stretch::Stretch;
 
+use motion_kernel::law::Pulse;
+
 use crate::trace::TracedBlock;
 
 /// How ramps and blocks go together.
@@ -52,8 +54,18 @@ pub enum Mode {
     /// A ramp may span blocks.
     #[default]
     Spanning,
-    /// One pair of ramps per block, as S3 plans.
+    /// One pair of sin² ramps per block, as S3 plans.
     PerBlock,
+}
+
+impl Mode {
+    /// The shape of the pulses of jerk where `chosen` is what the machine or the block list says.
+    fn pulse(self, chosen: Pulse) -> Pulse {
+        match self {
+            Self::Spanning => chosen,
+            Self::PerBlock => Pulse::Sin2,
+        }
+    }
 }
 
 /// A planned program.
@@ -73,13 +85,15 @@ pub struct Plan {
     pub items: Vec<Item>,
     /// Words that were accepted and not acted on.
     pub notices: Vec<String>,
+    /// The shape of the pulses of jerk in its ramps.
+    pub pulse: Pulse,
     /// The control tick it was planned for \[s\].
     pub tick_s: f64,
 }
 
 impl Plan {
     /// A plan with nothing to do.
-    fn empty(source: &str, tick_s: f64) -> Self {
+    fn empty(source: &str, pulse: Pulse, tick_s: f64) -> Self {
         Self {
             source: source.to_owned(),
             blocks: Vec::new(),
@@ -88,6 +102,7 @@ impl Plan {
             length_mm: 0.0,
             items: Vec::new(),
             notices: Vec::new(),
+            pulse,
             tick_s,
         }
     }

@@ -7,7 +7,7 @@ use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
 use super::{Item, Mode, PlacedRamp, Plan, travel};
 use crate::gcode::{Feed, PathMode, Program, StepKind};
-use crate::machine::Machine;
+use crate::machine::{Machine, PathSettings};
 use crate::toolpath::Element;
 use crate::toolpath::smooth::Move;
 
@@ -29,7 +29,8 @@ pub fn plan_program(
             problem,
         }
     };
-    let mut plan = Plan::empty(source_name, machine.tick_s);
+    let machine = &driven(machine, mode);
+    let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s);
     plan.notices = program.notices.iter().map(ToString::to_string).collect();
     let mut run: Vec<Move> = Vec::new();
     // Where the spline begins whose points are being collected.
@@ -89,7 +90,8 @@ pub fn plan_moves(
     machine: &Machine,
     mode: Mode,
 ) -> Result<Plan, PlanningError> {
-    let mut plan = Plan::empty(source_name, machine.tick_s);
+    let machine = &driven(machine, mode);
+    let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s);
     append(&mut moves, &mut plan, machine, mode).map_err(|(line, problem)| PlanningError {
         source_name: source_name.to_owned(),
         place: line.into(),
@@ -98,6 +100,12 @@ pub fn plan_moves(
     // As for a program.
     travel::check(source_name, &Executable::new::<f32>(&plan)?, machine)?;
     Ok(plan)
+}
+
+/// `machine` with the pulses of jerk of `mode`.
+fn driven(machine: &Machine, mode: Mode) -> Machine {
+    let path = PathSettings { pulse: mode.pulse(machine.path.pulse), ..machine.path };
+    Machine { path, ..machine.clone() }
 }
 
 /// Infinite for a rapid.

@@ -3,6 +3,7 @@
 use core::convert::Infallible;
 
 use motion_kernel::exec::ExecState;
+use motion_kernel::law::Pulse;
 use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::path::Travel;
@@ -59,7 +60,7 @@ impl<'script, R: Real> Storage<'script, R> {
         rules: PathRules,
         (start, travel): ([Position; AXES], Travel<AXES>),
         items: I,
-        tick_s: f64,
+        (pulse, tick_s): (Pulse, f64),
     ) -> (Background<'a, R, I>, Intake<'a, R, AXES>) {
         match self {
             Self::Plain(streams) => {
@@ -70,7 +71,7 @@ impl<'script, R: Real> Storage<'script, R> {
             Self::Live(streams, script) => {
                 let (mut feeder, intake) = streams.split(rules, start);
                 feeder.bound(travel);
-                let control = LiveControl::new(items, tick_s, 0);
+                let control = LiveControl::new(items, pulse, tick_s, 0);
                 let live = Live { feeder, control, script, given: 0, is_on_hold: false };
                 (Background::Live(Box::new(live)), intake)
             }

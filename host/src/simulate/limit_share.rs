@@ -2,9 +2,9 @@
 //!
 //! Consumes the executed ticks; produces the share of the path length on which the feed is at its block's
 //! ceiling, or acceleration, jerk or snap along the path, as vectors or of an axis, are at their limit. The
-//! rest of the length is what a better plan could still gain on. The law's jerk and snap touch their limits
-//! only at the top of their curves, so that ramps count for little; a plan that wastes nothing is still
-//! below 1.
+//! rest of the length is what a better plan could still gain on. A sin² pulse touches the limits of jerk and
+//! snap only at the top of its curves, so that ramps count for little; one with a plateau holds its jerk
+//! there, so that only its edges do not count. A plan that wastes nothing is still below 1.
 
 use super::job::RunInfo;
 use crate::trace::{TraceRow, TracedBlock};

@@ -101,7 +101,7 @@ fn run_in<R: Real>(
     let mut storage = Storage::<R>::new(script.as_ref());
     let items = job.items.iter().map(|&item| Ok(item));
     let (mut background, intake) =
-        storage.split(header.rules, (header.start, job.guards.travel()), items, tick_s);
+        storage.split(header.rules, (header.start, job.guards.travel()), items, (header.pulse, tick_s));
     let mut intake = CorrectedIntake::from(intake);
     if let &Some(StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
         intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?)?;

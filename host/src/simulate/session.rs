@@ -127,7 +127,8 @@ impl<'a, R: Real> Session<'a, R> {
         mut after_tick: impl FnMut(&Trace<R, AXES>, &mut SimulatedHardware<'a>, State) -> Result<Then, E>,
     ) -> Result<(), E> {
         let (mut feeder, mut intake) = self.streams.split(self.machine.rules(), self.set);
-        let mut control = LiveControl::<R, AXES, _, _, PLACES>::new(items, self.machine.tick_s, 0);
+        let mut control =
+            LiveControl::<R, AXES, _, _, PLACES>::new(items, self.machine.path.pulse, self.machine.tick_s, 0);
         loop {
             control.poll(&mut feeder).map_err(|error| SessionError::Run(RunError::Rejected(error)))?;
             let trace = *self.kernel.tick(&mut intake, &mut self.hardware);
@@ -157,5 +158,5 @@ pub(super) fn jog_axis(machine: &Machine, axis: usize) -> JogAxis {
     let &AxisSettings { feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, .. } = &machine.axes[axis];
     let path = &machine.path;
     let limits = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }.least(&path.limits());
-    JogAxis { feed_mm_s: feed_mm_s.min(path.feed_mm_s), limits, travel: None }
+    JogAxis { feed_mm_s: feed_mm_s.min(path.feed_mm_s), limits, pulse: path.pulse, travel: None }
 }

@@ -1,6 +1,10 @@
 //! `home` and `jog`.
 
-use crate::workspace::{Workspace, assert_has, number};
+use std::f64::consts::PI;
+
+use serde_json::Value;
+
+use super::workspace::{Workspace, assert_has, number};
 
 /// The machine file's homing in use: the reference is the index behind the switch; what is not found is
 /// named.
@@ -65,12 +69,19 @@ fn jog_goes_as_far_as_its_key_says() {
     assert_eq!((number(&third["from_mm"]), number(&third["to_mm"])), (20.0, 30.0));
     // Released after 0.2 s, in the ramp's second half, which jerk limits: it and braking from 50 mm/s take
     // all of their times.
-    let (stop_s, stop_mm) = (number(&fourth["stop_s"]), number(&fourth["stop_mm"]));
-    assert!((number(&fourth["time_s"]) - stop_s - 0.2).abs() < 1e-9, "{fourth}");
-    let ramp_s = 2.0 * (2.0 * 50.0 / 5000.0_f64).sqrt();
-    assert!((stop_s - (2.0 * ramp_s - 0.2)).abs() < 0.0011, "{fourth}");
-    let gone_mm = number(&fourth["from_mm"]) - number(&fourth["to_mm"]);
-    assert!((gone_mm - 50.0 * ramp_s).abs() < 1e-3 && stop_mm < gone_mm, "{fourth}");
+    let released_in_the_ramp = |press: &Value, pulse_s: f64| {
+        let (stop_s, stop_mm) = (number(&press["stop_s"]), number(&press["stop_mm"]));
+        assert!((number(&press["time_s"]) - stop_s - 0.2).abs() < 1e-9, "{press}");
+        let ramp_s = 2.0 * pulse_s;
+        assert!((stop_s - (2.0 * ramp_s - 0.2)).abs() < 0.0011, "{press}");
+        let gone_mm = number(&press["from_mm"]) - number(&press["to_mm"]);
+        assert!((gone_mm - 50.0 * ramp_s).abs() < 1e-3 && stop_mm < gone_mm, "{press}");
+    };
+    let half_edge_s = PI * 5000.0 / (4.0 * 400_000.0);
+    released_in_the_ramp(fourth, half_edge_s + half_edge_s.hypot((50.0 / 5000.0_f64).sqrt()));
+    workspace.put("sin2.toml", &bounded.replace("law = \"plateau\"", "law = \"sin2\""));
+    let arch = workspace.json(&["jog", "X-@400", "--machine", "sin2.toml", "--feed", "50", "--json"]);
+    released_in_the_ramp(&arch[0], (2.0 * 50.0 / 5000.0_f64).sqrt());
     // Where the key is released behind the end, the end is the distance's.
     let gone_mm = number(&fifth["to_mm"]) - number(&fifth["from_mm"]);
     assert!((gone_mm - 1.0).abs() < 1e-9 && fifth["stop_s"].is_null(), "{fifth}");

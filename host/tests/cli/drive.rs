@@ -3,7 +3,7 @@
 use motion_host::machine::Machine;
 use serde_json::Value;
 
-use crate::workspace::{Workspace, assert_has, number};
+use super::workspace::{Workspace, assert_has, number};
 
 #[test]
 fn drive_compares_regulators() {

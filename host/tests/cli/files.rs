@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::workspace::{STRINGER, Workspace};
+use super::workspace::{STRINGER, Workspace};
 
 /// What was there before.
 const KEPT: &str = "kept";
@@ -171,8 +171,7 @@ mod unix {
     use std::path::Path;
     use std::process::{Child, Command, Output, Stdio};
 
-    use super::{KEPT, THREE, folder, names};
-    use crate::workspace::Workspace;
+    use super::{KEPT, STRINGER, THREE, Workspace, folder, names};
 
     /// Sends a signal by the shell, which has `kill` itself.
     fn send(signal: &str, id: u32) -> std::io::Result<std::process::ExitStatus> {
@@ -224,7 +223,7 @@ mod unix {
             let expected = format!("--report {report}: found the same file as {other}, expected another one");
             assert_eq!(refusal, expected);
         }
-        assert_eq!(workspace.read("part.ngc"), crate::workspace::STRINGER);
+        assert_eq!(workspace.read("part.ngc"), STRINGER);
         assert!(!path("new.html").exists());
 
         // A link is written through, be it to a file that exists or not.
@@ -279,7 +278,7 @@ mod unix {
         let expected =
             "motion: --report part.ngc: found the same file as standard input, expected another one\n";
         assert_eq!((ended.status.code(), text(&ended.stderr).as_str()), (Some(2), expected));
-        assert_eq!(workspace.read("part.ngc"), crate::workspace::STRINGER);
+        assert_eq!(workspace.read("part.ngc"), STRINGER);
         // No files, so none that could be lost.
         let ended =
             shell(&workspace, "\"$0\" run part.ngc --trace /dev/null --report /dev/null > out.csv 2>&1");

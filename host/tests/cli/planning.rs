@@ -1,5 +1,6 @@
 //! `profile`, `machine`, `plan`, `compile`: figures, plans and what planning refuses.
 
+use std::f64::consts::PI;
 use std::fs;
 
 use motion_host::machine::Machine;
@@ -7,13 +8,74 @@ use motion_kernel::num::Fixed;
 use motion_kernel::program::{Item, Reader, check};
 use serde_json::Value;
 
-use crate::workspace::{STRINGER, Workspace, assert_has, keys, number, profile};
+use super::workspace::{STRINGER, Workspace, assert_has, keys, number, profile};
+
+const RAMP_KEYS: [&str; 10] = [
+    "law",
+    "peak_jerk_mm_s3",
+    "edge_s",
+    "plateau_s",
+    "t1_s",
+    "t2_s",
+    "tp_s",
+    "length_mm",
+    "limited_by",
+    "at",
+];
+
+/// The worked example with a plateau: the edge is π·J/(2·DJ), and all other figures follow from it.
+#[test]
+fn profile_with_a_plateau() {
+    let workspace = Workspace::new("profile-plateau");
+    let ramp = workspace.json(&profile("0", "200", &["--law", "plateau", "--json"]));
+    assert_has(&ramp, &RAMP_KEYS);
+    assert_eq!((&ramp["law"], &ramp["limited_by"]), (&Value::from("plateau"), &Value::from("acceleration")));
+    let edge_s = PI * 5e3 / (2.0 * 4e5);
+    for (key, expected) in [
+        ("peak_jerk_mm_s3", 5e3),
+        ("edge_s", edge_s),
+        ("plateau_s", 0.1 - edge_s),
+        ("t1_s", 0.1 + edge_s),
+        ("t2_s", 0.4),
+        ("tp_s", 0.5 + edge_s),
+        ("length_mm", 100.0 * (0.5 + edge_s)),
+    ] {
+        let found = number(&ramp[key]);
+        assert!((found - expected).abs() <= 1e-12 * expected, "{key}: {found}, expected {expected}");
+    }
+    // In the middle of the edge: half of the jerk, all of the snap.
+    let at = ramp["at"].as_array().expect("a list");
+    assert!((number(&at[0]["t_s"]) - edge_s / 2.0).abs() < 1e-12);
+    assert!((number(&at[0]["j_mm_s3"]) - 2500.0).abs() < 1e-6);
+    assert!((number(&at[0]["snap_mm_s4"]) - 4e5).abs() < 1e-4);
+    assert!((number(&at[1]["a_mm_s2"]) - 500.0).abs() < 1e-9);
+    let table = workspace.stdout(&profile("0", "200", &["--law", "plateau"]));
+    for word in ["e = 0.019635 s, p = 0.080365 s", "tp = 0.519635 s", "S = 51.963495 mm", "e/2", "400000.00"]
+    {
+        assert!(table.contains(word), "{word} is not in\n{table}");
+    }
+    assert!(!table.contains("t1/4"), "{table}");
+    let csv = workspace.stdout(&profile("0", "200", &["--law", "plateau", "--csv", "--tick", "0.001"]));
+    assert_eq!(csv.lines().count(), 522);
+    assert!(csv.lines().last().expect("a row").starts_with("0.51963"), "{csv}");
+    // Small changes of feed have no plateau under either law.
+    let ramps =
+        ["sin2", "plateau"].map(|law| workspace.json(&profile("18", "20", &["--law", law, "--json"])));
+    assert!(number(&ramps[1]["plateau_s"]).abs() <= 0.0, "{}", ramps[1]);
+    assert_eq!(ramps[0]["at"], ramps[1]["at"]);
+    let refused = workspace.motion(&profile("0", "200", &["--law", "sine"]));
+    let error = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && error.contains("sin2, plateau"), "{error}");
+}
 
 #[test]
 fn profile_json() {
     let workspace = Workspace::new("profile-json");
     let ramp = workspace.json(&profile("0", "200", &["--json"]));
-    assert_has(&ramp, &["peak_jerk_mm_s3", "t1_s", "t2_s", "tp_s", "length_mm", "limited_by", "at"]);
+    assert_has(&ramp, &RAMP_KEYS);
+    assert_eq!(ramp["law"], "sin2");
+    assert_eq!(ramp, workspace.json(&profile("0", "200", &["--json", "--law", "sin2"])));
+    assert!((number(&ramp["edge_s"]) - 0.1).abs() < 1e-12 && number(&ramp["plateau_s"]).abs() <= 0.0);
     assert_eq!(ramp["limited_by"], "acceleration");
     assert!((number(&ramp["tp_s"]) - 0.6).abs() < 1e-12);
     assert!((number(&ramp["length_mm"]) - 60.0).abs() < 1e-9);
@@ -97,6 +159,7 @@ fn machine_explains_its_keys() {
         "kp_per_s [1/s]: a number from 0 to 1e9; required",
         "timer_bits: 16 or 32; default 32",
         "mm_s [mm/s]: 9 times a number from -100000 to 100000; required",
+        "law: \"sin2\" or \"plateau\"; default \"plateau\"",
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
@@ -115,8 +178,79 @@ fn machine_explains_its_keys() {
 fn plan_of_the_stringer() {
     let workspace = Workspace::new("plan");
     workspace.put("part.ngc", STRINGER);
-    let plan = workspace.json(&["plan", "part.ngc", "--json"]);
-    assert_has(&plan, &["time_s", "blocks", "feed"]);
+    let file = workspace.stdout(&["machine"]);
+    workspace.put("sin2.toml", &file.replace("law = \"plateau\"", "law = \"sin2\""));
+    let [per_block, sin2, plateau] = [&["--per-block"][..], &["--machine", "sin2.toml"], &[]].map(|more| {
+        let plan = workspace.json(&[&["plan", "part.ngc", "--json"], more].concat());
+        check_stringer(&plan, if more.is_empty() { plateau_pulse } else { arch });
+        plan
+    });
+    let time_s = |plan: &Value| number(&plan["time_s"]);
+    let reasons = |plan: &Value| {
+        let blocks = plan["blocks"].as_array().expect("a list");
+        blocks.iter().map(|block| block["cap_reason"].clone()).collect::<Vec<Value>>()
+    };
+    // S3's result. The paper does not say what limits N1.
+    for plan in [&per_block, &sin2] {
+        assert_eq!(reasons(plan)[1..], ["jerk", "acceleration", "jerk", "braking"]);
+    }
+    assert!(time_s(&sin2) <= time_s(&per_block) + 1e-9);
+    // With a plateau the last line is long enough for its feed, and every block reaches its ceiling: the time
+    // is that of the ceilings, and of each ramp half of its duration times the feed it lacks.
+    assert_eq!(reasons(&plateau)[1..], ["jerk", "acceleration", "jerk", "programmed"]);
+    let blocks = plateau["blocks"].as_array().expect("a list");
+    let of = |key: &str| blocks.iter().map(|block| number(&block[key])).collect::<Vec<f64>>();
+    let (lengths_mm, caps_mm_s) = (of("length_mm"), of("cap_mm_s"));
+    let lost_s = |ramp_s: f64, cap_mm_s: f64, to_mm_s: f64| ramp_s * (cap_mm_s - to_mm_s) / (2.0 * cap_mm_s);
+    let on_a_line_s = |cap_mm_s: f64, to_mm_s: f64| {
+        let (pulse_s, hold_s) = plateau_pulse(cap_mm_s - to_mm_s);
+        lost_s(pulse_s + hold_s, cap_mm_s, to_mm_s)
+    };
+    let [n1, n2, n3, _, n5] = caps_mm_s[..] else { panic!("{caps_mm_s:?}") };
+    let feed = plateau["feed"].as_array().expect("a list");
+    let on_the_arc =
+        |part: &&Value| (number(&part["to_mm_s"]) - n3).abs() < 1e-6 && number(&part["t1_s"]) > 0.0;
+    let on_the_arc_s = number(&feed.iter().find(on_the_arc).expect("a ramp")["time_s"]);
+    let expected_s = lengths_mm.iter().zip(&caps_mm_s).map(|(length, cap)| length / cap).sum::<f64>()
+        + on_a_line_s(n1, 0.0)
+        + on_a_line_s(n1, n2)
+        + 2.0 * lost_s(on_the_arc_s, n3, n2)
+        + on_a_line_s(n5, n2)
+        + on_a_line_s(n5, 0.0);
+    let found_s = time_s(&plateau);
+    assert!((found_s - expected_s).abs() < 1e-6, "{found_s}, by formula {expected_s}");
+    assert!(found_s < 0.94 * time_s(&sin2), "{found_s}, {}", time_s(&sin2));
+    let table = workspace.stdout(&["plan", "part.ngc", "--per-block"]);
+    for word in ["limited by", "mm/min", "acceleration", "5 blocks"] {
+        assert!(table.contains(word), "{word} is not in\n{table}");
+    }
+}
+
+/// P and t₂ of a sin² ramp: S1 (22), (23).
+fn arch(change_mm_s: f64) -> (f64, f64) {
+    let snap_s = (2.0 * PI * change_mm_s / 4e5).cbrt();
+    let jerk_s = (2.0 * change_mm_s / 5e3).sqrt();
+    if jerk_s <= PI * 5e3 / 4e5 {
+        return (snap_s, snap_s);
+    }
+    let pulse_s = jerk_s.min(2.0 * 500.0 / 5e3);
+    (pulse_s, pulse_s.max(change_mm_s / 500.0))
+}
+
+/// The same with a plateau: A = J·(P − e), and without a hold x = J·P·(P − e).
+fn plateau_pulse(change_mm_s: f64) -> (f64, f64) {
+    let edge_s = PI * 5e3 / (2.0 * 4e5);
+    let jerk_s = edge_s / 2.0 + (edge_s / 2.0).hypot((change_mm_s / 5e3).sqrt());
+    if jerk_s <= 2.0 * edge_s {
+        return arch(change_mm_s);
+    }
+    let pulse_s = jerk_s.min(500.0 / 5e3 + edge_s);
+    (pulse_s, pulse_s.max(change_mm_s / 500.0))
+}
+
+/// What is so under every law, with the times of its ramps by `pulse`.
+fn check_stringer(plan: &Value, pulse: fn(f64) -> (f64, f64)) {
+    assert_has(plan, &["time_s", "blocks", "feed"]);
     let blocks = plan["blocks"].as_array().expect("a list");
     for block in blocks {
         assert_has(
@@ -137,24 +271,55 @@ fn plan_of_the_stringer() {
     let of = |key: &str| blocks.iter().map(|block| block[key].clone()).collect::<Vec<Value>>();
     assert_eq!(of("line"), [4, 5, 6, 7, 8]);
     assert_eq!(of("kind"), ["line", "arc", "arc", "arc", "line"]);
-    // S3's result. The paper does not say what limits N1.
-    assert_eq!(of("cap_reason")[1..], ["jerk", "acceleration", "jerk", "braking"]);
     let feed = plan["feed"].as_array().expect("a list");
+    let is_on_a_line = |at_mm: f64| {
+        let block = blocks.iter().rfind(|block| number(&block["start_mm"]) < at_mm + 1e-6).expect("a block");
+        block["kind"] == "line"
+    };
+    let mut lines_ramps = 0;
     let (mut start_mm, mut time_s) = (0.0, 0.0);
     for part in feed {
         assert_has(
             part,
-            &["start_mm", "length_mm", "from_mm_s", "to_mm_s", "peak_jerk_mm_s3", "t1_s", "t2_s", "time_s"],
+            &[
+                "start_mm",
+                "length_mm",
+                "from_mm_s",
+                "to_mm_s",
+                "law",
+                "peak_jerk_mm_s3",
+                "edge_s",
+                "plateau_s",
+                "t1_s",
+                "t2_s",
+                "time_s",
+            ],
         );
+        let of = |key: &str| number(&part[key]);
+        let change_mm_s = (of("to_mm_s") - of("from_mm_s")).abs();
+        if change_mm_s > 0.0 {
+            let [edge_s, t1_s, t2_s] = ["edge_s", "t1_s", "t2_s"].map(of);
+            assert!((2.0 * edge_s + of("plateau_s") - t1_s).abs() < 1e-12, "{part}");
+            let gained_mm_s = of("peak_jerk_mm_s3") * (t1_s - edge_s) * t2_s;
+            assert!((gained_mm_s - change_mm_s).abs() < 1e-9 * change_mm_s, "{part}: {gained_mm_s} mm/s");
+            assert!((of("time_s") - t1_s - t2_s).abs() < 1e-9, "{part}");
+            // On the arcs the path leaves less than the machine's limits.
+            if is_on_a_line(of("start_mm")) {
+                let (pulse_s, hold_s) = pulse(change_mm_s);
+                assert!((t1_s - pulse_s).abs() < 1e-9 * pulse_s, "{part}, by formula {pulse_s} s");
+                assert!((t2_s - hold_s).abs() < 1e-9 * hold_s, "{part}, by formula {hold_s} s");
+                lines_ramps += 1;
+            }
+        }
+        let is_arch = pulse(50.0) == arch(50.0);
+        assert_eq!(part["law"], if is_arch { "sin2" } else { "plateau" });
+        assert!(!is_arch || of("plateau_s").abs() <= 0.0, "{part}");
         assert!((number(&part["start_mm"]) - start_mm).abs() < 1e-6);
         start_mm += number(&part["length_mm"]);
         time_s += number(&part["time_s"]);
     }
     assert!((time_s - number(&plan["time_s"])).abs() < 1e-9);
-    let table = workspace.stdout(&["plan", "part.ngc", "--per-block"]);
-    for word in ["limited by", "mm/min", "acceleration", "5 blocks"] {
-        assert!(table.contains(word), "{word} is not in\n{table}");
-    }
+    assert_eq!(lines_ramps, 4);
 }
 
 const BLOCKS: &str = r#"{
@@ -268,14 +433,39 @@ fn what_a_block_list_refuses() {
     let torn = BLOCKS.split(SECOND).next().expect("a beginning");
     assert_eq!(refusal(torn), "7:4: found the end of the file, expected the rest of a value");
 
+    for wrong in ["-1", "null", "\"other\"", "\"Plateau\"", "\"at line 3\"", "[\"sin2\"]"] {
+        let found = refusal(&BLOCKS.replacen('{', &format!("{{ \"law\": {wrong},"), 1));
+        let expected = format!(": found {wrong}, expected \"sin2\" or \"plateau\"");
+        assert!(found.starts_with("1:") && found.ends_with(&expected), "{found}");
+    }
+
+    // One ramp over both blocks, v·P = 1 mm. An arch has v = J·P²/2, so that v = 50^(2/3) mm/s; a pulse with
+    // a plateau has v = J·P·(P − e), so that J·P²·(P − e) = 1 mm.
+    let (jerk, edge_s) = (5e3, PI * 5e3 / (2.0 * 4e5));
+    let pulse_s = (0..100).fold((edge_s, 1.0), |(low, high), _| {
+        let middle = 0.5 * (low + high);
+        if jerk * middle * middle * (middle - edge_s) < 1.0 { (middle, high) } else { (low, middle) }
+    });
     let short = BLOCKS.replace(": 50,", ": 0.5,").replace(": 25,", ": 0.5,");
-    // One ramp over both blocks: v·√(2v/J) = 1 mm for v = 50^(2/3) mm/s.
-    let found = refusal(&short.replace("start_feed_mm_s\": 0", "start_feed_mm_s\": 80"));
-    assert!(found.starts_with("3: found start feed 80 mm/s, expected at most 13.57208"), "{found}");
-    assert!(found.ends_with(" mm/s: the path is too short to brake from more"), "{found}");
-    let found = refusal(&short.replace("end_feed_mm_s\": 0", "end_feed_mm_s\": 40"));
-    assert!(found.starts_with("4: found end feed 40 mm/s, expected at most 13.57208"), "{found}");
-    assert!(found.ends_with(" mm/s: the path is too short to reach more"), "{found}");
+    for (law, most_mm_s) in
+        [("", 1.0 / pulse_s.0), ("plateau", 1.0 / pulse_s.0), ("sin2", 50_f64.powf(2.0 / 3.0))]
+    {
+        let short = match law {
+            "" => short.clone(),
+            law => short.replacen('{', &format!("{{ \"law\": \"{law}\","), 1),
+        };
+        for (key, feed_mm_s, before, after) in [
+            ("start_feed_mm_s", 80, "3: found start feed 80 mm/s, expected at most ", "brake from more"),
+            ("end_feed_mm_s", 40, "4: found end feed 40 mm/s, expected at most ", "reach more"),
+        ] {
+            let found = refusal(&short.replace(&format!("{key}\": 0"), &format!("{key}\": {feed_mm_s}")));
+            let rest = found.strip_prefix(before).unwrap_or_else(|| panic!("{found}"));
+            let (figure, rest) = rest.split_once(" mm/s: the path is too short to ").expect("a figure");
+            let figure: f64 = figure.parse().expect("a number");
+            assert!((figure - most_mm_s).abs() < 1e-9 * most_mm_s, "{law}: {found}, by formula {most_mm_s}");
+            assert_eq!(rest, after);
+        }
+    }
 }
 
 /// What a board gets is a program to it; what is wrong with the input is said with file and line, and nothing

@@ -12,7 +12,7 @@ use motion_kernel::queue::Streams;
 use motion_kernel::units::{Counts, DacCode, Position};
 use serde_json::Value;
 
-use crate::workspace::{STRINGER, Workspace, assert_has, keys, number, profile};
+use super::workspace::{STRINGER, Workspace, assert_has, keys, number, profile};
 
 #[test]
 fn run_of_the_stringer() {

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::workspace::{Workspace, assert_has, keys, number};
+use super::workspace::{Workspace, assert_has, keys, number};
 
 /// Points of two turns of a curve in space, `count` of them.
 fn points(count: u32) -> String {

@@ -65,13 +65,16 @@ impl Moving {
     ) -> Option<Self> {
         let elapsed = before.phase_duration(self.phase).minus(self.left)?;
         let left = segment.phase_duration(self.phase).minus(elapsed)?;
+        let is_same_rise = before.phase_duration(Phase::Rise) == segment.phase_duration(Phase::Rise);
         let fraction = match self.phase {
-            // The same phase in both, except where it ends.
-            Phase::Rise => self.fraction,
-            // The place where `segment` is cut has been passed.
-            Phase::Hold if before.phase_duration(Phase::Rise) != segment.phase_duration(Phase::Rise) => {
-                return None;
+            Phase::Rise if is_same_rise => self.fraction,
+            // The same up to where `segment` parts from `before`.
+            Phase::Rise if elapsed <= segment.opens_for() && elapsed <= before.opens_for() => {
+                segment.fraction_after(Phase::Rise, elapsed)
             }
+            Phase::Rise => return None,
+            // The place where `segment` is cut has been passed.
+            Phase::Hold if !is_same_rise => return None,
             Phase::Hold => segment.fraction_after(Phase::Hold, elapsed),
             // A falling acceleration can't be ended earlier.
             Phase::Fall => return None,
@@ -88,7 +91,7 @@ impl Moving {
     /// The activity after the segment's end.
     #[inline]
     pub(super) fn ended<R: Real>(&self, segment: &FeedSegment<R>) -> Activity<R> {
-        Activity::Between { s: self.start + segment.length(), v_mm_s: segment.as_ramp().to_mm_s }
+        Activity::Between { s: self.start + segment.length(), v_mm_s: segment.to_mm_s() }
     }
 
     /// The motion now; `s` counts from the stretch's start.

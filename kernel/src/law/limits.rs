@@ -1,15 +1,54 @@
 //! Limits along the path, and the constants of the law that follow from them.
 //!
-//! Consumes the limits of a machine or of a block; produces a [`Law`] that [`Ramp`](super::Ramp)
-//! and [`reach`](super::reach()) share, so that roots are taken once per set of limits. Background.
+//! Consumes the limits of a machine or of a block, and the shape of the pulses; produces a [`Law`] that
+//! [`Ramp`](super::Ramp) and [`reach`](super::reach()) share. Here is the one choice between the regimes of a
+//! ramp. Background.
+//!
+//! A change of feed x is made by a pulse of jerk of length P, a hold, and the pulse reversed. A pulse has two
+//! edges of length e, each half of a sin² arch, and between them the peak jerk Jp holds for P − 2e. With
+//! J' = min(J, √(2·A·DJ/π)) and e' = πJ'/(2·DJ), the shortest edge to J',
+//!
+//! | what limits | sin² | with a plateau |
+//! |---|---|---|
+//! | snap | e = P/2, P = (2πx/DJ)^⅓ | the same |
+//! | jerk | e = P/2, P = √(2x/J') | e = e', P = e'/2 + √(e'²/4 + x/J') |
+//! | acceleration | e = P/2, P = 2A/J' | e = e', P = A/J' + e' |
+//!
+//! and t₂, the end of the hold, is P or, where acceleration limits, x/A. The sin² column is S1 (22) and (23)
+//! with t₁ = P. The other one is the fastest of its family.
 
 use core::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
+use super::pulse::JerkPulse;
 use super::ramp::LimitedBy;
 use crate::num::Root;
 use crate::work;
+
+/// The shape of a pulse of jerk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[serde(rename_all = "lowercase")]
+pub enum Pulse {
+    /// One sin² arch, S1 to the letter.
+    Sin2,
+    /// Two halves of an arch, as short as snap allows, and between them a plateau of constant jerk: faster
+    /// wherever jerk limits.
+    #[default]
+    Plateau,
+}
+
+impl Pulse {
+    /// Its name: what machine files and the command line call the law.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sin2 => "sin2",
+            Self::Plateau => "plateau",
+        }
+    }
+}
 
 /// Limits along the path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -83,59 +122,57 @@ impl<R: Root> Limits<R> {
         }
         Ok(())
     }
-
-    /// J' = min(J_max, √(2·A_max·DJ_max/π)): the peak jerk of every ramp large enough for it; the first two
-    /// terms of (22) \[mm/s³\].
-    pub(super) fn peak_jerk_mm_s3(&self) -> R {
-        self.jerk_mm_s3.min(self.accel_mm_s2.sqrt_product(self.snap_mm_s4 * R::from_f64(2.0 / PI)))
-    }
 }
 
-/// The law for one set of limits. Symbols of S1 in the fields' docs.
+/// The law for one set of limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law<R> {
+    pulse: Pulse,
     limits: Limits<R>,
     /// J' = min(J_max, √(2·A_max·DJ_max/π)): the peak jerk of every ramp large enough for it; the
     /// first two terms of (22) \[mm/s³\].
     pub(super) jerk_mm_s3: R,
-    /// x₁ = π²J'³/(2·DJ²): up to this change of feed, snap fixes the ramp \[mm/s\].
-    pub(super) snap_limited_to_mm_s: R,
-    /// x₂ = 2A²/J': from this change of feed on, acceleration fixes the ramp \[mm/s\].
-    pub(super) accel_limited_from_mm_s: R,
-    /// (DJ/2π)^⅓: t₁ = x^⅓/(DJ/2π)^⅓ when snap fixes the ramp.
-    pub(super) snap_root: R,
-    /// √(J'/2): t₁ = √x/√(J'/2) when jerk fixes the ramp.
-    pub(super) jerk_root: R,
-    /// πJ'/DJ: t₁ of the ramp by x₁ \[s\].
+    /// 2e' = πJ'/DJ: the length of a pulse up to which snap fixes the ramp \[s\].
     pub(super) snap_time_s: R,
-    /// 2A/J': t₁ of the ramp by x₂, and when acceleration fixes the ramp, (15) \[s\].
+    /// The length of a pulse from which on acceleration fixes the ramp; with sin² pulses 2A/J', (15) \[s\].
     pub(super) accel_time_s: R,
 }
 
+/// The times of a ramp \[s\], and what fixed them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Times<R> {
+    /// e.
+    pub(super) edge_s: R,
+    /// P, t₁ of S1.
+    pub(super) rise_s: R,
+    /// t₂.
+    pub(super) fall_start_s: R,
+    pub(super) limited_by: LimitedBy,
+}
+
 impl<R: Root> Law<R> {
-    /// The law for `limits`.
+    /// The law for `limits`, with pulses of this shape.
     ///
     /// # Errors
     /// A limit is not positive and finite, or beyond [`Root::LIMITS`]: from 1 to 10⁹ in fixed point.
-    pub fn new(limits: Limits<R>) -> Result<Self, LimitError> {
+    pub fn new(pulse: Pulse, limits: Limits<R>) -> Result<Self, LimitError> {
         limits.check()?;
-        let Limits { accel_mm_s2: accel, jerk_mm_s3: _, snap_mm_s4: snap } = limits;
-        let constant = R::from_f64;
-        let (pi, two) = (constant(PI), constant(2.0));
-        let peak = limits.peak_jerk_mm_s3();
+        Ok(Self::within(pulse, limits))
+    }
+
+    /// The law for limits that were checked before.
+    #[must_use]
+    pub(crate) fn within(pulse: Pulse, limits: Limits<R>) -> Self {
+        let Limits { accel_mm_s2: accel, jerk_mm_s3: jerk, snap_mm_s4: snap } = limits;
+        let (pi, two) = (R::from_f64(PI), R::from_f64(2.0));
+        let peak = jerk.min(accel.sqrt_product(snap * R::from_f64(2.0 / PI)));
         let snap_time_s = pi.times_per(peak, snap);
-        let accel_time_s = two.times_per(accel, peak);
-        Ok(Self {
-            limits,
-            jerk_mm_s3: peak,
-            // The first product is below A.
-            snap_limited_to_mm_s: (snap_time_s * (peak / two)).times_per(snap_time_s, R::ONE),
-            accel_limited_from_mm_s: accel_time_s.times_per(accel, R::ONE),
-            snap_root: (snap / constant(TAU)).cbrt(),
-            jerk_root: (peak / two).sqrt(),
-            snap_time_s,
-            accel_time_s,
-        })
+        let accel_time_s = match pulse {
+            Pulse::Sin2 => two.times_per(accel, peak),
+            // No shorter than two edges, which it is by rounding where the plateau is empty.
+            Pulse::Plateau => (accel / peak + snap_time_s / two).max(snap_time_s),
+        };
+        Self { pulse, limits, jerk_mm_s3: peak, snap_time_s, accel_time_s }
     }
 
     /// The limits this law keeps.
@@ -143,33 +180,85 @@ impl<R: Root> Law<R> {
         self.limits
     }
 
+    /// The shape of its pulses.
+    pub fn pulse(&self) -> Pulse {
+        self.pulse
+    }
+
     /// The duration of a ramp that changes the feed by `change_mm_s` ≥ 0 \[s\]: t_p of (14).
     pub fn ramp_time_s(&self, change_mm_s: R) -> R {
-        let (rise_s, fall_start_s, _) = self.times_s(change_mm_s);
+        let Times { rise_s, fall_start_s, .. } = self.times(change_mm_s);
         rise_s + fall_start_s
     }
 
-    /// (t₁, t₂) of a ramp that changes the feed by `change_mm_s` ≥ 0 \[s\], and what fixed them: (13), (22),
-    /// (23). In fixed point they are up to 8 steps (1.9 ns) too long, never too short, so the limits hold
+    /// The times of a ramp that changes the feed by `change_mm_s` ≥ 0: the one choice between the regimes. In
+    /// fixed point pulses and hold are up to 8 steps (1.9 ns) too long, never too short, so the limits hold
     /// whatever the rounding. The regime is found by comparing times, because regimes may meet at changes of
     /// feed of only a few steps.
-    pub(super) fn times_s(&self, change_mm_s: R) -> (R, R, LimitedBy) {
+    pub(super) fn times(&self, change_mm_s: R) -> Times<R> {
         work::add(1);
+        let half = R::from_f64(0.5);
         if change_mm_s <= R::ZERO {
-            return (R::ZERO, R::ZERO, LimitedBy::Snap);
+            let (edge_s, rise_s, fall_start_s) = (R::ZERO, R::ZERO, R::ZERO);
+            return Times { edge_s, rise_s, fall_start_s, limited_by: LimitedBy::Snap };
         }
-        let by_jerk_s = change_mm_s.sqrt() / self.jerk_root;
-        if by_jerk_s <= self.snap_time_s {
-            let rise_s = change_mm_s.cbrt() / self.snap_root + R::MARGIN;
-            (rise_s, rise_s, LimitedBy::Snap)
+        let by_jerk_s = self.by_jerk_s(change_mm_s);
+        let (rise_s, limited_by) = if by_jerk_s <= self.snap_time_s {
+            (change_mm_s.cbrt() / self.snap_root(), LimitedBy::Snap)
         } else if by_jerk_s < self.accel_time_s {
-            let rise_s = by_jerk_s + R::MARGIN;
-            (rise_s, rise_s, LimitedBy::Jerk)
+            (by_jerk_s, LimitedBy::Jerk)
         } else {
-            let rise_s = self.accel_time_s + R::MARGIN;
-            let fall_start_s = change_mm_s / self.limits.accel_mm_s2 + R::MARGIN;
-            (rise_s, fall_start_s.max(rise_s), LimitedBy::Acceleration)
+            (self.accel_time_s, LimitedBy::Acceleration)
+        };
+        let rise_s = rise_s + R::MARGIN;
+        let (edge_s, rise_s) = match (self.pulse, limited_by) {
+            (Pulse::Sin2, _) | (Pulse::Plateau, LimitedBy::Snap) => {
+                (half * rise_s, half * rise_s + half * rise_s)
+            }
+            (Pulse::Plateau, _) => ((half * (self.snap_time_s + R::MARGIN)).min(half * rise_s), rise_s),
+        };
+        let fall_start_s = match limited_by {
+            LimitedBy::Acceleration => (change_mm_s / self.limits.accel_mm_s2 + R::MARGIN).max(rise_s),
+            LimitedBy::Jerk | LimitedBy::Snap => rise_s,
+        };
+        Times { edge_s, rise_s, fall_start_s, limited_by }
+    }
+
+    /// P where jerk limits \[s\].
+    fn by_jerk_s(&self, change_mm_s: R) -> R {
+        match self.pulse {
+            Pulse::Sin2 => change_mm_s.sqrt() / self.jerk_root(),
+            Pulse::Plateau => {
+                JerkPulse::duration_for_s(self.jerk_mm_s3, R::from_f64(0.5) * self.snap_time_s, change_mm_s)
+            }
         }
+    }
+
+    /// The change of feed that a ramp without a hold makes with pulses of length `rise_s` and edges e':
+    /// J'·P·(P − e') \[mm/s\].
+    pub(super) fn change_mm_s(&self, rise_s: R) -> R {
+        // The first product is at most A.
+        ((rise_s - R::from_f64(0.5) * self.snap_time_s) * self.jerk_mm_s3) * rise_s
+    }
+
+    /// √(J'/2): P = √x/√(J'/2) where jerk fixes the sin² pulse.
+    pub(super) fn jerk_root(&self) -> R {
+        (R::from_f64(0.5) * self.jerk_mm_s3).sqrt()
+    }
+
+    /// (DJ/2π)^⅓: P = x^⅓/(DJ/2π)^⅓ where snap fixes the ramp.
+    pub(super) fn snap_root(&self) -> R {
+        (self.limits.snap_mm_s4 / R::from_f64(TAU)).cbrt()
+    }
+
+    /// Up to this change of feed snap fixes the ramp: x₁ = J'·2e'·e' \[mm/s\].
+    pub(super) fn snap_limited_to_mm_s(&self) -> R {
+        self.change_mm_s(self.snap_time_s)
+    }
+
+    /// From this change of feed on acceleration fixes the ramp: x₂ = A·P \[mm/s\].
+    pub(super) fn accel_limited_from_mm_s(&self) -> R {
+        self.accel_time_s.times_per(self.limits.accel_mm_s2, R::ONE)
     }
 
     /// The length of a ramp between the two feeds \[mm\], the same up and down: (12). Saturates in fixed

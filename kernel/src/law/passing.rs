@@ -1,49 +1,59 @@
 //! Bounds on where an accelerating ramp passes a feed.
 //!
 //! Consumes a ramp, then feeds; produces two lengths between which [`Ramp::length_to_feed_mm`] lies, at a
-//! fraction of its cost: no division, two square roots. Background: the planner of spanning ramps uses it for
-//! every ceiling that a ramp may pass.
+//! fraction of its cost: no division, two square roots, up to the end of an opening edge. Background:
+//! the planner of spanning ramps uses it for every ceiling that a ramp may pass.
 
 use super::Ramp;
+use super::pulse::JerkPulse;
 use super::shape::{ABOUT_WITHIN, Shape};
 use crate::work;
 
-/// Relative rounding of the length while acceleration is held, where the formula is exact.
-const HELD_WITHIN: f64 = 1.0e-12;
+/// Relative rounding of the length where the formula is exact: all but the arches.
+const EXACT_WITHIN: f64 = 1.0e-12;
 
 /// The values of a ramp that are the same for every feed it passes.
 #[derive(Clone, Copy, Debug)]
 pub struct Passing {
     from_mm_s: f64,
     to_mm_s: f64,
-    rise_s: f64,
+    pulse: JerkPulse<f64>,
     length_mm: f64,
-    /// The feed gained while acceleration rises \[mm/s\]: a quarter of the scale of feeds.
-    curved_mm_s: f64,
-    /// 1 / `curved_mm_s`.
-    per_curved: f64,
-    /// The scale of lengths: Jp·t₁³ \[mm\].
-    curve_mm: f64,
     /// One over the greatest acceleration \[s²/mm\].
     per_accel: f64,
+    /// What a pulse gains \[mm/s, mm\].
+    pulse_mm_s: f64,
+    pulse_mm: f64,
+    /// The feed gained up to which the shape of an arch holds: of all of a pulse without a plateau, or of an
+    /// edge \[mm/s\].
+    arch_mm_s: f64,
+    /// The length of the arch \[s\], and the scale of its lengths \[mm\].
+    arch_s: f64,
+    arch_mm: f64,
+    /// One over the scale of its feeds \[s/mm\].
+    per_arch: f64,
 }
 
 impl Passing {
     /// Prepares `ramp`, which goes from a lower feed to a higher one.
     #[must_use]
     pub fn new(ramp: &Ramp<f64>) -> Self {
-        let accel = ramp.peak_accel_mm_s2();
-        let per_accel = 1.0 / accel;
-        let rise_s = ramp.t1_s;
+        let pulse = ramp.pulse();
+        let arch_s = 2.0 * ramp.edge_s;
+        let scale_mm_s = ramp.peak_jerk_mm_s3 * arch_s * arch_s;
+        let arch_mm_s = if ramp.plateau_s() > 0.0 { Shape::<f64>::middle().speed } else { 0.25 };
         Self {
             from_mm_s: ramp.from_mm_s,
             to_mm_s: ramp.to_mm_s,
-            rise_s,
+            pulse,
             length_mm: ramp.length_mm(),
-            curved_mm_s: 0.5 * accel * rise_s,
-            per_curved: 2.0 * per_accel / rise_s,
-            curve_mm: 2.0 * accel * rise_s * rise_s,
-            per_accel,
+            per_accel: 1.0 / ramp.peak_accel_mm_s2(),
+            pulse_mm_s: pulse.speed_mm_s(),
+            pulse_mm: pulse.length_mm(),
+            arch_mm_s: scale_mm_s * arch_mm_s,
+            arch_s,
+            arch_mm: scale_mm_s * arch_s,
+            per_arch: 1.0 / scale_mm_s,
         }
     }
 
@@ -59,22 +69,25 @@ impl Passing {
         if left <= 0.0 {
             return (self.length_mm, self.length_mm);
         }
-        let near_start = gained <= self.curved_mm_s;
-        if !near_start && left >= self.curved_mm_s {
-            let straight_mm = self.from_mm_s * self.rise_s + self.curve_mm * Shape::END.length;
-            let held = gained - self.curved_mm_s;
+        let is_near_start = gained <= self.pulse_mm_s;
+        if !is_near_start && left >= self.pulse_mm_s {
+            let held = gained - self.pulse_mm_s;
             let held_mm = held * self.per_accel * (feed_mm_s - 0.5 * held);
-            let slack_mm = self.length_mm * HELD_WITHIN;
-            let about_mm = straight_mm + held_mm;
+            let about_mm = self.from_mm_s * self.pulse.duration_s + self.pulse_mm + held_mm;
+            let slack_mm = self.length_mm * EXACT_WITHIN;
             return (about_mm - slack_mm, about_mm + slack_mm);
         }
-        let (near, end_mm_s) = if near_start { (gained, self.from_mm_s) } else { (left, self.to_mm_s) };
-        let (x, shape_length) = Shape::<f64>::about_where_speed_is(0.25 * (near * self.per_curved));
-        let straight_mm = end_mm_s * (self.rise_s * x);
-        let curve_mm = self.curve_mm * shape_length;
-        let slack_mm = straight_mm * ABOUT_WITHIN[0] + curve_mm * ABOUT_WITHIN[1];
+        let (near, end_mm_s) = if is_near_start { (gained, self.from_mm_s) } else { (left, self.to_mm_s) };
+        let (straight_mm, curve_mm, slack_mm) = if near <= self.arch_mm_s {
+            let (x, length) = Shape::<f64>::about_where_speed_is(near * self.per_arch);
+            let (straight_mm, curve_mm) = (end_mm_s * (self.arch_s * x), self.arch_mm * length);
+            (straight_mm, curve_mm, straight_mm * ABOUT_WITHIN[0] + curve_mm * ABOUT_WITHIN[1])
+        } else {
+            let (at_s, curve_mm) = self.pulse.where_speed_is(near);
+            (end_mm_s * at_s, curve_mm, self.length_mm * EXACT_WITHIN)
+        };
         let about_mm =
-            if near_start { straight_mm + curve_mm } else { self.length_mm - (straight_mm - curve_mm) };
+            if is_near_start { straight_mm + curve_mm } else { self.length_mm - (straight_mm - curve_mm) };
         (about_mm - slack_mm, about_mm + slack_mm)
     }
 }

@@ -5,12 +5,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::limits::{Law, Limits};
-use super::shape::Shape;
-use crate::num::{Root, Scalar};
+use super::limits::{Law, Times};
+use super::pulse::JerkPulse;
+use crate::num::Root;
 use crate::work;
 
-/// A ramp between two feeds (S1, section 1). A braking ramp is the accelerating one mirrored.
+/// A ramp between two feeds: a pulse of jerk, a hold, and the pulse reversed (S1, section 1). A braking ramp
+/// is the accelerating one mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ramp<R> {
     /// F₀ \[mm/s\], ≥ 0.
@@ -19,7 +20,9 @@ pub struct Ramp<R> {
     pub to_mm_s: R,
     /// J_p \[mm/s³\], ≥ 0; 0 if the feeds are equal.
     pub peak_jerk_mm_s3: R,
-    /// t₁, the end of the rising phase \[s\].
+    /// e, the length of each edge of a pulse \[s\]: at most t₁/2, and just that in a sin² pulse.
+    pub edge_s: R,
+    /// t₁, the end of the rising phase: the length of a pulse \[s\].
     pub t1_s: R,
     /// t₂, the end of the phase of constant acceleration \[s\], ≥ t₁.
     pub t2_s: R,
@@ -67,51 +70,19 @@ pub struct FeedState<R> {
 }
 
 impl<R: Root> Ramp<R> {
-    /// The fastest ramp of the law between two feeds ≥ 0: S1 (13), (22), (23). Equal feeds give a
-    /// ramp of no duration.
+    /// The fastest ramp of the law between two feeds ≥ 0: with sin² pulses S1 (13), (22), (23). Equal feeds
+    /// give a ramp of no duration.
     #[must_use]
     pub fn new(law: &Law<R>, from_mm_s: R, to_mm_s: R) -> Self {
         let change = (to_mm_s - from_mm_s).abs();
-        let (t1_s, t2_s, limited_by) = law.times_s(change);
+        let Times { edge_s, rise_s: t1_s, fall_start_s: t2_s, limited_by } = law.times(change);
         let peak_jerk_mm_s3 = match limited_by {
             LimitedBy::Snap if change <= R::ZERO => R::ZERO,
             // Divided twice: the square of a short time loses its digits in fixed point.
             LimitedBy::Snap => (change.times_per(R::from_f64(2.0), t1_s) / t1_s).min(law.jerk_mm_s3),
             LimitedBy::Jerk | LimitedBy::Acceleration => law.jerk_mm_s3,
         };
-        Self { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by }
-    }
-
-    /// As [`new`](Self::new) for the law of `limits` > 0, but for rounding. Cheaper than making that law for
-    /// one ramp, most of all if acceleration fixes the ramp.
-    #[must_use]
-    pub fn within(limits: &Limits<R>, from_mm_s: R, to_mm_s: R) -> Self {
-        work::add(1);
-        let change = (to_mm_s - from_mm_s).abs();
-        let (accel, snap) = (limits.accel_mm_s2, limits.snap_mm_s4);
-        let (pi, two) = (R::from_f64(core::f64::consts::PI), R::from_f64(2.0));
-        let jerk = limits.peak_jerk_mm_s3();
-        let (rise_s, fall_start_s) = (two.times_per(accel, jerk), change / accel);
-        if fall_start_s >= rise_s {
-            return Self {
-                from_mm_s,
-                to_mm_s,
-                peak_jerk_mm_s3: jerk,
-                t1_s: rise_s + R::MARGIN,
-                t2_s: fall_start_s + R::MARGIN,
-                limited_by: LimitedBy::Acceleration,
-            };
-        }
-        let by_jerk_s = change.sqrt() / (jerk / two).sqrt();
-        let (rise_s, peak_jerk_mm_s3, limited_by) = if change <= R::ZERO {
-            (R::ZERO, R::ZERO, LimitedBy::Snap)
-        } else if by_jerk_s <= pi.times_per(jerk, snap) {
-            let rise_s = change.times_per(pi + pi, snap).cbrt() + R::MARGIN;
-            (rise_s, (change.times_per(two, rise_s) / rise_s).min(jerk), LimitedBy::Snap)
-        } else {
-            (by_jerk_s + R::MARGIN, jerk, LimitedBy::Jerk)
-        };
-        Self { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s: rise_s, t2_s: rise_s, limited_by }
+        Self { from_mm_s, to_mm_s, peak_jerk_mm_s3, edge_s, t1_s, t2_s, limited_by }
     }
 
     /// A constant feed for `time_s`.
@@ -121,6 +92,7 @@ impl<R: Root> Ramp<R> {
             from_mm_s: feed_mm_s,
             to_mm_s: feed_mm_s,
             peak_jerk_mm_s3: R::ZERO,
+            edge_s: R::ZERO,
             t1_s: R::ZERO,
             t2_s: time_s,
             limited_by: LimitedBy::Snap,
@@ -148,14 +120,53 @@ impl<R: Root> Ramp<R> {
         (self.from_mm_s + self.to_mm_s).times_per(self.duration_s(), R::from_f64(2.0))
     }
 
-    /// The greatest acceleration \[mm/s²\], without its sign: J_p·t₁/2.
-    pub fn peak_accel_mm_s2(&self) -> R {
-        self.peak_jerk_mm_s3.times_per(self.t1_s, R::from_f64(2.0))
+    /// How long a pulse holds its peak jerk \[s\]: 0 in a sin² pulse.
+    pub fn plateau_s(&self) -> R {
+        self.t1_s - (self.edge_s + self.edge_s)
     }
 
-    /// J_p with the sign of the change of feed.
-    pub(super) fn signed_jerk_mm_s3(&self) -> R {
-        if self.to_mm_s < self.from_mm_s { -self.peak_jerk_mm_s3 } else { self.peak_jerk_mm_s3 }
+    /// The greatest acceleration \[mm/s²\], without its sign: J_p·(t₁ − e), with sin² pulses J_p·t₁/2.
+    pub fn peak_accel_mm_s2(&self) -> R {
+        self.peak_jerk_mm_s3 * (self.t1_s - self.edge_s)
+    }
+
+    /// The first of its pulses, with the sign of the change of feed.
+    pub(super) fn pulse(&self) -> JerkPulse<R> {
+        let jerk = self.peak_jerk_mm_s3;
+        let jerk_mm_s3 = if self.to_mm_s < self.from_mm_s { -jerk } else { jerk };
+        JerkPulse { jerk_mm_s3, edge_s: self.edge_s, duration_s: self.t1_s }
+    }
+
+    /// The length of a pulse with the jerk and edges of this ramp's, of which two make a change of feed
+    /// > 0 \[s\].
+    pub(crate) fn rise_for_s(&self, change_mm_s: R) -> R {
+        JerkPulse::duration_for_s(self.peak_jerk_mm_s3, self.edge_s, change_mm_s)
+    }
+
+    /// The time of a ramp like this one that changes the feed by `change_mm_s` > 0, and its derivative, as
+    /// long as the same limit fixes it \[s, s²/mm\].
+    pub(crate) fn time_for_s(&self, change_mm_s: R) -> (R, R) {
+        let (half, two) = (R::from_f64(0.5), R::from_f64(2.0));
+        let jerk = self.peak_jerk_mm_s3;
+        match self.limited_by {
+            LimitedBy::Acceleration => {
+                let accel = self.peak_accel_mm_s2();
+                (self.t1_s + change_mm_s / accel, R::ONE / accel)
+            }
+            LimitedBy::Jerk if self.plateau_s() > R::ZERO => {
+                let rise_s = self.rise_for_s(change_mm_s);
+                (two * rise_s, R::ONE / (jerk * (rise_s - half * self.edge_s)))
+            }
+            LimitedBy::Jerk => {
+                let time_s = two * (two * change_mm_s / jerk).sqrt();
+                (time_s, half * time_s / change_mm_s)
+            }
+            LimitedBy::Snap => {
+                let share = change_mm_s / (self.to_mm_s - self.from_mm_s).abs();
+                let time_s = self.duration_s() * share.cbrt();
+                (time_s, time_s / (R::from_f64(3.0) * change_mm_s))
+            }
+        }
     }
 
     /// How far into an accelerating ramp its feed passes `feed_mm_s` \[mm\]: 0 at its start and below, its
@@ -169,22 +180,20 @@ impl<R: Root> Ramp<R> {
         if feed_mm_s >= self.to_mm_s {
             return self.length_mm();
         }
-        let (rise_s, jerk) = (self.t1_s, self.peak_jerk_mm_s3);
-        let speed_scale = jerk * rise_s * rise_s;
-        let length_scale = speed_scale * rise_s;
+        let pulse = self.pulse();
         let (gained, left) = (feed_mm_s - self.from_mm_s, self.to_mm_s - feed_mm_s);
-        let curved = speed_scale * R::from_f64(Shape::END.speed);
+        let curved = pulse.speed_mm_s();
         if gained <= curved {
-            let (x, shape) = Shape::where_speed_is(gained / speed_scale);
-            self.from_mm_s * (rise_s * x) + length_scale.scaled(shape.length)
+            let (at_s, length_mm) = pulse.where_speed_is(gained);
+            self.from_mm_s * at_s + length_mm
         } else if left < curved {
-            let (x, shape) = Shape::where_speed_is(left / speed_scale);
-            self.length_mm() - (self.to_mm_s * (rise_s * x) - length_scale.scaled(shape.length))
+            let (at_s, length_mm) = pulse.where_speed_is(left);
+            self.length_mm() - (self.to_mm_s * at_s - length_mm)
         } else {
-            let held_s = (gained - curved) / (jerk * rise_s * R::from_f64(Shape::END.accel));
+            let held_s = (gained - curved) / pulse.accel_mm_s2();
             let half = R::from_f64(0.5);
-            self.from_mm_s * rise_s
-                + length_scale * R::from_f64(Shape::END.length)
+            self.from_mm_s * self.t1_s
+                + pulse.length_mm()
                 + held_s * (self.from_mm_s + curved + half * (gained - curved))
         }
     }
@@ -208,36 +217,28 @@ impl<R: Root> Ramp<R> {
         if remaining_s <= R::ZERO {
             return rest(self.length_mm() - self.to_mm_s * remaining_s, self.to_mm_s);
         }
-        let (rise_s, jerk) = (self.t1_s, self.signed_jerk_mm_s3());
-        let accel_scale = jerk * rise_s;
-        let speed_scale = accel_scale * rise_s;
-        let length_scale = speed_scale * rise_s;
-        let snap_scale = R::from_f64(core::f64::consts::PI).times_per(jerk, rise_s);
-        if t_s < rise_s {
-            let shape = Shape::at((t_s / rise_s).to_unit());
+        let pulse = self.pulse();
+        if t_s < self.t1_s {
+            let gained = pulse.at(t_s);
             FeedState {
-                s_mm: self.from_mm_s * t_s + length_scale.scaled(shape.length),
-                v_mm_s: self.from_mm_s + speed_scale.scaled(shape.speed),
-                a_mm_s2: accel_scale.scaled(shape.accel),
-                j_mm_s3: jerk.scaled(shape.jerk),
-                snap_mm_s4: snap_scale.scaled(shape.snap),
+                s_mm: self.from_mm_s * t_s + gained.s_mm,
+                v_mm_s: self.from_mm_s + gained.v_mm_s,
+                ..gained
             }
-        } else if remaining_s < rise_s {
+        } else if remaining_s < self.t1_s {
             // The rising phase, run backwards from the end.
-            let shape = Shape::at((remaining_s / rise_s).to_unit());
+            let gained = pulse.at(remaining_s);
             FeedState {
-                s_mm: self.length_mm() - (self.to_mm_s * remaining_s - length_scale.scaled(shape.length)),
-                v_mm_s: self.to_mm_s - speed_scale.scaled(shape.speed),
-                a_mm_s2: accel_scale.scaled(shape.accel),
-                j_mm_s3: -(jerk.scaled(shape.jerk)),
-                snap_mm_s4: snap_scale.scaled(shape.snap),
+                s_mm: self.length_mm() - (self.to_mm_s * remaining_s - gained.s_mm),
+                v_mm_s: self.to_mm_s - gained.v_mm_s,
+                j_mm_s3: -gained.j_mm_s3,
+                ..gained
             }
         } else {
-            let end = Shape::at(R::Unit::ONE);
-            let held_s = t_s - rise_s;
-            let accel = accel_scale.scaled(end.accel);
-            let v_start = self.from_mm_s + speed_scale.scaled(end.speed);
-            let s_start = self.from_mm_s * rise_s + length_scale.scaled(end.length);
+            let held_s = t_s - self.t1_s;
+            let accel = pulse.accel_mm_s2();
+            let v_start = self.from_mm_s + pulse.speed_mm_s();
+            let s_start = self.from_mm_s * self.t1_s + pulse.length_mm();
             FeedState {
                 s_mm: s_start + held_s * (v_start + R::from_f64(0.5) * accel * held_s),
                 v_mm_s: v_start + accel * held_s,

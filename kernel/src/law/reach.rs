@@ -8,7 +8,7 @@
 //! Background only; pure; generic. In f32 one unit in the last place of a feed is a ramp of up to 82 µm, so
 //! f32 is for tests only. In fixed point the solution's precision is that of its times, in steps of 0.23 ns.
 
-use super::limits::Law;
+use super::limits::{Law, Pulse, Times};
 use super::ramp::LimitedBy;
 use crate::num::Root;
 
@@ -58,18 +58,23 @@ fn change_within<R: Root>(law: &Law<R>, lower: R, length: R) -> R {
         return R::ZERO;
     }
     let double_lower = lower + lower;
-    let x2 = law.accel_limited_from_mm_s;
-    // The ramp by x₁ has the length (2F + x₁)·t₁ with t₁ = πJ'/DJ, the one by x₂ likewise with t₁ = 2A/J'.
-    if length / law.snap_time_s - double_lower <= law.snap_limited_to_mm_s {
-        // x = w³, t₁ = w/k with k = (DJ/2π)^⅓:  w·(x + 2F) = k·L
-        let w = root_of_power::<R, 4>(double_lower, law.snap_root, length);
+    let x2 = law.accel_limited_from_mm_s();
+    // The ramp by x₁ has the length (2F + x₁)·P with P = πJ'/DJ, the one by x₂ likewise.
+    if length / law.snap_time_s - double_lower <= law.snap_limited_to_mm_s() {
+        // x = w³, P = w/k with k = (DJ/2π)^⅓:  w·(x + 2F) = k·L
+        let w = root_of_power::<R, 4>(double_lower, law.snap_root(), length);
         w * w * w
     } else if length / law.accel_time_s - double_lower < x2 {
-        // x = w², t₁ = w/k with k = √(J'/2):  w·(x + 2F) = k·L
-        let w = root_of_power::<R, 3>(double_lower, law.jerk_root, length);
-        w * w
+        match law.pulse() {
+            Pulse::Sin2 => {
+                // x = w², P = w/k with k = √(J'/2):  w·(x + 2F) = k·L
+                let w = root_of_power::<R, 3>(double_lower, law.jerk_root(), length);
+                w * w
+            }
+            Pulse::Plateau => law.change_mm_s(pulse_within(law, double_lower, length)),
+        }
     } else {
-        // (F + x/2)(x/A + 2A/J') = L, solved for x without cancellation; a = A²/J':
+        // (F + x/2)(x/A + P) = L, solved for x without cancellation; a = A·P/2:
         // x = (2AL − 4aF)/(√((F − a)² + 2AL) + F + a), no square taken by itself.
         let accel = law.limits().accel_mm_s2;
         let a = R::from_f64(0.5) * x2;
@@ -77,6 +82,33 @@ fn change_within<R: Root>(law: &Law<R>, lower: R, length: R) -> R {
         let taken = x2.sqrt_product(double_lower);
         (all - taken).times_per(all + taken, (lower - a).root_of_squares(all) + lower + a)
     }
+}
+
+/// The length P of a pulse with a plateau for which a ramp without a hold from `double_lower`/2 takes
+/// `length`: P·(2F + J'·P·(P − e')) = L, of which P is longer than two edges and shorter than acceleration allows.
+fn pulse_within<R: Root>(law: &Law<R>, double_lower: R, length: R) -> R {
+    let edge_mm_s2 = R::from_f64(0.5) * law.snap_time_s * law.jerk_mm_s3;
+    // All of these are above the root; x ≥ J'·P²/2 gives the second.
+    let by_jerk_s = (length + length).cbrt() / law.jerk_mm_s3.cbrt();
+    let mut pulse_s = law.accel_time_s.min(by_jerk_s);
+    if double_lower > R::ZERO {
+        pulse_s = pulse_s.min(length.times_per(R::ONE, double_lower));
+    }
+    pulse_s = pulse_s + R::MARGIN;
+    // Increasing and convex in P: Newton falls to the root.
+    for _ in 0..NEWTON_STEPS_MAX {
+        let change = law.change_mm_s(pulse_s);
+        // The residual of the equation divided by P: both sides are feeds.
+        let residual = change + double_lower - length.times_per(R::ONE, pulse_s);
+        let slope = R::from_f64(3.0) * change + double_lower + edge_mm_s2 * pulse_s;
+        let next = pulse_s - pulse_s.times_per(residual, slope);
+        // `<` also ends on NaN.
+        if !(next > R::ZERO && next < pulse_s) {
+            break;
+        }
+        pulse_s = next;
+    }
+    pulse_s
 }
 
 /// The positive root of w·(wⁿ⁻¹ + p) = k·L for n = 3 or 4, p ≥ 0, k > 0, L > 0.
@@ -127,12 +159,13 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     let upper = above.max(change_within(law, lower, half * length_mm) - step);
     let mut y = upper.cbrt() + R::MARGIN;
     let (two, three) = (R::from_f64(2.0), R::from_f64(3.0));
+    let (snap_root, snap_limited_to) = (law.snap_root(), law.snap_limited_to_mm_s());
     for _ in 0..NEWTON_STEPS_MAX {
         let square = y * y;
         let (change, by_y) = (square * y, three * square);
         // While snap limits the shorter ramp, y is the cube root in its time.
-        let short_time = if change <= law.snap_limited_to_mm_s {
-            ((y + y) / law.snap_root, two / law.snap_root)
+        let short_time = if change <= snap_limited_to {
+            ((y + y) / snap_root, two / snap_root)
         } else {
             time(law, change, by_y)
         };
@@ -153,13 +186,16 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
 
 /// Duration of the ramp by `change` > 0, and its derivative by y; the derivative of the change is `by_y`.
 fn time<R: Root>(law: &Law<R>, change: R, by_y: R) -> (R, R) {
-    let (rise, fall_start, limited_by) = law.times_s(change);
-    let time = rise + fall_start;
-    // dT/dx is T/(3x), T/(2x) or 1/A.
-    let slope = match limited_by {
-        LimitedBy::Snap => time.times_per(by_y, R::from_f64(3.0) * change),
-        LimitedBy::Jerk => time.times_per(by_y, change + change),
-        LimitedBy::Acceleration => by_y / law.limits().accel_mm_s2,
+    let Times { rise_s, fall_start_s, edge_s, limited_by } = law.times(change);
+    let time = rise_s + fall_start_s;
+    // dT/dx is T/(3x), T/(2x) or, with a plateau, 2/(J'·(2P − e)), or 1/A.
+    let slope = match (limited_by, law.pulse()) {
+        (LimitedBy::Snap, _) => time.times_per(by_y, R::from_f64(3.0) * change),
+        (LimitedBy::Jerk, Pulse::Sin2) => time.times_per(by_y, change + change),
+        (LimitedBy::Jerk, Pulse::Plateau) => {
+            by_y.times_per(R::from_f64(2.0), law.jerk_mm_s3) / (time - edge_s)
+        }
+        (LimitedBy::Acceleration, _) => by_y / law.limits().accel_mm_s2,
     };
     (time, slope)
 }
@@ -177,9 +213,13 @@ mod tests {
     use crate::law::Limits;
     use crate::random::Random;
 
-    fn laws() -> [Law<f64>; 4] {
-        [(500.0, 5e3, 4e5), (5e3, 1e5, 5e6), (12_500.0, 1e6, 1e8), (500.0, 1e5, 4e5)].map(|(a, j, d)| {
-            Law::new(Limits { accel_mm_s2: a, jerk_mm_s3: j, snap_mm_s4: d }).expect("positive")
+    fn laws() -> impl Iterator<Item = Law<f64>> + Clone {
+        let sets = [(500.0, 5e3, 4e5), (5e3, 1e5, 5e6), (12_500.0, 1e6, 1e8), (500.0, 1e5, 4e5)];
+        [Pulse::Sin2, Pulse::Plateau].into_iter().flat_map(move |pulse| {
+            sets.into_iter().map(move |(a, j, d)| {
+                let limits = Limits { accel_mm_s2: a, jerk_mm_s3: j, snap_mm_s4: d };
+                Law::new(pulse, limits).expect("positive")
+            })
         })
     }
 
@@ -190,10 +230,10 @@ mod tests {
 
     #[test]
     fn reach_takes_just_the_length() {
-        let random = Random::new(1);
+        let (random, laws) = (Random::new(1), laws().collect::<Vec<_>>());
         let mut worst = 0.0_f64;
         for _ in 0..200_000 {
-            for law in &laws() {
+            for law in &laws {
                 let (lower, length) = (feed(&random), random.log(1e-3, 2e3));
                 let higher = reach(law, lower, length);
                 // The change of feed is what the length depends on: compare lengths for it.
@@ -209,11 +249,11 @@ mod tests {
 
     #[test]
     fn peak_takes_just_the_length() {
-        let random = Random::new(2);
+        let (random, laws) = (Random::new(2), laws().collect::<Vec<_>>());
         let mut worst = 0.0_f64;
         let mut solved = 0;
         for _ in 0..200_000 {
-            for law in &laws() {
+            for law in &laws {
                 let (from, to, length) = (feed(&random), feed(&random), random.log(1e-3, 2e3));
                 let peak = peak(law, from, to, length);
                 let taken = law.ramp_length_mm(from, peak) + law.ramp_length_mm(peak, to);
@@ -233,7 +273,7 @@ mod tests {
     /// FIELD's named case: from 60 mm/s, slowing to 20 takes longer than stopping.
     #[test]
     fn length_is_not_monotone_in_the_lower_feed() {
-        let law = &laws()[0];
+        let law = laws().next().expect("the first");
         let (stop, slow) = (law.ramp_length_mm(60.0, 0.0), law.ramp_length_mm(60.0, 20.0));
         assert!(slow > stop, "{slow} {stop}");
     }

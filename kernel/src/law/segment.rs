@@ -1,25 +1,24 @@
 //! A ramp or a cruise made ready for the tick.
 //!
 //! Consumes a [`Ramp`] of any number type and the control tick; produces a [`FeedSegment`]: the feed stream's
-//! item. All divisions and roots happen here, in the background, in f64. The tick is left with one [`Shape`]
-//! and a handful of products.
+//! item. All divisions and roots happen here, in the background, in f64. The tick is left with one
+//! [`Shape`](super::shape::Shape) and a handful of products.
 //!
 //! **Time** is counted in ticks with 32 fractional bits, and the tick never divides by it: a phase adds up
 //! the fraction of itself that passes per tick, with 64 fractional bits.
 //!
-//! **Position** in a rise is F₀·t + Jp·t₁³·(x³/12 − x/(8π²) + sin 2πx/(16π³)) with x = t/t₁. All but the sine
-//! is fixed point times fractions, accurate to a few position steps and length·2⁻³² (1.9 nm over 8 m) in any
-//! number type; the sine's term, a five-hundredth of Jp·t₁³, is a `Real`.
+//! **Position** in a rise is F₀·t and what its pulse has gained ([`TickPulse`]). All but a sine's small part is
+//! fixed point times fractions, accurate to a few position steps and length·2⁻³² (1.9 nm over 8 m) in any
+//! number type.
 
 #[cfg(feature = "live")]
 mod cut;
-
-use core::f64::consts::PI;
+mod tick_pulse;
 
 use serde::{Deserialize, Serialize};
 
+use self::tick_pulse::TickPulse;
 use super::ramp::Ramp;
-use super::shape::Shape;
 use crate::num::{Real, Root, Unit, is_within, rolled, whole};
 use crate::units::Position;
 
@@ -231,16 +230,20 @@ const fn times(a: u32, b: u32) -> u32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeedSegment<R> {
     length: Position,
-    ramp: Ramp<R>,
+    from_mm_s: R,
+    to_mm_s: R,
     rise: Clock,
     hold: Clock,
     /// Where in the rise it is cut, counted from 1 downwards in 2⁻⁶⁴; 0 if it is not cut, see `cut`.
     #[cfg(feature = "live")]
     cut_at: u64,
-    /// F₀·t₁ and −F·t₁ less Jp·t₁³/(8π²), and Jp·t₁³/12, in position steps.
+    /// Where the closing edge of the first pulse begins: until then it is like a ramp that lasts longer.
+    #[cfg(feature = "live")]
+    closing_at: Ticks,
+    /// F₀·P and −F·P less the pulse's bend, in position steps.
     rise_bits: i64,
     fall_bits: i64,
-    cube_bits: i64,
+    pulse: TickPulse<R>,
     /// S(t₁), V(t₁)·(t₂−t₁) and A(t₁)·(t₂−t₁)²/2, in position steps.
     hold_start_bits: i64,
     hold_linear_bits: i64,
@@ -248,12 +251,6 @@ pub struct FeedSegment<R> {
     hold_v_mm_s: R,
     hold_a_mm_s2: R,
     hold_gain_mm_s: R,
-    /// ±Jp times 1, t₁, t₁², t₁³/(16π³) and π/t₁: the scales of [`Shape`].
-    jerk_mm_s3: R,
-    accel_mm_s2: R,
-    speed_mm_s: R,
-    sine_mm: R,
-    snap_mm_s4: R,
 }
 
 /// Corruption of a segment in memory.
@@ -261,31 +258,24 @@ pub struct FeedSegment<R> {
 impl FeedSegment<f32> {
     /// Flips one bit of one of its figures.
     pub(crate) fn with_flipped_bit(mut self, bit: u32) -> Self {
-        let mut wide = [
+        let wide = [
             &mut self.rise_bits,
             &mut self.fall_bits,
-            &mut self.cube_bits,
             &mut self.hold_start_bits,
             &mut self.hold_linear_bits,
             &mut self.hold_square_bits,
         ];
-        let mut narrow = [
-            &mut self.hold_v_mm_s,
-            &mut self.hold_a_mm_s2,
-            &mut self.hold_gain_mm_s,
-            &mut self.jerk_mm_s3,
-            &mut self.accel_mm_s2,
-            &mut self.speed_mm_s,
-            &mut self.sine_mm,
-            &mut self.snap_mm_s4,
-        ];
-        let figure = (bit >> 8) as usize % (wide.len() + narrow.len() + 1);
-        if let Some(wide) = wide.get_mut(figure) {
-            **wide ^= 1 << (bit % 64);
-        } else if let Some(narrow) = narrow.get_mut(figure - 6) {
-            **narrow = f32::from_bits(narrow.to_bits() ^ 1 << (bit % 32));
-        } else {
-            self.length = Position::from_bits(self.length.to_bits() ^ 1 << (bit % 64));
+        let mut narrow = [&mut self.hold_v_mm_s, &mut self.hold_a_mm_s2, &mut self.hold_gain_mm_s];
+        let figure = (bit >> 8) as usize;
+        let figures = wide.len() + narrow.len() + 1 + TickPulse::<f32>::FIGURES;
+        match figure % figures {
+            figure @ 0..5 => *wide[figure] ^= 1 << (bit % 64),
+            figure @ 5..8 => {
+                let narrow = &mut narrow[figure - 5];
+                **narrow = f32::from_bits(narrow.to_bits() ^ 1 << (bit % 32));
+            }
+            8 => self.length = Position::from_bits(self.length.to_bits() ^ 1 << (bit % 64)),
+            figure => self.pulse.flip_bit(figure - 9, bit),
         }
         self
     }
@@ -294,6 +284,9 @@ impl FeedSegment<f32> {
 /// Greatest difference between a ramp's own length and the path it covers \[mm\]: rounding of both ends to
 /// position steps, and of the ramp's figures in f64 at a kilometre.
 const LENGTH_TOLERANCE_MM: f64 = 1.0e-8;
+
+/// How much longer than a pulse its two edges may be by rounding, as a part of it.
+const ROUNDING_OF_EDGES: f64 = 1.0e-14;
 
 impl<R: Real> FeedSegment<R> {
     /// A ramp over `length` of path, which must be its own length to 10⁻⁸ mm (rounding).
@@ -314,92 +307,61 @@ impl<R: Real> FeedSegment<R> {
     }
 
     fn new(ramp: &Ramp<f64>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
-        let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by } = *ramp;
+        let Ramp { from_mm_s, to_mm_s, edge_s, t1_s, t2_s, .. } = *ramp;
         let hold_s = t2_s - t1_s;
         // The first reason to refuse it. The computation still continues to its end: an early return at each
         // figure would take more flash than the computation.
         let mut refused = None;
         let [rise, hold] = check(&mut refused, ramp, length, tick_s, R::RAMP_MM_MAX).map(Clock::new);
-        let jerk = ramp.signed_jerk_mm_s3();
-        let accel = jerk * t1_s;
-        let speed = accel * t1_s;
-        let length_scale = speed * t1_s;
-        let end = Shape::END;
-        let (hold_a, hold_v) = (accel * end.accel, from_mm_s + speed * end.speed);
-        let snap = if t1_s > 0.0 { PI * jerk / t1_s } else { 0.0 };
-        let of_ramp = &["entry feed [mm/s]", "exit feed [mm/s]", "peak jerk [mm/s³]", "t1 [s]", "t2 [s]"];
-        let figures = [from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s];
-        let ramp = made(&mut refused, of_ramp, figures, R::checked_from_f64);
+        let feeds = made(
+            &mut refused,
+            &["entry feed [mm/s]", "exit feed [mm/s]"],
+            [from_mm_s, to_mm_s],
+            R::checked_from_f64,
+        );
+        let of_ramp = ramp.pulse();
+        let (pulse, bent_mm) = TickPulse::new(&mut refused, &of_ramp);
+        let (hold_v, hold_a) = (from_mm_s + of_ramp.speed_mm_s(), of_ramp.accel_mm_s2());
         let lengths = &[
             "entry feed · t1 [mm]",
             "exit feed · t1 [mm]",
-            "jerk · t1³/12 [mm]",
             "length of the rise [mm]",
             "feed · hold time [mm]",
             "length gained in the hold [mm]",
         ];
-        let bent = length_scale / (8.0 * PI * PI);
         let lengths_mm = [
-            from_mm_s * t1_s - bent,
-            to_mm_s * t1_s + bent,
-            length_scale / 12.0,
-            from_mm_s * t1_s + length_scale * end.length,
+            from_mm_s * t1_s - bent_mm,
+            to_mm_s * t1_s + bent_mm,
+            from_mm_s * t1_s + of_ramp.length_mm(),
             hold_v * hold_s,
             0.5 * hold_a * hold_s * hold_s,
         ];
         let lengths = made(&mut refused, lengths, lengths_mm, Position::from_mm);
-        let scales = &[
-            "feed at t1 [mm/s]",
-            "acceleration at t1 [mm/s²]",
-            "feed gained in the hold [mm/s]",
-            "peak jerk [mm/s³]",
-            "jerk · t1 [mm/s²]",
-            "jerk · t1² [mm/s]",
-            "jerk · t1³ [mm]",
-            "peak snap [mm/s⁴]",
-        ];
-        let sine = length_scale / (16.0 * PI * PI * PI);
-        // A value that a narrow type can't hold must be refused here, not overflow in a tick.
-        let scales = made(
-            &mut refused,
-            scales,
-            [hold_v, hold_a, hold_a * hold_s, jerk, accel, speed, sine, snap],
-            R::checked_from_f64,
-        );
-        let [from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s] = ramp;
-        let [rise_bits, fall_less_bits, cube_bits, hold_start_bits, hold_linear_bits, hold_square_bits] =
+        let scales = &["feed at t1 [mm/s]", "acceleration at t1 [mm/s²]", "feed gained in the hold [mm/s]"];
+        let figures = [hold_v, hold_a, hold_a * hold_s];
+        let scales = made(&mut refused, scales, figures, R::checked_from_f64);
+        let [rise_bits, fall_less_bits, hold_start_bits, hold_linear_bits, hold_square_bits] =
             lengths.map(Position::to_bits);
-        let [
-            hold_v_mm_s,
-            hold_a_mm_s2,
-            hold_gain_mm_s,
-            jerk_mm_s3,
-            accel_mm_s2,
-            speed_mm_s,
-            sine_mm,
-            snap_mm_s4,
-        ] = scales;
+        let ([from_mm_s, to_mm_s], [hold_v_mm_s, hold_a_mm_s2, hold_gain_mm_s]) = (feeds, scales);
         let segment = Self {
             length,
-            ramp: Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by },
+            from_mm_s,
+            to_mm_s,
             rise,
             hold,
             #[cfg(feature = "live")]
             cut_at: 0,
+            #[cfg(feature = "live")]
+            closing_at: Ticks::from_seconds(t1_s - edge_s, tick_s).unwrap_or_default(),
             rise_bits,
             fall_bits: -fall_less_bits,
-            cube_bits,
+            pulse,
             hold_start_bits,
             hold_linear_bits,
             hold_square_bits,
             hold_v_mm_s,
             hold_a_mm_s2,
             hold_gain_mm_s,
-            jerk_mm_s3,
-            accel_mm_s2,
-            speed_mm_s,
-            sine_mm,
-            snap_mm_s4,
         };
         refused.map_or(Ok(segment), Err)
     }
@@ -409,9 +371,14 @@ impl<R: Real> FeedSegment<R> {
         self.length
     }
 
-    /// The ramp it was made from; a cruise has equal feeds and t₁ = 0.
-    pub fn as_ramp(&self) -> &Ramp<R> {
-        &self.ramp
+    /// The feed at its start \[mm/s\].
+    pub fn from_mm_s(&self) -> R {
+        self.from_mm_s
+    }
+
+    /// The feed at its end \[mm/s\].
+    pub fn to_mm_s(&self) -> R {
+        self.to_mm_s
     }
 
     /// Greatest |acceleration| inside \[mm/s²\].
@@ -419,9 +386,22 @@ impl<R: Real> FeedSegment<R> {
         self.hold_a_mm_s2.abs()
     }
 
-    /// Greatest |snap| inside \[mm/s⁴\].
+    /// Greatest |jerk| inside \[mm/s³\]; of a cut ramp, that of the whole.
+    pub fn peak_jerk_mm_s3(&self) -> R {
+        self.pulse.jerk_mm_s3.abs()
+    }
+
+    /// Greatest |snap| inside \[mm/s⁴\]; of a cut ramp, that of the whole.
     pub(crate) fn peak_snap_mm_s4(&self) -> R {
-        self.snap_mm_s4.abs()
+        self.pulse.snap_mm_s4.abs()
+    }
+
+    /// How long it is like a ramp with the same first pulse that goes on: up to the closing edge or the cut.
+    pub(crate) fn opens_for(&self) -> Ticks {
+        #[cfg(feature = "live")]
+        return self.closing_at;
+        #[cfg(not(feature = "live"))]
+        self.rise.duration
     }
 
     /// The whole duration.
@@ -500,37 +480,28 @@ impl<R: Real> FeedSegment<R> {
                 snap_mm_s4: R::ZERO,
             };
         }
-        // The fall is the rise run backwards from the end, and in a cut ramp time before the middle counts
-        // towards it: one evaluation of the shape serves all cases.
-        let falling = phase == Phase::Fall;
-        let before = is_cut && fraction.cast_signed() < 0;
-        let fraction = match (falling, before) {
-            (true, _) => !fraction,
-            (false, true) => fraction.wrapping_neg(),
-            (false, false) => fraction,
-        };
-        let unit = R::Unit::from_fraction(fraction);
-        let shape = Shape::at(unit);
-        let (gained, jerk) = (self.speed_mm_s.scaled(shape.speed), self.jerk_mm_s3.scaled(shape.jerk));
-        let x = (fraction >> 32) as u32;
-        let square = times(x, x);
-        let cube = portion(self.cube_bits, times(square, x));
-        let bent = Position::from_bits(cube) + Position::from_offset(self.sine_mm.scaled(shape.snap));
-        let (accel, snap) = (self.accel_mm_s2.scaled(shape.accel), self.snap_mm_s4.scaled(shape.snap));
         #[cfg(feature = "live")]
         if is_cut {
-            let rise =
-                PathMotion { s: bent, v_mm_s: gained, a_mm_s2: accel, j_mm_s3: jerk, snap_mm_s4: snap };
-            return self.at_cut(&rise, unit, x, before);
+            return self.at_cut(fraction);
         }
+        // The fall is the rise run backwards from the end: one evaluation of the pulse serves both.
+        let falling = phase == Phase::Fall;
+        let fraction = if falling { !fraction } else { fraction };
+        let gained = self.pulse.at(fraction);
+        let x = (fraction >> 32) as u32;
         let (s, v_mm_s, j_mm_s3) = if falling {
-            let even = Position::from_bits(portion(self.fall_bits, x));
-            (self.length + even, self.ramp.to_mm_s - gained, -jerk)
+            let even = self.length.to_bits().wrapping_add(portion(self.fall_bits, x));
+            (even, self.to_mm_s - gained.v_mm_s, -gained.j_mm_s3)
         } else {
-            let even = Position::from_bits(portion(self.rise_bits, x));
-            (even, self.ramp.from_mm_s + gained, jerk)
+            (portion(self.rise_bits, x), self.from_mm_s + gained.v_mm_s, gained.j_mm_s3)
         };
-        PathMotion { s: (s + bent).min(self.length), v_mm_s, a_mm_s2: accel, j_mm_s3, snap_mm_s4: snap }
+        PathMotion {
+            s: Position::from_bits(s.wrapping_add(gained.s)).min(self.length),
+            v_mm_s,
+            a_mm_s2: gained.a_mm_s2,
+            j_mm_s3,
+            snap_mm_s4: gained.snap_mm_s4,
+        }
     }
 }
 
@@ -558,7 +529,7 @@ pub(super) fn check(
     tick_s: f64,
     ramp_mm_max: f64,
 ) -> [Ticks; 2] {
-    let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, .. } = *ramp;
+    let Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, edge_s, t1_s, t2_s, .. } = *ramp;
     let hold_s = t2_s - t1_s;
     made(
         refused,
@@ -567,11 +538,23 @@ pub(super) fn check(
             "exit feed [mm/s]",
             "peak jerk [mm/s³]",
             "length [mm]",
+            "edge [s]",
             "t1 [s]",
+            "t1 − edges [s]",
             "t2 − t1 [s]",
             "tick [s]",
         ],
-        [from_mm_s, to_mm_s, peak_jerk_mm_s3, length.to_mm(), t1_s, hold_s, tick_s],
+        [
+            from_mm_s,
+            to_mm_s,
+            peak_jerk_mm_s3,
+            length.to_mm(),
+            edge_s,
+            t1_s,
+            ramp.plateau_s() + ROUNDING_OF_EDGES * t1_s,
+            hold_s,
+            tick_s,
+        ],
         // Any type will do; the type of lengths needs no extra function in the image.
         |value| is_within(value, 0.0, f64::MAX).then_some(Position::ZERO),
     );
@@ -585,9 +568,10 @@ pub(super) fn check(
         })
     };
     let phases = [ticks("t1 [s]", t1_s), ticks("t2 − t1 [s]", hold_s)];
-    let value = peak_jerk_mm_s3 * t1_s * t1_s * t1_s;
+    let arch_s = edge_s + edge_s;
+    let value = peak_jerk_mm_s3 * arch_s * arch_s * arch_s;
     if !(value <= ramp_mm_max) {
-        refused.get_or_insert(SegmentError::OutOfRange { quantity: "jerk · t1³ [mm]", value });
+        refused.get_or_insert(SegmentError::OutOfRange { quantity: "jerk · (2·edge)³ [mm]", value });
     }
     phases
 }
@@ -623,14 +607,15 @@ fn make_each<T>(
     }
 }
 
-/// The ramp in f64. Its peak jerk is recomputed from its feeds and times, 2·|F − F₀|/(t₁·t₂): the rounding of
-/// `P` in the original would be a step of the feed in the middle.
+/// The ramp in f64. Its peak jerk is recomputed from its feeds and times, |F − F₀|/(t₂·(t₁ − e)): the
+/// rounding of `P` in the original would be a step of the feed in the middle.
 pub(crate) fn to_f64<P: Root>(ramp: &Ramp<P>) -> Ramp<f64> {
-    let (from_mm_s, to_mm_s) = (ramp.from_mm_s.to_f64(), ramp.to_mm_s.to_f64());
-    let (t1_s, t2_s) = (ramp.t1_s.to_f64(), ramp.t2_s.to_f64());
-    let twice = 2.0 * libm::fabs(to_mm_s - from_mm_s);
-    let peak_jerk_mm_s3 = if t1_s > 0.0 { twice / t2_s / t1_s } else { ramp.peak_jerk_mm_s3.to_f64() };
-    Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, t1_s, t2_s, limited_by: ramp.limited_by }
+    let [from_mm_s, to_mm_s, edge_s, t1_s, t2_s] =
+        [ramp.from_mm_s, ramp.to_mm_s, ramp.edge_s, ramp.t1_s, ramp.t2_s].map(|value| value.to_f64());
+    let change = libm::fabs(to_mm_s - from_mm_s);
+    let peak_jerk_mm_s3 =
+        if t1_s > 0.0 { change / t2_s / (t1_s - edge_s) } else { ramp.peak_jerk_mm_s3.to_f64() };
+    Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, edge_s, t1_s, t2_s, limited_by: ramp.limited_by }
 }
 
 #[cfg(test)]

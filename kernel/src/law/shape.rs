@@ -1,6 +1,7 @@
-//! The law in normalised time, the same for every ramp.
+//! An arch of jerk in normalised time, the same for every ramp.
 //!
-//! With x = t/t₁ in \[0, 1\] the rising phase of S1 (1)–(6) is
+//! With x = t/t₁ in \[0, 1\] the rising phase of S1 (1)–(6) is one arch; the edges of a pulse with a plateau
+//! are its halves, with t₁ = 2e.
 //!
 //! | quantity | scale | shape |
 //! |---|---|---|
@@ -25,8 +26,7 @@
 //! ramp's end, so both ends of a ramp have the full relative precision. All coefficients and intermediate
 //! results stay below 4, so 32-bit fixed point is enough.
 //!
-//! In the tick: two series of constant length side by side, a dozen more multiplications, no division, and no
-//! branch that depends on the time; the mirror is a selection of values.
+//! In the tick: two series of constant length side by side, a dozen more multiplications, no division.
 //!
 //! [`Shape::closed`] has the closed forms, with any sine of [`crate::num::sine`].
 
@@ -58,18 +58,20 @@ pub struct Shape<U> {
     pub snap: U,
 }
 
-impl Shape<f64> {
-    /// At x = 1, S1 (7)–(9).
-    pub const END: Self = Self {
-        jerk: 0.0,
-        accel: 0.5,
-        speed: 0.25,
-        length: 1.0 / 12.0 - 1.0 / (8.0 * core::f64::consts::PI * core::f64::consts::PI),
-        snap: 0.0,
-    };
-}
-
 impl<U: Unit> Shape<U> {
+    /// At x = 1/2, where a plateau begins.
+    pub(super) fn middle() -> Self {
+        let unit = U::from_f64;
+        let square = core::f64::consts::PI * core::f64::consts::PI;
+        Self {
+            jerk: U::ONE,
+            accel: unit(0.25),
+            speed: unit(1.0 / 16.0 - 0.25 / square),
+            length: unit(1.0 / 96.0 - 1.0 / (16.0 * square)),
+            snap: U::ZERO,
+        }
+    }
+
     /// The place in the phase where the feed gained is `speed` of its scale, 0 … 1/4, and the shapes there.
     /// Background.
     ///
@@ -105,17 +107,12 @@ impl<U: Unit> Shape<U> {
         (x, x * w * w * polynomial(&ABOUT_LENGTH))
     }
 
-    /// The shapes at `x` in \[0, 1\].
+    /// The shapes at `z` in \[0, 1/2\]: an edge. In the tick.
     #[inline]
     #[must_use]
-    pub fn at(x: U) -> Self {
+    pub(super) fn at_edge(z: U) -> Self {
         use core::f64::consts::PI;
         let unit = U::from_f64;
-        let half = unit(0.5);
-        let mirrored = x > half;
-        // Exact: 1 − x loses no digit for x above 1/2.
-        let left = U::ONE - x;
-        let z = if mirrored { left } else { x };
         let y = z + z;
         let square = y * y;
         let cube = square * y;
@@ -126,19 +123,30 @@ impl<U: Unit> Shape<U> {
         let twice = accel + accel;
         let snap = (y - (twice + twice)) * unit(PI);
         let scale = unit(1.0 / (4.0 * PI * PI));
-        let (speed, length) = (c * scale, b * scale);
-        if mirrored {
-            // From x³ + z³ = 1 − 3xz and x² − z² = x − z.
-            let length_sum = unit(1.0 / 12.0 - 1.0 / (8.0 * PI * PI)) - unit(0.25) * (x * z);
-            Self {
-                jerk,
-                accel: half - accel,
-                speed: half * (x - half) + speed,
-                length: length_sum - length,
-                snap: -snap,
-            }
-        } else {
-            Self { jerk, accel, speed, length, snap }
+        Self { jerk, accel, speed: c * scale, length: b * scale, snap }
+    }
+
+    /// The shapes at `x` in \[0, 1\].
+    #[inline]
+    #[must_use]
+    pub fn at(x: U) -> Self {
+        use core::f64::consts::PI;
+        let unit = U::from_f64;
+        let half = unit(0.5);
+        if !(x > half) {
+            return Self::at_edge(x);
+        }
+        // Exact: 1 − x loses no digit for x above 1/2.
+        let z = U::ONE - x;
+        let Self { jerk, accel, speed, length, snap } = Self::at_edge(z);
+        // From x³ + z³ = 1 − 3xz and x² − z² = x − z.
+        let length_sum = unit(1.0 / 12.0 - 1.0 / (8.0 * PI * PI)) - unit(0.25) * (x * z);
+        Self {
+            jerk,
+            accel: half - accel,
+            speed: half * (x - half) + speed,
+            length: length_sum - length,
+            snap: -snap,
         }
     }
 

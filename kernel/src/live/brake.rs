@@ -26,7 +26,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
     ) -> Option<PlannedRamp> {
         let mut limits = self.from(from).next()?.limits_at(from.feed_mm_s);
         for _ in 0..LIMITS_STEPS {
-            let ramp = Ramp::new(&Law::new(limits).ok()?, from.feed_mm_s, to_mm_s);
+            let ramp = Ramp::new(&Law::new(self.pulse(), limits).ok()?, from.feed_mm_s, to_mm_s);
             let length_mm = ramp.length_mm();
             let mut length = Position::from_mm(length_mm)?;
             let left = end - (from.at + length);

@@ -9,6 +9,7 @@ use super::reader::Reader;
 use super::source::Source;
 use super::splice::{BlockEnd, Extent};
 use super::timeline::Timeline;
+use crate::law::Pulse;
 use crate::num::Real;
 use crate::program::SupplyError;
 use crate::queue::{LiveFeeder, Progress};
@@ -56,13 +57,14 @@ where
     E: Clone,
     I: Source<AXES, Error = E>,
 {
-    /// Starts at rest with all of `items` still to do, for ticks of `tick_s` and freshly split streams. If
+    /// Starts at rest with all of `items` still to do, planning anew with ramps of `pulse`s, for ticks of
+    /// `tick_s` and freshly split streams. If
     /// ticks can interrupt the background, `lead_ticks` is the number that pass during an ordinary poll with
     /// a plan: a ramp is changed no sooner than that after the progress last seen. Where that was too late,
     /// the lead grows by a tick, and stays.
-    pub fn new(items: I, tick_s: f64, lead_ticks: u32) -> Self {
+    pub fn new(items: I, pulse: Pulse, tick_s: f64, lead_ticks: u32) -> Self {
         Self {
-            reader: Reader::new(items, tick_s),
+            reader: Reader::new(items, pulse, tick_s),
             timeline: Timeline::new(tick_s, lead_ticks),
             mode: Mode::new(),
             block_end: None,

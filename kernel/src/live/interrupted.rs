@@ -5,7 +5,7 @@ use core::convert::Infallible;
 
 use super::{LiveControl, State};
 use crate::exec::{ExecState, Executor};
-use crate::law::{Law, Limits, PathMotion};
+use crate::law::{Law, Limits, PathMotion, Pulse};
 use crate::plan::{Block, BlockPlan, plan, ramps};
 use crate::program::{Allowed, Item, PathBlock};
 use crate::queue::{Intake, LiveStreams, PathRules};
@@ -18,8 +18,8 @@ const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_m
 const PIECE_MM: f64 = 4.0;
 
 /// Adds the items of a straight stretch of blocks from rest to rest; returns each block's end and ceiling.
-fn stretch(random: &Random, from: Position, items: &mut Vec<Item<1>>) -> Vec<(Position, f64)> {
-    let law = Law::new(LIMITS).expect("limits");
+fn stretch(random: &Random, pulse: Pulse, from: Position, items: &mut Vec<Item<1>>) -> Vec<(Position, f64)> {
+    let law = Law::new(pulse, LIMITS).expect("limits");
     let count = 1 + (random.unit() * 8.0) as usize;
     let blocks: Vec<Block<f64>> = (0..count)
         .map(|_| {
@@ -126,9 +126,10 @@ fn ticks_between_any_two_operations_of_a_poll() {
     for seed in 0..150 {
         println!("seed {seed}");
         let random = Random::new(seed);
+        let pulse = if seed % 3 == 0 { Pulse::Sin2 } else { Pulse::Plateau };
         let (mut items, mut stretches, mut from) = (Vec::new(), Vec::new(), Position::ZERO);
         for _ in 0..1 + (random.unit() * 3.0) as usize {
-            let caps = stretch(&random, from, &mut items);
+            let caps = stretch(&random, pulse, from, &mut items);
             let end = from + caps[caps.len() - 1].0;
             stretches.push((from, caps));
             from = end;
@@ -157,7 +158,7 @@ fn ticks_between_any_two_operations_of_a_poll() {
         feeder.between = Some(&between);
         let lead_ticks = (random.unit() * 6.0) as u32;
         let items = items.into_iter().map(Ok);
-        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items, TICK_S, lead_ticks);
+        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items, pulse, TICK_S, lead_ticks);
         loop {
             let ticks = machine.borrow().ticks;
             assert!(ticks < 400_000, "seed {seed}: no end, {:?}", control.state(&feeder));

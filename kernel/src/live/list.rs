@@ -90,14 +90,23 @@ impl Item {
             }
             // The rise is over before it could be cut.
             Phase::Rise if ramp.t1_s <= tick_s => None,
-            Phase::Rise if 2.0 * elapsed_s <= ramp.t1_s => {
+            // Back the way its jerk came.
+            Phase::Rise if elapsed_s <= ramp.edge_s => {
                 let cut = CutRamp { ramp, cut_s: elapsed_s };
                 Some(Self::Cut { ramp, at: elapsed, length: length(cut.length_mm())? })
             }
+            // A plateau is followed by the closing edge at once; in the closing edge, that is driven out.
             Phase::Rise | Phase::Hold => {
-                let t2_s = if phase == Phase::Rise { ramp.t1_s } else { ramp.t1_s + elapsed_s };
-                let change_mm_s = (ramp.to_mm_s - ramp.from_mm_s) * (t2_s / ramp.t2_s);
-                let ramp = Ramp { to_mm_s: changed(ramp.from_mm_s, change_mm_s), t2_s, ..ramp };
+                let (t1_s, t2_s) = match phase {
+                    Phase::Hold => (ramp.t1_s, ramp.t1_s + elapsed_s),
+                    _ => {
+                        let t1_s = (elapsed_s + ramp.edge_s).min(ramp.t1_s);
+                        (t1_s, t1_s)
+                    }
+                };
+                let share = (t1_s - ramp.edge_s) / (ramp.t1_s - ramp.edge_s) * (t2_s / ramp.t2_s);
+                let change_mm_s = (ramp.to_mm_s - ramp.from_mm_s) * share;
+                let ramp = Ramp { to_mm_s: changed(ramp.from_mm_s, change_mm_s), t1_s, t2_s, ..ramp };
                 Some(Self::Feed(PlannedRamp { ramp, length: length(ramp.length_mm())? }))
             }
             Phase::Fall => None,
@@ -118,7 +127,12 @@ impl Item {
                 if held_s >= 0.0 {
                     return self.cut(Phase::Hold, before(held_s)?, tick_s);
                 }
-                (ramp, 0.5 * ramp.t1_s)
+                let change_mm_s = libm::fabs(feed_mm_s - ramp.from_mm_s);
+                let opening_s = ramp.rise_for_s(change_mm_s) - ramp.edge_s;
+                if opening_s > ramp.edge_s {
+                    return self.cut(Phase::Rise, before(opening_s)?, tick_s);
+                }
+                (ramp, ramp.edge_s)
             }
             Self::Cut { ramp, at, .. } => (ramp, at.to_f64() * tick_s),
             _ => return None,
@@ -279,7 +293,7 @@ impl List {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::Limits;
+    use crate::law::{Law, Limits, Pulse};
     use crate::random::Random;
 
     /// Wherever a ramp is to end, it can be cut so that it does, whole or cut already, and never beyond.
@@ -291,7 +305,8 @@ mod tests {
         for number in 0..10_000 {
             let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
             let (from_mm_s, change_mm_s) = (200.0 * random.unit(), random.log(0.1, 200.0));
-            let ramp = Ramp::within(&limits, from_mm_s, from_mm_s + change_mm_s);
+            let pulse = [Pulse::Sin2, Pulse::Plateau][number % 2];
+            let ramp = Ramp::new(&Law::within(pulse, limits), from_mm_s, from_mm_s + change_mm_s);
             let length = Position::from_mm(ramp.length_mm()).expect("in range");
             let start = Splice { stretch: 0, at: Position::ZERO, feed_mm_s: from_mm_s };
             let mut item = Item::Feed(PlannedRamp { ramp, length });
@@ -321,23 +336,27 @@ mod tests {
                 Limits { accel_mm_s2: 50.0 + 500.0 * random.unit(), jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
             let from_mm_s = 1000.0 * random.unit();
             let to_mm_s = libm::fabs(from_mm_s + 100.0 * (random.unit() - 0.5));
-            let ramp = Ramp::within(&limits, from_mm_s, to_mm_s);
+            let pulse = [Pulse::Sin2, Pulse::Plateau][seed % 2];
+            let ramp = Ramp::new(&Law::within(pulse, limits), from_mm_s, to_mm_s);
             let item = Item::Feed(PlannedRamp {
                 ramp,
                 length: Position::from_mm(ramp.length_mm()).expect("in range"),
             });
             let held_s = ramp.t2_s - ramp.t1_s;
             let elapsed = Ticks::from_seconds(held_s * random.unit(), tick_s).expect("in range");
-            for (phase, elapsed) in
-                [(Phase::Rise, Ticks::from_seconds(ramp.t1_s, tick_s)), (Phase::Hold, Some(elapsed))]
-            {
+            let plateau_s = ramp.edge_s + ramp.plateau_s() * random.unit();
+            for (phase, elapsed) in [
+                (Phase::Rise, Ticks::from_seconds(plateau_s, tick_s)),
+                (Phase::Rise, Ticks::from_seconds(ramp.t1_s, tick_s)),
+                (Phase::Hold, Some(elapsed)),
+            ] {
                 let Some(Item::Feed(PlannedRamp { ramp: cut, .. })) =
                     item.cut(phase, elapsed.expect("in range"), tick_s)
                 else {
                     continue;
                 };
                 cuts += 1;
-                let accel_mm_s2 = 0.5 * segment::to_f64(&cut).peak_jerk_mm_s3 * cut.t1_s;
+                let accel_mm_s2 = segment::to_f64(&cut).peak_accel_mm_s2();
                 let most_mm_s2 = limits.accel_mm_s2 * (1.0 + 8.0 * f64::EPSILON);
                 assert!(
                     accel_mm_s2 <= most_mm_s2,

@@ -7,7 +7,7 @@
 use heapless::Deque;
 
 use super::splice::{BlockEnd, SLIVER, Splice, is_before};
-use crate::law::Limits;
+use crate::law::{Limits, Pulse};
 use crate::program::PathBlock;
 use crate::queue::Rejection;
 use crate::units::Position;
@@ -66,6 +66,7 @@ impl AheadBlock {
 /// The known path ahead.
 #[derive(Debug)]
 pub(super) struct Lookahead<const PLACES: usize> {
+    pulse: Pulse,
     blocks: Deque<AheadBlock, PLACES>,
     /// The stretch and end of the last block appended, which may have been passed since.
     last: (u32, Position),
@@ -79,8 +80,20 @@ pub(super) struct Lookahead<const PLACES: usize> {
 }
 
 impl<const PLACES: usize> Lookahead<PLACES> {
-    pub(super) const fn new() -> Self {
-        Self { blocks: Deque::new(), last: (0, Position::ZERO), ends: Deque::new(), line: None, queued: 0 }
+    pub(super) const fn new(pulse: Pulse) -> Self {
+        Self {
+            pulse,
+            blocks: Deque::new(),
+            last: (0, Position::ZERO),
+            ends: Deque::new(),
+            line: None,
+            queued: 0,
+        }
+    }
+
+    /// The shape of the pulses of every ramp planned here.
+    pub(super) fn pulse(&self) -> Pulse {
+        self.pulse
     }
 
     /// Whether there is no place for another block or block end.

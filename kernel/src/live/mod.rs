@@ -38,7 +38,7 @@
 //!
 //! ```
 //! use motion_kernel::exec::Executor;
-//! use motion_kernel::law::Limits;
+//! use motion_kernel::law::{Limits, Pulse};
 //! use motion_kernel::live::{LiveControl, State};
 //! use motion_kernel::queue::{LiveStreams, PathRules};
 //! use motion_kernel::straight::Straight;
@@ -47,10 +47,10 @@
 //! # let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
 //! # let rules = PathRules { limits, feed_mm_s: 50.0, junction_angle_rad: 0.01, junction_gap_mm: 5e-6 };
 //! let (start, end) = ([Position::ZERO], [Position::from_mm(100.0).expect("within a kilometre")]);
-//! let program = Straight::new(start, end, limits, [40.0, 50.0], 0.0005).expect("a motion");
+//! let program = Straight::new(start, end, Pulse::Plateau, limits, [40.0, 50.0], 0.0005).expect("a motion");
 //! let mut streams = LiveStreams::<f32, 1, 64, 16>::new();
 //! let (mut feeder, mut intake) = streams.split(rules, start);
-//! let mut control = LiveControl::<f32, 1, _, _, 64>::new(program, 0.0005, 1);
+//! let mut control = LiveControl::<f32, 1, _, _, 64>::new(program, Pulse::Plateau, 0.0005, 1);
 //! let mut executor = Executor::new(start);
 //! for tick in 0..2000 {
 //!     if tick == 1000 {

@@ -11,6 +11,7 @@ use super::lookahead::Lookahead;
 use super::program_feed::ProgramFeed;
 use super::source::Source;
 use super::splice::{BlockEnd, Extent, Splice};
+use crate::law::Pulse;
 use crate::num::Real;
 use crate::program::supply::{Ready, is_taken};
 use crate::program::{Item, SupplyError};
@@ -72,7 +73,7 @@ pub(super) struct Reader<R: Real, const AXES: usize, I, const PLACES: usize> {
 }
 
 impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R, AXES, I, PLACES> {
-    pub(super) fn new(source: I, tick_s: f64) -> Self {
+    pub(super) fn new(source: I, pulse: Pulse, tick_s: f64) -> Self {
         Self {
             source,
             tick_s,
@@ -80,7 +81,7 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
             pending: None,
             is_full: false,
             path: QueuedPath::new(0, Position::ZERO),
-            lookahead: Lookahead::new(),
+            lookahead: Lookahead::new(pulse),
             feed: ProgramFeed::new(),
         }
     }

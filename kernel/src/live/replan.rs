@@ -119,11 +119,11 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
                     found.are_softer |= least != greatest;
                     last.length_mm += length_mm;
                     last.junction_mm_s = block.junction_mm_s();
-                    last.law = Law::new(least).ok()?;
+                    last.law = Law::new(lookahead.pulse(), least).ok()?;
                     continue;
                 }
             }
-            let law = Law::new(limits).ok()?;
+            let law = Law::new(lookahead.pulse(), limits).ok()?;
             let next = Block { length_mm, cap_mm_s, junction_mm_s: block.junction_mm_s(), law };
             found.blocks.push(next).ok()?;
             found.ends.push(block_end).ok()?;

@@ -122,7 +122,7 @@ pub trait Real: Scalar {
     /// 0.1 µm count \[mm\]. Longer lines are cut into several pieces.
     const PIECE_MM_MAX: f64;
 
-    /// The greatest Jp·t₁³ of a ramp whose positions this type keeps within a quarter of a 0.1 µm count
+    /// The greatest Jp·(2e)³ of a ramp whose positions this type keeps within a quarter of a 0.1 µm count
     /// \[mm\]: a five-hundredth of it is scaled by a sine of this type, good to six [`Self::EPSILON`] in a
     /// float and 70 steps of 2⁻²⁹ in fixed point. Reached by limits so soft that a ramp takes a minute.
     const RAMP_MM_MAX: f64;

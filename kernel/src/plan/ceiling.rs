@@ -14,7 +14,7 @@
 //! get limits with which the sums above stay within the machine's limits even at that feed. All terms grow
 //! with v, a and j, so the sums are smaller at any lower feed.
 
-use crate::law::{Law, LimitError, Limits};
+use crate::law::{Law, LimitError, Limits, Pulse};
 use crate::num::Root;
 
 /// A good value for [`MachineLimits::curve_feed_share`]: it costs a fifth of the feed on a long arc and
@@ -49,6 +49,8 @@ pub struct MachineLimits<R, const AXES: usize> {
     pub path: AxisLimits<R>,
     /// Each axis'.
     pub axes: [AxisLimits<R>; AXES],
+    /// The shape of the pulses of jerk that change the feed.
+    pub pulse: Pulse,
     /// Share of a curve's greatest feed that blocks are planned with, above 0 and at most
     /// [`CURVE_FEED_SHARE_MAX`]; the rest of the limits is for changing the feed on the curve.
     pub curve_feed_share: R,
@@ -183,7 +185,7 @@ impl<R: Root> Ceiling<R> {
         }
         let kappa = bend.curvature_per_mm;
         if kappa <= R::ZERO {
-            return Ok(Self { feed_mm_s: feed, reason, law: Law::new(along)? });
+            return Ok(Self { feed_mm_s: feed, reason, law: Law::new(machine.pulse, along)? });
         }
         let along = least(&along, &across, R::ONE);
         let (accel, jerk, snap) = (across.accel_mm_s2, across.jerk_mm_s3, across.snap_mm_s4);
@@ -236,7 +238,8 @@ impl<R: Root> Ceiling<R> {
         let along_snap = constant(6.0) * (w2 * (w2 * ramp_accel));
         let ramp_snap =
             ((snap - normal_snap).sqrt_product(snap + normal_snap) - along_snap).min(along.snap_mm_s4);
-        let law = Law::new(Limits { accel_mm_s2: ramp_accel, jerk_mm_s3: ramp_jerk, snap_mm_s4: ramp_snap })?;
+        let left = Limits { accel_mm_s2: ramp_accel, jerk_mm_s3: ramp_jerk, snap_mm_s4: ramp_snap };
+        let law = Law::new(machine.pulse, left)?;
         Ok(Self { feed_mm_s: feed, reason, law })
     }
 }
@@ -257,7 +260,7 @@ mod tests {
 
     fn machine() -> MachineLimits<f64, 3> {
         let all = AxisLimits { feed_mm_s: 300.0, limits: LIMITS };
-        MachineLimits { path: all, axes: [all; 3], curve_feed_share: CURVE_FEED_SHARE }
+        MachineLimits { path: all, axes: [all; 3], pulse: Pulse::Plateau, curve_feed_share: CURVE_FEED_SHARE }
     }
 
     /// Worst vectors over every state a ramp on the arc can be in, radii from 1 µm to 100 m.

@@ -67,14 +67,15 @@ const GAP_MM: f64 = 4.0e-9;
 mod tests {
     use super::super::two_pass::plan;
     use super::*;
-    use crate::law::{Law, Limits};
+    use crate::law::{Law, Limits, Pulse};
     use crate::random::Random;
 
     /// Whatever the length, down to a position step: feeds meet to the bit, and lengths to the step. Blocks
     /// are driven from a feed to rest, as when a stop begins where hardly any path is left.
     #[test]
     fn nothing_is_lost_in_ramps_without_a_step() {
-        let law = Law::new(Limits { accel_mm_s2: 2000.0, jerk_mm_s3: 5e4, snap_mm_s4: 4e6 }).expect("limits");
+        let law = Law::new(Pulse::Plateau, Limits { accel_mm_s2: 2000.0, jerk_mm_s3: 5e4, snap_mm_s4: 4e6 })
+            .expect("limits");
         let random = Random::new(7);
         let (mut made_up, mut short) = (0, 0);
         for number in 0..20_000 {

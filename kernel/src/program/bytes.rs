@@ -3,7 +3,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MOTN` |
-//! | 1 | version of this format, 3 |
+//! | 1 | version of this format, 4 |
 //! | 1 | number of axes |
 //! | 2 | length of the guards, least significant byte first; 0 for none |
 //! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format; a kernel without guards skips them |
@@ -21,11 +21,12 @@ use serde::{Deserialize, Serialize};
 use super::checksum::Checksum;
 use super::{Item, wire};
 use crate::axis::{AxisFigures, Guards};
+use crate::law::Pulse;
 use crate::queue::PathRules;
 use crate::units::Position;
 
 const MAGIC: [u8; 4] = *b"MOTN";
-const VERSION: u8 = 3;
+const VERSION: u8 = 4;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 8;
@@ -39,6 +40,9 @@ pub struct Header<const AXES: usize> {
     pub tick_s: f64,
     /// The limits that the streams check items against.
     pub rules: PathRules,
+    /// The shape of the pulses of jerk with which a board plans anew. The program's own ramps may have
+    /// another.
+    pub pulse: Pulse,
     /// The machine's axes.
     #[serde(with = "crate::array")]
     pub axes: [AxisFigures; AXES],
@@ -56,7 +60,7 @@ pub enum ProgramError {
     NotAProgram,
     /// It has another version of the format.
     Version {
-        /// Its version; 3 is expected.
+        /// Its version; 4 is expected.
         found: u8,
     },
     /// It is for a machine with another number of axes.
@@ -239,7 +243,7 @@ mod tests {
     use crate::axis::{Feedforward, GuardFigures};
     use crate::fault::{Reaction, Reactions};
     use crate::fixture::{GUARD, RULES, figures};
-    use crate::law::Ticks;
+    use crate::law::{Pulse, Ticks};
 
     fn header() -> Header<2> {
         let feedforward =
@@ -247,6 +251,7 @@ mod tests {
         Header {
             tick_s: 0.0005,
             rules: RULES,
+            pulse: Pulse::Plateau,
             axes: [AxisFigures { feedforward, ..figures() }; 2],
             start: [Position::ZERO, Position::from_bits(-7)],
         }
@@ -301,9 +306,9 @@ mod tests {
         axis.feedforward.tables = Tables { velocity: table, accel: table, jerk: table };
         axis.feedforward.drive = Some(drive);
         fn longest<const AXES: usize>(axis: AxisFigures) -> Result<usize, postcard::Error> {
-            let Header { tick_s, rules, .. } = header();
+            let Header { tick_s, rules, pulse, .. } = header();
             let far = [Position::from_bits(i64::MIN); AXES];
-            let header = Header { tick_s, rules, axes: [axis; AXES], start: far };
+            let header = Header { tick_s, rules, pulse, axes: [axis; AXES], start: far };
             let figures = GuardFigures { noise_counts: u16::MAX, ..guards().axes[1].expect("figures") };
             let reactions = Reactions { ramp_ticks: u16::MAX, stop_ticks: u32::MAX, ..guards().reactions };
             let guards = Guards { axes: [Some(figures); AXES], reactions };

@@ -112,18 +112,19 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
     }
 
     pub(crate) fn segment(&mut self, segment: &FeedSegment<R>) -> Result<(), Rejection> {
-        let ramp = segment.as_ramp();
-        let step = (ramp.from_mm_s - self.feed_mm_s).abs();
+        let (from_mm_s, to_mm_s) = (segment.from_mm_s(), segment.to_mm_s());
+        let step = (from_mm_s - self.feed_mm_s).abs();
         if !(step <= R::from_f64(4.0 * R::EPSILON) * self.feed_mm_s) {
             return Err(Rejection::FeedStep {
                 from_mm_s: self.feed_mm_s.to_f64(),
-                to_mm_s: ramp.from_mm_s.to_f64(),
+                to_mm_s: from_mm_s.to_f64(),
             });
         }
         let limits = &self.rules.limits;
         let quantities = ["feed [mm/s]", "acceleration [mm/s²]", "jerk [mm/s³]", "snap [mm/s⁴]"];
-        let feed_mm_s = ramp.from_mm_s.max(ramp.to_mm_s);
-        let values = [feed_mm_s, segment.peak_accel_mm_s2(), ramp.peak_jerk_mm_s3, segment.peak_snap_mm_s4()];
+        let feed_mm_s = from_mm_s.max(to_mm_s);
+        let values =
+            [feed_mm_s, segment.peak_accel_mm_s2(), segment.peak_jerk_mm_s3(), segment.peak_snap_mm_s4()];
         let most = [self.rules.feed_mm_s, limits.accel_mm_s2, limits.jerk_mm_s3, limits.snap_mm_s4];
         let (quantities, values, most) = rolled((quantities.as_slice(), values.as_slice(), most.as_slice()));
         for ((&quantity, value), &limit) in quantities.iter().zip(values).zip(most) {
@@ -136,13 +137,13 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
         let feed_length = self.feed_length + segment.length();
         within_range(feed_length)?;
         if R::SETPOINT_MAX.is_some() {
-            let v_mm_s = ramp.from_mm_s.max(ramp.to_mm_s).to_f64();
+            let v_mm_s = from_mm_s.max(to_mm_s).to_f64();
             let is_on_curve = self.feed_length < self.curved_until;
             self.fits(if is_on_curve { &self.steepness } else { &Steepness::STRAIGHT }, v_mm_s)?;
             let was_ahead = self.feed_length > self.path_length;
             self.ahead_mm_s = if was_ahead { f64::max(self.ahead_mm_s, v_mm_s) } else { v_mm_s };
         }
-        self.feed_mm_s = ramp.to_mm_s;
+        self.feed_mm_s = to_mm_s;
         self.feed_length = feed_length;
         Ok(())
     }

@@ -34,7 +34,7 @@ use std::time::{Duration, Instant};
 
 use criterion::Criterion;
 use motion_kernel::exec::Executor;
-use motion_kernel::law::{FeedSegment, Law, Limits, Phase, Ramp, Ticks, peak, reach};
+use motion_kernel::law::{FeedSegment, Law, Limits, Phase, Pulse, Ramp, Ticks, peak, reach};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
 use motion_kernel::plan::{Block, BlockPlan, Node, merge_equal, nodes_for, plan, plan_spanning, ramps};
@@ -339,7 +339,7 @@ const QUEUE: usize = 256;
 /// The whole executor over stretches of random blocks along one axis.
 fn ticks<R: Real>(all: &mut Vec<Contender>, name: &'static str) {
     let limits = Limits { accel_mm_s2: 2000.0, jerk_mm_s3: 5e4, snap_mm_s4: 4e6 };
-    let law = Law::new(limits).expect("positive");
+    let law = Law::new(Pulse::Plateau, limits).expect("positive");
     let mut random = Random(3);
     let blocks: Vec<Block<f64>> = (0..40)
         .map(|_| Block {
@@ -619,7 +619,7 @@ fn plans(all: &mut Vec<Contender>, random: &mut Random) {
 /// A tooth of forty blocks of 0.3 mm whose ceilings rise from 20 to 98 mm/s.
 fn saw_tooth(step: usize) -> Block<f64> {
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
-    let law = Law::new(limits).expect("positive");
+    let law = Law::new(Pulse::Plateau, limits).expect("positive");
     Block { length_mm: 0.3, cap_mm_s: 20.0 + 2.0 * step as f64, junction_mm_s: f64::INFINITY, law }
 }
 
@@ -627,7 +627,7 @@ fn saw_tooth(step: usize) -> Block<f64> {
 fn law(random: &mut Random) -> Law<f64> {
     let limits = [(500.0, 5e3, 4e5), (5e3, 1e5, 5e6), (12_500.0, 1e6, 1e8), (500.0, 1e5, 4e5)];
     let (accel_mm_s2, jerk_mm_s3, snap_mm_s4) = limits[random.below(limits.len())];
-    Law::new(Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }).expect("positive")
+    Law::new(Pulse::Plateau, Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }).expect("positive")
 }
 
 /// Reproducible random numbers (splitmix64).

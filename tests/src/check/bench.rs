@@ -1,6 +1,6 @@
 //! Hand-made items of the streams, for machines of two axes.
 
-use motion_kernel::law::{FeedSegment, Law, Limits, Ramp};
+use motion_kernel::law::{FeedSegment, Law, Limits, Pulse, Ramp};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
 use motion_kernel::plan::{Block, BlockPlan, plan, ramps};
@@ -26,7 +26,7 @@ pub fn line<R: Real>(from: [f64; 2], direction: [f64; 2], length_mm: f64) -> Pie
 }
 
 pub fn law(limits: Limits<f64>) -> Law<f64> {
-    Law::new(limits).expect("limits")
+    Law::new(Pulse::Plateau, limits).expect("limits")
 }
 
 /// A ramp over its own length.

@@ -109,7 +109,7 @@ where
     let mut streams = LiveStreams::<R, 3, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
     let mut executor = Executor::<R, 3>::new(start);
-    let mut control = LiveControl::<R, 3, _, _, PLACES>::new(source, machine.tick_s, 0);
+    let mut control = LiveControl::<R, 3, _, _, PLACES>::new(source, machine.path.pulse, machine.tick_s, 0);
     let mut checker = Checker::new::<R>(machine, plan, path, seed).live(1.0);
     let mut greatest = Greatest { ticks: response_ticks, falling: VecDeque::new() };
     let (mut ticks, mut polls, mut stretches, mut feed_override) = (0_u64, 0_u64, 0_usize, 1.0);

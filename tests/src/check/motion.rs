@@ -1,7 +1,7 @@
 //! Checks of one tick against the limits, the tick before, and the programmed path.
 //!
 //! The feed law makes the path position four times continuously differentiable in time, through rests
-//! too, with a fifth derivative bounded by K = 2π²·Jp/t₁² of the ramps under way. So the values of two
+//! too, with a fifth derivative bounded by K = 2π²·Jp/(2e)² of the ramps under way. So the values of two
 //! neighbouring ticks determine each other: the change of each is the integral of the next one, by
 //! Hermite's rule of the order that the known derivatives allow, within a multiple of K·τⁿ. No law, no
 //! phases: an error in any of the five values shows.
@@ -211,16 +211,16 @@ impl<'a> Checker<'a> {
         }
         for record in records[self.feed..].iter().take_while(|r| r.start_mm <= now[0] + 1e-7) {
             let ramp = &record.planned.ramp;
-            let (jp, t1) = (ramp.peak_jerk_mm_s3, ramp.t1_s);
+            let (jp, arch_s) = (ramp.peak_jerk_mm_s3, 2.0 * ramp.edge_s);
             if jp > 0.0 {
-                crackle = crackle.max(2.0 * PI * PI * jp / (t1 * t1));
-                snap = snap.max(PI * jp / t1);
+                crackle = crackle.max(2.0 * PI * PI * jp / (arch_s * arch_s));
+                snap = snap.max(PI * jp / arch_s);
                 jerk = jerk.max(jp);
-                accel = accel.max(0.5 * jp * t1);
+                accel = accel.max(ramp.peak_accel_mm_s2());
             }
             // In a phase of constant acceleration the feed is computed from its start.
             feed = feed.max(ramp.from_mm_s).max(ramp.to_mm_s);
-            gained = gained.max(jp * t1 * t1 * t1);
+            gained = gained.max(jp * arch_s * arch_s * arch_s);
             span = span.max(record.length_mm());
         }
         if now[0] < then[0] - bounds::backward_mm(self.epsilon, gained) {

@@ -1,7 +1,7 @@
 //! A program out of bytes: stretches that can be driven, rests between them, and some items broken.
 
 use arbitrary::{Result, Unstructured};
-use motion_kernel::law::{Law, Limits, PlannedRamp, Ramp, Ticks};
+use motion_kernel::law::{Law, Limits, PlannedRamp, Pulse, Ramp, Ticks};
 use motion_kernel::program::{Allowed, Item, PathBlock};
 use motion_kernel::queue::PathRules;
 use motion_kernel::units::Position;
@@ -111,7 +111,7 @@ impl Program {
 
     /// Up, along and down again.
     fn feed(&mut self, whole: Position, cap_mm_s: f64) -> Vec<(Ramp<f64>, Position)> {
-        let law = Law::new(LIMITS).expect("limits");
+        let law = Law::new(Pulse::Plateau, LIMITS).expect("limits");
         let mut top_mm_s = cap_mm_s;
         let mut up = Ramp::new(&law, 0.0, top_mm_s);
         while 2.0 * up.length_mm() > whole.to_mm() {
@@ -157,7 +157,7 @@ fn broken(input: &mut Unstructured<'_>, item: Item<2>) -> Result<Item<2>> {
     let axis = input.choose_index(2)?;
     let value: f64 = input.arbitrary()?;
     let bits = Position::from_bits(input.arbitrary()?);
-    let which = input.int_in_range(0..=4)?;
+    let which = input.int_in_range(0..=5)?;
     Ok(match item {
         Item::Line { line, mut start, mut direction, mut length } => {
             match which {
@@ -181,6 +181,7 @@ fn broken(input: &mut Unstructured<'_>, item: Item<2>) -> Result<Item<2>> {
                 1 => ramp.to_mm_s = value,
                 2 => ramp.peak_jerk_mm_s3 = value,
                 3 => (ramp.t1_s, ramp.t2_s) = (value, input.arbitrary()?),
+                4 => ramp.edge_s = value,
                 _ => length = bits,
             }
             Item::Feed(PlannedRamp { ramp, length })

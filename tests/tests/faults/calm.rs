@@ -5,8 +5,8 @@ use motion_host::machine::Machine;
 use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Gains};
 use motion_kernel::num::{Fixed, Real};
 
-use crate::machine::{Next, random_plan, run};
-use crate::setting;
+use super::machine::{Next, random_plan, run};
+use super::setting;
 use motion_tests::random::Random;
 
 /// The reference machine, tuned: the inverse of its drives, early feedforward.

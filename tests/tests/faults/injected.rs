@@ -12,8 +12,8 @@ use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::{Fixed, Real};
 
-use crate::machine::{Next, TickView, random_plan, run};
-use crate::setting;
+use super::machine::{Next, TickView, random_plan, run};
+use super::setting;
 use motion_tests::random::Random;
 
 /// A round of looks at three axes [ticks].

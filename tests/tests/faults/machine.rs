@@ -87,7 +87,12 @@ pub(crate) fn run<R: Real>(plan: &Plan, machine: &Machine, between: &mut Between
     kernel.enable(SETTLE_TICKS);
     let mut streams = Box::new(LiveStreams::<R, 3, PIECES, SEGMENTS>::new());
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
-    let mut control = LiveControl::<R, 3, _, _, PLACES>::new(executable.supplied(), executable.tick_s, 0);
+    let mut control = LiveControl::<R, 3, _, _, PLACES>::new(
+        executable.supplied(),
+        machine.path.pulse,
+        executable.tick_s,
+        0,
+    );
     let mut last: Option<TickView<R>> = None;
     let mut standing = 0;
     for tick in 0.. {

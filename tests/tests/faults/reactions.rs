@@ -7,8 +7,8 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
 
-use crate::machine::{Next, TickView, random_plan, run};
-use crate::setting;
+use super::machine::{Next, TickView, random_plan, run};
+use super::setting;
 use motion_tests::check::drive;
 use motion_tests::check::totals::Totals;
 use motion_tests::random::Random;

@@ -1,6 +1,6 @@
 //! Ramps that are cut in their rise, against the integral of their jerk.
 
-use crate::{LIMITS, feeds, limits};
+use super::{LIMITS, PULSES, feeds, limits};
 use motion_kernel::internals::CutRamp;
 use motion_kernel::law::{FeedSegment, Law, PathMotion, Phase, Ramp, SegmentError, Ticks};
 use motion_kernel::num::{Fixed, Real};
@@ -56,10 +56,10 @@ fn walk<R: Real>(segment: &FeedSegment<R>, mut visit: impl FnMut(f64, &PathMotio
 
 /// A random ramp and where it is cut.
 fn some(random: &mut Random) -> Option<(Ramp<f64>, Ticks)> {
-    let law = Law::new(limits(*random.pick(&LIMITS))).expect("limits");
+    let law = Law::new(*random.pick(&PULSES), limits(*random.pick(&LIMITS))).expect("limits");
     let (from, to) = feeds::<f32>(random);
     let ramp = Ramp::new(&law, from, to);
-    let half = 0.5 * ramp.t1_s / TICK_S;
+    let half = ramp.edge_s / TICK_S;
     (half > 1.0 && half < 4000.0).then(|| {
         let at = 0.01 + random.unit() * (half - 0.01);
         let at = if random.once_in(2) { at.ceil().min(half.floor()) } else { at };
@@ -70,7 +70,7 @@ fn some(random: &mut Random) -> Option<(Ramp<f64>, Ticks)> {
 fn check<R: Real>(stream: u64, epsilon: f64) -> usize {
     let mut random = Random::of_stream(stream);
     let (mut worst, mut points) = ([0.0_f64; 5], 0);
-    for _ in 0..400 {
+    for _ in 0..600 {
         let Some((ramp, at)) = some(&mut random) else { continue };
         let cut = CutRamp { ramp, cut_s: at.to_f64() * TICK_S };
         let length = Position::from_mm(cut.length_mm()).expect("in range");
@@ -79,12 +79,12 @@ fn check<R: Real>(stream: u64, epsilon: f64) -> usize {
             Err(SegmentError::OutOfRange { .. }) => continue,
             Err(error) => panic!("{error} of {cut:?}"),
         };
-        let (cut_s, t1_s) = (cut.cut_s, ramp.t1_s);
+        let (cut_s, t1_s, arch_s) = (cut.cut_s, ramp.t1_s, 2.0 * ramp.edge_s);
         let peak = if ramp.to_mm_s < ramp.from_mm_s { -ramp.peak_jerk_mm_s3 } else { ramp.peak_jerk_mm_s3 };
         // The law's jerk, its beginning backwards, and both once more with the other sign.
         let jerk = |t: f64| {
             let u = t.rem_euclid(2.0 * cut_s);
-            let x = if u < cut_s { u } else { 2.0 * cut_s - u } / t1_s;
+            let x = if u < cut_s { u } else { 2.0 * cut_s - u } / arch_s;
             peak * (PI * x).sin().powi(2) * if t < 2.0 * cut_s { 1.0 } else { -1.0 }
         };
         let (mut state, mut at_s) = ([0.0, ramp.from_mm_s, 0.0], 0.0);
@@ -113,8 +113,8 @@ fn check<R: Real>(stream: u64, epsilon: f64) -> usize {
                     / (STEPS_MM + whole_mm * PART + scale * t1_s * t1_s * (epsilon + PART) + v * late_s),
                 (found.v_mm_s.to_f64() - v).abs() / (highest.max(scale * t1_s) * epsilon + a.abs() * late_s),
                 (found.a_mm_s2.to_f64() - a).abs() / (scale * epsilon + peak.abs() * late_s),
-                (found.j_mm_s3.to_f64() - jerk(t)).abs() / (peak.abs() * (epsilon + 6.3 * late_s / t1_s)),
-                found.snap_mm_s4.to_f64().abs() / (PI * peak.abs() / t1_s * (1.0 + epsilon)),
+                (found.j_mm_s3.to_f64() - jerk(t)).abs() / (peak.abs() * (epsilon + 6.3 * late_s / arch_s)),
+                found.snap_mm_s4.to_f64().abs() / (PI * peak.abs() / arch_s * (1.0 + epsilon)),
             ];
             for (worst, error) in worst.iter_mut().zip(errors) {
                 *worst = worst.max(error);
@@ -141,7 +141,7 @@ fn a_cut_ramp_is_the_integral_of_its_jerk() {
 #[test]
 fn the_rise_is_that_of_the_ramp_under_way() {
     let (mut random, mut compared) = (Random::of_stream(34), 0);
-    for _ in 0..400 {
+    for _ in 0..800 {
         let Some((ramp, at)) = some(&mut random) else { continue };
         let cut = CutRamp { ramp, cut_s: at.to_f64() * TICK_S };
         let length = |mm| Position::from_mm(mm).expect("in range");
@@ -159,11 +159,11 @@ fn the_rise_is_that_of_the_ramp_under_way() {
 }
 
 #[test]
-fn a_cut_belongs_in_the_first_half_of_the_rise() {
+fn a_cut_belongs_in_the_opening_edge() {
     let mut random = Random::of_stream(35);
     let (ramp, _) = std::iter::repeat_with(|| some(&mut random)).flatten().next().expect("endless");
-    for share in [0.0, 0.5001, 0.9] {
-        let at = Ticks::from_seconds(share * ramp.t1_s, TICK_S).expect("in range");
+    for share in [0.0, 1.0002, 1.8] {
+        let at = Ticks::from_seconds(share * ramp.edge_s, TICK_S).expect("in range");
         let refused = FeedSegment::<f64>::cut(&ramp, at, Position::ZERO, TICK_S);
         assert!(matches!(refused, Err(SegmentError::OutOfRange { .. })), "{share}: {refused:?}");
     }

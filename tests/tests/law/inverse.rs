@@ -1,8 +1,8 @@
 //! The inverse problems against bisection in thirty digits.
 
-use crate::oracle::length;
-use crate::{LIMITS, feed, limits, narrow};
-use motion_kernel::law::{Law, Limits, peak, reach};
+use super::oracle::length;
+use super::{LIMITS, PULSES, feed, limits, narrow};
+use motion_kernel::law::{Law, Limits, Pulse, peak, reach};
 use motion_kernel::num::Root;
 use motion_tests::dd::{Dd, dd};
 use motion_tests::random::Random;
@@ -83,7 +83,8 @@ fn room<R: Root>(random: &mut Random) -> f64 {
 }
 
 fn laws<R: Root>() -> Vec<(Limits<f64>, Law<R>)> {
-    LIMITS.map(limits).iter().map(|limits| (*limits, Law::new(narrow(limits)).expect("positive"))).collect()
+    let sets = PULSES.iter().flat_map(|&pulse| LIMITS.map(|set| (pulse, limits(set))));
+    sets.map(|(pulse, limits)| (limits, Law::new(pulse, narrow(&limits)).expect("positive"))).collect()
 }
 
 fn reach_errors<R: Root>(stream: u64, bound: f64) {
@@ -94,9 +95,10 @@ fn reach_errors<R: Root>(stream: u64, bound: f64) {
         let (limits, law) = random.pick(&laws);
         let (lower, room) = (feed::<R>(&mut random), room::<R>(&mut random));
         let found = reach(law, R::from_f64(lower), R::from_f64(room)).to_f64();
-        let error = error_ulp::<R>(found, lower, |higher| length(limits, dd(lower), higher) - dd(room));
+        let error =
+            error_ulp::<R>(found, lower, |higher| length(law.pulse(), limits, dd(lower), higher) - dd(room));
         assert!(error < 100.0, "{error} ulp: {limits:?} from {lower} within {room}: {found}");
-        errors.add(error, length(limits, dd(lower), dd(found)), room);
+        errors.add(error, length(law.pulse(), limits, dd(lower), dd(found)), room);
     }
     errors.check::<R>("reach", bound);
 }
@@ -110,11 +112,12 @@ fn peak_errors<R: Root>(stream: u64, bound: f64) {
         let (from, other, room) = (feed::<R>(&mut random), feed::<R>(&mut random), room::<R>(&mut random));
         let to = if random.once_in(4) { from } else { other };
         let found = peak(law, R::from_f64(from), R::from_f64(to), R::from_f64(room)).to_f64();
-        if length(limits, dd(from), dd(to)) >= dd(room) {
+        if length(law.pulse(), limits, dd(from), dd(to)) >= dd(room) {
             assert_eq!(found, from.max(to), "no room: {limits:?} {from} {to} {room}");
             continue;
         }
-        let both = |peak| length(limits, dd(from), peak) + length(limits, peak, dd(to));
+        let both =
+            |peak| length(law.pulse(), limits, dd(from), peak) + length(law.pulse(), limits, peak, dd(to));
         let error = error_ulp::<R>(found, from.max(to), |peak| both(peak) - dd(room));
         assert!(error < 100.0, "{error} ulp: {limits:?} {from} to {to} within {room}: {found}");
         errors.add(error, both(dd(found)), room);
@@ -156,7 +159,11 @@ fn monotone_in_the_higher_feed() {
             .min(limits.jerk_mm_s3);
         let boundary = match random.below(3) {
             0 => (std::f64::consts::PI / limits.snap_mm_s4).powi(2) * peak_jerk.powi(3) / 2.0,
-            1 => 2.0 * limits.accel_mm_s2.powi(2) / peak_jerk,
+            1 if law.pulse() == Pulse::Sin2 => 2.0 * limits.accel_mm_s2.powi(2) / peak_jerk,
+            1 => {
+                let edge_s = std::f64::consts::PI * peak_jerk / (2.0 * limits.snap_mm_s4);
+                limits.accel_mm_s2 * (limits.accel_mm_s2 / peak_jerk + edge_s)
+            }
             _ => random.log(1e-6, 1e3),
         };
         let change = boundary * (1.0 + (random.unit() - 0.5) * random.log(1e-12, 1.0));
@@ -176,14 +183,14 @@ fn monotone_in_the_higher_feed() {
 #[test]
 fn not_monotone_in_the_lower_feed() {
     let limits = Limits { accel_mm_s2: 2000.0, jerk_mm_s3: 5e4, snap_mm_s4: 5e6 };
-    let law = Law::new(limits).expect("positive");
+    let law = Law::new(Pulse::Sin2, limits).expect("positive");
     let printed = |lower: f64| (law.ramp_length_mm(60.0, lower) * 100.0).round() / 100.0;
     assert_eq!((printed(0.0), printed(20.0)), (2.94, 3.2));
     assert!(printed(40.0) < 3.0);
     let from = [0.0, 20.0, 40.0].map(|lower| reach(&law, lower, 3.0));
     assert!(from[0] > 60.0 && from[1] < 60.0 && from[2] > 60.0, "{from:?}");
     // 200 mm/s with S1's limits: to 0 in 60.0 mm, to 50 in 62.5 mm, to 100 in 60.0 mm.
-    let law = Law::new(crate::limits(LIMITS[0])).expect("positive");
+    let law = Law::new(Pulse::Sin2, super::limits(LIMITS[0])).expect("positive");
     for (lower, mm) in [(0.0, 60.0), (50.0, 62.5), (100.0, 60.0)] {
         assert!((law.ramp_length_mm(200.0, lower) - mm).abs() < 1e-12);
     }

@@ -1,7 +1,7 @@
 //! The choice (22), (23) keeps the limits, and no other law made of sin² pulses is faster.
 
-use crate::{LIMITS, feeds, limits};
-use motion_kernel::law::{Law, Limits, Ramp};
+use super::{LIMITS, feeds, limits};
+use motion_kernel::law::{Law, Limits, Pulse, Ramp};
 use motion_tests::random::Random;
 use std::f64::consts::PI;
 
@@ -36,7 +36,7 @@ fn no_other_pulses_are_faster() {
     let (mut symmetric, mut asymmetric, mut nearest) = (0, 0, f64::INFINITY);
     for _ in 0..20_000 {
         let limits = limits(*random.pick(&LIMITS));
-        let law = Law::new(limits).expect("positive");
+        let law = Law::new(Pulse::Sin2, limits).expect("positive");
         let (from, to) = feeds::<f64>(&mut random);
         let change = (to - from).abs();
         if change <= 0.0 {

@@ -1,5 +1,6 @@
-//! The law from its definition, in thirty digits: (22), (23), (13) choose the ramp, and the jerk
-//! J(t) = ±Jp·sin²(πt/t₁) is integrated numerically. None of the closed forms (3)–(5) is used.
+//! The law from its definition, in thirty digits: (22), (23), (13) and what they become with a plateau choose
+//! the ramp, and the jerk J(t) = ±Jp·sin²(πt/2e) in edges, ±Jp between them, is integrated numerically. None
+//! of the closed forms (3)–(5) is used.
 //!
 //! One step of the three cumulative integrals over \[a, b\], h = b − a, is Taylor's formula with its
 //! remainder as an integral of the jerk,
@@ -10,13 +11,13 @@
 //! S(b) = S(a) + V(a)·h + A(a)·h²/2 + ∫ (b − s)²/2·J(s) ds
 //! ```
 //!
-//! by six-point Gauss–Legendre on panels of at most 1/64 of a phase: its error is below 10⁻²⁹.
+//! by six-point Gauss–Legendre on panels of at most 1/64 of an arch: its error is below 10⁻²⁹.
 
-use motion_kernel::law::Limits;
+use motion_kernel::law::{Limits, Pulse};
 use motion_tests::dd::{Dd, dd};
 
 const NODES: usize = 6;
-/// Panels are at most this part of a phase.
+/// Panels in an edge are at most this part of an arch.
 const PANEL: f64 = 1.0 / 64.0;
 
 /// What the integration needs and no ramp changes.
@@ -104,6 +105,7 @@ pub(crate) struct Exact<'a> {
     from: Dd,
     to: Dd,
     pub(crate) jerk: Dd,
+    pub(crate) edge: Dd,
     pub(crate) t1: Dd,
     pub(crate) t2: Dd,
     pub(crate) end: Dd,
@@ -111,32 +113,55 @@ pub(crate) struct Exact<'a> {
     pub(crate) length: Dd,
 }
 
-/// (Jp, t₁, t₂) by (22), (23), (13); zero for no change.
-pub(crate) fn choose(limits: &Limits<f64>, change: Dd) -> (Dd, Dd, Dd) {
+/// Jp, e, t₁, t₂.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Choice {
+    pub(crate) jerk: Dd,
+    pub(crate) edge: Dd,
+    pub(crate) t1: Dd,
+    pub(crate) t2: Dd,
+}
+
+/// The ramp by (22), (23), (13); with a plateau, by what its edges, its jerk and its acceleration may be at
+/// most. Zero for no change.
+pub(crate) fn choose(pulse: Pulse, limits: &Limits<f64>, change: Dd) -> Choice {
     let (accel, jerk, snap) = (dd(limits.accel_mm_s2), dd(limits.jerk_mm_s3), dd(limits.snap_mm_s4));
     if change.hi <= 0.0 {
-        return (Dd::ZERO, Dd::ZERO, Dd::ZERO);
+        return Choice { jerk: Dd::ZERO, edge: Dd::ZERO, t1: Dd::ZERO, t2: Dd::ZERO };
     }
-    let two = dd(2.0);
+    let (half, two) = (dd(0.5), dd(2.0));
+    if pulse == Pulse::Plateau {
+        let by_snap = Dd::PI / (two * snap);
+        let edge = (by_snap * jerk).min((by_snap * accel).sqrt()).min((by_snap * change * half).cbrt());
+        let peak = edge / by_snap;
+        let by_jerk = half * edge + (half * half * edge * edge + change / peak).sqrt();
+        let t1 = (accel / peak + edge).min(by_jerk);
+        return Choice { jerk: peak, edge, t1, t2: change / (peak * (t1 - edge)) };
+    }
     let peak = jerk
         .min((two * accel * snap / Dd::PI).sqrt())
         .min((two * change * snap * snap / (Dd::PI * Dd::PI)).cbrt());
     let t1 = (two * accel / peak).min((two * change / peak).sqrt());
-    (peak, t1, two * change / (peak * t1))
+    Choice { jerk: peak, edge: half * t1, t1, t2: two * change / (peak * t1) }
 }
 
 /// Λ, the length of the ramp between two feeds: (12).
-pub(crate) fn length(limits: &Limits<f64>, from: Dd, to: Dd) -> Dd {
-    let (_, t1, t2) = choose(limits, (to - from).abs());
+pub(crate) fn length(pulse: Pulse, limits: &Limits<f64>, from: Dd, to: Dd) -> Dd {
+    let Choice { t1, t2, .. } = choose(pulse, limits, (to - from).abs());
     (from + to) * dd(0.5) * (t1 + t2)
 }
 
 impl<'a> Exact<'a> {
-    pub(crate) fn new(quadrature: &'a Quadrature, limits: &Limits<f64>, from: f64, to: f64) -> Self {
+    pub(crate) fn new(
+        quadrature: &'a Quadrature,
+        (pulse, limits): (Pulse, &Limits<f64>),
+        from: f64,
+        to: f64,
+    ) -> Self {
         let (from, to) = (dd(from), dd(to));
-        let (peak, t1, t2) = choose(limits, (to - from).abs());
+        let Choice { jerk: peak, edge, t1, t2 } = choose(pulse, limits, (to - from).abs());
         let jerk = if to < from { -peak } else { peak };
-        let mut exact = Self { quadrature, from, to, jerk, t1, t2, end: t1 + t2, length: Dd::ZERO };
+        let mut exact = Self { quadrature, from, to, jerk, edge, t1, t2, end: t1 + t2, length: Dd::ZERO };
         let top = exact.hold(&exact.pulse(&exact.start(), t1, jerk), t2 - t1);
         let last = exact.pulse(&top, t1, -jerk);
         exact.length = last.s;
@@ -159,15 +184,26 @@ impl<'a> Exact<'a> {
 
     /// From `a` to `b` after a pulse's start.
     fn advance(&self, motion: &mut Motion, a: Dd, b: Dd, jerk: Dd) {
+        // Panels end where the edges do.
+        for knot in [self.edge, self.t1 - self.edge] {
+            if a < knot && knot < b {
+                self.advance(motion, a, knot, jerk);
+                return self.advance(motion, knot, b, jerk);
+            }
+        }
         let half = dd(0.5);
-        let panels = ((b - a).hi / (self.t1.hi * PANEL)).ceil().max(1.0);
+        let is_plateau = a >= self.edge && b <= self.t1 - self.edge;
+        let arch = dd(2.0) * self.edge;
+        let panels = if is_plateau { 1.0 } else { ((b - a).hi / (arch.hi * PANEL)).ceil().max(1.0) };
         let h = (b - a) / dd(panels);
         for panel in 0..panels as u32 {
             let start = a + h * dd(f64::from(panel));
             let (mut zeroth, mut first, mut second) = (Dd::ZERO, Dd::ZERO, Dd::ZERO);
             for &(node, weight) in &self.quadrature.nodes {
                 let left = (dd(1.0) - node) * h;
-                let value = weight * self.quadrature.pulse((start + node * h) / self.t1);
+                let at = start + node * h;
+                let near = at.min(self.t1 - at);
+                let value = if is_plateau { weight } else { weight * self.quadrature.pulse(near / arch) };
                 zeroth = zeroth + value;
                 first = first + value * left;
                 second = second + value * left * left;
@@ -190,9 +226,14 @@ impl<'a> Exact<'a> {
 
     /// With jerk and snap by definition, `t` after the start of a pulse of `jerk`.
     fn with_jerk(&self, motion: &Motion, t: Dd, jerk: Dd) -> Motion {
-        let (sine, cosine) = self.quadrature.sin_cos(t / self.t1);
-        let snap = jerk * Dd::PI / self.t1 * dd(2.0) * sine * cosine;
-        Motion { j: jerk * sine * sine, snap, ..*motion }
+        let left = self.t1 - t;
+        if t >= self.edge && left >= self.edge {
+            return Motion { j: jerk, snap: Dd::ZERO, ..*motion };
+        }
+        let arch = dd(2.0) * self.edge;
+        let (sine, cosine) = self.quadrature.sin_cos(t.min(left) / arch);
+        let snap = jerk * Dd::PI / arch * dd(2.0) * sine * cosine;
+        Motion { j: jerk * sine * sine, snap: if t < left { snap } else { -snap }, ..*motion }
     }
 
     /// The motion at each of `times_s`, which ascend. The falling phase is integrated backwards from

@@ -1,8 +1,8 @@
 //! One ramp: [`Ramp`] against S1's examples and against the oracle.
 
-use crate::oracle::{Exact, Motion, Quadrature, choose};
-use crate::{LIMITS, feed, feeds, limits, narrow};
-use motion_kernel::law::{FeedState, Law, LimitedBy, Ramp};
+use super::oracle::{Choice, Exact, Motion, Quadrature, choose};
+use super::{LIMITS, PULSES, feed, feeds, limits, narrow};
+use motion_kernel::law::{FeedState, Law, LimitedBy, Pulse, Ramp};
 use motion_kernel::num::Root;
 use motion_tests::dd::{Dd, dd};
 use motion_tests::random::Random;
@@ -73,7 +73,7 @@ fn examples_of_the_paper() {
             ],
         },
     ];
-    let law = Law::new(limits(LIMITS[0])).expect("positive");
+    let law = Law::new(Pulse::Sin2, limits(LIMITS[0])).expect("positive");
     for Example { feeds_mm_s: (from, to), limited_by, printed } in &examples {
         let up = Ramp::new(&law, *from, *to);
         assert_eq!(up.limited_by, *limited_by);
@@ -113,7 +113,7 @@ fn examples_of_the_paper() {
 /// S1's first example prints only "0.2" for t₁; here all that is exact in it.
 #[test]
 fn first_example_exactly() {
-    let ramp = Ramp::new(&Law::new(limits(LIMITS[0])).expect("positive"), 0.0, 200.0);
+    let ramp = Ramp::new(&Law::new(Pulse::Sin2, limits(LIMITS[0])).expect("positive"), 0.0, 200.0);
     assert_eq!((ramp.peak_jerk_mm_s3, ramp.t1_s, ramp.t2_s), (5000.0, 0.2, 0.4));
     let s1_mm = 5000.0 * 0.008 * (1.0 / 12.0 - 1.0 / (8.0 * std::f64::consts::PI.powi(2)));
     assert!((ramp.at(0.2).s_mm - s1_mm).abs() < 1e-15);
@@ -152,7 +152,8 @@ fn excesses<R: Root>(found: &FeedState<R>, exact: &Motion, crackle: f64, span_s:
 /// `count` ascending times in a ramp: everywhere, close to both sides of every phase's ends, and the
 /// ends themselves with their neighbours.
 fn times<R: Root>(random: &mut Random, exact: &Exact<'_>, count: usize) -> Vec<f64> {
-    let ends = [0.0, exact.t1.hi, exact.t2.hi, exact.end.hi];
+    let [edge, t1, t2, end] = [exact.edge, exact.t1, exact.t2, exact.end].map(|time| time.hi);
+    let ends = [0.0, edge, t1 - edge, t1, t2, t2 + edge, end - edge, end];
     let mut times: Vec<f64> = ends.iter().flat_map(|end| [end.next_down(), *end, end.next_up()]).collect();
     while times.len() < count {
         times.push(if random.once_in(2) {
@@ -174,18 +175,18 @@ fn worst_over_random_ramps<R: Root>(stream: u64, ramps: usize, points: usize) ->
     let mut worst = [0.0_f64; 5];
     let mut regimes = [0; 3];
     while regimes.iter().sum::<usize>() < ramps {
-        let limits = limits(*random.pick(&LIMITS));
-        let law = Law::new(narrow::<R>(&limits)).expect("positive");
+        let (pulse, limits) = (*random.pick(&PULSES), limits(*random.pick(&LIMITS)));
+        let law = Law::new(pulse, narrow::<R>(&limits)).expect("positive");
         let (from, to) = feeds::<R>(&mut random);
         if from == to {
             continue;
         }
         let ramp = Ramp::new(&law, R::from_f64(from), R::from_f64(to));
         regimes[ramp.limited_by as usize] += 1;
-        let exact = Exact::new(&quadrature, &limits, from, to);
-        let (t1, end) = (exact.t1.hi, exact.end.hi);
+        let exact = Exact::new(&quadrature, (pulse, &limits), from, to);
+        let (arch_s, end) = (2.0 * exact.edge.hi, exact.end.hi);
         let span_s = 2.0 * R::EPSILON * end;
-        let crackle = 2.0 * std::f64::consts::PI.powi(2) * exact.jerk.hi / (t1 * t1);
+        let crackle = 2.0 * std::f64::consts::PI.powi(2) * exact.jerk.hi / (arch_s * arch_s);
         assert!((ramp.length_mm().to_f64() / exact.length.hi - 1.0).abs() < 8.0 * R::EPSILON, "{ramp:?}");
         let times = times::<R>(&mut random, &exact, points);
         for (&t, motion) in times.iter().zip(exact.at_each(&times)) {
@@ -218,7 +219,7 @@ fn f32_is_the_integrated_law() {
 fn outside_and_without_a_change() {
     let mut random = Random::of_stream(3);
     for _ in 0..1000 {
-        let law = Law::new(limits(*random.pick(&LIMITS))).expect("positive");
+        let law = Law::new(*random.pick(&PULSES), limits(*random.pick(&LIMITS))).expect("positive");
         let (from, to) = feeds::<f64>(&mut random);
         let ramp = Ramp::new(&law, from, to);
         let (end_s, length_mm) = (ramp.duration_s(), ramp.length_mm());
@@ -244,12 +245,12 @@ fn outside_and_without_a_change() {
 #[test]
 fn choice_of_jerk_and_times() {
     fn check<R: Root>(random: &mut Random) {
-        for set in LIMITS {
+        for (set, pulse) in LIMITS.into_iter().flat_map(|set| PULSES.map(|pulse| (set, pulse))) {
             let limits = limits(set);
-            let law = Law::new(narrow::<R>(&limits)).expect("positive");
-            let peak = choose(&limits, dd(1e9)).0.hi;
-            let boundaries =
-                [(std::f64::consts::PI / set.2).powi(2) * peak.powi(3) / 2.0, 2.0 * set.0 * set.0 / peak];
+            let law = Law::new(pulse, narrow::<R>(&limits)).expect("positive");
+            let Choice { jerk, t1, .. } = choose(pulse, &limits, dd(1e9));
+            let peak = jerk.hi;
+            let boundaries = [(std::f64::consts::PI / set.2).powi(2) * peak.powi(3) / 2.0, set.0 * t1.hi];
             for n in 0..4000 {
                 let change = match n % 4 {
                     0 => random.log(1e-12, 1e3),
@@ -261,9 +262,11 @@ fn choice_of_jerk_and_times() {
                 };
                 let change = R::from_f64(change);
                 let ramp = Ramp::new(&law, R::ZERO, change);
-                let (jerk, t1, t2) = choose(&limits, dd(change.to_f64()));
+                let Choice { jerk, edge, t1, t2 } = choose(pulse, &limits, dd(change.to_f64()));
                 let tolerance = 12.0 * R::EPSILON;
-                for (found, exact) in [(ramp.peak_jerk_mm_s3, jerk), (ramp.t1_s, t1), (ramp.t2_s, t2)] {
+                for (found, exact) in
+                    [(ramp.peak_jerk_mm_s3, jerk), (ramp.edge_s, edge), (ramp.t1_s, t1), (ramp.t2_s, t2)]
+                {
                     assert!((found.to_f64() - exact.hi).abs() <= tolerance * exact.hi, "{ramp:?}: {exact:?}");
                 }
             }
@@ -285,17 +288,20 @@ fn peaks_keep_their_limits_but_for_rounding() {
         let snap = accel * random.log(30.0, 3e5);
         // At times out of reach, so that acceleration takes over from snap.
         let jerk = if random.once_in(2) { 1e9 } else { accel * random.log(3.0, 300.0) };
-        let law = Law::new(limits((accel, jerk, snap))).expect("limits");
+        let law = Law::new(*random.pick(&PULSES), limits((accel, jerk, snap))).expect("limits");
         let peak = jerk.min((2.0 * accel * snap / std::f64::consts::PI).sqrt());
         let snap_s = std::f64::consts::PI * peak / snap;
-        let border =
-            if random.once_in(2) { 2.0 * accel * accel / peak } else { 0.5 * peak * snap_s * snap_s };
+        let border = match (random.once_in(2), law.pulse()) {
+            (false, _) => 0.5 * peak * snap_s * snap_s,
+            (true, Pulse::Sin2) => 2.0 * accel * accel / peak,
+            (true, Pulse::Plateau) => accel * (accel / peak + 0.5 * snap_s),
+        };
         let near = (random.unit() - 0.5) * 2.0_f64.powi(-(random.below(10) as i32) - 42);
         let ramp = Ramp::new(&law, 0.0, border * (1.0 + near));
         let peaks = [
             ramp.peak_accel_mm_s2() / accel,
             ramp.peak_jerk_mm_s3 / jerk,
-            std::f64::consts::PI * ramp.peak_jerk_mm_s3 / ramp.t1_s / snap,
+            0.5 * std::f64::consts::PI * ramp.peak_jerk_mm_s3 / ramp.edge_s / snap,
         ];
         for (worst, peak) in worst.iter_mut().zip(peaks) {
             *worst = worst.max((peak - 1.0) / f64::EPSILON);

@@ -1,7 +1,9 @@
 //! [`FeedSegment`], the form the tick evaluates, against the ramp it was made from.
 
-use crate::{LIMITS, feeds, limits};
-use motion_kernel::law::{FeedSegment, FeedState, Law, Limits, PathMotion, Phase, Ramp, SegmentError, Ticks};
+use super::{LIMITS, PULSES, feeds, limits};
+use motion_kernel::law::{
+    FeedSegment, FeedState, Law, Limits, PathMotion, Phase, Pulse, Ramp, SegmentError, Ticks,
+};
 use motion_kernel::num::{Real, Root, Scalar};
 use motion_kernel::units::Position;
 use motion_tests::random::Random;
@@ -10,8 +12,8 @@ use motion_tests::random::Random;
 /// the quantity, beyond what the rounding of time explains. Measured: 1.6, 1.4, 3.9 and 6.5 (f32).
 const STATE_EPSILONS: [f64; 4] = [2.0, 4.0, 8.0, 12.0];
 /// Greatest error of the position: a part of the length and of Jp·t₁³, the number type's epsilon in the sine's
-/// part of Jp·t₁³, and some steps. The first is the fixed-point product's 2⁻³² (documented with the segment)
-/// twice, and the time step's 2⁻³³; the sine has snap's error and half an epsilon of time, 2π-fold.
+/// part of Jp·(2e)³, and some steps. The first is the fixed-point product's 2⁻³² (documented with the
+/// segment) twice, and the time step's 2⁻³³; the sine has snap's error and half an epsilon of time, 2π-fold.
 const LENGTH_PART: f64 = 2.5 / 4_294_967_296.0;
 const SINE_EPSILONS: f64 = (STATE_EPSILONS[3] + std::f64::consts::PI) / 496.1;
 const CUBE_PART: f64 = 1.0 / 4_294_967_296.0;
@@ -53,11 +55,11 @@ impl Worst {
     fn compare<R: Real>(&mut self, moment: &Moment<'_>, length_mm: f64, found: &PathMotion<R>) {
         let Moment { ramp, phase, in_phase_s, late_s } = *moment;
         let exact = at_phase(ramp, phase, in_phase_s);
-        let (jerk, t1_s) = (ramp.peak_jerk_mm_s3, ramp.t1_s);
+        let (jerk, t1_s, arch_s) = (ramp.peak_jerk_mm_s3, ramp.t1_s, 2.0 * ramp.edge_s);
         let highest = ramp.from_mm_s.max(ramp.to_mm_s);
-        let over_t1 = |value: f64| if t1_s > 0.0 { value / t1_s } else { 0.0 };
-        let peak = [highest, jerk * t1_s / 2.0, jerk, over_t1(std::f64::consts::PI * jerk)];
-        let crackle = over_t1(over_t1(2.0 * std::f64::consts::PI.powi(2) * jerk));
+        let over_arch = |value: f64| if arch_s > 0.0 { value / arch_s } else { 0.0 };
+        let peak = [highest, ramp.peak_accel_mm_s2(), jerk, over_arch(std::f64::consts::PI * jerk)];
+        let crackle = over_arch(over_arch(2.0 * std::f64::consts::PI.powi(2) * jerk));
         // By how much each may change while the time is off.
         let moves = [exact.a_mm_s2, exact.j_mm_s3, exact.snap_mm_s4, crackle];
         let moved = |n: usize| {
@@ -77,7 +79,8 @@ impl Worst {
             }
         }
         let bound = LENGTH_PART * length_mm
-            + (SINE_EPSILONS * R::EPSILON + CUBE_PART) * jerk * t1_s.powi(3)
+            + SINE_EPSILONS * R::EPSILON * jerk * arch_s.powi(3)
+            + CUBE_PART * jerk * t1_s.powi(3)
             + STEPS_MM
             + exact.v_mm_s.max(0.0) * late_s
             + 4.0 * f64::EPSILON * length_mm;
@@ -137,13 +140,12 @@ fn walk<R: Real>(
 }
 
 fn ends_are_exact<R: Real>(segment: &FeedSegment<R>) {
-    let ramp = segment.as_ramp();
     let at_rest = |motion: &PathMotion<R>| {
         motion.a_mm_s2 == R::ZERO && motion.j_mm_s3 == R::ZERO && motion.snap_mm_s4 == R::ZERO
     };
     let (start, end) = (segment.at(Phase::Rise, 0), segment.at(Phase::Fall, u64::MAX));
-    assert!(start.s == Position::ZERO && start.v_mm_s == ramp.from_mm_s && at_rest(&start), "{start:?}");
-    assert!(end.s == segment.length() && end.v_mm_s == ramp.to_mm_s && at_rest(&end), "{end:?}");
+    assert!(start.s == Position::ZERO && start.v_mm_s == segment.from_mm_s() && at_rest(&start), "{start:?}");
+    assert!(end.s == segment.length() && end.v_mm_s == segment.to_mm_s() && at_rest(&end), "{end:?}");
     let phases = [Phase::Rise, Phase::Hold, Phase::Fall].map(|phase| segment.phase_duration(phase));
     assert_eq!(phases[0].plus(phases[1]).plus(phases[2]), segment.duration());
 }
@@ -154,7 +156,7 @@ fn random_segments<R: Real>(stream: u64) {
     let mut below_a_tick = 0;
     for _ in 0..20_000 {
         let tick_s = if random.once_in(2) { 5e-4 } else { random.log(1e-5, 1e-2) };
-        let law = Law::new(limits(*random.pick(&LIMITS))).expect("positive");
+        let law = Law::new(*random.pick(&PULSES), limits(*random.pick(&LIMITS))).expect("positive");
         let (from, to) = feeds::<R32>(&mut random);
         let ramp = Ramp::new(&law, from, to);
         let length = Position::from_mm(ramp.length_mm()).expect("in range");
@@ -189,7 +191,7 @@ fn f32_segments_are_their_ramps() {
 fn steps_add_up() {
     let mut random = Random::of_stream(32);
     for _ in 0..200 {
-        let law = Law::new(limits(*random.pick(&LIMITS[..4]))).expect("positive");
+        let law = Law::new(*random.pick(&PULSES), limits(*random.pick(&LIMITS[..4]))).expect("positive");
         let (from, to) = feeds::<f64>(&mut random);
         let ramp = Ramp::new(&law, from, to);
         let length = Position::from_mm(ramp.length_mm()).expect("in range");
@@ -222,7 +224,7 @@ fn steps_add_up() {
 fn phases_meet() {
     fn check<R: Real>(random: &mut Random) {
         for _ in 0..20_000 {
-            let law = Law::new(limits(*random.pick(&LIMITS))).expect("positive");
+            let law = Law::new(*random.pick(&PULSES), limits(*random.pick(&LIMITS))).expect("positive");
             let (from, to) = feeds::<R32>(random);
             let ramp = Ramp::new(&law, from, to);
             let length = Position::from_mm(ramp.length_mm()).expect("in range");
@@ -265,7 +267,7 @@ fn long_and_slow() {
     assert!(worst <= LENGTH_PART * 8000.0);
     // A slow ramp of the softest limits: 83 minutes.
     let soft = Limits { accel_mm_s2: 1e-2, jerk_mm_s3: 1e-4, snap_mm_s4: 1e-3 };
-    let ramp = Ramp::new(&Law::new(soft).expect("positive"), 0.0, 50.0);
+    let ramp = Ramp::new(&Law::new(Pulse::Sin2, soft).expect("positive"), 0.0, 50.0);
     let length = Position::from_mm(ramp.length_mm()).expect("in range");
     let (mut random, mut worst) = (Random::of_stream(34), Worst::default());
     for _ in 0..100 {
@@ -279,12 +281,12 @@ fn long_and_slow() {
 #[test]
 fn soft_limits_keep_their_counts_in_f32() {
     // Softer still is refused by name.
-    let softer = Ramp::new(&Law::new(limits((50.0, 0.5, 100.0))).expect("positive"), 0.0, 300.0);
+    let softer = Ramp::new(&Law::new(Pulse::Sin2, limits((50.0, 0.5, 100.0))).expect("positive"), 0.0, 300.0);
     let length = Position::from_mm(softer.length_mm()).expect("in range");
     let refused = FeedSegment::<f32>::ramp(&softer, length, 5e-4);
-    assert!(matches!(refused, Err(SegmentError::OutOfRange { quantity: "jerk · t1³ [mm]", .. })));
+    assert!(matches!(refused, Err(SegmentError::OutOfRange { quantity: "jerk · (2·edge)³ [mm]", .. })));
     for (soft, to) in [((50.0, 2.0, 4e5), 300.0), ((50.0, 1.7, 100.0), 300.0), ((20.0, 1.0, 1.0), 200.0)] {
-        let ramp = Ramp::new(&Law::new(limits(soft)).expect("positive"), 0.0, to);
+        let ramp = Ramp::new(&Law::new(Pulse::Sin2, limits(soft)).expect("positive"), 0.0, to);
         let length = Position::from_mm(ramp.length_mm()).expect("in range");
         let narrow = FeedSegment::<f32>::ramp(&ramp, length, 5e-4).expect("a segment");
         let wide = FeedSegment::<f64>::ramp(&ramp, length, 5e-4).expect("a segment");
@@ -304,7 +306,7 @@ fn soft_limits_keep_their_counts_in_f32() {
 /// What does not fit is refused by name.
 #[test]
 fn refusals() {
-    let law = Law::new(limits(LIMITS[0])).expect("positive");
+    let law = Law::new(Pulse::Sin2, limits(LIMITS[0])).expect("positive");
     let ramp = Ramp::new(&law, 0.0, 200.0);
     let position = |mm| Position::from_mm(mm).expect("in range");
     let made = |ramp: &Ramp<f64>, mm, tick_s| FeedSegment::<f32>::ramp(ramp, position(mm), tick_s);
@@ -322,8 +324,8 @@ fn refusals() {
     }
     // A ramp without a rise would step at its end, and the set-points with it.
     for from_mm_s in [0.0, 100.0, 199.999] {
-        let (t1_s, t2_s, peak_jerk_mm_s3) = (0.0, 120.0 / (from_mm_s + 200.0), 0.0);
-        let step = Ramp { from_mm_s, t1_s, t2_s, peak_jerk_mm_s3, ..ramp };
+        let (edge_s, t1_s, t2_s, peak_jerk_mm_s3) = (0.0, 0.0, 120.0 / (from_mm_s + 200.0), 0.0);
+        let step = Ramp { from_mm_s, edge_s, t1_s, t2_s, peak_jerk_mm_s3, ..ramp };
         assert_eq!(made(&step, 60.0, 5e-4), Err(SegmentError::FeedStep { from_mm_s, to_mm_s: 200.0 }));
     }
     let nan = Ramp { from_mm_s: f64::NAN, ..ramp };
@@ -342,7 +344,7 @@ fn refusals() {
         for place in 0..3 {
             let mut set = [500.0, 5e3, 4e5];
             set[place] = bad;
-            let error = Law::new(limits((set[0], set[1], set[2]))).expect_err("must be refused");
+            let error = Law::new(Pulse::Sin2, limits((set[0], set[1], set[2]))).expect_err("must be refused");
             assert_eq!(error.quantity, ["acceleration", "jerk", "snap"][place]);
         }
     }
@@ -354,7 +356,7 @@ fn ramps_of_f32_make_segments() {
     let mut random = Random::of_stream(35);
     for _ in 0..5000 {
         let wide = limits(*random.pick(&LIMITS));
-        let law = Law::new(crate::narrow::<f32>(&wide)).expect("positive");
+        let law = Law::new(*random.pick(&PULSES), super::narrow::<f32>(&wide)).expect("positive");
         let (from, to) = feeds::<f32>(&mut random);
         let ramp = Ramp::new(&law, <f32 as Scalar>::from_f64(from), <f32 as Scalar>::from_f64(to));
         let length = Position::from_mm(Root::sqrt(ramp.length_mm()).to_f64().powi(2)).expect("in range");

@@ -5,7 +5,7 @@ use motion_kernel::axis::{Correction, CorrectionError};
 use motion_kernel::exec::{ExecState, Executor};
 use motion_kernel::internals::{Change, CutRamp, Density};
 use motion_kernel::kernel::CorrectedIntake;
-use motion_kernel::law::{FeedSegment, Law, Ramp, Ticks};
+use motion_kernel::law::{FeedSegment, Law, Pulse, Ramp, Ticks};
 use motion_kernel::path::Piece;
 use motion_kernel::queue::{LiveStreams, Refused, Rejection, SEGMENTS_PER_TICK_MAX};
 
@@ -54,7 +54,7 @@ fn a_change_to_anything_else_is_refused() {
     for (from, to, after) in [(0, 2, 0), (0, 0, 0), (1, 1, 0), (3, 1, 0), (0, 1, Change::AFTER_MAX + 1)] {
         assert_eq!(feeder.change(change(from, to, after)), refused(from, to, after));
     }
-    let up = Ramp::new(&Law::new(machine.rules().limits).expect("limits"), 0.0, 20.0);
+    let up = Ramp::new(&Law::new(machine.path.pulse, machine.rules().limits).expect("limits"), 0.0, 20.0);
     let length = mm(up.length_mm());
     let segment = FeedSegment::ramp(&up, length, machine.tick_s).expect("a segment");
     feeder.segment(list, segment).expect("room");
@@ -81,7 +81,7 @@ fn a_learnt_correction_is_refused() {
 fn a_change_that_comes_too_late_is_refused() {
     let machine = Machine::reference();
     let (tick_s, rules) = (machine.tick_s, machine.rules());
-    let law = Law::new(rules.limits).expect("limits");
+    let law = Law::new(Pulse::Plateau, rules.limits).expect("limits");
     let up = Ramp::new(&law, 0.0, 20.0);
     let length = mm(up.length_mm());
     let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
@@ -105,10 +105,10 @@ fn a_change_that_comes_too_late_is_refused() {
     }
     let progress = feeder.progress();
     assert_eq!((progress.tick, progress.list, progress.done), (100, list, 0));
-    // The same ramp, cut where it was 50 ticks ago, and to rest.
-    let cut = CutRamp { ramp: up, cut_s: 50.0 * tick_s };
+    // The same ramp, cut where it was 70 ticks ago, in its opening edge, and to rest.
+    let cut = CutRamp { ramp: up, cut_s: 30.0 * tick_s };
     let other = feeder.begin(mm(0.0), 0.0, Density::NONE).expect("a list");
-    let cut_at = Ticks::from_seconds(50.0, 1.0).expect("in range");
+    let cut_at = Ticks::from_seconds(30.0, 1.0).expect("in range");
     let first = FeedSegment::cut(&up, cut_at, mm(cut.length_mm()), tick_s).expect("a segment");
     feeder.segment(other, first).expect("room");
     let stop = Ramp::new(&law, cut.to_mm_s(), 0.0);

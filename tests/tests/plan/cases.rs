@@ -1,6 +1,6 @@
 //! Named cases: the field's, and S3's.
 
-use crate::{block, from_rest, law, planned, reference, time_s};
+use super::{block, from_rest, law, planned, reference, time_s};
 use motion_kernel::law::reach;
 use motion_kernel::plan::{Block, merge_equal};
 use motion_tests::random::Random;

@@ -1,10 +1,10 @@
 //! What planning takes: memory from sizes, work as the planner counts it, in evaluations of the law and visits to a ceiling.
 
 use motion_kernel::internals::work_done;
-use motion_kernel::law::{Law, Limits};
+use motion_kernel::law::{Law, Limits, Pulse};
 use motion_kernel::plan::{Block, Node, nodes_for};
 
-use crate::spanning::spans;
+use super::spanning::spans;
 use motion_tests::block_lists::{block, lists, reference};
 use motion_tests::random::Random;
 
@@ -48,7 +48,8 @@ fn many_laws_in_an_interval_cost_little_more() {
         (0..count)
             .map(|n| {
                 let accel_mm_s2 = 500.0 + random.unit() * f64::from(u8::from(is_mixed));
-                let law = Law::new(Limits { accel_mm_s2, ..reference().limits() }).expect("positive");
+                let law = Law::new(Pulse::Plateau, Limits { accel_mm_s2, ..reference().limits() })
+                    .expect("positive");
                 Block { law, ..block(0.002, 5.0 + 60.0 * (f64::from(n % 20_000) / 1e4 - 1.0).abs()) }
             })
             .collect()

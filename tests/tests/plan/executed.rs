@@ -11,8 +11,8 @@ use motion_kernel::plan::Block;
 use motion_kernel::queue::{Feeder, PathRules, Refused, Streams};
 use motion_kernel::units::Position;
 
-use crate::spanning::{Span, rising_steps, spans};
-use crate::{block, laws, reference};
+use super::spanning::{Span, rising_steps, spans};
+use super::{block, laws};
 use motion_tests::judge::along;
 use motion_tests::random::Random;
 
@@ -236,6 +236,7 @@ fn random_lists_keep_every_limit_in_every_tick() {
         let count = 1 + random.below(80);
         let length_mm = random.log(0.02, 5.0);
         let (is_mixed, laws) = (random.once_in(2), laws());
+        let same = *random.pick(&laws[..2]);
         let mut walk = 50.0;
         let blocks: Vec<_> = (0..count)
             .map(|_| {
@@ -245,7 +246,7 @@ fn random_lists_keep_every_limit_in_every_tick() {
                     length_mm: if random.once_in(20) { 0.0 } else { length_mm * random.log(0.1, 1.0) },
                     cap_mm_s,
                     junction_mm_s: if random.once_in(5) { random.log(1.0, 100.0) } else { f64::INFINITY },
-                    law: if is_mixed { *random.pick(&laws[..4]) } else { reference() },
+                    law: if is_mixed { *random.pick(&laws[..8]) } else { same },
                 }
             })
             .collect();

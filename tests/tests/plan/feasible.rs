@@ -1,6 +1,6 @@
 //! Whatever the blocks are, the plan keeps every ceiling and every ramp has its length.
 
-use crate::{from_rest, planned, random_blocks, reference, time_s};
+use super::{from_rest, planned, random_blocks, reference, time_s};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, merge_equal};
 use motion_tests::random::Random;
 

@@ -1,9 +1,11 @@
 //! Plans in fixed point: within every limit, feasible, as fast as those in f64, and without overflow for all that
 //! is accepted. A debug build panics where fixed point overflows; an optimised one wraps.
 
-use crate::executed::Supply;
+use super::executed::Supply;
 use motion_kernel::exec::{ExecState, Executor};
-use motion_kernel::law::{FeedSegment, Law, LimitError, Limits, Ramp, SegmentError, peak, reach};
+use motion_kernel::law::{
+    FeedSegment, Law, LimitError, Limits, PlannedRamp, Pulse, Ramp, SegmentError, peak, reach,
+};
 use motion_kernel::num::{Fixed, Root, Scalar};
 use motion_kernel::plan::{
     AxisLimits, Bend, Block, BlockPlan, Ceiling, Junction, MachineLimits, PlanError, junction, merge_equal,
@@ -27,13 +29,17 @@ fn fixed(value: f64) -> Fixed {
     Fixed::from_f64(value)
 }
 
-/// A law in both types, of the same limits.
-fn laws(limits: [f64; 3]) -> (Law<Fixed>, Law<f64>) {
+/// A law in both types, of the same pulses and limits.
+fn laws(pulse: Pulse, limits: [f64; 3]) -> (Law<Fixed>, Law<f64>) {
     let [accel, jerk, snap] = limits.map(fixed);
-    let of = |limits| Law::new(limits).expect("accepted");
+    let of = |limits| Law::new(pulse, limits).expect("accepted");
     let narrow = of(Limits { accel_mm_s2: accel, jerk_mm_s3: jerk, snap_mm_s4: snap });
     let limits = Limits { accel_mm_s2: accel.to_f64(), jerk_mm_s3: jerk.to_f64(), snap_mm_s4: snap.to_f64() };
-    (narrow, Law::new(limits).expect("accepted"))
+    (narrow, Law::new(pulse, limits).expect("accepted"))
+}
+
+fn any_pulse(random: &mut Random) -> Pulse {
+    *random.pick(&[Pulse::Sin2, Pulse::Plateau])
 }
 
 /// What is drawn at random: limits, lengths, feeds.
@@ -78,10 +84,10 @@ impl Range {
 
     /// A list of blocks in both types.
     fn blocks(self, random: &mut Random, most: usize) -> (Vec<Block<Fixed>>, Vec<Block<f64>>) {
-        let same = random.once_in(2).then(|| laws(self.limits(random)));
+        let same = random.once_in(2).then(|| laws(any_pulse(random), self.limits(random)));
         (0..1 + random.below(most))
             .map(|_| {
-                let (law, law_f64) = same.unwrap_or_else(|| laws(self.limits(random)));
+                let (law, law_f64) = same.unwrap_or_else(|| laws(any_pulse(random), self.limits(random)));
                 let length_mm = fixed(if random.once_in(20) { 0.0 } else { self.length(random) });
                 let cap_mm_s = fixed(self.feed(random));
                 let junction = match random.below(10) {
@@ -118,11 +124,13 @@ fn excess(law: &Law<Fixed>, from: Fixed, to: Fixed) -> f64 {
     }
     assert!(t1 > 0.0 && t2 >= t1, "{ramp:?}");
     let limits = law.limits();
-    let (accel, jerk) = (change / t2, 2.0 * change / (t1 * t2));
+    let edge = ramp.edge_s.to_f64();
+    assert!(edge > 0.0 && 2.0 * edge <= t1, "{ramp:?}");
+    let (accel, jerk) = (change / t2, change / ((t1 - edge) * t2));
     [
         accel / limits.accel_mm_s2.to_f64(),
         jerk / limits.jerk_mm_s3.to_f64(),
-        std::f64::consts::PI * jerk / t1 / limits.snap_mm_s4.to_f64(),
+        0.5 * std::f64::consts::PI * jerk / edge / limits.snap_mm_s4.to_f64(),
     ]
     .into_iter()
     .fold(-1.0, |worst, part| f64::max(worst, part - 1.0))
@@ -196,7 +204,7 @@ fn random_lists(stream: u64, range: Range, lists: usize) {
         count += blocks.len();
         worst = worst.max(check(&blocks, &wide, &plans));
         let Ok(reference) = planned(&wide, start.to_f64(), end.to_f64()) else { continue };
-        let (found_s, wide_s) = (crate::time_s(&wide, &wide_plans(&plans)), crate::time_s(&wide, &reference));
+        let (found_s, wide_s) = (super::time_s(&wide, &wide_plans(&plans)), super::time_s(&wide, &reference));
         let lengths = wide.iter().map(|block| block.length_mm).filter(|&length_mm| length_mm > 0.0);
         let resolved = TIME_PART + STEP / lengths.fold(f64::INFINITY, f64::min);
         slowest = slowest.max((found_s / wide_s - 1.0) / resolved);
@@ -238,7 +246,9 @@ fn the_ends_of_the_ranges_neither_overflow_nor_exceed_limits() {
         }
     }
     let (mut solved, mut worst) = (0, 0.0_f64);
-    for (law, wide) in limits.into_iter().map(laws) {
+    let both =
+        limits.into_iter().flat_map(|limits| [Pulse::Sin2, Pulse::Plateau].map(|pulse| laws(pulse, limits)));
+    for (law, wide) in both {
         for from in feeds {
             for to in feeds {
                 worst = worst.max(excess(&law, fixed(from), fixed(to)));
@@ -294,10 +304,15 @@ fn limits_are_kept_where_regimes_meet() {
     for case in 0..4000 {
         let range = if case % 2 == 0 { Range::Machines } else { Range::Accepted };
         let [accel, jerk, snap] = range.limits(&mut random);
-        let (law, _) = laws([accel, jerk, snap]);
+        let pulse = any_pulse(&mut random);
+        let (law, _) = laws(pulse, [accel, jerk, snap]);
         let pi = std::f64::consts::PI;
         let peak = jerk.min((2.0 * accel * snap / pi).sqrt());
-        for meeting in [(pi / snap).powi(2) * peak.powi(3) / 2.0, 2.0 * accel * accel / peak] {
+        let by_accel = match pulse {
+            Pulse::Sin2 => 2.0 * accel * accel / peak,
+            Pulse::Plateau => accel * (accel / peak + 0.5 * pi * peak / snap),
+        };
+        for meeting in [(pi / snap).powi(2) * peak.powi(3) / 2.0, by_accel] {
             let from = fixed(*random.pick(&[0.0, 1.0, 1e5]));
             for steps in -40..=40 {
                 let change = fixed(meeting.min(1e6)).to_bits() + steps;
@@ -322,12 +337,12 @@ fn beyond_the_ranges_is_refused() {
             let value = limits[place].to_f64();
             let range = (1.0, 1e9);
             assert_eq!(
-                Law::new(Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }),
+                Law::new(Pulse::Plateau, Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }),
                 Err(LimitError { quantity: name, value, range })
             );
         }
     }
-    let (law, _) = laws(good);
+    let (law, _) = laws(Pulse::Plateau, good);
     let good =
         Block { length_mm: fixed(1.0), cap_mm_s: fixed(10.0), junction_mm_s: fixed(f64::INFINITY), law };
     let short = Block { length_mm: fixed(1e-6 - STEP), ..good };
@@ -366,7 +381,7 @@ fn beyond_the_ranges_is_refused() {
 /// Merging adds lengths before any was checked: what would be beyond the range stays apart.
 #[test]
 fn merged_lengths_stay_in_range() {
-    let (law, _) = laws([500.0, 5e3, 4e5]);
+    let (law, _) = laws(Pulse::Sin2, [500.0, 5e3, 4e5]);
     let block =
         |mm| Block { length_mm: fixed(mm), cap_mm_s: fixed(10.0), junction_mm_s: fixed(f64::INFINITY), law };
     let mut blocks = [block(6e5), block(4e5), block(1.0), block(2e9), block(2e9), block(2.0)];
@@ -380,7 +395,8 @@ fn merged_lengths_stay_in_range() {
 
 /// The ceiling of an arc in the plane of two like axes.
 fn ceiling<R: Root>(limits: AxisLimits<R>, share: R, radius: R, planar: R) -> Result<Ceiling<R>, LimitError> {
-    let machine = MachineLimits { path: limits, axes: [limits; 2], curve_feed_share: share };
+    let machine =
+        MachineLimits { path: limits, axes: [limits; 2], pulse: Pulse::Plateau, curve_feed_share: share };
     let bend = Bend::circle(radius, planar);
     Ceiling::new(&machine, R::from_f64(f64::INFINITY), &[R::ONE; 2], &[true; 2], &bend)
 }
@@ -521,9 +537,8 @@ fn segments_join() {
             };
             let mut at = start;
             for segment in &made {
-                let ramp = segment.as_ramp();
-                assert_eq!(ramp.from_mm_s, feed, "{block:?} {plan:?} {made:?}");
-                feed = ramp.to_mm_s;
+                assert_eq!(segment.from_mm_s(), feed, "{block:?} {plan:?} {made:?}");
+                feed = segment.to_mm_s();
                 at = at + segment.length();
                 count += 1;
             }
@@ -542,7 +557,7 @@ fn plans_are_accepted_and_executed() {
     let (mut executed, mut ticks, mut worst) = (0, 0_u64, [0.0_f64; 5]);
     while executed < 150 {
         let limits = Range::Machines.limits(&mut random);
-        let (law, _) = laws(limits);
+        let (law, _) = laws(any_pulse(&mut random), limits);
         let (_, mut wide) = Range::Machines.blocks(&mut random, 30);
         let longest = 300.0 / wide.len() as f64;
         let mut blocks = Vec::new();
@@ -559,6 +574,7 @@ fn plans_are_accepted_and_executed() {
         // Positions are steps of the same size: lengths add up exactly.
         let mut end = Position::ZERO;
         let mut all: Vec<FeedSegment<Fixed>> = Vec::new();
+        let mut planned_ramps = Vec::new();
         for (block, plan) in blocks.iter().zip(&plans) {
             let start = end;
             end = start + Position::from_bits(block.length_mm.to_bits());
@@ -566,6 +582,7 @@ fn plans_are_accepted_and_executed() {
             let length = made.iter().flatten().fold(start, |at, ramp| at + ramp.length);
             assert_eq!(length, end, "{block:?} {plan:?}");
             all.extend(made.iter().flatten().map(|ramp| ramp.segment(TICK_S).expect("a segment")));
+            planned_ramps.extend(made.into_iter().flatten());
         }
         let duration: f64 = all.iter().map(|segment| segment.duration().to_f64()).sum();
         if !(1.0..60_000.0).contains(&duration) {
@@ -583,10 +600,9 @@ fn plans_are_accepted_and_executed() {
         let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
         let mut executor = Executor::<Fixed, 1>::new([Position::ZERO]);
         let mut supply = Supply::new(&all, end);
-        let rounding = all.iter().map(FeedSegment::as_ramp).fold(0.0, |rounding: f64, ramp| {
-            let t1_s = ramp.t1_s.to_f64();
-            let gained = ramp.peak_jerk_mm_s3.to_f64() * t1_s.powi(3);
-            rounding.max(2.0 * 70.0 / 536_870_912.0 * gained / 496.1 + 2.0 * STEP * ramp.length_mm().to_f64())
+        let rounding = planned_ramps.iter().fold(0.0, |rounding: f64, &PlannedRamp { ramp, .. }| {
+            let gained: f64 = ramp.peak_jerk_mm_s3 * f64::powi(2.0 * ramp.edge_s, 3);
+            rounding.max(2.0 * 70.0 / 536_870_912.0 * gained / 496.1 + 2.0 * STEP * ramp.length_mm())
         });
         let mut before = [0.0; 5];
         loop {

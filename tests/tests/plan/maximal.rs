@@ -3,7 +3,7 @@
 //! The plan is *not* claimed to be the fastest, and a single junction's feed can be a local bottleneck that a lower
 //! feed elsewhere would widen (a ramp's length is not monotone in its lower feed); that is no contradiction.
 
-use crate::{from_rest, planned, random_blocks};
+use super::{from_rest, planned, random_blocks};
 use motion_kernel::plan::{Block, BlockPlan};
 use motion_tests::random::Random;
 

@@ -6,8 +6,8 @@ use motion_kernel::plan::{
 };
 use motion_kernel::units::Position;
 
-use crate::spanning::{Span, legal, spans_between, unreachable};
-use crate::{block, from_rest, laws, planned, random_blocks, time_s};
+use super::spanning::{Span, legal, spans_between, unreachable};
+use super::{block, from_rest, laws, planned, random_blocks, time_s};
 use motion_tests::random::Random;
 
 /// The ramps of a plan, of which there is room for so many.

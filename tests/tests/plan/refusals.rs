@@ -1,6 +1,6 @@
 //! Bad input gives the error that names it, never a panic and never another plan.
 
-use crate::{block, planned, random_blocks};
+use super::{block, planned, random_blocks};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, plan};
 use motion_tests::random::Random;
 

@@ -1,6 +1,6 @@
 //! Planned blocks as feed segments: they fill the path without a gap.
 
-use crate::{block, from_rest, random_blocks};
+use super::{block, from_rest, random_blocks};
 use motion_kernel::num::Real;
 use motion_kernel::plan::{Block, BlockPlan, ramps};
 use motion_kernel::units::Position;
@@ -27,16 +27,19 @@ fn fill<R: Real>(blocks: &[Block<f64>], plans: &[BlockPlan<f64>]) -> Total {
         let mut reached = start;
         for planned in made.into_iter().flatten() {
             let segment = planned.segment::<R>(TICK_S).expect("a segment");
-            let ramp = segment.as_ramp();
             assert!(segment.length() > Position::ZERO, "block {index}: {segment:?}");
             assert_eq!(
-                ramp.from_mm_s.to_f64(),
+                segment.from_mm_s().to_f64(),
                 R::from_f64(feed).to_f64(),
                 "the feed steps in block {index}"
             );
-            feed = if ramp.to_mm_s == R::from_f64(plan.peak_mm_s) { plan.peak_mm_s } else { plan.exit_mm_s };
+            feed = if segment.to_mm_s() == R::from_f64(plan.peak_mm_s) {
+                plan.peak_mm_s
+            } else {
+                plan.exit_mm_s
+            };
             assert_eq!(
-                ramp.to_mm_s.to_f64(),
+                segment.to_mm_s().to_f64(),
                 R::from_f64(feed).to_f64(),
                 "block {index}: {plan:?} {segment:?}"
             );
@@ -64,7 +67,7 @@ fn random_stretches<R: Real>(stream: u64, shortest_mm: f64) {
         let plans = from_rest(&blocks);
         let total = fill::<R>(&blocks, &plans);
         count += total.segments;
-        let time_s = crate::time_s(&blocks, &plans);
+        let time_s = super::time_s(&blocks, &plans);
         assert!(
             (total.time_s - time_s).abs() <= 1e-6 * time_s + 1e-6,
             "{} s, planned {time_s} s",

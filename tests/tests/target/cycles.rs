@@ -2,8 +2,10 @@
 //! and the core's published timing. Not measured: only hardware measures cycles.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{self, BufReader, Read};
 use std::process::Command;
+use std::thread::sleep;
+use std::time::Duration;
 
 use motion_tests::cycles::{Begin, Calls};
 use motion_tests::figures::{Table, hold};
@@ -49,10 +51,21 @@ pub(crate) fn estimated_cycles(tools: &Tools) -> Result<(), String> {
 /// Instructions, nominal and pessimistic cycles of every tick.
 fn count(pipe: &std::path::Path) -> Result<Vec<[u64; 3]>, String> {
     let trace = File::open(pipe).map_err(|error| format!("{}: {error}", pipe.display()))?;
-    Calls::new(BufReader::with_capacity(1 << 20, trace), Begin::Symbol("budgeted_tick".into()))
+    Calls::new(BufReader::with_capacity(1 << 20, Portions(trace)), Begin::Symbol("budgeted_tick".into()))
         .map(|call| {
             let call = call.map_err(|error| error.to_string())?;
             Ok([call.instructions, call.nominal_cycles, call.pessimistic_cycles])
         })
         .collect()
+}
+
+/// A pipe that is left to fill before it is read: the emulator writes line by line, and to wake for each of the lines takes longer
+/// than to read them.
+struct Portions(File);
+
+impl Read for Portions {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        sleep(Duration::from_millis(1));
+        self.0.read(buffer)
+    }
 }

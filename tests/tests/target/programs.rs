@@ -4,7 +4,7 @@ use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan, plan_program};
 use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Table, Tables};
-use motion_kernel::law::{Law, PlannedRamp, Ramp};
+use motion_kernel::law::{Law, PlannedRamp, Pulse, Ramp};
 use motion_kernel::num::Fixed;
 use motion_kernel::program::{Header, Item, write};
 use motion_kernel::units::Position;
@@ -214,20 +214,29 @@ pub(crate) fn utmost<const AXES: usize>() -> Vec<u8> {
     // 17 mm/s where 50 are asked for.
     (axis.output_limit_v, axis.following_error_limit_mm) = (0.5, 100.0);
     let header = Header::<AXES> {
+        pulse: Pulse::Plateau,
         tick_s: reference.tick_s,
         rules: reference.rules,
         axes: [axis; AXES],
         start: [Position::ZERO; AXES],
     };
     let feed_mm_s = 50.0;
-    let law = Law::new(reference.rules.limits).expect("limits");
+    let law = Law::new(Pulse::Plateau, reference.rules.limits).expect("limits");
     let (up, down) = (Ramp::new(&law, 0.0, feed_mm_s), Ramp::new(&law, feed_mm_s, 0.0));
     // A nanometre a second up and down again, each a third of its time rising, holding and falling.
     let change = |index: usize| {
         let third_s = reference.tick_s / 7.9 / 3.0;
         let (low, high) = (feed_mm_s, feed_mm_s + 1e-9);
         let (from_mm_s, to_mm_s) = if index.is_multiple_of(2) { (low, high) } else { (high, low) };
-        Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3: 1.0, t1_s: third_s, t2_s: 2.0 * third_s, ..up }
+        Ramp {
+            from_mm_s,
+            to_mm_s,
+            peak_jerk_mm_s3: 1.0,
+            edge_s: third_s / 3.0,
+            t1_s: third_s,
+            t2_s: 2.0 * third_s,
+            ..up
+        }
     };
     let length = |mm: f64| Position::from_mm(mm).expect("in range");
     let ramps = core::iter::once(up).chain((0..SEGMENTS).map(change)).chain([down]);
@@ -281,6 +290,7 @@ pub(crate) fn one_axis() -> Vec<u8> {
     let text = "G1 X20 F5000\nX18\nG4 P0.01\nX40 F3000\nX40.3 F5000\nX44\nM2\n";
     let header = machine.header();
     let header = Header::<1> {
+        pulse: Pulse::Plateau,
         tick_s: header.tick_s,
         rules: header.rules,
         axes: [header.axes[0]],

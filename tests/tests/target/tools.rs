@@ -1,9 +1,9 @@
 //! Emulator and compiler; images are built once, when they are first asked for.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use motion_tests::figures::is_accepting;
 
@@ -63,11 +63,25 @@ pub(crate) enum Clock {
     Counting,
 }
 
+/// The images that tests ask for, by features.
+const IMAGES: [(&str, &[&str]); 3] = [
+    ("", &["closed_loop", "interrupt", "budget", "functions", "trace", "kernel_only", "empty"]),
+    ("live", &["live", "live_budget", "budget", "kernel_only", "empty"]),
+    ("soft-float", &["budget", "functions"]),
+];
+
+/// Machine, image, programs.
+type Run = (&'static str, PathBuf, Vec<Vec<u8>>);
+/// What it printed; empty while the first one who asks runs it.
+type Printed = Arc<Mutex<Option<String>>>;
+
 /// The tools of this machine.
 pub(crate) struct Tools {
     compiler: Compiler,
-    /// Built images, by target and features.
-    built: Mutex<BTreeMap<(String, String), PathBuf>>,
+    /// Folders of built images, by features.
+    built: Mutex<BTreeMap<&'static str, PathBuf>>,
+    /// Where instructions are counted, the same run prints the same.
+    counted: Mutex<BTreeMap<Run, Printed>>,
 }
 
 struct Compiler {
@@ -96,7 +110,7 @@ impl Tools {
             "needs a compiler for Cortex-M: Debian's rustc-web and rust-web-src, or rustup target add \
              thumbv7em-none-eabihf thumbv7m-none-eabi thumbv6m-none-eabi",
         )?;
-        Ok(Self { compiler, built: Mutex::default() })
+        Ok(Self { compiler, built: Mutex::default(), counted: Mutex::default() })
     }
 
     /// Why figures measured here can't be compared with the committed ones.
@@ -120,22 +134,23 @@ impl Tools {
 
     /// The image `name` for a board.
     pub(crate) fn image(&self, board: Board, name: &str) -> Result<PathBuf, String> {
-        let key = (board.target.to_owned(), board.features.to_owned());
         // One build at a time: others would wait for cargo's lock anyway.
         let mut built = self.built.lock().map_err(|_| "a build panicked".to_owned())?;
-        if !built.contains_key(&key) {
-            let folder = self.build(board)?;
-            built.insert(key.clone(), folder);
+        if !built.contains_key(board.features) {
+            let folder = self.build(board.features)?;
+            built.insert(board.features, folder);
         }
-        Ok(built[&key].join(name))
+        Ok(built[board.features].join(board.target).join(name))
     }
 
-    fn build(&self, board: Board) -> Result<PathBuf, String> {
-        let target_dir = root().join("target/boards").join(if board.features.is_empty() {
-            "plain"
-        } else {
-            board.features
-        });
+    /// All images with `features`, for all targets, in a folder by target.
+    fn build(&self, features: &'static str) -> Result<PathBuf, String> {
+        let boards = BOARDS.into_iter().chain(LIVE_BOARDS).chain([M3_SOFT]);
+        let targets: BTreeSet<_> =
+            boards.filter(|board| board.features == features).map(|board| board.target).collect();
+        let images = IMAGES.iter().find(|(of, _)| *of == features).map_or(&[][..], |(_, images)| *images);
+        // One folder for all, so that the libraries are built once for a target.
+        let target_dir = root().join("target/boards");
         let mut cargo = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()));
         // Not what the outer cargo was told.
         for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
@@ -143,7 +158,9 @@ impl Tools {
         }
         cargo
             .current_dir(root().join("boards/qemu-mps2"))
-            .args(["build", "--release", "--locked", "--target", board.target, "--features", board.features])
+            .args(["build", "--release", "--locked", "--features", features])
+            .args(targets.iter().flat_map(|target| ["--target", *target]))
+            .args(images.iter().flat_map(|image| ["--bin", *image]))
             .arg("--target-dir")
             .arg(&target_dir)
             .env("RUSTC", &self.compiler.rustc);
@@ -156,9 +173,19 @@ impl Tools {
         }
         let done = cargo.output().map_err(|error| format!("cargo: {error}"))?;
         if !done.status.success() {
-            return Err(format!("build for {}: {}", board.target, String::from_utf8_lossy(&done.stderr)));
+            return Err(format!("build for {targets:?}: {}", String::from_utf8_lossy(&done.stderr)));
         }
-        Ok(target_dir.join(board.target).join("release"))
+        // Away from where those with other features would replace them.
+        let folder = target_dir.join("images").join(if features.is_empty() { "plain" } else { features });
+        for target in targets {
+            let (from, to) = (target_dir.join(target).join("release"), folder.join(target));
+            std::fs::create_dir_all(&to).map_err(|error| format!("{}: {error}", to.display()))?;
+            for image in images {
+                std::fs::copy(from.join(image), to.join(image))
+                    .map_err(|error| format!("{image}: {error}"))?;
+            }
+        }
+        Ok(folder)
     }
 
     /// QEMU with an image and a bundle of programs, not yet started.
@@ -177,6 +204,25 @@ impl Tools {
 
     /// Runs an image over `programs`; what it printed.
     pub(crate) fn run(
+        &self,
+        board: Board,
+        name: &str,
+        programs: &[Vec<u8>],
+        clock: Clock,
+    ) -> Result<String, String> {
+        if clock == Clock::Free {
+            return self.run_anew(board, name, programs, clock);
+        }
+        let key = (board.machine, self.image(board, name)?, programs.to_vec());
+        let printed = Arc::clone(self.counted.lock().map_err(|_| "a run panicked")?.entry(key).or_default());
+        let mut printed = printed.lock().map_err(|_| "a run panicked")?;
+        if printed.is_none() {
+            *printed = Some(self.run_anew(board, name, programs, clock)?);
+        }
+        Ok(printed.clone().unwrap_or_default())
+    }
+
+    fn run_anew(
         &self,
         board: Board,
         name: &str,

@@ -14,7 +14,7 @@ use motion_kernel::axis::AxesConfig;
 use motion_kernel::fault::FaultKind;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Scalar;
-use motion_kernel::program::{Items, ProgramError, Reader};
+use motion_kernel::program::{Header, Items, ProgramError, Reader};
 use motion_kernel::units::{Counts, DacCode};
 use qemu_boards::programs::programs;
 use qemu_boards::{AXES, Number};
@@ -31,14 +31,14 @@ mod plain {
     use motion_kernel::queue::{Intake, Streams};
     use qemu_boards::{PIECES, SEGMENTS};
 
-    use super::{AXES, InMemory, Items, Kernel, Number, ProgramError};
+    use super::{AXES, Header, InMemory, Items, Kernel, Number, ProgramError};
 
     pub(super) type Queues = Streams<Number, AXES, PIECES, SEGMENTS>;
     pub(super) type Feeder<'a> = motion_kernel::queue::Feeder<'a, Number, AXES>;
     pub(super) type Background<'a> = Supply<Number, AXES, Items<'a, AXES>, ProgramError>;
 
-    pub(super) fn background(items: Items<'_, AXES>, tick_s: f64) -> Background<'_> {
-        Supply::new(items, tick_s)
+    pub(super) fn background<'a>(items: Items<'a, AXES>, header: &Header<AXES>) -> Background<'a> {
+        Supply::new(items, header.tick_s)
     }
 
     pub(super) fn poll(supply: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {
@@ -75,14 +75,14 @@ mod live {
     use motion_kernel::queue::{Intake, LiveFeeder};
     use qemu_boards::live::{PLACES, Streams};
 
-    use super::{AXES, CODES, COMMAND, InMemory, Items, Kernel, Number, ProgramError};
+    use super::{AXES, CODES, COMMAND, Header, InMemory, Items, Kernel, Number, ProgramError};
 
     pub(super) type Queues = Streams;
     pub(super) type Feeder<'a> = LiveFeeder<'a, Number, AXES>;
     pub(super) type Background<'a> = LiveControl<Number, AXES, Items<'a, AXES>, ProgramError, PLACES>;
 
-    pub(super) fn background(items: Items<'_, AXES>, tick_s: f64) -> Background<'_> {
-        LiveControl::new(items, tick_s, 2)
+    pub(super) fn background<'a>(items: Items<'a, AXES>, header: &Header<AXES>) -> Background<'a> {
+        LiveControl::new(items, header.pulse, header.tick_s, 2)
     }
 
     pub(super) fn poll(control: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {
@@ -149,7 +149,7 @@ fn run() -> Option<()> {
     let header = program.header();
     let streams = cortex_m::singleton!(: Queues = Queues::new())?;
     let (mut feeder, intake) = streams.split(header.rules, header.start);
-    let mut background: Background<'_> = background(program.items(), header.tick_s);
+    let mut background: Background<'_> = background(program.items(), header);
     let config = AxesConfig::<Number, AXES>::new(&header.axes, header.tick_s).ok()?;
     let counts = [Counts(0); AXES];
     let mut kernel = Kernel::new(&config, header.start, counts);

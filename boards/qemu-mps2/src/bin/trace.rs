@@ -18,7 +18,7 @@ use qemu_boards::{AXES, Number, PIECES, SEGMENTS, exit, fail};
 fn main() -> ! {
     let bytes = programs().next().unwrap_or_else(|| fail(&"a bundle without a program"));
     let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
-    let &Header { tick_s, rules, ref axes, start } = program.header();
+    let &Header { tick_s, rules, ref axes, start, .. } = program.header();
     let config = AxesConfig::<Number, _>::new(axes, tick_s).unwrap_or_else(|error| fail(&error));
     let steps = config.axes.map(|config| config.encoder.position(Counts(1)).to_bits());
     let mut streams = Streams::<Number, AXES, PIECES, SEGMENTS>::new();

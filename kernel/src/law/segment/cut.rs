@@ -1,17 +1,17 @@
 //! A ramp that is cut while its acceleration still rises: the jerk returns the way it came.
 //!
 //! Consumes a ramp under way and where in its rise it is cut; produces a [`FeedSegment`] with the same rise
-//! up to there, but for rounding. With x = t/t₁ and a cut at x₁ ≤ 1/2, the jerk Jp·sin²πx runs up to x₁ and
-//! back to 0, and then the same mirrored: the change of feed is symmetric about its middle like any ramp's
-//! and takes 4·x₁·t₁. It keeps the ramp's limits, because jerk and snap only take values that they have in
-//! the ramp. Snap steps at the cut and at its mirror image.
+//! up to there, but for rounding. With z = t/2e and a cut in the opening edge, at z₁ ≤ 1/2, the jerk
+//! Jp·sin²πz runs up to z₁ and back to 0, and then the same mirrored: the change of feed is symmetric about
+//! its middle like any ramp's and takes four times the time to the cut. It keeps the ramp's limits, because
+//! jerk and snap only take values that they have in the ramp. Snap steps at the cut and at its mirror image.
 //!
 //! Between the cut and its image one expression holds, about the middle, where acceleration is greatest. With
 //! u the time from the middle as a fraction of t₁, and V, A and S the feed, acceleration and position in the
 //! middle,
 //!
 //! ```text
-//! s = S + V·u·t₁ + A·(u·t₁)²/2 − Jp·t₁³·(x³/12 − x/(8π²) + sin 2πx/(16π³)),  x = |u|
+//! s = S + V·u·t₁ + A·(u·t₁)²/2 − Jp·(2e)³·(z³/12 − z/(8π²) + sin 2πz/(16π³)),  z = |u|·t₁/2e
 //! ```
 //!
 //! and its derivatives. Construction in the background, evaluation in the tick.
@@ -20,11 +20,10 @@ use core::f64::consts::PI;
 
 use super::{Clock, FeedSegment, PathMotion, SegmentError, Ticks, portion, times};
 use crate::law::ramp::Ramp;
-use crate::law::shape::Shape;
-use crate::num::Real;
+use crate::num::{Real, Unit};
 use crate::units::Position;
 
-/// A ramp that is cut `cut_s` into its rise, at most half of the rise.
+/// A ramp that is cut `cut_s` into its rise, inside its opening edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutRamp {
     /// The ramp as it was begun.
@@ -37,8 +36,7 @@ impl CutRamp {
     /// The greatest acceleration, in the middle, with the sign of the change of feed \[mm/s²\].
     #[must_use]
     pub fn peak_accel_mm_s2(&self) -> f64 {
-        let shape = Shape::at(self.cut_s / self.ramp.t1_s);
-        2.0 * self.ramp.signed_jerk_mm_s3() * self.ramp.t1_s * shape.accel
+        2.0 * self.ramp.pulse().at(self.cut_s).a_mm_s2
     }
 
     /// The feed at its end \[mm/s\].
@@ -68,7 +66,7 @@ impl<R: Real> FeedSegment<R> {
     /// 10⁻⁸ mm.
     ///
     /// # Errors
-    /// The ramp is not cut in the first half of its rise, or rises in less than a tick; a figure is not
+    /// The ramp is not cut in its opening edge, or rises in less than a tick; a figure is not
     /// finite or too large; the lengths differ.
     pub fn cut(ramp: &Ramp<f64>, cut_at: Ticks, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
         // As for the whole ramp: rounding here would be a step there.
@@ -76,7 +74,8 @@ impl<R: Real> FeedSegment<R> {
         let cut = CutRamp { ramp: *ramp, cut_s: cut_at.to_f64() * tick_s };
         let CutRamp { cut_s, .. } = cut;
         let rise_ticks = ramp.t1_s / tick_s;
-        if !(cut_s > 0.0 && cut_at.to_f64() <= 0.5 * rise_ticks + ROUNDING_TICKS && rise_ticks > 1.0) {
+        let edge_ticks = ramp.edge_s / tick_s;
+        if !(cut_s > 0.0 && cut_at.to_f64() <= edge_ticks + ROUNDING_TICKS && rise_ticks > 1.0) {
             return Err(SegmentError::OutOfRange { quantity: "cut in the rise [s]", value: cut_s });
         }
         let (path_mm, ramp_mm) = (length.to_mm(), cut.length_mm());
@@ -97,10 +96,9 @@ impl<R: Real> FeedSegment<R> {
             R::checked_from_f64(value).ok_or(SegmentError::OutOfRange { quantity, value })
         };
         let t1_s = ramp.t1_s;
-        let scale_mm = ramp.signed_jerk_mm_s3() * t1_s * t1_s * t1_s;
         let peak = cut.peak_accel_mm_s2();
         let middle_mm_s = ramp.from_mm_s + peak * cut_s;
-        let cut_mm = ramp.from_mm_s * cut_s + scale_mm * Shape::at(cut_s / t1_s).length;
+        let cut_mm = ramp.from_mm_s * cut_s + ramp.pulse().at(cut_s).s_mm;
         let middle_mm = 2.0 * cut_mm + 0.5 * peak * cut_s * cut_s;
         let step = segment.rise.step;
         // x₁ as the tick counts it, in steps.
@@ -109,8 +107,11 @@ impl<R: Real> FeedSegment<R> {
         segment.rise.duration = cut_at;
         segment.hold = Clock { duration: cut_at.plus(cut_at), step };
         segment.length = length;
-        segment.ramp.to_mm_s = real("exit feed [mm/s]", to_mm_s)?;
-        segment.fall_bits = bits("exit feed · t1 [mm]", -to_mm_s * t1_s - scale_mm / (8.0 * PI * PI))?;
+        segment.closing_at = cut_at;
+        segment.to_mm_s = real("exit feed [mm/s]", to_mm_s)?;
+        // The rise's own is F₀·P less the bend.
+        let bent_mm = ramp.from_mm_s * t1_s - Position::from_bits(segment.rise_bits).to_mm();
+        segment.fall_bits = bits("exit feed · t1 [mm]", -to_mm_s * t1_s - bent_mm)?;
         segment.hold_start_bits = bits("length of the rise [mm]", middle_mm)?;
         segment.hold_linear_bits = bits("feed · t1 [mm]", middle_mm_s * t1_s)?;
         segment.hold_square_bits = bits("acceleration · t1² [mm]", 0.5 * peak * t1_s * t1_s)?;
@@ -120,14 +121,18 @@ impl<R: Real> FeedSegment<R> {
         Ok(segment)
     }
 
-    /// The motion between the cut and its image, at the fraction `x` of t₁ from the middle. `rise` is a
-    /// rise's motion at `x`: its bent length and its gains. In the tick.
+    /// The motion between the cut and its image, at the fraction of t₁ from the middle in 2⁻⁶⁴. In the tick.
     #[cold]
     #[inline(never)]
-    pub(super) fn at_cut(&self, rise: &PathMotion<R>, unit: R::Unit, x: u32, before: bool) -> PathMotion<R> {
+    pub(super) fn at_cut(&self, fraction: u64) -> PathMotion<R> {
         /// 12/(8π²), in 2⁻³².
         const LINEAR: u32 = (12.0 / (8.0 * PI * PI) * 4_294_967_296.0) as u32;
-        let bent = rise.s - Position::from_bits(portion(portion(self.cube_bits, LINEAR), x));
+        let before = fraction.cast_signed() < 0;
+        let fraction = if before { fraction.wrapping_neg() } else { fraction };
+        let (unit, x) = (R::Unit::from_fraction(fraction), (fraction >> 32) as u32);
+        let z = self.pulse.in_arch(fraction);
+        let rise = self.pulse.opened(z);
+        let bent = rise.s.wrapping_sub(portion(portion(self.pulse.cube_bits(), LINEAR), (z >> 32) as u32));
         let even = portion(self.hold_linear_bits, x);
         let gained = self.hold_gain_mm_s.scaled(unit) - rise.v_mm_s;
         let (even, v_mm_s, j_mm_s3) = if before {
@@ -138,7 +143,7 @@ impl<R: Real> FeedSegment<R> {
         let square = portion(self.hold_square_bits, times(x, x));
         let middle = self.hold_start_bits.wrapping_add(even).wrapping_add(square);
         PathMotion {
-            s: (Position::from_bits(middle) - bent).min(self.length),
+            s: Position::from_bits(middle.wrapping_sub(bent)).min(self.length),
             v_mm_s,
             a_mm_s2: self.hold_a_mm_s2 - rise.a_mm_s2,
             j_mm_s3,

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::fixture::LIMITS;
-use crate::law::{Law, Phase, Ramp, Ticks};
+use crate::law::{Law, Phase, Pulse, Ramp, Ticks};
 use crate::live::mode::{Blocks, Request};
 use crate::program::{Allowed, PathBlock};
 use crate::queue::Progress;
@@ -29,11 +29,11 @@ struct Ahead {
 impl Ahead {
     /// All of it is read and queued.
     fn new() -> Self {
-        let up = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, FEED_MM_S);
+        let up = Ramp::new(&Law::new(Pulse::Plateau, LIMITS).expect("limits"), 0.0, FEED_MM_S);
         let ramp = at(up.length_mm());
         let whole = ramp + at(CRUISE_MM) + ramp;
         let allowed = Allowed { cap_mm_s: FEED_MM_S, limits: LIMITS };
-        let mut lookahead = Lookahead::new();
+        let mut lookahead = Lookahead::new(Pulse::Plateau);
         let block = PathBlock::new(whole, FEED_MM_S, allowed, allowed, 0.0);
         lookahead.push(0, block).expect("room");
         let mut feed = ProgramFeed::new();

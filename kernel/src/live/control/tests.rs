@@ -7,7 +7,7 @@ use core::task::Poll;
 use super::*;
 use crate::exec::Executor;
 use crate::fixture::{self, LIMITS};
-use crate::law::{Law, Limits, PlannedRamp, Ramp};
+use crate::law::{Law, Limits, PlannedRamp, Pulse, Ramp};
 use crate::num::Fixed;
 use crate::program::{Allowed, Item, PathBlock};
 use crate::queue::{LiveStreams, PathRules, Rejection};
@@ -23,7 +23,7 @@ const RULES: PathRules = PathRules { feed_mm_s: 20.0, ..fixture::RULES };
 
 /// A hundred millimetres of cruise between two ramps, on a block that is `longer` than the path by that much.
 fn line(longer: Position) -> [Item<1>; 6] {
-    let up = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, 20.0);
+    let up = Ramp::new(&Law::new(Pulse::Plateau, LIMITS).expect("limits"), 0.0, 20.0);
     let (ramp, cruise) = (at(up.length_mm()), at(100.0));
     let whole = ramp + cruise + ramp;
     let allowed = Allowed { cap_mm_s: 20.0, limits: LIMITS };
@@ -43,13 +43,18 @@ fn line(longer: Position) -> [Item<1>; 6] {
 #[test]
 fn a_refused_command_is_made_again() {
     let items = line(Position::ZERO);
-    let ramp_s = Ramp::new(&Law::new(LIMITS).expect("limits"), 0.0, 20.0).duration_s();
+    let ramp_s = Ramp::new(&Law::new(Pulse::Plateau, LIMITS).expect("limits"), 0.0, 20.0).duration_s();
     // In the rise, in a cruise, and just before a ramp ends.
     for seen in [50, 2000, (ramp_s / TICK_S) as u32 - 2] {
         let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
         let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
         let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
-        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
+        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(
+            items.into_iter().map(Ok),
+            Pulse::Plateau,
+            TICK_S,
+            0,
+        );
         for _ in 0..seen {
             control.poll(&mut feeder).expect("items");
             executor.tick(&mut intake).expect("no fault");
@@ -88,7 +93,8 @@ fn a_source_may_go_on_later() {
     let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
     let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
     let none = std::vec::Vec::new().into_iter();
-    let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(Late { items: none }, TICK_S, 0);
+    let mut control =
+        LiveControl::<f64, 1, _, Infallible, 64>::new(Late { items: none }, Pulse::Plateau, TICK_S, 0);
     let mut start = Position::ZERO;
     for _ in 0..3 {
         for _ in 0..100 {
@@ -120,7 +126,8 @@ fn a_source_may_go_on_later() {
 #[test]
 fn a_stop_asks_for_no_more_than_the_number_type_holds() {
     let hard = Limits { accel_mm_s2: 1e4, jerk_mm_s3: 1e9, snap_mm_s4: 4e9 };
-    let soft = Straight::new([Position::ZERO], [at(100.0)], LIMITS, [20.0; 2], TICK_S).expect("a way");
+    let soft = Straight::new([Position::ZERO], [at(100.0)], Pulse::Plateau, LIMITS, [20.0; 2], TICK_S)
+        .expect("a way");
     let allowed = Allowed { cap_mm_s: 20.0, limits: hard };
     let items = soft.map(|item| match item {
         Ok(Item::Block(block)) => Ok(Item::Block(PathBlock::new(block.length, 20.0, allowed, allowed, 0.0))),
@@ -130,7 +137,7 @@ fn a_stop_asks_for_no_more_than_the_number_type_holds() {
     let mut streams = LiveStreams::<Fixed, 1, 8, 16>::new();
     let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
     let mut executor = Executor::<Fixed, 1>::new([Position::ZERO]);
-    let mut control = LiveControl::<Fixed, 1, _, Infallible, 64>::new(items, TICK_S, 0);
+    let mut control = LiveControl::<Fixed, 1, _, Infallible, 64>::new(items, Pulse::Plateau, TICK_S, 0);
     for tick in 0..2100 {
         if tick == 2000 {
             control.hold();
@@ -150,7 +157,12 @@ fn blocks_that_contradict_their_path_are_refused() {
         let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
         let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
         let items = line(Position::from_bits(steps));
-        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items.into_iter().map(Ok), TICK_S, 0);
+        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(
+            items.into_iter().map(Ok),
+            Pulse::Plateau,
+            TICK_S,
+            0,
+        );
         let mut refused = 0;
         for _ in 0..20_000 {
             let polled = control.poll(&mut feeder);

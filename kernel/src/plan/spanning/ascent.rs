@@ -6,7 +6,7 @@
 //! side of an interval is the same, seen from its end.
 
 use super::ramp_fit::{Fit, RampFit};
-use crate::law::{Limits, Ramp};
+use crate::law::{Limits, Pulse, Ramp};
 
 /// Number of steps considered one by one; if there are more, those that lose least by it are joined.
 const STEPS_MAX: usize = 48;
@@ -131,6 +131,7 @@ pub(super) struct Ascent {
     /// The chain asked for last.
     peak: Reached,
     room_mm: f64,
+    pulse: Pulse,
     /// The ramps of that chain, as indices.
     chain: [u8; RAMPS_MAX],
 }
@@ -143,12 +144,13 @@ impl Ascent {
         known: 0,
         peak: Reached::NOT,
         room_mm: 0.0,
+        pulse: Pulse::Sin2,
         chain: [0; RAMPS_MAX],
     };
 
-    /// Begins before `steps` at `from_mm_s`, with `room_mm` for the ascent. Steps not above the start only
-    /// delay it.
-    pub(super) fn start(&mut self, steps: &Steps, from_mm_s: f64, room_mm: f64) {
+    /// Begins before `steps` at `from_mm_s`, with `room_mm` for the ascent and ramps of `pulse`s. Steps not
+    /// above the start only delay it.
+    pub(super) fn start(&mut self, steps: &Steps, from_mm_s: f64, room_mm: f64, pulse: Pulse) {
         let mut start = Reached { feed_mm_s: from_mm_s, lag_s: 0.0, ..Reached::NOT };
         let mut count = 0;
         for step in steps.as_slice() {
@@ -162,7 +164,8 @@ impl Ascent {
         if let Some(first) = self.reached.first_mut() {
             *first = start;
         }
-        (self.steps, self.known, self.peak, self.room_mm) = (count, 0, start, room_mm);
+        (self.steps, self.known, self.peak) = (count, 0, start);
+        (self.room_mm, self.pulse) = (room_mm, pulse);
     }
 
     /// Finds the chain to `to_mm_s` that keeps below the steps, within the room; returns its length \[mm\].
@@ -231,6 +234,7 @@ impl Ascent {
             room_mm: self.room_mm,
             wait_s_mm: 1.0 / start.feed_mm_s - 1.0 / target.feed_mm_s,
             between: self.reached.get(from + 1..=below)?,
+            pulse: self.pulse,
             within,
             limits,
             hinders: 0,

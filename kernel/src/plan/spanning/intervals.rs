@@ -15,7 +15,7 @@ mod least;
 mod settle;
 
 use super::ascent::{Step, Steps};
-use crate::law::{Law, Limits, Ramp, peak};
+use crate::law::{Law, Limits, Pulse, Ramp, peak};
 use crate::plan::Block;
 
 /// No node.
@@ -107,6 +107,7 @@ pub(super) struct Intervals<'a> {
     nodes: &'a mut [Node],
     /// Greatest acceleration of any block.
     accel_mm_s2: f64,
+    pulse: Pulse,
 }
 
 /// A part of the stretch still to be visited: the minima it lies between, and the nodes next to its rest.
@@ -155,9 +156,13 @@ impl<'a> Intervals<'a> {
         };
         put(Node { feed_mm_s: start_mm_s, ..Node::EMPTY })?;
         let (mut at_mm, mut accel_mm_s2) = (0.0, 0.0_f64);
+        let mut pulse = Pulse::Plateau;
         let mut open: Option<Node> = None;
         for (index, block) in blocks.iter().enumerate() {
             accel_mm_s2 = accel_mm_s2.max(block.law.limits().accel_mm_s2);
+            if block.law.pulse() == Pulse::Sin2 {
+                pulse = Pulse::Sin2;
+            }
             let end_mm = at_mm + block.length_mm;
             let next_mm_s = blocks.get(index + 1).map_or(f64::INFINITY, |next| next.cap_mm_s);
             let is_junction = index + 1 < blocks.len() && block.junction_mm_s < block.cap_mm_s.min(next_mm_s);
@@ -205,7 +210,7 @@ impl<'a> Intervals<'a> {
         least::collect(nodes, blocks);
         let root = tree(nodes);
         let last = (count - 1) as u32;
-        let mut intervals = Self { blocks, nodes, accel_mm_s2 };
+        let mut intervals = Self { blocks, nodes, accel_mm_s2, pulse };
         intervals.find(Open { left_minimum: 0, left_bound: 0, right_minimum: last, right_bound: last, root });
         Some(intervals)
     }
@@ -444,6 +449,11 @@ impl<'a> Intervals<'a> {
             (true, false) => f64::INFINITY,
         };
         (rested - lag_s(bound.feed_mm_s, peak) - waited_s).max(0.0)
+    }
+
+    /// The shape of the pulses: sin² if any block is to have it, which keeps the limits of all.
+    pub(super) fn pulse(&self) -> Pulse {
+        self.pulse
     }
 
     /// The laws of the blocks of an interval.

@@ -5,7 +5,7 @@
 
 use super::ascent::{AscentRamp, Reached};
 use crate::law::passing::Passing;
-use crate::law::{Limits, Ramp};
+use crate::law::{Law, Limits, Pulse, Ramp};
 
 /// Factor by which a ramp below steps is made softer at a time, and how often at most.
 const SOFTER: f64 = 3.0;
@@ -38,6 +38,7 @@ pub(super) struct RampFit<'a, L> {
     pub(super) wait_s_mm: f64,
     /// The steps it passes.
     pub(super) between: &'a [Reached],
+    pub(super) pulse: Pulse,
     /// The limits it is made with: those where it may start, later also those of the blocks that the last one
     /// passed.
     pub(super) within: Limits<f64>,
@@ -61,7 +62,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
     pub(super) fn best(&mut self, most_s: f64) -> Option<(AscentRamp, Fit)> {
         let mut most_s = most_s;
         // As hard as allowed.
-        let hard = Ramp::within(&self.within, self.from_mm_s, self.to_mm_s);
+        let hard = self.hardest(self.within);
         let mut best = None;
         match self.below_steps(hard, self.within, most_s) {
             Tried::Lost(_, ramp) if ramp.start_mm <= self.start_mm => return Some((ramp, Fit::Free)),
@@ -127,7 +128,12 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
     /// The ramp with at most this acceleration, if it loses at most `most_s`.
     fn with(&mut self, accel_mm_s2: f64, most_s: f64) -> Tried {
         let limits = self.softened(accel_mm_s2);
-        self.below_steps(Ramp::within(&limits, self.from_mm_s, self.to_mm_s), limits, most_s)
+        self.below_steps(self.hardest(limits), limits, most_s)
+    }
+
+    /// The fastest ramp within `limits`.
+    fn hardest(&self, limits: Limits<f64>) -> Ramp<f64> {
+        Ramp::new(&Law::within(self.pulse, limits), self.from_mm_s, self.to_mm_s)
     }
 
     /// The limits where it may start, with no more than this acceleration.
@@ -159,7 +165,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
                 return Tried::Lost(own_s + waited_s, AscentRamp { start_mm: at_mm, ramp });
             }
             limits = least;
-            ramp = Ramp::within(&limits, self.from_mm_s, self.to_mm_s);
+            ramp = self.hardest(limits);
         }
         Tried::TooSoft
     }
@@ -173,7 +179,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         if !(accel_mm_s2 > 0.0) {
             return false;
         }
-        let soft = Ramp::within(&self.softened(accel_mm_s2), self.from_mm_s, self.to_mm_s);
+        let soft = self.hardest(self.softened(accel_mm_s2));
         let ends = [hard, &soft].map(|ramp| {
             let own_s = ramp.duration_s() - ramp.length_mm() / self.to_mm_s;
             (Passing::new(ramp), self.start_mm + (most_s - own_s) / self.wait_s_mm)

@@ -14,25 +14,30 @@ mod refusals;
 mod segments;
 mod spanning;
 
-use motion_kernel::law::{Law, Limits};
+use motion_kernel::law::{Law, Limits, Pulse};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, plan};
 use motion_tests::block_lists::{block, reference};
 use motion_tests::random::Random;
 
-/// The law for acceleration, jerk and snap limits.
+/// The sin² law for acceleration, jerk and snap limits.
 fn law(accel_mm_s2: f64, jerk_mm_s3: f64, snap_mm_s4: f64) -> Law<f64> {
-    Law::new(Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }).expect("positive")
+    Law::new(Pulse::Sin2, Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }).expect("positive")
 }
 
-fn laws() -> [Law<f64>; 6] {
-    [
+/// S1's limits first, each with sin² pulses and with plateaus.
+fn laws() -> [Law<f64>; 12] {
+    let sets = [
         reference(),
         law(5e3, 1e5, 5e6),
         law(12_500.0, 1e6, 1e8),
         law(500.0, 1e5, 4e5),
         law(100.0, 100.0, 1e4),
         law(1.0, 1e4, 1e8),
-    ]
+    ];
+    core::array::from_fn(|n| {
+        let pulse = if n % 2 == 0 { Pulse::Sin2 } else { Pulse::Plateau };
+        Law::new(pulse, sets[n / 2].limits()).expect("positive")
+    })
 }
 
 /// The plan from rest to rest, or between the feeds.

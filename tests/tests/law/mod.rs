@@ -1,5 +1,5 @@
-//! The sin² jerk law from outside: against the papers' printed examples, and against its definition
-//! integrated in thirty digits.
+//! The jerk law, with sin² pulses and with plateaus, from outside: against the papers' printed examples, and
+//! against its definition integrated in thirty digits.
 
 #![allow(clippy::float_cmp, reason = "exact values are the point")]
 
@@ -10,7 +10,7 @@ mod ramp;
 mod segment;
 mod cut;
 
-use motion_kernel::law::Limits;
+use motion_kernel::law::{Limits, Pulse};
 use motion_kernel::num::Root;
 use motion_tests::random::Random;
 
@@ -24,6 +24,9 @@ const LIMITS: [(f64, f64, f64); 6] = [
     (100.0, 100.0, 1e4),
     (1.0, 1e4, 1e8),
 ];
+
+/// Both shapes of a pulse.
+const PULSES: [Pulse; 2] = [Pulse::Sin2, Pulse::Plateau];
 
 fn limits((accel_mm_s2, jerk_mm_s3, snap_mm_s4): (f64, f64, f64)) -> Limits<f64> {
     Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }

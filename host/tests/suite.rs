@@ -1,0 +1,19 @@
+//! All suites in one executable: what they share is compiled once, and their tests share the processor's cores.
+//!
+//! ```text
+//! cargo test -p motion-host --test suite gcode::      one suite
+//! ```
+
+mod cli;
+mod compare;
+mod curves;
+mod drive;
+mod gcode;
+mod limit_share;
+mod smoothness;
+mod spline;
+
+#[test]
+fn no_suite_is_left_out() {
+    motion_tests::assert_all_are_in(env!("CARGO_MANIFEST_DIR"), include_str!("suite.rs"), &[]);
+}
