@@ -87,30 +87,34 @@ impl<'a> Sides<'a> {
     pub(super) fn best(&self, up: &mut Ascent, down: &mut Ascent) -> Option<f64> {
         self.start(up, down);
         let (mut low, mut high) = (self.lowest(), self.highest());
+        let at_high = self.fit(high, up, down);
+        if at_high.is_some_and(|left| left >= 0.0) {
+            return Some(high);
+        }
+        let mut left_high = at_high.unwrap_or(f64::NEG_INFINITY);
+        // What the ramps to the highest peak aim at has to be found before the lowest takes their place.
         let room_mm = self.interval.end_mm - self.interval.start_mm;
+        let aim_mm = 0.5 * PEAK_GAP * room_mm;
+        let mut aimed = peak_by_ramps(up, down, high, room_mm - aim_mm);
         let mut left_low = self.fit(low, up, down).filter(|&left| left >= 0.0)?;
         let low_s = up.time_s() + down.time_s() + if low > 0.0 { left_low / low } else { f64::INFINITY };
-        let mut left_high = match self.fit(high, up, down) {
-            Some(left) if left >= 0.0 => return Some(high),
-            Some(left) => left,
-            None => f64::NEG_INFINITY,
-        };
         // The best peak need not be the highest that fits, nor better than the lowest one: just above a step
         // a chain may lose more than its peak gains.
         let (mut gap_mm, mut last) = (left_low, high);
         let (mut best, mut best_s) = (low, low_s);
         // False position, with bisection where that stalls; aimed a little short, so that there is room.
-        let aim_mm = 0.5 * PEAK_GAP * room_mm;
         for step in 0..PEAK_STEPS {
             let gains = best_s == f64::INFINITY || gap_mm * (high - low) > PEAK_GAIN * best_s * high * low;
             if gap_mm < PEAK_GAP * room_mm || !gains {
                 break;
             }
-            let by_ramps =
-                if step < AIMED_STEPS { peak_by_ramps(up, down, last, room_mm - aim_mm) } else { None };
+            if 0 < step && step < AIMED_STEPS {
+                aimed = peak_by_ramps(up, down, last, room_mm - aim_mm);
+            }
             let part = (left_low - aim_mm) / (left_low - left_high);
             let part = if part > 0.02 && part < 0.98 { part } else { 0.5 };
-            last = by_ramps.filter(|&peak| low < peak && peak < high).unwrap_or(low + part * (high - low));
+            last =
+                aimed.take().filter(|&peak| low < peak && peak < high).unwrap_or(low + part * (high - low));
             match self.fit(last, up, down) {
                 Some(left) if left >= 0.0 => {
                     (low, left_low, gap_mm) = (last, left, left);
