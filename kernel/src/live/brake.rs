@@ -3,15 +3,40 @@
 //! Consumes a splice and the [`Lookahead`]; produces a ramp under the ceilings, junctions and limits of all
 //! the blocks that it crosses. Background.
 
+use core::f64::consts::FRAC_PI_2;
+
+use super::list::Item;
 use super::lookahead::{AheadBlock, FEED_ROUNDING, Lookahead};
 use super::splice::{SLIVER, Splice};
-use crate::law::{Law, PlannedRamp, Ramp};
+use crate::law::{Law, Limits, Phase, PlannedRamp, Ramp, Ticks};
 use crate::units::Position;
 
 /// Tolerated rounding of a length \[mm\].
 pub(super) const LENGTH_ROUNDING_MM: f64 = 4.0e-9;
 /// How often a ramp is made anew because it crosses blocks with lower limits.
 const LIMITS_STEPS: usize = 8;
+
+/// Tolerated rounding of jerk and snap, relative.
+const LIMIT_ROUNDING: f64 = 1.0e-12;
+/// Number of places where braking may begin: here, and the ends of the first blocks ahead.
+const STARTS_TRIED: usize = 4;
+
+/// How motion comes to rest from a splice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stop {
+    /// The path on which the feed is kept before it brakes.
+    pub(super) kept: Position,
+    pub(super) ramp: PlannedRamp,
+    /// How long both take \[s\].
+    pub(super) time_s: f64,
+}
+
+impl Stop {
+    /// The path up to the rest.
+    pub(super) fn length(&self) -> Position {
+        self.kept + self.ramp.length
+    }
+}
 
 impl<const PLACES: usize> Lookahead<PLACES> {
     /// The fastest braking ramp from a splice to `to_mm_s`: under `feed_override`, ending no
@@ -24,9 +49,43 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         end: Position,
         feed_override: f64,
     ) -> Option<PlannedRamp> {
+        self.brake_by(from, end, feed_override, |limits| {
+            Some(Ramp::new(&Law::new(self.pulse(), *limits).ok()?, from.feed_mm_s, to_mm_s))
+        })
+    }
+
+    /// The braking ramp under way since `from`, driven on to rest from `since` in it. `None` if it can only be
+    /// driven to its own end.
+    pub(super) fn brake_on(
+        &self,
+        from: &Splice,
+        ramp: &Item,
+        since: (Phase, Ticks),
+        end: Position,
+        feed_override: f64,
+        tick_s: f64,
+    ) -> Option<PlannedRamp> {
+        self.brake_by(from, end, feed_override, |limits| {
+            let ramp = ramp.to_rest(since, self.pulse(), limits.accel_mm_s2, tick_s)?;
+            let snap_mm_s4 = FRAC_PI_2 * ramp.peak_jerk_mm_s3 / ramp.edge_s;
+            let is_within = |value: f64, limit: f64| value <= limit * (1.0 + LIMIT_ROUNDING);
+            let keeps = is_within(ramp.peak_jerk_mm_s3, limits.jerk_mm_s3)
+                && is_within(snap_mm_s4, limits.snap_mm_s4);
+            keeps.then_some(ramp)
+        })
+    }
+
+    /// The braking ramp from a splice that `make` makes within the limits of all blocks it crosses.
+    fn brake_by(
+        &self,
+        from: &Splice,
+        end: Position,
+        feed_override: f64,
+        make: impl Fn(&Limits<f64>) -> Option<Ramp<f64>>,
+    ) -> Option<PlannedRamp> {
         let mut limits = self.from(from).next()?.limits_at(from.feed_mm_s);
         for _ in 0..LIMITS_STEPS {
-            let ramp = Ramp::new(&Law::new(self.pulse(), limits).ok()?, from.feed_mm_s, to_mm_s);
+            let ramp = make(&limits)?;
             let length_mm = ramp.length_mm();
             let mut length = Position::from_mm(length_mm)?;
             let left = end - (from.at + length);
@@ -48,6 +107,32 @@ impl<const PLACES: usize> Lookahead<PLACES> {
             limits = least;
         }
         None
+    }
+
+    /// The soonest rest from a splice: braking at once, or at the end of one of the blocks ahead. A blend
+    /// leaves little of the limits at its feed, so it may take less time to drive through it first.
+    pub(super) fn stop(&self, from: &Splice, end: Position, feed_override: f64) -> Option<Stop> {
+        let (mut best, mut best_s) = (None, f64::INFINITY);
+        let mut begin = *from;
+        for block in self.from(from).take(STARTS_TRIED) {
+            let kept = begin.at - from.at;
+            let kept_s = kept.to_mm() / from.feed_mm_s;
+            if kept_s >= best_s {
+                break;
+            }
+            if let Some(ramp) = self.brake(&begin, 0.0, end, feed_override) {
+                let time_s = kept_s + ramp.ramp.duration_s();
+                if time_s < best_s {
+                    (best, best_s) = (Some(Stop { kept, ramp, time_s }), time_s);
+                }
+            }
+            // The junction at the block's end and the ceiling behind it count, too.
+            if !self.may_keep(from, block.end() + SLIVER, feed_override) {
+                break;
+            }
+            begin.at = block.end();
+        }
+        best
     }
 
     /// Whether the feed of a splice may be kept up to `end` under `feed_override`.
@@ -82,5 +167,70 @@ impl<const PLACES: usize> Lookahead<PLACES> {
             junction_mm_s = block.junction_mm_s();
         }
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::Pulse;
+    use crate::program::{Allowed, PathBlock};
+
+    const FEED_MM_S: f64 = 48.0;
+    const HARD: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+    const SOFT: Limits<f64> = Limits { accel_mm_s2: 70.0, jerk_mm_s3: 40.0, snap_mm_s4: 4e5 };
+
+    fn at(mm: f64) -> Position {
+        Position::from_mm(mm).expect("in range")
+    }
+
+    /// Blocks of these lengths, limits and ceilings; the junctions between them ask for nothing.
+    fn ahead(blocks: &[(f64, Limits<f64>, f64)]) -> Lookahead<8> {
+        let mut ahead = Lookahead::new(Pulse::Plateau);
+        for &(length_mm, limits, cap_mm_s) in blocks {
+            let allowed = Allowed { cap_mm_s, limits };
+            ahead.push(0, PathBlock::new(at(length_mm), cap_mm_s, allowed, allowed, 1e3)).expect("room");
+        }
+        ahead
+    }
+
+    fn stop(ahead: &Lookahead<8>, end_mm: f64) -> Option<Stop> {
+        let from = Splice { stretch: 0, at: at(1.0), feed_mm_s: FEED_MM_S };
+        ahead.stop(&from, at(end_mm), 1.0)
+    }
+
+    /// A blend of 1.5 mm takes 31 ms to drive through, and 2 s to brake in.
+    #[test]
+    fn a_blend_is_driven_through_before_braking() {
+        let law = Law::new(Pulse::Plateau, HARD).expect("limits");
+        let hard = Ramp::new(&law, FEED_MM_S, 0.0);
+        let blocks = [(3.0, HARD, FEED_MM_S), (1.5, SOFT, FEED_MM_S), (100.0, HARD, FEED_MM_S)];
+        let found = stop(&ahead(&blocks), 100.0).expect("a stop");
+        assert_eq!(found.kept, at(3.5));
+        assert_eq!((found.ramp.ramp.t1_s, found.ramp.ramp.t2_s), (hard.t1_s, hard.t2_s));
+        assert!(libm::fabs(found.time_s - 3.5 / FEED_MM_S - hard.duration_s()) < 1e-12);
+        // Inside the blend, too; and not where it is behind.
+        let found = stop(&ahead(&[blocks[1], blocks[2]]), 100.0).expect("a stop");
+        assert_eq!(found.kept, at(0.5));
+        assert_eq!(stop(&ahead(&[blocks[2]]), 100.0).expect("a stop").kept, Position::ZERO);
+    }
+
+    /// Not where its feed is too high behind the blend, or at the junction, or where the known path ends before
+    /// the rest: then it brakes in the blend.
+    #[test]
+    fn a_feed_is_kept_only_where_that_is_allowed() {
+        let (blend, line) = ((1.5, SOFT, FEED_MM_S), (100.0, HARD, FEED_MM_S));
+        let soft = stop(&ahead(&[(100.0, SOFT, FEED_MM_S)]), 100.0).expect("a stop");
+        assert!(soft.kept == Position::ZERO && soft.time_s > 2.0);
+        let slow = ahead(&[blend, (100.0, HARD, 0.9 * FEED_MM_S)]);
+        assert_eq!(stop(&slow, 100.0), None, "neither kept nor braked within the half millimetre");
+        assert_eq!(stop(&ahead(&[blend, line]), 5.0), None, "no room");
+        let mut ahead = Lookahead::<8>::new(Pulse::Plateau);
+        for (junction_mm_s, (length_mm, limits, cap_mm_s)) in [(0.9 * FEED_MM_S, blend), (1e3, line)] {
+            let allowed = Allowed { cap_mm_s, limits };
+            let block = PathBlock::new(at(length_mm), cap_mm_s, allowed, allowed, junction_mm_s);
+            ahead.push(0, block).expect("room");
+        }
+        assert_eq!(stop(&ahead, 100.0), None, "the junction");
     }
 }

@@ -2,13 +2,17 @@
 
 use heapless::Vec;
 
+use super::brake::Stop;
 use super::splice::Splice;
-use crate::law::{CutRamp, Phase, PlannedRamp, Ramp, Ticks, segment};
+use crate::law::{CutRamp, Phase, PlannedRamp, Pulse, Ramp, Ticks, segment};
 pub use crate::queue::LIST_ITEMS;
 use crate::units::Position;
 
 /// Rounding between feeds that are calculated differently: of 1 mm/s, plus relative to the feed.
 const FEED_ROUNDING_MM_S: f64 = 1.0e-12;
+
+/// Tolerated rounding of an acceleration, relative.
+const ACCEL_ROUNDING: f64 = 1.0e-12;
 
 /// Bisection steps that find where a ramp is cut: to a millionth of a millionth.
 const CUT_STEPS: usize = 40;
@@ -146,6 +150,39 @@ impl Item {
         self.cut(Phase::Rise, before(low_s)?, tick_s)
     }
 
+    /// The same braking ramp driven on to rest, from `elapsed` after the start of `phase`: what is left of its
+    /// first pulse, if that may have another `pulse` shape, or of its hold is made longer, with an
+    /// acceleration of at most `most_mm_s2`. `None` where nothing of that is left, or where there is more
+    /// acceleration already.
+    pub(super) fn to_rest(
+        &self,
+        (phase, elapsed): (Phase, Ticks),
+        pulse: Pulse,
+        most_mm_s2: f64,
+        tick_s: f64,
+    ) -> Option<Ramp<f64>> {
+        let Self::Feed(PlannedRamp { ramp, .. }) = self else { return None };
+        let ramp = segment::to_f64(ramp);
+        let (change_mm_s, jerk) = (ramp.from_mm_s, ramp.peak_jerk_mm_s3);
+        let goes_on = ramp.to_mm_s > 0.0 && ramp.to_mm_s < change_mm_s;
+        if phase == Phase::Fall || !goes_on || ramp.t1_s <= tick_s {
+            return None;
+        }
+        // One step less: the closing edge must not have begun.
+        let before_closing = Ticks::from_seconds(ramp.t1_s - ramp.edge_s, tick_s)?.minus(Ticks::from_bits(1));
+        let is_open = phase == Phase::Rise && before_closing.is_some_and(|closing| elapsed <= closing);
+        let t1_s = if is_open && pulse == Pulse::Plateau {
+            let longest_s = most_mm_s2 / jerk + ramp.edge_s;
+            ramp.t1_s.max(ramp.rise_for_s(change_mm_s).min(longest_s))
+        } else {
+            ramp.t1_s
+        };
+        let accel_mm_s2 = jerk * (t1_s - ramp.edge_s);
+        let t2_s = t1_s.max(change_mm_s / accel_mm_s2);
+        let is_within = accel_mm_s2 <= most_mm_s2 * (1.0 + ACCEL_ROUNDING);
+        is_within.then_some(Ramp { to_mm_s: 0.0, t1_s, t2_s, ..ramp })
+    }
+
     /// The duration of a phase of its [`FeedSegment`](crate::law::FeedSegment), if the item can be cut there.
     pub(super) fn phase_duration(&self, phase: Phase, tick_s: f64) -> Option<Ticks> {
         let ramp = match self {
@@ -254,6 +291,21 @@ impl List {
         item
     }
 
+    /// Appends a stop, up to two items.
+    pub(super) fn push_stop(&mut self, stop: &Stop) {
+        let feed_mm_s = stop.ramp.ramp.from_mm_s;
+        if stop.kept > Position::ZERO {
+            self.push_cruise(feed_mm_s, stop.kept);
+        }
+        self.push(Item::Feed(stop.ramp));
+    }
+
+    /// Appends a cruise at `feed_mm_s` > 0 over `length`.
+    pub(super) fn push_cruise(&mut self, feed_mm_s: f64, length: Position) {
+        let ramp = Ramp::cruise(feed_mm_s, length.to_mm() / feed_mm_s);
+        self.push(Item::Feed(PlannedRamp { ramp, length }));
+    }
+
     pub(super) fn contains(&self, item: &Item) -> bool {
         self.items().any(|other| other == item)
     }
@@ -293,7 +345,7 @@ impl List {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Law, Limits, Pulse};
+    use crate::law::{Law, LimitedBy, Limits};
     use crate::random::Random;
 
     /// Wherever a ramp is to end, it can be cut so that it does, whole or cut already, and never beyond.
@@ -323,6 +375,61 @@ mod tests {
             }
         }
         assert!(cuts > 5_000, "{cuts}");
+    }
+
+    /// In its rise or hold a braking ramp may go on to rest: it is the same up to there, brakes no harder than
+    /// allowed, and is sooner at rest than the whole ramp and another one after it.
+    #[test]
+    fn a_ramp_that_brakes_goes_on_to_rest() {
+        let random = Random::new(3);
+        let tick_s = 5e-4;
+        let mut grown = 0;
+        for number in 0..20_000 {
+            let pulse = [Pulse::Sin2, Pulse::Plateau][number % 2];
+            let limits = Limits {
+                accel_mm_s2: random.log(50.0, 5e3),
+                jerk_mm_s3: 5e3,
+                snap_mm_s4: random.log(1e5, 1e7),
+            };
+            let law = Law::within(pulse, limits);
+            let from_mm_s = random.log(5.0, 500.0);
+            let ramp = Ramp::new(&law, from_mm_s, from_mm_s * (0.02 + 0.9 * random.unit()));
+            let length = Position::from_mm(ramp.length_mm()).expect("in range");
+            let item = Item::Feed(PlannedRamp { ramp, length });
+            let phases = [(Phase::Rise, ramp.t1_s), (Phase::Hold, ramp.t2_s - ramp.t1_s)];
+            for (phase, lasts_s) in phases {
+                let elapsed_s = lasts_s * random.unit();
+                let since = (phase, Ticks::from_seconds(elapsed_s, tick_s).expect("in range"));
+                let Some(on) = item.to_rest(since, pulse, limits.accel_mm_s2, tick_s) else {
+                    panic!("{number}: {phase:?} {elapsed_s} of {ramp:?}");
+                };
+                let until_s = if phase == Phase::Hold { ramp.t1_s + elapsed_s } else { elapsed_s };
+                for part in [0.25, 0.5, 1.0] {
+                    let (was, is) = (ramp.at(part * until_s), on.at(part * until_s));
+                    let size = 1e-9 * from_mm_s;
+                    let is_same = libm::fabs(was.v_mm_s - is.v_mm_s) <= size
+                        && libm::fabs(was.a_mm_s2 - is.a_mm_s2) <= 1e-9 * limits.accel_mm_s2
+                        && libm::fabs(was.j_mm_s3 - is.j_mm_s3) <= 1e-7 * limits.jerk_mm_s3;
+                    assert!(is_same, "{number}: {was:?} {is:?}, {phase:?} {elapsed_s} of {ramp:?}, {on:?}");
+                }
+                let end = on.at(on.duration_s());
+                assert!(on.to_mm_s <= 0.0 && libm::fabs(end.v_mm_s) <= 1e-9 * from_mm_s, "{end:?}");
+                let changed = on.peak_accel_mm_s2() * on.t2_s;
+                assert!(libm::fabs(changed - from_mm_s) <= 1e-9 * from_mm_s, "{changed} of {from_mm_s}");
+                assert!(on.peak_accel_mm_s2() <= limits.accel_mm_s2 * (1.0 + 1e-9), "{on:?}");
+                grown += usize::from(on.peak_accel_mm_s2() > 1.01 * ramp.peak_accel_mm_s2());
+                // Ramps of the law that limits fix alike may go on as the law would have it.
+                if ramp.limited_by == LimitedBy::Acceleration {
+                    let waits_s = ramp.duration_s() + Ramp::new(&law, ramp.to_mm_s, 0.0).duration_s();
+                    assert!(on.duration_s() < waits_s, "{number}: {on:?}, {waits_s} s");
+                }
+            }
+            let falling = (Phase::Fall, Ticks::ONE);
+            assert_eq!(item.to_rest(falling, pulse, limits.accel_mm_s2, tick_s), None);
+            let softer = 0.99 * ramp.peak_accel_mm_s2();
+            assert_eq!(item.to_rest((Phase::Rise, Ticks::ONE), pulse, softer, tick_s), None);
+        }
+        assert!(grown > 1000, "{grown}");
     }
 
     /// However great the feeds are compared with their change.

@@ -32,6 +32,8 @@ pub(super) struct Place {
     takeover: Takeover,
     start: Splice,
     head: Option<Item>,
+    /// The phase of the item under way, and the time in it, at which it is left.
+    since: Option<(Phase, Ticks)>,
 }
 
 impl Place {
@@ -42,6 +44,11 @@ impl Place {
     /// Where the list that takes over begins.
     pub(super) fn start(&self) -> &Splice {
         &self.start
+    }
+
+    /// The phase of the item under way, and the time in it, at which it is left.
+    pub(super) fn since(&self) -> Option<(Phase, Ticks)> {
+        self.since
     }
 
     /// The splice from which it may do something else.
@@ -102,7 +109,7 @@ impl<'a> Places<'a> {
     }
 
     fn after(&self, count: usize) -> Place {
-        Place { takeover: Takeover::After(count), start: self.list.after(count), head: None }
+        Place { takeover: Takeover::After(count), start: self.list.after(count), head: None, since: None }
     }
 
     /// Within the item under way, cut as soon as possible.
@@ -116,7 +123,8 @@ impl<'a> Places<'a> {
             return None;
         }
         let head = item.cut(phase, elapsed, tick_s)?;
-        Some(Place { takeover: Takeover::Within(done), start: *start, head: Some(head) })
+        let since = Some((phase, elapsed));
+        Some(Place { takeover: Takeover::Within(done), start: *start, head: Some(head), since })
     }
 }
 

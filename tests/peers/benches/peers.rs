@@ -113,8 +113,8 @@ fn rows() -> Vec<Row> {
         row("ramp", "rsruckig calculate", Free),
         row("block: peak and two ramps", "rsruckig calculate", Free),
         row("block: peak and two ramps", "ruckig calculate", Free),
-        row("plan, a block", "rsruckig calculate", RatioMax(1.0)),
-        row("merge and plan, a block", "rsruckig calculate", RatioMax(1.0 / 3.0)),
+        row("plan, a block", "rsruckig calculate", RatioMax(1.5)),
+        row("merge and plan, a block", "rsruckig calculate", RatioMax(0.5)),
     ]
 }
 

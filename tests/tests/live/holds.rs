@@ -7,7 +7,7 @@ use motion_host::machine::Machine;
 use motion_kernel::live::State;
 use motion_kernel::num::Fixed;
 
-use super::{Case, Runs};
+use super::{Case, Runs, planned};
 use motion_tests::check::bounds::Number;
 use motion_tests::check::geometry::{Arc, Move, UNITS_PER_MM};
 use motion_tests::check::live::Command;
@@ -83,6 +83,21 @@ fn held_before_every_tick_of_a_corner() {
     held.print_and_assert("corner");
     // From 40 mm/s: a ramp given up at its half, 3 t1/2, and a ramp to rest; as much again to start.
     assert!(held.longest_stop < 900, "{}", held.longest_stop);
+}
+
+/// At its feed a blend leaves next to nothing of the jerk: 40 mm/s³ here, with which a stop takes 2.4 s.
+#[test]
+fn a_blend_does_not_hold_up_a_stop() {
+    let machine = Machine::reference();
+    let text = "G64 P0.05\nF4800\nG1 X40\nG1 X60 Y3\nG1 X100 Y3\nM2\n";
+    let plan = planned(text, &machine, 10_000.0).expect("a plan");
+    assert_eq!(plan.blocks.iter().filter(|block| block.kind == "blend").count(), 2);
+    let case = Case::compiled::<f64>(plan, machine).expect("a path");
+    let mut held = Held::default();
+    held.before_ticks::<f64>(&case, 0, 0, from_env("MOTION_TEST_EVERY").unwrap_or(31));
+    held.print_and_assert("blends");
+    // From 80 mm/s: 0.26 s at the least, 2.2 times that and two of S1's rises.
+    assert!(held.longest_stop < 1544, "{}", held.longest_stop);
 }
 
 /// The published test part, as its text says.

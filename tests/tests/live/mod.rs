@@ -61,6 +61,11 @@ impl Case {
         if !plan.blocks.iter().any(|block| block.kind == "blend") {
             return None;
         }
+        Self::compiled::<R>(plan, machine)
+    }
+
+    /// A plan whose path is that of a kernel of numbers `R`.
+    fn compiled<R: Number>(plan: Plan, machine: Machine) -> Option<Self> {
         let path = Path::compiled(&plan, &Executable::new::<R>(&plan).ok()?);
         Some(Self { machine, path, plan })
     }

@@ -1,6 +1,8 @@
 //! Commands: the list that takes over from the motion under way, and where.
 
 use super::{Choice, Chooser};
+use crate::law::PlannedRamp;
+use crate::live::brake::Stop;
 use crate::live::list::{Item, List};
 use crate::live::mode::Request;
 use crate::live::places::{Place, Places, Takeover};
@@ -18,6 +20,39 @@ pub(super) enum Cut {
     All,
 }
 
+/// How motion comes to rest from a place in the list under way.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum StopFrom {
+    /// The item under way is a ramp that brakes: it goes on to rest.
+    Start(PlannedRamp),
+    /// After the item under way, perhaps cut.
+    Splice(Stop),
+}
+
+impl StopFrom {
+    /// Restarts `list` with the stop from `place`.
+    fn begin(&self, place: &Place, list: &mut List) {
+        match self {
+            Self::Start(ramp) => {
+                list.restart(*place.start());
+                list.push(Item::Feed(*ramp));
+            }
+            Self::Splice(stop) => {
+                place.begin(list);
+                list.push_stop(stop);
+            }
+        }
+    }
+
+    /// Where it ends.
+    pub(super) fn rest(&self, place: &Place, tick_s: f64) -> Position {
+        match self {
+            Self::Start(ramp) => place.start().at + ramp.length,
+            Self::Splice(stop) => place.splice(tick_s).at + stop.length(),
+        }
+    }
+}
+
 impl<const PLACES: usize> Chooser<'_, PLACES> {
     /// Makes a list that obeys `request`, with motion at `progress`.
     pub(in crate::live) fn obey(&mut self, request: Request, progress: &Progress, list: &mut List) -> Choice {
@@ -28,33 +63,44 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         }
     }
 
-    /// Brakes to rest from the first place that allows it; if there is none, the list under way ends at rest.
+    /// Comes to rest from the first place that allows it; if there is none, the list under way ends at rest.
     pub(super) fn stop(&self, places: Places<'_>, progress: &Progress, list: &mut List) -> Choice {
         for place in places {
-            place.begin(list);
-            let splice = list.end();
-            if splice.feed_mm_s < place.start().feed_mm_s {
-                // A ramp that brakes is driven to its end.
-                continue;
-            }
-            if splice.is_at_rest() {
+            if place.since().is_none() && place.start().is_at_rest() {
                 // The rest of this list must not be driven.
                 if let Some(rest) = self.rest_before_more(&place, progress) {
                     return rest;
                 }
                 break;
             }
-            let path_end = self.extent_of(splice.stretch).end();
-            let driven_override = self.timeline.driven_override();
-            let Some(ramp) = self.lookahead.brake(&splice, 0.0, path_end, driven_override) else {
-                continue;
-            };
-            list.push(Item::Feed(ramp));
+            let Some(stop) = self.stop_from(&place) else { continue };
+            stop.begin(&place, list);
             if self.timeline.keeps_up(list, place.takeover()) {
                 return self.rest_at_end_of(list, &place);
             }
         }
         Choice::DriveToEnd
+    }
+
+    /// How motion comes to rest if the list under way is left at `place`.
+    pub(super) fn stop_from(&self, place: &Place) -> Option<StopFrom> {
+        let (start, splice) = (*place.start(), place.splice(self.tick_s));
+        let driven_override = self.timeline.driven_override();
+        let path_end = self.extent_of(splice.stretch).end();
+        if splice.feed_mm_s >= start.feed_mm_s {
+            return self.lookahead.stop(&splice, path_end, driven_override).map(StopFrom::Splice);
+        }
+        // A ramp that brakes can't be ended early, but may be driven on, unless it is so gentle that another one
+        // after it is sooner at rest.
+        let (_, item) = self.timeline.list().get(place.takeover().driven())?;
+        let on =
+            self.lookahead.brake_on(&start, item, place.since()?, path_end, driven_override, self.tick_s)?;
+        let after = item.end(&start, self.tick_s);
+        let another_s = self.lookahead.stop(&after, path_end, driven_override).map(|stop| stop.time_s);
+        let (Item::Feed(PlannedRamp { ramp, .. }), Some(another_s)) = (item, another_s) else {
+            return Some(StopFrom::Start(on));
+        };
+        (on.ramp.duration_s() <= ramp.duration_s() + another_s).then_some(StopFrom::Start(on))
     }
 
     /// Lets a list that ends at rest take over.

@@ -5,7 +5,7 @@
 
 use super::command::Cut;
 use super::{Choice, Chooser};
-use crate::law::{PlannedRamp, Ramp};
+use crate::live::brake::Stop;
 use crate::live::list::{Item, LIST_ITEMS, List};
 use crate::live::places::Places;
 use crate::live::replan::Ramps;
@@ -25,15 +25,14 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         self.mode.is_single_block() && place.is_at_rest() && self.block_end == Some(BlockEnd::from(*place))
     }
 
-    /// The path position of the nearest rest from a splice, and how to brake to it.
-    fn nearest_rest(&self, from: &Splice) -> Option<(Position, Option<Item>)> {
+    /// The path position of the soonest rest from a splice, and how to come to it.
+    fn soonest_rest(&self, from: &Splice) -> Option<(Position, Option<Stop>)> {
         if from.is_at_rest() {
             return Some((from.at, None));
         }
         let path_end = self.extent_of(from.stretch).end();
-        let driven_override = self.timeline.driven_override();
-        let ramp = self.lookahead.brake(from, 0.0, path_end, driven_override)?;
-        Some((from.at + ramp.length, Some(Item::Feed(ramp))))
+        let stop = self.lookahead.stop(from, path_end, self.timeline.driven_override())?;
+        Some((from.at + stop.length(), Some(stop)))
     }
 
     /// The first block ends of `stretch` at or after `nearest`.
@@ -67,8 +66,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                     return false;
                 }
                 if kept > Position::ZERO {
-                    let cruise = Ramp::cruise(from.feed_mm_s, kept.to_mm() / from.feed_mm_s);
-                    list.push(Item::Feed(PlannedRamp { ramp: cruise, length: kept }));
+                    list.push_cruise(from.feed_mm_s, kept);
                 }
                 list.push(Item::Feed(ramp));
                 return true;
@@ -82,9 +80,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
     /// the end of the stretch, as far as it is known.
     pub(super) fn gather_block(&mut self, list: &mut List, ramps: Ramps) -> bool {
         let splice = *self.timeline.splice();
-        if let Some((nearest, brake)) = self.nearest_rest(&splice) {
+        if let Some((nearest, stop)) = self.soonest_rest(&splice) {
             // At rest, the block end it rests at doesn't count.
-            let nearest = if brake.is_none() { nearest + SLIVER + SLIVER } else { nearest };
+            let nearest = if stop.is_none() { nearest + SLIVER + SLIVER } else { nearest };
             let ends = self.block_ends(splice.stretch, nearest);
             for end in ends.into_iter().flatten() {
                 self.block_end = Some(end);
@@ -96,8 +94,8 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                     return true;
                 }
             }
-            if let ([Some(_), ..], Some(brake)) = (ends, brake) {
-                list.push(brake);
+            if let ([Some(_), ..], Some(stop)) = (ends, stop) {
+                list.push_stop(&stop);
                 return true;
             }
         }
@@ -119,7 +117,11 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         let stretch = under_way.after(done).stretch;
         let rests = places.clone().filter_map(|place| {
             let splice = place.splice(self.tick_s);
-            let (rest, _) = self.nearest_rest(&splice)?;
+            let rest = if splice.is_at_rest() {
+                splice.at
+            } else {
+                self.stop_from(&place)?.rest(&place, self.tick_s)
+            };
             (splice.stretch == stretch).then_some(rest)
         });
         if let Some(nearest) = rests.min() {

@@ -151,7 +151,7 @@ fn single_block_comes_to_rest_at_the_end_of_the_block() {
     assert!(list.end().is_at_rest() && ahead.feed.peek() == Some(&Item::End), "{list:?}");
 }
 
-/// A cruise is cut at once; a ramp that brakes goes to its end; a dwell is the last item driven.
+/// A cruise is cut at once; a ramp that brakes to rest goes to its end; a dwell is the last item driven.
 #[test]
 fn a_stop_takes_over_as_soon_as_the_feed_does_not_change() {
     let left = Ticks::from_seconds(1.0, TICK_S).expect("in range");
@@ -168,6 +168,30 @@ fn a_stop_takes_over_as_soon_as_the_feed_does_not_change() {
     let dwelling = Progress { waits: true, ..progress(1, None) };
     let (choice, _) = ahead.choose(Some((Request::Stop, dwelling)));
     assert_eq!(choice, Choice::Rest { after: 1, ends_block: false });
+}
+
+/// A ramp that brakes to a lower feed goes on to rest from its rise or its hold; from its fall it goes to its
+/// end, and brakes again.
+#[test]
+fn a_ramp_that_brakes_is_driven_on_to_rest() {
+    let mut ahead = Ahead::new();
+    let law = Law::new(Pulse::Plateau, LIMITS).expect("limits");
+    let down = Ramp::new(&law, FEED_MM_S, 0.5 * FEED_MM_S);
+    let mut list = List::new(Splice { feed_mm_s: FEED_MM_S, ..*ahead.timeline.splice() }, TICK_S);
+    list.push(Item::Feed(PlannedRamp { ramp: down, length: at(down.length_mm()) }));
+    list.push_cruise(0.5 * FEED_MM_S, at(50.0));
+    list.set_exit_to_end();
+    ahead.timeline = Timeline::driving(list, TICK_S);
+    let middle = Ticks::from_seconds(0.5 * down.t1_s, TICK_S).expect("in range");
+    let rising = progress(0, Some((Phase::Rise, middle)));
+    let (choice, list) = ahead.choose(Some((Request::Stop, rising)));
+    assert_eq!(choice, Choice::TakeOver { takeover: Takeover::Within(0), feed_override: 1.0 });
+    assert!(list.len() == 1 && list.end().is_at_rest() && list.start().feed_mm_s == FEED_MM_S, "{list:?}");
+
+    let falling = progress(0, Some((Phase::Fall, middle)));
+    let (choice, list) = ahead.choose(Some((Request::Stop, falling)));
+    assert_eq!(choice, Choice::TakeOver { takeover: Takeover::After(1), feed_override: 1.0 });
+    assert!(list.start().feed_mm_s == 0.5 * FEED_MM_S && list.end().is_at_rest(), "{list:?}");
 }
 
 /// A lower override brakes from the cruise to its feed; the whole stretch is planned anew from there.
