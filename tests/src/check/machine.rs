@@ -3,10 +3,8 @@
 use motion_host::machine::Machine;
 use motion_kernel::law::Pulse;
 
+use crate::PULSES;
 use crate::random::Random;
-
-/// The laws.
-pub const PULSES: [Pulse; 2] = [Pulse::Sin2, Pulse::Plateau];
 
 /// The reference machine with each law.
 pub fn references() -> [Machine; 2] {

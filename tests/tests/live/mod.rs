@@ -223,7 +223,7 @@ const FOUND: [u64; 6] = [201_515, 8_012_480, 20_035_463, 50_019_280, 60_024_445,
 #[test]
 fn any_command_at_any_tick_is_legal() {
     let mut runs = Runs::default();
-    let found = machine::PULSES.map(|pulse| FOUND.map(|seed| (seed, Some(pulse))));
+    let found = motion_tests::PULSES.map(|pulse| FOUND.map(|seed| (seed, Some(pulse))));
     for (seed, pulse) in found.into_iter().flatten().chain(seeds(400).map(|seed| (seed, None))) {
         // A third of the programs with blends, where they are worth it.
         let is_blended = seed % 9 >= 6;
