@@ -4,8 +4,8 @@
 //! cargo bench -p motion-tests --bench plan
 //! ```
 //!
-//! Every list of `tests/plan`'s cost is planned some times, in turns with a loop that makes ramps of the law between
-//! random feeds. The table gives the least processor time a block, and the median over the rounds of that time in ramps,
+//! Every list of `tests/plan`'s cost is planned some times with either law, in turns with a loop that makes ramps with
+//! sin² pulses between random feeds. The table gives the least processor time a block, and the median over the rounds of that time in ramps,
 //! which tells planners apart on machines that are not equally fast or have other work to do. Processor time is read
 //! from the scheduler's own count where there is one (Linux, to some 4 ms), else it is the time on the clock. A name, or a
 //! part of one, selects lists.
@@ -13,9 +13,10 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use motion_kernel::law::Ramp;
+use motion_kernel::law::{Pulse, Ramp};
 use motion_kernel::plan::{Block, Node, nodes_for, plan_spanning};
 
+use motion_tests::PULSES;
 use motion_tests::block_lists::{lists, reference};
 use motion_tests::random::Random;
 
@@ -39,15 +40,20 @@ fn main() {
     println!("| {BLOCKS} blocks | µs a block | ramps a block |");
     println!("|---|---:|---:|");
     let mut ramp_s = f64::INFINITY;
-    for (name, blocks) in lists(BLOCKS).into_iter().filter(|list| is_asked(list.0)) {
-        let rounds = [(); ROUNDS].map(|()| (planned_s(&blocks, &mut places), ramps_s(&feeds) / RAMPS as f64));
-        let least_s = rounds.iter().map(|round| round.0).fold(f64::INFINITY, f64::min);
-        ramp_s = rounds.iter().map(|round| round.1).fold(ramp_s, f64::min);
-        let mut ratios = rounds.map(|(planned_s, ramp_s)| planned_s / ramp_s / BLOCKS as f64);
-        ratios.sort_by(f64::total_cmp);
-        println!("| {name} | {:.2} | {:.1} |", least_s * 1e6 / BLOCKS as f64, ratios[ROUNDS / 2]);
+    for pulse in PULSES {
+        let law = pulse.name();
+        // Lists of a million blocks: one law's are gone before the other's are made.
+        for (name, blocks) in lists(pulse, BLOCKS).into_iter().filter(|list| is_asked(list.0)) {
+            let rounds =
+                [(); ROUNDS].map(|()| (planned_s(&blocks, &mut places), ramps_s(&feeds) / RAMPS as f64));
+            let least_s = rounds.iter().map(|round| round.0).fold(f64::INFINITY, f64::min);
+            ramp_s = rounds.iter().map(|round| round.1).fold(ramp_s, f64::min);
+            let mut ratios = rounds.map(|(planned_s, ramp_s)| planned_s / ramp_s / BLOCKS as f64);
+            ratios.sort_by(f64::total_cmp);
+            println!("| {name}, {law} | {:.2} | {:.1} |", least_s * 1e6 / BLOCKS as f64, ratios[ROUNDS / 2]);
+        }
     }
-    println!("\nA ramp of the law takes {:.1} ns.", ramp_s * 1e9);
+    println!("\nA ramp with sin² pulses takes {:.1} ns.", ramp_s * 1e9);
 }
 
 /// The time of planning a list \[s\].
@@ -67,7 +73,7 @@ fn feeds() -> Vec<[f64; 2]> {
 
 /// The time of the yardstick \[s\].
 fn ramps_s(feeds: &[[f64; 2]]) -> f64 {
-    let law = reference();
+    let law = reference(Pulse::Sin2);
     time_s(|| {
         for &[from, to] in feeds.iter().cycle().take(RAMPS) {
             black_box(Ramp::new(&law, black_box(from), black_box(to)));

@@ -5,22 +5,23 @@ use motion_kernel::plan::Block;
 
 use crate::random::Random;
 
-/// S1's law and limits.
-pub fn reference() -> Law<f64> {
-    law(Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 })
+/// S1's limits, and pulses of this shape.
+pub fn reference(pulse: Pulse) -> Law<f64> {
+    law(pulse, Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 })
 }
 
-fn law(limits: Limits<f64>) -> Law<f64> {
-    Law::new(Pulse::Sin2, limits).expect("positive")
+fn law(pulse: Pulse, limits: Limits<f64>) -> Law<f64> {
+    Law::new(pulse, limits).expect("positive")
 }
 
 /// A block of the reference law that stops at neither end.
-pub fn block(length_mm: f64, cap_mm_s: f64) -> Block<f64> {
-    Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law: reference() }
+pub fn block(pulse: Pulse, length_mm: f64, cap_mm_s: f64) -> Block<f64> {
+    Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law: reference(pulse) }
 }
 
-/// The lists, of `count` blocks each, with their names.
-pub fn lists(count: usize) -> Vec<(&'static str, Vec<Block<f64>>)> {
+/// The lists, of `count` blocks each with pulses of this shape, with their names.
+pub fn lists(pulse: Pulse, count: usize) -> Vec<(&'static str, Vec<Block<f64>>)> {
+    let block = |length_mm, cap_mm_s| block(pulse, length_mm, cap_mm_s);
     let mut random = Random::of_stream(52);
     let mut walk = |length_mm: f64| {
         let mut feed: f64 = 50.0;
@@ -40,8 +41,9 @@ pub fn lists(count: usize) -> Vec<(&'static str, Vec<Block<f64>>)> {
     // Every block with limits of its own.
     let mut mixed = |blocks: &[Block<f64>]| -> Vec<Block<f64>> {
         let mut limit = |least: f64| least * (1.0 + random.unit());
-        let mut any =
-            || law(Limits { accel_mm_s2: limit(500.0), jerk_mm_s3: limit(5e3), snap_mm_s4: limit(4e5) });
+        let mut any = || {
+            law(pulse, Limits { accel_mm_s2: limit(500.0), jerk_mm_s3: limit(5e3), snap_mm_s4: limit(4e5) })
+        };
         blocks.iter().map(|block| Block { law: any(), ..*block }).collect()
     };
     let [mixed_feeds, mixed_walk, mixed_saw] = [&feeds_short, &walk_middle, &saw].map(|list| mixed(list));

@@ -50,13 +50,12 @@ impl Judge {
         Ok(())
     }
 
-    /// In a tick the feed changes by what the limit of acceleration makes of it, and the rounding of both
-    /// feeds to f32, and no more.
+    /// In a tick the feed changes by what the limit of acceleration makes of it, and no more.
     ///
     /// # Errors
     /// The step.
     pub fn feed(&self, before: &Along, now: &Along) -> Result<(), String> {
-        self.step("feed", [before[0], now[0]], self.limits[1])
+        self.step("feed", now[0] - before[0], self.limits[1])
     }
 
     /// The same of the acceleration and jerk.
@@ -64,14 +63,11 @@ impl Judge {
     /// # Errors
     /// The step.
     pub fn accel(&self, before: &Along, now: &Along) -> Result<(), String> {
-        self.step("acceleration", [before[1], now[1]], self.limits[2])
+        self.step("acceleration", now[1] - before[1], self.limits[2])
     }
 
-    fn step(&self, name: &str, [before, now]: [f64; 2], rate: f64) -> Result<(), String> {
-        let step = now - before;
-        // Each is a sum of a few terms, rounded in the last place of f32.
-        let last_places = 2.0 * f64::from(f32::EPSILON) * before.abs().max(now.abs());
-        let bound = self.bound(rate * self.tick_s) + last_places;
+    fn step(&self, name: &str, step: f64, rate: f64) -> Result<(), String> {
+        let bound = self.bound(rate * self.tick_s);
         if step.abs() <= bound { Ok(()) } else { Err(format!("the {name} steps by {step}, bound {bound}")) }
     }
 }

@@ -15,6 +15,10 @@ pub mod judge;
 pub mod random;
 pub mod s4;
 
+/// The laws.
+pub const PULSES: [motion_kernel::law::Pulse; 2] =
+    [motion_kernel::law::Pulse::Sin2, motion_kernel::law::Pulse::Plateau];
+
 /// A number from the environment: the seed of a test, or how much it does in its long form.
 ///
 /// # Panics

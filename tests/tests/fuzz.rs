@@ -2,20 +2,24 @@
 
 use std::path::Path;
 
-use motion_tests::fuzz::drive;
+use motion_tests::fuzz::{Laws, drive, drive_with};
 use motion_tests::random::Random;
 
 /// Random inputs in a short run; `MOTION_TEST_PROGRAMS` has more.
 const INPUTS: usize = 2000;
 
+/// With any laws: a search has kept a seed for what it did with those of its time.
 #[test]
 fn every_seed_of_the_corpus_keeps_the_promises() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/kernel");
     let mut inputs = 0;
     for entry in std::fs::read_dir(&folder).expect("a corpus") {
         let path = entry.expect("an entry").path();
-        println!("{}", path.display());
-        drive(&std::fs::read(&path).expect("a seed"));
+        let bytes = std::fs::read(&path).expect("a seed");
+        for laws in Laws::ALL {
+            println!("{}, {laws:?}", path.display());
+            drive_with(laws, &bytes);
+        }
         inputs += 1;
     }
     assert!(inputs >= 20, "{inputs} seeds");

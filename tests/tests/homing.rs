@@ -9,9 +9,10 @@ use motion_host::simulate::session::Session;
 use motion_host::trace::TraceRow;
 use motion_kernel::homing::{HomingConfig, HomingError};
 use motion_kernel::jog::{Direction, Jog, JogAxis, JogTarget};
-use motion_kernel::num::{Fixed, Real};
+use motion_kernel::num::Fixed;
 use motion_kernel::units::{Counts, Position};
 use motion_tests::check::bench::mm;
+use motion_tests::check::bounds::Number;
 use motion_tests::check::planned;
 use motion_tests::judge::Judge;
 use motion_tests::random::Random;
@@ -80,8 +81,12 @@ struct SessionJudge {
 }
 
 impl SessionJudge {
-    fn new(machine: &Machine) -> Self {
-        Self { path: Judge::new(&machine.rules(), machine.tick_s, 1e-5, 0.0), before: None, wrong: None }
+    fn new<R: Number>(machine: &Machine) -> Self {
+        let rules = machine.rules();
+        // On a plateau acceleration changes by all that jerk allows. Both accelerations of a step are rounded by half of
+        // this.
+        let rounding = R::RELATIVE * rules.limits.accel_mm_s2;
+        Self { path: Judge::new(&rules, machine.tick_s, 1e-5, rounding), before: None, wrong: None }
     }
 
     fn tick(&mut self, row: &TraceRow) {
@@ -110,7 +115,7 @@ impl SessionJudge {
 }
 
 /// Homes an axis of the reference machine, and hands over the session.
-fn homed<R: Real>(
+fn homed<R: Number>(
     settings: HomingSettings,
     noise: Option<EncoderNoise>,
     behind: &mut dyn FnMut(&mut Session<'_, R>, &Simulated, &mut SessionJudge),
@@ -121,7 +126,7 @@ fn homed<R: Real>(
     machine.axes[1].feedforward.lead_s = 12.0 * machine.tick_s;
     let simulated = Simulated::new(&machine.simulated()).expect("a machine");
     let mut session = Session::<R>::new(&machine, &simulated).expect("a session");
-    let mut judge = SessionJudge::new(&machine);
+    let mut judge = SessionJudge::new::<R>(&machine);
     let homed = session.home(AXIS, &settings, &mut |row| judge.tick(row));
     let homed = homed.map_err(|error| match error {
         HomeError::Axis { source, .. } => source,
@@ -253,7 +258,7 @@ fn what_is_broken_is_named() {
 /// Behind homing a program is driven, from the new position.
 #[test]
 fn programs_go_on_from_the_new_position() {
-    fn driven<R: Real>(direction: Direction) {
+    fn driven<R: Number>(direction: Direction) {
         let place = Place { direction, switch_mm: 25.0, switch_length_mm: 35.0, index_mm: 28.5 };
         let settings = HomingSettings { config: config(direction, true), simulated: place.simulated() };
         homed::<R>(settings, None, &mut |session, simulated, judge| {

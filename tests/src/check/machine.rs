@@ -1,12 +1,30 @@
 //! Random machines around the reference one.
 
 use motion_host::machine::Machine;
+use motion_kernel::law::Pulse;
 
+use crate::PULSES;
 use crate::random::Random;
 
-/// Any limits and tick; its drives need not keep up.
+/// The reference machine with each law.
+pub fn references() -> [Machine; 2] {
+    PULSES.map(|pulse| {
+        let mut machine = Machine::reference();
+        machine.path.pulse = pulse;
+        machine
+    })
+}
+
+/// One law or the other, as often. A bit decides of the number that is drawn next, and stays there: what is drawn next is
+/// a quantity, which leaves that bit aside. So a seed's machine and program are the same whatever its law.
+pub fn pulse(random: &Random) -> Pulse {
+    if random.clone().bits() % 2 == 0 { Pulse::Sin2 } else { Pulse::Plateau }
+}
+
+/// Any limits, tick and law; its drives need not keep up.
 pub fn any(random: &mut Random) -> Machine {
     let mut machine = Machine::reference();
+    machine.path.pulse = pulse(random);
     machine.tick_s = random.log(0.000_25, 0.002);
     let accel = random.log(50.0, 2e4);
     let jerk = accel * random.log(3.0, 300.0);
@@ -27,9 +45,10 @@ pub fn any(random: &mut Random) -> Machine {
     machine
 }
 
-/// Limits that the reference machine's drives keep up with.
+/// Limits that the reference machine's drives keep up with, with either law.
 pub fn gentle(random: &mut Random) -> Machine {
     let mut machine = Machine::reference();
+    machine.path.pulse = pulse(random);
     let share = random.between(0.3, 1.0);
     machine.path.feed_mm_s *= share;
     machine.path.accel_mm_s2 *= share;

@@ -37,13 +37,15 @@ pub(super) struct Program {
 }
 
 impl Program {
-    pub(super) fn read(input: &mut Unstructured<'_>) -> Result<Self> {
+    /// What `input` says, with ramps of this law.
+    pub(super) fn read(pulse: Pulse, input: &mut Unstructured<'_>) -> Result<Self> {
+        let law = Law::new(pulse, LIMITS).expect("limits");
         let mut program = Self { items: Vec::new(), end: [Position::ZERO; 2], ticks: 0.0, is_whole: true };
         for line in 1..=input.int_in_range(1..=PHRASES_MAX)? {
             match input.int_in_range(0..=7)? {
                 0 => program.dwell(input)?,
                 1 => program.items.push(Item::Stop),
-                _ => program.stretch(input, line as u32)?,
+                _ => program.stretch(&law, input, line as u32)?,
             }
         }
         // Bytes that have come to their end say the least, which is "yes".
@@ -63,12 +65,12 @@ impl Program {
     }
 
     /// Straight from rest to rest, in pieces that are lines or the same as curves.
-    fn stretch(&mut self, input: &mut Unstructured<'_>, line: u32) -> Result<()> {
+    fn stretch(&mut self, law: &Law<f64>, input: &mut Unstructured<'_>, line: u32) -> Result<()> {
         let angle_rad = f64::from(input.arbitrary::<u8>()?) * core::f64::consts::TAU / 256.0;
         let direction = [libm::cos(angle_rad), libm::sin(angle_rad)];
         let whole = length(scaled(input, STRETCH_MM)?);
         let cap_mm_s = scaled(input, FEED_MM_S)?;
-        let feed = self.feed(whole, cap_mm_s);
+        let feed = self.feed(law, whole, cap_mm_s);
         // Blocks, pieces and ramps come in the order of where they begin.
         let mut placed = Vec::new();
         let fewest = (whole.to_mm() / PIECE_MM_MAX).ceil() as u64;
@@ -110,13 +112,12 @@ impl Program {
     }
 
     /// Up, along and down again.
-    fn feed(&mut self, whole: Position, cap_mm_s: f64) -> Vec<(Ramp<f64>, Position)> {
-        let law = Law::new(Pulse::Plateau, LIMITS).expect("limits");
+    fn feed(&mut self, law: &Law<f64>, whole: Position, cap_mm_s: f64) -> Vec<(Ramp<f64>, Position)> {
         let mut top_mm_s = cap_mm_s;
-        let mut up = Ramp::new(&law, 0.0, top_mm_s);
+        let mut up = Ramp::new(law, 0.0, top_mm_s);
         while 2.0 * up.length_mm() > whole.to_mm() {
             top_mm_s *= 0.75;
-            up = Ramp::new(&law, 0.0, top_mm_s);
+            up = Ramp::new(law, 0.0, top_mm_s);
         }
         let ramp = length(up.length_mm());
         let cruise = whole - ramp - ramp;

@@ -20,25 +20,63 @@ mod machine;
 mod runs;
 
 use arbitrary::{Result, Unstructured};
+use motion_kernel::law::Pulse;
 use motion_kernel::num::Fixed;
+
+/// The laws of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Laws {
+    /// Of the program's own ramps.
+    pub planned: Pulse,
+    /// Of what is planned anew.
+    pub live: Pulse,
+}
+
+impl Laws {
+    /// The four that there are.
+    pub const ALL: [Self; 4] = [
+        Self { planned: Pulse::Sin2, live: Pulse::Sin2 },
+        Self { planned: Pulse::Plateau, live: Pulse::Plateau },
+        Self { planned: Pulse::Sin2, live: Pulse::Plateau },
+        Self { planned: Pulse::Plateau, live: Pulse::Sin2 },
+    ];
+
+    /// Those that `bytes` say: by what the choice of the number type leaves over of its byte, the second. So no byte says
+    /// something else than before there were two laws.
+    fn of(bytes: &[u8]) -> Self {
+        let [_, byte, ..] = *bytes else { return Self::ALL[0] };
+        Self::ALL[usize::from(byte) / NUMBERS % Self::ALL.len()]
+    }
+}
+
+/// Number types to choose from.
+const NUMBERS: usize = 3;
 
 /// Runs what `bytes` say. Whether they were enough to say anything.
 ///
 /// # Panics
 /// The kernel breaks a promise.
 pub fn drive(bytes: &[u8]) -> bool {
-    let mut input = Unstructured::new(bytes);
-    run(&mut input).is_ok()
+    drive_with(Laws::of(bytes), bytes)
 }
 
-fn run(input: &mut Unstructured<'_>) -> Result<()> {
+/// The same with these laws instead of what `bytes` say of them.
+///
+/// # Panics
+/// The kernel breaks a promise.
+pub fn drive_with(laws: Laws, bytes: &[u8]) -> bool {
+    let mut input = Unstructured::new(bytes);
+    run(laws, &mut input).is_ok()
+}
+
+fn run(laws: Laws, input: &mut Unstructured<'_>) -> Result<()> {
     let is_live = input.ratio(1, 2)?;
-    match (input.int_in_range(0..=2)?, is_live) {
-        (0, false) => runs::of_streams::<f32>(input),
-        (1, false) => runs::of_streams::<f64>(input),
-        (_, false) => runs::of_streams::<Fixed>(input),
-        (0, true) => runs::under_live_control::<f32>(input),
-        (1, true) => runs::under_live_control::<f64>(input),
-        (_, true) => runs::under_live_control::<Fixed>(input),
+    match (input.int_in_range(0..=NUMBERS - 1)?, is_live) {
+        (0, false) => runs::of_streams::<f32>(laws, input),
+        (1, false) => runs::of_streams::<f64>(laws, input),
+        (_, false) => runs::of_streams::<Fixed>(laws, input),
+        (0, true) => runs::under_live_control::<f32>(laws, input),
+        (1, true) => runs::under_live_control::<f64>(laws, input),
+        (_, true) => runs::under_live_control::<Fixed>(laws, input),
     }
 }

@@ -8,13 +8,13 @@ use arbitrary::{Result, Unstructured};
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::law::Pulse;
 use motion_kernel::live::{LiveControl, Source, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::{Intake, LiveStreams, Streams};
 use motion_kernel::units::{Counts, Position};
 
+use super::Laws;
 use super::items::{Program, RULES, TICK_S};
 use super::judge::Judge;
 use super::machine::{REACTIONS, axes, mend, upset};
@@ -157,8 +157,8 @@ impl<R: Real> Machine<R> {
 }
 
 /// As a board without live control does it.
-pub(super) fn of_streams<R: Real>(input: &mut Unstructured<'_>) -> Result<()> {
-    let program = Program::read(input)?;
+pub(super) fn of_streams<R: Real>(laws: Laws, input: &mut Unstructured<'_>) -> Result<()> {
+    let program = Program::read(laws.planned, input)?;
     let mut streams = Streams::<R, 2, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO; 2]);
     let items = program.items.iter().map(|&item| Ok::<_, Infallible>(item));
@@ -222,14 +222,14 @@ impl Source<2> for Arriving<'_> {
 }
 
 /// Held, resumed, overridden, given up; items and polls come late.
-pub(super) fn under_live_control<R: Real>(input: &mut Unstructured<'_>) -> Result<()> {
-    let program = Program::read(input)?;
+pub(super) fn under_live_control<R: Real>(laws: Laws, input: &mut Unstructured<'_>) -> Result<()> {
+    let program = Program::read(laws.planned, input)?;
     let mut streams = LiveStreams::<R, 2, PIECES, LIVE_SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO; 2]);
     let there = Cell::new(0);
     let source = Arriving { items: program.items.iter(), there: &there };
     let mut control =
-        LiveControl::<R, 2, _, _, PLACES>::new(source, Pulse::Plateau, TICK_S, input.int_in_range(0..=3)?);
+        LiveControl::<R, 2, _, _, PLACES>::new(source, laws.live, TICK_S, input.int_in_range(0..=3)?);
     let mut machine = Machine::<R>::new();
     let (mut is_polled, mut is_aborted) = (true, false);
     while !input.is_empty() {

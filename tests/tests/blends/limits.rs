@@ -10,6 +10,7 @@ use super::compiled::{Compiled, compiled, continuous, distance};
 use super::driven::{Worst, driven};
 use super::tolerance::CHAINS;
 use super::{SAMPLES, assert_none, norm, planned, rounded, seeds, without_path_mode};
+use motion_tests::check::machine;
 use motion_tests::random::Random;
 
 /// Many moves one after the other, on machines whose axes differ: every tick within every limit, jerk without a
@@ -21,6 +22,7 @@ fn every_tick_of_blended_programs_keeps_the_limits() {
     for seed in seeds(CHAINS) {
         let mut random = Random::new(seed);
         let mut machine = Machine::reference();
+        machine.path.pulse = machine::pulse(&random);
         // No step that jerk would not be within its limit for.
         machine.path.accel_step_mm_s2 = 1e-3;
         for axis in &mut machine.axes {
@@ -180,17 +182,22 @@ fn a_tessellated_circle_runs_smoothly() {
 /// The programs of the tests, blended, in every number type.
 #[test]
 fn whole_programs_keep_the_limits_in_every_number_type() {
-    let mut machine = Machine::reference();
-    machine.path.accel_step_mm_s2 = 1e-3;
+    for mut machine in machine::references() {
+        machine.path.accel_step_mm_s2 = 1e-3;
+        samples_keep_the_limits(&machine);
+    }
+}
+
+fn samples_keep_the_limits(machine: &Machine) {
     for (name, text) in SAMPLES {
         let text = without_path_mode(text);
-        let exact = planned(&text, &machine).expect("a plan");
+        let exact = planned(&text, machine).expect("a plan");
         let blended = format!("G21 G64 P0.05\n{text}");
-        let plan = planned(&blended, &machine).expect("a plan");
+        let plan = planned(&blended, machine).expect("a plan");
         assert!(plan.blocks.iter().any(|block| block.kind == "blend"), "{name}");
         println!("{name}: {} s exact, {} s blended", exact.time_s, plan.time_s);
         for worst in
-            [driven::<f64>(&plan, &machine), driven::<f32>(&plan, &machine), driven::<Fixed>(&plan, &machine)]
+            [driven::<f64>(&plan, machine), driven::<f32>(&plan, machine), driven::<Fixed>(&plan, machine)]
         {
             let worst = worst.unwrap_or_else(|error| panic!("{name}: {error}"));
             // f32 and fixed point round jerk to some millionths of its limit.

@@ -5,6 +5,7 @@ use motion_host::machine::Machine;
 use super::asked::{Asked, corners, line, program};
 use super::driven::driven;
 use super::{SAMPLES, assert_none, planned, rounded, seeds, without_path_mode};
+use motion_tests::check::machine;
 use motion_tests::random::Random;
 
 /// Programs of many moves.
@@ -28,6 +29,7 @@ fn no_program_is_slower_with_blends_than_without() {
     for seed in seeds(PROGRAMS) {
         let mut random = Random::new(seed);
         let mut machine = Machine::reference();
+        machine.path.pulse = machine::pulse(&random);
         machine.path.accel_step_mm_s2 = random.log(1.0, 500.0);
         let lengths = if random.chance(0.5) { (0.1, 30.0) } else { (0.005, 0.5) };
         let moves = 3 + random.below(20);
@@ -65,12 +67,15 @@ fn no_program_is_slower_with_blends_than_without() {
 
 #[test]
 fn no_sample_is_slower_with_blends_than_without() {
-    let machine = Machine::reference();
+    machine::references().iter().for_each(no_sample_is_slower);
+}
+
+fn no_sample_is_slower(machine: &Machine) {
     for (name, text) in SAMPLES {
         let text = without_path_mode(text);
-        let exact = planned(&format!("G61\n{text}"), &machine).expect("a plan").time_s;
+        let exact = planned(&format!("G61\n{text}"), machine).expect("a plan").time_s;
         for tolerance in [0.001, 0.01, 0.05, 0.2] {
-            let blended = planned(&format!("G21 G64 P{tolerance}\n{text}"), &machine).expect("a plan").time_s;
+            let blended = planned(&format!("G21 G64 P{tolerance}\n{text}"), machine).expect("a plan").time_s;
             println!("{name}, P{tolerance}: {blended} s, exact {exact} s");
             assert!(blended <= RATIO_MAX * exact, "{name}, P{tolerance}: {blended} s, exact {exact} s");
         }

@@ -10,8 +10,9 @@ mod ramp;
 mod segment;
 mod cut;
 
-use motion_kernel::law::{Limits, Pulse};
+use motion_kernel::law::Limits;
 use motion_kernel::num::Root;
+use motion_tests::PULSES;
 use motion_tests::random::Random;
 
 /// Sets of limits: S1's; a fast machine; a faster one; one whose jerk limit is out of reach; two whose ramps
@@ -24,9 +25,6 @@ const LIMITS: [(f64, f64, f64); 6] = [
     (100.0, 100.0, 1e4),
     (1.0, 1e4, 1e8),
 ];
-
-/// Both shapes of a pulse.
-const PULSES: [Pulse; 2] = [Pulse::Sin2, Pulse::Plateau];
 
 fn limits((accel_mm_s2, jerk_mm_s3, snap_mm_s4): (f64, f64, f64)) -> Limits<f64> {
     Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }

@@ -27,7 +27,7 @@ struct Blocks {
 
 impl Blocks {
     fn random(seed: u64, longest_ticks: f64) -> Option<Self> {
-        let (machine, program) = generated(&mut Random::new(seed));
+        let (machine, program) = generated(&mut Random::new(seed), None);
         let case = Case::of(&program, machine, longest_ticks)?;
         let ends = block_ends(&program, &case.path);
         Some(Self { case, ends })

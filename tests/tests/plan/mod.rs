@@ -16,8 +16,18 @@ mod spanning;
 
 use motion_kernel::law::{Law, Limits, Pulse};
 use motion_kernel::plan::{Block, BlockPlan, PlanError, plan};
-use motion_tests::block_lists::{block, reference};
+use motion_tests::block_lists;
 use motion_tests::random::Random;
+
+/// S1's law and limits: named cases are of it.
+fn reference() -> Law<f64> {
+    block_lists::reference(Pulse::Sin2)
+}
+
+/// A block of that law that stops at neither end.
+fn block(length_mm: f64, cap_mm_s: f64) -> Block<f64> {
+    block_lists::block(Pulse::Sin2, length_mm, cap_mm_s)
+}
 
 /// The sin² law for acceleration, jerk and snap limits.
 fn law(accel_mm_s2: f64, jerk_mm_s3: f64, snap_mm_s4: f64) -> Law<f64> {
