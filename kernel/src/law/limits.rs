@@ -235,10 +235,10 @@ impl<R: Root> Law<R> {
     }
 
     /// The change of feed that a ramp without a hold makes with pulses of length `rise_s` and edges e':
-    /// J'·P·(P − e') \[mm/s\].
+    /// J'·P·(P − e') \[mm/s\]. Saturates in fixed point.
     pub(super) fn change_mm_s(&self, rise_s: R) -> R {
         // The first product is at most A.
-        ((rise_s - R::from_f64(0.5) * self.snap_time_s) * self.jerk_mm_s3) * rise_s
+        ((rise_s - R::from_f64(0.5) * self.snap_time_s) * self.jerk_mm_s3).times_per(rise_s, R::ONE)
     }
 
     /// √(J'/2): P = √x/√(J'/2) where jerk fixes the sin² pulse.

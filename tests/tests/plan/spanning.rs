@@ -10,10 +10,11 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use motion_kernel::internals::Passing;
-use motion_kernel::law::Ramp;
+use motion_kernel::law::{Law, Limits, Ramp};
 use motion_kernel::plan::{Block, Node, PlanError, merge_equal, nodes_for, plan_spanning};
 
 use super::{block, from_rest, law, laws, planned, random_blocks, time_s};
+use motion_tests::PULSES;
 use motion_tests::random::Random;
 
 /// A ramp or a cruise with its place on the path.
@@ -419,27 +420,61 @@ fn a_ramp_passes_its_feeds_where_it_says() {
     }
 }
 
-/// Backwards the same plan, whatever law each block has.
+/// Backwards the same plan, whatever limits each block has.
 #[test]
 fn a_list_takes_as_long_backwards() {
-    let mut random = Random::of_stream(37);
-    let (mut worst, mut above, mut sums) = (0.0_f64, 0, [0.0; 2]);
-    for _ in 0..500 {
-        let mut blocks = random_blocks(&mut random, 30, 0.1);
-        blocks.iter_mut().for_each(|block| block.junction_mm_s = f64::INFINITY);
-        let mut back = blocks.clone();
-        back.reverse();
-        let times = [spans_between(&blocks, 0.0, 0.0), spans_between(&back, 0.0, 0.0)];
-        let [Ok(Some((on, _))), Ok(Some((back, _)))] = times else { continue };
-        (sums[0], sums[1]) = (sums[0] + on, sums[1] + back);
-        let off = (on / back - 1.0).abs();
-        (worst, above) = (worst.max(off), above + u32::from(off > 0.02));
+    for pulse in PULSES {
+        let mut random = Random::of_stream(37);
+        let (mut worst, mut lists) = (0.0_f64, 0);
+        for _ in 0..500 {
+            let mut blocks = random_blocks(&mut random, 30, 0.1);
+            for block in &mut blocks {
+                block.junction_mm_s = f64::INFINITY;
+                block.law = Law::new(pulse, block.law.limits()).expect("limits");
+            }
+            let Some(off) = off_backwards(&blocks) else { continue };
+            (worst, lists) = (worst.max(off), lists + 1);
+        }
+        println!("{}: worst {worst:.1e} of {lists} lists", pulse.name());
+        assert!(worst < BACKWARDS_OFF_MAX && lists > 400, "{}: {worst}", pulse.name());
     }
-    println!("worst {worst:.4}, {above} above 0.02, together {:.6}", sums[0] / sums[1]);
-    assert!((sums[0] / sums[1] - 1.0).abs() < 1e-4, "{sums:?}");
-    // Rests that one direction gives up and the other one finds: seldom, and the planner's door then takes
-    // pairs.
-    assert!(above <= 1 && worst < 0.05, "{above} {worst}");
+}
+
+/// Parts of the time by which a list may differ from itself backwards.
+const BACKWARDS_OFF_MAX: f64 = 2e-5;
+
+/// By what part of its time a list takes longer or shorter backwards; none if it has no length or no plan.
+fn off_backwards(blocks: &[Block<f64>]) -> Option<f64> {
+    let mut back = blocks.to_vec();
+    back.reverse();
+    let [on, back] =
+        [blocks, &back].map(|blocks| spans_between(blocks, 0.0, 0.0).ok()?.map(|(time_s, _)| time_s));
+    let (on, back) = (on?, back?);
+    (on > 0.0).then_some((on / back - 1.0).abs())
+}
+
+/// A long, soft block between short, hard ones. Where it ends was off by a last place on the way back, and so its
+/// limits held for the ramp beside it too: that one did not fit, and the slowest feed was held over all of its length,
+/// for 9309 s instead of 313.
+#[test]
+fn a_soft_block_does_not_reach_over_its_ends() {
+    let hard = (5e3, 1e5, 5e6);
+    let soft = (100.0, 100.0, 1e4);
+    for pulse in PULSES {
+        let list = |middle_mm: f64| {
+            let figures = [(2.917, 36.0, hard), (middle_mm, 2.4, soft), (0.157, 0.08, hard)];
+            figures.map(|(length_mm, cap_mm_s, (accel_mm_s2, jerk_mm_s3, snap_mm_s4))| {
+                let limits = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 };
+                let law = Law::new(pulse, limits).expect("limits");
+                Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law }
+            })
+        };
+        for step in 0..1000 {
+            let blocks = list(700.0 + 0.137 * f64::from(step));
+            let off = off_backwards(&blocks).expect("a plan");
+            assert!(off < BACKWARDS_OFF_MAX, "{}, {} mm: {off}", pulse.name(), blocks[1].length_mm);
+        }
+    }
 }
 
 /// Strong and weak blocks by turns, of which only the strong ones would let every third ceiling be rested in: minima that

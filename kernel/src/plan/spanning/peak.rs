@@ -56,10 +56,18 @@ impl<'a> Sides<'a> {
     /// The least limits of the blocks between two positions. For a single position, the limits of the block
     /// after it, or on the way back the block before it.
     fn limits(&self, low_mm: f64, high_mm: f64, is_back: bool) -> Limits<f64> {
-        match self.uniform {
-            Some(law) => law.limits(),
-            None => self.intervals.least(self.interval, low_mm, high_mm, is_back),
+        if let Some(law) = self.uniform {
+            return law.limits();
         }
+        // Where a block ends is off by some last places, because an ascent counts from the end of the interval
+        // that it begins at. So much of a block must not ask for its limits: it may be far softer.
+        let rounding_mm = 4.0 * f64::EPSILON * self.interval.end_mm;
+        let (low_mm, high_mm) = match (low_mm < high_mm, is_back) {
+            (true, _) => (low_mm + rounding_mm, high_mm - rounding_mm),
+            (false, false) => (low_mm + rounding_mm, high_mm + rounding_mm),
+            (false, true) => (low_mm - rounding_mm, high_mm - rounding_mm),
+        };
+        self.intervals.least(self.interval, low_mm, high_mm, is_back)
     }
 
     /// Length of the interval plus a rounding, so that a ramp planned before to end just there still fits.
