@@ -43,19 +43,24 @@
 //! | v: ceilings, feeds | 10⁻³ … 10⁶ mm/s, or 0 | below, a ramp from rest is shorter than s |
 //! | L: lengths | 10⁻⁶ … 10⁶ mm, or 0 | s is a part of 2.3·10⁻⁴ of the shortest, and exactly a position step |
 //! | J' = min(J, √(A·DJ·2/π)) | 8·10⁸ | root of the whole product; rounded down |
-//! | πJ'/DJ, 2A/J' | 8·10⁴ s, 2·10⁹ s | quotients of whole products; the first from 13 s up, the second from 8·10⁻⁵ s up |
-//! | x₁ = π²J'³/(2DJ²) | A·πJ'/DJ, saturates | as (πJ'/DJ · J'/2)·πJ'/DJ, the first product ≤ A |
-//! | x₂ = 2A²/J' | saturates | beyond 2³¹ mm/s acceleration never fixes a ramp |
+//! | 2e' = πJ'/DJ, 2A/J' | 8·10⁴ s, 2·10⁹ s | quotients of whole products; the first from 13 s up, the second from 8·10⁻⁵ s up |
+//! | A/J' + e' | 10⁹ s | where A/J' is greatest, J' is 1 and e' no longer than that |
+//! | J'·(P − e')·P, and x₁ of it, P = 2e' | A, then saturates | J' × (P − e') ≤ A + 8·J'·s, because P is at most A/J' + e' + 8 s |
+//! | x₂ = 2A²/J', A·(A/J' + e') | saturates | beyond 2³¹ mm/s acceleration never fixes a ramp |
 //! | √(J'/2), (DJ/2π)^⅓ | 0.5 … 2.3·10⁴ | divisors of roots: the error of a time is at most 3 s |
+//! | √(x/J' + e'²/4) with a plateau | 2.1·10⁴ s | of whole squares: √x/√J' ≤ 7·10³ s, e'/2 ≤ 2·10⁴ s |
 //! | times of ramps | 10⁸ s | from √x/√(J'/2), x^⅓/(DJ/2π)^⅓, x/A; up to 8 s (1.9 ns) too long, never too short |
 //! | length of a ramp | saturates | (F₀ + F)·t/2 of the whole product, to the nearest s; saturated is longer than any block |
 //! | sums of two such | – | never taken: a length less one of them is compared with the other |
 //! | Newton: k·L/w, x + 2F | saturates, 4·10⁷ mm/s | the equation divided by w, so that no w³ or w⁴ is taken |
+//! | the same for P: L/P, 3x + 2F + e'J'·P | saturates, 6·10⁷ mm/s | P ≤ (2L/J')^⅓ makes x ≤ J'·P² ≤ (2L)^⅔·J'^⅓ = 1.5·10⁷; e'J' ≤ A, and e'J'·P is no more than x |
+//! | slope by y: 2·3y²/J'/(2P − e) | saturates | y³ is a change of feed, so y² ≤ 1.2·10⁵ |
 //! | √((F − a)² + 2AL) | 4·10⁷ mm/s | of whole squares, √(2AL) of a whole product |
 //! | κ, √κ', ∛κ'' and their inverses | 2·10⁹ per mm, 5·10⁸ mm | R⁻³ itself has no digits left at 1 m; up to 9 s too much |
 //! | κ·v, √κ'·v, ∛κ''·v | 1/s | multiplied by v, a, j one at a time, so that products end below a limit |
 //!
-//! What follows, and is tested: no ramp exceeds a limit of acceleration, jerk or snap by more than a part of
+//! The ends of these ranges with each other are planned with, for either law, in a build that finds what wraps
+//! (`plan` in `tests`). What follows, and is tested: no ramp exceeds a limit of acceleration, jerk or snap by more than a part of
 //! 10⁻⁹ (its times are too long rather than too short; the rest is the rounding of constants), no ramp is
 //! longer than its block, no ceiling or junction is exceeded. Ceilings and junctions keep their limits to
 //! 10⁻⁸. A stretch takes at most a part of 10⁻⁶ longer than planned in f64, plus the part that s is of its

@@ -236,7 +236,7 @@ fn every_accepted_list_keeps_limits_and_is_as_fast_as_in_f64() {
 /// The ends of all ranges with each other: no overflow, and the inverse problems solved as in f64.
 #[test]
 fn the_ends_of_the_ranges_neither_overflow_nor_exceed_limits() {
-    let ends = [1.0, 1e3, 1e9];
+    let ends = [1.0, 1e3, 1e6, 1e9];
     let feeds = [0.0, STEP, 1e-6, 1.0, 1e3, 1e6];
     let lengths = [1e-6 + STEP, 1e-3, 1.0, 1e6];
     let mut limits = Vec::new();
