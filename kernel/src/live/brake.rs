@@ -66,7 +66,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         tick_s: f64,
     ) -> Option<PlannedRamp> {
         self.brake_by(from, end, feed_override, |limits| {
-            let ramp = ramp.to_rest(since, self.pulse(), limits.accel_mm_s2, tick_s)?;
+            let ramp = ramp.driven_to_rest(since, self.pulse(), limits.accel_mm_s2, tick_s)?;
             let snap_mm_s4 = FRAC_PI_2 * ramp.peak_jerk_mm_s3 / ramp.edge_s;
             let is_within = |value: f64, limit: f64| value <= limit * (1.0 + LIMIT_ROUNDING);
             let keeps = is_within(ramp.peak_jerk_mm_s3, limits.jerk_mm_s3)

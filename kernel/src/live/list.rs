@@ -154,7 +154,7 @@ impl Item {
     /// first pulse, if that may have another `pulse` shape, or of its hold is made longer, with an
     /// acceleration of at most `most_mm_s2`. `None` where nothing of that is left, or where there is more
     /// acceleration already.
-    pub(super) fn to_rest(
+    pub(super) fn driven_to_rest(
         &self,
         (phase, elapsed): (Phase, Ticks),
         pulse: Pulse,
@@ -401,7 +401,7 @@ mod tests {
             for (phase, lasts_s) in phases {
                 let elapsed_s = lasts_s * random.unit();
                 let since = (phase, Ticks::from_seconds(elapsed_s, tick_s).expect("in range"));
-                let Some(on) = item.to_rest(since, pulse, limits.accel_mm_s2, tick_s) else {
+                let Some(on) = item.driven_to_rest(since, pulse, limits.accel_mm_s2, tick_s) else {
                     panic!("{number}: {phase:?} {elapsed_s} of {ramp:?}");
                 };
                 let until_s = if phase == Phase::Hold { ramp.t1_s + elapsed_s } else { elapsed_s };
@@ -426,9 +426,9 @@ mod tests {
                 }
             }
             let falling = (Phase::Fall, Ticks::ONE);
-            assert_eq!(item.to_rest(falling, pulse, limits.accel_mm_s2, tick_s), None);
+            assert_eq!(item.driven_to_rest(falling, pulse, limits.accel_mm_s2, tick_s), None);
             let softer = 0.99 * ramp.peak_accel_mm_s2();
-            assert_eq!(item.to_rest((Phase::Rise, Ticks::ONE), pulse, softer, tick_s), None);
+            assert_eq!(item.driven_to_rest((Phase::Rise, Ticks::ONE), pulse, softer, tick_s), None);
         }
         assert!(grown > 1000, "{grown}");
     }
