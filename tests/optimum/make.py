@@ -16,7 +16,7 @@ LISTS = 24
 STOPS = 200
 # Cells of a half move and of a stop, and the coarser grids they are compared with.
 MOVE_CELLS = (400, 800)
-STOP_CELLS = (100, 160)
+STOP_CELLS = (60, 120)
 STOP_SLACK = 1e-4
 VIOLATION_MAX = 1e-6
 
@@ -35,25 +35,32 @@ def moves(machine):
         }
 
 
-def lists(machine):
+def lists(machine, before):
+    """`before`: what an earlier run found. A list keeps it if it is faster: all are upper bounds."""
     solver = Solver(machine)
     for number in range(LISTS):
         kind, seed = KINDS[number % len(KINDS)], number // len(KINDS)
         blocks = random_list(machine, kind, seed)
-        found = solver.best(blocks, seed)
-        assert found, (machine, kind, seed)
-        best, middle_s, solved = found
-        print(machine.name, kind, seed, best.time_s, middle_s, solved, file=sys.stderr)
-        yield {
+        row = {
             "kind": kind,
             "seed": seed,
             "blocks": [{"length_mm": length, "cap_mm_s": cap} for length, cap in blocks],
-            "time_s": round(best.time_s, 9),
-            "cells": best.cells,
-            "middle_s": round(middle_s, 9),
-            "starts_solved": solved,
-            "violation": float(f"{best.violation:.1e}"),
         }
+        kept = [old for old in before if all(old[key] == value for key, value in row.items())]
+        found = solver.best(blocks, seed)
+        if found:
+            best, middle_s, solved = found
+            row |= {
+                "time_s": round(best.time_s, 9),
+                "cells": best.cells,
+                "middle_s": round(middle_s, 9),
+                "starts_solved": solved,
+                "violation": float(f"{best.violation:.1e}"),
+            }
+            kept.append(row)
+        fastest = min(kept, key=lambda one: one["time_s"])
+        print(machine.name, kind, seed, [one["time_s"] for one in kept], file=sys.stderr)
+        yield fastest
 
 
 def stops(machine):
@@ -79,7 +86,7 @@ def stops(machine):
             "a_mm_s2": state[1],
             "j_mm_s3": state[2],
             "time_s": round(time_s, 8),
-            "peak_mm_s": round(peak, 6),
+            "peak_mm_s": max(round(peak, 6), state[0]),
             "violation": float(f"{broken:.1e}"),
         }
         if count % 10 == 0:
@@ -105,7 +112,13 @@ def write(name, machines):
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["optimum"]:
-        write("optimum.json", [(m, {"moves": list(moves(m)), "lists": list(lists(m))}) for m in MACHINES])
+        path = FOLDER / "optimum.json"
+        found = json.loads(path.read_text()) if path.exists() else []
+        before = {machine["name"]: machine["lists"] for machine in found}
+        write(
+            path.name,
+            [(m, {"moves": list(moves(m)), "lists": list(lists(m, before.get(m.name, [])))}) for m in MACHINES],
+        )
     elif sys.argv[1:] == ["stops"]:
         write("stops.json", [(m, {"stops": list(stops(m))}) for m in MACHINES])
     else:

@@ -1,6 +1,6 @@
 """Motion on a straight without ceilings, in least time: linear programs.
 
-Snap is constant in each of N equal cells. For a given duration every constraint is linear in jerk,
+Snap is constant in each of N cells. For a given duration every constraint is linear in jerk,
 acceleration and feed at the grid points, so a linear program decides; the duration is found by iteration.
 Between grid points acceleration is quadratic and feed cubic. Bernstein's coefficients bound them there, so
 what is found is a motion within all limits at every instant. Its time is an upper bound of the optimum,
@@ -21,12 +21,12 @@ class Rows:
         self.entries, self.right, self.count = [], [], 0
 
     def add(self, terms, right):
-        """`terms`: (columns, coefficient) with columns an array as long as the rows."""
+        """`terms`: (columns, coefficients), one for each row or one for all of them."""
         n = max(np.size(columns) for columns, _ in terms)
         rows = self.count + np.arange(n)
         for columns, coefficient in terms:
-            self.entries.append((rows, np.broadcast_to(columns, n), np.full(n, float(coefficient))))
-        self.right.append(np.full(n, float(right)))
+            self.entries.append((rows, np.broadcast_to(columns, n), np.broadcast_to(coefficient, n)))
+        self.right.append(np.broadcast_to(right, n))
         self.count += n
 
     def matrix(self, width):
@@ -34,12 +34,28 @@ class Rows:
         return coo_matrix((values, (rows, columns)), shape=(self.count, width)).tocsr()
 
 
+# Limits of acceleration may be exceeded by this part: a state just below its limit has less room than a cell
+# can show.
+ROOM = 2e-7
+
+
+def equal(cells):
+    """The cells' parts of the duration."""
+    return np.full(cells, 1.0 / cells)
+
+
+def graded(cells):
+    """Short cells first: a state in motion may be near a limit and must soon turn away from it."""
+    first = cells // 4
+    parts = np.concatenate([np.geomspace(0.02, 1.0, first), np.ones(cells - first)])
+    return parts / parts.sum()
+
+
 class Horizon:
     """The program for one duration. Feed is in units of `v_scale`, acceleration and jerk in their limits."""
 
-    def __init__(self, machine, cells, duration_s, v_scale_mm_s, has_peak=False):
-        self.cells, self.h, self.v_scale = cells, duration_s / cells, v_scale_mm_s
-        self.machine, self.has_peak = machine, has_peak
+    def __init__(self, machine, parts, duration_s, v_scale_mm_s, has_peak=False):
+        cells, self.h, self.v_scale, self.machine = len(parts), parts * duration_s, v_scale_mm_s, machine
         accel, jerk = machine.accel_mm_s2, machine.jerk_mm_s3
         points = cells + 1
         self.j, self.a, self.v = (np.arange(points) + part * points for part in range(3))
@@ -56,7 +72,7 @@ class Horizon:
         change = h * machine.snap_mm_s4 / jerk
         for sign in (1, -1):
             self.less.add([(j[1:], sign), (j[:-1], -sign)], change)
-            self.less.add([(a[:-1], sign), (j[:-1], sign * ja / 2)], 1)
+            self.less.add([(a[:-1], sign), (j[:-1], sign * ja / 2)], 1 + ROOM)
         self.less.add([(v[:-1], -1), (a[:-1], -av / 3)], 0)
         self.less.add([(v[1:], -1), (a[1:], av / 3)], 0)
         if has_peak:
@@ -65,8 +81,9 @@ class Horizon:
             self.less.add([(v[:-1], 1), (a[:-1], av / 3), (peak, -1)], 0)
             self.less.add([(v[1:], 1), (a[1:], -av / 3), (peak, -1)], 0)
         self.cost = np.zeros(self.width)
-        self.low = np.concatenate([-np.ones(2 * points), np.zeros(points + int(has_peak))])
-        self.high = np.concatenate([np.ones(2 * points), np.full(points + int(has_peak), np.inf)])
+        limits = np.repeat([1.0, 1.0 + ROOM], points)
+        self.low = np.concatenate([-limits, np.zeros(points + int(has_peak))])
+        self.high = np.concatenate([limits, np.full(points + int(has_peak), np.inf)])
 
     def fix(self, column, value):
         self.low[column] = self.high[column] = value
@@ -101,7 +118,7 @@ def longest_mm(machine, cells, duration_s):
     symmetric.
     """
     v_scale = machine.accel_mm_s2 * duration_s / 2
-    half = Horizon(machine, cells, duration_s / 2, v_scale)
+    half = Horizon(machine, equal(cells), duration_s / 2, v_scale)
     half.start(0.0, 0.0, 0.0)
     half.fix(half.a[-1], 0.0)
     # Length in units of v_scale and duration; the halves' feeds and slopes, as above.
@@ -110,8 +127,8 @@ def longest_mm(machine, cells, duration_s):
     half.cost[half.v] = -length
     found = half.solved()
     snap = half.snap(found.x)
-    slopes = (found.x[half.a[0]] - found.x[half.a[-1]]) * machine.accel_mm_s2 * half.h**2 / 6
-    motion = Motion(np.full(2 * cells, half.h), np.concatenate([snap, -snap[::-1]]))
+    slopes = (found.x[half.a[0]] - found.x[half.a[-1]]) * machine.accel_mm_s2 * half.h[0] ** 2 / 6
+    motion = Motion(np.concatenate([half.h, half.h]), np.concatenate([snap, -snap[::-1]]))
     return -found.fun * v_scale * duration_s + slopes, motion
 
 
@@ -135,7 +152,7 @@ def least_time_of_move(machine, cells, length_mm, relative=1e-9):
 
 def _stop(machine, cells, duration_s, state, v_scale):
     """The least final feed of a motion that ends with a = j = 0, or None."""
-    horizon = Horizon(machine, cells, duration_s, v_scale)
+    horizon = Horizon(machine, graded(cells), duration_s, v_scale)
     horizon.start(*state)
     horizon.fix(horizon.a[-1], 0.0)
     horizon.fix(horizon.j[-1], 0.0)
@@ -143,7 +160,7 @@ def _stop(machine, cells, duration_s, state, v_scale):
     return horizon, horizon.solved()
 
 
-def least_stop(machine, cells, state, slack=1e-4, relative=1e-5):
+def least_stop(machine, cells, state, slack=1e-4, relative=3e-5):
     """The least time to rest, then the least peak of feed in that time and a slack, and that motion."""
     v_scale = max(state[0], machine.accel_mm_s2**2 / machine.jerk_mm_s3 / 2)
     zero = 1e-9
@@ -153,6 +170,8 @@ def least_stop(machine, cells, state, slack=1e-4, relative=1e-5):
         if found is not None and found.fun <= zero:
             break
         low, high = high, 1.5 * high
+        if high > 1e3:
+            raise RuntimeError(f"no stop from {state} on {machine}")
     points = []
     while high - low > relative * high:
         middle = 0.5 * (low + high)
@@ -180,7 +199,7 @@ def least_stop(machine, cells, state, slack=1e-4, relative=1e-5):
             if found is not None:
                 points.append((middle, found.fun))
     time_s = high
-    horizon = Horizon(machine, cells, time_s * (1.0 + slack), v_scale, has_peak=True)
+    horizon = Horizon(machine, graded(cells), time_s * (1.0 + slack), v_scale, has_peak=True)
     horizon.start(*state)
     for column in (horizon.v[-1], horizon.a[-1], horizon.j[-1]):
         horizon.fix(column, 0.0)
@@ -189,5 +208,5 @@ def least_stop(machine, cells, state, slack=1e-4, relative=1e-5):
     if found is None:
         raise RuntimeError(f"no stop from {state} in {time_s} s on {machine}")
     peak = max(found.fun * v_scale, state[0])
-    motion = Motion(np.full(cells, horizon.h), horizon.snap(found.x), state)
+    motion = Motion(horizon.h, horizon.snap(found.x), state)
     return time_s, peak, motion
