@@ -22,6 +22,7 @@ mod jog;
 mod law;
 mod learning;
 mod live;
+mod optimum;
 mod plan;
 mod precision;
 mod programs;
