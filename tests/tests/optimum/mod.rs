@@ -6,9 +6,13 @@
 
 mod moves;
 mod states;
+mod stops;
 
 use motion_kernel::law::{Law, Limits, Pulse};
 use serde_json::Value;
+
+/// How much a figure may grow: the last digit, which rounding may change.
+const GROWTH: f64 = 0.001;
 
 /// One machine of a committed file: its limits and its cases.
 struct Machine {
@@ -20,6 +24,12 @@ struct Machine {
 impl Machine {
     fn law(&self, pulse: Pulse) -> Law<f64> {
         Law::new(pulse, self.limits).expect("positive")
+    }
+
+    /// Its limits, as tables name it.
+    fn name(&self) -> String {
+        let limits = self.limits;
+        format!("A {}, J {:e}, DJ {:e}", limits.accel_mm_s2, limits.jerk_mm_s3, limits.snap_mm_s4)
     }
 
     fn cases(&self, group: &str) -> &[Value] {
