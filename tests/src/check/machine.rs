@@ -15,8 +15,9 @@ pub fn references() -> [Machine; 2] {
     })
 }
 
-/// One law or the other, as often. A bit decides of the number that is drawn next, and stays there: what is drawn next is
-/// a quantity, which leaves that bit aside. So a seed's machine and program are the same whatever its law.
+/// One law or the other, as often. A bit decides of the number that is drawn next, and stays there: what is
+/// drawn next is a quantity, which leaves that bit aside. So a seed's machine and program are the same
+/// whatever its law.
 pub fn pulse(random: &Random) -> Pulse {
     if random.clone().bits() % 2 == 0 { Pulse::Sin2 } else { Pulse::Plateau }
 }
