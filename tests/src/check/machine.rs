@@ -19,7 +19,7 @@ pub fn references() -> [Machine; 2] {
 /// drawn next is a quantity, which leaves that bit aside. So a seed's machine and program are the same
 /// whatever its law.
 pub fn pulse(random: &Random) -> Pulse {
-    if random.clone().bits() % 2 == 0 { Pulse::Sin2 } else { Pulse::Plateau }
+    if random.clone().bits() & 1 == 0 { Pulse::Sin2 } else { Pulse::Plateau }
 }
 
 /// Any limits, tick and law; its drives need not keep up.
