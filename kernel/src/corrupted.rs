@@ -40,8 +40,8 @@ struct Came {
     fault: Option<FaultKind<f32>>,
     /// The greatest jump that was no fault, of set-points \[mm\].
     set_mm: f64,
-    /// The same of set-points against where their axes are \[mm\]: what the guard holds to its limit. A wrong coefficient
-    /// may let a set-point gain 7 µm a tick in every tick, of which its axis follows 3.
+    /// The same of set-points against where their axes are \[mm\]: what the guard holds to its limit. A wrong
+    /// coefficient may let a set-point gain 7 µm a tick in every tick, of which its axis follows 3.
     missed_mm: f64,
 }
 

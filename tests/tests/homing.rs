@@ -83,8 +83,8 @@ struct SessionJudge {
 impl SessionJudge {
     fn new<R: Number>(machine: &Machine) -> Self {
         let rules = machine.rules();
-        // On a plateau acceleration changes by all that jerk allows. Both accelerations of a step are rounded by half of
-        // this.
+        // On a plateau acceleration changes by all that jerk allows. Both accelerations of a step are rounded
+        // by half of this.
         let rounding = R::RELATIVE * rules.limits.accel_mm_s2;
         Self { path: Judge::new(&rules, machine.tick_s, 1e-5, rounding), before: None, wrong: None }
     }

@@ -70,6 +70,8 @@ mod brake;
 mod choose;
 mod control;
 #[cfg(test)]
+mod given_up;
+#[cfg(test)]
 mod interrupted;
 mod list;
 mod lookahead;

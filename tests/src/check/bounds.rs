@@ -44,10 +44,11 @@ pub const CONTINUITY_ROUNDING: f64 = 8.0;
 pub const LENGTH_ROUNDING_MM: f64 = 1.2e-8;
 
 /// How far rounding may set the path position back where the motion is slower than it \[mm\]: a few position
-/// steps, and twice the error of the sine's part of a ramp's length, Jp·t₁³/(16π³). The sine is 4π times the
-/// acceleration's shape, so it has 4π times that one's rounding, of about 2 `relative`.
-pub fn backward_mm(relative: f64, jerk_t1_cubed_mm: f64) -> f64 {
-    2e-9 + 2.0 * 2.0 * 12.6 * relative * jerk_t1_cubed_mm / 496.1
+/// steps, and twice the error of the sine's part of a ramp's length, Jp·(2e)³/(16π³), of an arch of length
+/// 2e. The sine is 4π times the acceleration's shape, so it has 4π times that one's rounding, of about 2
+/// `relative`.
+pub fn backward_mm(relative: f64, jerk_arch_cubed_mm: f64) -> f64 {
+    2e-9 + 2.0 * 2.0 * 12.6 * relative * jerk_arch_cubed_mm / 496.1
 }
 
 /// Set positions against the programmed path \[mm\]: the curves' tolerance, a hundredth of a count of 0.1 µm …

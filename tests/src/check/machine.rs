@@ -15,10 +15,11 @@ pub fn references() -> [Machine; 2] {
     })
 }
 
-/// One law or the other, as often. A bit decides of the number that is drawn next, and stays there: what is drawn next is
-/// a quantity, which leaves that bit aside. So a seed's machine and program are the same whatever its law.
+/// One law or the other, as often. A bit decides of the number that is drawn next, and stays there: what is
+/// drawn next is a quantity, which leaves that bit aside. So a seed's machine and program are the same
+/// whatever its law.
 pub fn pulse(random: &Random) -> Pulse {
-    if random.clone().bits().is_multiple_of(2) { Pulse::Sin2 } else { Pulse::Plateau }
+    if random.clone().bits() & 1 == 0 { Pulse::Sin2 } else { Pulse::Plateau }
 }
 
 /// Any limits, tick and law; its drives need not keep up.

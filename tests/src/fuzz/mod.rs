@@ -41,8 +41,8 @@ impl Laws {
         Self { planned: Pulse::Plateau, live: Pulse::Sin2 },
     ];
 
-    /// Those that `bytes` say: by what the choice of the number type leaves over of its byte, the second. So no byte says
-    /// something else than before there were two laws.
+    /// Those that `bytes` say: by what the choice of the number type leaves over of its byte, the second. So
+    /// no byte says something else than before there were two laws.
     fn of(bytes: &[u8]) -> Self {
         let [_, byte, ..] = *bytes else { return Self::ALL[0] };
         Self::ALL[usize::from(byte) / NUMBERS % Self::ALL.len()]

@@ -453,9 +453,9 @@ fn off_backwards(blocks: &[Block<f64>]) -> Option<f64> {
     (on > 0.0).then_some((on / back - 1.0).abs())
 }
 
-/// A long, soft block between short, hard ones. Where it ends was off by a last place on the way back, and so its
-/// limits held for the ramp beside it too: that one did not fit, and the slowest feed was held over all of its length,
-/// for 9309 s instead of 313.
+/// A long, soft block between short, hard ones. Where it ends was off by a last place on the way back, and so
+/// its limits held for the ramp beside it too: that one did not fit, and the slowest feed was held over all
+/// of its length, for 9309 s instead of 313.
 #[test]
 fn a_soft_block_does_not_reach_over_its_ends() {
     let hard = (5e3, 1e5, 5e6);

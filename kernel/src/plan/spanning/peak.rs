@@ -59,8 +59,8 @@ impl<'a> Sides<'a> {
         if let Some(law) = self.uniform {
             return law.limits();
         }
-        // Where a block ends is off by some last places, because an ascent counts from the end of the interval
-        // that it begins at. So much of a block must not ask for its limits: it may be far softer.
+        // Where a block ends is off by some last places, because an ascent counts from the end of the
+        // interval that it begins at. So much of a block must not ask for its limits: it may be far softer.
         let rounding_mm = 4.0 * f64::EPSILON * self.interval.end_mm;
         let (low_mm, high_mm) = match (low_mm < high_mm, is_back) {
             (true, _) => (low_mm + rounding_mm, high_mm - rounding_mm),
