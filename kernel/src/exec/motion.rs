@@ -73,7 +73,7 @@ impl Moving {
                 segment.fraction_after(Phase::Rise, elapsed)
             }
             Phase::Rise => return None,
-            // The place where `segment` is cut has been passed.
+            // The place where `segment` parts from `before` has been passed.
             Phase::Hold if !is_same_rise => return None,
             Phase::Hold => segment.fraction_after(Phase::Hold, elapsed),
             // A falling acceleration can't be ended earlier.

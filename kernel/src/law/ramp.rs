@@ -3,6 +3,9 @@
 //! Background: the planner chooses ramps with it, and reports evaluate it. The tick evaluates the same shapes
 //! through [`FeedSegment`](super::FeedSegment), which has nothing left to divide.
 
+#[cfg(feature = "live")]
+use core::f64::consts::FRAC_PI_2;
+
 use serde::{Deserialize, Serialize};
 
 use super::limits::{Law, Times};
@@ -128,6 +131,15 @@ impl<R: Root> Ramp<R> {
     /// The greatest acceleration \[mm/s²\], without its sign: J_p·(t₁ − e), with sin² pulses J_p·t₁/2.
     pub fn peak_accel_mm_s2(&self) -> R {
         self.peak_jerk_mm_s3 * (self.t1_s - self.edge_s)
+    }
+
+    /// The greatest snap \[mm/s⁴\]: π·J_p/(2e); 0 without edges.
+    #[cfg(feature = "live")]
+    pub(crate) fn peak_snap_mm_s4(&self) -> R {
+        if self.edge_s <= R::ZERO {
+            return R::ZERO;
+        }
+        R::from_f64(FRAC_PI_2).times_per(self.peak_jerk_mm_s3, self.edge_s)
     }
 
     /// The first of its pulses, with the sign of the change of feed.

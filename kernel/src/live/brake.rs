@@ -3,8 +3,6 @@
 //! Consumes a splice and the [`Lookahead`]; produces a ramp under the ceilings, junctions and limits of all
 //! the blocks that it crosses. Background.
 
-use core::f64::consts::FRAC_PI_2;
-
 use super::list::Item;
 use super::lookahead::{AheadBlock, FEED_ROUNDING, Lookahead};
 use super::splice::{SLIVER, Splice};
@@ -16,25 +14,28 @@ pub(super) const LENGTH_ROUNDING_MM: f64 = 4.0e-9;
 /// How often a ramp is made anew because it crosses blocks with lower limits.
 const LIMITS_STEPS: usize = 8;
 
-/// Tolerated rounding of jerk and snap, relative.
-const LIMIT_ROUNDING: f64 = 1.0e-12;
 /// Number of places where braking may begin: here, and the ends of the first blocks ahead.
 const STARTS_TRIED: usize = 4;
 
 /// How motion comes to rest from a splice.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Stop {
-    /// The path on which the feed is kept before it brakes.
+pub(super) struct Braking {
+    /// The path on which the feed is kept first.
     pub(super) kept: Position,
     pub(super) ramp: PlannedRamp,
-    /// How long both take \[s\].
-    pub(super) time_s: f64,
 }
 
-impl Stop {
+impl Braking {
     /// The path up to the rest.
     pub(super) fn length(&self) -> Position {
         self.kept + self.ramp.length
+    }
+
+    /// How long it takes \[s\].
+    pub(super) fn time_s(&self) -> f64 {
+        let Ramp { from_mm_s, .. } = self.ramp.ramp;
+        let kept_s = if from_mm_s > 0.0 { self.kept.to_mm() / from_mm_s } else { 0.0 };
+        kept_s + self.ramp.ramp.duration_s()
     }
 }
 
@@ -49,7 +50,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         end: Position,
         feed_override: f64,
     ) -> Option<PlannedRamp> {
-        self.brake_by(from, end, feed_override, |limits| {
+        self.brake_by(from, from.at, end, feed_override, |limits| {
             Some(Ramp::new(&Law::new(self.pulse(), *limits).ok()?, from.feed_mm_s, to_mm_s))
         })
     }
@@ -65,20 +66,19 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         feed_override: f64,
         tick_s: f64,
     ) -> Option<PlannedRamp> {
-        self.brake_by(from, end, feed_override, |limits| {
-            let ramp = ramp.driven_to_rest(since, self.pulse(), limits.accel_mm_s2, tick_s)?;
-            let snap_mm_s4 = FRAC_PI_2 * ramp.peak_jerk_mm_s3 / ramp.edge_s;
-            let is_within = |value: f64, limit: f64| value <= limit * (1.0 + LIMIT_ROUNDING);
-            let keeps = is_within(ramp.peak_jerk_mm_s3, limits.jerk_mm_s3)
-                && is_within(snap_mm_s4, limits.snap_mm_s4);
-            keeps.then_some(ramp)
+        // Up to its own end it is nowhere faster than the ramp under way, whatever the override was then.
+        let known = ramp.end(from, tick_s).at;
+        self.brake_by(from, known, end, feed_override, |limits| {
+            ramp.driven_to_rest(since, self.pulse(), limits, tick_s)
         })
     }
 
-    /// The braking ramp from a splice that `make` makes within the limits of all blocks it crosses.
+    /// The braking ramp from a splice that `make` makes within the limits of all blocks it crosses, and below
+    /// the ceilings of those that begin after `known`.
     fn brake_by(
         &self,
         from: &Splice,
+        known: Position,
         end: Position,
         feed_override: f64,
         make: impl Fn(&Limits<f64>) -> Option<Ramp<f64>>,
@@ -101,7 +101,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
                 .fold(limits, |least, block| least.least(&block.limits_at(from.feed_mm_s)));
             if least == limits {
                 return self
-                    .is_below_ceilings(from, &ramp, feed_override)
+                    .is_below_ceilings(from, known, &ramp, feed_override)
                     .then_some(PlannedRamp { ramp, length });
             }
             limits = least;
@@ -109,22 +109,23 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         None
     }
 
-    /// The soonest rest from a splice: braking at once, or at the end of one of the blocks ahead. A blend
-    /// leaves little of the limits at its feed, so it may take less time to drive through it first.
-    pub(super) fn stop(&self, from: &Splice, end: Position, feed_override: f64) -> Option<Stop> {
-        let (mut best, mut best_s) = (None, f64::INFINITY);
+    /// The nearest rest from a splice: braking at once, or at the end of one of the blocks ahead. A blend leaves
+    /// little of the limits at its feed, so motion may be nearer at rest if it drives through it first. It is
+    /// sooner at rest then, too: with the feed F, on d and then in a ramp of the time T', d + F·T'/2 < F·T/2
+    /// means T' < T and d/F + T' < (T + T')/2.
+    pub(super) fn nearest_rest(&self, from: &Splice, end: Position, feed_override: f64) -> Option<Braking> {
+        let mut best = None::<Braking>;
         let mut begin = *from;
         for block in self.from(from).take(STARTS_TRIED) {
             let kept = begin.at - from.at;
-            let kept_s = kept.to_mm() / from.feed_mm_s;
-            if kept_s >= best_s {
+            let is_nearer = |length: Position| best.is_none_or(|best| length < best.length());
+            if !is_nearer(kept) {
                 break;
             }
-            if let Some(ramp) = self.brake(&begin, 0.0, end, feed_override) {
-                let time_s = kept_s + ramp.ramp.duration_s();
-                if time_s < best_s {
-                    (best, best_s) = (Some(Stop { kept, ramp, time_s }), time_s);
-                }
+            if let Some(ramp) = self.brake(&begin, 0.0, end, feed_override)
+                && is_nearer(kept + ramp.length)
+            {
+                best = Some(Braking { kept, ramp });
             }
             // The junction at the block's end and the ceiling behind it count, too.
             if !self.may_keep(from, block.end() + SLIVER, feed_override) {
@@ -145,9 +146,15 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         })
     }
 
-    /// Whether a braking ramp is below every ceiling and junction on its way. It only falls, so block starts
-    /// are enough.
-    fn is_below_ceilings(&self, from: &Splice, ramp: &Ramp<f64>, feed_override: f64) -> bool {
+    /// Whether a braking ramp is below every ceiling and junction behind `known` on its way. It only falls, so
+    /// block starts are enough.
+    fn is_below_ceilings(
+        &self,
+        from: &Splice,
+        known: Position,
+        ramp: &Ramp<f64>,
+        feed_override: f64,
+    ) -> bool {
         let rising = ramp.reversed();
         let length_mm = ramp.length_mm();
         let mut junction_mm_s = f64::INFINITY;
@@ -161,7 +168,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
             if at_mm > length_mm {
                 break;
             }
-            if !is_slow {
+            if !is_slow && block.start() > known {
                 return false;
             }
             junction_mm_s = block.junction_mm_s();
@@ -194,9 +201,9 @@ mod tests {
         ahead
     }
 
-    fn stop(ahead: &Lookahead<8>, end_mm: f64) -> Option<Stop> {
+    fn rest(ahead: &Lookahead<8>, end_mm: f64) -> Option<Braking> {
         let from = Splice { stretch: 0, at: at(1.0), feed_mm_s: FEED_MM_S };
-        ahead.stop(&from, at(end_mm), 1.0)
+        ahead.nearest_rest(&from, at(end_mm), 1.0)
     }
 
     /// A blend of 1.5 mm takes 31 ms to drive through, and 2 s to brake in.
@@ -205,14 +212,25 @@ mod tests {
         let law = Law::new(Pulse::Plateau, HARD).expect("limits");
         let hard = Ramp::new(&law, FEED_MM_S, 0.0);
         let blocks = [(3.0, HARD, FEED_MM_S), (1.5, SOFT, FEED_MM_S), (100.0, HARD, FEED_MM_S)];
-        let found = stop(&ahead(&blocks), 100.0).expect("a stop");
+        let found = rest(&ahead(&blocks), 100.0).expect("a rest");
         assert_eq!(found.kept, at(3.5));
         assert_eq!((found.ramp.ramp.t1_s, found.ramp.ramp.t2_s), (hard.t1_s, hard.t2_s));
-        assert!(libm::fabs(found.time_s - 3.5 / FEED_MM_S - hard.duration_s()) < 1e-12);
+        assert!(libm::fabs(found.time_s() - 3.5 / FEED_MM_S - hard.duration_s()) < 1e-12);
         // Inside the blend, too; and not where it is behind.
-        let found = stop(&ahead(&[blocks[1], blocks[2]]), 100.0).expect("a stop");
+        let found = rest(&ahead(&[blocks[1], blocks[2]]), 100.0).expect("a rest");
         assert_eq!(found.kept, at(0.5));
-        assert_eq!(stop(&ahead(&[blocks[2]]), 100.0).expect("a stop").kept, Position::ZERO);
+        assert_eq!(rest(&ahead(&[blocks[2]]), 100.0).expect("a rest").kept, Position::ZERO);
+    }
+
+    /// A soft block is not driven through where that is sooner at rest, but farther away.
+    #[test]
+    fn the_nearest_rest_is_taken() {
+        let soft = Limits { accel_mm_s2: 100.0, jerk_mm_s3: 1e3, ..HARD };
+        let blocks = [(17.0, soft, FEED_MM_S), (100.0, HARD, FEED_MM_S)];
+        let found = rest(&ahead(&blocks), 100.0).expect("a rest");
+        assert_eq!(found.kept, Position::ZERO);
+        let hard = Ramp::new(&Law::new(Pulse::Plateau, HARD).expect("limits"), FEED_MM_S, 0.0);
+        assert!(found.length() < at(16.0) && 16.0 / FEED_MM_S + hard.duration_s() < found.time_s());
     }
 
     /// Not where its feed is too high behind the blend, or at the junction, or where the known path ends before
@@ -220,17 +238,17 @@ mod tests {
     #[test]
     fn a_feed_is_kept_only_where_that_is_allowed() {
         let (blend, line) = ((1.5, SOFT, FEED_MM_S), (100.0, HARD, FEED_MM_S));
-        let soft = stop(&ahead(&[(100.0, SOFT, FEED_MM_S)]), 100.0).expect("a stop");
-        assert!(soft.kept == Position::ZERO && soft.time_s > 2.0);
+        let soft = rest(&ahead(&[(100.0, SOFT, FEED_MM_S)]), 100.0).expect("a rest");
+        assert!(soft.kept == Position::ZERO && soft.time_s() > 2.0);
         let slow = ahead(&[blend, (100.0, HARD, 0.9 * FEED_MM_S)]);
-        assert_eq!(stop(&slow, 100.0), None, "neither kept nor braked within the half millimetre");
-        assert_eq!(stop(&ahead(&[blend, line]), 5.0), None, "no room");
+        assert_eq!(rest(&slow, 100.0), None, "neither kept nor braked within the half millimetre");
+        assert_eq!(rest(&ahead(&[blend, line]), 5.0), None, "no room");
         let mut ahead = Lookahead::<8>::new(Pulse::Plateau);
         for (junction_mm_s, (length_mm, limits, cap_mm_s)) in [(0.9 * FEED_MM_S, blend), (1e3, line)] {
             let allowed = Allowed { cap_mm_s, limits };
             let block = PathBlock::new(at(length_mm), cap_mm_s, allowed, allowed, junction_mm_s);
             ahead.push(0, block).expect("room");
         }
-        assert_eq!(stop(&ahead, 100.0), None, "the junction");
+        assert_eq!(rest(&ahead, 100.0), None, "the junction");
     }
 }

@@ -2,17 +2,17 @@
 
 use heapless::Vec;
 
-use super::brake::Stop;
+use super::brake::Braking;
 use super::splice::Splice;
-use crate::law::{CutRamp, Phase, PlannedRamp, Pulse, Ramp, Ticks, segment};
+use crate::law::{CutRamp, Limits, Phase, PlannedRamp, Pulse, Ramp, Ticks, segment};
 pub use crate::queue::LIST_ITEMS;
 use crate::units::Position;
 
 /// Rounding between feeds that are calculated differently: of 1 mm/s, plus relative to the feed.
 const FEED_ROUNDING_MM_S: f64 = 1.0e-12;
 
-/// Tolerated rounding of an acceleration, relative.
-const ACCEL_ROUNDING: f64 = 1.0e-12;
+/// Tolerated rounding of a limit, relative.
+const LIMIT_ROUNDING: f64 = 1.0e-12;
 
 /// Bisection steps that find where a ramp is cut: to a millionth of a millionth.
 const CUT_STEPS: usize = 40;
@@ -150,15 +150,14 @@ impl Item {
         self.cut(Phase::Rise, before(low_s)?, tick_s)
     }
 
-    /// The same braking ramp driven on to rest, from `elapsed` after the start of `phase`: what is left of its
-    /// first pulse, if that may have another `pulse` shape, or of its hold is made longer, with an
-    /// acceleration of at most `most_mm_s2`. `None` where nothing of that is left, or where there is more
-    /// acceleration already.
+    /// The same braking ramp driven on to rest within `limits`, from `elapsed` after the start of `phase`.
+    /// Before its closing edge a pulse with a plateau gets longer, up to the limit of acceleration; later, and
+    /// with sin² pulses, only the hold does. `None` in the fall, and where the ramp is beyond the limits.
     pub(super) fn driven_to_rest(
         &self,
         (phase, elapsed): (Phase, Ticks),
         pulse: Pulse,
-        most_mm_s2: f64,
+        limits: &Limits<f64>,
         tick_s: f64,
     ) -> Option<Ramp<f64>> {
         let Self::Feed(PlannedRamp { ramp, .. }) = self else { return None };
@@ -172,15 +171,19 @@ impl Item {
         let before_closing = Ticks::from_seconds(ramp.t1_s - ramp.edge_s, tick_s)?.minus(Ticks::from_bits(1));
         let is_open = phase == Phase::Rise && before_closing.is_some_and(|closing| elapsed <= closing);
         let t1_s = if is_open && pulse == Pulse::Plateau {
-            let longest_s = most_mm_s2 / jerk + ramp.edge_s;
+            let longest_s = limits.accel_mm_s2 / jerk + ramp.edge_s;
             ramp.t1_s.max(ramp.rise_for_s(change_mm_s).min(longest_s))
         } else {
             ramp.t1_s
         };
-        let accel_mm_s2 = jerk * (t1_s - ramp.edge_s);
-        let t2_s = t1_s.max(change_mm_s / accel_mm_s2);
-        let is_within = accel_mm_s2 <= most_mm_s2 * (1.0 + ACCEL_ROUNDING);
-        is_within.then_some(Ramp { to_mm_s: 0.0, t1_s, t2_s, ..ramp })
+        // Rounded up: the jerk that follows from the times must not be above that of the ramp.
+        let t2_s = t1_s.max(change_mm_s / (jerk * (t1_s - ramp.edge_s))) * (1.0 + 4.0 * f64::EPSILON);
+        let on = Ramp { to_mm_s: 0.0, t1_s, t2_s, ..ramp };
+        let is_within = |value: f64, limit: f64| value <= limit * (1.0 + LIMIT_ROUNDING);
+        let keeps_limits = is_within(on.peak_accel_mm_s2(), limits.accel_mm_s2)
+            && is_within(on.peak_jerk_mm_s3, limits.jerk_mm_s3)
+            && is_within(on.peak_snap_mm_s4(), limits.snap_mm_s4);
+        keeps_limits.then_some(on)
     }
 
     /// The duration of a phase of its [`FeedSegment`](crate::law::FeedSegment), if the item can be cut there.
@@ -291,13 +294,12 @@ impl List {
         item
     }
 
-    /// Appends a stop, up to two items.
-    pub(super) fn push_stop(&mut self, stop: &Stop) {
-        let feed_mm_s = stop.ramp.ramp.from_mm_s;
-        if stop.kept > Position::ZERO {
-            self.push_cruise(feed_mm_s, stop.kept);
+    /// Appends what comes to rest, up to two items.
+    pub(super) fn push_braking(&mut self, braking: &Braking) {
+        if braking.kept > Position::ZERO {
+            self.push_cruise(braking.ramp.ramp.from_mm_s, braking.kept);
         }
-        self.push(Item::Feed(stop.ramp));
+        self.push(Item::Feed(braking.ramp));
     }
 
     /// Appends a cruise at `feed_mm_s` > 0 over `length`.
@@ -345,7 +347,7 @@ impl List {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Law, LimitedBy, Limits};
+    use crate::law::{Law, LimitedBy};
     use crate::random::Random;
 
     /// Wherever a ramp is to end, it can be cut so that it does, whole or cut already, and never beyond.
@@ -400,7 +402,7 @@ mod tests {
             for (phase, lasts_s) in phases {
                 let elapsed_s = lasts_s * random.unit();
                 let since = (phase, Ticks::from_seconds(elapsed_s, tick_s).expect("in range"));
-                let Some(on) = item.driven_to_rest(since, pulse, limits.accel_mm_s2, tick_s) else {
+                let Some(on) = item.driven_to_rest(since, pulse, &limits, tick_s) else {
                     panic!("{number}: {phase:?} {elapsed_s} of {ramp:?}");
                 };
                 let until_s = if phase == Phase::Hold { ramp.t1_s + elapsed_s } else { elapsed_s };
@@ -425,9 +427,9 @@ mod tests {
                 }
             }
             let falling = (Phase::Fall, Ticks::ONE);
-            assert_eq!(item.driven_to_rest(falling, pulse, limits.accel_mm_s2, tick_s), None);
-            let softer = 0.99 * ramp.peak_accel_mm_s2();
-            assert_eq!(item.driven_to_rest((Phase::Rise, Ticks::ONE), pulse, softer, tick_s), None);
+            assert_eq!(item.driven_to_rest(falling, pulse, &limits, tick_s), None);
+            let softer = Limits { accel_mm_s2: 0.99 * ramp.peak_accel_mm_s2(), ..limits };
+            assert_eq!(item.driven_to_rest((Phase::Rise, Ticks::ONE), pulse, &softer, tick_s), None);
         }
         assert!(grown > 1000, "{grown}");
     }

@@ -21,8 +21,9 @@
 //! for an override where it reaches the feed that this allows (`Item::cut_to`); at the end of a ramp that
 //! brakes, because ceilings ahead may need all of it. From there on it brakes to rest or to another feed
 //! under the ceilings and limits of all the blocks it crosses; where a ceiling ahead forbids that, it begins
-//! at the next splice that allows it. A stop drives a ramp that brakes on to rest (`Item::driven_to_rest`), and keeps
-//! the feed up to the end of a block where it is sooner at rest for it (`Lookahead::stop`). After a stop or an override the rest of the stretch is planned anew; an
+//! at the next splice that allows it. A stop drives a ramp that brakes on to rest (`Item::driven_to_rest`).
+//! It may keep the feed up to the end of a soft block, if it is nearer at rest then
+//! (`Lookahead::nearest_rest`). After a stop or an override the rest of the stretch is planned anew; an
 //! unchanged stretch is driven by the program's own plan.
 //!
 //! Modules in the order the data travels:

@@ -119,7 +119,12 @@ impl<'a> Places<'a> {
         // Not at its very start: there is no beginning to repeat yet.
         let lead = if left >= duration { lead.max(Ticks::ONE) } else { lead };
         let elapsed = duration.minus(left)?.plus(lead);
-        if elapsed > duration {
+        // The rise may be over by then, and the hold under way.
+        let (phase, elapsed) = match elapsed.minus(duration) {
+            Some(over) if phase == Phase::Rise && over > Ticks::ZERO => (Phase::Hold, over),
+            _ => (phase, elapsed),
+        };
+        if elapsed > item.phase_duration(phase, tick_s)? {
             return None;
         }
         let head = item.cut(phase, elapsed, tick_s)?;

@@ -272,9 +272,9 @@ fn plateaus_of_any_length<R: Real>(stream: u64, state_epsilons: [f64; 4]) -> usi
 fn plateaus_from_none_to_a_thousand_million_edges() {
     assert_eq!(plateaus_of_any_length::<f64>(36, STATE_EPSILONS), 0);
     assert_eq!(plateaus_of_any_length::<f32>(37, STATE_EPSILONS), 0);
-    // Fixed point has no place for the snap of edges of a microsecond.
+    // Fixed point has no place for the snap of edges of a microsecond: 6716 of 20 000.
     let refused = plateaus_of_any_length::<Fixed>(38, FIXED_EPSILONS);
-    assert!(refused < 10_000, "{refused}");
+    assert!(refused < 7000, "{refused}");
 }
 
 /// The phases of a segment meet: no step of position, feed or acceleration where one ends and the next begins.

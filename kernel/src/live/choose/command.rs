@@ -2,7 +2,7 @@
 
 use super::{Choice, Chooser};
 use crate::law::PlannedRamp;
-use crate::live::brake::Stop;
+use crate::live::brake::Braking;
 use crate::live::list::{Item, List};
 use crate::live::mode::Request;
 use crate::live::places::{Place, Places, Takeover};
@@ -20,26 +20,26 @@ pub(super) enum Cut {
     All,
 }
 
-/// How motion comes to rest from a place in the list under way.
+/// How motion comes to rest if the list under way is left at a place.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum StopFrom {
-    /// The item under way is a ramp that brakes: it goes on to rest.
-    Start(PlannedRamp),
+pub(super) enum Stopping {
+    /// The item under way, a ramp that brakes, is driven on.
+    DrivenOn(PlannedRamp),
     /// After the item under way, perhaps cut.
-    Splice(Stop),
+    After(Braking),
 }
 
-impl StopFrom {
+impl Stopping {
     /// Restarts `list` with the stop from `place`.
     fn begin(&self, place: &Place, list: &mut List) {
         match self {
-            Self::Start(ramp) => {
+            Self::DrivenOn(ramp) => {
                 list.restart(*place.start());
                 list.push(Item::Feed(*ramp));
             }
-            Self::Splice(stop) => {
+            Self::After(braking) => {
                 place.begin(list);
-                list.push_stop(stop);
+                list.push_braking(braking);
             }
         }
     }
@@ -47,8 +47,8 @@ impl StopFrom {
     /// Where it ends.
     pub(super) fn rest(&self, place: &Place, tick_s: f64) -> Position {
         match self {
-            Self::Start(ramp) => place.start().at + ramp.length,
-            Self::Splice(stop) => place.splice(tick_s).at + stop.length(),
+            Self::DrivenOn(ramp) => place.start().at + ramp.length,
+            Self::After(braking) => place.splice(tick_s).at + braking.length(),
         }
     }
 }
@@ -83,24 +83,22 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
     }
 
     /// How motion comes to rest if the list under way is left at `place`.
-    pub(super) fn stop_from(&self, place: &Place) -> Option<StopFrom> {
+    pub(super) fn stop_from(&self, place: &Place) -> Option<Stopping> {
         let (start, splice) = (*place.start(), place.splice(self.tick_s));
         let driven_override = self.timeline.driven_override();
         let path_end = self.extent_of(splice.stretch).end();
+        let nearest_rest = |from: &Splice| self.lookahead.nearest_rest(from, path_end, driven_override);
         if splice.feed_mm_s >= start.feed_mm_s {
-            return self.lookahead.stop(&splice, path_end, driven_override).map(StopFrom::Splice);
+            return nearest_rest(&splice).map(Stopping::After);
         }
         // A ramp that brakes can't be ended early, but may be driven on, unless it is so gentle that another one
         // after it is sooner at rest.
         let (_, item) = self.timeline.list().get(place.takeover().driven())?;
-        let on =
-            self.lookahead.brake_on(&start, item, place.since()?, path_end, driven_override, self.tick_s)?;
-        let after = item.end(&start, self.tick_s);
-        let another_s = self.lookahead.stop(&after, path_end, driven_override).map(|stop| stop.time_s);
-        let (Item::Feed(PlannedRamp { ramp, .. }), Some(another_s)) = (item, another_s) else {
-            return Some(StopFrom::Start(on));
-        };
-        (on.ramp.duration_s() <= ramp.duration_s() + another_s).then_some(StopFrom::Start(on))
+        let (since, tick_s) = (place.since()?, self.tick_s);
+        let on = self.lookahead.brake_on(&start, item, since, path_end, driven_override, tick_s)?;
+        let Item::Feed(PlannedRamp { ramp, .. }) = item else { return None };
+        let is_sooner = |braking: Braking| on.ramp.duration_s() <= ramp.duration_s() + braking.time_s();
+        nearest_rest(&item.end(&start, tick_s)).is_none_or(is_sooner).then_some(Stopping::DrivenOn(on))
     }
 
     /// Lets a list that ends at rest take over.

@@ -5,7 +5,7 @@
 
 use super::command::Cut;
 use super::{Choice, Chooser};
-use crate::live::brake::Stop;
+use crate::live::brake::Braking;
 use crate::live::list::{Item, LIST_ITEMS, List};
 use crate::live::places::Places;
 use crate::live::replan::Ramps;
@@ -25,14 +25,14 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         self.mode.is_single_block() && place.is_at_rest() && self.block_end == Some(BlockEnd::from(*place))
     }
 
-    /// The path position of the soonest rest from a splice, and how to come to it.
-    fn soonest_rest(&self, from: &Splice) -> Option<(Position, Option<Stop>)> {
+    /// The path position of the nearest rest from a splice, and how to come to it.
+    fn nearest_rest(&self, from: &Splice) -> Option<(Position, Option<Braking>)> {
         if from.is_at_rest() {
             return Some((from.at, None));
         }
         let path_end = self.extent_of(from.stretch).end();
-        let stop = self.lookahead.stop(from, path_end, self.timeline.driven_override())?;
-        Some((from.at + stop.length(), Some(stop)))
+        let braking = self.lookahead.nearest_rest(from, path_end, self.timeline.driven_override())?;
+        Some((from.at + braking.length(), Some(braking)))
     }
 
     /// The first block ends of `stretch` at or after `nearest`.
@@ -80,9 +80,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
     /// the end of the stretch, as far as it is known.
     pub(super) fn gather_block(&mut self, list: &mut List, ramps: Ramps) -> bool {
         let splice = *self.timeline.splice();
-        if let Some((nearest, stop)) = self.soonest_rest(&splice) {
+        if let Some((nearest, braking)) = self.nearest_rest(&splice) {
             // At rest, the block end it rests at doesn't count.
-            let nearest = if stop.is_none() { nearest + SLIVER + SLIVER } else { nearest };
+            let nearest = if braking.is_none() { nearest + SLIVER + SLIVER } else { nearest };
             let ends = self.block_ends(splice.stretch, nearest);
             for end in ends.into_iter().flatten() {
                 self.block_end = Some(end);
@@ -94,8 +94,8 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                     return true;
                 }
             }
-            if let ([Some(_), ..], Some(stop)) = (ends, stop) {
-                list.push_stop(&stop);
+            if let ([Some(_), ..], Some(braking)) = (ends, braking) {
+                list.push_braking(&braking);
                 return true;
             }
         }

@@ -194,6 +194,30 @@ fn a_ramp_that_brakes_is_driven_on_to_rest() {
     assert!(list.start().feed_mm_s == 0.5 * FEED_MM_S && list.end().is_at_rest(), "{list:?}");
 }
 
+/// A rise that will be over before a change can take effect is cut in its hold: it does not go on to its end.
+#[test]
+fn a_ramp_is_cut_across_the_end_of_its_rise() {
+    let mut ahead = Ahead::new();
+    let law = Law::new(Pulse::Plateau, LIMITS).expect("limits");
+    let long = Ramp::new(&law, 0.0, 200.0);
+    let mut list = List::new(*ahead.timeline.splice(), TICK_S);
+    list.push(Item::Feed(PlannedRamp { ramp: long, length: at(long.length_mm()) }));
+    list.push_cruise(200.0, at(100.0));
+    list.set_exit_to_end();
+    ahead.timeline = Timeline::driving(list, TICK_S);
+    for _ in 0..3 {
+        ahead.timeline.lead_more();
+    }
+    let allowed = Allowed { cap_mm_s: 200.0, limits: LIMITS };
+    ahead.lookahead = Lookahead::new(Pulse::Plateau);
+    ahead.lookahead.push(0, PathBlock::new(ahead.whole, 200.0, allowed, allowed, 0.0)).expect("room");
+    let (choice, list) = ahead.choose(Some((Request::Stop, progress(0, Some((Phase::Rise, Ticks::ONE))))));
+    assert_eq!(choice, Choice::TakeOver { takeover: Takeover::Within(0), feed_override: 1.0 });
+    let Some((_, Item::Feed(PlannedRamp { ramp, .. }))) = list.get(0) else { panic!("{list:?}") };
+    assert!(libm::fabs(ramp.t2_s - ramp.t1_s - 2.0 * TICK_S) < 1e-9 && ramp.t1_s == long.t1_s, "{ramp:?}");
+    assert!(list.len() == 2 && list.end().is_at_rest(), "{list:?}");
+}
+
 /// A lower override brakes from the cruise to its feed; the whole stretch is planned anew from there.
 #[test]
 fn another_override_takes_over_in_a_cruise() {
