@@ -113,6 +113,7 @@ fn rows() -> Vec<Row> {
         row("ramp", "rsruckig calculate", Free),
         row("block: peak and two ramps", "rsruckig calculate", Free),
         row("block: peak and two ramps", "ruckig calculate", Free),
+        // With room: from one machine to another the ratio goes from 0.65 to 0.93.
         row("plan, a block", "rsruckig calculate", RatioMax(1.5)),
         row("merge and plan, a block", "rsruckig calculate", RatioMax(0.5)),
     ]
