@@ -66,6 +66,7 @@ fn the_times_of_the_samples_are_in_order() {
     for row in rows {
         let number = |key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key}: {row}"));
         let (time, per_block, least) = (number("time_s"), number("per_block_s"), number("least_s"));
+        assert!(number("acceleration_s") <= 1.001 * least, "{row}");
         assert!(least < time && time <= per_block * (1.0 + 1e-12), "{row}");
         for ratio in ["feed_ratio", "accel_ratio", "jerk_ratio", "accel_step_ratio", "tolerance_share"] {
             assert!((0.0..=1.0 + 1e-6).contains(&number(ratio)), "{ratio}: {row}");
@@ -139,7 +140,7 @@ fn the_forms_say_the_same() {
     assert_eq!(
         lines[0],
         "program,path,blocks,blends,length_mm,time_s,per_block_s,least_s,tolerance_share,feed_ratio,accel_ratio,jerk_ratio,\
-         accel_step_ratio"
+         accel_step_ratio,acceleration_s"
     );
     assert_eq!(lines.len(), 3);
     let table = String::from_utf8(compared(&asked).stdout).expect("UTF-8");

@@ -13,6 +13,7 @@ pub mod figures;
 pub mod fuzz;
 pub mod judge;
 pub mod random;
+pub mod samples;
 pub mod s4;
 
 /// The laws.

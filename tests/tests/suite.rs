@@ -28,6 +28,7 @@ mod precision;
 mod programs;
 mod recording;
 mod regulators;
+mod samples;
 mod streams;
 mod stringer;
 mod tuning;

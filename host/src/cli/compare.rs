@@ -23,8 +23,9 @@ Examples:
       every .ngc file of a folder, with blends of two tolerances
 
 Columns: `per block` is the time with one pair of sin² ramps per block, the published plan, whatever the
-machine's law is; `least` is the time on the same path without limits of jerk and snap, a lower bound for every
-plan; `tolerance` is the greatest share of the tolerance that the path uses; `feed` to `step` are the executed
+machine's law is; `least` is the time on the same path without limits of jerk and snap along it, but under the
+ceilings that they make, a lower bound for every plan; `accel. alone` is the time on it under programmed feeds
+and acceleration alone; `tolerance` is the greatest share of the tolerance that the path uses; `feed` to `step` are the executed
 ticks over the limits of axes and path, `step` for the acceleration step at a junction without a blend. Refused
 programs are listed; then the exit status is 2.";
 
@@ -71,12 +72,13 @@ struct Row {
     accel_ratio: f64,
     jerk_ratio: f64,
     accel_step_ratio: f64,
+    acceleration_s: f64,
 }
 
 impl Row {
     fn new(program: &str, path: Path, figures: &Figures) -> Self {
-        let Figures { blocks, blends, length_mm, time_s, per_block_s, least_s, tolerance_share, ratios } =
-            *figures;
+        let Figures { blocks, blends, length_mm, time_s, per_block_s, least_s, .. } = *figures;
+        let Figures { acceleration_s, tolerance_share, ratios, .. } = *figures;
         Self {
             program: program.to_owned(),
             path: path.to_string(),
@@ -91,6 +93,7 @@ impl Row {
             accel_ratio: ratios.accel,
             jerk_ratio: ratios.jerk,
             accel_step_ratio: ratios.accel_step,
+            acceleration_s,
         }
     }
 }
@@ -192,6 +195,7 @@ fn write_table(rows: &[Row], out: &mut dyn Write) -> io::Result<()> {
         ("time", "s", Align::Right),
         ("per block", "s", Align::Right),
         ("least", "s", Align::Right),
+        ("accel. alone", "s", Align::Right),
         ("tolerance", "%", Align::Right),
         ("feed", "%", Align::Right),
         ("accel", "%", Align::Right),
@@ -199,7 +203,7 @@ fn write_table(rows: &[Row], out: &mut dyn Write) -> io::Result<()> {
         ("step", "%", Align::Right),
     ];
     let percent = |ratio: f64| format!("{:.1}", 100.0 * ratio);
-    let cells: Vec<[String; 13]> = rows
+    let cells: Vec<[String; 14]> = rows
         .iter()
         .map(|row| {
             [
@@ -211,6 +215,7 @@ fn write_table(rows: &[Row], out: &mut dyn Write) -> io::Result<()> {
                 format!("{:.4}", row.time_s),
                 format!("{:.4}", row.per_block_s),
                 format!("{:.4}", row.least_s),
+                format!("{:.4}", row.acceleration_s),
                 percent(row.tolerance_share),
                 percent(row.feed_ratio),
                 percent(row.accel_ratio),

@@ -1,8 +1,9 @@
-//! The least time that a plan's path can take.
+//! The least time that a plan's path can take under the plan's ceilings.
 //!
 //! Consumes a plan; produces the time of the fastest motion over its blocks that keeps their ceilings, their
-//! junction feeds and the acceleration of their laws, with no limit of jerk and snap. Every plan of these
-//! blocks keeps all that too, so none is faster.
+//! junction feeds and the acceleration of their laws, with no limit of jerk and snap along the path. Every plan
+//! of these blocks keeps all that too, so none is faster. Jerk and snap across the path make ceilings, and
+//! these count here.
 
 use motion_kernel::plan::Block;
 

@@ -1,13 +1,15 @@
 //! The time of a program, in forms that can be compared.
 //!
 //! Consumes a program and a machine; produces, for a path mode, the time of the plan, of S3's plan per block,
-//! and the least time that acceleration alone would allow on the same path, with what the path used of its
-//! tolerance and the executed ticks of the machine's limits. Background; two plans and one pass over all
-//! ticks.
+//! the least time under the plan's ceilings and the time that acceleration alone would allow on the same path,
+//! with what the path used of its tolerance and the executed ticks of the machine's limits. Background; two
+//! plans and one pass over all ticks.
 //!
-//! - [`bound`]: the least time;
+//! - [`bound`]: the least time under the ceilings;
+//! - [`acceleration`]: the time under acceleration alone;
 //! - [`ticks`]: the executed ticks against the limits.
 
+pub mod acceleration;
 pub mod bound;
 pub mod ticks;
 
@@ -52,8 +54,10 @@ pub struct Figures {
     pub time_s: f64,
     /// Time with one pair of sin² ramps per block, whatever the machine's law is \[s\].
     pub per_block_s: f64,
-    /// The least time \[s\]: [`bound::least_time_s`].
+    /// The least time under the plan's ceilings \[s\]: [`bound::least_time_s`].
     pub least_s: f64,
+    /// The time under acceleration alone \[s\]: [`acceleration::acceleration_time_s`].
+    pub acceleration_s: f64,
     /// Greatest part of its tolerance that a block may use: the planner's bound, not a measurement.
     pub tolerance_share: f64,
     /// The executed ticks against the limits.
@@ -103,13 +107,15 @@ pub fn figures(
         time_s: plan.time_s,
         per_block_s: per_block.time_s,
         least_s: bound::least_time_s(&plan),
+        acceleration_s: acceleration::acceleration_time_s(&plan, machine),
         tolerance_share: tolerance_share(&plan),
         ratios: ticks::ratios(&plan, machine)?,
     })
 }
 
-/// The program with a path mode of its own.
-fn on(program: &Program, path: Path) -> Program {
+/// The program on another path.
+#[must_use]
+pub fn on(program: &Program, path: Path) -> Program {
     let mut program = program.clone();
     let mode = match path {
         Path::Written => return program,

@@ -2,6 +2,8 @@
 //!
 //! Rounding is counted in ε, the distance of 1 from the next number: 1.2·10⁻⁷ in f32, 2.2·10⁻¹⁶ in f64.
 
+use std::f64::consts::PI;
+
 use motion_kernel::num::{Fixed, Real};
 
 /// How a number type rounds.
@@ -46,9 +48,12 @@ pub const LENGTH_ROUNDING_MM: f64 = 1.2e-8;
 /// How far rounding may set the path position back where the motion is slower than it \[mm\]: a few position
 /// steps, and twice the error of the sine's part of a ramp's length, Jp·(2e)³/(16π³), of an arch of length
 /// 2e. The sine is 4π times the acceleration's shape, so it has 4π times that one's rounding, of about 2
-/// `relative`.
+/// `relative`. The cube, Jp·(2e)³/12, and the bend, Jp·(2e)³/(8π²), are multiplied by fractions in 2⁻³², which
+/// are rounded twice and once.
 pub fn backward_mm(relative: f64, jerk_arch_cubed_mm: f64) -> f64 {
-    2e-9 + 2.0 * 2.0 * 12.6 * relative * jerk_arch_cubed_mm / 496.1
+    let sine = 2.0 * 2.0 * 12.6 * relative / 496.1;
+    let fractions = 2.0_f64.powi(-32) * (2.0 / 12.0 + 1.0 / (8.0 * PI * PI));
+    2e-9 + (sine + fractions) * jerk_arch_cubed_mm
 }
 
 /// Set positions against the programmed path \[mm\]: the curves' tolerance, a hundredth of a count of 0.1 µm …

@@ -9,9 +9,10 @@ use super::asked::{Asked, corners, line, program};
 use super::compiled::{Compiled, compiled, continuous, distance};
 use super::driven::{Worst, driven};
 use super::tolerance::CHAINS;
-use super::{SAMPLES, assert_none, norm, planned, rounded, seeds, without_path_mode};
+use super::{assert_none, norm, planned, rounded, seeds, without_path_mode};
 use motion_tests::check::machine;
 use motion_tests::random::Random;
+use motion_tests::samples::SAMPLES;
 
 /// Many moves one after the other, on machines whose axes differ: every tick within every limit, jerk without a
 /// step, the tolerance kept over the whole path.

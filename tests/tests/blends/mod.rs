@@ -22,16 +22,6 @@ use motion_host::machine::Machine;
 use motion_host::planning::{Mode, Plan, plan_program};
 use motion_tests::check::geometry::{Vector, dot, minus, norm};
 
-/// The programs of the tests.
-const SAMPLES: [(&str, &str); 6] = [
-    ("modes", include_str!("../../programs/modes.ngc")),
-    ("nameplate", include_str!("../../programs/nameplate_inch.ngc")),
-    ("pockets", include_str!("../../programs/pockets.ngc")),
-    ("stairs", include_str!("../../programs/stairs_incremental.ngc")),
-    ("thread mill", include_str!("../../programs/thread_mill_helix.ngc")),
-    ("stringer", include_str!("../../../host/src/cli/stringer.ngc")),
-];
-
 fn along(a: Vector, direction: Vector, length: f64) -> Vector {
     [a[0] + direction[0] * length, a[1] + direction[1] * length, a[2] + direction[2] * length]
 }

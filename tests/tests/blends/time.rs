@@ -4,9 +4,10 @@ use motion_host::machine::Machine;
 
 use super::asked::{Asked, corners, line, program};
 use super::driven::driven;
-use super::{SAMPLES, assert_none, planned, rounded, seeds, without_path_mode};
+use super::{assert_none, planned, rounded, seeds, without_path_mode};
 use motion_tests::check::machine;
 use motion_tests::random::Random;
+use motion_tests::samples::SAMPLES;
 
 /// Programs of many moves.
 const PROGRAMS: u64 = 150;

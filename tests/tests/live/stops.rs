@@ -6,13 +6,14 @@ use motion_host::machine::Machine;
 use motion_kernel::live::State;
 use motion_tests::figures::{Table, hold};
 
-use super::Case;
+use super::{Case, planned};
 use motion_tests::check::geometry::{Move, UNITS_PER_MM};
 use motion_tests::check::live::{Command, Run};
 use motion_tests::check::machine;
 use motion_tests::check::program::{Asked, Generated};
 use motion_tests::from_env;
 use motion_tests::random::Random;
+use motion_tests::samples::SAMPLES;
 
 /// The time that stopping takes at least with limits of acceleration and jerk alone, from a feed and an acceleration
 /// (the optimum of a velocity interface without a limit of snap).
@@ -192,4 +193,75 @@ fn a_stop_is_not_much_longer_than_the_shortest() {
             assert!(greatest(all) <= published + 0.005, "{} of the published {published}", greatest(all));
         }
     }
+}
+
+/// The samples, and what `MOTION_TEST_FOLDER` has.
+fn programs() -> Vec<(String, String)> {
+    let mut programs = SAMPLES.map(|(name, text)| (name.to_owned(), text.to_owned())).to_vec();
+    let Some(folder) = std::env::var_os("MOTION_TEST_FOLDER") else { return programs };
+    let files = std::fs::read_dir(folder).expect("MOTION_TEST_FOLDER names a folder");
+    for file in files.map(|file| file.expect("a file").path()) {
+        if file.extension().is_some_and(|ending| ending == "ngc") {
+            let text = std::fs::read(&file).expect("a program that can be read");
+            programs.push((file.display().to_string(), String::from_utf8_lossy(&text).into_owned()));
+        }
+    }
+    programs
+}
+
+/// With ceilings, arcs and blends: the greatest share of the bound that a stop of a program takes, before which tick, and
+/// the number of stops; none where planning refuses the program or it takes more than five minutes.
+fn greatest_share(text: &str, machine: &Machine, every: Option<u64>) -> Option<(f64, u64, u64)> {
+    let plan = planned(text, machine, 600_000.0)?;
+    let time_s = plan.time_s;
+    let case = Case::compiled::<f64>(plan, machine.clone())?;
+    let ticks = (time_s / machine.tick_s) as u64;
+    // Every run begins at the beginning.
+    let every = match every {
+        Some(every) if time_s > 60.0 => 10 * every,
+        Some(every) => every,
+        None => (ticks / 20).max(20),
+    };
+    let (mut worst, mut worst_at, mut stops) = (0.0, 0, 0);
+    for at in (every..ticks).step_by(every as usize) {
+        let mut before = [0.0; 2];
+        let run = case.run::<f64>(at, &mut |seen| {
+            (seen.ticks == at).then(|| {
+                before = [seen.executed.motion.v_mm_s, seen.executed.motion.a_mm_s2];
+                Command::Abort
+            })
+        });
+        let run = run.unwrap_or_else(|error| panic!("aborted before tick {at}: {error}"));
+        let [v, a] = before;
+        if v <= 0.0 {
+            continue;
+        }
+        // A tick until it begins, and one until it is seen to be over.
+        let stop_s = (run.ticks as f64 - at as f64 - 2.0) * machine.tick_s;
+        let shortest_s = shortest_stop_s(v, a, machine.path.accel_mm_s2, peak_jerk(machine));
+        let share = stop_s / (2.2 * shortest_s + 2.0 * rise_s(machine));
+        stops += 1;
+        if share > worst {
+            (worst, worst_at) = (share, at);
+        }
+    }
+    Some((worst, worst_at, stops))
+}
+
+/// The bound holds where ceilings, arcs and blends leave less than the machine's limits, too. The long form is
+/// `MOTION_TEST_EVERY=20`: every twentieth tick, of programs over a minute every two hundredth.
+#[test]
+fn a_stop_keeps_its_bound_in_programs() {
+    let every = from_env("MOTION_TEST_EVERY");
+    let mut samples = 0;
+    for (name, text) in programs() {
+        for machine in machine::references() {
+            let law = machine.path.pulse.name();
+            let Some((share, at, stops)) = greatest_share(&text, &machine, every) else { continue };
+            println!("{name}, {law}: {stops} stops, at most {share:.3} of the bound, before tick {at}");
+            assert!(share <= 1.0, "{name}, {law}: {share} before tick {at}");
+            samples += usize::from(stops > 10);
+        }
+    }
+    assert!(samples >= 2 * SAMPLES.len(), "{samples}");
 }
