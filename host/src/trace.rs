@@ -115,7 +115,7 @@ pub struct PathLimits {
 pub struct TracedBlock {
     /// G-code line, from 1.
     pub line: u32,
-    /// "line", "arc", "helix", "blend" or "spline".
+    /// "line", "arc", "helix", "blend", "curve", "spline" or "involute".
     pub kind: Cow<'static, str>,
     /// Where the block starts, from the program's start along the path \[mm\].
     pub start_mm: f64,

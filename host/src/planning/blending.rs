@@ -25,7 +25,7 @@ use motion_kernel::plan::{
 };
 
 use super::Mode;
-use super::ceilings::{Ceilings, ceilings, junction_feed};
+use super::ceilings::{Ceilings, ceilings, junction_feed, lower_along_curves};
 use super::error::Problem;
 use super::lookahead::lookahead;
 use super::stretch::StretchBlock;
@@ -35,6 +35,9 @@ use crate::toolpath::smooth::{Move, Run};
 
 /// Part of the time that a junction without a blend has to gain over the best one.
 const EXACT_GAIN_MIN: f64 = 0.002;
+
+/// Sharpest corners that curves through dense moves are led past \[rad\]: a stop on one may take less time.
+const CORNERS_RAD: [f64; 2] = [130.0 * core::f64::consts::PI / 180.0, 75.0 * core::f64::consts::PI / 180.0];
 
 /// Lengths of blends that are tried, as parts of the longest one.
 const SIZES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
@@ -92,11 +95,24 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlo
     let junctions = Junctions::new(Run::new(moves), machine)?;
     let is_merged = junctions.run.moves().len() < moves.len();
     let merged = junctions.exact();
-    let candidates = match junctions.choose(&merged)? {
-        Some([longest, chosen]) => vec![junctions.blocks(&chosen), junctions.blocks(&longest)],
-        None if is_merged => vec![junctions.blocks(&merged)],
-        None => return Ok(junctions.blocks(&merged)),
-    };
+    let mut candidates = Vec::new();
+    let limits = machine.limits().in_any_direction();
+    for corner_rad in CORNERS_RAD {
+        if let Some(run) = Run::faired(moves, corner_rad, &limits, machine.path.feed_mm_s) {
+            let junctions = Junctions::new(run, machine)?;
+            let exact = junctions.exact();
+            candidates.push(match junctions.choose(&exact)? {
+                Some([_, chosen]) => junctions.blocks(&chosen),
+                None => junctions.blocks(&exact),
+            });
+        }
+    }
+    match junctions.choose(&merged)? {
+        Some([longest, chosen]) => candidates.extend([junctions.blocks(&chosen), junctions.blocks(&longest)]),
+        None if is_merged => candidates.push(junctions.blocks(&merged)),
+        None if candidates.is_empty() => return Ok(junctions.blocks(&merged)),
+        None => {}
+    }
     let exact = if is_merged {
         let junctions = Junctions::new(Run::exact(moves), machine)?;
         junctions.blocks(&junctions.exact())
@@ -131,6 +147,7 @@ impl<'a> Junctions<'a> {
             let greatest = step.element.greatest();
             all.push(ceilings(step, &greatest, machine.path.curve_feed_share, machine)?);
         }
+        lower_along_curves(run.moves(), &mut all, machine)?;
         Ok(Self { run, ceilings: all, machine, limits: machine.limits().in_any_direction() })
     }
 
@@ -149,7 +166,9 @@ impl<'a> Junctions<'a> {
         }
         let mut chosen: Vec<Crossing> = variants.iter().map(|variants| variants.all[0]).collect();
         for (junction, variants) in variants.iter().enumerate() {
-            chosen[junction] = self.best(junction, &chosen, variants.longest());
+            if variants.are_blends() {
+                chosen[junction] = self.best(junction, &chosen, variants.longest());
+            }
         }
         let longest = chosen.clone();
         // Junctions next to a change are planned again.
@@ -364,6 +383,15 @@ mod tests {
         blocks(moves, &Machine::reference()).expect("a machine's limits")
     }
 
+    /// Blends alone, without curves and exact corners to compare them with.
+    fn blended(moves: &[Move]) -> Vec<StretchBlock> {
+        let machine = Machine::reference();
+        let junctions = Junctions::new(Run::new(moves), &machine).expect("a machine's limits");
+        let exact = junctions.exact();
+        let [_, chosen] = junctions.choose(&exact).expect("limits").expect("corners");
+        junctions.blocks(&chosen)
+    }
+
     fn kinds(blocks: &[StretchBlock]) -> Vec<(u32, &'static str)> {
         blocks.iter().map(|block| (block.line, block.element.kind())).collect()
     }
@@ -386,7 +414,7 @@ mod tests {
     #[test]
     fn neighbours_share_a_short_element() {
         let slow = |_: u32| 0.5;
-        let both = blocks_of(&path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 1.0], [20.0, 1.0]], 0.2, slow));
+        let both = blended(&path(&[[0.0, 0.0], [10.0, 0.0], [10.0, 1.0], [20.0, 1.0]], 0.2, slow));
         assert_eq!(kinds(&both)[2], (2, "line"), "{:?}", kinds(&both));
         let rest_mm = both[2].element.length_mm();
         assert!((rest_mm - 0.1).abs() < 1e-12, "{rest_mm}");
@@ -396,7 +424,7 @@ mod tests {
         let turn = libm::sincos(152.0_f64.to_radians());
         let corner = [10.0 + cosine, sine];
         let end = [corner[0] + 10.0 * turn.1, corner[1] + 10.0 * turn.0];
-        let blocks = blocks_of(&path(&[[0.0, 0.0], [10.0, 0.0], corner, end], 0.2, |line| {
+        let blocks = blended(&path(&[[0.0, 0.0], [10.0, 0.0], corner, end], 0.2, |line| {
             0.05 + 1e-9 * f64::from(line)
         }));
         assert_eq!(blocks.len(), 5, "{:?}", kinds(&blocks));
@@ -421,10 +449,36 @@ mod tests {
     fn beside_a_fast_move_a_slow_blend_is_short() {
         let corner = [[0.0, 0.0], [10.0, 0.0], [19.8, 2.0]];
         let blend_mm = |feed_mm_s: [f64; 2]| {
-            let blocks = blocks_of(&path(&corner, 0.5, |line| feed_mm_s[line as usize - 1]));
+            let blocks = blended(&path(&corner, 0.5, |line| feed_mm_s[line as usize - 1]));
             blocks.iter().find(|block| block.element.kind() == "blend").map(|block| block.element.length_mm())
         };
         let (even, uneven) = (blend_mm([5.0, 5.0]), blend_mm([5.0, 60.0]));
         assert!(even > Some(3.0) && uneven < even.map(|mm| 0.6 * mm), "{even:?} {uneven:?}");
+    }
+
+    /// Lines with no room for blends: a curve through all of them takes less time than merged lines and blends.
+    #[test]
+    fn dense_lines_become_a_curve() {
+        let wave = |index: u32| {
+            let x = 0.05 * f64::from(index);
+            [x, 0.3 * libm::sin(2.0 * x) + 2e-3 * f64::from(index % 2)]
+        };
+        let points: Vec<_> = (0..200).map(wave).collect();
+        let moves = path(&points, 0.02, |_| 50.0);
+        let machine = Machine::reference();
+        let time_s = |blocks: &[StretchBlock]| run_time_s(blocks, machine.tick_s);
+        let blocks = blocks_of(&moves);
+        assert!(blocks.iter().any(|block| block.element.kind() == "curve"), "{:?}", kinds(&blocks));
+        assert!(blocks.windows(2).all(|pair| pair[0].junction_mm_s > 1e3), "a stop");
+        assert!(
+            time_s(&blocks) < 0.9 * time_s(&blended(&moves)),
+            "{} {}",
+            time_s(&blocks),
+            time_s(&blended(&moves))
+        );
+        assert!(blocks.iter().all(|block| block.tolerance_share <= 1.0));
+        // As far as they lead and no farther.
+        assert_eq!(blocks[0].element.ends_mm().0, [points[0][0], points[0][1], 0.0]);
+        assert_eq!(blocks[blocks.len() - 1].element.ends_mm().1, [points[199][0], points[199][1], 0.0]);
     }
 }

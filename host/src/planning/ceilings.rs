@@ -4,8 +4,9 @@ use motion_kernel::plan::{Ceiling, Junction, MachineLimits, Reason, junction};
 
 use super::error::Problem;
 use crate::machine::Machine;
+use crate::toolpath::fairing::feeds::lower;
 use crate::toolpath::smooth::{Move, TANGENT_ROUNDING_RAD};
-use crate::toolpath::{Element, Greatest, angle, norm, subtract};
+use crate::toolpath::{Element, Greatest, Role, angle, norm, subtract};
 
 /// The ceilings of a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +33,45 @@ pub(super) fn ceilings(
     let programmed = at(step.feed_mm_s)?;
     let greatest = if programmed.reason == Reason::Programmed { at(f64::INFINITY)? } else { programmed };
     Ok(Ceilings { programmed, greatest })
+}
+
+/// The part of the feed that a curve through dense moves allows, with which it is driven: where it is
+/// tightest the feed hardly changes, and before and behind it is lower anyhow.
+const FAIR_FEED_SHARE: f64 = 0.93;
+
+/// Lowers the ceilings of the curves through dense moves to the feeds that ramps between their slowest spans
+/// reach. That leaves more of the limits for the ramps. An error comes with the program line.
+pub(super) fn lower_along_curves(
+    moves: &[Move],
+    all: &mut [Ceilings],
+    machine: &Machine,
+) -> Result<(), (u32, Problem)> {
+    let is_fair = |step: &Move| matches!(step.element, Element::Polynomial { role: Role::Fair, .. });
+    let limits = machine.limits().in_any_direction();
+    let mut first = 0;
+    for curve in moves.chunk_by(|before, after| is_fair(before) == is_fair(after)) {
+        let all = &mut all[first..first + curve.len()];
+        first += curve.len();
+        if !curve.first().is_some_and(is_fair) {
+            continue;
+        }
+        let greatest: Vec<Greatest> = curve.iter().map(|step| step.element.greatest()).collect();
+        for ((ceiling, step), greatest) in all.iter_mut().zip(curve).zip(&greatest) {
+            *ceiling = ceilings(step, greatest, FAIR_FEED_SHARE, machine)?;
+        }
+        let mut feeds: Vec<f64> = all.iter().map(|ceilings| ceilings.programmed.feed_mm_s).collect();
+        let lengths: Vec<f64> = curve.iter().map(|step| step.element.length_mm()).collect();
+        lower(&mut feeds, &lengths, &limits);
+        for (((ceiling, step), greatest), feed_mm_s) in all.iter_mut().zip(curve).zip(&greatest).zip(feeds) {
+            if feed_mm_s < ceiling.programmed.feed_mm_s {
+                let reason = ceiling.programmed.reason;
+                let lowered = ceilings(&Move { feed_mm_s, ..*step }, greatest, FAIR_FEED_SHARE, machine)?;
+                let lowered = Ceiling { reason, ..lowered.programmed };
+                *ceiling = Ceilings { programmed: lowered, greatest: lowered };
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.

@@ -310,6 +310,9 @@ impl Side {
             Self::Arc { shape, corner_rad, rad_per_mm } => {
                 let end = corner_rad + rad_per_mm * trim_mm;
                 let (least, most) = (corner_rad.min(end), corner_rad.max(end));
+                if shape.radius_per_rad == 0.0 && shape.height_per_rad == 0.0 {
+                    return from_circle(point, shape, [*corner_rad, end]);
+                }
                 let mut angle = 0.5 * (least + most);
                 // Newton; wherever it gets to is a point of the arc, so the distance is never too small.
                 for _ in 0..4 {
@@ -322,6 +325,30 @@ impl Side {
             }
         }
     }
+}
+
+/// How far `point`, relative to the one at the first of two angles, is from the part of a circle between
+/// them, which is less than half of it.
+fn from_circle(point: Vector, circle: &Spiral, angles: [f64; 2]) -> f64 {
+    let [corner, end] = angles.map(|angle| {
+        let (sine, cosine) = libm::sincos(angle);
+        add(scale(circle.outward, cosine), scale(circle.onward, sine))
+    });
+    let spoke = add(point, scale(corner, circle.radius_mm));
+    let height_mm = dot(spoke, circle.normal);
+    let flat = subtract(spoke, scale(circle.normal, height_mm));
+    // Between both ends where it is on their inner sides.
+    let middle = add(corner, end);
+    let across = subtract(end, corner);
+    let is_within = |unit: Vector, inward: f64| {
+        let along = dot(flat, across) - dot(flat, middle) * (dot(unit, across) / dot(unit, middle));
+        along * inward >= 0.0
+    };
+    if dot(flat, middle) > 0.0 && is_within(corner, 1.0) && is_within(end, -1.0) {
+        return libm::hypot(norm(flat) - circle.radius_mm, height_mm);
+    }
+    let to = |unit: Vector| norm(subtract(spoke, scale(unit, circle.radius_mm)));
+    to(corner).min(to(end))
 }
 
 #[cfg(test)]
@@ -417,6 +444,29 @@ mod tests {
         let Element::Polynomial { shape, .. } = blend.element else { panic!("a polynomial") };
         // Faster than the curvature's step lets pass, 500 mm/s² · 5 mm: 50 mm/s; the arc itself allows 50.
         assert!(feed_mm_s(&shape, &LIMITS) > 20.0, "{}", feed_mm_s(&shape, &LIMITS));
+    }
+
+    /// Against the nearest of many points of the arc.
+    #[test]
+    fn the_distance_from_an_arc_is_that_of_its_nearest_point() {
+        let [_, arc] = line_and_arc();
+        let Element::Arc { shape, .. } = arc else { panic!("an arc") };
+        for angles in [[0.0, 0.6], [0.6, 0.0], [1.1, 0.4]] {
+            for index in 0..500_u32 {
+                let turn = f64::from(index);
+                let point = [0.05 * (turn - 250.0), 3.0 * libm::sin(turn), libm::cos(3.0 * turn)];
+                let found = from_circle(point, &shape, angles);
+                let nearest = (0..=4000).map(|part| {
+                    let angle = angles[0] + (angles[1] - angles[0]) * f64::from(part) / 4000.0;
+                    norm(subtract(point, shape.offset(angles[0], angle)))
+                });
+                let nearest = nearest.fold(f64::INFINITY, f64::min);
+                assert!(
+                    (found - nearest).abs() < 1e-6 * (1.0 + nearest),
+                    "{angles:?} {point:?}: {found} {nearest}"
+                );
+            }
+        }
     }
 
     /// Each of the shapes is there because it is the best somewhere.

@@ -65,6 +65,8 @@ pub enum Role {
     Blend,
     /// The polynomial was programmed.
     Spline,
+    /// The polynomial stands for short lines and arcs.
+    Fair,
 }
 
 /// Tangent and curvature vector at an end of an element.
@@ -139,6 +141,7 @@ impl Element {
             Self::Arc { .. } => "helix",
             Self::Polynomial { role: Role::Blend, .. } => "blend",
             Self::Polynomial { role: Role::Spline, .. } => "spline",
+            Self::Polynomial { role: Role::Fair, .. } => "curve",
             Self::Involute { .. } => "involute",
         }
     }

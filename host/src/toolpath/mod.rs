@@ -10,7 +10,9 @@
 //! - [`spline`]: splines through points, or close to them;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
 //! - [`smooth`]: a run of elements with the blend of each of its junctions, by
-//!   [`blend`]: one corner's septic blend, and [`merge`]: short lines to fewer lines and arcs;
+//!   [`blend`]: one corner's septic blend, [`merge`]: short lines to fewer lines and arcs, and `dense`: runs
+//!   of short lines and arcs to curves, by
+//!   [`fairing`]: the curve that bends least within a tolerance;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`greatest`]: how curves and their pieces bend at their tightest;
 //! - [`mod@compile`]: elements to pieces over exact path positions.
@@ -18,7 +20,9 @@
 pub mod blend;
 pub mod compile;
 pub mod curve;
+mod dense;
 pub mod element;
+pub mod fairing;
 pub mod greatest;
 pub mod involute;
 pub mod merge;

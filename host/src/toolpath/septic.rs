@@ -220,9 +220,12 @@ pub(crate) fn between(rise: f64, start: [f64; 3], end: [f64; 3]) -> [f64; 7] {
 fn deviation(curve: &(impl Curve + ?Sized), piece: &Septic) -> Deviation {
     let (a, b) = piece.span;
     let mut greatest = Deviation::default();
+    let (mut before, mut gone_mm) = (a, 0.0);
     for part in 1..8 {
         let parameter = a + (b - a) * f64::from(part) / 8.0;
-        let u = curve.length(a, parameter) / piece.length_mm;
+        gone_mm += curve.length(before, parameter);
+        before = parameter;
+        let u = gone_mm / piece.length_mm;
         let (point, slope) = piece.at(u);
         let position_mm = norm(subtract(point, curve.offset(a, parameter)));
         let feed = (norm(slope) - 1.0).abs();

@@ -8,7 +8,8 @@
 //! tolerance are spent on making fewer lines and arcs of them, the rest on blends between these. One that
 //! stays alone among longer ones is made part of the line before it, if that can be led past their corner.
 //! Where the program gives merging a tolerance of its own (Q of G64), all lines of one feed are merged within
-//! it, and the whole tolerance of blends counts from what they became.
+//! it, and the whole tolerance of blends counts from what they became. Or curves take the place of what is
+//! dense ([`dense`](super::dense)), within both tolerances together.
 //!
 //! **Who gets the room.** Blends take at most nine tenths of an element together, and where motion starts or
 //! ends half of that. A blend gets what the one at the other end does not need; if both want more, each gets
@@ -17,12 +18,13 @@
 use motion_kernel::law::Limits;
 
 use super::blend::{Blend, trim_mm};
+use super::dense::faired;
 use super::element::Element;
 use super::merge::{Merged, merge};
 use super::{Vector, angle, norm, subtract};
 
 /// Part of an element that blends may take together.
-const TAKEN_MAX: f64 = 0.9;
+pub(super) const TAKEN_MAX: f64 = 0.9;
 
 /// Part of the tolerance that short lines are merged within.
 const MERGED_SHARE: f64 = 0.6;
@@ -71,6 +73,14 @@ impl Run {
     pub fn new(moves: &[Move]) -> Self {
         let (moves, distances_mm) = merged(moves);
         Self::of(moves, distances_mm)
+    }
+
+    /// The run of `moves` with curves in place of what is dense, made for `limits` and at most `feed_mm_s`. A
+    /// turn of more than `corner_rad` stays a corner.
+    #[must_use]
+    pub fn faired(moves: &[Move], corner_rad: f64, limits: &Limits<f64>, feed_mm_s: f64) -> Option<Self> {
+        let (moves, distances_mm) = faired(moves, corner_rad, limits, feed_mm_s)?;
+        Some(Self::of(moves, distances_mm))
     }
 
     /// The run of `moves` as they are, nothing merged.

@@ -195,7 +195,7 @@ fn samples_keep_the_limits(machine: &Machine) {
         let exact = planned(&text, machine).expect("a plan");
         let blended = format!("G21 G64 P0.05\n{text}");
         let plan = planned(&blended, machine).expect("a plan");
-        assert!(plan.blocks.iter().any(|block| block.kind == "blend"), "{name}");
+        assert!(plan.blocks.iter().any(|block| ["blend", "curve"].contains(&&*block.kind)), "{name}");
         println!("{name}: {} s exact, {} s blended", exact.time_s, plan.time_s);
         for worst in
             [driven::<f64>(&plan, machine), driven::<f32>(&plan, machine), driven::<Fixed>(&plan, machine)]

@@ -103,10 +103,11 @@ fn gentle_corners_cost_less_than_stops() {
 /// faster, or has to be led over.
 #[test]
 fn the_acceleration_step_limit_decides_about_tangent_junctions() {
-    let text = format!("G64 P0.05\n{}", without_path_mode(SAMPLES[5].1));
+    // Long enough that no curve takes the place of the arc.
+    let text = "G21 G64 P0.05\nG1 X40 F6000\nG3 X60 Y20 J20\nG1 Y60\n";
     let mut machine = Machine::reference();
     let step = |machine: &Machine| {
-        let plan = planned(&text, machine).expect("a plan");
+        let plan = planned(text, machine).expect("a plan");
         let worst = driven::<f64>(&plan, machine).expect("a run");
         (plan.blocks.iter().filter(|block| block.kind == "blend").count(), worst.accel_step_mm_s2)
     };
@@ -117,5 +118,5 @@ fn the_acceleration_step_limit_decides_about_tangent_junctions() {
     assert!(accel_step < machine.path.accel_step_mm_s2 + by_jerk, "{accel_step} mm/s²");
     machine.path.accel_step_mm_s2 = 1.0;
     let (blends, accel_step) = step(&machine);
-    assert!(blends == 4 && accel_step < by_jerk, "{blends} blends, {accel_step} mm/s²");
+    assert!(blends == 2 && accel_step < by_jerk, "{blends} blends, {accel_step} mm/s²");
 }

@@ -43,7 +43,7 @@ fn a_blend_keeps_its_tolerance_and_steps_nowhere() {
             let stretches = compiled(&plan);
             continuous(&stretches)?;
             let ratio = distance(&asked, &stretches, tolerance, 60);
-            blends += plan.blocks.iter().filter(|block| block.kind == "blend").count();
+            blends += usize::from(plan.blocks.iter().any(|block| ["blend", "curve"].contains(&&*block.kind)));
             if ratio > 1.0 + 1e-6 {
                 return Err(format!("{ratio} times the tolerance"));
             }
@@ -60,10 +60,10 @@ fn a_blend_keeps_its_tolerance_and_steps_nowhere() {
             Err(error) => failures.push(format!("MOTION_TEST_SEED={seed}: {error}\n{text}")),
         }
     }
-    println!("{blends} blends, worst {worst} of the tolerance, {close} above 0.99");
+    println!("{blends} of {PAIRS} rounded, worst {worst} of the tolerance, {close} above 0.99");
     assert_none(&failures);
     if motion_tests::from_env("MOTION_TEST_PROGRAMS").is_none() {
-        assert!(blends > 3000 && close > 600, "{blends} blends, {close} that use their tolerance");
+        assert!(blends > 3000 && close > 600, "{blends} rounded, {close} that use their tolerance");
     }
 }
 
@@ -127,9 +127,9 @@ fn merged_chords_keep_the_tolerance() {
     }
 }
 
-/// With Q, lines of one feed are merged within it, and blends are within P of what they become. Q0 merges nothing.
+/// With Q, the path may be off the lines by P and Q together; with Q0 by P alone.
 #[test]
-fn merging_has_a_tolerance_of_its_own() {
+fn lines_have_both_tolerances() {
     let machine = unhurried();
     let mut failures = Vec::new();
     let (mut worst, mut beyond, mut counts) = (0.0_f64, 0, [0; 3]);
@@ -145,9 +145,6 @@ fn merging_has_a_tolerance_of_its_own() {
                 let plan = planned(&text.replace(&mode, &format!("{mode} Q{merging:.10}")), &machine)?;
                 let moves = plan.blocks.iter().filter(|block| block.kind != "blend").count();
                 *count += moves;
-                if part == 0.0 && moves != asked.len() {
-                    return Err(format!("{moves} moves of {}", asked.len()));
-                }
                 let stretches = compiled(&plan);
                 continuous(&stretches)?;
                 let distance = tolerance * distance(&asked, &stretches, tolerance, 24);
@@ -178,6 +175,6 @@ fn merging_has_a_tolerance_of_its_own() {
     println!("{counts:?} moves, worst {worst} of both tolerances, {beyond} times beyond P alone");
     assert_none(&failures);
     if motion_tests::from_env("MOTION_TEST_PROGRAMS").is_none() {
-        assert!(counts[0] > 3 * counts[1] && counts[1] > counts[2] && beyond > 5, "{counts:?}, {beyond}");
+        assert!(counts[0] > counts[1] && counts[1] > counts[2] && beyond > 5, "{counts:?}, {beyond}");
     }
 }

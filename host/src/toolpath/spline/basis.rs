@@ -3,7 +3,7 @@
 use super::DEGREE_MAX;
 
 /// Factors of the control points that act on one span, the first one first; unused ones are 0.
-pub(super) type Row = [f64; DEGREE_MAX + 1];
+pub(in crate::toolpath) type Row = [f64; DEGREE_MAX + 1];
 
 /// The factors with which control points `span − degree` … `span` make the derivative of `order` ≤ `degree`
 /// at `u`, which lies between `knots[span]` and `knots[span + 1]`, of which the second is the greater.
@@ -11,7 +11,7 @@ pub(super) type Row = [f64; DEGREE_MAX + 1];
 /// A derivative is a spline of a lower degree whose control points are differences of those of the spline,
 /// P⁽ᵏ⁾ᵢ = (p − k + 1)·(P⁽ᵏ⁻¹⁾ᵢ₊₁ − P⁽ᵏ⁻¹⁾ᵢ)/(Uᵢ₊ₚ₊₁ − Uᵢ₊ₖ); here the differences are taken of the factors
 /// instead.
-pub(super) fn row(knots: &[f64], degree: usize, span: usize, u: f64, order: usize) -> Row {
+pub(in crate::toolpath) fn row(knots: &[f64], degree: usize, span: usize, u: f64, order: usize) -> Row {
     let mut row = [0.0; DEGREE_MAX + 1];
     row[0] = 1.0;
     // Cox and de Boor's recursion, degree by degree; every term is positive.
@@ -41,7 +41,7 @@ pub(super) fn row(knots: &[f64], degree: usize, span: usize, u: f64, order: usiz
 
 /// The knot vector of `breaks`, with the ends as often as a curve that starts and ends in its control points
 /// needs.
-pub(super) fn clamped(breaks: &[f64], degree: usize) -> Vec<f64> {
+pub(in crate::toolpath) fn clamped(breaks: &[f64], degree: usize) -> Vec<f64> {
     let (Some(&first), Some(&last)) = (breaks.first(), breaks.last()) else {
         return Vec::new();
     };

@@ -13,7 +13,7 @@
 //! next to its ends, which keeps its order of accuracy where nothing is known ("not-a-knot").
 
 mod band;
-mod basis;
+pub(in crate::toolpath) mod basis;
 
 use self::band::Band;
 use super::element::{Element, Role};

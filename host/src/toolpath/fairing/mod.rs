@@ -1,0 +1,315 @@
+//! A run of short lines and arcs to one smooth curve within its tolerance.
+//!
+//! Points that were cut from a curve, or that something else made dense, have a corner at every joint and no
+//! room for blends that are worth it. Consumes lines and arcs, each with its tolerance and feed; produces the
+//! spans of a quintic spline, continuous to the fourth derivative, that goes on as the path does at both
+//! ends. Background; linear in the number of parts, but for the search of a point's span.
+//!
+//! - `guide`: the path by its length;
+//! - `knots`: where the spline gets its knots;
+//! - `problem`: the curve that bends least within the tolerance, by
+//!   `band`: equations in a band;
+//! - `deviation`: how far the curve is from the path;
+//! - [`feeds`]: the feeds that a curve allows.
+//!
+//! **Feed.** What bends least depends on the feed: at a low one acceleration counts, at a high one snap. So
+//! the curve is made for the feeds that the one before allows, a few times.
+
+mod band;
+mod deviation;
+pub mod feeds;
+mod guide;
+mod knots;
+mod problem;
+
+use motion_kernel::law::Limits;
+
+use self::guide::Guide;
+use self::problem::Problem;
+use super::Vector;
+use super::element::{Element, Role};
+
+/// Knots to the scale of the path: at first, and how often they are doubled where that is too few.
+const PER_SCALE: f64 = 2.0;
+const DOUBLINGS: usize = 3;
+/// How often the curve is made for other feeds.
+const ROUNDS: usize = 3;
+/// Steps until the curve is given up, and steps for the feeds of one round.
+const STEPS_MAX: usize = 120;
+const STEPS_PER_ROUND: usize = 12;
+/// What may be left to gain when a round ends, and at the end, as a part of the cost. Feeds change with its
+/// sixth root.
+const LEFT: f64 = 0.5;
+const LEFT_AT_LAST: f64 = 0.2;
+/// How often the tolerance is made smaller where the curve is too far from the path between its samples, by
+/// what at most, and what the new one aims below.
+const TIGHTENINGS: usize = 8;
+const TIGHTENED_MIN: f64 = 0.8;
+const BELOW: f64 = 0.98;
+/// How much of the gap a step leaves: little where the one before was taken whole, most where it was not.
+const REMAINS: [(f64, f64); 2] = [(0.8, 0.1), (0.4, 0.3)];
+const REMAINS_MOST: f64 = 0.6;
+/// The gap that is aimed at while the curve is not within the tolerance, over the cost: great enough to push
+/// it into the middle.
+const ENTERING: f64 = 3.0;
+const ENTERING_MAX: f64 = 1.0e6;
+/// How much wider than the curve the tubes are made until it is within the tolerance.
+const WIDER: f64 = 1.02;
+/// The third derivative of a curve that is led by the tolerance past the path, over the tolerance and the
+/// third power of the path's scale.
+const THIRD: f64 = 100.0;
+
+/// A line or an arc of the path.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// The line or arc.
+    pub element: Element,
+    /// How far the curve may be from it \[mm\], above 0.
+    pub tolerance_mm: f64,
+    /// The greatest feed \[mm/s\].
+    pub feed_mm_s: f64,
+}
+
+/// A span of the curve.
+#[derive(Clone, Copy, Debug)]
+pub struct Span {
+    /// The span.
+    pub element: Element,
+    /// The first and the last of the parts that it stands for.
+    pub parts: (usize, usize),
+    /// A bound on the distance between it and the path \[mm\].
+    pub distance_mm: f64,
+}
+
+/// The curve that stands for `parts`, made for `limits`; nothing if none was found, or if a part is neither a
+/// line nor an arc.
+#[must_use]
+pub fn fair(parts: &[Part], limits: &Limits<f64>) -> Option<Vec<Span>> {
+    let guide = Guide::new(parts)?;
+    (0..=DOUBLINGS).find_map(|doublings| with_knots(&guide, PER_SCALE * (1 << doublings) as f64, limits))
+}
+
+/// The curve with so many knots to the scale of the path.
+fn with_knots(guide: &Guide, per_scale: f64, limits: &Limits<f64>) -> Option<Vec<Span>> {
+    let mut problem = Problem::new(guide, knots::knots(guide, per_scale));
+    let programmed = programmed_mm_s(guide, &problem);
+    problem.set_costs(limits, &first_mm_s(guide, &problem, per_scale, &programmed, limits));
+    let mut wide = (WIDER * problem.farthest()).max(1.0);
+    problem.start(wide)?;
+    let (mut round, mut taken, mut tightenings) = (0, 0, 0);
+    let (mut remains, mut entering) = (REMAINS[0].1, ENTERING);
+    for _ in 0..STEPS_MAX {
+        let aim = if wide > 1.0 { entering * problem.cost() } else { remains * problem.gap(wide) };
+        let part = problem.step(aim, wide)?;
+        remains =
+            REMAINS.iter().find(|(least, _)| part > *least).map_or(REMAINS_MOST, |&(_, remains)| remains);
+        if wide > 1.0 {
+            let narrower = (WIDER * problem.farthest()).clamp(1.0, wide);
+            if narrower > 0.8 * wide {
+                entering = (4.0 * entering).min(ENTERING_MAX);
+            }
+            wide = narrower;
+            continue;
+        }
+        taken += 1;
+        let left = if round == ROUNDS { LEFT_AT_LAST } else { LEFT };
+        if problem.gap(wide) >= left * problem.cost() && taken < STEPS_PER_ROUND {
+            continue;
+        }
+        taken = 0;
+        if round < ROUNDS {
+            round += 1;
+            let before = problem.cost();
+            let mut feeds = problem.allowed_mm_s(limits);
+            for (feed, &programmed) in feeds.iter_mut().zip(&programmed) {
+                *feed = feed.min(programmed);
+            }
+            feeds::lower(&mut feeds, &problem.lengths_mm(), limits);
+            problem.set_costs(limits, &feeds);
+            problem.press(problem.cost() / before);
+            continue;
+        }
+        match spans(guide, &problem) {
+            Ok(spans) => return Some(spans),
+            Err(_) if tightenings == TIGHTENINGS => return None,
+            Err(far) => {
+                tightenings += 1;
+                far.into_iter().for_each(|(span, factor)| problem.tighten(span, factor));
+                wide = (WIDER * problem.farthest()).max(1.0);
+                entering = ENTERING;
+            }
+        }
+    }
+    None
+}
+
+/// The programmed feed of each span \[mm/s\].
+fn programmed_mm_s(guide: &Guide, problem: &Problem) -> Vec<f64> {
+    let of_span = |ends: &[f64]| {
+        let parts = &guide.parts[guide.part_at(ends[0])..=guide.part_at(ends[1])];
+        parts.iter().map(|part| part.feed_mm_s).fold(f64::INFINITY, f64::min)
+    };
+    problem.breaks().windows(2).map(of_span).collect()
+}
+
+/// The feeds that the scale of the path promises, to begin with \[mm/s\].
+fn first_mm_s(
+    guide: &Guide,
+    problem: &Problem,
+    per_scale: f64,
+    programmed: &[f64],
+    limits: &Limits<f64>,
+) -> Vec<f64> {
+    let of_span = |(ends, &programmed): (&[f64], &f64)| {
+        let tolerance_mm = guide.parts[guide.part_at(ends[0])].tolerance_mm;
+        let third = libm::cbrt(limits.jerk_mm_s3 / (THIRD * tolerance_mm));
+        (per_scale * (ends[1] - ends[0]) * third).min(programmed)
+    };
+    problem.breaks().windows(2).zip(programmed).map(of_span).collect()
+}
+
+/// The spans of a curve, or those that are farther from the path than their tolerance, with what it has to be
+/// made smaller by.
+fn spans(guide: &Guide, problem: &Problem) -> Result<Vec<Span>, Vec<(usize, f64)>> {
+    let shapes = problem.shapes();
+    let distances = deviation::distances_mm(guide, problem.breaks(), &shapes);
+    let (mut spans, mut far) = (Vec::with_capacity(shapes.len()), Vec::new());
+    for (index, ((from, shape), ends)) in shapes.iter().zip(problem.breaks().windows(2)).enumerate() {
+        let parts = (guide.part_at(ends[0]), guide.part_at(ends[1]));
+        let tolerances = guide.parts[parts.0..=parts.1].iter().map(|part| part.tolerance_mm);
+        let tolerance_mm = tolerances.fold(f64::INFINITY, f64::min);
+        // Written so that what is not a number is too far.
+        if !(distances[index] <= tolerance_mm) {
+            far.push((index, (BELOW * tolerance_mm / distances[index]).max(TIGHTENED_MIN)));
+        }
+        let to: Vector = shapes.get(index + 1).map_or_else(|| guide.end(true)[0], |next| next.0);
+        let element = Element::Polynomial { from: *from, to, shape: *shape, role: Role::Fair };
+        spans.push(Span { element, parts, distance_mm: distances[index] });
+    }
+    if far.is_empty() { Ok(spans) } else { Err(far) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::curve::Curve as _;
+    use super::super::{Polynomial, add, norm, scale, subtract};
+    use super::*;
+
+    const LIMITS: Limits<f64> = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+
+    fn lines(points: &[Vector], tolerance_mm: f64) -> Vec<Part> {
+        let part = |pair: &[Vector]| Part {
+            element: Element::Line { from: pair[0], to: pair[1] },
+            tolerance_mm,
+            feed_mm_s: 60.0,
+        };
+        points.windows(2).map(part).collect()
+    }
+
+    /// Chords of a curve in space that bends to both sides, off it to and fro, with a corner in the middle.
+    fn chords(count: u32, off_mm: f64) -> Vec<Vector> {
+        let point = |index: u32| {
+            let u = f64::from(index);
+            let off = if index.is_multiple_of(2) { off_mm } else { 0.0 };
+            let back = if index > count / 2 { 0.1 * (u - f64::from(count / 2)) } else { 0.0 };
+            [0.1 * u - back, 0.8 * libm::sin(0.07 * u) + off, 0.3 * libm::cos(0.05 * u) + back]
+        };
+        (0..=count).map(point).collect()
+    }
+
+    fn shape(span: &Span) -> (Vector, Polynomial) {
+        let Element::Polynomial { from, shape, .. } = span.element else { panic!("a polynomial") };
+        (from, shape)
+    }
+
+    fn from_segment(point: Vector, [from, to]: [Vector; 2]) -> f64 {
+        let along = subtract(to, from);
+        let square = along.iter().map(|c| c * c).sum::<f64>();
+        let offset = subtract(point, from);
+        let share = along.iter().zip(offset).map(|(a, b)| a * b).sum::<f64>() / square;
+        norm(subtract(offset, scale(along, share.clamp(0.0, 1.0))))
+    }
+
+    /// Every point of the curve against all segments, every point of the path against all of the curve.
+    #[test]
+    fn the_curve_is_within_the_tolerance_and_says_so() {
+        for (off_mm, tolerance_mm) in [(0.0, 0.01), (0.004, 0.01), (0.01, 0.05), (0.02, 0.2)] {
+            let points = chords(120, off_mm);
+            let spans = fair(&lines(&points, tolerance_mm), &LIMITS).expect("a curve");
+            let said_mm = spans.iter().map(|span| span.distance_mm).fold(0.0, f64::max);
+            let mut greatest = 0.0_f64;
+            let mut on_curve = Vec::new();
+            for span in &spans {
+                let (from, shape) = shape(span);
+                for index in 0..=40_u32 {
+                    let point = add(from, shape.offset(0.0, f64::from(index) / 40.0));
+                    let nearest = points.windows(2).map(|pair| from_segment(point, [pair[0], pair[1]]));
+                    greatest = greatest.max(nearest.fold(f64::INFINITY, f64::min));
+                    on_curve.push(point);
+                }
+            }
+            for pair in points.windows(2) {
+                for index in 0..5_u32 {
+                    let point = add(pair[0], scale(subtract(pair[1], pair[0]), f64::from(index) / 5.0));
+                    let nearest = on_curve.windows(2).map(|pair| from_segment(point, [pair[0], pair[1]]));
+                    greatest = greatest.max(nearest.fold(f64::INFINITY, f64::min));
+                }
+            }
+            assert!(
+                said_mm <= tolerance_mm && greatest <= said_mm + 1e-5,
+                "{greatest} {said_mm} {tolerance_mm}"
+            );
+            // It is used, or there would have been a better curve.
+            assert!(greatest > 0.6 * tolerance_mm, "{greatest} of {tolerance_mm}");
+        }
+    }
+
+    /// From span to span position and four derivatives by the length of the path; at the ends the path's own.
+    #[test]
+    fn nothing_steps_along_the_curve() {
+        let points = chords(80, 0.005);
+        let parts = lines(&points, 0.02);
+        let spans = fair(&parts, &LIMITS).expect("a curve");
+        let guide = Guide::new(&parts).expect("lines");
+        let derivatives = |span: &Span, u: f64| {
+            let (from, shape) = shape(span);
+            let [tangent, second, third] = super::super::curve::by_arc_length(shape.derivatives(u));
+            [add(from, shape.offset(0.0, u)), tangent, second, third]
+        };
+        let mut pairs: Vec<_> =
+            spans.windows(2).map(|pair| (derivatives(&pair[0], 1.0), derivatives(&pair[1], 0.0))).collect();
+        pairs.push((guide.end(false), derivatives(&spans[0], 0.0)));
+        pairs.push((derivatives(&spans[spans.len() - 1], 1.0), guide.end(true)));
+        for (before, after) in pairs {
+            for (order, (a, b)) in before.into_iter().zip(after).enumerate() {
+                let step = norm(subtract(a, b));
+                assert!(step < 1e-9 * 100.0_f64.powi(order as i32), "derivative {order} steps by {step}");
+            }
+        }
+    }
+
+    /// A wider tolerance lets the curve be driven faster.
+    #[test]
+    fn room_is_made_use_of() {
+        let points = chords(120, 0.01);
+        let time_s = |tolerance_mm: f64| {
+            let spans = fair(&lines(&points, tolerance_mm), &LIMITS).expect("a curve");
+            let of_span = |span: &Span| {
+                let (_, shape) = shape(span);
+                shape.length(0.0, 1.0) / super::super::blend::feed_mm_s(&shape, &LIMITS).min(60.0)
+            };
+            spans.iter().map(of_span).sum::<f64>()
+        };
+        let times = [0.012, 0.05, 0.2].map(time_s);
+        assert!(times[1] < 0.98 * times[0] && times[2] < 0.9 * times[1], "{times:?}");
+    }
+
+    #[test]
+    fn what_has_no_curve_has_none() {
+        assert!(fair(&[], &LIMITS).is_none());
+        let mut parts = lines(&chords(20, 0.0), 0.01);
+        let curve = Polynomial::bezier(core::array::from_fn(|index| [index as f64, 0.0, 0.0]));
+        parts.push(Part { element: Element::polynomial([0.0; 3], curve, Role::Spline), ..parts[0] });
+        assert!(fair(&parts, &LIMITS).is_none());
+    }
+}

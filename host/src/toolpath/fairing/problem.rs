@@ -1,0 +1,406 @@
+//! The curve of least bending within a tube about the path: a convex problem (S. Boyd, L. Vandenberghe,
+//! "Convex Optimization", chapter 11).
+//!
+//! The curve is a quintic spline over the length of the path. What is made least is the integral of the
+//! squares of its second to fourth derivative, each in units of what the limits allow at the feed that is
+//! expected there. Each sample of the path holds the curve's point at the same place within a sphere of the
+//! tolerance.
+//!
+//! Every step is one of the primal-dual interior-point method (section 11.7 there): what bends pulls, each
+//! sample pushes back with a force that grows as the curve comes near to its sphere, and where all are in
+//! balance, the sum of forces times room bounds what is left to gain.
+
+use super::super::spline::basis::{Row, clamped, row};
+use super::super::{Vector, add, dot, norm, scale, subtract};
+use super::band::{ACTING, Band};
+use super::guide::Guide;
+use crate::toolpath::Polynomial;
+use crate::toolpath::polynomial::DEGREE as POWERS;
+use motion_kernel::law::Limits;
+
+/// Degree of the spline.
+const DEGREE: usize = ACTING - 1;
+/// Control points that the conditions at one end decide: point and three derivatives.
+const DECIDED: usize = 4;
+/// Samples of the path for each span.
+const SAMPLES: f64 = 3.0;
+/// Part of the tolerance that is used: between the samples the curve may be farther.
+const USED: f64 = 0.96;
+/// Abscissae of Gauss's rule on 0 … 1, and their weights.
+const GAUSS: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+
+/// A point of the path that holds the curve.
+struct Sample {
+    /// The first control point that acts on it.
+    first: usize,
+    row: Row,
+    at: Vector,
+    /// 1/tolerance² \[1/mm²\].
+    per_square: f64,
+    /// How hard it presses: the cost that a little more tolerance would save.
+    force: f64,
+}
+
+impl Sample {
+    fn new(knots: &[f64], span: usize, mm: f64, at: Vector, tolerance_mm: f64) -> Self {
+        let tolerance_mm = USED * tolerance_mm;
+        let per_square = 1.0 / (tolerance_mm * tolerance_mm);
+        Self { first: span - DEGREE, row: row(knots, DEGREE, span, mm, 0), at, per_square, force: 1.0 }
+    }
+}
+
+/// Quadrature over one span: factors of second to fourth derivative at three points.
+struct Bending {
+    rows: [[Row; 3]; GAUSS.len()],
+    length_mm: f64,
+    /// What the square of each derivative costs at each point.
+    factors: [[f64; 3]; GAUSS.len()],
+    /// Σ factor·row·rowᵀ.
+    gram: [[f64; ACTING]; ACTING],
+}
+
+/// The problem and where its solution stands.
+pub(super) struct Problem {
+    /// Ends of the spans \[mm\].
+    breaks: Vec<f64>,
+    knots: Vec<f64>,
+    samples: Vec<Sample>,
+    bendings: Vec<Bending>,
+    control: Vec<Vector>,
+    band: Band,
+}
+
+impl Problem {
+    pub(super) fn new(guide: &Guide, breaks: Vec<f64>) -> Self {
+        let knots = clamped(&breaks, DEGREE);
+        let points = breaks.len() - 1 + DEGREE;
+        let mut control: Vec<Vector> = (0..points)
+            .map(|index| {
+                let mm = knots[index + 1..=index + DEGREE].iter().sum::<f64>() / DEGREE as f64;
+                guide.at(guide.part_at(mm), mm).0
+            })
+            .collect();
+        decide_ends(guide, &knots, &mut control);
+        let bendings = breaks
+            .windows(2)
+            .enumerate()
+            .map(|(span, ends)| Bending {
+                rows: GAUSS.map(|(x, _)| {
+                    let mm = ends[0] + (ends[1] - ends[0]) * x;
+                    core::array::from_fn(|order| row(&knots, DEGREE, DEGREE + span, mm, order + 2))
+                }),
+                length_mm: ends[1] - ends[0],
+                factors: [[0.0; 3]; GAUSS.len()],
+                gram: [[0.0; ACTING]; ACTING],
+            })
+            .collect();
+        let samples = samples(guide, &breaks, &knots);
+        let band = Band::new(points - 2 * DECIDED);
+        Self { breaks, knots, samples, bendings, control, band }
+    }
+
+    /// The lengths of the spans \[mm\].
+    pub(super) fn lengths_mm(&self) -> Vec<f64> {
+        self.breaks.windows(2).map(|ends| ends[1] - ends[0]).collect()
+    }
+
+    /// The ends of the spans \[mm\].
+    pub(super) fn breaks(&self) -> &[f64] {
+        &self.breaks
+    }
+
+    /// Sets what bending costs where: the limits, at the feeds that are expected on the spans \[mm/s\].
+    pub(super) fn set_costs(&mut self, limits: &Limits<f64>, feeds_mm_s: &[f64]) {
+        for (bending, &feed) in self.bendings.iter_mut().zip(feeds_mm_s) {
+            let square = feed * feed;
+            let units = [
+                square / limits.accel_mm_s2,
+                square * feed / limits.jerk_mm_s3,
+                square * square / limits.snap_mm_s4,
+            ];
+            let mut gram = [[0.0; ACTING]; ACTING];
+            bending.factors =
+                GAUSS.map(|(_, share)| units.map(|unit| share * bending.length_mm * unit * unit));
+            for (rows, factors) in bending.rows.iter().zip(&bending.factors) {
+                for (row, factor) in rows.iter().zip(factors) {
+                    for a in 0..ACTING {
+                        for b in 0..=a {
+                            gram[a][b] += factor * row[a] * row[b];
+                        }
+                    }
+                }
+            }
+            bending.gram = gram;
+        }
+    }
+
+    /// Second to fourth derivative at a point of the quadrature on a span.
+    fn bent(&self, span: usize, rows: &[Row; 3]) -> [Vector; 3] {
+        let acting = &self.control[span..span + ACTING];
+        // Relative to one of them, so that nothing is lost far from the origin.
+        rows.map(|row| {
+            let terms = acting.iter().zip(row);
+            terms.fold([0.0; 3], |sum, (&c, factor)| add(sum, scale(subtract(c, acting[2]), factor)))
+        })
+    }
+
+    /// What bending costs.
+    pub(super) fn cost(&self) -> f64 {
+        let mut sum = 0.0;
+        for (span, bending) in self.bendings.iter().enumerate() {
+            for (rows, factors) in bending.rows.iter().zip(&bending.factors) {
+                for (derivative, factor) in self.bent(span, rows).into_iter().zip(factors) {
+                    sum += factor * dot(derivative, derivative);
+                }
+            }
+        }
+        0.5 * sum
+    }
+
+    fn distance(&self, sample: &Sample) -> Vector {
+        let acting = &self.control[sample.first..sample.first + ACTING];
+        let offset = subtract(acting[2], sample.at);
+        let terms = acting.iter().zip(sample.row);
+        terms.fold(offset, |sum, (&c, factor)| add(sum, scale(subtract(c, acting[2]), factor)))
+    }
+
+    /// The greatest distance of the curve from a sample, in units of its tolerance.
+    pub(super) fn farthest(&self) -> f64 {
+        let squares = self.samples.iter().map(|sample| {
+            let e = self.distance(sample);
+            sample.per_square * dot(e, e)
+        });
+        squares.fold(0.0, f64::max).sqrt()
+    }
+
+    /// Makes the tolerance of the samples on a span smaller by `factor`.
+    pub(super) fn tighten(&mut self, span: usize, factor: f64) {
+        let first = span.saturating_sub(1);
+        for sample in &mut self.samples {
+            if (first..=span + 1).contains(&sample.first) {
+                sample.per_square /= factor * factor;
+            }
+        }
+    }
+
+    /// What is left of a sphere `wide` times as wide: 1 in its middle, 0 on it.
+    fn room(&self, sample: &Sample, wide: f64) -> f64 {
+        let e = self.distance(sample);
+        1.0 - sample.per_square * dot(e, e) / (wide * wide)
+    }
+
+    /// Starts in spheres `wide` times as wide, with what is to gain equal to the cost; nothing if the curve is
+    /// not in them.
+    pub(super) fn start(&mut self, wide: f64) -> Option<()> {
+        self.balance(self.cost().max(f64::MIN_POSITIVE), wide, 1.0)
+    }
+
+    /// The costs have become `factor` times as great.
+    pub(super) fn press(&mut self, factor: f64) {
+        self.samples.iter_mut().for_each(|sample| sample.force *= factor);
+    }
+
+    /// What is to gain at most if all forces are in balance.
+    pub(super) fn gap(&self, wide: f64) -> f64 {
+        self.samples.iter().map(|sample| sample.force * self.room(sample, wide)).sum()
+    }
+
+    /// Brings every force to within `apart` times what belongs to a gap of `aim`; nothing if the curve is
+    /// beyond a sphere, or nowhere.
+    fn balance(&mut self, aim: f64, wide: f64, apart: f64) -> Option<()> {
+        let per_sample = aim / self.samples.len() as f64;
+        for index in 0..self.samples.len() {
+            let balanced = per_sample / self.room(&self.samples[index], wide);
+            if !(balanced >= 0.0 && balanced.is_finite()) {
+                return None;
+            }
+            let force = &mut self.samples[index].force;
+            *force = force.clamp(balanced / apart, balanced * apart);
+        }
+        Some(())
+    }
+
+    /// One step towards a gap of `aim`, in spheres `wide` times as wide: how much of it was taken,
+    /// or nothing if the equations have no solution.
+    pub(super) fn step(&mut self, aim: f64, wide: f64) -> Option<f64> {
+        let free = self.control.len() - 2 * DECIDED;
+        let per_sample = aim / self.samples.len() as f64;
+        self.band.clear();
+        let mut slope = vec![[0.0; 3]; free];
+        let at = |index: usize| index.checked_sub(DECIDED).filter(|&index| index < free);
+        for (span, bending) in self.bendings.iter().enumerate() {
+            for (rows, factors) in bending.rows.iter().zip(&bending.factors) {
+                for ((row, derivative), factor) in rows.iter().zip(self.bent(span, rows)).zip(factors) {
+                    for (a, entry) in row.iter().enumerate() {
+                        if let Some(at) = at(span + a) {
+                            slope[at] = subtract(slope[at], scale(derivative, factor * entry));
+                        }
+                    }
+                }
+            }
+            for a in 0..ACTING {
+                let Some(row) = at(span + a) else { continue };
+                for b in 0..=a {
+                    if let Some(column) = at(span + b) {
+                        self.band.add_unit(row, column, bending.gram[a][b]);
+                    }
+                }
+            }
+        }
+        let per_wide = 1.0 / (wide * wide);
+        for sample in &self.samples {
+            let e = self.distance(sample);
+            let pulled = scale(e, 2.0 * per_wide * sample.per_square);
+            let room = 1.0 - 0.5 * dot(e, pulled);
+            let (linear, square) = (2.0 * sample.force * per_wide * sample.per_square, sample.force / room);
+            let push = per_sample / room;
+            let curvature: [Vector; 3] = core::array::from_fn(|a| {
+                core::array::from_fn(|b| square * pulled[a] * pulled[b] + if a == b { linear } else { 0.0 })
+            });
+            for a in 0..ACTING {
+                let Some(row) = at(sample.first + a) else { continue };
+                slope[row] = subtract(slope[row], scale(pulled, push * sample.row[a]));
+                for b in 0..=a {
+                    if let Some(column) = at(sample.first + b) {
+                        self.band.add(row, column, sample.row[a] * sample.row[b], &curvature);
+                    }
+                }
+            }
+        }
+        if !self.band.solve(&mut slope) {
+            return None;
+        }
+        let step = slope;
+        // Forces follow, and neither they nor the room may come to nothing.
+        let (mut part, mut force_part) = (1.0_f64, 1.0_f64);
+        let mut forces = Vec::with_capacity(self.samples.len());
+        for sample in &self.samples {
+            let e = self.distance(sample);
+            let pulled = scale(e, 2.0 * per_wide * sample.per_square);
+            let room = 1.0 - 0.5 * dot(e, pulled);
+            let moved = (0..ACTING).fold([0.0; 3], |sum, a| match at(sample.first + a) {
+                Some(row) => add(sum, scale(step[row], sample.row[a])),
+                None => sum,
+            });
+            let next = (per_sample + sample.force * dot(pulled, moved)) / room;
+            let change = next - sample.force;
+            if change < 0.0 {
+                force_part = force_part.min(NEAR * sample.force / -change);
+            }
+            // room − part·linear − part²·square > (1 − NEAR)·room
+            let (linear, square) = (dot(pulled, moved), per_wide * sample.per_square * dot(moved, moved));
+            let most = NEAR * room;
+            if linear + square > most {
+                let root = (linear * linear + 4.0 * square * most).sqrt();
+                part = part.min(2.0 * most / (linear + root));
+            }
+            forces.push(change);
+        }
+        if !part.is_finite() || step.iter().flatten().any(|mm| !mm.is_finite()) {
+            return None;
+        }
+        for (sample, change) in self.samples.iter_mut().zip(forces) {
+            sample.force += force_part * change;
+        }
+        for (index, &step) in step.iter().enumerate() {
+            self.control[DECIDED + index] = add(self.control[DECIDED + index], scale(step, part));
+        }
+        self.balance(aim, wide, APART_MAX)?;
+        Some(part)
+    }
+
+    /// The feed at which each span alone keeps the limits \[mm/s\].
+    pub(super) fn allowed_mm_s(&self, limits: &Limits<f64>) -> Vec<f64> {
+        let of_span = |(span, bending): (usize, &Bending)| {
+            let mut least = f64::INFINITY;
+            for rows in &bending.rows {
+                let [second, third, fourth] = self.bent(span, rows).map(norm);
+                let by_accel = (limits.accel_mm_s2 / second).sqrt();
+                let by_jerk = libm::cbrt(limits.jerk_mm_s3 / third);
+                let by_snap = (limits.snap_mm_s4 / fourth).sqrt().sqrt();
+                least = least.min(by_accel).min(by_jerk).min(by_snap);
+            }
+            least
+        };
+        self.bendings.iter().enumerate().map(of_span).collect()
+    }
+
+    /// Start and shape of each span.
+    pub(super) fn shapes(&self) -> Vec<(Vector, Polynomial)> {
+        let of_span = |(span, ends): (usize, &[f64])| {
+            let acting = &self.control[span..span + ACTING];
+            let derivative = |order: usize| {
+                let row = row(&self.knots, DEGREE, DEGREE + span, ends[0], order);
+                // Relative to the first control point, so that nothing is lost far from the origin.
+                acting
+                    .iter()
+                    .zip(row)
+                    .fold([0.0; 3], |sum, (&c, f)| add(sum, scale(subtract(c, acting[0]), f)))
+            };
+            let mut coefficients = [[0.0; 3]; POWERS];
+            let mut power = 1.0;
+            for (order, coefficient) in (1..=DEGREE).zip(&mut coefficients) {
+                power *= (ends[1] - ends[0]) / order as f64;
+                *coefficient = scale(derivative(order), power);
+            }
+            (add(acting[0], derivative(0)), Polynomial::new(coefficients))
+        };
+        self.breaks.windows(2).enumerate().map(of_span).collect()
+    }
+}
+
+/// How much of the way to where a room or a force comes to nothing a step may take.
+const NEAR: f64 = 0.95;
+/// How far forces may be from balance: beyond, steps come to nothing.
+const APART_MAX: f64 = 100.0;
+
+/// The control points at the ends, from point and derivatives of the path there.
+fn decide_ends(guide: &Guide, knots: &[f64], control: &mut [Vector]) {
+    let (count, last_span) = (control.len(), control.len() - 1);
+    for is_end in [false, true] {
+        let (span, mm) = if is_end { (last_span, guide.length_mm()) } else { (DEGREE, 0.0) };
+        for (order, derivative) in guide.end(is_end).into_iter().enumerate() {
+            let row = row(knots, DEGREE, span, mm, order);
+            // The derivative of this order has one control point more than the one below.
+            let place = |index: usize| {
+                if is_end { (count - 1 - index, row[DEGREE - index]) } else { (index, row[index]) }
+            };
+            let known = (0..order).fold(derivative, |rest, index| {
+                let (point, factor) = place(index);
+                subtract(rest, scale(control[point], factor))
+            });
+            let (point, factor) = place(order);
+            control[point] = scale(known, 1.0 / factor);
+        }
+    }
+}
+
+/// Samples at every joint of the path's parts, and so many between that each span has some.
+fn samples(guide: &Guide, breaks: &[f64], knots: &[f64]) -> Vec<Sample> {
+    let mut samples = Vec::new();
+    let (mut part, mut span) = (0, 0);
+    let last = breaks.len() - 2;
+    let mut mm = 0.0;
+    while mm < guide.length_mm() {
+        let (_, part_end_mm) = guide.range_mm(part);
+        let spacing_mm = (breaks[span + 1] - breaks[span]) / SAMPLES;
+        mm = part_end_mm.min(mm + spacing_mm);
+        while span < last && breaks[span + 1] <= mm {
+            span += 1;
+        }
+        let mut tolerance_mm = guide.parts[part].tolerance_mm;
+        let (at, _) = guide.at(part, mm);
+        // At a joint the smaller tolerance holds.
+        if let Some(next) = guide.parts.get(part + 1)
+            && mm >= part_end_mm
+        {
+            tolerance_mm = tolerance_mm.min(next.tolerance_mm);
+            part += 1;
+        }
+        if mm < guide.length_mm() {
+            samples.push(Sample::new(knots, DEGREE + span, mm, at, tolerance_mm));
+        }
+    }
+    samples
+}
