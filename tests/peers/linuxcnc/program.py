@@ -32,10 +32,9 @@ class PathMode:
 
 def rewritten(text, mode):
     """`text` with `mode` at its start and in place of every G61, G61.1 and G64."""
-    lines = text.splitlines()
     inches = False
     result = []
-    for line in lines:
+    for line in text.splitlines():
         # Comments stand at odd places.
         parts = COMMENT.split(line)
         code = " ".join(parts[0::2])
@@ -47,10 +46,7 @@ def rewritten(text, mode):
             # Units of a line hold for its path mode, wherever they stand in it.
             words = mode.words(inches)
             for at in range(0, len(parts), 2):
-                parts[at] = TOLERANCE.sub(" ", parts[at])
-                parts[at], found = MODE.subn(f" {words} ", parts[at], count=1)
-                if found:
-                    words = ""
+                parts[at] = MODE.sub(f" {words} ", TOLERANCE.sub(" ", parts[at]))
         result.append("".join(parts))
     first = 1 if result and result[0].strip() == "%" else 0
     result.insert(first, "G21 " + mode.words(inches=False))

@@ -55,7 +55,8 @@ class Distance(unittest.TestCase):
 
     def test_clockwise_is_the_other_way_round(self):
         points = arc_points((2.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0), -1, XY)
-        self.assertTrue(any(x < -1.9 for x, _, _ in points))
+        self.assertLess(points[1][1], 0)
+        self.assertAlmostEqual(sum(map(math.dist, points, points[1:])), 3 * math.pi, delta=0.1)
 
     def test_a_full_turn_and_a_helix_of_two(self):
         start = (0.0, 0.0, 3.0)
@@ -109,6 +110,9 @@ class Recorded(unittest.TestCase):
     def test_jerk_of_accelerations(self):
         rows = [(0.0, 0.0, 0.0), (2.0, 0.0, -5.0), (4.0, 0.0, 0.0), (0.5, 0.0, 0.0)]
         self.assertAlmostEqual(recording.peak_jerk_of_accelerations_mm_s3(rows), 5000)
+        # Rest is before the first and after the last.
+        self.assertAlmostEqual(recording.peak_jerk_of_accelerations_mm_s3([(0.0, 9.0, 0.0), (0.0, 2.0, 0.0)]), 9000)
+        self.assertAlmostEqual(recording.peak_jerk_of_accelerations_mm_s3([(0.0, 2.0, 0.0), (0.0, 9.0, 0.0)]), 9000)
 
     def test_both_jerks_agree_where_jerk_is_smooth(self):
         # From rest to rest: acceleration is 1 − cos, then the negative of it.
