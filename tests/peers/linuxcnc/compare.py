@@ -94,20 +94,24 @@ def compared(name, text, options, motion):
         return {"name": name, "left_out": f"refused: {reason}"}
 
 
+def row(cells, name):
+    widths = (9, 9, 7, 12, 8, 12, 8)
+    return "".join(f"{cell:>{width}}" for cell, width in zip(cells, widths)) + "  " + name
+
+
 def figures(side):
     if "jerk_mm_s3" not in side:
-        return f"{'–':>9} {'–':>7}"
-    return f"{side['jerk_mm_s3']:9.0f} {side['deviation_mm'] * 1000:7.1f}"
+        return ["–", "–"]
+    return [f"{side['jerk_mm_s3']:.0f}", f"{side['deviation_mm'] * 1000:.1f}"]
 
 
 def table(results):
-    yield f"{'ours s':>9} {'theirs s':>9} {'ratio':>6}  {'ours: mm/s³':>9} {'µm':>6}  {'theirs':>9} {'µm':>7}  program"
+    yield row(["time", "", "ratio", "ours:", "", "theirs:", ""], "")
+    yield row(["ours s", "theirs s", "", "mm/s³", "µm", "mm/s³", "µm"], "program")
     for result in sorted(results, key=lambda result: -result["ratio"]):
         mine, other = result["ours"], result["theirs"]
-        yield (
-            f"{mine['time_s']:9.3f} {other['time_s']:9.3f} {result['ratio']:6.3f}  {figures(mine)}  {figures(other)}"
-            f"  {result['name']}"
-        )
+        times = [f"{mine['time_s']:.3f}", f"{other['time_s']:.3f}", f"{result['ratio']:.3f}"]
+        yield row([*times, *figures(mine), *figures(other)], result["name"])
 
 
 def summary(results, left_out, allowed):
@@ -149,4 +153,5 @@ def main():
         options.json.write_text(json.dumps({"results": results, "left_out": left_out}, indent=1) + "\n")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -135,6 +135,12 @@ class Recorded(unittest.TestCase):
             with self.assertRaises(peer.LeftOut):
                 peer.samples(text)
 
+    def test_a_stall_is_a_long_rest_in_a_run_that_was_given_up(self):
+        moving, resting = [[float(at), 0.0, 0.0] for at in range(40000)], [[0.0, 0.0, 0.0]] * 40000
+        self.assertTrue(peer.stalled({"problem": "too long", "um": moving + resting}))
+        self.assertFalse(peer.stalled({"problem": "too long", "um": resting + moving}))
+        self.assertFalse(peer.stalled({"problem": None, "um": moving + resting}))
+
     def test_a_trace_is_read_at_whole_periods(self):
         rows = [
             {"t_s": f"{at * 0.0005:.9f}", **{f"{a}_set_mm": at for a in "XYZ"}, **{f"{a}_acc_mm_s2": -at for a in "XYZ"}}
