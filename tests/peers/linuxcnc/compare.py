@@ -4,6 +4,7 @@
 import argparse
 import json
 import math
+import os
 import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
@@ -119,7 +120,8 @@ def summary(results, left_out, allowed):
         mean = math.exp(sum(math.log(result["ratio"]) for result in results) / len(results))
         worst = max(results, key=lambda result: result["ratio"])
         faster = sum(result["ratio"] < 1 for result in results)
-        yield f"{len(results)} programs: geometric mean {mean:.3f}, worst {worst['ratio']:.3f} ({worst['name']}), faster in {faster}"
+        extreme = f"worst {worst['ratio']:.3f} ({worst['name']}), faster in {faster}"
+        yield f"{len(results)} programs: geometric mean {mean:.3f}, {extreme}"
     for side, allowed_mm in allowed.items():
         far = [result for result in results if result[side].get("deviation_mm", 0) > allowed_mm + DEVIATION_SLACK_MM]
         listed = ", ".join(f"{result['name']} {result[side]['deviation_mm'] * 1000:.1f} µm" for result in far)
@@ -133,6 +135,8 @@ def main():
     options = arguments()
     if not peer.installed():
         sys.exit("compare.py: found no `linuxcnc`, expected Debian's package linuxcnc-uspace")
+    if os.geteuid() != 0:
+        sys.exit("compare.py: expected to be run by root: a run of LinuxCNC has namespaces of its own")
     programs, left_out = found(options.folder, options.names)
     with tempfile.TemporaryDirectory() as folder:
         motion = ours.Motion(options.motion, MACHINES[options.machine], folder)

@@ -13,7 +13,7 @@ STEP_MM = 1e-6
 
 def arc_points(start, end, centre, turns, plane):
     """Points of an arc or helix after its start. `plane`: the indices of first, second and third axis. `turns`: positive
-    counterclockwise, ±1 is up to one turn, ±2 one turn more. The radius goes evenly from that of the start to that of the end."""
+    counterclockwise, ±1 is up to one turn, ±2 one turn more. The radius goes evenly from the start's to the end's."""
     first, second, third = plane
     from_x, from_y = start[first] - centre[0], start[second] - centre[1]
     to_x, to_y = end[first] - centre[0], end[second] - centre[1]
