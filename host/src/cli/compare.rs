@@ -22,11 +22,12 @@ Examples:
   motion compare parts/ --tolerance 0.01 --tolerance 0.05 --csv > times.csv
       every .ngc file of a folder, with blends of two tolerances
 
-Columns: `per block` is the time with one pair of sin² ramps per block, the published plan, whatever the
-machine's law is; `least` is the time on the same path without limits of jerk and snap along it, but under the
-ceilings that they make, a lower bound for every plan; `accel. alone` is the time on it under programmed feeds
-and acceleration alone; `tolerance` is the greatest share of the tolerance that the path uses; `feed` to `step` are the executed
-ticks over the limits of axes and path, `step` for the acceleration step at a junction without a blend. Refused
+Columns: `blends` counts blends and curves; `per block` is the time with one pair of sin² ramps per block, the
+published plan, whatever the machine's law is; `least` is the time on the same path without limits of jerk and
+snap along it, but under the ceilings that they make, a lower bound for every plan; `accel. alone` is the time
+on it under programmed feeds and acceleration alone; `tolerance` is the greatest share of the tolerance that the
+path uses; `feed` to `step` are the executed ticks over the limits of axes and path, `step` for the acceleration
+step at a junction without a blend. Refused
 programs are listed; then the exit status is 2.";
 
 /// Compare the times of programs: exact path, blends, plan per block, and the least possible.

@@ -19,6 +19,7 @@ use self::ticks::{Ratios, TicksError};
 use crate::gcode::{PathMode, Program, StepKind};
 use crate::machine::Machine;
 use crate::planning::{Item, Mode, Plan, PlanningError, plan_program};
+use crate::trace::TracedBlock;
 
 /// The path that is driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,9 +45,9 @@ impl fmt::Display for Path {
 /// The figures of a program on one path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
-    /// Blocks, blends among them.
+    /// Blocks, those of blends and curves among them.
     pub blocks: usize,
-    /// Blends.
+    /// Blends and curves.
     pub blends: usize,
     /// Length \[mm\].
     pub length_mm: f64,
@@ -102,7 +103,7 @@ pub fn figures(
     let per_block = plan_program(source_name, &program, machine, Mode::PerBlock)?;
     Ok(Figures {
         blocks: plan.blocks.len(),
-        blends: plan.blocks.iter().filter(|block| block.kind == "blend").count(),
+        blends: blends(&plan.blocks),
         length_mm: plan.length_mm,
         time_s: plan.time_s,
         per_block_s: per_block.time_s,
@@ -140,4 +141,11 @@ fn tolerance_share(plan: &Plan) -> f64 {
         Item::Dwell { .. } | Item::Stop { .. } => None,
     });
     stretches.flat_map(|stretch| &stretch.blocks).map(|block| block.tolerance_share).fold(0.0, f64::max)
+}
+
+/// The number of blends, and of curves: the spans of one follow each other.
+fn blends(blocks: &[TracedBlock]) -> usize {
+    let is_curve = |block: &TracedBlock| block.kind == "curve";
+    let curves = blocks.chunk_by(|before, after| is_curve(before) && is_curve(after));
+    curves.filter(|blocks| matches!(&*blocks[0].kind, "blend" | "curve")).count()
 }

@@ -41,6 +41,9 @@ const CORNERS_RAD: [f64; 2] = [130.0 * core::f64::consts::PI / 180.0, 75.0 * cor
 
 /// Lengths of blends that are tried, as parts of the longest one.
 const SIZES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+/// How much longer than the best found the longest blends may take for others to be tried: these gain a few
+/// hundredths.
+const PROMISING: f64 = 1.25;
 /// How often a junction is looked at at most.
 const SWEEPS: usize = 4;
 /// How many more moves are looked at on either side of those at a junction.
@@ -92,26 +95,20 @@ impl Variants {
 /// The blocks of a run that starts and ends at rest; the junction feed of the last one is 0. An error comes
 /// with the program line.
 pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlock>> {
+    let mut candidates = curved(moves, machine);
+    let fastest_s = |candidates: &[Vec<StretchBlock>]| {
+        candidates.iter().map(|blocks| run_time_s(blocks, machine.tick_s)).fold(f64::INFINITY, f64::min)
+    };
     let junctions = Junctions::new(Run::new(moves), machine)?;
     let is_merged = junctions.run.moves().len() < moves.len();
     let merged = junctions.exact();
-    let mut candidates = Vec::new();
-    let limits = machine.limits().in_any_direction();
-    for corner_rad in CORNERS_RAD {
-        if let Some(run) = Run::faired(moves, corner_rad, &limits, machine.path.feed_mm_s) {
-            let junctions = Junctions::new(run, machine)?;
-            let exact = junctions.exact();
-            candidates.push(match junctions.choose(&exact)? {
-                Some([_, chosen]) => junctions.blocks(&chosen),
-                None => junctions.blocks(&exact),
-            });
-        }
+    let chosen = junctions.choose(&merged, fastest_s(&candidates))?;
+    if chosen.is_empty() && is_merged {
+        candidates.push(junctions.blocks(&merged));
     }
-    match junctions.choose(&merged)? {
-        Some([longest, chosen]) => candidates.extend([junctions.blocks(&chosen), junctions.blocks(&longest)]),
-        None if is_merged => candidates.push(junctions.blocks(&merged)),
-        None if candidates.is_empty() => return Ok(junctions.blocks(&merged)),
-        None => {}
+    candidates.extend(chosen.iter().map(|chosen| junctions.blocks(chosen)));
+    if candidates.is_empty() {
+        return Ok(junctions.blocks(&merged));
     }
     let exact = if is_merged {
         let junctions = Junctions::new(Run::exact(moves), machine)?;
@@ -128,6 +125,28 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlo
         }
     }
     Ok(best)
+}
+
+/// The blocks of a run with curves in place of what is dense, once for each of [`CORNERS_RAD`] that makes a
+/// difference.
+fn curved(moves: &[Move], machine: &Machine) -> Vec<Vec<StretchBlock>> {
+    let limits = machine.limits().in_any_direction();
+    let (mut candidates, mut before, mut most_s) = (Vec::new(), None, f64::INFINITY);
+    for corner_rad in CORNERS_RAD {
+        let Some(run) = Run::faired(moves, corner_rad, &limits, machine.path.feed_mm_s) else { continue };
+        if before.as_deref() == Some(run.moves()) {
+            continue;
+        }
+        before = Some(run.moves().to_vec());
+        // Nobody has programmed a curve: one that has no ceilings is no candidate.
+        let Ok(junctions) = Junctions::new(run, machine) else { continue };
+        let exact = junctions.exact();
+        let Ok(chosen) = junctions.choose(&exact, most_s) else { continue };
+        let blocks = junctions.blocks(chosen.last().unwrap_or(&exact));
+        most_s = most_s.min(run_time_s(&blocks, machine.tick_s));
+        candidates.push(blocks);
+    }
+    candidates
 }
 
 /// The junctions of a run.
@@ -151,9 +170,9 @@ impl<'a> Junctions<'a> {
         Ok(Self { run, ceilings: all, machine, limits: machine.limits().in_any_direction() })
     }
 
-    /// The crossings with all blends at their longest, and those that were found best one by one; none where
-    /// there is nothing to blend.
-    fn choose(&self, exact: &[Crossing]) -> AtLine<Option<[Vec<Crossing>; 2]>> {
+    /// The crossings with all blends at their longest, and those that were found best one by one, unless the
+    /// first take so much longer than `most_s` that these would, too; none where there is nothing to blend.
+    fn choose(&self, exact: &[Crossing], most_s: f64) -> AtLine<Vec<Vec<Crossing>>> {
         // First as if each were alone, then those that touch within what the other leaves.
         let alone_mm: Vec<f64> = (0..exact.len()).map(|junction| self.longest_mm(junction)).collect();
         let mut variants = Vec::with_capacity(exact.len());
@@ -162,7 +181,7 @@ impl<'a> Junctions<'a> {
             variants.push(self.variants(junction, room_mm, exact[junction])?);
         }
         if !variants.iter().any(Variants::are_blends) {
-            return Ok(None);
+            return Ok(Vec::new());
         }
         let mut chosen: Vec<Crossing> = variants.iter().map(|variants| variants.all[0]).collect();
         for (junction, variants) in variants.iter().enumerate() {
@@ -171,6 +190,9 @@ impl<'a> Junctions<'a> {
             }
         }
         let longest = chosen.clone();
+        if run_time_s(&self.blocks(&longest), self.machine.tick_s) > PROMISING * most_s {
+            return Ok(vec![longest]);
+        }
         // Junctions next to a change are planned again.
         let mut is_open = vec![true; chosen.len()];
         for _ in 0..SWEEPS {
@@ -191,7 +213,7 @@ impl<'a> Junctions<'a> {
                 }
             }
         }
-        Ok(Some([longest, chosen]))
+        Ok(vec![longest, chosen])
     }
 
     /// The trim of the longest blend of a junction, 0 if there is none \[mm\].
@@ -388,8 +410,8 @@ mod tests {
         let machine = Machine::reference();
         let junctions = Junctions::new(Run::new(moves), &machine).expect("a machine's limits");
         let exact = junctions.exact();
-        let [_, chosen] = junctions.choose(&exact).expect("limits").expect("corners");
-        junctions.blocks(&chosen)
+        let chosen = junctions.choose(&exact, f64::INFINITY).expect("limits");
+        junctions.blocks(chosen.last().expect("corners"))
     }
 
     fn kinds(blocks: &[StretchBlock]) -> Vec<(u32, &'static str)> {
@@ -480,5 +502,27 @@ mod tests {
         // As far as they lead and no farther.
         assert_eq!(blocks[0].element.ends_mm().0, [points[0][0], points[0][1], 0.0]);
         assert_eq!(blocks[blocks.len() - 1].element.ends_mm().1, [points[199][0], points[199][1], 0.0]);
+    }
+
+    /// A long line that goes straight on into dense ones gives the curve a part of itself, and everything
+    /// joins to the last bit.
+    #[test]
+    fn a_curve_joins_what_is_beside_it() {
+        let mut points = vec![[13.37, -7.1], [43.37, -7.1], [43.47, -7.1]];
+        points.extend((1..80).map(|index| {
+            let u = 0.1 * f64::from(index);
+            [43.47 + u, -7.1 + 0.4 * (1.0 - libm::cos(2.0 * u))]
+        }));
+        points.push([95.123, -30.3]);
+        let moves = path(&points, 0.02, |_| 50.0);
+        let blocks = blocks_of(&moves);
+        let curve: Vec<_> = kinds(&blocks).iter().map(|&(_, kind)| kind == "curve").collect();
+        assert!(!curve[0] && curve[1] && !curve[curve.len() - 1], "{:?}", kinds(&blocks));
+        for pair in blocks.windows(2) {
+            assert_eq!(pair[0].element.ends_mm().1, pair[1].element.ends_mm().0);
+            assert!(pair[0].junction_mm_s > 1e3, "{}", pair[0].junction_mm_s);
+        }
+        let ends = (blocks[0].element.ends_mm().0, blocks[blocks.len() - 1].element.ends_mm().1);
+        assert_eq!(ends, ([13.37, -7.1, 0.0], [95.123, -30.3, 0.0]));
     }
 }

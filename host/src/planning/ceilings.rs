@@ -46,7 +46,7 @@ pub(super) fn lower_along_curves(
     all: &mut [Ceilings],
     machine: &Machine,
 ) -> Result<(), (u32, Problem)> {
-    let is_fair = |step: &Move| matches!(step.element, Element::Polynomial { role: Role::Fair, .. });
+    let is_fair = |step: &Move| matches!(step.element, Element::Polynomial { role: Role::Curve, .. });
     let limits = machine.limits().in_any_direction();
     let mut first = 0;
     for curve in moves.chunk_by(|before, after| is_fair(before) == is_fair(after)) {

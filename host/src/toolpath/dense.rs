@@ -29,25 +29,26 @@ pub(super) fn faired(
 ) -> Option<(Vec<Move>, Vec<f64>)> {
     let run = Moves::new(moves, corner_rad);
     let mut made = Made::default();
-    let (mut first, mut taken_mm, mut is_faired) = (0, 0.0, false);
+    let (mut first, mut is_faired) = (0, false);
+    // What the curve before has left of the first move.
+    let mut rest = moves.first()?.element;
     while first < moves.len() {
         let last = run.last_from(first);
         let is_dense = last > first && (first..=last).any(|index| run.is_short(index));
-        let cuts = is_dense.then(|| run.cuts_mm(first, last));
-        let spans = cuts.and_then(|cuts_mm| fair(&run.parts(first, last, cuts_mm, feed_mm_s), limits));
-        let (Some(cuts_mm), Some(spans)) = (cuts, spans) else {
+        let cut = is_dense.then(|| run.cut(first, rest, last, feed_mm_s));
+        let Some((cut, spans)) = cut.and_then(|cut| fair(&cut.parts, limits).map(|spans| (cut, spans)))
+        else {
             // A run that has no curve is left as it is; its last move may begin another one.
             let next = last.max(first + 1);
-            for step in &moves[first..next] {
-                made.push(*step, step.element.trimmed(taken_mm, 0.0), 0.0);
-                taken_mm = 0.0;
-            }
+            made.push(moves[first], rest, 0.0);
+            moves[first + 1..next].iter().for_each(|step| made.push(*step, step.element, 0.0));
             first = next;
+            rest = moves.get(first).map_or(rest, |step| step.element);
             continue;
         };
         is_faired = true;
-        if run.is_long(first) {
-            made.push(moves[first], moves[first].element.trimmed(taken_mm, cuts_mm.0), 0.0);
+        if let Some(before) = cut.before {
+            made.push(moves[first], before, 0.0);
         }
         for span in spans {
             let stands_for = &moves[first + span.parts.0..=first + span.parts.1];
@@ -56,7 +57,10 @@ pub(super) fn faired(
             let step = Move { feed_mm_s, tolerance_mm, merging_mm: None, ..stands_for[0] };
             made.push(step, span.element, span.distance_mm);
         }
-        (first, taken_mm) = if run.is_long(last) { (last, cuts_mm.1) } else { (last + 1, 0.0) };
+        (first, rest) = match (cut.behind, moves.get(last + 1)) {
+            (Some(behind), _) => (last, behind),
+            (None, next) => (last + 1, next.map_or(rest, |next| next.element)),
+        };
     }
     is_faired.then_some((made.moves, made.distances_mm))
 }
@@ -113,31 +117,43 @@ impl<'a> Moves<'a> {
         last
     }
 
-    /// What the curve of a run takes of its first and its last move \[mm\]: all of one that is not long.
-    fn cuts_mm(&self, first: usize, last: usize) -> (f64, f64) {
-        let of = |index: usize, junction: usize| {
-            let length_mm = self.lengths_mm[index];
-            let wanted_mm = self.wanted_mm[junction].unwrap_or(0.0);
-            if self.is_long(index) {
-                (MARGIN * wanted_mm).min(0.5 * TAKEN_MAX * length_mm)
-            } else {
-                length_mm
-            }
-        };
-        (of(first, first), of(last, last - 1))
+    /// What a curve takes of a long move, as a part of `length_mm`: more than the blend with its neighbour
+    /// wants, and something where that goes straight on.
+    fn share(&self, length_mm: f64, junction: usize, neighbour: usize) -> f64 {
+        let wanted_mm = MARGIN * self.wanted_mm[junction].unwrap_or(0.0);
+        (wanted_mm.max(self.lengths_mm[neighbour]) / length_mm).min(0.5 * TAKEN_MAX)
     }
 
-    fn parts(&self, first: usize, last: usize, cuts_mm: (f64, f64), feed_mm_s: f64) -> Vec<Part> {
+    /// Cuts a run, of whose first move `rest` is left, out of its long ends.
+    fn cut(&self, first: usize, rest: Element, last: usize, feed_mm_s: f64) -> Cut {
+        let (mut start, mut end) = (rest, self.moves[last].element);
+        let (mut before, mut behind) = (None, None);
+        if self.is_long(first) {
+            let [kept, taken] = start.split(1.0 - self.share(start.length_mm(), first, first + 1));
+            (before, start) = (Some(kept), taken);
+        }
+        if self.is_long(last) {
+            let [taken, left] = end.split(self.share(self.lengths_mm[last], last - 1, last - 1));
+            (end, behind) = (taken, Some(left));
+        }
         let part = |index: usize| {
             let step = &self.moves[index];
-            let first_mm = if index == first { self.lengths_mm[index] - cuts_mm.0 } else { 0.0 };
-            let last_mm = if index == last { self.lengths_mm[index] - cuts_mm.1 } else { 0.0 };
-            let is_whole = first_mm == 0.0 && last_mm == 0.0;
-            let element = if is_whole { step.element } else { step.element.trimmed(first_mm, last_mm) };
+            let element = match index {
+                _ if index == first => start,
+                _ if index == last => end,
+                _ => step.element,
+            };
             Part { element, tolerance_mm: tolerance_mm(step), feed_mm_s: step.feed_mm_s.min(feed_mm_s) }
         };
-        (first..=last).map(part).collect()
+        Cut { before, parts: (first..=last).map(part).collect(), behind }
     }
+}
+
+/// A run with what is left of its long ends before and behind.
+struct Cut {
+    before: Option<Element>,
+    parts: Vec<Part>,
+    behind: Option<Element>,
 }
 
 /// What a blend between two moves wants of either \[mm\]; nothing where there is to be none.
@@ -152,10 +168,17 @@ fn wanted_mm(before: &Move, after: &Move, corner_rad: f64) -> Option<f64> {
     if angle_rad > corner_rad.min(ANGLE_MAX_RAD) {
         return None;
     }
+    // Arcs of one circle have none, but for rounding.
     let jump_per_mm = norm(subtract(start.curvature, end.curvature));
+    let rounding_per_mm = TANGENT_ROUNDING_RAD * norm(start.curvature).max(norm(end.curvature));
     let by_angle_mm =
         if angle_rad > TANGENT_ROUNDING_RAD { trim_mm(angle_rad, tolerance_mm) } else { f64::INFINITY };
-    let wanted_mm = by_angle_mm.min((tolerance_mm / (JUMP * jump_per_mm)).sqrt());
+    let by_jump_mm = if jump_per_mm > rounding_per_mm {
+        (tolerance_mm / (JUMP * jump_per_mm)).sqrt()
+    } else {
+        f64::INFINITY
+    };
+    let wanted_mm = by_angle_mm.min(by_jump_mm);
     Some(if wanted_mm.is_finite() { wanted_mm } else { 0.0 })
 }
 

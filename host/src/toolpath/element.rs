@@ -66,7 +66,7 @@ pub enum Role {
     /// The polynomial was programmed.
     Spline,
     /// The polynomial stands for short lines and arcs.
-    Fair,
+    Curve,
 }
 
 /// Tangent and curvature vector at an end of an element.
@@ -132,7 +132,7 @@ impl Element {
         Self::Involute { from, to: add(from, shape.offset(0.0, shape.sweep_rad())), shape }
     }
 
-    /// "line", "arc", "helix", "blend", "spline" or "involute".
+    /// "line", "arc", "helix", "blend", "curve", "spline" or "involute".
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
@@ -141,7 +141,7 @@ impl Element {
             Self::Arc { .. } => "helix",
             Self::Polynomial { role: Role::Blend, .. } => "blend",
             Self::Polynomial { role: Role::Spline, .. } => "spline",
-            Self::Polynomial { role: Role::Fair, .. } => "curve",
+            Self::Polynomial { role: Role::Curve, .. } => "curve",
             Self::Involute { .. } => "involute",
         }
     }
@@ -181,6 +181,27 @@ impl Element {
                 }
             }
             Self::Polynomial { .. } | Self::Involute { .. } => *self,
+        }
+    }
+
+    /// A line or an arc in two, which meet in one point, the first of them `share` of it. Polynomials and
+    /// involutes stay whole, twice.
+    pub(super) fn split(&self, share: f64) -> [Self; 2] {
+        match *self {
+            Self::Line { from, to } => {
+                let middle = add(from, scale(subtract(to, from), share));
+                [Self::Line { from, to: middle }, Self::Line { from: middle, to }]
+            }
+            Self::Arc { from, to, shape, sweep_rad } => {
+                let angle = sweep_rad * share;
+                let middle = add(from, shape.offset(0.0, angle));
+                let rest = shape.rotated(angle);
+                [
+                    Self::Arc { from, to: middle, shape, sweep_rad: angle },
+                    Self::Arc { from: middle, to, shape: rest, sweep_rad: sweep_rad - angle },
+                ]
+            }
+            Self::Polynomial { .. } | Self::Involute { .. } => [*self, *self],
         }
     }
 

@@ -8,8 +8,8 @@
 //! tolerance are spent on making fewer lines and arcs of them, the rest on blends between these. One that
 //! stays alone among longer ones is made part of the line before it, if that can be led past their corner.
 //! Where the program gives merging a tolerance of its own (Q of G64), all lines of one feed are merged within
-//! it, and the whole tolerance of blends counts from what they became. Or curves take the place of what is
-//! dense ([`dense`](super::dense)), within both tolerances together.
+//! it, and the whole tolerance of blends counts from what they became. [`Run::faired`] puts curves in place of
+//! what is dense instead, within both tolerances together.
 //!
 //! **Who gets the room.** Blends take at most nine tenths of an element together, and where motion starts or
 //! ends half of that. A blend gets what the one at the other end does not need; if both want more, each gets

@@ -13,7 +13,7 @@ pub(super) struct Guide<'a> {
 }
 
 impl<'a> Guide<'a> {
-    /// Nothing if a part is neither a line nor an arc.
+    /// Nothing if a part is neither a line nor an arc, or has no length.
     pub(super) fn new(parts: &'a [Part]) -> Option<Self> {
         let mut starts_mm = Vec::with_capacity(parts.len() + 1);
         let mut end_mm = 0.0;
@@ -22,10 +22,14 @@ impl<'a> Guide<'a> {
             if !matches!(part.element, Element::Line { .. } | Element::Arc { .. }) {
                 return None;
             }
+            let start_mm = end_mm;
             end_mm += part.element.length_mm();
+            if !(end_mm > start_mm && end_mm.is_finite()) {
+                return None;
+            }
             starts_mm.push(end_mm);
         }
-        (end_mm > 0.0 && end_mm.is_finite()).then_some(Self { parts, starts_mm })
+        (!parts.is_empty()).then_some(Self { parts, starts_mm })
     }
 
     pub(super) fn length_mm(&self) -> f64 {
@@ -74,10 +78,10 @@ impl<'a> Guide<'a> {
         }
     }
 
-    /// Where a part is nearest to `point`, and how far \[mm\].
-    pub(super) fn nearest(&self, part: usize, point: Vector) -> (f64, f64) {
+    /// Where a part is nearest to `point` \[mm\].
+    pub(super) fn nearest_mm(&self, part: usize, point: Vector) -> f64 {
         let (start_mm, end_mm) = self.range_mm(part);
-        let foot_mm = match self.parts[part].element {
+        match self.parts[part].element {
             Element::Arc { from, shape, sweep_rad, .. } => {
                 let length_mm = end_mm - start_mm;
                 let offset = subtract(point, from);
@@ -101,9 +105,7 @@ impl<'a> Guide<'a> {
                 let share = dot(subtract(point, from), along) / dot(along, along);
                 start_mm + (end_mm - start_mm) * share.clamp(0.0, 1.0)
             }
-        };
-        let (foot, _) = self.at(part, foot_mm);
-        (foot_mm, norm(subtract(point, foot)))
+        }
     }
 
     /// The curvature of a part \[1/mm\].

@@ -3,19 +3,19 @@
 //! Points that were cut from a curve, or that something else made dense, have a corner at every joint and no
 //! room for blends that are worth it. Consumes lines and arcs, each with its tolerance and feed; produces the
 //! spans of a quintic spline, continuous to the fourth derivative, that goes on as the path does at both
-//! ends. Background; linear in the number of parts, but for the search of a point's span.
+//! ends. Background; linear in the number of parts times the logarithm of how many a line stands for.
 //!
 //! - `guide`: the path by its length;
 //! - `knots`: where the spline gets its knots;
 //! - `problem`: the curve that bends least within the tolerance, by
-//!   `band`: equations in a band;
+//!   `cholesky`: equations in a band;
 //! - `deviation`: how far the curve is from the path;
 //! - [`feeds`]: the feeds that a curve allows.
 //!
 //! **Feed.** What bends least depends on the feed: at a low one acceleration counts, at a high one snap. So
 //! the curve is made for the feeds that the one before allows, a few times.
 
-mod band;
+mod cholesky;
 mod deviation;
 pub mod feeds;
 mod guide;
@@ -130,7 +130,11 @@ fn with_knots(guide: &Guide, per_scale: f64, limits: &Limits<f64>) -> Option<Vec
             continue;
         }
         match spans(guide, &problem) {
-            Ok(spans) => return Some(spans),
+            // A curve that can't be driven is none.
+            Ok(spans) => {
+                let is_driven = spans.iter().all(|span| span.element.septics(f64::INFINITY).is_ok());
+                return is_driven.then_some(spans);
+            }
             Err(_) if tightenings == TIGHTENINGS => return None,
             Err(far) => {
                 tightenings += 1;
@@ -172,19 +176,22 @@ fn first_mm_s(
 /// made smaller by.
 fn spans(guide: &Guide, problem: &Problem) -> Result<Vec<Span>, Vec<(usize, f64)>> {
     let shapes = problem.shapes();
-    let distances = deviation::distances_mm(guide, problem.breaks(), &shapes);
+    let deviations = deviation::deviations(guide, problem.breaks(), &shapes);
     let (mut spans, mut far) = (Vec::with_capacity(shapes.len()), Vec::new());
+    // It starts and ends exactly where the path does.
+    let (start, end) =
+        (guide.parts[0].element.ends_mm().0, guide.parts[guide.parts.len() - 1].element.ends_mm().1);
     for (index, ((from, shape), ends)) in shapes.iter().zip(problem.breaks().windows(2)).enumerate() {
         let parts = (guide.part_at(ends[0]), guide.part_at(ends[1]));
-        let tolerances = guide.parts[parts.0..=parts.1].iter().map(|part| part.tolerance_mm);
-        let tolerance_mm = tolerances.fold(f64::INFINITY, f64::min);
+        let deviation = deviations[index];
         // Written so that what is not a number is too far.
-        if !(distances[index] <= tolerance_mm) {
-            far.push((index, (BELOW * tolerance_mm / distances[index]).max(TIGHTENED_MIN)));
+        if !(deviation.share <= 1.0) {
+            far.push((index, (BELOW / deviation.share).max(TIGHTENED_MIN)));
         }
-        let to: Vector = shapes.get(index + 1).map_or_else(|| guide.end(true)[0], |next| next.0);
-        let element = Element::Polynomial { from: *from, to, shape: *shape, role: Role::Fair };
-        spans.push(Span { element, parts, distance_mm: distances[index] });
+        let from = if index == 0 { start } else { *from };
+        let to: Vector = shapes.get(index + 1).map_or(end, |next| next.0);
+        let element = Element::Polynomial { from, to, shape: *shape, role: Role::Curve };
+        spans.push(Span { element, parts, distance_mm: deviation.distance_mm });
     }
     if far.is_empty() { Ok(spans) } else { Err(far) }
 }

@@ -12,7 +12,7 @@
 
 use super::super::spline::basis::{Row, clamped, row};
 use super::super::{Vector, add, dot, norm, scale, subtract};
-use super::band::{ACTING, Band};
+use super::cholesky::{ACTING, Cholesky};
 use super::guide::Guide;
 use crate::toolpath::Polynomial;
 use crate::toolpath::polynomial::DEGREE as POWERS;
@@ -68,7 +68,7 @@ pub(super) struct Problem {
     samples: Vec<Sample>,
     bendings: Vec<Bending>,
     control: Vec<Vector>,
-    band: Band,
+    equations: Cholesky,
 }
 
 impl Problem {
@@ -96,8 +96,8 @@ impl Problem {
             })
             .collect();
         let samples = samples(guide, &breaks, &knots);
-        let band = Band::new(points - 2 * DECIDED);
-        Self { breaks, knots, samples, bendings, control, band }
+        let equations = Cholesky::new(points - 2 * DECIDED);
+        Self { breaks, knots, samples, bendings, control, equations }
     }
 
     /// The lengths of the spans \[mm\].
@@ -226,7 +226,7 @@ impl Problem {
     pub(super) fn step(&mut self, aim: f64, wide: f64) -> Option<f64> {
         let free = self.control.len() - 2 * DECIDED;
         let per_sample = aim / self.samples.len() as f64;
-        self.band.clear();
+        self.equations.clear();
         let mut slope = vec![[0.0; 3]; free];
         let at = |index: usize| index.checked_sub(DECIDED).filter(|&index| index < free);
         for (span, bending) in self.bendings.iter().enumerate() {
@@ -243,7 +243,7 @@ impl Problem {
                 let Some(row) = at(span + a) else { continue };
                 for b in 0..=a {
                     if let Some(column) = at(span + b) {
-                        self.band.add_unit(row, column, bending.gram[a][b]);
+                        self.equations.add_unit(row, column, bending.gram[a][b]);
                     }
                 }
             }
@@ -263,12 +263,12 @@ impl Problem {
                 slope[row] = subtract(slope[row], scale(pulled, push * sample.row[a]));
                 for b in 0..=a {
                     if let Some(column) = at(sample.first + b) {
-                        self.band.add(row, column, sample.row[a] * sample.row[b], &curvature);
+                        self.equations.add(row, column, sample.row[a] * sample.row[b], &curvature);
                     }
                 }
             }
         }
-        if !self.band.solve(&mut slope) {
+        if !self.equations.solve(&mut slope) {
             return None;
         }
         let step = slope;

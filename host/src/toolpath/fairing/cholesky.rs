@@ -8,11 +8,11 @@ pub(super) const ACTING: usize = 6;
 const WIDTH: usize = 3 * ACTING;
 
 /// The lower triangle of the matrix of points whose entries couple at most [`ACTING`] neighbours.
-pub(super) struct Band {
+pub(super) struct Cholesky {
     rows: Vec<[f64; WIDTH]>,
 }
 
-impl Band {
+impl Cholesky {
     pub(super) fn new(points: usize) -> Self {
         Self { rows: vec![[0.0; WIDTH]; 3 * points] }
     }
@@ -47,9 +47,9 @@ impl Band {
             for back in (0..=reach).rev() {
                 // L[r][c] = (A[r][c] − Σ L[r][k]·L[c][k]) / L[c][c]
                 let c = r - back;
-                let shared = reach.min(WIDTH - 1).saturating_sub(back).min(c);
-                let (before, rest) = self.rows.split_at_mut(r);
-                let row = &mut rest[0];
+                let shared = reach - back;
+                let (before, row) = self.rows.split_at_mut(r);
+                let row = &mut row[0];
                 let at = WIDTH - 1 - back;
                 if back == 0 {
                     let sum: f64 = row[at - shared..at].iter().map(|entry| entry * entry).sum();
@@ -102,7 +102,7 @@ mod tests {
         };
         let size = 3 * points;
         let mut full = vec![vec![0.0; size]; size];
-        let mut band = Band::new(points);
+        let mut band = Cholesky::new(points);
         for row in 0..points {
             for column in row.saturating_sub(ACTING - 1)..=row {
                 let diagonal = if row == column { 20.0 } else { 0.0 };
@@ -128,7 +128,7 @@ mod tests {
         for (index, expected) in expected.iter().enumerate() {
             assert!((sides[index / 3][index % 3] - expected).abs() < 1e-13);
         }
-        let mut indefinite = Band::new(2);
+        let mut indefinite = Cholesky::new(2);
         indefinite.add_unit(0, 0, 1.0);
         indefinite.add_unit(1, 1, -1.0);
         assert!(!indefinite.solve(&mut [[0.0; 3]; 2]));
