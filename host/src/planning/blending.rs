@@ -25,7 +25,7 @@ use motion_kernel::plan::{
 };
 
 use super::Mode;
-use super::ceilings::{Ceilings, ceilings, junction_feed, lower_along_curves};
+use super::ceilings::{Ceilings, along, ceilings, junction_feed};
 use super::error::Problem;
 use super::lookahead::lookahead;
 use super::stretch::StretchBlock;
@@ -96,57 +96,54 @@ impl Variants {
 /// with the program line.
 pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlock>> {
     let mut candidates = curved(moves, machine);
-    let fastest_s = |candidates: &[Vec<StretchBlock>]| {
-        candidates.iter().map(|blocks| run_time_s(blocks, machine.tick_s)).fold(f64::INFINITY, f64::min)
-    };
+    let fastest_s = candidates.iter().map(|timed| timed.time_s).fold(f64::INFINITY, f64::min);
     let junctions = Junctions::new(Run::new(moves), machine)?;
     let is_merged = junctions.run.moves().len() < moves.len();
     let merged = junctions.exact();
-    let chosen = junctions.choose(&merged, fastest_s(&candidates))?;
+    let chosen = junctions.choose(&merged, fastest_s)?;
     if chosen.is_empty() && is_merged {
-        candidates.push(junctions.blocks(&merged));
+        candidates.push(junctions.timed(&merged));
     }
-    candidates.extend(chosen.iter().map(|chosen| junctions.blocks(chosen)));
+    candidates.extend(chosen);
     if candidates.is_empty() {
         return Ok(junctions.blocks(&merged));
     }
-    let exact = if is_merged {
+    let mut best = if is_merged {
         let junctions = Junctions::new(Run::exact(moves), machine)?;
-        junctions.blocks(&junctions.exact())
+        junctions.timed(&junctions.exact())
     } else {
-        junctions.blocks(&merged)
+        junctions.timed(&merged)
     };
-    let mut best = exact;
-    let mut most_s = run_time_s(&best, machine.tick_s) / (1.0 - EXACT_GAIN_MIN);
-    for blocks in candidates {
-        let time_s = run_time_s(&blocks, machine.tick_s);
-        if time_s < most_s {
-            (best, most_s) = (blocks, time_s);
+    best.time_s /= 1.0 - EXACT_GAIN_MIN;
+    for timed in candidates {
+        if timed.time_s < best.time_s {
+            best = timed;
         }
     }
-    Ok(best)
+    Ok(best.blocks)
 }
 
 /// The blocks of a run with curves in place of what is dense, once for each of [`CORNERS_RAD`] that makes a
 /// difference.
-fn curved(moves: &[Move], machine: &Machine) -> Vec<Vec<StretchBlock>> {
+fn curved(moves: &[Move], machine: &Machine) -> Vec<Timed> {
     let limits = machine.limits().in_any_direction();
-    let (mut candidates, mut before, mut most_s) = (Vec::new(), None, f64::INFINITY);
-    for corner_rad in CORNERS_RAD {
-        let Some(run) = Run::faired(moves, corner_rad, &limits, machine.path.feed_mm_s) else { continue };
-        if before.as_deref() == Some(run.moves()) {
-            continue;
-        }
-        before = Some(run.moves().to_vec());
+    let (mut candidates, mut most_s) = (Vec::new(), f64::INFINITY);
+    for run in Run::faired(moves, &CORNERS_RAD, &limits, machine.path.feed_mm_s) {
         // Nobody has programmed a curve: one that has no ceilings is no candidate.
         let Ok(junctions) = Junctions::new(run, machine) else { continue };
         let exact = junctions.exact();
-        let Ok(chosen) = junctions.choose(&exact, most_s) else { continue };
-        let blocks = junctions.blocks(chosen.last().unwrap_or(&exact));
-        most_s = most_s.min(run_time_s(&blocks, machine.tick_s));
-        candidates.push(blocks);
+        let Ok(mut chosen) = junctions.choose(&exact, most_s) else { continue };
+        let timed = chosen.pop().unwrap_or_else(|| junctions.timed(&exact));
+        most_s = most_s.min(timed.time_s);
+        candidates.push(timed);
     }
     candidates
+}
+
+/// The blocks of a run, and the time that they take \[s\], infinite if there is no plan.
+struct Timed {
+    blocks: Vec<StretchBlock>,
+    time_s: f64,
 }
 
 /// The junctions of a run.
@@ -161,18 +158,17 @@ struct Junctions<'a> {
 
 impl<'a> Junctions<'a> {
     fn new(run: Run, machine: &'a Machine) -> AtLine<Self> {
-        let mut all = Vec::with_capacity(run.moves().len());
-        for step in run.moves() {
-            let greatest = step.element.greatest();
-            all.push(ceilings(step, &greatest, machine.path.curve_feed_share, machine)?);
-        }
-        lower_along_curves(run.moves(), &mut all, machine)?;
-        Ok(Self { run, ceilings: all, machine, limits: machine.limits().in_any_direction() })
+        Ok(Self {
+            ceilings: along(run.moves(), machine)?,
+            run,
+            machine,
+            limits: machine.limits().in_any_direction(),
+        })
     }
 
-    /// The crossings with all blends at their longest, and those that were found best one by one, unless the
-    /// first take so much longer than `most_s` that these would, too; none where there is nothing to blend.
-    fn choose(&self, exact: &[Crossing], most_s: f64) -> AtLine<Vec<Vec<Crossing>>> {
+    /// The run with all blends at their longest, and with those that were found best one by one, unless the
+    /// first takes so much longer than `most_s` that this would, too; none where there is nothing to blend.
+    fn choose(&self, exact: &[Crossing], most_s: f64) -> AtLine<Vec<Timed>> {
         // First as if each were alone, then those that touch within what the other leaves.
         let alone_mm: Vec<f64> = (0..exact.len()).map(|junction| self.longest_mm(junction)).collect();
         let mut variants = Vec::with_capacity(exact.len());
@@ -189,8 +185,8 @@ impl<'a> Junctions<'a> {
                 chosen[junction] = self.best(junction, &chosen, variants.longest());
             }
         }
-        let longest = chosen.clone();
-        if run_time_s(&self.blocks(&longest), self.machine.tick_s) > PROMISING * most_s {
+        let longest = self.timed(&chosen);
+        if longest.time_s > PROMISING * most_s {
             return Ok(vec![longest]);
         }
         // Junctions next to a change are planned again.
@@ -213,7 +209,7 @@ impl<'a> Junctions<'a> {
                 }
             }
         }
-        Ok(vec![longest, chosen])
+        Ok(vec![longest, self.timed(&chosen)])
     }
 
     /// The trim of the longest blend of a junction, 0 if there is none \[mm\].
@@ -309,6 +305,12 @@ impl<'a> Junctions<'a> {
             }
         }
         blocks
+    }
+
+    /// The blocks of the run, with their time.
+    fn timed(&self, crossings: &[Crossing]) -> Timed {
+        let blocks = self.blocks(crossings);
+        Timed { time_s: run_time_s(&blocks, self.machine.tick_s), blocks }
     }
 
     /// The blocks of the run.
@@ -410,8 +412,8 @@ mod tests {
         let machine = Machine::reference();
         let junctions = Junctions::new(Run::new(moves), &machine).expect("a machine's limits");
         let exact = junctions.exact();
-        let chosen = junctions.choose(&exact, f64::INFINITY).expect("limits");
-        junctions.blocks(chosen.last().expect("corners"))
+        let mut chosen = junctions.choose(&exact, f64::INFINITY).expect("limits");
+        chosen.pop().expect("corners").blocks
     }
 
     fn kinds(blocks: &[StretchBlock]) -> Vec<(u32, &'static str)> {

@@ -37,41 +37,44 @@ pub(super) fn ceilings(
 
 /// The part of the feed that a curve through dense moves allows, with which it is driven: where it is
 /// tightest the feed hardly changes, and before and behind it is lower anyhow.
-const FAIR_FEED_SHARE: f64 = 0.93;
+const SMOOTH_FEED_SHARE: f64 = 0.93;
 
-/// Lowers the ceilings of the curves through dense moves to the feeds that ramps between their slowest spans
-/// reach. That leaves more of the limits for the ramps. An error comes with the program line.
-pub(super) fn lower_along_curves(
-    moves: &[Move],
-    all: &mut [Ceilings],
-    machine: &Machine,
-) -> Result<(), (u32, Problem)> {
-    let is_fair = |step: &Move| matches!(step.element, Element::Polynomial { role: Role::Curve, .. });
-    let limits = machine.limits().in_any_direction();
-    let mut first = 0;
-    for curve in moves.chunk_by(|before, after| is_fair(before) == is_fair(after)) {
-        let all = &mut all[first..first + curve.len()];
-        first += curve.len();
-        if !curve.first().is_some_and(is_fair) {
+/// The ceilings of moves that follow each other. An error comes with the program line.
+pub(super) fn along(moves: &[Move], machine: &Machine) -> Result<Vec<Ceilings>, (u32, Problem)> {
+    let is_curve = |step: &Move| matches!(step.element, Element::Polynomial { role: Role::Curve, .. });
+    let mut all = Vec::with_capacity(moves.len());
+    for moves in moves.chunk_by(|before, after| is_curve(before) == is_curve(after)) {
+        if moves.first().is_some_and(is_curve) {
+            all.extend(along_curve(moves, machine)?);
             continue;
         }
-        let greatest: Vec<Greatest> = curve.iter().map(|step| step.element.greatest()).collect();
-        for ((ceiling, step), greatest) in all.iter_mut().zip(curve).zip(&greatest) {
-            *ceiling = ceilings(step, greatest, FAIR_FEED_SHARE, machine)?;
-        }
-        let mut feeds: Vec<f64> = all.iter().map(|ceilings| ceilings.programmed.feed_mm_s).collect();
-        let lengths: Vec<f64> = curve.iter().map(|step| step.element.length_mm()).collect();
-        lower(&mut feeds, &lengths, &limits);
-        for (((ceiling, step), greatest), feed_mm_s) in all.iter_mut().zip(curve).zip(&greatest).zip(feeds) {
-            if feed_mm_s < ceiling.programmed.feed_mm_s {
-                let reason = ceiling.programmed.reason;
-                let lowered = ceilings(&Move { feed_mm_s, ..*step }, greatest, FAIR_FEED_SHARE, machine)?;
-                let lowered = Ceiling { reason, ..lowered.programmed };
-                *ceiling = Ceilings { programmed: lowered, greatest: lowered };
-            }
+        for step in moves {
+            all.push(ceilings(step, &step.element.greatest(), machine.path.curve_feed_share, machine)?);
         }
     }
-    Ok(())
+    Ok(all)
+}
+
+/// The ceilings of a curve through dense moves: those of its spans, lowered to the feeds that ramps between
+/// the slowest of them reach. That leaves more of the limits for the ramps.
+fn along_curve(spans: &[Move], machine: &Machine) -> Result<Vec<Ceilings>, (u32, Problem)> {
+    let greatest: Vec<Greatest> = spans.iter().map(|step| step.element.greatest()).collect();
+    let mut all = Vec::with_capacity(spans.len());
+    for (step, greatest) in spans.iter().zip(&greatest) {
+        all.push(ceilings(step, greatest, SMOOTH_FEED_SHARE, machine)?);
+    }
+    let mut feeds: Vec<f64> = all.iter().map(|ceilings| ceilings.programmed.feed_mm_s).collect();
+    let lengths: Vec<f64> = spans.iter().map(|step| step.element.length_mm()).collect();
+    lower(&mut feeds, &lengths, &machine.limits().in_any_direction());
+    for (((ceiling, step), greatest), feed_mm_s) in all.iter_mut().zip(spans).zip(&greatest).zip(feeds) {
+        if feed_mm_s < ceiling.programmed.feed_mm_s {
+            let reason = ceiling.programmed.reason;
+            let lowered = ceilings(&Move { feed_mm_s, ..*step }, greatest, SMOOTH_FEED_SHARE, machine)?;
+            let lowered = Ceiling { reason, ..lowered.programmed };
+            *ceiling = Ceilings { programmed: lowered, greatest: lowered };
+        }
+    }
+    Ok(all)
 }
 
 /// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.

@@ -9,7 +9,7 @@ use motion_kernel::law::Limits;
 use super::blend::{ANGLE_MAX_RAD, trim_mm};
 use super::element::Element;
 use super::fairing::{Part, fair};
-use super::smooth::{Move, TAKEN_MAX, TANGENT_ROUNDING_RAD};
+use super::smooth::{Move, TAKEN_MAX, TANGENT_ROUNDING_RAD, is_smooth};
 use super::{angle, norm, subtract};
 
 /// Distance of a blend from a jump of curvature over the jump and the square of its trim.
@@ -19,15 +19,23 @@ const LONG: f64 = 2.0;
 /// How much more of a long move a curve takes than a blend would.
 const MARGIN: f64 = 4.0;
 
-/// The moves with curves in place of what is dense, and how far each is from those it stands for \[mm\];
-/// nothing if nothing is dense. See [`Run::faired`](super::smooth::Run::faired).
+/// The moves with curves in place of what is dense, and how far each is from those it stands for \[mm\]: once
+/// for each angle above which a corner stays one, if it makes a difference; nothing if nothing is dense. See
+/// [`Run::faired`](super::smooth::Run::faired).
 pub(super) fn faired(
     moves: &[Move],
-    corner_rad: f64,
+    corners_rad: &[f64],
     limits: &Limits<f64>,
     feed_mm_s: f64,
-) -> Option<(Vec<Move>, Vec<f64>)> {
-    let run = Moves::new(moves, corner_rad);
+) -> Vec<(Vec<Move>, Vec<f64>)> {
+    let mut runs: Vec<Moves> = corners_rad.iter().map(|&corner_rad| Moves::new(moves, corner_rad)).collect();
+    // A curve takes much longer to find than what a corner changes.
+    runs.dedup_by(|run, before| run.wanted_mm == before.wanted_mm);
+    runs.iter().filter_map(|run| with_curves(run, limits, feed_mm_s)).collect()
+}
+
+fn with_curves(run: &Moves, limits: &Limits<f64>, feed_mm_s: f64) -> Option<(Vec<Move>, Vec<f64>)> {
+    let moves = run.moves;
     let mut made = Made::default();
     let (mut first, mut is_faired) = (0, false);
     // What the curve before has left of the first move.
@@ -136,16 +144,17 @@ impl<'a> Moves<'a> {
             let [taken, left] = end.split(self.share(self.lengths_mm[last], last - 1, last - 1));
             (end, behind) = (taken, Some(left));
         }
-        let part = |index: usize| {
-            let step = &self.moves[index];
-            let element = match index {
-                _ if index == first => start,
-                _ if index == last => end,
-                _ => step.element,
-            };
-            Part { element, tolerance_mm: tolerance_mm(step), feed_mm_s: step.feed_mm_s.min(feed_mm_s) }
-        };
-        Cut { before, parts: (first..=last).map(part).collect(), behind }
+        let mut parts: Vec<Part> = self.moves[first..=last]
+            .iter()
+            .map(|step| Part {
+                element: step.element,
+                tolerance_mm: tolerance_mm(step),
+                feed_mm_s: step.feed_mm_s.min(feed_mm_s),
+            })
+            .collect();
+        parts[0].element = start;
+        parts[last - first].element = end;
+        Cut { before, parts, behind }
     }
 }
 
@@ -168,18 +177,13 @@ fn wanted_mm(before: &Move, after: &Move, corner_rad: f64) -> Option<f64> {
     if angle_rad > corner_rad.min(ANGLE_MAX_RAD) {
         return None;
     }
-    // Arcs of one circle have none, but for rounding.
+    if is_smooth([&before.element, &after.element]) {
+        return Some(0.0);
+    }
     let jump_per_mm = norm(subtract(start.curvature, end.curvature));
-    let rounding_per_mm = TANGENT_ROUNDING_RAD * norm(start.curvature).max(norm(end.curvature));
     let by_angle_mm =
         if angle_rad > TANGENT_ROUNDING_RAD { trim_mm(angle_rad, tolerance_mm) } else { f64::INFINITY };
-    let by_jump_mm = if jump_per_mm > rounding_per_mm {
-        (tolerance_mm / (JUMP * jump_per_mm)).sqrt()
-    } else {
-        f64::INFINITY
-    };
-    let wanted_mm = by_angle_mm.min(by_jump_mm);
-    Some(if wanted_mm.is_finite() { wanted_mm } else { 0.0 })
+    Some(by_angle_mm.min((tolerance_mm / (JUMP * jump_per_mm)).sqrt()))
 }
 
 /// How far a curve may be from a move \[mm\]: merging is for lines.

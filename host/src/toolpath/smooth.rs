@@ -75,12 +75,14 @@ impl Run {
         Self::of(moves, distances_mm)
     }
 
-    /// The run of `moves` with curves in place of what is dense, made for `limits` and at most `feed_mm_s`. A
-    /// turn of more than `corner_rad` stays a corner.
+    /// The runs of `moves` with curves in place of what is dense, made for `limits` and at most `feed_mm_s`: one
+    /// for each of `corners_rad` that makes a difference. A turn of more than that stays a corner.
     #[must_use]
-    pub fn faired(moves: &[Move], corner_rad: f64, limits: &Limits<f64>, feed_mm_s: f64) -> Option<Self> {
-        let (moves, distances_mm) = faired(moves, corner_rad, limits, feed_mm_s)?;
-        Some(Self::of(moves, distances_mm))
+    pub fn faired(moves: &[Move], corners_rad: &[f64], limits: &Limits<f64>, feed_mm_s: f64) -> Vec<Self> {
+        let made = faired(moves, corners_rad, limits, feed_mm_s).into_iter();
+        let mut runs: Vec<Self> = made.map(|(moves, distances_mm)| Self::of(moves, distances_mm)).collect();
+        runs.dedup_by(|run, before| run.moves == before.moves);
+        runs
     }
 
     /// The run of `moves` as they are, nothing merged.
@@ -262,7 +264,7 @@ impl Room {
 }
 
 /// Whether nothing steps from one element to the next.
-fn is_smooth([before, after]: [&Element; 2]) -> bool {
+pub(super) fn is_smooth([before, after]: [&Element; 2]) -> bool {
     let ([_, end], [start, _]) = (before.ends(), after.ends());
     let step = norm(subtract(start.curvature, end.curvature));
     angle(end.tangent, start.tangent) <= TANGENT_ROUNDING_RAD

@@ -10,12 +10,11 @@
 //! sample pushes back with a force that grows as the curve comes near to its sphere, and where all are in
 //! balance, the sum of forces times room bounds what is left to gain.
 
-use super::super::spline::basis::{Row, clamped, row};
+use super::super::spline::basis::{Row, clamped, polynomial, row};
 use super::super::{Vector, add, dot, norm, scale, subtract};
 use super::cholesky::{ACTING, Cholesky};
 use super::guide::Guide;
 use crate::toolpath::Polynomial;
-use crate::toolpath::polynomial::DEGREE as POWERS;
 use motion_kernel::law::Limits;
 
 /// Degree of the spline.
@@ -176,11 +175,10 @@ impl Problem {
 
     /// Makes the tolerance of the samples on a span smaller by `factor`.
     pub(super) fn tighten(&mut self, span: usize, factor: f64) {
-        let first = span.saturating_sub(1);
-        for sample in &mut self.samples {
-            if (first..=span + 1).contains(&sample.first) {
-                sample.per_square /= factor * factor;
-            }
+        // They are in the order of the spans.
+        let first = self.samples.partition_point(|sample| sample.first + 1 < span);
+        for sample in self.samples[first..].iter_mut().take_while(|sample| sample.first <= span + 1) {
+            sample.per_square /= factor * factor;
         }
     }
 
@@ -328,25 +326,14 @@ impl Problem {
 
     /// Start and shape of each span.
     pub(super) fn shapes(&self) -> Vec<(Vector, Polynomial)> {
-        let of_span = |(span, ends): (usize, &[f64])| {
+        let of_span = |span: usize| {
             let acting = &self.control[span..span + ACTING];
-            let derivative = |order: usize| {
-                let row = row(&self.knots, DEGREE, DEGREE + span, ends[0], order);
-                // Relative to the first control point, so that nothing is lost far from the origin.
-                acting
-                    .iter()
-                    .zip(row)
-                    .fold([0.0; 3], |sum, (&c, f)| add(sum, scale(subtract(c, acting[0]), f)))
-            };
-            let mut coefficients = [[0.0; 3]; POWERS];
-            let mut power = 1.0;
-            for (order, coefficient) in (1..=DEGREE).zip(&mut coefficients) {
-                power *= (ends[1] - ends[0]) / order as f64;
-                *coefficient = scale(derivative(order), power);
-            }
-            (add(acting[0], derivative(0)), Polynomial::new(coefficients))
+            // Relative to the first control point, so that nothing is lost far from the origin.
+            let relative: [Vector; ACTING] = core::array::from_fn(|index| subtract(acting[index], acting[0]));
+            let (offset, shape) = polynomial(&self.knots, DEGREE, DEGREE + span, &relative);
+            (add(acting[0], offset), shape)
         };
-        self.breaks.windows(2).enumerate().map(of_span).collect()
+        (0..self.breaks.len() - 1).map(of_span).collect()
     }
 }
 

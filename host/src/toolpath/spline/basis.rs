@@ -1,6 +1,8 @@
 //! B-spline basis functions over a knot vector, and their derivatives.
 
 use super::DEGREE_MAX;
+use crate::toolpath::polynomial::{self, Polynomial};
+use crate::toolpath::{Vector, add, scale};
 
 /// Factors of the control points that act on one span, the first one first; unused ones are 0.
 pub(in crate::toolpath) type Row = [f64; DEGREE_MAX + 1];
@@ -37,6 +39,30 @@ pub(in crate::toolpath) fn row(knots: &[f64], degree: usize, span: usize, u: f64
         row = below;
     }
     row
+}
+
+/// The start, and the polynomial from there, of the span between `knots[span]` and the knot behind it, on
+/// which the control points `acting` act.
+pub(in crate::toolpath) fn polynomial(
+    knots: &[f64],
+    degree: usize,
+    span: usize,
+    acting: &[Vector],
+) -> (Vector, Polynomial) {
+    let (u, width) = (knots[span], knots[span + 1] - knots[span]);
+    let derivative = |order: usize| {
+        let row = row(knots, degree, span, u, order);
+        let terms = row.iter().zip(acting);
+        terms.fold([0.0; 3], |sum, (&factor, &point)| add(sum, scale(point, factor)))
+    };
+    let mut coefficients = [[0.0; 3]; polynomial::DEGREE];
+    let mut power = 1.0;
+    for (order, coefficient) in (1..=degree).zip(&mut coefficients) {
+        // hᵏ/k!
+        power *= width / order as f64;
+        *coefficient = scale(derivative(order), power);
+    }
+    (derivative(0), Polynomial::new(coefficients))
 }
 
 /// The knot vector of `breaks`, with the ends as often as a curve that starts and ends in its control points

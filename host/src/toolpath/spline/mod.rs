@@ -17,7 +17,7 @@ pub(in crate::toolpath) mod basis;
 
 use self::band::Band;
 use super::element::{Element, Role};
-use super::polynomial::{self, Polynomial};
+use super::polynomial::Polynomial;
 use super::{Vector, add, norm, scale, subtract};
 
 /// Highest degree.
@@ -413,21 +413,9 @@ fn least_squares(
         points_to: Vec::new(),
     };
     for (index, pair) in breaks.windows(2).enumerate() {
-        let derivative = |order: usize| {
-            let row = basis::row(&knots, p, p + index, pair[0], order);
-            row.iter()
-                .zip(&control[index..])
-                .fold([0.0; 3], |sum, (&factor, &point)| add(sum, scale(point, factor)))
-        };
-        spline.starts.push(add(points[0], derivative(0)));
-        let mut coefficients = [[0.0; 3]; polynomial::DEGREE];
-        let mut power = 1.0;
-        for (order, coefficient) in (1..=p).zip(&mut coefficients) {
-            // hᵏ/k!
-            power *= (pair[1] - pair[0]) / order as f64;
-            *coefficient = scale(derivative(order), power);
-        }
-        spline.spans.push(Polynomial::new(coefficients));
+        let (offset, shape) = basis::polynomial(&knots, p, p + index, &control[index..]);
+        spline.starts.push(add(points[0], offset));
+        spline.spans.push(shape);
         spline.points_to.push(parameters.partition_point(|&u| u <= pair[1]));
     }
     let (mut farthest, mut deviation_mm) = (0, 0.0);
