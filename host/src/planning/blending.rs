@@ -78,17 +78,14 @@ impl Crossing {
 struct Variants {
     /// The greatest trim of either move \[mm\].
     room_mm: f64,
+    /// How many of [`SIZES`] have been tried.
+    sizes: usize,
     all: Vec<Crossing>,
 }
 
 impl Variants {
     fn are_blends(&self) -> bool {
         self.all.len() > 1
-    }
-
-    /// The crossings with the longest blend, or the one without a blend.
-    fn longest(&self) -> &[Crossing] {
-        if self.are_blends() { &self.all[..2] } else { &self.all }
     }
 }
 
@@ -174,7 +171,7 @@ impl<'a> Junctions<'a> {
         let mut variants = Vec::with_capacity(exact.len());
         for (junction, &longest_mm) in alone_mm.iter().enumerate() {
             let room_mm = self.room_mm(junction, |junction| alone_mm[junction]).min(longest_mm);
-            variants.push(self.variants(junction, room_mm, exact[junction])?);
+            variants.push(self.variants(junction, room_mm, 1, exact[junction])?);
         }
         if !variants.iter().any(Variants::are_blends) {
             return Ok(Vec::new());
@@ -182,7 +179,8 @@ impl<'a> Junctions<'a> {
         let mut chosen: Vec<Crossing> = variants.iter().map(|variants| variants.all[0]).collect();
         for (junction, variants) in variants.iter().enumerate() {
             if variants.are_blends() {
-                chosen[junction] = self.best(junction, &chosen, variants.longest());
+                let blends = &variants.all[..variants.all.len() - 1];
+                chosen[junction] = self.best(junction, &chosen, blends);
             }
         }
         let longest = self.timed(&chosen);
@@ -198,8 +196,9 @@ impl<'a> Junctions<'a> {
                 }
                 let room_mm =
                     self.room_mm(junction, |junction| chosen[junction].trim_mm()).min(alone_mm[junction]);
-                if room_mm != variants[junction].room_mm {
-                    variants[junction] = self.variants(junction, room_mm, exact[junction])?;
+                let known = &mut variants[junction];
+                if (room_mm, SIZES.len()) != (known.room_mm, known.sizes) {
+                    *known = self.variants(junction, room_mm, SIZES.len(), exact[junction])?;
                 }
                 let best = self.best(junction, &chosen, &variants[junction].all);
                 if best != std::mem::replace(&mut chosen[junction], best) {
@@ -237,10 +236,11 @@ impl<'a> Junctions<'a> {
         Crossing { blend: None, feed_mm_s: feed_mm_s.min(before.1.feed_mm_s).min(after.1.feed_mm_s) }
     }
 
-    fn variants(&self, junction: usize, room_mm: f64, exact: Crossing) -> AtLine<Variants> {
+    /// The crossings of a junction with blends of the first `sizes` of [`SIZES`].
+    fn variants(&self, junction: usize, room_mm: f64, sizes: usize, exact: Crossing) -> AtLine<Variants> {
         let [before, after] = [junction, junction + 1].map(|index| self.run.moves()[index]);
         let mut all = Vec::with_capacity(2 * SIZES.len() + 1);
-        for size in SIZES {
+        for &size in &SIZES[..sizes] {
             let Some(blend) = self.run.blend(junction, size * room_mm, &self.limits) else { continue };
             let feed_mm_s = before.feed_mm_s.min(after.feed_mm_s);
             let step = Move { element: blend.element, feed_mm_s, ..before };
@@ -254,7 +254,7 @@ impl<'a> Junctions<'a> {
             }
         }
         all.push(exact);
-        Ok(Variants { room_mm, all })
+        Ok(Variants { room_mm, sizes, all })
     }
 
     /// The best of some crossings of a junction, the others being crossed as `chosen` says.

@@ -7,6 +7,9 @@ pub(super) const ACTING: usize = 6;
 /// Entries of a row, the diagonal last.
 const WIDTH: usize = 3 * ACTING;
 
+/// What the diagonal is made greater by, as a part of it, so that rounding leaves the pivots above 0.
+const RAISED: f64 = 1.0e-13;
+
 /// The lower triangle of the matrix of points whose entries couple at most [`ACTING`] neighbours.
 pub(super) struct Cholesky {
     rows: Vec<[f64; WIDTH]>,
@@ -53,7 +56,7 @@ impl Cholesky {
                 let at = WIDTH - 1 - back;
                 if back == 0 {
                     let sum: f64 = row[at - shared..at].iter().map(|entry| entry * entry).sum();
-                    let rest = row[at] - sum;
+                    let rest = row[at] * (1.0 + RAISED) - sum;
                     if !(rest > 0.0) {
                         return false;
                     }

@@ -2,14 +2,30 @@
 
 use motion_kernel::law::Limits;
 
-/// Part of the acceleration and the jerk that the ramps may take: the rest bends.
+/// Part of the acceleration and the jerk that ramps may take where bends take the rest, and where a span is
+/// driven so much slower than it allows that its bends take hardly any.
 const RAMP_SHARE: f64 = 0.4;
+const STEEP_SHARE: f64 = 0.9;
+const SLOWER: f64 = 1.5;
 /// Halvings of the rise of a ramp.
 const HALVINGS: usize = 20;
 
 /// Lowers the greatest feeds of spans \[mm/s\] to what ramps from the slower ones can make of them. A span
 /// costs a step for each of the spans that it slows down.
 pub fn lower(feeds_mm_s: &mut [f64], lengths_mm: &[f64], limits: &Limits<f64>) {
+    let own = feeds_mm_s.to_vec();
+    let mut steep = own.clone();
+    lower_to(RAMP_SHARE, feeds_mm_s, lengths_mm, limits);
+    lower_to(STEEP_SHARE, &mut steep, lengths_mm, limits);
+    for ((feed, steep), own) in feeds_mm_s.iter_mut().zip(steep).zip(own) {
+        *feed = feed.max(steep.min(own / SLOWER));
+    }
+}
+
+/// Lowers feeds to what ramps with a share of the limits reach.
+fn lower_to(share: f64, feeds_mm_s: &mut [f64], lengths_mm: &[f64], limits: &Limits<f64>) {
+    let limits =
+        Limits { accel_mm_s2: share * limits.accel_mm_s2, jerk_mm_s3: share * limits.jerk_mm_s3, ..*limits };
     let own = feeds_mm_s.to_vec();
     let most_mm_s = own.iter().copied().fold(0.0, f64::max);
     let mut order: Vec<usize> = (0..own.len()).collect();
@@ -21,8 +37,8 @@ pub fn lower(feeds_mm_s: &mut [f64], lengths_mm: &[f64], limits: &Limits<f64>) {
             continue;
         }
         let ahead = from + 1..own.len();
-        lower_from(least_mm_s, most_mm_s, ahead, feeds_mm_s, lengths_mm, limits);
-        lower_from(least_mm_s, most_mm_s, (0..from).rev(), feeds_mm_s, lengths_mm, limits);
+        lower_from(least_mm_s, most_mm_s, ahead, feeds_mm_s, lengths_mm, &limits);
+        lower_from(least_mm_s, most_mm_s, (0..from).rev(), feeds_mm_s, lengths_mm, &limits);
     }
 }
 
@@ -57,7 +73,7 @@ fn lower_from(
 
 /// The length of a ramp that rises from a feed \[mm\].
 fn ramp_mm(from_mm_s: f64, rise_mm_s: f64, limits: &Limits<f64>) -> f64 {
-    let (accel, jerk) = (RAMP_SHARE * limits.accel_mm_s2, RAMP_SHARE * limits.jerk_mm_s3);
+    let (accel, jerk) = (limits.accel_mm_s2, limits.jerk_mm_s3);
     let time_s = if rise_mm_s > accel * accel / jerk {
         rise_mm_s / accel + accel / jerk
     } else {
@@ -95,6 +111,30 @@ mod tests {
         // Rising on both sides, and free where the ramp has ended.
         assert!(feeds[..=100].windows(2).all(|pair| pair[0] >= pair[1]));
         assert_eq!((feeds[0], feeds[199]), (50.0, 50.0));
-        assert!(feeds[95] < 25.0 && feeds[95] > 6.0, "{}", feeds[95]);
+        assert!(feeds[95] < 30.0 && feeds[95] > 6.0, "{}", feeds[95]);
+    }
+
+    /// A ramp is steep where bends leave it the limits, and not where they take them.
+    #[test]
+    fn ramps_are_steep_where_little_bends() {
+        let at_end = |allowed_mm_s: f64| {
+            let mut feeds = [allowed_mm_s; 8];
+            feeds[0] = 5.0;
+            lower(&mut feeds, &[0.5; 8], &LIMITS);
+            feeds[7]
+        };
+        let [tight, between, free] = [30.0, 45.0, 80.0].map(at_end);
+        let ramp_mm = |to_mm_s: f64, share: f64| {
+            let limits = Limits {
+                accel_mm_s2: share * LIMITS.accel_mm_s2,
+                jerk_mm_s3: share * LIMITS.jerk_mm_s3,
+                ..LIMITS
+            };
+            super::ramp_mm(5.0, to_mm_s - 5.0, &limits)
+        };
+        // From the end of the slow span to the middle of the last one.
+        assert!((ramp_mm(free, STEEP_SHARE) - 3.25).abs() < 1e-3, "{free}");
+        assert!((between - 45.0 / SLOWER).abs() < 1e-9, "{between}");
+        assert!((ramp_mm(tight, RAMP_SHARE) - 3.25).abs() < 1e-3, "{tight}");
     }
 }

@@ -1,20 +1,73 @@
 //! Where the curve gets its knots: as close as the path needs them within its tolerance.
 //!
 //! How far a straight line can stand for the path, within a share of the tolerance, is the scale on which
-//! a curve within it bends. Knots stand at a part of that, and their distance changes gradually.
+//! a curve within it bends. Knots stand at a part of that, closer where one such line turns into the next,
+//! and their distance changes gradually. Where they turn out to be too few, more are put between them.
 
 use super::super::{Vector, dot, norm, scale, subtract};
 use super::guide::Guide;
 use crate::toolpath::Element;
 
 /// Part of the tolerance within which straight lines give the scale.
-const SCALE_SHARE: f64 = 0.5;
+const SCALE_SHARE: f64 = 0.6;
+/// How many knots there are to the scale.
+const PER_SCALE: f64 = 2.0;
+/// Distance of knots where the direction turns, over the tolerance and one over the turn: between two lines,
+/// and at an end, where the curve starts as the path does.
+const ROOM: f64 = 4.5;
+const END_ROOM: f64 = 2.0;
 /// Greatest change of the distance of knots over a length.
 const SLOPE: f64 = 0.3;
 /// The fewest spans: with fewer the conditions at both ends leave nothing free.
 const SPANS_MIN: usize = 10;
+/// How many spans on either side of one that has too few knots get more, too.
+const BESIDE: usize = 1;
 /// The most chords that stand for an arc.
 const CHORDS_MAX: f64 = 64.0;
+
+/// The spans of a curve.
+pub(super) struct Mesh {
+    /// Their ends \[mm\].
+    pub(super) breaks_mm: Vec<f64>,
+    /// On what scale the path bends at each of them \[mm\].
+    pub(super) scales_mm: Vec<f64>,
+}
+
+impl Mesh {
+    pub(super) fn new(guide: &Guide) -> Self {
+        let chords = chords(guide);
+        let breaks_mm = breaks_mm(&chords, guide.length_mm());
+        let mut first = 0;
+        let scale_mm = |ends: &[f64]| {
+            while first + 1 < chords.len() && chords[first].end_mm <= ends[0] {
+                first += 1;
+            }
+            let over = chords[first..].iter().take_while(|chord| chord.start_mm < ends[1]);
+            PER_SCALE * over.fold(f64::INFINITY, |least, chord| least.min(chord.alone_mm(ends)))
+        };
+        let scales_mm = breaks_mm.windows(2).map(scale_mm).collect();
+        Self { breaks_mm, scales_mm }
+    }
+
+    /// One knot more in the middle of each span named, in rising order, and of those beside it; nothing if
+    /// none is named.
+    pub(super) fn refined(&self, spans: &[usize]) -> Option<Self> {
+        let mut breaks_mm = Vec::with_capacity(self.breaks_mm.len() + (2 * BESIDE + 1) * spans.len());
+        let mut scales_mm = Vec::with_capacity(breaks_mm.capacity());
+        let mut named = spans.iter().peekable();
+        for (span, (ends, &scale_mm)) in self.breaks_mm.windows(2).zip(&self.scales_mm).enumerate() {
+            breaks_mm.push(ends[0]);
+            scales_mm.push(scale_mm);
+            while named.next_if(|&&named| named + BESIDE < span).is_some() {}
+            if named.peek().is_some_and(|&&named| named <= span + BESIDE) {
+                breaks_mm.push(f64::midpoint(ends[0], ends[1]));
+                scales_mm.push(scale_mm);
+            }
+        }
+        breaks_mm.push(*self.breaks_mm.last()?);
+        (!spans.is_empty()).then_some(Self { breaks_mm, scales_mm })
+    }
+}
 
 /// A point of the path.
 struct Point {
@@ -27,25 +80,32 @@ struct Point {
 struct Chord {
     start_mm: f64,
     end_mm: f64,
-    /// The distance of knots on it, and what its neighbours before and behind allow at their ends \[mm\].
+    /// The distance of knots that its length asks for, and what its turns at both ends do \[mm\].
     knots_mm: f64,
+    turns_mm: [f64; 2],
+    /// The distance of knots at its ends, with what the chords before and behind ask for \[mm\].
     before_mm: f64,
     behind_mm: f64,
 }
 
 impl Chord {
+    /// The distance of knots.
     fn knots_mm(&self, mm: f64) -> f64 {
         let before_mm = self.before_mm + SLOPE * (mm - self.start_mm);
         let behind_mm = self.behind_mm + SLOPE * (self.end_mm - mm);
         self.knots_mm.min(before_mm).min(behind_mm)
     }
+
+    /// The distance of knots that it asks for between `ends`.
+    fn alone_mm(&self, ends: &[f64]) -> f64 {
+        let before_mm = if self.start_mm >= ends[0] { self.turns_mm[0] } else { f64::INFINITY };
+        let behind_mm = if self.end_mm <= ends[1] { self.turns_mm[1] } else { f64::INFINITY };
+        self.knots_mm.min(before_mm).min(behind_mm)
+    }
 }
 
-/// The knots, `per_scale` of them to the scale of the path \[mm\].
-pub(super) fn knots(guide: &Guide, per_scale: f64) -> Vec<f64> {
-    let chords = chords(&points(guide), per_scale);
-    let length_mm = guide.length_mm();
-    let mut knots = vec![0.0];
+fn breaks_mm(chords: &[Chord], length_mm: f64) -> Vec<f64> {
+    let mut breaks_mm = vec![0.0];
     let (mut mm, mut chord) = (0.0, 0);
     while mm < length_mm {
         let distance_at = |chord: &mut usize, mm: f64| {
@@ -57,18 +117,18 @@ pub(super) fn knots(guide: &Guide, per_scale: f64) -> Vec<f64> {
         let here_mm = distance_at(&mut chord, mm);
         let there_mm = distance_at(&mut chord.clone(), (mm + here_mm).min(length_mm));
         mm += here_mm.min(1.5 * there_mm).max(1e-9 * length_mm);
-        knots.push(mm);
+        breaks_mm.push(mm);
     }
-    if knots.len() <= SPANS_MIN {
+    if breaks_mm.len() <= SPANS_MIN {
         return (0..=SPANS_MIN).map(|knot| length_mm * knot as f64 / SPANS_MIN as f64).collect();
     }
     // The last one is beyond the end.
     let stretched = length_mm / mm;
-    knots.iter_mut().for_each(|knot| *knot *= stretched);
-    if let Some(last) = knots.last_mut() {
+    breaks_mm.iter_mut().for_each(|end_mm| *end_mm *= stretched);
+    if let Some(last) = breaks_mm.last_mut() {
         *last = length_mm;
     }
-    knots
+    breaks_mm
 }
 
 fn points(guide: &Guide) -> Vec<Point> {
@@ -94,8 +154,15 @@ fn points(guide: &Guide) -> Vec<Point> {
     points
 }
 
-fn chords(points: &[Point], per_scale: f64) -> Vec<Chord> {
+/// The longest lines that stand for the path, one after the other.
+fn chords(guide: &Guide) -> Vec<Chord> {
+    let points = points(guide);
     let mut chords: Vec<Chord> = Vec::new();
+    // By the length of the path: a line that stands for what goes to and fro is slower than it.
+    let [mut velocity, end_velocity] = [false, true].map(|is_end| guide.end(is_end)[1]);
+    let turn_mm = |room: f64, point: &Point, before: Vector, after: Vector| {
+        room * point.tolerance_mm / norm(subtract(after, before))
+    };
     let mut first = 0;
     while first + 1 < points.len() {
         let fits = |count: usize| points.get(first..=first + count).is_some_and(is_straight);
@@ -108,35 +175,50 @@ fn chords(points: &[Point], per_scale: f64) -> Vec<Chord> {
             let middle = usize::midpoint(good, bad);
             if fits(middle) { good = middle } else { bad = middle }
         }
-        let (start_mm, end_mm) = (points[first].mm, points[first + good].mm);
-        let knots_mm = (end_mm - start_mm) / per_scale;
-        chords.push(Chord { start_mm, end_mm, knots_mm, before_mm: f64::INFINITY, behind_mm: f64::INFINITY });
+        let [start, end] = [&points[first], &points[first + good]];
+        let (start_mm, end_mm) = (start.mm, end.mm);
+        let before = velocity;
+        velocity = scale(subtract(end.at, start.at), 1.0 / (end_mm - start_mm));
+        let room = if chords.is_empty() { END_ROOM } else { ROOM };
+        let turns_mm =
+            [turn_mm(room, start, before, velocity), turn_mm(END_ROOM, end, velocity, end_velocity)];
+        if let Some(chord) = chords.last_mut() {
+            chord.turns_mm[1] = turns_mm[0];
+        }
+        let knots_mm = (end_mm - start_mm) / PER_SCALE;
+        chords.push(Chord { start_mm, end_mm, knots_mm, turns_mm, before_mm: 0.0, behind_mm: 0.0 });
         first += good;
     }
     let mut allowed_mm = f64::INFINITY;
     for chord in &mut chords {
-        chord.before_mm = allowed_mm;
+        (chord.before_mm, chord.behind_mm) = (chord.turns_mm[0].min(allowed_mm), chord.turns_mm[1]);
         allowed_mm = chord.knots_mm(chord.end_mm);
     }
     allowed_mm = f64::INFINITY;
     for chord in chords.iter_mut().rev() {
-        chord.behind_mm = allowed_mm;
+        chord.behind_mm = chord.behind_mm.min(allowed_mm);
         allowed_mm = chord.knots_mm(chord.start_mm);
     }
     chords
 }
 
-/// Whether the line from the first point to the last is within the tolerance of all.
+/// Whether a line through the middle of the points, in the direction from the first to the last, is within the
+/// tolerance of all.
 fn is_straight(points: &[Point]) -> bool {
-    let [first, between @ .., last] = points else { return false };
+    let [first, .., last] = points else { return false };
     let chord = subtract(last.at, first.at);
     let direction = scale(chord, 1.0 / norm(chord));
-    let mut before_mm = 0.0;
-    between.iter().chain([last]).all(|point| {
+    let across = |point: &Point| {
         let offset = subtract(point.at, first.at);
-        let along_mm = dot(offset, direction);
-        let across_mm = norm(subtract(offset, scale(direction, along_mm)));
-        let is_on = along_mm >= before_mm && across_mm <= point.tolerance_mm;
+        subtract(offset, scale(direction, dot(offset, direction)))
+    };
+    // The first point is at 0 across.
+    let farther = |a: Vector, b: Vector| if norm(b) > norm(a) { b } else { a };
+    let middle = scale(points.iter().map(across).fold([0.0; 3], farther), 0.5);
+    let mut before_mm = 0.0;
+    points.iter().all(|point| {
+        let along_mm = dot(subtract(point.at, first.at), direction);
+        let is_on = along_mm >= before_mm && norm(subtract(across(point), middle)) <= point.tolerance_mm;
         before_mm = along_mm;
         is_on
     })

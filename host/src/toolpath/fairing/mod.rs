@@ -25,36 +25,42 @@ mod problem;
 use motion_kernel::law::Limits;
 
 use self::guide::Guide;
+use self::knots::Mesh;
 use self::problem::Problem;
 use super::Vector;
 use super::element::{Element, Role};
 
-/// Knots to the scale of the path: at first, and how often they are doubled where that is too few.
-const PER_SCALE: f64 = 2.0;
-const DOUBLINGS: usize = 3;
-/// How often the curve is made for other feeds.
-const ROUNDS: usize = 3;
+/// How often more knots are put where they are too few.
+const REFINEMENTS: usize = 8;
+/// How often the curve is made for other feeds at most; it ends where that has gained hardly any time twice.
+const ROUNDS: usize = 24;
+const GAIN_MIN: f64 = 0.003;
 /// Steps until the curve is given up, and steps for the feeds of one round.
-const STEPS_MAX: usize = 120;
+const STEPS_MAX: usize = 200;
 const STEPS_PER_ROUND: usize = 12;
 /// What may be left to gain when a round ends, and at the end, as a part of the cost. Feeds change with its
 /// sixth root.
 const LEFT: f64 = 0.5;
 const LEFT_AT_LAST: f64 = 0.2;
-/// How often the tolerance is made smaller where the curve is too far from the path between its samples, by
-/// what at most, and what the new one aims below.
-const TIGHTENINGS: usize = 8;
-const TIGHTENED_MIN: f64 = 0.8;
-const BELOW: f64 = 0.98;
-/// How much of the gap a step leaves: little where the one before was taken whole, most where it was not.
+/// What a step aims to leave: a part of what there is to gain, little where the step before was taken whole,
+/// most where it was not; never less than a part of the cost, because equations near to the very best lose
+/// their digits; and all of the cost while the curve is far from where it has to be.
 const REMAINS: [(f64, f64); 2] = [(0.8, 0.1), (0.4, 0.3)];
 const REMAINS_MOST: f64 = 0.6;
-/// The gap that is aimed at while the curve is not within the tolerance, over the cost: great enough to push
-/// it into the middle.
-const ENTERING: f64 = 3.0;
-const ENTERING_MAX: f64 = 1.0e6;
-/// How much wider than the curve the tubes are made until it is within the tolerance.
-const WIDER: f64 = 1.02;
+const AIM_MIN: f64 = 0.03;
+/// How far the curve may be from the path at its samples, and from where on it is far, in units of what is
+/// used of the tolerance.
+const WITHIN: f64 = 1.01;
+const FAR: f64 = 1.1;
+/// Within so many steps a curve that is too far has to come nearer, to this part of what it was too far by:
+/// or it has too few knots.
+const NEARER_STEPS: usize = 10;
+const NEARER: f64 = 0.7;
+/// How often the tolerance is made smaller where the curve is too far from the path between its samples, by
+/// what at most, and what the new one aims below.
+const TIGHTENINGS: usize = 12;
+const TIGHTENED_MIN: f64 = 0.8;
+const BELOW: f64 = 0.95;
 /// The third derivative of a curve that is led by the tolerance past the path, over the tolerance and the
 /// third power of the path's scale.
 const THIRD: f64 = 100.0;
@@ -86,90 +92,132 @@ pub struct Span {
 #[must_use]
 pub fn fair(parts: &[Part], limits: &Limits<f64>) -> Option<Vec<Span>> {
     let guide = Guide::new(parts)?;
-    (0..=DOUBLINGS).find_map(|doublings| with_knots(&guide, PER_SCALE * (1 << doublings) as f64, limits))
+    let mut mesh = Mesh::new(&guide);
+    for _ in 0..=REFINEMENTS {
+        match with_knots(&guide, &mesh, limits) {
+            Ok(spans) => return Some(spans),
+            Err(tight) => mesh = mesh.refined(&tight)?,
+        }
+    }
+    None
 }
 
-/// The curve with so many knots to the scale of the path.
-fn with_knots(guide: &Guide, per_scale: f64, limits: &Limits<f64>) -> Option<Vec<Span>> {
-    let mut problem = Problem::new(guide, knots::knots(guide, per_scale));
-    let programmed = programmed_mm_s(guide, &problem);
-    problem.set_costs(limits, &first_mm_s(guide, &problem, per_scale, &programmed, limits));
-    let mut wide = (WIDER * problem.farthest()).max(1.0);
-    problem.start(wide)?;
-    let (mut round, mut taken, mut tightenings) = (0, 0, 0);
-    let (mut remains, mut entering) = (REMAINS[0].1, ENTERING);
+/// The curve with these knots, or the spans that need more of them; none if more would be of no use.
+fn with_knots(guide: &Guide, mesh: &Mesh, limits: &Limits<f64>) -> Result<Vec<Span>, Vec<usize>> {
+    let programmed = programmed_mm_s(guide, mesh);
+    let lowered = |mut feeds: Vec<f64>, lengths_mm: &[f64]| {
+        feeds.iter_mut().zip(&programmed).for_each(|(feed, &programmed)| *feed = feed.min(programmed));
+        feeds::lower(&mut feeds, lengths_mm, limits);
+        feeds
+    };
+    let mut problem = Problem::new(guide, mesh.breaks_mm.clone());
+    let lengths_mm = problem.lengths_mm();
+    problem.start(limits, &lowered(promised_mm_s(guide, mesh, limits), &lengths_mm));
+    let (mut rounds, mut approach) = (Rounds::default(), Approach::default());
+    let (mut steps, mut tightenings, mut remains) = (0, 0, REMAINS[0].1);
     for _ in 0..STEPS_MAX {
-        let aim = if wide > 1.0 { entering * problem.cost() } else { remains * problem.gap(wide) };
-        let part = problem.step(aim, wide)?;
+        let least = if problem.farthest() > FAR { 1.0 } else { AIM_MIN };
+        let aim = (remains * problem.gap()).max(least * problem.cost());
+        let taken = problem.step(aim).ok_or_else(Vec::new)?;
         remains =
-            REMAINS.iter().find(|(least, _)| part > *least).map_or(REMAINS_MOST, |&(_, remains)| remains);
-        if wide > 1.0 {
-            let narrower = (WIDER * problem.farthest()).clamp(1.0, wide);
-            if narrower > 0.8 * wide {
-                entering = (4.0 * entering).min(ENTERING_MAX);
+            REMAINS.iter().find(|(least, _)| taken > *least).map_or(REMAINS_MOST, |&(_, remains)| remains);
+        let farthest = problem.farthest();
+        if farthest > WITHIN {
+            if approach.has_stalled(farthest) {
+                return Err(problem.tight(WITHIN));
             }
-            wide = narrower;
             continue;
         }
-        taken += 1;
-        let left = if round == ROUNDS { LEFT_AT_LAST } else { LEFT };
-        if problem.gap(wide) >= left * problem.cost() && taken < STEPS_PER_ROUND {
+        approach = Approach::default();
+        steps += 1;
+        let left = if rounds.are_over() { LEFT_AT_LAST } else { LEFT };
+        if problem.gap() >= left * problem.cost() && steps < STEPS_PER_ROUND {
             continue;
         }
-        taken = 0;
-        if round < ROUNDS {
-            round += 1;
-            let before = problem.cost();
-            let mut feeds = problem.allowed_mm_s(limits);
-            for (feed, &programmed) in feeds.iter_mut().zip(&programmed) {
-                *feed = feed.min(programmed);
-            }
-            feeds::lower(&mut feeds, &problem.lengths_mm(), limits);
-            problem.set_costs(limits, &feeds);
-            problem.press(problem.cost() / before);
+        steps = 0;
+        if !rounds.are_over() {
+            let feeds = lowered(problem.allowed_mm_s(limits), &lengths_mm);
+            rounds.next(lengths_mm.iter().zip(&feeds).map(|(mm, mm_s)| mm / mm_s).sum());
+            problem.change(limits, &feeds);
             continue;
         }
         match spans(guide, &problem) {
             // A curve that can't be driven is none.
             Ok(spans) => {
                 let is_driven = spans.iter().all(|span| span.element.septics(f64::INFINITY).is_ok());
-                return is_driven.then_some(spans);
+                return if is_driven { Ok(spans) } else { Err(Vec::new()) };
             }
-            Err(_) if tightenings == TIGHTENINGS => return None,
+            Err(far) if tightenings == TIGHTENINGS => {
+                return Err(far.into_iter().map(|(span, _)| span).collect());
+            }
             Err(far) => {
                 tightenings += 1;
-                far.into_iter().for_each(|(span, factor)| problem.tighten(span, factor));
-                wide = (WIDER * problem.farthest()).max(1.0);
-                entering = ENTERING;
+                problem.tighten(&far);
             }
         }
     }
-    None
+    Err(Vec::new())
+}
+
+/// The curve made for the feeds that the one before allows, again and again.
+#[derive(Default)]
+struct Rounds {
+    /// The time of each \[s\].
+    times_s: Vec<f64>,
+}
+
+impl Rounds {
+    fn next(&mut self, time_s: f64) {
+        self.times_s.push(time_s);
+    }
+
+    fn are_over(&self) -> bool {
+        let Some((before, [last, at_last])) = self.times_s.split_last_chunk() else { return false };
+        let least_s = before.iter().copied().fold(f64::INFINITY, f64::min);
+        self.times_s.len() == ROUNDS || last.min(*at_last) > (1.0 - GAIN_MIN) * least_s
+    }
+}
+
+/// A curve on its way to the path.
+struct Approach {
+    steps: usize,
+    /// How much farther than allowed it was when it last came nearer, in units of what is used of the tolerance.
+    beyond: f64,
+}
+
+impl Default for Approach {
+    fn default() -> Self {
+        Self { steps: 0, beyond: f64::INFINITY }
+    }
+}
+
+impl Approach {
+    /// Takes note of a step after which it is `farthest` from the path; true if it does not come nearer.
+    fn has_stalled(&mut self, farthest: f64) -> bool {
+        self.steps += 1;
+        if farthest - 1.0 < NEARER * self.beyond {
+            *self = Self { steps: 0, beyond: farthest - 1.0 };
+        }
+        self.steps > NEARER_STEPS
+    }
 }
 
 /// The programmed feed of each span \[mm/s\].
-fn programmed_mm_s(guide: &Guide, problem: &Problem) -> Vec<f64> {
+fn programmed_mm_s(guide: &Guide, mesh: &Mesh) -> Vec<f64> {
     let of_span = |ends: &[f64]| {
         let parts = &guide.parts[guide.part_at(ends[0])..=guide.part_at(ends[1])];
         parts.iter().map(|part| part.feed_mm_s).fold(f64::INFINITY, f64::min)
     };
-    problem.breaks().windows(2).map(of_span).collect()
+    mesh.breaks_mm.windows(2).map(of_span).collect()
 }
 
 /// The feeds that the scale of the path promises, to begin with \[mm/s\].
-fn first_mm_s(
-    guide: &Guide,
-    problem: &Problem,
-    per_scale: f64,
-    programmed: &[f64],
-    limits: &Limits<f64>,
-) -> Vec<f64> {
-    let of_span = |(ends, &programmed): (&[f64], &f64)| {
+fn promised_mm_s(guide: &Guide, mesh: &Mesh, limits: &Limits<f64>) -> Vec<f64> {
+    let of_span = |(ends, scale_mm): (&[f64], &f64)| {
         let tolerance_mm = guide.parts[guide.part_at(ends[0])].tolerance_mm;
-        let third = libm::cbrt(limits.jerk_mm_s3 / (THIRD * tolerance_mm));
-        (per_scale * (ends[1] - ends[0]) * third).min(programmed)
+        scale_mm * libm::cbrt(limits.jerk_mm_s3 / (THIRD * tolerance_mm))
     };
-    problem.breaks().windows(2).zip(programmed).map(of_span).collect()
+    mesh.breaks_mm.windows(2).zip(&mesh.scales_mm).map(of_span).collect()
 }
 
 /// The spans of a curve, or those that are farther from the path than their tolerance, with what it has to be
@@ -308,7 +356,7 @@ mod tests {
             spans.iter().map(of_span).sum::<f64>()
         };
         let times = [0.012, 0.05, 0.2].map(time_s);
-        assert!(times[1] < 0.98 * times[0] && times[2] < 0.9 * times[1], "{times:?}");
+        assert!(times[1] < 0.98 * times[0] && times[2] < 0.92 * times[1], "{times:?}");
     }
 
     #[test]

@@ -8,7 +8,8 @@
 //!
 //! Every step is one of the primal-dual interior-point method (section 11.7 there): what bends pulls, each
 //! sample pushes back with a force that grows as the curve comes near to its sphere, and where all are in
-//! balance, the sum of forces times room bounds what is left to gain.
+//! balance, the sum of forces times slacks bounds what is left to gain. The curve may start beyond a sphere:
+//! a slack is above 0 from the start, and steps bring what it is wrong by to 0.
 
 use super::super::spline::basis::{Row, clamped, polynomial, row};
 use super::super::{Vector, add, dot, norm, scale, subtract};
@@ -37,6 +38,8 @@ struct Sample {
     at: Vector,
     /// 1/tolerance² \[1/mm²\].
     per_square: f64,
+    /// What is left of the sphere: 1 in its middle, 0 on it; above 0, and right when the curve is within it.
+    slack: f64,
     /// How hard it presses: the cost that a little more tolerance would save.
     force: f64,
 }
@@ -45,7 +48,14 @@ impl Sample {
     fn new(knots: &[f64], span: usize, mm: f64, at: Vector, tolerance_mm: f64) -> Self {
         let tolerance_mm = USED * tolerance_mm;
         let per_square = 1.0 / (tolerance_mm * tolerance_mm);
-        Self { first: span - DEGREE, row: row(knots, DEGREE, span, mm, 0), at, per_square, force: 1.0 }
+        Self {
+            first: span - DEGREE,
+            row: row(knots, DEGREE, span, mm, 0),
+            at,
+            per_square,
+            slack: 1.0,
+            force: 1.0,
+        }
     }
 }
 
@@ -110,7 +120,7 @@ impl Problem {
     }
 
     /// Sets what bending costs where: the limits, at the feeds that are expected on the spans \[mm/s\].
-    pub(super) fn set_costs(&mut self, limits: &Limits<f64>, feeds_mm_s: &[f64]) {
+    fn set_costs(&mut self, limits: &Limits<f64>, feeds_mm_s: &[f64]) {
         for (bending, &feed) in self.bendings.iter_mut().zip(feeds_mm_s) {
             let square = feed * feed;
             let units = [
@@ -173,55 +183,65 @@ impl Problem {
         squares.fold(0.0, f64::max).sqrt()
     }
 
-    /// Makes the tolerance of the samples on a span smaller by `factor`.
-    pub(super) fn tighten(&mut self, span: usize, factor: f64) {
-        // They are in the order of the spans.
-        let first = self.samples.partition_point(|sample| sample.first + 1 < span);
-        for sample in self.samples[first..].iter_mut().take_while(|sample| sample.first <= span + 1) {
-            sample.per_square /= factor * factor;
-        }
+    /// The spans where the curve is farther from a sample than so many of its tolerances.
+    pub(super) fn tight(&self, tolerances: f64) -> Vec<usize> {
+        let is_far = |sample: &&Sample| self.beyond(sample) > tolerances * tolerances - 1.0;
+        let mut spans: Vec<usize> = self.samples.iter().filter(is_far).map(|sample| sample.first).collect();
+        spans.dedup();
+        spans
     }
 
-    /// What is left of a sphere `wide` times as wide: 1 in its middle, 0 on it.
-    fn room(&self, sample: &Sample, wide: f64) -> f64 {
-        let e = self.distance(sample);
-        1.0 - sample.per_square * dot(e, e) / (wide * wide)
-    }
-
-    /// Starts in spheres `wide` times as wide, with what is to gain equal to the cost; nothing if the curve is
-    /// not in them.
-    pub(super) fn start(&mut self, wide: f64) -> Option<()> {
-        self.balance(self.cost().max(f64::MIN_POSITIVE), wide, 1.0)
-    }
-
-    /// The costs have become `factor` times as great.
-    pub(super) fn press(&mut self, factor: f64) {
-        self.samples.iter_mut().for_each(|sample| sample.force *= factor);
-    }
-
-    /// What is to gain at most if all forces are in balance.
-    pub(super) fn gap(&self, wide: f64) -> f64 {
-        self.samples.iter().map(|sample| sample.force * self.room(sample, wide)).sum()
-    }
-
-    /// Brings every force to within `apart` times what belongs to a gap of `aim`; nothing if the curve is
-    /// beyond a sphere, or nowhere.
-    fn balance(&mut self, aim: f64, wide: f64, apart: f64) -> Option<()> {
-        let per_sample = aim / self.samples.len() as f64;
-        for index in 0..self.samples.len() {
-            let balanced = per_sample / self.room(&self.samples[index], wide);
-            if !(balanced >= 0.0 && balanced.is_finite()) {
-                return None;
+    /// Makes the tolerance of the samples on these spans and beside them smaller by the factors, and goes on.
+    pub(super) fn tighten(&mut self, spans: &[(usize, f64)]) {
+        for &(span, factor) in spans {
+            // Samples are in the order of the spans.
+            let first = self.samples.partition_point(|sample| sample.first + 1 < span);
+            for sample in self.samples[first..].iter_mut().take_while(|sample| sample.first <= span + 1) {
+                sample.per_square /= factor * factor;
             }
-            let force = &mut self.samples[index].force;
-            *force = force.clamp(balanced / apart, balanced * apart);
         }
-        Some(())
+        self.restart();
     }
 
-    /// One step towards a gap of `aim`, in spheres `wide` times as wide: how much of it was taken,
-    /// or nothing if the equations have no solution.
-    pub(super) fn step(&mut self, aim: f64, wide: f64) -> Option<f64> {
+    /// The square of the distance from a sample, in units of its tolerance, less 1: at most 0 within it.
+    fn beyond(&self, sample: &Sample) -> f64 {
+        let e = self.distance(sample);
+        sample.per_square * dot(e, e) - 1.0
+    }
+
+    /// Starts where the curve is, for the limits at these feeds, with as much to gain as bending costs.
+    pub(super) fn start(&mut self, limits: &Limits<f64>, feeds_mm_s: &[f64]) {
+        self.set_costs(limits, feeds_mm_s);
+        self.restart();
+    }
+
+    fn restart(&mut self) {
+        let per_sample = self.cost().max(f64::MIN_POSITIVE) / self.samples.len() as f64;
+        for index in 0..self.samples.len() {
+            let slack = SLACK_MIN.max(-self.beyond(&self.samples[index]));
+            self.samples[index].slack = slack;
+            self.samples[index].force = per_sample / slack;
+        }
+    }
+
+    /// Goes on for other feeds.
+    pub(super) fn change(&mut self, limits: &Limits<f64>, feeds_mm_s: &[f64]) {
+        let before = self.cost();
+        self.set_costs(limits, feeds_mm_s);
+        // What does not bend at all costs nothing at any feed.
+        if before > 0.0 {
+            let factor = self.cost() / before;
+            self.samples.iter_mut().for_each(|sample| sample.force *= factor);
+        }
+    }
+
+    /// What is to gain at most if the curve is within all spheres and all forces are in balance.
+    pub(super) fn gap(&self) -> f64 {
+        self.samples.iter().map(|sample| sample.force * sample.slack).sum()
+    }
+
+    /// One step towards a gap of `aim`: how much of it was taken, or nothing if the equations have no solution.
+    pub(super) fn step(&mut self, aim: f64) -> Option<f64> {
         let free = self.control.len() - 2 * DECIDED;
         let per_sample = aim / self.samples.len() as f64;
         self.equations.clear();
@@ -246,13 +266,14 @@ impl Problem {
                 }
             }
         }
-        let per_wide = 1.0 / (wide * wide);
+        let mut pushes = Vec::with_capacity(self.samples.len());
         for sample in &self.samples {
             let e = self.distance(sample);
-            let pulled = scale(e, 2.0 * per_wide * sample.per_square);
-            let room = 1.0 - 0.5 * dot(e, pulled);
-            let (linear, square) = (2.0 * sample.force * per_wide * sample.per_square, sample.force / room);
-            let push = per_sample / room;
+            let pulled = scale(e, 2.0 * sample.per_square);
+            let residual = sample.per_square * dot(e, e) - 1.0 + sample.slack;
+            let (linear, square) = (2.0 * sample.force * sample.per_square, sample.force / sample.slack);
+            let push = per_sample / sample.slack + square * residual;
+            pushes.push((pulled, residual, push));
             let curvature: [Vector; 3] = core::array::from_fn(|a| {
                 core::array::from_fn(|b| square * pulled[a] * pulled[b] + if a == b { linear } else { 0.0 })
             });
@@ -270,41 +291,39 @@ impl Problem {
             return None;
         }
         let step = slope;
-        // Forces follow, and neither they nor the room may come to nothing.
+        // Neither forces nor slacks may come to nothing.
         let (mut part, mut force_part) = (1.0_f64, 1.0_f64);
-        let mut forces = Vec::with_capacity(self.samples.len());
-        for sample in &self.samples {
-            let e = self.distance(sample);
-            let pulled = scale(e, 2.0 * per_wide * sample.per_square);
-            let room = 1.0 - 0.5 * dot(e, pulled);
+        let mut changes = Vec::with_capacity(self.samples.len());
+        for (sample, (pulled, residual, push)) in self.samples.iter().zip(pushes) {
             let moved = (0..ACTING).fold([0.0; 3], |sum, a| match at(sample.first + a) {
                 Some(row) => add(sum, scale(step[row], sample.row[a])),
                 None => sum,
             });
-            let next = (per_sample + sample.force * dot(pulled, moved)) / room;
-            let change = next - sample.force;
-            if change < 0.0 {
-                force_part = force_part.min(NEAR * sample.force / -change);
+            let along = dot(pulled, moved);
+            let force = push + sample.force / sample.slack * along - sample.force;
+            let slack = -residual - along;
+            if force < 0.0 {
+                force_part = force_part.min(NEAR * sample.force / -force);
             }
-            // room − part·linear − part²·square > (1 − NEAR)·room
-            let (linear, square) = (dot(pulled, moved), per_wide * sample.per_square * dot(moved, moved));
-            let most = NEAR * room;
-            if linear + square > most {
-                let root = (linear * linear + 4.0 * square * most).sqrt();
-                part = part.min(2.0 * most / (linear + root));
+            if slack < 0.0 {
+                part = part.min(NEAR * sample.slack / -slack);
             }
-            forces.push(change);
+            changes.push((slack, force));
         }
         if !part.is_finite() || step.iter().flatten().any(|mm| !mm.is_finite()) {
             return None;
         }
-        for (sample, change) in self.samples.iter_mut().zip(forces) {
-            sample.force += force_part * change;
-        }
         for (index, &step) in step.iter().enumerate() {
             self.control[DECIDED + index] = add(self.control[DECIDED + index], scale(step, part));
         }
-        self.balance(aim, wide, APART_MAX)?;
+        for (index, (slack, force)) in changes.into_iter().enumerate() {
+            let within = -self.beyond(&self.samples[index]);
+            let sample = &mut self.samples[index];
+            sample.slack = (sample.slack + part * slack).max(within);
+            let balanced = per_sample / sample.slack;
+            sample.force =
+                (sample.force + force_part * force).clamp(balanced / APART_MAX, balanced * APART_MAX);
+        }
         Some(part)
     }
 
@@ -337,8 +356,10 @@ impl Problem {
     }
 }
 
-/// How much of the way to where a room or a force comes to nothing a step may take.
+/// How much of the way to where a slack or a force comes to nothing a step may take.
 const NEAR: f64 = 0.95;
+/// The least slack to start with.
+const SLACK_MIN: f64 = 0.1;
 /// How far forces may be from balance: beyond, steps come to nothing.
 const APART_MAX: f64 = 100.0;
 
