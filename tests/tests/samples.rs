@@ -4,6 +4,7 @@
 use motion_host::compare::acceleration::acceleration_time_s;
 use motion_host::compare::{Path, bound, on};
 use motion_host::gcode;
+use motion_host::gcode::{PathMode, Program, StepKind};
 use motion_host::planning::{Mode, plan_program};
 use motion_host::simulate::run;
 use motion_tests::check::machine;
@@ -43,4 +44,45 @@ fn the_samples_take_as_long_as_published() {
     }
     // No sample may get slower.
     hold("samples", &table, 0.0005).unwrap_or_else(|error| panic!("{error}"));
+}
+
+/// From 1 µm to 0.2 mm, with and without as much for merging lines.
+#[test]
+fn a_larger_tolerance_is_not_slower() {
+    const TOLERANCES_MM: [f64; 8] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2];
+    const SLOWER_MAX: f64 = 1.002;
+    for (name, text) in SAMPLES {
+        let program = gcode::read(name, text.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
+        for machine in machine::references() {
+            for is_merged in [false, true] {
+                let mut least_s = f64::INFINITY;
+                for tolerance_mm in TOLERANCES_MM {
+                    let program = blended(&program, tolerance_mm, is_merged.then_some(tolerance_mm));
+                    let plan = plan_program(name, &program, &machine, Mode::Spanning)
+                        .unwrap_or_else(|error| panic!("{error}"));
+                    assert!(
+                        plan.time_s <= SLOWER_MAX * least_s,
+                        "{name} within {tolerance_mm} mm takes {} s, within less {least_s} s",
+                        plan.time_s
+                    );
+                    least_s = least_s.min(plan.time_s);
+                }
+            }
+        }
+    }
+}
+
+fn blended(program: &Program, tolerance_mm: f64, merging_mm: Option<f64>) -> Program {
+    let mut program = on(program, Path::Blended(tolerance_mm));
+    let blend = PathMode::Blend { tolerance_mm: Some(tolerance_mm), merging_mm };
+    for step in &mut program.steps {
+        match &mut step.kind {
+            StepKind::Line(line) => line.mode = blend,
+            StepKind::Arc(arc) => arc.mode = blend,
+            StepKind::Cubic(curve) => curve.mode = blend,
+            StepKind::Through(point) => point.mode = blend,
+            StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => {}
+        }
+    }
+    program
 }

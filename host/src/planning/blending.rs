@@ -1,7 +1,7 @@
 //! Chooses the junctions that are blended, and the length of each blend.
 //!
 //! Consumes a run of moves with their tolerances; produces blocks with ceiling, law and junction feed, ready
-//! for look-ahead. Background, a bounded number of plans of at most eleven blocks for each junction.
+//! for look-ahead. Background, a bounded number of plans of at most seven blocks for each junction.
 //!
 //! **A blend has to pay.** Jerk and snap bound the motion round a corner: within a small tolerance it may
 //! take longer than a stop on the corner, and between a slow and a fast move a blend keeps the fast one slow.

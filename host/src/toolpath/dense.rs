@@ -29,7 +29,7 @@ pub(super) fn faired(
     feed_mm_s: f64,
 ) -> Vec<(Vec<Move>, Vec<f64>)> {
     let mut runs: Vec<Moves> = corners_rad.iter().map(|&corner_rad| Moves::new(moves, corner_rad)).collect();
-    // A curve takes much longer to find than what a corner changes.
+    // Solving is slow: equal runs are solved once.
     runs.dedup_by(|run, before| run.wanted_mm == before.wanted_mm);
     runs.iter().filter_map(|run| with_curves(run, limits, feed_mm_s)).collect()
 }

@@ -1,4 +1,4 @@
-//! Symmetric positive definite equations in a band, by Cholesky's factors.
+//! Symmetric positive definite equations in a band, by Cholesky factorisation.
 
 use super::super::Vector;
 
@@ -8,7 +8,7 @@ pub(super) const ACTING: usize = 6;
 const WIDTH: usize = 3 * ACTING;
 
 /// What the diagonal is made greater by, as a part of it, so that rounding leaves the pivots above 0.
-const RAISED: f64 = 1.0e-13;
+const REGULARISATION: f64 = 1.0e-13;
 
 /// The lower triangle of the matrix of points whose entries couple at most [`ACTING`] neighbours.
 pub(super) struct Cholesky {
@@ -35,7 +35,7 @@ impl Cholesky {
         }
     }
 
-    /// Adds `factor` times the unit matrix.
+    /// Adds `factor` times the identity.
     pub(super) fn add_unit(&mut self, row: usize, column: usize, factor: f64) {
         for axis in 0..3 {
             self.rows[3 * row + axis][WIDTH - 1 - 3 * (row - column)] += factor;
@@ -56,7 +56,7 @@ impl Cholesky {
                 let at = WIDTH - 1 - back;
                 if back == 0 {
                     let sum: f64 = row[at - shared..at].iter().map(|entry| entry * entry).sum();
-                    let rest = row[at] * (1.0 + RAISED) - sum;
+                    let rest = row[at] * (1.0 + REGULARISATION) - sum;
                     if !(rest > 0.0) {
                         return false;
                     }

@@ -3,7 +3,8 @@
 use motion_kernel::law::Limits;
 
 /// Part of the acceleration and the jerk that ramps may take where bends take the rest, and where a span is
-/// driven so much slower than it allows that its bends take hardly any.
+/// driven so much slower than it allows that its bends take 0.44 of acceleration and 0.3 of jerk: across to the
+/// ramp's, so that the sum of squares is at the limit.
 const RAMP_SHARE: f64 = 0.4;
 const STEEP_SHARE: f64 = 0.9;
 const SLOWER: f64 = 1.5;
@@ -57,7 +58,8 @@ fn lower_from(
         before_mm += lengths_mm[index];
         let fits = |rise_mm_s: f64| ramp_mm(least_mm_s, rise_mm_s, limits) <= reach_mm;
         let rise_mm_s = feeds_mm_s[index] - least_mm_s;
-        if rise_mm_s < 0.0 || fits(most_mm_s - least_mm_s) {
+        // What is as slow slows down what is behind it by itself.
+        if rise_mm_s <= 0.0 || fits(most_mm_s - least_mm_s) {
             break;
         }
         if !fits(rise_mm_s) {

@@ -223,3 +223,23 @@ fn is_straight(points: &[Point]) -> bool {
         is_on
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A span that is named is halved with its neighbours, and every half keeps its scale.
+    #[test]
+    fn what_is_named_gets_a_knot_with_its_neighbours() {
+        let mesh =
+            Mesh { breaks_mm: (0..=8).map(f64::from).collect(), scales_mm: (0..8).map(f64::from).collect() };
+        let refined = mesh.refined(&[0, 4, 5]).expect("spans");
+        let breaks = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 6.5, 7.0, 8.0];
+        assert_eq!(refined.breaks_mm, breaks);
+        let scales = [0.0, 0.0, 1.0, 1.0, 2.0, 3.0, 3.0, 4.0, 4.0, 5.0, 5.0, 6.0, 6.0, 7.0];
+        assert_eq!(refined.scales_mm, scales);
+        let at_the_end = mesh.refined(&[7]).expect("spans");
+        assert_eq!(at_the_end.breaks_mm[6..], [6.0, 6.5, 7.0, 7.5, 8.0]);
+        assert!(mesh.refined(&[]).is_none());
+    }
+}

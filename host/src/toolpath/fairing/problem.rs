@@ -6,10 +6,11 @@
 //! expected there. Each sample of the path holds the curve's point at the same place within a sphere of the
 //! tolerance.
 //!
-//! Every step is one of the primal-dual interior-point method (section 11.7 there): what bends pulls, each
-//! sample pushes back with a force that grows as the curve comes near to its sphere, and where all are in
-//! balance, the sum of forces times slacks bounds what is left to gain. The curve may start beyond a sphere:
-//! a slack is above 0 from the start, and steps bring what it is wrong by to 0.
+//! Every step is one of a primal-dual interior-point method that may start outside (J. Nocedal, S. Wright,
+//! "Numerical Optimization", 2nd edition, sections 19.2 and 19.3). Each sample has a slack variable and a
+//! multiplier, both above 0. Newton steps reduce the constraint violation to zero and bring every product of
+//! slack and multiplier to the same value. Then the sum of these products, the duality gap, bounds what is left
+//! to gain.
 
 use super::super::spline::basis::{Row, clamped, polynomial, row};
 use super::super::{Vector, add, dot, norm, scale, subtract};
@@ -38,10 +39,10 @@ struct Sample {
     at: Vector,
     /// 1/tolerance² \[1/mm²\].
     per_square: f64,
-    /// What is left of the sphere: 1 in its middle, 0 on it; above 0, and right when the curve is within it.
+    /// The slack variable, above 0. Its sum with [`Problem::beyond`] is the constraint violation.
     slack: f64,
-    /// How hard it presses: the cost that a little more tolerance would save.
-    force: f64,
+    /// The multiplier: the cost that a little more tolerance would save.
+    multiplier: f64,
 }
 
 impl Sample {
@@ -54,7 +55,7 @@ impl Sample {
             at,
             per_square,
             slack: 1.0,
-            force: 1.0,
+            multiplier: 1.0,
         }
     }
 }
@@ -209,7 +210,7 @@ impl Problem {
         sample.per_square * dot(e, e) - 1.0
     }
 
-    /// Starts where the curve is, for the limits at these feeds, with as much to gain as bending costs.
+    /// Starts where the curve is, for the limits at these feeds, with a duality gap as great as the cost.
     pub(super) fn start(&mut self, limits: &Limits<f64>, feeds_mm_s: &[f64]) {
         self.set_costs(limits, feeds_mm_s);
         self.restart();
@@ -220,7 +221,7 @@ impl Problem {
         for index in 0..self.samples.len() {
             let slack = SLACK_MIN.max(-self.beyond(&self.samples[index]));
             self.samples[index].slack = slack;
-            self.samples[index].force = per_sample / slack;
+            self.samples[index].multiplier = per_sample / slack;
         }
     }
 
@@ -231,19 +232,19 @@ impl Problem {
         // What does not bend at all costs nothing at any feed.
         if before > 0.0 {
             let factor = self.cost() / before;
-            self.samples.iter_mut().for_each(|sample| sample.force *= factor);
+            self.samples.iter_mut().for_each(|sample| sample.multiplier *= factor);
         }
     }
 
-    /// What is to gain at most if the curve is within all spheres and all forces are in balance.
+    /// The duality gap: what is left to gain at most where no constraint is violated.
     pub(super) fn gap(&self) -> f64 {
-        self.samples.iter().map(|sample| sample.force * sample.slack).sum()
+        self.samples.iter().map(|sample| sample.multiplier * sample.slack).sum()
     }
 
-    /// One step towards a gap of `aim`: how much of it was taken, or nothing if the equations have no solution.
-    pub(super) fn step(&mut self, aim: f64) -> Option<f64> {
+    /// One step towards a gap of `gap_aim`: how much of it was taken, or nothing if the equations have no solution.
+    pub(super) fn step(&mut self, gap_aim: f64) -> Option<f64> {
         let free = self.control.len() - 2 * DECIDED;
-        let per_sample = aim / self.samples.len() as f64;
+        let per_sample = gap_aim / self.samples.len() as f64;
         self.equations.clear();
         let mut slope = vec![[0.0; 3]; free];
         let at = |index: usize| index.checked_sub(DECIDED).filter(|&index| index < free);
@@ -270,10 +271,11 @@ impl Problem {
         for sample in &self.samples {
             let e = self.distance(sample);
             let pulled = scale(e, 2.0 * sample.per_square);
-            let residual = sample.per_square * dot(e, e) - 1.0 + sample.slack;
-            let (linear, square) = (2.0 * sample.force * sample.per_square, sample.force / sample.slack);
-            let push = per_sample / sample.slack + square * residual;
-            pushes.push((pulled, residual, push));
+            let violation = sample.per_square * dot(e, e) - 1.0 + sample.slack;
+            let (linear, square) =
+                (2.0 * sample.multiplier * sample.per_square, sample.multiplier / sample.slack);
+            let push = per_sample / sample.slack + square * violation;
+            pushes.push((pulled, violation, push));
             let curvature: [Vector; 3] = core::array::from_fn(|a| {
                 core::array::from_fn(|b| square * pulled[a] * pulled[b] + if a == b { linear } else { 0.0 })
             });
@@ -291,38 +293,39 @@ impl Problem {
             return None;
         }
         let step = slope;
-        // Neither forces nor slacks may come to nothing.
-        let (mut part, mut force_part) = (1.0_f64, 1.0_f64);
+        // Neither multipliers nor slacks may come to nothing.
+        let (mut part, mut multiplier_part) = (1.0_f64, 1.0_f64);
         let mut changes = Vec::with_capacity(self.samples.len());
-        for (sample, (pulled, residual, push)) in self.samples.iter().zip(pushes) {
+        for (sample, (pulled, violation, push)) in self.samples.iter().zip(pushes) {
             let moved = (0..ACTING).fold([0.0; 3], |sum, a| match at(sample.first + a) {
                 Some(row) => add(sum, scale(step[row], sample.row[a])),
                 None => sum,
             });
             let along = dot(pulled, moved);
-            let force = push + sample.force / sample.slack * along - sample.force;
-            let slack = -residual - along;
-            if force < 0.0 {
-                force_part = force_part.min(NEAR * sample.force / -force);
+            let multiplier_change = push + sample.multiplier / sample.slack * along - sample.multiplier;
+            let slack_change = -violation - along;
+            if multiplier_change < 0.0 {
+                multiplier_part =
+                    multiplier_part.min(FRACTION_TO_BOUNDARY * sample.multiplier / -multiplier_change);
             }
-            if slack < 0.0 {
-                part = part.min(NEAR * sample.slack / -slack);
+            if slack_change < 0.0 {
+                part = part.min(FRACTION_TO_BOUNDARY * sample.slack / -slack_change);
             }
-            changes.push((slack, force));
+            changes.push((slack_change, multiplier_change));
         }
-        if !part.is_finite() || step.iter().flatten().any(|mm| !mm.is_finite()) {
+        if !part.is_finite() || !per_sample.is_finite() || step.iter().flatten().any(|mm| !mm.is_finite()) {
             return None;
         }
         for (index, &step) in step.iter().enumerate() {
             self.control[DECIDED + index] = add(self.control[DECIDED + index], scale(step, part));
         }
-        for (index, (slack, force)) in changes.into_iter().enumerate() {
+        for (index, (slack_change, multiplier_change)) in changes.into_iter().enumerate() {
             let within = -self.beyond(&self.samples[index]);
             let sample = &mut self.samples[index];
-            sample.slack = (sample.slack + part * slack).max(within);
+            sample.slack = (sample.slack + part * slack_change).max(within);
             let balanced = per_sample / sample.slack;
-            sample.force =
-                (sample.force + force_part * force).clamp(balanced / APART_MAX, balanced * APART_MAX);
+            sample.multiplier = (sample.multiplier + multiplier_part * multiplier_change)
+                .clamp(balanced / APART_MAX, balanced * APART_MAX);
         }
         Some(part)
     }
@@ -356,11 +359,11 @@ impl Problem {
     }
 }
 
-/// How much of the way to where a slack or a force comes to nothing a step may take.
-const NEAR: f64 = 0.95;
+/// How much of the way to where a slack or a multiplier comes to nothing a step may take.
+const FRACTION_TO_BOUNDARY: f64 = 0.95;
 /// The least slack to start with.
 const SLACK_MIN: f64 = 0.1;
-/// How far forces may be from balance: beyond, steps come to nothing.
+/// How far multipliers may be from balance: beyond, steps come to nothing.
 const APART_MAX: f64 = 100.0;
 
 /// The control points at the ends, from point and derivatives of the path there.
