@@ -2,9 +2,9 @@
 //! least time on the same path.
 
 use motion_host::compare::acceleration::acceleration_time_s;
-use motion_host::compare::{Path, bound, on};
+use motion_host::compare::{Path, bound, in_mode, on};
 use motion_host::gcode;
-use motion_host::gcode::{PathMode, Program, StepKind};
+use motion_host::gcode::PathMode;
 use motion_host::planning::{Mode, plan_program};
 use motion_host::simulate::run;
 use motion_tests::check::machine;
@@ -57,8 +57,9 @@ fn a_larger_tolerance_is_not_slower() {
             for is_merged in [false, true] {
                 let mut least_s = f64::INFINITY;
                 for tolerance_mm in TOLERANCES_MM {
-                    let program = blended(&program, tolerance_mm, is_merged.then_some(tolerance_mm));
-                    let plan = plan_program(name, &program, &machine, Mode::Spanning)
+                    let merging_mm = is_merged.then_some(tolerance_mm);
+                    let blend = PathMode::Blend { tolerance_mm: Some(tolerance_mm), merging_mm };
+                    let plan = plan_program(name, &in_mode(&program, blend), &machine, Mode::Spanning)
                         .unwrap_or_else(|error| panic!("{error}"));
                     assert!(
                         plan.time_s <= SLOWER_MAX * least_s,
@@ -70,19 +71,4 @@ fn a_larger_tolerance_is_not_slower() {
             }
         }
     }
-}
-
-fn blended(program: &Program, tolerance_mm: f64, merging_mm: Option<f64>) -> Program {
-    let mut program = on(program, Path::Blended(tolerance_mm));
-    let blend = PathMode::Blend { tolerance_mm: Some(tolerance_mm), merging_mm };
-    for step in &mut program.steps {
-        match &mut step.kind {
-            StepKind::Line(line) => line.mode = blend,
-            StepKind::Arc(arc) => arc.mode = blend,
-            StepKind::Cubic(curve) => curve.mode = blend,
-            StepKind::Through(point) => point.mode = blend,
-            StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => {}
-        }
-    }
-    program
 }

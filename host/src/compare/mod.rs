@@ -117,12 +117,19 @@ pub fn figures(
 /// The program on another path.
 #[must_use]
 pub fn on(program: &Program, path: Path) -> Program {
+    match path {
+        Path::Written => program.clone(),
+        Path::Exact => in_mode(program, PathMode::ExactPath),
+        Path::Blended(tolerance_mm) => {
+            in_mode(program, PathMode::Blend { tolerance_mm: Some(tolerance_mm), merging_mm: None })
+        }
+    }
+}
+
+/// The program with one path mode for all of its moves.
+#[must_use]
+pub fn in_mode(program: &Program, mode: PathMode) -> Program {
     let mut program = program.clone();
-    let mode = match path {
-        Path::Written => return program,
-        Path::Exact => PathMode::ExactPath,
-        Path::Blended(tolerance_mm) => PathMode::Blend { tolerance_mm: Some(tolerance_mm), merging_mm: None },
-    };
     for step in &mut program.steps {
         match &mut step.kind {
             StepKind::Line(line) => line.mode = mode,

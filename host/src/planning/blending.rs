@@ -111,9 +111,10 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlo
     } else {
         junctions.timed(&merged)
     };
-    best.time_s /= 1.0 - EXACT_GAIN_MIN;
+    let mut most_s = best.time_s / (1.0 - EXACT_GAIN_MIN);
     for timed in candidates {
-        if timed.time_s < best.time_s {
+        if timed.time_s < most_s {
+            most_s = timed.time_s;
             best = timed;
         }
     }

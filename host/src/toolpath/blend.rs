@@ -121,9 +121,16 @@ pub fn trim_mm(angle_rad: f64, tolerance_mm: f64) -> f64 {
 #[must_use]
 pub fn feed_mm_s(curve: &Polynomial, limits: &Limits<f64>) -> f64 {
     let bend = curve.greatest_of(COMPARED_PARTS).bend;
-    let by_accel = (limits.accel_mm_s2 / bend.curvature_per_mm).sqrt();
-    let by_jerk = libm::cbrt(limits.jerk_mm_s3 / (bend.third_root_per_mm * bend.third_root_per_mm));
-    let by_snap = (limits.snap_mm_s4 / bend.fourth_root_per_mm.powi(3)).sqrt().sqrt();
+    let third = bend.third_root_per_mm * bend.third_root_per_mm;
+    feed_within(limits, [bend.curvature_per_mm, third, bend.fourth_root_per_mm.powi(3)])
+}
+
+/// The greatest feed within the limits where the second to fourth derivative by arc length are so great
+/// \[1/mm, 1/mm², 1/mm³\].
+pub(super) fn feed_within(limits: &Limits<f64>, [second, third, fourth]: [f64; 3]) -> f64 {
+    let by_accel = (limits.accel_mm_s2 / second).sqrt();
+    let by_jerk = libm::cbrt(limits.jerk_mm_s3 / third);
+    let by_snap = (limits.snap_mm_s4 / fourth).sqrt().sqrt();
     // Not `min`, which would overlook what is not a number.
     [by_jerk, by_snap].into_iter().fold(by_accel, |least, feed| if feed >= least { least } else { feed })
 }

@@ -75,8 +75,8 @@ impl Run {
         Self::of(moves, distances_mm)
     }
 
-    /// The runs of `moves` with curves in place of what is dense, made for `limits` and at most `feed_mm_s`: one
-    /// for each of `corners_rad` that makes a difference. A turn of more than that stays a corner.
+    /// The runs of `moves` with curves in place of what is dense, made for `limits` and at most `feed_mm_s`:
+    /// one for each of `corners_rad` that makes a difference. A turn of more than that stays a corner.
     #[must_use]
     pub fn faired(moves: &[Move], corners_rad: &[f64], limits: &Limits<f64>, feed_mm_s: f64) -> Vec<Self> {
         let made = faired(moves, corners_rad, limits, feed_mm_s).into_iter();

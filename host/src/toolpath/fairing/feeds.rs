@@ -3,8 +3,8 @@
 use motion_kernel::law::Limits;
 
 /// Part of the acceleration and the jerk that ramps may take where bends take the rest, and where a span is
-/// driven so much slower than it allows that its bends take 0.44 of acceleration and 0.3 of jerk: across to the
-/// ramp's, so that the sum of squares is at the limit.
+/// driven so much slower than it allows that its bends take 0.44 of acceleration and 0.3 of jerk: across to
+/// the ramp's, so that the sum of squares is at the limit.
 const RAMP_SHARE: f64 = 0.4;
 const STEEP_SHARE: f64 = 0.9;
 const SLOWER: f64 = 1.5;

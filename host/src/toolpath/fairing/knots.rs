@@ -49,6 +49,11 @@ impl Mesh {
         Self { breaks_mm, scales_mm }
     }
 
+    /// The lengths of the spans \[mm\].
+    pub(super) fn lengths_mm(&self) -> Vec<f64> {
+        self.breaks_mm.windows(2).map(|ends| ends[1] - ends[0]).collect()
+    }
+
     /// One knot more in the middle of each span named, in rising order, and of those beside it; nothing if
     /// none is named.
     pub(super) fn refined(&self, spans: &[usize]) -> Option<Self> {
@@ -202,8 +207,8 @@ fn chords(guide: &Guide) -> Vec<Chord> {
     chords
 }
 
-/// Whether a line through the middle of the points, in the direction from the first to the last, is within the
-/// tolerance of all.
+/// Whether a line through the middle of the points, in the direction from the first to the last, is within
+/// the tolerance of all.
 fn is_straight(points: &[Point]) -> bool {
     let [first, .., last] = points else { return false };
     let chord = subtract(last.at, first.at);

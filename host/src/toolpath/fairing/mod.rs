@@ -41,13 +41,13 @@ const GAIN_MIN: f64 = 0.003;
 /// Steps until the curve is given up, and steps for the feeds of one round.
 const STEPS_MAX: usize = 400;
 const STEPS_PER_ROUND: usize = 12;
-/// The duality gap at which a round ends, and the last one, as a part of the cost. Feeds change with its sixth
-/// root.
+/// The duality gap at which a round ends, and the last one, as a part of the cost. Feeds change with its
+/// sixth root.
 const GAP_MAX: f64 = 0.5;
 const GAP_MAX_AT_LAST: f64 = 0.2;
-/// The duality gap that a step aims at: a part of the present one, small where the step before was taken whole,
-/// large where it was not; never less than a part of the cost, because the equations lose their digits near the
-/// optimum; and all of the cost while the curve is far outside.
+/// The duality gap that a step aims at: a part of the present one, small where the step before was taken
+/// whole, large where it was not; never less than a part of the cost, because the equations lose their digits
+/// near the optimum; and all of the cost while the curve is far outside.
 const CENTERING: [(f64, f64); 2] = [(0.8, 0.1), (0.4, 0.3)];
 const CENTERING_MAX: f64 = 0.6;
 const GAP_MIN: f64 = 0.03;
@@ -108,25 +108,26 @@ pub fn fair(parts: &[Part], limits: &Limits<f64>) -> Option<Vec<Span>> {
 /// The curve with these knots, or the spans that need more of them; none if it failed otherwise.
 fn with_knots(guide: &Guide, mesh: &Mesh, limits: &Limits<f64>) -> Result<Vec<Span>, Vec<usize>> {
     let programmed = programmed_mm_s(guide, mesh);
-    let lowered = |mut feeds: Vec<f64>, lengths_mm: &[f64]| {
+    let lengths_mm = mesh.lengths_mm();
+    let lowered = |mut feeds: Vec<f64>| {
         feeds.iter_mut().zip(&programmed).for_each(|(feed, &programmed)| *feed = feed.min(programmed));
-        feeds::lower(&mut feeds, lengths_mm, limits);
+        feeds::lower(&mut feeds, &lengths_mm, limits);
         feeds
     };
-    let mut problem = Problem::new(guide, mesh.breaks_mm.clone());
-    let lengths_mm = problem.lengths_mm();
-    problem.start(limits, &lowered(promised_mm_s(guide, mesh, limits), &lengths_mm));
+    let mut problem = Problem::new(guide, &mesh.breaks_mm);
+    problem.start(limits, &lowered(promised_mm_s(guide, mesh, limits)));
     let (mut rounds, mut approach) = (Rounds::default(), Approach::default());
     let (mut steps, mut tightenings, mut centering) = (0, 0, CENTERING[0].1);
+    let mut farthest = problem.farthest();
     for _ in 0..STEPS_MAX {
-        let least = if problem.farthest() > FAR { 1.0 } else { GAP_MIN };
+        let least = if farthest > FAR { 1.0 } else { GAP_MIN };
         let gap_aim = (centering * problem.gap()).max(least * problem.cost());
         let taken = problem.step(gap_aim).ok_or_else(Vec::new)?;
         centering = CENTERING
             .iter()
             .find(|(least, _)| taken > *least)
             .map_or(CENTERING_MAX, |&(_, centering)| centering);
-        let farthest = problem.farthest();
+        farthest = problem.farthest();
         if farthest > WITHIN {
             if approach.has_stalled(farthest) {
                 return Err(problem.tight(WITHIN));
@@ -141,7 +142,7 @@ fn with_knots(guide: &Guide, mesh: &Mesh, limits: &Limits<f64>) -> Result<Vec<Sp
         }
         steps = 0;
         if !rounds.are_over() {
-            let feeds = lowered(problem.allowed_mm_s(limits), &lengths_mm);
+            let feeds = lowered(problem.allowed_mm_s(limits));
             rounds.next(lengths_mm.iter().zip(&feeds).map(|(mm, mm_s)| mm / mm_s).sum());
             problem.change(limits, &feeds);
             continue;
@@ -158,6 +159,7 @@ fn with_knots(guide: &Guide, mesh: &Mesh, limits: &Limits<f64>) -> Result<Vec<Sp
             Err(far) => {
                 tightenings += 1;
                 problem.tighten(&far);
+                farthest = problem.farthest();
             }
         }
     }
@@ -186,7 +188,8 @@ impl Rounds {
 /// A curve on its way to the path.
 struct Approach {
     steps: usize,
-    /// How much farther than allowed it was when it last came nearer, in units of what is used of the tolerance.
+    /// How much farther than allowed it was when it last came nearer, in units of what is used of the
+    /// tolerance.
     beyond: f64,
 }
 

@@ -9,14 +9,15 @@
 //! Every step is one of a primal-dual interior-point method that may start outside (J. Nocedal, S. Wright,
 //! "Numerical Optimization", 2nd edition, sections 19.2 and 19.3). Each sample has a slack variable and a
 //! multiplier, both above 0. Newton steps reduce the constraint violation to zero and bring every product of
-//! slack and multiplier to the same value. Then the sum of these products, the duality gap, bounds what is left
-//! to gain.
+//! slack and multiplier to the same value. Then the sum of these products, the duality gap, bounds what is
+//! left to gain.
 
 use super::super::spline::basis::{Row, clamped, polynomial, row};
 use super::super::{Vector, add, dot, norm, scale, subtract};
 use super::cholesky::{ACTING, Cholesky};
 use super::guide::Guide;
 use crate::toolpath::Polynomial;
+use crate::toolpath::blend::feed_within;
 use motion_kernel::law::Limits;
 
 /// Degree of the spline.
@@ -39,7 +40,8 @@ struct Sample {
     at: Vector,
     /// 1/tolerance² \[1/mm²\].
     per_square: f64,
-    /// The slack variable, above 0. Its sum with [`Problem::beyond`] is the constraint violation.
+    /// The slack variable, above 0: with [`Problem::square`] it makes 1, and what it is off by is the
+    /// constraint violation.
     slack: f64,
     /// The multiplier: the cost that a little more tolerance would save.
     multiplier: f64,
@@ -71,9 +73,9 @@ struct Bending {
 }
 
 /// The problem and where its solution stands.
-pub(super) struct Problem {
+pub(super) struct Problem<'a> {
     /// Ends of the spans \[mm\].
-    breaks: Vec<f64>,
+    breaks: &'a [f64],
     knots: Vec<f64>,
     samples: Vec<Sample>,
     bendings: Vec<Bending>,
@@ -81,9 +83,9 @@ pub(super) struct Problem {
     equations: Cholesky,
 }
 
-impl Problem {
-    pub(super) fn new(guide: &Guide, breaks: Vec<f64>) -> Self {
-        let knots = clamped(&breaks, DEGREE);
+impl<'a> Problem<'a> {
+    pub(super) fn new(guide: &Guide, breaks: &'a [f64]) -> Self {
+        let knots = clamped(breaks, DEGREE);
         let points = breaks.len() - 1 + DEGREE;
         let mut control: Vec<Vector> = (0..points)
             .map(|index| {
@@ -105,19 +107,14 @@ impl Problem {
                 gram: [[0.0; ACTING]; ACTING],
             })
             .collect();
-        let samples = samples(guide, &breaks, &knots);
+        let samples = samples(guide, breaks, &knots);
         let equations = Cholesky::new(points - 2 * DECIDED);
         Self { breaks, knots, samples, bendings, control, equations }
     }
 
-    /// The lengths of the spans \[mm\].
-    pub(super) fn lengths_mm(&self) -> Vec<f64> {
-        self.breaks.windows(2).map(|ends| ends[1] - ends[0]).collect()
-    }
-
     /// The ends of the spans \[mm\].
     pub(super) fn breaks(&self) -> &[f64] {
-        &self.breaks
+        self.breaks
     }
 
     /// Sets what bending costs where: the limits, at the feeds that are expected on the spans \[mm/s\].
@@ -177,16 +174,12 @@ impl Problem {
 
     /// The greatest distance of the curve from a sample, in units of its tolerance.
     pub(super) fn farthest(&self) -> f64 {
-        let squares = self.samples.iter().map(|sample| {
-            let e = self.distance(sample);
-            sample.per_square * dot(e, e)
-        });
-        squares.fold(0.0, f64::max).sqrt()
+        self.samples.iter().map(|sample| self.square(sample)).fold(0.0, f64::max).sqrt()
     }
 
     /// The spans where the curve is farther from a sample than so many of its tolerances.
     pub(super) fn tight(&self, tolerances: f64) -> Vec<usize> {
-        let is_far = |sample: &&Sample| self.beyond(sample) > tolerances * tolerances - 1.0;
+        let is_far = |sample: &&Sample| self.square(sample) > tolerances * tolerances;
         let mut spans: Vec<usize> = self.samples.iter().filter(is_far).map(|sample| sample.first).collect();
         spans.dedup();
         spans
@@ -204,10 +197,10 @@ impl Problem {
         self.restart();
     }
 
-    /// The square of the distance from a sample, in units of its tolerance, less 1: at most 0 within it.
-    fn beyond(&self, sample: &Sample) -> f64 {
+    /// The square of the distance from a sample, in units of its tolerance: at most 1 within it.
+    fn square(&self, sample: &Sample) -> f64 {
         let e = self.distance(sample);
-        sample.per_square * dot(e, e) - 1.0
+        sample.per_square * dot(e, e)
     }
 
     /// Starts where the curve is, for the limits at these feeds, with a duality gap as great as the cost.
@@ -219,7 +212,7 @@ impl Problem {
     fn restart(&mut self) {
         let per_sample = self.cost().max(f64::MIN_POSITIVE) / self.samples.len() as f64;
         for index in 0..self.samples.len() {
-            let slack = SLACK_MIN.max(-self.beyond(&self.samples[index]));
+            let slack = SLACK_MIN.max(1.0 - self.square(&self.samples[index]));
             self.samples[index].slack = slack;
             self.samples[index].multiplier = per_sample / slack;
         }
@@ -241,7 +234,8 @@ impl Problem {
         self.samples.iter().map(|sample| sample.multiplier * sample.slack).sum()
     }
 
-    /// One step towards a gap of `gap_aim`: how much of it was taken, or nothing if the equations have no solution.
+    /// One step towards a gap of `gap_aim`: how much of it was taken, or nothing if the equations have no
+    /// solution.
     pub(super) fn step(&mut self, gap_aim: f64) -> Option<f64> {
         let free = self.control.len() - 2 * DECIDED;
         let per_sample = gap_aim / self.samples.len() as f64;
@@ -320,7 +314,7 @@ impl Problem {
             self.control[DECIDED + index] = add(self.control[DECIDED + index], scale(step, part));
         }
         for (index, (slack_change, multiplier_change)) in changes.into_iter().enumerate() {
-            let within = -self.beyond(&self.samples[index]);
+            let within = 1.0 - self.square(&self.samples[index]);
             let sample = &mut self.samples[index];
             sample.slack = (sample.slack + part * slack_change).max(within);
             let balanced = per_sample / sample.slack;
@@ -333,15 +327,8 @@ impl Problem {
     /// The feed at which each span alone keeps the limits \[mm/s\].
     pub(super) fn allowed_mm_s(&self, limits: &Limits<f64>) -> Vec<f64> {
         let of_span = |(span, bending): (usize, &Bending)| {
-            let mut least = f64::INFINITY;
-            for rows in &bending.rows {
-                let [second, third, fourth] = self.bent(span, rows).map(norm);
-                let by_accel = (limits.accel_mm_s2 / second).sqrt();
-                let by_jerk = libm::cbrt(limits.jerk_mm_s3 / third);
-                let by_snap = (limits.snap_mm_s4 / fourth).sqrt().sqrt();
-                least = least.min(by_accel).min(by_jerk).min(by_snap);
-            }
-            least
+            let at_point = |rows| feed_within(limits, self.bent(span, rows).map(norm));
+            bending.rows.iter().map(at_point).fold(f64::INFINITY, f64::min)
         };
         self.bendings.iter().enumerate().map(of_span).collect()
     }
