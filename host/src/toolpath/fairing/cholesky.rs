@@ -136,4 +136,29 @@ mod tests {
         indefinite.add_unit(1, 1, -1.0);
         assert!(!indefinite.solve(&mut [[0.0; 3]; 2]));
     }
+
+    /// What holds one direction very hard takes all digits of the others.
+    #[test]
+    fn rounding_does_not_make_a_matrix_indefinite() {
+        let mut state = 5_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1_u32 << 24) + 0.1
+        };
+        for _ in 0..100 {
+            let held: Vector = core::array::from_fn(|_| random());
+            let matrix: [Vector; 3] = held.map(|a| held.map(|b| 1e16 * a * b));
+            let factors = [random(), random()];
+            let mut equations = Cholesky::new(2);
+            for row in 0..2 {
+                equations.add_unit(row, row, 1e-3);
+                for column in 0..=row {
+                    equations.add(row, column, factors[row] * factors[column], &matrix);
+                }
+            }
+            let mut sides = [[1.0; 3]; 2];
+            assert!(equations.solve(&mut sides));
+            assert!(sides.iter().flatten().all(|side| side.is_finite()));
+        }
+    }
 }

@@ -327,6 +327,50 @@ mod tests {
         }
     }
 
+    /// Random walks with corners: where the curve is too far between its samples, it is made again.
+    #[test]
+    fn no_curve_is_farther_than_the_tolerance() {
+        let mut state = 11_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1_u32 << 24)
+        };
+        let mut found = 0;
+        for walk in 0..40 {
+            let (mut at, mut heading_rad, mut points) = ([0.0; 3], 0.0, vec![[0.0; 3]]);
+            for _ in 0..80 {
+                let length_mm = 0.05 + 0.3 * random();
+                heading_rad += 2.4 * (random() - 0.5);
+                let step = [libm::cos(heading_rad), libm::sin(heading_rad), 0.3 * (random() - 0.5)];
+                at = add(at, scale(step, length_mm));
+                points.push(at);
+            }
+            let Some(spans) = fair(&lines(&points, 0.03), &LIMITS) else { continue };
+            found += 1;
+            let said_mm = spans.iter().map(|span| span.distance_mm).fold(0.0, f64::max);
+            assert!(said_mm <= 0.03, "walk {walk}: {said_mm}");
+        }
+        assert!(found > 35, "{found} of 40 walks have a curve");
+    }
+
+    /// Short lines to and fro across the tolerance become a curve of few spans. Its equations are close to
+    /// singular, and the ends, which start as the lines do, need more knots than the scale gives them.
+    #[test]
+    fn what_goes_to_and_fro_becomes_straight() {
+        let mm = 25.4;
+        let point = |index: u32| {
+            let across = if index == 0 { 0.0 } else { [0.001, -0.001][usize::from(index % 2 == 1)] };
+            [0.002 * mm * f64::from(index), across * mm, 0.0]
+        };
+        let points: Vec<Vector> = (0..=2000).map(point).collect();
+        let spans = fair(&lines(&points, 0.05), &LIMITS).expect("a curve");
+        assert!(spans.len() < 100, "{} spans", spans.len());
+        assert!(spans.iter().all(|span| span.distance_mm <= 0.05));
+        let middle = &spans[spans.len() / 2];
+        let (start, end) = middle.element.ends_mm();
+        assert!((start[1] - end[1]).abs() < 1e-3 * (end[0] - start[0]), "{start:?} {end:?}");
+    }
+
     /// From span to span position and four derivatives by the length of the path; at the ends the path's own.
     #[test]
     fn nothing_steps_along_the_curve() {
