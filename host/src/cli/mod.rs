@@ -20,6 +20,7 @@
 //! as it was ([`files`](crate::files)).
 //!
 //! - [`profile`]: one ramp of the feed law, in figures;
+//! - [`read`]: the steps of a program;
 //! - [`plan`]: the feed plan of a program or a block list;
 //! - [`compare`]: the times of programs, exact and blended, compared with the least possible;
 //! - [`run`]: a program through plan, kernel and simulated machine;
@@ -46,6 +47,7 @@ pub mod jog;
 pub mod machine;
 pub mod plan;
 pub mod profile;
+pub mod read;
 pub mod replay;
 pub mod run;
 pub mod spline;
@@ -71,6 +73,7 @@ Examples:
   motion                                         the built-in demonstration; writes stringer.html
   motion run part.ngc --report part.html         run a program, with a report on the axes
   motion replay part.mrec                        run a recording again, to the same bits
+  motion read part.ngc                           the steps of a program, with absolute end points
   motion plan part.ngc                           what limits the feed, block by block
   motion compare parts/                          how long programs take, exact and blended
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
@@ -108,6 +111,7 @@ enum Command {
     Run(run::RunArguments),
     Replay(replay::ReplayArguments),
     Flight(flight::FlightArguments),
+    Read(read::ReadArguments),
     Plan(plan::PlanArguments),
     Compare(compare::CompareArguments),
     Profile(profile::ProfileArguments),
@@ -144,6 +148,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Run(arguments)) => run::run(arguments, out),
         Some(Command::Replay(arguments)) => replay::replay(arguments, out),
         Some(Command::Flight(arguments)) => flight::flight(arguments, out),
+        Some(Command::Read(arguments)) => read::read(arguments, out),
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
         Some(Command::Compare(arguments)) => compare::compare(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),

@@ -4,6 +4,7 @@ mod axes;
 mod drive;
 mod files;
 mod planning;
+mod reading;
 mod running;
 mod spline;
 mod unfinished;

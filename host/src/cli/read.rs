@@ -1,0 +1,206 @@
+//! `motion read`: the steps of a program as the reader understands them.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::input;
+use super::table::{self, Align};
+use crate::gcode::{self, Feed, Length, PathMode, Program, Step, StepKind};
+
+const EXAMPLES: &str = "\
+Examples:
+  motion read part.ngc                           a table: end point, feed and path mode of every step
+  motion read part.ngc --json                    a JSON object a line, for scripts
+  generate-part | motion read - --json           G-code from standard input
+
+JSON: an object for every step, in order. All have line and kind. kind is
+  line, arc, cubic, through    with from_mm, to_mm, feed_mm_min (null: rapid), path (exact or blend), tolerance_mm and
+                               merging_mm (null: the machine's choice)
+      arc                      also plane, centre_mm (along its first and second axis), sweep_rad (counter-clockwise positive)
+      cubic                    also controls_mm (the first from the start, the second from the end, X and Y)
+      through                  also begins (a spline begins with it)
+  dwell                        with dwell_s
+  stop, end
+After them an object for every notice, of kind notice, with text.";
+
+/// Print the steps of a program, without a machine.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct ReadArguments {
+    /// G-code (`-`: standard input).
+    #[arg(value_name = "PROGRAM")]
+    program: PathBuf,
+    /// Print JSON: an object a line.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct StepJson {
+    line: u32,
+    #[serde(flatten)]
+    kind: KindJson,
+}
+
+#[derive(Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+enum KindJson {
+    Line {
+        #[serde(flatten)]
+        ends: MoveJson,
+    },
+    Arc {
+        #[serde(flatten)]
+        ends: MoveJson,
+        plane: String,
+        centre_mm: [f64; 2],
+        sweep_rad: f64,
+    },
+    Cubic {
+        #[serde(flatten)]
+        ends: MoveJson,
+        controls_mm: [[f64; 2]; 2],
+    },
+    Through {
+        #[serde(flatten)]
+        ends: MoveJson,
+        begins: bool,
+    },
+    Dwell {
+        dwell_s: f64,
+    },
+    Stop,
+    End,
+}
+
+/// What all moves have.
+#[derive(Serialize)]
+struct MoveJson {
+    from_mm: [f64; 3],
+    to_mm: [f64; 3],
+    feed_mm_min: Option<f64>,
+    path: &'static str,
+    tolerance_mm: Option<f64>,
+    merging_mm: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct NoticeJson {
+    line: u32,
+    kind: &'static str,
+    text: String,
+}
+
+/// Reads and prints.
+///
+/// # Errors
+/// The program is refused, or `out` can't be written.
+pub fn read(arguments: &ReadArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let source = input::read(&arguments.program)?;
+    let program = gcode::read(&source.name, &source.text)?;
+    let write = if arguments.json { write_json_lines } else { write_table };
+    write(&program, out).map_err(CliError::Output)?;
+    Ok(Outcome::Done)
+}
+
+fn write_json_lines(program: &Program, out: &mut dyn Write) -> io::Result<()> {
+    program.steps.iter().try_for_each(|step| write_json_line(&step_json(step), out))?;
+    program.notices.iter().try_for_each(|notice| {
+        let text = notice.to_string();
+        write_json_line(&NoticeJson { line: notice.first_line, kind: "notice", text }, out)
+    })
+}
+
+fn write_json_line(value: &impl Serialize, out: &mut dyn Write) -> io::Result<()> {
+    serde_json::to_writer(&mut *out, value)?;
+    writeln!(out)
+}
+
+fn step_json(step: &Step) -> StepJson {
+    let kind = match step.kind {
+        StepKind::Line(line) => KindJson::Line { ends: move_json(line.from, line.to, line.feed, line.mode) },
+        StepKind::Arc(arc) => KindJson::Arc {
+            ends: move_json(arc.from, arc.to, arc.feed, arc.mode),
+            plane: arc.plane.to_string(),
+            centre_mm: arc.centre_mm,
+            sweep_rad: arc.sweep_rad,
+        },
+        StepKind::Cubic(cubic) => KindJson::Cubic {
+            ends: move_json(cubic.from, cubic.to, cubic.feed, cubic.mode),
+            controls_mm: cubic.controls_mm,
+        },
+        StepKind::Through(point) => KindJson::Through {
+            ends: move_json(point.from, point.to, point.feed, point.mode),
+            begins: point.begins,
+        },
+        StepKind::Dwell { seconds } => KindJson::Dwell { dwell_s: seconds },
+        StepKind::Stop => KindJson::Stop,
+        StepKind::End => KindJson::End,
+    };
+    StepJson { line: step.line, kind }
+}
+
+fn move_json(from: [Length; 3], to: [Length; 3], feed: Feed, mode: PathMode) -> MoveJson {
+    let (path, tolerance_mm, merging_mm) = match mode {
+        PathMode::ExactPath => ("exact", None, None),
+        PathMode::Blend { tolerance_mm, merging_mm } => ("blend", tolerance_mm, merging_mm),
+    };
+    let feed_mm_min = match feed {
+        Feed::Rapid => None,
+        Feed::MmPerMin(feed_mm_min) => Some(feed_mm_min),
+    };
+    let mm = |point: [Length; 3]| point.map(Length::to_mm);
+    MoveJson { from_mm: mm(from), to_mm: mm(to), feed_mm_min, path, tolerance_mm, merging_mm }
+}
+
+fn write_table(program: &Program, out: &mut dyn Write) -> io::Result<()> {
+    let columns = [
+        ("line", "", Align::Right),
+        ("step", "", Align::Left),
+        ("X", "mm", Align::Right),
+        ("Y", "mm", Align::Right),
+        ("Z", "mm", Align::Right),
+        ("feed", "mm/min", Align::Right),
+        ("path", "", Align::Left),
+        ("more", "", Align::Left),
+    ];
+    let rows: Vec<[String; 8]> = program.steps.iter().map(row).collect();
+    table::write(&columns, &rows, out)?;
+    writeln!(out, "\n  {} steps", rows.len())?;
+    program.notices.iter().try_for_each(|notice| writeln!(out, "  note: {notice}"))
+}
+
+fn row(step: &Step) -> [String; 8] {
+    let (name, ends, more) = match step_json(step).kind {
+        KindJson::Line { ends } if ends.feed_mm_min.is_none() => ("rapid", Some(ends), String::new()),
+        KindJson::Line { ends } => ("line", Some(ends), String::new()),
+        KindJson::Arc { ends, plane, centre_mm: [first, second], sweep_rad } => {
+            let sweep_deg = sweep_rad.to_degrees();
+            ("arc", Some(ends), format!("{plane}, centre {first:.4} {second:.4}, {sweep_deg:.4}°"))
+        }
+        KindJson::Cubic { ends, controls_mm: [[i, j], [p, q]] } => {
+            ("cubic", Some(ends), format!("I{i:.4} J{j:.4} P{p:.4} Q{q:.4}"))
+        }
+        KindJson::Through { ends, begins } => {
+            ("through", Some(ends), if begins { "begins a spline" } else { "" }.to_owned())
+        }
+        KindJson::Dwell { dwell_s } => ("dwell", None, format!("{dwell_s} s")),
+        KindJson::Stop => ("stop", None, String::new()),
+        KindJson::End => ("end", None, String::new()),
+    };
+    let [x, y, z, feed, path] = ends.map(move_cells).unwrap_or_default();
+    [step.line.to_string(), name.to_owned(), x, y, z, feed, path, more]
+}
+
+/// End point, feed and path mode.
+fn move_cells(ends: MoveJson) -> [String; 5] {
+    let [x, y, z] = ends.to_mm.map(|coordinate| format!("{coordinate:.4}"));
+    let feed = ends.feed_mm_min.map_or_else(|| "–".to_owned(), |feed_mm_min| format!("{feed_mm_min:.1}"));
+    let tolerance = |letter, mm: Option<f64>| mm.map_or_else(String::new, |mm| format!(" {letter}{mm}"));
+    let mode = if ends.path == "exact" { "G61" } else { "G64" };
+    [x, y, z, feed, format!("{mode}{}{}", tolerance('P', ends.tolerance_mm), tolerance('Q', ends.merging_mm))]
+}

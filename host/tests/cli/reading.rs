@@ -1,0 +1,86 @@
+//! `read`: the steps of a program, as JSON lines and as a table.
+
+use serde_json::{Value, json};
+
+use super::workspace::Workspace;
+
+const PROGRAM: &str = "\
+G20 G64 P0.1 S9
+G0 X1 F10
+G61 G2 X3 I1
+G4 P0.5
+G21 G18 G1 Z-5 F600
+M0
+G17 G5 X80 I1 J2 P3 Q4
+G5.5 Y9
+M2
+";
+
+fn lines(printed: &str) -> Vec<Value> {
+    printed.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
+}
+
+#[test]
+fn every_step_has_an_object() {
+    let workspace = Workspace::new("read");
+    workspace.put("part.ngc", PROGRAM);
+    let steps = lines(&workspace.stdout(&["read", "part.ngc", "--json"]));
+    let kinds: Vec<_> = steps.iter().map(|step| (step["line"].clone(), step["kind"].clone())).collect();
+    let expected = [
+        (2, "line"),
+        (3, "arc"),
+        (4, "dwell"),
+        (5, "line"),
+        (6, "stop"),
+        (7, "cubic"),
+        (8, "through"),
+        (9, "end"),
+        (1, "notice"),
+        (5, "notice"),
+    ];
+    assert_eq!(kinds, expected.map(|(line, kind)| (json!(line), json!(kind))));
+    assert_eq!(
+        steps[0],
+        json!({
+            "line": 2, "kind": "line", "from_mm": [0.0, 0.0, 0.0], "to_mm": [25.4, 0.0, 0.0], "feed_mm_min": null,
+            "path": "blend", "tolerance_mm": 2.54, "merging_mm": null,
+        })
+    );
+    assert_eq!(
+        steps[1],
+        json!({
+            "line": 3, "kind": "arc", "from_mm": [25.4, 0.0, 0.0], "to_mm": [76.2, 0.0, 0.0], "feed_mm_min": 254.0,
+            "path": "exact", "tolerance_mm": null, "merging_mm": null,
+            "plane": "XY", "centre_mm": [50.8, 0.0], "sweep_rad": -std::f64::consts::PI,
+        })
+    );
+    assert_eq!(steps[2]["dwell_s"], json!(0.5));
+    assert_eq!((&steps[3]["to_mm"], &steps[3]["feed_mm_min"]), (&json!([76.2, 0.0, -5.0]), &json!(600.0)));
+    assert_eq!(steps[5]["controls_mm"], json!([[1.0, 2.0], [3.0, 4.0]]));
+    assert_eq!(steps[6]["begins"], json!(true));
+    assert!(steps[8]["text"].as_str().expect("a text").contains("S is not acted on"));
+}
+
+#[test]
+fn a_table_is_for_people() {
+    let workspace = Workspace::new("read-table");
+    workspace.put("part.ngc", PROGRAM);
+    let table = workspace.stdout(&["read", "part.ngc"]);
+    let row = |line: &str| {
+        let found = table.lines().find(|row| row.split_whitespace().next() == Some(line)).expect("a row");
+        found.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(row("2"), "2 rapid 25.4000 0.0000 0.0000 – G64 P2.54");
+    assert_eq!(row("3"), "3 arc 76.2000 0.0000 0.0000 254.0 G61 XY, centre 50.8000 0.0000, -180.0000°");
+    assert_eq!(row("4"), "4 dwell 0.5 s");
+    assert!(table.contains("8 steps") && table.contains("note: line 1: S is not acted on"), "{table}");
+}
+
+#[test]
+fn what_is_no_program_is_refused() {
+    let workspace = Workspace::new("read-refused");
+    workspace.put("part.ngc", "G0 X1\nG1 X2\n");
+    assert!(workspace.refusal(&["read", "part.ngc"]).starts_with("part.ngc:2:1: found G1 without a feed"));
+    assert!(workspace.refusal(&["read", "part.ngc", "--json"]).starts_with("part.ngc:2:1: "));
+    assert!(workspace.refusal(&["read", "none.ngc"]).starts_with("none.ngc: found "));
+}
