@@ -1,13 +1,22 @@
-"""`python3 -m unittest test` in this folder. Needs no LinuxCNC."""
+"""`python3 -m unittest test` in this folder. What needs LinuxCNC is skipped without it."""
 
 import math
+import os
 import random
+import subprocess
+import sys
 import unittest
+from dataclasses import replace
 
+import interpreter
 import machine
 import ours
 import peer
+import reading
 import recording
+import steps
+import tools
+from difference import compared
 from path import Path, arc_points
 from program import NotRewritten, PathMode, rewritten
 
@@ -161,6 +170,148 @@ class Limits(unittest.TestCase):
             ["[path]", "feed_mm_s = 519.615242", "snap_mm_s4 = 277128129.211020", "[[axis]]", "jerk_mm_s3 = 100000.000000",
              "[axis.drive]", "jerk_mm_s3 = 1.0"],
         )
+
+
+# What both print of `G21 G64 P0.05 / F600 G1 X10 / G2 X20 I5 / M0 / G4 P.5 / G0 X0 / M2`.
+CALLS = [
+    ["set_g5x_offset", 0, 1, *[0.0] * 9],
+    ["straight_traverse", 0, *[0.0] * 9],
+    ["begin", 0],
+    ["set_feed_rate", 2, 600 / 25.4],
+    ["straight_feed", 2, 10 / 25.4, *[0.0] * 8],
+    ["arc_feed", 3, 20 / 25.4, 0.0, 15 / 25.4, 0.0, -1, *[0.0] * 7],
+    ["dwell", 5, 0.5],
+    ["straight_traverse", 6, *[0.0] * 9],
+    ["set_feed_rate", 7, 0.0],
+]
+ORDER = """    1 N..... USE_LENGTH_UNITS(CANON_UNITS_MM)
+    2 N..... STRAIGHT_TRAVERSE(0.0000, 0.0000, 0.0000, 0.0000, 0.0000, 0.0000)
+    3 N..... COMMENT("begin")
+    4 N..... SET_MOTION_CONTROL_MODE(CANON_CONTINUOUS, 0.050000)
+    5 N..... SET_NAIVECAM_TOLERANCE(0.0500)
+    6 N..... SET_FEED_RATE(600.0000)
+    7 N..... STRAIGHT_FEED(10.0000, 0.0000, 0.0000, 0.0000, 0.0000, 0.0000)
+    8 N20    ARC_FEED(20.0000, 0.0000, 15.0000, 0.0000, -1, 0.0000, 0.0000, 0.0000, 0.0000)
+    9 PROGRAM_STOP()
+   10 N..... DWELL(0.5000)
+   11 N..... STRAIGHT_TRAVERSE(0.0000, 0.0000, 0.0000, 0.0000, 0.0000, 0.0000)
+   12 N..... SET_FEED_RATE(0.0000)
+   13 N..... PROGRAM_END()
+"""
+BLEND = {"path": "blend", "tolerance_mm": 0.05, "merging_mm": None}
+OBJECTS = [
+    {"line": 2, "kind": "line", "from_mm": [0, 0, 0], "to_mm": [10, 0, 0], "feed_mm_min": 600.0, **BLEND},
+    {"line": 3, "kind": "arc", "from_mm": [10, 0, 0], "to_mm": [20, 0, 0], "feed_mm_min": 600.0, **BLEND,
+     "plane": "XY", "centre_mm": [15, 0], "sweep_rad": -math.pi},
+    {"line": 4, "kind": "stop"},
+    {"line": 5, "kind": "dwell", "dwell_s": 0.5},
+    {"line": 6, "kind": "line", "from_mm": [20, 0, 0], "to_mm": [0, 0, 0], "feed_mm_min": None, **BLEND},
+    {"line": 7, "kind": "end"},
+]
+
+
+class Steps(unittest.TestCase):
+    def whats(self, mine, other):
+        return [difference.what for difference in compared(mine, other)[0]]
+
+    def test_both_forms_are_the_same(self):
+        mine, other = steps.of_motion(OBJECTS), steps.of_linuxcnc(CALLS, ORDER)
+        self.assertEqual([step.kind for step in other], ["move", "move", "stop", "dwell", "move"])
+        differences, figures = compared(mine, other)
+        self.assertEqual(differences, [])
+        self.assertEqual((figures.moves, figures.others), (3, 2))
+
+    def test_every_difference_has_its_name(self):
+        other = steps.of_linuxcnc(CALLS, ORDER)
+        first, arc, _, dwell, last = other
+
+        def changed(at, **changes):
+            return [replace(step, **changes) if step is at else step for step in other]
+
+        def bent(**changes):
+            return changed(arc, arc=replace(arc.arc, **changes))
+
+        for mine, what in (
+            (changed(first, to=(10.000002, *first.to[1:])), "end"),
+            (changed(first, feed_mm_min=600.001), "feed"),
+            (changed(last, feed_mm_min=600.0), "feed"),
+            (changed(last, path=()), "path"),
+            (changed(dwell, value=0.6), "dwell"),
+            (changed(dwell, kind="stop"), "kind"),
+            (changed(arc, arc=None), "curve"),
+            (bent(sweep_rad=math.pi), "turns"),
+            (bent(sweep_rad=-math.pi + 1e-6), "centre"),
+            (bent(centre=(15.0, 2e-6, 0.0)), "centre"),
+            (bent(normal=(1.0, 0.0, 0.0)), "plane"),
+            (other[:-1], "kind"),
+        ):
+            self.assertEqual(self.whats(mine, other), [what])
+        swapped = [first, arc, dwell, other[2], last]
+        self.assertEqual(self.whats(swapped, other), ["kind"])
+
+    def test_offsets_and_rotation_lead_to_the_machine(self):
+        offsets = steps.Offsets()
+        offsets.g92, offsets.g5x, offsets.tool = (1.0, *[0.0] * 8), (0.0, 10.0, *[0.0] * 7), (0.0, 0.0, 5.0, 7.0, *[0.0] * 5)
+        offsets.rotation_rad = math.radians(90)
+        x, y, z, a, *_ = offsets.machine((2.0, 0.0, 0.0, 3.0, *[0.0] * 5))
+        for value, expected in ((x, 0), (y, 13 * 25.4), (z, 5 * 25.4), (a, 10)):
+            self.assertAlmostEqual(value, expected)
+
+    def test_an_arc_in_a_rotated_system_is_turned(self):
+        calls = [*CALLS[:3], ["set_xy_rotation", 1, 90.0], *CALLS[3:6]]
+        order = "\n".join(ORDER.splitlines()[:8])
+        _, arc = steps.of_linuxcnc(calls, order)
+        self.assertLess(math.dist(arc.arc.centre, (0, 15, 0)), 1e-12)
+        self.assertAlmostEqual(arc.arc.sweep_rad, -math.pi)
+
+    def test_full_turns_and_more(self):
+        for end, rotation, expected in (((2, 0), 1, math.tau), ((2, 0), -2, -2 * math.tau), ((0, 2), -1, -0.75 * math.tau)):
+            got = steps.sweep_rad((2, 0), end, (0, 0), XY, rotation)
+            self.assertAlmostEqual(got, expected)
+
+    def test_voices_that_do_not_agree_are_noticed(self):
+        for calls, order in (
+            (CALLS[:5] + CALLS[6:], ORDER),
+            (CALLS + [["dwell", 8, 1.0]], ORDER),
+            (CALLS[:-2], ORDER),
+            ([*CALLS[:6], ["change_tool", 4, 1]], ORDER.replace("PROGRAM_STOP()", "CHANGE_TOOL(1)")),
+        ):
+            with self.assertRaises(steps.NotComparable):
+                steps.of_linuxcnc(calls, order)
+
+    def test_a_cubic_curve_is_compared_at_its_points(self):
+        pieces = steps.pieces_of_curve(4)
+        ends = {"from_mm": [0, 0, 0], "to_mm": [3, 0, 0], "controls_mm": [[1, 0], [-1, 0]], "feed_mm_min": 6.0}
+        mine = steps.of_motion([{"line": 1, "kind": "cubic", **ends, **BLEND}])
+        self.assertIn(pieces, (60, 61))
+        for at, point in enumerate(mine[0].through, 1):
+            self.assertAlmostEqual(point[0], at / 20)
+
+
+class Interpreter(unittest.TestCase):
+    def test_reasons_lose_their_places_and_numbers(self):
+        for refusal, reason in (
+            ("motion: a.ngc:2:5: found T12, expected one of", "found T…"),
+            ("motion: a.ngc:2:5: found G43.1, expected one of", "found G43.1"),
+            ("motion: a.ngc:2:5: found X-.5 without a motion mode, expected", "found X… without a motion mode"),
+        ):
+            self.assertEqual(interpreter.reason_of(refusal), reason)
+
+    @unittest.skipUnless(reading.installed() and "MOTION" in os.environ, "needs LinuxCNC, and MOTION: the command to compare")
+    def test_our_own_programs_are_read_alike(self):
+        here = reading.HERE
+        command = [sys.executable, here / "interpreter.py", here / "programs", "--motion", os.environ["MOTION"]]
+        done = subprocess.run(command, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_the_beginning_stands_behind_the_tape_mark(self):
+        self.assertEqual(reading.with_beginning("%\nM2\n").splitlines()[::4], ["%", "M2"])
+        self.assertTrue(reading.with_beginning("M2\n").startswith("G21\n"))
+
+    def test_tool_tables(self):
+        [tool] = tools.read("T3 P1 Z50.8 D25.4 Q2 ; an end mill\n; none\n")
+        self.assertEqual((tool.number, tool.pocket, tool.offsets[2], tool.diameter, tool.orientation), (3, 1, 50.8, 25.4, 2))
+        self.assertEqual(tools.read(tool.line(25.4))[0], replace(tool, offsets=(0, 0, 2.0, *[0.0] * 6), diameter=1.0))
 
 
 if __name__ == "__main__":
