@@ -10,10 +10,15 @@ pub trait Curve {
     /// First to third derivative by the parameter at `u`.
     fn derivatives(&self, u: f64) -> [Vector; 3];
 
+    /// |r'| at `u`.
+    fn speed(&self, u: f64) -> f64 {
+        norm(self.derivatives(u)[0])
+    }
+
     /// Arc length from `a` to `b` \[mm\], `b` ≥ `a`. The default integrates |r'| by 16 Gauss points, which
     /// resolves a turn of up to an eighth of a circle to the last place.
     fn length(&self, a: f64, b: f64) -> f64 {
-        gauss(a, b, |u| norm(self.derivatives(u)[0]))
+        gauss(a, b, |u| self.speed(u))
     }
 }
 

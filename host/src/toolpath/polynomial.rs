@@ -79,7 +79,7 @@ impl Polynomial {
     /// First to fourth derivative by the parameter at `u`.
     #[must_use]
     pub fn four_derivatives(&self, u: f64) -> [Vector; 4] {
-        let [c1, c2, c3, c4, ..] = self.about(u);
+        let [c1, c2, c3, c4, ..] = self.first_about(u, 4);
         [c1, scale(c2, 2.0), scale(c3, 6.0), scale(c4, 24.0)]
     }
 
@@ -118,26 +118,23 @@ impl Polynomial {
 
     /// The coefficients of the same curve in u − `origin`, relative to the point at `origin`.
     fn about(&self, origin: f64) -> [Vector; DEGREE] {
+        self.first_about(origin, DEGREE)
+    }
+
+    /// The first `count` of them; the others mean nothing.
+    fn first_about(&self, origin: f64, count: usize) -> [Vector; DEGREE] {
         let mut shifted = self.coefficients;
         if origin == 0.0 {
             return shifted;
         }
         // Horner's scheme, applied to its own results. Its first pass makes the point itself, which is left
         // out, and the second c₁ at index 0.
-        for pass in 0..DEGREE {
+        for pass in 0..DEGREE.min(count + 1) {
             for index in (pass.saturating_sub(1)..DEGREE - 1).rev() {
                 shifted[index] = add(shifted[index], scale(shifted[index + 1], origin));
             }
         }
         shifted
-    }
-
-    fn speed(&self, u: f64) -> f64 {
-        let mut slope = [0.0; 3];
-        for (index, &coefficient) in self.coefficients.iter().enumerate().rev() {
-            slope = add(scale(slope, u), scale(coefficient, (index + 1) as f64));
-        }
-        norm(slope)
     }
 
     /// Halves [a, b], whose quadrature is `whole`, until both halves together say the same.
@@ -162,6 +159,14 @@ impl Curve for Polynomial {
     fn derivatives(&self, u: f64) -> [Vector; 3] {
         let [first, second, third, _] = self.four_derivatives(u);
         [first, second, third]
+    }
+
+    fn speed(&self, u: f64) -> f64 {
+        let mut slope = [0.0; 3];
+        for (index, &coefficient) in self.coefficients.iter().enumerate().rev() {
+            slope = add(scale(slope, u), scale(coefficient, (index + 1) as f64));
+        }
+        norm(slope)
     }
 
     fn length(&self, a: f64, b: f64) -> f64 {
