@@ -32,9 +32,11 @@ def downloaded(cache):
 
 
 def unpack(archive, cache):
-    """Unpacks the folders of programs; the archive has one folder around all."""
+    """Unpacks the programs; the archive has one folder around all."""
     with tarfile.open(archive) as files:
         for member in files:
-            member.name = member.name.partition("/")[2]
-            if member.name.startswith(tuple(name + "/" for name in FOLDERS)):
-                files.extract(member, cache, filter="data")
+            name = member.name.partition("/")[2]
+            if name.startswith(tuple(folder + "/" for folder in FOLDERS)) and member.isfile():
+                path = cache / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(files.extractfile(member).read())
