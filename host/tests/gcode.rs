@@ -32,7 +32,7 @@ fn read(name: &str, text: &str) -> Program {
 #[derive(Debug)]
 enum Expected {
     Line { to: [i128; 3], feed_mm_min: Option<f64> },
-    Arc { to: [i128; 3], feed_mm_min: f64, clockwise: bool, axes: [usize; 2], shape: Shape },
+    Arc { to: [i128; 3], feed_mm_min: f64, clockwise: bool, axes: [usize; 2], shape: Shape, turns: i128 },
     Cubic { to: [i128; 3], feed_mm_min: f64, controls: [[i128; 2]; 2] },
     Through { to: [i128; 3], feed_mm_min: f64, begins: bool },
     Dwell(f64),
@@ -60,7 +60,10 @@ fn split_words(line: &[u8]) -> Vec<(char, String)> {
             letter if letter.is_ascii_alphabetic() => {
                 words.push((letter.to_ascii_uppercase(), String::new()))
             }
-            other => words.last_mut().expect("a number belongs to a letter").1.push(other),
+            other => match words.last_mut() {
+                Some(word) => word.1.push(other),
+                None => words.push(('?', other.to_string())),
+            },
         }
     }
     words
@@ -76,6 +79,49 @@ fn units(text: &str) -> i128 {
     let decimals = decimals.trim_end_matches('0');
     assert!(decimals.len() <= 10, "{text}");
     sign * format!("{whole}{decimals:0<10}").parse::<i128>().unwrap_or_else(|_| panic!("a number: {text:?}"))
+}
+
+/// Whether the second interpreter knows all that is in a program. It knows neither parameters nor offsets.
+fn is_plain(text: &[u8]) -> bool {
+    let is_known = |(letter, number): &(char, String)| {
+        let number = number.strip_prefix(['-', '+']).unwrap_or(number);
+        let decimals = number.split_once('.').map_or("", |(_, decimals)| decimals).trim_end_matches('0');
+        let is_number = number.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
+        let is_code = matches!(letter, 'G' | 'M');
+        let codes: &[i128] = match letter {
+            'G' => &[
+                0, 10, 20, 30, 40, 50, 55, 170, 180, 190, 200, 210, 400, 490, 540, 610, 640, 800, 900, 901,
+                910, 911, 940,
+            ],
+            'M' => &[0, 10, 20, 30, 40, 50, 70, 80, 90, 300],
+            _ => &[],
+        };
+        is_number
+            && number.bytes().any(|byte| byte.is_ascii_digit())
+            && "FGIJKMNPQRSXYZ".contains(*letter)
+            && decimals.len() <= 9
+            && number.len() <= 18
+            && (!is_code || codes.contains(&(units(number) / 1_000_000_000)))
+    };
+    let is_plain_line = |line: &[u8]| {
+        if line.trim_ascii() == b"%" {
+            return true;
+        }
+        let mut in_comment = false;
+        let has_strangers = line.iter().any(|&byte| {
+            in_comment = byte == b'(' || in_comment && byte != b')';
+            !in_comment && matches!(byte, b'#' | b'[' | b'/' | b'*' | b'=' | b'<')
+        });
+        if has_strangers {
+            return false;
+        }
+        let words = split_words(line);
+        let has =
+            |code: i128| words.iter().any(|(letter, n)| *letter == 'G' && units(n) / 1_000_000_000 == code);
+        words.iter().all(is_known)
+            && !(has(800) && words.iter().filter(|(letter, _)| *letter == 'G').count() > 1)
+    };
+    text.split(|&byte| byte == b'\n').all(is_plain_line)
 }
 
 /// What an accepted program must have been read as. Panics on anything it does not know, since the reader
@@ -173,6 +219,9 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
             }
         } else if moves || offsets != [None, None] || radius.is_some() {
             let clockwise = motion == Some(20);
+            let turns = value('P')
+                .filter(|_| !dwell && !codes('G').contains(&640))
+                .map_or(1, |turns| turns / 10_i128.pow(10));
             match motion.expect("a motion mode") {
                 0 if from != to => expected.push((number, Expected::Line { to, feed_mm_min: None })),
                 10 if from != to => {
@@ -190,7 +239,7 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
                         None if centre_absolute => Shape::Centre(offsets.map(|offset| offset.expect("both"))),
                         None => Shape::Centre([0, 1].map(|i| from[axes[i]] + offsets[i].unwrap_or(0))),
                     };
-                    expected.push((number, Expected::Arc { to, feed_mm_min, clockwise, axes, shape }));
+                    expected.push((number, Expected::Arc { to, feed_mm_min, clockwise, axes, shape, turns }));
                 }
             }
         }
@@ -255,7 +304,8 @@ fn assert_same_step(step: &Step, expected: &Expected, position: &mut [i128; 3]) 
             same_feed(line.feed, *feed_mm_min);
             *position = *to;
         }
-        (StepKind::Arc(arc), Expected::Arc { to, feed_mm_min, clockwise, axes, shape }) => {
+        (StepKind::Arc(mut arc), Expected::Arc { to, feed_mm_min, clockwise, axes, shape, turns }) => {
+            arc.sweep_rad -= (2.0 * PI * (*turns - 1) as f64).copysign(arc.sweep_rad);
             assert_eq!((units(arc.from), units(arc.to)), (*position, *to));
             same_feed(arc.feed, Some(*feed_mm_min));
             assert_eq!(arc.plane.axes()[..2], axes[..]);
@@ -313,7 +363,9 @@ fn assert_second_opinion(text: &[u8], program: &Program) {
 fn check(text: &[u8], seed: u64) -> bool {
     let outcome = catch_unwind(|| match gcode::read("mutant.ngc", text) {
         Ok(program) => {
-            assert_second_opinion(text, &program);
+            if is_plain(text) {
+                assert_second_opinion(text, &program);
+            }
             true
         }
         Err(error) => {

@@ -40,6 +40,8 @@ pub struct CompareArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
+    #[command(flatten)]
+    reading: input::ReadArguments,
     /// Tolerance of blends, from 0 to 10 mm; may be given several times. Without it, the machine's tolerance.
     #[arg(long = "tolerance", value_name = "MM", value_parser = tolerance, allow_negative_numbers = true)]
     tolerances: Vec<f64>,
@@ -115,11 +117,12 @@ pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outc
     let programs = programs(&arguments.programs)?;
     let own = [machine.path.blend_tolerance_mm];
     let tolerances_mm = if arguments.tolerances.is_empty() { &own[..] } else { &arguments.tolerances };
+    let options = arguments.reading.options()?;
     let (mut rows, mut refused) = (Vec::new(), Vec::new());
     let mut progress = Progress::new(programs.len() as u64);
     for path in &programs {
         let source = input::read(path)?;
-        match gcode::read(&source.name, &source.text) {
+        match gcode::read_with(&source.name, &source.text, &options) {
             Ok(program) => rows_of(&source.name, &program, tolerances_mm, &machine, &mut rows)
                 .unwrap_or_else(|error| refused.push(error.to_string())),
             Err(error) => refused.push(error.to_string()),

@@ -10,7 +10,6 @@ use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::Written;
 use crate::files::Files;
-use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Executable, Mode, Plan, plan_program};
 
@@ -35,6 +34,8 @@ pub struct CompileArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
+    #[command(flatten)]
+    reading: input::ReadArguments,
     /// The number type of the board's kernel.
     #[arg(long, value_enum, default_value_t = Number::F32)]
     number: Number,
@@ -61,12 +62,14 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
     let mut files = Files::reading([
         ("PROGRAM", Some(arguments.program.as_path())),
         ("--machine", arguments.machine.as_deref()),
+        ("--parameters", arguments.reading.parameters.as_deref()),
+        ("--tools", arguments.reading.tools.as_deref()),
     ]);
     let output = files.output("--output", &arguments.output)?;
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
-    let program = gcode::read(&source.name, &source.text)?;
+    let program = arguments.reading.program(&source)?;
     let plan = plan_program(&source.name, &program, &machine, mode)?;
     let executable = match arguments.number {
         Number::F32 => executable::<f32>(&plan, &machine),

@@ -4,9 +4,69 @@ use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use clap::{ArgAction, Args};
+
 use super::error::CliError;
 use crate::files::STANDARD_INPUT;
+use crate::gcode::{self, ParameterFile, Program, ReadOptions, ToolTable};
 use crate::machine::Machine;
+
+/// What G-code is read with.
+#[derive(Debug, Args)]
+pub(super) struct ReadArguments {
+    /// Leave out lines of G-code that begin with `/`.
+    #[arg(long, value_name = "true|false", default_value_t = true, action = ArgAction::Set)]
+    block_delete: bool,
+    /// Stop at M1.
+    #[arg(long, value_name = "true|false", default_value_t = true, action = ArgAction::Set)]
+    optional_stop: bool,
+    /// Folder of subroutines, a file `name.ngc` each; may be given several times.
+    #[arg(long, value_name = "DIR")]
+    subroutines: Vec<PathBuf>,
+    /// Parameters to start with (offsets, places of G28 and G30), in LinuxCNC's format.
+    #[arg(long, value_name = "FILE.var")]
+    pub(super) parameters: Option<PathBuf>,
+    /// Tool table, in LinuxCNC's format. Without it, every tool has length and radius 0.
+    #[arg(long, value_name = "FILE.tbl")]
+    pub(super) tools: Option<PathBuf>,
+    /// Most lines of G-code to execute, loops included.
+    #[arg(long, value_name = "COUNT", default_value_t = ReadOptions::default().lines_max)]
+    lines_max: u64,
+}
+
+impl ReadArguments {
+    /// The options they ask for, with the files read.
+    pub(super) fn options(&self) -> Result<ReadOptions, CliError> {
+        let parameters = match &self.parameters {
+            Some(path) => {
+                let Source { name, text } = read(path)?;
+                ParameterFile::parse(&name, &text)?
+            }
+            None => ParameterFile::default(),
+        };
+        let tools = match &self.tools {
+            Some(path) => {
+                let Source { name, text } = read(path)?;
+                Some(ToolTable::parse(&name, &text)?)
+            }
+            None => None,
+        };
+        Ok(ReadOptions {
+            block_delete: self.block_delete,
+            optional_stop: self.optional_stop,
+            subroutines: self.subroutines.clone(),
+            parameters,
+            tools,
+            lines_max: self.lines_max,
+            ..ReadOptions::default()
+        })
+    }
+
+    /// The program of a source.
+    pub(super) fn program(&self, source: &Source) -> Result<Program, CliError> {
+        Ok(gcode::read_with(&source.name, &source.text, &self.options()?)?)
+    }
+}
 
 /// A text and its name in errors and reports.
 pub(super) struct Source {

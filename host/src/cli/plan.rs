@@ -10,7 +10,6 @@ use serde::Serialize;
 use super::error::{CliError, Outcome};
 use super::table::{self, Align};
 use super::{input, write_json};
-use crate::gcode;
 use crate::planning::{Mode, PlacedRamp, Plan, plan_blocks, plan_program};
 use crate::trace::TracedBlock;
 
@@ -37,6 +36,8 @@ pub struct PlanArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
+    #[command(flatten)]
+    reading: input::ReadArguments,
     /// One pair of sin² ramps per block, whatever `law` is; without it, ramps follow it and may span blocks.
     #[arg(long)]
     per_block: bool,
@@ -96,7 +97,7 @@ pub fn plan(arguments: &PlanArguments, out: &mut dyn Write) -> Result<Outcome, C
     let mut plan = if is_block_list {
         plan_blocks(&source.name, &source.text, mode)?
     } else {
-        let program = gcode::read(&source.name, &source.text)?;
+        let program = arguments.reading.program(&source)?;
         plan_program(&source.name, &program, &machine, mode)?
     };
     if is_block_list && arguments.machine.is_some() {

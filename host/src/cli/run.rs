@@ -48,6 +48,8 @@ pub struct RunArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
+    #[command(flatten)]
+    reading: input::ReadArguments,
     /// Write every tick as a row of CSV; an existing file is replaced.
     #[arg(long, value_name = "FILE.csv")]
     trace: Option<PathBuf>,
@@ -87,19 +89,29 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let mut files = Files::reading([
         ("PROGRAM", Some(arguments.program.as_path())),
         ("--machine", arguments.machine.as_deref()),
+        ("--parameters", arguments.reading.parameters.as_deref()),
+        ("--tools", arguments.reading.tools.as_deref()),
     ]);
     let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
     let record = outputs::open(&mut files, "--record", arguments.record.as_ref())?;
+    let kept = arguments.reading.parameters.as_ref();
+    let kept = kept.map(|path| files.edited("--parameters", path, "--parameters")).transpose()?;
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let program = gcode::read(&source.name, &source.text)?;
+    let options = arguments.reading.options()?;
+    let program = gcode::read_with(&source.name, &source.text, &options)?;
+    let after = options.parameters.after(&program.parameters);
     let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;
     let options = RunOptions {
         script: arguments.at.as_ref(),
         injections: arguments.inject.as_ref(),
         ..RunOptions::default()
     };
-    let (summary, written) = execute(&options, &plan, &machine, outputs, record)?;
+    let (summary, mut written) = execute(&options, &plan, &machine, outputs, record)?;
+    // A run that ended early has not set what the program would set later.
+    if Outcome::of(&summary) == Outcome::Done {
+        written.write("parameters", kept, |file| write!(file, "{after}"));
+    }
     let printed = if arguments.json {
         write_json(&json(&summary), out)
     } else {

@@ -80,10 +80,10 @@ pub enum CompareError {
 #[must_use]
 pub fn is_blended(program: &Program) -> bool {
     program.steps.iter().any(|step| match &step.kind {
-        StepKind::Line(line) => line.mode != PathMode::ExactPath,
-        StepKind::Arc(arc) => arc.mode != PathMode::ExactPath,
-        StepKind::Cubic(curve) => curve.mode != PathMode::ExactPath,
-        StepKind::Through(point) => point.mode != PathMode::ExactPath,
+        StepKind::Line(line) => matches!(line.mode, PathMode::Blend { .. }),
+        StepKind::Arc(arc) => matches!(arc.mode, PathMode::Blend { .. }),
+        StepKind::Cubic(curve) => matches!(curve.mode, PathMode::Blend { .. }),
+        StepKind::Through(point) => matches!(point.mode, PathMode::Blend { .. }),
         StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => false,
     })
 }

@@ -20,13 +20,12 @@ pub(super) enum NumberFault {
     Malformed,
     /// The number is beyond the range.
     TooLarge,
-    /// Digits other than zero after the tenth decimal.
-    TooManyDecimals,
 }
 
 impl Decimal {
-    /// Reads `[+-]digits[.digits]` with blanks anywhere, as RS-274 allows.
-    pub(super) fn parse(text: &[u8]) -> Result<Self, NumberFault> {
+    /// Reads `[+-]digits[.digits]` with blanks anywhere, as RS-274 allows. More than ten decimals are rounded,
+    /// halves away from zero; the second value says whether that changed the number.
+    pub(super) fn parse(text: &[u8]) -> Result<(Self, bool), NumberFault> {
         let mut bytes = text.iter().filter(|byte| !matches!(byte, b' ' | b'\t')).peekable();
         let sign = match bytes.peek() {
             None => return Err(NumberFault::Missing),
@@ -38,7 +37,7 @@ impl Decimal {
         let mut magnitude = Some(0_i64);
         let mut decimals = None;
         let mut digits_seen = false;
-        let mut excess = false;
+        let (mut rounded, mut excess_digits, mut rounds_up) = (false, false, false);
         for &byte in bytes {
             let digit = match byte {
                 b'0'..=b'9' => i64::from(byte - b'0'),
@@ -50,7 +49,9 @@ impl Decimal {
             };
             digits_seen = true;
             if decimals == Some(DECIMALS) {
-                excess |= digit != 0;
+                rounds_up |= !excess_digits && digit >= 5;
+                excess_digits = true;
+                rounded |= digit != 0;
                 continue;
             }
             decimals = decimals.map(|count| count + 1);
@@ -62,8 +63,9 @@ impl Decimal {
         let missing_decimals = DECIMALS - decimals.unwrap_or(0);
         let units = magnitude
             .and_then(|units| units.checked_mul(10_i64.pow(missing_decimals)))
+            .and_then(|units| units.checked_add(i64::from(rounds_up)))
             .ok_or(NumberFault::TooLarge)?;
-        if excess { Err(NumberFault::TooManyDecimals) } else { Ok(Self(sign * units)) }
+        Ok((Self(sign * units), rounded))
     }
 
     /// The value as f64, correctly rounded up to ±900 000 and within one unit in the last place beyond.
@@ -78,9 +80,19 @@ impl Decimal {
         (self.0 % UNITS_PER_TENTH == 0).then_some(self.0 / UNITS_PER_TENTH)
     }
 
-    /// Whether it is a whole number.
-    pub(super) fn is_whole(self) -> bool {
-        self.0 % UNITS_PER_ONE == 0
+    /// The value if it is a whole number.
+    pub(super) fn whole(self) -> Option<i64> {
+        (self.0 % UNITS_PER_ONE == 0).then_some(self.0 / UNITS_PER_ONE)
+    }
+
+    /// Half the value, if that is exact.
+    pub(super) fn half(self) -> Option<Self> {
+        (self.0 % 2 == 0).then_some(Self(self.0 / 2))
+    }
+
+    /// Whether as many inches are a whole count of 10⁻¹⁰ mm.
+    pub(super) fn is_exact_in_inches(self) -> bool {
+        self.0 % 5 == 0
     }
 
     /// -1, 0 or 1.
@@ -92,15 +104,6 @@ impl Decimal {
 /// A length or coordinate \[10⁻¹⁰ mm\], exact, within ±[`Length::LIMIT`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Length(i64);
-
-/// Why a number is no [`Length`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum LengthFault {
-    /// The length is beyond ±[`Length::LIMIT`].
-    OutOfRange,
-    /// An inch value that is no whole count of 10⁻¹⁰ mm.
-    Inexact,
-}
 
 impl Length {
     /// 0 mm.
@@ -136,18 +139,25 @@ impl Length {
         Self::from_units(self.0 + other.0)
     }
 
-    /// Millimetres.
-    pub(super) fn from_mm(number: Decimal) -> Result<Self, LengthFault> {
-        Self::from_units(number.0).ok_or(LengthFault::OutOfRange)
+    /// Millimetres; `None` beyond ±[`Length::LIMIT`].
+    pub(super) fn from_mm(number: Decimal) -> Option<Self> {
+        Self::from_units(number.0)
     }
 
-    /// Inches of 25.4 mm.
-    pub(super) fn from_inches(number: Decimal) -> Result<Self, LengthFault> {
+    /// Inches of 25.4 mm, rounded to 10⁻¹⁰ mm; `None` beyond ±[`Length::LIMIT`].
+    pub(super) fn from_inches(number: Decimal) -> Option<Self> {
         let tenths_of_units = i128::from(number.0) * 254;
-        if tenths_of_units % 10 != 0 {
-            return Err(LengthFault::Inexact);
-        }
-        i64::try_from(tenths_of_units / 10).ok().and_then(Self::from_units).ok_or(LengthFault::OutOfRange)
+        let half = if tenths_of_units < 0 { -5 } else { 5 };
+        i64::try_from((tenths_of_units + half) / 10).ok().and_then(Self::from_units)
+    }
+
+    /// The length nearest to a computed number of millimetres; `None` beyond ±[`Length::LIMIT`], and for what
+    /// is no number.
+    #[must_use]
+    pub fn nearest(mm: f64) -> Option<Self> {
+        let units = (mm * Self::UNITS_PER_MM as f64).round();
+        // As an integer the limit is exact in f64.
+        (units.abs() <= Self::LIMIT.0 as f64).then_some(Self(units as i64))
     }
 }
 
@@ -181,7 +191,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Result<Decimal, NumberFault> {
-        Decimal::parse(text.as_bytes())
+        Decimal::parse(text.as_bytes()).map(|(number, _)| number)
     }
 
     #[test]
@@ -209,27 +219,51 @@ mod tests {
         assert_eq!(parse(" "), Err(NumberFault::Missing));
         assert_eq!(parse("922337203.6854775808"), Err(NumberFault::TooLarge));
         assert_eq!(parse(&"9".repeat(100_000)), Err(NumberFault::TooLarge));
-        for text in ["0.00000000001", "0.000000000010", "-1.00000000000000005"] {
-            assert_eq!(parse(text), Err(NumberFault::TooManyDecimals), "{text}");
+        assert_eq!(parse("922337203.68547758075"), Err(NumberFault::TooLarge));
+    }
+
+    #[test]
+    fn more_than_ten_decimals_are_rounded() {
+        for (text, exact, rounded) in [
+            ("0.00000000001", "0", true),
+            ("0.00000000005", "0.0000000001", true),
+            ("-0.00000000005", "-0.0000000001", true),
+            ("-0.000000000049", "0", true),
+            ("1.99999999999", "2", true),
+            ("0.100000000000", "0.1", false),
+        ] {
+            let (number, was_rounded) = Decimal::parse(text.as_bytes()).unwrap();
+            assert_eq!((number.to_string().as_str(), was_rounded), (exact, rounded), "{text}");
         }
     }
 
     #[test]
-    fn inches_are_exact_or_refused() {
+    fn inches_are_exact_or_rounded() {
         let length = |text| Length::from_inches(parse(text).unwrap());
         assert_eq!(length("1").unwrap().to_string(), "25.4");
         assert_eq!(length("-0.000000001").unwrap().units(), -254);
         assert_eq!(length("0.0000000005").unwrap().units(), 127);
-        assert_eq!(length("0.0000000001"), Err(LengthFault::Inexact));
+        assert_eq!(length("0.0000000001").unwrap().units(), 25);
+        assert_eq!(length("-0.0000000003").unwrap().units(), -76);
+        assert!(!parse("0.0000000001").unwrap().is_exact_in_inches());
         assert_eq!(length("39370.078740157").unwrap().to_string(), "999999.9999999878");
-        assert_eq!(length("39370.078740158"), Err(LengthFault::OutOfRange));
-        assert_eq!(length("900000000"), Err(LengthFault::OutOfRange));
+        assert_eq!(length("39370.078740158"), None);
+        assert_eq!(length("900000000"), None);
+    }
+
+    #[test]
+    fn computed_lengths_are_the_nearest() {
+        assert_eq!(Length::nearest(0.1 + 0.2).unwrap().to_string(), "0.3");
+        assert_eq!(Length::nearest(-1e6), Some(Length(-Length::LIMIT.0)));
+        for mm in [1_000_000.001, f64::NAN, f64::NEG_INFINITY] {
+            assert_eq!(Length::nearest(mm), None);
+        }
     }
 
     #[test]
     fn the_limit_is_inside() {
         assert_eq!(Length::from_mm(parse("-1000000").unwrap()).unwrap().to_mm(), -1e6);
-        assert_eq!(Length::from_mm(parse("1000000.0000000001").unwrap()), Err(LengthFault::OutOfRange));
+        assert_eq!(Length::from_mm(parse("1000000.0000000001").unwrap()), None);
         assert_eq!(Length::LIMIT.checked_add(Length(1)), None);
     }
 }

@@ -50,12 +50,25 @@ impl GcodeError {
 pub enum Problem {
     #[error("found {found}, expected a word such as X1.5, a comment or the end of the line")]
     Character { found: String },
-    #[error("found '/' (block delete), expected a line that always runs: there is no block-delete switch")]
-    BlockDelete,
     #[error("found '%' among other text, expected it alone in its line")]
     PercentInLine,
-    #[error("found '{found}', expected a plain number: parameters and expressions are not supported")]
-    Expression { found: char },
+    #[error("found {found}, expected {expected}")]
+    Syntax { found: String, expected: &'static str },
+    #[error("found brackets and parameters within each other, expected {levels} levels at most")]
+    ExpressionTooDeep { levels: u32 },
+    #[error("found {found}, expected an expression with a value")]
+    Undefined { found: &'static str },
+    #[error("found '<' without a name and its '>', expected a name such as <depth>")]
+    NameNotClosed,
+    #[error(
+        "found parameter {found}, expected a whole number from 1 to {}",
+        super::parameters::PARAMETER_MAX
+    )]
+    ParameterNumber { found: f64 },
+    #[error("found #<{name}>, to which nothing was assigned, expected an assignment before it")]
+    ParameterUnset { name: String },
+    #[error("found {name} where a value is assigned, expected another parameter: programs can only read it")]
+    ParameterReadOnly { name: String },
     #[error("found a comment without its end, expected ')' in the same line")]
     CommentNotClosed,
     #[error("found '(' inside a comment, expected ')' before the next comment")]
@@ -64,31 +77,38 @@ pub enum Problem {
     NumberMissing { letter: char, found: String },
     #[error("found {word}, expected a number such as -12.5 after the letter")]
     NumberMalformed { word: String },
-    #[error("found {word}, expected a number within ±922337203")]
+    #[error("found {word}, expected a number within ±1.7e308")]
     NumberTooLarge { word: String },
-    #[error("found {word}, expected at most 10 decimals: more are not rounded")]
-    TooManyDecimals { word: String },
-    #[error("found {word} in inches, expected at most 9 decimals: more are not rounded")]
-    InchesInexact { word: String },
     #[error("found {word}, expected a length within ±{} mm", Length::LIMIT)]
     LengthOutOfRange { word: String },
     #[error("found {word}, which adds up beyond the range, expected a position within ±{} mm", Length::LIMIT)]
     PositionOutOfRange { word: String },
-    #[error("found {word}, expected one of the words F G I J K M N P Q R S X Y Z")]
+    #[error("found {word}, expected one of the words D E F G H I J K L M N P Q R S T X Y Z")]
     UnsupportedLetter { word: String },
+    #[error("found {word}, expected X, Y or Z: the machine has no such axis")]
+    NoSuchAxis { word: String },
     #[error(
-        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.5 G17 G18 G19 G20 G21 G40 G49 G54 G61 G64 G80 G90 G90.1 \
-         G91 G91.1 G94"
+        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.5 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G40 \
+         G43 G43.1 G43.2 G49 G52 G53 G54 to G59.3 G61 G61.1 G64 G73 G80 to G83 G85 G86 G88 G89 G90 G90.1 G91 G91.1 \
+         G92 to G92.3 G93 to G99"
     )]
     UnsupportedG { word: String },
-    #[error("found {word}, expected one of M0 to M9 or M30")]
+    #[error("found {word}, expected one of M0 to M9, M30, M48 to M53, M60 to M68, M70 to M73, M98 or M99")]
     UnsupportedM { word: String },
+    #[error("found {word}, which needs a spindle encoder, expected a word that goes without")]
+    NeedsEncoder { word: String },
+    #[error("found {word}, which needs a probe, expected a word that goes without")]
+    NeedsProbe { word: String },
     #[error("found a second {letter} word, {word}, expected one per line")]
     WordTwice { letter: char, word: String },
     #[error("found {word} in a line with {other}, expected one of them: both set the same mode")]
     SameGroup { word: String, other: String },
-    #[error("found {word}, expected a whole line number, not negative, as the first word of the line")]
+    #[error("found {word}, expected a line number, not negative, as the first word of the line")]
     LineNumber { word: String },
+    #[error("found {word}, expected it as the first word of its line")]
+    OWordPlace { word: String },
+    #[error("found {word}, expected {expected}")]
+    NotThisCount { word: String, expected: &'static str },
     #[error("found {word}, expected a positive feed")]
     FeedNotPositive { word: String },
     #[error("found {motion} without a feed, expected an F word in this line or before it")]
@@ -96,15 +116,102 @@ pub enum Problem {
     #[error("found {word}, expected a number that is not negative")]
     Negative { word: String },
     #[error(
-        "found {word} without a motion mode, expected G0, G1, G2, G3, G5 or G5.5 in this line or before it"
+        "found {word} without a motion mode, expected G0, G1, G2, G3, G5, G5.5 or a drilling cycle in this line or \
+         before it"
     )]
     AxisWithoutMotion { word: String },
     #[error("found {word} in a line without {needs}, expected no such word")]
     WordUnused { word: String, needs: &'static str },
+    #[error("found {word} in a line whose axis words another word takes, expected two lines")]
+    AxesTaken { word: String },
+    #[error("found {word} with G53, expected {expected}")]
+    MachineMove { word: String, expected: &'static str },
+    #[error("found {word}, expected {expected}")]
+    Cycle { word: &'static str, expected: &'static str },
+    #[error("found {word} in a line of M98 or M99, expected no other words but N, P and L")]
+    SubprogramAlone { word: String },
+    #[error("found M98 without a number, expected the number of a subprogram in a P word")]
+    SubprogramWithoutNumber,
+    #[error("found more than {steps_max} steps or messages, expected fewer: is there a loop without an end?")]
+    TooManySteps { steps_max: usize },
+    #[error("found M72, but no modes that were saved, expected M70 or M73 before it")]
+    NothingSaved,
+    #[error("found the end of the program by its own decision ({text}), expected its conditions to be met")]
+    Aborted { text: String },
+    #[error("found {motion} without F after G93, expected F in every line with such a move")]
+    InverseTimeMissing { motion: &'static str },
+    #[error("found {motion} after G93, expected a line or an arc: curves have no feed of inverse time")]
+    CurveTimed { motion: &'static str },
+    #[error("found {motion} after G95 without a spindle's speed, expected S in revolutions per minute (G97)")]
+    SpindleSpeedMissing { motion: &'static str },
+    #[error(
+        "found an arc in the {plane} plane of a coordinate system that is rotated, expected the XY plane (G17)"
+    )]
+    ArcPlaneTurned { plane: Plane },
+    #[error(
+        "found an offset of {mm} mm in parameter {number}, expected a length within ±{} mm",
+        Length::LIMIT
+    )]
+    OffsetOutOfRange { number: u32, mm: f64 },
+    #[error(
+        "found an offset that puts the position beyond the range, expected a position within ±{} mm",
+        Length::LIMIT
+    )]
+    WorkOutOfRange,
+    #[error("found {word}, expected {expected}")]
+    Setup { word: String, expected: &'static str },
+    #[error("found tool {number}, expected a tool of the tool table")]
+    ToolUnknown { number: u32 },
+    #[error("found a line without a T word, expected a tool such as T1 P1 Z12.5 D6")]
+    NoTool,
+    #[error("found {word} in a line of the tool table, expected T P X Y Z D I J or Q")]
+    NoToolWord { word: String },
+    #[error("found a second {word}, expected every tool once")]
+    ToolTwice { word: String },
+    #[error("found {found}, expected the number of a parameter, 1 to 5601, and its value")]
+    ParameterLine { found: String },
+    #[error("found {value} for parameter {number}, expected one value that it can have")]
+    ParameterValue { number: u32, value: f64 },
+    #[error("found O{found}, expected a whole number, 0 or more, as a label")]
+    Label { found: f64 },
+    #[error("found a computed label, expected it with call only")]
+    LabelComputed,
+    #[error("found O{label} within a block of this label, expected another label")]
+    LabelOpen { label: String },
+    #[error("found O{label} in a file that ends before its block, expected the block's end")]
+    BlockOpen { label: String },
+    #[error("found O{label} where no such block is open last, expected it after the beginning of its block")]
+    BlockNotOpen { label: String },
+    #[error(
+        "found O{label} sub in a block or a second time, expected every sub once, outside of other blocks"
+    )]
+    SubPlace { label: String },
+    #[error(
+        "found a call of O{label}, expected a subroutine of this file, or a file {label}.ngc in a folder of subroutines"
+    )]
+    SubroutineMissing { label: String },
+    #[error("found {error} in reading {path}, expected a file of a subroutine")]
+    SubroutineUnreadable { path: String, error: String },
+    #[error("found no O{label} in {path}, expected the subroutine of this name")]
+    SubroutineNotInFile { label: String, path: String },
+    #[error("found the end of the file in a subprogram, expected M99")]
+    SubprogramWithoutEnd,
+    #[error("found {found} in a subroutine that was called otherwise, expected {expected}")]
+    ReturnMismatch { found: &'static str, expected: &'static str },
+    #[error("found more than 30 arguments, expected 30 at most")]
+    TooManyArguments,
+    #[error("found subroutines within each other, expected {levels} levels at most")]
+    TooDeep { levels: usize },
+    #[error(
+        "found more than {lines_max} lines executed up to here, expected fewer: is there a loop without an end?"
+    )]
+    TooManyLines { lines_max: u64 },
     #[error("found G4 without a time, expected a P word in seconds")]
     DwellWithoutTime,
-    #[error("found {word} in a line with {takers}, expected two lines: both would take it")]
-    WordShared { word: String, takers: &'static str },
+    #[error(
+        "found {word} in a line with two words that take {letter}, expected two lines: both would take it"
+    )]
+    WordShared { word: String, letter: char },
     #[error("found {motion} without a centre or radius, expected {} or R", .plane.offset_letters())]
     ArcWithoutCentre { motion: &'static str, plane: Plane },
     #[error("found {word} in an arc of the {plane} plane, expected {} or R", .plane.offset_letters())]
@@ -159,7 +266,7 @@ mod tests {
     #[test]
     fn columns_count_characters_and_survive_any_bytes() {
         let at = |text: &[u8], offset| {
-            GcodeError::new("a.ngc", 3, text, Located::new(offset, Problem::BlockDelete)).column
+            GcodeError::new("a.ngc", 3, text, Located::new(offset, Problem::PercentInLine)).column
         };
         assert_eq!(at(b"G1 X2", 3), 4);
         assert_eq!(at("(größe) T1".as_bytes(), 10), 9);
@@ -169,10 +276,7 @@ mod tests {
 
     #[test]
     fn a_message_has_place_found_and_expected() {
-        let error = GcodeError::new("a.ngc", 3, b"/G1", Located::new(0, Problem::BlockDelete));
-        assert_eq!(
-            error.to_string(),
-            "a.ngc:3:1: found '/' (block delete), expected a line that always runs: there is no block-delete switch"
-        );
+        let error = GcodeError::new("a.ngc", 3, b"%G1", Located::new(0, Problem::PercentInLine));
+        assert_eq!(error.to_string(), "a.ngc:3:1: found '%' among other text, expected it alone in its line");
     }
 }

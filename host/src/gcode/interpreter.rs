@@ -1,100 +1,213 @@
 //! Executes the lines, in the order RS-274 gives to the words of a line.
 
-use super::arc;
 use super::block::{Block, GGroup, MGroup};
+use super::cycle::CycleState;
 use super::decimal::Length;
 use super::error::{Located, Problem};
-use super::lexer::{Word, is_blank_line, is_percent_line};
-use super::modal::{Distance, Modal, Motion, Units};
-use super::program::{
-    ArcMove, CubicMove, Feed, LineMove, Notice, NoticeKind, Program, Step, StepKind, ThroughMove,
-};
-use super::spline;
+use super::expression::Target;
+use super::frame::Frame;
+use super::lexer::Cursor;
+use super::message;
+use super::modal::{FeedMode, Modal, Motion, Units};
+use super::options::ReadOptions;
+use super::parameters::Parameters;
+use super::program::{Message, Notice, NoticeKind, PathMode, Program, Step, StepKind};
+use super::tool::ToolTable;
+
+/// Feeds beyond are no feeds \[mm/min\].
+const FEED_MAX: f64 = 1e15;
+
+/// What comes after a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Control {
+    /// The next line.
+    Next,
+    /// M98: a subprogram, so many times.
+    Call { number: u32, repeats: u32 },
+    /// M99.
+    Return,
+}
 
 /// State of a program being read: the steps up to here, and the modes in force.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Interpreter {
-    program: Program,
-    modal: Modal,
-    position: [Length; 3],
+    pub(super) program: Program,
+    pub(super) modal: Modal,
+    pub(super) frame: Frame,
+    /// Where the machine is, as the program counts.
+    pub(super) work: [Length; 3],
+    /// Where the machine is.
+    pub(super) machine: [Length; 3],
+    pub(super) parameters: Parameters,
+    pub(super) tools: Tools,
+    pub(super) cycle: CycleState,
     /// P and Q of the G5 that was the move before \[mm\].
-    cubic_before_mm: Option<[f64; 2]>,
-    /// Line being read, from 1; the last with any text.
-    line: u32,
+    pub(super) cubic_before_mm: Option<[f64; 2]>,
+    /// Modes that M70 or M73 saved, for the main program and every subroutine that runs.
+    saved: Vec<Option<Saved>>,
+    /// What the last subroutine returned.
+    pub(super) returned: Option<f64>,
+    /// Line of the program for steps, from 1.
+    pub(super) line: u32,
+    optional_stop: bool,
+    steps_max: usize,
     /// A word or a tape mark was read.
-    begun: bool,
-    ended: bool,
+    pub(super) begun: bool,
+    pub(super) ended: bool,
+}
+
+/// The tool in the spindle, and those there are.
+#[derive(Debug, Default)]
+pub(super) struct Tools {
+    /// What there is; empty without a table.
+    pub(super) table: ToolTable,
+    /// Whether a table was given: then there are no others.
+    pub(super) is_given: bool,
+    /// T.
+    pub(super) selected: Option<u32>,
+    /// M6, M61; 0 before.
+    pub(super) current: u32,
+}
+
+/// Modes that M70 or M73 saved.
+#[derive(Clone, Copy, Debug)]
+struct Saved {
+    modal: Modal,
+    system: u32,
+    tool: [Length; 3],
+    /// M73: restored at the end of the subroutine.
+    restores: bool,
 }
 
 impl Interpreter {
-    /// Reads a line, which is without its line end.
-    pub(super) fn line(&mut self, line_number: u32, line: &[u8]) -> Result<(), Located> {
-        if is_blank_line(line) {
-            return Ok(());
-        }
-        self.line = line_number;
-        if is_percent_line(line) {
-            // Before any word the mark opens the tape, later it closes it; closed twice is closed.
-            if self.begun && !self.ended {
-                self.end();
-            }
-            self.begun = true;
-            return Ok(());
-        }
-        if self.ended {
-            self.notice(NoticeKind::TextAfterEnd);
-            return Ok(());
-        }
-        let block = Block::collect(line)?;
+    /// Before the first line.
+    pub(super) fn new(options: &ReadOptions) -> Self {
+        let parameters = Parameters::with(options.parameters.values());
+        let mut interpreter = Self {
+            program: Program::default(),
+            modal: Modal::default(),
+            frame: Frame::default(),
+            work: [Length::ZERO; 3],
+            machine: [Length::ZERO; 3],
+            tools: Tools {
+                table: options.tools.clone().unwrap_or_default(),
+                is_given: options.tools.is_some(),
+                ..Tools::default()
+            },
+            parameters,
+            cycle: CycleState::default(),
+            cubic_before_mm: None,
+            saved: vec![None],
+            returned: None,
+            line: 0,
+            optional_stop: options.optional_stop,
+            steps_max: options.steps_max,
+            begun: false,
+            ended: false,
+        };
+        interpreter.start_frame();
+        interpreter
+    }
+
+    /// Executes a line from the cursor on.
+    pub(super) fn execute(&mut self, cursor: Cursor<'_>) -> Result<Control, Located> {
+        let block = Block::collect(cursor, self)?;
         self.begun |= !block.is_empty();
-        self.execute(&block)
-    }
-
-    /// The program, after its last line.
-    pub(super) fn finish(mut self) -> Program {
-        if !self.ended {
-            self.line = self.line.max(1);
-            self.notice(NoticeKind::NoProgramEnd);
+        for assignment in &block.assignments {
+            match &assignment.target {
+                Target::Number(number) => self.parameters.set(*number, assignment.value),
+                Target::Name(name) => self.parameters.set_named(name, assignment.value),
+            }
         }
-        self.program
-    }
-
-    fn execute(&mut self, block: &Block<'_>) -> Result<(), Located> {
-        self.set_feed(block)?;
-        self.note_accessories(block)?;
-        self.dwell(block)?;
-        self.modal.set(block)?;
+        for text in &block.comments {
+            if let Some(text) = message::shown(text, self)? {
+                self.message(text)?;
+            }
+        }
+        if let Some(code) = block.m(MGroup::Subprogram) {
+            return Self::subprogram(&block, code.tenths == 980);
+        }
+        self.modal.set_feed_mode(&block);
+        self.set_feed(&block)?;
+        self.accessories(&block)?;
+        self.dwell(&block)?;
+        self.modal.set(&block)?;
+        self.note_rounding(&block);
         block.refuse_unused(self.modal.motion)?;
         if self.modal.motion != Some(Motion::Cubic) {
             self.cubic_before_mm = None;
         }
-        self.motion(block)?;
+        if !matches!(self.modal.motion, Some(Motion::Cycle(_))) {
+            self.end_cycles();
+        }
+        self.offsets(&block)?;
+        self.motion(&block)?;
         match block.m(MGroup::Stop).map(|code| code.tenths) {
-            Some(0 | 10) => self.step(StepKind::Stop),
-            Some(_) => self.end(),
+            Some(10) if !self.optional_stop => {}
+            Some(0 | 10 | 600) => self.step(StepKind::Stop)?,
+            Some(_) => self.end()?,
             None => {}
         }
-        Ok(())
+        Ok(Control::Next)
     }
 
-    fn step(&mut self, kind: StepKind) {
+    /// M98 or M99, alone in its line.
+    fn subprogram(block: &Block<'_>, calls: bool) -> Result<Control, Located> {
+        if let Some(word) = block.other_than(if calls { b"MNPL" } else { b"MN" }) {
+            return Err(word.problem(|word| Problem::SubprogramAlone { word }));
+        }
+        if !calls {
+            return Ok(Control::Return);
+        }
+        let place = block.m(MGroup::Subprogram).map_or(0, |code| code.word.offset);
+        let number = block.letter(b'P').ok_or(Located::new(place, Problem::SubprogramWithoutNumber))?;
+        let number = number.count(0, "the whole number of a subprogram")?;
+        let repeats =
+            block.letter(b'L').map_or(Ok(1), |word| word.count(0, "a whole number of calls, 0 or more"))?;
+        Ok(Control::Call { number, repeats })
+    }
+
+    /// Appends a step.
+    pub(super) fn step(&mut self, kind: StepKind) -> Result<(), Located> {
+        if self.program.steps.len() >= self.steps_max {
+            return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
+        }
         self.cubic_before_mm = match &kind {
             StepKind::Cubic(cubic) => Some(cubic.controls_mm[1]),
             _ => None,
         };
         self.program.steps.push(Step { line: self.line, kind });
+        Ok(())
     }
 
-    fn end(&mut self) {
-        self.step(StepKind::End);
+    /// Shows a text to the operator before the next step.
+    pub(super) fn message(&mut self, text: String) -> Result<(), Located> {
+        if self.program.messages.len() >= self.steps_max {
+            return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
+        }
+        let step = self.program.steps.len();
+        self.program.messages.push(Message { line: self.line, step, text });
+        Ok(())
+    }
+
+    /// Ends the program.
+    pub(super) fn end(&mut self) -> Result<(), Located> {
+        self.step(StepKind::End)?;
         self.ended = true;
+        Ok(())
     }
 
     /// Called at most once per line and kind.
-    fn notice(&mut self, kind: NoticeKind) {
+    pub(super) fn notice(&mut self, kind: NoticeKind) {
         match self.program.notices.iter_mut().find(|notice| notice.kind == kind) {
             Some(notice) => notice.count = notice.count.saturating_add(1),
             None => self.program.notices.push(Notice { kind, first_line: self.line, count: 1 }),
+        }
+    }
+
+    fn note_rounding(&mut self, block: &Block<'_>) {
+        if block.rounded || self.modal.units == Units::Inches && block.is_inexact_in_inches() {
+            self.notice(NoticeKind::Rounded);
         }
     }
 
@@ -102,174 +215,91 @@ impl Interpreter {
     /// units hold, and a notice says so where it matters.
     fn set_feed(&mut self, block: &Block<'_>) -> Result<(), Located> {
         let Some(word) = block.letter(b'F') else { return Ok(()) };
-        if word.number.signum() <= 0 {
+        if word.number.signum() <= 0 || word.number.to_f64() > FEED_MAX {
             return Err(word.problem(|word| Problem::FeedNotPositive { word }));
+        }
+        if self.modal.feed_mode == FeedMode::InverseTime {
+            return Ok(());
         }
         let units = Units::of(block).unwrap_or(self.modal.units);
         if units != self.modal.units {
             self.notice(NoticeKind::FeedInNewUnits);
         }
-        self.modal.feed_mm_min = Some(units.feed_mm_min(word.number));
-        Ok(())
-    }
-
-    fn note_accessories(&mut self, block: &Block<'_>) -> Result<(), Located> {
-        if let Some(word) = block.letter(b'S') {
-            word.refuse_negative()?;
-            self.notice(NoticeKind::SpindleSpeed);
-        }
-        if block.m(MGroup::ToolChange).is_some() {
-            self.notice(NoticeKind::ToolChange);
-        }
-        if block.m(MGroup::Spindle).is_some() {
-            self.notice(NoticeKind::Spindle);
-        }
-        if [MGroup::Mist, MGroup::Flood, MGroup::CoolantOff].iter().any(|&group| block.m(group).is_some()) {
-            self.notice(NoticeKind::Coolant);
-        }
+        self.modal.feed = Some(units.mm(word.number.to_f64()));
         Ok(())
     }
 
     fn dwell(&mut self, block: &Block<'_>) -> Result<(), Located> {
-        let Some(code) = block.g(GGroup::Dwell) else { return Ok(()) };
+        let Some(code) = block.g(GGroup::NonModal).filter(|code| code.tenths == 40) else { return Ok(()) };
         let Some(time) = block.letter(b'P') else {
             return Err(Located::new(code.word.offset, Problem::DwellWithoutTime));
         };
         if block.is_blend() {
-            return Err(time.problem(|word| Problem::WordShared { word, takers: "G4 and G64" }));
+            return Err(time.problem(|word| Problem::WordShared { word, letter: 'P' }));
         }
         time.refuse_negative()?;
-        self.step(StepKind::Dwell { seconds: time.number.to_f64() });
+        self.step(StepKind::Dwell { seconds: time.number.to_f64() })
+    }
+
+    /// Gives the steps from `first` on, which are straight, their path mode.
+    pub(super) fn set_mode_from(&mut self, first: usize, path: PathMode) {
+        for step in self.program.steps.iter_mut().skip(first) {
+            if let StepKind::Line(line) = &mut step.kind {
+                line.mode = path;
+            }
+        }
+    }
+
+    /// The number of subroutines that run.
+    pub(super) fn call_level(&self) -> usize {
+        self.saved.len() - 1
+    }
+
+    /// A subroutine begins.
+    pub(super) fn enter(&mut self) {
+        self.saved.push(None);
+    }
+
+    /// A subroutine ends.
+    pub(super) fn leave(&mut self) -> Result<(), Located> {
+        match self.saved.pop().flatten() {
+            Some(saved) if saved.restores => self.restore(saved),
+            _ => Ok(()),
+        }
+    }
+
+    /// M70 to M73.
+    pub(super) fn modes(&mut self, tenths: i64, offset: usize) -> Result<(), Located> {
+        let now = Saved {
+            modal: self.modal,
+            system: self.system(),
+            tool: self.frame.tool,
+            restores: tenths == 730,
+        };
+        let Some(slot) = self.saved.last_mut() else { return Ok(()) };
+        match tenths {
+            700 | 730 => *slot = Some(now),
+            710 => *slot = None,
+            _ => match *slot {
+                Some(saved) => return self.restore(saved),
+                None => return Err(Located::new(offset, Problem::NothingSaved)),
+            },
+        }
         Ok(())
     }
 
-    /// The move a line asks for by an axis word or, in the arc modes, an offset or radius.
-    fn motion(&mut self, block: &Block<'_>) -> Result<(), Located> {
-        // P and Q alone belong to a G4 or G64 in the line.
-        let is_cubic = self.modal.motion == Some(Motion::Cubic);
-        let is_taken = block.is_blend() || block.g(GGroup::Dwell).is_some();
-        let ends = [b'P', b'Q'].map(|letter| block.letter(letter).filter(|_| is_cubic && !is_taken));
-        let words = block.axes().into_iter().chain(block.offsets()).chain([block.letter(b'R')]).chain(ends);
-        let Some(first) = words.flatten().min_by_key(|word| word.offset) else { return Ok(()) };
-        let Some(motion) = self.modal.motion else {
-            return Err(first.problem(|word| Problem::AxisWithoutMotion { word }));
-        };
-        let offset = block.g(GGroup::Motion).map_or(first.offset, |code| code.word.offset);
-        let feed = match self.modal.feed_mm_min {
-            _ if motion == Motion::Rapid => Feed::Rapid,
-            Some(feed_mm_min) => Feed::MmPerMin(feed_mm_min),
-            None => return Err(Located::new(offset, Problem::FeedMissing { motion: motion.word() })),
-        };
-        let (from, to, mode) = (self.position, self.end_point(block)?, self.modal.path);
-        if is_cubic && is_taken {
-            let word = block.letter(b'P').or(block.letter(b'Q')).unwrap_or(first);
-            return Err(word.problem(|word| Problem::WordShared { word, takers: "G5 and G4 or G64" }));
-        }
-        if is_cubic {
-            let controls_mm = spline::controls_mm(block, &self.modal, self.cubic_before_mm, offset)?;
-            self.position = to;
-            if from != to || controls_mm != [[0.0; 2]; 2] {
-                self.step(StepKind::Cubic(CubicMove { from, to, controls_mm, feed, mode }));
-            }
-            return Ok(());
-        }
-        self.position = to;
-        if motion.is_arc() {
-            let arc = self.arc(block, motion, from, to, feed, offset)?;
-            self.step(StepKind::Arc(arc));
-        } else if from != to && motion == Motion::Through {
-            let begins = block.g(GGroup::Motion).is_some();
-            self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }));
-        } else if from != to {
-            self.step(StepKind::Line(LineMove { from, to, feed, mode }));
-        }
-        Ok(())
-    }
-
-    fn end_point(&self, block: &Block<'_>) -> Result<[Length; 3], Located> {
-        let mut to = self.position;
-        for (coordinate, word) in to.iter_mut().zip(block.axes()) {
-            let Some(word) = word else { continue };
-            let length = self.modal.units.length(word)?;
-            *coordinate = match self.modal.distance {
-                Distance::Absolute => length,
-                Distance::Incremental => coordinate
-                    .checked_add(length)
-                    .ok_or_else(|| word.problem(|word| Problem::PositionOutOfRange { word }))?,
-            };
-        }
-        Ok(to)
-    }
-
-    fn arc(
-        &mut self,
-        block: &Block<'_>,
-        motion: Motion,
-        from: [Length; 3],
-        to: [Length; 3],
-        feed: Feed,
-        offset: usize,
-    ) -> Result<ArcMove, Located> {
-        let Modal { plane, units, path: mode, .. } = self.modal;
-        let [first, second, normal] = plane.axes();
-        let offsets = block.offsets();
-        if let Some(word) = offsets[normal] {
-            return Err(word.problem(|word| Problem::ArcOffsetOutsidePlane { word, plane }));
-        }
-        let in_plane = |point: [Length; 3]| [point[first], point[second]];
-        let (start, end) = (in_plane(from), in_plane(to));
-        let clockwise = motion == Motion::Clockwise;
-        let centre_words = [offsets[first], offsets[second]];
-        let resolved = match (block.letter(b'R'), centre_words) {
-            (None, [None, None]) => {
-                Err(Located::new(offset, Problem::ArcWithoutCentre { motion: motion.word(), plane }))
-            }
-            (None, _) => {
-                let centre = self.centre(centre_words, start, offset)?;
-                arc::about_centre(start, end, centre, clockwise)
-                    .map_err(|problem| Located::new(offset, problem))
-            }
-            (Some(word), [None, None]) => {
-                let radius = units.length(word)?;
-                arc::of_radius(start, end, radius, clockwise, plane, || word.text())
-                    .map_err(|problem| Located::new(word.offset, problem))
-            }
-            (Some(word), _) => Err(word.problem(|word| Problem::ArcCentreAndRadius { word })),
-        }?;
-        if resolved.radius_enlarged {
-            self.notice(NoticeKind::RadiusEnlarged);
-        }
-        let arc::Resolved { centre_mm, start_radius_mm, end_radius_mm, sweep_rad, .. } = resolved;
-        Ok(ArcMove { from, to, plane, centre_mm, start_radius_mm, end_radius_mm, sweep_rad, feed, mode })
-    }
-
-    /// Centre along the plane's axes \[10⁻¹⁰ mm\]; a relative one may lie beyond the range of a [`Length`].
-    fn centre(
-        &self,
-        words: [Option<Word<'_>>; 2],
-        start: [Length; 2],
-        offset: usize,
-    ) -> Result<[i64; 2], Located> {
-        let mut centre = [0; 2];
-        for (coordinate, (word, start)) in centre.iter_mut().zip(words.into_iter().zip(start)) {
-            let length = word.map(|word| self.modal.units.length(word)).transpose()?;
-            *coordinate = match (self.modal.arc_distance, length) {
-                (Distance::Incremental, length) => start.units() + length.unwrap_or_default().units(),
-                (Distance::Absolute, Some(length)) => length.units(),
-                (Distance::Absolute, None) => {
-                    let plane = self.modal.plane;
-                    return Err(Located::new(offset, Problem::ArcCentreIncomplete { plane }));
-                }
-            };
-        }
-        Ok(centre)
+    /// All modes but the motion mode.
+    fn restore(&mut self, saved: Saved) -> Result<(), Located> {
+        self.modal = Modal { motion: self.modal.motion, ..saved.modal };
+        self.frame.tool = saved.tool;
+        self.select(saved.system, 0)
     }
 }
 
 #[cfg(test)]
 #[allow(clippy::float_cmp, reason = "exact values are the point")]
 mod tests {
-    use super::super::{GcodeError, PathMode, read};
+    use super::super::{ArcMove, Feed, GcodeError, LineMove, PathMode, read};
     use super::*;
 
     fn steps(text: &str) -> Vec<StepKind> {
@@ -358,7 +388,8 @@ mod tests {
 
     #[test]
     fn what_is_not_acted_on_is_noticed_once_per_kind() {
-        let program = read("a", b"M3 S9\nS8 M7 M8\nM6\nM5 M9\nG64 Q.1\nG64\nF1 G2 X2.001 R1\nM30").unwrap();
+        let program =
+            read("a", b"M3 S9\nS8 M7 M8\nT1 M61 Q2\nM5 M9\nG64 Q.1\nG64\nF1 G2 X2.001 R1\nM30").unwrap();
         let notices: Vec<_> = program.notices.iter().map(|n| (n.kind, n.first_line, n.count)).collect();
         assert_eq!(
             notices,
@@ -366,7 +397,6 @@ mod tests {
                 (NoticeKind::SpindleSpeed, 1, 2),
                 (NoticeKind::Spindle, 1, 2),
                 (NoticeKind::Coolant, 2, 2),
-                (NoticeKind::ToolChange, 3, 1),
                 (NoticeKind::RadiusEnlarged, 7, 1),
             ]
         );
@@ -385,13 +415,13 @@ mod tests {
             ("G4", "1:1:", "found G4 without a time"),
             ("G4 P-1", "1:4:", "found P-1"),
             ("G4 G64 P1", "1:8:", "both would take it"),
-            ("G0 X1 P5", "1:7:", "in a line without G4, G5 or G64"),
-            ("G61 P5", "1:5:", "in a line without G4, G5 or G64"),
+            ("G0 X1 P5", "1:7:", "in a line without G2, G3, G4, G5, G10, G64"),
+            ("G61 P5", "1:5:", "in a line without G2, G3, G4, G5, G10, G64"),
             ("G64 P-.1", "1:5:", "not negative"),
-            ("G1 F5 X1 I2", "1:10:", "in a line without G2, G3 or G5"),
-            ("R5", "1:1:", "in a line without G2 or G3"),
+            ("G1 F5 X1 I2", "1:10:", "in a line without G2, G3, G5 or G10"),
+            ("R5", "1:1:", "in a line without G2, G3, G10 or"),
             ("F5 G2 X1", "1:4:", "found G2 without a centre or radius, expected I and J or R"),
-            ("F5 G2 X1 I1 K0", "1:13:", "found K0 in an arc of the XY plane"),
+            ("F5 G2 X1 I1 K1", "1:13:", "found K1 in an arc of the XY plane"),
             ("F5 G18 G2 X1 J1", "1:14:", "expected I and K or R"),
             ("F5 G2 X1 I1 R1", "1:13:", "the centre or the radius"),
             ("F5 G2 X2 I1.1", "1:4:", "starts 1.100000 mm and ends 0.900000 mm"),
@@ -407,13 +437,12 @@ mod tests {
             ("F5 G5 Z1 I1 J1 P1 Q1", "1:7:", "found Z1 in a line of G5"),
             ("F5 G5 X1 K1 P1 Q1", "1:10:", "found K1 in a line without G2 or G3"),
             ("F5 G5 X1 I1 J1 P1 Q1\nG1 X2\nG5 X3 P1 Q1", "3:1:", "found a first G5 without I and J"),
-            ("F5 G5 X1 I1 J1 G64 P1 Q1", "1:20:", "found P1 in a line with G5 and G4 or G64"),
+            ("F5 G5 X1 I1 J1 G64 P1 Q1", "1:20:", "found P1 in a line with two words that take P"),
             ("G5 X1 I1 J1 P1 Q1", "1:1:", "found G5 without a feed"),
-            ("F5 G5.5 X1 P1", "1:12:", "found P1 in a line without G4, G5 or G64"),
+            ("F5 G5.5 X1 P1", "1:12:", "found P1 in a line without G2, G3, G4, G5, G10, G64"),
             ("G5.2 X1", "1:1:", "found G5.2"),
             ("G0 X1000000.1", "1:4:", "within ±1000000 mm"),
             ("G91 G0 X-999999\nX-2", "2:1:", "adds up beyond"),
-            ("G20 G0 X.0000000001", "1:8:", "at most 9 decimals"),
         ] {
             let error: GcodeError = read("a", text.as_bytes()).unwrap_err();
             let shown = error.to_string();

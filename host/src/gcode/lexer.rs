@@ -1,9 +1,12 @@
-//! The bytes of a line to its words.
+//! The bytes of a line to its words, assignments and comments.
 //!
-//! One pass reads no byte more than twice and allocates nothing unless it fails.
+//! One pass reads no byte of a plain line more than twice and allocates nothing unless it fails.
 
 use super::decimal::{Decimal, NumberFault};
 use super::error::{Located, Problem, describe};
+use super::expression::{self, Environment, Target};
+use super::number::Number;
+use super::{parameters, predefined};
 
 /// A letter and its number.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,9 +14,11 @@ pub(super) struct Word<'a> {
     /// Upper-case letter.
     pub(super) letter: u8,
     /// The number after it.
-    pub(super) number: Decimal,
+    pub(super) number: Number,
     /// Byte offset of the letter in its line.
     pub(super) offset: usize,
+    /// It had more decimals than are exact.
+    pub(super) rounded: bool,
     /// The word as written.
     source: &'a [u8],
 }
@@ -27,6 +32,14 @@ impl Word<'_> {
     /// A problem at this word.
     pub(super) fn problem(&self, problem: impl FnOnce(String) -> Problem) -> Located {
         Located::new(self.offset, problem(self.text()))
+    }
+
+    /// The number, for quantities that are whole, `least` or more. `expected` says so.
+    pub(super) fn count(&self, least: i64, expected: &'static str) -> Result<u32, Located> {
+        let count = self.number.whole().filter(|&count| count >= least);
+        count
+            .and_then(|count| u32::try_from(count).ok())
+            .ok_or_else(|| self.problem(|word| Problem::NotThisCount { word, expected }))
     }
 
     /// Refuses a negative number, for quantities that are 0 or more.
@@ -62,14 +75,16 @@ pub(super) fn is_percent_line(line: &[u8]) -> bool {
     text.next() == Some(&b'%') && text.next().is_none()
 }
 
-/// The words of a line, from left to right; ends after the first error.
-pub(super) struct Words<'a> {
+/// A place in a line.
+#[derive(Clone, Debug)]
+pub(super) struct Cursor<'a> {
     line: &'a [u8],
-    next: usize,
+    /// Byte offset.
+    pub(super) next: usize,
 }
 
-impl<'a> Words<'a> {
-    /// The words of `line`, which is without its line end.
+impl<'a> Cursor<'a> {
+    /// The start of `line`, which is without its line end.
     pub(super) fn new(line: &'a [u8]) -> Self {
         Self { line, next: 0 }
     }
@@ -78,95 +93,217 @@ impl<'a> Words<'a> {
         self.line.get(self.next).copied()
     }
 
-    fn skip_while(&mut self, skip: impl Fn(u8) -> bool) {
-        while self.peek().is_some_and(&skip) {
-            self.next += 1;
-        }
+    /// Steps over blanks.
+    pub(super) fn skip_blanks(&mut self) {
+        self.take_while(is_blank);
     }
 
-    /// Steps over a comment; `next` is at its parenthesis.
-    fn comment(&mut self) -> Result<(), Located> {
+    /// The next byte that is no blank; steps over the blanks.
+    pub(super) fn peek_text(&mut self) -> Option<u8> {
+        self.skip_blanks();
+        self.peek()
+    }
+
+    /// Steps over the bytes that `take` accepts.
+    pub(super) fn take_while(&mut self, take: impl Fn(u8) -> bool) -> &'a [u8] {
+        let start = self.next;
+        while self.peek().is_some_and(&take) {
+            self.next += 1;
+        }
+        self.line.get(start..self.next).unwrap_or_default()
+    }
+
+    /// Steps over `name`, in any case, if it is next.
+    pub(super) fn take_name(&mut self, name: &[u8]) -> bool {
+        let end = self.next + name.len();
+        let is_next = self.line.get(self.next..end).is_some_and(|text| text.eq_ignore_ascii_case(name));
+        if is_next {
+            self.next = end;
+        }
+        is_next
+    }
+
+    /// Steps over `<name>`; gives the name in lower case, without blanks.
+    pub(super) fn name(&mut self) -> Result<String, Located> {
         let opening = self.next;
         self.next += 1;
-        self.skip_while(|byte| !matches!(byte, b'(' | b')'));
+        let text = self.take_while(|byte| !matches!(byte, b'>' | b'(' | b')' | b'[' | b']' | b'#' | b'<'));
+        let name = String::from_utf8_lossy(text);
+        let name: String =
+            name.chars().filter(|c| !matches!(c, ' ' | '\t')).map(|c| c.to_ascii_lowercase()).collect();
+        if self.peek() != Some(b'>') || name.is_empty() {
+            return Err(Located::new(opening, Problem::NameNotClosed));
+        }
+        self.next += 1;
+        Ok(name)
+    }
+
+    /// A problem at this place.
+    pub(super) fn located(&self, problem: Problem) -> Located {
+        Located::new(self.next, problem)
+    }
+
+    /// Steps over the comment at whose parenthesis it is; gives its text.
+    pub(super) fn comment(&mut self) -> Result<&'a [u8], Located> {
+        let opening = self.next;
+        self.next += 1;
+        let text = self.take_while(|byte| !matches!(byte, b'(' | b')'));
         match self.peek() {
             Some(b')') => {
                 self.next += 1;
-                Ok(())
+                Ok(text)
             }
-            Some(_) => Err(Located::new(self.next, Problem::CommentNested)),
+            Some(_) => Err(self.located(Problem::CommentNested)),
             None => Err(Located::new(opening, Problem::CommentNotClosed)),
         }
     }
+}
 
-    /// A word; `next` is at its letter.
-    fn word(&mut self, letter: u8) -> Result<Word<'a>, Located> {
-        let offset = self.next;
-        self.next += 1;
-        let number_start = self.next;
-        self.skip_while(|byte| is_blank(byte) || matches!(byte, b'0'..=b'9' | b'.' | b'+' | b'-'));
-        let source = self.line.get(offset..self.next).unwrap_or_default();
-        let number = self.line.get(number_start..self.next).unwrap_or_default();
-        let letter = letter.to_ascii_uppercase();
-        let number = Decimal::parse(number).map_err(|fault| {
-            let word = quote(source);
-            let problem = match fault {
-                NumberFault::Missing => return self.number_missing(offset, letter),
-                NumberFault::Malformed => Problem::NumberMalformed { word },
-                NumberFault::TooLarge => Problem::NumberTooLarge { word },
-                NumberFault::TooManyDecimals => Problem::TooManyDecimals { word },
-            };
-            Located::new(offset, problem)
-        })?;
-        Ok(Word { letter, number, offset, source })
+/// What a line is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Item<'a> {
+    /// A letter and its number.
+    Word(Word<'a>),
+    /// `#…=…`
+    Assignment(Assignment),
+    /// A comment in parentheses, without them.
+    Comment(&'a [u8]),
+}
+
+/// A parameter and the value it gets once the whole line is read.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Assignment {
+    pub(super) target: Target,
+    pub(super) value: f64,
+}
+
+/// The items of a line, from left to right; ends after the first error.
+pub(super) struct Items<'a, 'environment> {
+    cursor: Cursor<'a>,
+    environment: &'environment dyn Environment,
+}
+
+impl<'a, 'environment> Items<'a, 'environment> {
+    /// The items from the cursor to the end of its line.
+    pub(super) fn new(cursor: Cursor<'a>, environment: &'environment dyn Environment) -> Self {
+        Self { cursor, environment }
     }
 
-    fn number_missing(&self, letter_offset: usize, letter: u8) -> Located {
-        match self.peek() {
-            Some(found @ (b'#' | b'[')) => {
-                Located::new(self.next, Problem::Expression { found: char::from(found) })
-            }
-            found => {
-                let problem = Problem::NumberMissing { letter: char::from(letter), found: describe(found) };
-                Located::new(letter_offset, problem)
-            }
+    /// A word; the cursor is at its letter.
+    fn word(&mut self, letter: u8) -> Result<Word<'a>, Located> {
+        let cursor = &mut self.cursor;
+        let offset = cursor.next;
+        cursor.next += 1;
+        let letter = letter.to_ascii_uppercase();
+        let (mut number, rounded) = if self.is_computed() {
+            (Number::Real(expression::operand(&mut self.cursor, self.environment)?), false)
+        } else {
+            self.literal(offset, letter)?
+        };
+        if letter == b'X' && self.environment.is_diameter() {
+            number = number.half();
         }
+        let source = self.cursor.line.get(offset..self.cursor.next).unwrap_or_default();
+        Ok(Word { letter, number, offset, rounded, source })
+    }
+
+    /// Whether the number at the cursor is to be computed: `#1`, `-[…]`, `SIN[…]`.
+    fn is_computed(&self) -> bool {
+        let mut ahead = self.cursor.clone();
+        ahead.take_while(|byte| is_blank(byte) || matches!(byte, b'+' | b'-'));
+        match ahead.peek() {
+            Some(b'#' | b'[') => true,
+            Some(letter) if letter.is_ascii_alphabetic() => expression::is_function(&ahead),
+            _ => false,
+        }
+    }
+
+    /// A number as written, and whether it had to be rounded.
+    fn literal(&mut self, offset: usize, letter: u8) -> Result<(Number, bool), Located> {
+        let cursor = &mut self.cursor;
+        let text =
+            cursor.take_while(|byte| is_blank(byte) || matches!(byte, b'0'..=b'9' | b'.' | b'+' | b'-'));
+        let source = || quote(self.cursor.line.get(offset..self.cursor.next).unwrap_or_default());
+        let problem = match Decimal::parse(text) {
+            Ok((number, rounded)) => return Ok((Number::Exact(number), rounded)),
+            Err(NumberFault::Missing) => {
+                let found = describe(self.cursor.peek());
+                Problem::NumberMissing { letter: char::from(letter), found }
+            }
+            Err(NumberFault::Malformed) => Problem::NumberMalformed { word: source() },
+            Err(NumberFault::TooLarge) => {
+                let digits: String =
+                    text.iter().filter(|byte| !is_blank(**byte)).map(|&byte| char::from(byte)).collect();
+                match digits.parse::<f64>() {
+                    Ok(value) if value.is_finite() => return Ok((Number::Real(value), false)),
+                    _ => Problem::NumberTooLarge { word: source() },
+                }
+            }
+        };
+        Err(Located::new(offset, problem))
+    }
+
+    /// `#…=…`; the cursor is at the `#`.
+    fn assignment(&mut self) -> Result<Assignment, Located> {
+        let offset = self.cursor.next;
+        let target = expression::target(&mut self.cursor, self.environment)?;
+        if self.cursor.peek_text() != Some(b'=') {
+            let found = describe(self.cursor.peek_text());
+            return Err(self.cursor.located(Problem::Syntax { found, expected: "'=' after the parameter" }));
+        }
+        self.cursor.next += 1;
+        match &target {
+            Target::Number(number) if parameters::is_read_only(*number) => {
+                return Err(Located::new(offset, Problem::ParameterReadOnly { name: format!("#{number}") }));
+            }
+            Target::Name(name) if predefined::is_name(name) => {
+                return Err(Located::new(offset, Problem::ParameterReadOnly { name: format!("#<{name}>") }));
+            }
+            _ => {}
+        }
+        let value = expression::operand(&mut self.cursor, self.environment)?;
+        Ok(Assignment { target, value })
     }
 
     /// The problem of a byte that starts no word.
     fn stray(&self, byte: u8) -> Located {
-        let first = self.line.iter().take(self.next).all(|&before| is_blank(before));
         let problem = match byte {
-            b'/' if first => Problem::BlockDelete,
             b'%' => Problem::PercentInLine,
-            b'#' | b'[' | b']' | b'=' | b'<' | b'>' => Problem::Expression { found: char::from(byte) },
             _ => Problem::Character { found: describe(Some(byte)) },
         };
-        Located::new(self.next, problem)
+        self.cursor.located(problem)
+    }
+
+    fn item(&mut self) -> Option<Result<Item<'a>, Located>> {
+        Some(match self.cursor.peek_text()? {
+            b';' => return None,
+            b'(' => self.cursor.comment().map(Item::Comment),
+            b'#' => self.assignment().map(Item::Assignment),
+            // A checksum ends the line; nothing is to be compared with it.
+            b'*' if self.is_checksum() => return None,
+            letter if letter.is_ascii_alphabetic() => self.word(letter).map(Item::Word),
+            byte => Err(self.stray(byte)),
+        })
+    }
+
+    /// Whether nothing but the digits of a checksum follows.
+    fn is_checksum(&self) -> bool {
+        let mut ahead = self.cursor.clone();
+        ahead.next += 1;
+        let has_digits = !ahead.take_while(|byte| byte.is_ascii_digit()).is_empty();
+        has_digits && matches!(ahead.peek_text(), None | Some(b';'))
     }
 }
 
-impl<'a> Iterator for Words<'a> {
-    type Item = Result<Word<'a>, Located>;
+impl<'a> Iterator for Items<'a, '_> {
+    type Item = Result<Item<'a>, Located>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let result = loop {
-            self.skip_while(is_blank);
-            match self.peek()? {
-                b';' => break None,
-                b'(' => {
-                    if let Err(located) = self.comment() {
-                        break Some(Err(located));
-                    }
-                }
-                letter if letter.is_ascii_alphabetic() => break Some(self.word(letter)),
-                byte => break Some(Err(self.stray(byte))),
-            }
-        };
-        if !matches!(result, Some(Ok(_))) {
-            self.next = self.line.len();
+        let item = self.item();
+        if !matches!(item, Some(Ok(_))) {
+            self.cursor.next = self.cursor.line.len();
         }
-        result
+        item
     }
 }
 
@@ -174,12 +311,34 @@ impl<'a> Iterator for Words<'a> {
 mod tests {
     use super::*;
 
+    struct Nothing;
+
+    impl Environment for Nothing {
+        fn numbered(&self, _: u32) -> f64 {
+            0.0
+        }
+
+        fn named(&self, _: &str) -> Option<f64> {
+            None
+        }
+    }
+
     /// The words of a line written one way: upper case, one blank apart, plain decimals.
     fn plain(line: &[u8]) -> Result<String, Located> {
-        let words: Result<Vec<_>, _> = Words::new(line)
-            .map(|word| word.map(|word| format!("{}{}", char::from(word.letter), word.number)))
-            .collect();
-        words.map(|words| words.join(" "))
+        let mut words = Vec::new();
+        for item in Items::new(Cursor::new(line), &Nothing) {
+            match item? {
+                Item::Word(Word { letter, number: Number::Exact(number), .. }) => {
+                    words.push(format!("{}{number}", char::from(letter)));
+                }
+                Item::Word(Word { letter, number: Number::Real(value), .. }) => {
+                    words.push(format!("{}={value}", char::from(letter)));
+                }
+                Item::Assignment(Assignment { target, value }) => words.push(format!("{target:?}={value}")),
+                Item::Comment(_) => {}
+            }
+        }
+        Ok(words.join(" "))
     }
 
     #[test]
@@ -192,6 +351,20 @@ mod tests {
     }
 
     #[test]
+    fn computed_numbers_are_told_from_written_ones() {
+        assert_eq!(plain(b"X[1+2]Y-#5 Z - [2]F sqrt[4]").unwrap(), "X=3 Y=-0 Z=-2 F=2");
+        assert_eq!(plain(b"F99999999999").unwrap(), "F=99999999999");
+        assert_eq!(plain(b"#1=2#<_A b>=[1]X#1").unwrap(), "Number(1)=2 Name(\"_ab\")=1 X=0");
+    }
+
+    #[test]
+    fn a_checksum_ends_the_line() {
+        assert_eq!(plain(b"N5 G1 X2*71").unwrap(), "N5 G1 X2");
+        assert_eq!(plain(b"X2 *7 ; c").unwrap(), "X2");
+        assert!(plain(b"X2*7Y1").is_err() && plain(b"X2*").is_err());
+    }
+
+    #[test]
     fn faults_have_their_place() {
         for (line, offset, message) in [
             (&b"G1 (a"[..], 3, "comment without its end"),
@@ -201,11 +374,12 @@ mod tests {
             (b"G1 X(c)2", 3, "'(' after X"),
             (b"X1.2.3", 0, "found X1.2.3"),
             (b"X1 Y- -5", 3, "found Y--5"),
-            (b"X1 Y0.12345678901", 3, "at most 10 decimals"),
-            (b"X1 Y#5", 4, "parameters and expressions"),
-            (b"X [1]", 2, "parameters and expressions"),
-            (b"#1=5", 0, "parameters and expressions"),
-            (b" /X1", 1, "block delete"),
+            (b"X [1", 4, "an operator or ']'"),
+            (b"#1 X5", 3, "expected '=' after the parameter"),
+            (b"#5420=1", 0, "found #5420"),
+            (b"#<_x>=1", 0, "found #<_x>"),
+            (b"X#<no>", 1, "found #<no>"),
+            (b" /X1", 1, "'/'"),
             (b"X1/2", 2, "'/'"),
             (b"X1 %", 3, "'%' among"),
             (b"X1\xc2\xb5", 2, "the byte 0xc2"),

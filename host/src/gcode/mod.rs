@@ -61,42 +61,61 @@
 //! incremental programs do not drift. More decimals are an error unless they are zeros. Floating point begins
 //! only with what is irrational anyhow: the centre of an R arc, radii and sweeps.
 
+mod accessories;
 mod arc;
 mod block;
+mod cycle;
 mod decimal;
 mod error;
+mod expression;
+mod flow;
+mod frame;
 mod interpreter;
 mod lexer;
+mod message;
 mod modal;
+mod motion;
+mod number;
+mod offsets;
+mod options;
+mod oword;
+mod parameter_file;
+mod parameters;
+mod predefined;
 mod program;
+mod source;
 mod spline;
+mod structure;
+mod tool;
 
 pub use arc::{RADIUS_MISMATCH_MAX_MM, RADIUS_MISMATCH_MIN_MM, RADIUS_MISMATCH_RATIO};
 pub use decimal::{Decimal, Length};
 pub(crate) use error::describe;
 pub use error::{GcodeError, Problem};
+pub use options::ReadOptions;
+pub use parameter_file::ParameterFile;
+pub use parameters::{PARAMETER_MAX, Parameters};
 pub use program::{
-    ArcMove, CubicMove, Feed, LineMove, Notice, NoticeKind, PathMode, Plane, Program, Step, StepKind,
-    ThroughMove,
+    ArcMove, CubicMove, Feed, LineMove, Message, Notice, NoticeKind, PathMode, Plane, Program, Step,
+    StepKind, ThroughMove,
 };
+pub use tool::{Tool, ToolTable};
+
+/// Reads a whole program with the default [`ReadOptions`]; `source_name` appears in errors only.
+///
+/// # Errors
+///
+/// As [`read_with`].
+pub fn read(source_name: &str, text: &[u8]) -> Result<Program, GcodeError> {
+    read_with(source_name, text, &ReadOptions::default())
+}
 
 /// Reads a whole program; `source_name` appears in errors only.
 ///
 /// # Errors
 ///
 /// The first word, leftmost in the first line at fault, that is not G-code of this dialect or asks for the
-/// impossible.
-pub fn read(source_name: &str, text: &[u8]) -> Result<Program, GcodeError> {
-    const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-    let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
-    let mut interpreter = interpreter::Interpreter::default();
-    let mut line_number: u32 = 0;
-    for line in text.split(|&byte| byte == b'\n') {
-        line_number = line_number.saturating_add(1);
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        interpreter
-            .line(line_number, line)
-            .map_err(|located| GcodeError::new(source_name, line_number, line, located))?;
-    }
-    Ok(interpreter.finish())
+/// impossible. In a subroutine of another file, the error names that file.
+pub fn read_with(source_name: &str, text: &[u8], options: &ReadOptions) -> Result<Program, GcodeError> {
+    flow::Flow::new(source_name, text, options).read()
 }

@@ -1,9 +1,11 @@
 //! The modes, which stay in force from line to line.
 
 use super::block::{Block, GGroup};
-use super::decimal::{Decimal, Length, LengthFault};
+use super::cycle::Cycle;
+use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::lexer::Word;
+use super::number::Number;
 use super::program::{PathMode, Plane};
 
 /// Motion mode.
@@ -21,9 +23,24 @@ pub(super) enum Motion {
     Cubic,
     /// G5.5.
     Through,
+    /// G73 to G89.
+    Cycle(Cycle),
 }
 
 impl Motion {
+    /// The mode that a G word sets, by its number in tenths; none for G80.
+    fn of(tenths: i64) -> Option<Self> {
+        Some(match tenths {
+            0 => Self::Rapid,
+            10 => Self::Feed,
+            20 => Self::Clockwise,
+            30 => Self::CounterClockwise,
+            50 => Self::Cubic,
+            55 => Self::Through,
+            _ => Self::Cycle(Cycle::of(tenths)?),
+        })
+    }
+
     /// The word that sets it.
     pub(super) fn word(self) -> &'static str {
         match self {
@@ -33,12 +50,36 @@ impl Motion {
             Self::CounterClockwise => "G3",
             Self::Cubic => "G5",
             Self::Through => "G5.5",
+            Self::Cycle(cycle) => cycle.word(),
         }
     }
 
-    /// Whether it makes arcs.
+    /// The number of its word in tenths.
+    pub(super) fn tenths(self) -> i64 {
+        match self {
+            Self::Rapid => 0,
+            Self::Feed => 10,
+            Self::Clockwise => 20,
+            Self::CounterClockwise => 30,
+            Self::Cubic => 50,
+            Self::Through => 55,
+            Self::Cycle(cycle) => cycle.tenths(),
+        }
+    }
+
+    /// Whether the mode is G2 or G3.
     pub(super) fn is_arc(self) -> bool {
         matches!(self, Self::Clockwise | Self::CounterClockwise)
+    }
+
+    /// Whether it takes a letter other than those of the axes.
+    pub(super) fn takes(self, letter: u8) -> bool {
+        match self {
+            Self::Rapid | Self::Feed | Self::Through => false,
+            Self::Clockwise | Self::CounterClockwise => matches!(letter, b'I' | b'J' | b'K' | b'R' | b'P'),
+            Self::Cubic => matches!(letter, b'I' | b'J' | b'P' | b'Q'),
+            Self::Cycle(cycle) => cycle.takes(letter),
+        }
     }
 }
 
@@ -61,10 +102,52 @@ pub(super) enum Distance {
     Incremental,
 }
 
+/// The meaning of F.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum FeedMode {
+    /// G93: one by the minutes that a move takes; in every line with a move at a feed.
+    InverseTime,
+    /// G94: per minute.
+    #[default]
+    PerMinute,
+    /// G95: per revolution of the spindle, at its commanded speed.
+    PerRevolution,
+}
+
+/// What was commanded of the spindle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Spindle {
+    /// M3: clockwise; M4: not; M5: none.
+    pub(super) clockwise: Option<bool>,
+    /// S \[rev/min\], after G96 \[m/min or feet/min\].
+    pub(super) speed: f64,
+    /// G96: S is a speed of the surface.
+    pub(super) is_surface: bool,
+}
+
+/// Overrides that M48 to M53 allow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Overrides {
+    /// M50.
+    pub(super) feed: bool,
+    /// M51.
+    pub(super) speed: bool,
+    /// M52.
+    pub(super) adaptive_feed: bool,
+    /// M53.
+    pub(super) feed_stop: bool,
+}
+
+impl Default for Overrides {
+    fn default() -> Self {
+        Self { feed: true, speed: true, adaptive_feed: false, feed_stop: true }
+    }
+}
+
 /// The modes in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Modal {
-    /// G0 G1 G2 G3 G5 G5.5; none after G80.
+    /// G0 G1 G2 G3 G5 G5.5, drilling cycles; none after G80.
     pub(super) motion: Option<Motion>,
     /// G17 G18 G19.
     pub(super) plane: Plane,
@@ -74,10 +157,22 @@ pub(super) struct Modal {
     pub(super) distance: Distance,
     /// G90.1 G91.1.
     pub(super) arc_distance: Distance,
-    /// G61 G64.
+    /// G7: X words are diameters.
+    pub(super) is_diameter: bool,
+    /// G61 G61.1 G64.
     pub(super) path: PathMode,
-    /// F \[mm/min\], positive.
-    pub(super) feed_mm_min: Option<f64>,
+    /// G93 G94 G95.
+    pub(super) feed_mode: FeedMode,
+    /// F \[mm/min or mm/rev\], positive; none before the first, after a change of mode, and in G93.
+    pub(super) feed: Option<f64>,
+    /// G99: drilling cycles end at R, not where they began.
+    pub(super) retracts_to_r: bool,
+    pub(super) spindle: Spindle,
+    /// M7.
+    pub(super) mist: bool,
+    /// M8.
+    pub(super) flood: bool,
+    pub(super) overrides: Overrides,
 }
 
 impl Default for Modal {
@@ -89,14 +184,35 @@ impl Default for Modal {
             units: Units::default(),
             distance: Distance::Absolute,
             arc_distance: Distance::Incremental,
+            is_diameter: false,
             path: PathMode::default(),
-            feed_mm_min: None,
+            feed_mode: FeedMode::default(),
+            feed: None,
+            retracts_to_r: false,
+            spindle: Spindle::default(),
+            mist: false,
+            flood: false,
+            overrides: Overrides::default(),
         }
     }
 }
 
 impl Modal {
-    /// Sets the modes a line asks for: plane, units, path mode, distance modes, motion mode.
+    /// Sets what F means. Another meaning needs another F.
+    pub(super) fn set_feed_mode(&mut self, block: &Block<'_>) {
+        let mode = match block.g(GGroup::FeedMode).map(|code| code.tenths) {
+            Some(930) => FeedMode::InverseTime,
+            Some(950) => FeedMode::PerRevolution,
+            Some(_) => FeedMode::PerMinute,
+            None => return,
+        };
+        if mode != self.feed_mode {
+            self.feed_mode = mode;
+            self.feed = None;
+        }
+    }
+
+    /// Sets the modes a line asks for: plane, units, path mode, distance modes, retraction, motion mode.
     pub(super) fn set(&mut self, block: &Block<'_>) -> Result<(), Located> {
         let tenths = |group| block.g(group).map(|code| code.tenths);
         match tenths(GGroup::Plane) {
@@ -106,10 +222,11 @@ impl Modal {
             None => {}
         }
         self.units = Units::of(block).unwrap_or(self.units);
-        if block.is_blend() {
-            self.path = self.blend(block)?;
-        } else if tenths(GGroup::PathMode).is_some() {
-            self.path = PathMode::ExactPath;
+        match tenths(GGroup::PathMode) {
+            Some(640) => self.path = self.blend(block)?,
+            Some(611) => self.path = PathMode::ExactStop,
+            Some(_) => self.path = PathMode::ExactPath,
+            None => {}
         }
         if let Some(tenths) = tenths(GGroup::Distance) {
             self.distance = if tenths == 900 { Distance::Absolute } else { Distance::Incremental };
@@ -117,16 +234,14 @@ impl Modal {
         if let Some(tenths) = tenths(GGroup::ArcDistance) {
             self.arc_distance = if tenths == 901 { Distance::Absolute } else { Distance::Incremental };
         }
+        if let Some(tenths) = tenths(GGroup::Diameter) {
+            self.is_diameter = tenths == 70;
+        }
+        if let Some(tenths) = tenths(GGroup::Retract) {
+            self.retracts_to_r = tenths == 990;
+        }
         if let Some(tenths) = tenths(GGroup::Motion) {
-            self.motion = match tenths {
-                0 => Some(Motion::Rapid),
-                10 => Some(Motion::Feed),
-                20 => Some(Motion::Clockwise),
-                30 => Some(Motion::CounterClockwise),
-                50 => Some(Motion::Cubic),
-                55 => Some(Motion::Through),
-                _ => None,
-            };
+            self.motion = Motion::of(tenths);
         }
         Ok(())
     }
@@ -153,24 +268,28 @@ impl Units {
 
     /// The length a word gives.
     pub(super) fn length(self, word: Word<'_>) -> Result<Length, Located> {
-        let length = match self {
-            Self::Millimetres => Length::from_mm(word.number),
-            Self::Inches => Length::from_inches(word.number),
+        let length = match (self, word.number) {
+            (Self::Millimetres, Number::Exact(number)) => Length::from_mm(number),
+            (Self::Inches, Number::Exact(number)) => Length::from_inches(number),
+            (_, Number::Real(value)) => Length::nearest(self.mm(value)),
         };
-        length.map_err(|fault| {
-            word.problem(|word| match fault {
-                LengthFault::OutOfRange => Problem::LengthOutOfRange { word },
-                LengthFault::Inexact => Problem::InchesInexact { word },
-            })
-        })
+        length.ok_or_else(|| word.problem(|word| Problem::LengthOutOfRange { word }))
     }
 
-    /// \[mm/min\] of a feed; a feed is a speed, not a place, and may be rounded to the nearest f64.
-    pub(super) fn feed_mm_min(self, feed: Decimal) -> f64 {
+    /// \[mm\] of a number in these units, rounded to the nearest f64: for speeds and for what is computed.
+    pub(super) fn mm(self, value: f64) -> f64 {
         const MM_PER_INCH_TENTHS: f64 = 254.0;
         match self {
-            Self::Millimetres => feed.to_f64(),
-            Self::Inches => feed.to_f64() * MM_PER_INCH_TENTHS / 10.0,
+            Self::Millimetres => value,
+            Self::Inches => value * MM_PER_INCH_TENTHS / 10.0,
+        }
+    }
+
+    /// A number of millimetres in these units.
+    pub(super) fn of_mm(self, mm: f64) -> f64 {
+        match self {
+            Self::Millimetres => mm,
+            Self::Inches => mm / 25.4,
         }
     }
 }
@@ -183,8 +302,7 @@ mod tests {
     #[test]
     fn feeds_in_inches_are_the_nearest_double() {
         for (text, feed_mm_min) in [("1", 25.4), ("100", 2540.0), ("0.5", 12.7), ("60", 1524.0)] {
-            let feed = Decimal::parse(text.as_bytes()).unwrap();
-            assert_eq!(Units::Inches.feed_mm_min(feed), feed_mm_min);
+            assert_eq!(Units::Inches.mm(text.parse().unwrap()), feed_mm_min);
         }
     }
 }

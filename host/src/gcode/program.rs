@@ -1,6 +1,7 @@
 //! The steps of a program, in its order.
 
 use super::decimal::Length;
+use super::parameters::Parameters;
 use std::fmt;
 
 /// A program, read.
@@ -11,6 +12,45 @@ pub struct Program {
     /// Words that were accepted and not acted on: at most one notice per kind, in the order of their first
     /// lines.
     pub notices: Vec<Notice>,
+    /// What the operator is to read, in the order of the program.
+    pub messages: Vec<Message>,
+    /// Tools that were used without a tool table: taken to have length and radius 0.
+    pub tools_assumed: Vec<u32>,
+    /// The parameters at the end.
+    pub parameters: Parameters,
+}
+
+/// A text for the operator: a `(MSG,…)`, or the tool that a stop is for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// Line of the program that asks for it, from 1.
+    pub line: u32,
+    /// It is shown before the step of this index.
+    pub step: usize,
+    /// The text.
+    pub text: String,
+}
+
+impl Program {
+    /// Notices, tools that were assumed, and messages, a line each.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> = self.notices.iter().map(ToString::to_string).collect();
+        if !self.tools_assumed.is_empty() {
+            let tools: Vec<String> = self.tools_assumed.iter().map(ToString::to_string).collect();
+            let tools = tools.join(", ");
+            notes.push(format!("length and radius 0 are assumed, there is no tool table: tools {tools}"));
+        }
+        let shown = self.messages.iter().take(Self::MESSAGES_SHOWN);
+        notes.extend(shown.map(|message| format!("line {}: message: {}", message.line, message.text)));
+        if let Some(more @ 1..) = self.messages.len().checked_sub(Self::MESSAGES_SHOWN) {
+            notes.push(format!("{more} more messages"));
+        }
+        notes
+    }
+
+    /// Most messages that [`Self::notes`] lists.
+    const MESSAGES_SHOWN: usize = 100;
 }
 
 /// One thing to do.
@@ -76,8 +116,8 @@ pub struct ArcMove {
     pub start_radius_mm: f64,
     /// Distance of the end from the centre in the plane \[mm\], greater than 0.
     pub end_radius_mm: f64,
-    /// Angle run through \[rad\], in ±(0, 2π]: counter-clockwise positive, seen from the positive end of the
-    /// plane's normal; a full circle is ±2π.
+    /// Angle run through \[rad\], not 0: counter-clockwise positive, seen from the positive end of the
+    /// plane's normal; a full circle is ±2π, and every further turn (P) adds as much.
     pub sweep_rad: f64,
     /// Feed along the path, the height of a helix included.
     pub feed: Feed,
@@ -130,6 +170,8 @@ pub enum PathMode {
     /// G61, and before either is programmed: the path is kept.
     #[default]
     ExactPath,
+    /// G61.1: a full stop after every move.
+    ExactStop,
     /// G64: corners may be rounded; where two moves differ, within the smaller tolerance.
     Blend {
         /// Greatest distance from the programmed path \[mm\], 0 or more; the machine's choice if absent.
@@ -203,10 +245,20 @@ pub enum NoticeKind {
     Spindle,
     /// S.
     SpindleSpeed,
-    /// M6.
+    /// M6 without a tool that T selected.
     ToolChange,
     /// M7, M8, M9.
     Coolant,
+    /// M48 to M53.
+    Override,
+    /// M62 to M65, M67, M68.
+    Output,
+    /// M66.
+    Input,
+    /// More decimals than are exact.
+    Rounded,
+    /// A line that begins with `/`.
+    BlockDeleted,
     /// F in a line that switches the units: controllers differ in which unit they take it.
     FeedInNewUnits,
     /// R a rounding error smaller than half the chord.
@@ -222,8 +274,13 @@ impl fmt::Display for Notice {
         let text = match self.kind {
             NoticeKind::Spindle => "M3, M4, M5 are not acted on: there is no spindle",
             NoticeKind::SpindleSpeed => "S is not acted on: there is no spindle",
-            NoticeKind::ToolChange => "M6 is not acted on: there is no tool changer",
             NoticeKind::Coolant => "M7, M8, M9 are not acted on: there is no coolant",
+            NoticeKind::ToolChange => "M6 without a T word is not acted on: no tool is selected",
+            NoticeKind::Override => "M48 to M53 are not acted on: overrides are the operator's",
+            NoticeKind::Output => "M62 to M65, M67, M68 are not acted on: there are no outputs",
+            NoticeKind::Input => "M66 reads 0 and does not wait: there are no inputs",
+            NoticeKind::Rounded => "numbers with more decimals than are exact are rounded to 0.0000000001 mm",
+            NoticeKind::BlockDeleted => "lines that begin with / are left out",
             NoticeKind::FeedInNewUnits => "F in a line that switches the units is taken in the new unit",
             NoticeKind::RadiusEnlarged => {
                 "R falls short of half the chord by a rounding error: half circle made"

@@ -31,7 +31,7 @@ pub fn plan_program(
     };
     let machine = &driven(machine, mode);
     let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s);
-    plan.notices = program.notices.iter().map(ToString::to_string).collect();
+    plan.notices = program.notes();
     let mut run: Vec<Move> = Vec::new();
     // Where the spline begins whose points are being collected.
     let (mut start, mut points) = ([0.0; 3], Vec::new());
@@ -70,6 +70,15 @@ pub fn plan_program(
                     _ => {}
                 }
             }
+        }
+        let stops = match &step.kind {
+            StepKind::Line(line) => line.mode == PathMode::ExactStop,
+            StepKind::Arc(arc) => arc.mode == PathMode::ExactStop,
+            StepKind::Cubic(curve) => curve.mode == PathMode::ExactStop,
+            _ => false,
+        };
+        if stops {
+            append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
         }
     }
     let moves = through(start, &mut points, machine);
@@ -124,7 +133,7 @@ pub(super) fn path_move(
     machine: &Machine,
 ) -> Move {
     let (tolerance_mm, merging_mm) = match mode {
-        PathMode::ExactPath => (0.0, None),
+        PathMode::ExactPath | PathMode::ExactStop => (0.0, None),
         PathMode::Blend { tolerance_mm, merging_mm } => {
             (tolerance_mm.unwrap_or(machine.path.blend_tolerance_mm), merging_mm)
         }

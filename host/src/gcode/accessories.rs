@@ -1,0 +1,204 @@
+//! Spindle, coolant, tools, inputs and outputs: what a line asks of everything but the axes.
+
+use super::block::{Block, GGroup, MGroup};
+use super::decimal::Length;
+use super::error::{Located, Problem};
+use super::interpreter::Interpreter;
+use super::modal::Overrides;
+use super::program::{NoticeKind, StepKind};
+use super::tool::Tool;
+
+impl Interpreter {
+    /// S, T, and the M words that are no stops, in their order.
+    pub(super) fn accessories(&mut self, block: &Block<'_>) -> Result<(), Located> {
+        match block.g(GGroup::SpindleMode).map(|code| code.tenths) {
+            Some(960) if block.letter(b'S').is_none() => {
+                let expected = "S, the speed of the surface, in the same line";
+                return Err(block
+                    .g(GGroup::SpindleMode)
+                    .map_or(Located::new(0, Problem::NothingSaved), |code| {
+                        code.word.problem(|word| Problem::Setup { word, expected })
+                    }));
+            }
+            Some(tenths) => {
+                self.modal.spindle.is_surface = tenths == 960;
+                self.notice(NoticeKind::Spindle);
+            }
+            None => {}
+        }
+        if let Some(word) = block.letter(b'S') {
+            word.refuse_negative()?;
+            self.modal.spindle.speed = word.number.to_f64();
+            self.notice(NoticeKind::SpindleSpeed);
+        }
+        if let Some(word) = block.letter(b'T') {
+            let number = word.count(0, "a whole tool number, 0 or more")?;
+            self.tool(number, word.offset)?;
+            self.tools.selected = Some(number);
+        }
+        self.inputs_and_outputs(block)?;
+        self.change_tool(block)?;
+        if let Some(code) = block.m(MGroup::Spindle) {
+            self.modal.spindle.clockwise = match code.tenths {
+                30 => Some(true),
+                40 => Some(false),
+                _ => None,
+            };
+            self.notice(NoticeKind::Spindle);
+        }
+        if let Some(code) = block.m(MGroup::Modes) {
+            self.modes(code.tenths, code.word.offset)?;
+        }
+        self.coolant(block);
+        self.overrides(block);
+        Ok(())
+    }
+
+    fn coolant(&mut self, block: &Block<'_>) {
+        let [mist, flood, off] =
+            [MGroup::Mist, MGroup::Flood, MGroup::CoolantOff].map(|group| block.m(group).is_some());
+        self.modal.mist = !off && (self.modal.mist || mist);
+        self.modal.flood = !off && (self.modal.flood || flood);
+        if mist || flood || off {
+            self.notice(NoticeKind::Coolant);
+        }
+    }
+
+    fn overrides(&mut self, block: &Block<'_>) {
+        let Some(code) = block.m(MGroup::Override) else { return };
+        let is_on = block.letter(b'P').is_none_or(|word| word.number.signum() != 0);
+        let now = self.modal.overrides;
+        self.modal.overrides = match code.tenths {
+            480 => Overrides { feed: true, speed: true, ..now },
+            490 => Overrides { feed: false, speed: false, ..now },
+            500 => Overrides { feed: is_on, ..now },
+            510 => Overrides { speed: is_on, ..now },
+            520 => Overrides { adaptive_feed: is_on, ..now },
+            _ => Overrides { feed_stop: is_on, ..now },
+        };
+        self.notice(NoticeKind::Override);
+    }
+
+    fn inputs_and_outputs(&mut self, block: &Block<'_>) -> Result<(), Located> {
+        /// The result of M66.
+        const INPUT: u32 = 5399;
+        let Some(code) = block.m(MGroup::InputOutput) else { return Ok(()) };
+        let [p, e] = [b'P', b'E'].map(|letter| block.letter(letter));
+        let needs = |expected| code.word.problem(|word| Problem::Setup { word, expected });
+        let channel = match code.tenths {
+            620..=650 => p.ok_or_else(|| needs("the number of an output, a P word"))?,
+            660 => match (p, e) {
+                (Some(word), None) | (None, Some(word)) => word,
+                _ => return Err(needs("the number of an input, a P or an E word")),
+            },
+            _ => e.ok_or_else(|| needs("the number of an output, an E word"))?,
+        };
+        channel.count(0, "a whole number, 0 or more")?;
+        if code.tenths == 660 {
+            let waits = match block.letter(b'L') {
+                Some(word) => word.count(0, "a whole number from 0 to 4")? > 0,
+                None => false,
+            };
+            if waits && (e.is_some() || block.letter(b'Q').is_none_or(|word| word.number.signum() <= 0)) {
+                return Err(needs("L0, or a digital input (P) and a time to wait for it (Q)"));
+            }
+            // A wait for what never comes ends by its time.
+            self.parameters.set(INPUT, if waits { -1.0 } else { 0.0 });
+            self.notice(NoticeKind::Input);
+        } else {
+            self.notice(NoticeKind::Output);
+        }
+        Ok(())
+    }
+
+    /// M6 stops for the tool that T selected; M61 says which one there is.
+    fn change_tool(&mut self, block: &Block<'_>) -> Result<(), Located> {
+        let Some(code) = block.m(MGroup::ToolChange) else { return Ok(()) };
+        if code.tenths == 610 {
+            let Some(word) = block.letter(b'Q') else {
+                let expected = "the number of the tool, a Q word";
+                return Err(code.word.problem(|word| Problem::Setup { word, expected }));
+            };
+            let number = word.count(0, "a whole tool number, 0 or more")?;
+            self.tool(number, word.offset)?;
+            self.tools.current = number;
+            return Ok(());
+        }
+        // Without a tool there is nothing to take: LinuxCNC refuses it, older programs of this reader have it.
+        let Some(number) = self.tools.selected else {
+            self.notice(NoticeKind::ToolChange);
+            return Ok(());
+        };
+        self.modal.spindle.clockwise = None;
+        if number == self.tools.current {
+            return Ok(());
+        }
+        self.tools.current = number;
+        let tool = self.tool(number, code.word.offset)?;
+        let text = match (number, tool.remark.as_str()) {
+            (0, _) => "take the tool out".to_owned(),
+            (_, "") => format!("tool {number}"),
+            (_, remark) => format!("tool {number}: {remark}"),
+        };
+        self.message(text)?;
+        self.step(StepKind::Stop)
+    }
+
+    /// A tool by its number. Without a table it is assumed.
+    pub(super) fn tool(&mut self, number: u32, offset: usize) -> Result<Tool, Located> {
+        match self.tools.table.get(number) {
+            Some(tool) => Ok(tool.clone()),
+            None if number == 0 => Ok(Tool::default()),
+            None if self.tools.is_given => Err(Located::new(offset, Problem::ToolUnknown { number })),
+            None => {
+                // As many as there are in the text, unless it computes them.
+                const LISTED_MAX: usize = 1000;
+                let assumed = &mut self.program.tools_assumed;
+                if assumed.len() < LISTED_MAX && !assumed.contains(&number) {
+                    assumed.push(number);
+                }
+                Ok(Tool { number, ..Tool::default() })
+            }
+        }
+    }
+
+    /// G43 to G49.
+    pub(super) fn tool_length(&mut self, block: &Block<'_>) -> Result<(), Located> {
+        let Some(code) = block.g(GGroup::ToolLength) else { return Ok(()) };
+        let axes = block.axes();
+        let h = block.letter(b'H');
+        let mut tool = match code.tenths {
+            490 => [Length::ZERO; 3],
+            430 => {
+                let number =
+                    h.map_or(Ok(self.tools.current), |word| word.count(0, "a whole tool number, 0 or more"))?;
+                self.tool(number, h.map_or(code.word.offset, |word| word.offset))?.offset
+            }
+            _ => self.frame.tool,
+        };
+        if code.tenths == 431 || code.tenths == 432 {
+            let has_axes = axes.iter().any(Option::is_some);
+            let adds = code.tenths == 432;
+            if adds && has_axes == h.is_some() || !adds && !has_axes {
+                let expected = if adds { "either axis words or H" } else { "axis words" };
+                return Err(code.word.problem(|word| Problem::Setup { word, expected }));
+            }
+            for (axis, word) in axes.into_iter().enumerate() {
+                let Some(word) = word else { continue };
+                let length = self.modal.units.length(word)?;
+                let sum = if adds { tool[axis].checked_add(length) } else { Some(length) };
+                tool[axis] = sum.ok_or_else(|| word.problem(|word| Problem::PositionOutOfRange { word }))?;
+            }
+            if let Some(word) = h {
+                let number = word.count(0, "a whole tool number, 0 or more")?;
+                let offset = self.tool(number, word.offset)?.offset;
+                for (sum, more) in tool.iter_mut().zip(offset) {
+                    let beyond = || word.problem(|word| Problem::PositionOutOfRange { word });
+                    *sum = sum.checked_add(more).ok_or_else(beyond)?;
+                }
+            }
+        }
+        self.frame.tool = tool;
+        self.update_work(code.word.offset)
+    }
+}

@@ -1,0 +1,111 @@
+//! From work to machine coordinates and back.
+//!
+//! A point of the program is shifted by G92 or G52, turned about Z by the coordinate system's R, and shifted by
+//! the system's origin and the tool's offset, in this order. Without a rotation all of it is exact.
+
+use super::decimal::Length;
+
+/// The offsets in force.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Frame {
+    /// Of the coordinate system, in machine coordinates.
+    pub(super) origin: [Length; 3],
+    /// Of the coordinate system \[°\], counter-clockwise in XY.
+    pub(super) rotation_deg: f64,
+    /// G92 or G52, along the system's axes.
+    pub(super) shift: [Length; 3],
+    /// G43, in machine coordinates.
+    pub(super) tool: [Length; 3],
+}
+
+impl Frame {
+    /// Machine coordinates; `None` beyond the range.
+    pub(super) fn to_machine(&self, work: [Length; 3]) -> Option<[Length; 3]> {
+        let shifted = [0, 1, 2].map(|axis| work[axis].units() + self.shift[axis].units());
+        let turned = self.turned(shifted);
+        lengths([0, 1, 2].map(|axis| turned[axis] + self.origin[axis].units() + self.tool[axis].units()))
+    }
+
+    /// Work coordinates; `None` beyond the range.
+    pub(super) fn to_work(&self, machine: [Length; 3]) -> Option<[Length; 3]> {
+        let offsets = |axis: usize| self.origin[axis].units() + self.tool[axis].units();
+        let moved = [0, 1, 2].map(|axis| machine[axis].units() - offsets(axis));
+        let turned = turn(moved, -self.rotation_deg);
+        lengths([0, 1, 2].map(|axis| turned[axis] - self.shift[axis].units()))
+    }
+
+    /// A vector \[10⁻¹⁰ mm\] of the program, in machine coordinates.
+    pub(super) fn turned(&self, vector: [i64; 3]) -> [i64; 3] {
+        turn(vector, self.rotation_deg)
+    }
+
+    /// A vector \[10⁻¹⁰ mm\] of the machine, along the program's axes.
+    pub(super) fn turned_back(&self, vector: [i64; 3]) -> [i64; 3] {
+        turn(vector, -self.rotation_deg)
+    }
+}
+
+/// Lengths of so many units; `None` if one is beyond the range.
+pub(super) fn lengths(units: [i64; 3]) -> Option<[Length; 3]> {
+    let [x, y, z] = units.map(Length::from_units);
+    Some([x?, y?, z?])
+}
+
+/// A vector turned about Z; rounded, but by quarter turns.
+fn turn([x, y, z]: [i64; 3], angle_deg: f64) -> [i64; 3] {
+    let angle_deg = angle_deg % 360.0;
+    if angle_deg == 0.0 {
+        return [x, y, z];
+    }
+    if angle_deg == 90.0 || angle_deg == -270.0 {
+        return [-y, x, z];
+    }
+    if angle_deg == 180.0 || angle_deg == -180.0 {
+        return [-x, -y, z];
+    }
+    if angle_deg == 270.0 || angle_deg == -90.0 {
+        return [y, -x, z];
+    }
+    let (sin, cos) = libm::sincos(angle_deg.to_radians());
+    let (x, y) = (x as f64, y as f64);
+    [(x * cos - y * sin).round() as i64, (x * sin + y * cos).round() as i64, z]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(mm: [f64; 3]) -> [Length; 3] {
+        mm.map(|mm| Length::nearest(mm).unwrap())
+    }
+
+    #[test]
+    fn there_and_back() {
+        let mut frame = Frame {
+            origin: at([100.0, 20.0, 3.0]),
+            rotation_deg: 0.0,
+            shift: at([1.0, 2.0, 0.5]),
+            tool: at([0.0, 0.0, 50.0]),
+        };
+        assert_eq!(frame.to_machine(at([1.0, 1.0, 1.0])), Some(at([102.0, 23.0, 54.5])));
+        for quarter in [90.0, 180.0, 270.0, -90.0, -180.0, -270.0, 360.0, 450.0] {
+            frame.rotation_deg = quarter;
+            let point = at([0.1, -7.3, 2.0]);
+            assert_eq!(frame.to_work(frame.to_machine(point).unwrap()), Some(point), "{quarter}");
+        }
+        frame.rotation_deg = 90.0;
+        assert_eq!(frame.to_machine(at([1.0, 1.0, 1.0])), Some(at([97.0, 22.0, 54.5])));
+        frame.rotation_deg = 30.0;
+        let back = frame.to_work(frame.to_machine(at([3.0, 4.0, 5.0])).unwrap()).unwrap();
+        for (found, expected) in back.iter().zip(at([3.0, 4.0, 5.0])) {
+            assert!((found.units() - expected.units()).abs() <= 2);
+        }
+    }
+
+    #[test]
+    fn beyond_the_range_is_nowhere() {
+        let frame = Frame { origin: at([1e6, 0.0, 0.0]), ..Frame::default() };
+        assert_eq!(frame.to_machine(at([1.0, 0.0, 0.0])), None);
+        assert_eq!(frame.to_work(at([-1.0, 0.0, 0.0])), None);
+    }
+}

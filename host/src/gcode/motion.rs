@@ -1,0 +1,297 @@
+//! The move a line asks for: straight, an arc, a point of a curve, or the holes of a cycle.
+
+use std::f64::consts::PI;
+
+use super::arc;
+use super::block::{Block, GGroup};
+use super::decimal::Length;
+use super::error::{Located, Problem};
+use super::interpreter::Interpreter;
+use super::lexer::Word;
+use super::modal::{Distance, FeedMode, Modal, Motion};
+use super::program::{
+    ArcMove, CubicMove, Feed, LineMove, NoticeKind, PathMode, Plane, StepKind, ThroughMove,
+};
+use super::spline;
+
+/// Most turns of an arc or a helix.
+const TURNS_MAX: u32 = 10_000;
+
+impl Interpreter {
+    /// The move a line asks for by an axis word or, in the arc modes, an offset or radius.
+    pub(super) fn motion(&mut self, block: &Block<'_>) -> Result<(), Located> {
+        let code = block.g(GGroup::Motion);
+        if block.axes_are_taken() {
+            return match code.filter(|code| code.tenths != 800) {
+                Some(code) => Err(code.word.problem(|word| Problem::AxesTaken { word })),
+                None => Ok(()),
+            };
+        }
+        if let (Some(Motion::Cycle(cycle)), Some(code)) = (self.modal.motion, code)
+            && !block.axes().iter().any(Option::is_some)
+        {
+            let expected = "axis words";
+            return Err(code.word.problem(|_| Problem::Cycle { word: cycle.word(), expected }));
+        }
+        if !block.moves(self.modal.motion) {
+            return self.refuse_unmoved(block);
+        }
+        let ends = [b'P', b'Q'].map(|letter| block.letter(letter));
+        let words = block.axes().into_iter().chain(block.offsets()).chain([block.letter(b'R')]).chain(ends);
+        let Some(first) = words.flatten().min_by_key(|word| word.offset) else { return Ok(()) };
+        let Some(motion) = self.modal.motion else {
+            return Err(first.problem(|word| Problem::AxisWithoutMotion { word }));
+        };
+        let offset = code.map_or(first.offset, |code| code.word.offset);
+        let feed = self.feed(block, motion, offset)?;
+        if block.g(GGroup::NonModal).is_some_and(|code| code.tenths == 530) {
+            return self.machine_move(block, motion, feed, first);
+        }
+        if let Motion::Cycle(cycle) = motion {
+            return self.cycle(block, cycle, feed, first);
+        }
+        let (from, mode) = (self.machine, self.modal.path);
+        let work = self.end_point(block)?;
+        let to = self
+            .frame
+            .to_machine(work)
+            .ok_or_else(|| first.problem(|word| Problem::PositionOutOfRange { word }))?;
+        if motion == Motion::Cubic {
+            let controls_mm = spline::controls_mm(block, &self.modal, self.cubic_before_mm, offset)?;
+            self.untimed(motion, offset)?;
+            (self.work, self.machine) = (work, to);
+            if from == to && controls_mm == [[0.0; 2]; 2] {
+                return Ok(());
+            }
+            // What the next curve continues is in the program's directions.
+            let turned_mm = controls_mm.map(|control| self.turned_mm(control));
+            self.step(StepKind::Cubic(CubicMove { from, to, controls_mm: turned_mm, feed, mode }))?;
+            self.cubic_before_mm = Some(controls_mm[1]);
+            return Ok(());
+        }
+        if motion.is_arc() {
+            let arc = self.arc(block, motion, from, to, feed, offset)?;
+            (self.work, self.machine) = (work, to);
+            return self.step(StepKind::Arc(arc));
+        }
+        (self.work, self.machine) = (work, to);
+        if from != to && motion == Motion::Through {
+            self.untimed(motion, offset)?;
+            let begins = code.is_some();
+            self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }))
+        } else {
+            self.line_to(from, to, feed, mode)
+        }
+    }
+
+    /// A line without a move: words that only a move takes have no other use.
+    fn refuse_unmoved(&self, block: &Block<'_>) -> Result<(), Located> {
+        let waits = block.g(GGroup::NonModal).is_some_and(|code| code.tenths == 530);
+        match block.g(GGroup::NonModal).filter(|_| waits) {
+            Some(code) => {
+                Err(code.word.problem(|word| Problem::MachineMove { word, expected: "axis words" }))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn line_to(
+        &mut self,
+        from: [Length; 3],
+        to: [Length; 3],
+        feed: Feed,
+        mode: PathMode,
+    ) -> Result<(), Located> {
+        if from == to {
+            return Ok(());
+        }
+        let feed = self.timed(feed, distance_mm(from, to));
+        self.step(StepKind::Line(LineMove { from, to, feed, mode }))
+    }
+
+    /// G53: to a point in machine coordinates.
+    fn machine_move(
+        &mut self,
+        block: &Block<'_>,
+        motion: Motion,
+        feed: Feed,
+        first: Word<'_>,
+    ) -> Result<(), Located> {
+        let refused = |expected| first.problem(|word| Problem::MachineMove { word, expected });
+        if !matches!(motion, Motion::Rapid | Motion::Feed) {
+            return Err(refused("G0 or G1"));
+        }
+        if self.modal.distance == Distance::Incremental {
+            return Err(refused("absolute end points (G90)"));
+        }
+        let (from, mode) = (self.machine, self.modal.path);
+        let mut to = from;
+        for (coordinate, word) in to.iter_mut().zip(block.axes()) {
+            if let Some(word) = word {
+                *coordinate = self.modal.units.length(word)?;
+            }
+        }
+        self.machine = to;
+        self.update_work(first.offset)?;
+        self.line_to(from, to, feed, mode)
+    }
+
+    /// The feed in force; after G93, the F of the line.
+    fn feed(&self, block: &Block<'_>, motion: Motion, offset: usize) -> Result<Feed, Located> {
+        if motion == Motion::Rapid {
+            return Ok(Feed::Rapid);
+        }
+        let missing = |problem| Located::new(offset, problem);
+        let spindle = self.modal.spindle;
+        match (self.modal.feed_mode, self.modal.feed, block.letter(b'F')) {
+            (FeedMode::InverseTime, _, Some(word)) => Ok(Feed::MmPerMin(word.number.to_f64())),
+            (FeedMode::InverseTime, ..) => {
+                Err(missing(Problem::InverseTimeMissing { motion: motion.word() }))
+            }
+            (_, None, _) => Err(missing(Problem::FeedMissing { motion: motion.word() })),
+            (FeedMode::PerMinute, Some(feed_mm_min), _) => Ok(Feed::MmPerMin(feed_mm_min)),
+            (FeedMode::PerRevolution, Some(feed_mm_rev), _) if spindle.speed > 0.0 && !spindle.is_surface => {
+                Ok(Feed::MmPerMin(feed_mm_rev * spindle.speed))
+            }
+            (FeedMode::PerRevolution, ..) => {
+                Err(missing(Problem::SpindleSpeedMissing { motion: motion.word() }))
+            }
+        }
+    }
+
+    /// The feed of a move of this length.
+    fn timed(&self, feed: Feed, length_mm: f64) -> Feed {
+        match (self.modal.feed_mode, feed) {
+            (FeedMode::InverseTime, Feed::MmPerMin(per_min)) => Feed::MmPerMin(per_min * length_mm),
+            _ => feed,
+        }
+    }
+
+    /// Curves have no feed of inverse time.
+    fn untimed(&self, motion: Motion, offset: usize) -> Result<(), Located> {
+        if self.modal.feed_mode != FeedMode::InverseTime {
+            return Ok(());
+        }
+        Err(Located::new(offset, Problem::CurveTimed { motion: motion.word() }))
+    }
+
+    /// A vector in XY \[mm\] of the program, in machine coordinates.
+    fn turned_mm(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        if self.frame.rotation_deg == 0.0 {
+            return [x, y];
+        }
+        let (sin, cos) = libm::sincos(self.frame.rotation_deg.to_radians());
+        [x * cos - y * sin, x * sin + y * cos]
+    }
+
+    pub(super) fn end_point(&self, block: &Block<'_>) -> Result<[Length; 3], Located> {
+        let mut to = self.work;
+        for (coordinate, word) in to.iter_mut().zip(block.axes()) {
+            let Some(word) = word else { continue };
+            let length = self.modal.units.length(word)?;
+            *coordinate = match self.modal.distance {
+                Distance::Absolute => length,
+                Distance::Incremental => coordinate
+                    .checked_add(length)
+                    .ok_or_else(|| word.problem(|word| Problem::PositionOutOfRange { word }))?,
+            };
+        }
+        Ok(to)
+    }
+
+    fn arc(
+        &mut self,
+        block: &Block<'_>,
+        motion: Motion,
+        from: [Length; 3],
+        to: [Length; 3],
+        feed: Feed,
+        offset: usize,
+    ) -> Result<ArcMove, Located> {
+        let Modal { plane, units, path: mode, .. } = self.modal;
+        let [first, second, normal] = plane.axes();
+        let offsets = block.offsets();
+        if let Some(word) = offsets[normal].filter(|word| word.number.signum() != 0) {
+            return Err(word.problem(|word| Problem::ArcOffsetOutsidePlane { word, plane }));
+        }
+        if plane != Plane::Xy && self.frame.rotation_deg != 0.0 {
+            return Err(Located::new(offset, Problem::ArcPlaneTurned { plane }));
+        }
+        let in_plane = |point: [Length; 3]| [point[first], point[second]];
+        let (start, end) = (in_plane(from), in_plane(to));
+        let clockwise = motion == Motion::Clockwise;
+        let centre_words = [offsets[first], offsets[second]];
+        let resolved = match (block.letter(b'R'), centre_words) {
+            (None, [None, None]) => {
+                Err(Located::new(offset, Problem::ArcWithoutCentre { motion: motion.word(), plane }))
+            }
+            (None, _) => {
+                let centre = self.centre(centre_words, start, offset)?;
+                arc::about_centre(start, end, centre, clockwise)
+                    .map_err(|problem| Located::new(offset, problem))
+            }
+            (Some(word), [None, None]) => {
+                let radius = units.length(word)?;
+                arc::of_radius(start, end, radius, clockwise, plane, || word.text())
+                    .map_err(|problem| Located::new(word.offset, problem))
+            }
+            (Some(word), _) => Err(word.problem(|word| Problem::ArcCentreAndRadius { word })),
+        }?;
+        if resolved.radius_enlarged {
+            self.notice(NoticeKind::RadiusEnlarged);
+        }
+        let arc::Resolved { centre_mm, start_radius_mm, end_radius_mm, mut sweep_rad, .. } = resolved;
+        if let Some(word) = block.letter(b'P') {
+            let turns = word.count(1, "a whole number of turns from 1 to 10000")?;
+            if turns > TURNS_MAX {
+                let expected = "a whole number of turns from 1 to 10000";
+                return Err(word.problem(|word| Problem::NotThisCount { word, expected }));
+            }
+            sweep_rad += (2.0 * PI * f64::from(turns - 1)).copysign(sweep_rad);
+        }
+        let mean_radius_mm = (start_radius_mm + end_radius_mm) / 2.0;
+        let height_mm = to[normal].to_mm() - from[normal].to_mm();
+        let feed = self.timed(feed, libm::hypot(mean_radius_mm * sweep_rad, height_mm));
+        Ok(ArcMove { from, to, plane, centre_mm, start_radius_mm, end_radius_mm, sweep_rad, feed, mode })
+    }
+
+    /// Centre along the plane's axes in machine coordinates \[10⁻¹⁰ mm\]; it may lie beyond the range of a
+    /// [`Length`].
+    fn centre(
+        &self,
+        words: [Option<Word<'_>>; 2],
+        start: [Length; 2],
+        offset: usize,
+    ) -> Result<[i64; 2], Located> {
+        let [first, second, _] = self.modal.plane.axes();
+        let mut lengths = [0; 2];
+        for (length, word) in lengths.iter_mut().zip(words) {
+            *length = match word {
+                Some(word) => self.modal.units.length(word)?.units(),
+                None if self.modal.arc_distance == Distance::Incremental => 0,
+                None => {
+                    return Err(Located::new(
+                        offset,
+                        Problem::ArcCentreIncomplete { plane: self.modal.plane },
+                    ));
+                }
+            };
+        }
+        let mut vector = [0; 3];
+        (vector[first], vector[second]) = (lengths[0], lengths[1]);
+        if self.modal.arc_distance == Distance::Incremental {
+            let vector = self.frame.turned(vector);
+            return Ok([start[0].units() + vector[first], start[1].units() + vector[second]]);
+        }
+        let shifted = [0, 1, 2].map(|axis| vector[axis] + self.frame.shift[axis].units());
+        let turned = self.frame.turned(shifted);
+        let offset = |axis: usize| self.frame.origin[axis].units() + self.frame.tool[axis].units();
+        Ok([first, second].map(|axis| turned[axis] + offset(axis)))
+    }
+}
+
+/// The distance of two points \[mm\].
+fn distance_mm(from: [Length; 3], to: [Length; 3]) -> f64 {
+    let [x, y, z] = [0, 1, 2].map(|axis| to[axis].to_mm() - from[axis].to_mm());
+    libm::sqrt(x * x + y * y + z * z)
+}

@@ -1,0 +1,39 @@
+//! What a program is read with.
+
+use std::path::PathBuf;
+
+use super::parameter_file::ParameterFile;
+use super::tool::ToolTable;
+
+/// What a program is read with: switches of the operator, files beside the program, and bounds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadOptions {
+    /// Lines that begin with `/` are left out; as in LinuxCNC, on by default.
+    pub block_delete: bool,
+    /// M1 stops; on by default.
+    pub optional_stop: bool,
+    /// Folders with subroutines, `name.ngc` each; the first that has the file counts.
+    pub subroutines: Vec<PathBuf>,
+    /// Parameters to start with.
+    pub parameters: ParameterFile,
+    /// The tools there are; without a table, length and radius of every tool are 0.
+    pub tools: Option<ToolTable>,
+    /// Most lines to execute, so that endless loops end; 100 million by default.
+    pub lines_max: u64,
+    /// Most steps, and most messages, that the program may have; 20 million by default, some 4 GB.
+    pub steps_max: usize,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            block_delete: true,
+            optional_stop: true,
+            subroutines: Vec::new(),
+            parameters: ParameterFile::default(),
+            tools: None,
+            lines_max: 100_000_000,
+            steps_max: 20_000_000,
+        }
+    }
+}

@@ -1,0 +1,301 @@
+//! What the O-words of a file join: where each of them jumps.
+//!
+//! Made in one pass over the file, when the first O-word with a keyword runs. Blocks lie within each other, so
+//! a label says which one is meant, and may be used again after its block.
+
+use std::collections::HashMap;
+
+use super::error::{Located, Problem};
+use super::expression::Environment;
+use super::lexer::{Cursor, is_blank_line, is_percent_line};
+use super::oword::{self, Keyword, OWord};
+use super::source::{Place, Source};
+
+/// A line with an O-word.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OLine {
+    /// Its start.
+    pub(super) start: Place,
+    /// The start of the next line.
+    pub(super) after: Place,
+    pub(super) role: Role,
+}
+
+/// What an O-word does; indices are those of [`Structure::lines`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    Sub {
+        end: usize,
+    },
+    EndSub,
+    Call,
+    Return,
+    /// `next` is what is tried if the condition is false.
+    If {
+        next: usize,
+    },
+    ElseIf {
+        next: usize,
+        end: usize,
+    },
+    Else {
+        end: usize,
+    },
+    EndIf,
+    While {
+        end: usize,
+    },
+    EndWhile {
+        begin: usize,
+    },
+    Do {
+        end: usize,
+    },
+    DoWhile {
+        begin: usize,
+    },
+    Repeat {
+        end: usize,
+    },
+    EndRepeat {
+        begin: usize,
+    },
+    /// Of the loop that begins there.
+    Break {
+        begin: usize,
+    },
+    Continue {
+        begin: usize,
+    },
+    Program,
+}
+
+/// The O-words of a file.
+#[derive(Debug, Default)]
+pub(super) struct Structure {
+    /// In the order of the file.
+    pub(super) lines: Vec<OLine>,
+    /// `sub` lines by label.
+    pub(super) subs: HashMap<String, usize>,
+    /// Subprograms of M98 by label.
+    pub(super) programs: HashMap<String, usize>,
+}
+
+/// A block that is not closed yet.
+struct Open {
+    keyword: Keyword,
+    label: String,
+    index: usize,
+    /// `elseif` and `else` of an `if`.
+    branches: Vec<usize>,
+}
+
+/// Nothing counts: the text is only checked.
+pub(super) struct Unread;
+
+impl Environment for Unread {
+    fn numbered(&self, _: u32) -> f64 {
+        1.0
+    }
+
+    fn named(&self, _: &str) -> Option<f64> {
+        Some(1.0)
+    }
+
+    fn counts(&self) -> bool {
+        false
+    }
+}
+
+impl Structure {
+    /// The structure of a file; lines with `/` count if `block_delete` is off.
+    ///
+    /// # Errors
+    /// The place in the file, and what is wrong there.
+    pub(super) fn of(source: &Source<'_>, block_delete: bool) -> Result<Self, (Place, Located)> {
+        let mut structure = Self::default();
+        let mut open: Vec<Open> = Vec::new();
+        let mut place = Place::default();
+        let mut begun = false;
+        while let Some((line, after)) = source.line(place) {
+            if is_percent_line(line) {
+                if begun {
+                    break;
+                }
+                begun = true;
+            } else if !is_blank_line(line) {
+                begun = true;
+                if let Some(cursor) = source.cursor(line, block_delete).and_then(oword::place) {
+                    structure.add(cursor, place, after, &mut open).map_err(|located| (place, located))?;
+                }
+            }
+            place = after;
+        }
+        match open.last().and_then(|open| Some((open, structure.lines.get(open.index)?))) {
+            Some((open, line)) => {
+                Err((line.start, Located::new(0, Problem::BlockOpen { label: open.label.clone() })))
+            }
+            None => Ok(structure),
+        }
+    }
+
+    /// The O-word of a line.
+    pub(super) fn at(&self, place: Place) -> Option<(usize, OLine)> {
+        let index = self.lines.binary_search_by_key(&place.offset, |line| line.start.offset).ok()?;
+        Some((index, *self.lines.get(index)?))
+    }
+
+    fn add(
+        &mut self,
+        cursor: Cursor<'_>,
+        start: Place,
+        after: Place,
+        open: &mut Vec<Open>,
+    ) -> Result<(), Located> {
+        let word = OWord::read(cursor, &Unread)?;
+        if word.is_computed && word.keyword != Keyword::Call {
+            return Err(Located::new(word.offset, Problem::LabelComputed));
+        }
+        let index = self.lines.len();
+        let role = self.role(&word, index, open)?;
+        self.lines.push(OLine { start, after, role });
+        Ok(())
+    }
+
+    fn role(&mut self, word: &OWord<'_>, index: usize, open: &mut Vec<Open>) -> Result<Role, Located> {
+        let begins = |keyword, open: &mut Vec<Open>| {
+            if open.iter().any(|open| open.label == word.label && open.keyword != Keyword::Sub) {
+                return Err(Located::new(word.offset, Problem::LabelOpen { label: word.label.clone() }));
+            }
+            open.push(Open { keyword, label: word.label.clone(), index, branches: Vec::new() });
+            Ok(())
+        };
+        let closes = |keyword, open: &mut Vec<Open>| match open.pop() {
+            Some(last) if last.keyword == keyword && last.label == word.label => Ok(last),
+            _ => Err(Located::new(word.offset, Problem::BlockNotOpen { label: word.label.clone() })),
+        };
+        // The end of a block is known now.
+        Ok(match word.keyword {
+            Keyword::Program => {
+                self.programs.entry(word.label.clone()).or_insert(index);
+                Role::Program
+            }
+            Keyword::Call => Role::Call,
+            Keyword::Sub => {
+                if !open.is_empty() || self.subs.insert(word.label.clone(), index).is_some() {
+                    return Err(Located::new(word.offset, Problem::SubPlace { label: word.label.clone() }));
+                }
+                begins(Keyword::Sub, open)?;
+                Role::Sub { end: index }
+            }
+            Keyword::EndSub => {
+                let begin = closes(Keyword::Sub, open)?.index;
+                self.set(begin, Role::Sub { end: index });
+                Role::EndSub
+            }
+            Keyword::Return => {
+                if !open.iter().any(|open| open.keyword == Keyword::Sub && open.label == word.label) {
+                    return Err(Located::new(
+                        word.offset,
+                        Problem::BlockNotOpen { label: word.label.clone() },
+                    ));
+                }
+                Role::Return
+            }
+            Keyword::If => {
+                begins(Keyword::If, open)?;
+                Role::If { next: index }
+            }
+            Keyword::ElseIf | Keyword::Else => {
+                let is_else = |index: &usize| matches!(self.lines[*index].role, Role::Else { .. });
+                let last = open.last_mut().filter(|last| {
+                    last.keyword == Keyword::If
+                        && last.label == word.label
+                        && !last.branches.last().is_some_and(is_else)
+                });
+                let Some(last) = last else {
+                    return Err(Located::new(
+                        word.offset,
+                        Problem::BlockNotOpen { label: word.label.clone() },
+                    ));
+                };
+                let before = last.branches.last().copied().unwrap_or(last.index);
+                last.branches.push(index);
+                self.lead(before, index);
+                if word.keyword == Keyword::Else {
+                    Role::Else { end: index }
+                } else {
+                    Role::ElseIf { next: index, end: index }
+                }
+            }
+            Keyword::EndIf => {
+                let closed = closes(Keyword::If, open)?;
+                self.lead(closed.branches.last().copied().unwrap_or(closed.index), index);
+                for branch in closed.branches {
+                    match self.lines.get_mut(branch).map(|line| &mut line.role) {
+                        Some(Role::ElseIf { end, .. } | Role::Else { end }) => *end = index,
+                        _ => {}
+                    }
+                }
+                Role::EndIf
+            }
+            Keyword::While
+                if open
+                    .last()
+                    .is_some_and(|last| last.keyword == Keyword::Do && last.label == word.label) =>
+            {
+                let begin = closes(Keyword::Do, open)?.index;
+                self.set(begin, Role::Do { end: index });
+                Role::DoWhile { begin }
+            }
+            Keyword::While => {
+                begins(Keyword::While, open)?;
+                Role::While { end: index }
+            }
+            Keyword::EndWhile => {
+                let begin = closes(Keyword::While, open)?.index;
+                self.set(begin, Role::While { end: index });
+                Role::EndWhile { begin }
+            }
+            Keyword::Do => {
+                begins(Keyword::Do, open)?;
+                Role::Do { end: index }
+            }
+            Keyword::Repeat => {
+                begins(Keyword::Repeat, open)?;
+                Role::Repeat { end: index }
+            }
+            Keyword::EndRepeat => {
+                let begin = closes(Keyword::Repeat, open)?.index;
+                self.set(begin, Role::Repeat { end: index });
+                Role::EndRepeat { begin }
+            }
+            Keyword::Break | Keyword::Continue => {
+                let is_loop = |open: &&Open| {
+                    open.label == word.label && matches!(open.keyword, Keyword::While | Keyword::Do)
+                };
+                let Some(begin) = open.iter().rev().find(is_loop).map(|open| open.index) else {
+                    return Err(Located::new(
+                        word.offset,
+                        Problem::BlockNotOpen { label: word.label.clone() },
+                    ));
+                };
+                if word.keyword == Keyword::Break { Role::Break { begin } } else { Role::Continue { begin } }
+            }
+        })
+    }
+
+    fn set(&mut self, index: usize, role: Role) {
+        if let Some(line) = self.lines.get_mut(index) {
+            line.role = role;
+        }
+    }
+
+    /// A false condition at `from` leads to `to`.
+    fn lead(&mut self, from: usize, to: usize) {
+        match self.lines.get_mut(from).map(|line| &mut line.role) {
+            Some(Role::If { next } | Role::ElseIf { next, .. }) => *next = to,
+            _ => {}
+        }
+    }
+}
