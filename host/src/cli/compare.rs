@@ -41,7 +41,7 @@ pub struct CompareArguments {
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
     #[command(flatten)]
-    reading: input::ReadArguments,
+    reading: input::ReadingArguments,
     /// Tolerance of blends, from 0 to 10 mm; may be given several times. Without it, the machine's tolerance.
     #[arg(long = "tolerance", value_name = "MM", value_parser = tolerance, allow_negative_numbers = true)]
     tolerances: Vec<f64>,

@@ -35,7 +35,7 @@ pub struct CompileArguments {
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
     #[command(flatten)]
-    reading: input::ReadArguments,
+    reading: input::ReadingArguments,
     /// The number type of the board's kernel.
     #[arg(long, value_enum, default_value_t = Number::F32)]
     number: Number,

@@ -13,7 +13,7 @@ use crate::machine::Machine;
 
 /// What G-code is read with.
 #[derive(Debug, Args)]
-pub(super) struct ReadArguments {
+pub(super) struct ReadingArguments {
     /// Leave out lines of G-code that begin with `/`.
     #[arg(long, value_name = "true|false", default_value_t = true, action = ArgAction::Set)]
     block_delete: bool,
@@ -34,7 +34,7 @@ pub(super) struct ReadArguments {
     lines_max: u64,
 }
 
-impl ReadArguments {
+impl ReadingArguments {
     /// The options they ask for, with the files read.
     pub(super) fn options(&self) -> Result<ReadOptions, CliError> {
         let parameters = match &self.parameters {

@@ -37,7 +37,7 @@ pub struct PlanArguments {
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
     #[command(flatten)]
-    reading: input::ReadArguments,
+    reading: input::ReadingArguments,
     /// One pair of sin² ramps per block, whatever `law` is; without it, ramps follow it and may span blocks.
     #[arg(long)]
     per_block: bool,

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::table::{self, Align};
-use crate::gcode::{self, Feed, Length, PathMode, Program, Step, StepKind};
+use crate::gcode::{Feed, Length, PathMode, Program, Step, StepKind};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -18,14 +18,15 @@ Examples:
   generate-part | motion read - --json           G-code from standard input
 
 JSON: an object for every step, in order. All have line and kind. kind is
-  line, arc, cubic, through    with from_mm, to_mm, feed_mm_min (null: rapid), path (exact or blend), tolerance_mm and
-                               merging_mm (null: the machine's choice)
+  line, arc, cubic, through    with from_mm, to_mm, feed_mm_min (null: rapid), path (exact, stop or blend), tolerance_mm
+                               and merging_mm (null: the machine's choice)
       arc                      also plane, centre_mm (along its first and second axis), sweep_rad (counter-clockwise positive)
       cubic                    also controls_mm (the first from the start, the second from the end, X and Y)
       through                  also begins (a spline begins with it)
   dwell                        with dwell_s
+  tool                         with tool: a stop for the operator to change it
   stop, end
-After them an object for every notice, of kind notice, with text.";
+After them an object for every notice and every message, of kind notice and message, with text.";
 
 /// Print the steps of a program, without a machine.
 #[derive(Debug, Args)]
@@ -34,6 +35,8 @@ pub struct ReadArguments {
     /// G-code (`-`: standard input).
     #[arg(value_name = "PROGRAM")]
     program: PathBuf,
+    #[command(flatten)]
+    reading: input::ReadingArguments,
     /// Print JSON: an object a line.
     #[arg(long)]
     json: bool,
@@ -73,6 +76,9 @@ enum KindJson {
     Dwell {
         dwell_s: f64,
     },
+    Tool {
+        tool: u32,
+    },
     Stop,
     End,
 }
@@ -88,8 +94,9 @@ struct MoveJson {
     merging_mm: Option<f64>,
 }
 
+/// A notice or a message.
 #[derive(Serialize)]
-struct NoticeJson {
+struct NoteJson {
     line: u32,
     kind: &'static str,
     text: String,
@@ -101,7 +108,7 @@ struct NoticeJson {
 /// The program is refused, or `out` can't be written.
 pub fn read(arguments: &ReadArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let source = input::read(&arguments.program)?;
-    let program = gcode::read(&source.name, &source.text)?;
+    let program = arguments.reading.program(&source)?;
     let write = if arguments.json { write_json_lines } else { write_table };
     write(&program, out).map_err(CliError::Output)?;
     Ok(Outcome::Done)
@@ -111,7 +118,11 @@ fn write_json_lines(program: &Program, out: &mut dyn Write) -> io::Result<()> {
     program.steps.iter().try_for_each(|step| write_json_line(&step_json(step), out))?;
     program.notices.iter().try_for_each(|notice| {
         let text = notice.to_string();
-        write_json_line(&NoticeJson { line: notice.first_line, kind: "notice", text }, out)
+        write_json_line(&NoteJson { line: notice.first_line, kind: "notice", text }, out)
+    })?;
+    program.messages.iter().try_for_each(|message| {
+        let text = message.text.clone();
+        write_json_line(&NoteJson { line: message.line, kind: "message", text }, out)
     })
 }
 
@@ -138,6 +149,7 @@ fn step_json(step: &Step) -> StepJson {
             begins: point.begins,
         },
         StepKind::Dwell { seconds } => KindJson::Dwell { dwell_s: seconds },
+        StepKind::ToolChange { tool } => KindJson::Tool { tool },
         StepKind::Stop => KindJson::Stop,
         StepKind::End => KindJson::End,
     };
@@ -147,6 +159,7 @@ fn step_json(step: &Step) -> StepJson {
 fn move_json(from: [Length; 3], to: [Length; 3], feed: Feed, mode: PathMode) -> MoveJson {
     let (path, tolerance_mm, merging_mm) = match mode {
         PathMode::ExactPath => ("exact", None, None),
+        PathMode::ExactStop => ("stop", None, None),
         PathMode::Blend { tolerance_mm, merging_mm } => ("blend", tolerance_mm, merging_mm),
     };
     let feed_mm_min = match feed {
@@ -171,7 +184,7 @@ fn write_table(program: &Program, out: &mut dyn Write) -> io::Result<()> {
     let rows: Vec<[String; 8]> = program.steps.iter().map(row).collect();
     table::write(&columns, &rows, out)?;
     writeln!(out, "\n  {} steps", rows.len())?;
-    program.notices.iter().try_for_each(|notice| writeln!(out, "  note: {notice}"))
+    program.notes().iter().try_for_each(|note| writeln!(out, "  note: {note}"))
 }
 
 fn row(step: &Step) -> [String; 8] {
@@ -189,6 +202,7 @@ fn row(step: &Step) -> [String; 8] {
             ("through", Some(ends), if begins { "begins a spline" } else { "" }.to_owned())
         }
         KindJson::Dwell { dwell_s } => ("dwell", None, format!("{dwell_s} s")),
+        KindJson::Tool { tool } => ("tool", None, format!("T{tool}")),
         KindJson::Stop => ("stop", None, String::new()),
         KindJson::End => ("end", None, String::new()),
     };
@@ -201,6 +215,10 @@ fn move_cells(ends: MoveJson) -> [String; 5] {
     let [x, y, z] = ends.to_mm.map(|coordinate| format!("{coordinate:.4}"));
     let feed = ends.feed_mm_min.map_or_else(|| "–".to_owned(), |feed_mm_min| format!("{feed_mm_min:.1}"));
     let tolerance = |letter, mm: Option<f64>| mm.map_or_else(String::new, |mm| format!(" {letter}{mm}"));
-    let mode = if ends.path == "exact" { "G61" } else { "G64" };
+    let mode = match ends.path {
+        "exact" => "G61",
+        "stop" => "G61.1",
+        _ => "G64",
+    };
     [x, y, z, feed, format!("{mode}{}{}", tolerance('P', ends.tolerance_mm), tolerance('Q', ends.merging_mm))]
 }

@@ -49,7 +49,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
     #[command(flatten)]
-    reading: input::ReadArguments,
+    reading: input::ReadingArguments,
     /// Write every tick as a row of CSV; an existing file is replaced.
     #[arg(long, value_name = "FILE.csv")]
     trace: Option<PathBuf>,

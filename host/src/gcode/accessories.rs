@@ -141,7 +141,7 @@ impl Interpreter {
             (_, remark) => format!("tool {number}: {remark}"),
         };
         self.message(text)?;
-        self.step(StepKind::Stop)
+        self.step(StepKind::ToolChange { tool: number })
     }
 
     /// A tool by its number. Without a table it is assumed.

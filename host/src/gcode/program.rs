@@ -78,7 +78,12 @@ pub enum StepKind {
         /// How long \[s\], 0 or more.
         seconds: f64,
     },
-    /// M0 or M1: stop until the operator resumes.
+    /// M6: stop until the operator has changed the tool.
+    ToolChange {
+        /// T; 0: no tool.
+        tool: u32,
+    },
+    /// M0, M1 or M60: stop until the operator resumes.
     Stop,
     /// M2, M30 or a closing `%`: nothing follows.
     End,

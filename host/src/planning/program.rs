@@ -58,7 +58,7 @@ pub fn plan_program(
                 let (feed_mm_s, mode) = (mm_s(point.feed), point.mode);
                 points.push(Point { line: step.line, at: point.to.map(|c| c.to_mm()), feed_mm_s, mode });
             }
-            StepKind::Dwell { .. } | StepKind::Stop | StepKind::End => {
+            StepKind::Dwell { .. } | StepKind::ToolChange { .. } | StepKind::Stop | StepKind::End => {
                 append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
                 match step.kind {
                     // A dwell of no time changes nothing but the stop it makes.
@@ -66,7 +66,9 @@ pub fn plan_program(
                         plan.time_s += seconds;
                         plan.items.push(Item::Dwell { line: step.line, seconds });
                     }
-                    StepKind::Stop => plan.items.push(Item::Stop { line: step.line }),
+                    StepKind::ToolChange { .. } | StepKind::Stop => {
+                        plan.items.push(Item::Stop { line: step.line });
+                    }
                     _ => {}
                 }
             }
