@@ -20,7 +20,8 @@ Examples:
 JSON: an object for every step, in order. All have line and kind. kind is
   line, arc, cubic, through    with from_mm, to_mm, feed_mm_min (null: rapid), path (exact, stop or blend), tolerance_mm
                                and merging_mm (null: the machine's choice)
-      arc                      also plane, centre_mm (along its first and second axis), sweep_rad (counter-clockwise positive)
+      arc                      also plane, turn_deg (of the plane about Z), centre_mm (along its first and second axis), sweep_rad
+                               (counter-clockwise positive)
       cubic                    also controls_mm (the first from the start, the second from the end, X and Y)
       through                  also begins (a spline begins with it)
   dwell                        with dwell_s
@@ -60,6 +61,7 @@ enum KindJson {
         #[serde(flatten)]
         ends: MoveJson,
         plane: String,
+        turn_deg: f64,
         centre_mm: [f64; 2],
         sweep_rad: f64,
     },
@@ -137,6 +139,7 @@ fn step_json(step: &Step) -> StepJson {
         StepKind::Arc(arc) => KindJson::Arc {
             ends: move_json(arc.from, arc.to, arc.feed, arc.mode),
             plane: arc.plane.to_string(),
+            turn_deg: arc.turn_deg,
             centre_mm: arc.centre_mm,
             sweep_rad: arc.sweep_rad,
         },
@@ -191,9 +194,10 @@ fn row(step: &Step) -> [String; 8] {
     let (name, ends, more) = match step_json(step).kind {
         KindJson::Line { ends } if ends.feed_mm_min.is_none() => ("rapid", Some(ends), String::new()),
         KindJson::Line { ends } => ("line", Some(ends), String::new()),
-        KindJson::Arc { ends, plane, centre_mm: [first, second], sweep_rad } => {
+        KindJson::Arc { ends, plane, turn_deg, centre_mm: [first, second], sweep_rad } => {
             let sweep_deg = sweep_rad.to_degrees();
-            ("arc", Some(ends), format!("{plane}, centre {first:.4} {second:.4}, {sweep_deg:.4}°"))
+            let turn = if turn_deg == 0.0 { String::new() } else { format!(" turned by {turn_deg:.4}°") };
+            ("arc", Some(ends), format!("{plane}{turn}, centre {first:.4} {second:.4}, {sweep_deg:.4}°"))
         }
         KindJson::Cubic { ends, controls_mm: [[i, j], [p, q]] } => {
             ("cubic", Some(ends), format!("I{i:.4} J{j:.4} P{p:.4} Q{q:.4}"))

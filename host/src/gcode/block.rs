@@ -130,6 +130,7 @@ fn unsupported_m(word: &Word<'_>) -> Located {
     let tenths = word.number.tenths();
     word.problem(|word| match tenths {
         Some(190) => Problem::NeedsEncoder { word },
+        Some(1000..=1990) => Problem::UserProgram { word },
         _ => Problem::UnsupportedM { word },
     })
 }

@@ -93,6 +93,8 @@ pub enum Problem {
          G92 to G92.3 G93 to G99"
     )]
     UnsupportedG { word: String },
+    #[error("found {word}, which runs a program of the user's, expected a word that goes without")]
+    UserProgram { word: String },
     #[error("found {word}, expected one of M0 to M9, M30, M48 to M53, M60 to M68, M70 to M73, M98 or M99")]
     UnsupportedM { word: String },
     #[error("found {word}, which needs a spindle encoder, expected a word that goes without")]
@@ -145,10 +147,6 @@ pub enum Problem {
     #[error("found {motion} after G95 without a spindle's speed, expected S in revolutions per minute (G97)")]
     SpindleSpeedMissing { motion: &'static str },
     #[error(
-        "found an arc in the {plane} plane of a coordinate system that is rotated, expected the XY plane (G17)"
-    )]
-    ArcPlaneTurned { plane: Plane },
-    #[error(
         "found an offset of {mm} mm in parameter {number}, expected a length within ±{} mm",
         Length::LIMIT
     )]
@@ -196,6 +194,8 @@ pub enum Problem {
     SubroutineNotInFile { label: String, path: String },
     #[error("found the end of the file in a subprogram, expected M99")]
     SubprogramWithoutEnd,
+    #[error("found a return outside of subroutines, expected it between sub and endsub")]
+    ReturnOutside,
     #[error("found {found} in a subroutine that was called otherwise, expected {expected}")]
     ReturnMismatch { found: &'static str, expected: &'static str },
     #[error("found more than 30 arguments, expected 30 at most")]

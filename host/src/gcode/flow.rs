@@ -1,8 +1,5 @@
-//! Which line comes next: subroutines, loops, conditions.
+//! Which line comes next: the next one, or where an O-word, M98 or M99 leads.
 
-use std::borrow::Cow;
-use std::cell::OnceCell;
-use std::fs;
 use std::rc::Rc;
 
 use super::block::Block;
@@ -10,21 +7,16 @@ use super::error::{GcodeError, Located, Problem};
 use super::expression;
 use super::interpreter::{Control, Interpreter};
 use super::lexer::{Cursor, is_blank_line, is_percent_line};
+use super::library::{Callee, Failure, File, Library};
 use super::options::ReadOptions;
 use super::oword::{self, Keyword, OWord};
 use super::parameters::LOCALS;
 use super::program::{NoticeKind, Program};
-use super::source::{Place, Source};
-use super::structure::{Role, Structure, Unread};
+use super::source::Place;
+use super::structure::{Role, Unread};
 
 /// Most subroutines within each other; LinuxCNC has 10.
 const LEVELS_MAX: usize = 100;
-
-/// A file, with its structure once that is needed.
-struct File<'a> {
-    source: Source<'a>,
-    structure: OnceCell<Structure>,
-}
 
 /// A subroutine that runs.
 struct Call {
@@ -39,33 +31,34 @@ struct Call {
 
 /// A `repeat` that runs.
 #[derive(Clone, Copy)]
-struct Repeat {
+pub(super) struct Repeat {
     /// Its line.
-    begin: usize,
+    pub(super) begin: usize,
     /// How often it is to run after this time.
-    left: u64,
+    pub(super) left: u64,
 }
 
 /// A program being read.
 pub(super) struct Flow<'a> {
     options: &'a ReadOptions,
-    /// The program first.
-    files: Vec<Rc<File<'a>>>,
-    interpreter: Interpreter,
+    library: Library<'a>,
+    pub(super) interpreter: Interpreter,
+    /// The file of the next line.
     file: usize,
-    place: Place,
+    /// The next line.
+    pub(super) place: Place,
     calls: Vec<Call>,
-    repeats: Vec<Repeat>,
+    /// The loops of the subroutine that runs.
+    pub(super) repeats: Vec<Repeat>,
     executed: u64,
 }
 
 impl<'a> Flow<'a> {
     /// Before the first line.
     pub(super) fn new(source_name: &str, text: &'a [u8], options: &'a ReadOptions) -> Self {
-        let source = Source::new(source_name, Cow::Borrowed(text));
         Self {
             options,
-            files: vec![Rc::new(File { source, structure: OnceCell::new() })],
+            library: Library::new(source_name, text, options),
             interpreter: Interpreter::new(options),
             file: 0,
             place: Place::default(),
@@ -78,20 +71,14 @@ impl<'a> Flow<'a> {
     /// Reads to the end.
     pub(super) fn read(mut self) -> Result<Program, GcodeError> {
         let mut last = 1;
-        loop {
-            let file = self.current();
+        while let Some(file) = self.library.file(self.file).map(Rc::clone) {
             let here = self.place;
             let Some((line, after)) = file.source.line(here) else {
                 if self.calls.is_empty() {
                     break;
                 }
-                let problem = Problem::SubprogramWithoutEnd;
-                return Err(GcodeError::new(
-                    &file.source.name,
-                    here.line.saturating_sub(1).max(1),
-                    b"",
-                    Located::new(0, problem),
-                ));
+                let last = Place { line: here.line.saturating_sub(1).max(1), ..here };
+                return Err(file.failure(last, Located::new(0, Problem::SubprogramWithoutEnd)).into_error());
             };
             self.place = after;
             if is_blank_line(line) {
@@ -101,10 +88,7 @@ impl<'a> Flow<'a> {
                 self.interpreter.line = here.line;
                 last = here.line;
             }
-            self.line(&file, line, here).map_err(|(file, place, located)| {
-                let line = file.source.line(place).map_or(&b""[..], |(line, _)| line);
-                GcodeError::new(&file.source.name, place.line, line, located)
-            })?;
+            self.line(&file, line, here).map_err(Failure::into_error)?;
             if self.interpreter.ended && !self.calls.is_empty() {
                 break;
             }
@@ -119,18 +103,9 @@ impl<'a> Flow<'a> {
         Ok(program)
     }
 
-    fn current(&self) -> Rc<File<'a>> {
-        Rc::clone(&self.files[self.file])
-    }
-
-    /// One line with text; an error has its file and the place of its line.
-    fn line(
-        &mut self,
-        file: &Rc<File<'a>>,
-        line: &[u8],
-        here: Place,
-    ) -> Result<(), (Rc<File<'a>>, Place, Located)> {
-        let at = |located| (Rc::clone(file), here, located);
+    /// One line with text.
+    fn line(&mut self, file: &Rc<File<'a>>, line: &[u8], here: Place) -> Result<(), Failure<'a>> {
+        let at = |located| file.failure(here, located);
         if is_percent_line(line) {
             // Before any word the mark opens the tape, later it closes it; closed twice is closed.
             if self.file == 0 && self.calls.is_empty() {
@@ -142,13 +117,14 @@ impl<'a> Flow<'a> {
             return Ok(());
         }
         if self.interpreter.ended {
-            return self.after_end(file, here);
+            self.after_end(file, here);
+            return Ok(());
         }
         self.executed += 1;
         if self.executed > self.options.lines_max {
             return Err(at(Located::new(0, Problem::TooManyLines { lines_max: self.options.lines_max })));
         }
-        let Some(cursor) = file.source.cursor(line, self.options.block_delete) else {
+        let Some(cursor) = file.cursor(line) else {
             self.interpreter.notice(NoticeKind::BlockDeleted);
             return Ok(());
         };
@@ -157,170 +133,71 @@ impl<'a> Flow<'a> {
             return self.oword(file, cursor, here);
         }
         match self.interpreter.execute(cursor).map_err(at)? {
-            Control::Next => Ok(()),
-            Control::Call { repeats: 0, .. } => Ok(()),
+            Control::Next | Control::Call { repeats: 0, .. } => Ok(()),
             Control::Call { number, repeats } => {
-                self.call(&number.to_string(), None, repeats, 0).map_err(|error| error.at(file, here))
+                let failure = |problem| at(Located::new(0, problem));
+                self.call(&number.to_string(), None, repeats, &failure)
             }
             Control::Return if self.calls.is_empty() => self.interpreter.end().map_err(at),
-            Control::Return => match self.calls.last().is_some_and(|call| call.again.is_some()) {
-                true => self.leave().map_err(at),
-                false => Err(at(Located::new(
-                    0,
-                    Problem::ReturnMismatch { found: "M99", expected: "endsub or return" },
-                ))),
-            },
+            Control::Return if self.is_subprogram() => self.leave().map_err(at),
+            Control::Return => {
+                let problem = Problem::ReturnMismatch { found: "M99", expected: "endsub or return" };
+                Err(at(Located::new(0, problem)))
+            }
         }
     }
 
     /// Text after the end is not read; subroutines may stand there.
-    fn after_end(&mut self, file: &Rc<File<'a>>, here: Place) -> Result<(), (Rc<File<'a>>, Place, Located)> {
-        let structure = file.structure.get();
-        let sub = structure.and_then(|structure| {
+    fn after_end(&mut self, file: &Rc<File<'a>>, here: Place) {
+        let behind = file.structure().ok().and_then(|structure| {
             let (_, line) = structure.at(here)?;
             match line.role {
-                Role::Sub { end } => structure.lines.get(end),
+                Role::Sub { end } => Some(structure.line(end)?.after),
                 _ => None,
             }
         });
-        match (sub, structure) {
-            (Some(end), _) => self.place = end.after,
-            (None, Some(structure)) if !structure.programs.is_empty() => {}
-            _ => self.interpreter.notice(NoticeKind::TextAfterEnd),
+        match behind {
+            Some(behind) => self.place = behind,
+            None if file.has_subprograms() => {}
+            None => self.interpreter.notice(NoticeKind::TextAfterEnd),
         }
-        Ok(())
     }
 
-    fn oword(
-        &mut self,
-        file: &Rc<File<'a>>,
-        cursor: Cursor<'_>,
-        here: Place,
-    ) -> Result<(), (Rc<File<'a>>, Place, Located)> {
-        let at = |located| (Rc::clone(file), here, located);
+    /// A line with an O-word.
+    fn oword(&mut self, file: &Rc<File<'a>>, cursor: Cursor<'_>, here: Place) -> Result<(), Failure<'a>> {
+        let at = |located| file.failure(here, located);
         let word = OWord::read(cursor, &self.interpreter).map_err(at)?;
-        if word.keyword == Keyword::Program {
-            return Ok(());
+        match word.keyword {
+            Keyword::Program => Ok(()),
+            Keyword::Call => {
+                let arguments = self.arguments(&word).map_err(at)?;
+                let failure = |problem| at(Located::new(word.offset, problem));
+                self.call(&word.label, Some(arguments), 1, &failure)
+            }
+            Keyword::EndSub | Keyword::Return => self.end_of_sub(&word).map_err(at),
+            _ => self.jump(file, &word, here),
         }
-        if word.keyword == Keyword::Call {
-            let arguments = self.arguments(&word).map_err(at)?;
-            return self
-                .call(&word.label, Some(arguments), 1, word.offset)
-                .map_err(|error| error.at(file, here));
-        }
-        let structure =
-            structure(file, self.options).map_err(|(place, located)| (Rc::clone(file), place, located))?;
-        // What the structure leaves out is behind the end of the tape.
-        let Some((index, line)) = structure.at(here) else { return Ok(()) };
-        let line_at = |index: usize| structure.lines.get(index).copied().unwrap_or(line);
-        let end_of = |index: usize| match line_at(index).role {
-            Role::Sub { end } | Role::While { end } | Role::Do { end } | Role::Repeat { end } => end,
-            _ => index,
+    }
+
+    /// `endsub` and `return`, with the value they return.
+    fn end_of_sub(&mut self, word: &OWord<'_>) -> Result<(), Located> {
+        let wrong = |expected| {
+            let problem = Problem::ReturnMismatch { found: "the end of a sub", expected };
+            Err(Located::new(word.offset, problem))
         };
-        match line.role {
-            Role::Sub { end } => self.place = line_at(end).after,
-            Role::EndSub | Role::Return => {
-                if self.calls.last().is_some_and(|call| call.again.is_some()) {
-                    let problem = Problem::ReturnMismatch { found: "the end of a sub", expected: "M99" };
-                    return Err(at(Located::new(word.offset, problem)));
-                }
-                let mut rest = word.rest.clone();
-                self.interpreter.returned = match rest.peek_text() {
-                    Some(b'[') => Some(expression::bracketed(&mut rest, &self.interpreter).map_err(at)?),
-                    _ => None,
-                };
-                OWord { rest, ..word }.refuse_rest().map_err(at)?;
-                self.leave().map_err(at)?;
-            }
-            Role::If { .. } => self
-                .branch(file, structure, index)
-                .map_err(|(place, located)| (Rc::clone(file), place, located))?,
-            Role::ElseIf { end, .. } | Role::Else { end } => self.place = line_at(end).after,
-            Role::EndIf | Role::Do { .. } => word.refuse_rest().map_err(at)?,
-            Role::While { end } => {
-                if self.condition(&word).map_err(at)? == 0.0 {
-                    self.place = line_at(end).after;
-                }
-            }
-            Role::EndWhile { begin } => {
-                word.refuse_rest().map_err(at)?;
-                self.place = line_at(begin).start;
-            }
-            Role::DoWhile { begin } => {
-                if self.condition(&word).map_err(at)? != 0.0 {
-                    self.place = line_at(begin).after;
-                }
-            }
-            Role::Repeat { end } => {
-                let count = self.condition(&word).map_err(at)?.round();
-                if count >= 1.0 {
-                    // Beyond the lines that may run, every count is the same.
-                    self.repeats.push(Repeat { begin: index, left: count as u64 - 1 });
-                } else {
-                    self.place = line_at(end).after;
-                }
-            }
-            Role::EndRepeat { begin } => {
-                word.refuse_rest().map_err(at)?;
-                match self.repeats.last_mut().filter(|repeat| repeat.begin == begin) {
-                    Some(repeat) if repeat.left > 0 => {
-                        repeat.left -= 1;
-                        self.place = line_at(begin).after;
-                    }
-                    Some(_) => drop(self.repeats.pop()),
-                    None => {}
-                }
-            }
-            Role::Break { begin } | Role::Continue { begin } => {
-                word.refuse_rest().map_err(at)?;
-                while self.repeats.last().is_some_and(|repeat| repeat.begin > begin) {
-                    self.repeats.pop();
-                }
-                let end = line_at(end_of(begin));
-                self.place = match (line.role, line_at(begin).role) {
-                    (Role::Break { .. }, _) => end.after,
-                    (_, Role::Do { .. }) => end.start,
-                    _ => line_at(begin).start,
-                };
-            }
-            Role::Call | Role::Program => {}
+        if self.calls.is_empty() {
+            return wrong("it in a sub that is called");
         }
-        Ok(())
-    }
-
-    /// Goes to the branch of an `if` whose condition is true.
-    fn branch(
-        &mut self,
-        file: &File<'a>,
-        structure: &Structure,
-        first: usize,
-    ) -> Result<(), (Place, Located)> {
-        let mut index = first;
-        while let Some(line) = structure.lines.get(index) {
-            self.place = line.after;
-            let next = match line.role {
-                Role::If { next } | Role::ElseIf { next, .. } => next,
-                _ => return Ok(()),
-            };
-            let at = |located| (line.start, located);
-            let Some((text, _)) = file.source.line(line.start) else { return Ok(()) };
-            let cursor = file.source.cursor(text, self.options.block_delete).and_then(oword::place);
-            let Some(cursor) = cursor else { return Ok(()) };
-            let word = OWord::read(cursor, &self.interpreter).map_err(at)?;
-            if self.condition(&word).map_err(at)? != 0.0 {
-                return Ok(());
-            }
-            index = next;
+        if self.is_subprogram() {
+            return wrong("M99");
         }
-        Ok(())
-    }
-
-    /// The expression after a keyword.
-    fn condition(&self, word: &OWord<'_>) -> Result<f64, Located> {
         let mut rest = word.rest.clone();
-        let value = expression::bracketed(&mut rest, &self.interpreter)?;
-        OWord { rest, ..word.clone() }.refuse_rest()?;
-        Ok(value)
+        self.interpreter.returned = match rest.peek_text() {
+            Some(b'[') => Some(expression::bracketed(&mut rest, &self.interpreter)?),
+            _ => None,
+        };
+        word.with(rest).refuse_rest()?;
+        self.leave()
     }
 
     fn arguments(&self, word: &OWord<'_>) -> Result<[f64; LOCALS], Located> {
@@ -335,8 +212,13 @@ impl<'a> Flow<'a> {
                 rest.comment()?;
             }
         }
-        OWord { rest, ..word.clone() }.refuse_rest()?;
+        word.with(rest).refuse_rest()?;
         Ok(arguments)
+    }
+
+    /// Whether M98 called what runs.
+    fn is_subprogram(&self) -> bool {
+        self.calls.last().is_some_and(|call| call.again.is_some())
     }
 
     /// Calls a subroutine; without arguments, a subprogram of M98.
@@ -345,66 +227,23 @@ impl<'a> Flow<'a> {
         label: &str,
         arguments: Option<[f64; LOCALS]>,
         repeats: u32,
-        offset: usize,
-    ) -> Result<(), CallError<'a>> {
+        failure: &dyn Fn(Problem) -> Failure<'a>,
+    ) -> Result<(), Failure<'a>> {
         if self.calls.len() >= LEVELS_MAX {
-            return Err(CallError::Here(Located::new(offset, Problem::TooDeep { levels: LEVELS_MAX })));
+            return Err(failure(Problem::TooDeep { levels: LEVELS_MAX }));
         }
-        let is_sub = arguments.is_some();
-        let (file, place) = self.find(label, is_sub, offset)?;
+        let callee = if arguments.is_some() { Callee::Sub } else { Callee::Subprogram };
+        let (file, place) = self.library.find(label, callee, self.file, failure)?;
         self.interpreter.parameters.enter(arguments.as_ref());
         self.interpreter.enter();
         self.calls.push(Call {
             file: self.file,
             place: self.place,
             repeats: std::mem::take(&mut self.repeats),
-            again: (!is_sub).then_some((place, repeats)),
+            again: (callee == Callee::Subprogram).then_some((place, repeats)),
         });
         (self.file, self.place) = (file, place);
         Ok(())
-    }
-
-    /// Where a subroutine begins: in this file, in the program, in a file read before, in a file of its name.
-    fn find(&mut self, label: &str, is_sub: bool, offset: usize) -> Result<(usize, Place), CallError<'a>> {
-        let begin = |structure: &Structure| {
-            let table = if is_sub { &structure.subs } else { &structure.programs };
-            Some(structure.lines.get(*table.get(label)?)?.after)
-        };
-        for index in [self.file, 0].into_iter().chain(1..self.files.len()) {
-            let Some(file) = self.files.get(index) else { continue };
-            let structure = structure(file, self.options)
-                .map_err(|(place, located)| CallError::There(Rc::clone(file), place, located))?;
-            if let Some(place) = begin(structure) {
-                return Ok((index, place));
-            }
-        }
-        let missing =
-            || CallError::Here(Located::new(offset, Problem::SubroutineMissing { label: label.to_owned() }));
-        // A name leads to no other folder.
-        if label.contains(['/', '\\', ':', '\0']) || label.starts_with('.') {
-            return Err(missing());
-        }
-        let name = format!("{label}.ngc");
-        let found =
-            self.options.subroutines.iter().map(|folder| folder.join(&name)).find(|path| path.is_file());
-        let path = found.ok_or_else(missing)?;
-        let shown = path.display().to_string();
-        let text = fs::read(&path).map_err(|error| {
-            let problem = Problem::SubroutineUnreadable { path: shown.clone(), error: error.to_string() };
-            CallError::Here(Located::new(offset, problem))
-        })?;
-        let file =
-            Rc::new(File { source: Source::new(&shown, Cow::Owned(text)), structure: OnceCell::new() });
-        let place = begin(
-            structure(&file, self.options)
-                .map_err(|(place, located)| CallError::There(Rc::clone(&file), place, located))?,
-        );
-        let Some(place) = place else {
-            let problem = Problem::SubroutineNotInFile { label: label.to_owned(), path: shown };
-            return Err(CallError::Here(Located::new(offset, problem)));
-        };
-        self.files.push(file);
-        Ok((self.files.len() - 1, place))
     }
 
     /// Ends a subroutine, or begins it again.
@@ -424,50 +263,23 @@ impl<'a> Flow<'a> {
 
     /// A file of subroutines alone is right if all of it can be read.
     fn check_subroutines(&self) -> Result<(), GcodeError> {
-        let Some(file) = self.files.first() else { return Ok(()) };
-        let program = &self.interpreter.program;
-        let is_library = program.steps.is_empty() && file.structure.get().is_some_and(|s| !s.subs.is_empty());
-        if !is_library || self.files.len() > 1 {
+        let has_steps = !self.interpreter.program.steps.is_empty();
+        let Some(file) = self.library.file(0).filter(|file| !has_steps && file.has_subs()) else {
+            return Ok(());
+        };
+        if self.library.file(1).is_some() {
             return Ok(());
         }
         let mut place = Place::default();
         while let Some((line, after)) = file.source.line(place) {
-            let cursor = file.source.cursor(line, self.options.block_delete);
-            if let Some(cursor) = cursor.filter(|_| !is_blank_line(line) && !is_percent_line(line)) {
-                if oword::place(cursor.clone()).is_none() {
-                    Block::collect(cursor, &Unread)
-                        .map_err(|located| GcodeError::new(&file.source.name, place.line, line, located))?;
-                }
+            let has_text = !is_blank_line(line) && !is_percent_line(line);
+            let cursor = file.cursor(line);
+            if let Some(cursor) = cursor.filter(|cursor| has_text && oword::place(cursor.clone()).is_none()) {
+                Block::collect(cursor, &Unread)
+                    .map_err(|located| file.failure(place, located).into_error())?;
             }
             place = after;
         }
         Ok(())
     }
-}
-
-/// Why a call fails: here, or in the file that is called.
-enum CallError<'a> {
-    Here(Located),
-    There(Rc<File<'a>>, Place, Located),
-}
-
-impl<'a> CallError<'a> {
-    fn at(self, file: &Rc<File<'a>>, here: Place) -> (Rc<File<'a>>, Place, Located) {
-        match self {
-            Self::Here(located) => (Rc::clone(file), here, located),
-            Self::There(file, place, located) => (file, place, located),
-        }
-    }
-}
-
-/// The structure of a file, made when it is first needed.
-fn structure<'file>(
-    file: &'file File<'_>,
-    options: &ReadOptions,
-) -> Result<&'file Structure, (Place, Located)> {
-    if let Some(structure) = file.structure.get() {
-        return Ok(structure);
-    }
-    let structure = Structure::of(&file.source, options.block_delete)?;
-    Ok(file.structure.get_or_init(|| structure))
 }

@@ -34,6 +34,12 @@ impl Frame {
         lengths([0, 1, 2].map(|axis| turned[axis] - self.shift[axis].units()))
     }
 
+    /// The program's zero, in machine coordinates \[10⁻¹⁰ mm\].
+    pub(super) fn zero(&self) -> [i64; 3] {
+        let shift = self.turned(self.shift.map(Length::units));
+        [0, 1, 2].map(|axis| shift[axis] + self.origin[axis].units() + self.tool[axis].units())
+    }
+
     /// A vector \[10⁻¹⁰ mm\] of the program, in machine coordinates.
     pub(super) fn turned(&self, vector: [i64; 3]) -> [i64; 3] {
         turn(vector, self.rotation_deg)
@@ -52,7 +58,7 @@ pub(super) fn lengths(units: [i64; 3]) -> Option<[Length; 3]> {
 }
 
 /// A vector turned about Z; rounded, but by quarter turns.
-fn turn([x, y, z]: [i64; 3], angle_deg: f64) -> [i64; 3] {
+pub(super) fn turn([x, y, z]: [i64; 3], angle_deg: f64) -> [i64; 3] {
     let angle_deg = angle_deg % 360.0;
     if angle_deg == 0.0 {
         return [x, y, z];

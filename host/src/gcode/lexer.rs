@@ -127,7 +127,7 @@ impl<'a> Cursor<'a> {
     pub(super) fn name(&mut self) -> Result<String, Located> {
         let opening = self.next;
         self.next += 1;
-        let text = self.take_while(|byte| !matches!(byte, b'>' | b'(' | b')' | b'[' | b']' | b'#' | b'<'));
+        let text = self.take_while(|byte| !matches!(byte, b'>' | b'(' | b')' | b'#' | b'<'));
         let name = String::from_utf8_lossy(text);
         let name: String =
             name.chars().filter(|c| !matches!(c, ' ' | '\t')).map(|c| c.to_ascii_lowercase()).collect();

@@ -6,6 +6,7 @@ use super::arc;
 use super::block::{Block, GGroup};
 use super::decimal::Length;
 use super::error::{Located, Problem};
+use super::frame::{lengths, turn};
 use super::interpreter::Interpreter;
 use super::lexer::Word;
 use super::modal::{Distance, FeedMode, Modal, Motion};
@@ -214,11 +215,14 @@ impl Interpreter {
         if let Some(word) = offsets[normal].filter(|word| word.number.signum() != 0) {
             return Err(word.problem(|word| Problem::ArcOffsetOutsidePlane { word, plane }));
         }
-        if plane != Plane::Xy && self.frame.rotation_deg != 0.0 {
-            return Err(Located::new(offset, Problem::ArcPlaneTurned { plane }));
-        }
-        let in_plane = |point: [Length; 3]| [point[first], point[second]];
-        let (start, end) = (in_plane(from), in_plane(to));
+        // In XY the machine's axes do; another plane turns with the program's.
+        let turn_deg = if plane == Plane::Xy { 0.0 } else { self.frame.rotation_deg };
+        let in_plane = |point: [Length; 3]| {
+            let turned = turn(point.map(Length::units), -turn_deg);
+            let beyond = || Located::new(offset, Problem::WorkOutOfRange);
+            lengths(turned).map(|turned| [turned[first], turned[second]]).ok_or_else(beyond)
+        };
+        let (start, end) = (in_plane(from)?, in_plane(to)?);
         let clockwise = motion == Motion::Clockwise;
         let centre_words = [offsets[first], offsets[second]];
         let resolved = match (block.letter(b'R'), centre_words) {
@@ -226,7 +230,7 @@ impl Interpreter {
                 Err(Located::new(offset, Problem::ArcWithoutCentre { motion: motion.word(), plane }))
             }
             (None, _) => {
-                let centre = self.centre(centre_words, start, offset)?;
+                let centre = self.centre(centre_words, start, turn_deg, offset)?;
                 arc::about_centre(start, end, centre, clockwise)
                     .map_err(|problem| Located::new(offset, problem))
             }
@@ -250,17 +254,30 @@ impl Interpreter {
             sweep_rad += (2.0 * PI * f64::from(turns - 1)).copysign(sweep_rad);
         }
         let mean_radius_mm = (start_radius_mm + end_radius_mm) / 2.0;
-        let height_mm = to[normal].to_mm() - from[normal].to_mm();
+        let [from_units, to_units] = [from, to].map(|point| turn(point.map(Length::units), -turn_deg));
+        let height_mm = (to_units[normal] - from_units[normal]) as f64 / Length::UNITS_PER_MM as f64;
         let feed = self.timed(feed, libm::hypot(mean_radius_mm * sweep_rad, height_mm));
-        Ok(ArcMove { from, to, plane, centre_mm, start_radius_mm, end_radius_mm, sweep_rad, feed, mode })
+        Ok(ArcMove {
+            from,
+            to,
+            plane,
+            turn_deg,
+            centre_mm,
+            start_radius_mm,
+            end_radius_mm,
+            sweep_rad,
+            feed,
+            mode,
+        })
     }
 
-    /// Centre along the plane's axes in machine coordinates \[10⁻¹⁰ mm\]; it may lie beyond the range of a
-    /// [`Length`].
+    /// Centre along the plane's axes \[10⁻¹⁰ mm\], which are turned about Z by `turn_deg` from the machine's; it may
+    /// lie beyond the range of a [`Length`].
     fn centre(
         &self,
         words: [Option<Word<'_>>; 2],
         start: [Length; 2],
+        turn_deg: f64,
         offset: usize,
     ) -> Result<[i64; 2], Located> {
         let [first, second, _] = self.modal.plane.axes();
@@ -279,14 +296,12 @@ impl Interpreter {
         }
         let mut vector = [0; 3];
         (vector[first], vector[second]) = (lengths[0], lengths[1]);
+        let vector = turn(self.frame.turned(vector), -turn_deg);
         if self.modal.arc_distance == Distance::Incremental {
-            let vector = self.frame.turned(vector);
             return Ok([start[0].units() + vector[first], start[1].units() + vector[second]]);
         }
-        let shifted = [0, 1, 2].map(|axis| vector[axis] + self.frame.shift[axis].units());
-        let turned = self.frame.turned(shifted);
-        let offset = |axis: usize| self.frame.origin[axis].units() + self.frame.tool[axis].units();
-        Ok([first, second].map(|axis| turned[axis] + offset(axis)))
+        let origin = turn(self.frame.zero(), -turn_deg);
+        Ok([first, second].map(|axis| vector[axis] + origin[axis]))
     }
 }
 

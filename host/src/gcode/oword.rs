@@ -105,6 +105,11 @@ impl<'a> OWord<'a> {
         Ok(Self { label, is_computed, keyword, offset, rest: cursor })
     }
 
+    /// The word with what follows what was read behind its keyword.
+    pub(super) fn with(&self, rest: Cursor<'a>) -> Self {
+        Self { rest, ..self.clone() }
+    }
+
     /// Refuses what follows the keyword, but for comments.
     pub(super) fn refuse_rest(&self) -> Result<(), Located> {
         let mut rest = self.rest.clone();

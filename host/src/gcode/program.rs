@@ -113,8 +113,10 @@ pub struct ArcMove {
     pub from: [Length; 3],
     /// End, X Y Z.
     pub to: [Length; 3],
-    /// Plane of the arc.
+    /// Plane of the arc, before its turn.
     pub plane: Plane,
+    /// Turn of the plane and its axes about Z \[°\], counter-clockwise: a rotated coordinate system turns ZX and YZ.
+    pub turn_deg: f64,
     /// Centre \[mm\]: coordinates along the plane's first and second axis, in that order (ZX: Z, then X).
     pub centre_mm: [f64; 2],
     /// Distance of the start from the centre in the plane \[mm\], greater than 0.

@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use super::error::{Located, Problem};
 use super::expression::Environment;
 use super::lexer::{Cursor, is_blank_line, is_percent_line};
+use super::library::Callee;
 use super::oword::{self, Keyword, OWord};
 use super::source::{Place, Source};
 
@@ -74,7 +75,7 @@ pub(super) enum Role {
 #[derive(Debug, Default)]
 pub(super) struct Structure {
     /// In the order of the file.
-    pub(super) lines: Vec<OLine>,
+    lines: Vec<OLine>,
     /// `sub` lines by label.
     pub(super) subs: HashMap<String, usize>,
     /// Subprograms of M98 by label.
@@ -139,6 +140,28 @@ impl Structure {
         }
     }
 
+    /// An O-word by its index.
+    pub(super) fn line(&self, index: usize) -> Option<OLine> {
+        self.lines.get(index).copied()
+    }
+
+    /// The index of the last O-word of a block.
+    pub(super) fn end_of(&self, begin: usize) -> usize {
+        match self.line(begin).map(|line| line.role) {
+            Some(Role::Sub { end } | Role::While { end } | Role::Do { end } | Role::Repeat { end }) => end,
+            _ => begin,
+        }
+    }
+
+    /// The line behind the first one of a subroutine.
+    pub(super) fn body(&self, label: &str, callee: Callee) -> Option<Place> {
+        let table = match callee {
+            Callee::Sub => &self.subs,
+            Callee::Subprogram => &self.programs,
+        };
+        Some(self.line(*table.get(label)?)?.after)
+    }
+
     /// The O-word of a line.
     pub(super) fn at(&self, place: Place) -> Option<(usize, OLine)> {
         let index = self.lines.binary_search_by_key(&place.offset, |line| line.start.offset).ok()?;
@@ -170,11 +193,11 @@ impl Structure {
             open.push(Open { keyword, label: word.label.clone(), index, branches: Vec::new() });
             Ok(())
         };
+        let not_open = |problem| Located::new(word.offset, problem);
         let closes = |keyword, open: &mut Vec<Open>| match open.pop() {
             Some(last) if last.keyword == keyword && last.label == word.label => Ok(last),
-            _ => Err(Located::new(word.offset, Problem::BlockNotOpen { label: word.label.clone() })),
+            _ => Err(not_open(Problem::BlockNotOpen { label: word.label.clone() })),
         };
-        // The end of a block is known now.
         Ok(match word.keyword {
             Keyword::Program => {
                 self.programs.entry(word.label.clone()).or_insert(index);
@@ -193,31 +216,27 @@ impl Structure {
                 self.set(begin, Role::Sub { end: index });
                 Role::EndSub
             }
-            Keyword::Return => {
-                if !open.iter().any(|open| open.keyword == Keyword::Sub && open.label == word.label) {
-                    return Err(Located::new(
-                        word.offset,
-                        Problem::BlockNotOpen { label: word.label.clone() },
-                    ));
-                }
-                Role::Return
-            }
+            // Whatever its label is, it returns from the sub around it.
+            Keyword::Return if open.iter().any(|open| open.keyword == Keyword::Sub) => Role::Return,
+            Keyword::Return => return Err(not_open(Problem::ReturnOutside)),
             Keyword::If => {
                 begins(Keyword::If, open)?;
                 Role::If { next: index }
             }
             Keyword::ElseIf | Keyword::Else => {
-                let is_else = |index: &usize| matches!(self.lines[*index].role, Role::Else { .. });
+                if word.keyword == Keyword::Else {
+                    word.refuse_rest()?;
+                }
+                let is_else = |index: &usize| {
+                    self.line(*index).is_some_and(|line| matches!(line.role, Role::Else { .. }))
+                };
                 let last = open.last_mut().filter(|last| {
                     last.keyword == Keyword::If
                         && last.label == word.label
                         && !last.branches.last().is_some_and(is_else)
                 });
                 let Some(last) = last else {
-                    return Err(Located::new(
-                        word.offset,
-                        Problem::BlockNotOpen { label: word.label.clone() },
-                    ));
+                    return Err(not_open(Problem::BlockNotOpen { label: word.label.clone() }));
                 };
                 let before = last.branches.last().copied().unwrap_or(last.index);
                 last.branches.push(index);
@@ -275,10 +294,7 @@ impl Structure {
                     open.label == word.label && matches!(open.keyword, Keyword::While | Keyword::Do)
                 };
                 let Some(begin) = open.iter().rev().find(is_loop).map(|open| open.index) else {
-                    return Err(Located::new(
-                        word.offset,
-                        Problem::BlockNotOpen { label: word.label.clone() },
-                    ));
+                    return Err(not_open(Problem::BlockNotOpen { label: word.label.clone() }));
                 };
                 if word.keyword == Keyword::Break { Role::Break { begin } } else { Role::Continue { begin } }
             }

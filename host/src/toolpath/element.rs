@@ -8,7 +8,7 @@ use super::greatest::Greatest;
 use super::involute::Involute;
 use super::polynomial::Polynomial;
 use super::septic::{FitError, Septic, fit};
-use super::{Vector, add, cross, norm, scale, subtract};
+use super::{Vector, add, cross, dot, norm, scale, subtract};
 use crate::gcode::{ArcMove, LineMove};
 
 /// Widest piece of an arc or an involute \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off,
@@ -97,14 +97,20 @@ impl Element {
     pub fn arc(step: &ArcMove) -> Self {
         let (from, to) = (step.from.map(|c| c.to_mm()), step.to.map(|c| c.to_mm()));
         let [first, second, normal] = step.plane.axes();
-        let axis = |index: usize| {
-            let mut unit = [0.0; 3];
-            unit[index] = 1.0;
-            unit
+        let (sine, cosine) = match step.turn_deg {
+            0.0 => (0.0, 1.0),
+            turn_deg => libm::sincos(turn_deg.to_radians()),
+        };
+        let axis = |index: usize| match index {
+            0 => [cosine, sine, 0.0],
+            1 => [-sine, cosine, 0.0],
+            _ => [0.0, 0.0, 1.0],
         };
         let radius_mm = step.start_radius_mm;
-        let (x, y) =
-            ((from[first] - step.centre_mm[0]) / radius_mm, (from[second] - step.centre_mm[1]) / radius_mm);
+        let (x, y) = (
+            (dot(from, axis(first)) - step.centre_mm[0]) / radius_mm,
+            (dot(from, axis(second)) - step.centre_mm[1]) / radius_mm,
+        );
         let outward = add(scale(axis(first), x), scale(axis(second), y));
         let along = cross(axis(normal), outward);
         let sweep_rad = step.sweep_rad.abs();
@@ -114,7 +120,7 @@ impl Element {
             normal: axis(normal),
             radius_mm,
             radius_per_rad: (step.end_radius_mm - radius_mm) / sweep_rad,
-            height_per_rad: (to[normal] - from[normal]) / sweep_rad,
+            height_per_rad: dot(subtract(to, from), axis(normal)) / sweep_rad,
         };
         Self::Arc { from, to, shape, sweep_rad }
     }

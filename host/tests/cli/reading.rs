@@ -51,7 +51,7 @@ fn every_step_has_an_object() {
         json!({
             "line": 3, "kind": "arc", "from_mm": [25.4, 0.0, 0.0], "to_mm": [76.2, 0.0, 0.0], "feed_mm_min": 254.0,
             "path": "exact", "tolerance_mm": null, "merging_mm": null,
-            "plane": "XY", "centre_mm": [50.8, 0.0], "sweep_rad": -std::f64::consts::PI,
+            "plane": "XY", "turn_deg": 0.0, "centre_mm": [50.8, 0.0], "sweep_rad": -std::f64::consts::PI,
         })
     );
     assert_eq!(steps[2]["dwell_s"], json!(0.5));

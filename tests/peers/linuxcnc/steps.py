@@ -300,7 +300,9 @@ def of_motion(objects):
             steps.append(Step("through" if kind == "through" else "move", line, to, found["feed_mm_min"], path, **curve))
         elif kind == "dwell":
             steps.append(Step("dwell", line, value=found["dwell_s"]))
-        elif kind not in ("end", "notice"):
+        elif kind == "tool":
+            steps.append(Step("tool", line, value=found["tool"]))
+        elif kind not in ("end", "notice", "message"):
             steps.append(Step(kind, line, value=found.get("value")))
     return with_length(steps)
 
@@ -309,7 +311,11 @@ def arc_of_motion(found):
     first, second, normal = PLANES[found["plane"]]
     centre, direction = [0.0] * 3, [0.0] * 3
     centre[first], centre[second] = found["centre_mm"]
-    centre[normal], direction[normal] = found["to_mm"][normal], 1.0
+    turn_rad = math.radians(found["turn_deg"])
+    end = [*rotated(*found["to_mm"][:2], -turn_rad), found["to_mm"][2]]
+    centre[normal], direction[normal] = end[normal], 1.0
+    for vector in (centre, direction):
+        vector[:2] = rotated(*vector[:2], turn_rad)
     return {"arc": Arc(tuple(centre), tuple(direction), found["sweep_rad"])}
 
 
