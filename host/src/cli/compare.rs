@@ -13,7 +13,7 @@ use super::progress::Progress;
 use super::table::{self, Align};
 use super::{csv_failure, input, write_json};
 use crate::compare::{Figures, Path, figures, is_blended};
-use crate::gcode::{self, Program};
+use crate::gcode::Program;
 use crate::machine::Machine;
 
 const EXAMPLES: &str = "\
@@ -122,7 +122,7 @@ pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outc
     let mut progress = Progress::new(programs.len() as u64);
     for path in &programs {
         let source = input::read(path)?;
-        match gcode::read_with(&source.name, &source.text, &options) {
+        match source.program(&options) {
             Ok(program) => rows_of(&source.name, &program, tolerances_mm, &machine, &mut rows)
                 .unwrap_or_else(|error| refused.push(error.to_string())),
             Err(error) => refused.push(error.to_string()),

@@ -8,7 +8,7 @@ use clap::{ArgAction, Args};
 
 use super::error::CliError;
 use crate::files::STANDARD_INPUT;
-use crate::gcode::{self, ParameterFile, Program, ReadOptions, ToolTable};
+use crate::gcode::{self, GcodeError, ParameterFile, Program, ReadOptions, ToolTable};
 use crate::machine::Machine;
 
 /// What G-code is read with.
@@ -20,7 +20,7 @@ pub(super) struct ReadingArguments {
     /// Stop at M1.
     #[arg(long, value_name = "true|false", default_value_t = true, action = ArgAction::Set)]
     optional_stop: bool,
-    /// Folder of subroutines, a file `name.ngc` each; may be given several times.
+    /// Folder of subroutines, a file `name.ngc` each; may be given several times. The program's own is the last.
     #[arg(long, value_name = "DIR")]
     subroutines: Vec<PathBuf>,
     /// Parameters to start with (offsets, places of G28 and G30), in LinuxCNC's format.
@@ -39,14 +39,14 @@ impl ReadingArguments {
     pub(super) fn options(&self) -> Result<ReadOptions, CliError> {
         let parameters = match &self.parameters {
             Some(path) => {
-                let Source { name, text } = read(path)?;
+                let Source { name, text, .. } = read(path)?;
                 ParameterFile::parse(&name, &text)?
             }
             None => ParameterFile::default(),
         };
         let tools = match &self.tools {
             Some(path) => {
-                let Source { name, text } = read(path)?;
+                let Source { name, text, .. } = read(path)?;
                 Some(ToolTable::parse(&name, &text)?)
             }
             None => None,
@@ -64,7 +64,7 @@ impl ReadingArguments {
 
     /// The program of a source.
     pub(super) fn program(&self, source: &Source) -> Result<Program, CliError> {
-        Ok(gcode::read_with(&source.name, &source.text, &self.options()?)?)
+        Ok(source.program(&self.options()?)?)
     }
 }
 
@@ -72,6 +72,17 @@ impl ReadingArguments {
 pub(super) struct Source {
     pub(super) name: String,
     pub(super) text: Vec<u8>,
+    /// Where it lies; none for standard input.
+    folder: Option<PathBuf>,
+}
+
+impl Source {
+    /// The program in it. Its own folder is the last that is searched for subroutines.
+    pub(super) fn program(&self, options: &ReadOptions) -> Result<Program, GcodeError> {
+        let mut options = options.clone();
+        options.subroutines.extend(self.folder.clone());
+        gcode::read_with(&self.name, &self.text, &options)
+    }
 }
 
 /// Reads a file, or standard input if it is called `-`.
@@ -83,7 +94,11 @@ pub(super) fn read(path: &Path) -> Result<Source, CliError> {
         (path.display().to_string(), fs::read(path))
     };
     match text {
-        Ok(text) => Ok(Source { name, text }),
+        Ok(text) => {
+            let is_file = path.as_os_str() != STANDARD_INPUT;
+            let folder = path.parent().filter(|_| is_file).map(Path::to_path_buf);
+            Ok(Source { name, text, folder })
+        }
         Err(source) => Err(CliError::Read { path: name, source }),
     }
 }

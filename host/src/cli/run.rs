@@ -12,7 +12,6 @@ use super::outputs::{self, Outputs, Written};
 use super::table::{self, Align};
 use super::write_json;
 use crate::files::{Files, OutputFile};
-use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
 use crate::recording::Recorder;
@@ -99,7 +98,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let options = arguments.reading.options()?;
-    let program = gcode::read_with(&source.name, &source.text, &options)?;
+    let program = source.program(&options)?;
     let after = options.parameters.after(&program.parameters);
     let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;
     let options = RunOptions {

@@ -6,15 +6,20 @@
 use super::decimal::Length;
 use super::error::Problem;
 use super::program::Plane;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
-/// Start and end radius of an arc may differ by this share of the start radius, or by
-/// [`RADIUS_MISMATCH_MIN_MM`] if that is more: programs round their coordinates.
+/// Start and end radius of an arc may differ by this share of the start radius, or by [`RADIUS_MISMATCH_MM`] or
+/// [`RADIUS_MISMATCH_INCH`] if that is more, but never by more than a hundred times that: programs round their
+/// coordinates. LinuxCNC takes the same.
 pub const RADIUS_MISMATCH_RATIO: f64 = 0.001;
-/// The difference always allowed \[mm\]; also how far a chord may exceed 2 R.
-pub const RADIUS_MISMATCH_MIN_MM: f64 = 0.005;
-/// The difference never allowed to be exceeded \[mm\], however large the radius.
-pub const RADIUS_MISMATCH_MAX_MM: f64 = 0.5;
+/// The difference allowed in any case in programs in millimetres \[mm\]: a hundredth on each of four coordinates.
+pub const RADIUS_MISMATCH_MM: f64 = 0.02 * SQRT_2;
+/// The difference allowed in any case in programs in inches \[inch\].
+pub const RADIUS_MISMATCH_INCH: f64 = 0.002 * SQRT_2;
+/// What is never allowed, in differences that are allowed in any case.
+const MISMATCH_MAX: f64 = 100.0;
+/// How far a chord may exceed 2 R \[mm\].
+const CHORD_EXCESS_MM: f64 = 0.005;
 
 /// A point of the plane, relative to another \[10⁻¹⁰ mm\]; |coordinates| ≤ 4 [`Length::LIMIT`].
 type Offset = [i64; 2];
@@ -56,13 +61,15 @@ fn difference(a: Offset, b: Offset) -> Offset {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// An arc from `start` to `end` about `centre`; clockwise if `clockwise`. Start and end in one direction from
+/// An arc from `start` to `end` about `centre`; clockwise if `clockwise`. `mismatch_mm` is the difference of the
+/// radii that is allowed in any case. Start and end in one direction from
 /// the centre mean a full turn.
 pub(super) fn about_centre(
     start: [Length; 2],
     end: [Length; 2],
     centre: Offset,
     clockwise: bool,
+    mismatch_mm: f64,
 ) -> Result<Resolved, Problem> {
     let from = difference(start.map(Length::units), centre);
     let to = difference(end.map(Length::units), centre);
@@ -74,8 +81,7 @@ pub(super) fn about_centre(
     }
     let start_radius_mm = mm_from_root(dot(from, from));
     let end_radius_mm = mm_from_root(dot(to, to));
-    let allowed_mm =
-        (start_radius_mm * RADIUS_MISMATCH_RATIO).clamp(RADIUS_MISMATCH_MIN_MM, RADIUS_MISMATCH_MAX_MM);
+    let allowed_mm = (start_radius_mm * RADIUS_MISMATCH_RATIO).clamp(mismatch_mm, MISMATCH_MAX * mismatch_mm);
     if (start_radius_mm - end_radius_mm).abs() > allowed_mm {
         return Err(Problem::ArcRadiiDiffer { start_radius_mm, end_radius_mm, allowed_mm });
     }
@@ -119,7 +125,7 @@ pub(super) fn of_radius(
     // (2 R)² − chord² = (2 × distance of the centre from the chord)², exact, so that nothing cancels.
     let apothem_squared = diameter * diameter - chord_squared;
     let radius_enlarged = apothem_squared < 0;
-    if radius_enlarged && chord_mm - 2.0 * radius.to_mm().abs() > RADIUS_MISMATCH_MIN_MM {
+    if radius_enlarged && chord_mm - 2.0 * radius.to_mm().abs() > CHORD_EXCESS_MM {
         return Err(Problem::ArcRadiusTooSmall { word: word(), chord_mm });
     }
     let apothem_mm = mm_from_root(apothem_squared.max(0)) / 2.0;
@@ -158,7 +164,7 @@ mod tests {
         centre: [f64; 2],
         clockwise: bool,
     ) -> Result<Resolved, Problem> {
-        about_centre(at(start), at(end), at(centre).map(Length::units), clockwise)
+        about_centre(at(start), at(end), at(centre).map(Length::units), clockwise, 0.005)
     }
 
     fn radius(start: [f64; 2], end: [f64; 2], radius_mm: f64, clockwise: bool) -> Result<Resolved, Problem> {
@@ -184,7 +190,7 @@ mod tests {
     #[test]
     fn a_unit_short_of_the_start_is_no_full_circle() {
         let end = [at([5.0, 0.0])[0], Length::from_units(-1).unwrap()];
-        let arc = |clockwise| about_centre(at([5.0, 0.0]), end, [0, 0], clockwise).unwrap().sweep_rad;
+        let arc = |clockwise| about_centre(at([5.0, 0.0]), end, [0, 0], clockwise, 0.005).unwrap().sweep_rad;
         assert_eq!(arc(true), -2e-11);
         assert_eq!(arc(false), 2.0 * PI - 2e-11);
     }

@@ -11,12 +11,12 @@ use super::modal::Motion;
 use super::number::Number;
 
 /// Letters that take a number of their own.
-const LETTERS: &[u8; 17] = b"DEFHIJKLNPQRSTXYZ";
+const LETTERS: &[u8; 19] = b"DEFHIJKLNPQRSTXYZ@^";
 
 /// Modal groups of G words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GGroup {
-    /// G0 G1 G2 G3 G5 G5.5 G73 G80 G81 G82 G83 G85 G86 G88 G89.
+    /// G0 G1 G2 G3 G5 G5.5 G33 G33.1 G38.2 to G38.5 G73 G74 G76 G80 to G86 G88 G89.
     Motion,
     /// G4 G10 G28 G28.1 G30 G30.1 G52 G53 G92: in force for their line.
     NonModal,
@@ -79,6 +79,7 @@ const M_GROUPS: usize = MGroup::Subprogram as usize + 1;
 /// The group of a G word, by its number in tenths.
 fn g_group(tenths: i64) -> Option<GGroup> {
     Some(match tenths {
+        330 | 331 | 382..=385 | 740 | 760 | 840 => GGroup::Motion,
         0 | 10 | 20 | 30 | 50 | 55 | 730 | 800 | 810 | 820 | 830 | 850 | 860 | 880 | 890 => GGroup::Motion,
         40 | 100 | 280 | 281 | 300 | 301 | 520 | 530 | 920 => GGroup::NonModal,
         921..=923 => GGroup::Shift,
@@ -117,12 +118,7 @@ fn m_group(tenths: i64) -> Option<MGroup> {
 
 /// The problem of a G word without a group.
 fn unsupported_g(word: &Word<'_>) -> Located {
-    let tenths = word.number.tenths();
-    word.problem(|word| match tenths {
-        Some(330 | 331 | 740 | 760 | 840) => Problem::NeedsEncoder { word },
-        Some(382..=385) => Problem::NeedsProbe { word },
-        _ => Problem::UnsupportedG { word },
-    })
+    word.problem(|word| Problem::UnsupportedG { word })
 }
 
 /// The problem of an M word without a group.
@@ -175,7 +171,21 @@ impl<'a> Block<'a> {
             }
             block.any = true;
         }
+        let is_diameter = match block.g(GGroup::Diameter) {
+            Some(code) => code.tenths == 70,
+            None => environment.is_diameter(),
+        };
+        if is_diameter {
+            block.halve_x();
+        }
         Ok(block)
+    }
+
+    /// After G7, also in the line itself, X is a diameter.
+    fn halve_x(&mut self) {
+        for word in self.letters.iter_mut().flatten().filter(|word| word.letter == b'X') {
+            word.number = word.number.half();
+        }
     }
 
     fn put_word(&mut self, word: Word<'a>) -> Result<(), Located> {
@@ -308,7 +318,9 @@ impl<'a> Block<'a> {
     /// A word nothing in the line takes would be silently dropped, and a word that two others take would do
     /// two things. `motion` is the mode in force.
     pub(super) fn refuse_unused(&self, motion: Option<Motion>) -> Result<(), Located> {
-        const CHECKED: [(u8, &str); 10] = [
+        const CHECKED: [(u8, &str); 12] = [
+            (b'@', "a move in the XY plane"),
+            (b'^', "a move in the XY plane"),
             (b'D', "G96"),
             (b'E', "M66, M67 or M68"),
             (b'H', "G43 or G43.2"),
@@ -325,7 +337,8 @@ impl<'a> Block<'a> {
         for (letter, needs) in CHECKED {
             let Some(word) = self.letter(letter) else { continue };
             let others = self.takers(letter);
-            let by_motion = motion.is_some_and(|motion| motion.takes(letter));
+            let is_polar = matches!(letter, b'@' | b'^') && !self.axes_are_taken();
+            let by_motion = is_polar || motion.is_some_and(|motion| motion.takes(letter));
             let problem = if others == 0 && !by_motion {
                 word.problem(|word| Problem::WordUnused { word, needs })
             } else if others > 1 || others == 1 && by_motion && moves {
@@ -342,7 +355,7 @@ impl<'a> Block<'a> {
 
     /// Whether the line asks for a move in the mode `motion`.
     pub(super) fn moves(&self, motion: Option<Motion>) -> bool {
-        let has_axes = self.axes().iter().any(Option::is_some) && !self.axes_are_taken();
+        let has_axes = self.has_axes() && !self.axes_are_taken();
         let own = |letters: &[u8]| {
             letters.iter().any(|&letter| self.letter(letter).is_some() && self.takers(letter) == 0)
         };
@@ -358,6 +371,11 @@ impl<'a> Block<'a> {
     pub(super) fn letter(&self, letter: u8) -> Option<Word<'a>> {
         let index = LETTERS.iter().position(|&candidate| candidate == letter)?;
         self.letters.get(index).copied().flatten()
+    }
+
+    /// Whether there are words of axes, polar ones too.
+    pub(super) fn has_axes(&self) -> bool {
+        b"XYZ@^".iter().any(|&letter| self.letter(letter).is_some())
     }
 
     /// X, Y and Z.

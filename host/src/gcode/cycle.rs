@@ -8,7 +8,8 @@ use super::error::{Located, Problem};
 use super::interpreter::Interpreter;
 use super::lexer::Word;
 use super::modal::{Distance, FeedMode};
-use super::program::{Feed, LineMove, PathMode, StepKind};
+use super::polar::Polar;
+use super::program::{Feed, LineMove, PathMode, Plane, StepKind};
 
 /// How far above the depth reached a peck stops its rapid, or a chip breaks \[10⁻¹⁰ mm\]: 0.254 mm.
 const CLEARANCE: i64 = Length::UNITS_PER_MM * 254 / 1000;
@@ -142,6 +143,10 @@ impl Interpreter {
         let mut increments = [0, 0];
         let mut hole = [self.work[axis_1].units(), self.work[axis_2].units()];
         let axes = block.axes();
+        let polar = Polar::of(block)?;
+        if polar.is_some() && self.modal.plane != Plane::Xy {
+            return Err(refused("X, Y and Z in this plane, not @ and ^"));
+        }
         for (index, axis) in [axis_1, axis_2].into_iter().enumerate() {
             let Some(word) = axes[axis] else { continue };
             let length = self.modal.units.length(word)?.units();
@@ -167,12 +172,21 @@ impl Interpreter {
         };
         if initial < r {
             let above = [self.work[axis_1].units(), self.work[axis_2].units()];
+            let before = self.program.steps.len();
             self.straight(at(above, r), Feed::Rapid, first)?;
+            // The cycle has not begun.
+            self.set_mode_from(before, self.modal.path);
             (initial, here) = (r, r);
         }
+        let beyond = || first.problem(|word| Problem::PositionOutOfRange { word });
         let levels = Levels { r, clear: if self.modal.retracts_to_r { r } else { initial }, bottom };
         for repeat in 0..repeats {
             hole = [hole[0] + increments[0], hole[1] + increments[1]];
+            if let Some(polar) = polar {
+                let here = hole.map(Length::from_units);
+                let [Some(x), Some(y)] = here else { return Err(beyond()) };
+                hole = polar.point([x, y], &self.modal)?.map(Length::units);
+            }
             let over = if repeat == 0 && here > r { here } else { levels.clear };
             self.straight(at(hole, over), Feed::Rapid, first)?;
             self.straight(at(hole, r), Feed::Rapid, first)?;

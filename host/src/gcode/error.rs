@@ -111,8 +111,8 @@ pub enum Problem {
     OWordPlace { word: String },
     #[error("found {word}, expected {expected}")]
     NotThisCount { word: String, expected: &'static str },
-    #[error("found {word}, expected a positive feed")]
-    FeedNotPositive { word: String },
+    #[error("found {word}, expected a feed that is not negative")]
+    FeedNegative { word: String },
     #[error("found {motion} without a feed, expected an F word in this line or before it")]
     FeedMissing { motion: &'static str },
     #[error("found {word}, expected a number that is not negative")]
@@ -126,6 +126,10 @@ pub enum Problem {
     WordUnused { word: String, needs: &'static str },
     #[error("found {word} in a line whose axis words another word takes, expected two lines")]
     AxesTaken { word: String },
+    #[error("found {word} in a line with @ or ^, expected either of them, not both")]
+    PolarWithAxes { word: String },
+    #[error("found {word} at X0 Y0, where there is no angle, expected both @ and ^ after G90")]
+    PolarAtZero { word: String },
     #[error("found {word} with G53, expected {expected}")]
     MachineMove { word: String, expected: &'static str },
     #[error("found {word}, expected {expected}")]

@@ -11,7 +11,7 @@ use super::library::{Callee, Failure, File, Library};
 use super::options::ReadOptions;
 use super::oword::{self, Keyword, OWord};
 use super::parameters::LOCALS;
-use super::program::{NoticeKind, Program};
+use super::program::{NoticeKind, Program, StepKind};
 use super::source::Place;
 use super::structure::{Role, Unread};
 
@@ -263,7 +263,7 @@ impl<'a> Flow<'a> {
 
     /// A file of subroutines alone is right if all of it can be read.
     fn check_subroutines(&self) -> Result<(), GcodeError> {
-        let has_steps = !self.interpreter.program.steps.is_empty();
+        let has_steps = self.interpreter.program.steps.iter().any(|step| step.kind != StepKind::End);
         let Some(file) = self.library.file(0).filter(|file| !has_steps && file.has_subs()) else {
             return Ok(());
         };

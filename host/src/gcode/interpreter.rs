@@ -10,7 +10,7 @@ use super::lexer::Cursor;
 use super::message;
 use super::modal::{FeedMode, Modal, Motion, Units};
 use super::options::ReadOptions;
-use super::parameters::Parameters;
+use super::parameters::{Parameters, SELECTED};
 use super::program::{Message, Notice, NoticeKind, PathMode, Program, Step, StepKind};
 use super::tool::ToolTable;
 
@@ -124,6 +124,7 @@ impl Interpreter {
                 self.message(text)?;
             }
         }
+        refuse_unequipped(&block)?;
         if let Some(code) = block.m(MGroup::Subprogram) {
             return Self::subprogram(&block, code.tenths == 980);
         }
@@ -190,9 +191,10 @@ impl Interpreter {
         Ok(())
     }
 
-    /// Ends the program.
+    /// Ends the program; the next one starts in the first coordinate system.
     pub(super) fn end(&mut self) -> Result<(), Located> {
         self.step(StepKind::End)?;
+        self.parameters.set(SELECTED, 1.0);
         self.ended = true;
         Ok(())
     }
@@ -215,8 +217,8 @@ impl Interpreter {
     /// units hold, and a notice says so where it matters.
     fn set_feed(&mut self, block: &Block<'_>) -> Result<(), Located> {
         let Some(word) = block.letter(b'F') else { return Ok(()) };
-        if word.number.signum() <= 0 || word.number.to_f64() > FEED_MAX {
-            return Err(word.problem(|word| Problem::FeedNotPositive { word }));
+        if word.number.signum() < 0 || word.number.to_f64() > FEED_MAX {
+            return Err(word.problem(|word| Problem::FeedNegative { word }));
         }
         if self.modal.feed_mode == FeedMode::InverseTime {
             return Ok(());
@@ -225,7 +227,8 @@ impl Interpreter {
         if units != self.modal.units {
             self.notice(NoticeKind::FeedInNewUnits);
         }
-        self.modal.feed = Some(units.mm(word.number.to_f64()));
+        // F0 is no feed: what moves after it is refused.
+        self.modal.feed = Some(units.mm(word.number.to_f64())).filter(|feed| *feed > 0.0);
         Ok(())
     }
 
@@ -293,6 +296,16 @@ impl Interpreter {
         self.modal = Modal { motion: self.modal.motion, ..saved.modal };
         self.frame.tool = saved.tool;
         self.select(saved.system, 0)
+    }
+}
+
+/// Refuses moves that need what no machine here has. In a subroutine that is never called they may stand.
+fn refuse_unequipped(block: &Block<'_>) -> Result<(), Located> {
+    let Some(code) = block.g(GGroup::Motion) else { return Ok(()) };
+    match code.tenths {
+        330 | 331 | 740 | 760 | 840 => Err(code.word.problem(|word| Problem::NeedsEncoder { word })),
+        382..=385 => Err(code.word.problem(|word| Problem::NeedsProbe { word })),
+        _ => Ok(()),
     }
 }
 
@@ -407,8 +420,12 @@ mod tests {
         for (text, place, message) in [
             ("G1 X1", "1:1:", "found G1 without a feed"),
             ("G1\n X1", "2:2:", "found G1 without a feed"),
-            ("F0", "1:1:", "found F0, expected a positive feed"),
-            ("F-5", "1:1:", "found F-5"),
+            ("F0 G1 X1", "1:4:", "found G1 without a feed"),
+            ("F-5", "1:1:", "found F-5, expected a feed that is not negative"),
+            ("@5 ^10 X1", "1:8:", "found X1 in a line with @ or ^"),
+            ("G0 @5", "1:4:", "found @5 at X0 Y0"),
+            ("G0 X1\nG53 G0 @5 ^1", "2:8:", "found @5 with G53, expected X, Y and Z"),
+            ("G92 @5 ^1", "1:5:", "found @5 in a line without a move in the XY plane"),
             ("X1", "1:1:", "found X1 without a motion mode"),
             ("G0 X1\nG80 Y2", "2:5:", "found Y2 without a motion mode"),
             ("S-1", "1:1:", "found S-1"),
@@ -425,6 +442,8 @@ mod tests {
             ("F5 G18 G2 X1 J1", "1:14:", "expected I and K or R"),
             ("F5 G2 X1 I1 R1", "1:13:", "the centre or the radius"),
             ("F5 G2 X2 I1.1", "1:4:", "starts 1.100000 mm and ends 0.900000 mm"),
+            ("F5 G2 X2 I1.015", "1:4:", "expected a difference of 0.028284 mm at most"),
+            ("F5 G20 G2 X2 I1.0015", "1:8:", "expected a difference of 0.071842 mm at most"),
             ("F5 G2 X0 R1", "1:10:", "ends where it starts"),
             ("F5 G2 X2.006 R1", "1:14:", "found R1 for two points 2.006000 mm apart"),
             ("F5 G2 X1 I0", "1:4:", "centre is its start point"),

@@ -11,7 +11,7 @@ use super::{parameters, predefined};
 /// A letter and its number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Word<'a> {
-    /// Upper-case letter.
+    /// Upper-case letter, `@` or `^`.
     pub(super) letter: u8,
     /// The number after it.
     pub(super) number: Number,
@@ -195,14 +195,11 @@ impl<'a, 'environment> Items<'a, 'environment> {
         let offset = cursor.next;
         cursor.next += 1;
         let letter = letter.to_ascii_uppercase();
-        let (mut number, rounded) = if self.is_computed() {
+        let (number, rounded) = if self.is_computed() {
             (Number::Real(expression::operand(&mut self.cursor, self.environment)?), false)
         } else {
             self.literal(offset, letter)?
         };
-        if letter == b'X' && self.environment.is_diameter() {
-            number = number.half();
-        }
         let source = self.cursor.line.get(offset..self.cursor.next).unwrap_or_default();
         Ok(Word { letter, number, offset, rounded, source })
     }
@@ -282,6 +279,7 @@ impl<'a, 'environment> Items<'a, 'environment> {
             // A checksum ends the line; nothing is to be compared with it.
             b'*' if self.is_checksum() => return None,
             letter if letter.is_ascii_alphabetic() => self.word(letter).map(Item::Word),
+            sign @ (b'@' | b'^') => self.word(sign).map(Item::Word),
             byte => Err(self.stray(byte)),
         })
     }

@@ -83,6 +83,7 @@ mod options;
 mod oword;
 mod parameter_file;
 mod parameters;
+mod polar;
 mod predefined;
 mod program;
 mod source;
@@ -90,7 +91,7 @@ mod spline;
 mod structure;
 mod tool;
 
-pub use arc::{RADIUS_MISMATCH_MAX_MM, RADIUS_MISMATCH_MIN_MM, RADIUS_MISMATCH_RATIO};
+pub use arc::{RADIUS_MISMATCH_INCH, RADIUS_MISMATCH_MM, RADIUS_MISMATCH_RATIO};
 pub use decimal::{Decimal, Length};
 pub(crate) use error::describe;
 pub use error::{GcodeError, Problem};

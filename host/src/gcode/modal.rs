@@ -1,5 +1,6 @@
 //! The modes, which stay in force from line to line.
 
+use super::arc::{RADIUS_MISMATCH_INCH, RADIUS_MISMATCH_MM};
 use super::block::{Block, GGroup};
 use super::cycle::Cycle;
 use super::decimal::Length;
@@ -282,6 +283,14 @@ impl Units {
         match self {
             Self::Millimetres => value,
             Self::Inches => value * MM_PER_INCH_TENTHS / 10.0,
+        }
+    }
+
+    /// How far the radii of an arc's ends may differ in any case \[mm\].
+    pub(super) fn radius_mismatch_mm(self) -> f64 {
+        match self {
+            Self::Millimetres => RADIUS_MISMATCH_MM,
+            Self::Inches => self.mm(RADIUS_MISMATCH_INCH),
         }
     }
 

@@ -10,6 +10,7 @@ use super::frame::{lengths, turn};
 use super::interpreter::Interpreter;
 use super::lexer::Word;
 use super::modal::{Distance, FeedMode, Modal, Motion};
+use super::polar::Polar;
 use super::program::{
     ArcMove, CubicMove, Feed, LineMove, NoticeKind, PathMode, Plane, StepKind, ThroughMove,
 };
@@ -29,7 +30,7 @@ impl Interpreter {
             };
         }
         if let (Some(Motion::Cycle(cycle)), Some(code)) = (self.modal.motion, code)
-            && !block.axes().iter().any(Option::is_some)
+            && !block.has_axes()
         {
             let expected = "axis words";
             return Err(code.word.problem(|_| Problem::Cycle { word: cycle.word(), expected }));
@@ -37,7 +38,7 @@ impl Interpreter {
         if !block.moves(self.modal.motion) {
             return self.refuse_unmoved(block);
         }
-        let ends = [b'P', b'Q'].map(|letter| block.letter(letter));
+        let ends = [b'P', b'Q', b'@', b'^'].map(|letter| block.letter(letter));
         let words = block.axes().into_iter().chain(block.offsets()).chain([block.letter(b'R')]).chain(ends);
         let Some(first) = words.flatten().min_by_key(|word| word.offset) else { return Ok(()) };
         let Some(motion) = self.modal.motion else {
@@ -125,6 +126,9 @@ impl Interpreter {
         if self.modal.distance == Distance::Incremental {
             return Err(refused("absolute end points (G90)"));
         }
+        if let Some(word) = block.letter(b'@').or(block.letter(b'^')) {
+            return Err(word.problem(|word| Problem::MachineMove { word, expected: "X, Y and Z" }));
+        }
         let (from, mode) = (self.machine, self.modal.path);
         let mut to = from;
         for (coordinate, word) in to.iter_mut().zip(block.axes()) {
@@ -144,7 +148,8 @@ impl Interpreter {
         }
         let missing = |problem| Located::new(offset, problem);
         let spindle = self.modal.spindle;
-        match (self.modal.feed_mode, self.modal.feed, block.letter(b'F')) {
+        let own = block.letter(b'F').filter(|word| word.number.signum() > 0);
+        match (self.modal.feed_mode, self.modal.feed, own) {
             (FeedMode::InverseTime, _, Some(word)) => Ok(Feed::MmPerMin(word.number.to_f64())),
             (FeedMode::InverseTime, ..) => {
                 Err(missing(Problem::InverseTimeMissing { motion: motion.word() }))
@@ -197,6 +202,10 @@ impl Interpreter {
                     .ok_or_else(|| word.problem(|word| Problem::PositionOutOfRange { word }))?,
             };
         }
+        if let Some(polar) = Polar::of(block)? {
+            let [x, y, _] = self.work;
+            [to[0], to[1]] = polar.point([x, y], &self.modal)?;
+        }
         Ok(to)
     }
 
@@ -231,7 +240,7 @@ impl Interpreter {
             }
             (None, _) => {
                 let centre = self.centre(centre_words, start, turn_deg, offset)?;
-                arc::about_centre(start, end, centre, clockwise)
+                arc::about_centre(start, end, centre, clockwise, units.radius_mismatch_mm())
                     .map_err(|problem| Located::new(offset, problem))
             }
             (Some(word), [None, None]) => {

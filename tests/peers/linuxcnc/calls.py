@@ -41,8 +41,12 @@ class Canon:
         print()
 
     def change_tool(self, index):
+        self.change_tool_number(index)
+        # Without a tool, T0.
+        self.tell("change_tool", max(self.by_index[0].number, 0))
+
+    def change_tool_number(self, index):
         self.by_index[0] = self.by_index[index] if index else tools.EMPTY
-        self.tell("change_tool", self.by_index[0].number)
 
     def get_tool(self, index):
         return (self.by_index[index] if index < len(self.by_index) else tools.EMPTY).entry()
@@ -71,7 +75,8 @@ def told(name):
 
 
 for name in (
-    "straight_traverse straight_feed straight_probe rigid_tap arc_feed dwell set_feed_rate set_plane "
+    "straight_traverse straight_feed straight_probe rigid_tap arc_feed dwell set_feed_rate set_feed_mode "
+    "set_plane "
     "set_g5x_offset set_g92_offset set_xy_rotation tool_offset"
 ).split():
     setattr(Canon, name, told(name))

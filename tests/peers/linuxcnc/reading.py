@@ -82,7 +82,9 @@ def with_beginning(text):
 def by_motion(motion, program, given):
     """Steps of this project's reader."""
     options = [word for name, path in given.items() if path for word in (f"--{name}", path.resolve())]
-    done = called([Path(motion).resolve(), "read", program.name, "--json", *options], cwd=program.parent)
+    # LinuxCNC's two voices read lines that begin with `/`.
+    command = [Path(motion).resolve(), "read", program.name, "--json", "--block-delete", "false", *options]
+    done = called(command, cwd=program.parent)
     if done.returncode != 0:
         raise Refused((done.stderr.strip().splitlines() or [f"status {done.returncode}"])[0])
     return steps.of_motion([json.loads(line) for line in done.stdout.splitlines()])

@@ -115,7 +115,9 @@ class Merging:
         self.steps = []
         self.offsets = Offsets()
         self.plane = PLANES[1]
-        self.feed_mm_min = None
+        # In a minute; after G95, in a revolution.
+        self.feed_mm = None
+        self.per_revolution, self.speed_rev_min = False, 0.0
         self.path = None
         # What is executed before a program says G21.
         self.unit_mm = 1.0
@@ -127,7 +129,9 @@ class Merging:
     def move(self, call, kind="move", **more):
         _, line, *arguments = call
         point = tuple(arguments)
-        feed_mm_min = None if call[0] == "straight_traverse" else self.feed_mm_min
+        feed_mm_min = None if call[0] == "straight_traverse" or self.feed_mm is None else self.feed_mm
+        if feed_mm_min is not None and self.per_revolution:
+            feed_mm_min *= self.speed_rev_min
         self.position = self.offsets.machine(point)
         self.point = point
         self.steps.append(Step(kind, line, self.position, feed_mm_min, self.path, **more))
@@ -168,7 +172,10 @@ class Merging:
         self.steps.append(Step("tool", call[1], value=call[2]))
 
     def set_feed_rate(self, call):
-        self.feed_mm_min = call[2] * INCH_MM
+        self.feed_mm = call[2] * INCH_MM
+
+    def set_feed_mode(self, call):
+        self.per_revolution = call[-1] == 1
 
     def set_plane(self, call):
         self.plane = PLANES[call[2]]
@@ -195,7 +202,7 @@ class Merging:
     def begin(self, call):
         """Everything before was the beginning that all programs are given."""
         self.steps = []
-        self.path, self.feed_mm_min = None, None
+        self.path, self.feed_mm = None, None
         self.is_position_known = True
 
     def user_defined(self, call):
@@ -240,6 +247,8 @@ class Merging:
         elif name == "SET_NAIVECAM_TOLERANCE" and self.path:
             self.path = (self.path[0], float(arguments) * self.unit_mm)
         elif name in KINDS:
+            if name == "SET_SPINDLE_SPEED":
+                self.speed_rev_min = float(arguments.split(",")[1])
             line = self.calls[min(self.at, len(self.calls) - 1)][1]
             value = None if KINDS[name] == "stop" else f"{name}({arguments})"
             self.steps.append(Step(KINDS[name], line, value=value))
@@ -272,9 +281,13 @@ def of_linuxcnc(calls, order):
 
 
 def with_length(steps):
-    """Without moves to where the machine is, but with full turns."""
-    position, kept = NOWHERE, []
+    """Without moves to where the machine is, but with full turns, and without changes to the tool that there is."""
+    position, tool, kept = NOWHERE, 0, []
     for step in steps:
+        if step.kind == "tool":
+            step, tool = (None if step.value == tool else step), step.value
+            kept += [step] if step else []
+            continue
         stays = step.kind == "move" and not step.arc and not step.through and math.dist(step.to, position) < NO_LENGTH_MM
         if not stays:
             kept.append(step)
