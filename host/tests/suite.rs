@@ -7,6 +7,7 @@
 mod cli;
 mod compare;
 mod curves;
+mod dialect;
 mod drive;
 mod gcode;
 mod limit_share;

@@ -71,10 +71,12 @@ pub(super) enum MGroup {
     Modes,
     /// M98 M99.
     Subprogram,
+    /// M100 to M199: a program of the user's.
+    User,
 }
 
 const G_GROUPS: usize = GGroup::Retract as usize + 1;
-const M_GROUPS: usize = MGroup::Subprogram as usize + 1;
+const M_GROUPS: usize = MGroup::User as usize + 1;
 
 /// The group of a G word, by its number in tenths.
 fn g_group(tenths: i64) -> Option<GGroup> {
@@ -112,6 +114,7 @@ fn m_group(tenths: i64) -> Option<MGroup> {
         620 | 630 | 640 | 650 | 660 | 670 | 680 => MGroup::InputOutput,
         700 | 710 | 720 | 730 => MGroup::Modes,
         980 | 990 => MGroup::Subprogram,
+        1000..=1990 if tenths % 10 == 0 => MGroup::User,
         _ => return None,
     })
 }
@@ -126,7 +129,6 @@ fn unsupported_m(word: &Word<'_>) -> Located {
     let tenths = word.number.tenths();
     word.problem(|word| match tenths {
         Some(190) => Problem::NeedsEncoder { word },
-        Some(1000..=1990) => Problem::UserProgram { word },
         _ => Problem::UnsupportedM { word },
     })
 }
@@ -479,16 +481,14 @@ mod tests {
             (b"M2 M30", 3, "found M30 in a line with M2"),
             (b"X1 X2", 3, "a second X word, X2"),
             (b"G41 D1", 0, "found G41, expected one of G0"),
-            (b"G33 K1", 0, "needs a spindle encoder"),
-            (b"G84", 0, "needs a spindle encoder"),
             (b"M19", 0, "needs a spindle encoder"),
-            (b"G38.2", 0, "needs a probe"),
             (b"G90.2", 0, "found G90.2"),
             (b"G1.05", 0, "found G1.05"),
             (b"G-1", 0, "found G-1"),
             (b"M10", 0, "found M10"),
             (b"M0.5", 0, "found M0.5"),
-            (b"@5", 0, "found '@'"),
+            (b"@5 @6", 3, "a second @ word"),
+            (b"M100.5", 0, "found M100.5"),
             (b"G1 X1 A5", 6, "found A5, expected X, Y or Z"),
             (b"G1 N5", 3, "line number"),
             (b"N-5", 0, "line number"),

@@ -174,22 +174,19 @@ impl<'a> Flow<'a> {
                 let failure = |problem| at(Located::new(word.offset, problem));
                 self.call(&word.label, Some(arguments), 1, &failure)
             }
-            Keyword::EndSub | Keyword::Return => self.end_of_sub(&word).map_err(at),
+            Keyword::EndSub | Keyword::Return => {
+                file.structure()?;
+                self.end_of_sub(&word).map_err(at)
+            }
             _ => self.jump(file, &word, here),
         }
     }
 
     /// `endsub` and `return`, with the value they return.
     fn end_of_sub(&mut self, word: &OWord<'_>) -> Result<(), Located> {
-        let wrong = |expected| {
-            let problem = Problem::ReturnMismatch { found: "the end of a sub", expected };
-            Err(Located::new(word.offset, problem))
-        };
-        if self.calls.is_empty() {
-            return wrong("it in a sub that is called");
-        }
         if self.is_subprogram() {
-            return wrong("M99");
+            let problem = Problem::ReturnMismatch { found: "the end of a sub", expected: "M99" };
+            return Err(Located::new(word.offset, problem));
         }
         let mut rest = word.rest.clone();
         self.interpreter.returned = match rest.peek_text() {

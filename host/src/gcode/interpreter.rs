@@ -299,8 +299,11 @@ impl Interpreter {
     }
 }
 
-/// Refuses moves that need what no machine here has. In a subroutine that is never called they may stand.
+/// Refuses what needs what no machine here has. In a subroutine that is never called it may stand.
 fn refuse_unequipped(block: &Block<'_>) -> Result<(), Located> {
+    if let Some(code) = block.m(MGroup::User) {
+        return Err(code.word.problem(|word| Problem::UserProgram { word }));
+    }
     let Some(code) = block.g(GGroup::Motion) else { return Ok(()) };
     match code.tenths {
         330 | 331 | 740 | 760 | 840 => Err(code.word.problem(|word| Problem::NeedsEncoder { word })),
@@ -422,7 +425,7 @@ mod tests {
             ("G1\n X1", "2:2:", "found G1 without a feed"),
             ("F0 G1 X1", "1:4:", "found G1 without a feed"),
             ("F-5", "1:1:", "found F-5, expected a feed that is not negative"),
-            ("@5 ^10 X1", "1:8:", "found X1 in a line with @ or ^"),
+            ("G0 @5 ^10 X1", "1:11:", "found X1 in a line with @ or ^"),
             ("G0 @5", "1:4:", "found @5 at X0 Y0"),
             ("G0 X1\nG53 G0 @5 ^1", "2:8:", "found @5 with G53, expected X, Y and Z"),
             ("G92 @5 ^1", "1:5:", "found @5 in a line without a move in the XY plane"),
@@ -460,6 +463,10 @@ mod tests {
             ("G5 X1 I1 J1 P1 Q1", "1:1:", "found G5 without a feed"),
             ("F5 G5.5 X1 P1", "1:12:", "found P1 in a line without G2, G3, G4, G5, G10, G64"),
             ("G5.2 X1", "1:1:", "found G5.2"),
+            ("F9 G33 Z1 K1", "1:4:", "found G33, which needs a spindle encoder"),
+            ("G84 X1 Z1 R2", "1:1:", "found G84, which needs a spindle encoder"),
+            ("F9 G38.2 Z-1", "1:4:", "found G38.2, which needs a probe"),
+            ("M110 P1", "1:1:", "found M110, which runs a program of the user's"),
             ("G0 X1000000.1", "1:4:", "within ±1000000 mm"),
             ("G91 G0 X-999999\nX-2", "2:1:", "adds up beyond"),
         ] {

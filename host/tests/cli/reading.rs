@@ -84,3 +84,47 @@ fn what_is_no_program_is_refused() {
     assert!(workspace.refusal(&["read", "part.ngc", "--json"]).starts_with("part.ngc:2:1: "));
     assert!(workspace.refusal(&["read", "none.ngc"]).starts_with("none.ngc: found "));
 }
+
+#[test]
+fn subroutines_lie_in_files_of_their_own() {
+    let workspace = Workspace::new("read-subroutines");
+    workspace.put("part.ngc", "o<pocket> call [5]\no<other> call\nM2\n");
+    workspace.put("pocket.ngc", "o<pocket> sub\nG0 X#1\no<pocket> endsub\n");
+    std::fs::create_dir(workspace.0.join("more")).expect("a folder");
+    workspace.put("more/other.ngc", "o<other> sub\nG0 Y1\nG1 Y2\no<other> endsub\n");
+    assert!(
+        workspace.refusal(&["read", "part.ngc"]).starts_with("part.ngc:2:1: found a call of Oother"),
+        "the folder is not given"
+    );
+    let refusal = workspace.refusal(&["read", "part.ngc", "--subroutines", "more"]);
+    assert!(refusal.starts_with("more/other.ngc:3:1: found G1 without a feed"), "{refusal}");
+    workspace.put("more/other.ngc", "o<other> sub\nG0 Y1\no<other> endsub\n");
+    let steps = lines(&workspace.stdout(&["read", "part.ngc", "--json", "--subroutines", "more"]));
+    // The lines are those of the program.
+    assert_eq!((&steps[0]["line"], &steps[0]["to_mm"]), (&json!(1), &json!([5.0, 0.0, 0.0])));
+    assert_eq!((&steps[1]["line"], &steps[1]["to_mm"]), (&json!(2), &json!([5.0, 1.0, 0.0])));
+    workspace.put("pocket.ngc", "G0 X1\n");
+    let refusal = workspace.refusal(&["read", "part.ngc", "--subroutines", "more"]);
+    assert!(refusal.starts_with("part.ngc:1:1: found no Opocket in pocket.ngc"), "{refusal}");
+}
+
+#[test]
+fn parameters_are_kept_after_a_whole_run_only() {
+    let workspace = Workspace::new("run-parameters");
+    let before = "5220\t1\n5221\t4\n";
+    workspace.put("machine.var", before);
+    workspace.put("part.ngc", "G10 L2 P1 X7\nG0 X1\nM0\nX0\nM2\n");
+    let run = ["run", "part.ngc", "--parameters", "machine.var"];
+    let kept = || workspace.read("machine.var");
+    workspace.stdout(&["plan", "part.ngc", "--parameters", "machine.var"]);
+    assert_eq!(kept(), before, "plan keeps nothing");
+    workspace.stdout(&run);
+    assert!(kept().contains("\n5221\t7.0\n"), "{}", kept());
+    assert_eq!(kept().lines().filter(|line| line.starts_with("5220\t")).collect::<Vec<_>>(), ["5220\t1.0"]);
+    workspace.put("machine.var", "5221\tx\n");
+    assert!(workspace.refusal(&run).starts_with("machine.var:1:1: found x, expected"));
+    workspace.put("tool.tbl", "T1 Z5\n");
+    workspace.put("tools.ngc", "T1 M6 G43\nG0 Z1\nM2\n");
+    let steps = lines(&workspace.stdout(&["read", "tools.ngc", "--json", "--tools", "tool.tbl"]));
+    assert_eq!((&steps[0]["tool"], &steps[1]["to_mm"]), (&json!(1), &json!([0.0, 0.0, 6.0])));
+}

@@ -75,8 +75,7 @@ def told(name):
 
 
 for name in (
-    "straight_traverse straight_feed straight_probe rigid_tap arc_feed dwell set_feed_rate set_feed_mode "
-    "set_plane "
+    "straight_traverse straight_feed straight_probe rigid_tap arc_feed dwell set_feed_rate set_plane "
     "set_g5x_offset set_g92_offset set_xy_rotation tool_offset"
 ).split():
     setattr(Canon, name, told(name))

@@ -174,9 +174,6 @@ class Merging:
     def set_feed_rate(self, call):
         self.feed_mm = call[2] * INCH_MM
 
-    def set_feed_mode(self, call):
-        self.per_revolution = call[-1] == 1
-
     def set_plane(self, call):
         self.plane = PLANES[call[2]]
 
@@ -246,6 +243,8 @@ class Merging:
             self.path = (float(tolerance[0]) * self.unit_mm, 0.0) if mode == "CANON_CONTINUOUS" else ()
         elif name == "SET_NAIVECAM_TOLERANCE" and self.path:
             self.path = (self.path[0], float(arguments) * self.unit_mm)
+        elif name == "SET_FEED_MODE":
+            self.per_revolution = arguments.split(",")[1].strip() == "1"
         elif name in KINDS:
             if name == "SET_SPINDLE_SPEED":
                 self.speed_rev_min = float(arguments.split(",")[1])

@@ -202,7 +202,7 @@ BLEND = {"path": "blend", "tolerance_mm": 0.05, "merging_mm": None}
 OBJECTS = [
     {"line": 2, "kind": "line", "from_mm": [0, 0, 0], "to_mm": [10, 0, 0], "feed_mm_min": 600.0, **BLEND},
     {"line": 3, "kind": "arc", "from_mm": [10, 0, 0], "to_mm": [20, 0, 0], "feed_mm_min": 600.0, **BLEND,
-     "plane": "XY", "centre_mm": [15, 0], "sweep_rad": -math.pi},
+     "plane": "XY", "turn_deg": 0.0, "centre_mm": [15, 0], "sweep_rad": -math.pi},
     {"line": 4, "kind": "stop"},
     {"line": 5, "kind": "dwell", "dwell_s": 0.5},
     {"line": 6, "kind": "line", "from_mm": [20, 0, 0], "to_mm": [0, 0, 0], "feed_mm_min": None, **BLEND},

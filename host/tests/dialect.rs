@@ -1,0 +1,419 @@
+//! Programs as other controllers take them: subroutines, loops, offsets, tools, drilling cycles, saved modes. What is
+//! expected here was seen to be what LinuxCNC's interpreter makes of the same lines (`tests/peers/linuxcnc`).
+
+use motion_host::gcode::{self, Feed, Length, ParameterFile, Program, ReadOptions, StepKind, ToolTable};
+
+fn read(text: &str) -> Program {
+    gcode::read("a.ngc", text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A step in a word or two: `r` a rapid and `l` a line to their end points, `a` an arc.
+fn shown(kind: &StepKind) -> String {
+    let point = |at: [Length; 3]| {
+        // −0 is 0.
+        let [x, y, z] = at.map(|length| (length.to_mm() * 1e6).round() / 1e6 + 0.0);
+        format!("{x} {y} {z}")
+    };
+    match kind {
+        StepKind::Line(line) if line.feed == Feed::Rapid => format!("r {}", point(line.to)),
+        StepKind::Line(line) => format!("l {}", point(line.to)),
+        StepKind::Arc(arc) => format!("a {}", point(arc.to)),
+        StepKind::Dwell { seconds } => format!("dwell {seconds}"),
+        StepKind::ToolChange { tool } => format!("T{tool}"),
+        StepKind::Stop => "stop".to_owned(),
+        StepKind::End => "end".to_owned(),
+        other => format!("{other:?}"),
+    }
+}
+
+fn steps(text: &str) -> Vec<String> {
+    read(text).steps.iter().map(|step| shown(&step.kind)).collect()
+}
+
+/// The end point of the last move.
+fn last(text: &str) -> String {
+    steps(text).pop().expect("a step")
+}
+
+fn refusal(text: &str) -> String {
+    refusal_with(text, &ReadOptions::default())
+}
+
+fn refusal_with(text: &str, options: &ReadOptions) -> String {
+    gcode::read_with("a.ngc", text.as_bytes(), options).expect_err(text).to_string()
+}
+
+fn feeds(text: &str) -> Vec<f64> {
+    let feed = |kind: &StepKind| match kind {
+        StepKind::Line(line) => Some(line.feed),
+        StepKind::Arc(arc) => Some(arc.feed),
+        _ => None,
+    };
+    let mm_min = |feed| match feed {
+        Feed::Rapid => 0.0,
+        Feed::MmPerMin(feed) => feed,
+    };
+    read(text).steps.iter().filter_map(|step| feed(&step.kind)).map(mm_min).collect()
+}
+
+#[test]
+fn subroutines_take_arguments_and_return_values() {
+    let factorial = "
+o200 sub
+  o210 if [#1 LE 1]
+    o210 return [1]
+  o210 endif
+  #2 = #1
+  o200 call [#1-1]
+o200 endsub [#<_value>*#2]
+#1 = 77
+o200 call [6]
+G0 X#<_value> Y#1 Z#<_value_returned>";
+    assert_eq!(last(factorial), "r 720 77 1");
+    let names = "
+#<a b> = 5 #<_Global> = 6 #31 = 7
+o<names> sub
+  o500 if [EXISTS[#<ab>]]
+    G0 X999
+  o500 endif
+  #<ab> = 1
+  G0 X[#<ab>+#<_global>] Y#31
+o<names> endsub
+o<names> call
+X#<ab> Y#<_value_returned>";
+    assert_eq!(steps(names), ["r 7 7 0", "r 5 0 0"]);
+    // A subroutine may stand behind the end.
+    assert_eq!(steps("o<later> call\nM2\no<later> sub\nG0 X1\no<later> endsub"), ["r 1 0 0", "end"]);
+}
+
+#[test]
+fn loops_and_conditions_run_as_often_as_they_say() {
+    let text = "
+o100 while [#5 LT 9]
+  #5 = [#5+1]
+  o110 if [#5 EQ 3]
+    o100 continue
+  o110 elseif [#5 EQ 5]
+    o100 break
+  o110 else
+    G0 X#5
+  o110 endif
+o100 endwhile
+o300 do
+  #7 = [#7+1]
+  o310 if [#7 EQ 2]
+    o300 continue
+  o310 endif
+  Y#7
+o300 while [#7 LT 3]
+o400 repeat [2]
+  o410 repeat [2]
+    #8 = [#8+1]
+    Z#8
+  o410 endrepeat
+o400 endrepeat
+o500 repeat [0]
+  X99
+o500 endrepeat
+o600 if [0]
+  X99
+o600 elseif [1]
+  o610 if [1]
+    X50
+  o610 endif
+o600 elseif [#<never_set>]
+  X98
+o600 endif";
+    let expected = [
+        "r 1 0 0", "r 2 0 0", "r 4 0 0", "r 4 1 0", "r 4 3 0", "r 4 3 1", "r 4 3 2", "r 4 3 3", "r 4 3 4",
+        "r 50 3 4",
+    ];
+    assert_eq!(steps(text), expected);
+    // A return and a break leave the loops they are in.
+    let nested = "
+o1 sub
+  o10 repeat [5]
+    o20 while [1]
+      #31 = [#31+1]
+      o30 if [#31 EQ 3]
+        o20 break
+      o30 endif
+      o40 if [#31 EQ 6]
+        o40 return
+      o40 endif
+    o20 endwhile
+    G0 Y#31
+  o10 endrepeat
+o1 endsub
+o50 repeat [2]
+  X[#31+1]
+  o1 call
+  #31 = 0
+o50 endrepeat";
+    assert_eq!(steps(&format!("G0\n{nested}")), ["r 1 0 0", "r 1 3 0"]);
+}
+
+#[test]
+fn subprograms_of_m98_work_on_their_callers_parameters() {
+    let text = "G0 X1\n#1=5\nM98 P100 L3\nY#1\nM30\nO100\n#1=[#1+1]\nX#1\nM99\n";
+    assert_eq!(steps(text), ["r 1 0 0", "r 6 0 0", "r 7 0 0", "r 8 0 0", "r 8 8 0", "end"]);
+    assert_eq!(steps("G0 X1\nM98 P5 L0\nM99\nX2"), ["r 1 0 0", "end"]);
+    for (text, message) in [
+        ("M98", "a.ngc:1:1: found M98 without a number"),
+        ("M98 P7", "a.ngc:1:1: found a call of O7"),
+        ("M98 P7 X1", "a.ngc:1:8: found X1 in a line of M98"),
+        ("M98 P7\nM2\nO7\nG0 X1", "a.ngc:4:1: found the end of the file in a subprogram, expected M99"),
+        ("o1 sub\nM99\no1 endsub\no1 call", "a.ngc:2:1: found M99 in a subroutine that was called otherwise"),
+    ] {
+        let error = refusal(text);
+        assert!(error.starts_with(message), "{text}: {error}");
+    }
+}
+
+#[test]
+fn o_words_that_join_nothing_are_refused_at_their_place() {
+    for (text, message) in [
+        ("o1 while [1]\nM2", "a.ngc:1:1: found O1 in a file that ends before its block"),
+        ("o1 endwhile", "a.ngc:1:1: found O1 where no such block is open last"),
+        ("o1 if [1]\n o2 while [1]\n o1 endif", "a.ngc:3:2: found O1 where no such block is open last"),
+        ("o1 break", "a.ngc:1:1: found O1 where no such block is open last"),
+        ("o1 return", "a.ngc:1:1: found a return outside of subroutines"),
+        (
+            "o1 if [1]\no1 else if [1]\no1 endif",
+            "a.ngc:2:9: found 'i', expected a comment or the end of the line",
+        ),
+        ("o1 if [1] G0 X1\no1 endif", "a.ngc:1:11: found 'G', expected a comment or the end of the line"),
+        ("o1 call", "a.ngc:1:1: found a call of O1, expected a subroutine of this file"),
+        ("o<../a> call", "a.ngc:1:1: found a call of O../a"),
+        (
+            "o1 sub\no1 endsub\no1 sub\no1 endsub\no1 call",
+            "a.ngc:3:1: found O1 sub in a block or a second time",
+        ),
+        (
+            "o1 sub\no1 call\no1 endsub\no1 call",
+            "a.ngc:2:1: found subroutines within each other, expected 100",
+        ),
+        ("o[1+1] sub\no2 endsub", "a.ngc:1:1: found a computed label, expected it with call only"),
+        ("o<x", "a.ngc:1:2: found '<' without a name"),
+        ("G0 X[#<depth>]", "a.ngc:1:6: found #<depth>, to which nothing was assigned"),
+        ("G0 X#5602", "a.ngc:1:5: found parameter 5602"),
+        ("#5420 = 1", "a.ngc:1:1: found #5420 where a value is assigned"),
+        ("#<_x> = 1", "a.ngc:1:1: found #<_x> where a value is assigned"),
+        ("G0 X[1/0]", "a.ngc:1:7: found a division by 0"),
+    ] {
+        let error = refusal(text);
+        assert!(error.starts_with(message), "{text}: {error}");
+    }
+    let options = ReadOptions { lines_max: 1000, ..ReadOptions::default() };
+    let error = refusal_with("o1 while [1]\nG0 X1\no1 endwhile", &options);
+    assert!(error.starts_with("a.ngc:2:1: found more than 1000 lines executed up to here"), "{error}");
+}
+
+#[test]
+fn coordinate_systems_shift_and_turn() {
+    for (text, end) in [
+        ("G10 L2 P1 X10 Y20 Z30\nG0 X1 Y1 Z1", "r 11 21 31"),
+        ("G10 L2 P2 X-5 Y4 R90\nG55 G0 X3 Y1", "r -6 7 0"),
+        ("G10 L2 P2 X1 R30\nG55 G0 X2 Y0", "r 2.732051 1 0"),
+        ("G0 X5 Y5\nG92 X0 Y1\nX1 Y1", "r 6 5 0"),
+        ("G0 X5\nG92 X0\nG92.2\nX1", "r 1 0 0"),
+        ("G0 X5\nG92 X0\nG92.2\nG92.3\nX1", "r 6 0 0"),
+        ("G0 X5\nG92 X0\nG92.1\nG92.3\nX1", "r 1 0 0"),
+        ("G52 X1 Y2\nG0 X0 Y0 Z1", "r 1 2 1"),
+        ("G10 L2 P1 X10\nG0 X1\nG53 X1", "r 1 0 0"),
+        ("G0 X7\nG10 L20 P1 X2\nX0", "r 5 0 0"),
+        ("G0 X7 Y1\nG28.1\nX0 Y0\nG28", "r 7 1 0"),
+        ("G0 X7 Y1\nG30.1\nX0 Y0\nG30 X1", "r 7 0 0"),
+        ("G59.3 G10 L2 P9 X1 R90\nG0 X2 Y0", "r 1 2 0"),
+        ("G20 G10 L2 P1 X1\nG21 G0 X1", "r 26.4 0 0"),
+        ("G91 G0 X1\nG10 L2 P1 X10\nX1", "r 2 0 0"),
+        ("G7 G0 X30", "r 15 0 0"),
+        ("G7\nG8 G0 X30", "r 30 0 0"),
+        ("G0 @10 ^90", "r 0 10 0"),
+        ("G0 X3 Y4\n@10", "r 6 8 0"),
+        ("G0 X3 Y0\n^180", "r -3 0 0"),
+        ("G0 X3\nG91 @1 ^90", "r 0 4 0"),
+    ] {
+        assert_eq!(last(text), end, "{text}");
+    }
+    assert_eq!(steps("G0 X7 Y1 Z2\nG28 Z5"), ["r 7 1 2", "r 7 1 5", "r 7 1 0"]);
+    for (text, message) in [
+        ("G10 L2 P10", "a.ngc:1:8: found P10, expected a coordinate system from 0 to 9"),
+        ("G10 P1", "a.ngc:1:1: found G10, expected L1, L2, L10, L11 or L20"),
+        ("G53 X1", "a.ngc:1:5: found X1 without a motion mode"),
+        ("G91 G53 G0 X1", "a.ngc:1:12: found X1 with G53, expected absolute end points"),
+        ("G92", "a.ngc:1:1: found G92, expected axis words"),
+        ("G92 G1 X1", "a.ngc:1:5: found G1 in a line whose axis words another word takes"),
+    ] {
+        let error = refusal(text);
+        assert!(error.starts_with(message), "{text}: {error}");
+    }
+}
+
+#[test]
+fn an_arc_turns_with_its_coordinate_system() {
+    let arc = |text: &str| match read(text).steps.last().expect("a step").kind {
+        StepKind::Arc(arc) => arc,
+        ref other => panic!("{other:?}"),
+    };
+    // The quarter from (1, 0, 0) over Z in the plane that a turn by 90° makes of ZX.
+    let turned = arc("G10 L2 P1 R90\nG0 X1\nF60 G18 G3 X0 Z1 I-1");
+    assert_eq!((turned.turn_deg, turned.centre_mm), (90.0, [0.0, 0.0]));
+    assert_eq!(shown(&StepKind::Arc(turned)), "a 0 0 1");
+    let mm = |point: [Length; 3]| point.map(Length::to_mm);
+    assert_eq!(mm(turned.from), [0.0, 1.0, 0.0]);
+    let flat = arc("G10 L2 P1 X5 R90\nG0 X1 Y0\nF60 G3 X0 Y1 I-1");
+    assert_eq!((flat.turn_deg, flat.centre_mm), (0.0, [5.0, 0.0]));
+    // Absolute centres, by which the same arc is written.
+    let absolute = arc("G10 L2 P1 X5 R90\nG0 X1 Y0\nF60 G90.1 G3 X0 Y1 I0 J0");
+    assert_eq!((absolute.centre_mm, absolute.to), (flat.centre_mm, flat.to));
+}
+
+#[test]
+fn tools_are_changed_by_hand_and_their_lengths_added() {
+    let table = ToolTable::parse("tool.tbl", b"T1 Z10 D6 ; end mill\nT2 X1 Z-5\n").expect("a table");
+    let options = ReadOptions { tools: Some(table), ..ReadOptions::default() };
+    let read = |text: &str| {
+        gcode::read_with("a.ngc", text.as_bytes(), &options).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let program =
+        read("T1 M6 G43\nG0 Z1\nT2\nG43 H2 Z1\nM6\nM6\nG49 X0 Z1\nG43.1 Z3\nZ1\nT0 M6\nM61 Q2\nX#5400");
+    let steps: Vec<_> = program.steps.iter().map(|step| shown(&step.kind)).collect();
+    assert_eq!(steps, ["T1", "r 0 0 11", "r 0 0 -4", "T2", "r 0 0 1", "r 0 0 4", "T0", "r 2 0 4"]);
+    let messages: Vec<_> = program.messages.iter().map(|message| message.text.as_str()).collect();
+    assert_eq!(messages, ["tool 1: end mill", "tool 2", "take the tool out"]);
+    assert!(
+        refusal_with("T3", &options)
+            .starts_with("a.ngc:1:1: found tool 3, expected a tool of the tool table")
+    );
+    assert!(refusal_with("G43 H9", &options).starts_with("a.ngc:1:5: found tool 9"));
+    // Tables are set by the program, too.
+    let set = read("G10 L1 P1 Z20\nG43 H1 G0 Z0\nG49\nG10 L10 P2 Z-3\nG43 H2 Z1");
+    let ends: Vec<_> = set.steps.iter().map(|step| shown(&step.kind)).collect();
+    assert_eq!(ends, ["r 0 0 20", "r 0 0 24"]);
+    // Without a table every tool is assumed to have no length.
+    let assumed = gcode::read("a.ngc", b"T7 M6\nG43 H3 G0 Z1").expect("a program");
+    assert_eq!(assumed.tools_assumed, [7, 3]);
+    assert!(assumed.notes().iter().any(|note| note.contains("there is no tool table: tools 7, 3")));
+}
+
+#[test]
+fn drilling_cycles_are_rapids_and_feeds() {
+    // Above R first; back to where the first hole began, or after G99 to R.
+    let plain = "F9 G0 Z10\nG81 X5 Y6 Z-3 R2\nG99 X7\nG80\nX8";
+    let error = refusal(plain);
+    assert!(error.starts_with("a.ngc:5:1: found X8 without a motion mode"), "{error}");
+    let expected = [
+        "r 0 0 10", "r 5 6 10", "r 5 6 2", "l 5 6 -3", "r 5 6 10", "r 7 6 10", "r 7 6 2", "l 7 6 -3",
+        "r 7 6 2",
+    ];
+    assert_eq!(steps(plain.trim_end_matches("\nG80\nX8")), expected);
+    let incremental = "F9 G0 Z4\nG91 G81 X1 Y2 Z-3 R-2 L2";
+    let expected =
+        ["r 0 0 4", "r 1 2 4", "r 1 2 2", "l 1 2 -1", "r 1 2 4", "r 2 4 4", "r 2 4 2", "l 2 4 -1", "r 2 4 4"];
+    assert_eq!(steps(incremental), expected);
+    let peck = "F9 G0 Z5\nG99 G83 X1 Z-3 R1 Q2";
+    let expected =
+        ["r 0 0 5", "r 1 0 5", "r 1 0 1", "l 1 0 -1", "r 1 0 1", "r 1 0 -0.746", "l 1 0 -3", "r 1 0 1"];
+    assert_eq!(steps(peck), expected);
+    let chips = "F9 G0 Z5\nG99 G73 X1 Z-3 R1 Q2";
+    assert_eq!(steps(chips)[3..], ["l 1 0 -1", "r 1 0 -0.746", "l 1 0 -3", "r 1 0 1"]);
+    assert_eq!(steps("F9 G0 Z1\nG82 Z-1 R1 P0.5")[1..], ["l 0 0 -1", "dwell 0.5", "r 0 0 1"]);
+    assert_eq!(steps("F9 G0 Z1\nG85 Z-1 R1")[1..], ["l 0 0 -1", "l 0 0 1"]);
+    assert_eq!(steps("F9 M3 G0 Z1\nG86 Z-1 R1 P0")[1..], ["l 0 0 -1", "dwell 0", "r 0 0 1"]);
+    assert_eq!(steps("F9 M3 G0 Z1\nG88 Z-1 R1 P0")[1..], ["l 0 0 -1", "dwell 0", "stop", "r 0 0 1"]);
+    assert_eq!(steps("F9 G0 Z1\nG89 Z-1 R1 P0")[1..], ["l 0 0 -1", "dwell 0", "l 0 0 1"]);
+    // Below R it goes up to it first; in another plane along that one's normal.
+    assert_eq!(steps("F9 G18 G81 X1 Z1 Y-1 R2"), ["r 0 2 0", "r 1 2 1", "l 1 -1 1", "r 1 2 1"]);
+    for (text, message) in [
+        ("F9 G81 X1 Z-1", "a.ngc:1:8: found G81, expected an R word"),
+        ("F9 G81 X1 R1", "a.ngc:1:8: found G81, expected a depth along the normal"),
+        ("F9 G83 X1 Z-1 R1", "a.ngc:1:8: found G83, expected the depth of a peck"),
+        ("F9 G82 X1 Z-1 R1", "a.ngc:1:8: found G82, expected a dwell"),
+        ("F9 G81 X1 Z2 R1", "a.ngc:1:8: found G81, expected a depth below R"),
+        ("F9 G81 X1 Z-1 R1 L0", "a.ngc:1:18: found L0, expected a whole number of holes"),
+        ("F9 G83 X1 Z-1 R1 Q0", "a.ngc:1:18: found Q0, expected a positive depth of a peck"),
+        ("F9 G86 X1 Z-1 R1 P1", "a.ngc:1:8: found G86, expected a turning spindle"),
+        ("G81 X1 Z-1 R1", "a.ngc:1:1: found G81 without a feed"),
+        ("F9 G81 X1 Z-1 R1 Q1", "a.ngc:1:18: found Q1 in a line without"),
+    ] {
+        let error = refusal(text);
+        assert!(error.starts_with(message), "{text}: {error}");
+    }
+}
+
+#[test]
+fn feeds_have_three_meanings() {
+    // 10 mm in 1/4 min, a half circle of 5 mm in 1 min.
+    let inverse = feeds("G93 G1 X10 F4\nG2 X20 I5 F1\nG0 X30");
+    assert_eq!(inverse[0], 40.0);
+    assert!((inverse[1] - 5.0 * std::f64::consts::PI).abs() < 1e-12);
+    assert_eq!(inverse[2], 0.0);
+    assert_eq!(feeds("G95 S1200 F0.2\nG1 X1\nS600 X2\nG94 F7 X3"), [240.0, 120.0, 7.0]);
+    for (text, message) in [
+        ("G93 G1 X1", "a.ngc:1:5: found G1 without F after G93"),
+        ("G93 G1 X1 F1\nX2", "a.ngc:2:1: found G1 without F after G93"),
+        ("G95 F1 G1 X1", "a.ngc:1:8: found G1 after G95 without a spindle's speed"),
+        ("F9\nG95 S5 G1 X1", "a.ngc:2:8: found G1 without a feed"),
+        ("G93 G81 X1 Z-1 R1 F1", "a.ngc:1:9: found G81, expected a feed per minute or revolution"),
+    ] {
+        let error = refusal(text);
+        assert!(error.starts_with(message), "{text}: {error}");
+    }
+}
+
+#[test]
+fn modes_are_saved_and_restored() {
+    let text = "G21 G90 F120 G1 X1
+o<saves> sub
+  M73 G20 G91
+  G1 X1
+o<saves> endsub
+o<saves> call
+X1 Y#<_feed>
+M70
+G91 G20 X1
+M72
+X5 Z#<_absolute>";
+    assert_eq!(steps(text), ["l 1 0 0", "l 26.4 0 0", "l 1 120 0", "l 26.4 120 0", "l 5 120 1"]);
+    assert!(refusal("M72").starts_with("a.ngc:1:1: found M72, but no modes that were saved"));
+}
+
+#[test]
+fn switches_and_messages_are_the_operators() {
+    let text = "/G0 X1\nG0 X2\nM1\n(MSG, turn the part)\n(DEBUG, at #5420)\nM2";
+    let options =
+        |block_delete, optional_stop| ReadOptions { block_delete, optional_stop, ..ReadOptions::default() };
+    for (options, expected) in [
+        (options(true, true), &["r 2 0 0", "stop", "end"][..]),
+        (options(false, false), &["r 1 0 0", "r 2 0 0", "end"]),
+    ] {
+        let program = gcode::read_with("a.ngc", text.as_bytes(), &options).expect("a program");
+        let steps: Vec<_> = program.steps.iter().map(|step| shown(&step.kind)).collect();
+        assert_eq!(steps, expected);
+        let texts: Vec<_> = program.messages.iter().map(|message| message.text.as_str()).collect();
+        assert_eq!(texts, ["turn the part", "at 2.000000"]);
+    }
+    assert!(refusal("(ABORT, no stock)").contains("no stock"));
+}
+
+#[test]
+fn a_parameter_file_goes_in_and_out() {
+    let file = ParameterFile::parse("machine.var", b"5220 2\n5241 7\n5161 3\n100 5\n").expect("a file");
+    let options = ReadOptions { parameters: file.clone(), ..ReadOptions::default() };
+    let program = gcode::read_with("a.ngc", b"G0 X#100\nG28\n#100=6\n#101=7\nG10 L2 P1 Y9\nM2", &options);
+    let program = program.expect("a program");
+    let steps: Vec<_> = program.steps.iter().map(|step| shown(&step.kind)).collect();
+    // G55 puts X0 at 7, the machine's zero is X-7 before the first move; G28 goes to the machine's X3.
+    assert_eq!(steps, ["r 12 0 0", "r 3 0 0", "end"]);
+    let after = file.after(&program.parameters).to_string();
+    let value = |number: &str| {
+        let line = after.lines().find(|line| line.split('\t').next() == Some(number));
+        line.and_then(|line| line.split('\t').nth(1)).map(str::to_owned)
+    };
+    let found = ["100", "101", "5222", "5241", "5220"].map(value);
+    assert_eq!(
+        found.each_ref().map(Option::as_deref),
+        [Some("6.0"), None, Some("9.0"), Some("7.0"), Some("1.0")]
+    );
+}
