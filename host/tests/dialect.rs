@@ -2,6 +2,8 @@
 //! expected here was seen to be what LinuxCNC's interpreter makes of the same lines (`tests/peers/linuxcnc`).
 
 use motion_host::gcode::{self, Feed, Length, ParameterFile, Program, ReadOptions, StepKind, ToolTable};
+use motion_host::machine::Machine;
+use motion_host::planning::{Mode, plan_program};
 
 fn read(text: &str) -> Program {
     gcode::read("a.ngc", text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
@@ -416,4 +418,25 @@ fn a_parameter_file_goes_in_and_out() {
         found.each_ref().map(Option::as_deref),
         [Some("6.0"), None, Some("9.0"), Some("7.0"), Some("1.0")]
     );
+}
+
+#[test]
+fn programs_as_posts_write_them_are_planned_as_they_are() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/programs/posts");
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("a file").path()).collect();
+    names.sort();
+    assert_eq!(names.len(), 9);
+    for path in names {
+        let name = path.display().to_string();
+        let program = read(&std::fs::read_to_string(&path).expect("a text"));
+        assert_eq!(program.steps.last().map(|step| &step.kind), Some(&StepKind::End), "{name}");
+        let plan = plan_program(&name, &program, &Machine::reference(), Mode::Spanning);
+        let plan = plan.unwrap_or_else(|error| panic!("{error}"));
+        assert!(plan.blocks.len() >= 9, "{name}: {} blocks", plan.blocks.len());
+    }
+    // What repeats in a subprogram: three slots, 8 mm apart.
+    let slots = steps(include_str!("../../tests/programs/posts/solidcam.ngc"));
+    let starts: Vec<_> = slots.iter().filter(|step| step.starts_with("l") && step.ends_with(" -1")).collect();
+    assert_eq!(starts, ["l 10 10 -1", "l 30 10 -1", "l 10 18 -1", "l 30 18 -1", "l 10 26 -1", "l 30 26 -1"]);
 }

@@ -12,6 +12,21 @@ use super::number::Number;
 
 /// Letters that take a number of their own.
 const LETTERS: &[u8; 19] = b"DEFHIJKLNPQRSTXYZ@^";
+/// The slot of every letter by its byte; beyond the last for letters without a slot.
+const SLOTS: [u8; 128] = {
+    let mut slots = [u8::MAX; 128];
+    let mut slot = 0;
+    while slot < LETTERS.len() {
+        slots[LETTERS[slot] as usize] = slot as u8;
+        slot += 1;
+    }
+    slots
+};
+
+/// The slot of a letter.
+fn slot_of(letter: u8) -> Option<usize> {
+    SLOTS.get(usize::from(letter)).map(|&slot| usize::from(slot))
+}
 
 /// Modal groups of G words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -248,7 +263,7 @@ impl<'a> Block<'a> {
     }
 
     fn put_letter(&mut self, word: Word<'a>) -> Result<(), Located> {
-        let slot = LETTERS.iter().position(|&letter| letter == word.letter);
+        let slot = slot_of(word.letter);
         let Some(slot) = slot.and_then(|index| self.letters.get_mut(index)) else {
             return Err(word.problem(|word| Problem::UnsupportedLetter { word }));
         };
@@ -268,6 +283,12 @@ impl<'a> Block<'a> {
             _ => None,
         };
         clash.map_or(Ok(()), |other| Err(same_group(code, other)))
+    }
+
+    /// Whether nothing in the line takes its D. Posts for Fanuc name the tool's radius beside its length, where its use
+    /// may begin much later.
+    pub(super) fn has_idle_d(&self) -> bool {
+        self.letter(b'D').is_some() && self.takers(b'D') == 0
     }
 
     /// Whether the line sets G64.
@@ -320,10 +341,9 @@ impl<'a> Block<'a> {
     /// A word nothing in the line takes would be silently dropped, and a word that two others take would do
     /// two things. `motion` is the mode in force.
     pub(super) fn refuse_unused(&self, motion: Option<Motion>) -> Result<(), Located> {
-        const CHECKED: [(u8, &str); 12] = [
+        const CHECKED: [(u8, &str); 11] = [
             (b'@', "a move in the XY plane"),
             (b'^', "a move in the XY plane"),
-            (b'D', "G96"),
             (b'E', "M66, M67 or M68"),
             (b'H', "G43 or G43.2"),
             (b'I', "G2, G3, G5 or G10"),
@@ -371,8 +391,7 @@ impl<'a> Block<'a> {
 
     /// The word with a letter of its own.
     pub(super) fn letter(&self, letter: u8) -> Option<Word<'a>> {
-        let index = LETTERS.iter().position(|&candidate| candidate == letter)?;
-        self.letters.get(index).copied().flatten()
+        self.letters.get(slot_of(letter)?).copied().flatten()
     }
 
     /// Whether there are words of axes, polar ones too.

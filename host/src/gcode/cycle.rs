@@ -277,7 +277,7 @@ impl Interpreter {
     pub(super) fn straight(&mut self, to: [i64; 3], feed: Feed, first: Word<'_>) -> Result<(), Located> {
         let beyond = || first.problem(|word| Problem::PositionOutOfRange { word });
         let work = super::frame::lengths(to).ok_or_else(beyond)?;
-        let (from, to) = (self.machine, self.frame.to_machine(work).ok_or_else(beyond)?);
+        let (from, to) = (self.machine, self.frame.machine(work).ok_or_else(beyond)?);
         (self.work, self.machine) = (work, to);
         if from == to {
             return Ok(());

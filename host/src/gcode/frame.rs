@@ -20,14 +20,14 @@ pub(super) struct Frame {
 
 impl Frame {
     /// Machine coordinates; `None` beyond the range.
-    pub(super) fn to_machine(&self, work: [Length; 3]) -> Option<[Length; 3]> {
+    pub(super) fn machine(&self, work: [Length; 3]) -> Option<[Length; 3]> {
         let shifted = [0, 1, 2].map(|axis| work[axis].units() + self.shift[axis].units());
         let turned = self.turned(shifted);
         lengths([0, 1, 2].map(|axis| turned[axis] + self.origin[axis].units() + self.tool[axis].units()))
     }
 
     /// Work coordinates; `None` beyond the range.
-    pub(super) fn to_work(&self, machine: [Length; 3]) -> Option<[Length; 3]> {
+    pub(super) fn work(&self, machine: [Length; 3]) -> Option<[Length; 3]> {
         let offsets = |axis: usize| self.origin[axis].units() + self.tool[axis].units();
         let moved = [0, 1, 2].map(|axis| machine[axis].units() - offsets(axis));
         let turned = turn(moved, -self.rotation_deg);
@@ -93,16 +93,16 @@ mod tests {
             shift: at([1.0, 2.0, 0.5]),
             tool: at([0.0, 0.0, 50.0]),
         };
-        assert_eq!(frame.to_machine(at([1.0, 1.0, 1.0])), Some(at([102.0, 23.0, 54.5])));
+        assert_eq!(frame.machine(at([1.0, 1.0, 1.0])), Some(at([102.0, 23.0, 54.5])));
         for quarter in [90.0, 180.0, 270.0, -90.0, -180.0, -270.0, 360.0, 450.0] {
             frame.rotation_deg = quarter;
             let point = at([0.1, -7.3, 2.0]);
-            assert_eq!(frame.to_work(frame.to_machine(point).unwrap()), Some(point), "{quarter}");
+            assert_eq!(frame.work(frame.machine(point).unwrap()), Some(point), "{quarter}");
         }
         frame.rotation_deg = 90.0;
-        assert_eq!(frame.to_machine(at([1.0, 1.0, 1.0])), Some(at([97.0, 22.0, 54.5])));
+        assert_eq!(frame.machine(at([1.0, 1.0, 1.0])), Some(at([97.0, 22.0, 54.5])));
         frame.rotation_deg = 30.0;
-        let back = frame.to_work(frame.to_machine(at([3.0, 4.0, 5.0])).unwrap()).unwrap();
+        let back = frame.work(frame.machine(at([3.0, 4.0, 5.0])).unwrap()).unwrap();
         for (found, expected) in back.iter().zip(at([3.0, 4.0, 5.0])) {
             assert!((found.units() - expected.units()).abs() <= 2);
         }
@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn beyond_the_range_is_nowhere() {
         let frame = Frame { origin: at([1e6, 0.0, 0.0]), ..Frame::default() };
-        assert_eq!(frame.to_machine(at([1.0, 0.0, 0.0])), None);
-        assert_eq!(frame.to_work(at([-1.0, 0.0, 0.0])), None);
+        assert_eq!(frame.machine(at([1.0, 0.0, 0.0])), None);
+        assert_eq!(frame.work(at([-1.0, 0.0, 0.0])), None);
     }
 }

@@ -135,6 +135,9 @@ impl Interpreter {
         self.modal.set(&block)?;
         self.note_rounding(&block);
         block.refuse_unused(self.modal.motion)?;
+        if block.has_idle_d() {
+            self.notice(NoticeKind::IdleD);
+        }
         if self.modal.motion != Some(Motion::Cubic) {
             self.cubic_before_mm = None;
         }

@@ -56,7 +56,7 @@ impl Interpreter {
         let work = self.end_point(block)?;
         let to = self
             .frame
-            .to_machine(work)
+            .machine(work)
             .ok_or_else(|| first.problem(|word| Problem::PositionOutOfRange { word }))?;
         if motion == Motion::Cubic {
             let controls_mm = spline::controls_mm(block, &self.modal, self.cubic_before_mm, offset)?;

@@ -38,7 +38,7 @@ impl Interpreter {
         if let Ok(frame) = self.frame_in(self.system(), 0) {
             self.frame = frame;
         }
-        self.work = self.frame.to_work(self.machine).unwrap_or_default();
+        self.work = self.frame.work(self.machine).unwrap_or_default();
     }
 
     /// The coordinate system in force, 1 to 9.
@@ -78,7 +78,7 @@ impl Interpreter {
 
     /// Offsets changed; the machine is where it was.
     pub(super) fn update_work(&mut self, offset: usize) -> Result<(), Located> {
-        self.work = self.frame.to_work(self.machine).ok_or(Located::new(offset, Problem::WorkOutOfRange))?;
+        self.work = self.frame.work(self.machine).ok_or(Located::new(offset, Problem::WorkOutOfRange))?;
         Ok(())
     }
 
@@ -139,7 +139,7 @@ impl Interpreter {
     /// G28 and G30: by way of the end point of the line, to the place; along the axes given, or all.
     fn go_to_place(&mut self, block: &Block<'_>, place: u32, code: Word<'_>) -> Result<(), Located> {
         let place = self.stored(place, code.offset)?;
-        let place = self.frame.to_work(place).ok_or(Located::new(code.offset, Problem::WorkOutOfRange))?;
+        let place = self.frame.work(place).ok_or(Located::new(code.offset, Problem::WorkOutOfRange))?;
         let way = self.end_point(block)?;
         let axes = block.axes();
         let all = axes.iter().all(Option::is_none);
@@ -202,7 +202,7 @@ impl Interpreter {
         let beyond = || code.problem(|word| Problem::PositionOutOfRange { word });
         let mut origin = frame.origin;
         if from_position {
-            let here = frame.to_work(self.machine).ok_or_else(beyond)?;
+            let here = frame.work(self.machine).ok_or_else(beyond)?;
             let mut back = [0; 3];
             for (axis, word) in block.axes().into_iter().enumerate() {
                 let Some(word) = word else { continue };
@@ -246,7 +246,7 @@ impl Interpreter {
             if kind == 11 {
                 frame.shift = [Length::ZERO; 3];
             }
-            let here = frame.to_work(self.machine).ok_or_else(beyond)?;
+            let here = frame.work(self.machine).ok_or_else(beyond)?;
             let mut offset = frame.turned_back(tool.offset.map(Length::units));
             for (axis, length) in given.into_iter().enumerate() {
                 if let Some(length) = length {

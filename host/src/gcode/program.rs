@@ -262,6 +262,8 @@ pub enum NoticeKind {
     Output,
     /// M66.
     Input,
+    /// D in a line that takes none.
+    IdleD,
     /// More decimals than are exact.
     Rounded,
     /// A line that begins with `/`.
@@ -286,6 +288,7 @@ impl fmt::Display for Notice {
             NoticeKind::Override => "M48 to M53 are not acted on: overrides are the operator's",
             NoticeKind::Output => "M62 to M65, M67, M68 are not acted on: there are no outputs",
             NoticeKind::Input => "M66 reads 0 and does not wait: there are no inputs",
+            NoticeKind::IdleD => "D is not acted on: nothing in its line takes it",
             NoticeKind::Rounded => "numbers with more decimals than are exact are rounded to 0.0000000001 mm",
             NoticeKind::BlockDeleted => "lines that begin with / are left out",
             NoticeKind::FeedInNewUnits => "F in a line that switches the units is taken in the new unit",

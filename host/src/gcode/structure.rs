@@ -251,9 +251,9 @@ impl Structure {
                 let closed = closes(Keyword::If, open)?;
                 self.lead(closed.branches.last().copied().unwrap_or(closed.index), index);
                 for branch in closed.branches {
-                    match self.lines.get_mut(branch).map(|line| &mut line.role) {
-                        Some(Role::ElseIf { end, .. } | Role::Else { end }) => *end = index,
-                        _ => {}
+                    let role = self.lines.get_mut(branch).map(|line| &mut line.role);
+                    if let Some(Role::ElseIf { end, .. } | Role::Else { end }) = role {
+                        *end = index;
                     }
                 }
                 Role::EndIf
@@ -309,9 +309,9 @@ impl Structure {
 
     /// A false condition at `from` leads to `to`.
     fn lead(&mut self, from: usize, to: usize) {
-        match self.lines.get_mut(from).map(|line| &mut line.role) {
-            Some(Role::If { next } | Role::ElseIf { next, .. }) => *next = to,
-            _ => {}
+        let role = self.lines.get_mut(from).map(|line| &mut line.role);
+        if let Some(Role::If { next } | Role::ElseIf { next, .. }) = role {
+            *next = to;
         }
     }
 }
