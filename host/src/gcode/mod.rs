@@ -1,8 +1,9 @@
 //! G-code text to typed steps.
 //!
-//! **Consumes** the bytes of a program. **Produces** a [`Program`]: lines, arcs, dwells and stops with
-//! absolute end points in millimetres, and [`Notice`]s of what was accepted without being acted on.
-//! **Runs** in the background on the PC, in one pass, in time and memory linear in the text.
+//! **Consumes** the bytes of a program, and of files with subroutines. **Produces** a [`Program`]: lines, arcs, dwells
+//! and stops in machine coordinates in millimetres, [`Message`]s for the operator, and [`Notice`]s of what was accepted
+//! without being acted on.
+//! **Runs** in the background on the PC, in time and memory linear in the lines executed.
 //! **Fails** with a [`GcodeError`] that names file, line, column, what was found and what was expected;
 //! no bytes make it panic, and nothing is rounded, clamped or skipped without an error or a notice.
 //!
@@ -20,46 +21,81 @@
 //!
 //! # The journey of a line
 //!
-//! 1. `lexer`: bytes to words, a letter and an exact [`Decimal`] each; comments vanish.
-//! 2. `block`: the words of one line, each in its slot; a word twice, two words of one modal group
-//!    and words this machine cannot obey are refused here, the leftmost first.
-//! 3. `interpreter`: the slots executed in the order RS-274 prescribes, whatever the order in the line:
-//!    feed, spindle and coolant; dwell; plane, units, path mode, distance modes; motion; stop or end.
-//! 4. `arc`: centre, radii and sweep of G2 and G3; `spline`: control points of G5.
+//! 1. `source`, `library`: the text of a file, and the files of subroutines.
+//! 2. `flow`, `jump`, `structure`, `oword`: which line comes next. Only a file with O-words is looked through as a
+//!    whole, once.
+//! 3. `lexer`: bytes to words, a letter and a [`Decimal`] or a computed number each; `expression` and `parameters`
+//!    compute it, `predefined` knows the parameters that tell the state.
+//! 4. `block`: the words of one line, each in its slot; a word twice, two words of one modal group and words that
+//!    nothing takes are refused here, the leftmost first.
+//! 5. `interpreter`: the slots executed in the order RS-274 prescribes, whatever the order in the line: comments for the
+//!    operator; feed mode, feed; `accessories`: spindle, tool, coolant, outputs; dwell; plane, units, path mode, distance
+//!    modes; `offsets`: tool length, coordinate system, G10, G28, G30, G52, G92; `motion`; stop or end.
+//! 6. `motion`: `arc` gives centre, radii and sweep of G2 and G3, `spline` the control points of G5, `cycle` the moves of
+//!    a drilling cycle, `polar` the point of `@` and `^`; `frame` makes machine coordinates of the program's.
 //!
 //! # Dialect
+//!
+//! The semantics are those of LinuxCNC 2.9's interpreter; a test compares every move with it
+//! (`tests/peers/linuxcnc/interpreter.py`). What differs is told below.
 //!
 //! | words | meaning |
 //! |---|---|
 //! | G0 G1 G2 G3, X Y Z | motion, modal; a line of axis words alone repeats it; G80 ends it |
-//! | I J K, R | centre of an arc (relative, or absolute after G90.1), or its radius (negative: more than half a turn) |
+//! | `@` `^` | X and Y as the distance from the program's zero and the angle about it \[°\] |
+//! | I J K, R, P | centre of an arc (relative, or absolute after G90.1), or its radius (negative: more than half a turn); P whole turns. Start and end radius may differ as [`RADIUS_MISMATCH_RATIO`] says |
 //! | G5, X Y, \[I J\] P Q | cubic Bézier curve in XY: I J from its start to its first control point, P Q from its end to its second; modal. Without I J it continues the G5 before it, whose P Q are turned round. Control points that are no point of their own (I0 J0) or fold back make a curve that stands still, which is refused |
-//! | G5.5, X Y Z | quintic spline through points, one a line, from where the machine is; modal. At least five points; a line with the word G5.5 begins another spline |
-//! | F | feed \[mm/min or inch/min\], positive; kept as a speed when the units change |
+//! | G5.5, X Y Z | quintic spline through points, one a line, from where the machine is; modal. At least five points; a line with the word G5.5 begins another spline. Of this project alone |
+//! | G73 G81 G82 G83 G85 G86 G88 G89, R P Q L, G98 G99 | drilling cycles along the plane's normal, modal; they end where the first began, or at R |
+//! | F, G93 G94 G95 | feed \[mm/min or inch/min\], kept as a speed when the units change; of a minute's part, a minute, a revolution at the commanded speed |
 //! | G4 P | dwell \[s\] |
 //! | G17 G18 G19 | arc plane XY, ZX, YZ; clockwise is seen from the positive end of the third axis |
-//! | G20 G21, G90 G91, G90.1 G91.1 | inch or mm; absolute or incremental end points; the same for arc centres |
-//! | G61, G64 \[P\] \[Q\] | exact path; corners blended within P \[mm or inch\], without P within the machine's own tolerance; short lines of one feed made longer lines and arcs within Q, which comes on top of P, without Q within a part of P |
-//! | G40 G49 G54 G94 | accepted: they ask for what is always so (no compensation, first work offset, feed per minute) |
-//! | M0 M1, M2 M30 | stop (M1 too: there is no optional-stop switch), end |
-//! | M3–M9, S | accepted with a notice: there is no spindle, tool changer or coolant |
-//! | N, `( )`, `;`, `%` | line number (first in its line), comments, tape marks |
+//! | G20 G21, G90 G91, G90.1 G91.1, G7 G8 | inch or mm; absolute or incremental end points; the same for arc centres; X as a diameter or a radius |
+//! | G54 to G59.3, G10 L2 L20, G52, G92 to G92.3, G53 | coordinate systems with a rotation about Z; shifts; a move in machine coordinates |
+//! | G28 G28.1 G30 G30.1 | to a stored place, by way of a point; store it |
+//! | T, M6, M61 Q | the operator changes the tool: a stop with its number and remark; the tool that is there |
+//! | G43 H, G43.1, G43.2, G49, G10 L1 L10 L11 | tool lengths, from the tool table. Without a table every tool has length 0, which is told; with one, a tool that is not in it is refused. G10 changes the table for this program alone |
+//! | G61, G61.1, G64 \[P\] \[Q\] | exact path; with a full stop after every move; corners blended within P \[mm or inch\], without P within the machine's own tolerance; short lines of one feed made longer lines and arcs within Q, which comes on top of P, without Q within a part of P |
+//! | M0 M1 M60, M2 M30 | stop (M1 by a switch), end |
+//! | M3 M4 M5 S, G96 G97 D, M7 M8 M9, M48 to M53, M62 to M68 | kept as modes and read back by parameters, otherwise not acted on, which is told |
+//! | M70 to M73 | modes saved and restored |
+//! | G40 G80 | accepted: they end what is not there |
+//! | `#1`, `#<name>`, `#<_name>`, `[…]` | parameters of a subroutine (#1 to #30, names) and of all, read before any assignment of their line; expressions with all operators and functions of LinuxCNC |
+//! | O…  sub, call, return, if, while, do, repeat, break, continue | subroutines and loops, named or numbered; other files are looked for in [`ReadOptions::subroutines`] |
+//! | M98 P L, M99 | Fanuc's subprograms, which begin with a bare O… and work on their caller's parameters |
+//! | N, `( )`, `;`, `%`, `/`, `*44` | line number (first in its line), comments, tape marks, a line left out by a switch, a checksum, which is not looked at |
+//! | `(MSG,…)` `(DEBUG,…)` `(PRINT,…)` `(ABORT,…)` | a text for the operator; with values of parameters; an end by the program's own decision |
 //!
-//! Anything else is an error. Blanks count nowhere outside comments, not even inside a number; letters may be
-//! lower case; lines end in LF or CRLF; a UTF-8 byte-order mark at the start of the file is skipped.
-//! A `%` before the first word opens the program, a later one ends it.
+//! Anything else is an error. G33, G74, G76, G84 need a spindle encoder, G38 a probe, M100 to M199 a program of the
+//! user's: they may stand in subroutines that are not called. Blanks count nowhere outside comments, not even inside a
+//! number; letters may be lower case; lines end in LF or CRLF; a UTF-8 byte-order mark at the start of the file is skipped.
+//! A `%` before the first word opens the program, a later one ends it. Behind the end only subroutines are read.
+//!
+//! Where this reader differs from LinuxCNC's interpreter:
+//!
+//! - F in a line that switches the units is taken in the new unit, with a notice.
+//! - Two words that would take one letter (`G64 P1 G4`) are refused, and letters that nothing takes; D alone is noticed.
+//! - A drilling cycle before any G98 or G99 ends where it began, as Fanuc's do; LinuxCNC begins with G99.
+//! - A file without an end is accepted, with a notice. So is an R up to 0.005 mm short of the chord.
+//! - M6 for the tool that is in the spindle does not stop, and without any T it is noticed.
+//! - Loops run to their end after a `break` or `continue` of another loop, where LinuxCNC may leave a `do` early.
 //!
 //! # At the start
 //!
-//! The position is 0, 0, 0. The modes are the power-on modes of RS-274/NGC: G17, G21, G90, G91.1, G94, no
-//! motion mode, no feed. Interpreters differ in the path mode; here it is [`PathMode::ExactPath`] (G61), the
-//! one that never leaves the programmed path.
+//! The machine stands at 0, 0, 0; the offsets are those of [`ReadOptions::parameters`]. The modes are the power-on
+//! modes of RS-274/NGC: G17, G21, G90, G91.1, G94, G98, no motion mode, no feed. Interpreters differ in the path mode; here
+//! it is [`PathMode::ExactPath`] (G61), the one that never leaves the programmed path.
+//!
+//! # Bounds
+//!
+//! Subroutines within each other: 100. Brackets: 64. Lines executed and steps made: [`ReadOptions::lines_max`],
+//! [`ReadOptions::steps_max`]. A program takes its text and some 170 bytes a step.
 //!
 //! # Exactness
 //!
 //! A [`Length`] counts 10⁻¹⁰ mm, so ten decimals of a millimetre and nine of an inch are exact, and
-//! incremental programs do not drift. More decimals are an error unless they are zeros. Floating point begins
-//! only with what is irrational anyhow: the centre of an R arc, radii and sweeps.
+//! incremental programs do not drift. More decimals are rounded, with a notice. Floating point begins
+//! only with what is irrational anyhow: expressions, rotations, the centre of an R arc, radii and sweeps.
 
 mod accessories;
 mod arc;
