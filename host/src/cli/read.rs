@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::table::{self, Align};
-use crate::gcode::{Feed, Length, PathMode, Program, Step, StepKind};
+use crate::gcode::{Feed, Length, Nurbs, PathMode, Program, Step, StepKind};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -18,12 +18,14 @@ Examples:
   generate-part | motion read - --json           G-code from standard input
 
 JSON: an object for every step, in order. All have line and kind. kind is
-  line, arc, cubic, through    with from_mm, to_mm, feed_mm_min (null: rapid), path (exact, stop or blend), tolerance_mm
+  line, arc, cubic, through,
+  nurbs                        with from_mm, to_mm, feed_mm_min (null: rapid), path (exact, stop or blend), tolerance_mm
                                and merging_mm (null: the machine's choice)
       arc                      also plane, turn_deg (of the plane about Z), centre_mm (along its first and second axis), sweep_rad
                                (counter-clockwise positive)
       cubic                    also controls_mm (the first from the start, the second from the end, X and Y)
       through                  also begins (a spline begins with it)
+      nurbs                    also degree, points_mm (control points, X Y Z), weights, knots
   dwell                        with dwell_s
   tool                         with tool: a stop for the operator to change it
   stop, end
@@ -75,6 +77,14 @@ enum KindJson {
         ends: MoveJson,
         begins: bool,
     },
+    Nurbs {
+        #[serde(flatten)]
+        ends: MoveJson,
+        degree: usize,
+        points_mm: Vec<[f64; 3]>,
+        weights: Vec<f64>,
+        knots: Vec<f64>,
+    },
     Dwell {
         dwell_s: f64,
     },
@@ -117,7 +127,7 @@ pub fn read(arguments: &ReadArguments, out: &mut dyn Write) -> Result<Outcome, C
 }
 
 fn write_json_lines(program: &Program, out: &mut dyn Write) -> io::Result<()> {
-    program.steps.iter().try_for_each(|step| write_json_line(&step_json(step), out))?;
+    program.steps.iter().try_for_each(|step| write_json_line(&step_json(program, step), out))?;
     program.notices.iter().try_for_each(|notice| {
         let text = notice.to_string();
         write_json_line(&NoteJson { line: notice.first_line, kind: "notice", text }, out)
@@ -133,7 +143,7 @@ fn write_json_line(value: &impl Serialize, out: &mut dyn Write) -> io::Result<()
     writeln!(out)
 }
 
-fn step_json(step: &Step) -> StepJson {
+fn step_json(program: &Program, step: &Step) -> StepJson {
     let kind = match step.kind {
         StepKind::Line(line) => KindJson::Line { ends: move_json(line.from, line.to, line.feed, line.mode) },
         StepKind::Arc(arc) => KindJson::Arc {
@@ -151,6 +161,12 @@ fn step_json(step: &Step) -> StepJson {
             ends: move_json(point.from, point.to, point.feed, point.mode),
             begins: point.begins,
         },
+        StepKind::Nurbs(curve) => {
+            let Nurbs { degree, points_mm, weights, knots } =
+                program.nurbs.get(curve.curve).cloned().unwrap_or_default();
+            let ends = move_json(curve.from, curve.to, curve.feed, curve.mode);
+            KindJson::Nurbs { ends, degree, points_mm, weights, knots }
+        }
         StepKind::Dwell { seconds } => KindJson::Dwell { dwell_s: seconds },
         StepKind::ToolChange { tool } => KindJson::Tool { tool },
         StepKind::Stop => KindJson::Stop,
@@ -184,14 +200,14 @@ fn write_table(program: &Program, out: &mut dyn Write) -> io::Result<()> {
         ("path", "", Align::Left),
         ("more", "", Align::Left),
     ];
-    let rows: Vec<[String; 8]> = program.steps.iter().map(row).collect();
+    let rows: Vec<[String; 8]> = program.steps.iter().map(|step| row(program, step)).collect();
     table::write(&columns, &rows, out)?;
     writeln!(out, "\n  {} steps", rows.len())?;
     program.notes().iter().try_for_each(|note| writeln!(out, "  note: {note}"))
 }
 
-fn row(step: &Step) -> [String; 8] {
-    let (name, ends, more) = match step_json(step).kind {
+fn row(program: &Program, step: &Step) -> [String; 8] {
+    let (name, ends, more) = match step_json(program, step).kind {
         KindJson::Line { ends } if ends.feed_mm_min.is_none() => ("rapid", Some(ends), String::new()),
         KindJson::Line { ends } => ("line", Some(ends), String::new()),
         KindJson::Arc { ends, plane, turn_deg, centre_mm: [first, second], sweep_rad } => {
@@ -204,6 +220,9 @@ fn row(step: &Step) -> [String; 8] {
         }
         KindJson::Through { ends, begins } => {
             ("through", Some(ends), if begins { "begins a spline" } else { "" }.to_owned())
+        }
+        KindJson::Nurbs { ends, degree, points_mm, .. } => {
+            ("nurbs", Some(ends), format!("degree {degree}, {} control points", points_mm.len()))
         }
         KindJson::Dwell { dwell_s } => ("dwell", None, format!("{dwell_s} s")),
         KindJson::Tool { tool } => ("tool", None, format!("T{tool}")),

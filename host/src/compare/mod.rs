@@ -84,6 +84,7 @@ pub fn is_blended(program: &Program) -> bool {
         StepKind::Arc(arc) => matches!(arc.mode, PathMode::Blend { .. }),
         StepKind::Cubic(curve) => matches!(curve.mode, PathMode::Blend { .. }),
         StepKind::Through(point) => matches!(point.mode, PathMode::Blend { .. }),
+        StepKind::Nurbs(curve) => matches!(curve.mode, PathMode::Blend { .. }),
         StepKind::Dwell { .. } | StepKind::ToolChange { .. } | StepKind::Stop | StepKind::End => false,
     })
 }
@@ -136,6 +137,7 @@ pub fn in_mode(program: &Program, mode: PathMode) -> Program {
             StepKind::Arc(arc) => arc.mode = mode,
             StepKind::Cubic(curve) => curve.mode = mode,
             StepKind::Through(point) => point.mode = mode,
+            StepKind::Nurbs(curve) => curve.mode = mode,
             StepKind::Dwell { .. } | StepKind::ToolChange { .. } | StepKind::Stop | StepKind::End => {}
         }
     }

@@ -31,9 +31,9 @@ fn slot_of(letter: u8) -> Option<usize> {
 /// Modal groups of G words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GGroup {
-    /// G0 G1 G2 G3 G5 G5.5 G33 G33.1 G38.2 to G38.5 G73 G74 G76 G80 to G86 G88 G89.
+    /// G0 G1 G2 G3 G5 G5.2 G5.5 G6.2 G33 G33.1 G38.2 to G38.5 G73 G74 G76 G80 to G86 G88 G89.
     Motion,
-    /// G4 G10 G28 G28.1 G30 G30.1 G52 G53 G92: in force for their line.
+    /// G4 G5.3 G6.3 G10 G28 G28.1 G30 G30.1 G52 G53 G92: in force for their line.
     NonModal,
     /// G92.1 G92.2 G92.3.
     Shift,
@@ -97,8 +97,10 @@ const M_GROUPS: usize = MGroup::User as usize + 1;
 fn g_group(tenths: i64) -> Option<GGroup> {
     Some(match tenths {
         330 | 331 | 382..=385 | 740 | 760 | 840 => GGroup::Motion,
-        0 | 10 | 20 | 30 | 50 | 55 | 730 | 800 | 810 | 820 | 830 | 850 | 860 | 880 | 890 => GGroup::Motion,
-        40 | 100 | 280 | 281 | 300 | 301 | 520 | 530 | 920 => GGroup::NonModal,
+        0 | 10 | 20 | 30 | 50 | 52 | 55 | 62 | 730 | 800 | 810 | 820 | 830 | 850 | 860 | 880 | 890 => {
+            GGroup::Motion
+        }
+        40 | 53 | 63 | 100 | 280 | 281 | 300 | 301 | 520 | 530 | 920 => GGroup::NonModal,
         921..=923 => GGroup::Shift,
         170 | 180 | 190 => GGroup::Plane,
         200 | 210 => GGroup::Units,
@@ -257,7 +259,13 @@ impl<'a> Block<'a> {
 
     /// The leftmost word whose letter is not in `letters`.
     pub(super) fn other_than(&self, letters: &[u8]) -> Option<Word<'a>> {
-        let codes = self.g.iter().chain(&self.m).flatten().map(|code| code.word);
+        self.stranger(letters, &[])
+    }
+
+    /// The same, but for the G words of these tenths.
+    pub(super) fn stranger(&self, letters: &[u8], g_tenths: &[i64]) -> Option<Word<'a>> {
+        let g = self.g.iter().flatten().filter(|code| !g_tenths.contains(&code.tenths));
+        let codes = g.chain(self.m.iter().flatten()).map(|code| code.word);
         let words = self.letters.iter().flatten().copied().chain(codes);
         words.filter(|word| !letters.contains(&word.letter)).min_by_key(|word| word.offset)
     }
@@ -348,11 +356,14 @@ impl<'a> Block<'a> {
             (b'H', "G43 or G43.2"),
             (b'I', "G2, G3, G5 or G10"),
             (b'J', "G2, G3, G5 or G10"),
-            (b'K', "G2 or G3"),
-            (b'L', "G10, M66, M98 or a drilling cycle"),
-            (b'P', "G2, G3, G4, G5, G10, G64, a cycle with a dwell, M50 to M53, M62 to M66 or M98"),
-            (b'Q', "G5, G10, G64, G73, G83, M61 or M66 to M68"),
-            (b'R', "G2, G3, G10 or a drilling cycle"),
+            (b'K', "G2, G3 or G6.2"),
+            (b'L', "G5.2, G10, M66, M98 or a drilling cycle"),
+            (
+                b'P',
+                "G2, G3, G4, G5, G5.2, G6.2, G10, G64, a cycle with a dwell, M50 to M53, M62 to M66 or M98",
+            ),
+            (b'Q', "G5, G6.2, G10, G64, G73, G83, M61 or M66 to M68"),
+            (b'R', "G2, G3, G6.2, G10 or a drilling cycle"),
         ];
         let moves = self.moves(motion);
         let mut first: Option<Located> = None;
@@ -378,15 +389,19 @@ impl<'a> Block<'a> {
     /// Whether the line asks for a move in the mode `motion`.
     pub(super) fn moves(&self, motion: Option<Motion>) -> bool {
         let has_axes = self.has_axes() && !self.axes_are_taken();
-        let own = |letters: &[u8]| {
-            letters.iter().any(|&letter| self.letter(letter).is_some() && self.takers(letter) == 0)
-        };
+        let own = |letters: &[u8]| letters.iter().any(|&letter| self.own(letter).is_some());
         has_axes
             || match motion {
                 Some(motion) if motion.is_arc() => own(b"IJKR"),
                 Some(Motion::Cubic) => own(b"IJPQ"),
+                Some(Motion::Nurbs(kind)) => own(kind.letters()),
                 _ => false,
             }
+    }
+
+    /// The word with a letter, if no word but a motion word takes it.
+    pub(super) fn own(&self, letter: u8) -> Option<Word<'a>> {
+        self.letter(letter).filter(|_| self.takers(letter) == 0)
     }
 
     /// The word with a letter of its own.

@@ -88,7 +88,7 @@ pub enum Problem {
     #[error("found {word}, expected X, Y or Z: the machine has no such axis")]
     NoSuchAxis { word: String },
     #[error(
-        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.5 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G40 \
+        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.2 G5.3 G5.5 G6.2 G6.3 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G40 \
          G43 G43.1 G43.2 G49 G52 G53 G54 to G59.3 G61 G61.1 G64 G73 G80 to G83 G85 G86 G88 G89 G90 G90.1 G91 G91.1 \
          G92 to G92.3 G93 to G99"
     )]
@@ -118,8 +118,8 @@ pub enum Problem {
     #[error("found {word}, expected a number that is not negative")]
     Negative { word: String },
     #[error(
-        "found {word} without a motion mode, expected G0, G1, G2, G3, G5, G5.5 or a drilling cycle in this line or \
-         before it"
+        "found {word} without a motion mode, expected G0, G1, G2, G3, G5, G5.2, G5.5, G6.2 or a drilling cycle in this line \
+         or before it"
     )]
     AxisWithoutMotion { word: String },
     #[error("found {word} in a line without {needs}, expected no such word")]
@@ -250,6 +250,12 @@ pub enum Problem {
         "found a first G5 without I and J, expected the offset from its start to its first control point"
     )]
     SplineWithoutStart,
+    #[error("found G5.2 in the {plane} plane, expected it in the XY plane (G17)")]
+    NurbsPlane { plane: Plane },
+    #[error("found {points} control points, expected {order} at least: the order of the NURBS")]
+    NurbsPoints { points: usize, order: u32 },
+    #[error("found {found}, expected {expected}")]
+    Nurbs { found: String, expected: &'static str },
     #[error("found G5 without P and Q, expected the offset from its end to its second control point")]
     SplineWithoutEnd,
 }

@@ -95,6 +95,9 @@ impl<'a> Flow<'a> {
         }
         self.interpreter.line = last;
         self.check_subroutines()?;
+        if let Some(unended) = self.interpreter.unended_nurbs() {
+            return Err(GcodeError::new(&self.current().source.name, last, b"", unended));
+        }
         if !self.interpreter.ended {
             self.interpreter.notice(NoticeKind::NoProgramEnd);
         }

@@ -9,6 +9,7 @@ use super::frame::Frame;
 use super::lexer::Cursor;
 use super::message;
 use super::modal::{FeedMode, Modal, Motion, Units};
+use super::nurbs;
 use super::options::ReadOptions;
 use super::parameters::{Parameters, SELECTED};
 use super::program::{Message, Notice, NoticeKind, PathMode, Program, Step, StepKind};
@@ -41,6 +42,8 @@ pub(super) struct Interpreter {
     pub(super) parameters: Parameters,
     pub(super) tools: Tools,
     pub(super) cycle: CycleState,
+    /// The NURBS whose lines are being read.
+    pub(super) nurbs: Option<nurbs::Open>,
     /// P and Q of the G5 that was the move before \[mm\].
     pub(super) cubic_before_mm: Option<[f64; 2]>,
     /// Modes that M70 or M73 saved, for the main program and every subroutine that runs.
@@ -96,6 +99,7 @@ impl Interpreter {
             },
             parameters,
             cycle: CycleState::default(),
+            nurbs: None,
             cubic_before_mm: None,
             saved: vec![None],
             returned: None,
@@ -113,6 +117,7 @@ impl Interpreter {
     pub(super) fn execute(&mut self, cursor: Cursor<'_>) -> Result<Control, Located> {
         let block = Block::collect(cursor, self)?;
         self.begun |= !block.is_empty();
+        self.refuse_in_nurbs(&block)?;
         for assignment in &block.assignments {
             match &assignment.target {
                 Target::Number(number) => self.parameters.set(*number, assignment.value),
@@ -184,6 +189,11 @@ impl Interpreter {
         Ok(())
     }
 
+    /// Most control points of a NURBS.
+    pub(super) fn points_max(&self) -> usize {
+        self.steps_max
+    }
+
     /// Shows a text to the operator before the next step.
     pub(super) fn message(&mut self, text: String) -> Result<(), Located> {
         if self.program.messages.len() >= self.steps_max {
@@ -196,6 +206,7 @@ impl Interpreter {
 
     /// Ends the program; the next one starts in the first coordinate system.
     pub(super) fn end(&mut self) -> Result<(), Located> {
+        self.unended_nurbs().map_or(Ok(()), Err)?;
         self.step(StepKind::End)?;
         self.parameters.set(SELECTED, 1.0);
         self.ended = true;
@@ -296,6 +307,7 @@ impl Interpreter {
 
     /// All modes but the motion mode.
     fn restore(&mut self, saved: Saved) -> Result<(), Located> {
+        self.unended_nurbs().map_or(Ok(()), Err)?;
         self.modal = Modal { motion: self.modal.motion, ..saved.modal };
         self.frame.tool = saved.tool;
         self.select(saved.system, 0)

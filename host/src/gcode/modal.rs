@@ -7,6 +7,7 @@ use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::lexer::Word;
 use super::number::Number;
+use super::nurbs::Kind;
 use super::program::{PathMode, Plane};
 
 /// Motion mode.
@@ -24,6 +25,8 @@ pub(super) enum Motion {
     Cubic,
     /// G5.5.
     Through,
+    /// G5.2 and G6.2.
+    Nurbs(Kind),
     /// G73 to G89.
     Cycle(Cycle),
 }
@@ -37,7 +40,9 @@ impl Motion {
             20 => Self::Clockwise,
             30 => Self::CounterClockwise,
             50 => Self::Cubic,
+            52 => Self::Nurbs(Kind::Uniform),
             55 => Self::Through,
+            62 => Self::Nurbs(Kind::Knotted),
             _ => Self::Cycle(Cycle::of(tenths)?),
         })
     }
@@ -51,6 +56,7 @@ impl Motion {
             Self::CounterClockwise => "G3",
             Self::Cubic => "G5",
             Self::Through => "G5.5",
+            Self::Nurbs(kind) => kind.word(),
             Self::Cycle(cycle) => cycle.word(),
         }
     }
@@ -64,6 +70,7 @@ impl Motion {
             Self::CounterClockwise => 30,
             Self::Cubic => 50,
             Self::Through => 55,
+            Self::Nurbs(kind) => kind.tenths(),
             Self::Cycle(cycle) => cycle.tenths(),
         }
     }
@@ -79,6 +86,7 @@ impl Motion {
             Self::Rapid | Self::Feed | Self::Through => false,
             Self::Clockwise | Self::CounterClockwise => matches!(letter, b'I' | b'J' | b'K' | b'R' | b'P'),
             Self::Cubic => matches!(letter, b'I' | b'J' | b'P' | b'Q'),
+            Self::Nurbs(kind) => kind.letters().contains(&letter),
             Self::Cycle(cycle) => cycle.takes(letter),
         }
     }
@@ -148,7 +156,7 @@ impl Default for Overrides {
 /// The modes in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Modal {
-    /// G0 G1 G2 G3 G5 G5.5, drilling cycles; none after G80.
+    /// G0 G1 G2 G3 G5 G5.2 G5.5 G6.2, drilling cycles; none after G80.
     pub(super) motion: Option<Motion>,
     /// G17 G18 G19.
     pub(super) plane: Plane,

@@ -22,6 +22,9 @@ const TURNS_MAX: u32 = 10_000;
 impl Interpreter {
     /// The move a line asks for by an axis word or, in the arc modes, an offset or radius.
     pub(super) fn motion(&mut self, block: &Block<'_>) -> Result<(), Located> {
+        if self.nurbs_line(block)? {
+            return Ok(());
+        }
         let code = block.g(GGroup::Motion);
         if block.axes_are_taken() {
             return match code.filter(|code| code.tenths != 800) {
@@ -97,7 +100,7 @@ impl Interpreter {
         }
     }
 
-    fn line_to(
+    pub(super) fn line_to(
         &mut self,
         from: [Length; 3],
         to: [Length; 3],
@@ -142,7 +145,7 @@ impl Interpreter {
     }
 
     /// The feed in force; after G93, the F of the line.
-    fn feed(&self, block: &Block<'_>, motion: Motion, offset: usize) -> Result<Feed, Located> {
+    pub(super) fn feed(&self, block: &Block<'_>, motion: Motion, offset: usize) -> Result<Feed, Located> {
         if motion == Motion::Rapid {
             return Ok(Feed::Rapid);
         }
@@ -174,7 +177,7 @@ impl Interpreter {
     }
 
     /// Curves have no feed of inverse time.
-    fn untimed(&self, motion: Motion, offset: usize) -> Result<(), Located> {
+    pub(super) fn untimed(&self, motion: Motion, offset: usize) -> Result<(), Located> {
         if self.modal.feed_mode != FeedMode::InverseTime {
             return Ok(());
         }

@@ -9,6 +9,8 @@ use std::fmt;
 pub struct Program {
     /// The steps, in order. Moves of no length are not listed.
     pub steps: Vec<Step>,
+    /// The curves of [`NurbsMove`]s.
+    pub nurbs: Vec<Nurbs>,
     /// Words that were accepted and not acted on: at most one notice per kind, in the order of their first
     /// lines.
     pub notices: Vec<Notice>,
@@ -73,6 +75,8 @@ pub enum StepKind {
     Cubic(CubicMove),
     /// A point of G5.5.
     Through(ThroughMove),
+    /// G5.2 to G5.3, or G6.2.
+    Nurbs(NurbsMove),
     /// G4: stand still.
     Dwell {
         /// How long \[s\], 0 or more.
@@ -160,6 +164,35 @@ pub struct ThroughMove {
     pub feed: Feed,
     /// How the spline's ends are passed.
     pub mode: PathMode,
+}
+
+/// A move along a NURBS.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NurbsMove {
+    /// Start, X Y Z: the first control point.
+    pub from: [Length; 3],
+    /// End, X Y Z: the last control point.
+    pub to: [Length; 3],
+    /// Index of the curve in [`Program::nurbs`].
+    pub curve: usize,
+    /// Feed along the curve.
+    pub feed: Feed,
+    /// How its ends are passed.
+    pub mode: PathMode,
+}
+
+/// A rational spline from its first control point to its last.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Nurbs {
+    /// Degree, 1 or more: the order is one more.
+    pub degree: usize,
+    /// Control points \[mm\], X Y Z in machine coordinates.
+    pub points_mm: Vec<[f64; 3]>,
+    /// Weight of each control point, positive.
+    pub weights: Vec<f64>,
+    /// Knots, `degree + 1` more than control points; none is below the one before, and the first `degree + 1`
+    /// are equal, as are the last.
+    pub knots: Vec<f64>,
 }
 
 /// Speed of a move along its path.

@@ -1,12 +1,13 @@
-//! Programmed curves to moves: G5 and G5.5.
+//! Programmed curves to moves: G5, G5.5 and NURBS.
 //!
 //! Consumes control points, or the points that a spline goes through; produces polynomials that the kernel's
 //! pieces can follow within their stated errors. A curve that is not smooth, or that has no pieces, is
 //! refused with its line.
 
 use super::error::Problem;
-use crate::gcode::{CubicMove, PathMode};
+use crate::gcode::{CubicMove, Nurbs, PathMode};
 use crate::machine::Machine;
+use crate::toolpath::rational::spans;
 use crate::toolpath::smooth::Move;
 use crate::toolpath::spline::{Degree, Ends, chord_lengths, interpolate};
 use crate::toolpath::{Element, Polynomial, Role, Vector, add, scale, septics, subtract};
@@ -33,6 +34,16 @@ pub(super) fn cubic(step: &CubicMove) -> Result<Element, Problem> {
     let none = [0.0; 3];
     let shape = Polynomial::new([c1, c2, c3, none, none, none, none]);
     checked(Element::Polynomial { from, to, shape, role: Role::Spline })
+}
+
+/// The elements of a NURBS. An error has no line yet.
+pub(super) fn nurbs(curve: Option<&Nurbs>) -> Result<Vec<Element>, Problem> {
+    let spans = curve.and_then(spans).ok_or(Problem::Nurbs)?;
+    let mut elements = Vec::new();
+    for span in spans {
+        elements.extend(span.elements().map_err(|error| Problem::Geometry(error.into()))?);
+    }
+    elements.into_iter().map(checked).collect()
 }
 
 /// The spans of the quintic spline from `from` through all `points`, which are taken. An error comes with the

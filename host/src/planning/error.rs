@@ -50,6 +50,9 @@ pub enum Problem {
     /// There is no spline through the points.
     #[error("found {0}")]
     Spline(#[from] SplineError),
+    /// The parts of a NURBS do not belong together. What is read from G-code does.
+    #[error("found a NURBS without its curve, expected one with weights and knots that fit its degree")]
+    Nurbs,
     /// A limit that results for the block is unusable.
     #[error("found {} limit {}, expected a positive finite number", .0.quantity, .0.value)]
     Limit(#[from] LimitError),

@@ -1,7 +1,7 @@
 //! Steps of a program to stretches: where the motion must stop.
 
 use super::blending::blocks;
-use super::curves::{Point, cubic, through};
+use super::curves::{Point, cubic, nurbs, through};
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
@@ -51,6 +51,13 @@ pub fn plan_program(
                 let element = cubic(curve).map_err(at(step.line))?;
                 run.push(path_move(step.line, element, mm_s(curve.feed), curve.mode, machine));
             }
+            StepKind::Nurbs(curve) => {
+                let elements = nurbs(program.nurbs.get(curve.curve)).map_err(at(step.line))?;
+                let moves = elements
+                    .into_iter()
+                    .map(|element| path_move(step.line, element, mm_s(curve.feed), curve.mode, machine));
+                run.extend(moves);
+            }
             StepKind::Through(point) => {
                 if points.is_empty() {
                     start = point.from.map(|c| c.to_mm());
@@ -77,6 +84,7 @@ pub fn plan_program(
             StepKind::Line(line) => line.mode == PathMode::ExactStop,
             StepKind::Arc(arc) => arc.mode == PathMode::ExactStop,
             StepKind::Cubic(curve) => curve.mode == PathMode::ExactStop,
+            StepKind::Nurbs(curve) => curve.mode == PathMode::ExactStop,
             _ => false,
         };
         if stops {

@@ -8,6 +8,7 @@
 //! - [`polynomial`]: curves of degree seven, which blends and splines are;
 //! - [`involute`]: involutes of circles and their offsets;
 //! - [`spline`]: splines through points, or close to them;
+//! - [`rational`]: NURBS, span by span;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
 //! - [`smooth`]: a run of elements with the blend of each of its junctions, by
 //!   [`blend`]: one corner's septic blend, [`merge`]: short lines to fewer lines and arcs, and `dense`: runs
@@ -27,6 +28,7 @@ pub mod greatest;
 pub mod involute;
 pub mod merge;
 pub mod polynomial;
+pub mod rational;
 pub mod septic;
 pub mod smooth;
 pub mod spline;
