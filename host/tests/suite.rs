@@ -11,6 +11,7 @@ mod dialect;
 mod drive;
 mod gcode;
 mod limit_share;
+mod nurbs;
 mod smoothness;
 mod spline;
 

@@ -77,6 +77,29 @@ fn a_table_is_for_people() {
 }
 
 #[test]
+fn a_nurbs_has_its_curve() {
+    let workspace = Workspace::new("read-nurbs");
+    workspace.put("part.ngc", "G0 X1\nF600\nG5.2 P.5\nX2 Y2 P2\nX3 Y0 P1\nG5.3\nM2\n");
+    let steps = lines(&workspace.stdout(&["read", "part.ngc", "--json"]));
+    assert_eq!(
+        steps[1],
+        json!({
+            "line": 6, "kind": "nurbs", "from_mm": [1.0, 0.0, 0.0], "to_mm": [3.0, 0.0, 0.0], "feed_mm_min": 600.0,
+            "path": "exact", "tolerance_mm": null, "merging_mm": null,
+            "degree": 2, "points_mm": [[1.0, 0.0, 0.0], [2.0, 2.0, 0.0], [3.0, 0.0, 0.0]],
+            "weights": [0.5, 2.0, 1.0], "knots": [0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+        })
+    );
+    let table = workspace.stdout(&["read", "part.ngc"]);
+    assert!(table.contains("degree 2, 3 control points"), "{table}");
+    assert!(
+        workspace
+            .stdout(&["read", "--help"])
+            .contains("degree, points_mm (control points, X Y Z), weights, knots")
+    );
+}
+
+#[test]
 fn what_is_no_program_is_refused() {
     let workspace = Workspace::new("read-refused");
     workspace.put("part.ngc", "G0 X1\nG1 X2\n");
