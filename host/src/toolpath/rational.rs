@@ -2,8 +2,8 @@
 //!
 //! Consumes degree, control points, weights and knots; produces the rational Bézier curve between every two
 //! knots that differ, and the elements that are driven for it: a line where a span is straight, polynomials of
-//! degree seven in arc length elsewhere. These follow the span within the tolerance of [`septic`](super::septic)
-//! and are joined as smoothly as it is. What bends or turns at a knot does so between two spans.
+//! degree seven in arc length elsewhere. These follow the span within the tolerance of
+//! [`septic`](super::septic) and are joined as smoothly as it is. What bends or turns at a knot does so between two spans.
 
 use super::curve::{Curve, gauss};
 use super::element::{Element, Role};
