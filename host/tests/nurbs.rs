@@ -4,6 +4,7 @@
 use motion_host::gcode::{self, Nurbs, Program, StepKind};
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Item as PlanItem, Mode, Plan, plan_program};
+use motion_host::toolpath::Element;
 use motion_host::toolpath::curve::Curve;
 use motion_host::toolpath::rational::spans;
 use motion_kernel::program::Item;
@@ -194,6 +195,10 @@ fn joints_are_those_of_the_degree() {
     let cubic = "F600\nG5.2 L4 X10 Y0 P1\nX20 Y10 P1\nX20 Y20 P2\nX10 Y30 P1\nX0 Y20 P1\nG5.3\nM2\n";
     let plan = planned(cubic).expect("a plan");
     assert_eq!(stretches(&plan), 1);
+    // Tangent to it goes on without a stop, but under G61.1.
+    let on = cubic.replace("M2", "G1 X-10 Y10\nM2");
+    assert_eq!(stretches(&planned(&on).expect("a plan")), 1);
+    assert_eq!(stretches(&planned(&format!("G61.1 {on}")).expect("a plan")), 2);
     let corners = "F600\nG6.2 X0 Y0 R1 K0 P2 Q1\nX10 Y0 R1 K0\nX10 Y10 R1 K1\nG6.2 K2\nG6.2 K2\nM2\n";
     let plan = planned(corners).expect("a plan");
     assert_eq!((stretches(&plan), plan.length_mm), (2, 20.0));
@@ -208,6 +213,20 @@ fn a_start_in_two_control_points_is_driven() {
     let (plan, curve) = (planned(text).expect("a plan"), curve(text));
     let worst = driven(&plan).iter().map(|&point| from_curve(point, &curve)).fold(0.0, f64::max);
     assert!(worst < DEVIATION_MM, "{worst:e} mm");
+    // The chord that it starts with, too.
+    let spans = spans(&curve).expect("spans");
+    for span in [&spans[0], &spans[spans.len() - 1]] {
+        let elements = span.elements().expect("elements");
+        let is_line = |element: &&Element| matches!(element, Element::Line { .. });
+        for (from, to) in elements.iter().filter(is_line).map(Element::ends_mm) {
+            for share in [0.25, 0.5, 0.75] {
+                let off = from_curve([0, 1, 2].map(|i: usize| from[i] + share * (to[i] - from[i])), &curve);
+                assert!(off < 1e-6, "{off:e} mm");
+            }
+        }
+    }
+    let first = spans[0].elements().expect("elements");
+    assert!(matches!(first.first(), Some(Element::Line { .. })));
 }
 
 #[test]
