@@ -165,6 +165,18 @@ fn a_rational_quadratic_is_a_circle() {
     assert!((length_mm - 5.0 * std::f64::consts::PI).abs() < 1e-6, "{length_mm}");
 }
 
+/// A weight that pulls most of the curve into a small part of its parameter.
+#[test]
+fn lengths_are_good_where_weights_differ() {
+    let curve = curve("F9 G5.2 X10 Y20 P3000\nX20 Y0 P1\nG5.3\n");
+    let [span] = &spans(&curve).expect("spans")[..] else { panic!("one span") };
+    let parts = 1 << 14;
+    let at = |part: i32| f64::from(part) / f64::from(parts);
+    let sum: f64 = (0..parts).map(|part| span.length(at(part), at(part + 1))).sum();
+    let whole = span.length(0.0, 1.0);
+    assert!((whole - sum).abs() < 1e-9, "{whole} {sum}");
+}
+
 #[test]
 fn a_plan_follows_the_curve_and_its_length() {
     for text in [EXAMPLE, KNOTTED] {
