@@ -454,7 +454,7 @@ mod tests {
             ("G61 P5", "1:5:", "in a line without G2, G3, G4, G5, G5.2, G6.2, G10, G64"),
             ("G64 P-.1", "1:5:", "not negative"),
             ("G1 F5 X1 I2", "1:10:", "in a line without G2, G3, G5 or G10"),
-            ("R5", "1:1:", "in a line without G2, G3, G10 or"),
+            ("R5", "1:1:", "in a line without G2, G3, G6.2, G10 or"),
             ("F5 G2 X1", "1:4:", "found G2 without a centre or radius, expected I and J or R"),
             ("F5 G2 X1 I1 K1", "1:13:", "found K1 in an arc of the XY plane"),
             ("F5 G18 G2 X1 J1", "1:14:", "expected I and K or R"),
