@@ -96,7 +96,8 @@ impl<'a> Flow<'a> {
         self.interpreter.line = last;
         self.check_subroutines()?;
         if let Some(unended) = self.interpreter.unended_nurbs() {
-            return Err(GcodeError::new(&self.current().source.name, last, b"", unended));
+            let name = self.library.file(0).map_or("", |file| file.source.name.as_str());
+            return Err(GcodeError::new(name, last, b"", unended));
         }
         if !self.interpreter.ended {
             self.interpreter.notice(NoticeKind::NoProgramEnd);

@@ -155,7 +155,7 @@ impl Interpreter {
             (Some(word), Some(_)) => word,
         };
         let work = self.end_point(block)?;
-        match self.frame.to_machine(work) {
+        match self.frame.machine(work) {
             Some(machine) => Ok(Some([work, machine])),
             None => Err(word.problem(|word| Problem::PositionOutOfRange { word })),
         }
