@@ -325,6 +325,8 @@ fn drilling_cycles_are_rapids_and_feeds() {
     assert_eq!(steps("F9 M3 G0 Z1\nG86 Z-1 R1 P0")[1..], ["l 0 0 -1", "dwell 0", "r 0 0 1"]);
     assert_eq!(steps("F9 M3 G0 Z1\nG88 Z-1 R1 P0")[1..], ["l 0 0 -1", "dwell 0", "stop", "r 0 0 1"]);
     assert_eq!(steps("F9 G0 Z1\nG89 Z-1 R1 P0")[1..], ["l 0 0 -1", "dwell 0", "l 0 0 1"]);
+    // Holes of no depth where the machine is end at once.
+    assert_eq!(steps("F9 G0 Z1\nG81 Z1 R1 L4000000000"), ["r 0 0 1"]);
     // Below R it goes up to it first; in another plane along that one's normal.
     assert_eq!(steps("F9 G18 G81 X1 Z1 Y-1 R2"), ["r 0 2 0", "r 1 2 1", "l 1 -1 1", "r 1 2 1"]);
     for (text, message) in [

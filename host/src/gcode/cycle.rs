@@ -181,6 +181,7 @@ impl Interpreter {
         let beyond = || first.problem(|word| Problem::PositionOutOfRange { word });
         let levels = Levels { r, clear: if self.modal.retracts_to_r { r } else { initial }, bottom };
         for repeat in 0..repeats {
+            let before = self.program.steps.len();
             hole = [hole[0] + increments[0], hole[1] + increments[1]];
             if let Some(polar) = polar {
                 let here = hole.map(Length::from_units);
@@ -191,6 +192,10 @@ impl Interpreter {
             self.straight(at(hole, over), Feed::Rapid, first)?;
             self.straight(at(hole, r), Feed::Rapid, first)?;
             self.hole(cycle, levels, feed, first, |level| at(hole, level))?;
+            // Without a step, the others would make none either, however many L asks for.
+            if self.program.steps.len() == before {
+                break;
+            }
         }
         Ok(())
     }
