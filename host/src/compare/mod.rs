@@ -16,7 +16,7 @@ pub mod ticks;
 use std::fmt;
 
 use self::ticks::{Ratios, TicksError};
-use crate::gcode::{PathMode, Program, StepKind};
+use crate::gcode::{PathMode, Program};
 use crate::machine::Machine;
 use crate::planning::{Item, Mode, Plan, PlanningError, plan_program};
 use crate::trace::TracedBlock;
@@ -79,14 +79,7 @@ pub enum CompareError {
 /// Whether some move of the program may leave its path.
 #[must_use]
 pub fn is_blended(program: &Program) -> bool {
-    program.steps.iter().any(|step| match &step.kind {
-        StepKind::Line(line) => matches!(line.mode, PathMode::Blend { .. }),
-        StepKind::Arc(arc) => matches!(arc.mode, PathMode::Blend { .. }),
-        StepKind::Cubic(curve) => matches!(curve.mode, PathMode::Blend { .. }),
-        StepKind::Through(point) => matches!(point.mode, PathMode::Blend { .. }),
-        StepKind::Nurbs(curve) => matches!(curve.mode, PathMode::Blend { .. }),
-        StepKind::Dwell { .. } | StepKind::ToolChange { .. } | StepKind::Stop | StepKind::End => false,
-    })
+    program.steps.iter().any(|step| matches!(step.kind.mode(), Some(PathMode::Blend { .. })))
 }
 
 /// The figures of a program on a path.
@@ -132,13 +125,8 @@ pub fn on(program: &Program, path: Path) -> Program {
 pub fn in_mode(program: &Program, mode: PathMode) -> Program {
     let mut program = program.clone();
     for step in &mut program.steps {
-        match &mut step.kind {
-            StepKind::Line(line) => line.mode = mode,
-            StepKind::Arc(arc) => arc.mode = mode,
-            StepKind::Cubic(curve) => curve.mode = mode,
-            StepKind::Through(point) => point.mode = mode,
-            StepKind::Nurbs(curve) => curve.mode = mode,
-            StepKind::Dwell { .. } | StepKind::ToolChange { .. } | StepKind::Stop | StepKind::End => {}
+        if let Some(of_step) = step.kind.mode_mut() {
+            *of_step = mode;
         }
     }
     program

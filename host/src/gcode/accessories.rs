@@ -11,20 +11,14 @@ use super::tool::Tool;
 impl Interpreter {
     /// S, T, and the M words that are no stops, in their order.
     pub(super) fn accessories(&mut self, block: &Block<'_>) -> Result<(), Located> {
-        match block.g(GGroup::SpindleMode).map(|code| code.tenths) {
-            Some(960) if block.letter(b'S').is_none() => {
+        if let Some(code) = block.g(GGroup::SpindleMode) {
+            let is_surface = code.tenths == 960;
+            if is_surface && block.letter(b'S').is_none() {
                 let expected = "S, the speed of the surface, in the same line";
-                return Err(block
-                    .g(GGroup::SpindleMode)
-                    .map_or(Located::new(0, Problem::NothingSaved), |code| {
-                        code.word.problem(|word| Problem::Setup { word, expected })
-                    }));
+                return Err(code.word.problem(|word| Problem::Setup { word, expected }));
             }
-            Some(tenths) => {
-                self.modal.spindle.is_surface = tenths == 960;
-                self.notice(NoticeKind::Spindle);
-            }
-            None => {}
+            self.modal.spindle.is_surface = is_surface;
+            self.notice(NoticeKind::Spindle);
         }
         if let Some(word) = block.letter(b'S') {
             word.refuse_negative()?;

@@ -257,12 +257,7 @@ impl<'a> Block<'a> {
         })
     }
 
-    /// The leftmost word whose letter is not in `letters`.
-    pub(super) fn other_than(&self, letters: &[u8]) -> Option<Word<'a>> {
-        self.stranger(letters, &[])
-    }
-
-    /// The same, but for the G words of these tenths.
+    /// The leftmost word whose letter is not in `letters`, but for the G words of these tenths.
     pub(super) fn stranger(&self, letters: &[u8], g_tenths: &[i64]) -> Option<Word<'a>> {
         let g = self.g.iter().flatten().filter(|code| !g_tenths.contains(&code.tenths));
         let codes = g.chain(self.m.iter().flatten()).map(|code| code.word);
@@ -297,6 +292,11 @@ impl<'a> Block<'a> {
     /// may begin much later.
     pub(super) fn has_idle_d(&self) -> bool {
         self.letter(b'D').is_some() && self.takers(b'D') == 0
+    }
+
+    /// G53.
+    pub(super) fn machine_word(&self) -> Option<Word<'a>> {
+        self.g(GGroup::NonModal).filter(|code| code.tenths == 530).map(|code| code.word)
     }
 
     /// Whether the line sets G64.
@@ -459,22 +459,11 @@ fn same_group(code: Code<'_>, other: Code<'_>) -> Located {
 #[cfg(test)]
 #[allow(clippy::float_cmp, reason = "exact values are the point")]
 mod tests {
+    use super::super::expression::NoParameters;
     use super::*;
 
-    struct Nothing;
-
-    impl Environment for Nothing {
-        fn numbered(&self, _: u32) -> f64 {
-            0.0
-        }
-
-        fn named(&self, _: &str) -> Option<f64> {
-            None
-        }
-    }
-
     fn collect(line: &[u8]) -> Result<Block<'_>, Located> {
-        Block::collect(Cursor::new(line), &Nothing)
+        Block::collect(Cursor::new(line), &NoParameters)
     }
 
     #[test]

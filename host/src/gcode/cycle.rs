@@ -172,10 +172,8 @@ impl Interpreter {
         };
         if initial < r {
             let above = [self.work[axis_1].units(), self.work[axis_2].units()];
-            let before = self.program.steps.len();
-            self.straight(at(above, r), Feed::Rapid, first)?;
             // The cycle has not begun.
-            self.set_mode_from(before, self.modal.path);
+            self.straight(at(above, r), Feed::Rapid, self.modal.path, first)?;
             (initial, here) = (r, r);
         }
         let beyond = || first.problem(|word| Problem::PositionOutOfRange { word });
@@ -189,8 +187,8 @@ impl Interpreter {
                 hole = polar.point([x, y], &self.modal)?.map(Length::units);
             }
             let over = if repeat == 0 && here > r { here } else { levels.clear };
-            self.straight(at(hole, over), Feed::Rapid, first)?;
-            self.straight(at(hole, r), Feed::Rapid, first)?;
+            self.straight(at(hole, over), Feed::Rapid, PathMode::ExactPath, first)?;
+            self.straight(at(hole, r), Feed::Rapid, PathMode::ExactPath, first)?;
             self.hole(cycle, levels, feed, first, |level| at(hole, level))?;
             // Without a step, the others would make none either, however many L asks for.
             if self.program.steps.len() == before {
@@ -257,29 +255,35 @@ impl Interpreter {
         if cycle.pecks() {
             let mut depth = levels.r - self.cycle.peck.units();
             while depth > levels.bottom {
-                self.straight(at(depth), feed, first)?;
+                self.straight(at(depth), feed, PathMode::ExactPath, first)?;
                 if cycle == Cycle::Peck {
-                    self.straight(at(levels.r), Feed::Rapid, first)?;
+                    self.straight(at(levels.r), Feed::Rapid, PathMode::ExactPath, first)?;
                 }
-                self.straight(at(depth + CLEARANCE), Feed::Rapid, first)?;
+                self.straight(at(depth + CLEARANCE), Feed::Rapid, PathMode::ExactPath, first)?;
                 depth -= self.cycle.peck.units();
             }
         }
-        self.straight(at(levels.bottom), feed, first)?;
+        self.straight(at(levels.bottom), feed, PathMode::ExactPath, first)?;
         if cycle.dwells() {
             self.step(StepKind::Dwell { seconds: self.cycle.dwell_s })?;
         }
         match cycle {
-            Cycle::Bore => self.straight(at(levels.r), feed, first)?,
-            Cycle::BoreDwell => self.straight(at(levels.clear), feed, first)?,
+            Cycle::Bore => self.straight(at(levels.r), feed, PathMode::ExactPath, first)?,
+            Cycle::BoreDwell => self.straight(at(levels.clear), feed, PathMode::ExactPath, first)?,
             Cycle::BoreManual => self.step(StepKind::Stop)?,
             _ => {}
         }
-        self.straight(at(levels.clear), Feed::Rapid, first)
+        self.straight(at(levels.clear), Feed::Rapid, PathMode::ExactPath, first)
     }
 
-    /// A straight move in exact path to a point in work coordinates \[10⁻¹⁰ mm\].
-    pub(super) fn straight(&mut self, to: [i64; 3], feed: Feed, first: Word<'_>) -> Result<(), Located> {
+    /// A straight move to a point in work coordinates \[10⁻¹⁰ mm\].
+    pub(super) fn straight(
+        &mut self,
+        to: [i64; 3],
+        feed: Feed,
+        mode: PathMode,
+        first: Word<'_>,
+    ) -> Result<(), Located> {
         let beyond = || first.problem(|word| Problem::PositionOutOfRange { word });
         let work = super::frame::lengths(to).ok_or_else(beyond)?;
         let (from, to) = (self.machine, self.frame.machine(work).ok_or_else(beyond)?);
@@ -287,7 +291,7 @@ impl Interpreter {
         if from == to {
             return Ok(());
         }
-        self.step(StepKind::Line(LineMove { from, to, feed, mode: PathMode::ExactPath }))
+        self.step(StepKind::Line(LineMove { from, to, feed, mode }))
     }
 
     /// Another motion mode is in force: the next cycle begins anew.

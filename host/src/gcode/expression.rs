@@ -37,6 +37,19 @@ pub(super) trait Environment {
     }
 }
 
+/// No parameters: a text of plain numbers.
+pub(super) struct NoParameters;
+
+impl Environment for NoParameters {
+    fn numbered(&self, _: u32) -> f64 {
+        0.0
+    }
+
+    fn named(&self, _: &str) -> Option<f64> {
+        None
+    }
+}
+
 /// The parameter an assignment is for.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Target {

@@ -12,7 +12,7 @@ use super::modal::{FeedMode, Modal, Motion, Units};
 use super::nurbs;
 use super::options::ReadOptions;
 use super::parameters::{Parameters, SELECTED};
-use super::program::{Message, Notice, NoticeKind, PathMode, Program, Step, StepKind};
+use super::program::{Message, Notice, NoticeKind, Program, Step, StepKind};
 use super::tool::ToolTable;
 
 /// Feeds beyond are no feeds \[mm/min\].
@@ -53,7 +53,8 @@ pub(super) struct Interpreter {
     /// Line of the program for steps, from 1.
     pub(super) line: u32,
     optional_stop: bool,
-    steps_max: usize,
+    /// Most steps, most messages, and most control points of a NURBS.
+    pub(super) steps_max: usize,
     /// A word or a tape mark was read.
     pub(super) begun: bool,
     pub(super) ended: bool,
@@ -162,7 +163,7 @@ impl Interpreter {
 
     /// M98 or M99, alone in its line.
     fn subprogram(block: &Block<'_>, calls: bool) -> Result<Control, Located> {
-        if let Some(word) = block.other_than(if calls { b"MNPL" } else { b"MN" }) {
+        if let Some(word) = block.stranger(if calls { b"MNPL" } else { b"MN" }, &[]) {
             return Err(word.problem(|word| Problem::SubprogramAlone { word }));
         }
         if !calls {
@@ -181,17 +182,9 @@ impl Interpreter {
         if self.program.steps.len() >= self.steps_max {
             return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
         }
-        self.cubic_before_mm = match &kind {
-            StepKind::Cubic(cubic) => Some(cubic.controls_mm[1]),
-            _ => None,
-        };
+        self.cubic_before_mm = None;
         self.program.steps.push(Step { line: self.line, kind });
         Ok(())
-    }
-
-    /// Most control points of a NURBS.
-    pub(super) fn points_max(&self) -> usize {
-        self.steps_max
     }
 
     /// Shows a text to the operator before the next step.
@@ -256,15 +249,6 @@ impl Interpreter {
         }
         time.refuse_negative()?;
         self.step(StepKind::Dwell { seconds: time.number.to_f64() })
-    }
-
-    /// Gives the steps from `first` on, which are straight, their path mode.
-    pub(super) fn set_mode_from(&mut self, first: usize, path: PathMode) {
-        for step in self.program.steps.iter_mut().skip(first) {
-            if let StepKind::Line(line) = &mut step.kind {
-                line.mode = path;
-            }
-        }
     }
 
     /// The number of subroutines that run.

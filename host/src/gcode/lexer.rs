@@ -307,24 +307,13 @@ impl<'a> Iterator for Items<'a, '_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::expression::NoParameters;
     use super::*;
-
-    struct Nothing;
-
-    impl Environment for Nothing {
-        fn numbered(&self, _: u32) -> f64 {
-            0.0
-        }
-
-        fn named(&self, _: &str) -> Option<f64> {
-            None
-        }
-    }
 
     /// The words of a line written one way: upper case, one blank apart, plain decimals.
     fn plain(line: &[u8]) -> Result<String, Located> {
         let mut words = Vec::new();
-        for item in Items::new(Cursor::new(line), &Nothing) {
+        for item in Items::new(Cursor::new(line), &NoParameters) {
             match item? {
                 Item::Word(Word { letter, number: Number::Exact(number), .. }) => {
                     words.push(format!("{}{number}", char::from(letter)));

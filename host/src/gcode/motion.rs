@@ -38,8 +38,11 @@ impl Interpreter {
             let expected = "axis words";
             return Err(code.word.problem(|_| Problem::Cycle { word: cycle.word(), expected }));
         }
+        let machine = block.machine_word();
         if !block.moves(self.modal.motion) {
-            return self.refuse_unmoved(block);
+            let unmoved =
+                |word: Word<'_>| word.problem(|word| Problem::MachineMove { word, expected: "axis words" });
+            return machine.map_or(Ok(()), |word| Err(unmoved(word)));
         }
         let ends = [b'P', b'Q', b'@', b'^'].map(|letter| block.letter(letter));
         let words = block.axes().into_iter().chain(block.offsets()).chain([block.letter(b'R')]).chain(ends);
@@ -49,7 +52,7 @@ impl Interpreter {
         };
         let offset = code.map_or(first.offset, |code| code.word.offset);
         let feed = self.feed(block, motion, offset)?;
-        if block.g(GGroup::NonModal).is_some_and(|code| code.tenths == 530) {
+        if machine.is_some() {
             return self.machine_move(block, motion, feed, first);
         }
         if let Motion::Cycle(cycle) = motion {
@@ -86,17 +89,6 @@ impl Interpreter {
             self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }))
         } else {
             self.line_to(from, to, feed, mode)
-        }
-    }
-
-    /// A line without a move: words that only a move takes have no other use.
-    fn refuse_unmoved(&self, block: &Block<'_>) -> Result<(), Located> {
-        let waits = block.g(GGroup::NonModal).is_some_and(|code| code.tenths == 530);
-        match block.g(GGroup::NonModal).filter(|_| waits) {
-            Some(code) => {
-                Err(code.word.problem(|word| Problem::MachineMove { word, expected: "axis words" }))
-            }
-            None => Ok(()),
         }
     }
 
@@ -229,12 +221,12 @@ impl Interpreter {
         }
         // In XY the machine's axes do; another plane turns with the program's.
         let turn_deg = if plane == Plane::Xy { 0.0 } else { self.frame.rotation_deg };
-        let in_plane = |point: [Length; 3]| {
-            let turned = turn(point.map(Length::units), -turn_deg);
+        let turned = |point: [Length; 3]| {
             let beyond = || Located::new(offset, Problem::WorkOutOfRange);
-            lengths(turned).map(|turned| [turned[first], turned[second]]).ok_or_else(beyond)
+            lengths(turn(point.map(Length::units), -turn_deg)).ok_or_else(beyond)
         };
-        let (start, end) = (in_plane(from)?, in_plane(to)?);
+        let (turned_from, turned_to) = (turned(from)?, turned(to)?);
+        let [start, end] = [turned_from, turned_to].map(|point| [point[first], point[second]]);
         let clockwise = motion == Motion::Clockwise;
         let centre_words = [offsets[first], offsets[second]];
         let resolved = match (block.letter(b'R'), centre_words) {
@@ -266,8 +258,7 @@ impl Interpreter {
             sweep_rad += (2.0 * PI * f64::from(turns - 1)).copysign(sweep_rad);
         }
         let mean_radius_mm = (start_radius_mm + end_radius_mm) / 2.0;
-        let [from_units, to_units] = [from, to].map(|point| turn(point.map(Length::units), -turn_deg));
-        let height_mm = (to_units[normal] - from_units[normal]) as f64 / Length::UNITS_PER_MM as f64;
+        let height_mm = turned_to[normal].to_mm() - turned_from[normal].to_mm();
         let feed = self.timed(feed, libm::hypot(mean_radius_mm * sweep_rad, height_mm));
         Ok(ArcMove {
             from,

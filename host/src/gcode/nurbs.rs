@@ -110,8 +110,8 @@ impl Interpreter {
         if block.axes_are_taken() || code.is_none() && !block.moves(Some(motion)) {
             return Ok(false);
         }
-        if let Some(code) = block.g(GGroup::NonModal).filter(|code| code.tenths == 530) {
-            return Err(code.word.problem(|word| Problem::MachineMove { word, expected: "G0 or G1" }));
+        if let Some(word) = block.machine_word() {
+            return Err(word.problem(|word| Problem::MachineMove { word, expected: "G0 or G1" }));
         }
         let letters = b"XYZPLQRK".iter().filter_map(|&letter| block.letter(letter));
         let Some(first) = code.into_iter().chain(letters).min_by_key(|word| word.offset) else {
@@ -133,8 +133,8 @@ impl Interpreter {
                 }
             }
         }
-        if self.nurbs.as_ref().is_some_and(|open| open.entries.len() > self.points_max()) {
-            let steps_max = self.points_max();
+        if self.nurbs.as_ref().is_some_and(|open| open.entries.len() > self.steps_max) {
+            let steps_max = self.steps_max;
             return Err(Located::new(first.offset, Problem::TooManySteps { steps_max }));
         }
         Ok(true)

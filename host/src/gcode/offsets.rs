@@ -149,11 +149,7 @@ impl Interpreter {
     }
 
     fn rapid(&mut self, work: [Length; 3], code: Word<'_>) -> Result<(), Located> {
-        let mode = self.modal.path;
-        let before = self.program.steps.len();
-        self.straight(work.map(Length::units), Feed::Rapid, code)?;
-        self.set_mode_from(before, mode);
-        Ok(())
+        self.straight(work.map(Length::units), Feed::Rapid, self.modal.path, code)
     }
 
     /// G10.

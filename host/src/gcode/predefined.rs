@@ -5,8 +5,8 @@ use super::interpreter::Interpreter;
 use super::modal::{Distance, FeedMode, Units};
 use super::program::Plane;
 
-/// The names, without their underscore.
-const NAMES: [&str; 53] = [
+/// The names, without their underscore, sorted.
+const NAMES: [&str; 60] = [
     "a",
     "abs_a",
     "abs_b",
@@ -42,6 +42,7 @@ const NAMES: [&str; 53] = [
     "mist",
     "motion_mode",
     "plane",
+    "remap_level",
     "retract_old_z",
     "retract_r_plane",
     "rpm",
@@ -60,13 +61,17 @@ const NAMES: [&str; 53] = [
     "v",
     "value",
     "value_returned",
+    "vmajor",
+    "vminor",
+    "w",
+    "x",
+    "y",
+    "z",
 ];
-/// The rest of them, which do not sort among these.
-const MORE: [&str; 7] = ["w", "x", "y", "z", "vmajor", "vminor", "remap_level"];
 
 /// Whether a name, with its underscore, is predefined.
 pub(super) fn is_name(name: &str) -> bool {
-    name.strip_prefix('_').is_some_and(|name| NAMES.binary_search(&name).is_ok() || MORE.contains(&name))
+    name.strip_prefix('_').is_some_and(|name| NAMES.binary_search(&name).is_ok())
 }
 
 fn truth(value: bool) -> f64 {
@@ -190,7 +195,7 @@ mod tests {
     fn every_name_has_a_value() {
         assert!(NAMES.is_sorted());
         let interpreter = Interpreter::new(&super::super::ReadOptions::default());
-        for name in NAMES.iter().chain(&MORE) {
+        for name in NAMES {
             assert!(interpreter.named(&format!("_{name}")).is_some(), "{name}");
             assert!(is_name(&format!("_{name}")), "{name}");
         }

@@ -93,6 +93,33 @@ pub enum StepKind {
     End,
 }
 
+impl StepKind {
+    /// The path mode of a move.
+    #[must_use]
+    pub fn mode(&self) -> Option<PathMode> {
+        match self {
+            Self::Line(line) => Some(line.mode),
+            Self::Arc(arc) => Some(arc.mode),
+            Self::Cubic(curve) => Some(curve.mode),
+            Self::Through(point) => Some(point.mode),
+            Self::Nurbs(curve) => Some(curve.mode),
+            Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+        }
+    }
+
+    /// The same, to set it.
+    pub fn mode_mut(&mut self) -> Option<&mut PathMode> {
+        match self {
+            Self::Line(line) => Some(&mut line.mode),
+            Self::Arc(arc) => Some(&mut arc.mode),
+            Self::Cubic(curve) => Some(&mut curve.mode),
+            Self::Through(point) => Some(&mut point.mode),
+            Self::Nurbs(curve) => Some(&mut curve.mode),
+            Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+        }
+    }
+}
+
 /// A straight move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineMove {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use super::decimal::Length;
 use super::error::{GcodeError, Located, Problem};
-use super::expression::Environment;
+use super::expression::NoParameters;
 use super::lexer::{Cursor, Item, Items, Word};
 use super::modal::Units;
 
@@ -35,19 +35,6 @@ pub struct ToolTable {
     tools: BTreeMap<u32, Tool>,
 }
 
-/// No parameters: a table is plain numbers.
-struct Plain;
-
-impl Environment for Plain {
-    fn numbered(&self, _: u32) -> f64 {
-        0.0
-    }
-
-    fn named(&self, _: &str) -> Option<f64> {
-        None
-    }
-}
-
 impl ToolTable {
     /// Reads a table; `source_name` appears in errors only.
     ///
@@ -65,7 +52,7 @@ impl ToolTable {
     fn add(&mut self, line: &[u8]) -> Result<(), Located> {
         let mut tool = Tool::default();
         let mut number: Option<Word<'_>> = None;
-        for item in Items::new(Cursor::new(line), &Plain) {
+        for item in Items::new(Cursor::new(line), &NoParameters) {
             let word = match item? {
                 Item::Word(word) => word,
                 Item::Comment(_) => continue,

@@ -80,13 +80,9 @@ pub fn plan_program(
                 }
             }
         }
-        let stops = match &step.kind {
-            StepKind::Line(line) => line.mode == PathMode::ExactStop,
-            StepKind::Arc(arc) => arc.mode == PathMode::ExactStop,
-            StepKind::Cubic(curve) => curve.mode == PathMode::ExactStop,
-            StepKind::Nurbs(curve) => curve.mode == PathMode::ExactStop,
-            _ => false,
-        };
+        // The points of a spline are not moves yet.
+        let is_point = matches!(step.kind, StepKind::Through(_));
+        let stops = step.kind.mode() == Some(PathMode::ExactStop) && !is_point;
         if stops {
             append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
         }

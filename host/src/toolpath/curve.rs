@@ -30,6 +30,26 @@ pub(super) fn gauss(a: f64, b: f64, function: impl Fn(f64) -> f64) -> f64 {
     half * sum
 }
 
+/// The integral of |r'| from `a` to `b` \[mm\], halved until both halves say what the whole, `whole_mm`, says, or so
+/// many times. `agree` takes both halves together and the whole.
+pub(super) fn refined_length(
+    curve: &impl Curve,
+    [a, b]: [f64; 2],
+    whole_mm: f64,
+    halvings: u32,
+    agree: &impl Fn(f64, f64) -> bool,
+) -> f64 {
+    let middle = 0.5 * (a + b);
+    let length = |a, b| gauss(a, b, |u| curve.speed(u));
+    let (left, right) = (length(a, middle), length(middle, b));
+    let both = left + right;
+    if halvings == 0 || agree(both, whole_mm) || !both.is_finite() {
+        return both;
+    }
+    refined_length(curve, [a, middle], left, halvings - 1, agree)
+        + refined_length(curve, [middle, b], right, halvings - 1, agree)
+}
+
 /// First to third derivative by arc length, from those by a parameter.
 ///
 /// With σ = |r'|: t = r'/σ, κn = (r'' − t·(t·r''))/σ², and the third from the derivative of that.

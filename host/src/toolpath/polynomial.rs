@@ -6,7 +6,7 @@
 //! arc length. Any finite coefficients are accepted; a curve that stands still somewhere (|r'| = 0) has no
 //! tangent there and is refused when it is made into pieces.
 
-use super::curve::{Curve, by_arc_length, fourth_by_arc_length};
+use super::curve::{Curve, by_arc_length, fourth_by_arc_length, gauss, refined_length};
 use super::greatest::{Greatest, Peak, bend};
 use super::{Vector, add, norm, scale};
 
@@ -136,18 +136,6 @@ impl Polynomial {
         }
         shifted
     }
-
-    /// Halves [a, b], whose quadrature is `whole`, until both halves together say the same.
-    fn refined(&self, a: f64, b: f64, whole: f64, halvings: u32) -> f64 {
-        let middle = 0.5 * (a + b);
-        let gauss = |a, b| super::curve::gauss(a, b, |u| self.speed(u));
-        let (left, right) = (gauss(a, middle), gauss(middle, b));
-        let both = left + right;
-        if halvings == HALVINGS_MAX || (both - whole).abs() <= LENGTH_TOLERANCE * both || !both.is_finite() {
-            return both;
-        }
-        self.refined(a, middle, left, halvings + 1) + self.refined(middle, b, right, halvings + 1)
-    }
 }
 
 impl Curve for Polynomial {
@@ -170,7 +158,9 @@ impl Curve for Polynomial {
     }
 
     fn length(&self, a: f64, b: f64) -> f64 {
-        self.refined(a, b, super::curve::gauss(a, b, |u| self.speed(u)), 0)
+        let whole_mm = gauss(a, b, |u| self.speed(u));
+        let agree = |both: f64, whole: f64| (both - whole).abs() <= LENGTH_TOLERANCE * both;
+        refined_length(self, [a, b], whole_mm, HALVINGS_MAX, &agree)
     }
 }
 

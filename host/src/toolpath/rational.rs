@@ -5,7 +5,7 @@
 //! degree seven in arc length elsewhere. These follow the span within the tolerance of
 //! [`septic`](super::septic) and are joined as smoothly as it is. What bends or turns at a knot does so between two spans.
 
-use super::curve::{Curve, gauss};
+use super::curve::{Curve, gauss, refined_length};
 use super::element::{Element, Role};
 use super::polynomial::Polynomial;
 use super::septic::{FitError, POSITION_TOLERANCE_MM, fit};
@@ -200,19 +200,6 @@ impl Rational {
         });
         errors.fold(0.0, f64::max)
     }
-
-    /// Halves [a, b], whose quadrature is `whole_mm`, until both halves together say the same to `error_mm`.
-    fn refined(&self, a: f64, b: f64, whole_mm: f64, error_mm: f64, halvings: u32) -> f64 {
-        let middle = 0.5 * (a + b);
-        let length = |a, b| gauss(a, b, |u| self.speed(u));
-        let (left, right) = (length(a, middle), length(middle, b));
-        let both = left + right;
-        if halvings == HALVINGS_MAX || (both - whole_mm).abs() <= error_mm || !both.is_finite() {
-            return both;
-        }
-        self.refined(a, middle, left, error_mm, halvings + 1)
-            + self.refined(middle, b, right, error_mm, halvings + 1)
-    }
 }
 
 /// One step of de Casteljau's construction.
@@ -264,6 +251,8 @@ impl Curve for Rational {
 
     fn length(&self, a: f64, b: f64) -> f64 {
         let whole_mm = gauss(a, b, |u| self.speed(u));
-        self.refined(a, b, whole_mm, LENGTH_TOLERANCE * whole_mm, 0)
+        let error_mm = LENGTH_TOLERANCE * whole_mm;
+        let agree = |both: f64, whole: f64| (both - whole).abs() <= error_mm;
+        refined_length(self, [a, b], whole_mm, HALVINGS_MAX, &agree)
     }
 }

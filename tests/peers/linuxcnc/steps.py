@@ -283,14 +283,12 @@ def with_length(steps):
     """Without moves to where the machine is, but with full turns, and without changes to the tool that there is."""
     position, tool, kept = NOWHERE, 0, []
     for step in steps:
-        if step.kind == "tool":
-            step, tool = (None if step.value == tool else step), step.value
-            kept += [step] if step else []
+        is_straight = step.kind == "move" and not step.arc and not step.through
+        if is_straight and math.dist(step.to, position) < NO_LENGTH_MM or step.kind == "tool" and step.value == tool:
             continue
-        stays = step.kind == "move" and not step.arc and not step.through and math.dist(step.to, position) < NO_LENGTH_MM
-        if not stays:
-            kept.append(step)
-            position = step.to or position
+        kept.append(step)
+        position = step.to or position
+        tool = step.value if step.kind == "tool" else tool
     return kept
 
 
