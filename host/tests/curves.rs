@@ -177,3 +177,11 @@ fn what_has_no_curve_is_refused_with_its_line() {
         assert!(error.starts_with(start) && error.contains(message), "{error}");
     }
 }
+
+/// A spline through points on a straight line goes on in a move along it, but under G61.1.
+#[test]
+fn an_exact_stop_holds_behind_a_spline() {
+    let text = "F600\nG5.5 X10\nX20\nX30\nX40\nX50\nG1 X60\nM2\n";
+    assert_eq!(stretches(&planned(&format!("G61\n{text}")).expect("a plan")), 1);
+    assert_eq!(stretches(&planned(&format!("G61.1\n{text}")).expect("a plan")), 2);
+}

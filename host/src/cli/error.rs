@@ -69,6 +69,14 @@ pub enum CliError {
         /// The system's reason.
         source: io::Error,
     },
+    /// A folder can't be read.
+    #[error("{path}: found {source}, expected a folder that can be read")]
+    Folder {
+        /// The path, as the user gave it.
+        path: String,
+        /// The system's reason.
+        source: io::Error,
+    },
     /// A file must not be written, or can't be opened: found before the work.
     #[error(transparent)]
     Files(#[from] FilesError),

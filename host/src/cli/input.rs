@@ -37,6 +37,10 @@ pub(super) struct ReadingArguments {
 impl ReadingArguments {
     /// The options they ask for, with the files read.
     pub(super) fn options(&self) -> Result<ReadOptions, CliError> {
+        for folder in &self.subroutines {
+            let path = || folder.display().to_string();
+            fs::read_dir(folder).map_err(|source| CliError::Folder { path: path(), source })?;
+        }
         let parameters = match &self.parameters {
             Some(path) => {
                 let Source { name, text, .. } = read(path)?;

@@ -34,11 +34,15 @@ pub fn plan_program(
     plan.notices = program.notes();
     let mut run: Vec<Move> = Vec::new();
     // Where the spline begins whose points are being collected.
-    let (mut start, mut points) = ([0.0; 3], Vec::new());
+    let (mut start, mut points) = ([0.0; 3], Vec::<Point>::new());
     for step in &program.steps {
         if !matches!(&step.kind, StepKind::Through(point) if !point.begins) {
+            let stops = points.last().is_some_and(|point| point.mode == PathMode::ExactStop);
             let moves = through(start, &mut points, machine);
             run.extend(moves.map_err(|(line, problem)| at(line)(problem))?);
+            if stops {
+                append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
+            }
         }
         match &step.kind {
             StepKind::Line(line) => {
@@ -80,7 +84,7 @@ pub fn plan_program(
                 }
             }
         }
-        // The points of a spline are not moves yet.
+        // The points of a spline are not moves yet; the stop behind the last is made above.
         let is_point = matches!(step.kind, StepKind::Through(_));
         let stops = step.kind.mode() == Some(PathMode::ExactStop) && !is_point;
         if stops {

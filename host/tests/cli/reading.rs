@@ -126,6 +126,12 @@ fn subroutines_lie_in_files_of_their_own() {
     // The lines are those of the program.
     assert_eq!((&steps[0]["line"], &steps[0]["to_mm"]), (&json!(1), &json!([5.0, 0.0, 0.0])));
     assert_eq!((&steps[1]["line"], &steps[1]["to_mm"]), (&json!(2), &json!([5.0, 1.0, 0.0])));
+    let refusal = workspace.refusal(&["read", "part.ngc", "--subroutines", "mroe"]);
+    assert!(
+        refusal.starts_with("mroe: found ")
+            && refusal.trim_end().ends_with("expected a folder that can be read"),
+        "{refusal}"
+    );
     workspace.put("pocket.ngc", "G0 X1\n");
     let refusal = workspace.refusal(&["read", "part.ngc", "--subroutines", "more"]);
     assert!(refusal.starts_with("part.ngc:1:1: found no Opocket in pocket.ngc"), "{refusal}");
