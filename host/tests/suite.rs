@@ -7,6 +7,7 @@
 mod cli;
 mod compare;
 mod curves;
+mod cutter;
 mod dialect;
 mod drive;
 mod gcode;

@@ -1,6 +1,7 @@
 //! Spindle, coolant, tools, inputs and outputs: what a line asks of everything but the axes.
 
 use super::block::{Block, GGroup, MGroup};
+use super::cutter::compensated;
 use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::interpreter::Interpreter;
@@ -108,6 +109,9 @@ impl Interpreter {
     /// M6 stops for the tool that T selected; M61 says which one there is.
     fn change_tool(&mut self, block: &Block<'_>) -> Result<(), Located> {
         let Some(code) = block.m(MGroup::ToolChange) else { return Ok(()) };
+        if self.cutter.is_some() {
+            return Err(compensated(code.word));
+        }
         if code.tenths == 610 {
             let Some(word) = block.letter(b'Q') else {
                 let expected = "the number of the tool, a Q word";
@@ -117,6 +121,11 @@ impl Interpreter {
             self.tool(number, word.offset)?;
             self.tools.current = number;
             return Ok(());
+        }
+        // The position is read anew: behind G40 the tool is beside the point that was programmed.
+        if let Some(at) = self.tool_at.take() {
+            self.machine = at;
+            self.update_work(code.word.offset)?;
         }
         // Without a tool there is nothing to take: LinuxCNC refuses it, older programs of this reader have it.
         let Some(number) = self.tools.selected else {

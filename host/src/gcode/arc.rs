@@ -21,6 +21,9 @@ const MISMATCH_MAX: f64 = 100.0;
 /// How far a chord may exceed 2 R \[mm\].
 const CHORD_EXCESS_MM: f64 = 0.005;
 
+/// An arc is a half circle if 2 R exceeds its chord by less \[10⁻¹⁰ mm\].
+const HALF_CIRCLE_UNITS: i128 = 3;
+
 /// A point of the plane, relative to another \[10⁻¹⁰ mm\]; |coordinates| ≤ 4 [`Length::LIMIT`].
 type Offset = [i64; 2];
 
@@ -125,11 +128,13 @@ pub(super) fn of_radius(
     // (2 R)² − chord² = (2 × distance of the centre from the chord)², exact, so that nothing cancels.
     let apothem_squared = diameter * diameter - chord_squared;
     let radius_enlarged = apothem_squared < 0;
+    // Ends and radius are rounded. So near to a half circle that would move the centre by 10⁵ times as much.
+    let is_half = apothem_squared <= 2 * HALF_CIRCLE_UNITS * diameter.abs();
     if radius_enlarged && chord_mm - 2.0 * radius.to_mm().abs() > CHORD_EXCESS_MM {
         return Err(Problem::ArcRadiusTooSmall { word: word(), chord_mm });
     }
-    let apothem_mm = mm_from_root(apothem_squared.max(0)) / 2.0;
-    let radius_mm = if radius_enlarged { chord_mm / 2.0 } else { radius.to_mm().abs() };
+    let apothem_mm = if is_half { 0.0 } else { mm_from_root(apothem_squared) / 2.0 };
+    let radius_mm = if is_half { chord_mm / 2.0 } else { radius.to_mm().abs() };
 
     let shorter_rad = 2.0 * libm::atan2(chord_mm / 2.0, apothem_mm);
     let longer = radius < Length::ZERO;

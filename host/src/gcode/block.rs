@@ -47,7 +47,7 @@ pub(super) enum GGroup {
     ArcDistance,
     /// G61 G61.1 G64.
     PathMode,
-    /// G40.
+    /// G40 G41 G41.1 G42 G42.1.
     CutterCompensation,
     /// G43 G43.1 G43.2 G49.
     ToolLength,
@@ -107,7 +107,7 @@ fn g_group(tenths: i64) -> Option<GGroup> {
         900 | 910 => GGroup::Distance,
         901 | 911 => GGroup::ArcDistance,
         610 | 611 | 640 => GGroup::PathMode,
-        400 => GGroup::CutterCompensation,
+        400 | 410 | 411 | 420 | 421 => GGroup::CutterCompensation,
         430..=432 | 490 => GGroup::ToolLength,
         540 | 550 | 560 | 570 | 580 | 590..=593 => GGroup::CoordinateSystem,
         70 | 80 => GGroup::Diameter,
@@ -337,9 +337,14 @@ impl<'a> Block<'a> {
                     + m(MGroup::ToolChange, &[610])
                     + m(MGroup::InputOutput, &[660, 670, 680])
             }
-            b'L' => setup + m(MGroup::InputOutput, &[660]) + m(MGroup::Subprogram, &[980]),
+            b'L' => {
+                setup
+                    + g(GGroup::CutterCompensation, &[411, 421])
+                    + m(MGroup::InputOutput, &[660])
+                    + m(MGroup::Subprogram, &[980])
+            }
             b'E' => m(MGroup::InputOutput, &[660, 670, 680]),
-            b'D' => g(GGroup::SpindleMode, &[960]),
+            b'D' => g(GGroup::CutterCompensation, &[410, 411, 420, 421]) + g(GGroup::SpindleMode, &[960]),
             b'H' => g(GGroup::ToolLength, &[430, 432]),
             b'I' | b'J' | b'R' => setup,
             _ => 0,
@@ -357,7 +362,7 @@ impl<'a> Block<'a> {
             (b'I', "G2, G3, G5 or G10"),
             (b'J', "G2, G3, G5 or G10"),
             (b'K', "G2, G3 or G6.2"),
-            (b'L', "G5.2, G10, M66, M98 or a drilling cycle"),
+            (b'L', "G5.2, G10, G41.1, G42.1, M66, M98 or a drilling cycle"),
             (
                 b'P',
                 "G2, G3, G4, G5, G5.2, G6.2, G10, G64, a cycle with a dwell, M50 to M53, M62 to M66 or M98",
@@ -503,7 +508,7 @@ mod tests {
             (b"M9 M7", 3, "found M7 in a line with M9"),
             (b"M2 M30", 3, "found M30 in a line with M2"),
             (b"X1 X2", 3, "a second X word, X2"),
-            (b"G41 D1", 0, "found G41, expected one of G0"),
+            (b"G41.2 D1", 0, "found G41.2, expected one of G0"),
             (b"M19", 0, "needs a spindle encoder"),
             (b"G90.2", 0, "found G90.2"),
             (b"G1.05", 0, "found G1.05"),

@@ -88,7 +88,7 @@ pub enum Problem {
     #[error("found {word}, expected X, Y or Z: the machine has no such axis")]
     NoSuchAxis { word: String },
     #[error(
-        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.2 G5.3 G5.5 G6.2 G6.3 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G40 \
+        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.2 G5.3 G5.5 G6.2 G6.3 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G40 to G42.1 \
          G43 G43.1 G43.2 G49 G52 G53 G54 to G59.3 G61 G61.1 G64 G73 G80 to G83 G85 G86 G88 G89 G90 G90.1 G91 G91.1 \
          G92 to G92.3 G93 to G99"
     )]
@@ -256,6 +256,29 @@ pub enum Problem {
     NurbsPoints { points: usize, order: u32 },
     #[error("found {found}, expected {expected}")]
     Nurbs { found: String, expected: &'static str },
+    #[error("found {word} with G41 or G42 in force, expected G40 in a line before it")]
+    Compensated { word: String },
+    #[error(
+        "found the radius of tool {number} wanted, but no such tool in a tool table, expected one (--tools), G10 L1 P{number} \
+         R before it, or G41.1 D or G42.1 D with the tool's diameter"
+    )]
+    CompensationRadius { number: u32 },
+    #[error(
+        "found a first move of {length_mm:.6} mm after G41 or G42, expected a longer one than the tool's radius, \
+         {radius_mm:.6} mm"
+    )]
+    CompensationEntry { length_mm: f64, radius_mm: f64 },
+    #[error(
+        "found an arc that is too tight for the tool, expected one of more than its radius, {radius_mm:.6} mm"
+    )]
+    CompensatedArc { radius_mm: f64 },
+    #[error(
+        "found a corner up to here that does not let the tool in, expected room for its radius, {radius_mm:.6} mm, beside \
+         both of its moves"
+    )]
+    Gouge { radius_mm: f64 },
+    #[error("found {motion} right after G40, expected G0 or G1, which takes the tool back to the path")]
+    CompensationLeft { motion: &'static str },
     #[error("found G5 without P and Q, expected the offset from its end to its second control point")]
     SplineWithoutEnd,
 }

@@ -1,6 +1,7 @@
 //! Executes the lines, in the order RS-274 gives to the words of a line.
 
 use super::block::{Block, GGroup, MGroup};
+use super::cutter::Cutter;
 use super::cycle::CycleState;
 use super::decimal::Length;
 use super::error::{Located, Problem};
@@ -37,8 +38,12 @@ pub(super) struct Interpreter {
     pub(super) frame: Frame,
     /// Where the machine is, as the program counts.
     pub(super) work: [Length; 3],
-    /// Where the machine is.
+    /// Where the machine is; with cutter compensation the programmed point.
     pub(super) machine: [Length; 3],
+    /// G41 or G42.
+    pub(super) cutter: Option<Cutter>,
+    /// Where the machine is instead, beside the programmed path.
+    pub(super) tool_at: Option<[Length; 3]>,
     pub(super) parameters: Parameters,
     pub(super) tools: Tools,
     pub(super) cycle: CycleState,
@@ -93,6 +98,8 @@ impl Interpreter {
             frame: Frame::default(),
             work: [Length::ZERO; 3],
             machine: [Length::ZERO; 3],
+            cutter: None,
+            tool_at: None,
             tools: Tools {
                 table: options.tools.clone().unwrap_or_default(),
                 is_given: options.tools.is_some(),
@@ -150,6 +157,7 @@ impl Interpreter {
         if !matches!(self.modal.motion, Some(Motion::Cycle(_))) {
             self.end_cycles();
         }
+        self.compensation(&block)?;
         self.offsets(&block)?;
         self.motion(&block)?;
         match block.m(MGroup::Stop).map(|code| code.tenths) {
@@ -200,6 +208,7 @@ impl Interpreter {
     /// Ends the program; the next one starts in the first coordinate system.
     pub(super) fn end(&mut self) -> Result<(), Located> {
         self.unended_nurbs().map_or(Ok(()), Err)?;
+        self.end_track(0)?;
         self.step(StepKind::End)?;
         self.parameters.set(SELECTED, 1.0);
         self.ended = true;
@@ -292,6 +301,13 @@ impl Interpreter {
     /// All modes but the motion mode.
     fn restore(&mut self, saved: Saved) -> Result<(), Located> {
         self.unended_nurbs().map_or(Ok(()), Err)?;
+        let moves_path = saved.modal.plane != self.modal.plane
+            || saved.system != self.system()
+            || saved.tool != self.frame.tool;
+        if self.cutter.is_some() && moves_path {
+            let word = "another plane or offset restored".to_owned();
+            return Err(Located::new(0, Problem::Compensated { word }));
+        }
         self.modal = Modal { motion: self.modal.motion, ..saved.modal };
         self.frame.tool = saved.tool;
         self.select(saved.system, 0)

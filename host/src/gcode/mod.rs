@@ -61,7 +61,8 @@
 //! | M0 M1 M60, M2 M30 | stop (M1 by a switch), end |
 //! | M3 M4 M5 S, G96 G97 D, M7 M8 M9, M48 to M53, M62 to M68 | kept as modes and read back by parameters, otherwise not acted on, which is told |
 //! | M70 to M73 | modes saved and restored |
-//! | G40 G80 | accepted: they end what is not there |
+//! | G40, G41 G42 \[D\], G41.1 G42.1 D \[L\] | cutter radius compensation in XY and ZX: the path of the tool's centre beside the programmed one, by the radius of the tool in the table, or half the D of G41.1 |
+//! | G80 | ends a drilling cycle |
 //! | `#1`, `#<name>`, `#<_name>`, `[…]` | parameters of a subroutine (#1 to #30, names) and of all, read before any assignment of their line; expressions with all operators and functions of LinuxCNC |
 //! | O…  sub, call, return, if, while, do, repeat, break, continue | subroutines and loops, named or numbered; other files are looked for in [`ReadOptions::subroutines`] |
 //! | M98 P L, M99 | Fanuc's subprograms, which begin with a bare O… and work on their caller's parameters |
@@ -79,6 +80,9 @@
 //! - Two words that would take one letter (`G64 P1 G4`) are refused, and letters that nothing takes; D alone is noticed.
 //! - A drilling cycle before any G98 or G99 ends where it began, as Fanuc's do; LinuxCNC begins with G99.
 //! - A file without an end is accepted, with a notice. So is an R up to 0.005 mm short of the chord.
+//! - G41 and G42 are refused where the tool's radius is not known, and where a move of the tool would begin behind its end;
+//!   LinuxCNC takes 0, and drives some of them backwards. G61, G64, G98, G99, M48 to M53 and M62 to M68 may be changed
+//!   with compensation; predefined parameters give the programmed position.
 //! - M6 for the tool that is in the spindle does not stop, and without any T it is noticed.
 //! - Loops run to their end after a `break` or `continue` of another loop, where LinuxCNC may leave a `do` early.
 //!
@@ -102,6 +106,8 @@
 mod accessories;
 mod arc;
 mod block;
+mod cutter;
+mod cutter_path;
 mod cycle;
 mod decimal;
 mod error;

@@ -11,9 +11,7 @@ use super::interpreter::Interpreter;
 use super::lexer::Word;
 use super::modal::{Distance, FeedMode, Modal, Motion};
 use super::polar::Polar;
-use super::program::{
-    ArcMove, CubicMove, Feed, LineMove, NoticeKind, PathMode, Plane, StepKind, ThroughMove,
-};
+use super::program::{ArcMove, CubicMove, Feed, LineMove, NoticeKind, PathMode, StepKind, ThroughMove};
 use super::spline;
 
 /// Most turns of an arc or a helix.
@@ -52,7 +50,9 @@ impl Interpreter {
         };
         let offset = code.map_or(first.offset, |code| code.word.offset);
         let feed = self.feed(block, motion, offset)?;
-        if machine.is_some() {
+        self.refuse_uncompensated(motion, offset)?;
+        if let Some(word) = machine {
+            self.refuse_machine_move(word)?;
             return self.machine_move(block, motion, feed, first);
         }
         if let Motion::Cycle(cycle) = motion {
@@ -79,26 +79,37 @@ impl Interpreter {
         }
         if motion.is_arc() {
             let arc = self.arc(block, motion, from, to, feed, offset)?;
+            if self.is_offset() {
+                self.offset_arc(&arc, offset)?;
+            } else {
+                self.step(StepKind::Arc(arc))?;
+            }
             (self.work, self.machine) = (work, to);
-            return self.step(StepKind::Arc(arc));
+            return Ok(());
+        }
+        if motion != Motion::Through {
+            if self.is_offset() {
+                self.offset_line(to, feed, mode, offset)?;
+                self.machine = to;
+            } else {
+                self.line_to(to, feed, mode)?;
+            }
+            self.work = work;
+            return Ok(());
         }
         (self.work, self.machine) = (work, to);
-        if from != to && motion == Motion::Through {
-            self.untimed(motion, offset)?;
-            let begins = code.is_some();
-            self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }))
-        } else {
-            self.line_to(from, to, feed, mode)
+        if from == to {
+            return Ok(());
         }
+        self.untimed(motion, offset)?;
+        let begins = code.is_some();
+        self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }))
     }
 
-    pub(super) fn line_to(
-        &mut self,
-        from: [Length; 3],
-        to: [Length; 3],
-        feed: Feed,
-        mode: PathMode,
-    ) -> Result<(), Located> {
+    /// A straight move from where the tool is.
+    pub(super) fn line_to(&mut self, to: [Length; 3], feed: Feed, mode: PathMode) -> Result<(), Located> {
+        let from = self.tool_at.take().unwrap_or(self.machine);
+        self.machine = to;
         if from == to {
             return Ok(());
         }
@@ -124,16 +135,14 @@ impl Interpreter {
         if let Some(word) = block.letter(b'@').or(block.letter(b'^')) {
             return Err(word.problem(|word| Problem::MachineMove { word, expected: "X, Y and Z" }));
         }
-        let (from, mode) = (self.machine, self.modal.path);
-        let mut to = from;
+        let mut to = self.machine;
         for (coordinate, word) in to.iter_mut().zip(block.axes()) {
             if let Some(word) = word {
                 *coordinate = self.modal.units.length(word)?;
             }
         }
-        self.machine = to;
-        self.update_work(first.offset)?;
-        self.line_to(from, to, feed, mode)
+        self.line_to(to, feed, self.modal.path)?;
+        self.update_work(first.offset)
     }
 
     /// The feed in force; after G93, the F of the line.
@@ -161,7 +170,7 @@ impl Interpreter {
     }
 
     /// The feed of a move of this length.
-    fn timed(&self, feed: Feed, length_mm: f64) -> Feed {
+    pub(super) fn timed(&self, feed: Feed, length_mm: f64) -> Feed {
         match (self.modal.feed_mode, feed) {
             (FeedMode::InverseTime, Feed::MmPerMin(per_min)) => Feed::MmPerMin(per_min * length_mm),
             _ => feed,
@@ -220,7 +229,7 @@ impl Interpreter {
             return Err(word.problem(|word| Problem::ArcOffsetOutsidePlane { word, plane }));
         }
         // In XY the machine's axes do; another plane turns with the program's.
-        let turn_deg = if plane == Plane::Xy { 0.0 } else { self.frame.rotation_deg };
+        let turn_deg = self.plane_turn_deg();
         let turned = |point: [Length; 3]| {
             let beyond = || Located::new(offset, Problem::WorkOutOfRange);
             lengths(turn(point.map(Length::units), -turn_deg)).ok_or_else(beyond)
@@ -309,7 +318,7 @@ impl Interpreter {
 }
 
 /// The distance of two points \[mm\].
-fn distance_mm(from: [Length; 3], to: [Length; 3]) -> f64 {
+pub(super) fn distance_mm(from: [Length; 3], to: [Length; 3]) -> f64 {
     let [x, y, z] = [0, 1, 2].map(|axis| to[axis].to_mm() - from[axis].to_mm());
     libm::sqrt(x * x + y * y + z * z)
 }

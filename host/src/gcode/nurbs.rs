@@ -117,6 +117,7 @@ impl Interpreter {
         let Some(first) = code.into_iter().chain(letters).min_by_key(|word| word.offset) else {
             return Ok(false);
         };
+        self.refuse_uncompensated(motion, first.offset)?;
         let feed = self.feed(block, motion, first.offset)?;
         self.untimed(motion, first.offset)?;
         let plane = self.modal.plane;
@@ -292,8 +293,8 @@ impl Interpreter {
         }
         // As in LinuxCNC, a line leads to a NURBS that starts elsewhere.
         if let Some([work, machine]) = points.first().and_then(|entry| entry.point) {
-            self.line_to(self.machine, machine, feed, self.modal.path)?;
-            (self.work, self.machine) = (work, machine);
+            self.line_to(machine, feed, self.modal.path)?;
+            self.work = work;
         }
         let knots = open.entries.iter().map(|entry| f64::from(entry.knot)).collect();
         self.made(order, points, knots, feed)

@@ -142,7 +142,7 @@ impl Interpreter {
                 Plane::Zx => 180.0,
                 Plane::Yz => 190.0,
             },
-            "ccomp" => 400.0,
+            "ccomp" => self.cutter.map_or(400.0, |cutter| cutter.tenths as f64),
             "metric" => truth(modal.units == Units::Millimetres),
             "imperial" => truth(modal.units == Units::Inches),
             "metric_machine" => 1.0,

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import debian
 import reading
+import tools
 from difference import Figures, compared
 from steps import NotComparable
 
@@ -29,7 +30,7 @@ def arguments():
     parser.add_argument("--cache", type=Path, default=cache, help="they are kept here")
     parser.add_argument("--motion", default="motion", help="the command to compare")
     parser.add_argument("--parameters", type=Path, help="parameter file, for both")
-    parser.add_argument("--tools", type=Path, help="tool table, for both; without it LinuxCNC has 99 tools of no length")
+    parser.add_argument("--tools", type=Path, help="tool table, for both, unless NAME.tbl is beside a program; without it 99 tools of 2 mm")
     parser.add_argument("--subroutines", type=Path, help="folder of subroutines, for both")
     parser.add_argument("--differences", type=Path, default=HERE / "differences.toml", help="differences with a reason")
     parser.add_argument("--jobs", type=int, default=2)
@@ -52,6 +53,8 @@ def found(folders):
 def outcome(name, path, motion, given, unread):
     """What became of a program; `differences` are objects of `Difference`."""
     result = {"name": name}
+    if path.with_suffix(".tbl").is_file():
+        given = given | {"tools": path.with_suffix(".tbl")}
     for side, read in (("ours", lambda: reading.by_motion(motion, path, given)),
                        ("theirs", lambda: reading.by_linuxcnc(path, given))):
         try:
@@ -151,7 +154,10 @@ def main():
         listing = tomllib.load(file)
     unread = {entry["kind"]: entry["reason"] for entry in listing.get("unread", [])}
     given = {name: getattr(options, name) for name in ("parameters", "tools", "subroutines")}
-    with ProcessPoolExecutor(options.jobs) as pool:
+    with ProcessPoolExecutor(options.jobs) as pool, tempfile.TemporaryDirectory() as folder:
+        if given["tools"] is None:
+            given["tools"] = Path(folder, "tools.tbl")
+            given["tools"].write_text(tools.alike(count=99, diameter=2))
         tasks = [pool.submit(outcome, name, path, options.motion, given, unread) for name, path in programs]
         results = [task.result() for task in tasks]
     is_right = report(results, listing.get("difference", []), unread)

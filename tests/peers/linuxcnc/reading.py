@@ -14,7 +14,6 @@ HERE = Path(__file__).parent
 PYTHON = "/usr/bin/python3"
 LIMIT_S = 60
 INCH_MM = 25.4
-TOOLS_ASSUMED = 99
 INI = """[EMC]
 VERSION = 1.1
 [DISPLAY]
@@ -43,7 +42,7 @@ def by_linuxcnc(program, given):
     """Steps of LinuxCNC's own interpreter. `given`: paths of `parameters`, `tools`, `subroutines`, or None for each."""
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
-        table = given["tools"].read_text() if given["tools"] else tools.without_offsets(TOOLS_ASSUMED)
+        table = given["tools"].read_text()
         (folder / "tools.tbl").write_text(table)
         # `rs274` takes its tables in inches, whatever the program says.
         (folder / "inch.tbl").write_text("".join(tool.line(INCH_MM) for tool in tools.read(table)))

@@ -45,6 +45,6 @@ def read(text):
     return table
 
 
-def without_offsets(count):
-    """The text of a table of tools of no length and no radius."""
-    return "".join(f"T{number} P{number}\n" for number in range(1, count + 1))
+def alike(count, diameter):
+    """The text of a table of tools of no length and one diameter."""
+    return "".join(f"T{number} P{number} D{diameter}\n" for number in range(1, count + 1))
