@@ -71,6 +71,15 @@ fn arcs_keep_their_centres() {
         // (20 − 12 cos φ, 12 sin φ) at the height 2 of the line beside.
         ["l 8.168 2 0", "a 20 12 0 by -80.406"]
     );
+    // Back along a line from the outside of an arc, and back from a line onto one: the tool stays on its side.
+    assert_eq!(
+        steps("F9 G42 D1\nG1 X10 Y0\nG3 X10 Y20 J10\nG1 X30\nG40"),
+        ["l 10 -2 0", "a 18.944 18 0 by 131.81", "l 30 18 0"]
+    );
+    assert_eq!(
+        steps("F9 G42 D1\nG1 X3 Y0\nX10\nG3 X10 Y0 J-5\nG40"),
+        ["l 3 -2 0", "l 3.675 -2 0", "a 10 2 0 by 295.377"]
+    );
     // The entry along an arc ends tangent to the path: its centre, (-2.25, 10), is level with its end.
     assert_eq!(steps("F9 G41 D1\nG3 X10 Y10 J10\nG40"), ["a 8 10 0 by 77.32"]);
 }
@@ -127,6 +136,8 @@ fn what_does_not_go_is_refused() {
         ("F9 G41 D1\nG1 X9\nX10\nY3\nX0\nG40", "4:1: found a corner up to here"),
         ("F9 G41 D1\nG1 X9\nX20\nX10 Y1\nM2", "4:1: found a corner up to here"),
         ("F9 G41 D1\nG1 X9\nG3 X9 Y10 J5\nG1 X20 Y-10\nX0", "4:1: found a corner up to here"),
+        ("F9 G42 D1\nG1 X10 Y12\nY0\nG3 X9.487 Y-.0905 J-1.5\nG40", "5:1: found a corner up to here"),
+        ("F9 G41 D1\nG1 X9\nX20\nX10 Y1", "4:1: found a corner up to here"),
         ("F9 G41 D1\nG1 X9\nG40 G2 X3 I-3", "3:5: found G2 right after G40"),
         ("F9 G41 D1\nG1 X9\nG40\nG5 X3 Y2 I1 J1 P1 Q1", "4:1: found G5 right after G40"),
         ("F9 G41 D1\nG1 X9\nG53 G0 X1", "3:1: found G53 with G41"),

@@ -204,10 +204,8 @@ impl Interpreter {
                 self.end_at(meeting.ok_or_else(|| cutter.gouge(place))?, place)?
             }
         };
+        // If nothing is left, the arc's end says so.
         circle.sweep_rad -= circle.travel_rad(beside, begins);
-        if circle.sweep_rad <= 0.0 {
-            return Err(cutter.gouge(place));
-        }
         let step = self.program.steps.len();
         self.centre_arc(&circle, end, arc.to, manner)?;
         self.follow(Track { start: begins, end, shape: Shape::Arc(circle), step });

@@ -95,7 +95,8 @@ impl<'a> Flow<'a> {
         }
         self.interpreter.line = last;
         self.check_subroutines()?;
-        if let Some(unended) = self.interpreter.unended_nurbs() {
+        let unended = self.interpreter.unended_nurbs();
+        if let Some(unended) = unended.or_else(|| self.interpreter.end_track(0).err()) {
             let name = self.library.file(0).map_or("", |file| file.source.name.as_str());
             return Err(GcodeError::new(name, last, b"", unended));
         }

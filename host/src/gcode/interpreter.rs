@@ -19,6 +19,9 @@ use super::tool::ToolTable;
 /// Feeds beyond are no feeds \[mm/min\].
 const FEED_MAX: f64 = 1e15;
 
+/// Most bytes of all messages: a loop may ask for long ones.
+const MESSAGE_BYTES_MAX: usize = 1 << 26;
+
 /// What comes after a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Control {
@@ -60,6 +63,7 @@ pub(super) struct Interpreter {
     optional_stop: bool,
     /// Most steps, most messages, and most control points of a NURBS.
     pub(super) steps_max: usize,
+    message_bytes: usize,
     /// A word or a tape mark was read.
     pub(super) begun: bool,
     pub(super) ended: bool,
@@ -114,6 +118,7 @@ impl Interpreter {
             line: 0,
             optional_stop: options.optional_stop,
             steps_max: options.steps_max,
+            message_bytes: 0,
             begun: false,
             ended: false,
         };
@@ -197,7 +202,8 @@ impl Interpreter {
 
     /// Shows a text to the operator before the next step.
     pub(super) fn message(&mut self, text: String) -> Result<(), Located> {
-        if self.program.messages.len() >= self.steps_max {
+        self.message_bytes = self.message_bytes.saturating_add(text.len());
+        if self.program.messages.len() >= self.steps_max || self.message_bytes > MESSAGE_BYTES_MAX {
             return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
         }
         let step = self.program.steps.len();

@@ -113,14 +113,17 @@ impl<'a> Cursor<'a> {
         self.line.get(start..self.next).unwrap_or_default()
     }
 
-    /// Steps over `name`, in any case, if it is next.
+    /// Steps over `name`, in any case, if it is next. Blanks within do not count: `else if` is `elseif`.
     pub(super) fn take_name(&mut self, name: &[u8]) -> bool {
-        let end = self.next + name.len();
-        let is_next = self.line.get(self.next..end).is_some_and(|text| text.eq_ignore_ascii_case(name));
-        if is_next {
-            self.next = end;
+        let start = self.next;
+        for letter in name {
+            if !self.peek_text().is_some_and(|byte| byte.eq_ignore_ascii_case(letter)) {
+                self.next = start;
+                return false;
+            }
+            self.next += 1;
         }
-        is_next
+        true
     }
 
     /// Steps over `<name>`; gives the name in lower case, without blanks.

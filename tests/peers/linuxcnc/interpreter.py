@@ -30,9 +30,12 @@ def arguments():
     parser.add_argument("--cache", type=Path, default=cache, help="they are kept here")
     parser.add_argument("--motion", default="motion", help="the command to compare")
     parser.add_argument("--parameters", type=Path, help="parameter file, for both")
-    parser.add_argument("--tools", type=Path, help="tool table, for both, unless NAME.tbl is beside a program; without it 99 tools of 2 mm")
+    parser.add_argument(
+        "--tools", type=Path, help="tool table, for both, unless NAME.tbl is beside a program; without it 99 tools of 2 mm"
+    )
     parser.add_argument("--subroutines", type=Path, help="folder of subroutines, for both")
     parser.add_argument("--differences", type=Path, default=HERE / "differences.toml", help="differences with a reason")
+    parser.add_argument("--refused", type=Path, default=HERE / "refused.toml", help="refused programs with a reason")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", type=Path, help="write the outcome of every program here")
     return parser.parse_args()
@@ -91,6 +94,19 @@ def listed(result, known):
         else:
             without.append(difference)
     return without
+
+
+def refusals(results, known):
+    """Faults of the list of refused programs: refused without an entry that says so, or accepted with one."""
+    entries = {program: entry["found"] for entry in known for program in entry["programs"]}
+    for result in results:
+        name, refusal = result["name"], result.get("ours_refused")
+        if refusal is not None and name not in entries:
+            yield f"refused, and not listed: {name}: {refusal}"
+        elif refusal is not None and entries[name] not in refusal:
+            yield f"refused for another reason than listed: {name}: {refusal}"
+        elif refusal is None and name in entries:
+            yield f"listed as refused, but accepted: {name}"
 
 
 def counted(reasons):
@@ -161,6 +177,10 @@ def main():
         tasks = [pool.submit(outcome, name, path, options.motion, given, unread) for name, path in programs]
         results = [task.result() for task in tasks]
     is_right = report(results, listing.get("difference", []), unread)
+    with open(options.refused, "rb") as file:
+        faults = list(refusals(results, tomllib.load(file)["refused"]))
+    print("\n".join([*faults, f"{len(faults)} faults of the list of refused programs"]))
+    is_right = is_right and not faults
     print(f"{time.monotonic() - begin:.0f} s")
     if options.json:
         options.json.write_text(json.dumps(results, default=str, indent=1) + "\n")

@@ -304,6 +304,22 @@ class Interpreter(unittest.TestCase):
         done = subprocess.run(command, capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
+    def test_the_list_of_refused_programs_is_whole(self):
+        known = [{"found": "a probe", "reason": "…", "programs": ["a", "b", "c"]}]
+        results = [
+            {"name": "a", "ours_refused": "a.ngc:1:1: found G38.2, which needs a probe"},
+            {"name": "b", "ours_refused": "b.ngc:1:1: found A1"},
+            {"name": "c"},
+            {"name": "d", "ours_refused": "d.ngc:1:1: found G38.2, which needs a probe"},
+            {"name": "e"},
+        ]
+        faults = [fault.split(": ")[:2] for fault in interpreter.refusals(results, known)]
+        self.assertEqual(faults, [
+            ["refused for another reason than listed", "b"],
+            ["listed as refused, but accepted", "c"],
+            ["refused, and not listed", "d"],
+        ])
+
     def test_the_beginning_stands_behind_the_tape_mark(self):
         self.assertEqual(reading.with_beginning("%\nM2\n").splitlines()[::4], ["%", "M2"])
         self.assertTrue(reading.with_beginning("M2\n").startswith("G21\n"))
