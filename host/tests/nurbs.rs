@@ -268,6 +268,13 @@ fn the_same_curve_in_other_coordinates() {
         "G10 L2 P1 X1 Y2 R90\nG54 G20 G0 X.2 Y-.1 F9\nG5.2 X1 Y-.5 P2\nX-1 Y-1 P1\nX0 Y-2 P3\nG5.3\n";
     let moved = points.map(|[x, y, z]| [x + 1.0, y + 2.0, z]);
     same(turned, &moved);
+    // In the other planes, at the height where the machine is.
+    let turned = |[x, y, z]: [f64; 3]| [y, z + 3.0, x];
+    let text = "G0 X5.08 Y3 Z2.54\nG18 F9\nG5.2 Z12.7 X25.4 P2\nZ25.4 X-25.4 P1\nZ50.8 X0 P3\nG5.3\n";
+    same(text, &points.map(turned));
+    let turned = |[x, y, z]: [f64; 3]| [z + 3.0, x, y];
+    let text = "G0 X3 Y2.54 Z5.08\nG19 F9\nG5.2 Y12.7 Z25.4 P2\nY25.4 Z-25.4 P1\nY50.8 Z0 P3\nG5.3\n";
+    same(text, &points.map(turned));
     let at_60 = "G10 L2 P1 R60\nG54 G0 X1 F9\nG5.2 X2 Y2 P1\nX3 Y0 P1\nG5.3\nG1 X9 Y0\n";
     let (sin, cos) = 60.0_f64.to_radians().sin_cos();
     for (found, [x, y]) in curve(at_60).points_mm.iter().zip([[1.0, 0.0], [2.0, 2.0], [3.0, 0.0]]) {
@@ -292,7 +299,7 @@ fn the_knots_of_g62_end_it() {
 #[test]
 fn what_is_no_nurbs_is_refused_at_its_place() {
     for (text, place, message) in [
-        ("G18 F9\nG5.2 P1\n", "2:1:", "found G5.2 in the ZX plane"),
+        ("G18 F9\nG5.2 X1 Y1 P1\n", "2:9:", "found Y1, expected no coordinate across"),
         ("G5.2 P1\n", "1:1:", "found G5.2 without a feed"),
         ("G93 F9 G5.2 P1\n", "1:8:", "found G5.2 after G93"),
         ("F9\nG5.2 P1 L4\nX1 Y1 P1\nX2 Y2 P1\nG5.3\n", "5:1:", "found 3 control points, expected 4"),
@@ -301,10 +308,10 @@ fn what_is_no_nurbs_is_refused_at_its_place() {
         ("F9\nG5.2 X1 Y1 P-1\n", "2:12:", "found P-1, expected a positive weight"),
         ("F9\nG5.2 P1\nX1 P1\n", "3:1:", "found X1, expected both coordinates"),
         ("F9\nG5.2 P1\nX1 Y1 Z1 P1\n", "3:7:", "found Z1, expected no coordinate across"),
-        ("F9\nG5.2 P1\nP2\n", "3:1:", "found P2, expected X and Y"),
+        ("F9\nG5.2 P1\nP2\n", "3:1:", "found P2, expected a control point"),
         ("F9\nG5.2 P1 L2\n", "2:9:", "found L2, expected an order"),
         ("F9\nG5.2 P1 L4\nX1 Y1 P1 L5\n", "3:10:", "found L5, expected one order"),
-        ("F9\nG5.2 P1\nG1 X5\n", "3:1:", "found G1, expected X, Y, P, L or F"),
+        ("F9\nG5.2 P1\nG1 X5\n", "3:1:", "found G1, expected X, Y, Z, P, L or F"),
         ("F9\nG5.2 P1\nG20\n", "3:1:", "found G20, expected"),
         ("F9\nG5.2 P1\nX1 Y1 P1 M3\n", "3:10:", "found M3, expected"),
         ("F9\nG5.2 P1\nX1 Y1 P1\nX2 Y1 P1\nG5.3 X5\n", "5:6:", "found X5, expected no other word"),

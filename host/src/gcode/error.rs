@@ -250,8 +250,6 @@ pub enum Problem {
         "found a first G5 without I and J, expected the offset from its start to its first control point"
     )]
     SplineWithoutStart,
-    #[error("found G5.2 in the {plane} plane, expected it in the XY plane (G17)")]
-    NurbsPlane { plane: Plane },
     #[error("found {points} control points, expected {order} at least: the order of the NURBS")]
     NurbsPoints { points: usize, order: u32 },
     #[error("found {found}, expected {expected}")]

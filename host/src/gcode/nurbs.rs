@@ -1,7 +1,7 @@
 //! Control points of G5.2 and G6.2, as LinuxCNC takes them.
 //!
 //! G5.2 is that of LinuxCNC 2.9, by its documentation ("G5.2 G5.3 NURBS Block") and `convert_nurbs` of its
-//! `interp_convert.cc`. G6.2 has no documentation: it is that of `convert_nurbs` of LinuxCNC 2.10, where P is
+//! `interp_convert.cc`; as in 2.10 it may be in any plane. G6.2 has no documentation: it is that of `convert_nurbs` of LinuxCNC 2.10, where P is
 //! the order, R the weight and K the knot.
 //!
 //! What they leave silent or undefined is refused here: a weight that is missing, an order that changes, other
@@ -79,7 +79,7 @@ impl Interpreter {
         let (word, expected) = match open.kind {
             _ if is_end(block) => (block.stranger(b"NF", &[53, 63]), "no other word but F in its line"),
             Kind::Uniform => {
-                (block.stranger(b"NXYZPLF", &[52]), "X, Y, P, L or F between G5.2 and G5.3, or G5.3")
+                (block.stranger(b"NXYZPLF", &[52]), "X, Y, Z, P, L or F between G5.2 and G5.3, or G5.3")
             }
             Kind::Knotted => (
                 block.stranger(b"NXYZPQRKF", &[62]),
@@ -120,11 +120,7 @@ impl Interpreter {
         self.refuse_uncompensated(motion, first.offset)?;
         let feed = self.feed(block, motion, first.offset)?;
         self.untimed(motion, first.offset)?;
-        let plane = self.modal.plane;
-        if kind == Kind::Uniform && plane != Plane::Xy {
-            return Err(Located::new(first.offset, Problem::NurbsPlane { plane }));
-        }
-        let point = self.control_point(block, plane)?;
+        let point = self.control_point(block, self.modal.plane)?;
         match kind {
             Kind::Uniform => self.uniform_line(block, first, point)?,
             Kind::Knotted => {
@@ -174,9 +170,10 @@ impl Interpreter {
         let begins = self.nurbs.is_none();
         let entry = |point, weight| Entry { point, weight: Some(weight), knot: 0 };
         let from = [self.work, self.machine];
+        let plane = self.modal.plane;
         let open = self.nurbs.get_or_insert_with(|| Open {
             kind: Kind::Uniform,
-            plane: Plane::Xy,
+            plane,
             order: None,
             entries: Vec::new(),
         });
@@ -191,7 +188,7 @@ impl Interpreter {
             let of_start = if point.is_none() { weight } else { None };
             open.entries.push(entry(Some(from), of_start.unwrap_or(1.0)));
         } else if point.is_none() {
-            return Err(refused(&first, "X and Y, or G5.3: only the first line may be without them"));
+            return Err(refused(&first, "a control point, or G5.3: only the first line may be without"));
         }
         match (point, weight) {
             (None, _) => Ok(()),
