@@ -12,6 +12,7 @@ mod dialect;
 mod drive;
 mod gcode;
 mod limit_share;
+mod mutation;
 mod nurbs;
 mod smoothness;
 mod spline;
