@@ -451,3 +451,44 @@ fn long_messages_of_a_loop_are_bounded() {
     let text = format!("o1 while [1]\n(MSG,{})\no1 endwhile", "x".repeat(10_000));
     assert!(refusal(&text).starts_with("a.ngc:2:1: found more than"));
 }
+
+#[test]
+fn whole_turns_remain_in_a_turned_system() {
+    let mut random = motion_tests::random::Random::new(7);
+    for _ in 0..2000 {
+        let [angle, x, y, i] = [180.0, 100.0, 100.0, 50.0].map(|size| random.between(-size, size));
+        let text = format!(
+            "G10 L2 P1 R{angle:.4}\nF100\nG53 G0 X{x:.4} Y{y:.4}\nG3 I{i:.4} Z-2\nG91 G49\nG2 J5\nG0 Z1"
+        );
+        let program = read(&text);
+        let turns = program.steps.iter().filter_map(|step| match &step.kind {
+            StepKind::Arc(arc) => Some((arc.from[0] == arc.to[0], arc.sweep_rad)),
+            _ => None,
+        });
+        let tau = 2.0 * std::f64::consts::PI;
+        assert_eq!(turns.collect::<Vec<_>>(), [(true, tau), (true, -tau)], "{text}");
+    }
+}
+
+#[test]
+fn the_system_in_force_is_no_parameter() {
+    assert_eq!(last("G10 L2 P3 X100\n#5220=3\nG56\nG0 X1"), "r 101 0 0");
+    assert!(refusal("#5220=2.5").contains("found 2.5 for parameter 5220"));
+    assert!(refusal("#5221=[10**8]").contains("for parameter 5221"));
+}
+
+#[test]
+fn speeds_and_lines_are_bounded() {
+    assert!(refusal("G95 S[10**308] F1000").starts_with("a.ngc:1:5: found S"));
+    let options = ReadOptions { lines_max: 1000, ..ReadOptions::default() };
+    for loops in [
+        format!("o1 while [1]\n{}o1 endwhile", "\n".repeat(900)),
+        format!("o1 while [1]\no2 if [0]\n{}o2 endif\no1 endwhile", "o2 elseif [0]\n".repeat(900)),
+    ] {
+        let error = refusal_with(&loops, &options);
+        assert!(error.contains("more than 1000 lines executed"), "{error}");
+    }
+    // As many lines behind the end as it takes to notice that each looks through the file.
+    let text = format!("M2\n{}O1 garbage", "X1\n".repeat(20_000));
+    assert_eq!(steps(&text), ["end"]);
+}

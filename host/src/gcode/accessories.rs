@@ -9,6 +9,9 @@ use super::modal::Overrides;
 use super::program::{NoticeKind, StepKind};
 use super::tool::Tool;
 
+/// Greatest S: with the greatest F, the feed of G95 is finite.
+const SPEED_MAX: f64 = 1e9;
+
 impl Interpreter {
     /// S, T, and the M words that are no stops, in their order.
     pub(super) fn accessories(&mut self, block: &Block<'_>) -> Result<(), Located> {
@@ -23,6 +26,10 @@ impl Interpreter {
         }
         if let Some(word) = block.letter(b'S') {
             word.refuse_negative()?;
+            if word.number.to_f64() > SPEED_MAX {
+                let expected = "a speed of 1000000000 at most";
+                return Err(word.problem(|word| Problem::NotThisCount { word, expected }));
+            }
             self.modal.spindle.speed = word.number.to_f64();
             self.notice(NoticeKind::SpindleSpeed);
         }

@@ -286,7 +286,7 @@ impl Interpreter {
     ) -> Result<(), Located> {
         let beyond = || first.problem(|word| Problem::PositionOutOfRange { word });
         let work = super::frame::lengths(to).ok_or_else(beyond)?;
-        let to = self.frame.machine(work).ok_or_else(beyond)?;
+        let to = self.machine_at(work).ok_or_else(beyond)?;
         let from = self.tool_at.take().unwrap_or(self.machine);
         (self.work, self.machine) = (work, to);
         if from == to {

@@ -19,7 +19,7 @@ pub struct GcodeError {
 }
 
 /// A problem and its place in the line.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Located {
     /// Byte offset in the line.
     pub(super) offset: usize,

@@ -50,7 +50,7 @@ pub(super) struct Flow<'a> {
     calls: Vec<Call>,
     /// The loops of the subroutine that runs.
     pub(super) repeats: Vec<Repeat>,
-    executed: u64,
+    pub(super) executed: u64,
 }
 
 impl<'a> Flow<'a> {
@@ -82,6 +82,8 @@ impl<'a> Flow<'a> {
             };
             self.place = after;
             if is_blank_line(line) {
+                // In a loop they take time, too.
+                self.executed += 1;
                 continue;
             }
             if self.file == 0 {

@@ -12,6 +12,7 @@ use super::message;
 use super::modal::{FeedMode, Modal, Motion, Units};
 use super::nurbs;
 use super::options::ReadOptions;
+use super::parameter_file;
 use super::parameters::{Parameters, SELECTED};
 use super::program::{Message, Notice, NoticeKind, Program, Step, StepKind};
 use super::tool::ToolTable;
@@ -39,6 +40,8 @@ pub(super) struct Interpreter {
     pub(super) program: Program,
     pub(super) modal: Modal,
     pub(super) frame: Frame,
+    /// The coordinate system in force, 1 to 9: parameter 5220 unless the program assigned that.
+    pub(super) system: u32,
     /// Where the machine is, as the program counts.
     pub(super) work: [Length; 3],
     /// Where the machine is; with cutter compensation the programmed point.
@@ -100,6 +103,7 @@ impl Interpreter {
             program: Program::default(),
             modal: Modal::default(),
             frame: Frame::default(),
+            system: 1,
             work: [Length::ZERO; 3],
             machine: [Length::ZERO; 3],
             cutter: None,
@@ -133,6 +137,10 @@ impl Interpreter {
         self.refuse_in_nurbs(&block)?;
         for assignment in &block.assignments {
             match &assignment.target {
+                Target::Number(number) if !parameter_file::fits(*number, assignment.value) => {
+                    let (number, value) = (*number, assignment.value);
+                    return Err(Located::new(0, Problem::ParameterValue { number, value }));
+                }
                 Target::Number(number) => self.parameters.set(*number, assignment.value),
                 Target::Name(name) => self.parameters.set_named(name, assignment.value),
             }

@@ -93,6 +93,7 @@ impl<'a> Flow<'a> {
         let mut index = first;
         while let Some(line) = structure.line(index) {
             self.place = line.after;
+            self.executed += 1;
             let (Role::If { next } | Role::ElseIf { next, .. }) = line.role else { return Ok(()) };
             let Some((text, _)) = file.source.line(line.start) else { return Ok(()) };
             let cursor = file.cursor(text).and_then(oword::place);

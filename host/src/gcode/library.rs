@@ -15,7 +15,7 @@ use super::structure::Structure;
 pub(super) struct File<'a> {
     pub(super) source: Source<'a>,
     block_delete: bool,
-    structure: OnceCell<Structure>,
+    structure: OnceCell<Result<Structure, (Place, Located)>>,
 }
 
 /// A problem in a line of a file.
@@ -43,22 +43,23 @@ impl<'a> File<'a> {
 
     /// What its O-words join; made when it is first asked for.
     pub(super) fn structure(self: &Rc<Self>) -> Result<&Structure, Failure<'a>> {
-        if let Some(structure) = self.structure.get() {
-            return Ok(structure);
-        }
-        let structure = Structure::of(&self.source, self.block_delete)
-            .map_err(|(place, located)| self.failure(place, located))?;
-        Ok(self.structure.get_or_init(|| structure))
+        let structure = self.structure.get_or_init(|| Structure::of(&self.source, self.block_delete));
+        structure.as_ref().map_err(|(place, located)| self.failure(*place, located.clone()))
+    }
+
+    /// The structure, if it was asked for.
+    fn known(&self) -> Option<&Structure> {
+        self.structure.get()?.as_ref().ok()
     }
 
     /// Whether an O-word was executed, and the file has subroutines.
     pub(super) fn has_subs(&self) -> bool {
-        self.structure.get().is_some_and(|structure| !structure.subs.is_empty())
+        self.known().is_some_and(|structure| !structure.subs.is_empty())
     }
 
     /// Whether an O-word was executed, and the file has subprograms of M98.
     pub(super) fn has_subprograms(&self) -> bool {
-        self.structure.get().is_some_and(|structure| !structure.programs.is_empty())
+        self.known().is_some_and(|structure| !structure.programs.is_empty())
     }
 }
 

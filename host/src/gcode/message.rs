@@ -86,7 +86,8 @@ fn format_of(text: &str) -> Option<(usize, &str)> {
 fn parameter_of<'a>(text: &'a str, environment: &dyn Environment) -> Option<(Option<f64>, &'a str)> {
     let after = text.strip_prefix('#')?;
     if let Some(name) = after.strip_prefix('<') {
-        let (name, after) = name.split_once('>')?;
+        let (name, after) = name.split_at_checked(name.find(['>', '<', '#'])?)?;
+        let after = after.strip_prefix('>')?;
         let name: String =
             name.chars().filter(|c| !c.is_whitespace()).map(|c| c.to_ascii_lowercase()).collect();
         return Some((environment.named(&name), after));

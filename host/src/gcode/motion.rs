@@ -61,8 +61,7 @@ impl Interpreter {
         let (from, mode) = (self.machine, self.modal.path);
         let work = self.end_point(block)?;
         let to = self
-            .frame
-            .machine(work)
+            .machine_at(work)
             .ok_or_else(|| first.problem(|word| Problem::PositionOutOfRange { word }))?;
         if motion == Motion::Cubic {
             let controls_mm = spline::controls_mm(block, &self.modal, self.cubic_before_mm, offset)?;
@@ -104,6 +103,14 @@ impl Interpreter {
         self.untimed(motion, offset)?;
         let begins = code.is_some();
         self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }))
+    }
+
+    /// Machine coordinates of a point; `None` beyond the range. Turned to the program's axes and back they are rounded:
+    /// what stays in XY stays, so that a whole turn remains one.
+    pub(super) fn machine_at(&self, work: [Length; 3]) -> Option<[Length; 3]> {
+        let to = self.frame.machine(work)?;
+        let stays = [0, 1].iter().all(|&axis| work[axis] == self.work[axis]);
+        Some(if stays { [self.machine[0], self.machine[1], to[2]] } else { to })
     }
 
     /// A straight move from where the tool is.

@@ -152,7 +152,7 @@ impl Interpreter {
             (Some(word), Some(_)) => word,
         };
         let work = self.end_point(block)?;
-        match self.frame.machine(work) {
+        match self.machine_at(work) {
             Some(machine) => Ok(Some([work, machine])),
             None => Err(word.problem(|word| Problem::PositionOutOfRange { word })),
         }

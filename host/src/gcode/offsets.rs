@@ -35,6 +35,7 @@ impl Interpreter {
         if self.parameters.get(SHIFT_APPLIES) != 0.0 {
             self.frame.shift = self.stored(SHIFT, 0).unwrap_or_default();
         }
+        self.system = self.parameters.get(SELECTED).clamp(1.0, 9.0) as u32;
         if let Ok(frame) = self.frame_in(self.system(), 0) {
             self.frame = frame;
         }
@@ -43,7 +44,7 @@ impl Interpreter {
 
     /// The coordinate system in force, 1 to 9.
     pub(super) fn system(&self) -> u32 {
-        self.parameters.get(SELECTED).clamp(1.0, 9.0) as u32
+        self.system
     }
 
     /// Three lengths from `first` on.
@@ -71,6 +72,7 @@ impl Interpreter {
 
     /// Selects a coordinate system.
     pub(super) fn select(&mut self, system: u32, offset: usize) -> Result<(), Located> {
+        self.system = system;
         self.parameters.set(SELECTED, f64::from(system));
         self.frame = self.frame_in(system, offset)?;
         self.update_work(offset)
@@ -90,7 +92,7 @@ impl Interpreter {
                 540..=590 => (code.tenths - 530) / 10,
                 tenths => tenths - 584,
             };
-            // Selecting the system in force changes nothing, even if its parameters were assigned.
+            // Selecting the system in force changes nothing, even if its parameters, or their 5220, were assigned.
             let system = u32::try_from(system).unwrap_or(1);
             if system != self.system() {
                 self.select(system, code.word.offset)?;

@@ -47,12 +47,7 @@ impl ParameterFile {
         }
         let value: f64 =
             value.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| wrong(value))?;
-        let fits = match key {
-            SELECTED => (1.0..=9.0).contains(&value) && value.fract() == 0.0,
-            _ if is_offset(key) => Length::nearest(value).is_some(),
-            _ => true,
-        };
-        if !fits || self.values.insert(key, value).is_some() {
+        if !fits(key, value) || self.values.insert(key, value).is_some() {
             return Err(Located::new(0, Problem::ParameterValue { number: key, value }));
         }
         Ok(())
@@ -68,6 +63,15 @@ impl ParameterFile {
     pub fn after(&self, parameters: &Parameters) -> Self {
         let numbers = self.values.keys().copied().chain(kept());
         Self { values: numbers.map(|number| (number, parameters.get(number))).collect() }
+    }
+}
+
+/// Whether a parameter can have a value: lengths and the coordinate system in force are bounded.
+pub(super) fn fits(number: u32, value: f64) -> bool {
+    match number {
+        SELECTED => (1.0..=9.0).contains(&value) && value.fract() == 0.0,
+        _ if is_offset(number) => Length::nearest(value).is_some(),
+        _ => true,
     }
 }
 
