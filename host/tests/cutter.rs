@@ -102,7 +102,7 @@ fn the_radius_has_a_source() {
     // Without a table it is known from the program alone; radius 0 keeps the path.
     let read = |text: &str| gcode::read("a.ngc", text.as_bytes());
     let error = read("T5 M6\nF9 G41 G1 X10").unwrap_err().to_string();
-    assert!(error.starts_with("a.ngc:2:4: found the radius of tool 5 wanted"), "{error}");
+    assert!(error.starts_with("a.ngc:2:4: found tool 5, whose radius is not known"), "{error}");
     assert!(read("T5 M6\nG10 L1 P5 R2\nF9 G41 G1 X10").is_ok());
     assert_eq!(steps("F9 G41.1 D0 G1 X1\nG2 X3 I1\nG40\nG3 X1 I-1").len(), 3);
 }
@@ -119,8 +119,8 @@ fn a_lathes_tool_is_led_by_its_nose() {
 #[test]
 fn what_does_not_go_is_refused() {
     for (text, expected) in [
-        ("F9 G41 D7 G1 X9", "1:8: found the radius of tool 7 wanted"),
-        ("F9 G41 G1 X9", "1:4: found the radius of tool 0 wanted"),
+        ("F9 G41 D7 G1 X9", "1:8: found tool 7, whose radius is not known"),
+        ("F9 G41 G1 X9", "1:4: found tool 0, whose radius is not known"),
         ("G41.1", "1:1: found G41.1, expected the tool's diameter"),
         ("G41 D1\nG42 D1", "2:1: found G42 with G41 or G42 in force"),
         ("G41 D1 G19", "1:1: found G41, expected the XY plane"),

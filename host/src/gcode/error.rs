@@ -257,7 +257,7 @@ pub enum Problem {
     #[error("found {word} with G41 or G42 in force, expected G40 in a line before it")]
     Compensated { word: String },
     #[error(
-        "found the radius of tool {number} wanted, but no such tool in a tool table, expected one (--tools), G10 L1 P{number} \
+        "found tool {number}, whose radius is not known, expected it in a tool table (--tools), G10 L1 P{number} \
          R before it, or G41.1 D or G42.1 D with the tool's diameter"
     )]
     CompensationRadius { number: u32 },
