@@ -101,8 +101,8 @@ fn the_share_of_limits_is_that_of_the_trace() {
         ("stringer", sample("host/src/cli/stringer.ngc")),
         ("nameplate", sample("tests/programs/nameplate_inch.ngc")),
         ("long", "G1 X200 F1200\nY5\nG64 P0.1 X0 F6000\nY0 M2\n".to_owned()),
-        ("fast", "G0 X300\nX0 Y40\nM2\n".to_owned()),
-        ("short", "F6000 G1 X1\nY1\nX0\nY0\nM2\n".to_owned()),
+        ("fast", "G61 G0 X300\nX0 Y40\nM2\n".to_owned()),
+        ("short", "G61 F6000 G1 X1\nY1\nX0\nY0\nM2\n".to_owned()),
     ];
     for law in ["sin2", "plateau"] {
         let file = REFERENCE_TOML.replace("law = \"plateau\"", &format!("law = \"{law}\""));

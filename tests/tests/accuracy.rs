@@ -344,8 +344,8 @@ fn fixed_point_and_f32_against_f64() {
     let programs = random_programs();
     println!("random programs: {programs:?}");
     assert!(programs.failures.is_empty(), "{:#?}", programs.failures);
-    let straight = reference_machine("G1 X8000 F18000\nM2\n");
-    let diagonal = reference_machine("G1 X5000 Y-4000 Z4795.8315233 F18000\nM2\n");
+    let straight = reference_machine("G61 G1 X8000 F18000\nM2\n");
+    let diagonal = reference_machine("G61 G1 X5000 Y-4000 Z4795.8315233 F18000\nM2\n");
     let stringer = reference_machine(STRINGER);
     let executed = programs.worst.map(|worst| worst.programs);
     let refused: String =

@@ -265,7 +265,7 @@ fn programs_go_on_from_the_new_position() {
             assert_eq!(session.position(), [Position::ZERO; 3]);
             let origin_mm = simulated.truth()[AXIS].position_mm;
             let machine = Machine::reference();
-            let text = "G1 X20 Y5 F2400\nG4 P0.2\nG1 X-5\nG0 X7 Y0\n";
+            let text = "G61 G1 X20 Y5 F2400\nG4 P0.2\nG1 X-5\nG0 X7 Y0\n";
             let plan = planned(text, &machine).expect("a plan");
             let executable = Executable::new::<R>(&plan).expect("executable");
             for _ in 0..2 {

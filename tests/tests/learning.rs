@@ -182,7 +182,7 @@ fn nothing_worse_than_no_correction_is_returned() {
 fn a_program_is_learnt_and_its_best_run_is_reproduced() {
     let machine = machine();
     let line = |options: &RunOptions<'_>, machine: &Machine| {
-        let program = "G21 G90 F3000\nG1 X10 Y4\nM2\n";
+        let program = "G21 G90 G61 F3000\nG1 X10 Y4\nM2\n";
         Recording::with(options, "line".to_owned(), program, machine.clone(), 50.0)
     };
     let options = LearningOptions { repeats: 4, ..LearningOptions::default() };

@@ -260,7 +260,7 @@ fn a_million_increments_do_not_drift() {
 }
 
 fn increments(count: i64) {
-    let mut text = "G91 G1 F18000\n".to_owned();
+    let mut text = "G61 G91 G1 F18000\n".to_owned();
     for _ in 0..count {
         let _ = writeln!(text, "X0.0033333333 Y-0.0011111111");
     }

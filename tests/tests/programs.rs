@@ -93,7 +93,7 @@ fn blocks_whose_change_of_feed_is_a_few_last_places_are_planned() {
     let mut failures = Vec::new();
     for step in 1..=400 {
         let length_mm = 1e-5 * 1.03_f64.powi(step);
-        let text = format!("G1 X200 F17000\nX{:.10} F18000\nX400 F17999\nM2\n", 200.0 + length_mm);
+        let text = format!("G61 G1 X200 F17000\nX{:.10} F18000\nX400 F17999\nM2\n", 200.0 + length_mm);
         if let Err(refused) = planned(&text, &reference) {
             failures.push(format!("{length_mm:e} mm: {refused}"));
         }

@@ -208,7 +208,7 @@ fn execute<const CAPACITY: usize>(
 
 /// Short stretches, a dwell, arcs: every stretch fits the streams.
 const SHORT: &str =
-    "G1 X5 F3000\nY5\nG2 X0 Y0 I-5 J0\nG4 P0.0123\nG1 X1\nY1\nX0\nY0\nG3 X0 Y0 I2 J1\nG1 Z3\nX30 Y20\nM2\n";
+    "G61 G1 X5 F3000\nY5\nG2 X0 Y0 I-5 J0\nG4 P0.0123\nG1 X1\nY1\nX0\nY0\nG3 X0 Y0 I2 J1\nG1 Z3\nX30 Y20\nM2\n";
 
 #[test]
 fn a_capacity_of_two_is_enough() {
@@ -238,7 +238,7 @@ fn irregular_delivery_in_time_changes_no_bit() {
 /// A stretch longer than the queues, alone: it starts when they are full.
 #[test]
 fn irregular_delivery_of_a_long_stretch_changes_no_bit() {
-    let program = executable("G1 X3000 F18000\nM2\n");
+    let program = executable("G61 G1 X3000 F18000\nM2\n");
     let all_at_once = execute::<512>(&program, |tick| tick == 0);
     for seed in 0..10 {
         let mut random = Random::new(seed);
@@ -250,7 +250,7 @@ fn irregular_delivery_of_a_long_stretch_changes_no_bit() {
 /// A stretch longer than the queues that follows another begins in the tick in which that one ends.
 #[test]
 fn a_long_stretch_after_another_loses_no_time() {
-    let program = executable("G1 Y1.2345 F6000\nX3000 F18000\nM2\n");
+    let program = executable("G61 G1 Y1.2345 F6000\nX3000 F18000\nM2\n");
     let all_at_once = execute::<512>(&program, |tick| tick == 0);
     assert_eq!(execute::<64>(&program, |_| true).len(), all_at_once.len());
     assert!(execute::<64>(&program, |_| true) == all_at_once);
@@ -260,7 +260,7 @@ fn a_long_stretch_after_another_loses_no_time() {
 /// not start before neither of them can starve it at once.
 #[test]
 fn a_tick_after_every_item_starves_nothing() {
-    let program = executable("G1 X3000 F18000\nM2\n");
+    let program = executable("G61 G1 X3000 F18000\nM2\n");
     let (mut pieces, mut segments) = (Vec::new(), Vec::new());
     for item in &program.items {
         match item.ready::<f32, Infallible>(program.tick_s).expect("f32 holds it") {
@@ -458,7 +458,7 @@ fn as_many_pieces_as_the_bound_end_in_a_tick_and_no_more() {
 fn short_lines(pieces_per_tick: f64) -> String {
     let feed_mm_min = 0.001 * pieces_per_tick / TICK_S * 60.0;
     // A zigzag within the junction angle: merging keeps every line a piece.
-    (1..20_000).fold("G91\n".to_owned(), |text, part| {
+    (1..20_000).fold("G61 G91\n".to_owned(), |text, part| {
         text + &format!("G1 X0.001 Y{:.10} F{feed_mm_min:.3}\n", f64::from(part % 2) * 1e-9)
     })
 }
@@ -493,7 +493,7 @@ fn only_what_is_dense_is_driven_slower_for_it() {
     let text: String = short_lines(10.0).lines().take(100).map(|line| format!("{line}\n")).collect();
     let items = executable(&format!("{text}X100 F3000\nM2\n")).items;
     let blocks: Vec<(f64, f64)> = items.iter().filter_map(fast).collect();
-    let alone = executable("G91\nG1 X100 F3000\nM2\n").items;
+    let alone = executable("G61 G91\nG1 X100 F3000\nM2\n").items;
     let &[(_, most_mm_s)] = &alone.iter().filter_map(fast).collect::<Vec<_>>()[..] else {
         panic!("one block")
     };
@@ -612,7 +612,7 @@ fn a_supply_stays_where_it_failed() {
 fn ten_thousand_lines_of_a_nanometre() {
     for feed_mm_min in [0.1, 1.0, 10.0, 1000.0] {
         let line = format!("G1 X0.000001 F{feed_mm_min}\n");
-        let text = "G91\n".to_owned() + &line.repeat(10_000);
+        let text = "G61 G91\n".to_owned() + &line.repeat(10_000);
         match planned(&text, &Machine::reference()) {
             Ok(plan) => {
                 let positions = execute::<64>(&Executable::new::<f32>(&plan).expect("executable"), |_| true);

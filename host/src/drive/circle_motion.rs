@@ -104,7 +104,7 @@ impl Circle {
             offsets[second],
         );
         let program =
-            format!("G21 G90 {select} F{:.10}\n{}M2\n", feed_mm_s * 60.0, revolution.repeat(revolutions));
+            format!("G21 G90 G61 {select} F{:.10}\n{}M2\n", feed_mm_s * 60.0, revolution.repeat(revolutions));
         let experiment = format!("circles at {frequency_hz} Hz and {} mm/min", feed_mm_s * 60.0);
         Recording::with(options, experiment, &program, machine, feed_mm_s)
     }

@@ -80,7 +80,7 @@ fn steps(
     let machine = raised(&open_loop(machine), &step::demands(feed_mm_s, machine.tick_s), &[axis])?;
     let (letter, feed_mm_min, far_mm) = (LETTERS[axis], feed_mm_s * 60.0, feed_mm_s * cruise_s);
     let program = format!(
-        "G21 G90 F{feed_mm_min:.10}\nG4 P{rest_s}\nG1 {letter}{far_mm:.10}\nG4 P{rest_s}\nG1 {letter}0\nG4 P{rest_s}\nM2\n"
+        "G21 G90 G61 F{feed_mm_min:.10}\nG4 P{rest_s}\nG1 {letter}{far_mm:.10}\nG4 P{rest_s}\nG1 {letter}0\nG4 P{rest_s}\nM2\n"
     );
     let experiment = format!("steps of axis {} to {feed_mm_min:.1} mm/min", machine.axes[axis].name);
     Recording::of(experiment, &program, machine, feed_mm_s)

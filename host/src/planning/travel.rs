@@ -58,11 +58,11 @@ mod tests {
     #[test]
     fn what_leaves_the_travel_is_refused_with_its_line_and_axis() {
         let box_mm = [Some([-5.0, 50.0]), Some([0.0, 30.0]), None];
-        assert_eq!(planned("G21 G90\nG1 X50 Y30 F1000\nX-5 Y0 Z-900\n", box_mm), Ok(()));
-        let refused = planned("G21 G90\nG1 X50 Y30 F1000\nX-5.01\n", box_mm).expect_err("beyond");
+        assert_eq!(planned("G21 G90 G61\nG1 X50 Y30 F1000\nX-5 Y0 Z-900\n", box_mm), Ok(()));
+        let refused = planned("G21 G90 G61\nG1 X50 Y30 F1000\nX-5.01\n", box_mm).expect_err("beyond");
         assert!(refused.starts_with("part.ngc:3: found X at -5.0"), "{refused}");
         assert!(refused.ends_with("mm, expected its travel, -5 to 50 mm"), "{refused}");
-        let refused = planned("G21 G90\nG1 X1 Y-0.1 F1000\n", box_mm).expect_err("beyond");
+        let refused = planned("G21 G90 G61\nG1 X1 Y-0.1 F1000\n", box_mm).expect_err("beyond");
         assert!(refused.starts_with("part.ngc:2: found Y at -0."), "{refused}");
     }
 

@@ -11,7 +11,7 @@ use crate::planning::{Mode, plan_program};
 use crate::simulate::{self, RunOptions};
 use crate::trace::TraceRow;
 
-const PROGRAM: &str = "G21 G90\nG1 X3 F600\nG1 X3 Y2\nG4 P0.05\nG1 X0 Y0 F2000\nM2\n";
+const PROGRAM: &str = "G21 G90 G61\nG1 X3 F600\nG1 X3 Y2\nG4 P0.05\nG1 X0 Y0 F2000\nM2\n";
 
 fn recorded(number: Number) -> Recording {
     let machine = Machine::reference();

@@ -364,7 +364,7 @@ fn what_planning_refuses() {
     let workspace = Workspace::new("planning");
     for (program, refusal) in [
         (
-            "G1 X1 F600\nG1 X1.001 F0.0000000001\nG1 X2 F600\nM2\n",
+            "G61 G1 X1 F600\nG1 X1.001 F0.0000000001\nG1 X2 F600\nM2\n",
             format!("2: found t2 − t1 = 599999958.6492777 s, {TICKS}"),
         ),
         ("G1 X1 F600\nG4 P1073742\nM2\n", format!("2: found a dwell of 1073742 s, {TICKS}")),
@@ -373,15 +373,15 @@ fn what_planning_refuses() {
             format!("1: found 1256637.0614359172 mm of path without a full stop, {KILOMETRE}"),
         ),
         (
-            "G0 X-1000000\nG0 X0\nG0 X1000000\nM2\n",
+            "G61 G0 X-1000000\nG0 X0\nG0 X1000000\nM2\n",
             format!("3: found 2000000 mm of path without a full stop, {KILOMETRE}"),
         ),
         (
-            "G0 X999999\nG2 I2 F1000\nM2\n",
+            "G61 G0 X999999\nG2 I2 F1000\nM2\n",
             "2: found a path through X = 1000001 mm, expected coordinates within ±1000000 mm".to_owned(),
         ),
         (
-            "G1 X1 F600\nG1 X1.0000000001\nM2\n",
+            "G61 G1 X1 F600\nG1 X1.0000000001\nM2\n",
             "2: found a piece of 1.00e-10 mm, expected at least 5e-10 mm: a short line is one piece, an \
              arc has one every 45°"
                 .to_owned(),
@@ -473,7 +473,7 @@ fn what_a_block_list_refuses() {
 #[test]
 fn compile_writes_a_program_or_says_why_not() {
     let workspace = Workspace::new("compile");
-    workspace.put("part.ngc", "G1 X10 Y5 F3000\nG2 X20 Y15 I5 J5 F1000\nG4 P0.1\nG0 Z3\nM2\n");
+    workspace.put("part.ngc", "G61 G1 X10 Y5 F3000\nG2 X20 Y15 I5 J5 F1000\nG4 P0.1\nG0 Z3\nM2\n");
     for number in ["f32", "fixed"] {
         let said = workspace.stdout(&["compile", "part.ngc", "--number", number, "--output", "part.bin"]);
         let bytes = fs::read(workspace.0.join("part.bin")).expect("a file");
@@ -502,7 +502,7 @@ fn compile_writes_a_program_or_says_why_not() {
     workspace.put("wrong.ngc", "G1 X10 F3000\nG1 X2O\nM2\n");
     let refusal = workspace.refusal(&["compile", "wrong.ngc", "--output", "part.bin"]);
     assert!(refusal.starts_with("wrong.ngc:2:") && refusal.contains(", expected"), "{refusal}");
-    workspace.put("dense.ngc", "G1 X1 F600\nG1 X1.0000000001\nM2\n");
+    workspace.put("dense.ngc", "G61 G1 X1 F600\nG1 X1.0000000001\nM2\n");
     let refusal = workspace.refusal(&["compile", "dense.ngc", "--output", "part.bin"]);
     assert!(refusal.starts_with("dense.ngc:2: found "), "{refusal}");
     assert!(!workspace.0.join("part.bin").exists());

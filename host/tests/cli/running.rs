@@ -126,7 +126,7 @@ fn run_under_live_control() {
     );
 
     // At rest at the end of the first line, and after the resume to the end.
-    workspace.put("line.ngc", "G1 X20 F2400\nX60\nM2\n");
+    workspace.put("line.ngc", "G61 G1 X20 F2400\nX60\nM2\n");
     let (_, states, _, end_mm) = run(3, "0:single");
     assert!(states.last().is_some_and(|state| state == "held") && (end_mm - 20.0).abs() < 1e-9, "{end_mm}");
     let (_, states, _, end_mm) = run(0, "0:single,6000:resume");

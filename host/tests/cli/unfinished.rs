@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::workspace::{Workspace, number};
 
 /// 60 mm along X, on two lines.
-const PROGRAM: &str = "G1 X20 F2400\nX60\nM2\n";
+const PROGRAM: &str = "G61 G1 X20 F2400\nX60\nM2\n";
 
 fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("JSON")

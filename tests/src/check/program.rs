@@ -46,7 +46,7 @@ struct Writer<'a> {
 pub fn generate(random: &mut Random, fragments: usize, feed_max_mm_s: f64) -> Generated {
     let move_s = random.log(0.02, 3.0);
     let mut writer = Writer {
-        program: Generated { text: "G17 G21 G90\n".to_owned(), asked: Vec::new() },
+        program: Generated { text: "G17 G21 G90 G61\n".to_owned(), asked: Vec::new() },
         at: [0; 3],
         feed_mm_min: 1000.0,
         is_rapid: false,

@@ -93,7 +93,7 @@ fn a_stop_stays_on_the_path_and_within_its_limits() {
 #[test]
 fn the_first_fault_stays_and_the_most_urgent_reaction_is_taken() {
     let machine = Machine::reference();
-    let plan = plan("G21 G90\nG1 X200 F6000\n", &machine);
+    let plan = plan("G21 G90 G61\nG1 X200 F6000\n", &machine);
     let [missed, drive] = [FaultKind::TickMissed { ticks: 1 }, FaultKind::Drive { axis: 2 }];
     let urgent: [(FaultKind<f32>, Option<FaultKind<f32>>, Reaction); 6] = [
         (missed, None, Reaction::Stop),
@@ -150,7 +150,7 @@ fn what_the_machine_says_of_its_reactions_is_done() {
         let mut machine = Machine::reference();
         machine.faults.emergency_stop = emergency_stop;
         (machine.faults.ramp_s, machine.faults.stop_s) = (ramp_s, stop_s);
-        let plan = plan("G21 G90\nG1 X200 F9000\n", &machine);
+        let plan = plan("G21 G90 G61\nG1 X200 F9000\n", &machine);
         let mut off = 0;
         run::<f32>(&plan, &machine, &mut |tick, hardware, _, seen| {
             hardware.injector.emergency_stop = tick >= 1000;
@@ -176,7 +176,7 @@ fn what_the_machine_says_of_its_reactions_is_done() {
 #[test]
 fn what_rests_does_not_begin_to_move() {
     let machine = Machine::reference();
-    let plan = plan("G21 G90\nG1 X2 F3000\nG4 P0.02\nG1 X4\nG1 Y3\n", &machine);
+    let plan = plan("G21 G90 G61\nG1 X2 F3000\nG4 P0.02\nG1 X4\nG1 Y3\n", &machine);
     let (mut resting, mut moving) = (0, 0);
     for at in 100..1200 {
         let (mut rests, mut last) = (false, [0.0; 3]);
@@ -207,7 +207,7 @@ fn what_rests_does_not_begin_to_move() {
 fn an_open_emergency_stop_hides_nothing() {
     let mut machine = Machine::reference();
     machine.faults.emergency_stop = Reaction::Stop;
-    let plan = plan("G21 G90\nG1 X200 F9000\n", &machine);
+    let plan = plan("G21 G90 G61\nG1 X200 F9000\n", &machine);
     let breaks = [Injection::DriveNotReady, Injection::DriveFault, Injection::LimitHigh { at_mm: -1.0 }];
     for then in breaks {
         let mut reactions = Vec::new();
@@ -241,7 +241,7 @@ fn a_limit_switch_is_driven_off_but_not_onto() {
     let machine = Machine::reference();
     for (sign, towards) in [(1.0, true), (1.0, false), (-1.0, true), (-1.0, false)] {
         let x_mm = if towards { 20.0 * sign } else { -20.0 * sign };
-        let plan = plan(&format!("G21 G90\nG1 X{x_mm} F3000\n"), &machine);
+        let plan = plan(&format!("G21 G90 G61\nG1 X{x_mm} F3000\n"), &machine);
         let mut found = None;
         run::<f32>(&plan, &machine, &mut |tick, hardware, kernel, seen| {
             // Reached from the beginning, before the drives have settled.
@@ -272,7 +272,7 @@ fn a_limit_switch_is_driven_off_but_not_onto() {
 #[test]
 fn motion_beyond_the_travel_is_stopped() {
     let mut machine = Machine::reference();
-    let plan = plan("G21 G90\nG1 X50 Y-30 F6000\n", &machine);
+    let plan = plan("G21 G90 G61\nG1 X50 Y-30 F6000\n", &machine);
     for (axis, travel_mm) in [(0, [-1.0, 25.0]), (1, [-10.0, 100.0])] {
         machine.axes[axis].travel_mm = Some(travel_mm);
         let (mut beyond, mut found) = (None, None);

@@ -8,7 +8,7 @@ use motion_tests::check::planned;
 
 fn run(injections: &str, script: Option<&Script>) -> RunSummary {
     let machine = Machine::reference();
-    let plan = planned("G21 G90\nG1 X100 Y40 F6000\n", &machine).expect("a plan");
+    let plan = planned("G21 G90 G61\nG1 X100 Y40 F6000\n", &machine).expect("a plan");
     let injections: Injections = injections.parse().expect("injections");
     let options = RunOptions { injections: Some(&injections), script, ..RunOptions::default() };
     run_with(&options, &plan, &machine, &mut |_| {}).expect("a run")

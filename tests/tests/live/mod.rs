@@ -283,7 +283,7 @@ fn held_in_a_dwell_it_stays() {
             feed_mm_min: 1200.0,
         })
     };
-    let text = "G1 X5 F1200\nG4 P0.5\nX10\nG4 P0.5\nX15\n".to_owned();
+    let text = "G61 G1 X5 F1200\nG4 P0.5\nX10\nG4 P0.5\nX15\n".to_owned();
     let asked = vec![line(5.0), Asked::Dwell(0.5), line(10.0), Asked::Dwell(0.5), line(15.0)];
     let case = Case::of(&Generated { text, asked }, Machine::reference(), 20_000.0).expect("a program");
     for (stop, go) in [

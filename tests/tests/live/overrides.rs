@@ -94,7 +94,7 @@ fn straight(random: &mut Random) -> Option<Straight> {
     if length_mm > 7000.0 || length_mm / feed_mm_s > 60_000.0 * machine.tick_s {
         return None;
     }
-    let (mut text, mut asked) = (String::new(), Vec::new());
+    let (mut text, mut asked) = ("G61\n".to_owned(), Vec::new());
     let lines = 1 + random.below(6) as i64;
     let mut from = [0; 3];
     for line in 1..=lines {
@@ -229,7 +229,7 @@ fn an_override_holds_between_rests() {
         Asked::Dwell(0.05),
         Asked::Stop,
     ];
-    let text = "G4 P0.05\nM0\nG4 P0.01\nG1 X8 F1200\nG4 P0.05\nM0\n".to_owned();
+    let text = "G61 G4 P0.05\nM0\nG4 P0.01\nG1 X8 F1200\nG4 P0.05\nM0\n".to_owned();
     let case = Case::of(&Generated { text, asked }, Machine::reference(), 10_000.0).expect("a program");
     let mut runs = Runs::default();
     // From the start, in the first dwell, in motion, in the last dwell.
@@ -273,7 +273,7 @@ fn an_override_that_never_rests_keeps_the_limits() {
 fn an_override_that_trembles_does_not_hold_up_an_acceleration() {
     let to = [(200.0 * UNITS_PER_MM) as i64, 0, 0];
     let asked = vec![Asked::Move(Move { from: [0; 3], to, arc: None, feed_mm_min: 3000.0 })];
-    let text = "G1 X200 F3000\n".to_owned();
+    let text = "G61 G1 X200 F3000\n".to_owned();
     let case = Case::of(&Generated { text, asked }, Machine::reference(), 20_000.0).expect("a program");
     let reaches = |share: &dyn Fn(u64) -> f64| {
         let mut reached = None;
@@ -297,7 +297,7 @@ fn an_override_that_trembles_does_not_hold_up_an_acceleration() {
 #[test]
 fn an_override_holds_behind_a_dwell() {
     for blocks in 1..=40 {
-        let (mut text, mut asked, mut from) = (String::new(), Vec::new(), [0; 3]);
+        let (mut text, mut asked, mut from) = ("G61\n".to_owned(), Vec::new(), [0; 3]);
         for index in 0..=blocks {
             let feed_mm_min = if index % 2 == 0 { 1200.0 } else { 600.0 };
             let to = [from[0] + 2 * UNITS_PER_MM as i64, 0, 0];

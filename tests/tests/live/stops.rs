@@ -42,7 +42,7 @@ fn straight(random: &mut Random) -> Option<Case> {
     }
     let (most_mm_s, room_s) =
         (machine.path.feed_mm_s, machine.path.feed_mm_s / machine.path.accel_mm_s2 + 2.0 * rise_s(&machine));
-    let (mut x_mm, mut text, mut asked, mut from) = (0.0, String::new(), Vec::new(), [0; 3]);
+    let (mut x_mm, mut text, mut asked, mut from) = (0.0, "G61\n".to_owned(), Vec::new(), [0; 3]);
     for _ in 0..12 {
         let feed_mm_min = format!("{:.4}", 60.0 * most_mm_s * random.log(0.02, 1.0));
         x_mm += most_mm_s * room_s * random.between(1.5, 3.0);

@@ -156,7 +156,7 @@ pub(crate) fn facets() -> Vec<u8> {
 
 fn facets_text() -> String {
     use std::fmt::Write;
-    let mut text = "G91 G1 F4000\n".to_owned();
+    let mut text = "G61 G91 G1 F4000\n".to_owned();
     for facet in 0..60 {
         let _ = writeln!(
             text,
@@ -200,7 +200,7 @@ pub(crate) fn densest() -> Vec<u8> {
 fn densest_of(machine: &Machine) -> Vec<u8> {
     let feed_mm_s = 50.0;
     let length_mm = feed_mm_s * machine.tick_s / 15.5;
-    let text = format!("G91 G1 F{}\n", feed_mm_s * 60.0) + &format!("X{length_mm:.7}\n").repeat(6000);
+    let text = format!("G61 G91 G1 F{}\n", feed_mm_s * 60.0) + &format!("X{length_mm:.7}\n").repeat(6000);
     bytes(&text, machine, Mode::Spanning)
 }
 
@@ -287,7 +287,7 @@ pub(crate) fn utmost<const AXES: usize>() -> Vec<u8> {
 /// The X axis of the stringer's lines alone.
 pub(crate) fn one_axis() -> Vec<u8> {
     let machine = Machine::reference();
-    let text = "G1 X20 F5000\nX18\nG4 P0.01\nX40 F3000\nX40.3 F5000\nX44\nM2\n";
+    let text = "G61 G1 X20 F5000\nX18\nG4 P0.01\nX40 F3000\nX40.3 F5000\nX44\nM2\n";
     let header = machine.header();
     let header = Header::<1> {
         pulse: Pulse::Plateau,
