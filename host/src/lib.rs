@@ -10,6 +10,7 @@
 //!   toolpath   moves ─► Element ─► Piece          arc length, septic polynomials
 //!   smoothness points, arcs ─► axis jerk          what the degree of a path does to the axes
 //!   planning   Program ─► Plan                    ceilings with reasons, feed over path
+//!   check      Program, Machine ─► Check          needs, time by reason, advice
 //!   compare    Program ─► figures                times of its paths, beside the least there is
 //!   simulate   Plan ─► ticks                      the kernel against hal-sim
 //!   recording  a run ─► bytes ─► the same run    replay from what the kernel was told
@@ -30,6 +31,7 @@ pub mod points;
 pub mod toolpath;
 pub mod smoothness;
 pub mod planning;
+pub mod check;
 pub mod compare;
 pub mod simulate;
 pub mod recording;

@@ -292,7 +292,9 @@ fn assert_arc_geometry(arc: &ArcMove) {
         );
     }
     assert!(arc.sweep_rad.abs() > 0.0 && arc.sweep_rad.abs() <= 2.0 * PI, "{}", arc.sweep_rad);
-    let allowed_mm = (arc.start_radius_mm * 0.001).clamp(0.005, 0.5);
+    // As LinuxCNC: a thousandth, but at least 0.002 √2 inch, the more of both units, and at most a hundred times that.
+    let least_mm = 25.4 * 0.002 * 2.0_f64.sqrt();
+    let allowed_mm = (arc.start_radius_mm * 0.001).clamp(least_mm, 100.0 * least_mm);
     assert_near(arc.end_radius_mm, arc.start_radius_mm, allowed_mm, "radii");
 }
 

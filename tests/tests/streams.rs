@@ -207,8 +207,7 @@ fn execute<const CAPACITY: usize>(
 }
 
 /// Short stretches, a dwell, arcs: every stretch fits the streams.
-const SHORT: &str =
-    "G61 G1 X5 F3000\nY5\nG2 X0 Y0 I-5 J0\nG4 P0.0123\nG1 X1\nY1\nX0\nY0\nG3 X0 Y0 I2 J1\nG1 Z3\nX30 Y20\nM2\n";
+const SHORT: &str = "G61 G1 X5 F3000\nY5\nG2 X0 Y0 I-5 J0\nG4 P0.0123\nG1 X1\nY1\nX0\nY0\nG3 X0 Y0 I2 J1\nG1 Z3\nX30 Y20\nM2\n";
 
 #[test]
 fn a_capacity_of_two_is_enough() {

@@ -8,7 +8,7 @@ use clap::{ArgAction, Args};
 
 use super::error::CliError;
 use crate::files::STANDARD_INPUT;
-use crate::gcode::{self, GcodeError, ParameterFile, Program, ReadOptions, ToolTable};
+use crate::gcode::{self, GcodeError, ParameterFile, Program, ReadOptions, Refusal, ToolTable};
 use crate::machine::Machine;
 
 /// What G-code is read with.
@@ -83,9 +83,18 @@ pub(super) struct Source {
 impl Source {
     /// The program in it. Its own folder is the last that is searched for subroutines.
     pub(super) fn program(&self, options: &ReadOptions) -> Result<Program, GcodeError> {
+        gcode::read_with(&self.name, &self.text, &self.options(options))
+    }
+
+    /// All refusals of the program in it.
+    pub(super) fn refusals(&self, options: &ReadOptions) -> Vec<Refusal> {
+        gcode::refusals(&self.name, &self.text, &self.options(options))
+    }
+
+    fn options(&self, options: &ReadOptions) -> ReadOptions {
         let mut options = options.clone();
         options.subroutines.extend(self.folder.clone());
-        gcode::read_with(&self.name, &self.text, &options)
+        options
     }
 }
 

@@ -21,6 +21,7 @@
 //!
 //! - [`profile`]: one ramp of the feed law, in figures;
 //! - [`read`]: the steps of a program;
+//! - [`check`]: all refusals of a program, or what it needs and where its time goes;
 //! - [`plan`]: the feed plan of a program or a block list;
 //! - [`compare`]: the times of programs, exact and blended, compared with the least possible;
 //! - [`run`]: a program through plan, kernel and simulated machine;
@@ -36,6 +37,7 @@
 //! - [`error`]: errors and exit statuses;
 //! - `input`, `outputs`, `until_closed`, `table`, `trace`, `progress`: shared by the commands.
 
+pub mod check;
 pub mod compare;
 pub mod compile;
 pub mod demo;
@@ -74,6 +76,7 @@ Examples:
   motion run part.ngc --report part.html         run a program, with a report on the axes
   motion replay part.mrec                        run a recording again, to the same bits
   motion read part.ngc                           the steps of a program, with absolute end points
+  motion check part.ngc                          all refusals at once; time, needs and advice
   motion plan part.ngc                           what limits the feed, block by block
   motion compare parts/                          how long programs take, exact and blended
   motion profile --from 0 --to 200 --accel 500 --jerk 5000 --snap 400000
@@ -112,6 +115,7 @@ enum Command {
     Replay(replay::ReplayArguments),
     Flight(flight::FlightArguments),
     Read(read::ReadArguments),
+    Check(check::CheckArguments),
     Plan(plan::PlanArguments),
     Compare(compare::CompareArguments),
     Profile(profile::ProfileArguments),
@@ -149,6 +153,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Replay(arguments)) => replay::replay(arguments, out),
         Some(Command::Flight(arguments)) => flight::flight(arguments, out),
         Some(Command::Read(arguments)) => read::read(arguments, out),
+        Some(Command::Check(arguments)) => check::run(arguments, out),
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
         Some(Command::Compare(arguments)) => compare::compare(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),

@@ -19,8 +19,9 @@ Examples:
 
 JSON: an object for every step, in order. All have line and kind. kind is
   line, arc, cubic, through,
-  nurbs                        with from_mm, to_mm, feed_mm_min (null: rapid), path (exact, stop or blend), tolerance_mm
-                               and merging_mm (null: the machine's choice)
+  nurbs                        with from_mm, to_mm, feed_mm_min (null: rapid), path (exact, stop or blend; machine: not
+                               programmed yet, the machine's choice), tolerance_mm and merging_mm (null: the machine's
+                               choice)
       arc                      also plane, turn_deg (of the plane about Z), centre_mm (along its first and second axis), sweep_rad
                                (counter-clockwise positive)
       cubic                    also controls_mm (the first from the start, the second from the end, X and Y)
@@ -177,6 +178,7 @@ fn step_json(program: &Program, step: &Step) -> StepJson {
 
 fn move_json(from: [Length; 3], to: [Length; 3], feed: Feed, mode: PathMode) -> MoveJson {
     let (path, tolerance_mm, merging_mm) = match mode {
+        PathMode::Unprogrammed => ("machine", None, None),
         PathMode::ExactPath => ("exact", None, None),
         PathMode::ExactStop => ("stop", None, None),
         PathMode::Blend { tolerance_mm, merging_mm } => ("blend", tolerance_mm, merging_mm),
@@ -239,6 +241,7 @@ fn move_cells(ends: MoveJson) -> [String; 5] {
     let feed = ends.feed_mm_min.map_or_else(|| "–".to_owned(), |feed_mm_min| format!("{feed_mm_min:.1}"));
     let tolerance = |letter, mm: Option<f64>| mm.map_or_else(String::new, |mm| format!(" {letter}{mm}"));
     let mode = match ends.path {
+        "machine" => "–",
         "exact" => "G61",
         "stop" => "G61.1",
         _ => "G64",

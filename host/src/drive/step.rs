@@ -86,7 +86,8 @@ impl Step {
         within("duration [s]", duration_s, (0.05, 60.0))?;
         let machine = raised(&open_loop(machine), &demands(feed_mm_s, machine.tick_s), &[axis])?;
         let (letter, feed_mm_min) = (["X", "Y", "Z"][axis], feed_mm_s * 60.0);
-        let program = format!("G21 G90 G61 G1 {letter}{:.10} F{feed_mm_min:.10}\nM2\n", feed_mm_s * duration_s);
+        let program =
+            format!("G21 G90 G61 G1 {letter}{:.10} F{feed_mm_min:.10}\nM2\n", feed_mm_s * duration_s);
         let experiment = format!("step of axis {} to {feed_mm_min} mm/min", machine.axes[axis].name);
         Recording::of(experiment, &program, machine, feed_mm_s)
     }

@@ -281,6 +281,58 @@ pub enum Problem {
     SplineWithoutEnd,
 }
 
+impl Problem {
+    /// Whether it is about one word that has no meaning here, whatever else is in its line.
+    pub(super) fn is_of_a_word(&self) -> bool {
+        matches!(
+            self,
+            Self::NoSuchAxis { .. }
+                | Self::UnsupportedG { .. }
+                | Self::UnsupportedM { .. }
+                | Self::UserProgram { .. }
+                | Self::NeedsEncoder { .. }
+                | Self::NeedsProbe { .. }
+        )
+    }
+
+    /// What it is about: a G or M word, or the letter of another word. Of other problems, nothing.
+    pub(super) fn subject(&self) -> Option<&str> {
+        match self {
+            Self::UnsupportedG { word }
+            | Self::UnsupportedM { word }
+            | Self::UserProgram { word }
+            | Self::NeedsEncoder { word }
+            | Self::NeedsProbe { word } => Some(word),
+            Self::NoSuchAxis { word } | Self::WordUnused { word, .. } => word.get(..1),
+            Self::SubroutineMissing { label } => Some(label),
+            Self::ParameterUnset { name } => Some(name),
+            _ => None,
+        }
+    }
+
+    /// Whether a program without its earlier refusals might not have it: where the machine is and what parameters are
+    /// depends on every line.
+    pub(super) fn may_follow(&self) -> bool {
+        matches!(
+            self,
+            Self::ParameterUnset { .. }
+                | Self::Undefined { .. }
+                | Self::FeedMissing { .. }
+                | Self::AxisWithoutMotion { .. }
+                | Self::ArcRadiiDiffer { .. }
+                | Self::ArcCentreOnPoint { .. }
+                | Self::ArcRadiusTooSmall { .. }
+                | Self::ArcWithoutChord { .. }
+                | Self::PolarAtZero { .. }
+                | Self::Gouge { .. }
+                | Self::CompensatedArc { .. }
+                | Self::CompensationEntry { .. }
+                | Self::NothingSaved
+                | Self::Aborted { .. }
+        )
+    }
+}
+
 /// A byte as an error message shows it.
 pub(crate) fn describe(byte: Option<u8>) -> String {
     match byte {

@@ -51,6 +51,8 @@ pub(super) struct Flow<'a> {
     /// The loops of the subroutine that runs.
     pub(super) repeats: Vec<Repeat>,
     pub(super) executed: u64,
+    /// The last line with text in the program's own file.
+    last: u32,
 }
 
 impl<'a> Flow<'a> {
@@ -65,36 +67,44 @@ impl<'a> Flow<'a> {
             calls: Vec::new(),
             repeats: Vec::new(),
             executed: 0,
+            last: 1,
         }
     }
 
     /// Reads to the end.
     pub(super) fn read(mut self) -> Result<Program, GcodeError> {
-        let mut last = 1;
-        while let Some(file) = self.library.file(self.file).map(Rc::clone) {
-            let here = self.place;
-            let Some((line, after)) = file.source.line(here) else {
-                if self.calls.is_empty() {
-                    break;
-                }
-                let last = Place { line: here.line.saturating_sub(1).max(1), ..here };
-                return Err(file.failure(last, Located::new(0, Problem::SubprogramWithoutEnd)).into_error());
-            };
-            self.place = after;
-            if is_blank_line(line) {
-                // In a loop they take time, too.
-                self.executed += 1;
-                continue;
+        while self.next_line().map_err(Failure::into_error)? {}
+        self.finish()
+    }
+
+    /// Reads a line; whether another may follow.
+    pub(super) fn next_line(&mut self) -> Result<bool, Failure<'a>> {
+        let Some(file) = self.library.file(self.file).map(Rc::clone) else { return Ok(false) };
+        let here = self.place;
+        let Some((line, after)) = file.source.line(here) else {
+            if self.calls.is_empty() {
+                return Ok(false);
             }
-            if self.file == 0 {
-                self.interpreter.line = here.line;
-                last = here.line;
-            }
-            self.line(&file, line, here).map_err(Failure::into_error)?;
-            if self.interpreter.ended && !self.calls.is_empty() {
-                break;
-            }
+            let last = Place { line: here.line.saturating_sub(1).max(1), ..here };
+            return Err(file.failure(last, Located::new(0, Problem::SubprogramWithoutEnd)));
+        };
+        self.place = after;
+        if is_blank_line(line) {
+            // In a loop they take time, too.
+            self.executed += 1;
+            return Ok(true);
         }
+        if self.file == 0 {
+            self.interpreter.line = here.line;
+            self.last = here.line;
+        }
+        self.line(&file, line, here)?;
+        Ok(!self.interpreter.ended || self.calls.is_empty())
+    }
+
+    /// The program, after the last line.
+    pub(super) fn finish(mut self) -> Result<Program, GcodeError> {
+        let last = self.last;
         self.interpreter.line = last;
         self.check_subroutines()?;
         let unended = self.interpreter.unended_nurbs();
@@ -110,8 +120,13 @@ impl<'a> Flow<'a> {
         Ok(program)
     }
 
+    /// Where the next line begins, and in which file.
+    pub(super) fn position(&self) -> (usize, Place) {
+        (self.file, self.place)
+    }
+
     /// One line with text.
-    fn line(&mut self, file: &Rc<File<'a>>, line: &[u8], here: Place) -> Result<(), Failure<'a>> {
+    pub(super) fn line(&mut self, file: &Rc<File<'a>>, line: &[u8], here: Place) -> Result<(), Failure<'a>> {
         let at = |located| file.failure(here, located);
         if is_percent_line(line) {
             // Before any word the mark opens the tape, later it closes it; closed twice is closed.

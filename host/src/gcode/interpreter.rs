@@ -204,6 +204,9 @@ impl Interpreter {
             return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
         }
         self.cubic_before_mm = None;
+        if kind.mode().is_some() {
+            self.program.systems.insert(self.system);
+        }
         self.program.steps.push(Step { line: self.line, kind });
         Ok(())
     }
@@ -398,10 +401,16 @@ mod tests {
             })
             .collect();
         let blend = |tolerance_mm, merging_mm| PathMode::Blend { tolerance_mm, merging_mm };
-        let exact = PathMode::ExactPath;
+        let (exact, unprogrammed) = (PathMode::ExactPath, PathMode::Unprogrammed);
         assert_eq!(
             modes,
-            [exact, blend(Some(0.1), None), blend(None, Some(0.2)), exact, blend(Some(25.4), Some(0.0)),]
+            [
+                unprogrammed,
+                blend(Some(0.1), None),
+                blend(None, Some(0.2)),
+                exact,
+                blend(Some(25.4), Some(0.0)),
+            ]
         );
     }
 

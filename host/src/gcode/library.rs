@@ -63,7 +63,12 @@ impl<'a> File<'a> {
     }
 }
 
-impl Failure<'_> {
+impl<'a> Failure<'a> {
+    /// The file, the start of the line, and the problem in it.
+    pub(super) fn parts(&self) -> (&Rc<File<'a>>, Place, &Located) {
+        (&self.file, self.place, &self.located)
+    }
+
     pub(super) fn into_error(self) -> GcodeError {
         let line = self.file.source.line(self.place).map_or(&b""[..], |(line, _)| line);
         GcodeError::new(&self.file.source.name, self.place.line, line, self.located)

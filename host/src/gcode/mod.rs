@@ -90,7 +90,7 @@
 //!
 //! The machine stands at 0, 0, 0; the offsets are those of [`ReadOptions::parameters`]. The modes are the power-on
 //! modes of RS-274/NGC: G17, G21, G90, G91.1, G94, G98, no motion mode, no feed. Interpreters differ in the path mode; here
-//! it is [`PathMode::ExactPath`] (G61), the one that never leaves the programmed path.
+//! it is the machine's choice ([`PathMode::Unprogrammed`]), which planning makes and tells.
 //!
 //! # Bounds
 //!
@@ -134,6 +134,7 @@ mod program;
 mod source;
 mod spline;
 mod structure;
+mod survey;
 mod tool;
 
 pub use arc::{RADIUS_MISMATCH_INCH, RADIUS_MISMATCH_MM, RADIUS_MISMATCH_RATIO};
@@ -145,8 +146,9 @@ pub use parameter_file::ParameterFile;
 pub use parameters::{PARAMETER_MAX, Parameters};
 pub use program::{
     ArcMove, CubicMove, Feed, LineMove, Message, Notice, NoticeKind, Nurbs, NurbsMove, PathMode, Plane,
-    Program, Step, StepKind, ThroughMove,
+    Program, Step, StepKind, Systems, ThroughMove,
 };
+pub use survey::{Refusal, refusals};
 pub use tool::{Tool, ToolTable};
 
 /// Reads a whole program with the default [`ReadOptions`]; `source_name` appears in errors only.

@@ -185,7 +185,7 @@ pub(super) struct Modal {
 }
 
 impl Default for Modal {
-    /// Power-on modes of RS-274/NGC, and exact path.
+    /// Power-on modes of RS-274/NGC; the path mode is the machine's choice.
     fn default() -> Self {
         Self {
             motion: None,

@@ -18,8 +18,26 @@ pub struct Program {
     pub messages: Vec<Message>,
     /// Tools that were used without a tool table: taken to have length and radius 0.
     pub tools_assumed: Vec<u32>,
+    /// Coordinate systems that moves are made in.
+    pub systems: Systems,
     /// The parameters at the end.
     pub parameters: Parameters,
+}
+
+/// A set of coordinate systems, 1 for G54 to 9 for G59.3.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Systems(u16);
+
+impl Systems {
+    /// Adds a system.
+    pub(super) fn insert(&mut self, system: u32) {
+        self.0 |= 1_u16.checked_shl(system).unwrap_or(0);
+    }
+
+    /// The systems, in order.
+    pub fn iter(self) -> impl Iterator<Item = u32> {
+        (1..=9).filter(move |&system| self.0 & (1 << system) != 0)
+    }
 }
 
 /// A text for the operator: a `(MSG,…)`, or the tool that a stop is for.
@@ -94,6 +112,19 @@ pub enum StepKind {
 }
 
 impl StepKind {
+    /// Start and end of a move.
+    #[must_use]
+    pub fn ends(&self) -> Option<[[Length; 3]; 2]> {
+        match self {
+            Self::Line(line) => Some([line.from, line.to]),
+            Self::Arc(arc) => Some([arc.from, arc.to]),
+            Self::Cubic(curve) => Some([curve.from, curve.to]),
+            Self::Through(point) => Some([point.from, point.to]),
+            Self::Nurbs(curve) => Some([curve.from, curve.to]),
+            Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+        }
+    }
+
     /// The path mode of a move.
     #[must_use]
     pub fn mode(&self) -> Option<PathMode> {
@@ -234,8 +265,10 @@ pub enum Feed {
 /// The treatment of the path at a corner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PathMode {
-    /// G61, and before either is programmed: the path is kept.
+    /// None of them was programmed yet: the machine's choice.
     #[default]
+    Unprogrammed,
+    /// G61: the path is kept.
     ExactPath,
     /// G61.1: a full stop after every move.
     ExactStop,

@@ -24,11 +24,11 @@ use super::range::{
     AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
     FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle,
     Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS,
-    NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, Place, Positive, Ramp, Resolution, Reversal,
-    StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch, Within,
+    NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp, Resolution,
+    Reversal, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch, Within,
 };
 use super::settings::{
-    AxisSettings, BLEND_TOLERANCE_MM, FaultSettings, HomingSettings, Machine, PathSettings,
+    AxisSettings, BLEND_TOLERANCE_MM, DefaultPathMode, FaultSettings, HomingSettings, Machine, PathSettings,
 };
 
 /// Seconds per minute: feeds in mm/min exist in this file only.
@@ -193,6 +193,7 @@ struct PathTable {
     junction_angle_deg: Within<JunctionAngle>,
     accel_step_mm_s2: Within<Limit>,
     curve_feed_share: Within<CurveShare>,
+    mode: Option<PathModeName>,
     blend_tolerance_mm: Option<Within<BlendTolerance>>,
 }
 
@@ -455,6 +456,7 @@ impl PathTable {
             junction_angle_rad: self.junction_angle_deg.0.to_radians(),
             accel_step_mm_s2: self.accel_step_mm_s2.0,
             curve_feed_share: self.curve_feed_share.0,
+            mode: self.mode.as_ref().map_or_else(DefaultPathMode::default, |mode| mode.0),
             blend_tolerance_mm: self
                 .blend_tolerance_mm
                 .as_ref()
@@ -599,6 +601,20 @@ impl<'de> Deserialize<'de> for LawName {
         let value = toml::Value::deserialize(deserializer)?;
         let refused = || D::Error::custom(format!("law = {value}, expected {LAW_NAMES}"));
         law_named(value.as_str()).map(Self).ok_or_else(refused)
+    }
+}
+
+/// How corners are passed before a program says so.
+struct PathModeName(DefaultPathMode);
+
+impl<'de> Deserialize<'de> for PathModeName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = toml::Value::deserialize(deserializer)?;
+        match value.as_str() {
+            Some("blend") => Ok(Self(DefaultPathMode::Blend)),
+            Some("exact") => Ok(Self(DefaultPathMode::Exact)),
+            _ => Err(D::Error::custom(format!("mode = {value}, expected {PATH_MODE}"))),
+        }
     }
 }
 

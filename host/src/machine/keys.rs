@@ -11,8 +11,8 @@ use super::range::{
     AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
     FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle,
     Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit,
-    OutputOffset, Place, Positive, Ramp, Range, Resolution, Reversal, StopTime, TIMER_BITS, TablePoint, Tick,
-    Velocity, Watch,
+    OutputOffset, PATH_MODE, Place, Positive, Ramp, Range, Resolution, Reversal, StopTime, TIMER_BITS,
+    TablePoint, Tick, Velocity, Watch,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -119,10 +119,17 @@ pub const KEY_TABLES: &[KeyTable] = &[
                  on the curve.",
             ),
             Key::new(
+                "mode",
+                "",
+                PATH_MODE,
+                "How corners are passed before a program says G61 or G64: blended within blend_tolerance_mm, or exactly.",
+            )
+            .or("\"blend\""),
+            Key::new(
                 "blend_tolerance_mm",
                 "mm",
                 BlendTolerance::EXPECTED,
-                "How far blends of corners may leave the programmed path under a G64 without P; 0 for exact path.",
+                "How far blends of corners may leave the programmed path without a P of G64; 0 for exact path.",
             )
             .or("0.01"),
         ],

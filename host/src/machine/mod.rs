@@ -39,7 +39,9 @@ mod tests;
 pub use edit::{AxisEdit, edited};
 pub use error::{AxisError, MachineError};
 pub(crate) use law_name::{LAW_NAMES, law_named};
-pub use settings::{AxisSettings, DEAD_TIME_CELLS, FaultSettings, HomingSettings, Machine, PathSettings};
+pub use settings::{
+    AxisSettings, DEAD_TIME_CELLS, DefaultPathMode, FaultSettings, HomingSettings, Machine, PathSettings,
+};
 
 /// The reference machine's file, with every key explained.
 pub const REFERENCE_TOML: &str = include_str!("reference.toml");

@@ -28,6 +28,7 @@ pub(super) const NOISE_COUNTS: &str = "a whole number from 0 to 1000";
 /// The greatest of them.
 pub(super) const NOISE_COUNTS_MAX: u16 = 1000;
 /// The reactions of an emergency stop.
+pub(super) const PATH_MODE: &str = "\"blend\" or \"exact\"";
 pub(super) const EMERGENCY_STOP: &str = "\"immediate\", \"ramp\" or \"stop\"";
 /// Seeds of an encoder's noise.
 pub(super) const NOISE_SEED: &str = "a whole number, 0 or more";

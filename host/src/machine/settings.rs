@@ -90,8 +90,20 @@ pub struct PathSettings {
     /// Part of a curve's greatest feed that is planned with, 0.1 to 0.85; what it leaves of acceleration,
     /// jerk and snap is for changing the feed on the curve.
     pub curve_feed_share: f64,
+    /// How corners are passed before a program says so.
+    pub mode: DefaultPathMode,
     /// How far blends may leave the path under a G64 without P \[mm\]; 0 to 10, 0 for exact path.
     pub blend_tolerance_mm: f64,
+}
+
+/// How corners are passed before G61, G61.1 or G64 is programmed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DefaultPathMode {
+    /// As under G61.
+    Exact,
+    /// As under a G64 without P, as users of LinuxCNC, grbl and Klipper expect.
+    #[default]
+    Blend,
 }
 
 /// One axis. Limits are from 0.001 to 10¹².
@@ -163,6 +175,7 @@ impl Machine {
                 junction_angle_rad: 0.5_f64.to_radians(),
                 accel_step_mm_s2: 500.0,
                 curve_feed_share: CURVE_FEED_SHARE,
+                mode: DefaultPathMode::default(),
                 blend_tolerance_mm: BLEND_TOLERANCE_MM,
             },
             axes: [
@@ -285,6 +298,15 @@ impl FaultSettings {
 }
 
 impl PathSettings {
+    /// How far blends may leave the path before a program says so \[mm\].
+    #[must_use]
+    pub fn unprogrammed_tolerance_mm(&self) -> f64 {
+        match self.mode {
+            DefaultPathMode::Exact => 0.0,
+            DefaultPathMode::Blend => self.blend_tolerance_mm,
+        }
+    }
+
     /// Acceleration, jerk and snap along the path.
     #[must_use]
     pub fn limits(&self) -> Limits<f64> {

@@ -365,6 +365,7 @@ fn ranges_of_optional_keys_are_kept() {
         ("axis.regulator.inverse.bed", "damping_ratio", &["0", "0.0009", "1.1"]),
         ("axis.regulator.inverse.bed", "mass_ratio", &["0", "-0.06", "101"]),
         ("path", "law", &["\"sin\"", "\"Plateau\"", "\"\"", "[\"sin2\"]"]),
+        ("path", "mode", &["\"G64\"", "\"Blend\"", "\"\"", "true", "[\"exact\"]"]),
         ("axis.homing", "search_mm_s", &["0", "0.0009", "-2e9"]),
         ("axis.homing", "approach_mm_s", &["0", "-2"]),
         ("axis.homing", "travel_mm", &["0", "-600", "100001"]),

@@ -6,8 +6,8 @@ use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
 use super::{Item, Mode, PlacedRamp, Plan, travel};
-use crate::gcode::{Feed, PathMode, Program, StepKind};
-use crate::machine::{Machine, PathSettings};
+use crate::gcode::{Feed, PathMode, Program, Step, StepKind};
+use crate::machine::{DefaultPathMode, Machine, PathSettings};
 use crate::toolpath::Element;
 use crate::toolpath::smooth::Move;
 
@@ -32,6 +32,7 @@ pub fn plan_program(
     let machine = &driven(machine, mode);
     let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s);
     plan.notices = program.notes();
+    plan.notices.extend(assumed_path(program, machine));
     let mut run: Vec<Move> = Vec::new();
     // Where the spline begins whose points are being collected.
     let (mut start, mut points) = ([0.0; 3], Vec::<Point>::new());
@@ -121,6 +122,17 @@ pub fn plan_moves(
     Ok(plan)
 }
 
+/// What is assumed of moves before any path mode is programmed, if there are such moves.
+fn assumed_path(program: &Program, machine: &Machine) -> Option<String> {
+    let is_assumed = |step: &&Step| step.kind.mode() == Some(PathMode::Unprogrammed);
+    let line = program.steps.iter().find(is_assumed)?.line;
+    let path = match machine.path.mode {
+        DefaultPathMode::Exact => "exact path (G61)".to_owned(),
+        DefaultPathMode::Blend => format!("G64 P{}", machine.path.blend_tolerance_mm),
+    };
+    Some(format!("line {line}: {path} is assumed until G61 or G64: path.mode of the machine"))
+}
+
 /// `machine` with the pulses of jerk of `mode`.
 fn driven(machine: &Machine, mode: Mode) -> Machine {
     let path = PathSettings { pulse: mode.pulse(machine.path.pulse), ..machine.path };
@@ -143,6 +155,7 @@ pub(super) fn path_move(
     machine: &Machine,
 ) -> Move {
     let (tolerance_mm, merging_mm) = match mode {
+        PathMode::Unprogrammed => (machine.path.unprogrammed_tolerance_mm(), None),
         PathMode::ExactPath | PathMode::ExactStop => (0.0, None),
         PathMode::Blend { tolerance_mm, merging_mm } => {
             (tolerance_mm.unwrap_or(machine.path.blend_tolerance_mm), merging_mm)

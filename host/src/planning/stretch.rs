@@ -74,7 +74,8 @@ impl Stretch {
     }
 
     /// Path position of every block's end, from the stretch's start \[mm\].
-    pub(super) fn ends_mm(&self) -> &[f64] {
+    #[must_use]
+    pub fn ends_mm(&self) -> &[f64] {
         &self.ends_mm
     }
 

@@ -1,6 +1,7 @@
 //! The command line as users and scripts rely on it: exit statuses, keys, headers, errors, files.
 
 mod axes;
+mod checking;
 mod drive;
 mod files;
 mod planning;

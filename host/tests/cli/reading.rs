@@ -85,7 +85,7 @@ fn a_nurbs_has_its_curve() {
         steps[1],
         json!({
             "line": 6, "kind": "nurbs", "from_mm": [1.0, 0.0, 0.0], "to_mm": [3.0, 0.0, 0.0], "feed_mm_min": 600.0,
-            "path": "exact", "tolerance_mm": null, "merging_mm": null,
+            "path": "machine", "tolerance_mm": null, "merging_mm": null,
             "degree": 2, "points_mm": [[1.0, 0.0, 0.0], [2.0, 2.0, 0.0], [3.0, 0.0, 0.0]],
             "weights": [0.5, 2.0, 1.0], "knots": [0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
         })

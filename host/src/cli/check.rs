@@ -1,0 +1,255 @@
+//! `motion check`: whether a program runs on the machine, what it needs, how long it takes, and why.
+
+use std::io::{self, Write};
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::error::{CliError, Outcome};
+use super::input::{self, Source};
+use super::table::{self, Align};
+use super::write_json;
+use crate::check::needs::system_word;
+use crate::check::{Check, Reason, check};
+use crate::gcode::{Program, ReadOptions, Refusal};
+use crate::machine::Machine;
+
+const EXAMPLES: &str = "\
+Examples:
+  motion check part.ngc                          every refusal at once, or time, needs and advice
+  motion check part.ngc --machine mine.toml --tools mill.tbl
+  generate-part | motion check - --json          for a script
+
+Exit status: 0 the program is accepted, 2 it is refused.
+
+JSON: accepted, refusals (source, line, column, lines, problem); of an accepted program also steps, blocks, length_mm, time_s,
+extent_mm (least and greatest X, Y, Z at the ends of moves), needs (tools, tools_assumed, systems, outputs), corner_stops,
+operator_stops, time_by_reason (seconds: programmed, machine, acceleration, jerk, snap, feed change, corner, stop, dwell),
+advice, notices.";
+
+/// Check a program: list all refusals, or what it needs and where its time goes.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct CheckArguments {
+    /// G-code (`-`: standard input).
+    #[arg(value_name = "PROGRAM")]
+    program: PathBuf,
+    /// Machine file (`motion machine` prints one); without it, the reference machine.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    #[command(flatten)]
+    reading: input::ReadingArguments,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct CheckJson<'a> {
+    accepted: bool,
+    refusals: Vec<RefusalJson<'a>>,
+    #[serde(flatten)]
+    accepted_program: Option<AcceptedJson<'a>>,
+}
+
+#[derive(Serialize)]
+struct RefusalJson<'a> {
+    source: &'a str,
+    line: u32,
+    column: u32,
+    lines: usize,
+    problem: String,
+}
+
+#[derive(Serialize)]
+struct AcceptedJson<'a> {
+    steps: usize,
+    blocks: usize,
+    length_mm: f64,
+    time_s: f64,
+    extent_mm: Option<[[f64; 2]; 3]>,
+    needs: NeedsJson<'a>,
+    corner_stops: usize,
+    operator_stops: usize,
+    time_by_reason: serde_json::Map<String, serde_json::Value>,
+    advice: &'a [String],
+    notices: &'a [String],
+}
+
+#[derive(Serialize)]
+struct NeedsJson<'a> {
+    tools: &'a [u32],
+    tools_assumed: &'a [u32],
+    systems: Vec<&'static str>,
+    outputs: &'a [&'static str],
+}
+
+/// Checks and prints.
+///
+/// # Errors
+/// The program or the machine file is refused, or `out` can't be written.
+pub fn run(arguments: &CheckArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    let machine = input::machine(arguments.machine.as_ref())?;
+    let source = input::read(&arguments.program)?;
+    let options = arguments.reading.options()?;
+    match source.program(&options) {
+        Ok(program) => accepted(arguments, &source, &program, &machine, out),
+        Err(_) => refused(arguments, &source, &options, out),
+    }
+}
+
+fn accepted(
+    arguments: &CheckArguments,
+    source: &Source,
+    program: &Program,
+    machine: &Machine,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    let checked = check(&source.name, program, machine)?;
+    if arguments.json {
+        let accepted_program = Some(json(program, &checked));
+        write_json(&CheckJson { accepted: true, refusals: Vec::new(), accepted_program }, out)?;
+    } else {
+        write_check(&source.name, program, &checked, out).map_err(CliError::Output)?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn refused(
+    arguments: &CheckArguments,
+    source: &Source,
+    options: &ReadOptions,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    let refusals = source.refusals(options);
+    if arguments.json {
+        let refusals = refusals.iter().map(refusal_json).collect();
+        write_json(&CheckJson { accepted: false, refusals, accepted_program: None }, out)?;
+    } else {
+        write_refusals(&refusals, out).map_err(CliError::Output)?;
+    }
+    let lines: usize = refusals.iter().map(|refusal| refusal.lines).sum();
+    let found = match (refusals.len(), lines) {
+        (1, 1) => "1 refusal".to_owned(),
+        (1, lines) => format!("1 refusal in {lines} lines"),
+        (kinds, lines) => format!("{kinds} refusals in {lines} lines"),
+    };
+    Err(CliError::Refused { programs: vec![format!("{}: found {found}, expected none", source.name)] })
+}
+
+fn refusal_json(refusal: &Refusal) -> RefusalJson<'_> {
+    let Refusal { first, lines } = refusal;
+    RefusalJson {
+        source: &first.source_name,
+        line: first.line,
+        column: first.column,
+        lines: *lines,
+        problem: first.problem.to_string(),
+    }
+}
+
+fn json<'a>(program: &'a Program, checked: &'a Check) -> AcceptedJson<'a> {
+    let Check { plan, needs, times, advice } = checked;
+    let by_reason = Reason::ALL.map(|reason| (reason.name().to_owned(), times.of_reason_s(reason).into()));
+    AcceptedJson {
+        steps: program.steps.len(),
+        blocks: plan.blocks.len(),
+        length_mm: plan.length_mm,
+        time_s: plan.time_s,
+        extent_mm: needs.extent_mm,
+        needs: NeedsJson {
+            tools: &needs.tools,
+            tools_assumed: &program.tools_assumed,
+            systems: needs.systems.iter().map(|&system| system_word(system)).collect(),
+            outputs: &needs.outputs,
+        },
+        corner_stops: times.corner_stops,
+        operator_stops: times.operator_stops,
+        time_by_reason: by_reason.into_iter().collect(),
+        advice,
+        notices: &plan.notices,
+    }
+}
+
+fn write_refusals(refusals: &[Refusal], out: &mut dyn Write) -> io::Result<()> {
+    let columns = [("lines", "", Align::Right), ("first", "", Align::Left), ("problem", "", Align::Left)];
+    let row = |refusal: &Refusal| {
+        let Refusal { first, lines } = refusal;
+        let place = format!("{}:{}:{}", first.source_name, first.line, first.column);
+        [lines.to_string(), place, first.problem.to_string()]
+    };
+    let rows: Vec<[String; 3]> = refusals.iter().map(row).collect();
+    table::write(&columns, &rows, out)
+}
+
+fn write_check(name: &str, program: &Program, checked: &Check, out: &mut dyn Write) -> io::Result<()> {
+    let Check { plan, needs, times, advice } = checked;
+    writeln!(out, "{name} is accepted: {}, {:.3} mm", duration(plan.time_s), plan.length_mm)?;
+    let stops = match times.operator_stops {
+        0 => String::new(),
+        1 => ", and 1 stop for the operator".to_owned(),
+        stops => format!(", and {stops} stops for the operator"),
+    };
+    writeln!(out, "  {} steps, {} blocks{stops}", program.steps.len(), plan.blocks.len())?;
+    if let Some(extent_mm) = needs.extent_mm {
+        let axes = ["X", "Y", "Z"].iter().zip(extent_mm);
+        let axes: Vec<String> =
+            axes.map(|(axis, [low, high])| format!("{axis} {low:.3} to {high:.3}")).collect();
+        writeln!(out, "  machine coordinates [mm]: {}", axes.join(", "))?;
+    }
+    let mut list = |what: &str, items: Vec<String>| match items.len() {
+        0 => Ok(()),
+        _ => writeln!(out, "  {what}: {}", items.join(", ")),
+    };
+    let word = |&system: &u32| system_word(system).to_owned();
+    list("coordinate systems", needs.systems.iter().map(word).collect())?;
+    list("tools", needs.tools.iter().map(|tool| format!("T{tool}")).collect())?;
+    list("switches", needs.outputs.iter().map(|&output| output.to_owned()).collect())?;
+    writeln!(out)?;
+    let columns = [("time", "s", Align::Right), ("", "%", Align::Right), ("spent", "", Align::Left)];
+    let total_s = plan.time_s;
+    let rows: Vec<[String; 3]> = Reason::ALL
+        .into_iter()
+        .map(|reason| (reason, times.of_reason_s(reason)))
+        .filter(|(_, time_s)| *time_s > 0.0)
+        .map(|(reason, time_s)| {
+            let share = format!("{:.1}", 100.0 * time_s / total_s);
+            [format!("{time_s:.3}"), share, reason.words().to_owned()]
+        })
+        .collect();
+    if !rows.is_empty() {
+        table::write(&columns, &rows, out)?;
+        writeln!(out)?;
+    }
+    advice.iter().try_for_each(|sentence| writeln!(out, "  {sentence}"))?;
+    plan.notices.iter().try_for_each(|notice| writeln!(out, "  note: {notice}"))
+}
+
+/// A time for people: seconds, from a minute on with minutes and hours.
+fn duration(time_s: f64) -> String {
+    const MINUTE_S: f64 = 60.0;
+    const HOUR_S: f64 = 3600.0;
+    let (hours, minutes) = ((time_s / HOUR_S).floor(), (time_s % HOUR_S / MINUTE_S).floor());
+    if time_s < MINUTE_S {
+        format!("{time_s:.3} s")
+    } else if time_s < HOUR_S {
+        format!("{minutes} min {:.1} s", time_s % MINUTE_S)
+    } else {
+        format!("{hours} h {minutes} min {:.0} s", (time_s % MINUTE_S).floor())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::duration;
+
+    #[test]
+    fn durations_are_told_in_the_units_of_people() {
+        for (time_s, expected) in
+            [(0.5, "0.500 s"), (75.25, "1 min 15.2 s"), (3600.0, "1 h 0 min 0 s"), (7325.9, "2 h 2 min 5 s")]
+        {
+            assert_eq!(duration(time_s), expected);
+        }
+    }
+}

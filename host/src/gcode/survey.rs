@@ -1,0 +1,213 @@
+//! All refusals of a program at once.
+//!
+//! **Consumes** what [`read_with`](super::read_with) consumes. **Produces** the [`Refusal`]s of a program that it refuses,
+//! alike ones together. Where a word has no meaning here, it is left out and the rest of its line is read; any other
+//! refused line is left out as a whole.
+//!
+//! What would not be refused without an earlier refusal is not listed: the geometry of arcs and corners, and parameters
+//! without a value, from the first line on that was left out.
+
+use std::collections::BTreeSet;
+use std::mem::discriminant;
+
+use super::error::{GcodeError, Problem};
+use super::flow::Flow;
+use super::library::Failure;
+use super::options::ReadOptions;
+use super::source::Place;
+
+/// Most lines that are executed after a refusal: a loop may have lost its end with it.
+const LINES_AFTER_REFUSAL: u64 = 10_000_000;
+
+/// A refusal, and how many lines are refused for the like.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// Where it is first, and why.
+    pub first: GcodeError,
+    /// The number of lines, in all files together.
+    pub lines: usize,
+}
+
+/// Every refusal of a program, file by file in the order of their first places; none if the program is accepted.
+///
+/// ```
+/// use motion_host::gcode::{self, ReadOptions};
+///
+/// let text = b"G1 X1 A5 F600\nG33 Z-1 K1\nX2 A6\nM2\n";
+/// let refusals = gcode::refusals("part.ngc", text, &ReadOptions::default());
+/// let found: Vec<_> = refusals.iter().map(|refusal| (refusal.first.line, refusal.lines)).collect();
+/// assert_eq!(found, [(1, 2), (2, 1)]);
+/// ```
+#[must_use]
+pub fn refusals(source_name: &str, text: &[u8], options: &ReadOptions) -> Vec<Refusal> {
+    let mut flow = Flow::new(source_name, text, options);
+    let mut survey = Survey::default();
+    loop {
+        let before = flow.position();
+        let failure = match flow.next_line() {
+            Ok(true) if survey.groups.is_empty() || flow.executed < survey.executed_max => continue,
+            Ok(true) => return survey.refusals(),
+            Ok(false) => break,
+            Err(failure) => failure,
+        };
+        if survey.groups.is_empty() {
+            survey.executed_max = flow.executed.saturating_add(LINES_AFTER_REFUSAL);
+        }
+        let stands_still = flow.position() == before;
+        survey.rest_of_line(&mut flow, failure);
+        if stands_still {
+            return survey.refusals();
+        }
+    }
+    if let Err(error) = flow.finish() {
+        // What is open at the end may have lost its end with a refused line.
+        if survey.groups.is_empty() {
+            survey.add(error);
+        }
+    }
+    survey.refusals()
+}
+
+/// Refusals alike.
+struct Group {
+    first: GcodeError,
+    /// Their places: file and line.
+    lines: BTreeSet<(String, u32)>,
+}
+
+#[derive(Default)]
+struct Survey {
+    groups: Vec<Group>,
+    /// Lines that may be executed.
+    executed_max: u64,
+    /// A line was left out: positions and parameters are not what they would be.
+    is_uncertain: bool,
+}
+
+impl Survey {
+    /// A refused line, and what else of it is refused.
+    fn rest_of_line<'a>(&mut self, flow: &mut Flow<'a>, failure: Failure<'a>) {
+        let (file, place, _) = failure.parts();
+        let (file, place): (_, Place) = (file.clone(), place);
+        let mut text = file.source.line(place).map_or_else(Vec::new, |(line, _)| line.to_vec());
+        let mut failure = Some(failure);
+        let mut is_first = true;
+        while let Some(found) = failure.take() {
+            let (_, at, located) = found.parts();
+            let is_word = at == place && located.problem.is_of_a_word();
+            let offset = located.offset;
+            if is_word || is_first {
+                self.is_uncertain |= !is_word;
+                self.add(found.into_error());
+            }
+            is_first = false;
+            // Every pass leaves out one word more.
+            if is_word && leave_out(&mut text, offset) {
+                failure = flow.line(&file, &text, place).err();
+            }
+        }
+    }
+
+    fn add(&mut self, error: GcodeError) {
+        let place = (error.source_name.clone(), error.line);
+        let group = self.groups.iter_mut().find(|group| alike(&group.first.problem, &error.problem));
+        if let Some(group) = group {
+            group.lines.insert(place);
+        } else if self.groups.is_empty() || !(self.is_uncertain && error.problem.may_follow()) {
+            self.groups.push(Group { first: error, lines: BTreeSet::from([place]) });
+        }
+    }
+
+    fn refusals(self) -> Vec<Refusal> {
+        let refusal = |group: Group| Refusal { first: group.first, lines: group.lines.len() };
+        let mut refusals: Vec<Refusal> = self.groups.into_iter().map(refusal).collect();
+        let files: Vec<String> = refusals.iter().map(|refusal| refusal.first.source_name.clone()).collect();
+        // A line is read again after each of its words: they are found in no order.
+        refusals.sort_by_key(|Refusal { first, .. }| {
+            let file = files.iter().position(|name| *name == first.source_name);
+            (file, first.line, first.column)
+        });
+        refusals
+    }
+}
+
+/// Whether two problems are told together: of one kind, and about one G or M word or one letter.
+fn alike(one: &Problem, other: &Problem) -> bool {
+    discriminant(one) == discriminant(other) && one.subject() == other.subject()
+}
+
+/// Puts blanks in place of the word at `offset`; whether there was one.
+fn leave_out(line: &mut [u8], offset: usize) -> bool {
+    let Some(word) = line.get_mut(offset..).filter(|word| word.first().is_some_and(|byte| *byte != b' '))
+    else {
+        return false;
+    };
+    let mut depth = 0_usize;
+    let mut is_name = false;
+    for (index, byte) in word.iter_mut().enumerate() {
+        match *byte {
+            b'[' => depth += 1,
+            b']' => depth = depth.saturating_sub(1),
+            b'<' => is_name = true,
+            b'>' => is_name = false,
+            b'0'..=b'9' | b'.' | b'+' | b'-' | b'#' | b' ' | b'\t' => {}
+            _ if index == 0 || depth > 0 || is_name => {}
+            _ => break,
+        }
+        *byte = b' ';
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(text: &str) -> Vec<(u32, u32, usize)> {
+        refusals("a.ngc", text.as_bytes(), &ReadOptions::default())
+            .iter()
+            .map(|refusal| (refusal.first.line, refusal.first.column, refusal.lines))
+            .collect()
+    }
+
+    #[test]
+    fn accepted_programs_have_none() {
+        for text in ["G1 X1 F60\nM2\n", "", "o1 sub\nG1 X1 F9\no1 endsub\n"] {
+            assert_eq!(found(text), []);
+        }
+    }
+
+    #[test]
+    fn every_word_of_a_line_is_found_and_the_rest_is_read() {
+        // A and B in one line; X2 of the line is executed, so that the arc after it is right.
+        let text = "G1 X1 F60 A1\nX2 A[1+[2*3]] B#1Y0\nG33 M199\nG2 X4 I1\nM2\n";
+        assert_eq!(found(text), [(1, 11, 2), (2, 15, 1), (3, 1, 1), (3, 5, 1)]);
+    }
+
+    #[test]
+    fn what_follows_from_a_refusal_is_not_listed() {
+        // The second line is left out: the arc would not be one, and #1 has no value.
+        assert_eq!(found("F60\nG1 X9 Q[1/0]\nG2 X4 I1\n#2=#<unset>\nM2\n").len(), 1);
+        assert_eq!(found("F60\nG2 X4 I1\n#2=#<unset>\nM2\n").len(), 1);
+    }
+
+    #[test]
+    fn a_loop_that_lost_its_end_ends() {
+        let text = "#1=0\no1 while [#1 lt 9]\n#1=[#1+1] H[sqrt[-1]]\no1 endwhile\nM2\n";
+        assert_eq!(found(text), [(3, 13, 1)]);
+    }
+
+    #[test]
+    fn a_word_is_left_out_with_its_number() {
+        for (line, offset, expected) in [
+            ("X1 A10. Y2", 3, "X1      Y2"),
+            ("A[#<a b>*[2]]X1", 0, "             X1"),
+            ("B#<x>", 0, "     "),
+        ] {
+            let mut text = line.as_bytes().to_vec();
+            assert!(leave_out(&mut text, offset));
+            assert_eq!(text, expected.as_bytes(), "{line}");
+        }
+        assert!(!leave_out(&mut b"X1".to_vec(), 2));
+    }
+}
