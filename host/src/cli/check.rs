@@ -186,12 +186,14 @@ fn write_refusals(refusals: &[Refusal], out: &mut dyn Write) -> io::Result<()> {
 fn write_check(name: &str, program: &Program, checked: &Check, out: &mut dyn Write) -> io::Result<()> {
     let Check { plan, needs, times, advice } = checked;
     writeln!(out, "{name} is accepted: {}, {:.3} mm", duration(plan.time_s), plan.length_mm)?;
-    let stops = match times.operator_stops {
+    let stops = |count: usize, one: &str, more: &str| match count {
         0 => String::new(),
-        1 => ", and 1 stop for the operator".to_owned(),
-        stops => format!(", and {stops} stops for the operator"),
+        1 => format!(", 1 {one}"),
+        count => format!(", {count} {more}"),
     };
-    writeln!(out, "  {} steps, {} blocks{stops}", program.steps.len(), plan.blocks.len())?;
+    let at_corners = stops(times.corner_stops, "full stop at a corner", "full stops at corners");
+    let for_operator = stops(times.operator_stops, "stop for the operator", "stops for the operator");
+    writeln!(out, "  {} steps, {} blocks{at_corners}{for_operator}", program.steps.len(), plan.blocks.len())?;
     if let Some(extent_mm) = needs.extent_mm {
         let axes = ["X", "Y", "Z"].iter().zip(extent_mm);
         let axes: Vec<String> =

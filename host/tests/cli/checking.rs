@@ -65,7 +65,7 @@ fn what_an_accepted_program_needs_is_told() {
     let table = workspace.stdout(&["check", "part.ngc"]);
     for words in [
         "part.ngc is accepted: ",
-        "1 stop for the operator",
+        ", 28 full stops at corners, 1 stop for the operator\n",
         "coordinate systems: G55",
         "tools: T3",
         "spindle (M3, M4)",

@@ -67,7 +67,7 @@ pub fn generate(random: &mut Random, fragments: usize, feed_max_mm_s: f64) -> Ge
 
 /// A program of lines from the origin through `points`, at one feed.
 pub fn lines(points: &[[i64; 3]], feed_mm_min: f64) -> Generated {
-    let mut program = Generated { text: format!("F{feed_mm_min}\n"), asked: Vec::new() };
+    let mut program = Generated { text: format!("G61 F{feed_mm_min}\n"), asked: Vec::new() };
     let mut from = [0; 3];
     for &to in points {
         let [x, y, z] = to.map(decimal);

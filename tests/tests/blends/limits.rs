@@ -192,7 +192,7 @@ fn whole_programs_keep_the_limits_in_every_number_type() {
 fn samples_keep_the_limits(machine: &Machine) {
     for (name, text) in SAMPLES {
         let text = without_path_mode(text);
-        let exact = planned(&text, machine).expect("a plan");
+        let exact = planned(&format!("G61\n{text}"), machine).expect("a plan");
         let blended = format!("G21 G64 P0.05\n{text}");
         let plan = planned(&blended, machine).expect("a plan");
         assert!(plan.blocks.iter().any(|block| ["blend", "curve"].contains(&&*block.kind)), "{name}");

@@ -62,7 +62,7 @@ impl Case {
         let mut random = Random::new(seed);
         let (machine, program) = generated(&mut random, pulse);
         let tolerance_mm = random.log(1e-3, 0.5);
-        let text = format!("G64 P{tolerance_mm:.6}\n{}", program.text);
+        let text = program.text.replace("G61", &format!("G64 P{tolerance_mm:.6}"));
         let plan = planned(&text, &machine, longest_ticks)?;
         if !plan.blocks.iter().any(|block| block.kind == "blend") {
             return None;
