@@ -169,6 +169,8 @@ pub(super) struct Block<'a> {
     pub(super) assignments: Vec<Assignment>,
     /// Comments that ask for something: `(MSG,…)` and the like, without their parentheses.
     pub(super) comments: Vec<&'a [u8]>,
+    /// A comment asks for a file that is written.
+    pub(super) asks_for_file: bool,
     /// A number had more decimals than are exact.
     pub(super) rounded: bool,
     any: bool,
@@ -186,7 +188,10 @@ impl<'a> Block<'a> {
                     block.comments.push(text);
                     continue;
                 }
-                Item::Comment(_) => continue,
+                Item::Comment(text) => {
+                    block.asks_for_file |= message::is_file(text);
+                    continue;
+                }
             }
             block.any = true;
         }

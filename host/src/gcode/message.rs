@@ -26,6 +26,13 @@ fn request(text: &[u8]) -> Option<(Request, &[u8])> {
     Some((request, rest))
 }
 
+/// Whether a comment asks for a file that is written: of probed points, or of a log.
+pub(super) fn is_file(text: &[u8]) -> bool {
+    let text = text.trim_ascii().to_ascii_uppercase();
+    let opens = [&b"PROBEOPEN "[..], b"LOGOPEN,", b"LOGAPPEND,", b"LOG,"];
+    matches!(text.as_slice(), b"PROBECLOSE" | b"LOGCLOSE") || opens.iter().any(|word| text.starts_with(word))
+}
+
 /// Whether a comment asks for something; its text is without the parentheses.
 pub(super) fn is_active(text: &[u8]) -> bool {
     request(text).is_some()
@@ -112,6 +119,17 @@ mod tests {
 
         fn named(&self, name: &str) -> Option<f64> {
             (name == "depth").then_some(-1.5)
+        }
+    }
+
+    #[test]
+    fn files_are_told_from_comments() {
+        for text in ["PROBEOPEN points.txt", " probeclose", "LOGOPEN,a", "logappend,a", "LOG,#1", "LOGCLOSE"]
+        {
+            assert!(is_file(text.as_bytes()), "{text}");
+        }
+        for text in ["PROBEOPENING", "log the position", "LOGCLOSE it", "a PROBECLOSE"] {
+            assert!(!is_file(text.as_bytes()), "{text}");
         }
     }
 

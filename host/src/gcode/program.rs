@@ -77,6 +77,8 @@ pub enum StepKind {
     Through(ThroughMove),
     /// G5.2 to G5.3, or G6.2.
     Nurbs(NurbsMove),
+    /// G38.2 to G38.5.
+    Probe(ProbeMove),
     /// G4: stand still.
     Dwell {
         /// How long \[s\], 0 or more.
@@ -94,7 +96,7 @@ pub enum StepKind {
 }
 
 impl StepKind {
-    /// The path mode of a move.
+    /// The path mode of a move; none for a probing move, which stops before and behind it whatever the mode.
     #[must_use]
     pub fn mode(&self) -> Option<PathMode> {
         match self {
@@ -103,7 +105,7 @@ impl StepKind {
             Self::Cubic(curve) => Some(curve.mode),
             Self::Through(point) => Some(point.mode),
             Self::Nurbs(curve) => Some(curve.mode),
-            Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+            Self::Probe(_) | Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
         }
     }
 
@@ -115,7 +117,7 @@ impl StepKind {
             Self::Cubic(curve) => Some(&mut curve.mode),
             Self::Through(point) => Some(&mut point.mode),
             Self::Nurbs(curve) => Some(&mut curve.mode),
-            Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+            Self::Probe(_) | Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
         }
     }
 }
@@ -206,6 +208,23 @@ pub struct NurbsMove {
     pub feed: Feed,
     /// How its ends are passed.
     pub mode: PathMode,
+}
+
+/// A straight move that ends where the probe trips, with a full stop before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbeMove {
+    /// Start, X Y Z.
+    pub from: [Length; 3],
+    /// Where the machine comes to rest: braked from where the probe tripped, or the programmed end.
+    pub to: [Length; 3],
+    /// The programmed end.
+    pub end: [Length; 3],
+    /// Where the probe trips; absent if it does not.
+    pub trip: Option<[Length; 3]>,
+    /// It trips where it leaves the surface.
+    pub leaves: bool,
+    /// Feed along the line.
+    pub feed: Feed,
 }
 
 /// A rational spline from its first control point to its last.
@@ -322,6 +341,8 @@ pub enum NoticeKind {
     Output,
     /// M66.
     Input,
+    /// `(PROBEOPEN …)`, `(LOG,…)` and the like.
+    File,
     /// D in a line that takes none.
     IdleD,
     /// More decimals than are exact.
@@ -348,6 +369,7 @@ impl fmt::Display for Notice {
             NoticeKind::Override => "M48 to M53 are not acted on: overrides are the operator's",
             NoticeKind::Output => "M62 to M65, M67, M68 are not acted on: there are no outputs",
             NoticeKind::Input => "M66 reads 0 and does not wait: there are no inputs",
+            NoticeKind::File => "(PROBEOPEN …), (LOG,…) and the like are not acted on: no file is written",
             NoticeKind::IdleD => "D is not acted on: nothing in its line takes it",
             NoticeKind::Rounded => "numbers with more decimals than are exact are rounded to 0.0000000001 mm",
             NoticeKind::BlockDeleted => "lines that begin with / are left out",
