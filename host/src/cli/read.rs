@@ -31,7 +31,8 @@ JSON: an object for every step, in order. All have line and kind. kind is
   dwell                        with dwell_s
   tool                         with tool: a stop for the operator to change it
   stop, end
-After them an object for every notice and every message, of kind notice and message, with text.";
+After them an object for every notice and every message, of kind notice and message, with text, and within: the line of a
+subroutine in another file, where that asks for it.";
 
 /// Print the steps of a program, in machine coordinates.
 #[derive(Debug, Args)]
@@ -124,6 +125,8 @@ struct MoveJson {
 struct NoteJson {
     line: u32,
     kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    within: Option<String>,
     text: String,
 }
 
@@ -144,11 +147,11 @@ fn write_json_lines(program: &Program, out: &mut dyn Write) -> io::Result<()> {
     program.steps.iter().try_for_each(|step| write_json_line(&step_json(program, step), out))?;
     program.notices.iter().try_for_each(|notice| {
         let text = notice.to_string();
-        write_json_line(&NoteJson { line: notice.first_line, kind: "notice", text }, out)
+        write_json_line(&NoteJson { line: notice.first_line, kind: "notice", within: None, text }, out)
     })?;
     program.messages.iter().try_for_each(|message| {
-        let text = message.text.clone();
-        write_json_line(&NoteJson { line: message.line, kind: "message", text }, out)
+        let (within, text) = (message.within.clone(), message.text.clone());
+        write_json_line(&NoteJson { line: message.line, kind: "message", within, text }, out)
     })
 }
 

@@ -228,7 +228,6 @@ impl<'a> Block<'a> {
                 Err(word.problem(|word| Problem::LineNumber { word }))
             }
             b'O' => Err(word.problem(|word| Problem::OWordPlace { word })),
-            b'A' | b'B' | b'C' | b'U' | b'V' | b'W' => Err(word.problem(|word| Problem::NoSuchAxis { word })),
             _ => self.put_letter(word),
         }
     }
@@ -273,7 +272,8 @@ impl<'a> Block<'a> {
     fn put_letter(&mut self, word: Word<'a>) -> Result<(), Located> {
         let slot = slot_of(word.letter);
         let Some(slot) = slot.and_then(|index| self.letters.get_mut(index)) else {
-            return Err(word.problem(|word| Problem::UnsupportedLetter { word }));
+            // A B C U V W: all other letters have a slot, or a group.
+            return Err(word.problem(|word| Problem::NoSuchAxis { word }));
         };
         if slot.is_some() {
             let letter = char::from(word.letter);

@@ -83,8 +83,6 @@ pub enum Problem {
     LengthOutOfRange { word: String },
     #[error("found {word}, which adds up beyond the range, expected a position within ±{} mm", Length::LIMIT)]
     PositionOutOfRange { word: String },
-    #[error("found {word}, expected one of the words D E F G H I J K L M N P Q R S T X Y Z")]
-    UnsupportedLetter { word: String },
     #[error("found {word}, expected X, Y or Z: the machine has no such axis")]
     NoSuchAxis { word: String },
     #[error(
@@ -181,16 +179,16 @@ pub enum Problem {
     Label { found: f64 },
     #[error("found a computed label, expected it with call only")]
     LabelComputed,
-    #[error("found O{label} within a block of this label, expected another label")]
-    LabelOpen { label: String },
-    #[error("found O{label} in a file that ends before its block, expected the block's end")]
-    BlockOpen { label: String },
-    #[error("found O{label} where no such block is open last, expected it after the beginning of its block")]
-    BlockNotOpen { label: String },
     #[error(
-        "found O{label} sub in a block or a second time, expected every sub once, outside of other blocks"
+        "found O{label} within the block of this label that begins in line {line}, expected another label"
     )]
-    SubPlace { label: String },
+    LabelOpen { label: String, line: u32 },
+    #[error("found O{label} {keyword} without its end up to line {last}, expected O{label} {end}")]
+    BlockOpen { label: String, keyword: &'static str, end: &'static str, last: u32 },
+    #[error("found O{label} where {open}, expected it after the beginning of its block")]
+    BlockNotOpen { label: String, open: String },
+    #[error("found O{label} sub {place} in line {line}, expected every sub once, outside of other blocks")]
+    SubPlace { label: String, place: &'static str, line: u32 },
     #[error(
         "found a call of O{label}, expected a subroutine of this file, or a file {label}.ngc in a folder of subroutines"
     )]

@@ -224,7 +224,7 @@ impl Interpreter {
             return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
         }
         let step = self.program.steps.len();
-        self.program.messages.push(Message { line: self.line, step, text });
+        self.program.messages.push(Message { line: self.line, within: None, step, text });
         Ok(())
     }
 

@@ -86,6 +86,10 @@
 //!   with compensation; predefined parameters give the programmed position.
 //! - The probe trips where the machine file's boxes say, so #5061 to #5070 are known before anything moves. G38.2 to G38.5
 //!   are refused after G93 as they are after G95. G38.3 and G38.5 from where they look for trip there, without a move.
+//! - M72 and the end behind M73 restore the length of G43.1, where LinuxCNC takes the table's of the tool in the spindle; they
+//!   restore no other offsets.
+//! - The position behind G10 L2 R of the system in force, with G92 in force, is where the machine is; LinuxCNC's interpreter takes
+//!   another. So it does in G53, G28 and G30 where G20 or G21 follows G43.1, and in a drilling cycle that G20 or G21 falls into.
 //! - M6 for the tool that is in the spindle does not stop, and without any T it is noticed.
 //! - Loops run to their end after a `break` or `continue` of another loop, where LinuxCNC may leave a `do` early.
 //!

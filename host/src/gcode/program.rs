@@ -25,8 +25,10 @@ pub struct Program {
 /// A text for the operator: a `(MSG,…)`, or the tool that a stop is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// Line of the program that asks for it, from 1.
+    /// Line of the program that asks for it, from 1; in a subroutine of another file, the line that called it.
     pub line: u32,
+    /// Of another file: its name and the line there.
+    pub within: Option<String>,
     /// It is shown before the step of this index.
     pub step: usize,
     /// The text.
@@ -44,7 +46,10 @@ impl Program {
             notes.push(format!("length and radius 0 are assumed, there is no tool table: tools {tools}"));
         }
         let shown = self.messages.iter().take(Self::MESSAGES_SHOWN);
-        notes.extend(shown.map(|message| format!("line {}: message: {}", message.line, message.text)));
+        notes.extend(shown.map(|message| {
+            let within = message.within.as_ref().map_or_else(String::new, |within| format!(", {within}"));
+            format!("line {}{within}: message: {}", message.line, message.text)
+        }));
         if let Some(more @ 1..) = self.messages.len().checked_sub(Self::MESSAGES_SHOWN) {
             notes.push(format!("{more} more messages"));
         }
@@ -58,7 +63,7 @@ impl Program {
 /// One thing to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// Line of the program that asks for it, from 1.
+    /// Line of the program that asks for it, from 1; in a subroutine of another file, the line that called it.
     pub line: u32,
     /// The action.
     pub kind: StepKind,
@@ -353,6 +358,8 @@ pub enum NoticeKind {
     FeedInNewUnits,
     /// R a rounding error smaller than half the chord.
     RadiusEnlarged,
+    /// M99 in the main program.
+    MainReturn,
     /// Text after the end.
     TextAfterEnd,
     /// No M2, M30 or closing `%`.
@@ -377,6 +384,7 @@ impl fmt::Display for Notice {
             NoticeKind::RadiusEnlarged => {
                 "R falls short of half the chord by a rounding error: half circle made"
             }
+            NoticeKind::MainReturn => "M99 ends the main program; Fanuc's would begin it again",
             NoticeKind::TextAfterEnd => "text after the end of the program is not read",
             NoticeKind::NoProgramEnd => "no M2, M30 or % at the end: is the file complete?",
         };
