@@ -5,6 +5,7 @@
 //! ```text
 //!   files      paths ─► OutputFile              what is read stays, what is written is whole
 //!   machine    TOML ─► Machine                    limits, axes, drives
+//!   touch      boxes                              what a probe touches
 //!   gcode      text ─► Program                    exact decimals, modal state
 //!   points     CSV ─► Points                    what a spline goes through
 //!   toolpath   moves ─► Element ─► Piece          arc length, septic polynomials
@@ -26,6 +27,7 @@
 pub mod files;
 pub mod machine;
 pub mod cli;
+pub mod touch;
 pub mod gcode;
 pub mod points;
 pub mod toolpath;

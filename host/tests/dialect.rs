@@ -175,17 +175,25 @@ fn subprograms_of_m98_work_on_their_callers_parameters() {
 #[test]
 fn o_words_that_join_nothing_are_refused_at_their_place() {
     for (text, message) in [
-        ("o1 while [1]\nM2", "a.ngc:1:1: found O1 in a file that ends before its block"),
-        ("o1 endwhile", "a.ngc:1:1: found O1 where no such block is open last"),
-        ("o1 if [1]\n o2 while [1]\n o1 endif", "a.ngc:3:2: found O1 where no such block is open last"),
-        ("o1 break", "a.ngc:1:1: found O1 where no such block is open last"),
+        ("o1 while [1]\nM2", "a.ngc:1:1: found O1 while without its end up to line 2, expected O1 endwhile"),
+        ("o1 endwhile", "a.ngc:1:1: found O1 where no block is open, expected"),
+        (
+            "o1 if [1]\n o2 while [1]\n o1 endif",
+            "a.ngc:3:2: found O1 where O2 while of line 2 is open last, expected",
+        ),
+        ("o1 break", "a.ngc:1:1: found O1 where no block is open"),
+        (
+            "\no1 while [1]\no1 if [1]\n",
+            "a.ngc:3:1: found O1 within the block of this label that begins in line 2",
+        ),
+        ("o1 sub\no2 sub\n", "a.ngc:2:1: found O2 sub in the block that begins in line 1"),
         ("o1 return", "a.ngc:1:1: found a return outside of subroutines"),
         ("o1 if [1] G0 X1\no1 endif", "a.ngc:1:11: found 'G', expected a comment or the end of the line"),
         ("o1 call", "a.ngc:1:1: found a call of O1, expected a subroutine of this file"),
         ("o<../a> call", "a.ngc:1:1: found a call of O../a"),
         (
             "o1 sub\no1 endsub\no1 sub\no1 endsub\no1 call",
-            "a.ngc:3:1: found O1 sub in a block or a second time",
+            "a.ngc:3:1: found O1 sub a second time, after that in line 1",
         ),
         (
             "o1 sub\no1 call\no1 endsub\no1 call",
@@ -225,6 +233,10 @@ fn coordinate_systems_shift_and_turn() {
         ("G59.3 G10 L2 P9 X1 R90\nG0 X2 Y0", "r 1 2 0"),
         ("G20 G10 L2 P1 X1\nG21 G0 X1", "r 26.4 0 0"),
         ("G91 G0 X1\nG10 L2 P1 X10\nX1", "r 2 0 0"),
+        // The machine is where it was, whatever turns or how lengths are counted.
+        ("G0 X10 Y5\nG92 X1 Y2\nG10 L2 P1 R90\nG91 X2", "r 10 7 0"),
+        ("G43.1 Z5\nG0 Z2\nG20\nG53 G0 Z1", "r 0 0 25.4"),
+        ("F9 G81 X1 Z-2 R1\nG20 X1\nG80 G21 G0 Z0", "r 25.4 0 0"),
         ("G7 G0 X30", "r 15 0 0"),
         ("G7\nG8 G0 X30", "r 30 0 0"),
         ("G0 @10 ^90", "r 0 10 0"),
@@ -376,6 +388,8 @@ G91 G20 X1
 M72
 X5 Z#<_absolute>";
     assert_eq!(steps(text), ["l 1 0 0", "l 26.4 0 0", "l 1 120 0", "l 26.4 120 0", "l 5 120 1"]);
+    // The length, not the table's.
+    assert_eq!(last("G43.1 Z5\nM70\nG49\nM72\nG0 Z1"), "r 0 0 6");
     assert!(refusal("M72").starts_with("a.ngc:1:1: found M72, but no modes that were saved"));
 }
 
@@ -394,7 +408,12 @@ fn switches_and_messages_are_the_operators() {
         let texts: Vec<_> = program.messages.iter().map(|message| message.text.as_str()).collect();
         assert_eq!(texts, ["turn the part", "at 2.000000"]);
     }
-    assert!(refusal("(ABORT, no stock)").contains("no stock"));
+    assert!(refusal("(ABORT, no stock at %d#5420)").contains("no stock at 0"));
+    let program = read("#5599=0 (DEBUG, no)\n(PRINT, 1)\n(MSG, 2)\n#5599=1\n(DEBUG, %d#5599)\nM99\nX1");
+    let texts: Vec<_> = program.messages.iter().map(|message| message.text.as_str()).collect();
+    assert_eq!(texts, ["1", "2", "1"]);
+    let notices: Vec<_> = program.notices.iter().map(|notice| (notice.kind, notice.first_line)).collect();
+    assert_eq!(notices, [(gcode::NoticeKind::MainReturn, 6), (gcode::NoticeKind::TextAfterEnd, 7)]);
 }
 
 #[test]
@@ -488,6 +507,16 @@ fn speeds_and_lines_are_bounded() {
         let error = refusal_with(&loops, &options);
         assert!(error.contains("more than 1000 lines executed"), "{error}");
     }
+    // As many blocks within each other as it takes to notice that each looks through the others.
+    const BLOCKS: usize = 200_000;
+    let nested = |open: &str, close: &str| {
+        let opened: String = (0..BLOCKS).map(|label| format!("o{label} {open}\n")).collect();
+        let closed: String = (0..BLOCKS).rev().map(|label| format!("o{label} {close}\n")).collect();
+        opened + "G0 X1\n" + &closed
+    };
+    assert_eq!(steps(&nested("if [1]", "endif")), ["r 1 0 0"]);
+    assert_eq!(steps(&nested("repeat [1]", "endrepeat")), ["r 1 0 0"]);
+    assert_eq!(steps(&nested("do", "while [0]")), ["r 1 0 0"]);
     // As many lines behind the end as it takes to notice that each looks through the file.
     let text = format!("M2\n{}O1 garbage", "X1\n".repeat(20_000));
     assert_eq!(steps(&text), ["end"]);

@@ -4,7 +4,8 @@
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
 
-use motion_host::gcode::{self, Length, Program, ReadOptions, StepKind, ToolTable};
+use motion_host::gcode::{self, ReadOptions, ToolTable};
+use motion_tests::fuzz::gcode::{assert_placed, assert_sound};
 use motion_tests::random::Random;
 
 const LINES_MAX: u64 = 3000;
@@ -86,30 +87,6 @@ fn changed(text: &[u8], random: &mut Random) -> Vec<u8> {
     lines.join(&b'\n')
 }
 
-fn assert_joined(program: &Program) {
-    assert!(program.steps.len() <= STEPS_MAX && program.messages.len() <= STEPS_MAX);
-    let mut at = [Length::ZERO; 3];
-    for step in &program.steps {
-        let (from, to) = match &step.kind {
-            StepKind::Line(line) => (line.from, line.to),
-            StepKind::Arc(arc) => {
-                assert!(arc.start_radius_mm > 0.0 && arc.end_radius_mm > 0.0 && arc.sweep_rad.abs() > 0.0);
-                assert!(arc.centre_mm.iter().chain([&arc.sweep_rad]).all(|value| value.is_finite()));
-                (arc.from, arc.to)
-            }
-            StepKind::Cubic(curve) => (curve.from, curve.to),
-            StepKind::Through(point) => (point.from, point.to),
-            StepKind::Nurbs(curve) => (curve.from, curve.to),
-            _ => continue,
-        };
-        assert_eq!(from, at, "line {} begins elsewhere", step.line);
-        assert!(
-            matches!(step.kind, StepKind::Arc(_) | StepKind::Cubic(_) | StepKind::Nurbs(_)) || from != to
-        );
-        at = to;
-    }
-}
-
 #[test]
 fn changed_programs_are_read_within_bounds_or_refused_at_a_place() {
     let seed: u64 = motion_tests::from_env("MOTION_TEST_SEED").unwrap_or(20_261_124);
@@ -123,12 +100,11 @@ fn changed_programs_are_read_within_bounds_or_refused_at_a_place() {
             let changed = changed(&text, &mut Random::new(seed));
             let outcome = catch_unwind(|| match gcode::read_with("a.ngc", &changed, &options) {
                 Ok(program) => {
-                    assert_joined(&program);
+                    assert_sound(&program, STEPS_MAX);
                     true
                 }
                 Err(error) => {
-                    let lines = changed.split(|&byte| byte == b'\n').count();
-                    assert!(error.line >= 1 && error.line as usize <= lines && error.column >= 1, "{error}");
+                    assert_placed(&error, &changed);
                     false
                 }
             });

@@ -1,8 +1,8 @@
-//! The fuzz target's own runs: every seed of its corpus, and random bytes.
+//! The fuzz targets' own runs: every seed of their corpora, and random bytes.
 
 use std::path::Path;
 
-use motion_tests::fuzz::{Laws, drive, drive_with};
+use motion_tests::fuzz::{Laws, drive, drive_with, gcode};
 use motion_tests::random::Random;
 
 /// Random inputs in a short run; `MOTION_TEST_PROGRAMS` has more.
@@ -39,4 +39,55 @@ fn random_bytes_keep_the_promises() {
         said += usize::from(drive(&bytes));
     }
     assert!(2 * said > inputs, "{said} of {inputs} inputs said anything");
+}
+
+#[test]
+fn every_seed_of_gcode_is_read_as_promised() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/gcode");
+    let (mut inputs, mut accepted) = (0, 0);
+    for entry in std::fs::read_dir(&folder).expect("a corpus") {
+        let path = entry.expect("an entry").path();
+        let seed = std::fs::read(&path).expect("a seed");
+        println!("{}", path.display());
+        accepted += usize::from(gcode::read(&seed));
+        // With all that it may be read with, and cut short anywhere.
+        for switches in 0..32 {
+            let _ = gcode::read(&[&[switches], &seed[1..]].concat());
+        }
+        for end in 0..seed.len() {
+            let _ = gcode::read(&seed[..end]);
+        }
+        inputs += 1;
+    }
+    assert!(inputs >= 20 && accepted >= 15, "{accepted} of {inputs} seeds accepted");
+}
+
+/// Programs that grow by lines of words and bytes. A line that is refused is left out again, so that others are read behind
+/// what was accepted.
+#[test]
+fn random_gcode_is_read_as_promised() {
+    const LINES: usize = 16;
+    let programs = motion_tests::from_env("MOTION_TEST_PROGRAMS").map_or(INPUTS, |inputs| inputs as usize);
+    let mut random = Random::of_stream(62);
+    let mut accepted = 0;
+    for program in 0..programs {
+        let mut bytes = vec![random.bits() as u8];
+        for _ in 0..LINES {
+            let before = bytes.len();
+            for _ in 0..1 + random.below(5) {
+                // Words from 136 on, ends of lines before them.
+                let byte = if random.once_in(16) { random.below(256) } else { 136 + random.below(120) };
+                bytes.push(byte as u8);
+            }
+            bytes.push(b'\n');
+            println!("program {program}: {bytes:?}");
+            if gcode::read(&bytes) {
+                accepted += 1;
+            } else {
+                bytes.truncate(before);
+            }
+        }
+    }
+    println!("{accepted} of {} lines accepted", LINES * programs);
+    assert!(5 * accepted > LINES * programs, "{accepted} of {} lines accepted", LINES * programs);
 }

@@ -92,7 +92,7 @@ struct NeedsJson<'a> {
 pub fn run(arguments: &CheckArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let options = arguments.reading.options()?;
+    let options = arguments.reading.options(&machine)?;
     match source.program(&options) {
         Ok(program) => accepted(arguments, &source, &program, &machine, out),
         Err(_) => refused(arguments, &source, &options, out),

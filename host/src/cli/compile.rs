@@ -69,8 +69,11 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
-    let program = arguments.reading.program(&source)?;
+    let program = arguments.reading.program(&source, &machine)?;
     let plan = plan_program(&source.name, &program, &machine, mode)?;
+    if let Some(probe) = plan.probes.first() {
+        return Err(CliError::NoProbeInput { program: source.name, line: probe.line });
+    }
     let executable = match arguments.number {
         Number::F32 => executable::<f32>(&plan, &machine),
         Number::Fixed => executable::<Fixed>(&plan, &machine),

@@ -35,8 +35,8 @@ pub(super) struct ReadingArguments {
 }
 
 impl ReadingArguments {
-    /// The options they ask for, with the files read.
-    pub(super) fn options(&self) -> Result<ReadOptions, CliError> {
+    /// The options they ask for on a machine, with the files read.
+    pub(super) fn options(&self, machine: &Machine) -> Result<ReadOptions, CliError> {
         for folder in &self.subroutines {
             let path = || folder.display().to_string();
             fs::read_dir(folder).map_err(|source| CliError::Folder { path: path(), source })?;
@@ -62,13 +62,13 @@ impl ReadingArguments {
             parameters,
             tools,
             lines_max: self.lines_max,
-            ..ReadOptions::default()
+            ..machine.read_options()
         })
     }
 
-    /// The program of a source.
-    pub(super) fn program(&self, source: &Source) -> Result<Program, CliError> {
-        Ok(source.program(&self.options()?)?)
+    /// The program of a source, for a machine.
+    pub(super) fn program(&self, source: &Source, machine: &Machine) -> Result<Program, CliError> {
+        Ok(source.program(&self.options(machine)?)?)
     }
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::error::{CliError, Outcome};
 use super::write_json;
 use crate::machine::REFERENCE_TOML;
-use crate::machine::keys::{KEY_TABLES, Key, KeyTable};
+use crate::machine::keys::{KEY_TABLES, Key, KeyTable, is_list};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -82,7 +82,7 @@ fn explain(out: &mut dyn Write) -> io::Result<()> {
     for table in KEY_TABLES {
         let heading = match table.name {
             "" => "At the top".to_owned(),
-            "axis" => "[[axis]]".to_owned(),
+            name if is_list(name) => format!("[[{name}]]"),
             name => format!("[{name}]"),
         };
         let optional = if table.is_optional { " Optional." } else { "" };

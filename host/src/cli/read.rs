@@ -27,18 +27,24 @@ JSON: an object for every step, in order. All have line and kind. kind is
       cubic                    also controls_mm (the first from the start, the second from the end, X and Y)
       through                  also begins (a spline begins with it)
       nurbs                    also degree, points_mm (control points, X Y Z), weights, knots
+  probe                        with from_mm, to_mm (where the machine comes to rest), end_mm (programmed), trip_mm (null: it does
+                               not trip), leaves (it trips where it leaves the surface), feed_mm_min
   dwell                        with dwell_s
   tool                         with tool: a stop for the operator to change it
   stop, end
-After them an object for every notice and every message, of kind notice and message, with text.";
+After them an object for every notice and every message, of kind notice and message, with text, and within: the line of a
+subroutine in another file, where that asks for it.";
 
-/// Print the steps of a program, without a machine.
+/// Print the steps of a program, in machine coordinates.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct ReadArguments {
     /// G-code (`-`: standard input).
     #[arg(value_name = "PROGRAM")]
     program: PathBuf,
+    /// Machine file: what its probe touches. Without it probing moves are refused.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
     #[command(flatten)]
     reading: input::ReadingArguments,
     /// Print JSON: an object a line.
@@ -86,6 +92,14 @@ enum KindJson {
         weights: Vec<f64>,
         knots: Vec<f64>,
     },
+    Probe {
+        from_mm: [f64; 3],
+        to_mm: [f64; 3],
+        end_mm: [f64; 3],
+        trip_mm: Option<[f64; 3]>,
+        leaves: bool,
+        feed_mm_min: Option<f64>,
+    },
     Dwell {
         dwell_s: f64,
     },
@@ -112,6 +126,8 @@ struct MoveJson {
 struct NoteJson {
     line: u32,
     kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    within: Option<String>,
     text: String,
 }
 
@@ -121,7 +137,8 @@ struct NoteJson {
 /// The program is refused, or `out` can't be written.
 pub fn read(arguments: &ReadArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let source = input::read(&arguments.program)?;
-    let program = arguments.reading.program(&source)?;
+    let machine = input::machine(arguments.machine.as_ref())?;
+    let program = arguments.reading.program(&source, &machine)?;
     let write = if arguments.json { write_json_lines } else { write_table };
     write(&program, out).map_err(CliError::Output)?;
     Ok(Outcome::Done)
@@ -131,11 +148,11 @@ fn write_json_lines(program: &Program, out: &mut dyn Write) -> io::Result<()> {
     program.steps.iter().try_for_each(|step| write_json_line(&step_json(program, step), out))?;
     program.notices.iter().try_for_each(|notice| {
         let text = notice.to_string();
-        write_json_line(&NoteJson { line: notice.first_line, kind: "notice", text }, out)
+        write_json_line(&NoteJson { line: notice.first_line, kind: "notice", within: None, text }, out)
     })?;
     program.messages.iter().try_for_each(|message| {
-        let text = message.text.clone();
-        write_json_line(&NoteJson { line: message.line, kind: "message", text }, out)
+        let (within, text) = (message.within.clone(), message.text.clone());
+        write_json_line(&NoteJson { line: message.line, kind: "message", within, text }, out)
     })
 }
 
@@ -168,6 +185,14 @@ fn step_json(program: &Program, step: &Step) -> StepJson {
             let ends = move_json(curve.from, curve.to, curve.feed, curve.mode);
             KindJson::Nurbs { ends, degree, points_mm, weights, knots }
         }
+        StepKind::Probe(probe) => KindJson::Probe {
+            from_mm: mm(probe.from),
+            to_mm: mm(probe.to),
+            end_mm: mm(probe.end),
+            trip_mm: probe.trip.map(mm),
+            leaves: probe.leaves,
+            feed_mm_min: mm_min(probe.feed),
+        },
         StepKind::Dwell { seconds } => KindJson::Dwell { dwell_s: seconds },
         StepKind::ToolChange { tool } => KindJson::Tool { tool },
         StepKind::Stop => KindJson::Stop,
@@ -183,12 +208,18 @@ fn move_json(from: [Length; 3], to: [Length; 3], feed: Feed, mode: PathMode) -> 
         PathMode::ExactStop => ("stop", None, None),
         PathMode::Blend { tolerance_mm, merging_mm } => ("blend", tolerance_mm, merging_mm),
     };
-    let feed_mm_min = match feed {
+    MoveJson { from_mm: mm(from), to_mm: mm(to), feed_mm_min: mm_min(feed), path, tolerance_mm, merging_mm }
+}
+
+fn mm(point: [Length; 3]) -> [f64; 3] {
+    point.map(Length::to_mm)
+}
+
+fn mm_min(feed: Feed) -> Option<f64> {
+    match feed {
         Feed::Rapid => None,
         Feed::MmPerMin(feed_mm_min) => Some(feed_mm_min),
-    };
-    let mm = |point: [Length; 3]| point.map(Length::to_mm);
-    MoveJson { from_mm: mm(from), to_mm: mm(to), feed_mm_min, path, tolerance_mm, merging_mm }
+    }
 }
 
 fn write_table(program: &Program, out: &mut dyn Write) -> io::Result<()> {
@@ -225,6 +256,18 @@ fn row(program: &Program, step: &Step) -> [String; 8] {
         }
         KindJson::Nurbs { ends, degree, points_mm, .. } => {
             ("nurbs", Some(ends), format!("degree {degree}, {} control points", points_mm.len()))
+        }
+        KindJson::Probe { from_mm, to_mm, trip_mm, leaves, feed_mm_min, .. } => {
+            let ends =
+                MoveJson { from_mm, to_mm, feed_mm_min, path: "stop", tolerance_mm: None, merging_mm: None };
+            let more = match trip_mm {
+                Some([x, y, z]) => {
+                    let trips = if leaves { "leaves" } else { "touches" };
+                    format!("{trips} at X{x:.4} Y{y:.4} Z{z:.4}")
+                }
+                None => "does not trip".to_owned(),
+            };
+            ("probe", Some(ends), more)
         }
         KindJson::Dwell { dwell_s } => ("dwell", None, format!("{dwell_s} s")),
         KindJson::Tool { tool } => ("tool", None, format!("T{tool}")),

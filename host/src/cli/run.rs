@@ -17,8 +17,8 @@ use crate::planning::{Mode, Plan, plan_program};
 use crate::recording::Recorder;
 use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
-use crate::simulate::{self, AxisSummary, Job, RunError, RunOptions, RunSummary};
-use crate::trace::{RunEnd, TracedCommand, TracedFault};
+use crate::simulate::{self, AxisSummary, Job, Probed, RunError, RunOptions, RunSummary};
+use crate::trace::{AXES, RunEnd, TracedCommand, TracedFault};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -35,7 +35,9 @@ Exit status: 0 the program finished, 1 a fault, 3 held, 4 aborted, 5 a command o
 be written. In all these cases the summary is printed, and the files are written.
 
 JSON: finished, stopped_by (null, \"hold\", \"single block\", \"override\", \"abort\" or \"fault\"), reached_mm, reached_line
-(how far the run came), commands_not_reached, and the figures of the run.";
+(how far the run came), commands_not_reached, probes (of every probing move line, tick, tripped, position_mm: where the
+encoders read the axes then, program_mm: where the program reads the trip, in machine coordinates), and the figures of the
+run.";
 
 /// Run a program: plan it, execute it tick by tick with the real-time kernel, on simulated axes.
 #[derive(Debug, Args)]
@@ -97,7 +99,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let kept = kept.map(|path| files.edited("--parameters", path, "--parameters")).transpose()?;
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let options = arguments.reading.options()?;
+    let options = arguments.reading.options(&machine)?;
     let program = source.program(&options)?;
     let after = options.parameters.after(&program.parameters);
     let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;
@@ -168,6 +170,7 @@ pub(super) struct RunJson<'run> {
     limit_active_share: f64,
     axes: Vec<AxisJson<'run>>,
     contour_error_um_max: f64,
+    probes: Vec<ProbeJson>,
     commands: &'run [TracedCommand],
     commands_not_reached: &'run [String],
     faults: Vec<FaultJson<'run>>,
@@ -192,6 +195,15 @@ struct AxisJson<'run> {
 }
 
 #[derive(Serialize)]
+struct ProbeJson {
+    line: u32,
+    tick: u64,
+    tripped: bool,
+    position_mm: [f64; AXES],
+    program_mm: Option<[f64; AXES]>,
+}
+
+#[derive(Serialize)]
 struct FaultJson<'run> {
     tick: u64,
     axis: Option<&'run str>,
@@ -206,6 +218,10 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         following_error_um_rms: axis.following_error_um_rms,
         end_error_counts: axis.end_error_counts,
         output_v_max: axis.output_v_max,
+    };
+    let probe = |probed: &Probed| {
+        let &Probed { line, tick, tripped, position_mm, program_mm } = probed;
+        ProbeJson { line, tick, tripped, position_mm, program_mm }
     };
     let fault = |fault: &'run TracedFault| FaultJson {
         tick: fault.tick,
@@ -232,6 +248,7 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         limit_active_share: summary.limit_active_share,
         axes: summary.axes.iter().map(axis).collect(),
         contour_error_um_max: summary.contour_error_um_max,
+        probes: summary.probes.iter().map(probe).collect(),
         commands: &summary.commands,
         commands_not_reached: &summary.unreached,
         faults: summary.faults.iter().map(fault).collect(),
@@ -287,7 +304,8 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
         })
         .collect();
     table::write(&columns, &rows, out)?;
-    if !(summary.commands.is_empty() && summary.faults.is_empty() && summary.notices.is_empty()) {
+    let nothing = summary.commands.is_empty() && summary.probes.is_empty();
+    if !(nothing && summary.faults.is_empty() && summary.notices.is_empty()) {
         writeln!(out)?;
     }
     for TracedCommand { tick, command, s_mm, stop, .. } in &summary.commands {
@@ -296,6 +314,14 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
             Some(stop) => writeln!(out, ": at rest after {:.4} s and {:.4} mm", stop.time_s, stop.length_mm)?,
             None => writeln!(out)?,
         }
+    }
+    for Probed { line, tick, tripped, position_mm: [x, y, z], .. } in &summary.probes {
+        let tripped = if *tripped { "tripped" } else { "did not trip" };
+        let time_s = *tick as f64 * tick_s;
+        writeln!(
+            out,
+            "  line {line}: the probe {tripped}, in tick {tick} ({time_s:.4} s) at X{x:.4} Y{y:.4} Z{z:.4} of the machine"
+        )?;
     }
     for TracedFault { tick, axis, fault, detail } in &summary.faults {
         let axis = axis.as_ref().map_or_else(String::new, |name| format!(" of axis {name}"));

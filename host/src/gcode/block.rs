@@ -169,6 +169,8 @@ pub(super) struct Block<'a> {
     pub(super) assignments: Vec<Assignment>,
     /// Comments that ask for something: `(MSG,…)` and the like, without their parentheses.
     pub(super) comments: Vec<&'a [u8]>,
+    /// A comment asks for a file that is written.
+    pub(super) asks_for_file: bool,
     /// A number had more decimals than are exact.
     pub(super) rounded: bool,
     any: bool,
@@ -186,7 +188,10 @@ impl<'a> Block<'a> {
                     block.comments.push(text);
                     continue;
                 }
-                Item::Comment(_) => continue,
+                Item::Comment(text) => {
+                    block.asks_for_file |= message::is_file(text);
+                    continue;
+                }
             }
             block.any = true;
         }
@@ -223,7 +228,6 @@ impl<'a> Block<'a> {
                 Err(word.problem(|word| Problem::LineNumber { word }))
             }
             b'O' => Err(word.problem(|word| Problem::OWordPlace { word })),
-            b'A' | b'B' | b'C' | b'U' | b'V' | b'W' => Err(word.problem(|word| Problem::NoSuchAxis { word })),
             _ => self.put_letter(word),
         }
     }
@@ -268,7 +272,8 @@ impl<'a> Block<'a> {
     fn put_letter(&mut self, word: Word<'a>) -> Result<(), Located> {
         let slot = slot_of(word.letter);
         let Some(slot) = slot.and_then(|index| self.letters.get_mut(index)) else {
-            return Err(word.problem(|word| Problem::UnsupportedLetter { word }));
+            // A B C U V W: all other letters have a slot, or a group.
+            return Err(word.problem(|word| Problem::NoSuchAxis { word }));
         };
         if slot.is_some() {
             let letter = char::from(word.letter);

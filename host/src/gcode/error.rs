@@ -83,12 +83,10 @@ pub enum Problem {
     LengthOutOfRange { word: String },
     #[error("found {word}, which adds up beyond the range, expected a position within ±{} mm", Length::LIMIT)]
     PositionOutOfRange { word: String },
-    #[error("found {word}, expected one of the words D E F G H I J K L M N P Q R S T X Y Z")]
-    UnsupportedLetter { word: String },
     #[error("found {word}, expected X, Y or Z: the machine has no such axis")]
     NoSuchAxis { word: String },
     #[error(
-        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.2 G5.3 G5.5 G6.2 G6.3 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G40 to G42.1 \
+        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.2 G5.3 G5.5 G6.2 G6.3 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G38.2 to G38.5 G40 to G42.1 \
          G43 G43.1 G43.2 G49 G52 G53 G54 to G59.3 G61 G61.1 G64 G73 G80 to G83 G85 G86 G88 G89 G90 G90.1 G91 G91.1 \
          G92 to G92.3 G93 to G99"
     )]
@@ -99,7 +97,10 @@ pub enum Problem {
     UnsupportedM { word: String },
     #[error("found {word}, which needs a spindle encoder, expected a word that goes without")]
     NeedsEncoder { word: String },
-    #[error("found {word}, which needs a probe, expected a word that goes without")]
+    #[error(
+        "found {word}, which needs a probe, expected [[probe.box]] in a machine file (--machine), which says what it \
+         touches"
+    )]
     NeedsProbe { word: String },
     #[error("found a second {letter} word, {word}, expected one per line")]
     WordTwice { letter: char, word: String },
@@ -178,16 +179,16 @@ pub enum Problem {
     Label { found: f64 },
     #[error("found a computed label, expected it with call only")]
     LabelComputed,
-    #[error("found O{label} within a block of this label, expected another label")]
-    LabelOpen { label: String },
-    #[error("found O{label} in a file that ends before its block, expected the block's end")]
-    BlockOpen { label: String },
-    #[error("found O{label} where no such block is open last, expected it after the beginning of its block")]
-    BlockNotOpen { label: String },
     #[error(
-        "found O{label} sub in a block or a second time, expected every sub once, outside of other blocks"
+        "found O{label} within the block of this label that begins in line {line}, expected another label"
     )]
-    SubPlace { label: String },
+    LabelOpen { label: String, line: u32 },
+    #[error("found O{label} {keyword} without its end up to line {last}, expected O{label} {end}")]
+    BlockOpen { label: String, keyword: &'static str, end: &'static str, last: u32 },
+    #[error("found O{label} where {open}, expected it after the beginning of its block")]
+    BlockNotOpen { label: String, open: String },
+    #[error("found O{label} sub {place} in line {line}, expected every sub once, outside of other blocks")]
+    SubPlace { label: String, place: &'static str, line: u32 },
     #[error(
         "found a call of O{label}, expected a subroutine of this file, or a file {label}.ngc in a folder of subroutines"
     )]
@@ -277,6 +278,21 @@ pub enum Problem {
     Gouge { radius_mm: f64 },
     #[error("found {motion} right after G40, expected G0 or G1, which takes the tool back to the path")]
     CompensationLeft { motion: &'static str },
+    #[error("found {motion} after G93 or G95, expected G94: a probe moves at a feed per minute")]
+    ProbeFeed { motion: &'static str },
+    #[error("found {motion} to where the machine is, expected another point")]
+    ProbeStands { motion: &'static str },
+    #[error(
+        "found {motion} where the probe {}, at {at} of the machine, expected a start where it {}",
+        touches(*.is_touched), touches(!.is_touched)
+    )]
+    ProbeTripped { motion: &'static str, at: String, is_touched: bool },
+    #[error(
+        "found {motion} up to {to} of the machine, where the probe {} as before, expected a way on which that changes, \
+         or a word with which the program goes on without: G38.3 or G38.5",
+        touches(*.is_touched)
+    )]
+    ProbeMissed { motion: &'static str, to: String, is_touched: bool },
     #[error("found G5 without P and Q, expected the offset from its end to its second control point")]
     SplineWithoutEnd,
 }
@@ -331,6 +347,10 @@ impl Problem {
                 | Self::Aborted { .. }
         )
     }
+}
+
+fn touches(is_touched: bool) -> &'static str {
+    if is_touched { "touches" } else { "does not touch" }
 }
 
 /// A byte as an error message shows it.

@@ -98,7 +98,14 @@ impl<'a> Flow<'a> {
             self.interpreter.line = here.line;
             self.last = here.line;
         }
+        let told = self.interpreter.program.messages.len();
+        let is_elsewhere = self.file != 0;
         self.line(&file, line, here)?;
+        if is_elsewhere {
+            for message in self.interpreter.program.messages.iter_mut().skip(told) {
+                message.within = Some(format!("{}:{}", file.source.name, here.line));
+            }
+        }
         Ok(!self.interpreter.ended || self.calls.is_empty())
     }
 
@@ -160,7 +167,10 @@ impl<'a> Flow<'a> {
                 let failure = |problem| at(Located::new(0, problem));
                 self.call(&number.to_string(), None, repeats, &failure)
             }
-            Control::Return if self.calls.is_empty() => self.interpreter.end().map_err(at),
+            Control::Return if self.calls.is_empty() => {
+                self.interpreter.notice(NoticeKind::MainReturn);
+                self.interpreter.end().map_err(at)
+            }
             Control::Return if self.is_subprogram() => self.leave().map_err(at),
             Control::Return => {
                 let problem = Problem::ReturnMismatch { found: "M99", expected: "endsub or return" };

@@ -1,5 +1,7 @@
 //! Executes the lines, in the order RS-274 gives to the words of a line.
 
+use std::rc::Rc;
+
 use super::block::{Block, GGroup, MGroup};
 use super::cutter::Cutter;
 use super::cycle::CycleState;
@@ -14,6 +16,7 @@ use super::nurbs;
 use super::options::ReadOptions;
 use super::parameter_file;
 use super::parameters::{Parameters, SELECTED};
+use super::probe::Probe;
 use super::program::{Message, Notice, NoticeKind, Program, Step, StepKind};
 use super::tool::ToolTable;
 
@@ -53,6 +56,8 @@ pub(super) struct Interpreter {
     pub(super) parameters: Parameters,
     pub(super) tools: Tools,
     pub(super) cycle: CycleState,
+    /// What G38.2 to G38.5 touch.
+    pub(super) probe: Option<Rc<Probe>>,
     /// The NURBS whose lines are being read.
     pub(super) nurbs: Option<nurbs::Open>,
     /// P and Q of the G5 that was the move before \[mm\].
@@ -115,6 +120,7 @@ impl Interpreter {
             },
             parameters,
             cycle: CycleState::default(),
+            probe: options.probe.clone().map(Rc::new),
             nurbs: None,
             cubic_before_mm: None,
             saved: vec![None],
@@ -145,12 +151,15 @@ impl Interpreter {
                 Target::Name(name) => self.parameters.set_named(name, assignment.value),
             }
         }
+        if block.asks_for_file {
+            self.notice(NoticeKind::File);
+        }
         for text in &block.comments {
             if let Some(text) = message::shown(text, self)? {
                 self.message(text)?;
             }
         }
-        refuse_unequipped(&block)?;
+        self.refuse_unequipped(&block)?;
         if let Some(code) = block.m(MGroup::Subprogram) {
             return Self::subprogram(&block, code.tenths == 980);
         }
@@ -204,7 +213,7 @@ impl Interpreter {
             return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
         }
         self.cubic_before_mm = None;
-        if kind.mode().is_some() {
+        if kind.ends().is_some() {
             self.program.systems.insert(self.system);
         }
         self.program.steps.push(Step { line: self.line, kind });
@@ -218,7 +227,7 @@ impl Interpreter {
             return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
         }
         let step = self.program.steps.len();
-        self.program.messages.push(Message { line: self.line, step, text });
+        self.program.messages.push(Message { line: self.line, within: None, step, text });
         Ok(())
     }
 
@@ -329,18 +338,18 @@ impl Interpreter {
         self.frame.tool = saved.tool;
         self.select(saved.system, 0)
     }
-}
 
-/// Refuses what needs what no machine here has. In a subroutine that is never called it may stand.
-fn refuse_unequipped(block: &Block<'_>) -> Result<(), Located> {
-    if let Some(code) = block.m(MGroup::User) {
-        return Err(code.word.problem(|word| Problem::UserProgram { word }));
-    }
-    let Some(code) = block.g(GGroup::Motion) else { return Ok(()) };
-    match code.tenths {
-        330 | 331 | 740 | 760 | 840 => Err(code.word.problem(|word| Problem::NeedsEncoder { word })),
-        382..=385 => Err(code.word.problem(|word| Problem::NeedsProbe { word })),
-        _ => Ok(()),
+    /// Refuses what needs what the machine does not have. In a subroutine that is never called it may stand.
+    fn refuse_unequipped(&self, block: &Block<'_>) -> Result<(), Located> {
+        if let Some(code) = block.m(MGroup::User) {
+            return Err(code.word.problem(|word| Problem::UserProgram { word }));
+        }
+        let Some(code) = block.g(GGroup::Motion) else { return Ok(()) };
+        match code.tenths {
+            330 | 331 | 740 | 760 | 840 => Err(code.word.problem(|word| Problem::NeedsEncoder { word })),
+            382..=385 if self.probe.is_none() => Err(code.word.problem(|word| Problem::NeedsProbe { word })),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -503,7 +512,11 @@ mod tests {
             ("G5.2 X1", "1:1:", "found G5.2"),
             ("F9 G33 Z1 K1", "1:4:", "found G33, which needs a spindle encoder"),
             ("G84 X1 Z1 R2", "1:1:", "found G84, which needs a spindle encoder"),
-            ("F9 G38.2 Z-1", "1:4:", "found G38.2, which needs a probe"),
+            (
+                "F9 G38.2 Z-1",
+                "1:4:",
+                "found G38.2, which needs a probe, expected [[probe.box]] in a machine file",
+            ),
             ("M110 P1", "1:1:", "found M110, which runs a program of the user's"),
             ("G0 X1000000.1", "1:4:", "within ±1000000 mm"),
             ("G91 G0 X-999999\nX-2", "2:1:", "adds up beyond"),

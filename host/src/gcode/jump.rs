@@ -71,7 +71,8 @@ impl<'a> Flow<'a> {
                 None => None,
             },
             Role::Break { begin } | Role::Continue { begin } => {
-                self.repeats.retain(|repeat| repeat.begin < begin);
+                // Those within it; the outer ones begin before it.
+                while self.repeats.pop_if(|repeat| repeat.begin >= begin).is_some() {}
                 let end = structure.end_of(begin);
                 match (line.role, structure.line(begin).map(|line| line.role)) {
                     (Role::Break { .. }, _) => after(end),

@@ -3,6 +3,9 @@
 use super::error::{Located, Problem};
 use super::expression::Environment;
 
+/// Above 0, as it is in the beginning, `(DEBUG,…)` shows its text.
+pub(super) const DEBUGS: u32 = 5599;
+
 /// What a comment asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Request {
@@ -10,7 +13,9 @@ enum Request {
     Message,
     /// Show the text with the values of the parameters in it.
     Values,
-    /// End the program with an error.
+    /// The same, unless #5599 says no.
+    Debug,
+    /// End the program with such a text.
     Abort,
 }
 
@@ -19,11 +24,19 @@ fn request(text: &[u8]) -> Option<(Request, &[u8])> {
     let (name, rest) = (text.get(..comma)?, text.get(comma + 1..)?);
     let request = match name.trim_ascii().to_ascii_uppercase().as_slice() {
         b"MSG" => Request::Message,
-        b"DEBUG" | b"PRINT" => Request::Values,
+        b"DEBUG" => Request::Debug,
+        b"PRINT" => Request::Values,
         b"ABORT" => Request::Abort,
         _ => return None,
     };
     Some((request, rest))
+}
+
+/// Whether a comment asks for a file that is written: of probed points, or of a log.
+pub(super) fn is_file(text: &[u8]) -> bool {
+    let text = text.trim_ascii().to_ascii_uppercase();
+    let opens = [&b"PROBEOPEN "[..], b"LOGOPEN,", b"LOGAPPEND,", b"LOG,"];
+    matches!(text.as_slice(), b"PROBECLOSE" | b"LOGCLOSE") || opens.iter().any(|word| text.starts_with(word))
 }
 
 /// Whether a comment asks for something; its text is without the parentheses.
@@ -40,8 +53,11 @@ pub(super) fn shown(text: &[u8], environment: &dyn Environment) -> Result<Option
     let text = String::from_utf8_lossy(rest);
     match request {
         Request::Message => Ok(Some(text.trim().to_owned())),
-        Request::Values => Ok(Some(with_values(text.trim(), environment))),
-        Request::Abort => Err(Located::new(0, Problem::Aborted { text: text.trim().to_owned() })),
+        Request::Debug if environment.numbered(DEBUGS) <= 0.0 => Ok(None),
+        Request::Debug | Request::Values => Ok(Some(with_values(text.trim(), environment))),
+        Request::Abort => {
+            Err(Located::new(0, Problem::Aborted { text: with_values(text.trim(), environment) }))
+        }
     }
 }
 
@@ -116,6 +132,17 @@ mod tests {
     }
 
     #[test]
+    fn files_are_told_from_comments() {
+        for text in ["PROBEOPEN points.txt", " probeclose", "LOGOPEN,a", "logappend,a", "LOG,#1", "LOGCLOSE"]
+        {
+            assert!(is_file(text.as_bytes()), "{text}");
+        }
+        for text in ["PROBEOPENING", "log the position", "LOGCLOSE it", "a PROBECLOSE"] {
+            assert!(!is_file(text.as_bytes()), "{text}");
+        }
+    }
+
+    #[test]
     fn messages_are_told_from_comments() {
         let shown = |text: &str| shown(text.as_bytes(), &Values).unwrap();
         assert_eq!(shown("a, b"), None);
@@ -126,7 +153,7 @@ mod tests {
             Some("1.250000 1 -1.5000 3.25, 5%".to_owned())
         );
         assert_eq!(shown("print,#<no> #0 # #<x"), Some("###### ###### # #<x".to_owned()));
-        let aborted = super::shown(b"ABORT, no stock", &Values).unwrap_err();
-        assert!(aborted.problem.to_string().contains("no stock"));
+        let aborted = super::shown(b"ABORT, no stock at %d#3", &Values).unwrap_err();
+        assert!(aborted.problem.to_string().contains("no stock at 3"));
     }
 }

@@ -32,7 +32,7 @@
 //!    operator; feed mode, feed; `accessories`: spindle, tool, coolant, outputs; dwell; plane, units, path mode, distance
 //!    modes; `offsets`: tool length, coordinate system, G10, G28, G30, G52, G92; `motion`; stop or end.
 //! 6. `motion`: `arc` gives centre, radii and sweep of G2 and G3, `spline` and `nurbs` the control points of G5, G5.2 and G6.2, `cycle` the moves of
-//!    a drilling cycle, `polar` the point of `@` and `^`; `frame` makes machine coordinates of the program's.
+//!    a drilling cycle, `probe` where a probing move ends, `polar` the point of `@` and `^`; `frame` makes machine coordinates of the program's.
 //!
 //! # Dialect
 //!
@@ -48,6 +48,7 @@
 //! | G5.5, X Y Z | quintic spline through points, one a line, from where the machine is; modal. At least five points; a line with the word G5.5 begins another spline. Of this project alone |
 //! | G5.2 \[P\] \[X Y P\] \[L\], X Y P, G5.3 | NURBS in the plane (here XY) from where the machine is, with uniform knots: control points with weights P, one a line; P alone in the first line is the weight of its start, otherwise 1; L: order, without it 3. Under G91 all control points count from the start. As in LinuxCNC 2.9, in ZX and YZ as in 2.10 |
 //! | G6.2 X Y R K P Q, X Y R K, G6.2 K | NURBS in the plane of arcs with knots K, whole numbers: control points with weights R; P: order; Q1 to Q3, a way of approximation, is not acted on. The first K stands in as many lines as the order, as does the last, whose lines end the NURBS and are no control points. A line leads to its first point. G6.3 may follow. As in LinuxCNC 2.10 |
+//! | G38.2 to G38.5 | a straight move at F up to where the probe touches the surface (.2, .3) or leaves it (.4, .5), modal; the machine brakes from there, and the program goes on from where it rests. #5061 to #5063 are where the probe tripped, in the coordinates and units in force, #5070 is 1. Without: .2 and .4 are refused; .3 and .5 set the programmed end, and 0 |
 //! | G73 G81 G82 G83 G85 G86 G88 G89, R P Q L, G98 G99 | drilling cycles along the plane's normal, modal; they end where the first began, or at R |
 //! | F, G93 G94 G95 | feed \[mm/min or inch/min\], kept as a speed when the units change; of a minute's part, a minute, a revolution at the commanded speed |
 //! | G4 P | dwell \[s\] |
@@ -67,9 +68,9 @@
 //! | O…  sub, call, return, if, while, do, repeat, break, continue | subroutines and loops, named or numbered; other files are looked for in [`ReadOptions::subroutines`] |
 //! | M98 P L, M99 | Fanuc's subprograms, which begin with a bare O… and work on their caller's parameters |
 //! | N, `( )`, `;`, `%`, `/`, `*44` | line number (first in its line), comments, tape marks, a line left out by a switch, a checksum, which is not looked at |
-//! | `(MSG,…)` `(DEBUG,…)` `(PRINT,…)` `(ABORT,…)` | a text for the operator; with values of parameters; an end by the program's own decision |
+//! | `(MSG,…)` `(DEBUG,…)` `(PRINT,…)` `(ABORT,…)` | a text for the operator; with values of parameters; an end by the program's own decision. `(PROBEOPEN …)`, `(LOG,…)` and their like write no file, which is told |
 //!
-//! Anything else is an error. G33, G74, G76, G84 need a spindle encoder, G38 a probe, M100 to M199 a program of the
+//! Anything else is an error. G33, G74, G76, G84 need a spindle encoder, G38.2 to G38.5 a probe ([`ReadOptions::probe`]), M100 to M199 a program of the
 //! user's: they may stand in subroutines that are not called. Blanks count nowhere outside comments, not even inside a
 //! number; letters may be lower case; lines end in LF or CRLF; a UTF-8 byte-order mark at the start of the file is skipped.
 //! A `%` before the first word opens the program, a later one ends it. Behind the end only subroutines are read.
@@ -83,6 +84,12 @@
 //! - G41 and G42 are refused where the tool's radius is not known, and where a move of the tool would begin behind its end;
 //!   LinuxCNC takes 0, and drives some of them backwards. G61, G64, G98, G99, M48 to M53 and M62 to M68 may be changed
 //!   with compensation; predefined parameters give the programmed position.
+//! - The probe trips where the machine file's boxes say, so #5061 to #5070 are known before anything moves. G38.2 to G38.5
+//!   are refused after G93 as they are after G95. G38.3 and G38.5 from where they look for trip there, without a move.
+//! - M72 and the end behind M73 restore the length of G43.1, where LinuxCNC takes the table's of the tool in the spindle; they
+//!   restore no other offsets.
+//! - The position behind G10 L2 R of the system in force, with G92 in force, is where the machine is; LinuxCNC's interpreter takes
+//!   another. So it does in G53, G28 and G30 where G20 or G21 follows G43.1, and in a drilling cycle that G20 or G21 falls into.
 //! - M6 for the tool that is in the spindle does not stop, and without any T it is noticed.
 //! - Loops run to their end after a `break` or `continue` of another loop, where LinuxCNC may leave a `do` early.
 //!
@@ -130,6 +137,7 @@ mod parameter_file;
 mod parameters;
 mod polar;
 mod predefined;
+mod probe;
 mod program;
 mod source;
 mod spline;
@@ -144,9 +152,10 @@ pub use error::{GcodeError, Problem};
 pub use options::ReadOptions;
 pub use parameter_file::ParameterFile;
 pub use parameters::{PARAMETER_MAX, Parameters};
+pub use probe::Probe;
 pub use program::{
     ArcMove, CubicMove, Feed, LineMove, Message, Notice, NoticeKind, Nurbs, NurbsMove, PathMode, Plane,
-    Program, Step, StepKind, Systems, ThroughMove,
+    ProbeMove, Program, Step, StepKind, Systems, ThroughMove,
 };
 pub use survey::{Refusal, refusals};
 pub use tool::{Tool, ToolTable};

@@ -8,6 +8,7 @@ use super::error::{Located, Problem};
 use super::lexer::Word;
 use super::number::Number;
 use super::nurbs::Kind;
+use super::probe::ProbeKind;
 use super::program::{PathMode, Plane};
 
 /// Motion mode.
@@ -27,6 +28,8 @@ pub(super) enum Motion {
     Through,
     /// G5.2 and G6.2.
     Nurbs(Kind),
+    /// G38.2 to G38.5.
+    Probe(ProbeKind),
     /// G73 to G89.
     Cycle(Cycle),
 }
@@ -43,6 +46,7 @@ impl Motion {
             52 => Self::Nurbs(Kind::Uniform),
             55 => Self::Through,
             62 => Self::Nurbs(Kind::Knotted),
+            382..=385 => Self::Probe(ProbeKind::of(tenths)?),
             _ => Self::Cycle(Cycle::of(tenths)?),
         })
     }
@@ -57,6 +61,7 @@ impl Motion {
             Self::Cubic => "G5",
             Self::Through => "G5.5",
             Self::Nurbs(kind) => kind.word(),
+            Self::Probe(kind) => kind.word(),
             Self::Cycle(cycle) => cycle.word(),
         }
     }
@@ -71,6 +76,7 @@ impl Motion {
             Self::Cubic => 50,
             Self::Through => 55,
             Self::Nurbs(kind) => kind.tenths(),
+            Self::Probe(kind) => kind.tenths(),
             Self::Cycle(cycle) => cycle.tenths(),
         }
     }
@@ -83,7 +89,7 @@ impl Motion {
     /// Whether it takes a letter other than those of the axes.
     pub(super) fn takes(self, letter: u8) -> bool {
         match self {
-            Self::Rapid | Self::Feed | Self::Through => false,
+            Self::Rapid | Self::Feed | Self::Through | Self::Probe(_) => false,
             Self::Clockwise | Self::CounterClockwise => matches!(letter, b'I' | b'J' | b'K' | b'R' | b'P'),
             Self::Cubic => matches!(letter, b'I' | b'J' | b'P' | b'Q'),
             Self::Nurbs(kind) => kind.letters().contains(&letter),
@@ -156,7 +162,7 @@ impl Default for Overrides {
 /// The modes in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Modal {
-    /// G0 G1 G2 G3 G5 G5.2 G5.5 G6.2, drilling cycles; none after G80.
+    /// G0 G1 G2 G3 G5 G5.2 G5.5 G6.2 G38.2 to G38.5, drilling cycles; none after G80.
     pub(super) motion: Option<Motion>,
     /// G17 G18 G19.
     pub(super) plane: Plane,

@@ -36,6 +36,9 @@ impl Interpreter {
             let expected = "axis words";
             return Err(code.word.problem(|_| Problem::Cycle { word: cycle.word(), expected }));
         }
+        if let (Some(Motion::Probe(_)), Some(code), false) = (self.modal.motion, code, block.has_axes()) {
+            return Err(code.word.problem(|word| Problem::Setup { word, expected: "axis words" }));
+        }
         let machine = block.machine_word();
         if !block.moves(self.modal.motion) {
             let unmoved =
@@ -49,59 +52,104 @@ impl Interpreter {
             return Err(first.problem(|word| Problem::AxisWithoutMotion { word }));
         };
         let offset = code.map_or(first.offset, |code| code.word.offset);
+        self.refuse_probe_feed(motion, offset)?;
         let feed = self.feed(block, motion, offset)?;
         self.refuse_uncompensated(motion, offset)?;
         if let Some(word) = machine {
             self.refuse_machine_move(word)?;
             return self.machine_move(block, motion, feed, first);
         }
-        if let Motion::Cycle(cycle) = motion {
-            return self.cycle(block, cycle, feed, first);
+        match motion {
+            // Its lines were taken above.
+            Motion::Nurbs(_) => Ok(()),
+            Motion::Cycle(cycle) => self.cycle(block, cycle, feed, first),
+            Motion::Rapid | Motion::Feed => self.line(block, feed, first, offset),
+            Motion::Clockwise | Motion::CounterClockwise => self.circular(block, motion, feed, first, offset),
+            Motion::Cubic => self.cubic(block, feed, first, offset),
+            Motion::Probe(kind) => self.probe(block, kind, feed, first, offset),
+            Motion::Through => self.through(block, code.is_some(), feed, first, offset),
         }
-        let (from, mode) = (self.machine, self.modal.path);
+    }
+
+    /// Where a line leads: in the program's coordinates, and in those of the machine.
+    pub(super) fn target(&self, block: &Block<'_>, first: Word<'_>) -> Result<[[Length; 3]; 2], Located> {
         let work = self.end_point(block)?;
-        let to = self
-            .machine_at(work)
-            .ok_or_else(|| first.problem(|word| Problem::PositionOutOfRange { word }))?;
-        if motion == Motion::Cubic {
-            let controls_mm = spline::controls_mm(block, &self.modal, self.cubic_before_mm, offset)?;
-            self.untimed(motion, offset)?;
-            (self.work, self.machine) = (work, to);
-            if from == to && controls_mm == [[0.0; 2]; 2] {
-                return Ok(());
-            }
-            // What the next curve continues is in the program's directions.
-            let turned_mm = controls_mm.map(|control| self.turned_mm(control));
-            self.step(StepKind::Cubic(CubicMove { from, to, controls_mm: turned_mm, feed, mode }))?;
-            self.cubic_before_mm = Some(controls_mm[1]);
+        let to = self.machine_at(work);
+        Ok([work, to.ok_or_else(|| first.problem(|word| Problem::PositionOutOfRange { word }))?])
+    }
+
+    /// G0 and G1.
+    fn line(&mut self, block: &Block<'_>, feed: Feed, first: Word<'_>, offset: usize) -> Result<(), Located> {
+        let [work, to] = self.target(block, first)?;
+        if self.is_offset() {
+            self.offset_line(to, feed, self.modal.path, offset)?;
+            self.machine = to;
+        } else {
+            self.line_to(to, feed, self.modal.path)?;
+        }
+        self.work = work;
+        Ok(())
+    }
+
+    /// G2 and G3.
+    fn circular(
+        &mut self,
+        block: &Block<'_>,
+        motion: Motion,
+        feed: Feed,
+        first: Word<'_>,
+        offset: usize,
+    ) -> Result<(), Located> {
+        let [work, to] = self.target(block, first)?;
+        let arc = self.arc(block, motion, self.machine, to, feed, offset)?;
+        if self.is_offset() {
+            self.offset_arc(&arc, offset)?;
+        } else {
+            self.step(StepKind::Arc(arc))?;
+        }
+        (self.work, self.machine) = (work, to);
+        Ok(())
+    }
+
+    /// G5.
+    fn cubic(
+        &mut self,
+        block: &Block<'_>,
+        feed: Feed,
+        first: Word<'_>,
+        offset: usize,
+    ) -> Result<(), Located> {
+        let [work, to] = self.target(block, first)?;
+        let (from, mode) = (self.machine, self.modal.path);
+        let controls_mm = spline::controls_mm(block, &self.modal, self.cubic_before_mm, offset)?;
+        self.untimed(Motion::Cubic, offset)?;
+        (self.work, self.machine) = (work, to);
+        if from == to && controls_mm == [[0.0; 2]; 2] {
             return Ok(());
         }
-        if motion.is_arc() {
-            let arc = self.arc(block, motion, from, to, feed, offset)?;
-            if self.is_offset() {
-                self.offset_arc(&arc, offset)?;
-            } else {
-                self.step(StepKind::Arc(arc))?;
-            }
-            (self.work, self.machine) = (work, to);
-            return Ok(());
-        }
-        if motion != Motion::Through {
-            if self.is_offset() {
-                self.offset_line(to, feed, mode, offset)?;
-                self.machine = to;
-            } else {
-                self.line_to(to, feed, mode)?;
-            }
-            self.work = work;
-            return Ok(());
-        }
+        // What the next curve continues is in the program's directions.
+        let turned_mm = controls_mm.map(|control| self.turned_mm(control));
+        self.step(StepKind::Cubic(CubicMove { from, to, controls_mm: turned_mm, feed, mode }))?;
+        self.cubic_before_mm = Some(controls_mm[1]);
+        Ok(())
+    }
+
+    /// A point of G5.5; with the word itself, another spline `begins`.
+    fn through(
+        &mut self,
+        block: &Block<'_>,
+        begins: bool,
+        feed: Feed,
+        first: Word<'_>,
+        offset: usize,
+    ) -> Result<(), Located> {
+        let [work, to] = self.target(block, first)?;
+        let (from, mode) = (self.machine, self.modal.path);
         (self.work, self.machine) = (work, to);
         if from == to {
             return Ok(());
         }
-        self.untimed(motion, offset)?;
-        let begins = code.is_some();
+        self.untimed(Motion::Through, offset)?;
         self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }))
     }
 

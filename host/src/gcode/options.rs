@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::parameter_file::ParameterFile;
+use super::probe::Probe;
 use super::tool::ToolTable;
 
 /// What a program is read with: switches of the operator, files beside the program, and bounds.
@@ -18,6 +19,8 @@ pub struct ReadOptions {
     pub parameters: ParameterFile,
     /// The tools there are; without a table, length and radius of every tool are 0.
     pub tools: Option<ToolTable>,
+    /// What probing moves touch; without it they are refused.
+    pub probe: Option<Probe>,
     /// Most lines to execute, so that endless loops end; 100 million by default.
     pub lines_max: u64,
     /// Most steps, and most messages, that the program may have; 20 million by default, some 4 GB.
@@ -32,6 +35,7 @@ impl Default for ReadOptions {
             subroutines: Vec::new(),
             parameters: ParameterFile::default(),
             tools: None,
+            probe: None,
             lines_max: 100_000_000,
             steps_max: 20_000_000,
         }

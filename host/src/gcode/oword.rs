@@ -46,6 +46,42 @@ const KEYWORDS: [(&[u8], Keyword); 15] = [
     (b"CONTINUE", Keyword::Continue),
 ];
 
+impl Keyword {
+    /// As it is written.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Sub => "sub",
+            Self::EndSub => "endsub",
+            Self::Call => "call",
+            Self::Return => "return",
+            Self::If => "if",
+            Self::ElseIf => "elseif",
+            Self::Else => "else",
+            Self::EndIf => "endif",
+            Self::While => "while",
+            Self::EndWhile => "endwhile",
+            Self::Do => "do",
+            Self::Repeat => "repeat",
+            Self::EndRepeat => "endrepeat",
+            Self::Break => "break",
+            Self::Continue => "continue",
+            Self::Program => "",
+        }
+    }
+
+    /// The word that ends the block it begins; its own, if it begins none.
+    pub(super) fn end(self) -> &'static str {
+        match self {
+            Self::Sub => Self::EndSub.word(),
+            Self::If => Self::EndIf.word(),
+            Self::While => Self::EndWhile.word(),
+            Self::Do => Self::While.word(),
+            Self::Repeat => Self::EndRepeat.word(),
+            _ => self.word(),
+        }
+    }
+}
+
 /// An O-word and what follows it.
 #[derive(Clone, Debug)]
 pub(super) struct OWord<'a> {

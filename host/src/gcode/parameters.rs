@@ -6,6 +6,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use super::message::DEBUGS;
+
 /// The greatest number of a parameter.
 pub const PARAMETER_MAX: u32 = 5601;
 /// The parameters that belong to a subroutine: #1 to #30.
@@ -34,6 +36,7 @@ impl Default for Parameters {
         let mut numbered = vec![0.0; PARAMETER_MAX as usize + 1];
         // The first coordinate system is selected.
         numbered[SELECTED as usize] = 1.0;
+        numbered[DEBUGS as usize] = 1.0;
         Self { numbered, globals: HashMap::new(), locals: vec![HashMap::new()], callers: Vec::new() }
     }
 }

@@ -43,8 +43,10 @@ impl Systems {
 /// A text for the operator: a `(MSG,…)`, or the tool that a stop is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// Line of the program that asks for it, from 1.
+    /// Line of the program that asks for it, from 1; in a subroutine of another file, the line that called it.
     pub line: u32,
+    /// Of another file: its name and the line there.
+    pub within: Option<String>,
     /// It is shown before the step of this index.
     pub step: usize,
     /// The text.
@@ -62,7 +64,10 @@ impl Program {
             notes.push(format!("length and radius 0 are assumed, there is no tool table: tools {tools}"));
         }
         let shown = self.messages.iter().take(Self::MESSAGES_SHOWN);
-        notes.extend(shown.map(|message| format!("line {}: message: {}", message.line, message.text)));
+        notes.extend(shown.map(|message| {
+            let within = message.within.as_ref().map_or_else(String::new, |within| format!(", {within}"));
+            format!("line {}{within}: message: {}", message.line, message.text)
+        }));
         if let Some(more @ 1..) = self.messages.len().checked_sub(Self::MESSAGES_SHOWN) {
             notes.push(format!("{more} more messages"));
         }
@@ -76,7 +81,7 @@ impl Program {
 /// One thing to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// Line of the program that asks for it, from 1.
+    /// Line of the program that asks for it, from 1; in a subroutine of another file, the line that called it.
     pub line: u32,
     /// The action.
     pub kind: StepKind,
@@ -95,6 +100,8 @@ pub enum StepKind {
     Through(ThroughMove),
     /// G5.2 to G5.3, or G6.2.
     Nurbs(NurbsMove),
+    /// G38.2 to G38.5.
+    Probe(ProbeMove),
     /// G4: stand still.
     Dwell {
         /// How long \[s\], 0 or more.
@@ -121,11 +128,12 @@ impl StepKind {
             Self::Cubic(curve) => Some([curve.from, curve.to]),
             Self::Through(point) => Some([point.from, point.to]),
             Self::Nurbs(curve) => Some([curve.from, curve.to]),
+            Self::Probe(probe) => Some([probe.from, probe.to]),
             Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
         }
     }
 
-    /// The path mode of a move.
+    /// The path mode of a move; none for a probing move, which stops before and behind it whatever the mode.
     #[must_use]
     pub fn mode(&self) -> Option<PathMode> {
         match self {
@@ -134,7 +142,7 @@ impl StepKind {
             Self::Cubic(curve) => Some(curve.mode),
             Self::Through(point) => Some(point.mode),
             Self::Nurbs(curve) => Some(curve.mode),
-            Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+            Self::Probe(_) | Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
         }
     }
 
@@ -146,7 +154,7 @@ impl StepKind {
             Self::Cubic(curve) => Some(&mut curve.mode),
             Self::Through(point) => Some(&mut point.mode),
             Self::Nurbs(curve) => Some(&mut curve.mode),
-            Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+            Self::Probe(_) | Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
         }
     }
 }
@@ -237,6 +245,23 @@ pub struct NurbsMove {
     pub feed: Feed,
     /// How its ends are passed.
     pub mode: PathMode,
+}
+
+/// A straight move that ends where the probe trips, with a full stop before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbeMove {
+    /// Start, X Y Z.
+    pub from: [Length; 3],
+    /// Where the machine comes to rest: braked from where the probe tripped, or the programmed end.
+    pub to: [Length; 3],
+    /// The programmed end.
+    pub end: [Length; 3],
+    /// Where the probe trips; absent if it does not.
+    pub trip: Option<[Length; 3]>,
+    /// It trips where it leaves the surface.
+    pub leaves: bool,
+    /// Feed along the line.
+    pub feed: Feed,
 }
 
 /// A rational spline from its first control point to its last.
@@ -355,6 +380,8 @@ pub enum NoticeKind {
     Output,
     /// M66.
     Input,
+    /// `(PROBEOPEN …)`, `(LOG,…)` and the like.
+    File,
     /// D in a line that takes none.
     IdleD,
     /// More decimals than are exact.
@@ -365,6 +392,8 @@ pub enum NoticeKind {
     FeedInNewUnits,
     /// R a rounding error smaller than half the chord.
     RadiusEnlarged,
+    /// M99 in the main program.
+    MainReturn,
     /// Text after the end.
     TextAfterEnd,
     /// No M2, M30 or closing `%`.
@@ -381,6 +410,7 @@ impl fmt::Display for Notice {
             NoticeKind::Override => "M48 to M53 are not acted on: overrides are the operator's",
             NoticeKind::Output => "M62 to M65, M67, M68 are not acted on: there are no outputs",
             NoticeKind::Input => "M66 reads 0 and does not wait: there are no inputs",
+            NoticeKind::File => "(PROBEOPEN …), (LOG,…) and the like are not acted on: no file is written",
             NoticeKind::IdleD => "D is not acted on: nothing in its line takes it",
             NoticeKind::Rounded => "numbers with more decimals than are exact are rounded to 0.0000000001 mm",
             NoticeKind::BlockDeleted => "lines that begin with / are left out",
@@ -388,6 +418,7 @@ impl fmt::Display for Notice {
             NoticeKind::RadiusEnlarged => {
                 "R falls short of half the chord by a rounding error: half circle made"
             }
+            NoticeKind::MainReturn => "M99 ends the main program; Fanuc's would begin it again",
             NoticeKind::TextAfterEnd => "text after the end of the program is not read",
             NoticeKind::NoProgramEnd => "no M2, M30 or % at the end: is the file complete?",
         };

@@ -87,8 +87,57 @@ struct Open {
     keyword: Keyword,
     label: String,
     index: usize,
+    /// Where it begins, from 1.
+    line: u32,
     /// `elseif` and `else` of an `if`.
     branches: Vec<usize>,
+}
+
+/// The blocks that are not closed yet. A block of a label is found without a look at the others.
+#[derive(Default)]
+struct OpenBlocks {
+    /// From the outermost to the innermost.
+    blocks: Vec<Open>,
+    /// Where those of a label are among them: a sub and one within it at most.
+    of_label: HashMap<String, Vec<usize>>,
+}
+
+impl OpenBlocks {
+    fn push(&mut self, open: Open) {
+        self.of_label.entry(open.label.clone()).or_default().push(self.blocks.len());
+        self.blocks.push(open);
+    }
+
+    fn pop(&mut self) -> Option<Open> {
+        let open = self.blocks.pop()?;
+        if let Some(places) = self.of_label.get_mut(&open.label) {
+            places.pop();
+        }
+        Some(open)
+    }
+
+    fn last(&self) -> Option<&Open> {
+        self.blocks.last()
+    }
+
+    /// The innermost block of a label.
+    fn of(&self, label: &str) -> Option<&Open> {
+        self.blocks.get(*self.of_label.get(label)?.last()?)
+    }
+
+    /// Subs stand in no other block.
+    fn is_in_sub(&self) -> bool {
+        self.blocks.first().is_some_and(|open| open.keyword == Keyword::Sub)
+    }
+
+    /// The problem of an O-word that belongs to another block than the last.
+    fn not_open(&self, word: &OWord<'_>) -> Located {
+        let open = self.last().map_or_else(
+            || "no block is open".to_owned(),
+            |open| format!("O{} {} of line {} is open last", open.label, open.keyword.word(), open.line),
+        );
+        Located::new(word.offset, Problem::BlockNotOpen { label: word.label.clone(), open })
+    }
 }
 
 /// Nothing counts: the text is only checked.
@@ -115,7 +164,7 @@ impl Structure {
     /// The place in the file, and what is wrong there.
     pub(super) fn of(source: &Source<'_>, block_delete: bool) -> Result<Self, (Place, Located)> {
         let mut structure = Self::default();
-        let mut open: Vec<Open> = Vec::new();
+        let mut open = OpenBlocks::default();
         let mut place = Place::default();
         let mut begun = false;
         while let Some((line, after)) = source.line(place) {
@@ -134,7 +183,10 @@ impl Structure {
         }
         match open.last().and_then(|open| Some((open, structure.lines.get(open.index)?))) {
             Some((open, line)) => {
-                Err((line.start, Located::new(0, Problem::BlockOpen { label: open.label.clone() })))
+                let (keyword, end) = (open.keyword.word(), open.keyword.end());
+                let last = place.line.saturating_sub(1);
+                let problem = Problem::BlockOpen { label: open.label.clone(), keyword, end, last };
+                Err((line.start, Located::new(0, problem)))
             }
             None => Ok(structure),
         }
@@ -173,30 +225,39 @@ impl Structure {
         cursor: Cursor<'_>,
         start: Place,
         after: Place,
-        open: &mut Vec<Open>,
+        open: &mut OpenBlocks,
     ) -> Result<(), Located> {
         let word = OWord::read(cursor, &Unread)?;
         if word.is_computed && word.keyword != Keyword::Call {
             return Err(Located::new(word.offset, Problem::LabelComputed));
         }
         let index = self.lines.len();
-        let role = self.role(&word, index, open)?;
+        let role = self.role(&word, index, start.line, open)?;
         self.lines.push(OLine { start, after, role });
         Ok(())
     }
 
-    fn role(&mut self, word: &OWord<'_>, index: usize, open: &mut Vec<Open>) -> Result<Role, Located> {
-        let begins = |keyword, open: &mut Vec<Open>| {
-            if open.iter().any(|open| open.label == word.label && open.keyword != Keyword::Sub) {
-                return Err(Located::new(word.offset, Problem::LabelOpen { label: word.label.clone() }));
+    fn role(
+        &mut self,
+        word: &OWord<'_>,
+        index: usize,
+        line: u32,
+        open: &mut OpenBlocks,
+    ) -> Result<Role, Located> {
+        let begins = |keyword, open: &mut OpenBlocks| {
+            if let Some(of_label) = open.of(&word.label).filter(|open| open.keyword != Keyword::Sub) {
+                let (label, line) = (word.label.clone(), of_label.line);
+                return Err(Located::new(word.offset, Problem::LabelOpen { label, line }));
             }
-            open.push(Open { keyword, label: word.label.clone(), index, branches: Vec::new() });
+            open.push(Open { keyword, label: word.label.clone(), index, line, branches: Vec::new() });
             Ok(())
         };
-        let not_open = |problem| Located::new(word.offset, problem);
-        let closes = |keyword, open: &mut Vec<Open>| match open.pop() {
-            Some(last) if last.keyword == keyword && last.label == word.label => Ok(last),
-            _ => Err(not_open(Problem::BlockNotOpen { label: word.label.clone() })),
+        let closes = |keyword, open: &mut OpenBlocks| {
+            let is_last = |last: &Open| last.keyword == keyword && last.label == word.label;
+            match open.last().is_some_and(is_last) {
+                true => open.pop().ok_or_else(|| open.not_open(word)),
+                false => Err(open.not_open(word)),
+            }
         };
         Ok(match word.keyword {
             Keyword::Program => {
@@ -205,9 +266,18 @@ impl Structure {
             }
             Keyword::Call => Role::Call,
             Keyword::Sub => {
-                if !open.is_empty() || self.subs.insert(word.label.clone(), index).is_some() {
-                    return Err(Located::new(word.offset, Problem::SubPlace { label: word.label.clone() }));
+                let other = match (open.last(), self.subs.get(&word.label)) {
+                    (Some(open), _) => Some(("in the block that begins", open.line)),
+                    (None, Some(&first)) => {
+                        self.line(first).map(|line| ("a second time, after that", line.start.line))
+                    }
+                    (None, None) => None,
+                };
+                if let Some((place, line)) = other {
+                    let problem = Problem::SubPlace { label: word.label.clone(), place, line };
+                    return Err(Located::new(word.offset, problem));
                 }
+                self.subs.insert(word.label.clone(), index);
                 begins(Keyword::Sub, open)?;
                 Role::Sub { end: index }
             }
@@ -217,8 +287,8 @@ impl Structure {
                 Role::EndSub
             }
             // Whatever its label is, it returns from the sub around it.
-            Keyword::Return if open.iter().any(|open| open.keyword == Keyword::Sub) => Role::Return,
-            Keyword::Return => return Err(not_open(Problem::ReturnOutside)),
+            Keyword::Return if open.is_in_sub() => Role::Return,
+            Keyword::Return => return Err(Located::new(word.offset, Problem::ReturnOutside)),
             Keyword::If => {
                 begins(Keyword::If, open)?;
                 Role::If { next: index }
@@ -230,14 +300,15 @@ impl Structure {
                 let is_else = |index: &usize| {
                     self.line(*index).is_some_and(|line| matches!(line.role, Role::Else { .. }))
                 };
-                let last = open.last_mut().filter(|last| {
+                let takes = |last: &Open| {
                     last.keyword == Keyword::If
                         && last.label == word.label
                         && !last.branches.last().is_some_and(is_else)
-                });
-                let Some(last) = last else {
-                    return Err(not_open(Problem::BlockNotOpen { label: word.label.clone() }));
                 };
+                if !open.last().is_some_and(takes) {
+                    return Err(open.not_open(word));
+                }
+                let Some(last) = open.blocks.last_mut() else { return Err(open.not_open(word)) };
                 let before = last.branches.last().copied().unwrap_or(last.index);
                 last.branches.push(index);
                 self.lead(before, index);
@@ -290,11 +361,9 @@ impl Structure {
                 Role::EndRepeat { begin }
             }
             Keyword::Break | Keyword::Continue => {
-                let is_loop = |open: &&Open| {
-                    open.label == word.label && matches!(open.keyword, Keyword::While | Keyword::Do)
-                };
-                let Some(begin) = open.iter().rev().find(is_loop).map(|open| open.index) else {
-                    return Err(not_open(Problem::BlockNotOpen { label: word.label.clone() }));
+                let is_loop = |open: &&Open| matches!(open.keyword, Keyword::While | Keyword::Do);
+                let Some(begin) = open.of(&word.label).filter(is_loop).map(|open| open.index) else {
+                    return Err(open.not_open(word));
                 };
                 if word.keyword == Keyword::Break { Role::Break { begin } } else { Role::Continue { begin } }
             }

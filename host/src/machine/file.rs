@@ -31,6 +31,8 @@ use super::settings::{
     AxisSettings, BLEND_TOLERANCE_MM, DefaultPathMode, FaultSettings, HomingSettings, Machine, PathSettings,
 };
 
+use crate::touch::{Surface, TouchBox};
+
 /// Seconds per minute: feeds in mm/min exist in this file only.
 const S_PER_MIN: f64 = 60.0;
 /// An encoder's register tells a move from its complement only while the axis moves by less than half the
@@ -111,6 +113,14 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
             return Err(refuse(at.clone(), expected));
         }
     }
+    for touch in file.probe.iter().flat_map(|probe| &probe.boxes) {
+        let high_mm = touch.high_mm.each_ref().map(|high_mm| high_mm.0);
+        for (low_mm, high_mm) in touch.low_mm.iter().zip(high_mm) {
+            if low_mm.get_ref().0 >= high_mm {
+                return Err(refuse(low_mm.span(), format!("less than high_mm = {high_mm} of the same axis")));
+            }
+        }
+    }
     for (places, axis) in &axes {
         if let (Some(at), Some([low_mm, high_mm])) = (&places.low_mm, axis.travel_mm)
             && low_mm >= high_mm
@@ -148,6 +158,7 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
         path: file.path.settings(),
         axes: axes.map(|(_, axis)| axis),
         faults,
+        probe: file.probe.map(|probe| probe.surface()),
     })
 }
 
@@ -178,6 +189,7 @@ struct MachineFile {
     tick_s: Within<Tick>,
     path: PathTable,
     faults: Option<FaultsTable>,
+    probe: Option<ProbeTable>,
     #[serde(deserialize_with = "three_axes")]
     axis: [AxisTable; 3],
 }
@@ -221,6 +233,20 @@ struct FaultsTable {
     ramp_s: Option<Within<Ramp>>,
     stop_s: Option<Within<StopTime>>,
     emergency_stop: Option<EmergencyStop>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ProbeTable {
+    #[serde(rename = "box")]
+    boxes: Vec<BoxTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoxTable {
+    low_mm: [Spanned<Within<Coordinate>>; 3],
+    high_mm: [Within<Coordinate>; 3],
 }
 
 #[derive(Deserialize)]
@@ -315,6 +341,16 @@ impl FaultsTable {
             stop_s: self.stop_s.as_ref().map_or(default.stop_s, |time| time.0),
             emergency_stop: self.emergency_stop.as_ref().map_or(default.emergency_stop, |stop| stop.0),
         }
+    }
+}
+
+impl ProbeTable {
+    fn surface(&self) -> Surface {
+        let touch = |touch: &BoxTable| TouchBox {
+            low_mm: touch.low_mm.each_ref().map(|low_mm| low_mm.get_ref().0),
+            high_mm: touch.high_mm.each_ref().map(|high_mm| high_mm.0),
+        };
+        Surface { boxes: self.boxes.iter().map(touch).collect() }
     }
 }
 

@@ -54,6 +54,10 @@ impl Key {
         Self { default: Some(default), ..self }
     }
 
+    const fn coordinates(name: &'static str, meaning: &'static str) -> Self {
+        Self { values: 3, ..Self::new(name, "mm", Coordinate::EXPECTED, meaning) }
+    }
+
     const fn points(name: &'static str, meaning: &'static str) -> Self {
         Self { values: TABLE_POINTS, ..Self::new(name, "mm/s", TablePoint::EXPECTED, meaning) }
     }
@@ -65,6 +69,12 @@ const fn table(name: &'static str, meaning: &'static str, keys: &'static [Key]) 
 
 const fn optional(name: &'static str, meaning: &'static str, keys: &'static [Key]) -> KeyTable {
     KeyTable { name, is_optional: true, meaning, keys }
+}
+
+/// Whether a table may be there several times: `[[axis]]`.
+#[must_use]
+pub fn is_list(table: &str) -> bool {
+    matches!(table, "axis" | "probe.box")
 }
 
 /// All tables, in the order of the reference file.
@@ -160,6 +170,15 @@ pub const KEY_TABLES: &[KeyTable] = &[
                  path.",
             )
             .or("\"immediate\""),
+        ],
+    ),
+    optional(
+        "probe.box",
+        "A probe, and what it touches in the simulated machine: any number of [[probe.box]] tables, a box each along the axes. \
+         Without one, G38.2 to G38.5 are refused. Other moves pass through.",
+        &[
+            Key::coordinates("low_mm", "Least X, Y, Z of the axes at which the probe touches; below high_mm."),
+            Key::coordinates("high_mm", "Greatest X, Y, Z of the axes at which the probe touches."),
         ],
     ),
     table(

@@ -17,6 +17,8 @@ use motion_kernel::units::{DacCode, Position};
 
 use super::error::{AxisError, MachineError};
 use super::file;
+use crate::gcode::{Probe, ReadOptions};
+use crate::touch::Surface;
 
 /// Pieces are rounded: their tangents agree with the planner's angle to this, and with a curve's feed.
 const JUNCTION_ANGLE_ROUNDING_RAD: f64 = 2.0e-6;
@@ -50,6 +52,8 @@ pub struct Machine {
     pub axes: [AxisSettings; 3],
     /// How faults end.
     pub faults: FaultSettings,
+    /// What the simulated probe touches, if there is one.
+    pub probe: Option<Surface>,
 }
 
 /// How faults end.
@@ -184,6 +188,7 @@ impl Machine {
                 AxisSettings::reference("Z", REFERENCE_Z),
             ],
             faults: FaultSettings::default(),
+            probe: None,
         }
     }
 
@@ -193,6 +198,13 @@ impl Machine {
     /// The text is not TOML, a key is missing or unknown, or a value is out of its range.
     pub fn from_toml(source_name: &str, text: &str) -> Result<Self, MachineError> {
         file::read(source_name, text)
+    }
+
+    /// What the machine adds to the options that its programs are read with.
+    #[must_use]
+    pub fn read_options(&self) -> ReadOptions {
+        let probe = self.probe.clone().map(|surface| Probe { surface, limits: self.limits() });
+        ReadOptions { probe, ..ReadOptions::default() }
     }
 
     /// The limits that planning keeps.

@@ -6,8 +6,9 @@ use motion_kernel::jog::Direction;
 use motion_kernel::law::Pulse;
 use motion_kernel::units::{Counts, Position};
 
-use super::keys::{KEY_TABLES, KeyTable};
+use super::keys::{KEY_TABLES, KeyTable, is_list};
 use super::{Machine, REFERENCE_TOML};
+use crate::touch::{Surface, TouchBox};
 
 /// The refusal of the reference file with the first `from` replaced by `to`.
 fn refused(from: &str, to: &str) -> String {
@@ -215,6 +216,8 @@ fn optional_keys_are_read() {
     let switch = Some(SwitchParameters { closes_mm: (-220.0, -180.0), hysteresis_mm: 0.2 });
     let index = Some(IndexParameters { counts: 100_000, at: Counts(42_000) });
     assert_eq!(homing.simulated, HomeParameters { switch, index });
+    let touch = TouchBox { low_mm: [0.0, 0.0, -30.0], high_mm: [100.0, 60.0, -10.0] };
+    assert_eq!(machine.probe, Some(Surface { boxes: vec![touch] }));
     // The others stay what they are.
     assert_eq!(machine.axes[1..], Machine::reference().axes[1..]);
     // Tables stand alone, and so does the inverse without its bed.
@@ -229,7 +232,7 @@ fn optional_keys_are_read() {
 fn set(text: &str, table: &KeyTable, name: &str, value: &str) -> (String, usize, usize) {
     let start = match table.name {
         "" => 0,
-        "axis" => text.find("\n[[axis]]\n").expect("axes"),
+        name if is_list(name) => text.find(&format!("\n[[{name}]]\n")).expect(name),
         name => text.find(&format!("\n[{name}]\n")).expect(name),
     };
     let key = start + text[start..].find(&format!("\n{name} = ")).expect(name) + 1;
@@ -258,9 +261,11 @@ fn the_reader_knows_exactly_the_explained_keys() {
         found.sort_unstable();
         let prefix = if table.name.is_empty() { String::new() } else { format!("{}.", table.name) };
         let inner = KEY_TABLES.iter().filter_map(|other| other.name.strip_prefix(&prefix));
-        let inner = inner.filter(|name| !name.is_empty() && !name.contains('.'));
+        // A table without keys of its own is known by its inner ones.
+        let inner = inner.filter_map(|name| name.split('.').next()).filter(|name| !name.is_empty());
         let mut expected: Vec<&str> = table.keys.iter().map(|key| key.name).chain(inner).collect();
         expected.sort_unstable();
+        expected.dedup();
         assert_eq!(found, expected, "[{}]", table.name);
     }
 }
@@ -332,7 +337,9 @@ fn defaults_and_only_they_may_be_left_out() {
             assert_eq!(found.expect("valid"), written, "{}", key.name);
         }
         if table.is_optional {
-            let start = text.find(&format!("\n[{}]\n", table.name)).expect("a table");
+            let brackets = usize::from(is_list(table.name)) + 1;
+            let heading = format!("\n{}{}{}\n", "[".repeat(brackets), table.name, "]".repeat(brackets));
+            let start = text.find(&heading).expect("a table");
             let end = text[start + 1..].find("\n[").map_or(text.len(), |end| start + 1 + end);
             let without = [&text[..start], &text[end..]].concat();
             let inner = KEY_TABLES.iter().any(|other| other.name.starts_with(&format!("{}.", table.name)));
@@ -378,6 +385,7 @@ fn ranges_of_optional_keys_are_kept() {
         ("axis.homing.simulated", "hysteresis_mm", &["-0.1", "100001"]),
         ("axis.homing.simulated", "index_every_mm", &["-10", "100001"]),
         ("axis.homing.simulated", "index_at_mm", &["-100001", "100001"]),
+        ("probe.box", "low_mm", &["[0, 0]", "[0, 0, 0, 0]", "[0, -1000001, 0]", "0"]),
     ];
     for (table, key, values) in cases {
         let table = KEY_TABLES.iter().find(|known| known.name == *table).expect("known");
@@ -415,6 +423,10 @@ fn rules_that_join_optional_keys() {
     }
     let (found, place) = change("axis.travel", "low_mm", "700");
     assert_eq!(found.map(|_| ()), Err(format!("{place}less than high_mm = 400")));
+    let (found, place) = change("probe.box", "low_mm", "[0, 60.0, -30]");
+    // The place is that of the number.
+    let place = place.replace(":10: found low_mm = [0, 60.0, -30],", ":14: found 60.0,");
+    assert_eq!(found.map(|_| ()), Err(format!("{place}less than high_mm = 60 of the same axis")));
     let (found, place) = change("axis.guard", "following_error_at_rest_mm", "1.01");
     assert_eq!(found.map(|_| ()), Err(format!("{place}at most following_error_limit_mm = 1")));
     assert!(change("axis.guard", "following_error_at_rest_mm", "1").0.is_ok());

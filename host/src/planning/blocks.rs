@@ -143,15 +143,11 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
         start_mm = end_mm;
     }
     Ok(Plan {
-        source: source_name.to_owned(),
         blocks: records,
         feed: profile.ramps().to_vec(),
         time_s: profile.time_s(),
         length_mm: ends_mm.last().copied().unwrap_or(0.0),
-        items: Vec::new(),
-        notices: Vec::new(),
-        pulse,
-        tick_s: TICK_S,
+        ..Plan::empty(source_name, pulse, TICK_S)
     })
 }
 

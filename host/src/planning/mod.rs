@@ -45,7 +45,9 @@ pub use spline::plan_spline;
 pub use stretch::Stretch;
 
 use motion_kernel::law::Pulse;
+use serde::{Deserialize, Serialize};
 
+use crate::gcode::{Length, ProbeMove};
 use crate::trace::TracedBlock;
 
 /// How ramps and blocks go together.
@@ -83,6 +85,10 @@ pub struct Plan {
     pub length_mm: f64,
     /// The items to execute, in order. Empty for a block list, which has no geometry.
     pub items: Vec<Item>,
+    /// Probing moves, in order.
+    pub probes: Vec<PlannedProbe>,
+    /// Stretches among the items.
+    pub stretches: u32,
     /// Words that were accepted and not acted on.
     pub notices: Vec<String>,
     /// The shape of the pulses of jerk in its ramps.
@@ -101,10 +107,39 @@ impl Plan {
             time_s: 0.0,
             length_mm: 0.0,
             items: Vec::new(),
+            probes: Vec::new(),
+            stretches: 0,
             notices: Vec::new(),
             pulse,
             tick_s,
         }
+    }
+}
+
+/// A probing move of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlannedProbe {
+    /// Program line.
+    pub line: u32,
+    /// Stretches before it. The next one is its own, unless it stands.
+    pub stretch: u32,
+    /// It stands where it trips, or where it ends.
+    pub stands: bool,
+    /// It trips where it leaves the surface.
+    pub leaves: bool,
+    /// Where the program reads it to have tripped \[mm\], in machine coordinates; absent if it does not trip.
+    pub trip_mm: Option<[f64; 3]>,
+}
+
+impl PlannedProbe {
+    fn new(line: u32, stretch: u32, probe: &ProbeMove) -> Self {
+        let trip_mm = probe.trip.map(|trip| trip.map(Length::to_mm));
+        Self { line, stretch, stands: probe.from == probe.to, leaves: probe.leaves, trip_mm }
+    }
+
+    /// Stretches up to its end.
+    pub(crate) fn end(&self) -> u32 {
+        self.stretch + u32::from(!self.stands)
     }
 }
 

@@ -5,8 +5,8 @@ use super::curves::{Point, cubic, nurbs, through};
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
 use super::stretch::{Stretch, StretchBlock};
-use super::{Item, Mode, PlacedRamp, Plan, travel};
-use crate::gcode::{Feed, PathMode, Program, Step, StepKind};
+use super::{Item, Mode, PlacedRamp, Plan, PlannedProbe, travel};
+use crate::gcode::{Feed, LineMove, PathMode, ProbeMove, Program, Step, StepKind};
 use crate::machine::{DefaultPathMode, Machine, PathSettings};
 use crate::toolpath::Element;
 use crate::toolpath::smooth::Move;
@@ -69,6 +69,17 @@ pub fn plan_program(
                 }
                 let (feed_mm_s, mode) = (mm_s(point.feed), point.mode);
                 points.push(Point { line: step.line, at: point.to.map(|c| c.to_mm()), feed_mm_s, mode });
+            }
+            StepKind::Probe(probe) => {
+                append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
+                let ProbeMove { from, to, end, feed, .. } = *probe;
+                travel::check_end(end, machine).map_err(at(step.line))?;
+                plan.probes.push(PlannedProbe::new(step.line, plan.stretches, probe));
+                if from != to {
+                    let line = LineMove { from, to, feed, mode: PathMode::ExactStop };
+                    run.push(path_move(step.line, Element::line(&line), mm_s(feed), line.mode, machine));
+                }
+                append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
             }
             StepKind::Dwell { .. } | StepKind::ToolChange { .. } | StepKind::Stop | StepKind::End => {
                 append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
@@ -191,5 +202,6 @@ fn close(open: &mut Vec<StretchBlock>, plan: &mut Plan, mode: Mode) -> Result<()
     plan.time_s += stretch.profile.time_s();
     plan.length_mm += stretch.length_mm();
     plan.items.push(Item::Stretch(stretch));
+    plan.stretches += 1;
     Ok(())
 }

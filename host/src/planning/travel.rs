@@ -7,6 +7,7 @@ use motion_kernel::program::Item;
 
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
+use crate::gcode::Length;
 use crate::machine::Machine;
 
 /// # Errors
@@ -35,6 +36,17 @@ pub(super) fn check(
         let [low_mm, high_mm] = axis.travel_mm.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let problem = Problem::Travel { axis: axis.name.clone(), found_mm, low_mm, high_mm };
         return Err(PlanningError { source_name: source_name.to_owned(), place: line.into(), problem });
+    }
+    Ok(())
+}
+
+/// Refuses a point beyond the travel: the programmed end of a probing move, wherever the move ends.
+pub(super) fn check_end(end: [Length; 3], machine: &Machine) -> Result<(), Problem> {
+    for (axis, found_mm) in machine.axes.iter().zip(end.map(Length::to_mm)) {
+        let Some([low_mm, high_mm]) = axis.travel_mm else { continue };
+        if found_mm < low_mm || found_mm > high_mm {
+            return Err(Problem::Travel { axis: axis.name.clone(), found_mm, low_mm, high_mm });
+        }
     }
     Ok(())
 }

@@ -6,7 +6,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MREC` |
-//! | 1 | version of this format, 2 |
+//! | 1 | version of this format, 3 |
 //! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
@@ -39,7 +39,7 @@ use crate::simulate::{Job, Number, RunInfo, StretchCorrection};
 use crate::trace::AXES;
 
 const MAGIC: [u8; 4] = *b"MREC";
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 
 /// A recorded run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -12,7 +12,8 @@ use super::error::RunError;
 use super::inject::Injections;
 use super::live::Script;
 use crate::machine::{AxisError, Machine};
-use crate::planning::{Executable, Item as PlanItem, Plan};
+use crate::planning::{Executable, Item as PlanItem, Plan, PlannedProbe};
+use crate::touch::Surface;
 use crate::trace::{AXES, PathLimits, RunTrace, TracedBlock};
 
 /// The number type of the kernel.
@@ -97,6 +98,10 @@ pub struct RunInfo {
     pub path_length_mm: f64,
     /// Duration of the plan, dwells included, stops not \[s\].
     pub planned_time_s: f64,
+    /// Probing moves, in path order.
+    pub probes: Vec<PlannedProbe>,
+    /// What they touch.
+    pub surface: Surface,
     /// What was accepted and not acted on.
     pub notices: Vec<String>,
 }
@@ -162,6 +167,8 @@ impl RunInfo {
             starts_mm: plan.items.iter().filter_map(start_mm).collect(),
             path_length_mm: plan.length_mm,
             planned_time_s: plan.time_s,
+            probes: plan.probes.clone(),
+            surface: machine.probe.clone().unwrap_or_default(),
             notices: plan.notices.clone(),
             ..Self::of_machine(machine)
         }

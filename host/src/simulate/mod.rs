@@ -15,6 +15,7 @@
 //! - `contour`: how far the machine is off its path;
 //! - `limit_share`: on how much of the path a limit is active;
 //! - [`run`](mod@run): the ticks;
+//! - [`probing`]: the probe, and where it trips;
 //! - [`summary`]: maxima, following and contour error;
 //! - [`session`]: one motion after the other, without a plan;
 //! - [`home`]: axes find their references;
@@ -32,6 +33,7 @@ pub mod live;
 pub mod hardware;
 pub mod run;
 pub mod summary;
+pub mod probing;
 pub mod session;
 pub mod home;
 pub mod jog;
@@ -39,6 +41,7 @@ pub mod jog;
 pub use error::RunError;
 pub use hardware::Hardware;
 pub use job::{Job, Number, RunInfo, RunOptions, StretchCorrection};
+pub use probing::Probed;
 pub use run::{on_simulated, run, run_on, run_with};
 pub use summary::{AxisSummary, RunSummary};
 

@@ -20,6 +20,7 @@ use super::hardware::{Hardware, SimulatedHardware, simulated};
 use super::inject::Injections;
 use super::job::{Job, Number, RunOptions, StretchCorrection};
 use super::limit_share::LimitShare;
+use super::probing::{Probed, Probing};
 use super::summary::{Collector, RunSummary};
 use crate::machine::Machine;
 use crate::planning::Plan;
@@ -117,6 +118,7 @@ fn run_in<R: Real>(
     let mut collector = Collector::default();
     let mut contour = Contour::default();
     let mut limit_share = LimitShare::new(info);
+    let mut probing = Probing::new(info);
     let mut commands = Commands::new(script.as_ref(), tick_s);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     let mut goes_on = true;
@@ -134,6 +136,7 @@ fn run_in<R: Real>(
         let row = trace_row(&trace, start_mm, &mut contour);
         collector.add(&row);
         limit_share.add(&row);
+        probing.tick(&trace);
         commands.add(&row);
         observe(&row);
         if let Some(fault) = trace.fault {
@@ -179,8 +182,11 @@ fn run_in<R: Real>(
         }
         let trace = *kernel.tick_corrected(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
+        probing.tick(&trace);
         last = Some(trace);
     }
+    summary.probes = probing.finish();
+    summary.notices.extend(summary.probes.iter().filter_map(Probed::disagreement));
     for (index, axis) in summary.axes.iter_mut().enumerate() {
         axis.name.clone_from(&info.axes[index].name);
         if let Some(trace) = &last {

@@ -1,5 +1,6 @@
 //! Figures of a run, collected tick by tick.
 
+use super::probing::Probed;
 use crate::trace::{AXES, RunEnd, TraceRow, TracedCommand, TracedFault};
 
 /// The figures of a run.
@@ -40,6 +41,8 @@ pub struct RunSummary {
     pub commands: Vec<TracedCommand>,
     /// Commands of the script that were not given, because the run ended before their ticks: `TICK:COMMAND`.
     pub unreached: Vec<String>,
+    /// What came of probing moves, in order; those that the run did not come to are left out.
+    pub probes: Vec<Probed>,
     /// Faults, in order.
     pub faults: Vec<TracedFault>,
     /// What was accepted and not acted on, and how the run was made.

@@ -6,6 +6,7 @@ mod drive;
 mod files;
 mod planning;
 mod reading;
+mod probing;
 mod running;
 mod spline;
 mod unfinished;

@@ -121,11 +121,15 @@ fn subroutines_lie_in_files_of_their_own() {
     );
     let refusal = workspace.refusal(&["read", "part.ngc", "--subroutines", "more"]);
     assert!(refusal.starts_with("more/other.ngc:3:1: found G1 without a feed"), "{refusal}");
-    workspace.put("more/other.ngc", "o<other> sub\nG0 Y1\no<other> endsub\n");
+    workspace.put("more/other.ngc", "o<other> sub\nG0 Y1 (MSG, over)\no<other> endsub\n");
     let steps = lines(&workspace.stdout(&["read", "part.ngc", "--json", "--subroutines", "more"]));
     // The lines are those of the program.
     assert_eq!((&steps[0]["line"], &steps[0]["to_mm"]), (&json!(1), &json!([5.0, 0.0, 0.0])));
     assert_eq!((&steps[1]["line"], &steps[1]["to_mm"]), (&json!(2), &json!([5.0, 1.0, 0.0])));
+    let message = json!({"line": 2, "kind": "message", "within": "more/other.ngc:2", "text": "over"});
+    assert!(steps.contains(&message), "{steps:?}");
+    let table = workspace.stdout(&["read", "part.ngc", "--subroutines", "more"]);
+    assert!(table.contains("note: line 2, more/other.ngc:2: message: over"), "{table}");
     let refusal = workspace.refusal(&["read", "part.ngc", "--subroutines", "mroe"]);
     assert!(
         refusal.starts_with("mroe: found ")

@@ -33,6 +33,7 @@ def arguments():
     parser.add_argument(
         "--tools", type=Path, help="tool table, for both, unless NAME.tbl is beside a program; without it 99 tools of 2 mm"
     )
+    parser.add_argument("--machine", type=Path, help="machine file for `motion`; without it the reference machine with its probe")
     parser.add_argument("--subroutines", type=Path, help="folder of subroutines, for both")
     parser.add_argument("--differences", type=Path, default=HERE / "differences.toml", help="differences with a reason")
     parser.add_argument("--refused", type=Path, default=HERE / "refused.toml", help="refused programs with a reason")
@@ -68,6 +69,7 @@ def outcome(name, path, motion, given, unread):
             result["not_comparable"] = str(reason)
     mine, other = result.pop("ours", None), result.pop("theirs", None)
     if mine is not None and other is not None:
+        result["probes"] = any(step.kind == "probe" for step in mine)
         result["unread"] = collections.Counter(step.kind for step in other if step.kind in unread)
         result["differences"], result["figures"] = compared(mine, [step for step in other if step.kind not in unread])
     return result
@@ -136,6 +138,8 @@ def report(results, known, unread):
     print("\n".join(counted(result["theirs_refused"] for result in mine)))
     print(f"not comparable: {len(apart)}")
     print("\n".join(f"  {result['name']}: {result['not_comparable']}" for result in apart))
+    print("compared up to the first probing move, which LinuxCNC's interpreter alone knows no end of: "
+          + (", ".join(result["name"] for result in both if result["probes"]) or "none"))
     skipped = sum((result["unread"] for result in both), collections.Counter())
     for kind, reason in unread.items():
         print(f"not compared: {skipped[kind]} of {kind} ({reason})")
@@ -169,11 +173,14 @@ def main():
     with open(options.differences, "rb") as file:
         listing = tomllib.load(file)
     unread = {entry["kind"]: entry["reason"] for entry in listing.get("unread", [])}
-    given = {name: getattr(options, name) for name in ("parameters", "tools", "subroutines")}
+    given = {name: getattr(options, name) for name in ("parameters", "tools", "subroutines", "machine")}
     with ProcessPoolExecutor(options.jobs) as pool, tempfile.TemporaryDirectory() as folder:
         if given["tools"] is None:
             given["tools"] = Path(folder, "tools.tbl")
             given["tools"].write_text(tools.alike(count=99, diameter=2))
+        if given["machine"] is None:
+            given["machine"] = Path(folder, "machine.toml")
+            given["machine"].write_text(reading.with_probe(options.motion))
         tasks = [pool.submit(outcome, name, path, options.motion, given, unread) for name, path in programs]
         results = [task.result() for task in tasks]
     is_right = report(results, listing.get("difference", []), unread)

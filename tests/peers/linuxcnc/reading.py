@@ -78,6 +78,14 @@ def with_beginning(text):
     return "".join(lines)
 
 
+def with_probe(motion):
+    """The reference machine's file with its probe, which is commented there."""
+    file = subprocess.run([Path(motion).resolve(), "machine"], capture_output=True, text=True, check=True).stdout
+    before, probe, after = file.partition("#[[probe.box]]")
+    touch, blank, after = after.partition("\n\n")
+    return before + probe[1:] + touch.replace("\n#low_mm", "\nlow_mm").replace("\n#high_mm", "\nhigh_mm") + blank + after
+
+
 def by_motion(motion, program, given):
     """Steps of this project's reader."""
     options = [word for name, path in given.items() if path for word in (f"--{name}", path.resolve())]

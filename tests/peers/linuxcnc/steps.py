@@ -4,7 +4,7 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 INCH_MM = 25.4
 # Indices of first axis, second axis and normal.
@@ -144,7 +144,8 @@ class Merging:
 
     def straight_probe(self, call):
         self.move(call, "probe")
-        self.is_position_known = True
+        # It stops before and behind it, whatever the path mode.
+        self.steps[-1] = replace(self.steps[-1], path=None)
 
     def rigid_tap(self, call):
         name, line, *xyz = call
@@ -262,7 +263,8 @@ def pieces_of_curve(count):
 
 
 def of_linuxcnc(calls, order):
-    """Steps of the calls that `calls.py` prints and of the text that `rs274` prints."""
+    """Steps of the calls that `calls.py` prints and of the text that `rs274` prints, up to the first probing move: where it trips
+    and rests neither voice knows."""
     merging = Merging(calls)
     while merging.at < len(calls) and calls[merging.at][0] != "begin":
         getattr(merging, calls[merging.at][0])(calls[merging.at])
@@ -273,6 +275,8 @@ def of_linuxcnc(calls, order):
         if name in ("PROGRAM_END", "FINISH"):
             break
         merging.in_order(name, arguments)
+        if merging.steps and merging.steps[-1].kind == "probe":
+            return with_length(merging.steps)
     rest = [call[0] for call in calls[merging.at :] if call[0] in MOVES.values()]
     if rest:
         raise NotComparable(f"{len(rest)} calls in full doubles after the end")
@@ -297,7 +301,7 @@ def nine(point):
 
 
 def of_motion(objects):
-    """Steps of the objects that `motion read --json` prints."""
+    """Steps of the objects that `motion read --json` prints, up to the first probing move."""
     steps = []
     for found in objects:
         kind, line = found["kind"], found["line"]
@@ -308,6 +312,9 @@ def of_motion(objects):
             path = (tolerance_mm, tolerance_mm if merging_mm is None else merging_mm) if found["path"] == "blend" else ()
             curve = {"arc": arc_of_motion, "cubic": cubic_of_motion}.get(kind, lambda found: {})(found)
             steps.append(Step("through" if kind == "through" else "move", line, to, found["feed_mm_min"], path, **curve))
+        elif kind == "probe":
+            steps.append(Step("probe", line, nine(found["end_mm"]), found["feed_mm_min"]))
+            break
         elif kind == "dwell":
             steps.append(Step("dwell", line, value=found["dwell_s"]))
         elif kind == "tool":

@@ -279,6 +279,17 @@ class Steps(unittest.TestCase):
             with self.assertRaises(steps.NotComparable):
                 steps.of_linuxcnc(calls, order)
 
+    def test_a_probing_move_ends_the_comparison(self):
+        probe = {"line": 3, "kind": "probe", "end_mm": [25.4, 0, -25.4], "feed_mm_min": 60.0}
+        mine = steps.of_motion([probe, {"line": 4, "kind": "dwell", "dwell_s": 1}])
+        calls = [["begin", 0], ["set_feed_rate", 2, 60 / 25.4], ["straight_probe", 3, 1.0, 0.0, -1.0, *[0.0] * 6],
+                 ["dwell", 4, 2.0]]
+        order = '1 N.. COMMENT("begin")\n2 N.. STRAIGHT_PROBE(25.4, 0, -25.4)\n3 N.. DWELL(2.0)\n'
+        other = steps.of_linuxcnc(calls, order)
+        self.assertEqual([step.kind for step in mine + other], ["probe", "probe"])
+        self.assertEqual(self.whats(mine, other), [])
+        self.assertEqual(self.whats([replace(mine[0], to=other[0].to[:2] + (0.0,) * 7)], other), ["end"])
+
     def test_a_cubic_curve_is_compared_at_its_points(self):
         pieces = steps.pieces_of_curve(4)
         ends = {"from_mm": [0, 0, 0], "to_mm": [3, 0, 0], "controls_mm": [[1, 0], [-1, 0]], "feed_mm_min": 6.0}
