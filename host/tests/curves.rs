@@ -102,6 +102,38 @@ fn a_g5_is_the_bezier_curve_of_its_control_points() {
     assert_eq!(planned(inches).expect("a plan").time_s, planned(mm).expect("a plan").time_s);
 }
 
+/// Control points are taken as they are, whatever the distance mode, in a turned system too.
+#[test]
+fn a_g51_is_the_quadratic_curve_of_its_control_point() {
+    let text = "G1 X1 Y2 F600\nG5.1 I4 J6 X11 Y5\nI3 J-9 X20 Y2\nM2\n";
+    let curves = [
+        vec![[1.0, 2.0, 0.0], [5.0, 8.0, 0.0], [11.0, 5.0, 0.0]],
+        vec![[11.0, 5.0, 0.0], [14.0, -4.0, 0.0], [20.0, 2.0, 0.0]],
+    ];
+    let plan = planned(text).expect("a plan");
+    let points = driven(&plan, 50);
+    let mut worst = 0.0_f64;
+    for &point in &points {
+        let off = |points: &Vec<Vector>| from_curve(point, &|u| casteljau(points.clone(), u));
+        worst = worst.max(curves.iter().map(off).fold(f64::INFINITY, f64::min));
+    }
+    for curve in &curves {
+        for sample in 0..=100 {
+            let at = casteljau(curve.clone(), f64::from(sample) / 100.0);
+            let gap = points.iter().map(|&point| distance(at, point)).fold(f64::INFINITY, f64::min);
+            assert!(gap < 0.2, "{at:?}: {gap} mm from what is driven");
+        }
+    }
+    println!("worst {worst:e} mm");
+    assert!(worst < DEVIATION_MM, "{worst:e} mm");
+    let incremental = text.replace("G1 X1 Y2 F600\n", "G1 X1 Y2 F600\nG91 ").replace("X11 Y5", "X10 Y3");
+    let incremental = incremental.replace("X20 Y2", "X9 Y-3");
+    assert_eq!(planned(&incremental).expect("a plan").time_s, plan.time_s);
+    let turned = text.replace("G1 X1", "G10 L2 P1 R90\nG1 X1");
+    let end = *driven(&planned(&turned).expect("a plan"), 50).last().expect("points");
+    assert!(distance(end, [-2.0, 20.0, 0.0]) < 1e-6, "{end:?}");
+}
+
 /// Through every point, in one motion, whose jerk does not step.
 #[test]
 fn a_g55_goes_through_its_points() {
@@ -171,6 +203,12 @@ fn what_has_no_curve_is_refused_with_its_line() {
         ("F600\nG5.5 X1\nX2 Y1\nX3\nM2\n", "curves.ngc:2: found 4 points", "expected at least 6"),
         ("F600\nG1 X1\nG5 X5 I1 J0 P-1 Q0\nG5 X9 I-8 J0 P8 Q0\n", "curves.ngc:4: found", "expected"),
         ("F600\nG5 X5 I0 J0 P0 Q0\n", "curves.ngc:2: found", "expected"),
+        ("F600\nG5.1 X5 I2\n", "curves.ngc:2:9: found I2 alone", "expected I and J"),
+        ("F600\nG5.1 X5\n", "curves.ngc:2:1: found G5.1 without I and J", "expected"),
+        ("F600\nG18 G5.1 X5 I1 J1\n", "curves.ngc:2:5: found G5.1 in the ZX plane", "expected"),
+        ("F600\nG5.1 X5 I1 J1 Z2\n", "curves.ngc:2:15: found Z2", "expected X and Y only"),
+        ("F600\nG5.1 X5 I1 J1 P2\n", "curves.ngc:2:15: found P2", "expected no such word"),
+        ("F600\nG5.1 X5 I1 J1\nG5 X9 P-1 Q0\n", "curves.ngc:3:1: found a first G5", "expected"),
     ] {
         let error = planned(text).expect_err(text);
         println!("{error}");

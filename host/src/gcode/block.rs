@@ -31,7 +31,7 @@ fn slot_of(letter: u8) -> Option<usize> {
 /// Modal groups of G words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GGroup {
-    /// G0 G1 G2 G3 G5 G5.2 G5.5 G6.2 G33 G33.1 G38.2 to G38.5 G73 G74 G76 G80 to G86 G88 G89.
+    /// G0 G1 G2 G3 G5 G5.1 G5.2 G5.5 G6.2 G33 G33.1 G38.2 to G38.5 G73 G74 G76 G80 to G86 G88 G89.
     Motion,
     /// G4 G5.3 G6.3 G10 G28 G28.1 G30 G30.1 G52 G53 G92: in force for their line.
     NonModal,
@@ -97,7 +97,7 @@ const M_GROUPS: usize = MGroup::User as usize + 1;
 fn g_group(tenths: i64) -> Option<GGroup> {
     Some(match tenths {
         330 | 331 | 382..=385 | 740 | 760 | 840 => GGroup::Motion,
-        0 | 10 | 20 | 30 | 50 | 52 | 55 | 62 | 730 | 800 | 810 | 820 | 830 | 850 | 860 | 880 | 890 => {
+        0 | 10 | 20 | 30 | 50 | 51 | 52 | 55 | 62 | 730 | 800 | 810 | 820 | 830 | 850 | 860 | 880 | 890 => {
             GGroup::Motion
         }
         40 | 53 | 63 | 100 | 280 | 281 | 300 | 301 | 520 | 530 | 920 => GGroup::NonModal,
@@ -364,8 +364,8 @@ impl<'a> Block<'a> {
             (b'^', "a move in the XY plane"),
             (b'E', "M66, M67 or M68"),
             (b'H', "G43 or G43.2"),
-            (b'I', "G2, G3, G5 or G10"),
-            (b'J', "G2, G3, G5 or G10"),
+            (b'I', "G2, G3, G5, G5.1 or G10"),
+            (b'J', "G2, G3, G5, G5.1 or G10"),
             (b'K', "G2, G3 or G6.2"),
             (b'L', "G5.2, G10, G41.1, G42.1, M66, M98 or a drilling cycle"),
             (
@@ -404,6 +404,7 @@ impl<'a> Block<'a> {
             || match motion {
                 Some(motion) if motion.is_arc() => own(b"IJKR"),
                 Some(Motion::Cubic) => own(b"IJPQ"),
+                Some(Motion::Quadratic) => own(b"IJ"),
                 Some(Motion::Nurbs(kind)) => own(kind.letters()),
                 _ => false,
             }

@@ -86,7 +86,7 @@ pub enum Problem {
     #[error("found {word}, expected X, Y or Z: the machine has no such axis")]
     NoSuchAxis { word: String },
     #[error(
-        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.2 G5.3 G5.5 G6.2 G6.3 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G38.2 to G38.5 G40 to G42.1 \
+        "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.1 G5.2 G5.3 G5.5 G6.2 G6.3 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G38.2 to G38.5 G40 to G42.1 \
          G43 G43.1 G43.2 G49 G52 G53 G54 to G59.3 G61 G61.1 G64 G73 G80 to G83 G85 G86 G88 G89 G90 G90.1 G91 G91.1 \
          G92 to G92.3 G93 to G99"
     )]
@@ -119,7 +119,7 @@ pub enum Problem {
     #[error("found {word}, expected a number that is not negative")]
     Negative { word: String },
     #[error(
-        "found {word} without a motion mode, expected G0, G1, G2, G3, G5, G5.2, G5.5, G6.2 or a drilling cycle in this line \
+        "found {word} without a motion mode, expected G0, G1, G2, G3, G5, G5.1, G5.2, G5.5, G6.2 or a drilling cycle in this line \
          or before it"
     )]
     AxisWithoutMotion { word: String },
@@ -241,16 +241,18 @@ pub enum Problem {
     #[error("found {word} for an arc that ends where it starts, expected {}: the radius leaves the centre open",
         .plane.offset_letters())]
     ArcWithoutChord { word: String, plane: Plane },
-    #[error("found G5 in the {plane} plane, expected it in the XY plane (G17)")]
-    SplinePlane { plane: Plane },
-    #[error("found {word} in a line of G5, expected X and Y only")]
+    #[error("found {motion} in the {plane} plane, expected it in the XY plane (G17)")]
+    SplinePlane { motion: &'static str, plane: Plane },
+    #[error("found {word} in a line of G5 or G5.1, expected X and Y only")]
     SplineOutsidePlane { word: String },
-    #[error("found {word} alone in a line of G5, expected {first} and {second}")]
+    #[error("found {word} alone in a line of G5 or G5.1, expected {first} and {second}")]
     SplineControlIncomplete { word: String, first: char, second: char },
     #[error(
         "found a first G5 without I and J, expected the offset from its start to its first control point"
     )]
     SplineWithoutStart,
+    #[error("found G5.1 without I and J, expected the offset from its start to its control point")]
+    QuadraticWithoutControl,
     #[error("found {points} control points, expected {order} at least: the order of the NURBS")]
     NurbsPoints { points: usize, order: u32 },
     #[error("found {found}, expected {expected}")]

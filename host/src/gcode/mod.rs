@@ -31,7 +31,7 @@
 //! 5. `interpreter`: the slots executed in the order RS-274 prescribes, whatever the order in the line: comments for the
 //!    operator; feed mode, feed; `accessories`: spindle, tool, coolant, outputs; dwell; plane, units, path mode, distance
 //!    modes; `offsets`: tool length, coordinate system, G10, G28, G30, G52, G92; `motion`; stop or end.
-//! 6. `motion`: `arc` gives centre, radii and sweep of G2 and G3, `spline` and `nurbs` the control points of G5, G5.2 and G6.2, `cycle` the moves of
+//! 6. `motion`: `arc` gives centre, radii and sweep of G2 and G3, `spline` and `nurbs` the control points of G5, G5.1, G5.2 and G6.2, `cycle` the moves of
 //!    a drilling cycle, `probe` where a probing move ends, `polar` the point of `@` and `^`; `frame` makes machine coordinates of the program's.
 //!
 //! # Dialect
@@ -45,6 +45,7 @@
 //! | `@` `^` | X and Y as the distance from the program's zero and the angle about it \[°\] |
 //! | I J K, R, P | centre of an arc (relative, or absolute after G90.1), or its radius (negative: more than half a turn); P whole turns. Start and end radius may differ as [`RADIUS_MISMATCH_RATIO`] says |
 //! | G5, X Y, \[I J\] P Q | cubic Bézier curve in XY: I J from its start to its first control point, P Q from its end to its second; modal. Without I J it continues the G5 before it, whose P Q are turned round. Control points that are no point of their own (I0 J0) or fold back make a curve that stands still, which is refused |
+//! | G5.1, X Y I J | quadratic Bézier curve in XY: I J from its start to its control point; modal |
 //! | G5.5, X Y Z | quintic spline through points, one a line, from where the machine is; modal. At least five points; a line with the word G5.5 begins another spline. Of this project alone |
 //! | G5.2 \[P\] \[X Y P\] \[L\], X Y P, G5.3 | NURBS in the plane (here XY) from where the machine is, with uniform knots: control points with weights P, one a line; P alone in the first line is the weight of its start, otherwise 1; L: order, without it 3. Under G91 all control points count from the start. As in LinuxCNC 2.9, in ZX and YZ as in 2.10 |
 //! | G6.2 X Y R K P Q, X Y R K, G6.2 K | NURBS in the plane of arcs with knots K, whole numbers: control points with weights R; P: order; Q1 to Q3, a way of approximation, is not acted on. The first K stands in as many lines as the order, as does the last, whose lines end the NURBS and are no control points. A line leads to its first point. G6.3 may follow. As in LinuxCNC 2.10 |

@@ -24,6 +24,8 @@ pub(super) enum Motion {
     CounterClockwise,
     /// G5.
     Cubic,
+    /// G5.1.
+    Quadratic,
     /// G5.5.
     Through,
     /// G5.2 and G6.2.
@@ -43,6 +45,7 @@ impl Motion {
             20 => Self::Clockwise,
             30 => Self::CounterClockwise,
             50 => Self::Cubic,
+            51 => Self::Quadratic,
             52 => Self::Nurbs(Kind::Uniform),
             55 => Self::Through,
             62 => Self::Nurbs(Kind::Knotted),
@@ -59,6 +62,7 @@ impl Motion {
             Self::Clockwise => "G2",
             Self::CounterClockwise => "G3",
             Self::Cubic => "G5",
+            Self::Quadratic => "G5.1",
             Self::Through => "G5.5",
             Self::Nurbs(kind) => kind.word(),
             Self::Probe(kind) => kind.word(),
@@ -74,6 +78,7 @@ impl Motion {
             Self::Clockwise => 20,
             Self::CounterClockwise => 30,
             Self::Cubic => 50,
+            Self::Quadratic => 51,
             Self::Through => 55,
             Self::Nurbs(kind) => kind.tenths(),
             Self::Probe(kind) => kind.tenths(),
@@ -92,6 +97,7 @@ impl Motion {
             Self::Rapid | Self::Feed | Self::Through | Self::Probe(_) => false,
             Self::Clockwise | Self::CounterClockwise => matches!(letter, b'I' | b'J' | b'K' | b'R' | b'P'),
             Self::Cubic => matches!(letter, b'I' | b'J' | b'P' | b'Q'),
+            Self::Quadratic => matches!(letter, b'I' | b'J'),
             Self::Nurbs(kind) => kind.letters().contains(&letter),
             Self::Cycle(cycle) => cycle.takes(letter),
         }
@@ -162,7 +168,7 @@ impl Default for Overrides {
 /// The modes in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Modal {
-    /// G0 G1 G2 G3 G5 G5.2 G5.5 G6.2 G38.2 to G38.5, drilling cycles; none after G80.
+    /// G0 G1 G2 G3 G5 G5.1 G5.2 G5.5 G6.2 G38.2 to G38.5, drilling cycles; none after G80.
     pub(super) motion: Option<Motion>,
     /// G17 G18 G19.
     pub(super) plane: Plane,

@@ -65,7 +65,7 @@ impl Interpreter {
             Motion::Cycle(cycle) => self.cycle(block, cycle, feed, first),
             Motion::Rapid | Motion::Feed => self.line(block, feed, first, offset),
             Motion::Clockwise | Motion::CounterClockwise => self.circular(block, motion, feed, first, offset),
-            Motion::Cubic => self.cubic(block, feed, first, offset),
+            Motion::Cubic | Motion::Quadratic => self.cubic(block, motion, feed, first, offset),
             Motion::Probe(kind) => self.probe(block, kind, feed, first, offset),
             Motion::Through => self.through(block, code.is_some(), feed, first, offset),
         }
@@ -111,18 +111,22 @@ impl Interpreter {
         Ok(())
     }
 
-    /// G5.
+    /// G5 and G5.1.
     fn cubic(
         &mut self,
         block: &Block<'_>,
+        motion: Motion,
         feed: Feed,
         first: Word<'_>,
         offset: usize,
     ) -> Result<(), Located> {
         let [work, to] = self.target(block, first)?;
         let (from, mode) = (self.machine, self.modal.path);
-        let controls_mm = spline::controls_mm(block, &self.modal, self.cubic_before_mm, offset)?;
-        self.untimed(Motion::Cubic, offset)?;
+        let controls_mm = match motion {
+            Motion::Quadratic => spline::quadratic_mm(block, &self.modal, [self.work, work], offset)?,
+            _ => spline::cubic_mm(block, &self.modal, self.cubic_before_mm, offset)?,
+        };
+        self.untimed(motion, offset)?;
         (self.work, self.machine) = (work, to);
         if from == to && controls_mm == [[0.0; 2]; 2] {
             return Ok(());
@@ -130,7 +134,8 @@ impl Interpreter {
         // What the next curve continues is in the program's directions.
         let turned_mm = controls_mm.map(|control| self.turned_mm(control));
         self.step(StepKind::Cubic(CubicMove { from, to, controls_mm: turned_mm, feed, mode }))?;
-        self.cubic_before_mm = Some(controls_mm[1]);
+        // Only a G5 continues a G5.
+        self.cubic_before_mm = (motion == Motion::Cubic).then_some(controls_mm[1]);
         Ok(())
     }
 
