@@ -14,6 +14,7 @@ mod gcode;
 mod limit_share;
 mod mutation;
 mod nurbs;
+mod outputs;
 mod smoothness;
 mod spline;
 

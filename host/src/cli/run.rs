@@ -4,11 +4,13 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::Args;
+use motion_kernel::hal::OutputState;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::{self, Outputs, Written};
+use super::read::direction;
 use super::table::{self, Align};
 use super::write_json;
 use crate::files::{Files, OutputFile};
@@ -18,7 +20,7 @@ use crate::recording::Recorder;
 use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
 use crate::simulate::{self, AxisSummary, Job, RunError, RunOptions, RunSummary};
-use crate::trace::{RunEnd, TracedCommand, TracedFault};
+use crate::trace::{RunEnd, TracedCommand, TracedFault, TracedSwitch};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -35,7 +37,9 @@ Exit status: 0 the program finished, 1 a fault, 3 held, 4 aborted, 5 a command o
 be written. In all these cases the summary is printed, and the files are written.
 
 JSON: finished, stopped_by (null, \"hold\", \"single block\", \"override\", \"abort\" or \"fault\"), reached_mm, reached_line
-(how far the run came), commands_not_reached, and the figures of the run.";
+(how far the run came), commands_not_reached, outputs, and the figures of the run. outputs are the switches of spindle and
+coolant: tick (before which), line (null: all off by an abort or a fault), spindle (\"clockwise\", \"counterclockwise\" or
+null: off), speed_rpm, flood, mist.";
 
 /// Run a program: plan it, execute it tick by tick with the real-time kernel, on simulated axes.
 #[derive(Debug, Args)]
@@ -170,6 +174,7 @@ pub(super) struct RunJson<'run> {
     contour_error_um_max: f64,
     commands: &'run [TracedCommand],
     commands_not_reached: &'run [String],
+    outputs: Vec<SwitchJson>,
     faults: Vec<FaultJson<'run>>,
     notices: &'run [String],
 }
@@ -189,6 +194,16 @@ struct AxisJson<'run> {
     following_error_um_rms: f64,
     end_error_counts: i64,
     output_v_max: f64,
+}
+
+#[derive(Serialize)]
+struct SwitchJson {
+    tick: u64,
+    line: Option<u32>,
+    spindle: Option<&'static str>,
+    speed_rpm: f64,
+    flood: bool,
+    mist: bool,
 }
 
 #[derive(Serialize)]
@@ -213,6 +228,11 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         fault: &fault.fault,
         detail: &fault.detail,
     };
+    let switch = |switch: &TracedSwitch| {
+        let OutputState { spindle, speed_rpm, flood, mist } = switch.to;
+        let spindle = direction(spindle);
+        SwitchJson { tick: switch.tick, line: switch.line, spindle, speed_rpm, flood, mist }
+    };
     RunJson {
         finished: summary.end == RunEnd::Finished,
         stopped_by: summary.end.stopped_by(),
@@ -234,6 +254,7 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         contour_error_um_max: summary.contour_error_um_max,
         commands: &summary.commands,
         commands_not_reached: &summary.unreached,
+        outputs: summary.outputs.iter().map(switch).collect(),
         faults: summary.faults.iter().map(fault).collect(),
         notices: &summary.notices,
     }
@@ -287,6 +308,15 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
         })
         .collect();
     table::write(&columns, &rows, out)?;
+    if let (Some(first), Some(last)) = (summary.outputs.first(), summary.outputs.last()) {
+        let (number, tick) = (summary.outputs.len(), first.tick);
+        write!(out, "\n  spindle and coolant: {number} switches, the first before tick {tick}")?;
+        if last.to == OutputState::OFF {
+            writeln!(out, ", all off before tick {}", last.tick)?;
+        } else {
+            writeln!(out, ", not all off at the end")?;
+        }
+    }
     if !(summary.commands.is_empty() && summary.faults.is_empty() && summary.notices.is_empty()) {
         writeln!(out)?;
     }

@@ -14,7 +14,7 @@ use super::nurbs;
 use super::options::ReadOptions;
 use super::parameter_file;
 use super::parameters::{Parameters, SELECTED};
-use super::program::{Message, Notice, NoticeKind, Program, Step, StepKind};
+use super::program::{Message, Notice, NoticeKind, Outputs, Program, Step, StepKind};
 use super::tool::ToolTable;
 
 /// Feeds beyond are no feeds \[mm/min\].
@@ -52,6 +52,8 @@ pub(super) struct Interpreter {
     pub(super) tool_at: Option<[Length; 3]>,
     pub(super) parameters: Parameters,
     pub(super) tools: Tools,
+    /// What spindle and coolant do after the steps up to here.
+    pub(super) outputs: Outputs,
     pub(super) cycle: CycleState,
     /// The NURBS whose lines are being read.
     pub(super) nurbs: Option<nurbs::Open>,
@@ -114,6 +116,7 @@ impl Interpreter {
                 ..Tools::default()
             },
             parameters,
+            outputs: Outputs::default(),
             cycle: CycleState::default(),
             nurbs: None,
             cubic_before_mm: None,
@@ -226,6 +229,7 @@ impl Interpreter {
     pub(super) fn end(&mut self) -> Result<(), Located> {
         self.unended_nurbs().map_or(Ok(()), Err)?;
         self.end_track(0)?;
+        self.all_off()?;
         self.step(StepKind::End)?;
         self.parameters.set(SELECTED, 1.0);
         self.ended = true;
@@ -327,6 +331,7 @@ impl Interpreter {
         }
         self.modal = Modal { motion: self.modal.motion, ..saved.modal };
         self.frame.tool = saved.tool;
+        self.switch()?;
         self.select(saved.system, 0)
     }
 }
@@ -370,9 +375,12 @@ mod tests {
         assert!(matches!(
             kinds[..],
             [
+                StepKind::Switch(_),
                 StepKind::Dwell { .. },
                 StepKind::Line(LineMove { feed: Feed::MmPerMin(_), .. }),
-                StepKind::Stop
+                StepKind::Stop,
+                // At the end of the file.
+                StepKind::Switch(_)
             ]
         ));
         assert_eq!(last_mm("G0 X1 G20"), [25.4, 0.0, 0.0]);

@@ -6,7 +6,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MREC` |
-//! | 1 | version of this format, 2 |
+//! | 1 | version of this format, 3 |
 //! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
@@ -39,7 +39,7 @@ use crate::simulate::{Job, Number, RunInfo, StretchCorrection};
 use crate::trace::AXES;
 
 const MAGIC: [u8; 4] = *b"MREC";
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 
 /// A recorded run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -151,7 +151,8 @@ impl Recording {
     fn check<R: Real>(&self) -> Result<(), RecordingError> {
         let reader = Reader::<AXES>::new(&self.program)?;
         reader.guards()?.ok_or(RecordingError::Unguarded)?;
-        program::check::<R, AXES, _>(reader.header(), reader.items()).map_err(|error| match error {
+        let items = program::switches_as_stops(reader.items());
+        program::check::<R, AXES, _>(reader.header(), items).map_err(|error| match error {
             CheckError::Item { cause: SupplyError::Source(error), .. } => error.into(),
             error => RecordingError::Check(error),
         })

@@ -160,7 +160,7 @@ fn strangers_are_named() {
     );
     let mut newer = bytes.clone();
     newer[4] = 9;
-    assert_eq!(message(&newer), "found a recording of format 9, expected format 2");
+    assert_eq!(message(&newer), "found a recording of format 9, expected format 3");
     assert!(message(&bytes[..bytes.len() - 1]).contains("damaged or not whole"));
 
     // With a checksum that fits.

@@ -13,6 +13,7 @@
 //! - [`hardware`]: the simulated machine as the kernel's hardware;
 //! - `commands`: what became of them;
 //! - `contour`: how far the machine is off its path;
+//! - `switches`: spindle and coolant;
 //! - `limit_share`: on how much of the path a limit is active;
 //! - [`run`](mod@run): the ticks;
 //! - [`summary`]: maxima, following and contour error;
@@ -30,6 +31,7 @@ pub mod inject;
 mod limit_share;
 pub mod live;
 pub mod hardware;
+mod switches;
 pub mod run;
 pub mod summary;
 pub mod session;

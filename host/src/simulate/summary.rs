@@ -1,6 +1,6 @@
 //! Figures of a run, collected tick by tick.
 
-use crate::trace::{AXES, RunEnd, TraceRow, TracedCommand, TracedFault};
+use crate::trace::{AXES, RunEnd, TraceRow, TracedCommand, TracedFault, TracedSwitch};
 
 /// The figures of a run.
 #[derive(Clone, Debug, Default)]
@@ -17,7 +17,7 @@ pub struct RunSummary {
     pub tick_s: f64,
     /// Duration of the plan, dwells included, stops not \[s\].
     pub planned_time_s: f64,
-    /// Executed duration, dwells included, stops not \[s\].
+    /// Executed duration, dwells included, stops and the ticks in which outputs were switched not \[s\].
     pub time_s: f64,
     /// Path length \[mm\].
     pub path_length_mm: f64,
@@ -40,6 +40,8 @@ pub struct RunSummary {
     pub commands: Vec<TracedCommand>,
     /// Commands of the script that were not given, because the run ended before their ticks: `TICK:COMMAND`.
     pub unreached: Vec<String>,
+    /// Switches of spindle and coolant, in order.
+    pub outputs: Vec<TracedSwitch>,
     /// Faults, in order.
     pub faults: Vec<TracedFault>,
     /// What was accepted and not acted on, and how the run was made.
