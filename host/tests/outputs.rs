@@ -235,7 +235,7 @@ fn plans_refuse_what_outputs_cannot_do() {
     let plan = plan.expect("a plan");
     assert!(plan.items.is_empty() && plan.time_s == 0.0 && plan.notices.len() == 3, "{:?}", plan.notices);
     // The words that a machine acts on are not noticed, the others are.
-    let plan = planned("M3 S9\nM8\nG0 X1\nM2", &Machine { coolant: None, ..machine }).expect("a plan");
+    let plan = planned("G61 M3 S9\nM8\nG0 X1\nM2", &Machine { coolant: None, ..machine }).expect("a plan");
     assert_eq!(plan.notices, ["line 2: M7, M8, M9 are not acted on: there is no coolant"]);
 }
 
