@@ -33,7 +33,7 @@ fn machine() -> Machine {
 fn run(text: &str, options: &RunOptions<'_>) -> (RunSummary, Vec<TraceRow>) {
     let (machine, mut rows) = (machine(), Vec::new());
     let plan = planned(text, &machine).expect("a plan");
-    let summary = run_with(options, &plan, &machine, &mut |row| rows.push(row.clone())).expect("a run");
+    let summary = run_with(options, &plan, &machine, &mut |row| rows.push(*row)).expect("a run");
     (summary, rows)
 }
 

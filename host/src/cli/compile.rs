@@ -47,7 +47,7 @@ pub struct CompileArguments {
     #[arg(long)]
     live: bool,
     /// Leave out the words of spindle and coolant (M3, M4, M5, S, M7, M8, M9) that the machine has no output for: it has
-    /// those of its file's tables [spindle] and [coolant]. Without this, a program that needs another one is refused.
+    /// those of the tables `spindle` and `coolant` of its file. Without this, a program that needs another one is refused.
     #[arg(long)]
     no_spindle: bool,
 }

@@ -32,9 +32,12 @@ pub(super) enum Storage<'script, R: Real> {
 
 /// What fills them.
 pub(super) enum Background<'a, R: Real, I> {
-    Plain(Box<(Feeder<'a, R, AXES>, Supply<R, AXES, Switching<I>, Infallible>)>),
+    Plain(Box<Plain<'a, R, I>>),
     Live(Box<Live<'a, R, I>>),
 }
+
+/// Without live control.
+type Plain<'a, R, I> = (Feeder<'a, R, AXES>, Supply<R, AXES, Switching<I>, Infallible>);
 
 /// Under live control.
 pub(super) struct Live<'a, R: Real, I> {
