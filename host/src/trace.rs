@@ -4,6 +4,7 @@
 
 use std::borrow::Cow;
 
+use motion_kernel::hal::OutputState;
 use serde::{Deserialize, Serialize};
 
 /// Axes of the machine.
@@ -36,10 +37,23 @@ pub struct RunTrace {
     pub end: RunEnd,
     /// Commands of live control, in order.
     pub commands: Vec<TracedCommand>,
+    /// Switches of spindle and coolant, in order.
+    pub outputs: Vec<TracedSwitch>,
     /// Faults, in order.
     pub faults: Vec<TracedFault>,
     /// What was accepted and not acted on, and other remarks for the reader.
     pub notices: Vec<String>,
+}
+
+/// A switch of spindle and coolant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TracedSwitch {
+    /// The tick before which it happened.
+    pub tick: u64,
+    /// The line of the program, from 1; none for all off after an abort or a fault.
+    pub line: Option<u32>,
+    /// What they do from then on.
+    pub to: OutputState,
 }
 
 /// How a run ended.

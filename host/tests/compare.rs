@@ -121,7 +121,7 @@ fn the_least_time_is_that_of_small_steps() {
             .map(|item| match item {
                 Item::Stretch(stretch) => stepped_s(stretch, 10_000),
                 Item::Dwell { seconds, .. } => *seconds,
-                Item::Stop { .. } => 0.0,
+                Item::Switch { .. } | Item::Stop { .. } => 0.0,
             })
             .sum();
         let least = least_time_s(&plan);

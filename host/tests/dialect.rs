@@ -1,9 +1,12 @@
 //! Programs as other controllers take them: subroutines, loops, offsets, tools, drilling cycles, saved modes. What is
 //! expected here was seen to be what LinuxCNC's interpreter makes of the same lines (`tests/peers/linuxcnc`).
 
-use motion_host::gcode::{self, Feed, Length, ParameterFile, Program, ReadOptions, StepKind, ToolTable};
-use motion_host::machine::Machine;
-use motion_host::planning::{Mode, plan_program};
+use motion_host::gcode::{
+    self, Feed, Length, Outputs, ParameterFile, Program, ReadOptions, SpindleSpeed, StepKind, ToolTable,
+};
+use motion_host::machine::{CoolantSettings, Machine, SpindleSettings};
+use motion_host::planning::{Item, Mode, plan_program};
+use motion_kernel::hal::{OutputState, Spindle};
 
 fn read(text: &str) -> Program {
     gcode::read("a.ngc", text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
@@ -22,10 +25,27 @@ fn shown(kind: &StepKind) -> String {
         StepKind::Arc(arc) => format!("a {}", point(arc.to)),
         StepKind::Dwell { seconds } => format!("dwell {seconds}"),
         StepKind::ToolChange { tool } => format!("T{tool}"),
+        StepKind::Switch(to) => switched(to),
         StepKind::Stop => "stop".to_owned(),
         StepKind::End => "end".to_owned(),
         other => format!("{other:?}"),
     }
+}
+
+/// `m3 1000` and the like, with `mist` and `flood`; `off` if there is nothing on.
+fn switched(to: &Outputs) -> String {
+    let spindle = match to.spindle {
+        Spindle::Off => None,
+        Spindle::Clockwise => Some("m3"),
+        Spindle::Counterclockwise => Some("m4"),
+    };
+    let spindle = spindle.map(|word| match to.speed {
+        SpindleSpeed::Rpm(speed) => format!("{word} {speed}"),
+        SpindleSpeed::Surface(speed) => format!("{word} {speed} of the surface"),
+    });
+    let coolant = [(to.mist, "mist"), (to.flood, "flood")].into_iter().filter(|(is_on, _)| *is_on);
+    let all: Vec<String> = spindle.into_iter().chain(coolant.map(|(_, word)| word.to_owned())).collect();
+    if all.is_empty() { "off".to_owned() } else { all.join(" ") }
 }
 
 fn steps(text: &str) -> Vec<String> {
@@ -304,7 +324,7 @@ fn tools_are_changed_by_hand_and_their_lengths_added() {
     // Without a table every tool is assumed to have no length.
     let assumed = gcode::read("a.ngc", b"T7 M6\nG43 H3 G0 Z1").expect("a program");
     assert_eq!(assumed.tools_assumed, [7, 3]);
-    assert!(assumed.notes().iter().any(|note| note.contains("there is no tool table: tools 7, 3")));
+    assert!(assumed.notes(|_| false).iter().any(|note| note.contains("there is no tool table: tools 7, 3")));
 }
 
 #[test]
@@ -330,8 +350,14 @@ fn drilling_cycles_are_rapids_and_feeds() {
     assert_eq!(steps(chips)[3..], ["l 1 0 -1", "r 1 0 -0.746", "l 1 0 -3", "r 1 0 1"]);
     assert_eq!(steps("F9 G0 Z1\nG82 Z-1 R1 P0.5")[1..], ["l 0 0 -1", "dwell 0.5", "r 0 0 1"]);
     assert_eq!(steps("F9 G0 Z1\nG85 Z-1 R1")[1..], ["l 0 0 -1", "l 0 0 1"]);
-    assert_eq!(steps("F9 M3 G0 Z1\nG86 Z-1 R1 P0")[1..], ["l 0 0 -1", "dwell 0", "r 0 0 1"]);
-    assert_eq!(steps("F9 M3 G0 Z1\nG88 Z-1 R1 P0")[1..], ["l 0 0 -1", "dwell 0", "stop", "r 0 0 1"]);
+    assert_eq!(
+        steps("F9 M3 G0 Z1\nG86 Z-1 R1 P0"),
+        ["m3 0", "r 0 0 1", "l 0 0 -1", "dwell 0", "off", "r 0 0 1", "m3 0", "off"]
+    );
+    assert_eq!(
+        steps("F9 S7 M4 G0 Z1\nG88 Z-1 R1 P0"),
+        ["m4 7", "r 0 0 1", "l 0 0 -1", "dwell 0", "off", "stop", "m4 7", "r 0 0 1", "off"]
+    );
     assert_eq!(steps("F9 G0 Z1\nG89 Z-1 R1 P0")[1..], ["l 0 0 -1", "dwell 0", "l 0 0 1"]);
     // Holes of no depth where the machine is end at once.
     assert_eq!(steps("F9 G0 Z1\nG81 Z1 R1 L4000000000"), ["r 0 0 1"]);
@@ -451,6 +477,25 @@ fn programs_as_posts_write_them_are_planned_as_they_are() {
         let plan = plan_program(&name, &program, &Machine::reference(), Mode::Spanning);
         let plan = plan.unwrap_or_else(|error| panic!("{error}"));
         assert!(plan.blocks.len() >= 9, "{name}: {} blocks", plan.blocks.len());
+        // And with spindle and coolant, which each of them switches on and at the end off.
+        let machine = Machine {
+            spindle: Some(SpindleSettings {
+                speed_max_rpm: 24_000.0,
+                start_s: 3.0,
+                stop_s: 0.0,
+                reverses: true,
+            }),
+            coolant: Some(CoolantSettings { flood: true, mist: true }),
+            ..Machine::reference()
+        };
+        let plan = plan_program(&name, &program, &machine, Mode::Spanning);
+        let plan = plan.unwrap_or_else(|error| panic!("{error}"));
+        let switch = |item: &Item| match item {
+            Item::Switch { to, .. } => Some(*to),
+            _ => None,
+        };
+        let switches: Vec<_> = plan.items.iter().filter_map(switch).collect();
+        assert!(switches[0].spindle_turns() && switches.last() == Some(&OutputState::OFF), "{name}");
     }
     // What repeats in a subprogram: three slots, 8 mm apart.
     let slots = steps(include_str!("../../tests/programs/posts/solidcam.ngc"));
@@ -520,4 +565,61 @@ fn speeds_and_lines_are_bounded() {
     // As many lines behind the end as it takes to notice that each looks through the file.
     let text = format!("M2\n{}O1 garbage", "X1\n".repeat(20_000));
     assert_eq!(steps(&text), ["end"]);
+}
+
+/// Spindle and coolant are steps where they change, in the order of LinuxCNC's calls.
+#[test]
+fn spindle_and_coolant_are_switched_where_they_change() {
+    // Not by what changes nothing; at the end off, in this order.
+    assert_eq!(
+        steps("S500 M5 M9\nM3\nM3 S500\nM7\nS600 M8\nX1 G0 M3\nM30"),
+        [
+            "m3 500",
+            "m3 500 mist",
+            "m3 600 mist",
+            "m3 600 mist flood",
+            "r 1 0 0",
+            "mist flood",
+            "flood",
+            "off",
+            "end"
+        ]
+    );
+    // Before the move and the dwell of their line, whatever the order in it; the stop comes last.
+    assert_eq!(
+        steps("M0 G4 P1 X1 G0 M8 M3 S9\nM5 M9\nM2")[..5],
+        ["m3 9", "m3 9 flood", "dwell 1", "r 1 0 0", "stop"]
+    );
+    // The speed comes first, so that it is one of the direction before.
+    assert_eq!(steps("M3 S1\nM4 S2\nM5\nS3\n%"), ["m3 1", "m3 2", "m4 2", "off", "end"]);
+    // A stop leaves all on, M6 stops the spindle, even for the tool that is there.
+    assert_eq!(
+        steps("M3 S1 M8\nM0\nT1 M6\nM3\nM6\nM2"),
+        ["m3 1", "m3 1 flood", "stop", "flood", "T1", "m3 1 flood", "flood", "off", "end"]
+    );
+    // Saved modes.
+    assert_eq!(
+        steps("M3 S5\nO1 sub\nM73\nM4 S6\nM8\nO1 endsub\nO1 call\nM2"),
+        ["m3 5", "m3 6", "m4 6", "m4 6 flood", "m4 5 flood", "m3 5 flood", "m3 5", "off", "end"]
+    );
+    // A speed of the surface is told as one.
+    assert_eq!(steps("G96 S100 M3\nG97 S900\nM2"), ["m3 100 of the surface", "m3 900", "off", "end"]);
+    // Without an end, too, in the last line.
+    let program = read("M3\nG0 X1\n\n");
+    assert_eq!(program.steps.last().map(|step| (step.line, shown(&step.kind))), Some((2, "off".to_owned())));
+}
+
+/// Switches between them leave a curve the continuation of the one before.
+#[test]
+fn a_switch_does_not_end_a_curve() {
+    let text = "F9 G5 X1 Y1 I1 J0 P-1 Q0\nM3\nX2 Y0 P-1 Q0\nM2";
+    let controls = |text: &str| -> Vec<_> {
+        let curve = |kind: &StepKind| match kind {
+            StepKind::Cubic(curve) => Some(curve.controls_mm),
+            _ => None,
+        };
+        read(text).steps.iter().filter_map(|step| curve(&step.kind)).collect()
+    };
+    assert_eq!(controls(text), controls(&text.replace("M3\n", "")));
+    assert_eq!(controls(text).len(), 2);
 }

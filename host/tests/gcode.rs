@@ -4,7 +4,8 @@
 
 #![allow(clippy::float_cmp, reason = "exact values are the point")]
 
-use motion_host::gcode::{self, ArcMove, Feed, Length, NoticeKind, Program, Step, StepKind};
+use motion_host::gcode::{self, ArcMove, Feed, Length, NoticeKind, Program, SpindleSpeed, Step, StepKind};
+use motion_kernel::hal::Spindle;
 use motion_tests::random::Random;
 use std::f64::consts::PI;
 use std::panic::catch_unwind;
@@ -36,9 +37,13 @@ enum Expected {
     Cubic { to: [i128; 3], feed_mm_min: f64, controls: [[i128; 2]; 2] },
     Through { to: [i128; 3], feed_mm_min: f64, begins: bool },
     Dwell(f64),
+    Switch(Switched),
     Stop,
     End,
 }
+
+/// Whether the spindle turns clockwise or the other way round, its speed, mist and flood.
+type Switched = (Option<bool>, f64, [bool; 2]);
 
 #[derive(Debug)]
 enum Shape {
@@ -133,14 +138,34 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
     let (mut motion, mut axes, mut begun) = (None, [0, 1], false);
     // P and Q of the curve before, if that was the last thing done.
     let mut before: Option<[i128; 2]> = None;
+    // What was programmed, and what the last step does.
+    let (mut clockwise, mut speed, mut coolant, mut now) = (None, 0.0, [false; 2], Switched::default());
+    let switch = |number, to: Switched, now: &mut Switched, expected: &mut Vec<(u32, Expected)>| {
+        let spindle = if to.0.is_some() { (to.0, to.1) } else { (None, 0.0) };
+        for next in [
+            (spindle.0, spindle.1, now.2),
+            (spindle.0, spindle.1, [to.2[0], now.2[1]]),
+            (spindle.0, spindle.1, to.2),
+        ] {
+            if next != *now {
+                *now = next;
+                expected.push((number, Expected::Switch(next)));
+            }
+        }
+    };
+    let mut last = 1;
     for (line, number) in text.split(|&byte| byte == b'\n').zip(1_u32..) {
         if line.trim_ascii() == b"%" {
             if begun {
+                switch(number, Switched::default(), &mut now, &mut expected);
                 expected.push((number, Expected::End));
                 break;
             }
             begun = true;
             continue;
+        }
+        if !line.trim_ascii().is_empty() {
+            last = number;
         }
         let words = split_words(line);
         begun |= !words.is_empty();
@@ -184,6 +209,24 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
         if let Some(feed) = value('F') {
             feed_mm_min = feed as f64 / 1e10 * if inch { 25.4 } else { 1.0 };
         }
+        if let Some(rpm) = value('S') {
+            speed = rpm as f64 / 1e10;
+            switch(number, (clockwise, speed, coolant), &mut now, &mut expected);
+        }
+        for code in codes('M') {
+            match code {
+                30 => clockwise = Some(true),
+                40 => clockwise = Some(false),
+                50 => clockwise = None,
+                70 => coolant[0] = true,
+                80 => coolant[1] = true,
+                _ => {}
+            }
+        }
+        if codes('M').contains(&90) {
+            coolant = [false; 2];
+        }
+        switch(number, (clockwise, speed, coolant), &mut now, &mut expected);
         if dwell || motion != Some(50) {
             before = None;
         }
@@ -247,11 +290,15 @@ fn second_opinion(text: &[u8]) -> Vec<(u32, Expected)> {
             before = None;
         }
         let ends = matches!(stop, Some(Expected::End));
+        if ends {
+            switch(number, Switched::default(), &mut now, &mut expected);
+        }
         expected.extend(stop.map(|stop| (number, stop)));
         if ends {
             break;
         }
     }
+    switch(last, Switched::default(), &mut now, &mut expected);
     expected
 }
 
@@ -344,6 +391,18 @@ fn assert_same_step(step: &Step, expected: &Expected, position: &mut [i128; 3]) 
         }
         (StepKind::Dwell { seconds }, Expected::Dwell(expected)) => {
             assert_near(seconds, *expected, 0.0, "dwell")
+        }
+        (StepKind::Switch(to), Expected::Switch((clockwise, speed, coolant))) => {
+            let turns = match to.spindle {
+                Spindle::Off => None,
+                Spindle::Clockwise => Some(true),
+                Spindle::Counterclockwise => Some(false),
+            };
+            assert_eq!((turns, [to.mist, to.flood]), (*clockwise, *coolant));
+            match to.speed {
+                SpindleSpeed::Rpm(rpm) => assert_near(rpm, *speed, 1e-12 * speed, "spindle speed"),
+                SpindleSpeed::Surface(_) => panic!("no G96"),
+            }
         }
         (StepKind::Stop, Expected::Stop) | (StepKind::End, Expected::End) => {}
         other => panic!("found {other:?}"),
@@ -462,7 +521,21 @@ fn random_line(random: &mut Random) -> String {
         [("G17", ['X', 'Y'], ['I', 'J']), ("G18", ['Z', 'X'], ['K', 'I']), ("G19", ['Y', 'Z'], ['J', 'K'])];
     let (plane, axes, offsets) = *random.pick(&planes);
     let direction = *random.pick(&["G2", "G3"]);
-    match random.below(11) {
+    match random.below(12) {
+        11 => (*random.pick(&[
+            "M3 S100",
+            "M3",
+            "S200.5",
+            "M4 S50",
+            "M5",
+            "M7",
+            "M8",
+            "M7 M8 M3",
+            "M9",
+            "G0 X1 M5 M9",
+            "M4 M8 S7",
+        ]))
+        .to_owned(),
         9 => {
             let mut line = "G17 G5 ".to_owned();
             for letter in ['X', 'I', 'Q', 'Y', 'J', 'P'] {
@@ -483,8 +556,7 @@ fn random_line(random: &mut Random) -> String {
             });
             format!("G5.5 {x}\n{z}")
         }
-        0 => (*random.pick(&["G21", "G20", "G91.1", "G61", "G64 P0.1", "M3 S100", "", "(G5)", "; G5"]))
-            .to_owned(),
+        0 => (*random.pick(&["G21", "G20", "G91.1", "G61", "G64 P0.1", "", "(G5)", "; G5"])).to_owned(),
         1 => format!("F{}", 1 + random.below(10_000)),
         2 => format!("G4 P{}", decimal(random.below(100_000) as i64, 3)),
         3..=5 => {

@@ -15,6 +15,7 @@ mod limit_share;
 mod mutation;
 mod nurbs;
 mod probing;
+mod outputs;
 mod smoothness;
 mod spline;
 

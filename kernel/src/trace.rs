@@ -4,7 +4,7 @@ use crate::axis::AxisOutput;
 use crate::exec::ExecState;
 use crate::exec::Executed;
 use crate::fault::Fault;
-use crate::hal::MachineInputs;
+use crate::hal::{MachineInputs, OutputState};
 use crate::num::Scalar;
 
 /// One tick of the whole kernel.
@@ -62,6 +62,13 @@ impl Digest {
             ExecState::Held => 8,
         };
         self.word(state | u64::from(trace.fault.is_some()) << 2 | u64::from(trace.executed.line) << 32);
+    }
+
+    /// Adds outputs that are switched between two ticks.
+    pub fn switch(&mut self, to: &OutputState) {
+        let &OutputState { spindle, speed_rpm, flood, mist } = to;
+        self.word(speed_rpm.to_bits());
+        self.word(spindle as u64 | u64::from(flood) << 2 | u64::from(mist) << 3);
     }
 
     /// FNV-1a with a word in place of a byte.

@@ -6,7 +6,9 @@ use motion_host::simulate::inject::Injections;
 use motion_host::simulate::live::Script;
 use motion_host::simulate::{self, Hardware, Job, Number, RunOptions, RunSummary, StretchCorrection};
 use motion_host::trace::{AXES, TraceRow};
-use motion_kernel::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+use motion_kernel::hal::{
+    AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
+};
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
@@ -55,6 +57,12 @@ impl<H: Hardware> Hardware for Breaking<'_, H> {
     fn advance<R: Scalar>(&mut self, trace: &Trace<R, AXES>) -> bool {
         self.tick += 1;
         self.hardware.advance(trace)
+    }
+}
+
+impl<H: Hardware> Outputs for Breaking<'_, H> {
+    fn switch(&mut self, to: &OutputState) {
+        self.hardware.switch(to);
     }
 }
 

@@ -11,6 +11,7 @@
 //! On failure it brings the machine to rest and logs why; in a fault, with drives off.
 
 use motion_kernel::exec::ExecState;
+use motion_kernel::hal::OutputState;
 use motion_kernel::live::State;
 use motion_kernel::num::Real;
 use motion_kernel::program::{ProgramError, Reader, SupplyError};
@@ -53,6 +54,8 @@ pub struct Background<
     refused: Option<SupplyError<ProgramError>>,
     /// The log has said that motion waits for the operator.
     has_said: bool,
+    /// The program has spindle or coolant on.
+    is_on: bool,
     button: Button,
     dump: FlightDump,
     report: Report,
@@ -79,6 +82,7 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
             no_way: None,
             refused: None,
             has_said: false,
+            is_on: false,
             button: Button::default(),
             dump: FlightDump::default(),
             report: Report::default(),
@@ -139,13 +143,13 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         if let Some(line) = self.ended(seen) {
             return Some(line);
         }
-        if let (Phase::Running { .. }, Some(run)) = (self.phase, &self.run) {
+        if let (Phase::Running { .. }, Some(run)) = (self.phase, &mut self.run) {
             let is_stopped = seen.state == ExecState::Stopped;
             self.phase = Phase::Running { is_held: run.is_held(), is_stopped };
         }
         match asked {
             Some(asked) => self.act(Action::of(self.phase, asked), seen, control),
-            None => self.came_to_rest(seen),
+            None => self.switched(control).or_else(|| self.came_to_rest(seen)),
         }
     }
 
@@ -168,9 +172,28 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         Some(LogLine::NoWay(error))
     }
 
+    /// Switches spindle and coolant where the program says so, and all off once motion of a refused program rests;
+    /// returns the line to log.
+    fn switched<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) -> Option<LogLine<R, AXES>> {
+        let run = self.run.as_mut()?;
+        let to = match self.phase {
+            Phase::Running { .. } => run.switch()?,
+            Phase::Refused if self.is_on && matches!(run.state(), State::Held | State::Failed) => {
+                OutputState::OFF
+            }
+            _ => return None,
+        };
+        self.is_on = to != OutputState::OFF;
+        control.lock(|control| control.switch(to));
+        Some(LogLine::Switched(to))
+    }
+
     /// Returns the line to log if a run has just ended, or waits for the operator.
     fn came_to_rest(&mut self, seen: &Seen<R, AXES>) -> Option<LogLine<R, AXES>> {
-        let (Phase::Running { is_stopped, .. }, Some(run)) = (self.phase, &self.run) else { return None };
+        let (Phase::Running { is_stopped, .. }, Some(run)) = (self.phase, &mut self.run) else { return None };
         let state = run.state();
         if state == State::Waiting && seen.state == ExecState::Idle {
             self.phase = Phase::Done;
@@ -260,20 +283,33 @@ mod tests {
 
     use motion_kernel::fault::FaultKind;
     use motion_kernel::flight::FlightRecorder;
-    use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+    use motion_kernel::hal::{
+        DriveEnable, Encoder, Inputs, MachineInputs, Outputs, Spindle, VelocityChannel,
+    };
     use motion_kernel::kernel::Kernel;
+    use motion_kernel::law::Ticks;
+    use motion_kernel::program::{Item, write};
     use motion_kernel::queue::Streams;
     use motion_kernel::units::{Counts, DacCode};
     use rtic_core::Exclusive;
 
     use super::*;
-    use crate::fixture::{AXES, BOARD, end, machine};
+    use crate::fixture::{AXES, BOARD, TICK_S, end, machine};
 
     /// Drives without inertia: a velocity is there in the tick that asks for it.
     struct IdealDrives {
         counts: [f64; AXES],
         counts_per_code: [f64; AXES],
         is_enabled: bool,
+        now: u32,
+        /// Ticks in which outputs were switched.
+        switched: Vec<(u32, OutputState)>,
+    }
+
+    impl Outputs for IdealDrives {
+        fn switch(&mut self, to: &OutputState) {
+            self.switched.push((self.now, *to));
+        }
     }
 
     impl Encoder<AXES> for IdealDrives {
@@ -338,8 +374,28 @@ mod tests {
     /// it; the lines of its log without reports, its set position and whether its drives are enabled.
     fn board(
         ticks: u32,
-        mut script: impl FnMut(u32, &mut Hands, &mut Option<FaultKind<f32>>, &Lines),
+        script: impl FnMut(u32, &mut Hands, &mut Option<FaultKind<f32>>, &Lines),
     ) -> (Lines, [Position; AXES], bool) {
+        let seen = board_of(machine().program, ticks, script);
+        (seen.lines, seen.position, seen.is_enabled)
+    }
+
+    /// What was seen of a board.
+    struct SeenOf {
+        lines: Lines,
+        position: [Position; AXES],
+        is_enabled: bool,
+        switched: Vec<(u32, OutputState)>,
+        /// The first and the last tick that changed the set position.
+        moved: [u32; 2],
+    }
+
+    /// The same of a board with another program.
+    fn board_of(
+        program: Reader<'static, AXES>,
+        ticks: u32,
+        mut script: impl FnMut(u32, &mut Hands, &mut Option<FaultKind<f32>>, &Lines),
+    ) -> SeenOf {
         let machine = machine();
         let header = *machine.header();
         let mut flight = FlightRecorder::<f32, AXES, 16, 8>::new();
@@ -349,23 +405,36 @@ mod tests {
             let mm_s_per_code = axis.mm_s_at_10_v / f64::from(DacCode::from_volts(10.0_f64).0);
             mm_s_per_code * BOARD.tick_s() / axis.mm_per_count
         });
-        let mut drives = IdealDrives { counts: [0.0; AXES], counts_per_code, is_enabled: false };
+        let mut drives = IdealDrives {
+            counts: [0.0; AXES],
+            counts_per_code,
+            is_enabled: false,
+            now: 0,
+            switched: Vec::new(),
+        };
         let kernel = Kernel::new(&machine.axes, header.start, [Counts(0); AXES]);
         let (_, intake) = empty.split(header.rules, header.start);
         let mut control = Control::new(kernel, intake, header.start, &mut flight);
-        let mut background = Background::<f32, AXES, 64, 16, 64>::new(BOARD, machine.program, &mut streams);
-        let (mut hands, mut lines) = (Hands::default(), Lines::new());
+        let mut background = Background::<f32, AXES, 64, 16, 64>::new(BOARD, program, &mut streams);
+        let (mut hands, mut lines, mut moved) = (Hands::default(), Lines::new(), [0; 2]);
+        let mut position = header.start;
         hands.down_from = u32::MAX - 100;
         for now in 1..=ticks {
             hands.now = now;
             let mut unhealthy = None;
             script(now, &mut hands, &mut unhealthy, &lines);
+            drives.now = now;
             control.tick(unhealthy, None, &mut drives);
+            if control.seen().position != position {
+                position = control.seen().position;
+                moved = [if moved[0] == 0 { now } else { moved[0] }, now];
+            }
             let line = background.poll(now, &mut hands, &mut Exclusive(&mut control));
             lines.extend(line.filter(|line| !is_report(line)).map(|line| (now, line)));
             background.plan();
         }
-        (lines, control.seen().position, drives.is_enabled)
+        let IdealDrives { is_enabled, switched, .. } = drives;
+        SeenOf { lines, position, is_enabled, switched, moved }
     }
 
     fn is_report(line: &LogLine<f32, AXES>) -> bool {
@@ -389,6 +458,93 @@ mod tests {
         assert_eq!(said(&lines), [Started(start), Holding, Held, Resumed, Done]);
         assert_eq!(lines[0].0, 100 + BOARD.button_ticks());
         assert_eq!((position, is_enabled), (end(), true));
+    }
+
+    const ON: OutputState =
+        OutputState { spindle: Spindle::Clockwise, speed_rpm: 9000.0, flood: true, mist: false };
+    /// The wait for the spindle.
+    const WAIT_TICKS: u32 = 300;
+
+    /// The stringer with spindle and coolant on, up to its end; then what `more` says.
+    fn with_outputs(more: &[Item<AXES>]) -> Reader<'static, AXES> {
+        let stringer = machine();
+        let wait = Ticks::from_seconds(f64::from(WAIT_TICKS) * TICK_S, TICK_S).expect("some ticks");
+        let mut items = vec![Item::Switch(ON), Item::Dwell(wait)];
+        items.extend(stringer.program.items().map(|item| item.expect("an item")));
+        items.extend(more);
+        let (mut bytes, guards) = (Vec::new(), stringer.program.guards().expect("guards"));
+        write(stringer.header(), guards.as_ref(), &items, &mut bytes).expect("short");
+        Reader::new(bytes.leak()).expect("a program")
+    }
+
+    #[test]
+    fn spindle_and_coolant_switch_in_order_with_motion_and_twice_in_two_runs() {
+        let program = with_outputs(&[Item::Switch(OutputState::OFF)]);
+        let seen = board_of(program, 30_000, |now, hands, _, _| {
+            if matches!(now, 100 | 8000) {
+                hands.down_from = now;
+            }
+        });
+        use LogLine::{Done, Started, Switched};
+        let off = OutputState::OFF;
+        assert_eq!(
+            said(&seen.lines),
+            [
+                Started(machine().header().start),
+                Switched(ON),
+                Switched(off),
+                Done,
+                Started(end()),
+                Switched(ON),
+                Switched(off),
+                Done
+            ]
+        );
+        let ticks: Vec<u32> = seen.switched.iter().map(|(tick, _)| *tick).collect();
+        assert_eq!(seen.switched.iter().map(|(_, to)| *to).collect::<Vec<_>>(), [ON, off, ON, off]);
+        // In the tick after the poll that says so.
+        for (tick, line) in ticks.iter().zip([1, 2, 5, 6]) {
+            assert_eq!(*tick, seen.lines[line].0 + 1);
+        }
+        assert!(seen.moved[0] > ticks[0] + WAIT_TICKS, "{:?} {ticks:?}", seen.moved);
+        assert!(seen.moved[1] < ticks[3], "{:?} {ticks:?}", seen.moved);
+    }
+
+    #[test]
+    fn a_hold_leaves_spindle_and_coolant_on_and_a_fault_switches_them_off_in_its_tick() {
+        let program = with_outputs(&[Item::Switch(OutputState::OFF)]);
+        let seen = board_of(program, 9000, |now, hands, unhealthy, _| {
+            *unhealthy = (now == 4000).then_some(FaultKind::EmergencyStop);
+            if matches!(now, 100 | 1500 | 3000) {
+                hands.down_from = now;
+            }
+        });
+        assert!(said(&seen.lines).contains(&LogLine::Held));
+        assert!(seen.moved[1] > 3000 && !seen.is_enabled);
+        let [(_, first), last] = seen.switched[..] else { panic!("{:?}", seen.switched) };
+        assert_eq!((first, last), (ON, (4000, OutputState::OFF)));
+        // Nothing is on, nothing is switched.
+        let seen = board_of(with_outputs(&[]), 4000, |now, _, unhealthy, _| {
+            *unhealthy = (now == 1500).then_some(FaultKind::EmergencyStop);
+        });
+        assert_eq!(seen.switched, []);
+    }
+
+    /// The program is refused on the way: all is off once motion rests.
+    #[test]
+    fn a_refused_program_ends_with_all_off_at_rest() {
+        let start = end();
+        let broken =
+            Item::Line { line: 9, start, direction: [f64::NAN; AXES], length: Position::from_bits(1 << 32) };
+        let seen = board_of(with_outputs(&[broken]), 9000, |now, hands, _, _| {
+            if now == 100 {
+                hands.down_from = now;
+            }
+        });
+        assert!(said(&seen.lines).iter().any(|line| matches!(line, LogLine::Refused(_))), "{:?}", seen.lines);
+        let [(_, first), (tick, last)] = seen.switched[..] else { panic!("{:?}", seen.switched) };
+        assert_eq!((first, last), (ON, OutputState::OFF));
+        assert!(tick > seen.moved[1], "{tick} {:?}", seen.moved);
     }
 
     #[test]

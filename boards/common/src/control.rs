@@ -6,7 +6,7 @@
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::flight::FlightRecorder;
-use motion_kernel::hal::{DriveEnable, Encoder, Inputs, VelocityChannel};
+use motion_kernel::hal::{DriveEnable, Encoder, Inputs, OutputState, Outputs, VelocityChannel};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Real;
 use motion_kernel::queue::Intake;
@@ -26,6 +26,10 @@ pub struct Control<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTE
     state: ExecState,
     position: [Position; AXES],
     is_healthy: bool,
+    /// What spindle and coolant are to be switched to in the next tick.
+    due: Option<OutputState>,
+    /// Spindle or coolant may be on.
+    is_switched: bool,
 }
 
 /// The tick's last results.
@@ -50,16 +54,26 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         flight: &'a mut FlightRecorder<R, AXES, ROWS, AFTER>,
     ) -> Self {
         let timing = TickTiming::new();
-        Self { kernel, intake, timing, flight, state: ExecState::Idle, position, is_healthy: false }
+        Self {
+            kernel,
+            intake,
+            timing,
+            flight,
+            state: ExecState::Idle,
+            position,
+            is_healthy: false,
+            due: None,
+            is_switched: false,
+        }
     }
 
     /// One control tick. `unhealthy` is the fault found in the inputs (the emergency stop, a drive that is
     /// not ready), `late` is that of the board's [`TickMonitor`](motion_kernel::tick_monitor::TickMonitor)
-    /// when the tick begins.
+    /// when the tick begins. A fault switches spindle and coolant off in the tick that finds it.
     #[inline]
     pub fn tick<H>(&mut self, unhealthy: Option<FaultKind<R>>, late: Option<FaultKind<R>>, hal: &mut H)
     where
-        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES>,
+        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> + Outputs,
     {
         self.is_healthy = unhealthy.is_none();
         for kind in unhealthy.into_iter().chain(late) {
@@ -69,6 +83,18 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         self.flight.add(trace);
         self.state = trace.executed.state;
         self.position = trace.executed.setpoints.map(|setpoint| setpoint.position);
+        if trace.fault.is_some() {
+            self.due = self.is_switched.then_some(OutputState::OFF);
+        }
+        if let Some(to) = self.due.take() {
+            hal.switch(&to);
+            self.is_switched = to != OutputState::OFF;
+        }
+    }
+
+    /// Switches spindle and coolant in the next tick, unless that finds a fault.
+    pub(crate) fn switch(&mut self, to: OutputState) {
+        self.due = Some(to);
     }
 
     /// Latches a fault that the board found after the tick; it takes effect in the next tick.

@@ -5,6 +5,7 @@
 
 use motion_kernel::fault::Fault;
 use motion_kernel::flight::FlightRow;
+use motion_kernel::hal::OutputState;
 use motion_kernel::num::Real;
 use motion_kernel::program::{ProgramError, SupplyError};
 use motion_kernel::straight::StraightError;
@@ -31,6 +32,8 @@ pub enum LogLine<R: Real, const AXES: usize> {
     Holding,
     /// A hold or a program stop ends.
     Resumed,
+    /// Spindle and coolant are switched.
+    Switched(OutputState),
     /// The new feed override \[%\].
     Override(u8),
     /// Single block is on or off.
@@ -85,6 +88,12 @@ pub fn write<R: Real + defmt::Format, const AXES: usize>(line: &LogLine<R, AXES>
         LogLine::Held => info!("held: the start button or r resumes"),
         LogLine::Holding => info!("coming to rest"),
         LogLine::Resumed => info!("resumed"),
+        LogLine::Switched(to) => info!(
+            "spindle {} at {=f64} rev/min, coolant {=str}",
+            to.spindle,
+            to.speed_rpm,
+            if to.coolant_flows() { "on" } else { "off" }
+        ),
         LogLine::Override(percent) => info!("feed override {=u8} %", percent),
         LogLine::SingleBlock(is_on) => info!("single block {=str}", if is_on { "on" } else { "off" }),
         LogLine::Nothing(why) => info!("{=str}", why),

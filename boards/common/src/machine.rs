@@ -7,8 +7,9 @@
 //! anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
+use motion_kernel::hal::{OutputState, Spindle};
 use motion_kernel::num::Real;
-use motion_kernel::program::{CheckError, Header, ProgramError, Reader, check_live};
+use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check_live, switches_as_stops};
 
 use crate::parameters::BoardParameters;
 
@@ -41,6 +42,12 @@ pub enum MachineError {
     /// An item can't be executed, the program starts or ends where it can't, or it has no blocks for live
     /// control to plan with (`motion compile --live` writes them).
     Items(CheckError<ProgramError>),
+    /// An item turns the spindle counter-clockwise, and there is one output for it. A machine file with `turns =
+    /// "clockwise"` has the PC refuse such a program.
+    Counterclockwise {
+        /// The item, from 0.
+        index: usize,
+    },
 }
 
 /// A program that suits the board, and its machine.
@@ -75,7 +82,15 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
         let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
         let axes = AxesConfig::new(axes, expected).and_then(|axes| axes.guarded(&guards, expected));
         let axes = axes.map_err(MachineError::Axes)?;
-        check_live::<R, AXES, _>(program.header(), program.items()).map_err(MachineError::Items)?;
+        let items = switches_as_stops(program.items());
+        check_live::<R, AXES, _>(program.header(), items).map_err(MachineError::Items)?;
+        let is_reverse = |item| {
+            let spindle = Spindle::Counterclockwise;
+            matches!(item, Ok(Item::Switch(OutputState { spindle: found, .. })) if found == spindle)
+        };
+        if let Some(index) = program.items().position(is_reverse) {
+            return Err(MachineError::Counterclockwise { index });
+        }
         Ok(Self { program, axes })
     }
 
@@ -136,6 +151,25 @@ mod tests {
         none.axes[2] = none.axes[2].map(|figures| GuardFigures { jump_mm: 0.0, ..figures });
         let refused = of(&header, Some(&none), &[]).map(|_| ());
         assert!(matches!(refused, Err(MachineError::Axes(AxesError { axis: 2, .. }))), "{refused:?}");
+    }
+
+    /// Spindle and coolant switch, between stretches; nothing here turns the other way round.
+    #[test]
+    fn a_program_may_switch_outputs_at_rest() {
+        let header = *machine().header();
+        let stringer: Vec<Item<AXES>> =
+            machine().program.items().map(|item| item.expect("an item")).collect();
+        let on = OutputState { spindle: Spindle::Clockwise, ..OutputState::OFF };
+        let with = |at: usize, to: OutputState| {
+            let mut items = stringer.clone();
+            items.insert(at, Item::Switch(to));
+            of(&header, Some(&guards()), &items).map(|_| ())
+        };
+        assert_eq!(with(0, on), Ok(()));
+        let within = with(stringer.len() - 1, on);
+        assert!(matches!(within, Err(MachineError::Items(CheckError::Item { .. }))), "{within:?}");
+        let reverse = OutputState { spindle: Spindle::Counterclockwise, ..on };
+        assert_eq!(with(0, reverse), Err(MachineError::Counterclockwise { index: 0 }));
     }
 
     /// The last item but one is damaged, with a right checksum: nothing of the program starts.

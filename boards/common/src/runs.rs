@@ -5,9 +5,10 @@
 
 use core::task::Poll;
 
-use motion_kernel::live::{LiveControl, Source, State};
+use motion_kernel::hal::OutputState;
+use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::Real;
-use motion_kernel::program::{Item, Items, ProgramError, Reader, SupplyError};
+use motion_kernel::program::{Item, Items, ProgramError, Reader, Source, SupplyError, Switching};
 use motion_kernel::queue::LiveFeeder;
 use motion_kernel::straight::{Straight, StraightError};
 use motion_kernel::units::Position;
@@ -42,7 +43,7 @@ impl<const AXES: usize> Source<AXES> for Runs<'_, AXES> {
 /// The program's runs, under live control, which knows `PLACES` blocks and as many ramps ahead.
 pub struct Run<'a, R: Real, const AXES: usize, const PLACES: usize> {
     feeder: LiveFeeder<'a, R, AXES>,
-    control: LiveControl<R, AXES, Runs<'a, AXES>, ProgramError, PLACES>,
+    control: LiveControl<R, AXES, Switching<Runs<'a, AXES>>, ProgramError, PLACES>,
 }
 
 impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACES> {
@@ -52,7 +53,7 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
     pub fn new(program: Reader<'a, AXES>, feeder: LiveFeeder<'a, R, AXES>, lead_ticks: u32) -> Self {
         let header = program.header();
         let (pulse, tick_s) = (header.pulse, header.tick_s);
-        let runs = Runs { program, to_start: None, items: None };
+        let runs = Switching::new(Runs { program, to_start: None, items: None });
         Self { feeder, control: LiveControl::new(runs, pulse, tick_s, lead_ticks) }
     }
 
@@ -62,7 +63,7 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
     /// # Errors
     /// There is no way to the program's start.
     pub fn start(&mut self, here: [Position; AXES]) -> Result<(), StraightError> {
-        let runs = self.control.source_mut();
+        let runs = self.control.source_mut().items_mut();
         let header = runs.program.header();
         let feed_mm_s = TO_START_MM_S.min(header.rules.feed_mm_s);
         let (limits, feeds_mm_s) = (header.rules.limits, [feed_mm_s; 2]);
@@ -84,7 +85,7 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
 
     /// Whether it is held, or coming to rest for a hold.
     #[must_use]
-    pub fn is_held(&self) -> bool {
+    pub fn is_held(&mut self) -> bool {
         matches!(self.state(), State::Holding | State::Held)
     }
 
@@ -104,10 +105,26 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
         self.control.poll(&mut self.feeder)
     }
 
+    /// What the program switches outputs to now, if motion has come to rest for that; from then on it goes on, so the
+    /// caller has to put it out.
+    pub fn switch(&mut self) -> Option<OutputState> {
+        if self.control.state(&self.feeder) != State::Waiting {
+            return None;
+        }
+        let source = self.control.source_mut();
+        let due = source.due();
+        source.switched();
+        due
+    }
+
     /// The state of live control; [`State::Waiting`] before, between and after runs.
     #[must_use]
-    pub fn state(&self) -> State {
-        self.control.state(&self.feeder)
+    pub fn state(&mut self) -> State {
+        match self.control.state(&self.feeder) {
+            // Not at its end.
+            State::Waiting if self.control.source_mut().due().is_some() => State::Running,
+            state => state,
+        }
     }
 
     /// Number of stops because the background was too slow.
@@ -316,7 +333,7 @@ mod tests {
                 let mut run = Run::new(machine.program, feeder, BOARD.lead_ticks);
                 let mut executor = Executor::new(here);
                 run.start(here).expect("a way");
-                run.control.source_mut().items = None;
+                run.control.source_mut().items_mut().items = None;
                 let (mut ticks, mut at) = (0_u32, here);
                 loop {
                     run.poll().expect("accepted");

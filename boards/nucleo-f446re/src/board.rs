@@ -1,7 +1,7 @@
 //! The board from reset to its first tick: pins, clocks, peripherals.
 //!
-//! Consumes the peripherals, once; produces what the tick and the background own. First of all the enables
-//! become outputs at low, the level at which their pull-downs have held them since reset. Panics if the
+//! Consumes the peripherals, once; produces what the tick and the background own. First of all the enables,
+//! spindle and coolant become outputs at low, the level at which their pull-downs have held them since reset. Panics if the
 //! hardware differs from `design_parameters.rs`; nothing is enabled then. Without the ST-LINK's clock it
 //! waits forever, with everything off.
 
@@ -23,6 +23,7 @@ use crate::dac::{self, Sync};
 use crate::drives::Drives;
 use crate::encoders::Encoders;
 use crate::hal::Hardware;
+use crate::spindle::SpindleAndCoolant;
 use crate::tick_timer::TickTimer;
 
 /// Everything the firmware uses, ready to tick.
@@ -59,6 +60,11 @@ impl Board {
                 gpioc.pc12.into_pull_up_input().erase(),
             ],
             emergency_stop: gpiod.pd2.into_pull_up_input().erase(),
+        };
+
+        let spindle_and_coolant = SpindleAndCoolant {
+            spindle: gpiob.pb1.into_push_pull_output().erase(),
+            coolant: gpiob.pb14.into_push_pull_output().erase(),
         };
 
         let after_watchdog = rcc.csr().read().wdgrstf().bit_is_set();
@@ -120,7 +126,7 @@ impl Board {
         watchdog.stop_on_debug(&device.DBGMCU, false);
 
         Self {
-            hardware: Hardware { encoders, outputs, drives },
+            hardware: Hardware { encoders, outputs, drives, spindle_and_coolant },
             tick_timer: TickTimer::new(device.TIM7, &mut rcc),
             watchdog,
             scope: gpioa.pa10.into_push_pull_output(),

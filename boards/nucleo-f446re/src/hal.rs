@@ -1,22 +1,24 @@
-//! The kernel's four traits on this board's hardware.
+//! The kernel's traits on this board's hardware.
 //!
 //! In the tick. Encoders and enables can't fail; there are no axis inputs; the converter fails with its bus.
 
 use core::convert::Infallible;
 
-use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, OutputState, VelocityChannel};
 use motion_kernel::units::{Counts, DacCode};
 use nucleo_f446re::machine::AXES;
 
 use crate::dac::Outputs;
 use crate::drives::Drives;
 use crate::encoders::Encoders;
+use crate::spindle::SpindleAndCoolant;
 
 /// The hardware that the tick drives.
 pub(crate) struct Hardware {
     pub(crate) encoders: Encoders,
     pub(crate) outputs: Outputs,
     pub(crate) drives: Drives,
+    pub(crate) spindle_and_coolant: SpindleAndCoolant,
 }
 
 impl Encoder<AXES> for Hardware {
@@ -49,5 +51,11 @@ impl DriveEnable<AXES> for Hardware {
     fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
         self.drives.switch(enabled);
         Ok(())
+    }
+}
+
+impl motion_kernel::hal::Outputs for Hardware {
+    fn switch(&mut self, to: &OutputState) {
+        self.spindle_and_coolant.switch(to);
     }
 }

@@ -20,6 +20,7 @@ mod board;
 mod encoders;
 mod dac;
 mod drives;
+mod spindle;
 mod hal;
 mod tick_timer;
 mod console_port;

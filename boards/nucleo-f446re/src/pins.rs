@@ -34,7 +34,7 @@ const fn pin(
 }
 
 /// The wiring, connector by connector.
-pub const PINS: [Pin; 19] = [
+pub const PINS: [Pin; 21] = [
     pin("drive ready X", "PC10", "CN7-1", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
     pin("drive ready Y", "PC11", "CN7-2", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
     pin("drive ready Z", "PC12", "CN7-3", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
@@ -50,7 +50,9 @@ pub const PINS: [Pin; 19] = [
     pin("encoder Z, A", "PA6", "CN10-13", "D12, CN5-5", "TIM3_CH1 AF2, 16 bit", "RS-422 receiver"),
     pin("encoder Z, B", "PA7", "CN10-15", "D11, CN5-4", "TIM3_CH2 AF2, 16 bit", "RS-422 receiver"),
     pin("converter SYNC", "PB12", "CN10-16", "–", "output, low is selected", "AD5754 SYNC, 10 kΩ to 3.3 V"),
+    pin("spindle on", "PB1", "CN10-24", "–", "output, high is on", "10 kΩ to GND, optocoupler"),
     pin("converter SDIN", "PB15", "CN10-26", "–", "SPI2_MOSI AF5", "AD5754 SDIN"),
+    pin("coolant on", "PB14", "CN10-28", "–", "output, high is on", "10 kΩ to GND, optocoupler"),
     pin("converter SCLK", "PB13", "CN10-30", "–", "SPI2_SCK AF5", "AD5754 SCLK"),
     pin("scope", "PA10", "CN10-33", "D2, CN9-3", "output, high in the tick", "oscilloscope"),
     pin(

@@ -114,6 +114,8 @@ impl Times {
                     times.add_stretch(stretch, [rest(follows), rest(is_followed)]);
                 }
                 Item::Dwell { seconds, .. } => times.add(Reason::Dwell, *seconds),
+                // Its wait is a dwell.
+                Item::Switch { .. } => {}
                 Item::Stop { .. } => times.operator_stops += 1,
             }
         }

@@ -11,7 +11,7 @@ use super::input;
 use super::outputs::Written;
 use crate::files::Files;
 use crate::machine::Machine;
-use crate::planning::{Executable, Mode, Plan, plan_program};
+use crate::planning::{Executable, Mode, Plan, plan_program, require_outputs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -46,6 +46,10 @@ pub struct CompileArguments {
     /// For a board with live control: include the path's blocks, so that the board can plan anew.
     #[arg(long)]
     live: bool,
+    /// Leave out the words of spindle and coolant (M3, M4, M5, S, M7, M8, M9) that the machine has no output for: it has
+    /// those of the tables `spindle` and `coolant` of its file. Without this, a program that needs another one is refused.
+    #[arg(long)]
+    no_spindle: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -70,6 +74,9 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
     let source = input::read(&arguments.program)?;
     let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
     let program = arguments.reading.program(&source, &machine)?;
+    if !arguments.no_spindle {
+        require_outputs(&source.name, &program, &machine)?;
+    }
     let plan = plan_program(&source.name, &program, &machine, mode)?;
     if let Some(probe) = plan.probes.first() {
         return Err(CliError::NoProbeInput { program: source.name, line: probe.line });

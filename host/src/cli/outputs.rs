@@ -166,6 +166,7 @@ fn trace_of(job: &Job, summary: &RunSummary, ticks: Vec<TraceRow>) -> RunTrace {
         ticks,
         end: summary.end,
         commands: summary.commands.clone(),
+        outputs: summary.outputs.clone(),
         faults: summary.faults.clone(),
         notices: summary.notices.clone(),
         ..job.info.empty_trace()

@@ -4,12 +4,15 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::Args;
+use motion_kernel::hal::Spindle;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::input;
 use super::table::{self, Align};
-use crate::gcode::{Feed, Length, Nurbs, PathMode, Program, Step, StepKind};
+use crate::gcode::{
+    Feed, Length, NoticeKind, Nurbs, Outputs, PathMode, Program, SpindleSpeed, Step, StepKind,
+};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -31,6 +34,8 @@ JSON: an object for every step, in order. All have line and kind. kind is
                                not trip), leaves (it trips where it leaves the surface), feed_mm_min
   dwell                        with dwell_s
   tool                         with tool: a stop for the operator to change it
+  switch                       spindle or coolant change: with spindle (\"clockwise\", \"counterclockwise\" or null: off),
+                               speed (rev/min; m/min or feet/min if surface, by G96), surface, flood, mist
   stop, end
 After them an object for every notice and every message, of kind notice and message, with text, and within: the line of a
 subroutine in another file, where that asks for it.";
@@ -106,6 +111,13 @@ enum KindJson {
     Tool {
         tool: u32,
     },
+    Switch {
+        spindle: Option<&'static str>,
+        speed: f64,
+        surface: bool,
+        flood: bool,
+        mist: bool,
+    },
     Stop,
     End,
 }
@@ -146,7 +158,8 @@ pub fn read(arguments: &ReadArguments, out: &mut dyn Write) -> Result<Outcome, C
 
 fn write_json_lines(program: &Program, out: &mut dyn Write) -> io::Result<()> {
     program.steps.iter().try_for_each(|step| write_json_line(&step_json(program, step), out))?;
-    program.notices.iter().try_for_each(|notice| {
+    // Of spindle and coolant the steps tell.
+    program.notices.iter().filter(|notice| !notice.kind.is_of_outputs()).try_for_each(|notice| {
         let text = notice.to_string();
         write_json_line(&NoteJson { line: notice.first_line, kind: "notice", within: None, text }, out)
     })?;
@@ -195,10 +208,29 @@ fn step_json(program: &Program, step: &Step) -> StepJson {
         },
         StepKind::Dwell { seconds } => KindJson::Dwell { dwell_s: seconds },
         StepKind::ToolChange { tool } => KindJson::Tool { tool },
+        StepKind::Switch(outputs) => switch_json(&outputs),
         StepKind::Stop => KindJson::Stop,
         StepKind::End => KindJson::End,
     };
     StepJson { line: step.line, kind }
+}
+
+fn switch_json(outputs: &Outputs) -> KindJson {
+    let &Outputs { spindle, speed, flood, mist } = outputs;
+    let (speed, surface) = match speed {
+        SpindleSpeed::Rpm(speed) => (speed, false),
+        SpindleSpeed::Surface(speed) => (speed, true),
+    };
+    KindJson::Switch { spindle: direction(spindle), speed, surface, flood, mist }
+}
+
+/// How a spindle turns, in JSON; none if it does not.
+pub(super) fn direction(spindle: Spindle) -> Option<&'static str> {
+    match spindle {
+        Spindle::Off => None,
+        Spindle::Clockwise => Some("clockwise"),
+        Spindle::Counterclockwise => Some("counterclockwise"),
+    }
 }
 
 fn move_json(from: [Length; 3], to: [Length; 3], feed: Feed, mode: PathMode) -> MoveJson {
@@ -236,7 +268,7 @@ fn write_table(program: &Program, out: &mut dyn Write) -> io::Result<()> {
     let rows: Vec<[String; 8]> = program.steps.iter().map(|step| row(program, step)).collect();
     table::write(&columns, &rows, out)?;
     writeln!(out, "\n  {} steps", rows.len())?;
-    program.notes().iter().try_for_each(|note| writeln!(out, "  note: {note}"))
+    program.notes(NoticeKind::is_of_outputs).iter().try_for_each(|note| writeln!(out, "  note: {note}"))
 }
 
 fn row(program: &Program, step: &Step) -> [String; 8] {
@@ -271,11 +303,26 @@ fn row(program: &Program, step: &Step) -> [String; 8] {
         }
         KindJson::Dwell { dwell_s } => ("dwell", None, format!("{dwell_s} s")),
         KindJson::Tool { tool } => ("tool", None, format!("T{tool}")),
+        KindJson::Switch { spindle, speed, surface, flood, mist } => {
+            ("switch", None, switch_words(spindle, speed, surface, [flood, mist]))
+        }
         KindJson::Stop => ("stop", None, String::new()),
         KindJson::End => ("end", None, String::new()),
     };
     let [x, y, z, feed, path] = ends.map(move_cells).unwrap_or_default();
     [step.line.to_string(), name.to_owned(), x, y, z, feed, path, more]
+}
+
+fn switch_words(spindle: Option<&str>, speed: f64, surface: bool, [flood, mist]: [bool; 2]) -> String {
+    let unit = if surface { "of the surface" } else { "rev/min" };
+    let spindle = spindle.map_or("spindle off".to_owned(), |turns| format!("spindle {turns} {speed} {unit}"));
+    let coolant = match (flood, mist) {
+        (false, false) => "coolant off",
+        (true, false) => "flood",
+        (false, true) => "mist",
+        (true, true) => "flood and mist",
+    };
+    format!("{spindle}, {coolant}")
 }
 
 /// End point, feed and path mode.

@@ -4,11 +4,13 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::Args;
+use motion_kernel::hal::OutputState;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::{self, Outputs, Written};
+use super::read::direction;
 use super::table::{self, Align};
 use super::write_json;
 use crate::files::{Files, OutputFile};
@@ -18,7 +20,7 @@ use crate::recording::Recorder;
 use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
 use crate::simulate::{self, AxisSummary, Job, Probed, RunError, RunOptions, RunSummary};
-use crate::trace::{AXES, RunEnd, TracedCommand, TracedFault};
+use crate::trace::{AXES, RunEnd, TracedCommand, TracedFault, TracedSwitch};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -35,9 +37,10 @@ Exit status: 0 the program finished, 1 a fault, 3 held, 4 aborted, 5 a command o
 be written. In all these cases the summary is printed, and the files are written.
 
 JSON: finished, stopped_by (null, \"hold\", \"single block\", \"override\", \"abort\" or \"fault\"), reached_mm, reached_line
-(how far the run came), commands_not_reached, probes (of every probing move line, tick, tripped, position_mm: where the
-encoders read the axes then, program_mm: where the program reads the trip, in machine coordinates), and the figures of the
-run.";
+(how far the run came), commands_not_reached, probes, outputs, and the figures of the run. probes are the probing moves: line,
+tick, tripped, position_mm (where the encoders read the axes then), program_mm (where the program reads the trip, in machine
+coordinates). outputs are the switches of spindle and coolant: tick (before which), line (null: all off by an abort or a
+fault), spindle (\"clockwise\", \"counterclockwise\" or null: off), speed_rpm, flood, mist.";
 
 /// Run a program: plan it, execute it tick by tick with the real-time kernel, on simulated axes.
 #[derive(Debug, Args)]
@@ -173,6 +176,7 @@ pub(super) struct RunJson<'run> {
     probes: Vec<ProbeJson>,
     commands: &'run [TracedCommand],
     commands_not_reached: &'run [String],
+    outputs: Vec<SwitchJson>,
     faults: Vec<FaultJson<'run>>,
     notices: &'run [String],
 }
@@ -204,6 +208,16 @@ struct ProbeJson {
 }
 
 #[derive(Serialize)]
+struct SwitchJson {
+    tick: u64,
+    line: Option<u32>,
+    spindle: Option<&'static str>,
+    speed_rpm: f64,
+    flood: bool,
+    mist: bool,
+}
+
+#[derive(Serialize)]
 struct FaultJson<'run> {
     tick: u64,
     axis: Option<&'run str>,
@@ -229,6 +243,11 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         fault: &fault.fault,
         detail: &fault.detail,
     };
+    let switch = |switch: &TracedSwitch| {
+        let OutputState { spindle, speed_rpm, flood, mist } = switch.to;
+        let spindle = direction(spindle);
+        SwitchJson { tick: switch.tick, line: switch.line, spindle, speed_rpm, flood, mist }
+    };
     RunJson {
         finished: summary.end == RunEnd::Finished,
         stopped_by: summary.end.stopped_by(),
@@ -251,6 +270,7 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
         probes: summary.probes.iter().map(probe).collect(),
         commands: &summary.commands,
         commands_not_reached: &summary.unreached,
+        outputs: summary.outputs.iter().map(switch).collect(),
         faults: summary.faults.iter().map(fault).collect(),
         notices: &summary.notices,
     }
@@ -304,6 +324,15 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
         })
         .collect();
     table::write(&columns, &rows, out)?;
+    if let (Some(first), Some(last)) = (summary.outputs.first(), summary.outputs.last()) {
+        let (number, tick) = (summary.outputs.len(), first.tick);
+        write!(out, "\n  spindle and coolant: {number} switches, the first before tick {tick}")?;
+        if last.to == OutputState::OFF {
+            writeln!(out, ", all off before tick {}", last.tick)?;
+        } else {
+            writeln!(out, ", not all off at the end")?;
+        }
+    }
     let nothing = summary.commands.is_empty() && summary.probes.is_empty();
     if !(nothing && summary.faults.is_empty() && summary.notices.is_empty()) {
         writeln!(out)?;

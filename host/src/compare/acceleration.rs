@@ -23,7 +23,7 @@ pub fn acceleration_time_s(plan: &Plan, machine: &Machine) -> f64 {
         .map(|item| match item {
             Item::Stretch(stretch) => of_stretch_s(stretch, machine),
             &Item::Dwell { seconds, .. } => seconds,
-            Item::Stop { .. } => 0.0,
+            Item::Switch { .. } | Item::Stop { .. } => 0.0,
         })
         .sum()
 }

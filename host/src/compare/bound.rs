@@ -17,7 +17,7 @@ pub fn least_time_s(plan: &Plan) -> f64 {
         .map(|item| match item {
             Item::Stretch(stretch) => of_stretch_s(stretch),
             &Item::Dwell { seconds, .. } => seconds,
-            Item::Stop { .. } => 0.0,
+            Item::Switch { .. } | Item::Stop { .. } => 0.0,
         })
         .sum()
 }

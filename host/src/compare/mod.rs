@@ -135,7 +135,7 @@ pub fn in_mode(program: &Program, mode: PathMode) -> Program {
 fn tolerance_share(plan: &Plan) -> f64 {
     let stretches = plan.items.iter().filter_map(|item| match item {
         Item::Stretch(stretch) => Some(stretch),
-        Item::Dwell { .. } | Item::Stop { .. } => None,
+        Item::Dwell { .. } | Item::Switch { .. } | Item::Stop { .. } => None,
     });
     stretches.flat_map(|stretch| &stretch.blocks).map(|block| block.tolerance_share).fold(0.0, f64::max)
 }

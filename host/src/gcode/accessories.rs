@@ -1,13 +1,16 @@
 //! Spindle, coolant, tools, inputs and outputs: what a line asks of everything but the axes.
+//!
+//! Spindle and coolant become a step where they change, each change a step of its own, as LinuxCNC's calls come.
 
 use super::block::{Block, GGroup, MGroup};
 use super::cutter::compensated;
 use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::interpreter::Interpreter;
-use super::modal::Overrides;
-use super::program::{NoticeKind, StepKind};
+use super::modal::{Modal, Overrides};
+use super::program::{NoticeKind, Outputs, SpindleSpeed, StepKind};
 use super::tool::Tool;
+use motion_kernel::hal::Spindle;
 
 /// Greatest S: with the greatest F, the feed of G95 is finite.
 const SPEED_MAX: f64 = 1e9;
@@ -33,6 +36,7 @@ impl Interpreter {
             self.modal.spindle.speed = word.number.to_f64();
             self.notice(NoticeKind::SpindleSpeed);
         }
+        self.switch()?;
         if let Some(word) = block.letter(b'T') {
             let number = word.count(0, "a whole tool number, 0 or more")?;
             self.tool(number, word.offset)?;
@@ -47,23 +51,69 @@ impl Interpreter {
                 _ => None,
             };
             self.notice(NoticeKind::Spindle);
+            self.switch()?;
         }
         if let Some(code) = block.m(MGroup::Modes) {
             self.modes(code.tenths, code.word.offset)?;
         }
-        self.coolant(block);
+        self.coolant(block)?;
         self.overrides(block);
         Ok(())
     }
 
-    fn coolant(&mut self, block: &Block<'_>) {
+    /// Appends a step for the spindle's speed, its direction, the mist and the flood, each if it is to be another one than
+    /// before. A spindle that is started has its speed at once.
+    pub(super) fn switch(&mut self) -> Result<(), Located> {
+        let spindle = &self.modal.spindle;
+        let speed = match (spindle.clockwise, spindle.is_surface) {
+            (None, _) => SpindleSpeed::default(),
+            (Some(_), false) => SpindleSpeed::Rpm(spindle.speed),
+            (Some(_), true) => SpindleSpeed::Surface(spindle.speed),
+        };
+        let spindle = match spindle.clockwise {
+            None => Spindle::Off,
+            Some(true) => Spindle::Clockwise,
+            Some(false) => Spindle::Counterclockwise,
+        };
+        let Modal { mist, flood, .. } = self.modal;
+        let stays = spindle != Spindle::Off && self.outputs.spindle != Spindle::Off;
+        let with_speed = if stays { Outputs { speed, ..self.outputs } } else { self.outputs };
+        let with_spindle = Outputs { spindle, speed, ..with_speed };
+        let with_mist = Outputs { mist, ..with_spindle };
+        for to in [with_speed, with_spindle, with_mist, Outputs { flood, ..with_mist }] {
+            if to != self.outputs {
+                self.outputs = to;
+                // A curve goes on behind it.
+                let cubic_before_mm = self.cubic_before_mm;
+                self.step(StepKind::Switch(to))?;
+                self.cubic_before_mm = cubic_before_mm;
+            }
+        }
+        Ok(())
+    }
+
+    /// Stops the spindle.
+    pub(super) fn stop_spindle(&mut self) -> Result<(), Located> {
+        self.modal.spindle.clockwise = None;
+        self.switch()
+    }
+
+    /// Switches all off.
+    pub(super) fn all_off(&mut self) -> Result<(), Located> {
+        (self.modal.mist, self.modal.flood) = (false, false);
+        self.stop_spindle()
+    }
+
+    fn coolant(&mut self, block: &Block<'_>) -> Result<(), Located> {
         let [mist, flood, off] =
             [MGroup::Mist, MGroup::Flood, MGroup::CoolantOff].map(|group| block.m(group).is_some());
         self.modal.mist = !off && (self.modal.mist || mist);
         self.modal.flood = !off && (self.modal.flood || flood);
+        self.switch()?;
         if mist || flood || off {
             self.notice(NoticeKind::Coolant);
         }
+        Ok(())
     }
 
     fn overrides(&mut self, block: &Block<'_>) {
@@ -139,7 +189,7 @@ impl Interpreter {
             self.notice(NoticeKind::ToolChange);
             return Ok(());
         };
-        self.modal.spindle.clockwise = None;
+        self.stop_spindle()?;
         if number == self.tools.current {
             return Ok(());
         }

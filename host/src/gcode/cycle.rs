@@ -29,7 +29,7 @@ pub(super) enum Cycle {
     Bore,
     /// G86: with a dwell, the spindle stopped on the way back.
     BoreStop,
-    /// G88: with a dwell, and a stop at the bottom.
+    /// G88: with a dwell, and a stop at the bottom, the spindle stopped for it.
     BoreManual,
     /// G89: with a dwell, back at feed.
     BoreDwell,
@@ -267,13 +267,22 @@ impl Interpreter {
         if cycle.dwells() {
             self.step(StepKind::Dwell { seconds: self.cycle.dwell_s })?;
         }
+        let turned = self.modal.spindle.clockwise;
         match cycle {
             Cycle::Bore => self.straight(at(levels.r), feed, PathMode::ExactPath, first)?,
             Cycle::BoreDwell => self.straight(at(levels.clear), feed, PathMode::ExactPath, first)?,
-            Cycle::BoreManual => self.step(StepKind::Stop)?,
+            Cycle::BoreStop => self.stop_spindle()?,
+            Cycle::BoreManual => {
+                self.stop_spindle()?;
+                self.step(StepKind::Stop)?;
+                self.modal.spindle.clockwise = turned;
+                self.switch()?;
+            }
             _ => {}
         }
-        self.straight(at(levels.clear), Feed::Rapid, PathMode::ExactPath, first)
+        self.straight(at(levels.clear), Feed::Rapid, PathMode::ExactPath, first)?;
+        self.modal.spindle.clockwise = turned;
+        self.switch()
     }
 
     /// A straight move to a point in work coordinates \[10⁻¹⁰ mm\].

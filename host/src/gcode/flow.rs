@@ -115,7 +115,10 @@ impl<'a> Flow<'a> {
         self.interpreter.line = last;
         self.check_subroutines()?;
         let unended = self.interpreter.unended_nurbs();
-        if let Some(unended) = unended.or_else(|| self.interpreter.end_track(0).err()) {
+        if let Some(unended) = unended
+            .or_else(|| self.interpreter.end_track(0).err())
+            .or_else(|| self.interpreter.all_off().err())
+        {
             let name = self.library.file(0).map_or("", |file| file.source.name.as_str());
             return Err(GcodeError::new(name, last, b"", unended));
         }

@@ -17,7 +17,7 @@ use super::options::ReadOptions;
 use super::parameter_file;
 use super::parameters::{Parameters, SELECTED};
 use super::probe::Probe;
-use super::program::{Message, Notice, NoticeKind, Program, Step, StepKind};
+use super::program::{Message, Notice, NoticeKind, Outputs, Program, Step, StepKind};
 use super::tool::ToolTable;
 
 /// Feeds beyond are no feeds \[mm/min\].
@@ -55,6 +55,8 @@ pub(super) struct Interpreter {
     pub(super) tool_at: Option<[Length; 3]>,
     pub(super) parameters: Parameters,
     pub(super) tools: Tools,
+    /// What spindle and coolant do after the steps up to here.
+    pub(super) outputs: Outputs,
     pub(super) cycle: CycleState,
     /// What G38.2 to G38.5 touch.
     pub(super) probe: Option<Rc<Probe>>,
@@ -119,6 +121,7 @@ impl Interpreter {
                 ..Tools::default()
             },
             parameters,
+            outputs: Outputs::default(),
             cycle: CycleState::default(),
             probe: options.probe.clone().map(Rc::new),
             nurbs: None,
@@ -235,6 +238,7 @@ impl Interpreter {
     pub(super) fn end(&mut self) -> Result<(), Located> {
         self.unended_nurbs().map_or(Ok(()), Err)?;
         self.end_track(0)?;
+        self.all_off()?;
         self.step(StepKind::End)?;
         self.parameters.set(SELECTED, 1.0);
         self.ended = true;
@@ -336,6 +340,7 @@ impl Interpreter {
         }
         self.modal = Modal { motion: self.modal.motion, ..saved.modal };
         self.frame.tool = saved.tool;
+        self.switch()?;
         self.select(saved.system, 0)
     }
 
@@ -379,9 +384,12 @@ mod tests {
         assert!(matches!(
             kinds[..],
             [
+                StepKind::Switch(_),
                 StepKind::Dwell { .. },
                 StepKind::Line(LineMove { feed: Feed::MmPerMin(_), .. }),
-                StepKind::Stop
+                StepKind::Stop,
+                // At the end of the file.
+                StepKind::Switch(_)
             ]
         ));
         assert_eq!(last_mm("G0 X1 G20"), [25.4, 0.0, 0.0]);

@@ -29,7 +29,7 @@
 //! 4. `block`: the words of one line, each in its slot; a word twice, two words of one modal group and words that
 //!    nothing takes are refused here, the leftmost first.
 //! 5. `interpreter`: the slots executed in the order RS-274 prescribes, whatever the order in the line: comments for the
-//!    operator; feed mode, feed; `accessories`: spindle, tool, coolant, outputs; dwell; plane, units, path mode, distance
+//!    operator; feed mode, feed; `accessories`: speed, tool, spindle, coolant; dwell; plane, units, path mode, distance
 //!    modes; `offsets`: tool length, coordinate system, G10, G28, G30, G52, G92; `motion`; stop or end.
 //! 6. `motion`: `arc` gives centre, radii and sweep of G2 and G3, `spline` and `nurbs` the control points of G5, G5.1, G5.2 and G6.2, `cycle` the moves of
 //!    a drilling cycle, `probe` where a probing move ends, `polar` the point of `@` and `^`; `frame` makes machine coordinates of the program's.
@@ -61,7 +61,9 @@
 //! | G43 H, G43.1, G43.2, G49, G10 L1 L10 L11 | tool lengths, from the tool table. Without a table every tool has length 0, which is told; with one, a tool that is not in it is refused. G10 changes the table for this program alone |
 //! | G61, G61.1, G64 \[P\] \[Q\] | exact path; with a full stop after every move; corners blended within P \[mm or inch\], without P within the machine's own tolerance; short lines of one feed made longer lines and arcs within Q, which comes on top of P, without Q within a part of P |
 //! | M0 M1 M60, M2 M30 | stop (M1 by a switch), end |
-//! | M3 M4 M5 S, G96 G97 D, M7 M8 M9, M48 to M53, M62 to M68 | kept as modes and read back by parameters, otherwise not acted on, which is told |
+//! | M3 M4 M5 S, M7 M8 M9 | spindle with its speed \[rev/min\] and coolant switch, where they are not so already, at rest; M2 and any other end switch all off; M6 stops the spindle, as do G86 and G88 for a while. Without `[spindle]` or `[coolant]` in the machine file not acted on, which is told |
+//! | G96 D, G97 | S is a speed of the surface \[m/min or feet/min\], or of the spindle; a spindle that turns after G96 is refused, as none here follows the radius |
+//! | M48 to M53, M62 to M68 | kept as modes and read back by parameters, otherwise not acted on, which is told |
 //! | M70 to M73 | modes saved and restored |
 //! | G40, G41 G42 \[D\], G41.1 G42.1 D \[L\] | cutter radius compensation in XY and ZX: the path of the tool's centre beside the programmed one, by the radius of the tool in the table, or half the D of G41.1 |
 //! | G80 | ends a drilling cycle |
@@ -91,7 +93,8 @@
 //!   restore no other offsets.
 //! - The position behind G10 L2 R of the system in force, with G92 in force, is where the machine is; LinuxCNC's interpreter takes
 //!   another. So it does in G53, G28 and G30 where G20 or G21 follows G43.1, and in a drilling cycle that G20 or G21 falls into.
-//! - M6 for the tool that is in the spindle does not stop, and without any T it is noticed.
+//! - M6 for the tool that is in the spindle does not stop the program, and without any T it is noticed.
+//! - A closing `%` and the end of a file switch spindle and coolant off, as M2 does.
 //! - Loops run to their end after a `break` or `continue` of another loop, where LinuxCNC may leave a `do` early.
 //!
 //! # At the start
@@ -155,8 +158,8 @@ pub use parameter_file::ParameterFile;
 pub use parameters::{PARAMETER_MAX, Parameters};
 pub use probe::Probe;
 pub use program::{
-    ArcMove, CubicMove, Feed, LineMove, Message, Notice, NoticeKind, Nurbs, NurbsMove, PathMode, Plane,
-    ProbeMove, Program, Step, StepKind, Systems, ThroughMove,
+    ArcMove, CubicMove, Feed, LineMove, Message, Notice, NoticeKind, Nurbs, NurbsMove, Outputs, PathMode,
+    Plane, ProbeMove, Program, SpindleSpeed, Step, StepKind, Systems, ThroughMove,
 };
 pub use survey::{Refusal, refusals};
 pub use tool::{Tool, ToolTable};

@@ -2,6 +2,7 @@
 
 use super::decimal::Length;
 use super::parameters::Parameters;
+use motion_kernel::hal::Spindle;
 use std::fmt;
 
 /// A program, read.
@@ -11,7 +12,8 @@ pub struct Program {
     pub steps: Vec<Step>,
     /// The curves of [`NurbsMove`]s.
     pub nurbs: Vec<Nurbs>,
-    /// Words that were accepted and not acted on: at most one notice per kind, in the order of their first
+    /// Words that were accepted and not acted on, those of spindle and coolant unless the machine has them: at most
+    /// one notice per kind, in the order of their first
     /// lines.
     pub notices: Vec<Notice>,
     /// What the operator is to read, in the order of the program.
@@ -54,10 +56,11 @@ pub struct Message {
 }
 
 impl Program {
-    /// Notices, tools that were assumed, and messages, a line each.
+    /// Notices but those of a kind that `is_acted_on`, tools that were assumed, and messages, a line each.
     #[must_use]
-    pub fn notes(&self) -> Vec<String> {
-        let mut notes: Vec<String> = self.notices.iter().map(ToString::to_string).collect();
+    pub fn notes(&self, is_acted_on: impl Fn(NoticeKind) -> bool) -> Vec<String> {
+        let notices = self.notices.iter().filter(|notice| !is_acted_on(notice.kind));
+        let mut notes: Vec<String> = notices.map(ToString::to_string).collect();
         if !self.tools_assumed.is_empty() {
             let tools: Vec<String> = self.tools_assumed.iter().map(ToString::to_string).collect();
             let tools = tools.join(", ");
@@ -112,6 +115,8 @@ pub enum StepKind {
         /// T; 0: no tool.
         tool: u32,
     },
+    /// M3, M4, M5, S, M7, M8, M9, and where other words switch these: spindle and coolant are not what they were.
+    Switch(Outputs),
     /// M0, M1 or M60: stop until the operator resumes.
     Stop,
     /// M2, M30 or a closing `%`: nothing follows.
@@ -129,7 +134,7 @@ impl StepKind {
             Self::Through(point) => Some([point.from, point.to]),
             Self::Nurbs(curve) => Some([curve.from, curve.to]),
             Self::Probe(probe) => Some([probe.from, probe.to]),
-            Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+            Self::Dwell { .. } | Self::ToolChange { .. } | Self::Switch(_) | Self::Stop | Self::End => None,
         }
     }
 
@@ -142,7 +147,12 @@ impl StepKind {
             Self::Cubic(curve) => Some(curve.mode),
             Self::Through(point) => Some(point.mode),
             Self::Nurbs(curve) => Some(curve.mode),
-            Self::Probe(_) | Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+            Self::Probe(_)
+            | Self::Dwell { .. }
+            | Self::ToolChange { .. }
+            | Self::Switch(_)
+            | Self::Stop
+            | Self::End => None,
         }
     }
 
@@ -154,8 +164,41 @@ impl StepKind {
             Self::Cubic(curve) => Some(&mut curve.mode),
             Self::Through(point) => Some(&mut point.mode),
             Self::Nurbs(curve) => Some(&mut curve.mode),
-            Self::Probe(_) | Self::Dwell { .. } | Self::ToolChange { .. } | Self::Stop | Self::End => None,
+            Self::Probe(_)
+            | Self::Dwell { .. }
+            | Self::ToolChange { .. }
+            | Self::Switch(_)
+            | Self::Stop
+            | Self::End => None,
         }
+    }
+}
+
+/// What spindle and coolant do.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outputs {
+    /// How the spindle turns.
+    pub spindle: Spindle,
+    /// Its commanded speed; 0 rev/min if it does not turn.
+    pub speed: SpindleSpeed,
+    /// M8.
+    pub flood: bool,
+    /// M7.
+    pub mist: bool,
+}
+
+/// Commanded speed of the spindle, 0 or more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SpindleSpeed {
+    /// G97 \[rev/min\].
+    Rpm(f64),
+    /// G96: of the surface, in m/min, after G20 in feet/min. It follows the tool's distance from the spindle's axis.
+    Surface(f64),
+}
+
+impl Default for SpindleSpeed {
+    fn default() -> Self {
+        Self::Rpm(0.0)
     }
 }
 
@@ -398,6 +441,14 @@ pub enum NoticeKind {
     TextAfterEnd,
     /// No M2, M30 or closing `%`.
     NoProgramEnd,
+}
+
+impl NoticeKind {
+    /// Whether it is of words that steps tell, and that a machine with spindle and coolant acts on.
+    #[must_use]
+    pub fn is_of_outputs(self) -> bool {
+        matches!(self, Self::Spindle | Self::SpindleSpeed | Self::Coolant)
+    }
 }
 
 impl fmt::Display for Notice {

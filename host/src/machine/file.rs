@@ -21,14 +21,16 @@ use toml::Spanned;
 use super::error::{MachineError, quote};
 use super::law_name::{LAW_NAMES, law_named};
 use super::range::{
-    AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
-    FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle,
-    Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS,
-    NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp, Resolution,
-    Reversal, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch, Within,
+    AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP,
+    ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump,
+    JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NAME_CHARACTERS_MAX,
+    NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp,
+    Resolution, Reversal, SPINDLE_TURNS, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick,
+    Velocity, Watch, Within,
 };
 use super::settings::{
-    AxisSettings, BLEND_TOLERANCE_MM, DefaultPathMode, FaultSettings, HomingSettings, Machine, PathSettings,
+    AxisSettings, BLEND_TOLERANCE_MM, CoolantSettings, DefaultPathMode, FaultSettings, HomingSettings,
+    Machine, PathSettings, SpindleSettings,
 };
 
 use crate::touch::{Surface, TouchBox};
@@ -159,6 +161,8 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
         axes: axes.map(|(_, axis)| axis),
         faults,
         probe: file.probe.map(|probe| probe.surface()),
+        spindle: file.spindle.map(|spindle| spindle.settings()),
+        coolant: file.coolant.map(|coolant| coolant.kinds.map_or(Kinds::BOTH, |kinds| kinds.0)),
     })
 }
 
@@ -190,6 +194,8 @@ struct MachineFile {
     path: PathTable,
     faults: Option<FaultsTable>,
     probe: Option<ProbeTable>,
+    spindle: Option<SpindleTable>,
+    coolant: Option<CoolantTable>,
     #[serde(deserialize_with = "three_axes")]
     axis: [AxisTable; 3],
 }
@@ -244,9 +250,24 @@ struct ProbeTable {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct SpindleTable {
+    speed_max_rpm: Within<SpindleSpeed>,
+    start_s: Within<SpindleTime>,
+    stop_s: Option<Within<SpindleTime>>,
+    turns: Option<Turns>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct BoxTable {
     low_mm: [Spanned<Within<Coordinate>>; 3],
     high_mm: [Within<Coordinate>; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CoolantTable {
+    kinds: Option<Kinds>,
 }
 
 #[derive(Deserialize)]
@@ -351,6 +372,17 @@ impl ProbeTable {
             high_mm: touch.high_mm.each_ref().map(|high_mm| high_mm.0),
         };
         Surface { boxes: self.boxes.iter().map(touch).collect() }
+    }
+}
+
+impl SpindleTable {
+    fn settings(&self) -> SpindleSettings {
+        SpindleSettings {
+            speed_max_rpm: self.speed_max_rpm.0,
+            start_s: self.start_s.0,
+            stop_s: self.stop_s.as_ref().map_or(0.0, |time| time.0),
+            reverses: self.turns.as_ref().is_none_or(|turns| turns.reverses),
+        }
     }
 }
 
@@ -625,6 +657,41 @@ impl<'de> Deserialize<'de> for EmergencyStop {
             Some("ramp") => Ok(Self(Reaction::Ramp)),
             Some("stop") => Ok(Self(Reaction::Stop)),
             _ => Err(D::Error::custom(format!("emergency_stop = {value}, expected {EMERGENCY_STOP}"))),
+        }
+    }
+}
+
+/// Which way the spindle turns.
+struct Turns {
+    reverses: bool,
+}
+
+impl<'de> Deserialize<'de> for Turns {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = toml::Value::deserialize(deserializer)?;
+        match value.as_str() {
+            Some("both") => Ok(Self { reverses: true }),
+            Some("clockwise") => Ok(Self { reverses: false }),
+            _ => Err(D::Error::custom(format!("turns = {value}, expected {SPINDLE_TURNS}"))),
+        }
+    }
+}
+
+/// The kinds of coolant.
+struct Kinds(CoolantSettings);
+
+impl Kinds {
+    const BOTH: CoolantSettings = CoolantSettings { flood: true, mist: true };
+}
+
+impl<'de> Deserialize<'de> for Kinds {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = toml::Value::deserialize(deserializer)?;
+        match value.as_str() {
+            Some("both") => Ok(Self(Self::BOTH)),
+            Some("flood") => Ok(Self(CoolantSettings { flood: true, mist: false })),
+            Some("mist") => Ok(Self(CoolantSettings { flood: false, mist: true })),
+            _ => Err(D::Error::custom(format!("kinds = {value}, expected {COOLANT_KINDS}"))),
         }
     }
 }

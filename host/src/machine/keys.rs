@@ -8,11 +8,11 @@ use motion_kernel::axis::TABLE_POINTS;
 
 use super::law_name::LAW_NAMES;
 use super::range::{
-    AXIS_NAME, BlendTolerance, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth,
-    FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle,
-    Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit,
-    OutputOffset, PATH_MODE, Place, Positive, Ramp, Range, Resolution, Reversal, StopTime, TIMER_BITS,
-    TablePoint, Tick, Velocity, Watch,
+    AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP,
+    ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump,
+    JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NOISE_COUNTS, NOISE_SEED,
+    OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp, Range, Resolution, Reversal, SPINDLE_TURNS,
+    SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -180,6 +180,38 @@ pub const KEY_TABLES: &[KeyTable] = &[
             Key::coordinates("low_mm", "Least X, Y, Z of the axes at which the probe touches; below high_mm."),
             Key::coordinates("high_mm", "Greatest X, Y, Z of the axes at which the probe touches."),
         ],
+    ),
+    optional(
+        "spindle",
+        "The spindle's output; without it the words M3, M4, M5 and S are not acted on, and `motion compile` refuses them.",
+        &[
+            Key::new(
+                "speed_max_rpm",
+                "rev/min",
+                SpindleSpeed::EXPECTED,
+                "Greatest speed; a program that commands more is refused.",
+            ),
+            Key::new(
+                "start_s",
+                "s",
+                SpindleTime::EXPECTED,
+                "Wait after the spindle is started, or its speed or direction changed.",
+            ),
+            Key::new("stop_s", "s", SpindleTime::EXPECTED, "Wait after the spindle is stopped.").or("0"),
+            Key::new("turns", "", SPINDLE_TURNS, "Which way it turns; a program with M4 is refused if it can't.")
+                .or("\"both\""),
+        ],
+    ),
+    optional(
+        "coolant",
+        "The coolant's output; without it the words M7, M8 and M9 are not acted on, and `motion compile` refuses them.",
+        &[Key::new(
+            "kinds",
+            "",
+            COOLANT_KINDS,
+            "The kinds there are: flood (M8), mist (M7); a program that switches on another one is refused.",
+        )
+        .or("\"both\"")],
     ),
     table(
         "axis",

@@ -40,7 +40,8 @@ pub use edit::{AxisEdit, edited};
 pub use error::{AxisError, MachineError};
 pub(crate) use law_name::{LAW_NAMES, law_named};
 pub use settings::{
-    AxisSettings, DEAD_TIME_CELLS, DefaultPathMode, FaultSettings, HomingSettings, Machine, PathSettings,
+    AxisSettings, CoolantSettings, DEAD_TIME_CELLS, DefaultPathMode, FaultSettings, HomingSettings, Machine,
+    PathSettings, SpindleSettings,
 };
 
 /// The reference machine's file, with every key explained.

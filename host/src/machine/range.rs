@@ -30,6 +30,10 @@ pub(super) const NOISE_COUNTS_MAX: u16 = 1000;
 /// The reactions of an emergency stop.
 pub(super) const PATH_MODE: &str = "\"blend\" or \"exact\"";
 pub(super) const EMERGENCY_STOP: &str = "\"immediate\", \"ramp\" or \"stop\"";
+/// Ways that a spindle turns.
+pub(super) const SPINDLE_TURNS: &str = "\"both\" or \"clockwise\"";
+/// Kinds of coolant.
+pub(super) const COOLANT_KINDS: &str = "\"both\", \"flood\" or \"mist\"";
 /// Seeds of an encoder's noise.
 pub(super) const NOISE_SEED: &str = "a whole number, 0 or more";
 
@@ -58,6 +62,8 @@ ranges! {
     BlendTolerance: "a number from 0 to 10", |value| (0.0..=10.0).contains(&value);
     Ramp: "a number from 0 to 1", |value| (0.0..=1.0).contains(&value);
     StopTime: "a number from 0 to 60", |value| (0.0..=60.0).contains(&value);
+    SpindleTime: "a number from 0 to 600", |value| (0.0..=600.0).contains(&value);
+    SpindleSpeed: "a number from 1 to 1e6", |value| (1.0..=1e6).contains(&value);
     ErrorGrowth: "a number from 0 to 10", |value| (0.0..=10.0).contains(&value);
     Jump: "a number from 1e-6 to 1000", |value| (1e-6..=1000.0).contains(&value);
     Watch: "a number from 0.00002 to 10", |value| (2e-5..=10.0).contains(&value);

@@ -54,6 +54,32 @@ pub struct Machine {
     pub faults: FaultSettings,
     /// What the simulated probe touches, if there is one.
     pub probe: Option<Surface>,
+    /// The spindle's output, if there is one.
+    pub spindle: Option<SpindleSettings>,
+    /// The coolant's outputs, if there are any.
+    pub coolant: Option<CoolantSettings>,
+}
+
+/// The spindle's output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpindleSettings {
+    /// Greatest speed \[rev/min\], 1 to 10⁶.
+    pub speed_max_rpm: f64,
+    /// Wait after a start or another speed or direction \[s\], 0 to 600.
+    pub start_s: f64,
+    /// Wait after a stop \[s\], 0 to 600.
+    pub stop_s: f64,
+    /// Whether it turns counter-clockwise, too.
+    pub reverses: bool,
+}
+
+/// The coolant's outputs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CoolantSettings {
+    /// M8.
+    pub flood: bool,
+    /// M7.
+    pub mist: bool,
 }
 
 /// How faults end.
@@ -189,6 +215,8 @@ impl Machine {
             ],
             faults: FaultSettings::default(),
             probe: None,
+            spindle: None,
+            coolant: None,
         }
     }
 

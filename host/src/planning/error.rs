@@ -113,6 +113,40 @@ pub enum Problem {
         /// The tick \[s\].
         tick_s: f64,
     },
+    /// The machine has no output for a word.
+    #[error(
+        "found {word}, and the machine file has no [{table}], expected that table if the board has the output, or \
+         --no-spindle to leave the word out"
+    )]
+    NoOutput {
+        /// M3, M4, M7 or M8.
+        word: &'static str,
+        /// The table of the machine file.
+        table: &'static str,
+    },
+    /// The spindle is commanded to turn faster than it may.
+    #[error("found a spindle speed of {found_rpm} rev/min, expected at most speed_max_rpm = {max_rpm}")]
+    SpindleSpeed {
+        /// The commanded speed \[rev/min\].
+        found_rpm: f64,
+        /// The greatest \[rev/min\].
+        max_rpm: f64,
+    },
+    /// The spindle is commanded to turn the other way round.
+    #[error("found M4, expected M3: the spindle turns clockwise only, turns = \"clockwise\"")]
+    SpindleDirection,
+    /// The spindle turns at a speed of the surface.
+    #[error(
+        "found a spindle turning after G96, whose speed would have to follow the tool's radius, expected a speed in \
+         revolutions per minute (G97)"
+    )]
+    SurfaceSpeed,
+    /// Coolant of a kind that the machine does not have.
+    #[error("found {word}, expected coolant of the kind that [coolant] of the machine file has")]
+    Coolant {
+        /// M7 or M8.
+        word: &'static str,
+    },
     /// The file is not a block list.
     #[error("{0}")]
     Json(String),

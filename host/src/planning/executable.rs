@@ -56,6 +56,7 @@ impl Executable {
                     segment_pace.next(dwell).map_err(|problem| fail(line, problem))?;
                     items.push(Item::Dwell(dwell));
                 }
+                PlanItem::Switch { to, .. } => items.push(Item::Switch(*to)),
                 PlanItem::Stop { .. } => items.push(Item::Stop),
             }
         }
@@ -80,9 +81,10 @@ impl Executable {
         bytes(machine, &self.items)
     }
 
-    /// The items, as the kernel's [`Supply`](motion_kernel::program::Supply) takes them.
+    /// The items of motion, as the kernel's [`Supply`](motion_kernel::program::Supply) takes them: without switches of
+    /// outputs.
     pub fn supplied(&self) -> impl Iterator<Item = Result<Item<3>, Infallible>> + '_ {
-        self.items.iter().map(|&item| Ok(item))
+        self.items.iter().filter(|item| !matches!(item, Item::Switch(_))).map(|&item| Ok(item))
     }
 }
 

@@ -11,6 +11,7 @@
 //!
 //! - [`program`]: steps to stretches: where motion must stop;
 //! - `blending`: stretches to blocks: the choice of the junctions that are blended;
+//! - [`outputs`]: spindle and coolant: what the machine switches;
 //! - `ceilings`: the ceiling of a move or a blend, and of a junction;
 //! - `curves`: programmed curves to moves;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
@@ -30,6 +31,7 @@ mod density;
 pub mod error;
 pub mod executable;
 mod lookahead;
+pub mod outputs;
 pub mod profile;
 pub mod program;
 pub mod spline;
@@ -39,11 +41,13 @@ mod travel;
 pub use blocks::plan_blocks;
 pub use error::{Place, PlanningError, Problem};
 pub use executable::Executable;
+pub use outputs::require_outputs;
 pub use profile::PlacedRamp;
 pub use program::{plan_moves, plan_program};
 pub use spline::plan_spline;
 pub use stretch::Stretch;
 
+use motion_kernel::hal::OutputState;
 use motion_kernel::law::Pulse;
 use serde::{Deserialize, Serialize};
 
@@ -154,6 +158,13 @@ pub enum Item {
         line: u32,
         /// Duration \[s\].
         seconds: f64,
+    },
+    /// Spindle and coolant switch.
+    Switch {
+        /// Program line.
+        line: u32,
+        /// To what.
+        to: OutputState,
     },
     /// Program stop.
     Stop {

@@ -4,6 +4,7 @@ use super::blending::blocks;
 use super::curves::{Point, cubic, nurbs, through};
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
+use super::outputs::{Switches, acts_on};
 use super::stretch::{Stretch, StretchBlock};
 use super::{Item, Mode, PlacedRamp, Plan, PlannedProbe, travel};
 use crate::gcode::{Feed, LineMove, PathMode, ProbeMove, Program, Step, StepKind};
@@ -31,12 +32,21 @@ pub fn plan_program(
     };
     let machine = &driven(machine, mode);
     let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s);
-    plan.notices = program.notes();
+    plan.notices = program.notes(|kind| acts_on(machine, kind));
     plan.notices.extend(assumed_path(program, machine));
+    let mut switches = Switches::new(machine);
     let mut run: Vec<Move> = Vec::new();
     // Where the spline begins whose points are being collected.
     let (mut start, mut points) = ([0.0; 3], Vec::<Point>::new());
     for step in &program.steps {
+        let switch = match &step.kind {
+            StepKind::Switch(to) => match switches.next(to).map_err(at(step.line))? {
+                // For this machine it is no step.
+                None => continue,
+                switch => switch,
+            },
+            _ => None,
+        };
         if !matches!(&step.kind, StepKind::Through(point) if !point.begins) {
             let stops = points.last().is_some_and(|point| point.mode == PathMode::ExactStop);
             let moves = through(start, &mut points, machine);
@@ -81,16 +91,23 @@ pub fn plan_program(
                 }
                 append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
             }
-            StepKind::Dwell { .. } | StepKind::ToolChange { .. } | StepKind::Stop | StepKind::End => {
+            StepKind::Dwell { .. }
+            | StepKind::ToolChange { .. }
+            | StepKind::Switch(_)
+            | StepKind::Stop
+            | StepKind::End => {
                 append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
+                let line = step.line;
                 match step.kind {
-                    // A dwell of no time changes nothing but the stop it makes.
-                    StepKind::Dwell { seconds } if seconds > 0.0 => {
-                        plan.time_s += seconds;
-                        plan.items.push(Item::Dwell { line: step.line, seconds });
+                    StepKind::Dwell { seconds } => rest(&mut plan, line, seconds),
+                    StepKind::Switch(_) => {
+                        if let Some((to, wait_s)) = switch {
+                            plan.items.push(Item::Switch { line, to });
+                            rest(&mut plan, line, wait_s);
+                        }
                     }
                     StepKind::ToolChange { .. } | StepKind::Stop => {
-                        plan.items.push(Item::Stop { line: step.line });
+                        plan.items.push(Item::Stop { line });
                     }
                     _ => {}
                 }
@@ -109,6 +126,14 @@ pub fn plan_program(
     // What the tick can't do is to be refused here, not on the machine.
     travel::check(source_name, &Executable::new::<f32>(&plan)?, machine)?;
     Ok(plan)
+}
+
+/// A dwell; one of no time changes nothing but the stop it makes.
+fn rest(plan: &mut Plan, line: u32, seconds: f64) {
+    if seconds > 0.0 {
+        plan.time_s += seconds;
+        plan.items.push(Item::Dwell { line, seconds });
+    }
 }
 
 /// Plans moves that follow each other, from rest to rest.

@@ -6,7 +6,7 @@
 //! replay that goes another way is found in the very tick, but for one chance in 256 in each of the ticks
 //! that follow; the whole digest at the end leaves one in 2⁶⁴.
 
-use motion_kernel::hal::{AxisInputs, MachineInputs};
+use motion_kernel::hal::{AxisInputs, MachineInputs, OutputState};
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::{Digest, Trace};
 use motion_kernel::units::Counts;
@@ -87,6 +87,11 @@ impl Checks {
     pub(super) fn add<R: Scalar>(&mut self, trace: &Trace<R, AXES>) -> u8 {
         self.0.add(trace);
         (self.digest().wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 56) as u8
+    }
+
+    /// Adds outputs that are switched before the next tick.
+    pub(super) fn switch(&mut self, to: &OutputState) {
+        self.0.switch(to);
     }
 
     pub(super) fn digest(&self) -> u64 {

@@ -151,7 +151,8 @@ impl Recording {
     fn check<R: Real>(&self) -> Result<(), RecordingError> {
         let reader = Reader::<AXES>::new(&self.program)?;
         reader.guards()?.ok_or(RecordingError::Unguarded)?;
-        program::check::<R, AXES, _>(reader.header(), reader.items()).map_err(|error| match error {
+        let items = program::switches_as_stops(reader.items());
+        program::check::<R, AXES, _>(reader.header(), items).map_err(|error| match error {
             CheckError::Item { cause: SupplyError::Source(error), .. } => error.into(),
             error => RecordingError::Check(error),
         })

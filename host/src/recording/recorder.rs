@@ -1,6 +1,8 @@
 //! Hardware that writes down what it answers.
 
-use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+use motion_kernel::hal::{
+    DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
+};
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
@@ -91,5 +93,12 @@ impl<H: Hardware> DriveEnable<AXES> for Recorder<'_, H> {
         let taken = self.hardware.set_enabled(enabled);
         self.answers.told = Some((enabled, taken.is_ok()));
         taken
+    }
+}
+
+impl<H: Hardware> Outputs for Recorder<'_, H> {
+    fn switch(&mut self, to: &OutputState) {
+        self.checks.switch(to);
+        self.hardware.switch(to);
     }
 }

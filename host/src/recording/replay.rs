@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use motion_kernel::hal::{DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
+use motion_kernel::hal::{
+    DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
+};
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
@@ -26,7 +28,7 @@ pub struct Replay {
 /// How a replay is not what was recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Difference {
-    /// The kernel set, put out or told the drives something else.
+    /// The kernel set, put out or told the drives something else, or spindle or coolant were switched otherwise.
     Tick {
         /// The tick, from 0.
         tick: u64,
@@ -134,6 +136,12 @@ impl Hardware for Player<'_> {
         };
         self.ticks += u64::from(!matches!(self.difference, Some(Difference::Longer { .. })));
         self.difference.is_none()
+    }
+}
+
+impl Outputs for Player<'_> {
+    fn switch(&mut self, to: &OutputState) {
+        self.checks.switch(to);
     }
 }
 

@@ -3,15 +3,17 @@
 use core::convert::Infallible;
 
 use motion_kernel::exec::ExecState;
+use motion_kernel::hal::{OutputState, Outputs};
 use motion_kernel::law::Pulse;
 use motion_kernel::live::{LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::path::Travel;
-use motion_kernel::program::{Item, Supply, SupplyError};
+use motion_kernel::program::{Item, Supply, SupplyError, Switching};
 use motion_kernel::queue::{Feeder, Intake, LiveFeeder, LiveStreams, PathRules, Streams};
 use motion_kernel::units::Position;
 
 use super::live::{Command, Script};
+use super::switches::Switches;
 use crate::trace::{AXES, HeldBy, RunEnd};
 
 /// Capacities of the two streams, as a board has them.
@@ -30,14 +32,17 @@ pub(super) enum Storage<'script, R: Real> {
 
 /// What fills them.
 pub(super) enum Background<'a, R: Real, I> {
-    Plain(Box<(Feeder<'a, R, AXES>, Supply<R, AXES, I, Infallible>)>),
+    Plain(Box<Plain<'a, R, I>>),
     Live(Box<Live<'a, R, I>>),
 }
+
+/// Without live control.
+type Plain<'a, R, I> = (Feeder<'a, R, AXES>, Supply<R, AXES, Switching<I>, Infallible>);
 
 /// Under live control.
 pub(super) struct Live<'a, R: Real, I> {
     feeder: LiveFeeder<'a, R, AXES>,
-    control: LiveControl<R, AXES, I, Infallible, PLACES>,
+    control: LiveControl<R, AXES, Switching<I>, Infallible, PLACES>,
     script: &'a Script,
     /// Commands given so far.
     given: usize,
@@ -62,6 +67,7 @@ impl<'script, R: Real> Storage<'script, R> {
         items: I,
         (pulse, tick_s): (Pulse, f64),
     ) -> (Background<'a, R, I>, Intake<'a, R, AXES>) {
+        let items = Switching::new(items);
         match self {
             Self::Plain(streams) => {
                 let (mut feeder, intake) = streams.split(rules, start);
@@ -80,11 +86,24 @@ impl<'script, R: Real> Storage<'script, R> {
 }
 
 impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_, R, I> {
-    /// Before a tick.
-    pub(super) fn poll(&mut self, tick: u64) -> Result<(), SupplyError<Infallible>> {
+    /// Before a tick; the one before ended in `state`.
+    pub(super) fn poll(
+        &mut self,
+        tick: u64,
+        state: ExecState,
+        (switches, hardware): (&mut Switches<'_>, &mut impl Outputs),
+    ) -> Result<(), SupplyError<Infallible>> {
         match self {
             Self::Plain(plain) => {
                 let (feeder, supply) = &mut **plain;
+                if !switches.is_over()
+                    && supply.is_waiting()
+                    && state == ExecState::Idle
+                    && let Some(to) = supply.source_mut().due()
+                {
+                    switches.by_program(tick, to, hardware);
+                    supply.source_mut().switched();
+                }
                 supply.fill(feeder)
             }
             Self::Live(live) => {
@@ -109,7 +128,16 @@ impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_,
                     // Each by itself, as if time passed between them.
                     control.poll(feeder)?;
                 }
-                control.poll(feeder)
+                control.poll(feeder)?;
+                while !switches.is_over()
+                    && control.state(feeder) == State::Waiting
+                    && let Some(to) = control.source_mut().due()
+                {
+                    switches.by_program(tick, to, hardware);
+                    control.source_mut().switched();
+                    control.poll(feeder)?;
+                }
+                Ok(())
             }
         }
     }
@@ -135,6 +163,14 @@ impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_,
                     _ => None,
                 }
             }
+        }
+    }
+
+    /// What is to be switched once the items before are done.
+    pub(super) fn due(&mut self) -> Option<OutputState> {
+        match self {
+            Self::Plain(plain) => plain.1.source_mut().due(),
+            Self::Live(live) => live.control.source_mut().due(),
         }
     }
 

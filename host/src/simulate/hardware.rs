@@ -8,7 +8,8 @@ use core::convert::Infallible;
 
 use hal_sim::{Ad5754Chip, ChipError, Injection, Injector, SimHome, SimMachine};
 use motion_kernel::hal::{
-    Ad5754Error, Ad5754Output, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, VelocityChannel,
+    Ad5754Error, Ad5754Output, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, OutputState, Outputs,
+    VelocityChannel,
 };
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
@@ -20,7 +21,9 @@ use crate::machine::{DEAD_TIME_CELLS, Machine};
 use crate::trace::AXES;
 
 /// A machine to run a program on: what the kernel asks of a board, and the time between two ticks.
-pub trait Hardware: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> {
+pub trait Hardware:
+    Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> + Outputs
+{
     /// What the encoders read before the first tick.
     fn start_counts(&mut self) -> [Counts; AXES];
 
@@ -151,6 +154,11 @@ impl DriveEnable<AXES> for SimulatedHardware<'_> {
     fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
         self.machine.set_enabled(enabled)
     }
+}
+
+/// Neither moves an axis.
+impl Outputs for SimulatedHardware<'_> {
+    fn switch(&mut self, _: &OutputState) {}
 }
 
 impl IndexLatch for SimulatedHardware<'_> {

@@ -94,6 +94,8 @@ pub struct RunInfo {
     pub blocks: Vec<TracedBlock>,
     /// Where each stretch starts, from the program's start along the path \[mm\].
     pub starts_mm: Vec<f64>,
+    /// The line of each switch of spindle and coolant.
+    pub switch_lines: Vec<u32>,
     /// Path length of the plan \[mm\].
     pub path_length_mm: f64,
     /// Duration of the plan, dwells included, stops not \[s\].
@@ -159,12 +161,17 @@ impl RunInfo {
     fn new(plan: &Plan, machine: &Machine) -> Self {
         let start_mm = |item: &PlanItem| match item {
             PlanItem::Stretch(stretch) => Some(stretch.start_mm),
-            PlanItem::Dwell { .. } | PlanItem::Stop { .. } => None,
+            PlanItem::Dwell { .. } | PlanItem::Switch { .. } | PlanItem::Stop { .. } => None,
+        };
+        let switch_line = |item: &PlanItem| match item {
+            &PlanItem::Switch { line, .. } => Some(line),
+            _ => None,
         };
         Self {
             program: plan.source.clone(),
             blocks: plan.blocks.clone(),
             starts_mm: plan.items.iter().filter_map(start_mm).collect(),
+            switch_lines: plan.items.iter().filter_map(switch_line).collect(),
             path_length_mm: plan.length_mm,
             planned_time_s: plan.time_s,
             probes: plan.probes.clone(),

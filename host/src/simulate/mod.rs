@@ -13,6 +13,7 @@
 //! - [`hardware`]: the simulated machine as the kernel's hardware;
 //! - `commands`: what became of them;
 //! - `contour`: how far the machine is off its path;
+//! - `switches`: spindle and coolant;
 //! - `limit_share`: on how much of the path a limit is active;
 //! - [`run`](mod@run): the ticks;
 //! - [`probing`]: the probe, and where it trips;
@@ -31,6 +32,7 @@ pub mod inject;
 mod limit_share;
 pub mod live;
 pub mod hardware;
+mod switches;
 pub mod run;
 pub mod summary;
 pub mod probing;

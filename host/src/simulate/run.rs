@@ -22,6 +22,7 @@ use super::job::{Job, Number, RunOptions, StretchCorrection};
 use super::limit_share::LimitShare;
 use super::probing::{Probed, Probing};
 use super::summary::{Collector, RunSummary};
+use super::switches::Switches;
 use crate::machine::Machine;
 use crate::planning::Plan;
 use crate::trace::{AXES, AxisTick, RunEnd, TraceRow};
@@ -120,14 +121,19 @@ fn run_in<R: Real>(
     let mut limit_share = LimitShare::new(info);
     let mut probing = Probing::new(info);
     let mut commands = Commands::new(script.as_ref(), tick_s);
+    let mut switches = Switches::new(&info.switch_lines);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
+    let mut state = ExecState::Idle;
     let mut goes_on = true;
     summary.end = RunEnd::Cut;
     while goes_on {
-        background.poll(collector.ticks()).map_err(RunError::Rejected)?;
+        background.poll(collector.ticks(), state, (&mut switches, hardware)).map_err(RunError::Rejected)?;
+        let was_idle = state == ExecState::Idle;
         let trace = *kernel.tick_corrected(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
-        let state = trace.executed.state;
+        state = trace.executed.state;
+        // Only the next poll may find that outputs are to be switched.
+        stopped_ticks += u64::from(was_idle && state == ExecState::Idle && background.due().is_some());
         // What is idle after the last item is no longer part of the program, but for the tick in which
         // it ended.
         let ended = background.ended(state);
@@ -145,6 +151,7 @@ fn run_in<R: Real>(
                 let setpoints = &trace.executed.setpoints;
                 summary.faults.push(faults::traced(&fault, (header, info), &config, setpoints));
             }
+            switches.off(collector.ticks(), hardware);
             if kernel.reaction() == Some(Reaction::Immediate) {
                 break;
             }
@@ -152,6 +159,9 @@ fn run_in<R: Real>(
         }
         if let Some(end) = ended {
             summary.end = end;
+            if end == RunEnd::Aborted {
+                switches.off(collector.ticks(), hardware);
+            }
             break;
         }
         if state == ExecState::Stopped {
@@ -161,6 +171,7 @@ fn run_in<R: Real>(
         }
     }
     collector.fill(&mut summary);
+    summary.outputs = switches.noted();
     match background.starvations() {
         0 => {}
         1 => summary.notices.push("1 stop on the path because data came too late".to_owned()),

@@ -1,7 +1,7 @@
 //! Figures of a run, collected tick by tick.
 
 use super::probing::Probed;
-use crate::trace::{AXES, RunEnd, TraceRow, TracedCommand, TracedFault};
+use crate::trace::{AXES, RunEnd, TraceRow, TracedCommand, TracedFault, TracedSwitch};
 
 /// The figures of a run.
 #[derive(Clone, Debug, Default)]
@@ -18,7 +18,7 @@ pub struct RunSummary {
     pub tick_s: f64,
     /// Duration of the plan, dwells included, stops not \[s\].
     pub planned_time_s: f64,
-    /// Executed duration, dwells included, stops not \[s\].
+    /// Executed duration, dwells included, stops and the ticks in which outputs were switched not \[s\].
     pub time_s: f64,
     /// Path length \[mm\].
     pub path_length_mm: f64,
@@ -43,6 +43,8 @@ pub struct RunSummary {
     pub unreached: Vec<String>,
     /// What came of probing moves, in order; those that the run did not come to are left out.
     pub probes: Vec<Probed>,
+    /// Switches of spindle and coolant, in order.
+    pub outputs: Vec<TracedSwitch>,
     /// Faults, in order.
     pub faults: Vec<TracedFault>,
     /// What was accepted and not acted on, and how the run was made.

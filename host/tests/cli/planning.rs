@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::fs;
 
 use motion_host::machine::Machine;
+use motion_kernel::hal::{OutputState, Spindle};
 use motion_kernel::num::Fixed;
 use motion_kernel::program::{Item, Reader, check};
 use serde_json::Value;
@@ -525,4 +526,76 @@ fn compile_writes_a_program_or_says_why_not() {
     );
     assert!(!workspace.0.join("wide.bin").exists());
     workspace.stdout(&compile("f32"));
+}
+
+/// What the machine has no output for is refused by `compile`, with line and word, unless told otherwise.
+#[test]
+fn compile_refuses_words_without_an_output() {
+    let workspace = Workspace::new("outputs");
+    workspace.put("part.ngc", "G21 G90 G61\nM5 M9 S900\nM3\nM8\nG1 X1 F600\nM30\n");
+    workspace.put("coolant.ngc", "G21 G90 G61\nM7\nG1 X1 F600\nM30\n");
+    workspace.put("none.ngc", "G21 G90 G61\nS900\nG1 X1 F600\nM5 M9\nM30\n");
+    let compile =
+        |part, more: &[&'static str]| [&["compile", part, "--live", "--output", "part.bin"], more].concat();
+    let refusal = workspace.refusal(&compile("part.ngc", &[]));
+    assert!(
+        refusal.starts_with("part.ngc:3: found M3, and the machine file has no [spindle], expected"),
+        "{refusal}"
+    );
+    assert!(refusal.ends_with("or --no-spindle to leave the word out"), "{refusal}");
+    assert!(workspace.refusal(&compile("coolant.ngc", &[])).starts_with("coolant.ngc:2: found M7, and the"));
+    assert!(!workspace.0.join("part.bin").exists());
+    // Nothing is ever on.
+    workspace.stdout(&compile("none.ngc", &[]));
+    let said = workspace.stdout(&compile("part.ngc", &["--no-spindle"]));
+    assert!(
+        said.contains("note: line 2: M3, M4, M5 are not acted on: there is no spindle (2 lines)"),
+        "{said}"
+    );
+    let without = fs::read(workspace.0.join("part.bin")).expect("a file");
+
+    let tables = "\n[spindle]\nspeed_max_rpm = 24000\nstart_s = 0.5\n\n[coolant]\n\n[[axis]]\n";
+    let machine = workspace.stdout(&["machine"]).replacen("\n[[axis]]\n", tables, 1);
+    workspace.put("mill.toml", &machine);
+    workspace.put("spindle.toml", &machine.replacen("\n[coolant]\n", "\n", 1));
+    let refusal = workspace.refusal(&compile("part.ngc", &["--machine", "spindle.toml"]));
+    assert!(refusal.starts_with("part.ngc:4: found M8, and the machine file has no [coolant]"), "{refusal}");
+    let said = workspace.stdout(&compile("part.ngc", &["--machine", "mill.toml"]));
+    assert!(!said.contains("note: "), "{said}");
+    let bytes = fs::read(workspace.0.join("part.bin")).expect("a file");
+    let switches = |bytes: &[u8]| {
+        let items = Reader::<3>::new(bytes).expect("a program").items();
+        let switch = |item| match item {
+            Ok(Item::Switch(to)) => Some(to),
+            _ => None,
+        };
+        items.filter_map(switch).collect::<Vec<OutputState>>()
+    };
+    let on = OutputState { spindle: Spindle::Clockwise, speed_rpm: 900.0, ..OutputState::OFF };
+    let all = [
+        on,
+        OutputState { flood: true, ..on },
+        OutputState { flood: true, ..OutputState::OFF },
+        OutputState::OFF,
+    ];
+    assert_eq!((switches(&without), switches(&bytes)), (vec![], all.to_vec()));
+
+    // The same in a run, with the ticks.
+    let run = workspace.json(&["run", "part.ngc", "--machine", "mill.toml", "--json"]);
+    let outputs = run["outputs"].as_array().expect("a list");
+    assert_eq!(outputs.len(), 4);
+    assert_eq!(keys(&outputs[1]), ["flood", "line", "mist", "speed_rpm", "spindle", "tick"]);
+    assert_eq!(outputs[1]["spindle"], "clockwise");
+    assert_eq!((number(&outputs[1]["line"]), number(&outputs[1]["speed_rpm"])), (4.0, 900.0));
+    let [on, off] = [0, 3].map(|index: usize| number(&outputs[index]["tick"]));
+    let said = workspace.stdout(&["run", "part.ngc", "--machine", "mill.toml"]);
+    let line =
+        format!("spindle and coolant: 4 switches, the first before tick {on}, all off before tick {off}");
+    assert!(said.contains(&line), "{said}");
+    assert_eq!(workspace.json(&["run", "part.ngc", "--json"])["outputs"], Value::Array(Vec::new()));
+    // And read, a step each.
+    let read = workspace.stdout(&["read", "part.ngc", "--json"]);
+    let step = r#"{"line":4,"kind":"switch","spindle":"clockwise","speed":900.0,"surface":false,"flood":true,"mist":false}"#;
+    assert!(read.lines().any(|line| line == step), "{read}");
+    assert!(workspace.stdout(&["read", "part.ngc"]).contains("spindle clockwise 900 rev/min, flood"));
 }

@@ -1,5 +1,5 @@
 //! The traits that a board implements: a velocity output, an encoder, digital inputs and a drive enable, for
-//! all axes at once.
+//! all axes at once; and [`Outputs`] for spindle and coolant, where it has them.
 //!
 //! All axes at once, because they have to be sampled and latched in the same instant: a circle is only round
 //! if both its axes are read at the same time. The tick's interrupt calls these traits, so each call must
@@ -9,11 +9,13 @@ mod ad5754;
 mod extend;
 mod index;
 mod inputs;
+mod outputs;
 
 pub use ad5754::{Ad5754Error, Ad5754Frame, Ad5754Output, POWER_UP_TIME_US};
 pub use extend::{CountExtender, TimerWidth};
 pub use index::IndexLatch;
 pub use inputs::{AxisInputs, Inputs, MachineInputs};
+pub use outputs::{NoOutputs, OutputState, Outputs, Spindle};
 
 use crate::units::{Counts, DacCode};
 

@@ -6,12 +6,11 @@ use super::list::List;
 use super::mode::{Blocks, Mode, Request, Run};
 use super::places::Takeover;
 use super::reader::Reader;
-use super::source::Source;
 use super::splice::{BlockEnd, Extent};
 use super::timeline::Timeline;
 use crate::law::Pulse;
 use crate::num::Real;
-use crate::program::SupplyError;
+use crate::program::{Source, SupplyError};
 use crate::queue::{LiveFeeder, Progress};
 use crate::units::Position;
 

@@ -81,11 +81,10 @@ mod places;
 mod program_feed;
 mod reader;
 mod replan;
-mod source;
 mod splice;
 mod timeline;
 
+pub use crate::program::Source;
 pub use control::{LiveControl, State};
 pub use list::LIST_ITEMS;
 pub use mode::{OVERRIDE_MAX, OVERRIDE_MIN};
-pub use source::Source;

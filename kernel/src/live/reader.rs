@@ -9,12 +9,11 @@ use core::task::Poll;
 use super::list::Item as ListItem;
 use super::lookahead::Lookahead;
 use super::program_feed::ProgramFeed;
-use super::source::Source;
 use super::splice::{BlockEnd, Extent, Splice};
 use crate::law::Pulse;
 use crate::num::Real;
 use crate::program::supply::{Ready, is_taken};
-use crate::program::{Item, SupplyError};
+use crate::program::{Item, Source, SupplyError};
 use crate::queue::{LiveFeeder, Rejection};
 use crate::units::Position;
 
@@ -203,6 +202,7 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
             Item::Feed(ramp) => self.feed.push(ListItem::Feed(ramp)),
             Item::Dwell(duration) => self.feed.push(ListItem::Dwell(duration)),
             Item::Stop => self.feed.push(ListItem::Stop),
+            Item::Switch(_) => return Err(SupplyError::NoOutputs),
         };
         taken.map_err(SupplyError::Rejected)
     }

@@ -3,7 +3,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MOTN` |
-//! | 1 | version of this format, 4 |
+//! | 1 | version of this format, 5 |
 //! | 1 | number of axes |
 //! | 2 | length of the guards, least significant byte first; 0 for none |
 //! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format; a kernel without guards skips them |
@@ -26,7 +26,7 @@ use crate::queue::PathRules;
 use crate::units::Position;
 
 const MAGIC: [u8; 4] = *b"MOTN";
-const VERSION: u8 = 4;
+const VERSION: u8 = 5;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 8;
@@ -60,7 +60,7 @@ pub enum ProgramError {
     NotAProgram,
     /// It has another version of the format.
     Version {
-        /// Its version; 4 is expected.
+        /// Its version; 5 is expected.
         found: u8,
     },
     /// It is for a machine with another number of axes.
@@ -243,6 +243,7 @@ mod tests {
     use crate::axis::{Feedforward, GuardFigures};
     use crate::fault::{Reaction, Reactions};
     use crate::fixture::{GUARD, RULES, figures};
+    use crate::hal::{OutputState, Spindle};
     use crate::law::{Pulse, Ticks};
 
     fn header() -> Header<2> {
@@ -271,6 +272,12 @@ mod tests {
             Item::EndOfStretch(at),
             Item::Dwell(Ticks::ONE),
             Item::Stop,
+            Item::Switch(OutputState {
+                spindle: Spindle::Counterclockwise,
+                speed_rpm: 1e9,
+                flood: true,
+                mist: false,
+            }),
         ];
         let mut bytes = Vec::new();
         write(&header(), Some(&guards()), &items, &mut bytes).expect("short entries");

@@ -2,7 +2,8 @@
 //! also for the blocks that it plans with.
 //!
 //! Consumes items; produces the first refusal. Background: as much work as filling the streams, and nothing
-//! is kept. If it accepts a program, [`Supply`](super::Supply) hands it over without an error. Only the tick
+//! is kept. If it accepts a program, [`Supply`](super::Supply) hands it over without an error. It refuses a
+//! program that switches outputs: a board that has them checks [`switches_as_stops`](super::switches_as_stops). Only the tick
 //! can tell the rest: how many pieces end in one ([`PIECES_PER_TICK_MAX`](crate::exec::PIECES_PER_TICK_MAX)),
 //! and whether the streams are filled fast enough.
 
@@ -139,7 +140,7 @@ impl Held {
                 *self = Self::default();
                 is_whole
             }
-            Item::Feed(_) | Item::Dwell(_) | Item::Stop => true,
+            Item::Feed(_) | Item::Dwell(_) | Item::Stop | Item::Switch(_) => true,
         }
     }
 

@@ -4,6 +4,8 @@
 //! into the two streams. Background.
 //!
 //! - [`Item`]: one item of a program, in f64 and position steps; converted to the same bits on every target;
+//! - [`Source`]: where items come from, perhaps later;
+//! - [`Switching`]: a source that waits where outputs are to be switched;
 //! - `supply`: keeps the two streams filled from items;
 //! - `check`: whether all of a program can be executed, before any of it is;
 //! - `bytes`: a program as bytes, with the machine it is for.
@@ -39,7 +41,9 @@
 mod bytes;
 mod check;
 mod checksum;
+mod source;
 pub(crate) mod supply;
+mod switching;
 mod wire;
 
 pub use bytes::{Header, Items, ProgramError, Reader, write};
@@ -47,10 +51,13 @@ pub use bytes::{Header, Items, ProgramError, Reader, write};
 pub use check::check_live;
 pub use check::{CheckError, check};
 pub use checksum::Checksum;
+pub use source::Source;
 pub use supply::{Supply, SupplyError};
+pub use switching::{Switching, switches_as_stops};
 
 use serde::{Deserialize, Serialize};
 
+use crate::hal::OutputState;
 use crate::law::{Limits, PlannedRamp, Ticks};
 #[cfg(feature = "live")]
 use crate::num::Real;
@@ -94,6 +101,9 @@ pub enum Item<const AXES: usize> {
     Dwell(Ticks),
     /// Rest until told to resume, between stretches.
     Stop,
+    /// Spindle and coolant switch at rest, between stretches. Only a [`Switching`] source takes it: elsewhere it
+    /// is refused, because nothing would switch.
+    Switch(OutputState),
     /// The limits of the feed over the next length of path; blocks follow each other without a gap. Live
     /// control plans anew with them; a kernel without it reads no programs with blocks.
     #[cfg_attr(not(feature = "live"), serde(skip))]

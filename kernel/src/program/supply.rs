@@ -1,9 +1,11 @@
 //! Keeps the two streams filled.
 //!
-//! Consumes [`Item`]s; at every call it offers them to the [`Feeder`] until that is full. Here an item is
+//! Consumes the [`Item`]s of a [`Source`]; at every call it offers them to the [`Feeder`] until that is full. Here an item is
 //! converted to the kernel's number type, so a board needs room for only one item in addition to its queues.
 
-use super::Item;
+use core::task::Poll;
+
+use super::{Item, Source};
 use crate::law::{FeedSegment, SegmentError, Ticks};
 use crate::num::Real;
 use crate::path::{Piece, PieceError};
@@ -23,6 +25,8 @@ pub enum SupplyError<E> {
     Segment(SegmentError),
     /// The item may not follow the ones before it.
     Rejected(Rejection),
+    /// The item switches outputs, and nothing here does; see [`Switching`](super::Switching).
+    NoOutputs,
 }
 
 impl<E: core::fmt::Display> core::fmt::Display for SupplyError<E> {
@@ -32,6 +36,7 @@ impl<E: core::fmt::Display> core::fmt::Display for SupplyError<E> {
             Self::Piece(error) => error.fmt(f),
             Self::Segment(error) => error.fmt(f),
             Self::Rejected(rejection) => rejection.fmt(f),
+            Self::NoOutputs => f.write_str("spindle or coolant is to be switched, and there are no outputs"),
         }
     }
 }
@@ -59,7 +64,7 @@ impl<const AXES: usize> Item<AXES> {
     /// The item in the number type `R`, for ticks of `tick_s`.
     ///
     /// # Errors
-    /// The number type does not hold it.
+    /// The number type does not hold it, or it is none for the streams.
     #[inline(never)]
     pub fn ready<R: Real, E>(&self, tick_s: f64) -> Result<Ready<R, AXES>, SupplyError<E>> {
         Ok(match *self {
@@ -73,6 +78,7 @@ impl<const AXES: usize> Item<AXES> {
             Self::EndOfStretch(end) => Ready::EndOfStretch(end),
             Self::Dwell(duration) => Ready::Dwell(duration),
             Self::Stop => Ready::Stop,
+            Self::Switch(_) => return Err(SupplyError::NoOutputs),
             Self::Block(_) => Ready::Block,
         })
     }
@@ -86,19 +92,31 @@ pub struct Supply<R: Real, const AXES: usize, I, E> {
     /// An item made ready but not yet taken by the queues.
     pending: Option<Ready<R, AXES>>,
     is_at_end: bool,
+    /// The source had none for now when it was last asked.
+    is_late: bool,
     /// The error that ended it. The failed item is gone, and the next one would not continue the queued path.
     error: Option<SupplyError<E>>,
 }
 
-impl<R: Real, const AXES: usize, E: Clone, I: Iterator<Item = Result<Item<AXES>, E>>> Supply<R, AXES, I, E> {
+impl<R: Real, const AXES: usize, E: Clone, I: Source<AXES, Error = E>> Supply<R, AXES, I, E> {
     /// A supply with all of `items` still to do, for ticks of `tick_s`.
     pub fn new(items: I, tick_s: f64) -> Self {
-        Self { items, tick_s, pending: None, is_at_end: false, error: None }
+        Self { items, tick_s, pending: None, is_at_end: false, is_late: false, error: None }
     }
 
     /// Whether everything has been offered and taken; never after an error.
     pub fn is_empty(&self) -> bool {
         self.is_at_end && self.pending.is_none() && self.error.is_none()
+    }
+
+    /// Whether everything that the source gave has been taken, and it has no more for now; never after an error.
+    pub fn is_waiting(&self) -> bool {
+        self.is_late && self.pending.is_none() && self.error.is_none()
+    }
+
+    /// The source, for sources that take instructions.
+    pub fn source_mut(&mut self) -> &mut I {
+        &mut self.items
     }
 
     /// Fills the streams.
@@ -118,13 +136,18 @@ impl<R: Real, const AXES: usize, E: Clone, I: Iterator<Item = Result<Item<AXES>,
         loop {
             let ready = match self.pending.take() {
                 Some(ready) => ready,
-                None => match self.items.next() {
-                    Some(item) => item.map_err(SupplyError::Source)?.ready(self.tick_s)?,
-                    None => {
-                        self.is_at_end = true;
-                        return Ok(());
+                None => {
+                    let polled = self.items.poll_next();
+                    self.is_late = polled.is_pending();
+                    match polled {
+                        Poll::Ready(Some(item)) => item.map_err(SupplyError::Source)?.ready(self.tick_s)?,
+                        Poll::Ready(None) => {
+                            self.is_at_end = true;
+                            return Ok(());
+                        }
+                        Poll::Pending => return Ok(()),
                     }
-                },
+                }
             };
             let is_taken = match ready {
                 Ready::Piece(piece) => is_taken(feeder.piece(piece)),

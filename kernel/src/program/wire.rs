@@ -98,6 +98,14 @@ impl<'de> Deserializer<'de> for &mut Wire<'de> {
         Err(Malformed)
     }
 
+    fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Malformed> {
+        match self.byte() {
+            0 => visitor.visit_bool(false),
+            1 => visitor.visit_bool(true),
+            _ => Err(Malformed),
+        }
+    }
+
     fn deserialize_i16<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Malformed> {
         // Of 16 bits, or unsound.
         #[allow(clippy::cast_possible_truncation)]
@@ -168,7 +176,7 @@ impl<'de> Deserializer<'de> for &mut Wire<'de> {
 
     // Types that no program has.
     serde::forward_to_deserialize_any! {
-        bool i8 i32 i128 u8 u128 f32 char str string bytes byte_buf unit unit_struct seq tuple_struct map
+        i8 i32 i128 u8 u128 f32 char str string bytes byte_buf unit unit_struct seq tuple_struct map
         identifier ignored_any
     }
 }

@@ -22,9 +22,7 @@ MOVES = {"STRAIGHT_TRAVERSE": "straight_traverse", "STRAIGHT_FEED": "straight_fe
          "STRAIGHT_PROBE": "straight_probe", "RIGID_TAP": "rigid_tap", "DWELL": "dwell", "CHANGE_TOOL": "change_tool"}
 # Calls that come in the order of `rs274` alone, by kind.
 OUTPUTS = {
-    "spindle": "START_SPINDLE_CLOCKWISE START_SPINDLE_COUNTERCLOCKWISE STOP_SPINDLE_TURNING SET_SPINDLE_SPEED "
-    "ORIENT_SPINDLE",
-    "coolant": "FLOOD_ON FLOOD_OFF MIST_ON MIST_OFF",
+    "orient": "ORIENT_SPINDLE",
     "output": "SET_MOTION_OUTPUT_BIT CLEAR_MOTION_OUTPUT_BIT SET_AUX_OUTPUT_BIT CLEAR_AUX_OUTPUT_BIT "
     "SET_MOTION_OUTPUT_VALUE SET_AUX_OUTPUT_VALUE",
     "override": "ENABLE_FEED_OVERRIDE DISABLE_FEED_OVERRIDE ENABLE_SPEED_OVERRIDE DISABLE_SPEED_OVERRIDE "
@@ -32,6 +30,10 @@ OUTPUTS = {
     "stop": "PROGRAM_STOP OPTIONAL_PROGRAM_STOP",
 }
 KINDS = {name: kind for kind, names in OUTPUTS.items() for name in names.split()}
+# Calls that switch spindle or coolant: what of `Outputs` they set, and to what; none: to their argument.
+SWITCHES = {"START_SPINDLE_CLOCKWISE": ("spindle", "clockwise"), "MIST_ON": ("mist", True), "MIST_OFF": ("mist", False),
+            "START_SPINDLE_COUNTERCLOCKWISE": ("spindle", "counterclockwise"), "STOP_SPINDLE_TURNING": ("spindle", None),
+            "FLOOD_ON": ("flood", True), "FLOOD_OFF": ("flood", False), "SET_SPINDLE_SPEED": ("speed", None)}
 # A number that counts, a line number of the program, the call.
 ORDERED = re.compile(r"\s*\d+ (?:N[\d.]*\s+)?([A-Z][A-Z0-9_.]*)\((.*)\)\s*")
 
@@ -62,6 +64,21 @@ class Step:
     # Points between start and end, at equal parts of the parameter.
     through: tuple = ()
     value: float | str | None = None
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What spindle and coolant do; without turning a spindle has no speed."""
+
+    spindle: str | None = None
+    speed: float = 0.0
+    # G96: `speed` is one of the surface.
+    surface: bool = False
+    mist: bool = False
+    flood: bool = False
+
+    def shown(self):
+        return self if self.spindle else replace(self, speed=0.0, surface=False)
 
 
 def rotated(x, y, angle_rad):
@@ -118,6 +135,8 @@ class Merging:
         # In a minute; after G95, in a revolution.
         self.feed_mm = None
         self.per_revolution, self.speed_rev_min = False, 0.0
+        # What calls have made of spindle and coolant, and what the last step did.
+        self.outputs = self.switched = Outputs()
         self.path = None
         # What is executed before a program says G21.
         self.unit_mm = 1.0
@@ -230,7 +249,36 @@ class Merging:
         self.steps.append(Step("move", last.line, last.to, last.feed_mm_min, last.path,
                                through=tuple(point.to for point in points)))
 
+    def switch(self):
+        """A step, if spindle or coolant are to do something else than before."""
+        to = self.outputs.shown()
+        if to != self.switched:
+            line = self.calls[min(self.at, len(self.calls) - 1)][1]
+            self.steps.append(Step("switch", line, value=to))
+            self.switched = to
+
+    def all_off(self):
+        """A `%` may end a file without M2, for LinuxCNC with the spindle on; this project's reader ends it as with M2."""
+        for off in ({"spindle": None}, {"mist": False}, {"flood": False}):
+            self.outputs = replace(self.outputs, **off)
+            self.switch()
+
     def in_order(self, name, arguments):
+        if name == "SET_SPINDLE_MODE":
+            # G96 or G97: with the speed that follows it is one change.
+            self.outputs = replace(self.outputs, surface=float(arguments.split()[1]) > 0)
+        elif name in SWITCHES:
+            what, value = SWITCHES[name]
+            if what == "speed":
+                value = self.speed_rev_min = float(arguments.split(",")[1])
+            self.outputs = replace(self.outputs, **{what: value})
+            self.switch()
+        else:
+            if name in MOVES or name in KINDS:
+                self.switch()
+            self.other_in_order(name, arguments)
+
+    def other_in_order(self, name, arguments):
         if name in MOVES:
             self.until(MOVES[name])
         elif name == "NURBS_FEED":
@@ -247,8 +295,6 @@ class Merging:
         elif name == "SET_FEED_MODE":
             self.per_revolution = arguments.split(",")[1].strip() == "1"
         elif name in KINDS:
-            if name == "SET_SPINDLE_SPEED":
-                self.speed_rev_min = float(arguments.split(",")[1])
             line = self.calls[min(self.at, len(self.calls) - 1)][1]
             value = None if KINDS[name] == "stop" else f"{name}({arguments})"
             self.steps.append(Step(KINDS[name], line, value=value))
@@ -277,6 +323,7 @@ def of_linuxcnc(calls, order):
         merging.in_order(name, arguments)
         if merging.steps and merging.steps[-1].kind == "probe":
             return with_length(merging.steps)
+    merging.all_off()
     rest = [call[0] for call in calls[merging.at :] if call[0] in MOVES.values()]
     if rest:
         raise NotComparable(f"{len(rest)} calls in full doubles after the end")
@@ -319,6 +366,11 @@ def of_motion(objects):
             steps.append(Step("dwell", line, value=found["dwell_s"]))
         elif kind == "tool":
             steps.append(Step("tool", line, value=found["tool"]))
+        elif kind == "switch":
+            # `rs274` prints speeds with four decimals.
+            speed = round(found["speed"], 4)
+            to = Outputs(found["spindle"], speed, found["surface"], found["mist"], found["flood"])
+            steps.append(Step("switch", line, value=to))
         elif kind not in ("end", "notice", "message"):
             steps.append(Step(kind, line, value=found.get("value")))
     return with_length(steps)

@@ -105,6 +105,7 @@ impl Path {
                     path.dwells += 1;
                     continue;
                 }
+                PlanItem::Switch { .. } => continue,
                 PlanItem::Stop { .. } => {
                     path.stops += 1;
                     continue;

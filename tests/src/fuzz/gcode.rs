@@ -8,7 +8,7 @@
 //! - what is refused has a place.
 
 use motion_host::gcode::{
-    self, Feed, GcodeError, Length, ParameterFile, Program, ReadOptions, StepKind, ToolTable,
+    self, Feed, GcodeError, Length, ParameterFile, Program, ReadOptions, SpindleSpeed, StepKind, ToolTable,
 };
 use motion_host::machine::Machine;
 use motion_host::touch::{Surface, TouchBox};
@@ -212,6 +212,11 @@ pub fn assert_sound(program: &Program, steps_max: usize) {
             StepKind::Probe(probe) => ((probe.from, probe.to), probe.feed, Vec::new()),
             StepKind::Dwell { seconds } => {
                 assert!(seconds.is_finite() && *seconds >= 0.0, "line {}: {seconds} s", step.line);
+                continue;
+            }
+            StepKind::Switch(outputs) => {
+                let (SpindleSpeed::Rpm(speed) | SpindleSpeed::Surface(speed)) = outputs.speed;
+                assert!(speed.is_finite() && speed >= 0.0, "line {}: {speed}", step.line);
                 continue;
             }
             StepKind::ToolChange { .. } | StepKind::Stop | StepKind::End => continue,

@@ -204,6 +204,6 @@ fn broken(input: &mut Unstructured<'_>, item: Item<2>) -> Result<Item<2>> {
                 if axis == 0 { (bits, block.junction_mm_s()) } else { (block.length, value) };
             Item::Block(PathBlock::new(length, block.feed_mm_s(), block.programmed(), allowed, junction_mm_s))
         }
-        Item::Stop => Item::EndOfStretch([bits; 2]),
+        Item::Stop | Item::Switch(_) => Item::EndOfStretch([bits; 2]),
     })
 }

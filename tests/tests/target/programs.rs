@@ -310,6 +310,7 @@ pub(crate) fn one_axis() -> Vec<u8> {
             Item::EndOfStretch(end) => Item::EndOfStretch([end[0]]),
             Item::Dwell(duration) => Item::Dwell(duration),
             Item::Stop => Item::Stop,
+            Item::Switch(to) => Item::Switch(to),
             Item::Block(_) => unreachable!("left out"),
         })
         .collect();

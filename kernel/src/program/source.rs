@@ -2,7 +2,7 @@
 
 use core::task::Poll;
 
-use crate::program::Item;
+use super::Item;
 
 /// Source of a program's items. A source that has none for now is asked again in the next poll of the
 /// background. Every iterator is a source that is never late.

@@ -1,0 +1,68 @@
+//! Spindle and coolant: outputs that a program switches while motion rests.
+//!
+//! Not called by the kernel's tick: the background switches between two stretches, in the program's order
+//! ([`Switching`](crate::program::Switching)), and whoever finds a fault switches all off
+//! ([`OutputState::OFF`]).
+
+use serde::{Deserialize, Serialize};
+
+/// Turning of the spindle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Spindle {
+    /// Not at all.
+    #[default]
+    Off,
+    /// Clockwise, seen from the spindle towards the part.
+    Clockwise,
+    /// The other way round.
+    Counterclockwise,
+}
+
+/// What spindle and coolant are to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct OutputState {
+    /// How the spindle turns.
+    pub spindle: Spindle,
+    /// Its commanded speed \[rev/min\], 0 or more; 0 if it does not turn. It may be 0 while the spindle turns: a
+    /// program need not say a speed.
+    pub speed_rpm: f64,
+    /// Coolant as a flood.
+    pub flood: bool,
+    /// Coolant as a mist.
+    pub mist: bool,
+}
+
+impl OutputState {
+    /// Nothing turns or flows: before a program, and after a fault or an abort.
+    pub const OFF: Self = Self { spindle: Spindle::Off, speed_rpm: 0.0, flood: false, mist: false };
+
+    /// Whether the spindle is to turn.
+    #[must_use]
+    pub fn spindle_turns(&self) -> bool {
+        self.spindle != Spindle::Off
+    }
+
+    /// Whether coolant is to flow, in whatever way.
+    #[must_use]
+    pub fn coolant_flows(&self) -> bool {
+        self.flood || self.mist
+    }
+}
+
+/// The outputs for spindle and coolant.
+pub trait Outputs {
+    /// Puts all outputs into a state. Does not wait for the spindle: the program has a dwell behind the switch. A
+    /// board whose outputs can fail reports it through [`Kernel::trip`](crate::kernel::Kernel::trip).
+    fn switch(&mut self, to: &OutputState);
+}
+
+/// A board without such outputs: nothing is switched. Such a board does not run programs that switch outputs, which
+/// [`check`](crate::program::check()) tells before the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoOutputs;
+
+impl Outputs for NoOutputs {
+    fn switch(&mut self, _: &OutputState) {}
+}
