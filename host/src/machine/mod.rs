@@ -41,6 +41,7 @@ pub use error::{AxisError, MachineError};
 pub(crate) use law_name::{LAW_NAMES, law_named};
 pub use settings::{
     AxisSettings, DEAD_TIME_CELLS, DefaultPathMode, FaultSettings, HomingSettings, Machine, PathSettings,
+    ToolSettings,
 };
 
 /// The reference machine's file, with every key explained.

@@ -30,6 +30,8 @@ pub(super) const NOISE_COUNTS_MAX: u16 = 1000;
 /// The reactions of an emergency stop.
 pub(super) const PATH_MODE: &str = "\"blend\" or \"exact\"";
 pub(super) const EMERGENCY_STOP: &str = "\"immediate\", \"ramp\" or \"stop\"";
+/// Names of a subroutine, or none.
+pub(super) const SUBROUTINE: &str = "letters, digits, '-' and '_', or \"\" for none";
 /// Seeds of an encoder's noise.
 pub(super) const NOISE_SEED: &str = "a whole number, 0 or more";
 
