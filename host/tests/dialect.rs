@@ -539,6 +539,16 @@ fn whole_turns_remain_in_a_turned_system() {
         });
         let tau = 2.0 * std::f64::consts::PI;
         assert_eq!(turns.collect::<Vec<_>>(), [(true, tau), (true, -tau)], "{text}");
+        // Helices in the other planes, which are turned with the system.
+        let text = format!(
+            "G10 L2 P1 R{angle:.4}\nF100\nG53 G0 X{x:.4} Y{y:.4}\nG18 G3 I{i:.4} K4 Y3 P2\nG19 G2 J{i:.4} K-3 X{x:.4}"
+        );
+        let program = read(&text);
+        let sweeps = program.steps.iter().filter_map(|step| match &step.kind {
+            StepKind::Arc(arc) => Some(arc.sweep_rad),
+            _ => None,
+        });
+        assert_eq!(sweeps.collect::<Vec<_>>(), [2.0 * tau, -tau], "{text}");
     }
 }
 
