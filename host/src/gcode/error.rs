@@ -350,6 +350,9 @@ impl Problem {
                 | Self::Gouge { .. }
                 | Self::CompensatedArc { .. }
                 | Self::CompensationEntry { .. }
+                | Self::ProbeTripped { .. }
+                | Self::ProbeMissed { .. }
+                | Self::ProbeStands { .. }
                 | Self::NothingSaved
                 | Self::Aborted { .. }
         )
