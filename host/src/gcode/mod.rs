@@ -90,6 +90,7 @@
 //!   restore no other offsets.
 //! - The position behind G10 L2 R of the system in force, with G92 in force, is where the machine is; LinuxCNC's interpreter takes
 //!   another. So it does in G53, G28 and G30 where G20 or G21 follows G43.1, and in a drilling cycle that G20 or G21 falls into.
+//! - After G93 a feed may be below 0.1 of the unit a minute, to which LinuxCNC raises it.
 //! - M6 for the tool that is in the spindle does not stop, and without any T it is noticed.
 //! - Loops run to their end after a `break` or `continue` of another loop, where LinuxCNC may leave a `do` early.
 //!
