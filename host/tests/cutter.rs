@@ -104,6 +104,21 @@ fn the_radius_has_a_source() {
     let error = read("T5 M6\nF9 G41 G1 X10").unwrap_err().to_string();
     assert!(error.starts_with("a.ngc:2:4: found tool 5, whose radius is not known"), "{error}");
     assert!(read("T5 M6\nG10 L1 P5 R2\nF9 G41 G1 X10").is_ok());
+    // A radius of the machine's holds for every tool, as long as there is no table.
+    let of_machine = ReadOptions { tool_radius_mm: 2.0, ..ReadOptions::default() };
+    let read = |text: &str| gcode::read_with("a.ngc", text.as_bytes(), &of_machine).unwrap();
+    for text in ["T5 M6\nF9 G41 G1 X10", "F9 G41 D7 G1 X10", "G10 L1 P5 Z9\nF9 G41 D5 G1 X[#5410*2.5]"] {
+        let program = read(text);
+        let Some(StepKind::Line(last)) = program.steps.last().map(|step| &step.kind) else {
+            panic!("a line")
+        };
+        assert_eq!(mm(last.to), [10.0, 2.0, 0.0], "{text}");
+    }
+    let notes = read("T5 M6\nM2").notes(|_| false);
+    assert!(notes[0].starts_with("length 0 and radius 2 mm are assumed"), "{notes:?}");
+    let with_table = ReadOptions { tool_radius_mm: 2.0, ..options() };
+    let error = gcode::read_with("a.ngc", b"F9 G41 D77 G1 X10", &with_table).unwrap_err().to_string();
+    assert!(error.contains("found tool 77, whose radius is not known"), "{error}");
     assert_eq!(steps("F9 G41.1 D0 G1 X1\nG2 X3 I1\nG40\nG3 X1 I-1").len(), 3);
 }
 

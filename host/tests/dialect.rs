@@ -280,6 +280,59 @@ fn coordinate_systems_shift_and_turn() {
     }
 }
 
+/// M6 calls the subroutine that the machine file names.
+#[test]
+fn a_subroutine_changes_tools() {
+    let table = ToolTable::parse("tool.tbl", b"T1 P7 Z10\nT2 P8\n").expect("a table");
+    let options =
+        |tools| ReadOptions { change_subroutine: Some("change".to_owned()), tools, ..ReadOptions::default() };
+    let read = |text: &str| {
+        let program = gcode::read_with("a.ngc", text.as_bytes(), &options(Some(table.clone())));
+        let program = program.unwrap_or_else(|error| panic!("{text}: {error}"));
+        program.steps.iter().map(|step| shown(&step.kind)).collect::<Vec<_>>()
+    };
+    let by_hand =
+        "o<change> sub\nG0 X#1 Y#<selected_tool> Z#<tool_in_spindle>\nM6\nG0 Z9\no<change> endsub\n";
+    // M6 in it is a stop; the tool that is there is not changed again; the caller goes on behind it.
+    let text = format!("{by_hand}N5 T1 M6 S100 F9 (end mill)\nG43\nG0 Z1\nM6\nT2 M6\nX#5400");
+    let expected = ["r 1 1 0", "T1", "r 1 1 9", "r 1 1 11", "r 2 2 11", "T2", "r 2 2 19", "r 2 2 19"];
+    assert_eq!(read(&text)[..7], expected[..7]);
+    let by_itself = "o<change> sub\nG0 X#<selected_pocket> Y#<current_pocket>\no<change> endsub [1]\n";
+    let text = format!("{by_itself}T1 M6\nG0 Z#5400\nT2 M6\nG0 Z#5400");
+    assert_eq!(read(&text), ["r 7 -1 0", "r 7 -1 1", "r 8 7 1", "r 8 7 2"]);
+    // Without a table there are no pockets.
+    let program =
+        gcode::read_with("a.ngc", format!("{by_itself}T3 M6").as_bytes(), &options(None)).expect("a program");
+    assert_eq!(shown(&program.steps[0].kind), "r -1 -1 0");
+    // In it the number may be taken by M61, and it may call others.
+    let others = "o<b> sub\nM61 Q#<_selected_tool>\no<b> endsub\no<change> sub\no<b> call\no<change> endsub\nT2 M6\nG0 X#5400";
+    assert_eq!(read(others), ["r 2 0 0"]);
+    for (text, expected) in [
+        ("T1 M6 G43", "a.ngc:1:7: found G43 in a line of M6, expected it in a line of its own"),
+        ("T1 M6 M3", "a.ngc:1:7: found M3 in a line of M6"),
+        ("X1 T1 M6", "a.ngc:1:1: found X1 in a line of M6"),
+        (
+            "T1 M6",
+            "a.ngc:1:1: found a call of Ochange, expected a subroutine of this file, or a file change.ngc",
+        ),
+        (
+            "o<change> sub\no<change> endsub\nT1 M6",
+            "a.ngc:2:1: found the end of the subroutine that changes tools without tool 1, expected M6 in it",
+        ),
+        (
+            "o<change> sub\no<change> return [-1]\no<change> endsub [1]\nT1 M6",
+            "a.ngc:2:1: found the end of the subroutine that changes tools without tool 1, which returns -1,",
+        ),
+        (
+            "o<change> sub\no<change> call\no<change> endsub\nT1 M6",
+            "a.ngc:2:1: found subroutines within each other",
+        ),
+    ] {
+        let error = refusal_with(text, &options(Some(table.clone())));
+        assert!(error.starts_with(expected), "{text}: {error}");
+    }
+}
+
 #[test]
 fn an_arc_turns_with_its_coordinate_system() {
     let arc = |text: &str| match read(text).steps.last().expect("a step").kind {
@@ -531,6 +584,16 @@ fn whole_turns_remain_in_a_turned_system() {
         });
         let tau = 2.0 * std::f64::consts::PI;
         assert_eq!(turns.collect::<Vec<_>>(), [(true, tau), (true, -tau)], "{text}");
+        // Helices in the other planes, which are turned with the system.
+        let text = format!(
+            "G10 L2 P1 R{angle:.4}\nF100\nG53 G0 X{x:.4} Y{y:.4}\nG18 G3 I{i:.4} K4 Y3 P2\nG19 G2 J{i:.4} K-3 X{x:.4}"
+        );
+        let program = read(&text);
+        let sweeps = program.steps.iter().filter_map(|step| match &step.kind {
+            StepKind::Arc(arc) => Some(arc.sweep_rad),
+            _ => None,
+        });
+        assert_eq!(sweeps.collect::<Vec<_>>(), [2.0 * tau, -tau], "{text}");
     }
 }
 
@@ -553,7 +616,7 @@ fn speeds_and_lines_are_bounded() {
         assert!(error.contains("more than 1000 lines executed"), "{error}");
     }
     // As many blocks within each other as it takes to notice that each looks through the others.
-    const BLOCKS: usize = 200_000;
+    const BLOCKS: usize = 100_000;
     let nested = |open: &str, close: &str| {
         let opened: String = (0..BLOCKS).map(|label| format!("o{label} {open}\n")).collect();
         let closed: String = (0..BLOCKS).rev().map(|label| format!("o{label} {close}\n")).collect();

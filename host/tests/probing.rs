@@ -262,6 +262,17 @@ fn the_encoders_latch_what_the_program_reads() {
     }
 }
 
+/// Its stops are no corners that a path mode would round.
+#[test]
+fn stops_at_a_probe_are_no_corners() {
+    let corners = |text: &str| {
+        let plan = plan_program("a.ngc", &read_on(&machine(), text), &machine(), Mode::Spanning).unwrap();
+        motion_host::check::Times::of(&plan).corner_stops
+    };
+    assert_eq!(corners("G61 G0 X5 Y5\nG38.2 Z-20 F60\nG0 Z5\nG38.3 Z3\nG38.3 Z3\nG0 X9"), 0);
+    assert_eq!(corners("G61 G0 X5 Y5\nZ-5\nG38.2 Z-20 F60\nG0 Z5\nX9"), 2);
+}
+
 /// The sample finds the plate of the machine file.
 #[test]
 fn the_sample_finds_the_plate() {

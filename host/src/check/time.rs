@@ -1,5 +1,7 @@
 //! Where the time of a plan goes.
 
+use std::collections::BTreeSet;
+
 use motion_kernel::plan;
 
 use crate::planning::{Item, PlacedRamp, Plan, Stretch};
@@ -103,12 +105,18 @@ impl Times {
     pub fn of(plan: &Plan) -> Self {
         let mut times = Self::default();
         let is_stretch = |item: Option<&Item>| matches!(item, Some(Item::Stretch(_)));
+        // A probing move has a stop at either end whatever the path mode: before which stretches they are.
+        let probe_stops: BTreeSet<u32> =
+            plan.probes.iter().flat_map(|probe| [probe.stretch, probe.end()]).collect();
+        let mut number = 0;
         for (index, item) in plan.items.iter().enumerate() {
             match item {
                 Item::Stretch(stretch) => {
                     let follows =
                         index.checked_sub(1).is_some_and(|before| is_stretch(plan.items.get(before)));
-                    let is_followed = is_stretch(plan.items.get(index + 1));
+                    let follows = follows && !probe_stops.contains(&number);
+                    number += 1;
+                    let is_followed = is_stretch(plan.items.get(index + 1)) && !probe_stops.contains(&number);
                     times.corner_stops += usize::from(is_followed);
                     let rest = |at_corner| if at_corner { Reason::Corner } else { Reason::Stop };
                     times.add_stretch(stretch, [rest(follows), rest(is_followed)]);

@@ -193,6 +193,13 @@ impl Interpreter {
         if number == self.tools.current {
             return Ok(());
         }
+        if self.tools.calls_change {
+            if let Some(word) = block.beside_tool_change() {
+                return Err(word.problem(|word| Problem::BesideToolChange { word }));
+            }
+            self.tools.change_to = Some(number);
+            return Ok(());
+        }
         self.tools.current = number;
         let tool = self.tool(number, code.word.offset)?;
         let text = match (number, tool.remark.as_str()) {
@@ -202,6 +209,36 @@ impl Interpreter {
         };
         self.message(text)?;
         self.step(StepKind::ToolChange { tool: number })
+    }
+
+    /// The subroutine that changes tools begins: in it M6 is a stop for the operator. It has the names of LinuxCNC's.
+    pub(super) fn begin_change(&mut self, tool: u32) {
+        self.tools.calls_change = false;
+        let pocket = |number| self.tools.table.get(number).map_or(-1.0, |tool| f64::from(tool.pocket));
+        let current = self.tools.current;
+        for (name, value) in [
+            ("tool_in_spindle", f64::from(current)),
+            ("selected_tool", f64::from(tool)),
+            ("current_pocket", pocket(current)),
+            ("selected_pocket", pocket(tool)),
+        ] {
+            self.parameters.set_named(name, value);
+        }
+    }
+
+    /// It ends: by its M6 or M61 the tool is there, or it returns a value above 0 and has changed it by itself.
+    pub(super) fn end_change(&mut self, tool: u32) -> Result<(), Located> {
+        self.tools.calls_change = true;
+        if self.tools.current == tool {
+            return Ok(());
+        }
+        match self.returned {
+            Some(value) if value > 0.0 => {
+                self.tools.current = tool;
+                self.stop_spindle()
+            }
+            found => Err(Located::new(0, Problem::ToolNotChanged { tool, found })),
+        }
     }
 
     /// A tool by its number. Without a table it is assumed.
@@ -217,7 +254,8 @@ impl Interpreter {
                 if assumed.len() < LISTED_MAX && !assumed.contains(&number) {
                     assumed.push(number);
                 }
-                Ok(Tool { number, ..Tool::default() })
+                let diameter = Length::nearest(2.0 * self.tools.radius_mm).unwrap_or_default();
+                Ok(Tool { number, diameter, ..Tool::default() })
             }
         }
     }

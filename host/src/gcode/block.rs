@@ -283,6 +283,15 @@ impl<'a> Block<'a> {
         Ok(())
     }
 
+    /// The leftmost word that would be executed behind M6.
+    pub(super) fn beside_tool_change(&self) -> Option<Word<'a>> {
+        let change = self.m(MGroup::ToolChange).map(|code| code.word.offset);
+        let codes = self.g.iter().chain(&self.m).flatten().map(|code| code.word);
+        let letters = self.letters.iter().flatten().copied();
+        let letters = letters.filter(|word| !matches!(word.letter, b'N' | b'T' | b'S' | b'F'));
+        letters.chain(codes.filter(|word| Some(word.offset) != change)).min_by_key(|word| word.offset)
+    }
+
     /// M7 and M8 go together, neither goes with M9.
     fn refuse_coolant_clash(&self, (group, code): (MGroup, Code<'a>)) -> Result<(), Located> {
         let clash = match group {

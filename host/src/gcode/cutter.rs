@@ -99,9 +99,11 @@ impl Interpreter {
             let number = d.map_or(Ok(0), |word| word.count(0, "a whole tool number, 0 or more"))?;
             let number = if number == 0 { self.tools.current } else { number };
             let place = d.map_or(code.offset, |word| word.offset);
-            let tool = self.tools.table.get(number);
-            let tool = tool.ok_or(Located::new(place, Problem::CompensationRadius { number }))?;
-            (tool.diameter.to_mm() / 2.0, tool.orientation)
+            match self.tools.table.get(number) {
+                Some(tool) => (tool.diameter.to_mm() / 2.0, tool.orientation),
+                None if self.tools.radius_mm > 0.0 => (self.tools.radius_mm, 0),
+                None => return Err(Located::new(place, Problem::CompensationRadius { number })),
+            }
         };
         let is_lathe_tool = !matches!(orientation, 0 | 9);
         if is_lathe_tool && plane != Plane::Zx {

@@ -260,8 +260,8 @@ pub enum Problem {
     #[error("found {word} with G41 or G42 in force, expected G40 in a line before it")]
     Compensated { word: String },
     #[error(
-        "found tool {number}, whose radius is not known, expected it in a tool table (--tools), G10 L1 P{number} \
-         R before it, or G41.1 D or G42.1 D with the tool's diameter"
+        "found tool {number}, whose radius is not known, expected it in a tool table (--tools), radius_mm under [tool] \
+         in a machine file, G10 L1 P{number} R before it, or G41.1 D or G42.1 D with the tool's diameter"
     )]
     CompensationRadius { number: u32 },
     #[error(
@@ -295,6 +295,13 @@ pub enum Problem {
         touches(*.is_touched)
     )]
     ProbeMissed { motion: &'static str, to: String, is_touched: bool },
+    #[error("found {word} in a line of M6, expected it in a line of its own: a subroutine changes the tool")]
+    BesideToolChange { word: String },
+    #[error(
+        "found the end of the subroutine that changes tools without tool {tool}{}, expected M6 in it, or endsub [1]",
+        returned(*.found)
+    )]
+    ToolNotChanged { tool: u32, found: Option<f64> },
     #[error("found G5 without P and Q, expected the offset from its end to its second control point")]
     SplineWithoutEnd,
 }
@@ -345,10 +352,17 @@ impl Problem {
                 | Self::Gouge { .. }
                 | Self::CompensatedArc { .. }
                 | Self::CompensationEntry { .. }
+                | Self::ProbeTripped { .. }
+                | Self::ProbeMissed { .. }
+                | Self::ProbeStands { .. }
                 | Self::NothingSaved
                 | Self::Aborted { .. }
         )
     }
+}
+
+fn returned(found: Option<f64>) -> String {
+    found.map_or_else(String::new, |value| format!(", which returns {value}"))
 }
 
 fn touches(is_touched: bool) -> &'static str {

@@ -27,6 +27,8 @@ struct Call {
     repeats: Vec<Repeat>,
     /// Of M98: where it begins, and how often it is to run yet.
     again: Option<(Place, u32)>,
+    /// Of M6: the tool that it is to change to.
+    changes_to: Option<u32>,
 }
 
 /// A `repeat` that runs.
@@ -170,6 +172,10 @@ impl<'a> Flow<'a> {
                 let failure = |problem| at(Located::new(0, problem));
                 self.call(&number.to_string(), None, repeats, &failure)
             }
+            Control::ChangeTool { tool } => {
+                let failure = |problem| at(Located::new(0, problem));
+                self.call_change(tool, &failure)
+            }
             Control::Return if self.calls.is_empty() => {
                 self.interpreter.notice(NoticeKind::MainReturn);
                 self.interpreter.end().map_err(at)
@@ -273,8 +279,26 @@ impl<'a> Flow<'a> {
             place: self.place,
             repeats: std::mem::take(&mut self.repeats),
             again: (callee == Callee::Subprogram).then_some((place, repeats)),
+            changes_to: None,
         });
         (self.file, self.place) = (file, place);
+        Ok(())
+    }
+
+    /// Calls the subroutine that changes tools, with the tool's number.
+    fn call_change(
+        &mut self,
+        tool: u32,
+        failure: &dyn Fn(Problem) -> Failure<'a>,
+    ) -> Result<(), Failure<'a>> {
+        let Some(label) = &self.options.change_subroutine else { return Ok(()) };
+        let mut arguments = [0.0; LOCALS];
+        arguments[0] = f64::from(tool);
+        self.call(label, Some(arguments), 1, failure)?;
+        self.interpreter.begin_change(tool);
+        if let Some(call) = self.calls.last_mut() {
+            call.changes_to = Some(tool);
+        }
         Ok(())
     }
 
@@ -289,6 +313,9 @@ impl<'a> Flow<'a> {
         let Some(call) = self.calls.pop() else { return Ok(()) };
         self.interpreter.parameters.leave(call.again.is_none());
         self.interpreter.leave()?;
+        if let Some(tool) = call.changes_to {
+            self.interpreter.end_change(tool)?;
+        }
         (self.file, self.place, self.repeats) = (call.file, call.place, call.repeats);
         Ok(())
     }

@@ -35,6 +35,8 @@ pub(super) enum Control {
     Call { number: u32, repeats: u32 },
     /// M99.
     Return,
+    /// M6, by the subroutine that changes tools.
+    ChangeTool { tool: u32 },
 }
 
 /// State of a program being read: the steps up to here, and the modes in force.
@@ -90,6 +92,12 @@ pub(super) struct Tools {
     pub(super) selected: Option<u32>,
     /// M6, M61; 0 before.
     pub(super) current: u32,
+    /// Of every tool, without a table \[mm\]; 0: not known.
+    pub(super) radius_mm: f64,
+    /// A subroutine changes tools, and does not run.
+    pub(super) calls_change: bool,
+    /// The tool that the line asks it for.
+    pub(super) change_to: Option<u32>,
 }
 
 /// Modes that M70 or M73 saved.
@@ -107,7 +115,7 @@ impl Interpreter {
     pub(super) fn new(options: &ReadOptions) -> Self {
         let parameters = Parameters::with(options.parameters.values());
         let mut interpreter = Self {
-            program: Program::default(),
+            program: Program { tool_radius_mm: options.tool_radius_mm, ..Program::default() },
             modal: Modal::default(),
             frame: Frame::default(),
             system: 1,
@@ -118,6 +126,8 @@ impl Interpreter {
             tools: Tools {
                 table: options.tools.clone().unwrap_or_default(),
                 is_given: options.tools.is_some(),
+                radius_mm: if options.tools.is_none() { options.tool_radius_mm } else { 0.0 },
+                calls_change: options.change_subroutine.is_some(),
                 ..Tools::default()
             },
             parameters,
@@ -169,6 +179,9 @@ impl Interpreter {
         self.modal.set_feed_mode(&block);
         self.set_feed(&block)?;
         self.accessories(&block)?;
+        if let Some(tool) = self.tools.change_to.take() {
+            return Ok(Control::ChangeTool { tool });
+        }
         self.dwell(&block)?;
         self.modal.set(&block)?;
         self.note_rounding(&block);

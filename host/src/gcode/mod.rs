@@ -57,7 +57,7 @@
 //! | G20 G21, G90 G91, G90.1 G91.1, G7 G8 | inch or mm; absolute or incremental end points; the same for arc centres; X as a diameter or a radius |
 //! | G54 to G59.3, G10 L2 L20, G52, G92 to G92.3, G53 | coordinate systems with a rotation about Z; shifts; a move in machine coordinates |
 //! | G28 G28.1 G30 G30.1 | to a stored place, by way of a point; store it |
-//! | T, M6, M61 Q | the operator changes the tool: a stop with its number and remark; the tool that is there |
+//! | T, M6, M61 Q | the operator changes the tool: a stop with its number and remark; or [`ReadOptions::change_subroutine`] does, told below; the tool that is there |
 //! | G43 H, G43.1, G43.2, G49, G10 L1 L10 L11 | tool lengths, from the tool table. Without a table every tool has length 0, which is told; with one, a tool that is not in it is refused. G10 changes the table for this program alone |
 //! | G61, G61.1, G64 \[P\] \[Q\] | exact path; with a full stop after every move; corners blended within P \[mm or inch\], without P within the machine's own tolerance; short lines of one feed made longer lines and arcs within Q, which comes on top of P, without Q within a part of P |
 //! | M0 M1 M60, M2 M30 | stop (M1 by a switch), end |
@@ -93,9 +93,18 @@
 //!   restore no other offsets.
 //! - The position behind G10 L2 R of the system in force, with G92 in force, is where the machine is; LinuxCNC's interpreter takes
 //!   another. So it does in G53, G28 and G30 where G20 or G21 follows G43.1, and in a drilling cycle that G20 or G21 falls into.
+//! - After G93 a feed may be below 0.1 of the unit a minute, to which LinuxCNC raises it.
 //! - M6 for the tool that is in the spindle does not stop the program, and without any T it is noticed.
 //! - A closing `%` and the end of a file switch spindle and coolant off, as M2 does.
 //! - Loops run to their end after a `break` or `continue` of another loop, where LinuxCNC may leave a `do` early.
+//!
+//! # Tools changed by a subroutine
+//!
+//! The machine file may name a subroutine, `change_subroutine` under `[tool]`. It is looked for like any that is called. M6 for
+//! another tool than that in the spindle calls it, and stands in a line with no other words than N, T, S and F. Its #1 is the
+//! tool's number; as in LinuxCNC's own remapping of M6, `#<selected_tool>`, `#<tool_in_spindle>`, `#<selected_pocket>` and
+//! `#<current_pocket>` are set (a pocket without a table is −1). M6 in it is the stop for the operator. Without M6 it returns a
+//! value above 0 (`endsub [1]`), and the tool counts as changed; everything else is refused.
 //!
 //! # At the start
 //!

@@ -101,7 +101,10 @@ impl Interpreter {
         offset: usize,
     ) -> Result<(), Located> {
         let [work, to] = self.target(block, first)?;
-        let arc = self.arc(block, motion, self.machine, to, feed, offset)?;
+        // In the program's coordinates: turned to another plane's and rounded, the same point would be another.
+        let [first_axis, second_axis, _] = self.modal.plane.axes();
+        let closes = [first_axis, second_axis].iter().all(|&axis| work[axis] == self.work[axis]);
+        let arc = self.arc(block, motion, [self.machine, to], closes, feed, offset)?;
         if self.is_offset() {
             self.offset_arc(&arc, offset)?;
         } else {
@@ -273,12 +276,13 @@ impl Interpreter {
         Ok(to)
     }
 
+    /// An arc between two points; it `closes` if they are the same in its plane.
     fn arc(
         &mut self,
         block: &Block<'_>,
         motion: Motion,
-        from: [Length; 3],
-        to: [Length; 3],
+        [from, to]: [[Length; 3]; 2],
+        closes: bool,
         feed: Feed,
         offset: usize,
     ) -> Result<ArcMove, Located> {
@@ -296,6 +300,7 @@ impl Interpreter {
         };
         let (turned_from, turned_to) = (turned(from)?, turned(to)?);
         let [start, end] = [turned_from, turned_to].map(|point| [point[first], point[second]]);
+        let end = if closes { start } else { end };
         let clockwise = motion == Motion::Clockwise;
         let centre_words = [offsets[first], offsets[second]];
         let resolved = match (block.letter(b'R'), centre_words) {

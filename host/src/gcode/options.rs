@@ -19,6 +19,10 @@ pub struct ReadOptions {
     pub parameters: ParameterFile,
     /// The tools there are; without a table, length and radius of every tool are 0.
     pub tools: Option<ToolTable>,
+    /// The subroutine that M6 calls, lower case; without it M6 is a stop for the operator.
+    pub change_subroutine: Option<String>,
+    /// Radius of every tool where there is no table \[mm\]; 0: not known, and G41 and G42 are refused.
+    pub tool_radius_mm: f64,
     /// What probing moves touch; without it they are refused.
     pub probe: Option<Probe>,
     /// Most lines to execute, so that endless loops end; 100 million by default.
@@ -35,6 +39,8 @@ impl Default for ReadOptions {
             subroutines: Vec::new(),
             parameters: ParameterFile::default(),
             tools: None,
+            change_subroutine: None,
+            tool_radius_mm: 0.0,
             probe: None,
             lines_max: 100_000_000,
             steps_max: 20_000_000,

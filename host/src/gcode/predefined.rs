@@ -87,7 +87,7 @@ impl Environment for Interpreter {
             5420..=5422 => length(at(self.work, number - 5420)),
             5400 => f64::from(self.tools.current),
             5401..=5403 => current().map_or(0.0, |tool| at(tool.offset, number - 5401)),
-            5410 => current().map_or(0.0, |tool| tool.diameter.to_mm()),
+            5410 => current().map_or(2.0 * self.tools.radius_mm, |tool| tool.diameter.to_mm()),
             5411 => current().map_or(0.0, |tool| tool.angles_deg[0]),
             5412 => current().map_or(0.0, |tool| tool.angles_deg[1]),
             5413 => current().map_or(0.0, |tool| f64::from(tool.orientation)),

@@ -18,8 +18,10 @@ pub struct Program {
     pub notices: Vec<Notice>,
     /// What the operator is to read, in the order of the program.
     pub messages: Vec<Message>,
-    /// Tools that were used without a tool table: taken to have length and radius 0.
+    /// Tools that were used without a tool table: taken to have length 0, and the radius of the options.
     pub tools_assumed: Vec<u32>,
+    /// That radius \[mm\].
+    pub tool_radius_mm: f64,
     /// Coordinate systems that moves are made in.
     pub systems: Systems,
     /// The parameters at the end.
@@ -64,7 +66,11 @@ impl Program {
         if !self.tools_assumed.is_empty() {
             let tools: Vec<String> = self.tools_assumed.iter().map(ToString::to_string).collect();
             let tools = tools.join(", ");
-            notes.push(format!("length and radius 0 are assumed, there is no tool table: tools {tools}"));
+            let assumed = match self.tool_radius_mm {
+                0.0 => "length and radius 0".to_owned(),
+                radius_mm => format!("length 0 and radius {radius_mm} mm"),
+            };
+            notes.push(format!("{assumed} are assumed, there is no tool table: tools {tools}"));
         }
         let shown = self.messages.iter().take(Self::MESSAGES_SHOWN);
         notes.extend(shown.map(|message| {

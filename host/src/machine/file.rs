@@ -25,12 +25,12 @@ use super::range::{
     ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump,
     JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NAME_CHARACTERS_MAX,
     NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp,
-    Resolution, Reversal, SPINDLE_TURNS, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick,
-    Velocity, Watch, Within,
+    Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS,
+    TablePoint, Tick, Velocity, Watch, Within,
 };
 use super::settings::{
     AxisSettings, BLEND_TOLERANCE_MM, CoolantSettings, DefaultPathMode, FaultSettings, HomingSettings,
-    Machine, PathSettings, SpindleSettings,
+    Machine, PathSettings, SpindleSettings, ToolSettings,
 };
 
 use crate::touch::{Surface, TouchBox};
@@ -160,6 +160,7 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
         path: file.path.settings(),
         axes: axes.map(|(_, axis)| axis),
         faults,
+        tool: file.tool.map_or_else(ToolSettings::default, ToolTable::settings),
         probe: file.probe.map(|probe| probe.surface()),
         spindle: file.spindle.map(|spindle| spindle.settings()),
         coolant: file.coolant.map(|coolant| coolant.kinds.map_or(Kinds::BOTH, |kinds| kinds.0)),
@@ -193,6 +194,7 @@ struct MachineFile {
     tick_s: Within<Tick>,
     path: PathTable,
     faults: Option<FaultsTable>,
+    tool: Option<ToolTable>,
     probe: Option<ProbeTable>,
     spindle: Option<SpindleTable>,
     coolant: Option<CoolantTable>,
@@ -239,6 +241,13 @@ struct FaultsTable {
     ramp_s: Option<Within<Ramp>>,
     stop_s: Option<Within<StopTime>>,
     emergency_stop: Option<EmergencyStop>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ToolTable {
+    change_subroutine: Option<SubroutineName>,
+    radius_mm: Option<Within<LengthOrNone>>,
 }
 
 #[derive(Deserialize)]
@@ -361,6 +370,15 @@ impl FaultsTable {
             ramp_s: self.ramp_s.as_ref().map_or(default.ramp_s, |time| time.0),
             stop_s: self.stop_s.as_ref().map_or(default.stop_s, |time| time.0),
             emergency_stop: self.emergency_stop.as_ref().map_or(default.emergency_stop, |stop| stop.0),
+        }
+    }
+}
+
+impl ToolTable {
+    fn settings(self) -> ToolSettings {
+        ToolSettings {
+            change_subroutine: self.change_subroutine.and_then(|name| name.0),
+            radius_mm: self.radius_mm.map_or(0.0, |radius_mm| radius_mm.0),
         }
     }
 }
@@ -692,6 +710,21 @@ impl<'de> Deserialize<'de> for Kinds {
             Some("flood") => Ok(Self(CoolantSettings { flood: true, mist: false })),
             Some("mist") => Ok(Self(CoolantSettings { flood: false, mist: true })),
             _ => Err(D::Error::custom(format!("kinds = {value}, expected {COOLANT_KINDS}"))),
+        }
+    }
+}
+
+/// A name of a subroutine, in lower case; none if it is empty.
+struct SubroutineName(Option<String>);
+
+impl<'de> Deserialize<'de> for SubroutineName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = toml::Value::deserialize(deserializer)?;
+        let is_name =
+            |name: &&str| name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte));
+        match value.as_str().filter(is_name) {
+            Some(name) => Ok(Self(Some(name.to_ascii_lowercase()).filter(|name| !name.is_empty()))),
+            None => Err(D::Error::custom(format!("change_subroutine = {value}, expected {SUBROUTINE}"))),
         }
     }
 }

@@ -12,7 +12,7 @@ use super::range::{
     ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump,
     JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NOISE_COUNTS, NOISE_SEED,
     OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp, Range, Resolution, Reversal, SPINDLE_TURNS,
-    SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch,
+    SUBROUTINE, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -170,6 +170,26 @@ pub const KEY_TABLES: &[KeyTable] = &[
                  path.",
             )
             .or("\"immediate\""),
+        ],
+    ),
+    optional(
+        "tool",
+        "Tools, where a program's words and tool table do not say more.",
+        &[
+            Key::new(
+                "change_subroutine",
+                "",
+                SUBROUTINE,
+                "The subroutine that M6 calls with the tool's number; without one, M6 is a stop for the operator.",
+            )
+            .or("\"\""),
+            Key::new(
+                "radius_mm",
+                "mm",
+                LengthOrNone::EXPECTED,
+                "Radius of every tool for G41 and G42 where there is no tool table; 0: not known, and they are refused.",
+            )
+            .or("0"),
         ],
     ),
     optional(

@@ -41,7 +41,7 @@ pub use error::{AxisError, MachineError};
 pub(crate) use law_name::{LAW_NAMES, law_named};
 pub use settings::{
     AxisSettings, CoolantSettings, DEAD_TIME_CELLS, DefaultPathMode, FaultSettings, HomingSettings, Machine,
-    PathSettings, SpindleSettings,
+    PathSettings, SpindleSettings, ToolSettings,
 };
 
 /// The reference machine's file, with every key explained.

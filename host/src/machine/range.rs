@@ -34,6 +34,8 @@ pub(super) const EMERGENCY_STOP: &str = "\"immediate\", \"ramp\" or \"stop\"";
 pub(super) const SPINDLE_TURNS: &str = "\"both\" or \"clockwise\"";
 /// Kinds of coolant.
 pub(super) const COOLANT_KINDS: &str = "\"both\", \"flood\" or \"mist\"";
+/// Names of a subroutine, or none.
+pub(super) const SUBROUTINE: &str = "letters, digits, '-' and '_', or \"\" for none";
 /// Seeds of an encoder's noise.
 pub(super) const NOISE_SEED: &str = "a whole number, 0 or more";
 

@@ -52,6 +52,8 @@ pub struct Machine {
     pub axes: [AxisSettings; 3],
     /// How faults end.
     pub faults: FaultSettings,
+    /// What is known of tools.
+    pub tool: ToolSettings,
     /// What the simulated probe touches, if there is one.
     pub probe: Option<Surface>,
     /// The spindle's output, if there is one.
@@ -80,6 +82,15 @@ pub struct CoolantSettings {
     pub flood: bool,
     /// M7.
     pub mist: bool,
+}
+
+/// What is known of tools.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ToolSettings {
+    /// The subroutine that M6 calls, lower case; without it M6 is a stop for the operator.
+    pub change_subroutine: Option<String>,
+    /// Radius of every tool where there is no tool table \[mm\], 0 to 100000; 0: not known.
+    pub radius_mm: f64,
 }
 
 /// How faults end.
@@ -214,6 +225,7 @@ impl Machine {
                 AxisSettings::reference("Z", REFERENCE_Z),
             ],
             faults: FaultSettings::default(),
+            tool: ToolSettings::default(),
             probe: None,
             spindle: None,
             coolant: None,
@@ -232,7 +244,8 @@ impl Machine {
     #[must_use]
     pub fn read_options(&self) -> ReadOptions {
         let probe = self.probe.clone().map(|surface| Probe { surface, limits: self.limits() });
-        ReadOptions { probe, ..ReadOptions::default() }
+        let ToolSettings { change_subroutine, radius_mm: tool_radius_mm } = self.tool.clone();
+        ReadOptions { change_subroutine, tool_radius_mm, probe, ..ReadOptions::default() }
     }
 
     /// The limits that planning keeps.

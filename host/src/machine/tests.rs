@@ -217,6 +217,7 @@ fn optional_keys_are_read() {
     let index = Some(IndexParameters { counts: 100_000, at: Counts(42_000) });
     assert_eq!(homing.simulated, HomeParameters { switch, index });
     let touch = TouchBox { low_mm: [0.0, 0.0, -30.0], high_mm: [100.0, 60.0, -10.0] };
+    assert_eq!((machine.tool.change_subroutine.as_deref(), machine.tool.radius_mm), (Some("change"), 3.0));
     assert_eq!(machine.probe, Some(Surface { boxes: vec![touch] }));
     // The others stay what they are.
     assert_eq!(machine.axes[1..], Machine::reference().axes[1..]);
@@ -288,6 +289,25 @@ fn the_reader_refuses_values_with_the_explained_ranges() {
             assert!(error.starts_with(&format!("wrong.toml:{row}:{column}: found ")), "{error}");
             assert!(error.ends_with(&format!(", expected {}", key.range)), "{error}, {}", key.range);
         }
+    }
+}
+
+/// The subroutine that changes tools by a name that leads to no other folder, and case does not count.
+#[test]
+fn a_subroutine_has_a_plain_name() {
+    let text = with_optional_keys();
+    let table = KEY_TABLES.iter().find(|table| table.name == "tool").expect("known");
+    let read = |value: &str| {
+        let machine = Machine::from_toml("tool.toml", &set(&text, table, "change_subroutine", value).0);
+        machine.map(|machine| machine.tool.change_subroutine).map_err(|error| error.to_string())
+    };
+    for (value, name) in [("\"Tool-Change_2\"", Some("tool-change_2")), ("\"5\"", Some("5")), ("\"\"", None)]
+    {
+        assert_eq!(read(value), Ok(name.map(str::to_owned)));
+    }
+    for wrong in ["\"a b\"", "\"../a\"", "\"a.ngc\"", "\"ä\"", "1", "true"] {
+        let refused = read(wrong).expect_err(wrong);
+        assert!(refused.contains("expected letters, digits, '-' and '_', or \"\" for none"), "{refused}");
     }
 }
 
@@ -390,6 +410,7 @@ fn ranges_of_optional_keys_are_kept() {
         ("axis.homing.simulated", "hysteresis_mm", &["-0.1", "100001"]),
         ("axis.homing.simulated", "index_every_mm", &["-10", "100001"]),
         ("axis.homing.simulated", "index_at_mm", &["-100001", "100001"]),
+        ("tool", "radius_mm", &["-0.1", "100001"]),
         ("probe.box", "low_mm", &["[0, 0]", "[0, 0, 0, 0]", "[0, -1000001, 0]", "0"]),
     ];
     for (table, key, values) in cases {

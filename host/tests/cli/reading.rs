@@ -141,6 +141,27 @@ fn subroutines_lie_in_files_of_their_own() {
     assert!(refusal.starts_with("part.ngc:1:1: found no Opocket in pocket.ngc"), "{refusal}");
 }
 
+/// The machine file names the subroutine that changes tools, and the radius of tools without a table.
+#[test]
+fn a_machine_changes_tools_its_own_way() {
+    let workspace = Workspace::new("read-change");
+    let file = workspace.stdout(&["machine"]);
+    let own = file.replace("#[tool]", "[tool]").replace("#change_subroutine", "change_subroutine");
+    workspace.put("own.toml", &own.replace("#radius_mm = 3", "radius_mm = 3"));
+    workspace.put("part.ngc", "T4 M6\nF60 G41 G1 X10\nM2\n");
+    std::fs::create_dir(workspace.0.join("subs")).expect("a folder");
+    workspace.put("subs/change.ngc", "o<change> sub\nG53 G0 Z50\nM6\no<change> endsub\n");
+    let read = ["read", "part.ngc", "--machine", "own.toml", "--json", "--subroutines", "subs"];
+    let steps = lines(&workspace.stdout(&read));
+    assert_eq!((&steps[0]["to_mm"], &steps[1]["tool"]), (&json!([0.0, 0.0, 50.0]), &json!(4)));
+    assert_eq!(steps[2]["to_mm"], json!([10.0, 3.0, 50.0]));
+    let refusal = workspace.refusal(&["read", "part.ngc"]);
+    assert!(refusal.starts_with("part.ngc:2:5: found tool 4, whose radius is not known"), "{refusal}");
+    let refusal = workspace.refusal(&["plan", "part.ngc", "--machine", "own.toml"]);
+    assert!(refusal.starts_with("part.ngc:1:1: found a call of Ochange"), "{refusal}");
+    workspace.stdout(&["run", "part.ngc", "--machine", "own.toml", "--subroutines", "subs"]);
+}
+
 #[test]
 fn parameters_are_kept_after_a_whole_run_only() {
     let workspace = Workspace::new("run-parameters");

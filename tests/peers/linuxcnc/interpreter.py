@@ -13,6 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import debian
+import random_programs
 import reading
 import tools
 from difference import Figures, compared
@@ -26,6 +27,8 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folders", nargs="*", type=Path, help="programs: every .ngc in them and below")
     parser.add_argument("--debian", action="store_true", help="the programs of Debian's source package, too")
+    parser.add_argument("--random", type=int, default=0, metavar="COUNT", help="so many random programs, too")
+    parser.add_argument("--seed", type=int, default=1, help="of the first of them")
     cache = Path(tempfile.gettempdir(), "linuxcnc-source")
     parser.add_argument("--cache", type=Path, default=cache, help="they are kept here")
     parser.add_argument("--motion", default="motion", help="the command to compare")
@@ -168,13 +171,18 @@ def main():
     begin = time.monotonic()
     folders = options.folders + (debian.folders(options.cache) if options.debian else [])
     programs = found(folders)
-    if not programs:
-        sys.exit("interpreter.py: found no .ngc, expected a folder with programs, or --debian")
+    if not programs and not options.random:
+        sys.exit("interpreter.py: found no .ngc, expected a folder with programs, --debian or --random")
     with open(options.differences, "rb") as file:
         listing = tomllib.load(file)
     unread = {entry["kind"]: entry["reason"] for entry in listing.get("unread", [])}
     given = {name: getattr(options, name) for name in ("parameters", "tools", "subroutines", "machine")}
     with ProcessPoolExecutor(options.jobs) as pool, tempfile.TemporaryDirectory() as folder:
+        if options.random:
+            made = Path(folder, "random")
+            made.mkdir()
+            random_programs.write(made, options.random, options.seed)
+            programs += found([made])
         if given["tools"] is None:
             given["tools"] = Path(folder, "tools.tbl")
             given["tools"].write_text(tools.alike(count=99, diameter=2))

@@ -98,6 +98,13 @@ class Offsets:
         inches = [a + b + c for a, b, c in zip(point, self.g5x, self.tool)]
         return tuple(value * (1 if at in ROTARY else INCH_MM) for at, value in enumerate(inches))
 
+    def program(self, position):
+        """The point of the program at a position of the machine."""
+        inches = [value / (1 if at in ROTARY else INCH_MM) for at, value in enumerate(position)]
+        point = [a - b - c for a, b, c in zip(inches, self.g5x, self.tool)]
+        point[0], point[1] = rotated(point[0], point[1], -self.rotation_rad)
+        return tuple(a - b for a, b in zip(point, self.g92))
+
 
 def sweep_rad(start, end, centre, plane, rotation):
     """The angle of an arc in the plane of the program. `rotation`: ±1 is up to one turn, ±2 one turn more."""
@@ -178,7 +185,8 @@ class Merging:
         centre[first], centre[second], centre[normal] = first_centre, second_centre, height
         direction[normal] = 1.0
         direction[:2] = rotated(*direction[:2], self.offsets.rotation_rad)
-        angle_rad = sweep_rad(self.point, end, centre, self.plane, rotation)
+        # Offsets may have changed since the move before.
+        angle_rad = sweep_rad(self.offsets.program(self.position), end, centre, self.plane, rotation)
         on_machine = self.offsets.machine((*centre, *others))[:3]
         self.move([name, line, *end, *others], arc=Arc(on_machine, tuple(direction), angle_rad))
         self.is_position_known = False

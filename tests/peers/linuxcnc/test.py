@@ -257,6 +257,24 @@ class Steps(unittest.TestCase):
         for value, expected in ((x, 0), (y, 13 * 25.4), (z, 5 * 25.4), (a, 10)):
             self.assertAlmostEqual(value, expected)
 
+    def test_the_way_back_from_the_machine(self):
+        offsets = steps.Offsets()
+        offsets.g92, offsets.g5x, offsets.tool = (1.0, *[0.0] * 8), (0.0, 10.0, *[0.0] * 7), (0.0, 0.0, 5.0, 7.0, *[0.0] * 5)
+        offsets.rotation_rad = 0.7
+        point = (2.0, -3.0, 4.0, 5.0, *[0.0] * 5)
+        for value, expected in zip(offsets.program(offsets.machine(point)), point):
+            self.assertAlmostEqual(value, expected)
+
+    def test_an_arc_behind_g92_begins_in_the_new_offsets(self):
+        here = [15 / 25.4, *[0.0] * 8]
+        # The position is called 0; half a turn round a centre that is where the position was called before.
+        calls = [*CALLS[:5], ["set_g92_offset", 2, *here],
+                 ["arc_feed", 3, -10 / 25.4, 0.0, -5 / 25.4, 0.0, -1, *[0.0] * 7]]
+        calls[4] = ["straight_feed", 2, *here]
+        _, arc = steps.of_linuxcnc(calls, "\n".join(ORDER.splitlines()[:8]))
+        self.assertAlmostEqual(arc.arc.sweep_rad, -math.pi)
+        self.assertLess(math.dist(arc.arc.centre, (10, 0, 0)), 1e-12)
+
     def test_an_arc_in_a_rotated_system_is_turned(self):
         calls = [*CALLS[:3], ["set_xy_rotation", 1, 90.0], *CALLS[3:6]]
         order = "\n".join(ORDER.splitlines()[:8])
