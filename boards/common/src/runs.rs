@@ -137,6 +137,7 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
 #[cfg(test)]
 mod tests {
     use motion_kernel::exec::Executor;
+    use motion_kernel::program::write;
     use motion_kernel::queue::{Intake, LiveStreams};
 
     use super::*;
@@ -193,6 +194,26 @@ mod tests {
         on_a_board(poll_ticks, |board| {
             (core::array::from_fn(|_| board.program(&mut command)), board.run.starvations())
         })
+    }
+
+    /// It runs until the switch is made, and comes to its end after that.
+    #[test]
+    fn a_run_that_waits_for_a_switch_is_not_at_its_end() {
+        let stringer = machine();
+        let (header, on) = (*stringer.header(), OutputState { flood: true, ..OutputState::OFF });
+        let mut bytes = Vec::new();
+        write(&header, None, &[Item::Switch(on)], &mut bytes).expect("short");
+        let program = Reader::new(bytes.leak()).expect("a program");
+        let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+        let (feeder, _intake) = streams.split(header.rules, header.start);
+        let mut run = Run::new(program, feeder, BOARD.lead_ticks);
+        run.poll().expect("nothing to do");
+        assert_eq!((run.state(), run.switch()), (State::Waiting, None));
+        run.start(header.start).expect("a way");
+        run.poll().expect("accepted");
+        assert_eq!((run.state(), run.switch()), (State::Running, Some(on)));
+        run.poll().expect("nothing left");
+        assert_eq!((run.state(), run.switch()), (State::Waiting, None));
     }
 
     /// As `motion compile` prints: 2.320 s to (102.045923136, 0, 0).
