@@ -1,7 +1,7 @@
 //! Work of the planner, counted where a test holds it to an amount: tests read no clock.
 //!
-//! Counts evaluations of the law and ceilings that are visited, for each thread by itself. Without the
-//! feature `count-work` nothing is counted.
+//! Counts evaluations of the law and ceilings that are visited, for each thread by itself, and what the host
+//! adds where it makes curves and blends. Without the feature `count-work` nothing is counted.
 
 #[cfg(feature = "count-work")]
 extern crate std;
@@ -13,7 +13,7 @@ std::thread_local! {
 
 /// Adds some steps of work.
 #[inline(always)]
-pub(crate) fn add(_steps: usize) {
+pub fn add(_steps: usize) {
     #[cfg(feature = "count-work")]
     DONE.set(DONE.get() + _steps as u64);
 }

@@ -1,7 +1,8 @@
 //! Chooses the junctions that are blended, and the length of each blend.
 //!
 //! Consumes a run of moves with their tolerances; produces blocks with ceiling, law and junction feed, ready
-//! for look-ahead. Background, a bounded number of plans of at most seven blocks for each junction.
+//! for look-ahead. Background, a bounded number of blends and of plans of at most seven blocks for each
+//! junction.
 //!
 //! **A blend has to pay.** Jerk and snap bound the motion round a corner: within a small tolerance it may
 //! take longer than a stop on the corner, and between a slow and a fast move a blend keeps the fast one slow.
@@ -19,6 +20,8 @@
 //! arcs of a few millimetres that a corner is rounded with, by a seventh). If no such step is wanted, the
 //! machine's limit says so: with a small one only the blend pays.
 
+use std::rc::Rc;
+
 use motion_kernel::law::Limits;
 use motion_kernel::plan::{
     BLEND_FEED_SHARE, Block, BlockPlan, Ceiling, Node, PlanError, nodes_for, plan, plan_spanning,
@@ -30,8 +33,10 @@ use super::error::Problem;
 use super::lookahead::lookahead;
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
+use crate::toolpath::Greatest;
 use crate::toolpath::blend::Blend;
 use crate::toolpath::smooth::{Move, Run};
+use crate::toolpath::{norm, subtract};
 
 /// Part of the time that a junction without a blend has to gain over the best one.
 const EXACT_GAIN_MIN: f64 = 0.002;
@@ -41,9 +46,9 @@ const CORNERS_RAD: [f64; 2] = [130.0 * core::f64::consts::PI / 180.0, 75.0 * cor
 
 /// Lengths of blends that are tried, as parts of the longest one.
 const SIZES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
-/// How much longer than the best found the longest blends may take for others to be tried: these gain a few
-/// hundredths.
-const PROMISING: f64 = 1.25;
+/// How much longer than the best found the longest blends may take for others to be tried: these gain up to
+/// an eighth.
+const PROMISING: f64 = 1.15;
 /// How often a junction is looked at at most.
 const SWEEPS: usize = 4;
 /// How many more moves are looked at on either side of those at a junction.
@@ -59,10 +64,10 @@ const LESS: f64 = 1.0 - 1.0e-9;
 type AtLine<T> = Result<T, (u32, Problem)>;
 
 /// How a junction is crossed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Crossing {
-    /// The blend with its length \[mm\] and its ceiling; none: as it is.
-    blend: Option<(Blend, f64, Ceilings)>,
+    /// The blend; none: as it is.
+    blend: Option<Rc<Rounding>>,
     /// The greatest feed \[mm/s\].
     feed_mm_s: f64,
 }
@@ -70,23 +75,22 @@ struct Crossing {
 impl Crossing {
     /// Its trim of either move \[mm\].
     fn trim_mm(&self) -> f64 {
-        self.blend.map_or(0.0, |(blend, ..)| blend.trim_mm)
+        self.blend.as_ref().map_or(0.0, |rounding| rounding.blend.trim_mm)
     }
 }
 
-/// How a junction may be crossed; without a blend last.
-struct Variants {
-    /// The greatest trim of either move \[mm\].
+/// A blend with what planning knows of it.
+#[derive(Clone, Debug, PartialEq)]
+struct Rounding {
+    blend: Blend,
+    length_mm: f64,
+    /// The room that it was made for \[mm\], of which its size is a part.
     room_mm: f64,
-    /// How many of [`SIZES`] have been tried.
-    sizes: usize,
-    all: Vec<Crossing>,
-}
-
-impl Variants {
-    fn are_blends(&self) -> bool {
-        self.all.len() > 1
-    }
+    size: f64,
+    greatest: Greatest,
+    /// The part of what its curvature allows with which it is driven.
+    share: f64,
+    ceilings: Ceilings,
 }
 
 /// The blocks of a run that starts and ends at rest; the junction feed of the last one is 0. An error comes
@@ -157,7 +161,7 @@ struct Junctions<'a> {
 impl<'a> Junctions<'a> {
     fn new(run: Run, machine: &'a Machine) -> AtLine<Self> {
         Ok(Self {
-            ceilings: along(run.moves(), machine)?,
+            ceilings: along(&run, machine)?,
             run,
             machine,
             limits: machine.limits().in_any_direction(),
@@ -165,23 +169,34 @@ impl<'a> Junctions<'a> {
     }
 
     /// The run with all blends at their longest, and with those that were found best one by one, unless the
-    /// first takes so much longer than `most_s` that this would, too; none where there is nothing to blend.
+    /// first takes so much longer than `most_s` that this would, too; none where there is nothing to blend, or
+    /// where that is seen before.
     fn choose(&self, exact: &[Crossing], most_s: f64) -> AtLine<Vec<Timed>> {
         // First as if each were alone, then those that touch within what the other leaves.
-        let alone_mm: Vec<f64> = (0..exact.len()).map(|junction| self.longest_mm(junction)).collect();
-        let mut variants = Vec::with_capacity(exact.len());
-        for (junction, &longest_mm) in alone_mm.iter().enumerate() {
-            let room_mm = self.room_mm(junction, |junction| alone_mm[junction]).min(longest_mm);
-            variants.push(self.variants(junction, room_mm, 1, exact[junction])?);
-        }
-        if !variants.iter().any(Variants::are_blends) {
+        let alone: Vec<Option<Blend>> = (0..exact.len()).map(|junction| self.longest(junction)).collect();
+        if alone.iter().all(Option::is_none) {
             return Ok(Vec::new());
         }
-        let mut chosen: Vec<Crossing> = variants.iter().map(|variants| variants.all[0]).collect();
-        for (junction, variants) in variants.iter().enumerate() {
-            if variants.are_blends() {
-                let blends = &variants.all[..variants.all.len() - 1];
-                chosen[junction] = self.best(junction, &chosen, blends);
+        let alone_mm: Vec<f64> = alone.iter().map(|blend| blend.map_or(0.0, |blend| blend.trim_mm)).collect();
+        if self.least_s(&alone) > PROMISING * most_s {
+            return Ok(Vec::new());
+        }
+        let mut chosen = Vec::with_capacity(exact.len());
+        for (junction, blend) in alone.into_iter().enumerate() {
+            let room_mm = self.room_mm(junction, |junction| alone_mm[junction]).min(alone_mm[junction]);
+            let blend = match blend {
+                Some(blend) if blend.trim_mm > room_mm => self.run.blend(junction, room_mm, &self.limits),
+                blend => blend,
+            };
+            chosen.push(match blend {
+                Some(blend) => self.rounded(junction, blend, (room_mm, SIZES[0]))?,
+                None => exact[junction].clone(),
+            });
+        }
+        for junction in 0..chosen.len() {
+            if let Some(longest) = chosen[junction].blend.clone() {
+                let shares = self.shared(junction, &longest)?;
+                chosen[junction] = self.best(junction, &chosen, &shares);
             }
         }
         let longest = self.timed(&chosen);
@@ -192,17 +207,12 @@ impl<'a> Junctions<'a> {
         let mut is_open = vec![true; chosen.len()];
         for _ in 0..SWEEPS {
             for junction in 0..chosen.len() {
-                if !std::mem::take(&mut is_open[junction]) || !variants[junction].are_blends() {
+                if !std::mem::take(&mut is_open[junction]) || alone_mm[junction] == 0.0 {
                     continue;
                 }
-                let room_mm =
-                    self.room_mm(junction, |junction| chosen[junction].trim_mm()).min(alone_mm[junction]);
-                let known = &mut variants[junction];
-                if (room_mm, SIZES.len()) != (known.room_mm, known.sizes) {
-                    *known = self.variants(junction, room_mm, SIZES.len(), exact[junction])?;
-                }
-                let best = self.best(junction, &chosen, &variants[junction].all);
-                if best != std::mem::replace(&mut chosen[junction], best) {
+                let best = self.better(junction, alone_mm[junction], &chosen, &exact[junction])?;
+                if best != chosen[junction] {
+                    chosen[junction] = best;
                     let beside = junction.saturating_sub(BESIDE + 1)..chosen.len().min(junction + BESIDE + 2);
                     is_open[beside].iter_mut().for_each(|is_open| *is_open = true);
                     is_open[junction] = false;
@@ -212,10 +222,20 @@ impl<'a> Junctions<'a> {
         Ok(vec![longest, self.timed(&chosen)])
     }
 
-    /// The trim of the longest blend of a junction, 0 if there is none \[mm\].
-    fn longest_mm(&self, junction: usize) -> f64 {
+    /// The longest blend of a junction, as if it were alone.
+    fn longest(&self, junction: usize) -> Option<Blend> {
         let room_mm = self.run.taken_mm_max(junction).min(self.run.taken_mm_max(junction + 1));
-        self.run.blend(junction, room_mm, &self.limits).map_or(0.0, |blend| blend.trim_mm)
+        self.run.blend(junction, room_mm, &self.limits)
+    }
+
+    /// About the least time that the run takes with blends, of which these are the longest \[s\]: each takes that
+    /// of its chord at its feed, two that overlap half of it. What is between them takes none.
+    fn least_s(&self, alone: &[Option<Blend>]) -> f64 {
+        let of_blend = |blend: &Blend| {
+            let (from, to) = blend.element.ends_mm();
+            0.5 * norm(subtract(to, from)) / blend.feed_mm_s
+        };
+        alone.iter().flatten().map(of_blend).sum()
     }
 
     /// The room of a junction where the others trim `trim_mm`.
@@ -237,25 +257,79 @@ impl<'a> Junctions<'a> {
         Crossing { blend: None, feed_mm_s: feed_mm_s.min(before.1.feed_mm_s).min(after.1.feed_mm_s) }
     }
 
-    /// The crossings of a junction with blends of the first `sizes` of [`SIZES`].
-    fn variants(&self, junction: usize, room_mm: f64, sizes: usize, exact: Crossing) -> AtLine<Variants> {
+    /// A junction with a blend that is a part of what `room_mm` allows, driven at the greatest share.
+    fn rounded(&self, junction: usize, blend: Blend, (room_mm, size): (f64, f64)) -> AtLine<Crossing> {
+        let (share, length_mm) = (BLEND_FEED_SHARE, blend.element.length_mm());
+        // How a curve bends takes a search along it: once, whatever share it is then given.
+        let greatest = blend.element.greatest();
+        let ceilings = self.ceilings_of(junction, &blend, &greatest, share)?;
+        let rounding = Rounding { blend, length_mm, room_mm, size, greatest, share, ceilings };
+        Ok(Crossing { feed_mm_s: ceilings.programmed.feed_mm_s, blend: Some(Rc::new(rounding)) })
+    }
+
+    /// A junction with a blend that is driven as it says.
+    fn crossing(&self, junction: usize, rounding: &Rounding) -> AtLine<Crossing> {
+        let ceilings = self.ceilings_of(junction, &rounding.blend, &rounding.greatest, rounding.share)?;
+        let rounding = Rounding { ceilings, ..rounding.clone() };
+        Ok(Crossing { feed_mm_s: ceilings.programmed.feed_mm_s, blend: Some(Rc::new(rounding)) })
+    }
+
+    fn ceilings_of(
+        &self,
+        junction: usize,
+        blend: &Blend,
+        greatest: &Greatest,
+        share: f64,
+    ) -> AtLine<Ceilings> {
         let [before, after] = [junction, junction + 1].map(|index| self.run.moves()[index]);
-        let mut all = Vec::with_capacity(2 * SIZES.len() + 1);
-        for &size in &SIZES[..sizes] {
-            let Some(blend) = self.run.blend(junction, size * room_mm, &self.limits) else { continue };
-            let feed_mm_s = before.feed_mm_s.min(after.feed_mm_s);
-            let step = Move { element: blend.element, feed_mm_s, ..before };
-            let length_mm = blend.element.length_mm();
-            // How a curve bends takes a search along it: once, whatever share it is then given.
-            let greatest = blend.element.greatest();
-            for share in [BLEND_FEED_SHARE, self.machine.path.curve_feed_share] {
-                let ceilings = ceilings(&step, &greatest, share, self.machine)?;
-                let blend = Some((blend, length_mm, ceilings));
-                all.push(Crossing { blend, feed_mm_s: ceilings.programmed.feed_mm_s });
-            }
+        let feed_mm_s = before.feed_mm_s.min(after.feed_mm_s);
+        ceilings(&Move { element: blend.element, feed_mm_s, ..before }, greatest, share, self.machine)
+    }
+
+    /// A junction with the same blend, once driven at each of the two shares.
+    fn shared(&self, junction: usize, rounding: &Rounding) -> AtLine<[Crossing; 2]> {
+        let at = |share: f64| self.crossing(junction, &Rounding { share, ..rounding.clone() });
+        Ok([at(BLEND_FEED_SHARE)?, at(self.machine.path.curve_feed_share)?])
+    }
+
+    /// The best crossing of a junction whose longest blend alone trims `alone_mm`, the others being crossed as
+    /// `chosen` says.
+    fn better(
+        &self,
+        junction: usize,
+        alone_mm: f64,
+        chosen: &[Crossing],
+        exact: &Crossing,
+    ) -> AtLine<Crossing> {
+        let room_mm = self.room_mm(junction, |junction| chosen[junction].trim_mm()).min(alone_mm);
+        let is_known = |rounding: &Rc<Rounding>| rounding.size == SIZES[0] && rounding.room_mm == room_mm;
+        let longest = match chosen[junction].blend.clone().filter(is_known) {
+            Some(rounding) => Some(rounding),
+            None => match self.run.blend(junction, room_mm, &self.limits) {
+                Some(blend) => self.rounded(junction, blend, (room_mm, SIZES[0]))?.blend,
+                None => None,
+            },
+        };
+        let Some(longest) = longest else { return Ok(exact.clone()) };
+        let mut variants = Vec::with_capacity(2 * SIZES.len() + 1);
+        variants.extend(self.shared(junction, &longest)?);
+        for &size in &SIZES[1..] {
+            variants.extend(self.shorter(junction, &longest, size)?);
         }
-        all.push(exact);
-        Ok(Variants { room_mm, sizes, all })
+        variants.push(exact.clone());
+        Ok(self.best(junction, chosen, &variants))
+    }
+
+    /// A junction with a part of its longest blend, at each of the two shares; nothing if there is none.
+    fn shorter(&self, junction: usize, longest: &Rounding, size: f64) -> AtLine<Vec<Crossing>> {
+        let Some(blend) = self.run.blend(junction, size * longest.room_mm, &self.limits) else {
+            return Ok(Vec::new());
+        };
+        let crossing = self.rounded(junction, blend, (longest.room_mm, size))?;
+        match &crossing.blend {
+            Some(rounding) => Ok(self.shared(junction, rounding)?.into()),
+            None => Ok(Vec::new()),
+        }
     }
 
     /// The best of some crossings of a junction, the others being crossed as `chosen` says.
@@ -267,15 +341,15 @@ impl<'a> Junctions<'a> {
             junction.and_then(|junction| chosen.get(junction)).map_or(0.0, |c| c.feed_mm_s)
         };
         let feeds = common_feeds(&windows, [feed(first.checked_sub(1)), feed(Some(last))]);
-        let mut best = (chosen[junction], f64::INFINITY);
+        let mut best = (&chosen[junction], f64::INFINITY);
         for (variant, blocks) in variants.iter().zip(&windows) {
             let gain = if variant.blend.is_none() { EXACT_GAIN_MIN } else { 0.0 };
             let time_s = window_time_s(blocks, feeds);
             if time_s < (1.0 - gain) * best.1 {
-                best = (*variant, time_s);
+                best = (variant, time_s);
             }
         }
-        best.0
+        best.0.clone()
     }
 
     /// The first and the last move that are looked at for a junction.
@@ -301,8 +375,8 @@ impl<'a> Junctions<'a> {
                 law: ceiling.law,
             };
             blocks.push(block(length_mm, &self.ceilings[index].programmed, junction_mm_s));
-            if let Some(Crossing { blend: Some((_, length_mm, ceilings)), .. }) = after {
-                blocks.push(block(*length_mm, &ceilings.programmed, f64::INFINITY));
+            if let Some(rounding) = after.and_then(|after| after.blend.as_ref()) {
+                blocks.push(block(rounding.length_mm, &rounding.ceilings.programmed, f64::INFINITY));
             }
         }
         blocks
@@ -334,11 +408,16 @@ impl<'a> Junctions<'a> {
                 tolerance_share,
             };
             blocks.push(block(element, step.feed_mm_s, ceilings, self.run.tolerance_share(index)));
-            if let Some(Crossing { blend: Some((blend, _, ceilings)), .. }) = crossings.get(index) {
-                let share = self.run.tolerance_share_of(index, blend);
+            if let Some(rounding) = crossings.get(index).and_then(|crossing| crossing.blend.as_ref()) {
+                let share = self.run.tolerance_share_of(index, &rounding.blend);
                 // As in the variant that it was chosen from.
                 let next = self.run.moves().get(index + 1).map_or(f64::INFINITY, |next| next.feed_mm_s);
-                blocks.push(block(blend.element, step.feed_mm_s.min(next), *ceilings, share));
+                blocks.push(block(
+                    rounding.blend.element,
+                    step.feed_mm_s.min(next),
+                    rounding.ceilings,
+                    share,
+                ));
             }
         }
         for index in 1..blocks.len() {

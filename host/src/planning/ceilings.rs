@@ -5,7 +5,7 @@ use motion_kernel::plan::{Ceiling, Junction, MachineLimits, Reason, junction};
 use super::error::Problem;
 use crate::machine::Machine;
 use crate::toolpath::fairing::feeds::lower;
-use crate::toolpath::smooth::{Move, TANGENT_ROUNDING_RAD};
+use crate::toolpath::smooth::{Move, Run, TANGENT_ROUNDING_RAD};
 use crate::toolpath::{Element, Greatest, Role, angle, norm, subtract};
 
 /// The ceilings of a move.
@@ -39,42 +39,45 @@ pub(super) fn ceilings(
 /// tightest the feed hardly changes, and before and behind it is lower anyhow.
 const SMOOTH_FEED_SHARE: f64 = 0.93;
 
-/// The ceilings of moves that follow each other. An error comes with the program line.
-pub(super) fn along(moves: &[Move], machine: &Machine) -> Result<Vec<Ceilings>, (u32, Problem)> {
+/// The ceilings of the moves of a run. An error comes with the program line.
+pub(super) fn along(run: &Run, machine: &Machine) -> Result<Vec<Ceilings>, (u32, Problem)> {
     let is_curve = |step: &Move| matches!(step.element, Element::Polynomial { role: Role::Curve, .. });
-    let mut all = Vec::with_capacity(moves.len());
-    for moves in moves.chunk_by(|before, after| is_curve(before) == is_curve(after)) {
-        if moves.first().is_some_and(is_curve) {
-            all.extend(along_curve(moves, machine)?);
-            continue;
+    let mut all: Vec<Ceilings> = Vec::with_capacity(run.moves().len());
+    for moves in run.moves().chunk_by(|before, after| is_curve(before) == is_curve(after)) {
+        let first = all.len();
+        let is_smooth = moves.first().is_some_and(is_curve);
+        let share = if is_smooth { SMOOTH_FEED_SHARE } else { machine.path.curve_feed_share };
+        for (index, step) in moves.iter().enumerate() {
+            all.push(ceilings(step, &run.greatest(first + index), share, machine)?);
         }
-        for step in moves {
-            all.push(ceilings(step, &step.element.greatest(), machine.path.curve_feed_share, machine)?);
+        if is_smooth {
+            lower_curve(run, first, &mut all[first..], machine)?;
         }
     }
     Ok(all)
 }
 
-/// The ceilings of a curve through dense moves: those of its spans, lowered to the feeds that ramps between
-/// the slowest of them reach. That leaves more of the limits for the ramps.
-fn along_curve(spans: &[Move], machine: &Machine) -> Result<Vec<Ceilings>, (u32, Problem)> {
-    let greatest: Vec<Greatest> = spans.iter().map(|step| step.element.greatest()).collect();
-    let mut all = Vec::with_capacity(spans.len());
-    for (step, greatest) in spans.iter().zip(&greatest) {
-        all.push(ceilings(step, greatest, SMOOTH_FEED_SHARE, machine)?);
-    }
+/// Lowers the ceilings of a curve through dense moves, those of a run from `first` on, to the feeds that ramps
+/// between the slowest of them reach. That leaves more of the limits for the ramps.
+fn lower_curve(
+    run: &Run,
+    first: usize,
+    all: &mut [Ceilings],
+    machine: &Machine,
+) -> Result<(), (u32, Problem)> {
     let mut feeds: Vec<f64> = all.iter().map(|ceilings| ceilings.programmed.feed_mm_s).collect();
-    let lengths: Vec<f64> = spans.iter().map(|step| step.element.length_mm()).collect();
+    let lengths: Vec<f64> = (first..first + all.len()).map(|index| run.length_mm(index)).collect();
     lower(&mut feeds, &lengths, &machine.limits().in_any_direction());
-    for (((ceiling, step), greatest), feed_mm_s) in all.iter_mut().zip(spans).zip(&greatest).zip(feeds) {
+    for (index, (ceiling, feed_mm_s)) in all.iter_mut().zip(feeds).enumerate() {
         if feed_mm_s < ceiling.programmed.feed_mm_s {
             let reason = ceiling.programmed.reason;
-            let lowered = ceilings(&Move { feed_mm_s, ..*step }, greatest, SMOOTH_FEED_SHARE, machine)?;
+            let step = Move { feed_mm_s, ..run.moves()[first + index] };
+            let lowered = ceilings(&step, &run.greatest(first + index), SMOOTH_FEED_SHARE, machine)?;
             let lowered = Ceiling { reason, ..lowered.programmed };
             *ceiling = Ceilings { programmed: lowered, greatest: lowered };
         }
     }
-    Ok(all)
+    Ok(())
 }
 
 /// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.

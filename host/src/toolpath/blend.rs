@@ -18,8 +18,11 @@
 //! the blend each of its points is held against the nearest of the element before, from there on against that
 //! of the element after, and u* itself against the corner. Over all pairs the walk is continuous on both
 //! curves and leaves nothing out, so the greatest distance of a pair bounds that of any point of either curve
-//! from the other. For two lines it is the distance from the corner to the blend's middle.
+//! from the other. u* is the place nearest to the corner, or another where the bound is less. For two lines it
+//! is the distance from the corner to the blend's middle. Shapes are compared by a walk of few steps, the best
+//! one is walked in small ones.
 
+use motion_kernel::internals::add_work;
 use motion_kernel::law::Limits;
 
 use super::curve::{Curve, Spiral, by_arc_length};
@@ -52,8 +55,17 @@ const EVEN: [f64; 3] = [2.0 / 7.0, 4.0 / 7.0, 6.0 / 7.0];
 
 /// The number of parts that a blend is cut into to compare shapes. Ceilings use more.
 const COMPARED_PARTS: usize = 24;
-/// The number of parts that it is cut into to measure its distance from the path.
-const MEASURED_PARTS: usize = 64;
+/// The number of parts that each half of it is cut into to measure its distance from the path: to compare
+/// shapes, and to bound it.
+const COMPARED_STEPS: usize = 8;
+const MEASURED_STEPS: usize = 32;
+/// How often the place that is nearest to the corner is corrected.
+const NEARER: usize = 3;
+/// The squares of an arc's radius and height by the angle over that of its radius, below which the angle about
+/// its axis tells where it is nearest.
+const ROUND: f64 = 1.0e-6;
+/// Distance of a blend from a jump of curvature over the jump and the square of its trim.
+const JUMP: f64 = 0.03;
 /// Corrections of the trim d until the distance fits the tolerance.
 const CORRECTIONS_MAX: usize = 8;
 /// Part of the tolerance at which it fits.
@@ -71,6 +83,8 @@ pub struct Blend {
     pub trim_mm: f64,
     /// A bound on its distance from the path and the path's from it \[mm\].
     pub distance_mm: f64,
+    /// About the feed that it alone allows \[mm/s\].
+    pub feed_mm_s: f64,
 }
 
 impl Blend {
@@ -89,23 +103,40 @@ impl Blend {
         if !(tolerance_mm > 0.0 && corner.room_mm > 0.0) {
             return None;
         }
-        let mut best: Option<(f64, Self)> = None;
+        let tolerance_mm = tolerance_mm * TOLERANCE_USED;
+        let mut guess = corner.guess(tolerance_mm);
+        let mut best: Option<(f64, [f64; 3], Guess)> = None;
         for shape in shapes(corner.angle_rad) {
-            let Some((trim_mm, curve, distance_mm)) = corner.within(tolerance_mm * TOLERANCE_USED, &shape)
-            else {
+            let Some((found, curve, _)) = corner.within(tolerance_mm, &shape, guess, COMPARED_STEPS) else {
                 continue;
             };
+            guess = found;
             let feed = feed_mm_s(&curve, limits);
-            if best.is_none_or(|(most, _)| feed > most) && feed.is_finite() && feed > 0.0 {
-                let (start, _) = corner.before.at(trim_mm);
-                let (end, _) = corner.after.at(trim_mm);
-                let (from, to) = (add(corner.point, start), add(corner.point, end));
-                let element = Element::Polynomial { from, to, shape: curve, role: Role::Blend };
-                best = Some((feed, Self { element, trim_mm, distance_mm }));
+            if best.is_none_or(|(most, ..)| feed > most) && feed.is_finite() && feed > 0.0 {
+                best = Some((feed, shape, found));
             }
         }
-        best.map(|(_, blend)| blend)
+        let (feed_mm_s, shape, guess) = best?;
+        let (Guess { trim_mm, .. }, curve, distance_mm) =
+            corner.within(tolerance_mm, &shape, guess, MEASURED_STEPS)?;
+        let (start, _) = corner.before.at(trim_mm);
+        let (end, _) = corner.after.at(trim_mm);
+        let (from, to) = (add(corner.point, start), add(corner.point, end));
+        let element = Element::Polynomial { from, to, shape: curve, role: Role::Blend };
+        Some(Self { element, trim_mm, distance_mm, feed_mm_s })
     }
+}
+
+/// Whether blends are made at the ends of an element.
+#[must_use]
+pub fn has_side(element: &Element) -> bool {
+    matches!(element, Element::Line { .. } | Element::Arc { .. })
+}
+
+/// The trim that a jump of curvature without a corner wants within `tolerance_mm` \[mm\].
+#[must_use]
+pub fn trim_of_jump_mm(jump_per_mm: f64, tolerance_mm: f64) -> f64 {
+    (tolerance_mm / (JUMP * jump_per_mm)).sqrt()
 }
 
 /// The trim of both lines at a corner of `angle_rad` within `tolerance_mm` \[mm\].
@@ -120,7 +151,7 @@ pub fn trim_mm(angle_rad: f64, tolerance_mm: f64) -> f64 {
 /// The greatest feed at which a curve alone keeps the limits \[mm/s\].
 #[must_use]
 pub fn feed_mm_s(curve: &Polynomial, limits: &Limits<f64>) -> f64 {
-    let bend = curve.greatest_of(COMPARED_PARTS).bend;
+    let bend = curve.bend_of(COMPARED_PARTS);
     let third = bend.third_root_per_mm * bend.third_root_per_mm;
     feed_within(limits, [bend.curvature_per_mm, third, bend.fourth_root_per_mm.powi(3)])
 }
@@ -206,28 +237,43 @@ impl Corner {
         (start, Polynomial::bezier([start, b1, b2, b3, b4, b5, b6, end]))
     }
 
-    /// The longest blend of a shape within a tolerance: its trim, itself, its distance from the path.
-    fn within(&self, tolerance_mm: f64, shape: &[f64; 3]) -> Option<(f64, Polynomial, f64)> {
-        let mut best: Option<(f64, Polynomial, f64)> = None;
-        // The distance at a corner grows with the trim, at a jump of curvature with its square. In between,
-        // the last two tries tell the power.
-        let (mut trim_mm, mut power) = (self.room_mm, 1.0);
+    /// A trim to begin with within a tolerance, and the power of it with which the distance grows: at a corner
+    /// the first, at a jump of curvature the second.
+    fn guess(&self, tolerance_mm: f64) -> Guess {
+        let [before, after] = [&self.before, &self.after].map(|side| side.at(0.0).1[1]);
+        let by_angle_mm = trim_mm(self.angle_rad, tolerance_mm);
+        let by_jump_mm = trim_of_jump_mm(norm(subtract(after, before)), tolerance_mm);
+        let power = if by_angle_mm < by_jump_mm { 1.0 } else { 2.0 };
+        Guess { trim_mm: by_angle_mm.min(by_jump_mm).min(self.room_mm), power }
+    }
+
+    /// The longest blend of a shape within a tolerance: its trim, itself, its distance from the path, measured
+    /// in so many steps on either side of its middle.
+    fn within(
+        &self,
+        tolerance_mm: f64,
+        shape: &[f64; 3],
+        Guess { mut trim_mm, mut power }: Guess,
+        steps: usize,
+    ) -> Option<(Guess, Polynomial, f64)> {
+        let mut best: Option<(Guess, Polynomial, f64)> = None;
+        // The last two tries tell the power.
         let mut last: Option<(f64, f64)> = None;
         for _ in 0..CORRECTIONS_MAX {
             let (start, curve) = self.curve(trim_mm, shape);
-            let distance_mm = self.distance_mm(start, &curve, trim_mm);
-            if distance_mm <= tolerance_mm {
-                if best.is_none_or(|(longest_mm, ..)| trim_mm > longest_mm) {
-                    best = Some((trim_mm, curve, distance_mm));
-                }
-                if trim_mm >= self.room_mm || distance_mm >= CLOSE * tolerance_mm {
-                    break;
-                }
-            }
+            let distance_mm = self.distance_mm(start, &curve, trim_mm, steps);
             if let Some((last_trim_mm, last_distance_mm)) = last {
                 let found = libm::log(distance_mm / last_distance_mm) / libm::log(trim_mm / last_trim_mm);
                 if (0.5..=4.0).contains(&found) {
                     power = found;
+                }
+            }
+            if distance_mm <= tolerance_mm {
+                if best.is_none_or(|(longest, ..)| trim_mm > longest.trim_mm) {
+                    best = Some((Guess { trim_mm, power }, curve, distance_mm));
+                }
+                if trim_mm >= self.room_mm || distance_mm >= CLOSE * tolerance_mm {
+                    break;
                 }
             }
             last = Some((trim_mm, distance_mm));
@@ -244,30 +290,64 @@ impl Corner {
         matches!((&self.before, &self.after), (Side::Line { .. }, Side::Line { .. }))
     }
 
-    /// The greatest distance between the blend and what it stands for.
-    fn distance_mm(&self, start: Vector, curve: &Polynomial, trim_mm: f64) -> f64 {
-        let point = |part: usize| add(start, curve.offset(0.0, part as f64 / MEASURED_PARTS as f64));
+    /// The greatest distance between the blend and what it stands for, measured in so many steps on either
+    /// side of its middle.
+    fn distance_mm(&self, start: Vector, curve: &Polynomial, trim_mm: f64, steps: usize) -> f64 {
+        let point = |u: f64| add(start, curve.offset(0.0, u));
         if self.is_straight() {
-            return norm(point(MEASURED_PARTS / 2));
+            return norm(point(0.5));
         }
-        let points: [Vector; MEASURED_PARTS + 1] = core::array::from_fn(point);
-        let (mut before, mut after) = ([0.0; MEASURED_PARTS + 1], [0.0; MEASURED_PARTS + 1]);
-        let mut greatest = 0.0_f64;
-        for (part, &point) in points.iter().enumerate() {
-            greatest = greatest.max(self.before.distance_mm(point, trim_mm));
-            before[part] = greatest;
+        add_work(2 * steps);
+        let middle = nearest_to_corner(start, curve);
+        let sides = [(&self.before, 0.0), (&self.after, 1.0)].map(|(side, end)| (side.near(trim_mm), end));
+        let at = |end: f64, step: usize| point(end + (middle - end) * (step as f64 / steps as f64));
+        // The greatest distance from each side, from its end up to each step.
+        let mut greatest = [[0.0_f64; MEASURED_STEPS + 1]; 2];
+        for ((near, end), greatest) in sides.iter().zip(&mut greatest) {
+            for step in 1..=steps {
+                greatest[step] = greatest[step - 1].max(near.distance_mm(at(*end, step)));
+            }
         }
-        greatest = 0.0;
-        for (part, &point) in points.iter().enumerate().rev() {
-            greatest = greatest.max(self.after.distance_mm(point, trim_mm));
-            after[part] = greatest;
+        let corner_mm = norm(point(middle));
+        let (far, close) = if greatest[0][steps] > greatest[1][steps] { (0, 1) } else { (1, 0) };
+        let mut least = greatest[far][steps].max(corner_mm);
+        if greatest[far][steps] > corner_mm {
+            // The other side takes over the last points of the farther one as long as that gains.
+            let mut taken = greatest[close][steps];
+            for step in (0..steps).rev() {
+                let point = at(sides[far].1, step);
+                taken = taken.max(sides[close].0.distance_mm(point));
+                least = least.min(greatest[far][step].max(taken).max(norm(point)));
+                if taken >= least {
+                    break;
+                }
+            }
         }
-        let at = |part: usize| before[part].max(after[part]).max(norm(points[part]));
-        let least = (0..=MEASURED_PARTS).map(at).fold(f64::INFINITY, f64::min);
         // Between two points the distance may rise above both by an eighth of its second difference, which is
         // below this part of the greatest for the curves made here: those of three and a half waves.
-        least * (1.0 + 16.0 / (MEASURED_PARTS * MEASURED_PARTS) as f64)
+        let widest = middle.max(1.0 - middle) / steps as f64;
+        least * (1.0 + 16.0 * widest * widest)
     }
+}
+
+/// Where a blend that begins `start` from the corner is nearest to it, or close to that; not near its ends.
+fn nearest_to_corner(start: Vector, curve: &Polynomial) -> f64 {
+    let mut u = 0.5_f64;
+    for _ in 0..NEARER {
+        let [first, second, _] = curve.derivatives(u);
+        let from_corner = add(start, curve.offset(0.0, u));
+        let square = dot(first, first);
+        let slope = (square + dot(from_corner, second)).max(0.5 * square);
+        u = (u - dot(from_corner, first) / slope).clamp(0.25, 0.75);
+    }
+    u
+}
+
+/// A trim to try, and the power of it with which the distance grows.
+#[derive(Clone, Copy, Debug)]
+struct Guess {
+    trim_mm: f64,
+    power: f64,
 }
 
 impl Side {
@@ -307,55 +387,109 @@ impl Side {
         }
     }
 
-    /// How far `point`, relative to the corner, is from the first `trim_mm` of the side.
-    fn distance_mm(&self, point: Vector, trim_mm: f64) -> f64 {
+    /// Its first `trim_mm`, to measure distances from.
+    fn near(&self, trim_mm: f64) -> Near {
         match self {
-            Self::Line { away, .. } => {
-                let foot = dot(point, *away).clamp(0.0, trim_mm);
-                norm(subtract(point, scale(*away, foot)))
-            }
+            Self::Line { away, .. } => Near::Line { away: *away, trim_mm },
             Self::Arc { shape, corner_rad, rad_per_mm } => {
-                let end = corner_rad + rad_per_mm * trim_mm;
-                let (least, most) = (corner_rad.min(end), corner_rad.max(end));
-                if shape.radius_per_rad == 0.0 && shape.height_per_rad == 0.0 {
-                    return from_circle(point, shape, [*corner_rad, end]);
-                }
-                let mut angle = 0.5 * (least + most);
-                // Newton; wherever it gets to is a point of the arc, so the distance is never too small.
-                for _ in 0..4 {
-                    let [d1, d2, _] = shape.derivatives(angle);
-                    let gap = subtract(point, shape.offset(*corner_rad, angle));
-                    let step = dot(gap, d1) / (dot(d1, d1) - dot(gap, d2)).max(0.1 * dot(d1, d1));
-                    angle = (angle + step).clamp(least, most);
-                }
-                norm(subtract(point, shape.offset(*corner_rad, angle)))
+                Near::Arc(NearArc::new(shape, *corner_rad, rad_per_mm * trim_mm))
             }
         }
     }
 }
 
-/// How far `point`, relative to the one at the first of two angles, is from the part of a circle between
-/// them, which is less than half of it.
-fn from_circle(point: Vector, circle: &Spiral, angles: [f64; 2]) -> f64 {
-    let [corner, end] = angles.map(|angle| {
-        let (sine, cosine) = libm::sincos(angle);
-        add(scale(circle.outward, cosine), scale(circle.onward, sine))
-    });
-    let spoke = add(point, scale(corner, circle.radius_mm));
-    let height_mm = dot(spoke, circle.normal);
-    let flat = subtract(spoke, scale(circle.normal, height_mm));
-    // Between both ends where it is on their inner sides.
-    let middle = add(corner, end);
-    let across = subtract(end, corner);
-    let is_within = |unit: Vector, inward: f64| {
-        let along = dot(flat, across) - dot(flat, middle) * (dot(unit, across) / dot(unit, middle));
-        along * inward >= 0.0
-    };
-    if dot(flat, middle) > 0.0 && is_within(corner, 1.0) && is_within(end, -1.0) {
-        return libm::hypot(norm(flat) - circle.radius_mm, height_mm);
+/// A side up to its trim, relative to the corner.
+enum Near {
+    Line { away: Vector, trim_mm: f64 },
+    Arc(NearArc),
+}
+
+impl Near {
+    fn distance_mm(&self, point: Vector) -> f64 {
+        match self {
+            Self::Line { away, trim_mm } => {
+                let foot = dot(point, *away).clamp(0.0, *trim_mm);
+                norm(subtract(point, scale(*away, foot)))
+            }
+            Self::Arc(arc) => arc.distance_mm(point),
+        }
     }
-    let to = |unit: Vector| norm(subtract(spoke, scale(unit, circle.radius_mm)));
-    to(corner).min(to(end))
+}
+
+/// Part of an arc, its angle counted from the corner.
+struct NearArc {
+    shape: Spiral,
+    /// The angle at its end, and its sine and cosine.
+    end_rad: f64,
+    end_sine: f64,
+    end_cosine: f64,
+    /// Its other end, relative to the corner.
+    end: Vector,
+    /// Whether radius and height hardly change.
+    is_round: bool,
+}
+
+impl NearArc {
+    /// The part that runs through `swept_rad` from `corner_rad`, either way; less than half a turn.
+    fn new(shape: &Spiral, corner_rad: f64, swept_rad: f64) -> Self {
+        let shape = shape.rotated(corner_rad);
+        let (end_sine, end_cosine) = libm::sincos(swept_rad);
+        let Spiral { radius_mm, radius_per_rad, height_per_rad, .. } = shape;
+        let square = radius_per_rad * radius_per_rad + height_per_rad * height_per_rad;
+        Self {
+            end_rad: swept_rad,
+            end_sine,
+            end_cosine,
+            end: shape.offset(0.0, swept_rad),
+            is_round: square <= ROUND * radius_mm * radius_mm,
+            shape,
+        }
+    }
+
+    /// How far `point`, relative to the corner, is from it; never less than that, and hardly more.
+    fn distance_mm(&self, point: Vector) -> f64 {
+        let Spiral { outward, onward, normal, radius_mm, radius_per_rad, height_per_rad } = self.shape;
+        // In the arc's own axes, from its centre.
+        let (x, y, z) = (radius_mm + dot(point, outward), dot(point, onward), dot(point, normal));
+        let out_mm = (x * x + y * y).sqrt();
+        if self.is_round {
+            // The point of the arc at the same angle; no angle is needed where it is within the part.
+            let past_end = y * self.end_cosine - x * self.end_sine;
+            let is_within =
+                if self.end_rad >= 0.0 { y >= 0.0 && past_end <= 0.0 } else { y <= 0.0 && past_end >= 0.0 };
+            if is_within && x > -out_mm {
+                if radius_per_rad == 0.0 && height_per_rad == 0.0 {
+                    return length(out_mm - radius_mm, z);
+                }
+                let angle = libm::atan2(y, x);
+                return length(out_mm - (radius_mm + radius_per_rad * angle), z - height_per_rad * angle);
+            }
+            return norm(point).min(norm(subtract(point, self.end)));
+        }
+        // One step of Newton from there. Wherever it gets to is a point of the arc.
+        let (least, most) = (self.end_rad.min(0.0), self.end_rad.max(0.0));
+        let at_point = libm::atan2(y, x);
+        let mut angle = at_point.clamp(least, most);
+        for _ in 0..2 {
+            let radius = radius_mm + radius_per_rad * angle;
+            let ahead = at_point - angle;
+            let (sine, cosine) = libm::sincos(ahead);
+            let along = out_mm * sine * radius
+                + (out_mm * cosine - radius) * radius_per_rad
+                + (z - height_per_rad * angle) * height_per_rad;
+            let square = radius * radius + radius_per_rad * radius_per_rad + height_per_rad * height_per_rad;
+            angle = (angle + along / square).clamp(least, most);
+        }
+        let radius = radius_mm + radius_per_rad * angle;
+        let half = libm::sin(0.5 * (at_point - angle));
+        // The chord between both in the plane, without cancellation.
+        let flat = ((out_mm - radius) * (out_mm - radius) + 4.0 * out_mm * radius * half * half).sqrt();
+        length(flat, z - height_per_rad * angle)
+    }
+}
+
+fn length(a: f64, b: f64) -> f64 {
+    (a * a + b * b).sqrt()
 }
 
 #[cfg(test)]
@@ -458,20 +592,26 @@ mod tests {
     fn the_distance_from_an_arc_is_that_of_its_nearest_point() {
         let [_, arc] = line_and_arc();
         let Element::Arc { shape, .. } = arc else { panic!("an arc") };
-        for angles in [[0.0, 0.6], [0.6, 0.0], [1.1, 0.4]] {
-            for index in 0..500_u32 {
-                let turn = f64::from(index);
-                let point = [0.05 * (turn - 250.0), 3.0 * libm::sin(turn), libm::cos(3.0 * turn)];
-                let found = from_circle(point, &shape, angles);
-                let nearest = (0..=4000).map(|part| {
-                    let angle = angles[0] + (angles[1] - angles[0]) * f64::from(part) / 4000.0;
-                    norm(subtract(point, shape.offset(angles[0], angle)))
-                });
-                let nearest = nearest.fold(f64::INFINITY, f64::min);
-                assert!(
-                    (found - nearest).abs() < 1e-6 * (1.0 + nearest),
-                    "{angles:?} {point:?}: {found} {nearest}"
-                );
+        let round = Spiral { radius_per_rad: 1e-3, height_per_rad: -3e-3, ..shape };
+        let steep = Spiral { radius_per_rad: 0.3, height_per_rad: -2.0, ..shape };
+        for (shape, off_mm) in [(shape, 3.0), (round, 3.0), (steep, 0.1)] {
+            for angles in [[0.0, 0.6], [0.6, 0.0], [1.1, 0.4]] {
+                let near = NearArc::new(&shape, angles[0], angles[1] - angles[0]);
+                let at = |part: f64| shape.offset(angles[0], angles[0] + (angles[1] - angles[0]) * part);
+                for index in 0..500_u32 {
+                    let turn = f64::from(index);
+                    let off = [0.3 * libm::sin(7.0 * turn), libm::sin(turn), 0.3 * libm::cos(3.0 * turn)];
+                    let point = add(at(0.003 * turn - 0.25), scale(off, off_mm));
+                    let found = near.distance_mm(point);
+                    let nearest = (0..=4000).map(|part| norm(subtract(point, at(f64::from(part) / 4000.0))));
+                    let nearest = nearest.fold(f64::INFINITY, f64::min);
+                    // The nearest of them is up to half a step beside the foot.
+                    let beside = nearest * nearest - found * found;
+                    assert!(
+                        found < nearest + 1e-5 * (1.0 + nearest) && beside < 3e-7 + 1e-5 * nearest,
+                        "{shape:?} {angles:?} {point:?}: {found} {nearest}"
+                    );
+                }
             }
         }
     }

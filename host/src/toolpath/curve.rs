@@ -30,6 +30,14 @@ pub(super) fn gauss(a: f64, b: f64, function: impl Fn(f64) -> f64) -> f64 {
     half * sum
 }
 
+/// The same by 4 points.
+pub(super) fn gauss_4(a: f64, b: f64, function: impl Fn(f64) -> f64) -> f64 {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let sum: f64 =
+        GAUSS_4.iter().map(|(x, w)| w * (function(middle - half * x) + function(middle + half * x))).sum();
+    half * sum
+}
+
 /// The integral of |r'| from `a` to `b` \[mm\], halved until both halves say what the whole, `whole_mm`, says, or so
 /// many times. `agree` takes both halves together and the whole.
 pub(super) fn refined_length(
@@ -70,12 +78,12 @@ pub fn by_arc_length([d1, d2, d3]: [Vector; 3]) -> [Vector; 3] {
     [tangent, second, third]
 }
 
-/// Fourth derivative by arc length, from the first four by a parameter.
+/// First to fourth derivative by arc length, from those by a parameter.
 ///
 /// With σ, s2, s3, s4 the derivatives of the arc length: r4 = x4·σ⁴ + 6x3·σ²·s2 + x2·(4σ·s3 + 3s2²) + t·s4,
 /// and t·x4 = −3x2·x3 because |t| = 1.
 #[must_use]
-pub fn fourth_by_arc_length([d1, d2, d3, d4]: [Vector; 4]) -> Vector {
+pub fn four_by_arc_length([d1, d2, d3, d4]: [Vector; 4]) -> [Vector; 4] {
     let speed = norm(d1);
     let [tangent, second, third] = by_arc_length([d1, d2, d3]);
     let square = speed * speed;
@@ -86,8 +94,15 @@ pub fn fourth_by_arc_length([d1, d2, d3, d4]: [Vector; 4]) -> Vector {
         scale(second, 4.0 * speed * s3 + 3.0 * s2 * s2),
     );
     let across = subtract(rest, scale(tangent, dot(tangent, rest)));
-    add(scale(across, 1.0 / (square * square)), scale(tangent, -3.0 * dot(second, third)))
+    let fourth = add(scale(across, 1.0 / (square * square)), scale(tangent, -3.0 * dot(second, third)));
+    [tangent, second, third, fourth]
 }
+
+/// Positive abscissae and weights of the 4-point Gauss–Legendre rule.
+const GAUSS_4: [(f64, f64); 2] = [
+    (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
+    (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+];
 
 /// Positive abscissae and weights of the 16-point Gauss–Legendre rule.
 const GAUSS_16: [(f64, f64); 8] = [

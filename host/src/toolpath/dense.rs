@@ -4,39 +4,61 @@
 //! of every run of lines and arcs that have no room for the blends at their ends. A curve begins and ends on
 //! a long move, of which it takes a part, or where there is none.
 
+use std::collections::HashMap;
+use std::rc::Rc;
+
 use motion_kernel::law::Limits;
 
-use super::blend::{ANGLE_MAX_RAD, trim_mm};
+use super::blend::{ANGLE_MAX_RAD, trim_mm, trim_of_jump_mm};
 use super::element::Element;
-use super::fairing::{Part, fair};
+use super::fairing::{Part, Span, fair};
 use super::smooth::{Move, TAKEN_MAX, TANGENT_ROUNDING_RAD, is_smooth};
-use super::{angle, norm, subtract};
+use super::{Greatest, angle, norm, subtract};
 
-/// Distance of a blend from a jump of curvature over the jump and the square of its trim.
-const JUMP: f64 = 0.03;
 /// How often a long move has room for what the blends at its ends want.
 const LONG: f64 = 2.0;
 /// How much more of a long move a curve takes than a blend would.
 const MARGIN: f64 = 4.0;
 
-/// The moves with curves in place of what is dense, and how far each is from those it stands for \[mm\]: once
-/// for each angle above which a corner stays one, if it makes a difference; nothing if nothing is dense. See
-/// [`Run::faired`](super::smooth::Run::faired).
+/// Moves with curves in place of what is dense.
+#[derive(Default)]
+pub(super) struct Faired {
+    pub(super) moves: Vec<Move>,
+    /// How far each is from those that it stands for \[mm\].
+    pub(super) distances_mm: Vec<f64>,
+    /// How each bends at its tightest, of the spans of curves.
+    pub(super) greatest: Vec<Option<Greatest>>,
+}
+
+impl Faired {
+    fn push(&mut self, step: Move, element: Element, distance_mm: f64, greatest: Option<Greatest>) {
+        self.moves.push(Move { element, ..step });
+        self.distances_mm.push(distance_mm);
+        self.greatest.push(greatest);
+    }
+}
+
+/// Curves that were made, by the first and the last of the moves that they stand for, with what is left of both.
+type Known = HashMap<(usize, usize), ([Part; 2], Option<Rc<[Span]>>)>;
+
+/// The moves with curves in place of what is dense: once for each angle above which a corner stays one, if it
+/// makes a difference; nothing if nothing is dense. See [`Run::faired`](super::smooth::Run::faired).
 pub(super) fn faired(
     moves: &[Move],
     corners_rad: &[f64],
     limits: &Limits<f64>,
     feed_mm_s: f64,
-) -> Vec<(Vec<Move>, Vec<f64>)> {
+) -> Vec<Faired> {
     let mut runs: Vec<Moves> = corners_rad.iter().map(|&corner_rad| Moves::new(moves, corner_rad)).collect();
-    // Solving is slow: equal runs are solved once.
     runs.dedup_by(|run, before| run.wanted_mm == before.wanted_mm);
-    runs.iter().filter_map(|run| with_curves(run, limits, feed_mm_s)).collect()
+    // Solving is slow: what the runs have in common is solved once.
+    let mut known = Known::new();
+    runs.iter().filter_map(|run| with_curves(run, limits, feed_mm_s, &mut known)).collect()
 }
 
-fn with_curves(run: &Moves, limits: &Limits<f64>, feed_mm_s: f64) -> Option<(Vec<Move>, Vec<f64>)> {
+fn with_curves(run: &Moves, limits: &Limits<f64>, feed_mm_s: f64, known: &mut Known) -> Option<Faired> {
     let moves = run.moves;
-    let mut made = Made::default();
+    let mut made = Faired::default();
     let (mut first, mut is_faired) = (0, false);
     // What the curve before has left of the first move.
     let mut rest = moves.first()?.element;
@@ -44,46 +66,44 @@ fn with_curves(run: &Moves, limits: &Limits<f64>, feed_mm_s: f64) -> Option<(Vec
         let last = run.last_from(first);
         let is_dense = last > first && (first..=last).any(|index| run.is_short(index));
         let cut = is_dense.then(|| run.cut(first, rest, last, feed_mm_s));
-        let Some((cut, spans)) = cut.and_then(|cut| fair(&cut.parts, limits).map(|spans| (cut, spans)))
-        else {
+        let curve = cut.and_then(|cut| {
+            let ends = [cut.parts[0], cut.parts[last - first]];
+            let spans = match known.get(&(first, last)) {
+                Some((of_known, spans)) if *of_known == ends => spans.clone(),
+                _ => {
+                    let spans = fair(&cut.parts, limits).map(Rc::from);
+                    known.insert((first, last), (ends, spans.clone()));
+                    spans
+                }
+            };
+            spans.map(|spans| (cut, spans))
+        });
+        let Some((cut, spans)) = curve else {
             // A run that has no curve is left as it is; its last move may begin another one.
             let next = last.max(first + 1);
-            made.push(moves[first], rest, 0.0);
-            moves[first + 1..next].iter().for_each(|step| made.push(*step, step.element, 0.0));
+            made.push(moves[first], rest, 0.0, None);
+            moves[first + 1..next].iter().for_each(|step| made.push(*step, step.element, 0.0, None));
             first = next;
             rest = moves.get(first).map_or(rest, |step| step.element);
             continue;
         };
         is_faired = true;
         if let Some(before) = cut.before {
-            made.push(moves[first], before, 0.0);
+            made.push(moves[first], before, 0.0, None);
         }
-        for span in spans {
+        for span in spans.iter() {
             let stands_for = &moves[first + span.parts.0..=first + span.parts.1];
             let feed_mm_s = stands_for.iter().map(|step| step.feed_mm_s).fold(f64::INFINITY, f64::min);
             let tolerance_mm = stands_for.iter().map(tolerance_mm).fold(f64::INFINITY, f64::min);
             let step = Move { feed_mm_s, tolerance_mm, merging_mm: None, ..stands_for[0] };
-            made.push(step, span.element, span.distance_mm);
+            made.push(step, span.element, span.distance_mm, Some(span.greatest));
         }
         (first, rest) = match (cut.behind, moves.get(last + 1)) {
             (Some(behind), _) => (last, behind),
             (None, next) => (last + 1, next.map_or(rest, |next| next.element)),
         };
     }
-    is_faired.then_some((made.moves, made.distances_mm))
-}
-
-#[derive(Default)]
-struct Made {
-    moves: Vec<Move>,
-    distances_mm: Vec<f64>,
-}
-
-impl Made {
-    fn push(&mut self, step: Move, element: Element, distance_mm: f64) {
-        self.moves.push(Move { element, ..step });
-        self.distances_mm.push(distance_mm);
-    }
+    is_faired.then_some(made)
 }
 
 /// Moves with what the blends between them want.
@@ -183,7 +203,7 @@ fn wanted_mm(before: &Move, after: &Move, corner_rad: f64) -> Option<f64> {
     let jump_per_mm = norm(subtract(start.curvature, end.curvature));
     let by_angle_mm =
         if angle_rad > TANGENT_ROUNDING_RAD { trim_mm(angle_rad, tolerance_mm) } else { f64::INFINITY };
-    Some(by_angle_mm.min((tolerance_mm / (JUMP * jump_per_mm)).sqrt()))
+    Some(by_angle_mm.min(trim_of_jump_mm(jump_per_mm, tolerance_mm)))
 }
 
 /// How far a curve may be from a move \[mm\]: merging is for lines.

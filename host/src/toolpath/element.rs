@@ -268,9 +268,25 @@ impl Element {
         fit(curve, 0.0, end, widest, longest_mm)
     }
 
-    /// How it bends at its tightest, itself and the pieces that it is driven as, and which axes take part.
+    /// How it bends at its tightest, itself and the pieces that it is driven as, and which axes take part. What
+    /// can't be made into pieces is refused elsewhere.
     #[must_use]
     pub fn greatest(&self) -> Greatest {
+        self.greatest_driven().unwrap_or_else(|_| self.greatest_itself())
+    }
+
+    /// The same; an error if it can't be made into pieces.
+    pub(super) fn greatest_driven(&self) -> Result<Greatest, FitError> {
+        let itself = self.greatest_itself();
+        Ok(match self {
+            Self::Line { .. } | Self::Arc { .. } => itself,
+            // Its pieces where they are longest.
+            _ => itself.driven_as(&self.septics(f64::INFINITY)?),
+        })
+    }
+
+    /// How it bends at its tightest without regard to the pieces that it is driven as.
+    fn greatest_itself(&self) -> Greatest {
         match self {
             Self::Line { .. } => Greatest {
                 bend: Bend::default(),
@@ -290,13 +306,8 @@ impl Element {
                     curved: part.map(|part| part > 0.0),
                 }
             }
-            Self::Polynomial { shape, .. } => self.driven(shape.greatest()),
-            Self::Involute { shape, .. } => self.driven(shape.greatest()),
+            Self::Polynomial { shape, .. } => shape.greatest(),
+            Self::Involute { shape, .. } => shape.greatest(),
         }
-    }
-
-    /// That of its pieces, too, where they are longest. What can't be made into pieces is refused elsewhere.
-    fn driven(&self, curve: Greatest) -> Greatest {
-        curve.driven_as(&self.septics(f64::INFINITY).unwrap_or_default())
     }
 }

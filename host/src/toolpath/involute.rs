@@ -187,7 +187,7 @@ impl Curve for Involute {
 
 #[cfg(test)]
 mod tests {
-    use super::super::curve::{by_arc_length, fourth_by_arc_length, gauss};
+    use super::super::curve::{four_by_arc_length, gauss};
     use super::super::septic::{FEED_TOLERANCE, POSITION_TOLERANCE_MM, fit};
     use super::*;
 
@@ -255,11 +255,10 @@ mod tests {
             for part in 0..=1000 {
                 let u = involute.sweep_rad() * f64::from(part) / 1000.0;
                 let [d1, d2, d3] = involute.derivatives(u);
-                let [_, second, third] = by_arc_length([d1, d2, d3]);
                 // The fourth derivative by φ is r·(−3T − φN).
                 let (tangent, normal) = involute.frame(involute.angle(u));
                 let d4 = scale(add(scale(tangent, 3.0), scale(normal, involute.angle(u))), -12.0);
-                let fourth = fourth_by_arc_length([d1, d2, d3, d4]);
+                let [_, second, third, fourth] = four_by_arc_length([d1, d2, d3, d4]);
                 for (greatest, vector) in greatest.iter_mut().zip([second, third, fourth]) {
                     *greatest = greatest.max(norm(vector));
                 }

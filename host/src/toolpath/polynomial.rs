@@ -6,7 +6,10 @@
 //! arc length. Any finite coefficients are accepted; a curve that stands still somewhere (|r'| = 0) has no
 //! tangent there and is refused when it is made into pieces.
 
-use super::curve::{Curve, by_arc_length, fourth_by_arc_length, gauss, refined_length};
+use motion_kernel::internals::add_work;
+use motion_kernel::plan::Bend;
+
+use super::curve::{Curve, four_by_arc_length, gauss, refined_length};
 use super::greatest::{Greatest, Peak, bend};
 use super::{Vector, add, norm, scale};
 
@@ -86,34 +89,41 @@ impl Polynomial {
     /// The greatest derivatives by arc length of the curve itself, from 64 parts.
     #[must_use]
     pub fn greatest(&self) -> Greatest {
-        self.greatest_of(BEND_PARTS)
-    }
-
-    /// The same from fewer `parts`.
-    pub(super) fn greatest_of(&self, parts: usize) -> Greatest {
-        let mut norms = [Peak::default(); 3];
         let mut tangents = [Peak::default(); 3];
         let mut curvatures = [0.0_f64; 3];
-        for part in 0..=parts {
-            let derivatives = self.four_derivatives(part as f64 / parts as f64);
-            let [d1, d2, d3, _] = derivatives;
-            let [tangent, second, third] = by_arc_length([d1, d2, d3]);
-            let fourth = fourth_by_arc_length(derivatives);
-            for (peak, derivative) in norms.iter_mut().zip([second, third, fourth]) {
-                peak.next(norm(derivative));
-            }
+        let norms = self.norms(BEND_PARTS, |tangent, second| {
             for axis in 0..3 {
                 tangents[axis].next(tangent[axis].abs());
                 curvatures[axis] = curvatures[axis].max(second[axis].abs());
             }
-        }
-        let norms = norms.map(Peak::greatest);
+        });
         let tangent = tangents.map(|peak| peak.greatest().min(1.0));
         Greatest {
             bend: bend(norms),
             tangent,
             curved: curvatures.map(|curvature| curvature > STRAIGHT * norms[0]),
         }
+    }
+
+    /// How it bends at its tightest, from so many parts.
+    pub(super) fn bend_of(&self, parts: usize) -> Bend<f64> {
+        bend(self.norms(parts, |_, _| ()))
+    }
+
+    /// The greatest second to fourth derivative by arc length, from so many parts; calls `each` with tangent
+    /// and curvature where they are taken.
+    fn norms(&self, parts: usize, mut each: impl FnMut(Vector, Vector)) -> [f64; 3] {
+        add_work(parts);
+        let mut norms = [Peak::default(); 3];
+        for part in 0..=parts {
+            let [tangent, second, third, fourth] =
+                four_by_arc_length(self.four_derivatives(part as f64 / parts as f64));
+            for (peak, derivative) in norms.iter_mut().zip([second, third, fourth]) {
+                peak.next(norm(derivative));
+            }
+            each(tangent, second);
+        }
+        norms.map(Peak::greatest)
     }
 
     /// The coefficients of the same curve in u − `origin`, relative to the point at `origin`.
@@ -212,9 +222,9 @@ mod tests {
                 let found = scale(subtract(after[order], before[order]), 0.5 / h);
                 assert!(norm(subtract(exact, found)) < 1e-5, "{order}: {exact:?} {found:?}");
             }
-            let third = |[d1, d2, d3, _]: [Vector; 4]| by_arc_length([d1, d2, d3])[2];
+            let third = |derivatives| four_by_arc_length(derivatives)[2];
             let found = scale(subtract(third(after), third(before)), 1.0 / curve.length(u - h, u + h));
-            let exact = fourth_by_arc_length([d1, d2, d3, d4]);
+            let [.., exact] = four_by_arc_length([d1, d2, d3, d4]);
             assert!(norm(subtract(exact, found)) < 1e-6 * (1.0 + norm(exact)), "{exact:?} {found:?}");
         }
     }
@@ -261,10 +271,9 @@ mod tests {
         let mut found = [0.0_f64; 3];
         let mut found_tangent = [0.0_f64; 3];
         for part in 0..=10_007 {
-            let derivatives = curve.four_derivatives(f64::from(part) / 10_007.0);
-            let [d1, d2, d3, _] = derivatives;
-            let [t, second, third] = by_arc_length([d1, d2, d3]);
-            for (found, vector) in found.iter_mut().zip([second, third, fourth_by_arc_length(derivatives)]) {
+            let [t, second, third, fourth] =
+                four_by_arc_length(curve.four_derivatives(f64::from(part) / 10_007.0));
+            for (found, vector) in found.iter_mut().zip([second, third, fourth]) {
                 *found = found.max(norm(vector));
             }
             found_tangent = core::array::from_fn(|axis| found_tangent[axis].max(t[axis].abs()));

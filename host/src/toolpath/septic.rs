@@ -5,7 +5,7 @@
 //! curve that no reasonable number of pieces follows is refused, and its cusp named if that is why.
 
 use super::Vector;
-use super::curve::{Curve, by_arc_length, gauss};
+use super::curve::{Curve, by_arc_length, gauss_4};
 use super::{norm, subtract};
 
 /// Greatest distance of a piece from its curve \[mm\]: a hundredth of a 0.1 µm count.
@@ -223,8 +223,8 @@ fn deviation(curve: &(impl Curve + ?Sized), piece: &Septic) -> Deviation {
     let (mut before, mut gone_mm) = (a, 0.0);
     for part in 1..8 {
         let parameter = a + (b - a) * f64::from(part) / 8.0;
-        // An eighth is so smooth that one rule is better than the deviations that are looked for.
-        gone_mm += gauss(before, parameter, |u| curve.speed(u));
+        // An eighth is so smooth that few points are better than the deviations that are looked for.
+        gone_mm += gauss_4(before, parameter, |u| curve.speed(u));
         before = parameter;
         let u = gone_mm / piece.length_mm;
         let (point, slope) = piece.at(u);
@@ -266,14 +266,19 @@ impl Septic {
     /// Second to fourth derivative by arc length at u = s/length.
     #[must_use]
     pub fn second_to_fourth(&self, u: f64) -> [Vector; 3] {
-        core::array::from_fn(|index| {
-            let order = index + 2;
-            let power = (0..order).fold(1.0, |power, _| power * self.length_mm);
-            let of_axis = |axis: &[f64; 7]| {
-                let terms = axis.iter().zip(&FACTORS[index]).skip(order - 1);
-                terms.rev().fold(0.0, |sum, (c, factor)| sum * u + c * factor) / power
-            };
-            core::array::from_fn(|axis| of_axis(&self.coefficients[axis]))
-        })
+        let per_mm = 1.0 / self.length_mm;
+        let mut derivatives = [[0.0; 3]; 3];
+        let mut per_power = per_mm;
+        for (index, (derivative, factors)) in derivatives.iter_mut().zip(&FACTORS).enumerate() {
+            per_power *= per_mm;
+            for (component, coefficients) in derivative.iter_mut().zip(&self.coefficients) {
+                let mut sum = 0.0;
+                for power in (index + 1..coefficients.len()).rev() {
+                    sum = sum * u + coefficients[power] * factors[power];
+                }
+                *component = sum * per_power;
+            }
+        }
+        derivatives
     }
 }

@@ -17,11 +17,11 @@
 
 use motion_kernel::law::Limits;
 
-use super::blend::{Blend, trim_mm};
-use super::dense::faired;
+use super::blend::{Blend, has_side, trim_mm};
+use super::dense::{Faired, faired};
 use super::element::Element;
 use super::merge::{Merged, merge};
-use super::{Vector, angle, norm, subtract};
+use super::{Greatest, Vector, angle, norm, subtract};
 
 /// Part of an element that blends may take together.
 pub(super) const TAKEN_MAX: f64 = 0.9;
@@ -65,6 +65,8 @@ pub struct Run {
     lengths_mm: Vec<f64>,
     /// How far each move is from those that it stands for \[mm\].
     distances_mm: Vec<f64>,
+    /// How each move bends at its tightest where that is known already.
+    greatest: Vec<Option<Greatest>>,
 }
 
 impl Run {
@@ -72,7 +74,7 @@ impl Run {
     #[must_use]
     pub fn new(moves: &[Move]) -> Self {
         let (moves, distances_mm) = merged(moves);
-        Self::of(moves, distances_mm)
+        Self::of(moves, distances_mm, Vec::new())
     }
 
     /// The runs of `moves` with curves in place of what is dense, made for `limits` and at most `feed_mm_s`:
@@ -80,7 +82,9 @@ impl Run {
     #[must_use]
     pub fn faired(moves: &[Move], corners_rad: &[f64], limits: &Limits<f64>, feed_mm_s: f64) -> Vec<Self> {
         let made = faired(moves, corners_rad, limits, feed_mm_s).into_iter();
-        let mut runs: Vec<Self> = made.map(|(moves, distances_mm)| Self::of(moves, distances_mm)).collect();
+        let mut runs: Vec<Self> = made
+            .map(|Faired { moves, distances_mm, greatest }| Self::of(moves, distances_mm, greatest))
+            .collect();
         runs.dedup_by(|run, before| run.moves == before.moves);
         runs
     }
@@ -88,12 +92,19 @@ impl Run {
     /// The run of `moves` as they are, nothing merged.
     #[must_use]
     pub fn exact(moves: &[Move]) -> Self {
-        Self::of(moves.to_vec(), vec![0.0; moves.len()])
+        Self::of(moves.to_vec(), vec![0.0; moves.len()], Vec::new())
     }
 
-    fn of(moves: Vec<Move>, distances_mm: Vec<f64>) -> Self {
+    fn of(moves: Vec<Move>, distances_mm: Vec<f64>, greatest: Vec<Option<Greatest>>) -> Self {
         let lengths_mm = moves.iter().map(|step| step.element.length_mm()).collect();
-        Self { moves, lengths_mm, distances_mm }
+        Self { moves, lengths_mm, distances_mm, greatest }
+    }
+
+    /// How a move bends at its tightest.
+    #[must_use]
+    pub fn greatest(&self, index: usize) -> Greatest {
+        let known = self.greatest.get(index).copied().flatten();
+        known.unwrap_or_else(|| self.moves[index].element.greatest())
     }
 
     /// The moves.
@@ -134,7 +145,9 @@ impl Run {
     #[must_use]
     pub fn blend(&self, junction: usize, room_mm: f64, limits: &Limits<f64>) -> Option<Blend> {
         let (before, after) = (&self.moves[junction], &self.moves[junction + 1]);
-        if is_smooth([&before.element, &after.element]) {
+        if !(has_side(&before.element) && has_side(&after.element))
+            || is_smooth([&before.element, &after.element])
+        {
             return None;
         }
         // A move of exact path is cut at neither end.

@@ -1,5 +1,8 @@
-//! What planning takes: memory from sizes, work as the planner counts it, in evaluations of the law and visits to a ceiling.
+//! What planning takes: memory from sizes, work as it is counted: evaluations of the law, visits to a ceiling, points of
+//! blends and curves that are looked at, spans and samples of a step of a curve's solver.
 
+use motion_host::machine::Machine;
+use motion_host::planning::{Mode, plan_program};
 use motion_kernel::internals::work_done;
 use motion_kernel::law::{Law, Limits, Pulse};
 use motion_kernel::plan::{Block, Node, nodes_for};
@@ -66,3 +69,45 @@ fn interval(pulse: Pulse, is_mixed: bool) -> Vec<Block<f64>> {
 
 /// 1.13 with either law.
 const LAWS_MAX: f64 = 1.25;
+
+/// Work of planning a program, a line.
+fn work_a_line(program: &str) -> f64 {
+    let parsed = motion_host::gcode::read("rate.ngc", program.as_bytes()).expect("a program");
+    let machine = Machine::reference();
+    let before = work_done();
+    plan_program("rate.ngc", &parsed, &machine, Mode::Spanning).expect("a plan");
+    (work_done() - before) as f64 / program.lines().count() as f64
+}
+
+/// `count` lines under G64, each from the one before: the point that `point` makes of its number.
+fn program(count: u32, point: impl Fn(u32) -> String) -> String {
+    let lines: Vec<String> = (0..count).map(point).collect();
+    format!("G21 G90 G17 G64 P0.05 F3000\nG0 X0 Y0\nG1\n{}\nM2\n", lines.join("\n"))
+}
+
+/// Dense lines, which become curves; long lines with corners; arcs that meet at angles.
+#[test]
+fn blends_and_curves_cost_bounded_work_a_line_however_long_the_program() {
+    let dense = |index: u32| {
+        let x = 0.05 * f64::from(index + 1);
+        format!("X{x:.4} Y{:.4}", libm::sin(x) + 0.004 * f64::from(index % 2))
+    };
+    let corners = |index: u32| format!("X{} Y{}", 5 * (index / 2), 4 * (index.div_ceil(2) % 2));
+    let arcs = |index: u32| {
+        let (x, y) = (f64::from(index + 1), 0.2 * f64::from((index + 1) % 2));
+        let rise = if index.is_multiple_of(2) { 0.2 } else { -0.2 };
+        // From the middle between both ends to the right or to the left.
+        let (turn, side) = if index.is_multiple_of(3) { ("G3", 0.7) } else { ("G2", -0.7) };
+        format!("{turn} X{x} Y{y:.4} I{:.4} J{:.4}", 0.5 - side * rise, 0.5 * rise + side)
+    };
+    let kinds: [(&str, &dyn Fn(u32) -> String, f64); 3] =
+        [("dense", &dense, WORK_MAX[0]), ("corners", &corners, WORK_MAX[1]), ("arcs", &arcs, WORK_MAX[2])];
+    for (name, point, most) in kinds {
+        let [short, long] = [1000, 4000].map(|count| work_a_line(&program(count, point)));
+        println!("{name}: {short:.0} and {long:.0} steps of work a line");
+        assert!(short > 0.0 && long < 1.25 * short && long.max(short) < most, "{name}: {short} {long}");
+    }
+}
+
+/// Each kind takes about nine tenths of it.
+const WORK_MAX: [f64; 3] = [155.0, 7600.0, 5400.0];

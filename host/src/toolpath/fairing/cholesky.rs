@@ -1,90 +1,99 @@
 //! Symmetric positive definite equations in a band, by Cholesky factorisation.
 
+use core::ops::Range;
+
 use super::super::Vector;
 
 /// Control points that act on one span.
 pub(super) const ACTING: usize = 6;
-/// Entries of a row, the diagonal last.
+/// Entries of a column, the diagonal first.
 const WIDTH: usize = 3 * ACTING;
 
 /// What the diagonal is made greater by, as a part of it, so that rounding leaves the pivots above 0.
 const REGULARISATION: f64 = 1.0e-13;
 
-/// The lower triangle of the matrix of points whose entries couple at most [`ACTING`] neighbours.
+/// The lower triangle of the matrix of points whose entries couple at most [`ACTING`] neighbours, by columns.
 pub(super) struct Cholesky {
-    rows: Vec<[f64; WIDTH]>,
+    columns: Vec<[f64; WIDTH]>,
 }
 
 impl Cholesky {
     pub(super) fn new(points: usize) -> Self {
-        Self { rows: vec![[0.0; WIDTH]; 3 * points] }
+        Self { columns: vec![[0.0; WIDTH]; 3 * points] }
     }
 
     pub(super) fn clear(&mut self) {
-        self.rows.fill([0.0; WIDTH]);
+        self.columns.fill([0.0; WIDTH]);
     }
 
-    /// Adds `factor` times a symmetric 3 × 3 matrix to the block of the points `row` ≥ `column`.
-    pub(super) fn add(&mut self, row: usize, column: usize, factor: f64, matrix: &[Vector; 3]) {
+    /// Adds a symmetric 3 × 3 matrix to the blocks of all pairs of [`ACTING`] points from `first` on, times the
+    /// factors of both.
+    pub(super) fn add(&mut self, first: usize, factors: &[f64; ACTING], matrix: &[Vector; 3]) {
         for (axis, line) in matrix.iter().enumerate() {
-            let r = 3 * row + axis;
-            let last = if row == column { axis } else { 2 };
-            for (other, entry) in line.iter().enumerate().take(last + 1) {
-                self.rows[r][WIDTH - 1 - (r - (3 * column + other))] += factor * entry;
+            let mut whole = [0.0; WIDTH];
+            for (entries, factor) in whole.chunks_exact_mut(3).zip(factors) {
+                entries.iter_mut().zip(line).for_each(|(entry, of_line)| *entry = factor * of_line);
+            }
+            for (point, factor) in factors.iter().enumerate() {
+                let diagonal = 3 * point + axis;
+                let column = &mut self.columns[3 * first + diagonal];
+                for (entry, below) in column.iter_mut().zip(&whole[diagonal..]) {
+                    *entry += factor * below;
+                }
             }
         }
     }
 
-    /// Adds `factor` times the identity.
+    /// Adds `factor` times the identity to the block of the points `row` ≥ `column`.
     pub(super) fn add_unit(&mut self, row: usize, column: usize, factor: f64) {
         for axis in 0..3 {
-            self.rows[3 * row + axis][WIDTH - 1 - 3 * (row - column)] += factor;
+            self.columns[3 * column + axis][3 * (row - column)] += factor;
+        }
+    }
+
+    /// Makes the equations of these points say that they stay at their side, and leaves them out of the others.
+    pub(super) fn hold(&mut self, points: Range<usize>) {
+        for index in 3 * points.start..3 * points.end {
+            self.columns[index] = [0.0; WIDTH];
+            self.columns[index][0] = 1.0;
+            for back in 1..WIDTH.min(index + 1) {
+                self.columns[index - back][back] = 0.0;
+            }
         }
     }
 
     /// Solves for `sides` in place; false if the matrix is not positive definite. The matrix is used up.
     pub(super) fn solve(&mut self, sides: &mut [Vector]) -> bool {
-        let size = self.rows.len();
-        for r in 0..size {
-            let reach = r.min(WIDTH - 1);
-            for back in (0..=reach).rev() {
-                // L[r][c] = (A[r][c] − Σ L[r][k]·L[c][k]) / L[c][c]
-                let c = r - back;
-                let shared = reach - back;
-                let (before, row) = self.rows.split_at_mut(r);
-                let row = &mut row[0];
-                let at = WIDTH - 1 - back;
-                if back == 0 {
-                    let sum: f64 = row[at - shared..at].iter().map(|entry| entry * entry).sum();
-                    let rest = row[at] * (1.0 + REGULARISATION) - sum;
-                    if !(rest > 0.0) {
-                        return false;
-                    }
-                    row[at] = rest.sqrt();
-                } else {
-                    let other = &before[c];
-                    let sum: f64 = row[at - shared..at]
-                        .iter()
-                        .zip(&other[WIDTH - 1 - shared..WIDTH - 1])
-                        .map(|(a, b)| a * b)
-                        .sum();
-                    row[at] = (row[at] - sum) / other[WIDTH - 1];
+        let size = self.columns.len();
+        self.columns.iter_mut().for_each(|column| column[0] *= 1.0 + REGULARISATION);
+        for index in 0..size {
+            let (done, rest) = self.columns.split_at_mut(index + 1);
+            let column = &mut done[index];
+            if !(column[0] > 0.0) {
+                return false;
+            }
+            let pivot = column[0].sqrt();
+            column[0] = pivot;
+            column[1..].iter_mut().for_each(|entry| *entry /= pivot);
+            // What is left of the matrix loses the product of this column with itself.
+            for (below, other) in (1..WIDTH).zip(rest) {
+                let factor = column[below];
+                for (entry, of_column) in other.iter_mut().zip(&column[below..]) {
+                    *entry -= factor * of_column;
                 }
             }
         }
-        for r in 0..size {
-            let mut side = sides[r / 3][r % 3];
-            for back in 1..=r.min(WIDTH - 1) {
-                side -= self.rows[r][WIDTH - 1 - back] * sides[(r - back) / 3][(r - back) % 3];
+        let sides = sides.as_flattened_mut();
+        for (index, column) in self.columns.iter().enumerate() {
+            let side = sides[index] / column[0];
+            sides[index] = side;
+            for (below, entry) in sides[index + 1..].iter_mut().zip(&column[1..]) {
+                *below -= entry * side;
             }
-            sides[r / 3][r % 3] = side / self.rows[r][WIDTH - 1];
         }
-        for r in (0..size).rev() {
-            let mut side = sides[r / 3][r % 3];
-            for ahead in 1..WIDTH.min(size - r) {
-                side -= self.rows[r + ahead][WIDTH - 1 - ahead] * sides[(r + ahead) / 3][(r + ahead) % 3];
-            }
-            sides[r / 3][r % 3] = side / self.rows[r][WIDTH - 1];
+        for (index, column) in self.columns.iter().enumerate().rev() {
+            let known = sides[index + 1..].iter().zip(&column[1..]);
+            sides[index] = known.fold(sides[index], |rest, (below, entry)| rest - entry * below) / column[0];
         }
         true
     }
@@ -94,10 +103,11 @@ impl Cholesky {
 mod tests {
     use super::*;
 
-    /// A random matrix plus its transpose, made dominant; the product with a known solution is the side.
+    /// Random outer products and identities, and a point in the middle that is held; the product with a known
+    /// solution is the side.
     #[test]
     fn a_known_solution_is_found() {
-        let points = 23;
+        let (points, held) = (23, 9);
         let mut state = 7_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -106,25 +116,35 @@ mod tests {
         let size = 3 * points;
         let mut full = vec![vec![0.0; size]; size];
         let mut band = Cholesky::new(points);
+        for first in 0..=points - ACTING {
+            let factors: [f64; ACTING] = core::array::from_fn(|_| random());
+            let [a, b, c, d, e, f] = core::array::from_fn(|_| random());
+            let matrix = [[a + 2.0, d, e], [d, b + 2.0, f], [e, f, c + 2.0]];
+            band.add(first, &factors, &matrix);
+            for (row, column) in (0..ACTING).flat_map(|row| (0..ACTING).map(move |column| (row, column))) {
+                for (axis, other) in (0..3).flat_map(|axis| (0..3).map(move |other| (axis, other))) {
+                    full[3 * (first + row) + axis][3 * (first + column) + other] +=
+                        factors[row] * factors[column] * matrix[axis][other];
+                }
+            }
+        }
         for row in 0..points {
             for column in row.saturating_sub(ACTING - 1)..=row {
-                let diagonal = if row == column { 20.0 } else { 0.0 };
-                let [a, b, c, d, e, f] = core::array::from_fn(|_| random());
-                let block = [[a + diagonal, d, e], [d, b + diagonal, f], [e, f, c + diagonal]];
-                band.add(row, column, 0.5, &block);
-                band.add_unit(row, column, 0.25);
-                for (a, line) in block.iter().enumerate() {
-                    for (b, entry) in line.iter().enumerate() {
-                        let entry = 0.5 * entry + if a == b { 0.25 } else { 0.0 };
-                        full[3 * row + a][3 * column + b] = entry;
-                        full[3 * column + b][3 * row + a] = entry;
+                let factor = if row == column { 3.0 } else { 0.2 * random() };
+                band.add_unit(row, column, factor);
+                for axis in 0..3 {
+                    full[3 * row + axis][3 * column + axis] += factor;
+                    if row != column {
+                        full[3 * column + axis][3 * row + axis] += factor;
                     }
                 }
             }
         }
-        let expected: Vec<f64> = (0..size).map(|_| random()).collect();
+        let mut expected: Vec<f64> = (0..size).map(|_| random()).collect();
+        band.hold(held..held + 1);
+        expected[3 * held..3 * held + 3].fill(0.0);
         let mut sides = vec![[0.0; 3]; points];
-        for (r, row) in full.iter().enumerate() {
+        for (r, row) in full.iter().enumerate().filter(|(r, _)| r / 3 != held) {
             sides[r / 3][r % 3] = row.iter().zip(&expected).map(|(a, b)| a * b).sum();
         }
         assert!(band.solve(&mut sides));
@@ -148,15 +168,11 @@ mod tests {
         for _ in 0..100 {
             let held: Vector = core::array::from_fn(|_| random());
             let matrix: [Vector; 3] = held.map(|a| held.map(|b| 1e16 * a * b));
-            let factors = [random(), random()];
-            let mut equations = Cholesky::new(2);
-            for row in 0..2 {
-                equations.add_unit(row, row, 1e-3);
-                for column in 0..=row {
-                    equations.add(row, column, factors[row] * factors[column], &matrix);
-                }
-            }
-            let mut sides = [[1.0; 3]; 2];
+            let factors = core::array::from_fn(|_| random());
+            let mut equations = Cholesky::new(ACTING);
+            equations.add(0, &factors, &matrix);
+            (0..ACTING).for_each(|point| equations.add_unit(point, point, 1e-3));
+            let mut sides = [[1.0; 3]; ACTING];
             assert!(equations.solve(&mut sides));
             assert!(sides.iter().flatten().all(|side| side.is_finite()));
         }

@@ -23,11 +23,30 @@ pub(super) struct Deviation {
     pub(super) share: f64,
 }
 
-/// How far each span is from the path.
-pub(super) fn deviations(guide: &Guide, breaks: &[f64], shapes: &[(Vector, Polynomial)]) -> Vec<Deviation> {
+/// How far the walk has come.
+#[derive(Clone, Copy)]
+pub(super) struct Walk {
+    /// The partner on the path \[mm\], and its part.
+    foot_mm: f64,
+    foot_part: usize,
+    /// The point of the curve.
+    before: Option<Vector>,
+}
+
+impl Walk {
+    /// The start of the path.
+    pub(super) const START: Self = Self { foot_mm: 0.0, foot_part: 0, before: None };
+}
+
+/// How far each span is from the path; the walk goes on to their end.
+pub(super) fn deviations(
+    guide: &Guide,
+    breaks: &[f64],
+    shapes: &[(Vector, Polynomial)],
+    walk: &mut Walk,
+) -> Vec<Deviation> {
     let mut deviations = Vec::with_capacity(shapes.len());
-    let mut before: Option<Vector> = None;
-    let (mut foot_mm, mut foot_part) = (0.0_f64, 0);
+    let Walk { mut foot_mm, mut foot_part, mut before } = *walk;
     for ((start, shape), ends) in shapes.iter().zip(breaks.windows(2)) {
         let mut greatest = Deviation::default();
         for index in 0..=POINTS {
@@ -61,6 +80,7 @@ pub(super) fn deviations(guide: &Guide, breaks: &[f64], shapes: &[(Vector, Polyn
         }
         deviations.push(greatest);
     }
+    *walk = Walk { foot_mm, foot_part, before };
     deviations
 }
 

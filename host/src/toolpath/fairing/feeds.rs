@@ -8,8 +8,8 @@ use motion_kernel::law::Limits;
 const RAMP_SHARE: f64 = 0.4;
 const STEEP_SHARE: f64 = 0.9;
 const SLOWER: f64 = 1.5;
-/// Halvings of the rise of a ramp.
-const HALVINGS: usize = 20;
+/// Steps of Newton for the rise of a ramp: it starts at most half too far.
+const NEWTON_STEPS: usize = 4;
 
 /// Lowers the greatest feeds of spans \[mm/s\] to what ramps from the slower ones can make of them. A span
 /// costs a step for each of the spans that it slows down.
@@ -63,14 +63,31 @@ fn lower_from(
             break;
         }
         if !fits(rise_mm_s) {
-            let (mut low, mut high) = (0.0, rise_mm_s);
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (low + high);
-                if fits(middle) { low = middle } else { high = middle }
-            }
-            feeds_mm_s[index] = least_mm_s + low;
+            feeds_mm_s[index] = least_mm_s + rise_mm_s.min(rise_within_mm_s(least_mm_s, reach_mm, limits));
         }
     }
+}
+
+/// The rise of a ramp of a length, from a feed \[mm/s\]: where [`ramp_mm`] is that length.
+fn rise_within_mm_s(from_mm_s: f64, length_mm: f64, limits: &Limits<f64>) -> f64 {
+    let (accel, jerk) = (limits.accel_mm_s2, limits.jerk_mm_s3);
+    // (v + r/2)·(r/a + a/j) = length, where the ramp reaches its acceleration.
+    let half = from_mm_s + 0.5 * accel * accel / jerk;
+    let rest = 2.0 * (accel * length_mm - from_mm_s * accel * accel / jerk);
+    let rise = (half * half + rest).max(0.0).sqrt() - half;
+    if rise > accel * accel / jerk {
+        return rise;
+    }
+    // (v + r/2)·2t = length with r = j·t² otherwise. Newton from above, where the slope is greater.
+    let mut time_s = libm::cbrt(length_mm / jerk);
+    if from_mm_s > 0.0 {
+        time_s = time_s.min(length_mm / (2.0 * from_mm_s));
+    }
+    for _ in 0..NEWTON_STEPS {
+        let off_mm = (2.0 * from_mm_s + jerk * time_s * time_s) * time_s - length_mm;
+        time_s -= off_mm / (2.0 * from_mm_s + 3.0 * jerk * time_s * time_s);
+    }
+    jerk * time_s * time_s
 }
 
 /// The length of a ramp that rises from a feed \[mm\].
@@ -138,5 +155,17 @@ mod tests {
         assert!((ramp_mm(free, STEEP_SHARE) - 3.25).abs() < 1e-3, "{free}");
         assert!((between - 45.0 / SLOWER).abs() < 1e-9, "{between}");
         assert!((ramp_mm(tight, RAMP_SHARE) - 3.25).abs() < 1e-3, "{tight}");
+    }
+
+    /// A ramp of that rise is as long as it was to be.
+    #[test]
+    fn the_rise_of_a_ramp_makes_its_length() {
+        for from_mm_s in [0.0, 0.01, 1.0, 7.0, 300.0] {
+            for length_mm in [1e-4, 0.01, 0.3, 3.0, 20.0, 1e3] {
+                let rise_mm_s = rise_within_mm_s(from_mm_s, length_mm, &LIMITS);
+                let found_mm = ramp_mm(from_mm_s, rise_mm_s, &LIMITS);
+                assert!((found_mm / length_mm - 1.0).abs() < 1e-5, "{from_mm_s} {length_mm}: {found_mm}");
+            }
+        }
     }
 }

@@ -4,6 +4,8 @@
 //! a curve within it bends. Knots stand at a part of that, closer where one such line turns into the next,
 //! and their distance changes gradually. Where they turn out to be too few, more are put between them.
 
+use core::ops::Range;
+
 use super::super::{Vector, dot, norm, scale, subtract};
 use super::guide::Guide;
 use crate::toolpath::Element;
@@ -47,6 +49,19 @@ impl Mesh {
         };
         let scales_mm = breaks_mm.windows(2).map(scale_mm).collect();
         Self { breaks_mm, scales_mm }
+    }
+
+    /// How many spans it has.
+    pub(super) fn len(&self) -> usize {
+        self.scales_mm.len()
+    }
+
+    /// So many of its spans.
+    pub(super) fn part(&self, spans: Range<usize>) -> Self {
+        Self {
+            breaks_mm: self.breaks_mm[spans.start..=spans.end].to_vec(),
+            scales_mm: self.scales_mm[spans].to_vec(),
+        }
     }
 
     /// The lengths of the spans \[mm\].
@@ -125,11 +140,13 @@ fn breaks_mm(chords: &[Chord], length_mm: f64) -> Vec<f64> {
         breaks_mm.push(mm);
     }
     if breaks_mm.len() <= SPANS_MIN {
-        return (0..=SPANS_MIN).map(|knot| length_mm * knot as f64 / SPANS_MIN as f64).collect();
+        breaks_mm = (0..=SPANS_MIN).map(|knot| length_mm * knot as f64 / SPANS_MIN as f64).collect();
+    } else {
+        // The last one is beyond the end.
+        let stretched = length_mm / mm;
+        breaks_mm.iter_mut().for_each(|end_mm| *end_mm *= stretched);
     }
-    // The last one is beyond the end.
-    let stretched = length_mm / mm;
-    breaks_mm.iter_mut().for_each(|end_mm| *end_mm *= stretched);
+    // Not an ulp beyond the path.
     if let Some(last) = breaks_mm.last_mut() {
         *last = length_mm;
     }

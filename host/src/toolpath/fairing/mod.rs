@@ -2,8 +2,8 @@
 //!
 //! Points that were cut from a curve, or that something else made dense, have a corner at every joint and no
 //! room for blends that are worth it. Consumes lines and arcs, each with its tolerance and feed; produces the
-//! spans of a quintic spline, continuous to the fourth derivative, that goes on as the path does at both
-//! ends. Background; linear in the number of parts times the logarithm of how many a line stands for.
+//! spans of a quintic spline, continuous to the third derivative, that goes on as the path does at both ends.
+//! Background; linear in the number of parts times the logarithm of how many a line stands for.
 //!
 //! - `guide`: the path by its length;
 //! - `knots`: where the spline gets its knots;
@@ -15,7 +15,12 @@
 //! **Feed.** What bends least depends on the feed: at a low one acceleration counts, at a high one snap. So
 //! the curve is made for the feeds that the one before allows, until two rounds in a row gain no time.
 //!
-//! **Bounds.** Nine meshes, 400 steps each, a step linear in spans and samples; most curves take one
+//! **Windows.** A long curve is made window by window. Each begins with point and derivatives that the one
+//! before ends with, and looks ahead beyond its own end, where it is free: what is ahead is made again by the
+//! next window. So a place that is hard costs steps where it is, and memory does not grow with the path but by
+//! the spans themselves. Where a window has no curve, it is made again with the one before, twice as long.
+//!
+//! **Bounds.** For each window nine meshes, 400 steps each, a step linear in spans and samples; most take one
 //! mesh and some twenty steps. Where none is found, there is none: the caller keeps what it has.
 
 mod cholesky;
@@ -27,12 +32,19 @@ mod problem;
 
 use motion_kernel::law::Limits;
 
+use self::deviation::Walk;
 use self::guide::Guide;
 use self::knots::Mesh;
-use self::problem::Problem;
-use super::Vector;
+use self::problem::{DECIDED, Problem};
+use super::curve::Curve as _;
 use super::element::{Element, Role};
+use super::{Greatest, Vector, scale};
 
+/// Spans of a window, and those that it looks ahead. What is not much longer is one window.
+const WINDOW: usize = 256;
+const AHEAD: usize = 48;
+/// Spans behind the end of a window that have to be within the tolerance, too, so that the next one can go on.
+const GOES_ON: usize = 8;
 /// How often more knots are put where they are too few.
 const REFINEMENTS: usize = 8;
 /// How often the curve is made for other feeds at most; it ends where that has gained hardly any time twice.
@@ -69,7 +81,7 @@ const BELOW: f64 = 0.95;
 const THIRD: f64 = 100.0;
 
 /// A line or an arc of the path.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
     /// The line or arc.
     pub element: Element,
@@ -88,6 +100,8 @@ pub struct Span {
     pub parts: (usize, usize),
     /// A bound on the distance between it and the path \[mm\].
     pub distance_mm: f64,
+    /// How it bends at its tightest.
+    pub greatest: Greatest,
 }
 
 /// The curve that stands for `parts`, made for `limits`; nothing if none was found, or if a part is neither a
@@ -95,75 +109,169 @@ pub struct Span {
 #[must_use]
 pub fn fair(parts: &[Part], limits: &Limits<f64>) -> Option<Vec<Span>> {
     let guide = Guide::new(parts)?;
-    let mut mesh = Mesh::new(&guide);
-    for _ in 0..=REFINEMENTS {
-        match with_knots(&guide, &mesh, limits) {
-            Ok(spans) => return Some(spans),
-            Err(tight) => mesh = mesh.refined(&tight)?,
+    let mesh = Mesh::new(&guide);
+    let mut spans = Vec::new();
+    let mut start = Start { point: guide.end(false), walk: Walk::START, past: None };
+    let (mut first, mut size) = (0, WINDOW);
+    // Where the last window began.
+    let mut before: Option<(usize, usize, Start)> = None;
+    while first < mesh.len() {
+        let is_last = mesh.len() - first <= size + 2 * AHEAD;
+        let next = if is_last { mesh.len() } else { first + size };
+        let until = if is_last { next } else { next + AHEAD };
+        let window = Window { guide: &guide, start, end_mm: mesh.breaks_mm[next], is_last, limits };
+        if let Some(made) = window.spans(mesh.part(first..until)) {
+            before = Some((first, spans.len(), start));
+            spans.extend(made.spans);
+            (first, size, start) = (next, WINDOW, made.next);
+            continue;
+        }
+        // It may have begun in the wrong direction, or looked ahead too short.
+        size *= 2;
+        match before.take() {
+            Some((first_before, count, start_before)) => {
+                (first, start) = (first_before, start_before);
+                spans.truncate(count);
+            }
+            None if is_last => return None,
+            None => {}
         }
     }
-    None
+    Some(spans)
 }
 
-/// The curve with these knots, or the spans that need more of them; none if it failed otherwise.
-fn with_knots(guide: &Guide, mesh: &Mesh, limits: &Limits<f64>) -> Result<Vec<Span>, Vec<usize>> {
-    let programmed = programmed_mm_s(guide, mesh);
-    let lengths_mm = mesh.lengths_mm();
-    let lowered = |mut feeds: Vec<f64>| {
-        feeds.iter_mut().zip(&programmed).for_each(|(feed, &programmed)| *feed = feed.min(programmed));
-        feeds::lower(&mut feeds, &lengths_mm, limits);
-        feeds
-    };
-    let mut problem = Problem::new(guide, &mesh.breaks_mm);
-    problem.start(limits, &lowered(promised_mm_s(guide, mesh, limits)));
-    let (mut rounds, mut approach) = (Rounds::default(), Approach::default());
-    let (mut steps, mut tightenings, mut centering) = (0, 0, CENTERING[0].1);
-    let mut farthest = problem.farthest();
-    for _ in 0..STEPS_MAX {
-        let least = if farthest > FAR { 1.0 } else { GAP_MIN };
-        let gap_aim = (centering * problem.gap()).max(least * problem.cost());
-        let taken = problem.step(gap_aim).ok_or_else(Vec::new)?;
-        centering = CENTERING
-            .iter()
-            .find(|(least, _)| taken > *least)
-            .map_or(CENTERING_MAX, |&(_, centering)| centering);
-        farthest = problem.farthest();
-        if farthest > WITHIN {
-            if approach.has_stalled(farthest) {
-                return Err(problem.tight(WITHIN));
-            }
-            continue;
+/// What a window begins with.
+#[derive(Clone, Copy)]
+struct Start {
+    /// Point and first to third derivative by the length of the path.
+    point: [Vector; DECIDED],
+    /// How far the curve and the path have been walked.
+    walk: Walk,
+    /// Length and feed of the span before \[mm, mm/s\].
+    past: Option<(f64, f64)>,
+}
+
+/// A part of a curve that is made at once.
+struct Window<'a> {
+    guide: &'a Guide<'a>,
+    start: Start,
+    /// Where it ends \[mm\]. The mesh goes farther, unless the path ends there.
+    end_mm: f64,
+    is_last: bool,
+    limits: &'a Limits<f64>,
+}
+
+/// The spans of a window, and what the next one begins with.
+struct Made {
+    spans: Vec<Span>,
+    next: Start,
+}
+
+/// Spans, and what their tolerance has to be made smaller by.
+type TooFar = Vec<(usize, f64)>;
+
+/// Why there is no curve with the knots that were tried.
+enum Failure {
+    /// These spans need more of them.
+    TooFew(Vec<usize>),
+    /// The equations have no solution, or the steps have come to no end.
+    Unsolved,
+}
+
+impl Window<'_> {
+    /// The spans, with more knots than the mesh has where that is needed; nothing if none were found.
+    fn spans(&self, mut mesh: Mesh) -> Option<Made> {
+        let mut is_halved = false;
+        for _ in 0..=REFINEMENTS {
+            mesh = match self.with_knots(&mesh) {
+                Ok(made) => return Some(made),
+                Err(Failure::TooFew(spans)) => mesh.refined(&spans)?,
+                Err(Failure::Unsolved) if is_halved => return None,
+                Err(Failure::Unsolved) => {
+                    is_halved = true;
+                    mesh.refined(&(0..mesh.len()).collect::<Vec<_>>())?
+                }
+            };
         }
-        approach = Approach::default();
-        steps += 1;
-        let gap_max = if rounds.are_over() { GAP_MAX_AT_LAST } else { GAP_MAX };
-        if problem.gap() >= gap_max * problem.cost() && steps < STEPS_PER_ROUND {
-            continue;
-        }
-        steps = 0;
-        if !rounds.are_over() {
-            let feeds = lowered(problem.allowed_mm_s(limits));
-            rounds.next(lengths_mm.iter().zip(&feeds).map(|(mm, mm_s)| mm / mm_s).sum());
-            problem.change(limits, &feeds);
-            continue;
-        }
-        match spans(guide, &problem) {
-            // A curve that can't be driven is none.
-            Ok(spans) => {
-                let is_driven = spans.iter().all(|span| span.element.septics(f64::INFINITY).is_ok());
-                return if is_driven { Ok(spans) } else { Err(Vec::new()) };
-            }
-            Err(far) if tightenings == TIGHTENINGS => {
-                return Err(far.into_iter().map(|(span, _)| span).collect());
-            }
-            Err(far) => {
-                tightenings += 1;
-                problem.tighten(&far);
-                farthest = problem.farthest();
-            }
-        }
+        None
     }
-    Err(Vec::new())
+
+    /// The spans with these knots.
+    fn with_knots(&self, mesh: &Mesh) -> Result<Made, Failure> {
+        let (guide, limits) = (self.guide, self.limits);
+        let programmed = programmed_mm_s(guide, mesh);
+        let lengths_mm = mesh.lengths_mm();
+        let lowered = |mut feeds: Vec<f64>| {
+            feeds.iter_mut().zip(&programmed).for_each(|(feed, &programmed)| *feed = feed.min(programmed));
+            self.lower(feeds, &lengths_mm)
+        };
+        let end = self.is_last.then(|| guide.end(true));
+        let mut problem = Problem::new(guide, &mesh.breaks_mm, &self.start.point, end.as_ref());
+        problem.start(limits, &lowered(promised_mm_s(guide, mesh, limits)));
+        let (mut rounds, mut approach) = (Rounds::default(), Approach::default());
+        let (mut steps, mut tightenings, mut centering) = (0, 0, CENTERING[0].1);
+        let (mut farthest, mut cost) = (problem.farthest(), problem.cost());
+        for _ in 0..STEPS_MAX {
+            let least = if farthest > FAR { 1.0 } else { GAP_MIN };
+            let gap_aim = (centering * problem.gap()).max(least * cost);
+            let taken = problem.step(gap_aim).ok_or(Failure::Unsolved)?;
+            cost = problem.cost();
+            centering = CENTERING
+                .iter()
+                .find(|(least, _)| taken > *least)
+                .map_or(CENTERING_MAX, |&(_, centering)| centering);
+            farthest = problem.farthest();
+            if farthest > WITHIN {
+                if approach.has_stalled(farthest) {
+                    return Err(Failure::TooFew(problem.tight(WITHIN)));
+                }
+                continue;
+            }
+            approach = Approach::default();
+            steps += 1;
+            let gap_max = if rounds.are_over() { GAP_MAX_AT_LAST } else { GAP_MAX };
+            if problem.gap() >= gap_max * cost && steps < STEPS_PER_ROUND {
+                continue;
+            }
+            steps = 0;
+            if !rounds.are_over() {
+                let feeds = lowered(problem.allowed_mm_s(limits));
+                rounds.next(lengths_mm.iter().zip(&feeds).map(|(mm, mm_s)| mm / mm_s).sum());
+                problem.change(limits, &feeds);
+                cost = problem.cost();
+                continue;
+            }
+            match self.made(&problem) {
+                Ok((spans, next)) => {
+                    let past = lowered(problem.allowed_mm_s(limits));
+                    let past = lengths_mm.iter().copied().zip(past).nth(spans.len() - 1);
+                    return Ok(Made { spans, next: Start { past, ..next } });
+                }
+                Err(far) if tightenings == TIGHTENINGS => {
+                    return Err(Failure::TooFew(far.into_iter().map(|(span, _)| span).collect()));
+                }
+                Err(far) => {
+                    tightenings += 1;
+                    problem.tighten(&far);
+                    farthest = problem.farthest();
+                }
+            }
+        }
+        Err(Failure::Unsolved)
+    }
+
+    /// The feeds of the spans \[mm/s\], lowered to what ramps between them and from the span before reach.
+    fn lower(&self, mut feeds_mm_s: Vec<f64>, lengths_mm: &[f64]) -> Vec<f64> {
+        let Some((past_mm, past_mm_s)) = self.start.past else {
+            feeds::lower(&mut feeds_mm_s, lengths_mm, self.limits);
+            return feeds_mm_s;
+        };
+        feeds_mm_s.insert(0, past_mm_s);
+        let lengths_mm: Vec<f64> = core::iter::once(past_mm).chain(lengths_mm.iter().copied()).collect();
+        feeds::lower(&mut feeds_mm_s, &lengths_mm, self.limits);
+        feeds_mm_s.remove(0);
+        feeds_mm_s
+    }
 }
 
 /// The curve made for the feeds that the one before allows, again and again.
@@ -228,28 +336,56 @@ fn promised_mm_s(guide: &Guide, mesh: &Mesh, limits: &Limits<f64>) -> Vec<f64> {
     mesh.breaks_mm.windows(2).zip(&mesh.scales_mm).map(of_span).collect()
 }
 
-/// The spans of a curve, or those that are farther from the path than their tolerance, with what it has to be
-/// made smaller by.
-fn spans(guide: &Guide, problem: &Problem) -> Result<Vec<Span>, Vec<(usize, f64)>> {
-    let shapes = problem.shapes();
-    let deviations = deviation::deviations(guide, problem.breaks(), &shapes);
-    let (mut spans, mut far) = (Vec::with_capacity(shapes.len()), Vec::new());
-    // It starts and ends exactly where the path does.
-    let (start, end) =
-        (guide.parts[0].element.ends_mm().0, guide.parts[guide.parts.len() - 1].element.ends_mm().1);
-    for (index, ((from, shape), ends)) in shapes.iter().zip(problem.breaks().windows(2)).enumerate() {
-        let parts = (guide.part_at(ends[0]), guide.part_at(ends[1]));
-        let deviation = deviations[index];
-        // Written so that what is not a number is too far.
-        if !(deviation.share <= 1.0) {
-            far.push((index, (BELOW / deviation.share).max(TIGHTENED_MIN)));
+impl Window<'_> {
+    /// The spans as they stand, and what the next window begins with; or those that are farther from the path
+    /// than their tolerance or can't be driven, with what the tolerance has to be made smaller by.
+    fn made(&self, problem: &Problem) -> Result<(Vec<Span>, Start), TooFar> {
+        let (guide, breaks) = (self.guide, problem.breaks());
+        let kept = breaks.partition_point(|&mm| mm < self.end_mm);
+        let shapes = problem.shapes();
+        let mut walk = self.start.walk;
+        let deviations = deviation::deviations(guide, &breaks[..=kept], &shapes[..kept], &mut walk);
+        let ahead = shapes.len().min(kept + GOES_ON);
+        let behind =
+            deviation::deviations(guide, &breaks[kept..=ahead], &shapes[kept..ahead], &mut walk.clone());
+        // What is not a number is too far, and what is near enough can't be driven.
+        let tightened = |share: f64| if share <= 1.0 { BELOW } else { (BELOW / share).max(TIGHTENED_MIN) };
+        let (mut spans, mut far) = (Vec::with_capacity(kept), Vec::new());
+        // It starts and ends exactly where the path does.
+        let end = guide.parts[guide.parts.len() - 1].element.ends_mm().1;
+        for (index, ((from, shape), ends)) in shapes[..kept].iter().zip(breaks.windows(2)).enumerate() {
+            let parts = (guide.part_at(ends[0]), guide.part_at(ends[1]));
+            let deviation = deviations[index];
+            let from = if index == 0 { self.start.point[0] } else { *from };
+            let to: Vector = shapes.get(index + 1).map_or(end, |next| next.0);
+            let element = Element::Polynomial { from, to, shape: *shape, role: Role::Curve };
+            match element.greatest_driven() {
+                Ok(greatest) if deviation.share <= 1.0 => {
+                    spans.push(Span { element, parts, distance_mm: deviation.distance_mm, greatest });
+                }
+                _ => far.push((index, tightened(deviation.share))),
+            }
         }
-        let from = if index == 0 { start } else { *from };
-        let to: Vector = shapes.get(index + 1).map_or(end, |next| next.0);
-        let element = Element::Polynomial { from, to, shape: *shape, role: Role::Curve };
-        spans.push(Span { element, parts, distance_mm: deviation.distance_mm });
+        let too_far = (kept..).zip(&behind).filter(|(_, deviation)| !(deviation.share <= 1.0));
+        far.extend(too_far.map(|(index, deviation)| (index, tightened(deviation.share))));
+        if !far.is_empty() {
+            return Err(far);
+        }
+        let point = match (shapes.get(kept), shapes[..kept].last()) {
+            (Some((point, _)), Some((_, shape))) => {
+                let per_mm = 1.0 / (breaks[kept] - breaks[kept - 1]);
+                let [first, second, third] = shape.derivatives(1.0);
+                [
+                    *point,
+                    scale(first, per_mm),
+                    scale(second, per_mm * per_mm),
+                    scale(third, per_mm * per_mm * per_mm),
+                ]
+            }
+            _ => self.start.point,
+        };
+        Ok((spans, Start { point, walk, past: None }))
     }
-    if far.is_empty() { Ok(spans) } else { Err(far) }
 }
 
 #[cfg(test)]
@@ -371,27 +507,35 @@ mod tests {
         assert!((start[1] - end[1]).abs() < 1e-3 * (end[0] - start[0]), "{start:?} {end:?}");
     }
 
-    /// From span to span position and four derivatives by the length of the path; at the ends the path's own.
+    /// From span to span position and three derivatives by arc length, also where windows meet; at the ends the
+    /// path's own.
     #[test]
     fn nothing_steps_along_the_curve() {
-        let points = chords(80, 0.005);
-        let parts = lines(&points, 0.02);
-        let spans = fair(&parts, &LIMITS).expect("a curve");
-        let guide = Guide::new(&parts).expect("lines");
-        let derivatives = |span: &Span, u: f64| {
-            let (from, shape) = shape(span);
-            let [tangent, second, third] = super::super::curve::by_arc_length(shape.derivatives(u));
-            [add(from, shape.offset(0.0, u)), tangent, second, third]
-        };
-        let mut pairs: Vec<_> =
-            spans.windows(2).map(|pair| (derivatives(&pair[0], 1.0), derivatives(&pair[1], 0.0))).collect();
-        pairs.push((guide.end(false), derivatives(&spans[0], 0.0)));
-        pairs.push((derivatives(&spans[spans.len() - 1], 1.0), guide.end(true)));
-        for (before, after) in pairs {
-            for (order, (a, b)) in before.into_iter().zip(after).enumerate() {
-                let step = norm(subtract(a, b));
-                assert!(step < 1e-9 * 100.0_f64.powi(order as i32), "derivative {order} steps by {step}");
+        for (count, spans_min) in [(80, 10), (6000, 3 * WINDOW)] {
+            let points = chords(count, 0.005);
+            let parts = lines(&points, 0.02);
+            let spans = fair(&parts, &LIMITS).expect("a curve");
+            assert!(spans.len() >= spans_min, "{} spans", spans.len());
+            let guide = Guide::new(&parts).expect("lines");
+            let derivatives = |span: &Span, u: f64| {
+                let (from, shape) = shape(span);
+                let [tangent, second, third] = super::super::curve::by_arc_length(shape.derivatives(u));
+                [add(from, shape.offset(0.0, u)), tangent, second, third]
+            };
+            let mut pairs: Vec<_> = spans
+                .windows(2)
+                .map(|pair| (derivatives(&pair[0], 1.0), derivatives(&pair[1], 0.0)))
+                .collect();
+            pairs.push((guide.end(false), derivatives(&spans[0], 0.0)));
+            pairs.push((derivatives(&spans[spans.len() - 1], 1.0), guide.end(true)));
+            for (before, after) in pairs {
+                for (order, (a, b)) in before.into_iter().zip(after).enumerate() {
+                    let step = norm(subtract(a, b));
+                    assert!(step < 1e-9 * 100.0_f64.powi(order as i32), "derivative {order} steps by {step}");
+                }
             }
+            let said_mm = spans.iter().map(|span| span.distance_mm).fold(0.0, f64::max);
+            assert!(said_mm <= 0.02, "{said_mm}");
         }
     }
 

@@ -18,12 +18,13 @@ use super::cholesky::{ACTING, Cholesky};
 use super::guide::Guide;
 use crate::toolpath::Polynomial;
 use crate::toolpath::blend::feed_within;
+use motion_kernel::internals::add_work;
 use motion_kernel::law::Limits;
 
 /// Degree of the spline.
 const DEGREE: usize = ACTING - 1;
 /// Control points that the conditions at one end decide: point and three derivatives.
-const DECIDED: usize = 4;
+pub(super) const DECIDED: usize = 4;
 /// Samples of the path for each span.
 const SAMPLES: f64 = 3.0;
 /// Part of the tolerance that is used: between the samples the curve may be farther.
@@ -80,11 +81,20 @@ pub(super) struct Problem<'a> {
     samples: Vec<Sample>,
     bendings: Vec<Bending>,
     control: Vec<Vector>,
+    /// Control points that the end has decided.
+    decided_at_end: usize,
     equations: Cholesky,
 }
 
 impl<'a> Problem<'a> {
-    pub(super) fn new(guide: &Guide, breaks: &'a [f64]) -> Self {
+    /// The curve over `breaks`, which starts with this point and its first to third derivative by the length of
+    /// the path, and ends with these, or freely.
+    pub(super) fn new(
+        guide: &Guide,
+        breaks: &'a [f64],
+        start: &[Vector; DECIDED],
+        end: Option<&[Vector; DECIDED]>,
+    ) -> Self {
         let knots = clamped(breaks, DEGREE);
         let points = breaks.len() - 1 + DEGREE;
         let mut control: Vec<Vector> = (0..points)
@@ -93,7 +103,10 @@ impl<'a> Problem<'a> {
                 guide.at(guide.part_at(mm), mm).0
             })
             .collect();
-        decide_ends(guide, &knots, &mut control);
+        decide(&knots, &mut control, start, false);
+        if let Some(end) = end {
+            decide(&knots, &mut control, end, true);
+        }
         let bendings = breaks
             .windows(2)
             .enumerate()
@@ -107,9 +120,10 @@ impl<'a> Problem<'a> {
                 gram: [[0.0; ACTING]; ACTING],
             })
             .collect();
-        let samples = samples(guide, breaks, &knots);
-        let equations = Cholesky::new(points - 2 * DECIDED);
-        Self { breaks, knots, samples, bendings, control, equations }
+        let samples = samples(guide, breaks, &knots, end.is_none());
+        let decided_at_end = if end.is_some() { DECIDED } else { 0 };
+        let equations = Cholesky::new(points);
+        Self { breaks, knots, samples, bendings, control, decided_at_end, equations }
     }
 
     /// The ends of the spans \[mm\].
@@ -237,27 +251,21 @@ impl<'a> Problem<'a> {
     /// One step towards a gap of `gap_aim`: how much of it was taken, or nothing if the equations have no
     /// solution.
     pub(super) fn step(&mut self, gap_aim: f64) -> Option<f64> {
-        let free = self.control.len() - 2 * DECIDED;
+        add_work(self.bendings.len() + self.samples.len());
         let per_sample = gap_aim / self.samples.len() as f64;
         self.equations.clear();
-        let mut slope = vec![[0.0; 3]; free];
-        let at = |index: usize| index.checked_sub(DECIDED).filter(|&index| index < free);
+        let mut slope = vec![[0.0; 3]; self.control.len()];
         for (span, bending) in self.bendings.iter().enumerate() {
             for (rows, factors) in bending.rows.iter().zip(&bending.factors) {
                 for ((row, derivative), factor) in rows.iter().zip(self.bent(span, rows)).zip(factors) {
-                    for (a, entry) in row.iter().enumerate() {
-                        if let Some(at) = at(span + a) {
-                            slope[at] = subtract(slope[at], scale(derivative, factor * entry));
-                        }
+                    for (slope, entry) in slope[span..].iter_mut().zip(row) {
+                        *slope = subtract(*slope, scale(derivative, factor * entry));
                     }
                 }
             }
-            for a in 0..ACTING {
-                let Some(row) = at(span + a) else { continue };
-                for b in 0..=a {
-                    if let Some(column) = at(span + b) {
-                        self.equations.add_unit(row, column, bending.gram[a][b]);
-                    }
+            for (a, row) in bending.gram.iter().enumerate() {
+                for (b, &entry) in row.iter().enumerate().take(a + 1) {
+                    self.equations.add_unit(span + a, span + b, entry);
                 }
             }
         }
@@ -273,15 +281,15 @@ impl<'a> Problem<'a> {
             let curvature: [Vector; 3] = core::array::from_fn(|a| {
                 core::array::from_fn(|b| square * pulled[a] * pulled[b] + if a == b { linear } else { 0.0 })
             });
-            for a in 0..ACTING {
-                let Some(row) = at(sample.first + a) else { continue };
-                slope[row] = subtract(slope[row], scale(pulled, push * sample.row[a]));
-                for b in 0..=a {
-                    if let Some(column) = at(sample.first + b) {
-                        self.equations.add(row, column, sample.row[a] * sample.row[b], &curvature);
-                    }
-                }
+            for (slope, entry) in slope[sample.first..].iter_mut().zip(&sample.row) {
+                *slope = subtract(*slope, scale(pulled, push * entry));
             }
+            self.equations.add(sample.first, &sample.row, &curvature);
+        }
+        let last = self.control.len() - self.decided_at_end;
+        for held in [0..DECIDED, last..self.control.len()] {
+            slope[held.clone()].fill([0.0; 3]);
+            self.equations.hold(held);
         }
         if !self.equations.solve(&mut slope) {
             return None;
@@ -291,10 +299,8 @@ impl<'a> Problem<'a> {
         let (mut part, mut multiplier_part) = (1.0_f64, 1.0_f64);
         let mut changes = Vec::with_capacity(self.samples.len());
         for (sample, (pulled, violation, push)) in self.samples.iter().zip(pushes) {
-            let moved = (0..ACTING).fold([0.0; 3], |sum, a| match at(sample.first + a) {
-                Some(row) => add(sum, scale(step[row], sample.row[a])),
-                None => sum,
-            });
+            let acting = step[sample.first..].iter().zip(&sample.row);
+            let moved = acting.fold([0.0; 3], |sum, (&step, &entry)| add(sum, scale(step, entry)));
             let along = dot(pulled, moved);
             let multiplier_change = push + sample.multiplier / sample.slack * along - sample.multiplier;
             let slack_change = -violation - along;
@@ -310,8 +316,8 @@ impl<'a> Problem<'a> {
         if !part.is_finite() || !per_sample.is_finite() || step.iter().flatten().any(|mm| !mm.is_finite()) {
             return None;
         }
-        for (index, &step) in step.iter().enumerate() {
-            self.control[DECIDED + index] = add(self.control[DECIDED + index], scale(step, part));
+        for (control, &step) in self.control.iter_mut().zip(&step) {
+            *control = add(*control, scale(step, part));
         }
         for (index, (slack_change, multiplier_change)) in changes.into_iter().enumerate() {
             let within = 1.0 - self.square(&self.samples[index]);
@@ -327,8 +333,13 @@ impl<'a> Problem<'a> {
     /// The feed at which each span alone keeps the limits \[mm/s\].
     pub(super) fn allowed_mm_s(&self, limits: &Limits<f64>) -> Vec<f64> {
         let of_span = |(span, bending): (usize, &Bending)| {
-            let at_point = |rows| feed_within(limits, self.bent(span, rows).map(norm));
-            bending.rows.iter().map(at_point).fold(f64::INFINITY, f64::min)
+            let mut greatest = [0.0_f64; 3];
+            for rows in &bending.rows {
+                for (greatest, derivative) in greatest.iter_mut().zip(self.bent(span, rows)) {
+                    *greatest = greatest.max(norm(derivative));
+                }
+            }
+            feed_within(limits, greatest)
         };
         self.bendings.iter().enumerate().map(of_span).collect()
     }
@@ -353,37 +364,36 @@ const SLACK_MIN: f64 = 0.1;
 /// How far multipliers may be from balance: beyond, steps come to nothing.
 const APART_MAX: f64 = 100.0;
 
-/// The control points at the ends, from point and derivatives of the path there.
-fn decide_ends(guide: &Guide, knots: &[f64], control: &mut [Vector]) {
+/// The control points at the start or the end of the knots, from point and derivatives there.
+fn decide(knots: &[f64], control: &mut [Vector], point: &[Vector; DECIDED], is_end: bool) {
     let (count, last_span) = (control.len(), control.len() - 1);
-    for is_end in [false, true] {
-        let (span, mm) = if is_end { (last_span, guide.length_mm()) } else { (DEGREE, 0.0) };
-        for (order, derivative) in guide.end(is_end).into_iter().enumerate() {
-            let row = row(knots, DEGREE, span, mm, order);
-            // The derivative of this order has one control point more than the one below.
-            let place = |index: usize| {
-                if is_end { (count - 1 - index, row[DEGREE - index]) } else { (index, row[index]) }
-            };
-            let known = (0..order).fold(derivative, |rest, index| {
-                let (point, factor) = place(index);
-                subtract(rest, scale(control[point], factor))
-            });
-            let (point, factor) = place(order);
-            control[point] = scale(known, 1.0 / factor);
-        }
+    let (span, mm) = if is_end { (last_span, knots[count]) } else { (DEGREE, knots[DEGREE]) };
+    for (order, &derivative) in point.iter().enumerate() {
+        let row = row(knots, DEGREE, span, mm, order);
+        // The derivative of this order has one control point more than the one below.
+        let place = |index: usize| {
+            if is_end { (count - 1 - index, row[DEGREE - index]) } else { (index, row[index]) }
+        };
+        let known = (0..order).fold(derivative, |rest, index| {
+            let (point, factor) = place(index);
+            subtract(rest, scale(control[point], factor))
+        });
+        let (point, factor) = place(order);
+        control[point] = scale(known, 1.0 / factor);
     }
 }
 
-/// Samples at every joint of the path's parts, and so many between that each span has some.
-fn samples(guide: &Guide, breaks: &[f64], knots: &[f64]) -> Vec<Sample> {
+/// Samples at every joint of the path's parts, and so many between that each span has some; none at the start,
+/// and one at the end if that is free.
+fn samples(guide: &Guide, breaks: &[f64], knots: &[f64], is_end_free: bool) -> Vec<Sample> {
     let mut samples = Vec::new();
-    let (mut part, mut span) = (0, 0);
     let last = breaks.len() - 2;
-    let mut mm = 0.0;
-    while mm < guide.length_mm() {
+    let (mut mm, end_mm) = (breaks[0], breaks[last + 1]);
+    let (mut part, mut span) = (guide.part_at(mm), 0);
+    while mm < end_mm {
         let (_, part_end_mm) = guide.range_mm(part);
         let spacing_mm = (breaks[span + 1] - breaks[span]) / SAMPLES;
-        mm = part_end_mm.min(mm + spacing_mm);
+        mm = part_end_mm.min(mm + spacing_mm).min(end_mm);
         while span < last && breaks[span + 1] <= mm {
             span += 1;
         }
@@ -396,7 +406,7 @@ fn samples(guide: &Guide, breaks: &[f64], knots: &[f64]) -> Vec<Sample> {
             tolerance_mm = tolerance_mm.min(next.tolerance_mm);
             part += 1;
         }
-        if mm < guide.length_mm() {
+        if mm < end_mm || is_end_free {
             samples.push(Sample::new(knots, DEGREE + span, mm, at, tolerance_mm));
         }
     }
