@@ -130,6 +130,10 @@ fn single_block_runs_a_switch_with_its_wait() {
     let (summary, rows) = run_at(&format!("0:single,{}", resumes.join(",")));
     assert_eq!(summary.end, RunEnd::Finished);
     assert_in_order(&summary, &rows, "single block");
+    // After a resume, not when the block before has ended.
+    for switch in &summary.outputs[2..] {
+        assert!(switch.tick % 2000 <= 2, "{switch:?}");
+    }
 }
 
 /// An abort at any time ends with all off, once motion rests.

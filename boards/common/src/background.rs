@@ -149,7 +149,7 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         }
         match asked {
             Some(asked) => self.act(Action::of(self.phase, asked), seen, control),
-            None => self.switched(control).or_else(|| self.came_to_rest(seen)),
+            None => self.switched(seen, control).or_else(|| self.came_to_rest(seen)),
         }
     }
 
@@ -176,12 +176,18 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
     /// returns the line to log.
     fn switched<const ROWS: usize, const AFTER: usize>(
         &mut self,
+        seen: &Seen<R, AXES>,
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) -> Option<LogLine<R, AXES>> {
         let run = self.run.as_mut()?;
         let to = match self.phase {
             Phase::Running { .. } => run.switch()?,
-            Phase::Refused if self.is_on && matches!(run.state(), State::Held | State::Failed) => {
+            // At a program stop it is neither held nor at its end.
+            Phase::Refused
+                if self.is_on
+                    && (seen.state == ExecState::Stopped
+                        || matches!(run.state(), State::Held | State::Failed | State::Waiting)) =>
+            {
                 OutputState::OFF
             }
             _ => return None,

@@ -2,12 +2,17 @@
 
 use motion_kernel::units::Position;
 
-use crate::parameters::BoardParameters;
+use crate::parameters::{BoardOutputs, BoardParameters};
 
 pub(crate) const AXES: usize = 3;
 
-pub(crate) const BOARD: BoardParameters =
-    BoardParameters { tick_hz: 2000, cycles_hz: 168_000_000, counts_per_s_max: 6_000_000, lead_ticks: 8 };
+pub(crate) const BOARD: BoardParameters = BoardParameters {
+    tick_hz: 2000,
+    cycles_hz: 168_000_000,
+    counts_per_s_max: 6_000_000,
+    lead_ticks: 8,
+    outputs: BoardOutputs::FixedSpeed,
+};
 
 pub(crate) const TICK_S: f64 = 0.0005;
 

@@ -56,6 +56,6 @@ pub use liveness::Liveness;
 pub use log::LogLine;
 pub use machine::Machine;
 pub use panel::Panel;
-pub use parameters::BoardParameters;
+pub use parameters::{BoardOutputs, BoardParameters};
 pub use runs::Run;
 pub use tick_timing::TickTiming;

@@ -11,7 +11,7 @@ use motion_kernel::hal::{OutputState, Spindle};
 use motion_kernel::num::Real;
 use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check_live, switches_as_stops};
 
-use crate::parameters::BoardParameters;
+use crate::parameters::{BoardOutputs, BoardParameters};
 
 /// Why the board can't run a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +48,18 @@ pub enum MachineError {
         /// The item, from 0.
         index: usize,
     },
+    /// An item turns the spindle at another speed than an item before, and the board can't command a speed.
+    SecondSpeed {
+        /// The item, from 0.
+        index: usize,
+    },
+    /// An item has a speed that is none: a number of 0 or more, 0 for a spindle that does not turn.
+    Speed {
+        /// The item, from 0.
+        index: usize,
+    },
+    /// The program ends with spindle or coolant on.
+    LeftOn,
 }
 
 /// A program that suits the board, and its machine.
@@ -82,15 +94,12 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
         let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
         let axes = AxesConfig::new(axes, expected).and_then(|axes| axes.guarded(&guards, expected));
         let axes = axes.map_err(MachineError::Axes)?;
-        let items = switches_as_stops(program.items());
-        check_live::<R, AXES, _>(program.header(), items).map_err(MachineError::Items)?;
-        let is_reverse = |item| {
-            let spindle = Spindle::Counterclockwise;
-            matches!(item, Ok(Item::Switch(OutputState { spindle: found, .. })) if found == spindle)
+        let checked = match board.outputs {
+            BoardOutputs::None => check_live::<R, AXES, _>(program.header(), program.items()),
+            _ => check_live::<R, AXES, _>(program.header(), switches_as_stops(program.items())),
         };
-        if let Some(index) = program.items().position(is_reverse) {
-            return Err(MachineError::Counterclockwise { index });
-        }
+        checked.map_err(MachineError::Items)?;
+        check_switches(&program, board.outputs)?;
         Ok(Self { program, axes })
     }
 
@@ -99,6 +108,30 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
     pub fn header(&self) -> &Header<AXES> {
         self.program.header()
     }
+}
+
+/// Whether the board can put out every state of spindle and coolant that the program asks for, the last of them off.
+fn check_switches<const AXES: usize>(
+    program: &Reader<'_, AXES>,
+    outputs: BoardOutputs,
+) -> Result<(), MachineError> {
+    let (mut speed_rpm, mut last) = (None, OutputState::OFF);
+    for (index, item) in program.items().enumerate() {
+        let Ok(Item::Switch(to)) = item else { continue };
+        if !(to.speed_rpm >= 0.0 && to.speed_rpm.is_finite()) || !to.spindle_turns() && to.speed_rpm != 0.0 {
+            return Err(MachineError::Speed { index });
+        }
+        if outputs != BoardOutputs::CommandedSpeed && to.spindle_turns() {
+            if to.spindle == Spindle::Counterclockwise {
+                return Err(MachineError::Counterclockwise { index });
+            }
+            if *speed_rpm.get_or_insert(to.speed_rpm) != to.speed_rpm {
+                return Err(MachineError::SecondSpeed { index });
+            }
+        }
+        last = to;
+    }
+    if last == OutputState::OFF { Ok(()) } else { Err(MachineError::LeftOn) }
 }
 
 #[cfg(test)]
@@ -165,7 +198,23 @@ mod tests {
             items.insert(at, Item::Switch(to));
             of(&header, Some(&guards()), &items).map(|_| ())
         };
-        assert_eq!(with(0, on), Ok(()));
+        assert_eq!(with(0, on), Err(MachineError::LeftOn));
+        assert_eq!(with(0, OutputState::OFF), Ok(()));
+        let speeds = |speeds: &[f64]| {
+            let states = speeds.iter().map(|&speed_rpm| OutputState { speed_rpm, ..on });
+            let items: Vec<Item<AXES>> = states.chain([OutputState::OFF]).map(Item::Switch).collect();
+            of(&header, Some(&guards()), &[items, stringer.clone()].concat()).map(|_| ())
+        };
+        assert_eq!(speeds(&[9000.0, 9000.0]), Ok(()));
+        assert_eq!(speeds(&[9000.0, 12_000.0]), Err(MachineError::SecondSpeed { index: 1 }));
+        for none in [f64::NAN, -1.0, f64::INFINITY] {
+            assert_eq!(speeds(&[none]), Err(MachineError::Speed { index: 0 }));
+        }
+        let without = BoardParameters { outputs: BoardOutputs::None, ..BOARD };
+        let mut bytes = Vec::new();
+        write(&header, Some(&guards()), &[Item::Switch(OutputState::OFF)], &mut bytes).expect("short");
+        let refused = crate::fixture::Machine::new(bytes.leak(), &without).map(|_| ());
+        assert!(matches!(refused, Err(MachineError::Items(_))), "{refused:?}");
         let within = with(stringer.len() - 1, on);
         assert!(matches!(within, Err(MachineError::Items(CheckError::Item { .. }))), "{within:?}");
         let reverse = OutputState { spindle: Spindle::Counterclockwise, ..on };

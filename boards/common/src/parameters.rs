@@ -13,6 +13,20 @@ pub struct BoardParameters {
     /// ordinary poll with a plan. If that was too late, live control tries again, one tick further ahead each
     /// time, and keeps that lead.
     pub lead_ticks: u32,
+    /// What there is for spindle and coolant.
+    pub outputs: BoardOutputs,
+}
+
+/// What a board has for spindle and coolant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BoardOutputs {
+    /// Nothing: programs that switch are refused.
+    None,
+    /// An output for a spindle that turns clockwise at the speed that is set at its drive. M4 and a second speed are
+    /// refused.
+    FixedSpeed,
+    /// A spindle that turns both ways at the commanded speed.
+    CommandedSpeed,
 }
 
 impl BoardParameters {

@@ -6,7 +6,7 @@
 //!
 //! To change the tick, change [`TICK_HZ`]: the rest follows or does not compile.
 
-use motion_board::BoardParameters;
+use motion_board::{BoardOutputs, BoardParameters};
 
 // --- Clock tree: RM0390 section 6.2, limits DS10693 section 6.3.1 ---------------------------------
 
@@ -160,6 +160,8 @@ pub const BOARD: BoardParameters = BoardParameters {
     cycles_hz: SYSCLK_HZ,
     counts_per_s_max: ENCODER_COUNTS_PER_S_MAX,
     lead_ticks: LEAD_TICKS,
+    // One pin each for spindle and coolant.
+    outputs: BoardOutputs::FixedSpeed,
 };
 
 #[cfg(test)]

@@ -203,7 +203,7 @@ pub const KEY_TABLES: &[KeyTable] = &[
     ),
     optional(
         "spindle",
-        "The spindle's output; without it the words M3, M4, M5 and S are not acted on, and `motion compile` refuses them.",
+        "The spindle's output; without it the words M3, M4, M5 and S are not acted on, and `motion compile` refuses M3 and M4.",
         &[
             Key::new(
                 "speed_max_rpm",
@@ -224,7 +224,7 @@ pub const KEY_TABLES: &[KeyTable] = &[
     ),
     optional(
         "coolant",
-        "The coolant's output; without it the words M7, M8 and M9 are not acted on, and `motion compile` refuses them.",
+        "The coolant's output; without it the words M7, M8 and M9 are not acted on, and `motion compile` refuses M7 and M8.",
         &[Key::new(
             "kinds",
             "",

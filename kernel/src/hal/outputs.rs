@@ -53,13 +53,13 @@ impl OutputState {
 
 /// The outputs for spindle and coolant.
 pub trait Outputs {
-    /// Puts all outputs into a state. Does not wait for the spindle: the program has a dwell behind the switch. A
-    /// board whose outputs can fail reports it through [`Kernel::trip`](crate::kernel::Kernel::trip).
+    /// Puts all outputs into a state. Does not wait for the spindle: the program has a dwell behind the switch. It
+    /// cannot fail: what a drive of the spindle reports is an input.
     fn switch(&mut self, to: &OutputState);
 }
 
-/// A board without such outputs: nothing is switched. Such a board does not run programs that switch outputs, which
-/// [`check`](crate::program::check()) tells before the start.
+/// No outputs: nothing is switched. A board without them refuses programs that switch before the start:
+/// [`check`](crate::program::check()) does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoOutputs;
 

@@ -130,10 +130,17 @@ where
             Run::Hold if rests => State::Held,
             Run::Hold => State::Holding,
             Run::On if !rests || self.timeline.splice().at != Position::ZERO => State::Running,
+            // The next poll holds it.
+            Run::On if self.is_at_block_end() => State::Running,
             Run::On if self.reader.is_read() => State::Done,
             Run::On if self.reader.is_waiting() => State::Waiting,
             Run::On => State::Running,
         }
+    }
+
+    /// Whether single block is to hold it here.
+    fn is_at_block_end(&self) -> bool {
+        self.mode.is_single_block() && self.timeline.waits_at_block_end(self.reader.lookahead())
     }
 
     /// Whether everything handed over has been driven and no request is pending.
@@ -297,7 +304,7 @@ where
     /// Whether motion is to wait at the end of a block. Once at rest there, it is held if more items are to
     /// come.
     fn waits_at_block_end(&mut self, feeder: &LiveFeeder<'_, R, AXES>) -> bool {
-        if !(self.mode.is_single_block() && self.timeline.waits_at_block_end(self.reader.lookahead())) {
+        if !self.is_at_block_end() {
             return false;
         }
         if self.rests(feeder) {

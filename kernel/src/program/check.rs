@@ -140,7 +140,9 @@ impl Held {
                 *self = Self::default();
                 is_whole
             }
-            Item::Feed(_) | Item::Dwell(_) | Item::Stop | Item::Switch(_) => true,
+            Item::Feed(_) => true,
+            // Blocks of a stretch have begun: these stand between stretches.
+            Item::Dwell(_) | Item::Stop | Item::Switch(_) => self.blocks == Position::ZERO,
         }
     }
 

@@ -6,7 +6,8 @@
 //!
 //! Once all items before the switch are done and the machine is at rest ([`State::Waiting`](crate::live::State) of
 //! live control; with [`Supply`](super::Supply), [`Supply::is_waiting`](super::Supply::is_waiting) and a tick
-//! that ended idle after the last [`Supply::fill`](super::Supply::fill)), the background puts
+//! that executed and ended idle after the last [`Supply::fill`](super::Supply::fill): one with the drives on and settled,
+//! and without a fault), the background puts
 //! [`Switching::due`] out and calls [`Switching::switched`]. The wait for the spindle is the program's next
 //! item, a dwell. Under a hold, live control is not waiting, so nothing is switched before the resume.
 //!

@@ -100,9 +100,9 @@ fn blends_and_curves_cost_bounded_work_a_line_however_long_the_program() {
         let (turn, side) = if index.is_multiple_of(3) { ("G3", 0.7) } else { ("G2", -0.7) };
         format!("{turn} X{x} Y{y:.4} I{:.4} J{:.4}", 0.5 - side * rise, 0.5 * rise + side)
     };
-    let kinds: [(&str, &dyn Fn(u32) -> String, f64); 3] =
-        [("dense", &dense, WORK_MAX[0]), ("corners", &corners, WORK_MAX[1]), ("arcs", &arcs, WORK_MAX[2])];
-    for (name, point, most) in kinds {
+    let kinds: [(&str, &dyn Fn(u32) -> String); 3] =
+        [("dense", &dense), ("corners", &corners), ("arcs", &arcs)];
+    for ((name, point), most) in kinds.into_iter().zip(WORK_MAX) {
         let [short, long] = [1000, 4000].map(|count| work_a_line(&program(count, point)));
         println!("{name}: {short:.0} and {long:.0} steps of work a line");
         assert!(short > 0.0 && long < 1.25 * short && long.max(short) < most, "{name}: {short} {long}");
