@@ -1,5 +1,7 @@
 //! What a program needs of its machine and its operator.
 
+use motion_kernel::hal::Spindle;
+
 use crate::gcode::{NoticeKind, Program, StepKind};
 
 /// What has to be ready.
@@ -36,13 +38,20 @@ impl Needs {
                 }
             }
         }
-        let switched = program.notices.iter().filter_map(|notice| match notice.kind {
-            NoticeKind::Spindle => Some("spindle (M3, M4)"),
-            NoticeKind::Coolant => Some("coolant (M7, M8)"),
-            NoticeKind::Output => Some("outputs (M62 to M68)"),
-            NoticeKind::Input => Some("inputs (M66)"),
-            _ => None,
-        });
+        let states = || {
+            program.steps.iter().filter_map(|step| match &step.kind {
+                StepKind::Switch(to) => Some(to),
+                _ => None,
+            })
+        };
+        let has = |kind| program.notices.iter().any(|notice| notice.kind == kind);
+        let switched = [
+            (states().any(|to| to.spindle != Spindle::Off), "spindle (M3, M4)"),
+            (states().any(|to| to.flood || to.mist), "coolant (M7, M8)"),
+            (has(NoticeKind::Output), "outputs (M62 to M68)"),
+            (has(NoticeKind::Input), "inputs (M66)"),
+        ];
+        let switched = switched.into_iter().filter_map(|(is_needed, what)| is_needed.then_some(what));
         needs.outputs.extend(switched);
         needs
     }
@@ -74,6 +83,8 @@ mod tests {
         let text = "G55\nT3 M6\nM3 S1000\nG10 L2 P2 X-5\nG0 X1 Z2\nG54\nT1 M6\nG1 Y-4 F60\nT3 M6\nG56\nM2\n";
         let program = gcode::read("a.ngc", text.as_bytes()).expect("G-code");
         let needs = Needs::of(&program);
+        let off = gcode::read("a.ngc", b"M5 M9\nG0 X1\nM2").expect("G-code");
+        assert_eq!(Needs::of(&off).outputs, [""; 0]);
         // No move is made in G56.
         assert_eq!(needs.systems, [1, 2]);
         assert_eq!(

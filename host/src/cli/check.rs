@@ -12,8 +12,9 @@ use super::table::{self, Align};
 use super::write_json;
 use crate::check::needs::system_word;
 use crate::check::{Check, Reason, check};
-use crate::gcode::{Program, ReadOptions, Refusal};
+use crate::gcode::{Program, Refusal};
 use crate::machine::Machine;
+use crate::planning::PlanningError;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -23,7 +24,7 @@ Examples:
 
 Exit status: 0 the program is accepted, 2 it is refused.
 
-JSON: accepted, refusals (source, line, column, lines, problem); of an accepted program also steps, blocks, length_mm, time_s,
+JSON: accepted, refusals (source, line, column or null, lines, problem); of an accepted program also steps, blocks, length_mm, time_s,
 extent_mm (least and greatest X, Y, Z at the ends of moves), needs (tools, tools_assumed, systems, outputs), corner_stops,
 operator_stops, time_by_reason (seconds: programmed, machine, acceleration, jerk, snap, feed change, corner, stop, dwell),
 advice, notices.";
@@ -57,7 +58,8 @@ struct CheckJson<'a> {
 struct RefusalJson<'a> {
     source: &'a str,
     line: u32,
-    column: u32,
+    /// Planning knows lines only.
+    column: Option<u32>,
     lines: usize,
     problem: String,
 }
@@ -95,7 +97,10 @@ pub fn run(arguments: &CheckArguments, out: &mut dyn Write) -> Result<Outcome, C
     let options = arguments.reading.options(&machine)?;
     match source.program(&options) {
         Ok(program) => accepted(arguments, &source, &program, &machine, out),
-        Err(_) => refused(arguments, &source, &options, out),
+        Err(_) => {
+            let refusals = source.refusals(&options);
+            refused(arguments, &source.name, refusals.iter().map(refusal_json).collect(), out)
+        }
     }
 }
 
@@ -106,7 +111,20 @@ fn accepted(
     machine: &Machine,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
-    let checked = check(&source.name, program, machine)?;
+    let checked = match check(&source.name, program, machine) {
+        Ok(checked) => checked,
+        Err(error) => {
+            let PlanningError { source_name, place, problem } = &error;
+            let refusal = RefusalJson {
+                source: source_name,
+                line: place.line,
+                column: place.column,
+                lines: 1,
+                problem: problem.to_string(),
+            };
+            return refused(arguments, &source.name, vec![refusal], out);
+        }
+    };
     if arguments.json {
         let accepted_program = Some(json(program, &checked));
         write_json(&CheckJson { accepted: true, refusals: Vec::new(), accepted_program }, out)?;
@@ -118,24 +136,22 @@ fn accepted(
 
 fn refused(
     arguments: &CheckArguments,
-    source: &Source,
-    options: &ReadOptions,
+    name: &str,
+    refusals: Vec<RefusalJson<'_>>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
-    let refusals = source.refusals(options);
+    let (kinds, lines) = (refusals.len(), refusals.iter().map(|refusal| refusal.lines).sum::<usize>());
     if arguments.json {
-        let refusals = refusals.iter().map(refusal_json).collect();
         write_json(&CheckJson { accepted: false, refusals, accepted_program: None }, out)?;
     } else {
         write_refusals(&refusals, out).map_err(CliError::Output)?;
     }
-    let lines: usize = refusals.iter().map(|refusal| refusal.lines).sum();
-    let found = match (refusals.len(), lines) {
+    let found = match (kinds, lines) {
         (1, 1) => "1 refusal".to_owned(),
         (1, lines) => format!("1 refusal in {lines} lines"),
         (kinds, lines) => format!("{kinds} refusals in {lines} lines"),
     };
-    Err(CliError::Refused { programs: vec![format!("{}: found {found}, expected none", source.name)] })
+    Err(CliError::Refused { programs: vec![format!("{name}: found {found}, expected none")] })
 }
 
 fn refusal_json(refusal: &Refusal) -> RefusalJson<'_> {
@@ -143,7 +159,7 @@ fn refusal_json(refusal: &Refusal) -> RefusalJson<'_> {
     RefusalJson {
         source: &first.source_name,
         line: first.line,
-        column: first.column,
+        column: Some(first.column),
         lines: *lines,
         problem: first.problem.to_string(),
     }
@@ -172,12 +188,12 @@ fn json<'a>(program: &'a Program, checked: &'a Check) -> AcceptedJson<'a> {
     }
 }
 
-fn write_refusals(refusals: &[Refusal], out: &mut dyn Write) -> io::Result<()> {
+fn write_refusals(refusals: &[RefusalJson<'_>], out: &mut dyn Write) -> io::Result<()> {
     let columns = [("lines", "", Align::Right), ("first", "", Align::Left), ("problem", "", Align::Left)];
-    let row = |refusal: &Refusal| {
-        let Refusal { first, lines } = refusal;
-        let place = format!("{}:{}:{}", first.source_name, first.line, first.column);
-        [lines.to_string(), place, first.problem.to_string()]
+    let row = |refusal: &RefusalJson<'_>| {
+        let RefusalJson { source, line, column, lines, problem } = refusal;
+        let column = column.map_or_else(String::new, |column| format!(":{column}"));
+        [lines.to_string(), format!("{source}:{line}{column}"), problem.clone()]
     };
     let rows: Vec<[String; 3]> = refusals.iter().map(row).collect();
     table::write(&columns, &rows, out)
@@ -232,13 +248,16 @@ fn write_check(name: &str, program: &Program, checked: &Check, out: &mut dyn Wri
 fn duration(time_s: f64) -> String {
     const MINUTE_S: f64 = 60.0;
     const HOUR_S: f64 = 3600.0;
+    // As it is printed, so that no minute has 60 seconds.
+    let step_s = if time_s < MINUTE_S - 0.0005 { 0.001 } else { 0.1 };
+    let time_s = (time_s / step_s).round() * step_s;
     let (hours, minutes) = ((time_s / HOUR_S).floor(), (time_s % HOUR_S / MINUTE_S).floor());
-    if time_s < MINUTE_S {
-        format!("{time_s:.3} s")
-    } else if time_s < HOUR_S {
+    if hours > 0.0 {
+        format!("{hours} h {minutes} min {:.0} s", (time_s % MINUTE_S).floor())
+    } else if minutes > 0.0 {
         format!("{minutes} min {:.1} s", time_s % MINUTE_S)
     } else {
-        format!("{hours} h {minutes} min {:.0} s", (time_s % MINUTE_S).floor())
+        format!("{time_s:.3} s")
     }
 }
 
@@ -248,9 +267,14 @@ mod tests {
 
     #[test]
     fn durations_are_told_in_the_units_of_people() {
-        for (time_s, expected) in
-            [(0.5, "0.500 s"), (75.25, "1 min 15.2 s"), (3600.0, "1 h 0 min 0 s"), (7325.9, "2 h 2 min 5 s")]
-        {
+        for (time_s, expected) in [
+            (0.5, "0.500 s"),
+            (75.23, "1 min 15.2 s"),
+            (119.97, "2 min 0.0 s"),
+            (59.9997, "1 min 0.0 s"),
+            (3600.0, "1 h 0 min 0 s"),
+            (7325.9, "2 h 2 min 5 s"),
+        ] {
             assert_eq!(duration(time_s), expected);
         }
     }

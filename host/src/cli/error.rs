@@ -16,7 +16,7 @@ use crate::recording::RecordingError;
 use crate::simulate::home::HomeError;
 use crate::simulate::jog::JogError;
 use crate::simulate::session::SessionError;
-use crate::simulate::{RunError, RunSummary};
+use crate::simulate::{Probed, RunError, RunSummary};
 use crate::toolpath::spline::SplineError;
 use crate::trace::RunEnd;
 use crate::tuning::TuningError;
@@ -39,6 +39,8 @@ impl Outcome {
     #[must_use]
     pub fn of(summary: &RunSummary) -> Self {
         match summary.end {
+            // The program would have gone on otherwise, or not at all.
+            RunEnd::Finished if summary.probes.iter().any(Probed::disagrees) => Self::Failed,
             RunEnd::Finished => Self::Done,
             RunEnd::Faulted | RunEnd::Cut => Self::Failed,
             RunEnd::Held(_) => Self::Held,

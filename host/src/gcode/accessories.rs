@@ -241,6 +241,16 @@ impl Interpreter {
         }
     }
 
+    /// Lists a tool that no table has.
+    pub(super) fn assume_tool(&mut self, number: u32) {
+        // As many as there are in the text, unless it computes them.
+        const LISTED_MAX: usize = 1000;
+        let assumed = &mut self.program.tools_assumed;
+        if assumed.len() < LISTED_MAX && !assumed.contains(&number) {
+            assumed.push(number);
+        }
+    }
+
     /// A tool by its number. Without a table it is assumed.
     pub(super) fn tool(&mut self, number: u32, offset: usize) -> Result<Tool, Located> {
         match self.tools.table.get(number) {
@@ -248,12 +258,7 @@ impl Interpreter {
             None if number == 0 => Ok(Tool::default()),
             None if self.tools.is_given => Err(Located::new(offset, Problem::ToolUnknown { number })),
             None => {
-                // As many as there are in the text, unless it computes them.
-                const LISTED_MAX: usize = 1000;
-                let assumed = &mut self.program.tools_assumed;
-                if assumed.len() < LISTED_MAX && !assumed.contains(&number) {
-                    assumed.push(number);
-                }
+                self.assume_tool(number);
                 let diameter = Length::nearest(2.0 * self.tools.radius_mm).unwrap_or_default();
                 Ok(Tool { number, diameter, ..Tool::default() })
             }

@@ -84,7 +84,7 @@ impl Interpreter {
     }
 
     /// The compensation that a word asks for.
-    fn cutter_of(&self, block: &Block<'_>, tenths: i64, code: Word<'_>) -> Result<Cutter, Located> {
+    fn cutter_of(&mut self, block: &Block<'_>, tenths: i64, code: Word<'_>) -> Result<Cutter, Located> {
         let plane = self.modal.plane;
         let refused = |expected| code.problem(|word| Problem::Setup { word, expected });
         if plane == Plane::Yz {
@@ -101,7 +101,10 @@ impl Interpreter {
             let place = d.map_or(code.offset, |word| word.offset);
             match self.tools.table.get(number) {
                 Some(tool) => (tool.diameter.to_mm() / 2.0, tool.orientation),
-                None if self.tools.radius_mm > 0.0 => (self.tools.radius_mm, 0),
+                None if self.tools.radius_mm > 0.0 => {
+                    self.assume_tool(number);
+                    (self.tools.radius_mm, 0)
+                }
                 None => return Err(Located::new(place, Problem::CompensationRadius { number })),
             }
         };

@@ -119,7 +119,7 @@ pub enum Problem {
     #[error("found {word}, expected a number that is not negative")]
     Negative { word: String },
     #[error(
-        "found {word} without a motion mode, expected G0, G1, G2, G3, G5, G5.1, G5.2, G5.5, G6.2 or a drilling cycle in this line \
+        "found {word} without a motion mode, expected G0, G1, G2, G3, G5, G5.1, G5.2, G5.5, G6.2, G38.2 or a drilling cycle in this line \
          or before it"
     )]
     AxisWithoutMotion { word: String },
@@ -344,6 +344,10 @@ impl Problem {
                 | Self::Undefined { .. }
                 | Self::FeedMissing { .. }
                 | Self::AxisWithoutMotion { .. }
+                | Self::WordUnused { .. }
+                | Self::SplineWithoutStart
+                | Self::SplineWithoutEnd
+                | Self::QuadraticWithoutControl
                 | Self::ArcRadiiDiffer { .. }
                 | Self::ArcCentreOnPoint { .. }
                 | Self::ArcRadiusTooSmall { .. }

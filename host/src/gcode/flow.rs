@@ -311,13 +311,10 @@ impl<'a> Flow<'a> {
             return Ok(());
         }
         let Some(call) = self.calls.pop() else { return Ok(()) };
+        (self.file, self.place, self.repeats) = (call.file, call.place, call.repeats);
         self.interpreter.parameters.leave(call.again.is_none());
         self.interpreter.leave()?;
-        if let Some(tool) = call.changes_to {
-            self.interpreter.end_change(tool)?;
-        }
-        (self.file, self.place, self.repeats) = (call.file, call.place, call.repeats);
-        Ok(())
+        call.changes_to.map_or(Ok(()), |tool| self.interpreter.end_change(tool))
     }
 
     /// A file of subroutines alone is right if all of it can be read.

@@ -4,8 +4,8 @@
 //! alike ones together. Where a word has no meaning here, it is left out and the rest of its line is read; any other
 //! refused line is left out as a whole.
 //!
-//! What would not be refused without an earlier refusal is not listed: the geometry of arcs and corners, and parameters
-//! without a value, from the first line on that was left out.
+//! What might not be refused without an earlier refusal is not listed: the geometry of arcs and corners, parameters without a
+//! value, and words that nothing takes, from the first line on that was left out, or whose G word was.
 
 use std::collections::BTreeSet;
 use std::mem::discriminant;
@@ -18,6 +18,9 @@ use super::source::Place;
 
 /// Most lines that are executed after a refusal: a loop may have lost its end with it.
 const LINES_AFTER_REFUSAL: u64 = 10_000_000;
+
+/// Most words of a line that are left out.
+const WORDS_MAX: usize = 100;
 
 /// A refusal, and how many lines are refused for the like.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,9 +56,15 @@ pub fn refusals(source_name: &str, text: &[u8], options: &ReadOptions) -> Vec<Re
         if survey.groups.is_empty() {
             survey.executed_max = flow.executed.saturating_add(LINES_AFTER_REFUSAL);
         }
+        let (_, _, located) = failure.parts();
+        let is_bound = matches!(located.problem, Problem::TooManyLines { .. } | Problem::TooManySteps { .. });
+        // A bound is passed at any line of a loop, which may have lost its end.
+        let is_listed = !is_bound || survey.groups.is_empty();
         let stands_still = flow.position() == before;
-        survey.rest_of_line(&mut flow, failure);
-        if stands_still {
+        if is_listed {
+            survey.rest_of_line(&mut flow, failure);
+        }
+        if stands_still || is_bound {
             return survey.refusals();
         }
     }
@@ -91,17 +100,16 @@ impl Survey {
         let (file, place): (_, Place) = (file.clone(), place);
         let mut text = file.source.line(place).map_or_else(Vec::new, |(line, _)| line.to_vec());
         let mut failure = Some(failure);
-        let mut is_first = true;
-        while let Some(found) = failure.take() {
+        // Every pass leaves out one word more.
+        for _ in 0..WORDS_MAX {
+            let Some(found) = failure.take() else { return };
             let (_, at, located) = found.parts();
             let is_word = at == place && located.problem.is_of_a_word();
             let offset = located.offset;
-            if is_word || is_first {
-                self.is_uncertain |= !is_word;
-                self.add(found.into_error());
-            }
-            is_first = false;
-            // Every pass leaves out one word more.
+            self.add(found.into_error());
+            // A G word may be a motion mode, and may take letters of its line.
+            let is_g = text.get(offset).is_some_and(|letter| letter.eq_ignore_ascii_case(&b'G'));
+            self.is_uncertain |= !is_word || is_g;
             if is_word && leave_out(&mut text, offset) {
                 failure = flow.line(&file, &text, place).err();
             }
@@ -142,19 +150,24 @@ fn leave_out(line: &mut [u8], offset: usize) -> bool {
     else {
         return false;
     };
-    let mut depth = 0_usize;
-    let mut is_name = false;
-    for (index, byte) in word.iter_mut().enumerate() {
-        match *byte {
+    let (mut depth, mut is_name, mut function) = (0_usize, false, 0);
+    for index in 0..word.len() {
+        // The name of a function has two letters or more, a word has one.
+        let letters = word[index..].iter().take_while(|byte| byte.is_ascii_alphabetic()).count();
+        if index > 0 && function == 0 && letters > 1 {
+            function = letters;
+        }
+        match word[index] {
             b'[' => depth += 1,
             b']' => depth = depth.saturating_sub(1),
             b'<' => is_name = true,
             b'>' => is_name = false,
             b'0'..=b'9' | b'.' | b'+' | b'-' | b'#' | b' ' | b'\t' => {}
-            _ if index == 0 || depth > 0 || is_name => {}
+            _ if index == 0 || depth > 0 || is_name || function > 0 => {}
             _ => break,
         }
-        *byte = b' ';
+        function = function.saturating_sub(1);
+        word[index] = b' ';
     }
     true
 }
@@ -191,6 +204,25 @@ mod tests {
         assert_eq!(found("F60\nG2 X4 I1\n#2=#<unset>\nM2\n").len(), 1);
     }
 
+    /// They are not hidden by refusals that leave no line out.
+    #[test]
+    fn refusals_beside_a_word_without_a_meaning_are_found() {
+        assert_eq!(found("F100\nG0 A1\nG1 X[1/0]\nM2\n"), [(2, 4, 1), (3, 7, 1)]);
+        assert_eq!(found("G0 A1\nG1 X5\nM2\n"), [(1, 4, 1), (2, 1, 1)]);
+        assert_eq!(found("F60\nG0 A1\nG2 X4 I1\nM2\n"), [(2, 4, 1), (3, 1, 1)]);
+        assert_eq!(found("F100\nG1 X1 A5 Q2\nM2\n"), [(2, 7, 1), (2, 10, 1)]);
+        // K belongs to the word that is refused.
+        assert_eq!(found("F100 S1\nG33 Z-1 K1\nZ-2 K1\nM2\n"), [(2, 1, 1)]);
+    }
+
+    #[test]
+    fn bounds_are_refused_once() {
+        let text = b"F100\no1 while [1]\nG1 X1\no1 endwhile\nM2\n";
+        let options = ReadOptions { lines_max: 1000, ..ReadOptions::default() };
+        let refusals = refusals("a.ngc", text, &options);
+        assert_eq!(refusals.iter().map(|refusal| refusal.lines).collect::<Vec<_>>(), [1], "{refusals:?}");
+    }
+
     #[test]
     fn a_loop_that_lost_its_end_ends() {
         let text = "#1=0\no1 while [#1 lt 9]\n#1=[#1+1] H[sqrt[-1]]\no1 endwhile\nM2\n";
@@ -203,6 +235,8 @@ mod tests {
             ("X1 A10. Y2", 3, "X1      Y2"),
             ("A[#<a b>*[2]]X1", 0, "             X1"),
             ("B#<x>", 0, "     "),
+            ("A SIN[30]X1", 0, "         X1"),
+            ("A-abs[3] X[1]", 0, "         X[1]"),
         ] {
             let mut text = line.as_bytes().to_vec();
             assert!(leave_out(&mut text, offset));

@@ -28,6 +28,12 @@ pub struct Probed {
 }
 
 impl Probed {
+    /// Whether run and program do not agree on whether it trips.
+    #[must_use]
+    pub fn disagrees(&self) -> bool {
+        self.tripped != self.program_mm.is_some()
+    }
+
     /// What is to be said where run and program do not agree.
     pub(super) fn disagreement(&self) -> Option<String> {
         let tripped = |tripped: bool| if tripped { "tripped" } else { "did not trip" };
@@ -40,7 +46,7 @@ impl Probed {
                 tripped(read)
             )
         };
-        (self.tripped != read).then(said)
+        self.disagrees().then(said)
     }
 }
 

@@ -148,7 +148,11 @@ pub fn read(bytes: &[u8]) -> bool {
             Some(word) => text.extend(WORDS.get(usize::from(word)).unwrap_or(&"\n").bytes()),
         }
     }
-    let outcome = gcode::read_with("a.ngc", &text, &options(switches));
+    let options = options(switches);
+    let outcome = gcode::read_with("a.ngc", &text, &options);
+    let refusals = gcode::refusals("a.ngc", &text, &options);
+    assert_eq!(refusals.is_empty(), outcome.is_ok(), "{refusals:?}");
+    refusals.iter().for_each(|refusal| assert_placed(&refusal.first, &text));
     match &outcome {
         Ok(program) => assert_sound(program, STEPS_MAX),
         Err(error) => assert_placed(error, &text),
