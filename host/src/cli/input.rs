@@ -26,7 +26,7 @@ pub(super) struct ReadingArguments {
     /// Parameters to start with (offsets, places of G28 and G30), in LinuxCNC's format.
     #[arg(long, value_name = "FILE.var")]
     pub(super) parameters: Option<PathBuf>,
-    /// Tool table, in LinuxCNC's format. Without it, every tool has length and radius 0.
+    /// Tool table, in LinuxCNC's format. Without it, every tool has length 0 and the radius of the machine file, or 0.
     #[arg(long, value_name = "FILE.tbl")]
     pub(super) tools: Option<PathBuf>,
     /// Most lines of G-code to execute, loops included.

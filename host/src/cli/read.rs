@@ -47,7 +47,7 @@ pub struct ReadArguments {
     /// G-code (`-`: standard input).
     #[arg(value_name = "PROGRAM")]
     program: PathBuf,
-    /// Machine file: what its probe touches. Without it probing moves are refused.
+    /// Machine file: what its probe touches, its tool radius, its subroutine that changes tools. Without it, none of these.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
     #[command(flatten)]

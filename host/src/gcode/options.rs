@@ -17,7 +17,7 @@ pub struct ReadOptions {
     pub subroutines: Vec<PathBuf>,
     /// Parameters to start with.
     pub parameters: ParameterFile,
-    /// The tools there are; without a table, length and radius of every tool are 0.
+    /// The tools there are; without a table, the length of every tool is 0.
     pub tools: Option<ToolTable>,
     /// The subroutine that M6 calls, lower case; without it M6 is a stop for the operator.
     pub change_subroutine: Option<String>,

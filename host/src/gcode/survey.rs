@@ -5,7 +5,7 @@
 //! refused line is left out as a whole.
 //!
 //! What might not be refused without an earlier refusal is not listed: the geometry of arcs and corners, parameters without a
-//! value, and words that nothing takes, from the first line on that was left out, or whose G word was.
+//! value, and words that nothing takes, from the first line on that was left out, or whose G or M word was.
 
 use std::collections::BTreeSet;
 use std::mem::discriminant;
@@ -107,9 +107,9 @@ impl Survey {
             let is_word = at == place && located.problem.is_of_a_word();
             let offset = located.offset;
             self.add(found.into_error());
-            // A G word may be a motion mode, and may take letters of its line.
-            let is_g = text.get(offset).is_some_and(|letter| letter.eq_ignore_ascii_case(&b'G'));
-            self.is_uncertain |= !is_word || is_g;
+            // A G word may be a motion mode, and both G and M words may take letters of their line.
+            let is_code = text.get(offset).is_some_and(|letter| b"gGmM".contains(letter));
+            self.is_uncertain |= !is_word || is_code;
             if is_word && leave_out(&mut text, offset) {
                 failure = flow.line(&file, &text, place).err();
             }
@@ -213,6 +213,7 @@ mod tests {
         assert_eq!(found("F100\nG1 X1 A5 Q2\nM2\n"), [(2, 7, 1), (2, 10, 1)]);
         // K belongs to the word that is refused.
         assert_eq!(found("F100 S1\nG33 Z-1 K1\nZ-2 K1\nM2\n"), [(2, 1, 1)]);
+        assert_eq!(found("M190 P1\nM2\n"), [(1, 1, 1)]);
     }
 
     #[test]
