@@ -396,14 +396,23 @@ def arc_of_motion(found):
     return {"arc": Arc(tuple(centre), tuple(direction), found["sweep_rad"])}
 
 
+def is_quadratic(controls):
+    """Whether a cubic curve is one of G5.1, which has three control points in LinuxCNC: it has no third difference, but a second."""
+    of_axes = [[control[axis] for control in controls] for axis in (0, 1)]
+    third = max(abs(d - 3 * c + 3 * b - a) for a, b, c, d in of_axes)
+    second = max(abs(c - 2 * b + a) for a, b, c, _ in of_axes)
+    return third < 1e-9 < second
+
+
 def cubic_of_motion(found):
     """Points of a cubic curve in XY where LinuxCNC's Python module has them."""
     start, end = found["from_mm"], nine(found["to_mm"])
     (i, j), (p, q) = found["controls_mm"]
     controls = [start[:2], (start[0] + i, start[1] + j), (end[0] + p, end[1] + q), end[:2]]
     through = []
-    for at in range(1, PIECES_OF_CUBIC):
-        u = at / PIECES_OF_CUBIC
+    pieces = pieces_of_curve(3) if is_quadratic(controls) else PIECES_OF_CUBIC
+    for at in range(1, pieces):
+        u = at / pieces
         weights = ((1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u * u * (1 - u), u**3)
         x, y = (sum(weight * control[axis] for weight, control in zip(weights, controls)) for axis in (0, 1))
         through.append((x, y, *end[2:]))

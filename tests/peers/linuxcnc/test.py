@@ -315,6 +315,14 @@ class Steps(unittest.TestCase):
         self.assertIn(pieces, (60, 61))
         for at, point in enumerate(mine[0].through, 1):
             self.assertAlmostEqual(point[0], at / 20)
+        # G5.1 from 0, 0 by way of 1.5, 3 to 3, 0: as many points as of three control points.
+        ends["controls_mm"] = [[1, 2], [-1, 2]]
+        (mine,) = steps.of_motion([{"line": 1, "kind": "cubic", **ends, **BLEND}])
+        pieces = steps.pieces_of_curve(3)
+        self.assertEqual(len(mine.through), pieces - 1)
+        for at, point in enumerate(mine.through, 1):
+            u = at / pieces
+            self.assertAlmostEqual(point[1], 6 * u * (1 - u))
 
 
 class Interpreter(unittest.TestCase):
