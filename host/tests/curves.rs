@@ -65,6 +65,26 @@ fn from_curve(point: Vector, curve: &dyn Fn(f64) -> Vector) -> f64 {
     off(0.5 * (low + high))
 }
 
+/// The curved pieces are Bézier curves with these control points, and nothing of the curves is left out.
+fn assert_drives(plan: &Plan, curves: &[Vec<Vector>]) {
+    let points = driven(plan, 50);
+    assert!(points.len() > 200);
+    let mut worst = 0.0_f64;
+    for &point in &points {
+        let off = |points: &Vec<Vector>| from_curve(point, &|u| casteljau(points.clone(), u));
+        worst = worst.max(curves.iter().map(off).fold(f64::INFINITY, f64::min));
+    }
+    for curve in curves {
+        for sample in 0..=100 {
+            let at = casteljau(curve.clone(), f64::from(sample) / 100.0);
+            let gap = points.iter().map(|&point| distance(at, point)).fold(f64::INFINITY, f64::min);
+            assert!(gap < 0.2, "{at:?}: {gap} mm from what is driven");
+        }
+    }
+    println!("worst {worst:e} mm");
+    assert!(worst < DEVIATION_MM, "{worst:e} mm");
+}
+
 /// LinuxCNC's own example of G5, and one that it is continued by; in inches the same.
 #[test]
 fn a_g5_is_the_bezier_curve_of_its_control_points() {
@@ -74,23 +94,7 @@ fn a_g5_is_the_bezier_curve_of_its_control_points() {
         vec![[1.0, 2.0, 0.0], [1.0, 5.0, 0.0], [11.0, 9.0, 0.0], [11.0, 12.0, 0.0]],
         vec![[11.0, 12.0, 0.0], [11.0, 15.0, 0.0], [22.0, 7.0, 0.0], [21.0, 2.0, 0.0]],
     ];
-    let points = driven(&plan, 50);
-    assert!(points.len() > 200);
-    let mut worst = 0.0_f64;
-    for &point in &points {
-        let off = |points: &Vec<Vector>| from_curve(point, &|u| casteljau(points.clone(), u));
-        worst = worst.max(curves.iter().map(off).fold(f64::INFINITY, f64::min));
-    }
-    // And nothing of the curves is left out.
-    for curve in &curves {
-        for sample in 0..=100 {
-            let at = casteljau(curve.clone(), f64::from(sample) / 100.0);
-            let gap = points.windows(2).map(|pair| distance(at, pair[0])).fold(f64::INFINITY, f64::min);
-            assert!(gap < 0.2, "{at:?}: {gap} mm from what is driven");
-        }
-    }
-    println!("worst {worst:e} mm");
-    assert!(worst < DEVIATION_MM, "{worst:e} mm");
+    assert_drives(&plan, &curves);
     assert_eq!(
         plan.blocks.iter().map(|block| &*block.kind).collect::<Vec<_>>(),
         ["line", "spline", "spline"]
@@ -111,31 +115,13 @@ fn a_g51_is_the_quadratic_curve_of_its_control_point() {
         vec![[11.0, 5.0, 0.0], [14.0, -4.0, 0.0], [20.0, 2.0, 0.0]],
     ];
     let plan = planned(text).expect("a plan");
-    let points = driven(&plan, 50);
-    let mut worst = 0.0_f64;
-    for &point in &points {
-        let off = |points: &Vec<Vector>| from_curve(point, &|u| casteljau(points.clone(), u));
-        worst = worst.max(curves.iter().map(off).fold(f64::INFINITY, f64::min));
-    }
-    for curve in &curves {
-        for sample in 0..=100 {
-            let at = casteljau(curve.clone(), f64::from(sample) / 100.0);
-            let gap = points.iter().map(|&point| distance(at, point)).fold(f64::INFINITY, f64::min);
-            assert!(gap < 0.2, "{at:?}: {gap} mm from what is driven");
-        }
-    }
-    println!("worst {worst:e} mm");
-    assert!(worst < DEVIATION_MM, "{worst:e} mm");
+    assert_drives(&plan, &curves);
     let incremental = text.replace("G1 X1 Y2 F600\n", "G1 X1 Y2 F600\nG91 ").replace("X11 Y5", "X10 Y3");
     let incremental = incremental.replace("X20 Y2", "X9 Y-3");
     assert_eq!(planned(&incremental).expect("a plan").time_s, plan.time_s);
     let turned = text.replace("G1 X1", "G10 L2 P1 R90\nG1 X1");
     let turned_curves = curves.map(|curve| curve.iter().map(|[x, y, z]| [-y, *x, *z]).collect::<Vec<_>>());
-    for &point in &driven(&planned(&turned).expect("a plan"), 50) {
-        let off = |points: &Vec<Vector>| from_curve(point, &|u| casteljau(points.clone(), u));
-        let least = turned_curves.iter().map(off).fold(f64::INFINITY, f64::min);
-        assert!(least < DEVIATION_MM, "{point:?}: {least:e} mm");
-    }
+    assert_drives(&planned(&turned).expect("a plan"), &turned_curves);
 }
 
 /// Through every point, in one motion, whose jerk does not step.

@@ -25,13 +25,7 @@ pub(super) fn advice(
     let fine_mm = if own_mm > 0.0 { own_mm } else { FINE_MM };
     // The widest tolerance in the program; 0 without blends.
     let modes = program.steps.iter().filter_map(|step| step.kind.mode());
-    let widest_mm = modes
-        .map(|mode| match mode {
-            PathMode::ExactPath | PathMode::ExactStop => 0.0,
-            PathMode::Unprogrammed => machine.path.unprogrammed_tolerance_mm(),
-            PathMode::Blend { tolerance_mm, .. } => tolerance_mm.unwrap_or(own_mm),
-        })
-        .fold(0.0, f64::max);
+    let widest_mm = modes.map(|mode| machine.path.tolerance_mm(mode)).fold(0.0, f64::max);
     let mut advice = Vec::new();
     let mut least_s = plan.time_s;
     for tolerance_mm in [fine_mm, COARSE_MM] {

@@ -23,11 +23,15 @@ impl Needs {
     #[must_use]
     pub fn of(program: &Program) -> Self {
         let mut needs = Self { systems: program.systems.iter().collect(), ..Self::default() };
+        let (mut turns, mut flows) = (false, false);
         for step in &program.steps {
-            if let StepKind::ToolChange { tool } = step.kind
-                && !needs.tools.contains(&tool)
-            {
-                needs.tools.push(tool);
+            match step.kind {
+                StepKind::ToolChange { tool } if !needs.tools.contains(&tool) => needs.tools.push(tool),
+                StepKind::Switch(to) => {
+                    turns |= to.spindle != Spindle::Off;
+                    flows |= to.flood || to.mist;
+                }
+                _ => {}
             }
             if let Some(ends) = step.kind.ends() {
                 for point in ends.map(|point| point.map(|coordinate| coordinate.to_mm())) {
@@ -38,16 +42,10 @@ impl Needs {
                 }
             }
         }
-        let states = || {
-            program.steps.iter().filter_map(|step| match &step.kind {
-                StepKind::Switch(to) => Some(to),
-                _ => None,
-            })
-        };
         let has = |kind| program.notices.iter().any(|notice| notice.kind == kind);
         let switched = [
-            (states().any(|to| to.spindle != Spindle::Off), "spindle (M3, M4)"),
-            (states().any(|to| to.flood || to.mist), "coolant (M7, M8)"),
+            (turns, "spindle (M3, M4)"),
+            (flows, "coolant (M7, M8)"),
             (has(NoticeKind::Output), "outputs (M62 to M68)"),
             (has(NoticeKind::Input), "inputs (M66)"),
         ];

@@ -17,6 +17,18 @@ use super::spline;
 /// Most turns of an arc or a helix.
 const TURNS_MAX: u32 = 10_000;
 
+/// A line that asks for a move.
+#[derive(Clone, Copy)]
+pub(super) struct MoveLine<'a, 'line> {
+    pub(super) block: &'a Block<'line>,
+    pub(super) motion: Motion,
+    pub(super) feed: Feed,
+    /// The first word that asks for the move.
+    pub(super) first: Word<'line>,
+    /// Where problems of the move as a whole stand: its G word, or else the first word.
+    pub(super) offset: usize,
+}
+
 impl Interpreter {
     /// The move a line asks for by an axis word or, in the arc modes, an offset or radius.
     pub(super) fn motion(&mut self, block: &Block<'_>) -> Result<(), Located> {
@@ -59,54 +71,48 @@ impl Interpreter {
             self.refuse_machine_move(word)?;
             return self.machine_move(block, motion, feed, first);
         }
+        let line = MoveLine { block, motion, feed, first, offset };
         match motion {
             // Its lines were taken above.
             Motion::Nurbs(_) => Ok(()),
             Motion::Cycle(cycle) => self.cycle(block, cycle, feed, first),
-            Motion::Rapid | Motion::Feed => self.line(block, feed, first, offset),
-            Motion::Clockwise | Motion::CounterClockwise => self.circular(block, motion, feed, first, offset),
-            Motion::Cubic | Motion::Quadratic => self.cubic(block, motion, feed, first, offset),
-            Motion::Probe(kind) => self.probe(block, kind, feed, first, offset),
-            Motion::Through => self.through(block, code.is_some(), feed, first, offset),
+            Motion::Rapid | Motion::Feed => self.line(line),
+            Motion::Clockwise | Motion::CounterClockwise => self.circular(line),
+            Motion::Cubic | Motion::Quadratic => self.cubic(line),
+            Motion::Probe(kind) => self.probe(line, kind),
+            Motion::Through => self.through(line, code.is_some()),
         }
     }
 
     /// Where a line leads: in the program's coordinates, and in those of the machine.
-    pub(super) fn target(&self, block: &Block<'_>, first: Word<'_>) -> Result<[[Length; 3]; 2], Located> {
-        let work = self.end_point(block)?;
+    pub(super) fn target(&self, line: MoveLine<'_, '_>) -> Result<[[Length; 3]; 2], Located> {
+        let work = self.end_point(line.block)?;
         let to = self.machine_at(work);
-        Ok([work, to.ok_or_else(|| first.problem(|word| Problem::PositionOutOfRange { word }))?])
+        Ok([work, to.ok_or_else(|| line.first.problem(|word| Problem::PositionOutOfRange { word }))?])
     }
 
     /// G0 and G1.
-    fn line(&mut self, block: &Block<'_>, feed: Feed, first: Word<'_>, offset: usize) -> Result<(), Located> {
-        let [work, to] = self.target(block, first)?;
+    fn line(&mut self, line: MoveLine<'_, '_>) -> Result<(), Located> {
+        let [work, to] = self.target(line)?;
         if self.is_offset() {
-            self.offset_line(to, feed, self.modal.path, offset)?;
+            self.offset_line(to, line.feed, self.modal.path, line.offset)?;
             self.machine = to;
         } else {
-            self.line_to(to, feed, self.modal.path)?;
+            self.line_to(to, line.feed, self.modal.path)?;
         }
         self.work = work;
         Ok(())
     }
 
     /// G2 and G3.
-    fn circular(
-        &mut self,
-        block: &Block<'_>,
-        motion: Motion,
-        feed: Feed,
-        first: Word<'_>,
-        offset: usize,
-    ) -> Result<(), Located> {
-        let [work, to] = self.target(block, first)?;
+    fn circular(&mut self, line: MoveLine<'_, '_>) -> Result<(), Located> {
+        let [work, to] = self.target(line)?;
         // In the program's coordinates: turned to another plane's and rounded, the same point would be another.
         let [first_axis, second_axis, _] = self.modal.plane.axes();
         let closes = [first_axis, second_axis].iter().all(|&axis| work[axis] == self.work[axis]);
-        let arc = self.arc(block, motion, [self.machine, to], closes, feed, offset)?;
+        let arc = self.arc(line, [self.machine, to], closes)?;
         if self.is_offset() {
-            self.offset_arc(&arc, offset)?;
+            self.offset_arc(&arc, line.offset)?;
         } else {
             self.step(StepKind::Arc(arc))?;
         }
@@ -115,15 +121,9 @@ impl Interpreter {
     }
 
     /// G5 and G5.1.
-    fn cubic(
-        &mut self,
-        block: &Block<'_>,
-        motion: Motion,
-        feed: Feed,
-        first: Word<'_>,
-        offset: usize,
-    ) -> Result<(), Located> {
-        let [work, to] = self.target(block, first)?;
+    fn cubic(&mut self, line: MoveLine<'_, '_>) -> Result<(), Located> {
+        let [work, to] = self.target(line)?;
+        let MoveLine { block, motion, feed, offset, .. } = line;
         let (from, mode) = (self.machine, self.modal.path);
         let controls_mm = match motion {
             Motion::Quadratic => spline::quadratic_mm(block, &self.modal, [self.work, work], offset)?,
@@ -143,22 +143,15 @@ impl Interpreter {
     }
 
     /// A point of G5.5; with the word itself, another spline `begins`.
-    fn through(
-        &mut self,
-        block: &Block<'_>,
-        begins: bool,
-        feed: Feed,
-        first: Word<'_>,
-        offset: usize,
-    ) -> Result<(), Located> {
-        let [work, to] = self.target(block, first)?;
+    fn through(&mut self, line: MoveLine<'_, '_>, begins: bool) -> Result<(), Located> {
+        let [work, to] = self.target(line)?;
         let (from, mode) = (self.machine, self.modal.path);
         (self.work, self.machine) = (work, to);
         if from == to {
             return Ok(());
         }
-        self.untimed(Motion::Through, offset)?;
-        self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }))
+        self.untimed(line.motion, line.offset)?;
+        self.step(StepKind::Through(ThroughMove { from, to, begins, feed: line.feed, mode }))
     }
 
     /// Machine coordinates of a point; `None` beyond the range. Turned to the program's axes and back they are rounded:
@@ -279,13 +272,11 @@ impl Interpreter {
     /// An arc between two points; it `closes` if they are the same in its plane.
     fn arc(
         &mut self,
-        block: &Block<'_>,
-        motion: Motion,
+        line: MoveLine<'_, '_>,
         [from, to]: [[Length; 3]; 2],
         closes: bool,
-        feed: Feed,
-        offset: usize,
     ) -> Result<ArcMove, Located> {
+        let MoveLine { block, motion, feed, offset, .. } = line;
         let Modal { plane, units, path: mode, .. } = self.modal;
         let [first, second, normal] = plane.axes();
         let offsets = block.offsets();

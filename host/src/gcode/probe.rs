@@ -7,13 +7,11 @@
 use motion_kernel::law::reach;
 use motion_kernel::plan::{Bend, Ceiling, MachineLimits};
 
-use super::block::Block;
 use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::interpreter::Interpreter;
-use super::lexer::Word;
 use super::modal::{FeedMode, Motion};
-use super::motion::distance_mm;
+use super::motion::{MoveLine, distance_mm};
 use super::program::{Feed, ProbeMove, StepKind};
 use crate::touch::Surface;
 
@@ -65,15 +63,11 @@ impl Probe {
     /// Where the machine is at rest after the probe tripped at `trip` on the way from `from` to `end`: braked as soon as it
     /// tripped, from the feed that it had there. At the latest that is the end. `None` where there are no such limits.
     fn rest(&self, [from, trip, end]: [[Length; 3]; 3], feed: Feed) -> Option<[Length; 3]> {
-        let feed_mm_s = match feed {
-            Feed::Rapid => f64::INFINITY,
-            Feed::MmPerMin(feed_mm_min) => feed_mm_min / 60.0,
-        };
         let (length_mm, to_trip_mm) = (distance_mm(from, end), distance_mm(from, trip));
         let way_mm = [0, 1, 2].map(|axis: usize| end[axis].to_mm() - from[axis].to_mm());
         let direction = way_mm.map(|way_mm| (way_mm / length_mm).abs());
         let ceiling =
-            Ceiling::new(&self.limits, feed_mm_s, &direction, &[false; 3], &Bend::default()).ok()?;
+            Ceiling::new(&self.limits, feed.mm_s(), &direction, &[false; 3], &Bend::default()).ok()?;
         let at_trip_mm_s = reach(&ceiling.law, 0.0, to_trip_mm).min(ceiling.feed_mm_s);
         let share = (to_trip_mm + ceiling.law.ramp_length_mm(0.0, at_trip_mm_s)) / length_mm;
         if share >= 1.0 {
@@ -95,20 +89,14 @@ impl Interpreter {
     }
 
     /// A move of G38.2 to G38.5.
-    pub(super) fn probe(
-        &mut self,
-        block: &Block<'_>,
-        kind: ProbeKind,
-        feed: Feed,
-        first: Word<'_>,
-        offset: usize,
-    ) -> Result<(), Located> {
-        let motion = kind.word();
+    pub(super) fn probe(&mut self, line: MoveLine<'_, '_>, kind: ProbeKind) -> Result<(), Located> {
+        let MoveLine { motion, feed, first, offset, .. } = line;
+        let motion = motion.word();
         let refused = |problem| Located::new(offset, problem);
         let Some(probe) = self.probe.clone() else {
             return Err(refused(Problem::NeedsProbe { word: motion.to_owned() }));
         };
-        let [_, end] = self.target(block, first)?;
+        let [_, end] = self.target(line)?;
         let from = self.machine;
         let [from_mm, end_mm] = [from, end].map(|point| point.map(Length::to_mm));
         let is_touched = probe.surface.is_touched(from_mm);

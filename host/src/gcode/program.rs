@@ -336,6 +336,17 @@ pub enum Feed {
     MmPerMin(f64),
 }
 
+impl Feed {
+    /// The same \[mm/s\]; infinite for a rapid.
+    #[must_use]
+    pub fn mm_s(self) -> f64 {
+        match self {
+            Self::Rapid => f64::INFINITY,
+            Self::MmPerMin(feed_mm_min) => feed_mm_min / 60.0,
+        }
+    }
+}
+
 /// The treatment of the path at a corner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum PathMode {

@@ -9,12 +9,12 @@
 
 use std::collections::BTreeSet;
 use std::mem::discriminant;
+use std::rc::Rc;
 
 use super::error::{GcodeError, Problem};
 use super::flow::Flow;
 use super::library::Failure;
 use super::options::ReadOptions;
-use super::source::Place;
 
 /// Most lines that are executed after a refusal: a loop may have lost its end with it.
 const LINES_AFTER_REFUSAL: u64 = 10_000_000;
@@ -97,7 +97,7 @@ impl Survey {
     /// A refused line, and what else of it is refused.
     fn rest_of_line<'a>(&mut self, flow: &mut Flow<'a>, failure: Failure<'a>) {
         let (file, place, _) = failure.parts();
-        let (file, place): (_, Place) = (file.clone(), place);
+        let file = Rc::clone(file);
         let mut text = file.source.line(place).map_or_else(Vec::new, |(line, _)| line.to_vec());
         let mut failure = Some(failure);
         // Every pass leaves out one word more.
@@ -152,10 +152,10 @@ fn leave_out(line: &mut [u8], offset: usize) -> bool {
     };
     let (mut depth, mut is_name, mut function) = (0_usize, false, 0);
     for index in 0..word.len() {
-        // The name of a function has two letters or more, a word has one.
-        let letters = word[index..].iter().take_while(|byte| byte.is_ascii_alphabetic()).count();
-        if index > 0 && function == 0 && letters > 1 {
-            function = letters;
+        if index > 0 && function == 0 {
+            // The name of a function has two letters or more, a word has one.
+            let letters = word[index..].iter().take_while(|byte| byte.is_ascii_alphabetic()).count();
+            function = if letters > 1 { letters } else { 0 };
         }
         match word[index] {
             b'[' => depth += 1,

@@ -17,7 +17,7 @@ use motion_kernel::units::{DacCode, Position};
 
 use super::error::{AxisError, MachineError};
 use super::file;
-use crate::gcode::{Probe, ReadOptions};
+use crate::gcode::{PathMode, Probe, ReadOptions};
 use crate::touch::Surface;
 
 /// Pieces are rounded: their tangents agree with the planner's angle to this, and with a curve's feed.
@@ -351,12 +351,14 @@ impl FaultSettings {
 }
 
 impl PathSettings {
-    /// How far blends may leave the path before a program says so \[mm\].
+    /// How far blends may leave the path in a program's path mode \[mm\], 0 or more; 0 for exact path.
     #[must_use]
-    pub fn unprogrammed_tolerance_mm(&self) -> f64 {
-        match self.mode {
-            DefaultPathMode::Exact => 0.0,
-            DefaultPathMode::Blend => self.blend_tolerance_mm,
+    pub fn tolerance_mm(&self, mode: PathMode) -> f64 {
+        match (mode, self.mode) {
+            (PathMode::ExactPath | PathMode::ExactStop, _) => 0.0,
+            (PathMode::Unprogrammed, DefaultPathMode::Exact) => 0.0,
+            (PathMode::Unprogrammed, DefaultPathMode::Blend) => self.blend_tolerance_mm,
+            (PathMode::Blend { tolerance_mm, .. }, _) => tolerance_mm.unwrap_or(self.blend_tolerance_mm),
         }
     }
 

@@ -7,7 +7,7 @@ use super::executable::Executable;
 use super::outputs::{Switches, acts_on};
 use super::stretch::{Stretch, StretchBlock};
 use super::{Item, Mode, PlacedRamp, Plan, PlannedProbe, travel};
-use crate::gcode::{Feed, LineMove, PathMode, ProbeMove, Program, Step, StepKind};
+use crate::gcode::{LineMove, PathMode, ProbeMove, Program, Step, StepKind};
 use crate::machine::{DefaultPathMode, Machine, PathSettings};
 use crate::toolpath::Element;
 use crate::toolpath::smooth::Move;
@@ -57,27 +57,27 @@ pub fn plan_program(
         }
         match &step.kind {
             StepKind::Line(line) => {
-                run.push(path_move(step.line, Element::line(line), mm_s(line.feed), line.mode, machine));
+                run.push(path_move(step.line, Element::line(line), line.feed.mm_s(), line.mode, machine));
             }
             StepKind::Arc(arc) => {
-                run.push(path_move(step.line, Element::arc(arc), mm_s(arc.feed), arc.mode, machine));
+                run.push(path_move(step.line, Element::arc(arc), arc.feed.mm_s(), arc.mode, machine));
             }
             StepKind::Cubic(curve) => {
                 let element = cubic(curve).map_err(at(step.line))?;
-                run.push(path_move(step.line, element, mm_s(curve.feed), curve.mode, machine));
+                run.push(path_move(step.line, element, curve.feed.mm_s(), curve.mode, machine));
             }
             StepKind::Nurbs(curve) => {
                 let elements = nurbs(program.nurbs.get(curve.curve)).map_err(at(step.line))?;
                 let moves = elements
                     .into_iter()
-                    .map(|element| path_move(step.line, element, mm_s(curve.feed), curve.mode, machine));
+                    .map(|element| path_move(step.line, element, curve.feed.mm_s(), curve.mode, machine));
                 run.extend(moves);
             }
             StepKind::Through(point) => {
                 if points.is_empty() {
                     start = point.from.map(|c| c.to_mm());
                 }
-                let (feed_mm_s, mode) = (mm_s(point.feed), point.mode);
+                let (feed_mm_s, mode) = (point.feed.mm_s(), point.mode);
                 points.push(Point { line: step.line, at: point.to.map(|c| c.to_mm()), feed_mm_s, mode });
             }
             StepKind::Probe(probe) => {
@@ -87,7 +87,7 @@ pub fn plan_program(
                 plan.probes.push(PlannedProbe::new(step.line, plan.stretches, probe));
                 if from != to {
                     let line = LineMove { from, to, feed, mode: PathMode::ExactStop };
-                    run.push(path_move(step.line, Element::line(&line), mm_s(feed), line.mode, machine));
+                    run.push(path_move(step.line, Element::line(&line), feed.mm_s(), line.mode, machine));
                 }
                 append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
             }
@@ -175,14 +175,6 @@ fn driven(machine: &Machine, mode: Mode) -> Machine {
     Machine { path, ..machine.clone() }
 }
 
-/// Infinite for a rapid.
-fn mm_s(feed: Feed) -> f64 {
-    match feed {
-        Feed::Rapid => f64::INFINITY,
-        Feed::MmPerMin(feed) => feed / 60.0,
-    }
-}
-
 pub(super) fn path_move(
     line: u32,
     element: Element,
@@ -190,14 +182,11 @@ pub(super) fn path_move(
     mode: PathMode,
     machine: &Machine,
 ) -> Move {
-    let (tolerance_mm, merging_mm) = match mode {
-        PathMode::Unprogrammed => (machine.path.unprogrammed_tolerance_mm(), None),
-        PathMode::ExactPath | PathMode::ExactStop => (0.0, None),
-        PathMode::Blend { tolerance_mm, merging_mm } => {
-            (tolerance_mm.unwrap_or(machine.path.blend_tolerance_mm), merging_mm)
-        }
+    let merging_mm = match mode {
+        PathMode::Blend { merging_mm, .. } => merging_mm,
+        PathMode::Unprogrammed | PathMode::ExactPath | PathMode::ExactStop => None,
     };
-    Move { line, element, feed_mm_s, tolerance_mm, merging_mm }
+    Move { line, element, feed_mm_s, tolerance_mm: machine.path.tolerance_mm(mode), merging_mm }
 }
 
 /// Appends the stretches of moves that follow each other, smoothed.
