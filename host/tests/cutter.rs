@@ -116,6 +116,8 @@ fn the_radius_has_a_source() {
     }
     let notes = read("T5 M6\nM2").notes(|_| false);
     assert!(notes[0].starts_with("length 0 and radius 2 mm are assumed"), "{notes:?}");
+    let notes = read("F9 G41 D7 G1 X10").notes(|_| false);
+    assert!(notes.iter().any(|note| note.ends_with("there is no tool table: tools 7")), "{notes:?}");
     let with_table = ReadOptions { tool_radius_mm: 2.0, ..options() };
     let error = gcode::read_with("a.ngc", b"F9 G41 D77 G1 X10", &with_table).unwrap_err().to_string();
     assert!(error.contains("found tool 77, whose radius is not known"), "{error}");

@@ -545,7 +545,7 @@ fn a_check_finds_whatever_the_streams_would_refuse() {
 }
 
 /// For live control blocks have to hold the whole path and nothing else: without any of them, without the last one, with
-/// one that is longer, with one after the end, and with one that comes after what it holds.
+/// one that is longer, with one after the end, with one that comes after what it holds, and with a stop after the first.
 #[test]
 fn a_check_for_live_control_finds_path_that_is_not_held() {
     let good = executable(SHORT).items;
@@ -569,12 +569,15 @@ fn a_check_for_live_control_finds_path_that_is_not_held() {
     let first_piece = without.iter().position(is_piece).expect("pieces");
     let but_last = [&good[..last], &good[last + 1..]].concat();
     let behind = [&good[..], &[good[last]]].concat();
+    let first = good.iter().position(is_block).expect("blocks");
+    let stopped = [&good[..=first], &[Item::Stop], &good[first + 1..]].concat();
     let cases = [
         (without, first_piece),
         (but_last, piece - 1),
         (longer, end),
         (late, piece - 1),
         (behind, good.len() + 1),
+        (stopped, first + 1),
     ];
     for (case, (items, index)) in cases.into_iter().enumerate() {
         assert_eq!(found(&items), Err(CheckError::NotHeld { index: index as u32 }), "{case}");

@@ -536,6 +536,30 @@ mod tests {
         assert_eq!(seen.switched, []);
     }
 
+    /// In single block a switch waits for the resume, as motion does: after a block, and after the way to the start of a
+    /// second run.
+    #[test]
+    fn in_single_block_nothing_is_switched_before_the_resume() {
+        let program = with_outputs(&[Item::Switch(OutputState::OFF)]);
+        let seen = board_of(program, 60_000, |now, hands, _, lines| {
+            hands.byte = (now == 50).then_some(b's');
+            let rests = |&(at, line): &(u32, LogLine<f32, AXES>)| {
+                now == at + 100 && matches!(line, LogLine::Held | LogLine::Done)
+            };
+            if now == 100 || lines.last().is_some_and(rests) {
+                hands.down_from = now;
+            }
+        });
+        let lines = said(&seen.lines);
+        let switched: Vec<usize> =
+            (0..lines.len()).filter(|&index| matches!(lines[index], LogLine::Switched(_))).collect();
+        assert!(switched.len() >= 4, "{lines:?}");
+        // The first is the beginning of the first run, which has no way to its start.
+        for &index in &switched[1..] {
+            assert_eq!(lines[index - 1], LogLine::Resumed, "{index}: {lines:?}");
+        }
+    }
+
     /// The program is refused on the way: all is off once motion rests.
     #[test]
     fn a_refused_program_ends_with_all_off_at_rest() {

@@ -37,7 +37,7 @@ pub(super) fn advice(
         let Ok(other) = plan_program(source_name, &in_mode(program, mode), machine, Mode::Spanning) else {
             continue;
         };
-        if other.time_s > (1.0 - GAIN_MIN) * least_s {
+        if other.time_s >= (1.0 - GAIN_MIN) * least_s {
             continue;
         }
         least_s = other.time_s;

@@ -37,6 +37,35 @@ fn all_refusals_are_listed_at_once() {
     );
 }
 
+/// A subroutine's end that is refused leads back to its caller.
+#[test]
+fn refusals_behind_a_refused_subroutine_are_listed() {
+    let workspace = Workspace::new("check-subroutine");
+    std::fs::create_dir(workspace.0.join("sub")).expect("a folder");
+    workspace.put("sub/f.ngc", "o<f> sub\nG54\nM73\nG55\nG41.1 D1\nG0 X9\no<f> endsub\n");
+    workspace.put("part.ngc", "G17\no<f> call\nG1 A5 F10\nG1 B5\nM199\nM2\n");
+    let (table, _) = workspace.ending(2, &["check", "part.ngc", "--subroutines", "sub"]);
+    for place in ["sub/f.ngc:7:", "part.ngc:3:4", "part.ngc:4:4", "part.ngc:5:1"] {
+        assert!(table.contains(place), "{place} is not in\n{table}");
+    }
+}
+
+/// What only planning refuses is a refusal, too.
+#[test]
+fn what_planning_refuses_is_listed() {
+    let workspace = Workspace::new("check-planning");
+    workspace.put("dense.ngc", "G61 G1 X1 F600\nG1 X1.0000000001\nM2\n");
+    let (found, error) = workspace.ending(2, &["check", "dense.ngc", "--json"]);
+    let found: Value = serde_json::from_str(&found).expect("JSON");
+    assert_eq!((&found["accepted"], &found["refusals"][0]["line"]), (&json!(false), &json!(2)));
+    assert_eq!(found["refusals"][0]["column"], Value::Null);
+    let problem = found["refusals"][0]["problem"].as_str().expect("a text");
+    assert_eq!(workspace.refusal(&["plan", "dense.ngc"]), format!("dense.ngc:2: {problem}"));
+    assert_eq!(error, "motion: dense.ngc: found 1 refusal, expected none\n");
+    workspace.put("empty.ngc", "");
+    assert_eq!(workspace.json(&["check", "empty.ngc", "--json"])["advice"], json!([]));
+}
+
 #[test]
 fn what_an_accepted_program_needs_is_told() {
     let workspace = Workspace::new("check-accepted");

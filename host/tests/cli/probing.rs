@@ -72,6 +72,19 @@ fn a_run_latches_where_the_probe_trips() {
     assert!(workspace.stdout(&["plan", "plate.ngc", "--machine", "probing.toml"]).contains("blocks"));
 }
 
+/// The program's end is the surface itself: it reads a trip, and the axes stop short of it.
+#[test]
+fn a_run_that_disagrees_with_the_program_fails_and_keeps_no_parameters() {
+    let workspace = workspace("probing-disagrees");
+    let text = "G61 G0 X20 Y5\nG38.2 Z-10 F600\nG38.4 Z5\nG10 L20 P1 Z[#5063-1]\nG1 X25\nM2\n";
+    workspace.put("face.ngc", text);
+    workspace.put("kept.var", "5220\t1\n");
+    let run = ["run", "face.ngc", "--machine", "probing.toml", "--parameters", "kept.var"];
+    let (printed, _) = workspace.ending(1, &run);
+    assert!(printed.contains("the probe did not trip, but the program reads that it tripped"), "{printed}");
+    assert_eq!(workspace.read("kept.var"), "5220\t1\n");
+}
+
 #[test]
 fn a_probe_that_is_not_there_is_refused() {
     let workspace = workspace("probing-refused");
