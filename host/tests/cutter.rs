@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-use motion_host::gcode::{self, Feed, Length, Program, ReadOptions, StepKind, ToolTable};
+use motion_host::gcode::{self, Feed, Point, Program, ReadOptions, StepKind, ToolTable, xyz_mm};
 use motion_tests::random::Random;
 use std::f64::consts::PI;
 
@@ -18,14 +18,14 @@ fn try_read(text: &str) -> Result<Program, String> {
     gcode::read_with("a.ngc", text.as_bytes(), &options()).map_err(|error| error.to_string())
 }
 
-fn mm(point: [Length; 3]) -> [f64; 3] {
-    point.map(Length::to_mm)
+fn mm(point: Point) -> [f64; 3] {
+    xyz_mm(point)
 }
 
 /// The steps, to a thousandth of a millimetre and degree.
 fn steps(text: &str) -> Vec<String> {
     let short = |value: f64| (value * 1e3).round() / 1e3 + 0.0;
-    let point = |at: [Length; 3]| {
+    let point = |at: Point| {
         let [x, y, z] = mm(at).map(short);
         format!("{x} {y} {z}")
     };

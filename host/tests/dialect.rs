@@ -2,7 +2,8 @@
 //! expected here was seen to be what LinuxCNC's interpreter makes of the same lines (`tests/peers/linuxcnc`).
 
 use motion_host::gcode::{
-    self, Feed, Length, Outputs, ParameterFile, Program, ReadOptions, SpindleSpeed, StepKind, ToolTable,
+    self, Feed, Outputs, ParameterFile, Point, Program, ReadOptions, SpindleSpeed, StepKind, ToolTable,
+    xyz_mm,
 };
 use motion_host::machine::{CoolantSettings, Machine, SpindleSettings};
 use motion_host::planning::{Item, Mode, plan_program};
@@ -14,9 +15,9 @@ fn read(text: &str) -> Program {
 
 /// A step in a word or two: `r` a rapid and `l` a line to their end points, `a` an arc.
 fn shown(kind: &StepKind) -> String {
-    let point = |at: [Length; 3]| {
+    let point = |at: Point| {
         // −0 is 0.
-        let [x, y, z] = at.map(|length| (length.to_mm() * 1e6).round() / 1e6 + 0.0);
+        let [x, y, z] = xyz_mm(at).map(|mm| (mm * 1e6).round() / 1e6 + 0.0);
         format!("{x} {y} {z}")
     };
     match kind {
@@ -343,8 +344,7 @@ fn an_arc_turns_with_its_coordinate_system() {
     let turned = arc("G10 L2 P1 R90\nG0 X1\nF60 G18 G3 X0 Z1 I-1");
     assert_eq!((turned.turn_deg, turned.centre_mm), (90.0, [0.0, 0.0]));
     assert_eq!(shown(&StepKind::Arc(turned)), "a 0 0 1");
-    let mm = |point: [Length; 3]| point.map(Length::to_mm);
-    assert_eq!(mm(turned.from), [0.0, 1.0, 0.0]);
+    assert_eq!(xyz_mm(turned.from), [0.0, 1.0, 0.0]);
     let flat = arc("G10 L2 P1 X5 R90\nG0 X1 Y0\nF60 G3 X0 Y1 I-1");
     assert_eq!((flat.turn_deg, flat.centre_mm), (0.0, [5.0, 0.0]));
     // Absolute centres, by which the same arc is written.

@@ -4,7 +4,7 @@
 
 #![allow(clippy::float_cmp, reason = "exact values are the point")]
 
-use motion_host::gcode::{self, ArcMove, Feed, Length, NoticeKind, Program, SpindleSpeed, Step, StepKind};
+use motion_host::gcode::{self, ArcMove, Feed, NoticeKind, Point, Program, SpindleSpeed, Step, StepKind};
 use motion_kernel::hal::Spindle;
 use motion_tests::random::Random;
 use std::f64::consts::PI;
@@ -317,9 +317,8 @@ fn same_feed(feed: Feed, expected: Option<f64>) {
 /// The arc's figures against each other, by rotating the start about the centre.
 fn assert_arc_geometry(arc: &ArcMove) {
     let [first, second, _] = arc.plane.axes();
-    let relative = |point: [Length; 3]| {
-        [point[first].to_mm() - arc.centre_mm[0], point[second].to_mm() - arc.centre_mm[1]]
-    };
+    let relative =
+        |point: Point| [point[first].to_mm() - arc.centre_mm[0], point[second].to_mm() - arc.centre_mm[1]];
     let (start, end) = (relative(arc.from), relative(arc.to));
     let largest =
         start.iter().chain(&arc.centre_mm).chain(&end).fold(1.0_f64, |largest, mm| largest.max(mm.abs()));
@@ -346,7 +345,7 @@ fn assert_arc_geometry(arc: &ArcMove) {
 }
 
 fn assert_same_step(step: &Step, expected: &Expected, position: &mut [i128; 3]) {
-    let units = |point: [Length; 3]| point.map(|length| i128::from(length.units()));
+    let units = |point: Point| core::array::from_fn(|axis| i128::from(point[axis].units()));
     match (step.kind, expected) {
         (StepKind::Line(line), Expected::Line { to, feed_mm_min }) => {
             assert_eq!((units(line.from), units(line.to)), (*position, *to));
@@ -478,7 +477,7 @@ fn a_million_increments_land_exactly() {
     let text = format!("G91 G1 F100\n{}M2", "X.1 Z-0.1\n".repeat(1_000_000));
     let program = read("increments", &text);
     let StepKind::Line(last) = program.steps[999_999].kind else { panic!("a line") };
-    assert_eq!(last.to.map(Length::to_mm), [100_000.0, 0.0, -100_000.0]);
+    assert_eq!(gcode::xyz_mm(last.to), [100_000.0, 0.0, -100_000.0]);
 }
 
 #[test]

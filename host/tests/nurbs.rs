@@ -253,7 +253,7 @@ fn the_same_curve_in_other_coordinates() {
         assert_eq!(curve.knots, [0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 2.0]);
         let program = read(text);
         let last = program.steps.iter().rev().find_map(|step| match step.kind {
-            StepKind::Nurbs(curve) => Some(curve.to.map(|length| length.to_mm())),
+            StepKind::Nurbs(curve) => Some(gcode::xyz_mm(curve.to)),
             _ => None,
         });
         assert_eq!(last, points_mm.last().copied());

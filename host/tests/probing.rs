@@ -1,6 +1,6 @@
 //! Probing moves: where they trip, where the machine comes to rest, and what the encoders of a run say of it.
 
-use motion_host::gcode::{self, Length, ProbeMove, Program, ReadOptions, StepKind};
+use motion_host::gcode::{self, Point, ProbeMove, Program, ReadOptions, StepKind, xyz_mm};
 use motion_host::machine::Machine;
 use motion_host::planning::{Item, Mode, Stretch, plan_program};
 use motion_host::simulate::{self, Probed};
@@ -35,8 +35,8 @@ fn probes(program: &Program) -> Vec<ProbeMove> {
     program.steps.iter().filter_map(|step| probe(&step.kind)).collect()
 }
 
-fn mm(point: [Length; 3]) -> [f64; 3] {
-    point.map(Length::to_mm)
+fn mm(point: Point) -> [f64; 3] {
+    xyz_mm(point)
 }
 
 /// #5061 to #5063 and #5070.

@@ -2,7 +2,7 @@
 
 use motion_kernel::hal::Spindle;
 
-use crate::gcode::{NoticeKind, Program, StepKind};
+use crate::gcode::{NoticeKind, Program, StepKind, xyz_mm};
 
 /// What has to be ready.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,7 +34,7 @@ impl Needs {
                 _ => {}
             }
             if let Some(ends) = step.kind.ends() {
-                for point in ends.map(|point| point.map(|coordinate| coordinate.to_mm())) {
+                for point in ends.map(xyz_mm) {
                     let extent_mm = needs.extent_mm.get_or_insert(point.map(|coordinate| [coordinate; 2]));
                     for ([low, high], coordinate) in extent_mm.iter_mut().zip(point) {
                         (*low, *high) = (low.min(coordinate), high.max(coordinate));

@@ -11,7 +11,7 @@ use super::error::{CliError, Outcome};
 use super::input;
 use super::table::{self, Align};
 use crate::gcode::{
-    Feed, Length, NoticeKind, Nurbs, Outputs, PathMode, Program, SpindleSpeed, Step, StepKind,
+    Feed, NoticeKind, Nurbs, Outputs, PathMode, Point, Program, SpindleSpeed, Step, StepKind, xyz_mm,
 };
 
 const EXAMPLES: &str = "\
@@ -233,7 +233,7 @@ pub(super) fn direction(spindle: Spindle) -> Option<&'static str> {
     }
 }
 
-fn move_json(from: [Length; 3], to: [Length; 3], feed: Feed, mode: PathMode) -> MoveJson {
+fn move_json(from: Point, to: Point, feed: Feed, mode: PathMode) -> MoveJson {
     let (path, tolerance_mm, merging_mm) = match mode {
         PathMode::Unprogrammed => ("machine", None, None),
         PathMode::ExactPath => ("exact", None, None),
@@ -243,8 +243,8 @@ fn move_json(from: [Length; 3], to: [Length; 3], feed: Feed, mode: PathMode) -> 
     MoveJson { from_mm: mm(from), to_mm: mm(to), feed_mm_min: mm_min(feed), path, tolerance_mm, merging_mm }
 }
 
-fn mm(point: [Length; 3]) -> [f64; 3] {
-    point.map(Length::to_mm)
+fn mm(point: Point) -> [f64; 3] {
+    xyz_mm(point)
 }
 
 fn mm_min(feed: Feed) -> Option<f64> {

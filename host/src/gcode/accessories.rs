@@ -2,6 +2,7 @@
 //!
 //! Spindle and coolant become a step where they change, each change a step of its own, as LinuxCNC's calls come.
 
+use super::axis::ORIGIN;
 use super::block::{Block, GGroup, MGroup};
 use super::cutter::compensated;
 use super::decimal::Length;
@@ -271,7 +272,7 @@ impl Interpreter {
         let axes = block.axes();
         let h = block.letter(b'H');
         let mut tool = match code.tenths {
-            490 => [Length::ZERO; 3],
+            490 => ORIGIN,
             430 => {
                 let number =
                     h.map_or(Ok(self.tools.current), |word| word.count(0, "a whole tool number, 0 or more"))?;

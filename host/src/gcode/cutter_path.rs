@@ -13,6 +13,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use super::axis::Point;
 use super::cutter::Cutter;
 use super::decimal::Length;
 use super::error::{Located, Problem};
@@ -32,15 +33,15 @@ const LENGTH_MIN_MM: f64 = 1e-6;
 const ENTRY_COS_MIN: f64 = 1e-4;
 
 /// A point or vector along the plane's axes \[mm\].
-type Point = [f64; 2];
+type PlanePoint = [f64; 2];
 
 /// The last move in the plane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Track {
     /// Where the centre starts.
-    start: Point,
+    start: PlanePoint,
     /// Where it ends unless the next corner is an inner one: beside the programmed point.
-    end: Point,
+    end: PlanePoint,
     shape: Shape,
     /// The index of its step. Behind it come steps that do not move in the plane.
     step: usize,
@@ -48,7 +49,7 @@ pub(super) struct Track {
 
 #[derive(Clone, Copy, Debug)]
 enum Shape {
-    Line { direction: Point },
+    Line { direction: PlanePoint },
     Arc(Circle),
 }
 
@@ -61,7 +62,7 @@ impl Shape {
 /// An arc of the centre.
 #[derive(Clone, Copy, Debug)]
 struct Circle {
-    centre: Point,
+    centre: PlanePoint,
     radius_mm: f64,
     /// 1: counter-clockwise, -1: clockwise.
     turn: f64,
@@ -94,7 +95,7 @@ impl Interpreter {
     /// A straight move with compensation.
     pub(super) fn offset_line(
         &mut self,
-        to: [Length; 3],
+        to: Point,
         feed: Feed,
         mode: PathMode,
         place: usize,
@@ -169,7 +170,7 @@ impl Interpreter {
             return Err(Located::new(place, Problem::CompensatedArc { radius_mm }));
         }
         // From a point of the arc to the side of the tool.
-        let normal = |point: Point| {
+        let normal = |point: PlanePoint| {
             let outwards = minus(point, centre);
             scaled(outwards, if is_inside { -1.0 } else { 1.0 } / norm(outwards))
         };
@@ -217,7 +218,7 @@ impl Interpreter {
         &mut self,
         arc: &ArcMove,
         mut circle: Circle,
-        [start, end]: [Point; 2],
+        [start, end]: [PlanePoint; 2],
         manner: Manner,
     ) -> Result<(), Located> {
         let Some(cutter) = self.cutter else { return Ok(()) };
@@ -251,12 +252,12 @@ impl Interpreter {
     /// Round an outer corner; where it ends.
     fn round(
         &mut self,
-        corner: Point,
-        end: Point,
+        corner: PlanePoint,
+        end: PlanePoint,
         turn_rad: f64,
-        height: [Length; 3],
+        height: Point,
         manner: Manner,
-    ) -> Result<Point, Located> {
+    ) -> Result<PlanePoint, Located> {
         let Some(cutter) = self.cutter else { return Ok(end) };
         self.end_track(manner.place)?;
         let circle = Circle {
@@ -272,7 +273,7 @@ impl Interpreter {
     }
 
     /// A straight step of the centre, to the height of a point across the plane.
-    fn centre_line(&mut self, end: Point, height: [Length; 3], manner: Manner) -> Result<(), Located> {
+    fn centre_line(&mut self, end: PlanePoint, height: Point, manner: Manner) -> Result<(), Located> {
         let from = self.position();
         let to = self.controlled(end, height, manner.place)?;
         if from != to {
@@ -286,8 +287,8 @@ impl Interpreter {
     fn centre_arc(
         &mut self,
         circle: &Circle,
-        end: Point,
-        height: [Length; 3],
+        end: PlanePoint,
+        height: Point,
         manner: Manner,
     ) -> Result<(), Located> {
         let Some(cutter) = self.cutter else { return Ok(()) };
@@ -324,7 +325,7 @@ impl Interpreter {
     }
 
     /// Ends the last move at a point, and with it what came behind it; where it ends.
-    fn end_at(&mut self, point: Point, place: usize) -> Result<Point, Located> {
+    fn end_at(&mut self, point: PlanePoint, place: usize) -> Result<PlanePoint, Located> {
         let Some((cutter, track)) = self.cutter.and_then(|cutter| Some((cutter, cutter.track?))) else {
             return Ok(point);
         };
@@ -394,7 +395,7 @@ impl Interpreter {
     }
 
     /// Where the tool is: beside the programmed point with compensation, and behind G40 until the next move.
-    fn position(&self) -> [Length; 3] {
+    fn position(&self) -> Point {
         self.tool_at.unwrap_or(self.machine)
     }
 
@@ -403,14 +404,14 @@ impl Interpreter {
         if self.modal.plane == Plane::Xy { 0.0 } else { self.frame.rotation_deg }
     }
 
-    fn in_plane(&self, point: [Length; 3]) -> Point {
+    fn in_plane(&self, point: Point) -> PlanePoint {
         let turned = turn(point.map(Length::units), -self.plane_turn_deg());
         let [first, second, _] = self.modal.plane.axes();
         [first, second].map(|axis| turned[axis] as f64 / Length::UNITS_PER_MM as f64)
     }
 
     /// The tool's controlled point with the centre there, at the height of a point across the plane.
-    fn controlled(&self, centre: Point, height: [Length; 3], place: usize) -> Result<[Length; 3], Located> {
+    fn controlled(&self, centre: PlanePoint, height: Point, place: usize) -> Result<Point, Located> {
         let beyond = Located::new(place, Problem::WorkOutOfRange);
         let Some(cutter) = self.cutter else { return Err(beyond) };
         let [first, second, _] = self.modal.plane.axes();
@@ -425,19 +426,19 @@ impl Interpreter {
 
 impl Cutter {
     /// A direction, turned to the side of the tool.
-    fn side(&self, [u, v]: Point) -> Point {
+    fn side(&self, [u, v]: PlanePoint) -> PlanePoint {
         if self.is_left { [-v, u] } else { [v, -u] }
     }
 
     /// The direction of a path, from that to the side of its tool.
-    fn direction(&self, [u, v]: Point) -> Point {
+    fn direction(&self, [u, v]: PlanePoint) -> PlanePoint {
         if self.is_left { [v, -u] } else { [-v, u] }
     }
 
     /// The corner between the last move and one that starts in `start` with the tool along `normal`. A path
     /// that goes back beside itself goes round its end, unless it `climbs` from the outside of an arc, or
     /// onto it: then it stays above.
-    fn corner(&self, track: &Track, start: Point, normal: Point, climbs: bool) -> Corner {
+    fn corner(&self, track: &Track, start: PlanePoint, normal: PlanePoint, climbs: bool) -> Corner {
         let before = minus(track.end, start);
         let turn_rad = libm::atan2(cross(before, normal), dot(before, normal));
         let outwards_rad = if self.is_left { -turn_rad } else { turn_rad };
@@ -465,7 +466,7 @@ impl Cutter {
 
 impl Circle {
     /// The angle from one direction to another, the way the arc goes, from -90° to 270° \[rad\].
-    fn travel_rad(&self, from: Point, to: Point) -> f64 {
+    fn travel_rad(&self, from: PlanePoint, to: PlanePoint) -> f64 {
         let (from, to) = (minus(from, self.centre), minus(to, self.centre));
         let angle_rad = self.turn * libm::atan2(cross(from, to), dot(from, to));
         if angle_rad < -FRAC_PI_2 { angle_rad + 2.0 * PI } else { angle_rad }
@@ -473,7 +474,7 @@ impl Circle {
 }
 
 /// Where a line crosses a circle, in the order of its direction, which is of length 1.
-fn crossings(on_line: Point, direction: Point, circle: &Circle) -> Option<[Point; 2]> {
+fn crossings(on_line: PlanePoint, direction: PlanePoint, circle: &Circle) -> Option<[PlanePoint; 2]> {
     let to_centre = minus(circle.centre, on_line);
     let off_mm = cross(direction, to_centre);
     let half_mm = libm::sqrt((circle.radius_mm - off_mm) * (circle.radius_mm + off_mm));
@@ -485,7 +486,7 @@ fn crossings(on_line: Point, direction: Point, circle: &Circle) -> Option<[Point
 }
 
 /// Where an arc and the next one meet.
-fn between(before: &Circle, next: &Circle) -> Option<Point> {
+fn between(before: &Circle, next: &Circle) -> Option<PlanePoint> {
     let across = minus(next.centre, before.centre);
     let distance_mm = norm(across);
     let towards = scaled(across, 1.0 / distance_mm);
@@ -500,26 +501,26 @@ fn between(before: &Circle, next: &Circle) -> Option<Point> {
     Some(plus(plus(before.centre, towards, along_mm), [-towards[1], towards[0]], left))
 }
 
-fn plus(a: Point, b: Point, times: f64) -> Point {
+fn plus(a: PlanePoint, b: PlanePoint, times: f64) -> PlanePoint {
     [a[0] + b[0] * times, a[1] + b[1] * times]
 }
 
-fn minus(a: Point, b: Point) -> Point {
+fn minus(a: PlanePoint, b: PlanePoint) -> PlanePoint {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-fn scaled(a: Point, times: f64) -> Point {
+fn scaled(a: PlanePoint, times: f64) -> PlanePoint {
     [a[0] * times, a[1] * times]
 }
 
-fn dot(a: Point, b: Point) -> f64 {
+fn dot(a: PlanePoint, b: PlanePoint) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-fn cross(a: Point, b: Point) -> f64 {
+fn cross(a: PlanePoint, b: PlanePoint) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-fn norm(a: Point) -> f64 {
+fn norm(a: PlanePoint) -> f64 {
     libm::hypot(a[0], a[1])
 }

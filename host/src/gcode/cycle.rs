@@ -2,6 +2,7 @@
 //!
 //! As LinuxCNC makes them: along the normal of the plane, in exact path, the holes of one line after each other.
 
+use super::axis::AXES_MAX;
 use super::block::Block;
 use super::decimal::Length;
 use super::error::{Located, Problem};
@@ -163,8 +164,9 @@ impl Interpreter {
             initial: Some(self.cycle.initial.unwrap_or(self.work[normal])),
             ..words
         };
+        let start = self.work.map(Length::units);
         let at = |hole: [i64; 2], level: i64| {
-            let mut point = [0; 3];
+            let mut point = start;
             point[axis_1] = hole[0];
             point[axis_2] = hole[1];
             point[normal] = level;
@@ -250,7 +252,7 @@ impl Interpreter {
         levels: Levels,
         feed: Feed,
         first: Word<'_>,
-        at: impl Fn(i64) -> [i64; 3],
+        at: impl Fn(i64) -> [i64; AXES_MAX],
     ) -> Result<(), Located> {
         if cycle.pecks() {
             let mut depth = levels.r - self.cycle.peck.units();
@@ -288,7 +290,7 @@ impl Interpreter {
     /// A straight move to a point in work coordinates \[10⁻¹⁰ mm\].
     pub(super) fn straight(
         &mut self,
-        to: [i64; 3],
+        to: [i64; AXES_MAX],
         feed: Feed,
         mode: PathMode,
         first: Word<'_>,

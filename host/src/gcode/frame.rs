@@ -3,86 +3,102 @@
 //! A point of the program is shifted by G92 or G52, turned about Z by the coordinate system's R, and shifted by
 //! the system's origin and the tool's offset, in this order. Without a rotation all of it is exact.
 
+use super::axis::{AXES_MAX, Point};
 use super::decimal::Length;
 
 /// The offsets in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Frame {
     /// Of the coordinate system, in machine coordinates.
-    pub(super) origin: [Length; 3],
+    pub(super) origin: Point,
     /// Of the coordinate system \[°\], counter-clockwise in XY.
     pub(super) rotation_deg: f64,
     /// G92 or G52, along the system's axes.
-    pub(super) shift: [Length; 3],
+    pub(super) shift: Point,
     /// G43, in machine coordinates.
-    pub(super) tool: [Length; 3],
+    pub(super) tool: Point,
 }
 
 impl Frame {
     /// Machine coordinates; `None` beyond the range.
-    pub(super) fn machine(&self, work: [Length; 3]) -> Option<[Length; 3]> {
-        let shifted = [0, 1, 2].map(|axis| work[axis].units() + self.shift[axis].units());
+    pub(super) fn machine(&self, work: Point) -> Option<Point> {
+        let shifted = core::array::from_fn(|axis| work[axis].units() + self.shift[axis].units());
         let turned = self.turned(shifted);
-        lengths([0, 1, 2].map(|axis| turned[axis] + self.origin[axis].units() + self.tool[axis].units()))
+        lengths(core::array::from_fn(|axis| {
+            turned[axis] + self.origin[axis].units() + self.tool[axis].units()
+        }))
     }
 
     /// Work coordinates; `None` beyond the range.
-    pub(super) fn work(&self, machine: [Length; 3]) -> Option<[Length; 3]> {
+    pub(super) fn work(&self, machine: Point) -> Option<Point> {
         let offsets = |axis: usize| self.origin[axis].units() + self.tool[axis].units();
-        let moved = [0, 1, 2].map(|axis| machine[axis].units() - offsets(axis));
+        let moved = core::array::from_fn(|axis| machine[axis].units() - offsets(axis));
         let turned = turn(moved, -self.rotation_deg);
-        lengths([0, 1, 2].map(|axis| turned[axis] - self.shift[axis].units()))
+        lengths(core::array::from_fn(|axis| turned[axis] - self.shift[axis].units()))
     }
 
     /// The program's zero, in machine coordinates \[10⁻¹⁰ mm\].
-    pub(super) fn zero(&self) -> [i64; 3] {
+    pub(super) fn zero(&self) -> [i64; AXES_MAX] {
         let shift = self.turned(self.shift.map(Length::units));
-        [0, 1, 2].map(|axis| shift[axis] + self.origin[axis].units() + self.tool[axis].units())
+        core::array::from_fn(|axis| shift[axis] + self.origin[axis].units() + self.tool[axis].units())
     }
 
     /// A vector \[10⁻¹⁰ mm\] of the program, in machine coordinates.
-    pub(super) fn turned(&self, vector: [i64; 3]) -> [i64; 3] {
+    pub(super) fn turned(&self, vector: [i64; AXES_MAX]) -> [i64; AXES_MAX] {
         turn(vector, self.rotation_deg)
     }
 
     /// A vector \[10⁻¹⁰ mm\] of the machine, along the program's axes.
-    pub(super) fn turned_back(&self, vector: [i64; 3]) -> [i64; 3] {
+    pub(super) fn turned_back(&self, vector: [i64; AXES_MAX]) -> [i64; AXES_MAX] {
         turn(vector, -self.rotation_deg)
     }
 }
 
 /// Lengths of so many units; `None` if one is beyond the range.
-pub(super) fn lengths(units: [i64; 3]) -> Option<[Length; 3]> {
-    let [x, y, z] = units.map(Length::from_units);
-    Some([x?, y?, z?])
+pub(super) fn lengths(units: [i64; AXES_MAX]) -> Option<Point> {
+    let mut lengths = [Length::ZERO; AXES_MAX];
+    for (length, units) in lengths.iter_mut().zip(units) {
+        *length = Length::from_units(units)?;
+    }
+    Some(lengths)
 }
 
 /// A vector turned about Z; rounded, but by quarter turns.
-pub(super) fn turn([x, y, z]: [i64; 3], angle_deg: f64) -> [i64; 3] {
+pub(super) fn turn(vector: [i64; AXES_MAX], angle_deg: f64) -> [i64; AXES_MAX] {
+    let mut turned = vector;
+    [turned[0], turned[1]] = turn_xy([vector[0], vector[1]], angle_deg);
+    turned
+}
+
+fn turn_xy([x, y]: [i64; 2], angle_deg: f64) -> [i64; 2] {
     let angle_deg = angle_deg % 360.0;
     if angle_deg == 0.0 {
-        return [x, y, z];
+        return [x, y];
     }
     if angle_deg == 90.0 || angle_deg == -270.0 {
-        return [-y, x, z];
+        return [-y, x];
     }
     if angle_deg == 180.0 || angle_deg == -180.0 {
-        return [-x, -y, z];
+        return [-x, -y];
     }
     if angle_deg == 270.0 || angle_deg == -90.0 {
-        return [y, -x, z];
+        return [y, -x];
     }
     let (sin, cos) = libm::sincos(angle_deg.to_radians());
     let (x, y) = (x as f64, y as f64);
-    [(x * cos - y * sin).round() as i64, (x * sin + y * cos).round() as i64, z]
+    [(x * cos - y * sin).round() as i64, (x * sin + y * cos).round() as i64]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn at(mm: [f64; 3]) -> [Length; 3] {
-        mm.map(|mm| Length::nearest(mm).unwrap())
+    fn at(mm: [f64; 3]) -> Point {
+        let mut point = [Length::ZERO; AXES_MAX];
+        for (length, mm) in point.iter_mut().zip(mm) {
+            *length = Length::nearest(mm).unwrap();
+        }
+        point
     }
 
     #[test]

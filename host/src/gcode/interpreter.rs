@@ -2,10 +2,10 @@
 
 use std::rc::Rc;
 
+use super::axis::{ORIGIN, Point};
 use super::block::{Block, GGroup, MGroup};
 use super::cutter::Cutter;
 use super::cycle::CycleState;
-use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::expression::Target;
 use super::frame::Frame;
@@ -48,13 +48,13 @@ pub(super) struct Interpreter {
     /// The coordinate system in force, 1 to 9: parameter 5220 unless the program assigned that.
     pub(super) system: u32,
     /// Where the machine is, as the program counts.
-    pub(super) work: [Length; 3],
+    pub(super) work: Point,
     /// Where the machine is; with cutter compensation the programmed point.
-    pub(super) machine: [Length; 3],
+    pub(super) machine: Point,
     /// G41 or G42.
     pub(super) cutter: Option<Cutter>,
     /// Where the machine is instead, beside the programmed path.
-    pub(super) tool_at: Option<[Length; 3]>,
+    pub(super) tool_at: Option<Point>,
     pub(super) parameters: Parameters,
     pub(super) tools: Tools,
     /// What spindle and coolant do after the steps up to here.
@@ -105,7 +105,7 @@ pub(super) struct Tools {
 struct Saved {
     modal: Modal,
     system: u32,
-    tool: [Length; 3],
+    tool: Point,
     /// M73: restored at the end of the subroutine.
     restores: bool,
 }
@@ -119,8 +119,8 @@ impl Interpreter {
             modal: Modal::default(),
             frame: Frame::default(),
             system: 1,
-            work: [Length::ZERO; 3],
-            machine: [Length::ZERO; 3],
+            work: ORIGIN,
+            machine: ORIGIN,
             cutter: None,
             tool_at: None,
             tools: Tools {
@@ -385,7 +385,7 @@ mod tests {
     fn last_mm(text: &str) -> [f64; 3] {
         match steps(text).last() {
             Some(StepKind::Line(LineMove { to, .. }) | StepKind::Arc(ArcMove { to, .. })) => {
-                to.map(Length::to_mm)
+                super::super::xyz_mm(*to)
             }
             other => panic!("a move, not {other:?}"),
         }

@@ -125,6 +125,7 @@
 
 mod accessories;
 mod arc;
+mod axis;
 mod block;
 mod cutter;
 mod cutter_path;
@@ -159,6 +160,7 @@ mod survey;
 mod tool;
 
 pub use arc::{RADIUS_MISMATCH_INCH, RADIUS_MISMATCH_MM, RADIUS_MISMATCH_RATIO};
+pub use axis::{AXES_MAX, Axes, Axis, ORIGIN, Point, xyz_mm};
 pub use decimal::{Decimal, Length};
 pub(crate) use error::describe;
 pub use error::{GcodeError, Problem};

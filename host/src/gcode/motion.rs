@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use super::arc;
+use super::axis::{AXES_MAX, Point};
 use super::block::{Block, GGroup};
 use super::decimal::Length;
 use super::error::{Located, Problem};
@@ -85,7 +86,7 @@ impl Interpreter {
     }
 
     /// Where a line leads: in the program's coordinates, and in those of the machine.
-    pub(super) fn target(&self, line: MoveLine<'_, '_>) -> Result<[[Length; 3]; 2], Located> {
+    pub(super) fn target(&self, line: MoveLine<'_, '_>) -> Result<[Point; 2], Located> {
         let work = self.end_point(line.block)?;
         let to = self.machine_at(work);
         Ok([work, to.ok_or_else(|| line.first.problem(|word| Problem::PositionOutOfRange { word }))?])
@@ -156,14 +157,18 @@ impl Interpreter {
 
     /// Machine coordinates of a point; `None` beyond the range. Turned to the program's axes and back they are rounded:
     /// what stays in XY stays, so that a whole turn remains one.
-    pub(super) fn machine_at(&self, work: [Length; 3]) -> Option<[Length; 3]> {
+    pub(super) fn machine_at(&self, work: Point) -> Option<Point> {
         let to = self.frame.machine(work)?;
         let stays = [0, 1].iter().all(|&axis| work[axis] == self.work[axis]);
-        Some(if stays { [self.machine[0], self.machine[1], to[2]] } else { to })
+        let mut to = to;
+        if stays {
+            [to[0], to[1]] = [self.machine[0], self.machine[1]];
+        }
+        Some(to)
     }
 
     /// A straight move from where the tool is.
-    pub(super) fn line_to(&mut self, to: [Length; 3], feed: Feed, mode: PathMode) -> Result<(), Located> {
+    pub(super) fn line_to(&mut self, to: Point, feed: Feed, mode: PathMode) -> Result<(), Located> {
         let from = self.tool_at.take().unwrap_or(self.machine);
         self.machine = to;
         if from == to {
@@ -250,7 +255,7 @@ impl Interpreter {
         [x * cos - y * sin, x * sin + y * cos]
     }
 
-    pub(super) fn end_point(&self, block: &Block<'_>) -> Result<[Length; 3], Located> {
+    pub(super) fn end_point(&self, block: &Block<'_>) -> Result<Point, Located> {
         let mut to = self.work;
         for (coordinate, word) in to.iter_mut().zip(block.axes()) {
             let Some(word) = word else { continue };
@@ -263,8 +268,7 @@ impl Interpreter {
             };
         }
         if let Some(polar) = Polar::of(block)? {
-            let [x, y, _] = self.work;
-            [to[0], to[1]] = polar.point([x, y], &self.modal)?;
+            [to[0], to[1]] = polar.point([self.work[0], self.work[1]], &self.modal)?;
         }
         Ok(to)
     }
@@ -273,7 +277,7 @@ impl Interpreter {
     fn arc(
         &mut self,
         line: MoveLine<'_, '_>,
-        [from, to]: [[Length; 3]; 2],
+        [from, to]: [Point; 2],
         closes: bool,
     ) -> Result<ArcMove, Located> {
         let MoveLine { block, motion, feed, offset, .. } = line;
@@ -285,7 +289,7 @@ impl Interpreter {
         }
         // In XY the machine's axes do; another plane turns with the program's.
         let turn_deg = self.plane_turn_deg();
-        let turned = |point: [Length; 3]| {
+        let turned = |point: Point| {
             let beyond = || Located::new(offset, Problem::WorkOutOfRange);
             lengths(turn(point.map(Length::units), -turn_deg)).ok_or_else(beyond)
         };
@@ -362,7 +366,7 @@ impl Interpreter {
                 }
             };
         }
-        let mut vector = [0; 3];
+        let mut vector = [0; AXES_MAX];
         (vector[first], vector[second]) = (lengths[0], lengths[1]);
         let vector = turn(self.frame.turned(vector), -turn_deg);
         if self.modal.arc_distance == Distance::Incremental {
@@ -374,7 +378,7 @@ impl Interpreter {
 }
 
 /// The distance of two points \[mm\].
-pub(super) fn distance_mm(from: [Length; 3], to: [Length; 3]) -> f64 {
-    let [x, y, z] = [0, 1, 2].map(|axis| to[axis].to_mm() - from[axis].to_mm());
+pub(super) fn distance_mm(from: Point, to: Point) -> f64 {
+    let [x, y, z] = core::array::from_fn(|axis: usize| to[axis].to_mm() - from[axis].to_mm());
     libm::sqrt(x * x + y * y + z * z)
 }

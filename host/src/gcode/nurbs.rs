@@ -8,8 +8,8 @@
 //! words within the lines of a NURBS, a NURBS that is never ended, knots that decrease or are not all equal at
 //! the start.
 
+use super::axis::{Point, xyz_mm};
 use super::block::{Block, GGroup};
-use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::interpreter::Interpreter;
 use super::lexer::Word;
@@ -67,7 +67,7 @@ pub(super) struct Open {
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     /// In work and in machine coordinates.
-    point: Option<[[Length; 3]; 2]>,
+    point: Option<[Point; 2]>,
     weight: Option<f64>,
     knot: u32,
 }
@@ -138,7 +138,7 @@ impl Interpreter {
     }
 
     /// The control point of a line. As in LinuxCNC, G91 counts all of them from where the NURBS starts.
-    fn control_point(&self, block: &Block<'_>, plane: Plane) -> Result<Option<[[Length; 3]; 2]>, Located> {
+    fn control_point(&self, block: &Block<'_>, plane: Plane) -> Result<Option<[Point; 2]>, Located> {
         let axes = block.axes();
         let [first, second, normal] = plane.axes().map(|axis| axes.get(axis).copied().flatten());
         if let Some(word) = normal {
@@ -163,7 +163,7 @@ impl Interpreter {
         &mut self,
         block: &Block<'_>,
         first: Word<'_>,
-        point: Option<[[Length; 3]; 2]>,
+        point: Option<[Point; 2]>,
     ) -> Result<(), Located> {
         let weight = block.own(b'P').map(|word| weight(&word)).transpose()?;
         let order = block.own(b'L').map(|word| order(&word, 3, "an order from 3 to 20")).transpose()?;
@@ -208,7 +208,7 @@ impl Interpreter {
         &mut self,
         block: &Block<'_>,
         first: Word<'_>,
-        point: Option<[[Length; 3]; 2]>,
+        point: Option<[Point; 2]>,
     ) -> Result<bool, Located> {
         const ORDER: &str = "an order from 2 to 20";
         let missing = |found: &str, expected| {
@@ -300,7 +300,7 @@ impl Interpreter {
     /// Appends the step. The machine is where the last control point is.
     fn made(&mut self, order: u32, entries: &[Entry], knots: Vec<f64>, feed: Feed) -> Result<(), Located> {
         self.modal.motion = None;
-        let points: Vec<[[Length; 3]; 2]> = entries.iter().filter_map(|entry| entry.point).collect();
+        let points: Vec<[Point; 2]> = entries.iter().filter_map(|entry| entry.point).collect();
         let (from, mode) = (self.machine, self.modal.path);
         if let Some(&[work, machine]) = points.last() {
             (self.work, self.machine) = (work, machine);
@@ -312,7 +312,7 @@ impl Interpreter {
         self.step(StepKind::Nurbs(NurbsMove { from, to: self.machine, curve, feed, mode }))?;
         self.program.nurbs.push(Nurbs {
             degree: order as usize - 1,
-            points_mm: points.iter().map(|[_, machine]| machine.map(Length::to_mm)).collect(),
+            points_mm: points.iter().map(|[_, machine]| xyz_mm(*machine)).collect(),
             weights: entries.iter().filter_map(|entry| entry.weight).collect(),
             knots,
         });

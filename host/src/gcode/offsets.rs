@@ -3,6 +3,7 @@
 //! Parameters hold the offsets \[mm\], as in LinuxCNC: 5161 and 5181 on the places of G28 and G30, 5211 on those
 //! of G92, 5221 + 20 n on those of the coordinate systems, with their rotation \[°\] nine places further.
 
+use super::axis::{AXES_MAX, ORIGIN, Point};
 use super::block::{Block, GGroup};
 use super::decimal::Length;
 use super::error::{Located, Problem};
@@ -48,8 +49,8 @@ impl Interpreter {
     }
 
     /// Three lengths from `first` on.
-    fn stored(&self, first: u32, offset: usize) -> Result<[Length; 3], Located> {
-        let mut stored = [Length::ZERO; 3];
+    fn stored(&self, first: u32, offset: usize) -> Result<Point, Located> {
+        let mut stored = ORIGIN;
         for (length, number) in stored.iter_mut().zip(first..) {
             let mm = self.parameters.get(number);
             *length =
@@ -58,7 +59,7 @@ impl Interpreter {
         Ok(stored)
     }
 
-    fn store(&mut self, first: u32, values: [Length; 3]) {
+    fn store(&mut self, first: u32, values: Point) {
         for (value, number) in values.into_iter().zip(first..) {
             self.parameters.set(number, value.to_mm());
         }
@@ -108,11 +109,10 @@ impl Interpreter {
             }
         }
         let Some(code) = block.g(GGroup::Shift) else { return Ok(()) };
-        self.frame.shift =
-            if code.tenths == 923 { self.stored(SHIFT, code.word.offset)? } else { [Length::ZERO; 3] };
+        self.frame.shift = if code.tenths == 923 { self.stored(SHIFT, code.word.offset)? } else { ORIGIN };
         self.parameters.set(SHIFT_APPLIES, f64::from(u8::from(code.tenths == 923)));
         if code.tenths == 921 {
-            self.store(SHIFT, [Length::ZERO; 3]);
+            self.store(SHIFT, ORIGIN);
         }
         self.update_work(code.word.offset)
     }
@@ -145,12 +145,13 @@ impl Interpreter {
         let way = self.end_point(block)?;
         let axes = block.axes();
         let all = axes.iter().all(Option::is_none);
-        let end = [0, 1, 2].map(|axis| if all || axes[axis].is_some() { place[axis] } else { way[axis] });
+        let end =
+            core::array::from_fn(|axis| if all || axes[axis].is_some() { place[axis] } else { way[axis] });
         self.rapid(way, code)?;
         self.rapid(end, code)
     }
 
-    fn rapid(&mut self, work: [Length; 3], code: Word<'_>) -> Result<(), Located> {
+    fn rapid(&mut self, work: Point, code: Word<'_>) -> Result<(), Located> {
         self.straight(work.map(Length::units), Feed::Rapid, self.modal.path, code)
     }
 
@@ -201,13 +202,14 @@ impl Interpreter {
         let mut origin = frame.origin;
         if from_position {
             let here = frame.work(self.machine).ok_or_else(beyond)?;
-            let mut back = [0; 3];
+            let mut back = [0; AXES_MAX];
             for (axis, word) in block.axes().into_iter().enumerate() {
                 let Some(word) = word else { continue };
                 back[axis] = here[axis].units() - self.modal.units.length(word)?.units();
             }
             let back = frame.turned(back);
-            origin = lengths([0, 1, 2].map(|axis| origin[axis].units() + back[axis])).ok_or_else(beyond)?;
+            origin =
+                lengths(core::array::from_fn(|axis| origin[axis].units() + back[axis])).ok_or_else(beyond)?;
         } else {
             for (length, word) in origin.iter_mut().zip(block.axes()) {
                 if let Some(word) = word {
@@ -230,7 +232,7 @@ impl Interpreter {
         if axes.iter().chain(&others).all(Option::is_none) {
             return Err(code.problem(|word| Problem::Setup { word, expected: "axis words, R, I, J or Q" }));
         }
-        let mut given = [None; 3];
+        let mut given = [None; AXES_MAX];
         for (length, word) in given.iter_mut().zip(axes) {
             *length = word.map(|word| self.modal.units.length(word)).transpose()?;
         }
@@ -240,9 +242,9 @@ impl Interpreter {
             }
         } else {
             let mut frame = self.frame_in(if kind == 11 { 9 } else { self.system() }, code.offset)?;
-            frame.tool = [Length::ZERO; 3];
+            frame.tool = ORIGIN;
             if kind == 11 {
-                frame.shift = [Length::ZERO; 3];
+                frame.shift = ORIGIN;
             }
             let here = frame.work(self.machine).ok_or_else(beyond)?;
             let mut offset = frame.turned_back(tool.offset.map(Length::units));

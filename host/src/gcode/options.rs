@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::axis::Axes;
 use super::parameter_file::ParameterFile;
 use super::probe::Probe;
 use super::tool::ToolTable;
@@ -9,6 +10,8 @@ use super::tool::ToolTable;
 /// What a program is read with: switches of the operator, files beside the program, and bounds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadOptions {
+    /// The axes of the machine; X, Y and Z by default. Words of others are refused.
+    pub axes: Axes,
     /// Lines that begin with `/` are left out; as in LinuxCNC, on by default.
     pub block_delete: bool,
     /// M1 stops; on by default.
@@ -34,6 +37,7 @@ pub struct ReadOptions {
 impl Default for ReadOptions {
     fn default() -> Self {
         Self {
+            axes: Axes::XYZ,
             block_delete: true,
             optional_stop: true,
             subroutines: Vec::new(),

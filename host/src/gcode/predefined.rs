@@ -108,7 +108,7 @@ impl Environment for Interpreter {
 }
 
 /// A coordinate \[mm\].
-fn at(point: [super::Length; 3], axis: u32) -> f64 {
+fn at(point: super::Point, axis: u32) -> f64 {
     point.get(axis as usize).map_or(0.0, |length| length.to_mm())
 }
 

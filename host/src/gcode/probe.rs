@@ -7,6 +7,7 @@
 use motion_kernel::law::reach;
 use motion_kernel::plan::{Bend, Ceiling, MachineLimits};
 
+use super::axis::{Point, xyz_mm};
 use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::interpreter::Interpreter;
@@ -62,7 +63,7 @@ impl ProbeKind {
 impl Probe {
     /// Where the machine is at rest after the probe tripped at `trip` on the way from `from` to `end`: braked as soon as it
     /// tripped, from the feed that it had there. At the latest that is the end. `None` where there are no such limits.
-    fn rest(&self, [from, trip, end]: [[Length; 3]; 3], feed: Feed) -> Option<[Length; 3]> {
+    fn rest(&self, [from, trip, end]: [Point; 3], feed: Feed) -> Option<Point> {
         let (length_mm, to_trip_mm) = (distance_mm(from, end), distance_mm(from, trip));
         let way_mm = [0, 1, 2].map(|axis: usize| end[axis].to_mm() - from[axis].to_mm());
         let direction = way_mm.map(|way_mm| (way_mm / length_mm).abs());
@@ -73,9 +74,8 @@ impl Probe {
         if share >= 1.0 {
             return Some(end);
         }
-        let [x, y, z] =
-            [0, 1, 2].map(|axis: usize| Length::nearest(from[axis].to_mm() + share * way_mm[axis]));
-        Some([x?, y?, z?])
+        let xyz_mm = core::array::from_fn(|axis| from[axis].to_mm() + share * way_mm[axis]);
+        with_xyz_mm(from, xyz_mm)
     }
 }
 
@@ -98,7 +98,7 @@ impl Interpreter {
         };
         let [_, end] = self.target(line)?;
         let from = self.machine;
-        let [from_mm, end_mm] = [from, end].map(|point| point.map(Length::to_mm));
+        let [from_mm, end_mm] = [from, end].map(xyz_mm);
         let is_touched = probe.surface.is_touched(from_mm);
         if from == end && !kind.may_miss {
             return Err(refused(Problem::ProbeStands { motion }));
@@ -117,10 +117,7 @@ impl Interpreter {
         };
         let beyond = || first.problem(|word| Problem::PositionOutOfRange { word });
         let trip = match trip {
-            Some(trip_mm) => {
-                let [x, y, z] = trip_mm.map(Length::nearest);
-                Some([x.ok_or_else(beyond)?, y.ok_or_else(beyond)?, z.ok_or_else(beyond)?])
-            }
+            Some(trip_mm) => Some(with_xyz_mm(from, trip_mm).ok_or_else(beyond)?),
             None if kind.may_miss => None,
             None => {
                 return Err(refused(Problem::ProbeMissed { motion, to: shown(end_mm), is_touched }));
@@ -142,6 +139,14 @@ impl Interpreter {
         self.parameters.set(TRIPPED, f64::from(u8::from(trip.is_some())));
         Ok(())
     }
+}
+
+/// A point with other X, Y and Z; `None` beyond the range.
+fn with_xyz_mm(mut point: Point, xyz_mm: [f64; 3]) -> Option<Point> {
+    for (coordinate, mm) in point.iter_mut().zip(xyz_mm) {
+        *coordinate = Length::nearest(mm)?;
+    }
+    Some(point)
 }
 
 /// A position in machine coordinates \[mm\], for people.

@@ -1,6 +1,6 @@
 //! The steps of a program, in its order.
 
-use super::decimal::Length;
+use super::axis::Point;
 use super::parameters::Parameters;
 use motion_kernel::hal::Spindle;
 use std::fmt;
@@ -132,7 +132,7 @@ pub enum StepKind {
 impl StepKind {
     /// Start and end of a move.
     #[must_use]
-    pub fn ends(&self) -> Option<[[Length; 3]; 2]> {
+    pub fn ends(&self) -> Option<[Point; 2]> {
         match self {
             Self::Line(line) => Some([line.from, line.to]),
             Self::Arc(arc) => Some([arc.from, arc.to]),
@@ -212,9 +212,9 @@ impl Default for SpindleSpeed {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineMove {
     /// Start, X Y Z.
-    pub from: [Length; 3],
+    pub from: Point,
     /// End, X Y Z; differs from the start.
-    pub to: [Length; 3],
+    pub to: Point,
     /// Feed along the line.
     pub feed: Feed,
     /// How its ends are passed.
@@ -229,9 +229,9 @@ pub struct LineMove {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArcMove {
     /// Start, X Y Z.
-    pub from: [Length; 3],
+    pub from: Point,
     /// End, X Y Z.
-    pub to: [Length; 3],
+    pub to: Point,
     /// Plane of the arc, before its turn.
     pub plane: Plane,
     /// Turn of the plane and its axes about Z \[°\], counter-clockwise: a rotated coordinate system turns ZX and YZ.
@@ -255,9 +255,9 @@ pub struct ArcMove {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CubicMove {
     /// Start, X Y Z.
-    pub from: [Length; 3],
+    pub from: Point,
     /// End, X Y Z; Z is that of the start.
-    pub to: [Length; 3],
+    pub to: Point,
     /// X and Y of the first control point from the start, and of the second from the end \[mm\].
     pub controls_mm: [[f64; 2]; 2],
     /// Feed along the curve.
@@ -270,9 +270,9 @@ pub struct CubicMove {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThroughMove {
     /// The point before, X Y Z.
-    pub from: [Length; 3],
+    pub from: Point,
     /// The point, X Y Z; differs from the one before.
-    pub to: [Length; 3],
+    pub to: Point,
     /// Whether the spline begins with it, whatever was before.
     pub begins: bool,
     /// Feed along the spline up to the point.
@@ -285,9 +285,9 @@ pub struct ThroughMove {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NurbsMove {
     /// Start, X Y Z: the first control point.
-    pub from: [Length; 3],
+    pub from: Point,
     /// End, X Y Z: the last control point.
-    pub to: [Length; 3],
+    pub to: Point,
     /// Index of the curve in [`Program::nurbs`].
     pub curve: usize,
     /// Feed along the curve.
@@ -300,13 +300,13 @@ pub struct NurbsMove {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbeMove {
     /// Start, X Y Z.
-    pub from: [Length; 3],
+    pub from: Point,
     /// Where the machine comes to rest: braked from where the probe tripped, or the programmed end.
-    pub to: [Length; 3],
+    pub to: Point,
     /// The programmed end.
-    pub end: [Length; 3],
+    pub end: Point,
     /// Where the probe trips; absent if it does not.
-    pub trip: Option<[Length; 3]>,
+    pub trip: Option<Point>,
     /// It trips where it leaves the surface.
     pub leaves: bool,
     /// Feed along the line.

@@ -1,7 +1,7 @@
 //! Control points of G5 and G5.1, as LinuxCNC takes them.
 
+use super::axis::Point;
 use super::block::Block;
-use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::modal::{Modal, Motion};
 use super::program::Plane;
@@ -28,7 +28,7 @@ pub(super) fn cubic_mm(
 pub(super) fn quadratic_mm(
     block: &Block<'_>,
     modal: &Modal,
-    ends: [[Length; 3]; 2],
+    ends: [Point; 2],
     offset: usize,
 ) -> Result<[[f64; 2]; 2], Located> {
     refuse_other_planes(block, modal, Motion::Quadratic, offset)?;

@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 
+use super::axis::Point;
 use super::decimal::Length;
 use super::error::{GcodeError, Located, Problem};
 use super::expression::NoParameters;
@@ -18,7 +19,7 @@ pub struct Tool {
     /// P: its place in the changer.
     pub pocket: u32,
     /// X Y Z: what G43 adds.
-    pub offset: [Length; 3],
+    pub offset: Point,
     /// D.
     pub diameter: Length,
     /// I and J \[°\]: front and back angle of a lathe tool.

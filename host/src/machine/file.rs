@@ -21,18 +21,19 @@ use toml::Spanned;
 use super::error::{MachineError, quote};
 use super::law_name::{LAW_NAMES, law_named};
 use super::range::{
-    AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP,
-    ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump,
-    JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NAME_CHARACTERS_MAX,
-    NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp,
-    Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS,
-    TablePoint, Tick, Velocity, Watch, Within,
+    AXIS_LETTER, AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CurveShare, Damping, DeadTime,
+    EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime,
+    InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio,
+    NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE,
+    Place, Positive, Ramp, Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed, SpindleTime,
+    StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch, Within,
 };
 use super::settings::{
     AxisSettings, BLEND_TOLERANCE_MM, CoolantSettings, DefaultPathMode, FaultSettings, HomingSettings,
     Machine, PathSettings, SpindleSettings, ToolSettings,
 };
 
+use crate::gcode::{AXES_MAX, Axis};
 use crate::touch::{Surface, TouchBox};
 
 /// Seconds per minute: feeds in mm/min exist in this file only.
@@ -42,7 +43,7 @@ const S_PER_MIN: f64 = 60.0;
 /// up, and readings have noise: it is held to twice its feed.
 const TIMER_MARGIN: f64 = 2.0;
 
-pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineError> {
+pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, MachineError> {
     let file: MachineFile =
         toml::from_str(text).map_err(|error| MachineError::from_reader(source_name, text, &error))?;
     let refuse = |at: Range<usize>, expected: String| {
@@ -50,10 +51,31 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
         MachineError::new(source_name, text, &at, problem)
     };
     let tick_s = file.tick_s.0;
-    let axes = file.axis.map(|axis| (axis.places(), axis.settings()));
+    let axes: Vec<(Places, AxisSettings)> = file
+        .axis
+        .into_iter()
+        .zip(Axis::ALL)
+        .map(|(axis, place)| (axis.places(), axis.settings(place)))
+        .collect();
     for (index, (places, axis)) in axes.iter().enumerate() {
-        if axes.iter().take(index).any(|(_, other)| other.name == axis.name) {
+        let others =
+            || axes.iter().enumerate().filter(|&(other, _)| other != index).map(|(_, (_, other))| other);
+        if others().any(|other| other.name == axis.name) {
             return Err(refuse(places.name.clone(), "a name that no other axis has".to_owned()));
+        }
+        let at = places.letter.as_ref().unwrap_or(&places.name);
+        if others().any(|other| other.letter == axis.letter) {
+            return Err(refuse(at.clone(), "a letter that no other axis has".to_owned()));
+        }
+        let named = Some(axis.name.as_bytes())
+            .filter(|name| name.len() == 1)
+            .and_then(|name| Axis::of_letter(name[0]));
+        if let (Some(named), Some(letter)) = (named, axis.letter)
+            && named != letter
+        {
+            let expected =
+                format!("{letter} or a name that is no axis' letter: the axis is moved by {letter}");
+            return Err(refuse(places.name.clone(), expected));
         }
         if axis.output_offset_v.abs() >= axis.output_limit_v {
             let limit_v = axis.output_limit_v;
@@ -138,13 +160,17 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
     }
     // What only the kernel's numbers can't hold, or does not go together, has no key of its own: it stands at
     // the axis.
-    let figures = [0, 1, 2].map(|index: usize| axes[index].1.figures());
+    let settings: [AxisSettings; AXES_MAX] = std::array::from_fn(|index| {
+        axes.get(index).map_or_else(AxisSettings::idle, |(_, axis)| axis.clone())
+    });
+    let figures = settings.each_ref().map(AxisSettings::figures);
     let faults = file.faults.map_or_else(FaultSettings::default, |faults| faults.settings());
     let guards = Guards {
-        axes: [0, 1, 2].map(|index: usize| Some(axes[index].1.guard_figures(tick_s))),
+        axes: settings.each_ref().map(|axis| Some(axis.guard_figures(tick_s))),
         reactions: faults.reactions(tick_s),
     };
-    let config = AxesConfig::<f32, 3>::new(&figures, tick_s).and_then(|axes| axes.guarded(&guards, tick_s));
+    let config =
+        AxesConfig::<f32, AXES_MAX>::new(&figures, tick_s).and_then(|axes| axes.guarded(&guards, tick_s));
     if let Err(error) = config {
         let (places, axis) = &axes[error.axis];
         let cause = error.cause;
@@ -158,7 +184,7 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
         name: file.name,
         tick_s,
         path: file.path.settings(),
-        axes: axes.map(|(_, axis)| axis),
+        axes: settings,
         faults,
         tool: file.tool.map_or_else(ToolSettings::default, ToolTable::settings),
         probe: file.probe.map(|probe| probe.surface()),
@@ -170,6 +196,7 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine, MachineErro
 /// The places of an axis' keys that rules of several keys are about.
 struct Places {
     name: Range<usize>,
+    letter: Option<Range<usize>>,
     feed_mm_s: Range<usize>,
     offset_v: Range<usize>,
     mm_per_count: Range<usize>,
@@ -198,8 +225,8 @@ struct MachineFile {
     probe: Option<ProbeTable>,
     spindle: Option<SpindleTable>,
     coolant: Option<CoolantTable>,
-    #[serde(deserialize_with = "three_axes")]
-    axis: [AxisTable; 3],
+    #[serde(deserialize_with = "one_to_nine_axes")]
+    axis: Vec<AxisTable>,
 }
 
 #[derive(Deserialize)]
@@ -221,6 +248,7 @@ struct PathTable {
 #[serde(deny_unknown_fields)]
 struct AxisTable {
     name: Spanned<AxisName>,
+    letter: Option<Spanned<AxisLetter>>,
     feed_mm_s: Spanned<Within<Limit>>,
     accel_mm_s2: Within<Limit>,
     jerk_mm_s3: Within<Limit>,
@@ -569,6 +597,7 @@ impl AxisTable {
             inverse_integral_time_s: inverse.map(|inverse| inverse.integral_time_s.span()),
             inverse_bed_hz: bed.map(|bed| bed.frequency_hz.span()),
             name: self.name.span(),
+            letter: self.letter.as_ref().map(Spanned::span),
             feed_mm_s: self.feed_mm_s.span(),
             offset_v: self.output.offset_v.span(),
             mm_per_count: self.encoder.mm_per_count.span(),
@@ -577,13 +606,15 @@ impl AxisTable {
         }
     }
 
-    fn settings(self) -> AxisSettings {
+    /// `place` is the axis that it is without a letter of its own.
+    fn settings(self, place: Axis) -> AxisSettings {
         let noise = match self.encoder.noise_counts.0 {
             0 => None,
             amplitude_counts => Some(EncoderNoise { amplitude_counts, seed: self.encoder.noise_seed.0 }),
         };
         let mm_per_count = self.encoder.mm_per_count.into_inner().0;
         AxisSettings {
+            letter: Some(self.letter.map_or(place, |letter| letter.into_inner().0)),
             name: self.name.into_inner().0,
             feed_mm_s: self.feed_mm_s.into_inner().0,
             accel_mm_s2: self.accel_mm_s2.0,
@@ -642,11 +673,26 @@ impl DriveTable {
     }
 }
 
-fn three_axes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[AxisTable; 3], D::Error> {
+fn one_to_nine_axes<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<AxisTable>, D::Error> {
     let axes = Vec::<AxisTable>::deserialize(deserializer)?;
-    axes.try_into().map_err(|axes: Vec<AxisTable>| {
-        D::Error::custom(format!("{} [[axis]] tables, expected exactly 3", axes.len()))
-    })
+    match axes.len() {
+        1..=AXES_MAX => Ok(axes),
+        count => Err(D::Error::custom(format!("{count} [[axis]] tables, expected 1 to {AXES_MAX}"))),
+    }
+}
+
+/// The letter of the words that move an axis.
+struct AxisLetter(Axis);
+
+impl<'de> Deserialize<'de> for AxisLetter {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = toml::Value::deserialize(deserializer)?;
+        let letter = value.as_str().map(str::as_bytes).filter(|letter| letter.len() == 1);
+        match letter.and_then(|letter| Axis::of_letter(letter[0])) {
+            Some(axis) => Ok(Self(axis)),
+            None => Err(D::Error::custom(format!("letter = {value}, expected {AXIS_LETTER}"))),
+        }
+    }
 }
 
 /// A name that can head a column.

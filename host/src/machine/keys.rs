@@ -8,11 +8,12 @@ use motion_kernel::axis::TABLE_POINTS;
 
 use super::law_name::LAW_NAMES;
 use super::range::{
-    AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CurveShare, Damping, DeadTime, EMERGENCY_STOP,
-    ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime, InverseGain, Jump,
-    JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio, NOISE_COUNTS, NOISE_SEED,
-    OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp, Range, Resolution, Reversal, SPINDLE_TURNS,
-    SUBROUTINE, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch,
+    AXIS_LETTER, AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CurveShare, Damping, DeadTime,
+    EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime,
+    InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio,
+    NOISE_COUNTS, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp, Range, Resolution,
+    Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick,
+    Velocity, Watch,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -235,9 +236,11 @@ pub const KEY_TABLES: &[KeyTable] = &[
     ),
     table(
         "axis",
-        "An axis; exactly three [[axis]] tables, moved by the words X, Y and Z.",
+        "An axis; one to nine [[axis]] tables. Of A, B and C, which are rotary, read ° for mm in every key.",
         &[
             Key::new("name", "", AXIS_NAME, "Heads the axis's columns in tables and traces; no two are equal."),
+            Key::new("letter", "", AXIS_LETTER, "The words that move it; no two are equal.")
+                .or("by place, X Y Z A B C U V W"),
             Key::new(
                 "feed_mm_s",
                 "mm/s",

@@ -9,6 +9,7 @@
 //! - [`edit`]: values written back into a file;
 //! - [`error`]: refusals and their places;
 //! - [`keys`]: every key of the file, for people;
+//! - `any`: a machine of any number of axes;
 //! - `file`: the layout of the file and the rules that join several keys;
 //! - `law_name`: the names of the feed law's shapes, which block lists have too;
 //! - `range`: numbers that carry their range, so that a wrong one is refused where it stands.
@@ -30,12 +31,14 @@ pub mod error;
 pub mod keys;
 pub mod settings;
 
+mod any;
 mod file;
 mod law_name;
 mod range;
 #[cfg(test)]
 mod tests;
 
+pub use any::AnyMachine;
 pub use edit::{AxisEdit, edited};
 pub use error::{AxisError, MachineError};
 pub(crate) use law_name::{LAW_NAMES, law_named};

@@ -18,6 +18,8 @@ pub(super) trait Range {
 }
 
 /// The rule for the name of an axis, which heads seven columns of a trace.
+/// Expected letter of an axis.
+pub(super) const AXIS_LETTER: &str = "one of the letters X, Y, Z, A, B, C, U, V, W";
 pub(super) const AXIS_NAME: &str = "1 to 8 letters and digits";
 /// Most characters of an axis's name.
 pub(super) const NAME_CHARACTERS_MAX: usize = 8;

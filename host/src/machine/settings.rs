@@ -17,7 +17,7 @@ use motion_kernel::units::{DacCode, Position};
 
 use super::error::{AxisError, MachineError};
 use super::file;
-use crate::gcode::{PathMode, Probe, ReadOptions};
+use crate::gcode::{Axes, Axis, PathMode, Point, Probe, ReadOptions};
 use crate::touch::Surface;
 
 /// Pieces are rounded: their tangents agree with the planner's angle to this, and with a curve's feed.
@@ -38,18 +38,18 @@ const SUBSTEP_S: f64 = 25e-6;
 /// steps.
 pub const DEAD_TIME_CELLS: usize = 640;
 
-/// A machine of three axes. Made by [`Machine::from_toml`] or [`Machine::reference`]; whoever changes a value
-/// afterwards is held to the ranges by the stages that take it.
+/// A machine of at most `N` axes. Made by [`Machine::from_toml`], [`AnyMachine::from_toml`](super::AnyMachine::from_toml) or
+/// [`Machine::reference`]; whoever changes a value afterwards is held to the ranges by the stages that take it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Machine {
+pub struct Machine<const N: usize = 3> {
     /// Shown in reports.
     pub name: String,
     /// Control tick \[s\], 0.00002 to 0.02.
     pub tick_s: f64,
     /// The limits along the path.
     pub path: PathSettings,
-    /// The axes X, Y, Z of G-code, under their own names.
-    pub axes: [AxisSettings; 3],
+    /// The axes, in the order of the file; the places behind them are [idle](AxisSettings::idle).
+    pub axes: [AxisSettings; N],
     /// How faults end.
     pub faults: FaultSettings,
     /// What is known of tools.
@@ -150,6 +150,8 @@ pub enum DefaultPathMode {
 /// One axis. Limits are from 0.001 to 10¹².
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisSettings {
+    /// The axis of a program that moves it; `None` for a place without an axis. Of A, B and C read ° for mm.
+    pub letter: Option<Axis>,
     /// Letters and digits, at most 8.
     pub name: String,
     /// Greatest velocity \[mm/s\].
@@ -220,9 +222,9 @@ impl Machine {
                 blend_tolerance_mm: BLEND_TOLERANCE_MM,
             },
             axes: [
-                AxisSettings::reference("X", REFERENCE_X),
-                AxisSettings::reference("Y", REFERENCE_Y),
-                AxisSettings::reference("Z", REFERENCE_Z),
+                AxisSettings::reference(Axis::X, REFERENCE_X),
+                AxisSettings::reference(Axis::Y, REFERENCE_Y),
+                AxisSettings::reference(Axis::Z, REFERENCE_Z),
             ],
             faults: FaultSettings::default(),
             tool: ToolSettings::default(),
@@ -232,25 +234,96 @@ impl Machine {
         }
     }
 
-    /// Reads a machine file; `source_name` appears in errors only.
+    /// Reads the file of a machine of at most three axes; `source_name` appears in errors only.
     ///
     /// # Errors
-    /// The text is not TOML, a key is missing or unknown, or a value is out of its range.
+    /// The text is not TOML, a key is missing or unknown, a value is out of its range, or there are more axes.
     pub fn from_toml(source_name: &str, text: &str) -> Result<Self, MachineError> {
-        file::read(source_name, text)
+        file::read(source_name, text)?.fitted(source_name, text)
+    }
+}
+
+impl<const N: usize> Machine<N> {
+    /// The same machine with `M` places for its axes.
+    pub(super) fn fitted<const M: usize>(
+        self,
+        source_name: &str,
+        text: &str,
+    ) -> Result<Machine<M>, MachineError> {
+        let count = self.axis_count();
+        if count > M {
+            let at = text.match_indices("[[axis]]").nth(M).map_or(0..0, |(at, found)| at..at + found.len());
+            let problem = format!("found {count} [[axis]] tables, expected at most {M} for this command");
+            return Err(MachineError::new(source_name, text, &at, problem));
+        }
+        let mut axes = self.axes.into_iter();
+        Ok(Machine {
+            name: self.name,
+            tick_s: self.tick_s,
+            path: self.path,
+            axes: std::array::from_fn(|_| axes.next().unwrap_or_else(AxisSettings::idle)),
+            faults: self.faults,
+            tool: self.tool,
+            probe: self.probe,
+            spindle: self.spindle,
+            coolant: self.coolant,
+        })
+    }
+
+    /// The number of its axes, which are the first of `axes`.
+    #[must_use]
+    pub fn axis_count(&self) -> usize {
+        self.axes.iter().take_while(|axis| axis.letter.is_some()).count()
+    }
+
+    /// The axes that there are.
+    #[must_use]
+    pub fn driven_axes(&self) -> &[AxisSettings] {
+        &self.axes[..self.axis_count()]
+    }
+
+    /// Their letters.
+    #[must_use]
+    pub fn letters(&self) -> Axes {
+        self.axes.iter().filter_map(|axis| axis.letter).collect()
+    }
+
+    /// The place of an axis, if there is one of this letter.
+    #[must_use]
+    pub fn place_of(&self, letter: Axis) -> Option<usize> {
+        self.axes.iter().position(|axis| axis.letter == Some(letter))
+    }
+
+    /// A point of a program along the machine's axes \[mm, ° for rotary axes\].
+    #[must_use]
+    pub fn coordinates(&self, point: Point) -> [f64; N] {
+        self.axes.each_ref().map(|axis| axis.letter.map_or(0.0, |letter| point[letter.index()].to_mm()))
     }
 
     /// What the machine adds to the options that its programs are read with.
     #[must_use]
     pub fn read_options(&self) -> ReadOptions {
-        let probe = self.probe.clone().map(|surface| Probe { surface, limits: self.limits() });
+        let probe = self.probe.clone().map(|surface| Probe { surface, limits: self.xyz_limits() });
         let ToolSettings { change_subroutine, radius_mm: tool_radius_mm } = self.tool.clone();
-        ReadOptions { change_subroutine, tool_radius_mm, probe, ..ReadOptions::default() }
+        ReadOptions {
+            axes: self.letters(),
+            change_subroutine,
+            tool_radius_mm,
+            probe,
+            ..ReadOptions::default()
+        }
+    }
+
+    /// The limits of moves of X, Y and Z alone, in this order; an axis that there is not has those of the path.
+    fn xyz_limits(&self) -> MachineLimits<f64, 3> {
+        let MachineLimits { path, axes, pulse, curve_feed_share } = self.limits();
+        let of = |letter| self.place_of(letter).map_or(path, |place| axes[place]);
+        MachineLimits { path, axes: [Axis::X, Axis::Y, Axis::Z].map(of), pulse, curve_feed_share }
     }
 
     /// The limits that planning keeps.
     #[must_use]
-    pub fn limits(&self) -> MachineLimits<f64, 3> {
+    pub fn limits(&self) -> MachineLimits<f64, N> {
         let path = &self.path;
         MachineLimits {
             curve_feed_share: path.curve_feed_share,
@@ -269,7 +342,7 @@ impl Machine {
 
     /// The travel of the axes. An end beyond the kernel's range bounds nothing.
     #[must_use]
-    pub fn travel(&self) -> Travel<3> {
+    pub fn travel(&self) -> Travel<N> {
         self.guards().travel()
     }
 
@@ -288,7 +361,7 @@ impl Machine {
     ///
     /// # Errors
     /// The first axis with a value that the kernel can't use.
-    pub fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, 3>, AxisError> {
+    pub fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, N>, AxisError> {
         AxesConfig::new(&self.figures(), self.tick_s)
             .and_then(|axes| axes.guarded(&self.guards(), self.tick_s))
             .map_err(|error| self.at_axis(error))
@@ -296,7 +369,7 @@ impl Machine {
 
     /// How faults are told and end.
     #[must_use]
-    pub fn guards(&self) -> Guards<3> {
+    pub fn guards(&self) -> Guards<N> {
         Guards {
             axes: self.axes.each_ref().map(|axis| Some(axis.guard_figures(self.tick_s))),
             reactions: self.faults.reactions(self.tick_s),
@@ -307,11 +380,11 @@ impl Machine {
     ///
     /// # Errors
     /// The first axis with a value that the kernel can't use.
-    pub fn unguarded_axes_config<R: Real>(&self) -> Result<AxesConfig<R, 3>, AxisError> {
+    pub fn unguarded_axes_config<R: Real>(&self) -> Result<AxesConfig<R, N>, AxisError> {
         AxesConfig::new(&self.figures(), self.tick_s).map_err(|error| self.at_axis(error))
     }
 
-    fn figures(&self) -> [AxisFigures; 3] {
+    fn figures(&self) -> [AxisFigures; N] {
         self.axes.each_ref().map(AxisSettings::figures)
     }
 
@@ -322,15 +395,15 @@ impl Machine {
     /// What a compiled program carries: everything that the kernel has to know of the machine, which stands
     /// at the origin when the program starts.
     #[must_use]
-    pub fn header(&self) -> Header<3> {
-        let (axes, start) = (self.figures(), [Position::ZERO; 3]);
+    pub fn header(&self) -> Header<N> {
+        let (axes, start) = (self.figures(), [Position::ZERO; N]);
         Header { tick_s: self.tick_s, rules: self.rules(), pulse: self.path.pulse, axes, start }
     }
 
     /// The simulated machine: the same drives, encoders and scales, at rest at the origin. Its dead times
     /// fit [`DEAD_TIME_CELLS`].
     #[must_use]
-    pub fn simulated(&self) -> MachineParameters<3> {
+    pub fn simulated(&self) -> MachineParameters<N> {
         let substeps = (self.tick_s / SUBSTEP_S).round() as u32;
         MachineParameters {
             axes: self.axes.each_ref().map(AxisSettings::simulated),
@@ -370,9 +443,10 @@ impl PathSettings {
 }
 
 impl AxisSettings {
-    fn reference(name: &str, drive: DriveParameters) -> Self {
+    fn reference(letter: Axis, drive: DriveParameters) -> Self {
         Self {
-            name: name.to_owned(),
+            letter: Some(letter),
+            name: letter.to_string(),
             feed_mm_s: 300.0,
             accel_mm_s2: 500.0,
             jerk_mm_s3: 5e3,
@@ -397,6 +471,12 @@ impl AxisSettings {
             homing: None,
             drive,
         }
+    }
+
+    /// A place without an axis: one like the reference machine's X that nothing moves.
+    #[must_use]
+    pub fn idle() -> Self {
+        Self { letter: None, name: String::new(), ..Self::reference(Axis::X, REFERENCE_X) }
     }
 
     /// The velocity that the output can command in either direction \[mm/s\].

@@ -7,7 +7,8 @@ use motion_kernel::law::Pulse;
 use motion_kernel::units::{Counts, Position};
 
 use super::keys::{KEY_TABLES, KeyTable, is_list};
-use super::{Machine, REFERENCE_TOML};
+use super::{AnyMachine, Machine, REFERENCE_TOML};
+use crate::gcode::Axis;
 use crate::touch::{Surface, TouchBox};
 
 /// The refusal of the reference file with the first `from` replaced by `to`.
@@ -165,9 +166,45 @@ fn keys_agree_with_each_other() {
     assert!(Machine::from_toml("n.toml", &narrow("0.00000916")).is_ok());
     let wide = REFERENCE_TOML.replacen("mm_per_count = 0.0001", "mm_per_count = 2e-8", 1);
     assert!(Machine::from_toml("w.toml", &wide).is_ok());
-    let two = REFERENCE_TOML.rsplit_once("[[axis]]").expect("axes").0;
-    let error = Machine::from_toml("two.toml", two).unwrap_err().to_string();
-    assert!(error.contains("found 2 [[axis]] tables, expected exactly 3"), "{error}");
+}
+
+/// The reference file with axes of these letters, each a copy of X.
+fn with_axes(letters: &str) -> String {
+    let (path, axes) = REFERENCE_TOML.split_once("[[axis]]").expect("axes");
+    let axis = axes.split("[[axis]]").next().expect("an axis");
+    let of = |letter: char| {
+        format!(
+            "[[axis]]{}",
+            axis.replacen("name = \"X\"", &format!("name = \"{letter}1\"\nletter = \"{letter}\""), 1)
+        )
+    };
+    path.to_owned() + &letters.chars().map(of).collect::<String>()
+}
+
+#[test]
+fn a_machine_has_one_to_nine_axes() {
+    let lathe = Machine::from_toml("lathe.toml", &with_axes("XZ")).expect("a lathe");
+    assert_eq!((lathe.axis_count(), lathe.letters().to_string()), (2, "X, Z".to_owned()));
+    assert_eq!((lathe.place_of(Axis::Z), lathe.place_of(Axis::Y)), (Some(1), None));
+    let AnyMachine::Nine(all) =
+        AnyMachine::from_toml("all.toml", &with_axes("XYZABCUVW")).expect("nine axes")
+    else {
+        panic!("nine places")
+    };
+    assert_eq!(all.axis_count(), 9);
+    assert!(matches!(AnyMachine::from_toml("mill.toml", REFERENCE_TOML), Ok(AnyMachine::Three(_))));
+    for (letters, expected) in [
+        ("XYZA", "found 4 [[axis]] tables, expected at most 3 for this command"),
+        ("XYX", "letter = \"X\", expected a letter that no other axis has"),
+        ("XQ", "found letter = \"Q\", expected one of the letters X, Y, Z, A, B, C, U, V, W"),
+        ("", "missing"),
+    ] {
+        let error = Machine::from_toml("few.toml", &with_axes(letters)).expect_err(letters).to_string();
+        assert!(error.contains(expected) || letters.is_empty(), "{error}");
+    }
+    let moved = REFERENCE_TOML.replacen("name = \"Z\"", "name = \"A\"", 1);
+    let error = Machine::from_toml("moved.toml", &moved).expect_err("moved by Z").to_string();
+    assert!(error.contains("expected Z or a name that is no axis' letter"), "{error}");
 }
 
 /// The longest dead time at every tick fits the simulation's cells.

@@ -5,7 +5,7 @@
 //! refused with its line.
 
 use super::error::Problem;
-use crate::gcode::{CubicMove, Nurbs, PathMode};
+use crate::gcode::{CubicMove, Nurbs, PathMode, xyz_mm};
 use crate::machine::Machine;
 use crate::toolpath::rational::spans;
 use crate::toolpath::smooth::Move;
@@ -23,7 +23,7 @@ pub(super) struct Point {
 
 /// The element of a G5. An error has no line yet.
 pub(super) fn cubic(step: &CubicMove) -> Result<Element, Problem> {
-    let (from, to) = (step.from.map(|c| c.to_mm()), step.to.map(|c| c.to_mm()));
+    let (from, to) = (xyz_mm(step.from), xyz_mm(step.to));
     let [[i, j], [p, q]] = step.controls_mm;
     let chord = subtract(to, from);
     let (b1, b2) = ([i, j, 0.0], add(chord, [p, q, 0.0]));

@@ -51,7 +51,7 @@ use motion_kernel::hal::OutputState;
 use motion_kernel::law::Pulse;
 use serde::{Deserialize, Serialize};
 
-use crate::gcode::{Length, ProbeMove};
+use crate::gcode::{ProbeMove, xyz_mm};
 use crate::trace::TracedBlock;
 
 /// How ramps and blocks go together.
@@ -137,7 +137,7 @@ pub struct PlannedProbe {
 
 impl PlannedProbe {
     fn new(line: u32, stretch: u32, probe: &ProbeMove) -> Self {
-        let trip_mm = probe.trip.map(|trip| trip.map(Length::to_mm));
+        let trip_mm = probe.trip.map(|trip| xyz_mm(trip));
         Self { line, stretch, stands: probe.from == probe.to, leaves: probe.leaves, trip_mm }
     }
 

@@ -7,7 +7,7 @@ use super::executable::Executable;
 use super::outputs::{Switches, acts_on};
 use super::stretch::{Stretch, StretchBlock};
 use super::{Item, Mode, PlacedRamp, Plan, PlannedProbe, travel};
-use crate::gcode::{LineMove, PathMode, ProbeMove, Program, Step, StepKind};
+use crate::gcode::{LineMove, PathMode, ProbeMove, Program, Step, StepKind, xyz_mm};
 use crate::machine::{DefaultPathMode, Machine, PathSettings};
 use crate::toolpath::Element;
 use crate::toolpath::smooth::Move;
@@ -75,10 +75,10 @@ pub fn plan_program(
             }
             StepKind::Through(point) => {
                 if points.is_empty() {
-                    start = point.from.map(|c| c.to_mm());
+                    start = xyz_mm(point.from);
                 }
                 let (feed_mm_s, mode) = (point.feed.mm_s(), point.mode);
-                points.push(Point { line: step.line, at: point.to.map(|c| c.to_mm()), feed_mm_s, mode });
+                points.push(Point { line: step.line, at: xyz_mm(point.to), feed_mm_s, mode });
             }
             StepKind::Probe(probe) => {
                 append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;

@@ -7,7 +7,7 @@ use motion_kernel::program::Item;
 
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
-use crate::gcode::Length;
+use crate::gcode::{Length, Point};
 use crate::machine::Machine;
 
 /// # Errors
@@ -41,7 +41,7 @@ pub(super) fn check(
 }
 
 /// Refuses a point beyond the travel: the programmed end of a probing move, wherever the move ends.
-pub(super) fn check_end(end: [Length; 3], machine: &Machine) -> Result<(), Problem> {
+pub(super) fn check_end(end: Point, machine: &Machine) -> Result<(), Problem> {
     for (axis, found_mm) in machine.axes.iter().zip(end.map(Length::to_mm)) {
         let Some([low_mm, high_mm]) = axis.travel_mm else { continue };
         if found_mm < low_mm || found_mm > high_mm {

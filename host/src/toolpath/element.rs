@@ -9,7 +9,7 @@ use super::involute::Involute;
 use super::polynomial::Polynomial;
 use super::septic::{FitError, Septic, fit};
 use super::{Vector, add, cross, dot, norm, scale, subtract};
-use crate::gcode::{ArcMove, LineMove};
+use crate::gcode::{ArcMove, LineMove, xyz_mm};
 
 /// Widest piece of an arc or an involute \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off,
 /// and their third derivative 2·10⁻⁵ of itself.
@@ -89,13 +89,13 @@ impl Element {
     /// The line of a move.
     #[must_use]
     pub fn line(step: &LineMove) -> Self {
-        Self::Line { from: step.from.map(|c| c.to_mm()), to: step.to.map(|c| c.to_mm()) }
+        Self::Line { from: xyz_mm(step.from), to: xyz_mm(step.to) }
     }
 
     /// The arc of a move.
     #[must_use]
     pub fn arc(step: &ArcMove) -> Self {
-        let (from, to) = (step.from.map(|c| c.to_mm()), step.to.map(|c| c.to_mm()));
+        let (from, to) = (xyz_mm(step.from), xyz_mm(step.to));
         let [first, second, normal] = step.plane.axes();
         let (sine, cosine) = match step.turn_deg {
             0.0 => (0.0, 1.0),

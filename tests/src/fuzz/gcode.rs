@@ -8,7 +8,7 @@
 //! - what is refused has a place.
 
 use motion_host::gcode::{
-    self, Feed, GcodeError, Length, ParameterFile, Program, ReadOptions, SpindleSpeed, StepKind, ToolTable,
+    self, Feed, GcodeError, ORIGIN, ParameterFile, Program, ReadOptions, SpindleSpeed, StepKind, ToolTable,
 };
 use motion_host::machine::Machine;
 use motion_host::touch::{Surface, TouchBox};
@@ -189,7 +189,7 @@ fn options(switches: u8) -> ReadOptions {
 /// They are not.
 pub fn assert_sound(program: &Program, steps_max: usize) {
     assert!(program.steps.len() <= steps_max && program.messages.len() <= steps_max);
-    let mut at = [Length::ZERO; 3];
+    let mut at = ORIGIN;
     for step in &program.steps {
         let (ends, feed, numbers) = match &step.kind {
             StepKind::Line(line) => {

@@ -1,0 +1,29 @@
+//! A machine of any number of axes.
+
+use super::error::MachineError;
+use super::file;
+use super::settings::Machine;
+use crate::gcode::AXES_MAX;
+
+/// A machine with the fewest places that hold its axes. Planning and simulation are made for both.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AnyMachine {
+    /// One to three axes.
+    Three(Box<Machine>),
+    /// Four to nine.
+    Nine(Box<Machine<AXES_MAX>>),
+}
+
+impl AnyMachine {
+    /// Reads a machine file; `source_name` appears in errors only.
+    ///
+    /// # Errors
+    /// The text is not TOML, a key is missing or unknown, or a value is out of its range.
+    pub fn from_toml(source_name: &str, text: &str) -> Result<Self, MachineError> {
+        let machine = file::read(source_name, text)?;
+        if machine.axis_count() > 3 {
+            return Ok(Self::Nine(Box::new(machine)));
+        }
+        machine.fitted(source_name, text).map(|machine| Self::Three(Box::new(machine)))
+    }
+}
