@@ -289,7 +289,7 @@ impl Interpreter {
             }
             for (axis, word) in axes.into_iter().enumerate() {
                 let Some(word) = word else { continue };
-                let length = self.modal.units.length(word)?;
+                let length = self.modal.units.coordinate(word)?;
                 let sum = if adds { tool[axis].checked_add(length) } else { Some(length) };
                 tool[axis] = sum.ok_or_else(|| word.problem(|word| Problem::PositionOutOfRange { word }))?;
             }

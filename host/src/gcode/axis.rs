@@ -13,6 +13,22 @@ pub type Point = [Length; AXES_MAX];
 /// The point whose coordinates are all 0.
 pub const ORIGIN: Point = [Length::ZERO; AXES_MAX];
 
+/// The length that the feed of a straight move counts along, as LinuxCNC has it: over X, Y and Z if one of them moves, else
+/// over U, V and W \[mm\], else over A, B and C \[°\].
+pub(super) fn feed_length(from: Point, to: Point) -> f64 {
+    let groups = [[Axis::X, Axis::Y, Axis::Z], [Axis::U, Axis::V, Axis::W], [Axis::A, Axis::B, Axis::C]];
+    let lengths = groups.map(|axes| {
+        let [first, second, third] = axes.map(|axis| to[axis.index()].to_mm() - from[axis.index()].to_mm());
+        libm::sqrt(first * first + second * second + third * third)
+    });
+    lengths.into_iter().find(|&length| length > 0.0).unwrap_or(0.0)
+}
+
+/// Whether only rotary axes move.
+pub(super) fn is_rotary(from: Point, to: Point) -> bool {
+    from != to && Axis::ALL.iter().all(|axis| axis.is_rotary() || from[axis.index()] == to[axis.index()])
+}
+
 /// X, Y and Z of a point \[mm\].
 #[must_use]
 pub fn xyz_mm(point: Point) -> [f64; 3] {

@@ -3,6 +3,7 @@
 //! A slot holds one word. So a word given twice, two words of one modal group, and words without a slot are
 //! refused here, the leftmost first. The interpreter acts on the words.
 
+use super::axis::{AXES_MAX, Axes, Axis, LETTERS as LETTERS_OF_AXES};
 use super::error::{Located, Problem};
 use super::expression::Environment;
 use super::lexer::{Assignment, Cursor, Item, Items, Word};
@@ -11,7 +12,7 @@ use super::modal::Motion;
 use super::number::Number;
 
 /// Letters that take a number of their own.
-const LETTERS: &[u8; 19] = b"DEFHIJKLNPQRSTXYZ@^";
+const LETTERS: &[u8; 25] = b"ABCDEFHIJKLNPQRSTUVWXYZ@^";
 /// The slot of every letter by its byte; beyond the last for letters without a slot.
 const SLOTS: [u8; 128] = {
     let mut slots = [u8::MAX; 128];
@@ -177,12 +178,16 @@ pub(super) struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// Collects the words of a line, from the cursor on.
-    pub(super) fn collect(cursor: Cursor<'a>, environment: &dyn Environment) -> Result<Self, Located> {
+    /// Collects the words of a line, from the cursor on, for a machine with these axes.
+    pub(super) fn collect(
+        cursor: Cursor<'a>,
+        environment: &dyn Environment,
+        axes: Axes,
+    ) -> Result<Self, Located> {
         let mut block = Self::default();
         for item in Items::new(cursor, environment) {
             match item? {
-                Item::Word(word) => block.put_word(word)?,
+                Item::Word(word) => block.put_word(word, axes)?,
                 Item::Assignment(assignment) => block.assignments.push(assignment),
                 Item::Comment(text) if message::is_active(text) => {
                     block.comments.push(text);
@@ -212,7 +217,7 @@ impl<'a> Block<'a> {
         }
     }
 
-    fn put_word(&mut self, word: Word<'a>) -> Result<(), Located> {
+    fn put_word(&mut self, word: Word<'a>, axes: Axes) -> Result<(), Located> {
         self.rounded |= word.rounded;
         match word.letter {
             b'G' => {
@@ -228,6 +233,9 @@ impl<'a> Block<'a> {
                 Err(word.problem(|word| Problem::LineNumber { word }))
             }
             b'O' => Err(word.problem(|word| Problem::OWordPlace { word })),
+            letter if Axis::of_letter(letter).is_some_and(|axis| !axes.contains(axis)) => {
+                Err(word.problem(|word| Problem::NoSuchAxis { word, axes }))
+            }
             _ => self.put_letter(word),
         }
     }
@@ -255,7 +263,7 @@ impl<'a> Block<'a> {
 
     /// Whether a length of the line is no whole count of 10⁻¹⁰ mm in inches.
     pub(super) fn is_inexact_in_inches(&self) -> bool {
-        b"DIJKPQRXYZ".iter().filter_map(|&letter| self.letter(letter)).any(|word| match word.number {
+        b"DIJKPQRUVWXYZ".iter().filter_map(|&letter| self.letter(letter)).any(|word| match word.number {
             Number::Exact(number) => !number.is_exact_in_inches(),
             Number::Real(_) => false,
         })
@@ -272,8 +280,8 @@ impl<'a> Block<'a> {
     fn put_letter(&mut self, word: Word<'a>) -> Result<(), Located> {
         let slot = slot_of(word.letter);
         let Some(slot) = slot.and_then(|index| self.letters.get_mut(index)) else {
-            // A B C U V W: all other letters have a slot, or a group.
-            return Err(word.problem(|word| Problem::NoSuchAxis { word }));
+            // All letters have a slot, or a group.
+            return Ok(());
         };
         if slot.is_some() {
             let letter = char::from(word.letter);
@@ -431,12 +439,18 @@ impl<'a> Block<'a> {
 
     /// Whether there are words of axes, polar ones too.
     pub(super) fn has_axes(&self) -> bool {
-        b"XYZ@^".iter().any(|&letter| self.letter(letter).is_some())
+        b"@^".iter().chain(&LETTERS_OF_AXES).any(|&letter| self.letter(letter).is_some())
     }
 
-    /// X, Y and Z.
-    pub(super) fn axes(&self) -> [Option<Word<'a>>; 3] {
-        [self.letter(b'X'), self.letter(b'Y'), self.letter(b'Z')]
+    /// The words of the axes, in the order of a [`Point`](super::Point).
+    pub(super) fn axes(&self) -> [Option<Word<'a>>; AXES_MAX] {
+        LETTERS_OF_AXES.map(|letter| self.letter(letter))
+    }
+
+    /// The leftmost word of an axis that is none of `axes`.
+    pub(super) fn axis_beside(&self, axes: Axes) -> Option<Word<'a>> {
+        let others = Axis::ALL.into_iter().filter(|&axis| !axes.contains(axis));
+        others.filter_map(|axis| self.letter(axis.letter() as u8)).min_by_key(|word| word.offset)
     }
 
     /// I, J and K.
@@ -483,7 +497,7 @@ mod tests {
     use super::*;
 
     fn collect(line: &[u8]) -> Result<Block<'_>, Located> {
-        Block::collect(Cursor::new(line), &NoParameters)
+        Block::collect(Cursor::new(line), &NoParameters, Axes::XYZ)
     }
 
     #[test]
@@ -508,7 +522,9 @@ mod tests {
         assert_eq!(block.g(GGroup::Motion).unwrap().tenths, 10);
         assert_eq!(block.g(GGroup::ArcDistance).unwrap().tenths, 901);
         assert_eq!(block.m(MGroup::Flood).unwrap().tenths, 80);
-        assert_eq!(block.axes().map(|word| word.unwrap().number.to_f64()), [1.0, 2.0, -3.0]);
+        let [x, y, z, others @ ..] = block.axes();
+        assert_eq!([x, y, z].map(|word| word.unwrap().number.to_f64()), [1.0, 2.0, -3.0]);
+        assert!(others.iter().all(Option::is_none));
         assert!(block.letter(b'R').is_none() && block.g(GGroup::Units).is_none());
     }
 
@@ -532,7 +548,7 @@ mod tests {
             (b"M0.5", 0, "found M0.5"),
             (b"@5 @6", 3, "a second @ word"),
             (b"M100.5", 0, "found M100.5"),
-            (b"G1 X1 A5", 6, "found A5, expected X, Y or Z"),
+            (b"G1 X1 A5", 6, "found A5, expected an axis of the machine: X, Y, Z"),
             (b"G1 N5", 3, "line number"),
             (b"N-5", 0, "line number"),
             (b"G0 O100", 3, "found O100"),

@@ -19,7 +19,6 @@ use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::frame::{lengths, turn};
 use super::interpreter::Interpreter;
-use super::motion::distance_mm;
 use super::program::{ArcMove, Feed, LineMove, PathMode, Plane, StepKind};
 
 /// Smaller turns are no corners \[rad\]: posts round their tangents. At an inner one the tool cuts a
@@ -102,7 +101,7 @@ impl Interpreter {
     ) -> Result<(), Located> {
         let Some(cutter) = self.cutter else { return Ok(()) };
         let from = self.machine;
-        let feed = self.timed(feed, distance_mm(from, to));
+        let feed = self.straight_feed(feed, from, to);
         let manner = Manner { feed, mode, place };
         let [start, end] = [from, to].map(|point| self.in_plane(point));
         let along = minus(end, start);

@@ -2,7 +2,7 @@
 //!
 //! As LinuxCNC makes them: along the normal of the plane, in exact path, the holes of one line after each other.
 
-use super::axis::AXES_MAX;
+use super::axis::{AXES_MAX, Axes};
 use super::block::Block;
 use super::decimal::Length;
 use super::error::{Located, Problem};
@@ -134,6 +134,9 @@ impl Interpreter {
             return Err(refused("a feed per minute or revolution (G94, G95)"));
         }
         let [axis_1, axis_2, normal] = self.modal.plane.axes();
+        if let Some(word) = block.axis_beside(Axes::XYZ) {
+            return Err(word.problem(|word| Problem::CycleAxis { word, cycle: cycle.word() }));
+        }
         let goes_on = self.cycle.last == Some(cycle);
         let words = self.words(block, cycle, goes_on, normal, first)?;
         let repeats =
@@ -150,7 +153,7 @@ impl Interpreter {
         }
         for (index, axis) in [axis_1, axis_2].into_iter().enumerate() {
             let Some(word) = axes[axis] else { continue };
-            let length = self.modal.units.length(word)?.units();
+            let length = self.modal.units.coordinate(word)?.units();
             if incremental { increments[index] = length } else { hole[index] = length }
         }
         let r = words.r.units() + if incremental { initial } else { 0 };

@@ -1,5 +1,6 @@
 //! Errors of a program: what was found, where, and what was expected instead.
 
+use super::axis::{Axes, Axis};
 use super::decimal::Length;
 use super::program::Plane;
 use thiserror::Error;
@@ -83,8 +84,12 @@ pub enum Problem {
     LengthOutOfRange { word: String },
     #[error("found {word}, which adds up beyond the range, expected a position within ±{} mm", Length::LIMIT)]
     PositionOutOfRange { word: String },
-    #[error("found {word}, expected X, Y or Z: the machine has no such axis")]
-    NoSuchAxis { word: String },
+    #[error("found {word}, expected an axis of the machine: {axes}")]
+    NoSuchAxis { word: String, axes: Axes },
+    #[error("found a move of {axis}, expected moves of the machine's axes: {axes}")]
+    MissingAxisMoves { axis: Axis, axes: Axes },
+    #[error("found {motion} in the {plane} plane, expected a plane of the machine's axes: {axes}")]
+    PlaneWithoutAxes { motion: &'static str, plane: Plane, axes: Axes },
     #[error(
         "found {word}, expected one of G0 G1 G2 G3 G4 G5 G5.1 G5.2 G5.3 G5.5 G6.2 G6.3 G7 G8 G10 G17 G18 G19 G20 G21 G28 G28.1 G30 G30.1 G38.2 to G38.5 G40 to G42.1 \
          G43 G43.1 G43.2 G49 G52 G53 G54 to G59.3 G61 G61.1 G64 G73 G80 to G83 G85 G86 G88 G89 G90 G90.1 G91 G91.1 \
@@ -243,6 +248,10 @@ pub enum Problem {
     ArcWithoutChord { word: String, plane: Plane },
     #[error("found {motion} in the {plane} plane, expected it in the XY plane (G17)")]
     SplinePlane { motion: &'static str, plane: Plane },
+    #[error(
+        "found {word} in a line of {cycle}, expected X, Y and Z only: a drilling cycle moves no other axis"
+    )]
+    CycleAxis { word: String, cycle: &'static str },
     #[error("found {word} in a line of G5 or G5.1, expected X and Y only")]
     SplineOutsidePlane { word: String },
     #[error("found {word} alone in a line of G5 or G5.1, expected {first} and {second}")]
@@ -328,7 +337,7 @@ impl Problem {
             | Self::UserProgram { word }
             | Self::NeedsEncoder { word }
             | Self::NeedsProbe { word } => Some(word),
-            Self::NoSuchAxis { word } | Self::WordUnused { word, .. } => word.get(..1),
+            Self::NoSuchAxis { word, .. } | Self::WordUnused { word, .. } => word.get(..1),
             Self::SubroutineMissing { label } => Some(label),
             Self::ParameterUnset { name } => Some(name),
             _ => None,

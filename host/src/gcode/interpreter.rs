@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::axis::{ORIGIN, Point};
+use super::axis::{Axes, Axis, ORIGIN, Point};
 use super::block::{Block, GGroup, MGroup};
 use super::cutter::Cutter;
 use super::cycle::CycleState;
@@ -11,7 +11,7 @@ use super::expression::Target;
 use super::frame::Frame;
 use super::lexer::Cursor;
 use super::message;
-use super::modal::{FeedMode, Modal, Motion, Units};
+use super::modal::{FeedMode, FeedWord, Modal, Motion, Units};
 use super::nurbs;
 use super::options::ReadOptions;
 use super::parameter_file;
@@ -43,6 +43,8 @@ pub(super) enum Control {
 #[derive(Debug)]
 pub(super) struct Interpreter {
     pub(super) program: Program,
+    /// The axes of the machine.
+    pub(super) axes: Axes,
     pub(super) modal: Modal,
     pub(super) frame: Frame,
     /// The coordinate system in force, 1 to 9: parameter 5220 unless the program assigned that.
@@ -116,6 +118,7 @@ impl Interpreter {
         let parameters = Parameters::with(options.parameters.values());
         let mut interpreter = Self {
             program: Program { tool_radius_mm: options.tool_radius_mm, ..Program::default() },
+            axes: options.axes,
             modal: Modal::default(),
             frame: Frame::default(),
             system: 1,
@@ -151,7 +154,7 @@ impl Interpreter {
 
     /// Executes a line from the cursor on.
     pub(super) fn execute(&mut self, cursor: Cursor<'_>) -> Result<Control, Located> {
-        let block = Block::collect(cursor, self)?;
+        let block = Block::collect(cursor, self, self.axes)?;
         self.begun |= !block.is_empty();
         self.refuse_in_nurbs(&block)?;
         for assignment in &block.assignments {
@@ -229,7 +232,14 @@ impl Interpreter {
             return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
         }
         self.cubic_before_mm = None;
-        if kind.ends().is_some() {
+        if let Some([from, to]) = kind.ends() {
+            // Turns and polar words move axes that no word names.
+            if let Some(axis) = Axis::ALL
+                .into_iter()
+                .find(|axis| from[axis.index()] != to[axis.index()] && !self.axes.contains(*axis))
+            {
+                return Err(Located::new(0, Problem::MissingAxisMoves { axis, axes: self.axes }));
+            }
             self.program.systems.insert(self.system);
         }
         self.program.steps.push(Step { line: self.line, kind });
@@ -287,7 +297,9 @@ impl Interpreter {
             self.notice(NoticeKind::FeedInNewUnits);
         }
         // F0 is no feed: what moves after it is refused.
-        self.modal.feed = Some(units.mm(word.number.to_f64())).filter(|feed| *feed > 0.0);
+        let number = word.number.to_f64();
+        let feed = FeedWord { linear: units.mm(number), angular: number };
+        self.modal.feed = Some(feed).filter(|_| number > 0.0);
         Ok(())
     }
 
@@ -495,7 +507,7 @@ mod tests {
             ("F-5", "1:1:", "found F-5, expected a feed that is not negative"),
             ("G0 @5 ^10 X1", "1:11:", "found X1 in a line with @ or ^"),
             ("G0 @5", "1:4:", "found @5 at X0 Y0"),
-            ("G0 X1\nG53 G0 @5 ^1", "2:8:", "found @5 with G53, expected X, Y and Z"),
+            ("G0 X1\nG53 G0 @5 ^1", "2:8:", "found @5 with G53, expected axis words"),
             ("G92 @5 ^1", "1:5:", "found @5 in a line without a move in the XY plane"),
             ("X1", "1:1:", "found X1 without a motion mode"),
             ("G0 X1\nG80 Y2", "2:5:", "found Y2 without a motion mode"),

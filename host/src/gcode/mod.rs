@@ -41,7 +41,7 @@
 //!
 //! | words | meaning |
 //! |---|---|
-//! | G0 G1 G2 G3, X Y Z | motion, modal; a line of axis words alone repeats it; G80 ends it |
+//! | G0 G1 G2 G3, X Y Z A B C U V W | motion, modal; a line of axis words alone repeats it; G80 ends it. Axes that the machine does not have are refused ([`ReadOptions::axes`]). A, B and C are in degrees, after G20 too, and count on beyond a turn; arcs take them along, as they take U, V and W |
 //! | `@` `^` | X and Y as the distance from the program's zero and the angle about it \[°\] |
 //! | I J K, R, P | centre of an arc (relative, or absolute after G90.1), or its radius (negative: more than half a turn); P whole turns. Start and end radius may differ as [`RADIUS_MISMATCH_RATIO`] says |
 //! | G5, X Y, \[I J\] P Q | cubic Bézier curve in XY: I J from its start to its first control point, P Q from its end to its second; modal. Without I J it continues the G5 before it, whose P Q are turned round. Control points that are no point of their own (I0 J0) or fold back make a curve that stands still, which is refused |
@@ -51,7 +51,7 @@
 //! | G6.2 X Y R K P Q, X Y R K, G6.2 K | NURBS in the plane of arcs with knots K, whole numbers: control points with weights R; P: order; Q1 to Q3, a way of approximation, is not acted on. The first K stands in as many lines as the order, as does the last, whose lines end the NURBS and are no control points. A line leads to its first point. G6.3 may follow. As in LinuxCNC 2.10 |
 //! | G38.2 to G38.5 | a straight move at F up to where the probe touches the surface (.2, .3) or leaves it (.4, .5), modal; the machine brakes from there, and the program goes on from where it rests. #5061 to #5063 are where the probe tripped, in the coordinates and units in force, #5070 is 1. Without: .2 and .4 are refused; .3 and .5 set the programmed end, and 0 |
 //! | G73 G81 G82 G83 G85 G86 G88 G89, R P Q L, G98 G99 | drilling cycles along the plane's normal, modal; they end where the first began, or at R |
-//! | F, G93 G94 G95 | feed \[mm/min or inch/min\], kept as a speed when the units change; of a minute's part, a minute, a revolution at the commanded speed |
+//! | F, G93 G94 G95 | feed along X, Y and Z \[mm/min or inch/min\]; of a move without them along U, V and W, and of A, B and C alone in °/min; kept as a speed when the units change; of a minute's part, a minute, a revolution at the commanded speed |
 //! | G4 P | dwell \[s\] |
 //! | G17 G18 G19 | arc plane XY, ZX, YZ; clockwise is seen from the positive end of the third axis |
 //! | G20 G21, G90 G91, G90.1 G91.1, G7 G8 | inch or mm; absolute or incremental end points; the same for arc centres; X as a diameter or a radius |
@@ -80,6 +80,8 @@
 //!
 //! Where this reader differs from LinuxCNC's interpreter:
 //!
+//! - Drilling cycles, G5 and NURBS move no axes but X, Y and Z; LinuxCNC leaves A, B and C in a drilling cycle out without a word. So
+//!   do probing moves. There are no wrapped rotary axes and no indexers.
 //! - F in a line that switches the units is taken in the new unit, with a notice.
 //! - Two words that would take one letter (`G64 P1 G4`) are refused, and letters that nothing takes; D alone is noticed.
 //! - A drilling cycle before any G98 or G99 ends where it began, as Fanuc's do; LinuxCNC begins with G99.

@@ -1,6 +1,7 @@
 //! The modes, which stay in force from line to line.
 
 use super::arc::{RADIUS_MISMATCH_INCH, RADIUS_MISMATCH_MM};
+use super::axis::Axis;
 use super::block::{Block, GGroup};
 use super::cycle::Cycle;
 use super::decimal::Length;
@@ -104,6 +105,15 @@ impl Motion {
     }
 }
 
+/// F, positive, a minute or a revolution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct FeedWord {
+    /// Of linear axes \[mm\].
+    pub(super) linear: f64,
+    /// Of rotary axes alone \[°\]: the number as it stands, in inches too.
+    pub(super) angular: f64,
+}
+
 /// Units of lengths and feeds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Units {
@@ -184,8 +194,8 @@ pub(super) struct Modal {
     pub(super) path: PathMode,
     /// G93 G94 G95.
     pub(super) feed_mode: FeedMode,
-    /// F \[mm/min or mm/rev\], positive; none before the first, after a change of mode, and in G93.
-    pub(super) feed: Option<f64>,
+    /// F; none before the first, after a change of mode, and in G93.
+    pub(super) feed: Option<FeedWord>,
     /// G99: drilling cycles end at R, not where they began.
     pub(super) retracts_to_r: bool,
     pub(super) spindle: Spindle,
@@ -285,6 +295,12 @@ impl Units {
     /// The units a line sets.
     pub(super) fn of(block: &Block<'_>) -> Option<Self> {
         block.g(GGroup::Units).map(|code| if code.tenths == 200 { Self::Inches } else { Self::Millimetres })
+    }
+
+    /// The coordinate an axis word gives \[mm, ° of a rotary axis\].
+    pub(super) fn coordinate(self, word: Word<'_>) -> Result<Length, Located> {
+        let is_rotary = Axis::of_letter(word.letter).is_some_and(Axis::is_rotary);
+        if is_rotary { Self::Millimetres.length(word) } else { self.length(word) }
     }
 
     /// The length a word gives.

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::arc;
-use super::axis::{AXES_MAX, Point};
+use super::axis::{AXES_MAX, Axis, Point, feed_length, is_rotary};
 use super::block::{Block, GGroup};
 use super::decimal::Length;
 use super::error::{Located, Problem};
@@ -12,7 +12,9 @@ use super::interpreter::Interpreter;
 use super::lexer::Word;
 use super::modal::{Distance, FeedMode, Modal, Motion};
 use super::polar::Polar;
-use super::program::{ArcMove, CubicMove, Feed, LineMove, NoticeKind, PathMode, StepKind, ThroughMove};
+use super::program::{
+    ArcMove, CubicMove, Feed, LineMove, NoticeKind, PathMode, Plane, StepKind, ThroughMove,
+};
 use super::spline;
 
 /// Most turns of an arc or a helix.
@@ -108,6 +110,7 @@ impl Interpreter {
     /// G2 and G3.
     fn circular(&mut self, line: MoveLine<'_, '_>) -> Result<(), Located> {
         let [work, to] = self.target(line)?;
+        self.refuse_plane(line.motion, self.modal.plane, line.offset)?;
         // In the program's coordinates: turned to another plane's and rounded, the same point would be another.
         let [first_axis, second_axis, _] = self.modal.plane.axes();
         let closes = [first_axis, second_axis].iter().all(|&axis| work[axis] == self.work[axis]);
@@ -125,6 +128,7 @@ impl Interpreter {
     fn cubic(&mut self, line: MoveLine<'_, '_>) -> Result<(), Located> {
         let [work, to] = self.target(line)?;
         let MoveLine { block, motion, feed, offset, .. } = line;
+        self.refuse_plane(motion, Plane::Xy, offset)?;
         let (from, mode) = (self.machine, self.modal.path);
         let controls_mm = match motion {
             Motion::Quadratic => spline::quadratic_mm(block, &self.modal, [self.work, work], offset)?,
@@ -174,7 +178,7 @@ impl Interpreter {
         if from == to {
             return Ok(());
         }
-        let feed = self.timed(feed, distance_mm(from, to));
+        let feed = self.straight_feed(feed, from, to);
         self.step(StepKind::Line(LineMove { from, to, feed, mode }))
     }
 
@@ -194,12 +198,12 @@ impl Interpreter {
             return Err(refused("absolute end points (G90)"));
         }
         if let Some(word) = block.letter(b'@').or(block.letter(b'^')) {
-            return Err(word.problem(|word| Problem::MachineMove { word, expected: "X, Y and Z" }));
+            return Err(word.problem(|word| Problem::MachineMove { word, expected: "axis words" }));
         }
         let mut to = self.machine;
         for (coordinate, word) in to.iter_mut().zip(block.axes()) {
             if let Some(word) = word {
-                *coordinate = self.modal.units.length(word)?;
+                *coordinate = self.modal.units.coordinate(word)?;
             }
         }
         self.line_to(to, feed, self.modal.path)?;
@@ -220,14 +224,37 @@ impl Interpreter {
                 Err(missing(Problem::InverseTimeMissing { motion: motion.word() }))
             }
             (_, None, _) => Err(missing(Problem::FeedMissing { motion: motion.word() })),
-            (FeedMode::PerMinute, Some(feed_mm_min), _) => Ok(Feed::MmPerMin(feed_mm_min)),
-            (FeedMode::PerRevolution, Some(feed_mm_rev), _) if spindle.speed > 0.0 && !spindle.is_surface => {
-                Ok(Feed::MmPerMin(feed_mm_rev * spindle.speed))
+            (FeedMode::PerMinute, Some(feed), _) => Ok(Feed::MmPerMin(feed.linear)),
+            (FeedMode::PerRevolution, Some(feed), _) if spindle.speed > 0.0 && !spindle.is_surface => {
+                Ok(Feed::MmPerMin(feed.linear * spindle.speed))
             }
             (FeedMode::PerRevolution, ..) => {
                 Err(missing(Problem::SpindleSpeedMissing { motion: motion.word() }))
             }
         }
+    }
+
+    /// The feed of a straight move, from the feed that linear axes have.
+    pub(super) fn straight_feed(&self, feed: Feed, from: Point, to: Point) -> Feed {
+        match (self.modal.feed_mode, self.modal.feed) {
+            (FeedMode::InverseTime, _) => self.timed(feed, feed_length(from, to)),
+            (_, Some(programmed)) if feed != Feed::Rapid && is_rotary(from, to) => {
+                let per_rev = self.modal.feed_mode == FeedMode::PerRevolution;
+                let times = if per_rev { self.modal.spindle.speed } else { 1.0 };
+                Feed::MmPerMin(programmed.angular * times)
+            }
+            _ => feed,
+        }
+    }
+
+    /// Refuses a curve in a plane whose axes the machine does not have.
+    pub(super) fn refuse_plane(&self, motion: Motion, plane: Plane, offset: usize) -> Result<(), Located> {
+        let [first, second, _] = plane.axes().map(|index| Axis::ALL[index]);
+        if self.axes.contains(first) && self.axes.contains(second) {
+            return Ok(());
+        }
+        let (motion, axes) = (motion.word(), self.axes);
+        Err(Located::new(offset, Problem::PlaneWithoutAxes { motion, plane, axes }))
     }
 
     /// The feed of a move of this length.
@@ -259,7 +286,7 @@ impl Interpreter {
         let mut to = self.work;
         for (coordinate, word) in to.iter_mut().zip(block.axes()) {
             let Some(word) = word else { continue };
-            let length = self.modal.units.length(word)?;
+            let length = self.modal.units.coordinate(word)?;
             *coordinate = match self.modal.distance {
                 Distance::Absolute => length,
                 Distance::Incremental => coordinate
@@ -375,10 +402,4 @@ impl Interpreter {
         let origin = turn(self.frame.zero(), -turn_deg);
         Ok([first, second].map(|axis| vector[axis] + origin[axis]))
     }
-}
-
-/// The distance of two points \[mm\].
-pub(super) fn distance_mm(from: Point, to: Point) -> f64 {
-    let [x, y, z] = core::array::from_fn(|axis: usize| to[axis].to_mm() - from[axis].to_mm());
-    libm::sqrt(x * x + y * y + z * z)
 }

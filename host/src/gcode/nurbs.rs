@@ -8,7 +8,7 @@
 //! words within the lines of a NURBS, a NURBS that is never ended, knots that decrease or are not all equal at
 //! the start.
 
-use super::axis::{Point, xyz_mm};
+use super::axis::{Axis, Point, xyz_mm};
 use super::block::{Block, GGroup};
 use super::error::{Located, Problem};
 use super::interpreter::Interpreter;
@@ -140,10 +140,12 @@ impl Interpreter {
     /// The control point of a line. As in LinuxCNC, G91 counts all of them from where the NURBS starts.
     fn control_point(&self, block: &Block<'_>, plane: Plane) -> Result<Option<[Point; 2]>, Located> {
         let axes = block.axes();
-        let [first, second, normal] = plane.axes().map(|axis| axes.get(axis).copied().flatten());
-        if let Some(word) = normal {
+        let [first, second, _] = plane.axes();
+        let in_plane = [first, second].map(|index| Axis::ALL[index]).into_iter().collect();
+        if let Some(word) = block.axis_beside(in_plane) {
             return Err(refused(&word, "no coordinate across the plane of the NURBS"));
         }
+        let [first, second] = [first, second].map(|axis| axes.get(axis).copied().flatten());
         let word = match (first, second) {
             (None, None) => return Ok(None),
             (Some(word), None) | (None, Some(word)) => {

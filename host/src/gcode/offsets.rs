@@ -3,7 +3,7 @@
 //! Parameters hold the offsets \[mm\], as in LinuxCNC: 5161 and 5181 on the places of G28 and G30, 5211 on those
 //! of G92, 5221 + 20 n on those of the coordinate systems, with their rotation \[°\] nine places further.
 
-use super::axis::{AXES_MAX, ORIGIN, Point};
+use super::axis::{AXES_MAX, Axis, ORIGIN, Point};
 use super::block::{Block, GGroup};
 use super::decimal::Length;
 use super::error::{Located, Problem};
@@ -48,7 +48,7 @@ impl Interpreter {
         self.system
     }
 
-    /// Three lengths from `first` on.
+    /// The coordinates from parameter `first` on.
     fn stored(&self, first: u32, offset: usize) -> Result<Point, Located> {
         let mut stored = ORIGIN;
         for (length, number) in stored.iter_mut().zip(first..) {
@@ -124,7 +124,7 @@ impl Interpreter {
         }
         for (axis, word) in block.axes().into_iter().enumerate() {
             let Some(word) = word else { continue };
-            let length = self.modal.units.length(word)?;
+            let length = self.modal.units.coordinate(word)?;
             let shift = if is_offset {
                 Some(length)
             } else {
@@ -145,8 +145,12 @@ impl Interpreter {
         let way = self.end_point(block)?;
         let axes = block.axes();
         let all = axes.iter().all(Option::is_none);
-        let end =
-            core::array::from_fn(|axis| if all || axes[axis].is_some() { place[axis] } else { way[axis] });
+        let mut end = way;
+        for axis in self.axes.iter().map(Axis::index) {
+            if all || axes[axis].is_some() {
+                end[axis] = place[axis];
+            }
+        }
         self.rapid(way, code)?;
         self.rapid(end, code)
     }
@@ -205,7 +209,7 @@ impl Interpreter {
             let mut back = [0; AXES_MAX];
             for (axis, word) in block.axes().into_iter().enumerate() {
                 let Some(word) = word else { continue };
-                back[axis] = here[axis].units() - self.modal.units.length(word)?.units();
+                back[axis] = here[axis].units() - self.modal.units.coordinate(word)?.units();
             }
             let back = frame.turned(back);
             origin =
@@ -213,7 +217,7 @@ impl Interpreter {
         } else {
             for (length, word) in origin.iter_mut().zip(block.axes()) {
                 if let Some(word) = word {
-                    *length = self.modal.units.length(word)?;
+                    *length = self.modal.units.coordinate(word)?;
                 }
             }
         }
@@ -234,7 +238,7 @@ impl Interpreter {
         }
         let mut given = [None; AXES_MAX];
         for (length, word) in given.iter_mut().zip(axes) {
-            *length = word.map(|word| self.modal.units.length(word)).transpose()?;
+            *length = word.map(|word| self.modal.units.coordinate(word)).transpose()?;
         }
         if kind == 1 {
             for (offset, length) in tool.offset.iter_mut().zip(given) {

@@ -1,5 +1,6 @@
 //! Parameters that tell positions, offsets, tool, feed and modes.
 
+use super::axis::{Axis, Point};
 use super::expression::Environment;
 use super::interpreter::Interpreter;
 use super::modal::{Distance, FeedMode, Units};
@@ -81,12 +82,15 @@ fn truth(value: bool) -> f64 {
 impl Environment for Interpreter {
     fn numbered(&self, number: u32) -> f64 {
         let current = || self.tools.table.get(self.tools.current);
-        let length = |mm: f64| self.modal.units.of_mm(mm);
+        let coordinate = |point: Point, index: u32| match Axis::ALL.get(index as usize) {
+            Some(axis) if axis.is_rotary() => at(point, index),
+            _ => self.modal.units.of_mm(at(point, index)),
+        };
         match number {
-            5021..=5023 => length(at(self.machine, number - 5021)),
-            5420..=5422 => length(at(self.work, number - 5420)),
+            5021..=5029 => coordinate(self.machine, number - 5021),
+            5420..=5428 => coordinate(self.work, number - 5420),
             5400 => f64::from(self.tools.current),
-            5401..=5403 => current().map_or(0.0, |tool| at(tool.offset, number - 5401)),
+            5401..=5409 => current().map_or(0.0, |tool| at(tool.offset, number - 5401)),
             5410 => current().map_or(2.0 * self.tools.radius_mm, |tool| tool.diameter.to_mm()),
             5411 => current().map_or(0.0, |tool| tool.angles_deg[0]),
             5412 => current().map_or(0.0, |tool| tool.angles_deg[1]),
@@ -108,12 +112,26 @@ impl Environment for Interpreter {
 }
 
 /// A coordinate \[mm\].
-fn at(point: super::Point, axis: u32) -> f64 {
+fn at(point: Point, axis: u32) -> f64 {
     point.get(axis as usize).map_or(0.0, |length| length.to_mm())
 }
 
 impl Interpreter {
+    /// `x` to `w` in work, `abs_x` to `abs_w` in machine coordinates.
+    fn coordinate_named(&self, name: &str) -> Option<f64> {
+        let (letter, first) = match name.strip_prefix("abs_") {
+            Some(letter) => (letter, 5021),
+            None => (name, 5420),
+        };
+        let [letter] = letter.as_bytes() else { return None };
+        let axis = Axis::of_letter(*letter)?;
+        Some(self.numbered(first + axis.index() as u32))
+    }
+
     fn predefined(&self, name: &str) -> Option<f64> {
+        if let Some(value) = self.coordinate_named(name) {
+            return Some(value);
+        }
         let modal = &self.modal;
         let pocket = |number: Option<u32>| {
             let pocket =
@@ -121,18 +139,9 @@ impl Interpreter {
             pocket.unwrap_or(-1.0)
         };
         Some(match name {
-            "x" => self.numbered(5420),
-            "y" => self.numbered(5421),
-            "z" => self.numbered(5422),
-            "abs_x" => self.numbered(5021),
-            "abs_y" => self.numbered(5022),
-            "abs_z" => self.numbered(5023),
-            "a" | "b" | "c" | "u" | "v" | "w" | "abs_a" | "abs_b" | "abs_c" | "abs_u" | "abs_v" | "abs_w" => {
-                0.0
-            }
             "feed" => match modal.feed_mode {
                 FeedMode::InverseTime => 0.0,
-                _ => modal.units.of_mm(modal.feed.unwrap_or(0.0)),
+                _ => modal.units.of_mm(modal.feed.map_or(0.0, |feed| feed.linear)),
             },
             "rpm" => modal.spindle.speed,
             "line" => f64::from(self.line),

@@ -7,12 +7,12 @@
 use motion_kernel::law::reach;
 use motion_kernel::plan::{Bend, Ceiling, MachineLimits};
 
-use super::axis::{Point, xyz_mm};
+use super::axis::{Axes, Axis, Point, feed_length, xyz_mm};
 use super::decimal::Length;
 use super::error::{Located, Problem};
 use super::interpreter::Interpreter;
 use super::modal::{FeedMode, Motion};
-use super::motion::{MoveLine, distance_mm};
+use super::motion::MoveLine;
 use super::program::{Feed, ProbeMove, StepKind};
 use crate::touch::Surface;
 
@@ -64,7 +64,7 @@ impl Probe {
     /// Where the machine is at rest after the probe tripped at `trip` on the way from `from` to `end`: braked as soon as it
     /// tripped, from the feed that it had there. At the latest that is the end. `None` where there are no such limits.
     fn rest(&self, [from, trip, end]: [Point; 3], feed: Feed) -> Option<Point> {
-        let (length_mm, to_trip_mm) = (distance_mm(from, end), distance_mm(from, trip));
+        let (length_mm, to_trip_mm) = (feed_length(from, end), feed_length(from, trip));
         let way_mm = [0, 1, 2].map(|axis: usize| end[axis].to_mm() - from[axis].to_mm());
         let direction = way_mm.map(|way_mm| (way_mm / length_mm).abs());
         let ceiling =
@@ -96,6 +96,11 @@ impl Interpreter {
         let Some(probe) = self.probe.clone() else {
             return Err(refused(Problem::NeedsProbe { word: motion.to_owned() }));
         };
+        if let Some(word) = line.block.axis_beside(Axes::XYZ) {
+            return Err(
+                word.problem(|word| Problem::Setup { word, expected: "a probing move of X, Y and Z only" })
+            );
+        }
         let [_, end] = self.target(line)?;
         let from = self.machine;
         let [from_mm, end_mm] = [from, end].map(xyz_mm);
@@ -132,9 +137,10 @@ impl Interpreter {
         self.machine = to;
         self.update_work(offset)?;
         let position = self.frame.work(trip.unwrap_or(end)).ok_or(refused(Problem::WorkOutOfRange))?;
-        // Axes that there are not stay at 0.
-        for (number, coordinate) in POSITION.zip(position) {
-            self.parameters.set(number, self.modal.units.of_mm(coordinate.to_mm()));
+        for ((number, coordinate), axis) in POSITION.zip(position).zip(Axis::ALL) {
+            let value = coordinate.to_mm();
+            let value = if axis.is_rotary() { value } else { self.modal.units.of_mm(value) };
+            self.parameters.set(number, value);
         }
         self.parameters.set(TRIPPED, f64::from(u8::from(trip.is_some())));
         Ok(())

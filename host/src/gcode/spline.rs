@@ -1,6 +1,6 @@
 //! Control points of G5 and G5.1, as LinuxCNC takes them.
 
-use super::axis::Point;
+use super::axis::{Axis, Point};
 use super::block::Block;
 use super::error::{Located, Problem};
 use super::modal::{Modal, Motion};
@@ -50,7 +50,7 @@ fn refuse_other_planes(
         let (motion, plane) = (motion.word(), modal.plane);
         return Err(Located::new(offset, Problem::SplinePlane { motion, plane }));
     }
-    match block.letter(b'Z') {
+    match block.axis_beside([Axis::X, Axis::Y].into_iter().collect()) {
         Some(word) => Err(word.problem(|word| Problem::SplineOutsidePlane { word })),
         None => Ok(()),
     }

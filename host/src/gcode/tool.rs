@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use super::axis::Point;
+use super::axis::{Axis, Point};
 use super::decimal::Length;
 use super::error::{GcodeError, Located, Problem};
 use super::expression::NoParameters;
@@ -18,7 +18,7 @@ pub struct Tool {
     pub number: u32,
     /// P: its place in the changer.
     pub pocket: u32,
-    /// X Y Z: what G43 adds.
+    /// What G43 adds, along every axis that the machine has.
     pub offset: Point,
     /// D.
     pub diameter: Length,
@@ -66,19 +66,14 @@ impl ToolTable {
                     number = Some(word);
                 }
                 b'P' => tool.pocket = word.count(0, "a whole number of a pocket, 0 or more")?,
-                b'X' => tool.offset[0] = length(word)?,
-                b'Y' => tool.offset[1] = length(word)?,
-                b'Z' => tool.offset[2] = length(word)?,
                 b'D' => tool.diameter = length(word)?,
                 b'I' => tool.angles_deg[0] = word.number.to_f64(),
                 b'J' => tool.angles_deg[1] = word.number.to_f64(),
                 b'Q' => tool.orientation = word.count(0, "a whole orientation from 0 to 9")?,
-                // No such axis, so no offset along it.
-                b'A' | b'B' | b'C' | b'U' | b'V' | b'W' if word.number.signum() == 0 => {}
-                b'A' | b'B' | b'C' | b'U' | b'V' | b'W' => {
-                    return Err(word.problem(|word| Problem::NoSuchAxis { word }));
-                }
-                _ => return Err(word.problem(|word| Problem::NoToolWord { word })),
+                letter => match Axis::of_letter(letter) {
+                    Some(axis) => tool.offset[axis.index()] = length(word)?,
+                    None => return Err(word.problem(|word| Problem::NoToolWord { word })),
+                },
             }
         }
         if let Some(remark) = line.iter().position(|&byte| byte == b';') {
@@ -114,7 +109,7 @@ mod tests {
 
     #[test]
     fn a_table_is_read() {
-        let text = "; machine tools\nT1 P1 D3.175 Z+12.5 ; 1/8 end mill\n\nt99p2x-.5 I90 J-45 Q3 A0\r\n";
+        let text = "; machine tools\nT1 P1 D3.175 Z+12.5 W-3 ; 1/8 end mill\n\nt99p2x-.5 I90 J-45 Q3 A0\r\n";
         let table = ToolTable::parse("tool.tbl", text.as_bytes()).unwrap();
         let tool = table.get(1).unwrap();
         assert_eq!(
@@ -133,7 +128,6 @@ mod tests {
             ("T1.5", "tool.tbl:1:1: found T1.5"),
             ("T-1", "tool.tbl:1:1: found T-1"),
             ("T1 F5", "tool.tbl:1:4: found F5"),
-            ("T1 W5", "tool.tbl:1:4: found W5"),
             ("T1 Z9999999", "tool.tbl:1:4: found Z9999999"),
             ("T1 Zx", "tool.tbl:1:4: found 'x' after Z"),
             ("#1=5", "tool.tbl:1:1: found a line without a T word"),

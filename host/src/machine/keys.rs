@@ -239,8 +239,14 @@ pub const KEY_TABLES: &[KeyTable] = &[
         "An axis; one to nine [[axis]] tables. Of A, B and C, which are rotary, read ° for mm in every key.",
         &[
             Key::new("name", "", AXIS_NAME, "Heads the axis's columns in tables and traces; no two are equal."),
-            Key::new("letter", "", AXIS_LETTER, "The words that move it; no two are equal.")
-                .or("by place, X Y Z A B C U V W"),
+            Key::new(
+                "letter",
+                "",
+                AXIS_LETTER,
+                "The words that move it; no two are equal. Without the key the axes are X, Y, Z, A, B, C, U, V, W, in this \
+                 order.",
+            )
+            .or("\"X\""),
             Key::new(
                 "feed_mm_s",
                 "mm/s",

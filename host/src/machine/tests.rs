@@ -172,13 +172,13 @@ fn keys_agree_with_each_other() {
 fn with_axes(letters: &str) -> String {
     let (path, axes) = REFERENCE_TOML.split_once("[[axis]]").expect("axes");
     let axis = axes.split("[[axis]]").next().expect("an axis");
-    let of = |letter: char| {
+    let of = |(place, letter): (usize, char)| {
         format!(
             "[[axis]]{}",
-            axis.replacen("name = \"X\"", &format!("name = \"{letter}1\"\nletter = \"{letter}\""), 1)
+            axis.replacen("name = \"X\"", &format!("name = \"axis{place}\"\nletter = \"{letter}\""), 1)
         )
     };
-    path.to_owned() + &letters.chars().map(of).collect::<String>()
+    path.to_owned() + &letters.chars().enumerate().map(of).collect::<String>()
 }
 
 #[test]
