@@ -94,7 +94,7 @@ struct NeedsJson<'a> {
 pub fn run(arguments: &CheckArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let options = arguments.reading.options(&machine)?;
+    let options = arguments.reading.options(machine.read_options())?;
     match source.program(&options) {
         Ok(program) => accepted(arguments, &source, &program, &machine, out),
         Err(_) => {

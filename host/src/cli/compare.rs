@@ -117,7 +117,7 @@ pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outc
     let programs = programs(&arguments.programs)?;
     let own = [machine.path.blend_tolerance_mm];
     let tolerances_mm = if arguments.tolerances.is_empty() { &own[..] } else { &arguments.tolerances };
-    let options = arguments.reading.options(&machine)?;
+    let options = arguments.reading.options(machine.read_options())?;
     let (mut rows, mut refused) = (Vec::new(), Vec::new());
     let mut progress = Progress::new(programs.len() as u64);
     for path in &programs {

@@ -73,7 +73,7 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
-    let program = arguments.reading.program(&source, &machine)?;
+    let program = arguments.reading.program(&source, machine.read_options())?;
     if !arguments.no_spindle {
         require_outputs(&source.name, &program, &machine)?;
     }

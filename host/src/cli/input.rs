@@ -9,7 +9,7 @@ use clap::{ArgAction, Args};
 use super::error::CliError;
 use crate::files::STANDARD_INPUT;
 use crate::gcode::{self, GcodeError, ParameterFile, Program, ReadOptions, Refusal, ToolTable};
-use crate::machine::Machine;
+use crate::machine::{AnyMachine, Machine};
 
 /// What G-code is read with.
 #[derive(Debug, Args)]
@@ -35,8 +35,8 @@ pub(super) struct ReadingArguments {
 }
 
 impl ReadingArguments {
-    /// The options they ask for on a machine, with the files read.
-    pub(super) fn options(&self, machine: &Machine) -> Result<ReadOptions, CliError> {
+    /// The options they ask for, with the files read, beside [those of a machine](Machine::read_options).
+    pub(super) fn options(&self, machine: ReadOptions) -> Result<ReadOptions, CliError> {
         for folder in &self.subroutines {
             let path = || folder.display().to_string();
             fs::read_dir(folder).map_err(|source| CliError::Folder { path: path(), source })?;
@@ -62,12 +62,12 @@ impl ReadingArguments {
             parameters,
             tools,
             lines_max: self.lines_max,
-            ..machine.read_options()
+            ..machine
         })
     }
 
-    /// The program of a source, for a machine.
-    pub(super) fn program(&self, source: &Source, machine: &Machine) -> Result<Program, CliError> {
+    /// The program of a source, with the options of a machine.
+    pub(super) fn program(&self, source: &Source, machine: ReadOptions) -> Result<Program, CliError> {
         Ok(source.program(&self.options(machine)?)?)
     }
 }
@@ -116,12 +116,32 @@ pub(super) fn read(path: &Path) -> Result<Source, CliError> {
     }
 }
 
-/// Reads a machine file; without one, the reference machine.
+/// Reads the file of a machine of any number of axes; without one, the reference machine.
+pub(super) fn any_machine(path: Option<&PathBuf>) -> Result<AnyMachine, CliError> {
+    match path {
+        Some(path) => {
+            let (name, text) = machine_text(path)?;
+            Ok(AnyMachine::from_toml(&name, &text)?)
+        }
+        None => Ok(AnyMachine::Three(Box::new(Machine::reference()))),
+    }
+}
+
+/// Reads the file of a machine of at most three axes; without one, the reference machine.
 pub(super) fn machine(path: Option<&PathBuf>) -> Result<Machine, CliError> {
-    let Some(path) = path else {
-        return Ok(Machine::reference());
-    };
+    match path {
+        Some(path) => {
+            let (name, text) = machine_text(path)?;
+            Ok(Machine::from_toml(&name, &text)?)
+        }
+        None => Ok(Machine::reference()),
+    }
+}
+
+fn machine_text(path: &Path) -> Result<(String, String), CliError> {
     let name = path.display().to_string();
-    let text = fs::read_to_string(path).map_err(|source| CliError::Read { path: name.clone(), source })?;
-    Ok(Machine::from_toml(&name, &text)?)
+    match fs::read_to_string(path) {
+        Ok(text) => Ok((name, text)),
+        Err(source) => Err(CliError::Read { path: name, source }),
+    }
 }

@@ -97,7 +97,7 @@ pub fn plan(arguments: &PlanArguments, out: &mut dyn Write) -> Result<Outcome, C
     let mut plan = if is_block_list {
         plan_blocks(&source.name, &source.text, mode)?
     } else {
-        let program = arguments.reading.program(&source, &machine)?;
+        let program = arguments.reading.program(&source, machine.read_options())?;
         plan_program(&source.name, &program, &machine, mode)?
     };
     if is_block_list && arguments.machine.is_some() {

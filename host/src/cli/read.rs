@@ -11,7 +11,8 @@ use super::error::{CliError, Outcome};
 use super::input;
 use super::table::{self, Align};
 use crate::gcode::{
-    Feed, NoticeKind, Nurbs, Outputs, PathMode, Point, Program, SpindleSpeed, Step, StepKind, xyz_mm,
+    AXES_MAX, Axes, Axis, Feed, NoticeKind, Nurbs, Outputs, PathMode, Point, Program, SpindleSpeed, Step,
+    StepKind, xyz_mm,
 };
 
 const EXAMPLES: &str = "\
@@ -37,6 +38,8 @@ JSON: an object for every step, in order. All have line and kind. kind is
   switch                       spindle or coolant change: with spindle (\"clockwise\", \"counterclockwise\" or null: off),
                                speed (rev/min; m/min or feet/min if surface, by G96), surface, flood, mist
   stop, end
+Points are X Y Z; if the machine has other axes, all nine coordinates, X Y Z A B C U V W (° for A, B and C; a feed of these
+alone is in °/min).
 After them an object for every notice and every message, of kind notice and message, with text, and within: the line of a
 subroutine in another file, where that asks for it.";
 
@@ -47,7 +50,7 @@ pub struct ReadArguments {
     /// G-code (`-`: standard input).
     #[arg(value_name = "PROGRAM")]
     program: PathBuf,
-    /// Machine file: what its probe touches, its tool radius, its subroutine that changes tools. Without it, none of these.
+    /// Machine file: its axes, what its probe touches, its tool radius, its subroutine that changes tools. Without it, X, Y, Z and none of the others.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
     #[command(flatten)]
@@ -98,9 +101,9 @@ enum KindJson {
         knots: Vec<f64>,
     },
     Probe {
-        from_mm: [f64; 3],
-        to_mm: [f64; 3],
-        end_mm: [f64; 3],
+        from_mm: Vec<f64>,
+        to_mm: Vec<f64>,
+        end_mm: Vec<f64>,
         trip_mm: Option<[f64; 3]>,
         leaves: bool,
         feed_mm_min: Option<f64>,
@@ -125,8 +128,8 @@ enum KindJson {
 /// What all moves have.
 #[derive(Serialize)]
 struct MoveJson {
-    from_mm: [f64; 3],
-    to_mm: [f64; 3],
+    from_mm: Vec<f64>,
+    to_mm: Vec<f64>,
     feed_mm_min: Option<f64>,
     path: &'static str,
     tolerance_mm: Option<f64>,
@@ -149,8 +152,8 @@ struct NoteJson {
 /// The program is refused, or `out` can't be written.
 pub fn read(arguments: &ReadArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let source = input::read(&arguments.program)?;
-    let machine = input::machine(arguments.machine.as_ref())?;
-    let program = arguments.reading.program(&source, &machine)?;
+    let machine = input::any_machine(arguments.machine.as_ref())?;
+    let program = arguments.reading.program(&source, machine.read_options())?;
     let write = if arguments.json { write_json_lines } else { write_table };
     write(&program, out).map_err(CliError::Output)?;
     Ok(Outcome::Done)
@@ -175,34 +178,37 @@ fn write_json_line(value: &impl Serialize, out: &mut dyn Write) -> io::Result<()
 }
 
 fn step_json(program: &Program, step: &Step) -> StepJson {
+    let axes = program.axes;
     let kind = match step.kind {
-        StepKind::Line(line) => KindJson::Line { ends: move_json(line.from, line.to, line.feed, line.mode) },
+        StepKind::Line(line) => {
+            KindJson::Line { ends: move_json(axes, [line.from, line.to], line.feed, line.mode) }
+        }
         StepKind::Arc(arc) => KindJson::Arc {
-            ends: move_json(arc.from, arc.to, arc.feed, arc.mode),
+            ends: move_json(axes, [arc.from, arc.to], arc.feed, arc.mode),
             plane: arc.plane.to_string(),
             turn_deg: arc.turn_deg,
             centre_mm: arc.centre_mm,
             sweep_rad: arc.sweep_rad,
         },
         StepKind::Cubic(cubic) => KindJson::Cubic {
-            ends: move_json(cubic.from, cubic.to, cubic.feed, cubic.mode),
+            ends: move_json(axes, [cubic.from, cubic.to], cubic.feed, cubic.mode),
             controls_mm: cubic.controls_mm,
         },
         StepKind::Through(point) => KindJson::Through {
-            ends: move_json(point.from, point.to, point.feed, point.mode),
+            ends: move_json(axes, [point.from, point.to], point.feed, point.mode),
             begins: point.begins,
         },
         StepKind::Nurbs(curve) => {
             let Nurbs { degree, points_mm, weights, knots } =
                 program.nurbs.get(curve.curve).cloned().unwrap_or_default();
-            let ends = move_json(curve.from, curve.to, curve.feed, curve.mode);
+            let ends = move_json(axes, [curve.from, curve.to], curve.feed, curve.mode);
             KindJson::Nurbs { ends, degree, points_mm, weights, knots }
         }
         StepKind::Probe(probe) => KindJson::Probe {
-            from_mm: mm(probe.from),
-            to_mm: mm(probe.to),
-            end_mm: mm(probe.end),
-            trip_mm: probe.trip.map(mm),
+            from_mm: coordinates(axes, probe.from),
+            to_mm: coordinates(axes, probe.to),
+            end_mm: coordinates(axes, probe.end),
+            trip_mm: probe.trip.map(xyz_mm),
             leaves: probe.leaves,
             feed_mm_min: mm_min(probe.feed),
         },
@@ -233,18 +239,21 @@ pub(super) fn direction(spindle: Spindle) -> Option<&'static str> {
     }
 }
 
-fn move_json(from: Point, to: Point, feed: Feed, mode: PathMode) -> MoveJson {
+fn move_json(axes: Axes, [from, to]: [Point; 2], feed: Feed, mode: PathMode) -> MoveJson {
     let (path, tolerance_mm, merging_mm) = match mode {
         PathMode::Unprogrammed => ("machine", None, None),
         PathMode::ExactPath => ("exact", None, None),
         PathMode::ExactStop => ("stop", None, None),
         PathMode::Blend { tolerance_mm, merging_mm } => ("blend", tolerance_mm, merging_mm),
     };
-    MoveJson { from_mm: mm(from), to_mm: mm(to), feed_mm_min: mm_min(feed), path, tolerance_mm, merging_mm }
+    let [from_mm, to_mm] = [from, to].map(|point| coordinates(axes, point));
+    MoveJson { from_mm, to_mm, feed_mm_min: mm_min(feed), path, tolerance_mm, merging_mm }
 }
 
-fn mm(point: Point) -> [f64; 3] {
-    xyz_mm(point)
+/// X, Y and Z; all nine coordinates if the machine has others.
+fn coordinates(axes: Axes, point: Point) -> Vec<f64> {
+    let others = axes.iter().any(|axis| !Axes::XYZ.contains(axis));
+    point.iter().take(if others { AXES_MAX } else { 3 }).map(|coordinate| coordinate.to_mm()).collect()
 }
 
 fn mm_min(feed: Feed) -> Option<f64> {
@@ -255,23 +264,21 @@ fn mm_min(feed: Feed) -> Option<f64> {
 }
 
 fn write_table(program: &Program, out: &mut dyn Write) -> io::Result<()> {
-    let columns = [
-        ("line", "", Align::Right),
-        ("step", "", Align::Left),
-        ("X", "mm", Align::Right),
-        ("Y", "mm", Align::Right),
-        ("Z", "mm", Align::Right),
-        ("feed", "mm/min", Align::Right),
-        ("path", "", Align::Left),
-        ("more", "", Align::Left),
-    ];
-    let rows: Vec<[String; 8]> = program.steps.iter().map(|step| row(program, step)).collect();
+    let mut columns = vec![("line", "", Align::Right), ("step", "", Align::Left)];
+    columns.extend(shown_axes(program.axes).map(|axis| (axis.name(), axis.unit(), Align::Right)));
+    columns.extend([("feed", "mm/min", Align::Right), ("path", "", Align::Left), ("more", "", Align::Left)]);
+    let rows: Vec<Vec<String>> = program.steps.iter().map(|step| row(program, step)).collect();
     table::write(&columns, &rows, out)?;
     writeln!(out, "\n  {} steps", rows.len())?;
     program.notes(NoticeKind::is_of_outputs).iter().try_for_each(|note| writeln!(out, "  note: {note}"))
 }
 
-fn row(program: &Program, step: &Step) -> [String; 8] {
+/// X, Y and Z, and the other axes of the machine.
+fn shown_axes(axes: Axes) -> impl Iterator<Item = Axis> {
+    Axis::ALL.into_iter().filter(move |&axis| Axes::XYZ.contains(axis) || axes.contains(axis))
+}
+
+fn row(program: &Program, step: &Step) -> Vec<String> {
     let (name, ends, more) = match step_json(program, step).kind {
         KindJson::Line { ends } if ends.feed_mm_min.is_none() => ("rapid", Some(ends), String::new()),
         KindJson::Line { ends } => ("line", Some(ends), String::new()),
@@ -309,8 +316,13 @@ fn row(program: &Program, step: &Step) -> [String; 8] {
         KindJson::Stop => ("stop", None, String::new()),
         KindJson::End => ("end", None, String::new()),
     };
-    let [x, y, z, feed, path] = ends.map(move_cells).unwrap_or_default();
-    [step.line.to_string(), name.to_owned(), x, y, z, feed, path, more]
+    let mut cells = vec![step.line.to_string(), name.to_owned()];
+    match ends {
+        Some(ends) => cells.extend(move_cells(program.axes, &ends)),
+        None => cells.extend(vec![String::new(); shown_axes(program.axes).count() + 2]),
+    }
+    cells.push(more);
+    cells
 }
 
 fn switch_words(spindle: Option<&str>, speed: f64, surface: bool, [flood, mist]: [bool; 2]) -> String {
@@ -326,8 +338,9 @@ fn switch_words(spindle: Option<&str>, speed: f64, surface: bool, [flood, mist]:
 }
 
 /// End point, feed and path mode.
-fn move_cells(ends: MoveJson) -> [String; 5] {
-    let [x, y, z] = ends.to_mm.map(|coordinate| format!("{coordinate:.4}"));
+fn move_cells(axes: Axes, ends: &MoveJson) -> Vec<String> {
+    let cell = |axis: Axis| ends.to_mm.get(axis.index()).map_or_else(String::new, |to| format!("{to:.4}"));
+    let mut cells: Vec<String> = shown_axes(axes).map(cell).collect();
     let feed = ends.feed_mm_min.map_or_else(|| "–".to_owned(), |feed_mm_min| format!("{feed_mm_min:.1}"));
     let tolerance = |letter, mm: Option<f64>| mm.map_or_else(String::new, |mm| format!(" {letter}{mm}"));
     let mode = match ends.path {
@@ -336,5 +349,7 @@ fn move_cells(ends: MoveJson) -> [String; 5] {
         "stop" => "G61.1",
         _ => "G64",
     };
-    [x, y, z, feed, format!("{mode}{}{}", tolerance('P', ends.tolerance_mm), tolerance('Q', ends.merging_mm))]
+    let mode = format!("{mode}{}{}", tolerance('P', ends.tolerance_mm), tolerance('Q', ends.merging_mm));
+    cells.extend([feed, mode]);
+    cells
 }

@@ -102,7 +102,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let kept = kept.map(|path| files.edited("--parameters", path, "--parameters")).transpose()?;
     let machine = input::machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let options = arguments.reading.options(&machine)?;
+    let options = arguments.reading.options(machine.read_options())?;
     let program = source.program(&options)?;
     let after = options.parameters.after(&program.parameters);
     let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;

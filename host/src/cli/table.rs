@@ -16,34 +16,36 @@ pub(super) enum Align {
 pub(super) type Column = (&'static str, &'static str, Align);
 
 /// Writes a table with one cell per column in every row.
-pub(super) fn write<const COLUMNS: usize>(
-    columns: &[Column; COLUMNS],
-    rows: &[[String; COLUMNS]],
+pub(super) fn write(
+    columns: &[Column],
+    rows: &[impl AsRef<[String]>],
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let width = |text: &str| text.chars().count();
-    let widths: [usize; COLUMNS] = std::array::from_fn(|index| {
-        let (heading, unit, _) = columns[index];
-        let widest = rows.iter().map(|row| width(&row[index])).max().unwrap_or(0);
-        widest.max(width(heading)).max(width(unit))
-    });
-    let mut line = |cells: [&str; COLUMNS]| {
+    let mut widths: Vec<usize> =
+        columns.iter().map(|(heading, unit, _)| width(heading).max(width(unit))).collect();
+    for row in rows {
+        for (widest, cell) in widths.iter_mut().zip(row.as_ref()) {
+            *widest = width(cell).max(*widest);
+        }
+    }
+    let mut line = |cells: &mut dyn Iterator<Item = &str>| {
         let mut text = String::new();
-        for ((cell, widest), (_, _, align)) in cells.iter().zip(widths).zip(columns) {
+        for ((cell, &widest), (_, _, align)) in cells.zip(&widths).zip(columns) {
             let blanks = " ".repeat(widest - width(cell));
             text += &" ".repeat(GAP);
             match align {
-                Align::Left => text += &[*cell, &blanks].concat(),
-                Align::Right => text += &[&blanks, *cell].concat(),
+                Align::Left => text += &[cell, &blanks].concat(),
+                Align::Right => text += &[&blanks, cell].concat(),
             }
         }
         writeln!(out, "{}", text.trim_end())
     };
-    line(columns.each_ref().map(|(heading, _, _)| *heading))?;
+    line(&mut columns.iter().map(|(heading, _, _)| *heading))?;
     if columns.iter().any(|(_, unit, _)| !unit.is_empty()) {
-        line(columns.each_ref().map(|(_, unit, _)| *unit))?;
+        line(&mut columns.iter().map(|(_, unit, _)| *unit))?;
     }
-    rows.iter().try_for_each(|row| line(row.each_ref().map(String::as_str)))
+    rows.iter().try_for_each(|row| line(&mut row.as_ref().iter().map(String::as_str)))
 }
 
 #[cfg(test)]

@@ -75,6 +75,12 @@ impl Axis {
         LETTERS[self.index()] as char
     }
 
+    /// The same, as a text.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        ["X", "Y", "Z", "A", "B", "C", "U", "V", "W"][self.index()]
+    }
+
     /// The axis of a letter, of either case.
     #[must_use]
     pub fn of_letter(letter: u8) -> Option<Self> {
@@ -99,7 +105,7 @@ pub(super) const LETTERS: [u8; AXES_MAX] = *b"XYZABCUVW";
 
 impl fmt::Display for Axis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.letter())
+        f.write_str(self.name())
     }
 }
 

@@ -331,7 +331,7 @@ impl<'a> Flow<'a> {
             let has_text = !is_blank_line(line) && !is_percent_line(line);
             let cursor = file.cursor(line);
             if let Some(cursor) = cursor.filter(|cursor| has_text && oword::place(cursor.clone()).is_none()) {
-                Block::collect(cursor, &Unread, self.interpreter.axes)
+                Block::collect(cursor, &Unread, self.interpreter.program.axes)
                     .map_err(|located| file.failure(place, located).into_error())?;
             }
             place = after;

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::axis::{Axes, Axis, ORIGIN, Point};
+use super::axis::{Axis, ORIGIN, Point};
 use super::block::{Block, GGroup, MGroup};
 use super::cutter::Cutter;
 use super::cycle::CycleState;
@@ -43,8 +43,6 @@ pub(super) enum Control {
 #[derive(Debug)]
 pub(super) struct Interpreter {
     pub(super) program: Program,
-    /// The axes of the machine.
-    pub(super) axes: Axes,
     pub(super) modal: Modal,
     pub(super) frame: Frame,
     /// The coordinate system in force, 1 to 9: parameter 5220 unless the program assigned that.
@@ -117,8 +115,11 @@ impl Interpreter {
     pub(super) fn new(options: &ReadOptions) -> Self {
         let parameters = Parameters::with(options.parameters.values());
         let mut interpreter = Self {
-            program: Program { tool_radius_mm: options.tool_radius_mm, ..Program::default() },
-            axes: options.axes,
+            program: Program {
+                axes: options.axes,
+                tool_radius_mm: options.tool_radius_mm,
+                ..Program::default()
+            },
             modal: Modal::default(),
             frame: Frame::default(),
             system: 1,
@@ -154,7 +155,7 @@ impl Interpreter {
 
     /// Executes a line from the cursor on.
     pub(super) fn execute(&mut self, cursor: Cursor<'_>) -> Result<Control, Located> {
-        let block = Block::collect(cursor, self, self.axes)?;
+        let block = Block::collect(cursor, self, self.program.axes)?;
         self.begun |= !block.is_empty();
         self.refuse_in_nurbs(&block)?;
         for assignment in &block.assignments {
@@ -236,9 +237,9 @@ impl Interpreter {
             // Turns and polar words move axes that no word names.
             if let Some(axis) = Axis::ALL
                 .into_iter()
-                .find(|axis| from[axis.index()] != to[axis.index()] && !self.axes.contains(*axis))
+                .find(|axis| from[axis.index()] != to[axis.index()] && !self.program.axes.contains(*axis))
             {
-                return Err(Located::new(0, Problem::MissingAxisMoves { axis, axes: self.axes }));
+                return Err(Located::new(0, Problem::MissingAxisMoves { axis, axes: self.program.axes }));
             }
             self.program.systems.insert(self.system);
         }

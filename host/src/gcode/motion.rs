@@ -250,10 +250,10 @@ impl Interpreter {
     /// Refuses a curve in a plane whose axes the machine does not have.
     pub(super) fn refuse_plane(&self, motion: Motion, plane: Plane, offset: usize) -> Result<(), Located> {
         let [first, second, _] = plane.axes().map(|index| Axis::ALL[index]);
-        if self.axes.contains(first) && self.axes.contains(second) {
+        if self.program.axes.contains(first) && self.program.axes.contains(second) {
             return Ok(());
         }
-        let (motion, axes) = (motion.word(), self.axes);
+        let (motion, axes) = (motion.word(), self.program.axes);
         Err(Located::new(offset, Problem::PlaneWithoutAxes { motion, plane, axes }))
     }
 

@@ -146,7 +146,7 @@ impl Interpreter {
         let axes = block.axes();
         let all = axes.iter().all(Option::is_none);
         let mut end = way;
-        for axis in self.axes.iter().map(Axis::index) {
+        for axis in self.program.axes.iter().map(Axis::index) {
             if all || axes[axis].is_some() {
                 end[axis] = place[axis];
             }

@@ -1,6 +1,6 @@
 //! The steps of a program, in its order.
 
-use super::axis::Point;
+use super::axis::{Axes, Point};
 use super::parameters::Parameters;
 use motion_kernel::hal::Spindle;
 use std::fmt;
@@ -8,6 +8,8 @@ use std::fmt;
 /// A program, read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Program {
+    /// The axes of the machine that it was read for.
+    pub axes: Axes,
     /// The steps, in order. Moves of no length are not listed.
     pub steps: Vec<Step>,
     /// The curves of [`NurbsMove`]s.

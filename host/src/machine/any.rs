@@ -3,7 +3,7 @@
 use super::error::MachineError;
 use super::file;
 use super::settings::Machine;
-use crate::gcode::AXES_MAX;
+use crate::gcode::{AXES_MAX, ReadOptions};
 
 /// A machine with the fewest places that hold its axes. Planning and simulation are made for both.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,5 +25,14 @@ impl AnyMachine {
             return Ok(Self::Nine(Box::new(machine)));
         }
         machine.fitted(source_name, text).map(|machine| Self::Three(Box::new(machine)))
+    }
+
+    /// What the machine adds to the options that its programs are read with.
+    #[must_use]
+    pub fn read_options(&self) -> ReadOptions {
+        match self {
+            Self::Three(machine) => machine.read_options(),
+            Self::Nine(machine) => machine.read_options(),
+        }
     }
 }

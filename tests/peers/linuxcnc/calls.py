@@ -15,7 +15,7 @@ import tools
 
 # The machine's units are millimetres; its position is 0 at the start, whatever the offsets of the parameter file.
 BEFORE = ["G21", "G53 G0 X0 Y0 Z0", "G80 (begin)"]
-AXES_XYZABC = 0x3F
+ALL_AXES = 0x1FF
 
 
 class Canon:
@@ -58,7 +58,7 @@ class Canon:
         return 1.0
 
     def get_axis_mask(self):
-        return AXES_XYZABC
+        return ALL_AXES
 
     def get_block_delete(self):
         return False

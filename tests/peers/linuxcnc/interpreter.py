@@ -17,7 +17,7 @@ import random_programs
 import reading
 import tools
 from difference import Figures, compared
-from steps import NotComparable
+from steps import NotComparable, as_of_calls
 
 HERE = Path(__file__).parent
 SHOWN = 3
@@ -36,7 +36,7 @@ def arguments():
     parser.add_argument(
         "--tools", type=Path, help="tool table, for both, unless NAME.tbl is beside a program; without it 99 tools of 2 mm"
     )
-    parser.add_argument("--machine", type=Path, help="machine file for `motion`; without it the reference machine with its probe")
+    parser.add_argument("--machine", type=Path, help="machine file for `motion`; without it the reference machine with its probe and nine axes")
     parser.add_argument("--subroutines", type=Path, help="folder of subroutines, for both")
     parser.add_argument("--differences", type=Path, default=HERE / "differences.toml", help="differences with a reason")
     parser.add_argument("--refused", type=Path, default=HERE / "refused.toml", help="refused programs with a reason")
@@ -72,6 +72,8 @@ def outcome(name, path, motion, given, unread):
             result["not_comparable"] = str(reason)
     mine, other = result.pop("ours", None), result.pop("theirs", None)
     if mine is not None and other is not None:
+        other, result["tells_all"] = other
+        mine = mine if result["tells_all"] else as_of_calls(mine)
         result["probes"] = any(step.kind == "probe" for step in mine)
         result["unread"] = collections.Counter(step.kind for step in other if step.kind in unread)
         result["differences"], result["figures"] = compared(mine, [step for step in other if step.kind not in unread])
@@ -114,6 +116,12 @@ def refusals(results, known):
             yield f"listed as refused, but accepted: {name}"
 
 
+def shortened(names):
+    random = [name for name in names if name.startswith("random/")]
+    told = [name for name in names if name not in random] + ([f"{len(random)} random programs"] if random else [])
+    return ", ".join(told) or "none"
+
+
 def counted(reasons):
     counts = collections.Counter(map(reason_of, reasons))
     return [f"  {count:4}  {reason}" for reason, count in counts.most_common()]
@@ -143,6 +151,8 @@ def report(results, known, unread):
     print("\n".join(f"  {result['name']}: {result['not_comparable']}" for result in apart))
     print("compared up to the first probing move, which LinuxCNC's interpreter alone knows no end of: "
           + (", ".join(result["name"] for result in both if result["probes"]) or "none"))
+    print("compared without path modes and outputs, as `rs274` knows six axes: "
+          + shortened([result["name"] for result in both if not result["tells_all"]]))
     skipped = sum((result["unread"] for result in both), collections.Counter())
     for kind, reason in unread.items():
         print(f"not compared: {skipped[kind]} of {kind} ({reason})")
@@ -188,7 +198,7 @@ def main():
             given["tools"].write_text(tools.alike(count=99, diameter=2))
         if given["machine"] is None:
             given["machine"] = Path(folder, "machine.toml")
-            given["machine"].write_text(reading.with_probe(options.motion))
+            given["machine"].write_text(reading.with_all(options.motion))
         tasks = [pool.submit(outcome, name, path, options.motion, given, unread) for name, path in programs]
         results = [task.result() for task in tasks]
     is_right = report(results, listing.get("difference", []), unread)

@@ -12,8 +12,12 @@ TOOLS = "".join(f"T{number} P{number} X{number % 3} Z{5 * number} D2\n" for numb
 AXES = {"G17": "XYZ", "G18": "ZXY", "G19": "YZX"}
 OFFSETS = {"X": "I", "Y": "J", "Z": "K"}
 FEATURES = ("arcs", "planes", "systems", "rotation", "shifts", "tools", "cycles", "units", "flow", "feeds", "places", "polar",
-            "modes", "diameter")
-APART = (("rotation", "shifts"), ("units", "tools"), ("units", "cycles"), ("modes", "tools"), ("modes", "units"))
+            "modes", "diameter", "rotary", "beside")
+APART = (("rotation", "shifts"), ("units", "tools"), ("units", "cycles"), ("modes", "tools"), ("modes", "units"),
+         # Of U, V and W one voice of LinuxCNC knows nothing, and the other does not tell the units.
+         ("units", "beside"))
+# Such programs are compared without path modes and outputs, so they are few.
+BESIDE_SHARE = 0.2
 
 
 class Program:
@@ -23,8 +27,11 @@ class Program:
         for one, other in APART:
             if one in wanted and other in wanted:
                 wanted.remove(self.random.choice((one, other)))
+        if "beside" in wanted and self.random.random() > BESIDE_SHARE:
+            wanted.remove("beside")
         self.features = sorted(wanted)
         self.plane, self.unit = "G17", 1.0
+        self.others = ("ABC" if "rotary" in wanted else "") + ("UVW" if "beside" in wanted else "")
         self.label = 0
         self.lines = [HEADER, "#1=0 #2=0.5 #<a>=3"]
         if "rotation" in wanted:
@@ -52,6 +59,7 @@ class Program:
 
     def axes(self, most=40):
         letters = [letter for letter in "XYZ" if self.random.random() < 0.6] or ["X"]
+        letters += [letter for letter in self.others if self.random.random() < 0.3]
         return " ".join(self.word(letter, most) for letter in letters)
 
     def block(self, count, depth):
@@ -98,6 +106,15 @@ class Program:
         else:
             self.say("G91", f"{code} {first}{end[0]:.5f} {second}{end[1]:.5f} {centre}{height}{turns}", "G90")
         self.say(f"G1 {self.axes()}")
+
+    def rotary(self):
+        """A move of rotary axes alone, and an arc that takes one along."""
+        self.say(f"G1 {self.word(self.random.choice('ABC'), 400)}")
+        if self.plane == "G17":
+            self.say("G91", f"G2 X2 I1 J0 {self.word('A', 90)}", "G90")
+
+    def beside(self):
+        self.say(f"G{self.random.randint(0, 1)} {self.word(self.random.choice('UVW'))}")
 
     def planes(self):
         self.plane = self.random.choice(tuple(AXES))

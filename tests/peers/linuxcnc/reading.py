@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -14,6 +15,7 @@ HERE = Path(__file__).parent
 PYTHON = "/usr/bin/python3"
 LIMIT_S = 60
 INCH_MM = 25.4
+UNKNOWN_AXIS = re.compile("Bad character '[uvw]' used")
 INI = """[EMC]
 VERSION = 1.1
 [DISPLAY]
@@ -39,7 +41,7 @@ def called(command, **options):
 
 
 def by_linuxcnc(program, given):
-    """Steps of LinuxCNC's own interpreter. `given`: paths of `parameters`, `tools`, `subroutines`, or None for each."""
+    """Steps of LinuxCNC's own interpreter, and whether they tell all: `rs274` knows six axes. `given`: paths of `parameters`, `tools`, `subroutines`, or None for each."""
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         table = given["tools"].read_text()
@@ -67,7 +69,9 @@ def by_linuxcnc(program, given):
     *calls, (outcome, *reason) = calls
     if outcome == "error":
         raise Refused(reason[1].splitlines()[0])
-    return steps.of_linuxcnc(calls, order.stdout)
+    if UNKNOWN_AXIS.search(order.stderr):
+        return steps.of_calls(calls), False
+    return steps.of_linuxcnc(calls, order.stdout), True
 
 
 def with_beginning(text):
@@ -78,12 +82,14 @@ def with_beginning(text):
     return "".join(lines)
 
 
-def with_probe(motion):
-    """The reference machine's file with its probe, which is commented there."""
+def with_all(motion):
+    """The reference machine's file with its probe, which is commented there, and with nine axes."""
     file = subprocess.run([Path(motion).resolve(), "machine"], capture_output=True, text=True, check=True).stdout
     before, probe, after = file.partition("#[[probe.box]]")
     touch, blank, after = after.partition("\n\n")
-    return before + probe[1:] + touch.replace("\n#low_mm", "\nlow_mm").replace("\n#high_mm", "\nhigh_mm") + blank + after
+    file = before + probe[1:] + touch.replace("\n#low_mm", "\nlow_mm").replace("\n#high_mm", "\nhigh_mm") + blank + after
+    last = file[file.rindex("[[axis]]"):]
+    return file + "".join(last.replace('name = "Z"', f'name = "{letter}"') for letter in "ABCUVW")
 
 
 def by_motion(motion, program, given):

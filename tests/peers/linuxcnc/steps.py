@@ -20,6 +20,8 @@ PIECES_OF_CUBIC = 60
 
 MOVES = {"STRAIGHT_TRAVERSE": "straight_traverse", "STRAIGHT_FEED": "straight_feed", "ARC_FEED": "arc_feed",
          "STRAIGHT_PROBE": "straight_probe", "RIGID_TAP": "rigid_tap", "DWELL": "dwell", "CHANGE_TOOL": "change_tool"}
+# Kinds of steps that calls in full doubles make.
+CALLED = ("move", "probe", "tap", "dwell", "tool")
 # Calls that come in the order of `rs274` alone, by kind.
 OUTPUTS = {
     "orient": "ORIENT_SPINDLE",
@@ -36,6 +38,11 @@ SWITCHES = {"START_SPINDLE_CLOCKWISE": ("spindle", "clockwise"), "MIST_ON": ("mi
             "FLOOD_ON": ("flood", True), "FLOOD_OFF": ("flood", False), "SET_SPINDLE_SPEED": ("speed", None)}
 # A number that counts, a line number of the program, the call.
 ORDERED = re.compile(r"\s*\d+ (?:N[\d.]*\s+)?([A-Z][A-Z0-9_.]*)\((.*)\)\s*")
+
+
+def only_rotary(start, end):
+    moved = [at for at in range(9) if abs(end[at] - start[at]) > NO_LENGTH_MM]
+    return bool(moved) and all(at in ROTARY for at in moved)
 
 
 class NotComparable(Exception):
@@ -158,7 +165,11 @@ class Merging:
         feed_mm_min = None if call[0] == "straight_traverse" or self.feed_mm is None else self.feed_mm
         if feed_mm_min is not None and self.per_revolution:
             feed_mm_min *= self.speed_rev_min
-        self.position = self.offsets.machine(point)
+        position = self.offsets.machine(point)
+        if feed_mm_min is not None and only_rotary(self.position, position):
+            # Degrees are degrees in inches, too.
+            feed_mm_min /= self.unit_mm
+        self.position = position
         self.point = point
         self.steps.append(Step(kind, line, self.position, feed_mm_min, self.path, **more))
 
@@ -336,6 +347,21 @@ def of_linuxcnc(calls, order):
     if rest:
         raise NotComparable(f"{len(rest)} calls in full doubles after the end")
     return with_length(merging.steps)
+
+
+def of_calls(calls):
+    """Steps of the calls in full doubles alone: moves without their path mode, dwells and tools."""
+    merging = Merging(calls)
+    for call in calls:
+        getattr(merging, call[0])(call)
+        if merging.steps and merging.steps[-1].kind == "probe":
+            break
+    return with_length(merging.steps)
+
+
+def as_of_calls(steps):
+    """Steps with no more than `of_calls` knows."""
+    return [replace(step, path=None) for step in steps if step.kind in CALLED]
 
 
 def with_length(steps):
