@@ -2,7 +2,7 @@
 
 use motion_kernel::hal::Spindle;
 
-use crate::gcode::{NoticeKind, Program, StepKind, xyz_mm};
+use crate::gcode::{AXES_MAX, Length, NoticeKind, Program, StepKind};
 
 /// What has to be ready.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -13,9 +13,9 @@ pub struct Needs {
     pub systems: Vec<u32>,
     /// What the program switches or reads that the machine may not have.
     pub outputs: Vec<&'static str>,
-    /// Least and greatest position that a move begins or ends at, X Y Z \[mm\]; none without moves. Curves between may
-    /// reach farther.
-    pub extent_mm: Option<[[f64; 2]; 3]>,
+    /// Least and greatest position that a move begins or ends at, in the order of a [`Point`](crate::gcode::Point) \[mm, ° of
+    /// rotary axes\]; none without moves. Curves between may reach farther.
+    pub extent: Option<[[f64; 2]; AXES_MAX]>,
 }
 
 impl Needs {
@@ -34,9 +34,9 @@ impl Needs {
                 _ => {}
             }
             if let Some(ends) = step.kind.ends() {
-                for point in ends.map(xyz_mm) {
-                    let extent_mm = needs.extent_mm.get_or_insert(point.map(|coordinate| [coordinate; 2]));
-                    for ([low, high], coordinate) in extent_mm.iter_mut().zip(point) {
+                for point in ends.map(|point| point.map(Length::to_mm)) {
+                    let extent = needs.extent.get_or_insert(point.map(|coordinate| [coordinate; 2]));
+                    for ([low, high], coordinate) in extent.iter_mut().zip(point) {
                         (*low, *high) = (low.min(coordinate), high.max(coordinate));
                     }
                 }
@@ -91,7 +91,8 @@ mod tests {
         );
         assert_eq!(needs.tools, [3, 1]);
         assert_eq!(needs.outputs, ["spindle (M3, M4)"]);
-        assert_eq!(needs.extent_mm, Some([[-4.0, 0.0], [-4.0, 0.0], [0.0, 2.0]]));
-        assert_eq!(Needs::of(&gcode::read("a.ngc", b"M2").expect("G-code")).extent_mm, None);
+        let extent = needs.extent.expect("moves");
+        assert_eq!(extent[..3], [[-4.0, 0.0], [-4.0, 0.0], [0.0, 2.0]]);
+        assert_eq!(Needs::of(&gcode::read("a.ngc", b"M2").expect("G-code")).extent, None);
     }
 }

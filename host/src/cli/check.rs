@@ -8,11 +8,12 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::input::{self, Source};
+use super::read;
 use super::table::{self, Align};
 use super::write_json;
 use crate::check::needs::system_word;
 use crate::check::{Check, Reason, check};
-use crate::gcode::{Program, Refusal};
+use crate::gcode::{Axis, Program, Refusal};
 use crate::machine::Machine;
 use crate::planning::PlanningError;
 
@@ -25,7 +26,8 @@ Examples:
 Exit status: 0 the program is accepted, 2 it is refused.
 
 JSON: accepted, refusals (source, line, column or null, lines, problem); of an accepted program also steps, blocks, length_mm, time_s,
-extent_mm (least and greatest X, Y, Z at the ends of moves), needs (tools, tools_assumed, systems, outputs), corner_stops,
+extent_mm (least and greatest X, Y, Z at the ends of moves, and of the machine's other
+axes in the order A B C U V W, ° for A, B and C), needs (tools, tools_assumed, systems, outputs), corner_stops,
 operator_stops, time_by_reason (seconds: programmed, machine, acceleration, jerk, snap, feed change, corner, stop, dwell),
 advice, notices.";
 
@@ -70,7 +72,7 @@ struct AcceptedJson<'a> {
     blocks: usize,
     length_mm: f64,
     time_s: f64,
-    extent_mm: Option<[[f64; 2]; 3]>,
+    extent_mm: Option<Vec<[f64; 2]>>,
     needs: NeedsJson<'a>,
     corner_stops: usize,
     operator_stops: usize,
@@ -173,7 +175,9 @@ fn json<'a>(program: &'a Program, checked: &'a Check) -> AcceptedJson<'a> {
         blocks: plan.blocks.len(),
         length_mm: plan.length_mm,
         time_s: plan.time_s,
-        extent_mm: needs.extent_mm,
+        extent_mm: needs
+            .extent
+            .map(|extent| read::shown_axes(program.axes).map(|axis| extent[axis.index()]).collect()),
         needs: NeedsJson {
             tools: &needs.tools,
             tools_assumed: &program.tools_assumed,
@@ -210,11 +214,13 @@ fn write_check(name: &str, program: &Program, checked: &Check, out: &mut dyn Wri
     let at_corners = stops(times.corner_stops, "full stop at a corner", "full stops at corners");
     let for_operator = stops(times.operator_stops, "stop for the operator", "stops for the operator");
     writeln!(out, "  {} steps, {} blocks{at_corners}{for_operator}", program.steps.len(), plan.blocks.len())?;
-    if let Some(extent_mm) = needs.extent_mm {
-        let axes = ["X", "Y", "Z"].iter().zip(extent_mm);
-        let axes: Vec<String> =
-            axes.map(|(axis, [low, high])| format!("{axis} {low:.3} to {high:.3}")).collect();
-        writeln!(out, "  machine coordinates [mm]: {}", axes.join(", "))?;
+    if let Some(extent) = needs.extent {
+        let of_axis = |axis: Axis| {
+            let [low, high] = extent[axis.index()];
+            format!("{axis} {low:.3} to {high:.3} {}", axis.unit())
+        };
+        let axes: Vec<String> = program.axes.iter().map(of_axis).collect();
+        writeln!(out, "  machine coordinates: {}", axes.join(", "))?;
     }
     let mut list = |what: &str, items: Vec<String>| match items.len() {
         0 => Ok(()),

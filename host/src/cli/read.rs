@@ -274,7 +274,7 @@ fn write_table(program: &Program, out: &mut dyn Write) -> io::Result<()> {
 }
 
 /// X, Y and Z, and the other axes of the machine.
-fn shown_axes(axes: Axes) -> impl Iterator<Item = Axis> {
+pub(super) fn shown_axes(axes: Axes) -> impl Iterator<Item = Axis> {
     Axis::ALL.into_iter().filter(move |&axis| Axes::XYZ.contains(axis) || axes.contains(axis))
 }
 

@@ -29,7 +29,7 @@ const MAGIC: [u8; 4] = *b"MOTN";
 const VERSION: u8 = 5;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
-const AXES_MAX: usize = 8;
+const AXES_MAX: usize = 9;
 /// Greatest length of a header or an item with that many axes \[bytes\].
 const ENTRY_MAX: usize = 4096;
 
@@ -103,7 +103,7 @@ impl core::error::Error for ProgramError {}
 /// Appends a program to `out`.
 ///
 /// # Errors
-/// There are more than eight axes, for which an entry may exceed the format's bound.
+/// There are more than nine axes, for which an entry may exceed the format's bound.
 pub fn write<'a, const AXES: usize>(
     header: &Header<AXES>,
     guards: Option<&Guards<AXES>>,
@@ -296,7 +296,7 @@ mod tests {
 
     /// Entries are longest with every figure there and every number at its longest.
     #[test]
-    fn eight_axes_fit_and_nine_are_refused() {
+    fn nine_axes_fit_and_ten_are_refused() {
         use crate::axis::{BedInverse, DriveInverse, TABLE_POINTS, Table, Tables};
         let table = Some(Table { reach: 1.0, mm_s_per_step: 1.0, steps: [i16::MAX; TABLE_POINTS] });
         let bed = Some(BedInverse { frequency_hz: 30.0, damping_ratio: 0.1, mass_ratio: 0.1 });
@@ -324,8 +324,8 @@ mod tests {
             let mut bytes = Vec::new();
             write(&header, Some(&guards), &[item], &mut bytes).map(|()| bytes.len())
         }
-        assert!(longest::<8>(axis).is_ok_and(|bytes| bytes > 2000));
-        assert_eq!(longest::<9>(axis), Err(postcard::Error::SerializeBufferFull));
+        assert!(longest::<9>(axis).is_ok_and(|bytes| bytes > 2000));
+        assert_eq!(longest::<10>(axis), Err(postcard::Error::SerializeBufferFull));
     }
 
     /// What is behind a good checksum and is none: guards of another length than said.

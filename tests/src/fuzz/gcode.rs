@@ -8,7 +8,8 @@
 //! - what is refused has a place.
 
 use motion_host::gcode::{
-    self, Feed, GcodeError, ORIGIN, ParameterFile, Program, ReadOptions, SpindleSpeed, StepKind, ToolTable,
+    self, Axis, Feed, GcodeError, ORIGIN, ParameterFile, Program, ReadOptions, SpindleSpeed, StepKind,
+    ToolTable,
 };
 use motion_host::machine::Machine;
 use motion_host::touch::{Surface, TouchBox};
@@ -19,7 +20,7 @@ const LINES_MAX: u64 = 2000;
 const STEPS_MAX: usize = 3000;
 
 /// What a byte from 128 on stands for; those that are missing are the end of a line.
-const WORDS: [&str; 112] = [
+const WORDS: [&str; 116] = [
     "\n",
     "\n",
     "\n",
@@ -132,6 +133,10 @@ const WORDS: [&str; 112] = [
     "o4 endrepeat\n",
     "#1=[#1+1] ",
     "#<_x> ",
+    "A30 ",
+    "B-9 ",
+    "U2 ",
+    "W-1 ",
 ];
 
 /// Reads what `bytes` say. Whether it was accepted.
@@ -169,7 +174,9 @@ fn options(switches: u8) -> ReadOptions {
     });
     let table = "T1 Z12 D4\nT2 X3 Z-4 D1.6 Q2\nT3 Z50 D-1\n";
     let parameters = "5220 2\n5221 7.5\n5230 30\n5211 1\n5210 1\n5241 -3\n5163 20\n";
+    let letters = ["XYZ", "XZ", "XYZA", "XYZABCUVW"][usize::from(switches >> 5 & 3)];
     ReadOptions {
+        axes: letters.bytes().filter_map(Axis::of_letter).collect(),
         tools: is_on(1).then(|| ToolTable::parse("tool.tbl", table.as_bytes()).expect("a table")),
         parameters: match is_on(2) {
             true => ParameterFile::parse("a.var", parameters.as_bytes()).expect("parameters"),
@@ -226,6 +233,9 @@ pub fn assert_sound(program: &Program, steps_max: usize) {
             StepKind::ToolChange { .. } | StepKind::Stop | StepKind::End => continue,
         };
         let (from, to) = ends;
+        for axis in Axis::ALL.into_iter().filter(|&axis| !program.axes.contains(axis)) {
+            assert_eq!(from[axis.index()], to[axis.index()], "line {} moves {axis}", step.line);
+        }
         assert_eq!(from, at, "line {} begins elsewhere", step.line);
         assert!(numbers.iter().all(|number| number.is_finite()), "line {}: {:?}", step.line, step.kind);
         if let Feed::MmPerMin(feed_mm_min) = feed {
