@@ -4,6 +4,7 @@
 //! cargo test -p motion-host --test suite gcode::      one suite
 //! ```
 
+mod axes_planning;
 mod cli;
 mod compare;
 mod curves;

@@ -140,7 +140,7 @@ pub struct PlannedProbe {
 
 impl PlannedProbe {
     fn new(line: u32, stretch: u32, probe: &ProbeMove) -> Self {
-        let trip_mm = probe.trip.map(|trip| xyz_mm(trip));
+        let trip_mm = probe.trip.map(xyz_mm);
         Self { line, stretch, stands: probe.from == probe.to, leaves: probe.leaves, trip_mm }
     }
 
