@@ -11,7 +11,7 @@ use motion_host::toolpath::smooth::Move;
 use motion_host::toolpath::spline::{
     Degree, Derivatives, Ends, Spline, SplineError, chord_lengths, fit, interpolate,
 };
-use motion_host::toolpath::{Element, Involute, Polynomial, Vector, septics};
+use motion_host::toolpath::{Element, Feeds, Involute, Polynomial, Vector, septics};
 use motion_tests::check::geometry::{minus, norm};
 use motion_tests::random::Random;
 
@@ -281,7 +281,7 @@ fn pieces_are_as_close_as_they_say() {
         let spline = interpolate(&points, &parameters, degree, &Ends::Free).expect("a spline");
         for (_, element) in spline.elements() {
             let (curve, end) = element.curve().expect("a curve");
-            let pieces = septics::<f32>(&element).expect("smooth");
+            let pieces = septics::<f32, _>(&element).expect("smooth");
             let total: f64 = pieces.iter().map(|piece| piece.length_mm).sum();
             assert!((total - element.length_mm()).abs() < 1e-9 * total);
             let mut before = (0.0, [0.0; 3]);
@@ -509,7 +509,7 @@ fn an_involute_runs_as_it_was_programmed() {
     assert_eq!(element.kind(), "involute");
     assert!(norm(element.ends_mm().0) < 1e-12);
     let machine = Machine::reference();
-    let step = Move { line: 1, element, feed_mm_s: 30.0, tolerance_mm: 0.0, merging_mm: None };
+    let step = Move { line: 1, element, feeds: Feeds::xyz(30.0), tolerance_mm: 0.0, merging_mm: None };
     let plan = plan_moves("involute", vec![step], &machine, Mode::default()).expect("a plan");
     assert!((plan.length_mm - 0.5 * base_mm * (to_rad * to_rad - from_rad * from_rad)).abs() < 1e-9);
     let mut farthest = 0.0_f64;

@@ -5,6 +5,7 @@
 //! ```
 
 mod axes_reading;
+mod axes_planning;
 mod cli;
 mod compare;
 mod curves;

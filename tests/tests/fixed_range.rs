@@ -19,10 +19,9 @@ fn arc(radius_mm: f64, sweep_rad: f64, height_per_rad: f64) -> ([[f64; 7]; 3], P
     let spiral = Spiral {
         outward: [0.0, -1.0, 0.0],
         onward: [1.0, 0.0, 0.0],
-        normal: [0.0, 0.0, 1.0],
         radius_mm,
         radius_per_rad: 0.0,
-        height_per_rad,
+        across_per_rad: [0.0, 0.0, height_per_rad],
     };
     let septic = fit(&spiral, 0.0, sweep_rad, sweep_rad, 16.0).expect("smooth")[0];
     (septic.coefficients.map(|axis| axis.map(|c| c / septic.length_mm)), mm(septic.length_mm))

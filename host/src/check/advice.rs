@@ -14,11 +14,11 @@ const COARSE_MM: f64 = 0.05;
 const FINE_MM: f64 = 0.01;
 
 /// A sentence for each path mode that saves time.
-pub(super) fn advice(
+pub(super) fn advice<const N: usize>(
     source_name: &str,
     program: &Program,
-    machine: &Machine,
-    plan: &Plan,
+    machine: &Machine<N>,
+    plan: &Plan<N>,
     times: &Times,
 ) -> Vec<String> {
     let own_mm = machine.path.blend_tolerance_mm;

@@ -21,9 +21,9 @@ use crate::planning::{Mode, Plan, PlanningError, plan_program};
 
 /// A program that was checked.
 #[derive(Clone, Debug)]
-pub struct Check {
+pub struct Check<const N: usize = 3> {
     /// Its plan.
-    pub plan: Plan,
+    pub plan: Plan<N>,
     /// What it needs.
     pub needs: Needs,
     /// Where its time goes.
@@ -36,7 +36,11 @@ pub struct Check {
 ///
 /// # Errors
 /// Those of [`plan_program`].
-pub fn check(source_name: &str, program: &Program, machine: &Machine) -> Result<Check, PlanningError> {
+pub fn check<const N: usize>(
+    source_name: &str,
+    program: &Program,
+    machine: &Machine<N>,
+) -> Result<Check<N>, PlanningError> {
     let plan = plan_program(source_name, program, machine, Mode::Spanning)?;
     let times = Times::of(&plan);
     let advice = advice::advice(source_name, program, machine, &plan, &times);

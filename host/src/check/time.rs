@@ -102,9 +102,9 @@ pub struct Times {
 impl Times {
     /// The times of a plan. They add up to [`Plan::time_s`].
     #[must_use]
-    pub fn of(plan: &Plan) -> Self {
+    pub fn of<const N: usize>(plan: &Plan<N>) -> Self {
         let mut times = Self::default();
-        let is_stretch = |item: Option<&Item>| matches!(item, Some(Item::Stretch(_)));
+        let is_stretch = |item: Option<&Item<N>>| matches!(item, Some(Item::Stretch(_)));
         // A probing move has a stop at either end whatever the path mode: before which stretches they are.
         let probe_stops: BTreeSet<u32> =
             plan.probes.iter().flat_map(|probe| [probe.stretch, probe.end()]).collect();
@@ -149,7 +149,7 @@ impl Times {
     }
 
     /// `ends`: why it starts and ends at rest.
-    fn add_stretch(&mut self, stretch: &Stretch, ends: [Reason; 2]) {
+    fn add_stretch<const N: usize>(&mut self, stretch: &Stretch<N>, ends: [Reason; 2]) {
         let mut first_block = 0;
         for placed in stretch.profile.ramps() {
             let ramp = placed.planned.ramp;
@@ -167,7 +167,12 @@ impl Times {
 
     /// A cruise may pass several blocks: each has its part, in proportion to its length. Gives the block that the next
     /// ramp begins in, at the latest.
-    fn add_cruise(&mut self, stretch: &Stretch, placed: &PlacedRamp, first_block: usize) -> usize {
+    fn add_cruise<const N: usize>(
+        &mut self,
+        stretch: &Stretch<N>,
+        placed: &PlacedRamp,
+        first_block: usize,
+    ) -> usize {
         let end_mm = placed.start_mm + placed.length_mm();
         let feed_mm_s = placed.planned.ramp.from_mm_s;
         let blocks = stretch.blocks.iter().zip(stretch.ends_mm()).enumerate().skip(first_block);

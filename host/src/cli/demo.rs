@@ -59,8 +59,8 @@ mod tests {
             .steps
             .iter()
             .filter_map(|step| match &step.kind {
-                StepKind::Line(line) => Some(Element::line(line)),
-                StepKind::Arc(arc) => Some(Element::arc(arc)),
+                StepKind::Line(line) => Some(Element::line(line, &Machine::reference())),
+                StepKind::Arc(arc) => Element::arc(arc, &Machine::reference()).ok(),
                 _ => None,
             })
             .collect();

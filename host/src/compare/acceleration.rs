@@ -3,13 +3,15 @@
 //! Consumes a plan and its machine; produces the time of the fastest motion over its path that keeps the
 //! programmed feed, the feeds of path and axes and their accelerations, with no limit of jerk and snap and no
 //! ceiling made by them. It stops where the plan has to stop at a corner. Between two points of a curve the
-//! acceleration along the path is taken as constant, so on curves the time is good to some 10⁻³.
+//! acceleration along the path is taken as constant, so on curves the time is good to some 10⁻³. The limits of the path
+//! bind the linear axes.
 
+use crate::gcode::Axis;
 use crate::machine::{AxisSettings, Machine};
 use crate::planning::stretch::StretchBlock;
 use crate::planning::{Item, Plan, Stretch};
 use crate::toolpath::curve::by_arc_length;
-use crate::toolpath::{Element, Vector, norm};
+use crate::toolpath::{Element, Vector, dot, norm};
 
 /// The distance between two points of a curve \[mm\], and how many there are at least and at most.
 const STEP_MM: f64 = 0.01;
@@ -17,7 +19,7 @@ const CELLS: [f64; 2] = [64.0, 16_384.0];
 
 /// The time \[s\], dwells included, stops not.
 #[must_use]
-pub fn acceleration_time_s(plan: &Plan, machine: &Machine) -> f64 {
+pub fn acceleration_time_s<const N: usize>(plan: &Plan<N>, machine: &Machine<N>) -> f64 {
     plan.items
         .iter()
         .map(|item| match item {
@@ -30,15 +32,25 @@ pub fn acceleration_time_s(plan: &Plan, machine: &Machine) -> f64 {
 
 /// A point of the path, as limits see it.
 #[derive(Clone, Copy)]
-struct Point {
-    tangent: Vector,
+struct Point<const N: usize> {
+    tangent: Vector<N>,
     /// κN \[1/mm\].
-    curvature: Vector,
+    curvature: Vector<N>,
+}
+
+/// What linear axes have of a point's tangent t and curvature κN.
+struct Linear {
+    /// |t|.
+    share: f64,
+    /// |κN|.
+    bend_per_mm: f64,
+    /// t·κN, 0 where they have all of both.
+    lean_per_mm: f64,
 }
 
 /// From one point to the next.
-struct Cell {
-    ends: [Point; 2],
+struct Cell<const N: usize> {
+    ends: [Point<N>; 2],
     length_mm: f64,
     /// The programmed feed \[mm/s\].
     feed_mm_s: f64,
@@ -46,11 +58,12 @@ struct Cell {
     stops: bool,
 }
 
-impl Point {
+impl<const N: usize> Point<N> {
     /// The greatest v² there.
-    fn most(&self, feed_mm_s: f64, machine: &Machine) -> f64 {
-        let feed_mm_s = feed_mm_s.min(machine.path.feed_mm_s);
-        let path = (feed_mm_s * feed_mm_s).min(machine.path.accel_mm_s2 / norm(self.curvature));
+    fn most(&self, feed_mm_s: f64, machine: &Machine<N>) -> f64 {
+        let Linear { share, bend_per_mm, .. } = self.linear(machine);
+        let feed_mm_s = feed_mm_s.min(machine.path.feed_mm_s / share);
+        let path = (feed_mm_s * feed_mm_s).min(machine.path.accel_mm_s2 / bend_per_mm);
         self.axes(machine).fold(path, |most, (tangent, curvature, axis)| {
             let feed_mm_s = axis.feed_mm_s / tangent.abs();
             most.min(feed_mm_s * feed_mm_s).min(axis.accel_mm_s2 / curvature.abs())
@@ -58,10 +71,14 @@ impl Point {
     }
 
     /// The greatest acceleration along the path at v², forwards (1) or backwards (−1) \[mm/s²\].
-    fn accel(&self, square: f64, direction: f64, machine: &Machine) -> f64 {
-        let across = square * norm(self.curvature);
+    fn accel(&self, square: f64, direction: f64, machine: &Machine<N>) -> f64 {
+        let Linear { share, bend_per_mm, lean_per_mm } = self.linear(machine);
+        let (across, lean) = (square * bend_per_mm, direction * square * lean_per_mm);
         let most = machine.path.accel_mm_s2;
-        let along = (most * most - across * across).max(0.0).sqrt();
+        // |a·t + v²·κN| = most, of the linear axes; without any there is no such a.
+        let rest = (most * most - across * across).max(0.0);
+        let along = ((lean * lean + share * share * rest).sqrt() - lean) / (share * share);
+        let along = if share > 0.0 { along } else { f64::INFINITY };
         let least = self.axes(machine).fold(along, |least, (tangent, curvature, axis)| {
             if tangent == 0.0 {
                 return least;
@@ -72,14 +89,28 @@ impl Point {
         least.max(0.0)
     }
 
-    fn axes<'a>(&self, machine: &'a Machine) -> impl Iterator<Item = (f64, f64, &'a AxisSettings)> {
+    /// The part that the limits of the path bind.
+    fn linear(&self, machine: &Machine<N>) -> Linear {
+        let is_rotary = |axis: usize| machine.axes[axis].letter.is_some_and(Axis::is_rotary);
+        let is_still = |axis: usize| self.tangent[axis] == 0.0 && self.curvature[axis] == 0.0;
+        if (0..N).all(|axis| !is_rotary(axis) || is_still(axis)) {
+            return Linear { share: 1.0, bend_per_mm: norm(self.curvature), lean_per_mm: 0.0 };
+        }
+        let linear = |vector: Vector<N>| -> Vector<N> {
+            core::array::from_fn(|axis| if is_rotary(axis) { 0.0 } else { vector[axis] })
+        };
+        let (tangent, curvature) = (linear(self.tangent), linear(self.curvature));
+        Linear { share: norm(tangent), bend_per_mm: norm(curvature), lean_per_mm: dot(tangent, curvature) }
+    }
+
+    fn axes<'a>(&self, machine: &'a Machine<N>) -> impl Iterator<Item = (f64, f64, &'a AxisSettings)> {
         let of_axes = self.tangent.into_iter().zip(self.curvature).zip(&machine.axes);
         of_axes.map(|((tangent, curvature), axis)| (tangent, curvature, axis))
     }
 }
 
-fn of_stretch_s(stretch: &Stretch, machine: &Machine) -> f64 {
-    let cells: Vec<Cell> = stretch.blocks.iter().flat_map(cells).collect();
+fn of_stretch_s<const N: usize>(stretch: &Stretch<N>, machine: &Machine<N>) -> f64 {
+    let cells: Vec<Cell<N>> = stretch.blocks.iter().flat_map(cells).collect();
     // v² at every point, at rest at both ends.
     let mut squares = vec![f64::INFINITY; cells.len() + 1];
     for (index, cell) in cells.iter().enumerate() {
@@ -103,9 +134,9 @@ fn of_stretch_s(stretch: &Stretch, machine: &Machine) -> f64 {
     cells.iter().zip(squares.windows(2)).map(|(cell, ends)| cell.time_s(ends, machine)).sum()
 }
 
-impl Cell {
+impl<const N: usize> Cell<N> {
     /// From one v² to the other: up to a peak, a cruise, and down \[s\].
-    fn time_s(&self, ends: &[f64], machine: &Machine) -> f64 {
+    fn time_s(&self, ends: &[f64], machine: &Machine<N>) -> f64 {
         let [enter, exit] = [ends[0], ends[1]].map(f64::sqrt);
         let [start, end] = &self.ends;
         if norm(start.curvature) > 0.0 || norm(end.curvature) > 0.0 {
@@ -121,13 +152,13 @@ impl Cell {
 }
 
 /// A line is a cell.
-fn cells(block: &StretchBlock) -> Vec<Cell> {
+fn cells<const N: usize>(block: &StretchBlock<N>) -> Vec<Cell<N>> {
     let length_mm = block.element.length_mm();
     let count = match block.element {
         Element::Line { .. } => 1,
         _ => (length_mm / STEP_MM).ceil().clamp(CELLS[0], CELLS[1]) as usize,
     };
-    let points: Vec<Point> =
+    let points: Vec<Point<N>> =
         (0..=count).map(|index| point(&block.element, index as f64 / count as f64)).collect();
     let length = |index: usize| match block.element.curve() {
         Some((curve, end)) => {
@@ -136,7 +167,7 @@ fn cells(block: &StretchBlock) -> Vec<Cell> {
         }
         None => length_mm,
     };
-    let cell = |(index, pair): (usize, &[Point])| Cell {
+    let cell = |(index, pair): (usize, &[Point<N>])| Cell {
         ends: [pair[0], pair[1]],
         length_mm: length(index),
         feed_mm_s: block.feed_mm_s,
@@ -146,13 +177,13 @@ fn cells(block: &StretchBlock) -> Vec<Cell> {
 }
 
 /// The point at a share of an element's parameter.
-fn point(element: &Element, share: f64) -> Point {
+fn point<const N: usize>(element: &Element<N>, share: f64) -> Point<N> {
     let (tangent, curvature) = match element.curve() {
         Some((curve, end)) => {
             let [tangent, curvature, _] = by_arc_length(curve.derivatives(share * end));
             (tangent, curvature)
         }
-        None => (element.ends()[0].tangent, [0.0; 3]),
+        None => (element.ends()[0].tangent, [0.0; N]),
     };
     Point { tangent, curvature }
 }

@@ -11,7 +11,7 @@ use crate::planning::{Item, Plan, Stretch};
 
 /// The least time \[s\], dwells included, stops not.
 #[must_use]
-pub fn least_time_s(plan: &Plan) -> f64 {
+pub fn least_time_s<const N: usize>(plan: &Plan<N>) -> f64 {
     plan.items
         .iter()
         .map(|item| match item {
@@ -22,7 +22,7 @@ pub fn least_time_s(plan: &Plan) -> f64 {
         .sum()
 }
 
-fn of_stretch_s(stretch: &Stretch) -> f64 {
+fn of_stretch_s<const N: usize>(stretch: &Stretch<N>) -> f64 {
     let blocks = stretch.for_lookahead();
     // v² at every junction, at most what the two ceilings and the junction allow; 0 at both ends.
     let mut squares = vec![0.0_f64; blocks.len() + 1];

@@ -86,11 +86,11 @@ pub fn is_blended(program: &Program) -> bool {
 ///
 /// # Errors
 /// There is no plan, or the kernel can't execute it.
-pub fn figures(
+pub fn figures<const N: usize>(
     source_name: &str,
     program: &Program,
     path: Path,
-    machine: &Machine,
+    machine: &Machine<N>,
 ) -> Result<Figures, CompareError> {
     let program = on(program, path);
     let plan = plan_program(source_name, &program, machine, Mode::Spanning)?;
@@ -132,7 +132,7 @@ pub fn in_mode(program: &Program, mode: PathMode) -> Program {
     program
 }
 
-fn tolerance_share(plan: &Plan) -> f64 {
+fn tolerance_share<const N: usize>(plan: &Plan<N>) -> f64 {
     let stretches = plan.items.iter().filter_map(|item| match item {
         Item::Stretch(stretch) => Some(stretch),
         Item::Dwell { .. } | Item::Switch { .. } | Item::Stop { .. } => None,

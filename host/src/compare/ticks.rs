@@ -10,9 +10,10 @@ use motion_kernel::program::{Supply, SupplyError};
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
 
+use crate::gcode::Axis;
 use crate::machine::Machine;
 use crate::planning::{Executable, Plan, PlanningError};
-use crate::toolpath::{norm, subtract};
+use crate::toolpath::{Vector, norm, subtract};
 
 /// Places in either stream.
 const QUEUED: usize = 64;
@@ -22,9 +23,9 @@ const QUEUED: usize = 64;
 pub struct Ratios {
     /// Velocity of an axis.
     pub feed: f64,
-    /// Acceleration, of an axis or as a vector.
+    /// Acceleration, of an axis or of the linear axes as a vector.
     pub accel: f64,
-    /// Jerk, of an axis or as a vector; what junctions step is not in it.
+    /// Jerk, of an axis or of the linear axes as a vector; what junctions step is not in it.
     pub jerk: f64,
     /// Change of the acceleration vector from one tick to the next, beyond what jerk accounts for, over the
     /// acceleration-step limit.
@@ -49,15 +50,20 @@ pub enum TicksError {
 ///
 /// # Errors
 /// The plan can't be executed.
-pub fn ratios(plan: &Plan, machine: &Machine) -> Result<Ratios, TicksError> {
+pub fn ratios<const N: usize>(plan: &Plan<N>, machine: &Machine<N>) -> Result<Ratios, TicksError> {
     let executable = Executable::new::<f64>(plan)?;
-    let start = [Position::ZERO; 3];
-    let mut streams = Streams::<f64, 3, QUEUED, QUEUED>::new();
+    let start = [Position::ZERO; N];
+    let mut streams = Streams::<f64, N, QUEUED, QUEUED>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
-    let mut executor = Executor::<f64, 3>::new(start);
+    let mut executor = Executor::<f64, N>::new(start);
     let mut supply = Supply::new(executable.supplied(), executable.tick_s);
-    let path = &machine.path;
-    let (mut ratios, mut last_accel) = (Ratios::default(), [0.0; 3]);
+    let (path, jerk_mm_s3) = (&machine.path, machine.rules().limits.jerk_mm_s3);
+    let is_linear = machine.axes.each_ref().map(|axis| !axis.letter.is_some_and(Axis::is_rotary));
+    // The part of a vector that the limits of the path bind.
+    let linear = |vector: Vector<N>| -> Vector<N> {
+        core::array::from_fn(|axis| if is_linear[axis] { vector[axis] } else { 0.0 })
+    };
+    let (mut ratios, mut last_accel) = (Ratios::default(), [0.0; N]);
     loop {
         supply.fill(&mut feeder).map_err(TicksError::Rejected)?;
         let executed = executor.tick(&mut intake).map_err(|fault| TicksError::Fault(format!("{fault:?}")))?;
@@ -68,9 +74,9 @@ pub fn ratios(plan: &Plan, machine: &Machine) -> Result<Ratios, TicksError> {
             ratios.accel = ratios.accel.max(set.accel_mm_s2.abs() / axis.accel_mm_s2);
             ratios.jerk = ratios.jerk.max(set.jerk_mm_s3.abs() / axis.jerk_mm_s3);
         }
-        ratios.accel = ratios.accel.max(norm(accel) / path.accel_mm_s2);
-        ratios.jerk = ratios.jerk.max(norm(jerk) / path.jerk_mm_s3);
-        let step = norm(subtract(accel, last_accel)) - path.jerk_mm_s3 * plan.tick_s;
+        ratios.accel = ratios.accel.max(norm(linear(accel)) / path.accel_mm_s2);
+        ratios.jerk = ratios.jerk.max(norm(linear(jerk)) / path.jerk_mm_s3);
+        let step = norm(subtract(accel, last_accel)) - jerk_mm_s3 * plan.tick_s;
         ratios.accel_step = ratios.accel_step.max(step / path.accel_step_mm_s2);
         last_accel = accel;
         match executed.state {

@@ -288,6 +288,12 @@ impl<const N: usize> Machine<N> {
         self.axes.iter().filter_map(|axis| axis.letter).collect()
     }
 
+    /// Their letters in the order of `axes`.
+    #[must_use]
+    pub fn letters_by_place(&self) -> [Option<Axis>; N] {
+        self.axes.each_ref().map(|axis| axis.letter)
+    }
+
     /// The place of an axis, if there is one of this letter.
     #[must_use]
     pub fn place_of(&self, letter: Axis) -> Option<usize> {
@@ -346,12 +352,20 @@ impl<const N: usize> Machine<N> {
         self.guards().travel()
     }
 
-    /// The rules that the kernel's queues hold the streams to.
+    /// The rules that the kernel's queues hold the streams to. The limits of the path bind the linear axes: along a path
+    /// that takes rotary axes along, these add what they can do themselves.
     #[must_use]
     pub fn rules(&self) -> PathRules {
+        let mut most = AxisLimits { feed_mm_s: self.path.feed_mm_s, limits: self.path.limits() };
+        for axis in self.axes.iter().filter(|axis| axis.letter.is_some_and(Axis::is_rotary)) {
+            most.feed_mm_s += axis.feed_mm_s;
+            most.limits.accel_mm_s2 += axis.accel_mm_s2;
+            most.limits.jerk_mm_s3 += axis.jerk_mm_s3;
+            most.limits.snap_mm_s4 += axis.snap_mm_s4;
+        }
         PathRules {
-            limits: self.path.limits(),
-            feed_mm_s: self.path.feed_mm_s,
+            limits: most.limits,
+            feed_mm_s: most.feed_mm_s,
             junction_angle_rad: self.path.junction_angle_rad + JUNCTION_ANGLE_ROUNDING_RAD,
             junction_gap_mm: JUNCTION_GAP_MM,
         }

@@ -28,15 +28,14 @@ use motion_kernel::plan::{
 };
 
 use super::Mode;
-use super::ceilings::{Ceilings, along, ceilings, junction_feed};
+use super::ceilings::{Ceilings, along, ceilings, in_any_direction, junction_feed};
 use super::error::Problem;
 use super::lookahead::lookahead;
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
-use crate::toolpath::Greatest;
 use crate::toolpath::blend::Blend;
 use crate::toolpath::smooth::{Move, Run};
-use crate::toolpath::{norm, subtract};
+use crate::toolpath::{Greatest, SpeedRatios, norm, subtract};
 
 /// Part of the time that a junction without a blend has to gain over the best one.
 const EXACT_GAIN_MIN: f64 = 0.002;
@@ -65,14 +64,14 @@ type AtLine<T> = Result<T, (u32, Problem)>;
 
 /// How a junction is crossed.
 #[derive(Clone, Debug, PartialEq)]
-struct Crossing {
+struct Crossing<const N: usize> {
     /// The blend; none: as it is.
-    blend: Option<Rc<Rounding>>,
+    blend: Option<Rc<Rounding<N>>>,
     /// The greatest feed \[mm/s\].
     feed_mm_s: f64,
 }
 
-impl Crossing {
+impl<const N: usize> Crossing<N> {
     /// Its trim of either move \[mm\].
     fn trim_mm(&self) -> f64 {
         self.blend.as_ref().map_or(0.0, |rounding| rounding.blend.trim_mm)
@@ -81,13 +80,14 @@ impl Crossing {
 
 /// A blend with what planning knows of it.
 #[derive(Clone, Debug, PartialEq)]
-struct Rounding {
-    blend: Blend,
+struct Rounding<const N: usize> {
+    blend: Blend<N>,
     length_mm: f64,
     /// The room that it was made for \[mm\], of which its size is a part.
     room_mm: f64,
     size: f64,
-    greatest: Greatest,
+    greatest: Greatest<N>,
+    ratios: SpeedRatios,
     /// The part of what its curvature allows with which it is driven.
     share: f64,
     ceilings: Ceilings,
@@ -95,7 +95,10 @@ struct Rounding {
 
 /// The blocks of a run that starts and ends at rest; the junction feed of the last one is 0. An error comes
 /// with the program line.
-pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlock>> {
+pub(super) fn blocks<const N: usize>(
+    moves: &[Move<N>],
+    machine: &Machine<N>,
+) -> AtLine<Vec<StretchBlock<N>>> {
     let mut candidates = curved(moves, machine);
     let fastest_s = candidates.iter().map(|timed| timed.time_s).fold(f64::INFINITY, f64::min);
     let junctions = Junctions::new(Run::new(moves), machine)?;
@@ -127,10 +130,11 @@ pub(super) fn blocks(moves: &[Move], machine: &Machine) -> AtLine<Vec<StretchBlo
 
 /// The blocks of a run with curves in place of what is dense, once for each of [`CORNERS_RAD`] that makes a
 /// difference.
-fn curved(moves: &[Move], machine: &Machine) -> Vec<Timed> {
-    let limits = machine.limits().in_any_direction();
+fn curved<const N: usize>(moves: &[Move<N>], machine: &Machine<N>) -> Vec<Timed<N>> {
+    let limits = in_any_direction(moves, machine);
     let (mut candidates, mut most_s) = (Vec::new(), f64::INFINITY);
-    for run in Run::faired(moves, &CORNERS_RAD, &limits, machine.path.feed_mm_s) {
+    for run in Run::faired(moves, &CORNERS_RAD, &limits, machine.path.feed_mm_s, &machine.letters_by_place())
+    {
         // Nobody has programmed a curve: one that has no ceilings is no candidate.
         let Ok(junctions) = Junctions::new(run, machine) else { continue };
         let exact = junctions.exact();
@@ -143,37 +147,37 @@ fn curved(moves: &[Move], machine: &Machine) -> Vec<Timed> {
 }
 
 /// The blocks of a run, and the time that they take \[s\], infinite if there is no plan.
-struct Timed {
-    blocks: Vec<StretchBlock>,
+struct Timed<const N: usize> {
+    blocks: Vec<StretchBlock<N>>,
     time_s: f64,
 }
 
 /// The junctions of a run.
-struct Junctions<'a> {
-    run: Run,
+struct Junctions<'a, const N: usize> {
+    run: Run<N>,
     /// The ceilings of the moves.
     ceilings: Vec<Ceilings>,
-    machine: &'a Machine,
+    machine: &'a Machine<N>,
     /// Limits of the path in any direction.
     limits: Limits<f64>,
 }
 
-impl<'a> Junctions<'a> {
-    fn new(run: Run, machine: &'a Machine) -> AtLine<Self> {
+impl<'a, const N: usize> Junctions<'a, N> {
+    fn new(run: Run<N>, machine: &'a Machine<N>) -> AtLine<Self> {
         Ok(Self {
             ceilings: along(&run, machine)?,
+            limits: in_any_direction(run.moves(), machine),
             run,
             machine,
-            limits: machine.limits().in_any_direction(),
         })
     }
 
     /// The run with all blends at their longest, and with those that were found best one by one, unless the
     /// first takes so much longer than `most_s` that this would, too; none where there is nothing to blend, or
     /// where that is seen before.
-    fn choose(&self, exact: &[Crossing], most_s: f64) -> AtLine<Vec<Timed>> {
+    fn choose(&self, exact: &[Crossing<N>], most_s: f64) -> AtLine<Vec<Timed<N>>> {
         // First as if each were alone, then those that touch within what the other leaves.
-        let alone: Vec<Option<Blend>> = (0..exact.len()).map(|junction| self.longest(junction)).collect();
+        let alone: Vec<Option<Blend<N>>> = (0..exact.len()).map(|junction| self.longest(junction)).collect();
         if alone.iter().all(Option::is_none) {
             return Ok(Vec::new());
         }
@@ -223,15 +227,15 @@ impl<'a> Junctions<'a> {
     }
 
     /// The longest blend of a junction, as if it were alone.
-    fn longest(&self, junction: usize) -> Option<Blend> {
+    fn longest(&self, junction: usize) -> Option<Blend<N>> {
         let room_mm = self.run.taken_mm_max(junction).min(self.run.taken_mm_max(junction + 1));
         self.run.blend(junction, room_mm, &self.limits)
     }
 
     /// About the least time that the run takes with blends, of which these are the longest \[s\]: each takes that
     /// of its chord at its feed, two that overlap half of it. What is between them takes none.
-    fn least_s(&self, alone: &[Option<Blend>]) -> f64 {
-        let of_blend = |blend: &Blend| {
+    fn least_s(&self, alone: &[Option<Blend<N>>]) -> f64 {
+        let of_blend = |blend: &Blend<N>| {
             let (from, to) = blend.element.ends_mm();
             0.5 * norm(subtract(to, from)) / blend.feed_mm_s
         };
@@ -246,11 +250,11 @@ impl<'a> Junctions<'a> {
     }
 
     /// All as they are.
-    fn exact(&self) -> Vec<Crossing> {
+    fn exact(&self) -> Vec<Crossing<N>> {
         (0..self.run.junctions()).map(|junction| self.exact_at(junction)).collect()
     }
 
-    fn exact_at(&self, junction: usize) -> Crossing {
+    fn exact_at(&self, junction: usize) -> Crossing<N> {
         let [before, after] = [junction, junction + 1]
             .map(|index| (&self.run.moves()[index], &self.ceilings[index].programmed));
         let feed_mm_s = junction_feed(&before.0.element, &after.0.element, self.machine);
@@ -258,18 +262,19 @@ impl<'a> Junctions<'a> {
     }
 
     /// A junction with a blend that is a part of what `room_mm` allows, driven at the greatest share.
-    fn rounded(&self, junction: usize, blend: Blend, (room_mm, size): (f64, f64)) -> AtLine<Crossing> {
+    fn rounded(&self, junction: usize, blend: Blend<N>, (room_mm, size): (f64, f64)) -> AtLine<Crossing<N>> {
         let (share, length_mm) = (BLEND_FEED_SHARE, blend.element.length_mm());
         // How a curve bends takes a search along it: once, whatever share it is then given.
         let greatest = blend.element.greatest();
-        let ceilings = self.ceilings_of(junction, &blend, &greatest, share)?;
-        let rounding = Rounding { blend, length_mm, room_mm, size, greatest, share, ceilings };
+        let ratios = SpeedRatios::of(&blend.element, &self.machine.letters_by_place());
+        let ceilings = self.ceilings_of(junction, &greatest, &ratios, share)?;
+        let rounding = Rounding { blend, length_mm, room_mm, size, greatest, ratios, share, ceilings };
         Ok(Crossing { feed_mm_s: ceilings.programmed.feed_mm_s, blend: Some(Rc::new(rounding)) })
     }
 
     /// A junction with a blend that is driven as it says.
-    fn crossing(&self, junction: usize, rounding: &Rounding) -> AtLine<Crossing> {
-        let ceilings = self.ceilings_of(junction, &rounding.blend, &rounding.greatest, rounding.share)?;
+    fn crossing(&self, junction: usize, rounding: &Rounding<N>) -> AtLine<Crossing<N>> {
+        let ceilings = self.ceilings_of(junction, &rounding.greatest, &rounding.ratios, rounding.share)?;
         let rounding = Rounding { ceilings, ..rounding.clone() };
         Ok(Crossing { feed_mm_s: ceilings.programmed.feed_mm_s, blend: Some(Rc::new(rounding)) })
     }
@@ -277,17 +282,18 @@ impl<'a> Junctions<'a> {
     fn ceilings_of(
         &self,
         junction: usize,
-        blend: &Blend,
-        greatest: &Greatest,
+        greatest: &Greatest<N>,
+        ratios: &SpeedRatios,
         share: f64,
     ) -> AtLine<Ceilings> {
-        let [before, after] = [junction, junction + 1].map(|index| self.run.moves()[index]);
-        let feed_mm_s = before.feed_mm_s.min(after.feed_mm_s);
-        ceilings(&Move { element: blend.element, feed_mm_s, ..before }, greatest, share, self.machine)
+        let [before, after] = [junction, junction + 1].map(|index| &self.run.moves()[index]);
+        let feed_mm_s = before.feeds.least(after.feeds).along(ratios);
+        ceilings(feed_mm_s, greatest, ratios, share, self.machine)
+            .map_err(|error| (before.line, error.into()))
     }
 
     /// A junction with the same blend, once driven at each of the two shares.
-    fn shared(&self, junction: usize, rounding: &Rounding) -> AtLine<[Crossing; 2]> {
+    fn shared(&self, junction: usize, rounding: &Rounding<N>) -> AtLine<[Crossing<N>; 2]> {
         let at = |share: f64| self.crossing(junction, &Rounding { share, ..rounding.clone() });
         Ok([at(BLEND_FEED_SHARE)?, at(self.machine.path.curve_feed_share)?])
     }
@@ -298,11 +304,11 @@ impl<'a> Junctions<'a> {
         &self,
         junction: usize,
         alone_mm: f64,
-        chosen: &[Crossing],
-        exact: &Crossing,
-    ) -> AtLine<Crossing> {
+        chosen: &[Crossing<N>],
+        exact: &Crossing<N>,
+    ) -> AtLine<Crossing<N>> {
         let room_mm = self.room_mm(junction, |junction| chosen[junction].trim_mm()).min(alone_mm);
-        let is_known = |rounding: &Rc<Rounding>| rounding.size == SIZES[0] && rounding.room_mm == room_mm;
+        let is_known = |rounding: &Rc<Rounding<N>>| rounding.size == SIZES[0] && rounding.room_mm == room_mm;
         let longest = match chosen[junction].blend.clone().filter(is_known) {
             Some(rounding) => Some(rounding),
             None => match self.run.blend(junction, room_mm, &self.limits) {
@@ -321,7 +327,7 @@ impl<'a> Junctions<'a> {
     }
 
     /// A junction with a part of its longest blend, at each of the two shares; nothing if there is none.
-    fn shorter(&self, junction: usize, longest: &Rounding, size: f64) -> AtLine<Vec<Crossing>> {
+    fn shorter(&self, junction: usize, longest: &Rounding<N>, size: f64) -> AtLine<Vec<Crossing<N>>> {
         let Some(blend) = self.run.blend(junction, size * longest.room_mm, &self.limits) else {
             return Ok(Vec::new());
         };
@@ -333,7 +339,7 @@ impl<'a> Junctions<'a> {
     }
 
     /// The best of some crossings of a junction, the others being crossed as `chosen` says.
-    fn best(&self, junction: usize, chosen: &[Crossing], variants: &[Crossing]) -> Crossing {
+    fn best(&self, junction: usize, chosen: &[Crossing<N>], variants: &[Crossing<N>]) -> Crossing<N> {
         let windows: Vec<Vec<Block<f64>>> =
             variants.iter().map(|variant| self.window(junction, variant, chosen)).collect();
         let (first, last) = self.beside(junction);
@@ -358,7 +364,7 @@ impl<'a> Junctions<'a> {
     }
 
     /// The neighbourhood of a junction, which is crossed as `variant` says.
-    fn window(&self, changed: usize, variant: &Crossing, chosen: &[Crossing]) -> Vec<Block<f64>> {
+    fn window(&self, changed: usize, variant: &Crossing<N>, chosen: &[Crossing<N>]) -> Vec<Block<f64>> {
         let crossing =
             |junction: usize| if junction == changed { Some(variant) } else { chosen.get(junction) };
         let trim_mm = |junction: Option<usize>| junction.and_then(crossing).map_or(0.0, Crossing::trim_mm);
@@ -383,14 +389,14 @@ impl<'a> Junctions<'a> {
     }
 
     /// The blocks of the run, with their time.
-    fn timed(&self, crossings: &[Crossing]) -> Timed {
+    fn timed(&self, crossings: &[Crossing<N>]) -> Timed<N> {
         let blocks = self.blocks(crossings);
         Timed { time_s: run_time_s(&blocks, self.machine.tick_s), blocks }
     }
 
     /// The blocks of the run.
-    fn blocks(&self, crossings: &[Crossing]) -> Vec<StretchBlock> {
-        let mut blocks: Vec<StretchBlock> = Vec::with_capacity(2 * self.ceilings.len());
+    fn blocks(&self, crossings: &[Crossing<N>]) -> Vec<StretchBlock<N>> {
+        let mut blocks: Vec<StretchBlock<N>> = Vec::with_capacity(2 * self.ceilings.len());
         let trim_mm = |junction: Option<usize>| {
             junction.and_then(|junction| crossings.get(junction)).map_or(0.0, Crossing::trim_mm)
         };
@@ -398,26 +404,19 @@ impl<'a> Junctions<'a> {
             let (first_mm, last_mm) = (trim_mm(index.checked_sub(1)), trim_mm(Some(index)));
             let is_whole = first_mm == 0.0 && last_mm == 0.0;
             let element = if is_whole { step.element } else { step.element.trimmed(first_mm, last_mm) };
-            let block = |element, feed_mm_s, ceilings: Ceilings, tolerance_share| StretchBlock {
+            let block = |element, ceilings: Ceilings, tolerance_share| StretchBlock {
                 line: step.line,
                 element,
                 ceiling: ceilings.programmed,
                 greatest: ceilings.greatest,
-                feed_mm_s,
+                feed_mm_s: ceilings.feed_mm_s,
                 junction_mm_s: 0.0,
                 tolerance_share,
             };
-            blocks.push(block(element, step.feed_mm_s, ceilings, self.run.tolerance_share(index)));
+            blocks.push(block(element, ceilings, self.run.tolerance_share(index)));
             if let Some(rounding) = crossings.get(index).and_then(|crossing| crossing.blend.as_ref()) {
                 let share = self.run.tolerance_share_of(index, &rounding.blend);
-                // As in the variant that it was chosen from.
-                let next = self.run.moves().get(index + 1).map_or(f64::INFINITY, |next| next.feed_mm_s);
-                blocks.push(block(
-                    rounding.blend.element,
-                    step.feed_mm_s.min(next),
-                    rounding.ceilings,
-                    share,
-                ));
+                blocks.push(block(rounding.blend.element, rounding.ceilings, share));
             }
         }
         for index in 1..blocks.len() {
@@ -459,12 +458,12 @@ fn window_time_s(blocks: &[Block<f64>], [start_mm_s, end_mm_s]: [f64; 2]) -> f64
 }
 
 /// The time of a run, infinite if there is no plan \[s\].
-fn run_time_s(blocks: &[StretchBlock], tick_s: f64) -> f64 {
+fn run_time_s<const N: usize>(blocks: &[StretchBlock<N>], tick_s: f64) -> f64 {
     let stretches = blocks.split_inclusive(|block| block.junction_mm_s <= 0.0);
     stretches.map(|stretch| stretch_time_s(stretch, tick_s).unwrap_or(f64::INFINITY)).sum()
 }
 
-fn stretch_time_s(stretch: &[StretchBlock], tick_s: f64) -> Option<f64> {
+fn stretch_time_s<const N: usize>(stretch: &[StretchBlock<N>], tick_s: f64) -> Option<f64> {
     let blocks: Vec<Block<f64>> = stretch.iter().map(StretchBlock::for_lookahead).collect();
     let mut end_mm = 0.0;
     let ends_mm: Vec<f64> = blocks

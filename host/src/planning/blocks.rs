@@ -147,7 +147,7 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
         feed: profile.ramps().to_vec(),
         time_s: profile.time_s(),
         length_mm: ends_mm.last().copied().unwrap_or(0.0),
-        ..Plan::empty(source_name, pulse, TICK_S)
+        ..Plan::empty(source_name, pulse, TICK_S, [None; 3])
     })
 }
 

@@ -1,38 +1,85 @@
 //! The ceilings of a move and of a junction.
+//!
+//! **Axes.** The limits of the path bind the linear axes together, X, Y, Z, U, V and W; rotary ones have limits of their
+//! own alone. Where the path takes rotary axes along, the linear ones have a part of its speed and of its ramps, and it
+//! may be driven the faster. Bends may turn the linear part faster than that: where linear axes take part in one, the
+//! acceleration, jerk and snap of the whole path keep the limits.
 
-use motion_kernel::plan::{Ceiling, Junction, MachineLimits, Reason, junction};
+use motion_kernel::law::{LimitError, Limits};
+use motion_kernel::plan::{AxisLimits, Ceiling, Junction, MachineLimits, Reason, junction};
 
 use super::error::Problem;
+use crate::gcode::Axis;
 use crate::machine::Machine;
 use crate::toolpath::fairing::feeds::lower;
 use crate::toolpath::smooth::{Move, Run, TANGENT_ROUNDING_RAD};
-use crate::toolpath::{Element, Greatest, Role, angle, norm, subtract};
+use crate::toolpath::{Element, Greatest, Role, SpeedRatios, angle, norm, subtract};
 
 /// The ceilings of a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ceilings {
+    /// The programmed feed along it \[mm/s\]; infinite for a rapid.
+    pub feed_mm_s: f64,
     /// The ceiling at the programmed feed.
     pub programmed: Ceiling<f64>,
     /// The ceiling without a programmed feed.
     pub greatest: Ceiling<f64>,
 }
 
-/// The ceilings of a move that bends as `greatest` says, driven at most at `curve_feed_share` of what its
-/// curvature allows. An error comes with the program line.
-pub(super) fn ceilings(
-    step: &Move,
-    greatest: &Greatest,
+/// The ceilings of what bends as `greatest` says, programmed to be driven along it at `feed_mm_s` and at most at
+/// `curve_feed_share` of what its curvature allows.
+pub(super) fn ceilings<const N: usize>(
+    feed_mm_s: f64,
+    greatest: &Greatest<N>,
+    ratios: &SpeedRatios,
     curve_feed_share: f64,
-    machine: &Machine,
-) -> Result<Ceilings, (u32, Problem)> {
-    let limits = MachineLimits { curve_feed_share, ..machine.limits() };
+    machine: &Machine<N>,
+) -> Result<Ceilings, LimitError> {
+    let limits = machine.limits();
+    let path = path_limits(&limits.path, greatest, ratios, machine);
+    let limits = MachineLimits { curve_feed_share, path, ..limits };
     let Greatest { bend, tangent, curved } = greatest;
-    let at = |feed_mm_s: f64| {
-        Ceiling::new(&limits, feed_mm_s, tangent, curved, bend).map_err(|error| (step.line, error.into()))
-    };
-    let programmed = at(step.feed_mm_s)?;
+    let at = |feed_mm_s: f64| Ceiling::new(&limits, feed_mm_s, tangent, curved, bend);
+    let programmed = at(feed_mm_s)?;
     let greatest = if programmed.reason == Reason::Programmed { at(f64::INFINITY)? } else { programmed };
-    Ok(Ceilings { programmed, greatest })
+    Ok(Ceilings { feed_mm_s, programmed, greatest })
+}
+
+/// What the limits of the linear axes together are along the path.
+fn path_limits<const N: usize>(
+    path: &AxisLimits<f64>,
+    greatest: &Greatest<N>,
+    ratios: &SpeedRatios,
+    machine: &Machine<N>,
+) -> AxisLimits<f64> {
+    let is_linear = |letter: Option<Axis>| letter.is_some_and(|letter| !letter.is_rotary());
+    let is_bent =
+        machine.axes.iter().zip(greatest.curved).any(|(axis, curved)| curved && is_linear(axis.letter));
+    let part = if is_bent { 1.0 } else { ratios.linear };
+    // Where nothing linear moves they bind nothing; limits are finite.
+    let most = |limit: f64| (limit / part).min(f64::MAX);
+    AxisLimits {
+        feed_mm_s: path.feed_mm_s / ratios.linear,
+        limits: Limits {
+            accel_mm_s2: most(path.limits.accel_mm_s2),
+            jerk_mm_s3: most(path.limits.jerk_mm_s3),
+            snap_mm_s4: most(path.limits.snap_mm_s4),
+        },
+    }
+}
+
+/// The limits that path and axes keep in any direction of X, Y and Z and of what else moves.
+pub(super) fn in_any_direction<const N: usize>(moves: &[Move<N>], machine: &Machine<N>) -> Limits<f64> {
+    let mut limits = machine.limits();
+    let path = limits.path;
+    for (place, axis) in machine.axes.iter().enumerate() {
+        let is_xyz = matches!(axis.letter, Some(Axis::X | Axis::Y | Axis::Z));
+        let is_bound = is_xyz || moves.iter().any(|step| step.element.moves()[place]);
+        if !is_bound {
+            limits.axes[place] = path;
+        }
+    }
+    limits.in_any_direction()
 }
 
 /// The part of the feed that a curve through dense moves allows, with which it is driven: where it is
@@ -40,15 +87,22 @@ pub(super) fn ceilings(
 const SMOOTH_FEED_SHARE: f64 = 0.93;
 
 /// The ceilings of the moves of a run. An error comes with the program line.
-pub(super) fn along(run: &Run, machine: &Machine) -> Result<Vec<Ceilings>, (u32, Problem)> {
-    let is_curve = |step: &Move| matches!(step.element, Element::Polynomial { role: Role::Curve, .. });
+pub(super) fn along<const N: usize>(
+    run: &Run<N>,
+    machine: &Machine<N>,
+) -> Result<Vec<Ceilings>, (u32, Problem)> {
+    let is_curve = |step: &Move<N>| matches!(step.element, Element::Polynomial { role: Role::Curve, .. });
+    let axes = machine.letters_by_place();
     let mut all: Vec<Ceilings> = Vec::with_capacity(run.moves().len());
     for moves in run.moves().chunk_by(|before, after| is_curve(before) == is_curve(after)) {
         let first = all.len();
         let is_smooth = moves.first().is_some_and(is_curve);
         let share = if is_smooth { SMOOTH_FEED_SHARE } else { machine.path.curve_feed_share };
         for (index, step) in moves.iter().enumerate() {
-            all.push(ceilings(step, &run.greatest(first + index), share, machine)?);
+            let ratios = SpeedRatios::of(&step.element, &axes);
+            let (feed_mm_s, greatest) = (step.feeds.along(&ratios), run.greatest(first + index));
+            let of_step = ceilings(feed_mm_s, &greatest, &ratios, share, machine);
+            all.push(of_step.map_err(|error| (step.line, error.into()))?);
         }
         if is_smooth {
             lower_curve(run, first, &mut all[first..], machine)?;
@@ -59,29 +113,37 @@ pub(super) fn along(run: &Run, machine: &Machine) -> Result<Vec<Ceilings>, (u32,
 
 /// Lowers the ceilings of a curve through dense moves, those of a run from `first` on, to the feeds that ramps
 /// between the slowest of them reach. That leaves more of the limits for the ramps.
-fn lower_curve(
-    run: &Run,
+fn lower_curve<const N: usize>(
+    run: &Run<N>,
     first: usize,
     all: &mut [Ceilings],
-    machine: &Machine,
+    machine: &Machine<N>,
 ) -> Result<(), (u32, Problem)> {
+    let axes = machine.letters_by_place();
+    let moves = &run.moves()[first..first + all.len()];
     let mut feeds: Vec<f64> = all.iter().map(|ceilings| ceilings.programmed.feed_mm_s).collect();
     let lengths: Vec<f64> = (first..first + all.len()).map(|index| run.length_mm(index)).collect();
-    lower(&mut feeds, &lengths, &machine.limits().in_any_direction());
-    for (index, (ceiling, feed_mm_s)) in all.iter_mut().zip(feeds).enumerate() {
-        if feed_mm_s < ceiling.programmed.feed_mm_s {
-            let reason = ceiling.programmed.reason;
-            let step = Move { feed_mm_s, ..run.moves()[first + index] };
-            let lowered = ceilings(&step, &run.greatest(first + index), SMOOTH_FEED_SHARE, machine)?;
+    lower(&mut feeds, &lengths, &in_any_direction(moves, machine));
+    for (index, (of_step, feed_mm_s)) in all.iter_mut().zip(feeds).enumerate() {
+        if feed_mm_s < of_step.programmed.feed_mm_s {
+            let reason = of_step.programmed.reason;
+            let ratios = SpeedRatios::of(&moves[index].element, &axes);
+            let greatest = run.greatest(first + index);
+            let lowered = ceilings(feed_mm_s, &greatest, &ratios, SMOOTH_FEED_SHARE, machine)
+                .map_err(|error| (moves[index].line, error.into()))?;
             let lowered = Ceiling { reason, ..lowered.programmed };
-            *ceiling = Ceilings { programmed: lowered, greatest: lowered };
+            *of_step = Ceilings { programmed: lowered, greatest: lowered, ..*of_step };
         }
     }
     Ok(())
 }
 
 /// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.
-pub(super) fn junction_feed(before: &Element, after: &Element, machine: &Machine) -> f64 {
+pub(super) fn junction_feed<const N: usize>(
+    before: &Element<N>,
+    after: &Element<N>,
+    machine: &Machine<N>,
+) -> f64 {
     let ([_, end], [start, _]) = (before.ends(), after.ends());
     let angle_rad = angle(end.tangent, start.tangent);
     let steps = Junction { angle_rad, curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)) };

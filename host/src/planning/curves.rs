@@ -5,57 +5,80 @@
 //! refused with its line.
 
 use super::error::Problem;
-use crate::gcode::{CubicMove, Nurbs, PathMode, xyz_mm};
+use super::program::move_at;
+use crate::gcode::{Axis, CubicMove, Nurbs, NurbsMove, PathMode};
 use crate::machine::Machine;
 use crate::toolpath::rational::spans;
 use crate::toolpath::smooth::Move;
 use crate::toolpath::spline::{Degree, Ends, chord_lengths, interpolate};
-use crate::toolpath::{Element, Polynomial, Role, Vector, add, scale, septics, subtract};
+use crate::toolpath::subspace::Subspace;
+use crate::toolpath::{
+    Element, Feeds, NoAxis, Polynomial, Role, Vector, add, from_xyz, scale, septics, subtract,
+};
 
 /// A point of a spline, with feed and path mode of the move to it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
+pub(super) struct Point<const N: usize> {
     pub(super) line: u32,
-    pub(super) at: Vector,
-    pub(super) feed_mm_s: f64,
+    pub(super) at: Vector<N>,
+    pub(super) feeds: Feeds,
     pub(super) mode: PathMode,
 }
 
-/// The element of a G5. An error has no line yet.
-pub(super) fn cubic(step: &CubicMove) -> Result<Element, Problem> {
-    let (from, to) = (xyz_mm(step.from), xyz_mm(step.to));
+/// The element of a G5. Axes besides X and Y go linearly with its parameter. An error has no line yet.
+pub(super) fn cubic<const N: usize>(step: &CubicMove, machine: &Machine<N>) -> Result<Element<N>, Problem> {
+    let (from, to) = (machine.coordinates(step.from), machine.coordinates(step.to));
     let [[i, j], [p, q]] = step.controls_mm;
     let chord = subtract(to, from);
-    let (b1, b2) = ([i, j, 0.0], add(chord, [p, q, 0.0]));
+    let third = core::array::from_fn(|place| match machine.axes[place].letter {
+        Some(Axis::X | Axis::Y) => 0.0,
+        _ => chord[place] / 3.0,
+    });
+    let b1 = add(from_xyz([i, j, 0.0], machine)?, third);
+    let b2 = subtract(add(chord, from_xyz([p, q, 0.0], machine)?), third);
     // Bézier's points 0, b1, b2, chord to powers of u.
     let c1 = scale(b1, 3.0);
     let c2 = scale(subtract(b2, scale(b1, 2.0)), 3.0);
     let c3 = subtract(chord, add(c1, c2));
-    let none = [0.0; 3];
+    let none = [0.0; N];
     let shape = Polynomial::new([c1, c2, c3, none, none, none, none]);
     checked(Element::Polynomial { from, to, shape, role: Role::Spline })
 }
 
-/// The elements of a NURBS. An error has no line yet.
-pub(super) fn nurbs(curve: Option<&Nurbs>) -> Result<Vec<Element>, Problem> {
-    let spans = curve.and_then(spans).ok_or(Problem::Nurbs)?;
+/// The elements of a NURBS. Axes besides X, Y and Z stand. An error has no line yet.
+pub(super) fn nurbs<const N: usize>(
+    step: &NurbsMove,
+    curve: Option<&Nurbs>,
+    machine: &Machine<N>,
+) -> Result<Vec<Element<N>>, Problem> {
+    let curve = curve.ok_or(Problem::Nurbs)?;
+    let letters = [Axis::X, Axis::Y, Axis::Z];
+    let places = letters.map(|letter| machine.place_of(letter));
+    for (axis, (letter, place)) in letters.into_iter().zip(places).enumerate() {
+        let mut coordinates = curve.points_mm.iter().map(|point| point[axis]);
+        if place.is_none() && coordinates.any(|mm| mm != curve.points_mm[0][axis]) {
+            return Err(NoAxis(letter).into());
+        }
+    }
+    let (space, rest) = (Subspace::at(places), machine.coordinates(step.from));
     let mut elements = Vec::new();
-    for span in spans {
-        elements.extend(span.elements().map_err(|error| Problem::Geometry(error.into()))?);
+    for span in spans(curve).ok_or(Problem::Nurbs)? {
+        let of_span = span.elements().map_err(|error| Problem::Geometry(error.into()))?;
+        elements.extend(of_span.iter().map(|element| space.widen_element(element, rest)));
     }
     elements.into_iter().map(checked).collect()
 }
 
 /// The spans of the quintic spline from `from` through all `points`, which are taken. An error comes with the
 /// program line.
-pub(super) fn through(
-    from: Vector,
-    points: &mut Vec<Point>,
-    machine: &Machine,
-) -> Result<Vec<Move>, (u32, Problem)> {
+pub(super) fn through<const N: usize>(
+    from: Vector<N>,
+    points: &mut Vec<Point<N>>,
+    machine: &Machine<N>,
+) -> Result<Vec<Move<N>>, (u32, Problem)> {
     let points = std::mem::take(points);
     let Some(first) = points.first() else { return Ok(Vec::new()) };
-    let all: Vec<Vector> = std::iter::once(from).chain(points.iter().map(|point| point.at)).collect();
+    let all: Vec<Vector<N>> = std::iter::once(from).chain(points.iter().map(|point| point.at)).collect();
     let spline = chord_lengths(&all)
         .and_then(|parameters| interpolate(&all, &parameters, Degree::Quintic, &Ends::Free))
         .map_err(|error| {
@@ -69,15 +92,15 @@ pub(super) fn through(
         let Some(passed @ [.., point]) = points.get(done..last) else { continue };
         let element = checked(element).map_err(|problem| (point.line, problem))?;
         // Where points of one span differ in feed, the slowest holds.
-        let feed_mm_s = passed.iter().map(|point| point.feed_mm_s).fold(f64::INFINITY, f64::min);
-        moves.push(super::program::path_move(point.line, element, feed_mm_s, point.mode, machine));
+        let feeds = passed.iter().map(|point| point.feeds).fold(Feeds::RAPID, Feeds::least);
+        moves.push(move_at(point.line, element, feeds, point.mode, machine));
         done = last;
     }
     Ok(moves)
 }
 
 /// A cusp is a limit of 0 to the plan, and has a name here.
-fn checked(element: Element) -> Result<Element, Problem> {
-    septics::<f32>(&element).map_err(|error| Problem::Geometry(error.into()))?;
+fn checked<const N: usize>(element: Element<N>) -> Result<Element<N>, Problem> {
+    septics::<f32, _>(&element).map_err(|error| Problem::Geometry(error.into()))?;
     Ok(element)
 }

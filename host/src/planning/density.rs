@@ -24,10 +24,10 @@ pub(super) struct PiecePace {
 impl PiecePace {
     /// The pieces of the next stretch; `blocks` holds the index of each one's block. An error comes with
     /// the program line.
-    pub(super) fn stretch(
+    pub(super) fn stretch<const N: usize>(
         &mut self,
-        stretch: &Stretch,
-        pieces: &[Placed],
+        stretch: &Stretch<N>,
+        pieces: &[Placed<N>],
         blocks: &[usize],
         tick_s: f64,
     ) -> Result<(), (u32, Problem)> {

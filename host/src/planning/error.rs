@@ -4,8 +4,9 @@ use motion_kernel::law::{LimitError, SegmentError, Ticks};
 use motion_kernel::plan::PlanError;
 use motion_kernel::units::Position;
 
-use crate::toolpath::CompileError;
+use crate::gcode::Axis;
 use crate::toolpath::spline::SplineError;
+use crate::toolpath::{CompileError, NoAxis};
 
 /// A place in a file, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,17 +69,33 @@ pub enum Problem {
         tick_s: f64,
     },
     /// A move leaves the travel of an axis.
-    #[error("found {axis} at {found_mm:.4} mm, expected its travel, {low_mm} to {high_mm} mm")]
+    #[error("found {axis} at {found:.4} {unit}, expected its travel, {low} to {high} {unit}")]
     Travel {
         /// The axis' name.
         axis: String,
-        /// The axis' position there \[mm\].
-        found_mm: f64,
-        /// The axis' least position \[mm\].
-        low_mm: f64,
-        /// The axis' greatest position \[mm\].
-        high_mm: f64,
+        /// The axis' position there.
+        found: f64,
+        /// The axis' least position.
+        low: f64,
+        /// The axis' greatest position.
+        high: f64,
+        /// The unit of the three: "mm" or "°".
+        unit: &'static str,
     },
+    /// A move leaves the space that the kernel has positions for.
+    #[error(
+        "found a path through {axis} = {found} {}, expected coordinates within ±{} {}",
+        axis.unit(), Position::LIMIT_MM, axis.unit()
+    )]
+    Coordinate {
+        /// The axis.
+        axis: Axis,
+        /// The coordinate, in the axis' unit.
+        found: f64,
+    },
+    /// A curve needs an axis that the machine does not have.
+    #[error("found {0}")]
+    NoAxis(#[from] NoAxis),
     /// More pieces than the tick handles.
     #[error(
         "found {pieces} pieces over {length_mm:.6} mm, which {feed_mm_s:.3} mm/s pass within one tick of \

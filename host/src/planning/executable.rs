@@ -17,25 +17,26 @@ use super::error::{PlanningError, Problem};
 use super::lookahead::block_at;
 use super::stretch::Stretch;
 use super::{Item as PlanItem, Plan};
+use crate::gcode::Axis;
 use crate::machine::Machine;
-use crate::toolpath::{Placed, compile, exact, on_path};
+use crate::toolpath::{CompileError, Placed, compile, exact, on_path};
 
 /// The items of the two streams.
 #[derive(Clone, Debug)]
-pub struct Executable {
+pub struct Executable<const N: usize = 3> {
     /// The items, in order.
-    pub items: Vec<Item<3>>,
+    pub items: Vec<Item<N>>,
     /// The control tick they are for \[s\].
     pub tick_s: f64,
 }
 
-impl Executable {
+impl<const N: usize> Executable<N> {
     /// The executable form of `plan`, for kernels of the number type `R`.
     ///
     /// # Errors
     /// A move can't be made into pieces, a figure is beyond the number type, or more pieces or segments than
     /// the tick's bound fall into one tick.
-    pub fn new<R: Real>(plan: &Plan) -> Result<Self, PlanningError> {
+    pub fn new<R: Real>(plan: &Plan<N>) -> Result<Self, PlanningError> {
         let fail = |line: u32, problem: Problem| PlanningError {
             source_name: plan.source.clone(),
             place: line.into(),
@@ -46,8 +47,14 @@ impl Executable {
         for item in &plan.items {
             match item {
                 PlanItem::Stretch(stretch) => {
-                    stretch_items::<R>(stretch, plan.tick_s, &mut piece_pace, &mut segment_pace, &mut items)
-                        .map_err(|(line, problem)| fail(line, problem))?;
+                    stretch_items::<R, N>(
+                        stretch,
+                        plan.tick_s,
+                        &mut piece_pace,
+                        &mut segment_pace,
+                        &mut items,
+                    )
+                    .map_err(|(line, problem)| fail(line, named(problem, &plan.axes)))?;
                 }
                 &PlanItem::Dwell { line, seconds } => {
                     let dwell = Ticks::from_seconds(seconds, plan.tick_s)
@@ -64,48 +71,58 @@ impl Executable {
     }
 
     /// The bytes for a board without live control.
-    pub fn without_blocks(&self) -> impl Iterator<Item = &Item<3>> {
+    pub fn without_blocks(&self) -> impl Iterator<Item = &Item<N>> {
         self.items.iter().filter(|item| !matches!(item, Item::Block(_)))
     }
 
     /// The program with the machine it was planned for, as bytes for a board without live control: without
     /// blocks.
     #[must_use]
-    pub fn to_bytes(&self, machine: &Machine) -> Vec<u8> {
+    pub fn to_bytes(&self, machine: &Machine<N>) -> Vec<u8> {
         bytes(machine, self.without_blocks())
     }
 
     /// The same for a board with live control.
     #[must_use]
-    pub fn to_live_bytes(&self, machine: &Machine) -> Vec<u8> {
+    pub fn to_live_bytes(&self, machine: &Machine<N>) -> Vec<u8> {
         bytes(machine, &self.items)
     }
 
     /// The items of motion, as the kernel's [`Supply`](motion_kernel::program::Supply) takes them: without switches of
     /// outputs.
-    pub fn supplied(&self) -> impl Iterator<Item = Result<Item<3>, Infallible>> + '_ {
+    pub fn supplied(&self) -> impl Iterator<Item = Result<Item<N>, Infallible>> + '_ {
         self.items.iter().filter(|item| !matches!(item, Item::Switch(_))).map(|&item| Ok(item))
     }
 }
 
-fn bytes<'a>(machine: &Machine, items: impl IntoIterator<Item = &'a Item<3>>) -> Vec<u8> {
+/// A problem that names the axis that it is about.
+fn named<const N: usize>(problem: Problem, axes: &[Option<Axis>; N]) -> Problem {
+    match problem {
+        Problem::Geometry(CompileError::Coordinate { axis: place, mm: found }) => {
+            axes.get(place).copied().flatten().map_or(problem, |axis| Problem::Coordinate { axis, found })
+        }
+        problem => problem,
+    }
+}
+
+fn bytes<'a, const N: usize>(machine: &Machine<N>, items: impl IntoIterator<Item = &'a Item<N>>) -> Vec<u8> {
     let mut bytes = Vec::new();
-    // Entries of three axes fit the format.
-    write(&machine.header(), Some(&machine.guards()), items, &mut bytes).expect("three axes");
+    // Entries of nine axes fit the format.
+    write(&machine.header(), Some(&machine.guards()), items, &mut bytes).expect("nine axes at most");
     bytes
 }
 
-fn stretch_items<R: Real>(
-    stretch: &Stretch,
+fn stretch_items<R: Real, const N: usize>(
+    stretch: &Stretch<N>,
     tick_s: f64,
     piece_pace: &mut PiecePace,
     segment_pace: &mut SegmentPace,
-    items: &mut Vec<Item<3>>,
+    items: &mut Vec<Item<N>>,
 ) -> Result<(), (u32, Problem)> {
     let (mut pieces, mut piece_blocks) = (Vec::new(), Vec::new());
-    let (mut start_mm, mut end) = (0.0, [0.0; 3]);
+    let (mut start_mm, mut end) = (0.0, [0.0; N]);
     for (index, block) in stretch.blocks.iter().enumerate() {
-        start_mm = compile::<R>(&block.element, block.line, start_mm, &mut pieces)
+        start_mm = compile::<R, N>(&block.element, block.line, start_mm, &mut pieces)
             .map_err(|error| (block.line, error.into()))?;
         piece_blocks.resize(pieces.len(), index);
         (_, end) = block.element.ends_mm();
@@ -140,9 +157,9 @@ struct Dense {
 }
 
 impl Dense {
-    fn of(pieces: &[Placed], tick_s: f64) -> Vec<Self> {
+    fn of<const N: usize>(pieces: &[Placed<N>], tick_s: f64) -> Vec<Self> {
         let mut end = Position::ZERO;
-        let place = |piece: &Placed| {
+        let place = |piece: &Placed<N>| {
             let start = end;
             end = end + piece.length;
             Self { start, end, most_mm_s: f64::INFINITY }
@@ -168,13 +185,13 @@ impl Dense {
 }
 
 /// Where each block ends.
-fn block_ends(stretch: &Stretch) -> Result<Vec<Position>, (u32, Problem)> {
+fn block_ends<const N: usize>(stretch: &Stretch<N>) -> Result<Vec<Position>, (u32, Problem)> {
     let ends = stretch.blocks.iter().zip(stretch.ends_mm());
     ends.map(|(block, &end_mm)| on_path(end_mm).map_err(|error| (block.line, error.into()))).collect()
 }
 
 /// The ceilings of the feed along the path. Neighbours with equal ceilings are one block.
-fn path_blocks(stretch: &Stretch, ends: &[Position], dense: &[Dense]) -> Vec<Placed> {
+fn path_blocks<const N: usize>(stretch: &Stretch<N>, ends: &[Position], dense: &[Dense]) -> Vec<Placed<N>> {
     let allowed = |ceiling: &Ceiling<f64>, most_mm_s: f64| Allowed {
         cap_mm_s: ceiling.feed_mm_s.min(most_mm_s),
         limits: ceiling.law.limits(),
@@ -202,8 +219,13 @@ fn path_blocks(stretch: &Stretch, ends: &[Position], dense: &[Dense]) -> Vec<Pla
 }
 
 /// Blocks and both streams as one, in the order of the path positions where the items start.
-fn in_order_of_start(blocks: &[Placed], pieces: &[Placed], feed: &[Placed], items: &mut Vec<Item<3>>) {
-    let mut ordered: Vec<(Position, Item<3>)> = Vec::with_capacity(blocks.len() + pieces.len() + feed.len());
+fn in_order_of_start<const N: usize>(
+    blocks: &[Placed<N>],
+    pieces: &[Placed<N>],
+    feed: &[Placed<N>],
+    items: &mut Vec<Item<N>>,
+) {
+    let mut ordered: Vec<(Position, Item<N>)> = Vec::with_capacity(blocks.len() + pieces.len() + feed.len());
     for kind in [blocks, pieces, feed] {
         let mut start = Position::ZERO;
         for placed in kind {

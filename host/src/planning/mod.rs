@@ -6,8 +6,8 @@
 //!
 //! **Limits.** A dwell, and a part of a move at constant feed or acceleration, may last 2³¹ ticks: twelve
 //! days at 0.5 ms. Between two full stops there may be one kilometre of path (10⁶ mm), and every point of the
-//! path lies within one kilometre of the origin on each axis. Anything beyond is refused, with the line of
-//! the block.
+//! path lies within one kilometre of the origin on each axis (a rotary one: 10⁶ °). Anything beyond is refused, with
+//! the line of the block.
 //!
 //! - [`program`]: steps to stretches: where motion must stop;
 //! - `blending`: stretches to blocks: the choice of the junctions that are blended;
@@ -51,7 +51,7 @@ use motion_kernel::hal::OutputState;
 use motion_kernel::law::Pulse;
 use serde::{Deserialize, Serialize};
 
-use crate::gcode::{ProbeMove, xyz_mm};
+use crate::gcode::{Axis, ProbeMove, xyz_mm};
 use crate::trace::TracedBlock;
 
 /// How ramps and blocks go together.
@@ -76,7 +76,7 @@ impl Mode {
 
 /// A planned program.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct Plan<const N: usize = 3> {
     /// Name of the program or block list.
     pub source: String,
     /// Blocks, in path order.
@@ -88,7 +88,7 @@ pub struct Plan {
     /// Path length \[mm\].
     pub length_mm: f64,
     /// The items to execute, in order. Empty for a block list, which has no geometry.
-    pub items: Vec<Item>,
+    pub items: Vec<Item<N>>,
     /// Probing moves, in order.
     pub probes: Vec<PlannedProbe>,
     /// Stretches among the items.
@@ -99,11 +99,13 @@ pub struct Plan {
     pub pulse: Pulse,
     /// The control tick it was planned for \[s\].
     pub tick_s: f64,
+    /// The axes of its machine, by their places; none for a block list.
+    pub axes: [Option<Axis>; N],
 }
 
-impl Plan {
+impl<const N: usize> Plan<N> {
     /// A plan with nothing to do.
-    fn empty(source: &str, pulse: Pulse, tick_s: f64) -> Self {
+    fn empty(source: &str, pulse: Pulse, tick_s: f64, axes: [Option<Axis>; N]) -> Self {
         Self {
             source: source.to_owned(),
             blocks: Vec::new(),
@@ -116,6 +118,7 @@ impl Plan {
             notices: Vec::new(),
             pulse,
             tick_s,
+            axes,
         }
     }
 }
@@ -149,9 +152,9 @@ impl PlannedProbe {
 
 /// One thing to execute.
 #[derive(Clone, Debug)]
-pub enum Item {
+pub enum Item<const N: usize = 3> {
     /// Motion from one full stop to the next.
-    Stretch(Stretch),
+    Stretch(Stretch<N>),
     /// Rest.
     Dwell {
         /// Program line.

@@ -11,14 +11,14 @@ use crate::gcode::{NoticeKind, Outputs, Program, SpindleSpeed, StepKind};
 use crate::machine::{Machine, SpindleSettings};
 
 /// The outputs as the program has switched them so far.
-pub(super) struct Switches<'m> {
-    machine: &'m Machine,
+pub(super) struct Switches<'m, const N: usize> {
+    machine: &'m Machine<N>,
     now: OutputState,
 }
 
-impl<'m> Switches<'m> {
+impl<'m, const N: usize> Switches<'m, N> {
     /// All off.
-    pub(super) fn new(machine: &'m Machine) -> Self {
+    pub(super) fn new(machine: &'m Machine<N>) -> Self {
         Self { machine, now: OutputState::OFF }
     }
 
@@ -61,7 +61,7 @@ fn speed_rpm(settings: &SpindleSettings, to: &Outputs) -> Result<f64, Problem> {
 }
 
 /// Whether the machine acts on what a notice says is not acted on.
-pub(super) fn acts_on(machine: &Machine, kind: NoticeKind) -> bool {
+pub(super) fn acts_on<const N: usize>(machine: &Machine<N>, kind: NoticeKind) -> bool {
     match kind {
         NoticeKind::Spindle | NoticeKind::SpindleSpeed => machine.spindle.is_some(),
         NoticeKind::Coolant => machine.coolant.is_some(),
@@ -73,7 +73,11 @@ pub(super) fn acts_on(machine: &Machine, kind: NoticeKind) -> bool {
 ///
 /// # Errors
 /// The first such word, with its line.
-pub fn require_outputs(source_name: &str, program: &Program, machine: &Machine) -> Result<(), PlanningError> {
+pub fn require_outputs<const N: usize>(
+    source_name: &str,
+    program: &Program,
+    machine: &Machine<N>,
+) -> Result<(), PlanningError> {
     for step in &program.steps {
         let StepKind::Switch(to) = &step.kind else { continue };
         let spindle = match to.spindle {

@@ -7,22 +7,22 @@ use super::executable::Executable;
 use super::outputs::{Switches, acts_on};
 use super::stretch::{Stretch, StretchBlock};
 use super::{Item, Mode, PlacedRamp, Plan, PlannedProbe, travel};
-use crate::gcode::{LineMove, PathMode, ProbeMove, Program, Step, StepKind, xyz_mm};
+use crate::gcode::{Feed, LineMove, PathMode, ProbeMove, Program, Step, StepKind};
 use crate::machine::{DefaultPathMode, Machine, PathSettings};
-use crate::toolpath::Element;
 use crate::toolpath::smooth::Move;
+use crate::toolpath::{Element, Feeds};
 
 /// Plans a whole program for a machine.
 ///
 /// # Errors
 /// A move can't be executed by the kernel, or the plan would exceed what a tick can do; the error
 /// names the line.
-pub fn plan_program(
+pub fn plan_program<const N: usize>(
     source_name: &str,
     program: &Program,
-    machine: &Machine,
+    machine: &Machine<N>,
     mode: Mode,
-) -> Result<Plan, PlanningError> {
+) -> Result<Plan<N>, PlanningError> {
     let at = |line: u32| {
         move |problem: Problem| PlanningError {
             source_name: source_name.to_owned(),
@@ -31,13 +31,13 @@ pub fn plan_program(
         }
     };
     let machine = &driven(machine, mode);
-    let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s);
+    let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s, machine.letters_by_place());
     plan.notices = program.notes(|kind| acts_on(machine, kind));
     plan.notices.extend(assumed_path(program, machine));
     let mut switches = Switches::new(machine);
-    let mut run: Vec<Move> = Vec::new();
+    let mut run: Vec<Move<N>> = Vec::new();
     // Where the spline begins whose points are being collected.
-    let (mut start, mut points) = ([0.0; 3], Vec::<Point>::new());
+    let (mut start, mut points) = ([0.0; N], Vec::<Point<N>>::new());
     for step in &program.steps {
         let switch = match &step.kind {
             StepKind::Switch(to) => match switches.next(to).map_err(at(step.line))? {
@@ -57,28 +57,32 @@ pub fn plan_program(
         }
         match &step.kind {
             StepKind::Line(line) => {
-                run.push(path_move(step.line, Element::line(line), line.feed.mm_s(), line.mode, machine));
+                run.push(path_move(step.line, Element::line(line, machine), line.feed, line.mode, machine));
             }
             StepKind::Arc(arc) => {
-                run.push(path_move(step.line, Element::arc(arc), arc.feed.mm_s(), arc.mode, machine));
+                let element = Element::arc(arc, machine).map_err(|error| at(step.line)(error.into()))?;
+                run.push(path_move(step.line, element, arc.feed, arc.mode, machine));
             }
             StepKind::Cubic(curve) => {
-                let element = cubic(curve).map_err(at(step.line))?;
-                run.push(path_move(step.line, element, curve.feed.mm_s(), curve.mode, machine));
+                let element = cubic(curve, machine).map_err(at(step.line))?;
+                run.push(path_move(step.line, element, curve.feed, curve.mode, machine));
             }
             StepKind::Nurbs(curve) => {
-                let elements = nurbs(program.nurbs.get(curve.curve)).map_err(at(step.line))?;
+                let shape = program.nurbs.get(curve.curve);
+                let elements = nurbs(curve, shape, machine).map_err(at(step.line))?;
                 let moves = elements
                     .into_iter()
-                    .map(|element| path_move(step.line, element, curve.feed.mm_s(), curve.mode, machine));
+                    .map(|element| path_move(step.line, element, curve.feed, curve.mode, machine));
                 run.extend(moves);
             }
             StepKind::Through(point) => {
+                let (from, to) = (machine.coordinates(point.from), machine.coordinates(point.to));
                 if points.is_empty() {
-                    start = xyz_mm(point.from);
+                    start = from;
                 }
-                let (feed_mm_s, mode) = (point.feed.mm_s(), point.mode);
-                points.push(Point { line: step.line, at: xyz_mm(point.to), feed_mm_s, mode });
+                let chord = Element::Line { from, to };
+                let feeds = Feeds::programmed(point.feed.mm_s(), &chord, &machine.letters_by_place());
+                points.push(Point { line: step.line, at: to, feeds, mode: point.mode });
             }
             StepKind::Probe(probe) => {
                 append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
@@ -87,7 +91,8 @@ pub fn plan_program(
                 plan.probes.push(PlannedProbe::new(step.line, plan.stretches, probe));
                 if from != to {
                     let line = LineMove { from, to, feed, mode: PathMode::ExactStop };
-                    run.push(path_move(step.line, Element::line(&line), feed.mm_s(), line.mode, machine));
+                    let element = Element::line(&line, machine);
+                    run.push(path_move(step.line, element, feed, line.mode, machine));
                 }
                 append(&mut run, &mut plan, machine, mode).map_err(|(line, problem)| at(line)(problem))?;
             }
@@ -129,7 +134,7 @@ pub fn plan_program(
 }
 
 /// A dwell; one of no time changes nothing but the stop it makes.
-fn rest(plan: &mut Plan, line: u32, seconds: f64) {
+fn rest<const N: usize>(plan: &mut Plan<N>, line: u32, seconds: f64) {
     if seconds > 0.0 {
         plan.time_s += seconds;
         plan.items.push(Item::Dwell { line, seconds });
@@ -140,14 +145,14 @@ fn rest(plan: &mut Plan, line: u32, seconds: f64) {
 ///
 /// # Errors
 /// Those of [`plan_program`].
-pub fn plan_moves(
+pub fn plan_moves<const N: usize>(
     source_name: &str,
-    mut moves: Vec<Move>,
-    machine: &Machine,
+    mut moves: Vec<Move<N>>,
+    machine: &Machine<N>,
     mode: Mode,
-) -> Result<Plan, PlanningError> {
+) -> Result<Plan<N>, PlanningError> {
     let machine = &driven(machine, mode);
-    let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s);
+    let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s, machine.letters_by_place());
     append(&mut moves, &mut plan, machine, mode).map_err(|(line, problem)| PlanningError {
         source_name: source_name.to_owned(),
         place: line.into(),
@@ -159,7 +164,7 @@ pub fn plan_moves(
 }
 
 /// What is assumed of moves before any path mode is programmed, if there are such moves.
-fn assumed_path(program: &Program, machine: &Machine) -> Option<String> {
+fn assumed_path<const N: usize>(program: &Program, machine: &Machine<N>) -> Option<String> {
     let is_assumed = |step: &&Step| step.kind.mode() == Some(PathMode::Unprogrammed);
     let line = program.steps.iter().find(is_assumed)?.line;
     let path = match machine.path.mode {
@@ -170,28 +175,44 @@ fn assumed_path(program: &Program, machine: &Machine) -> Option<String> {
 }
 
 /// `machine` with the pulses of jerk of `mode`.
-fn driven(machine: &Machine, mode: Mode) -> Machine {
+fn driven<const N: usize>(machine: &Machine<N>, mode: Mode) -> Machine<N> {
     let path = PathSettings { pulse: mode.pulse(machine.path.pulse), ..machine.path };
     Machine { path, ..machine.clone() }
 }
 
-pub(super) fn path_move(
+fn path_move<const N: usize>(
     line: u32,
-    element: Element,
-    feed_mm_s: f64,
+    element: Element<N>,
+    feed: Feed,
     mode: PathMode,
-    machine: &Machine,
-) -> Move {
+    machine: &Machine<N>,
+) -> Move<N> {
+    let feeds = Feeds::programmed(feed.mm_s(), &element, &machine.letters_by_place());
+    move_at(line, element, feeds, mode, machine)
+}
+
+pub(super) fn move_at<const N: usize>(
+    line: u32,
+    element: Element<N>,
+    feeds: Feeds,
+    mode: PathMode,
+    machine: &Machine<N>,
+) -> Move<N> {
     let merging_mm = match mode {
         PathMode::Blend { merging_mm, .. } => merging_mm,
         PathMode::Unprogrammed | PathMode::ExactPath | PathMode::ExactStop => None,
     };
-    Move { line, element, feed_mm_s, tolerance_mm: machine.path.tolerance_mm(mode), merging_mm }
+    Move { line, element, feeds, tolerance_mm: machine.path.tolerance_mm(mode), merging_mm }
 }
 
 /// Appends the stretches of moves that follow each other, smoothed.
-fn append(run: &mut Vec<Move>, plan: &mut Plan, machine: &Machine, mode: Mode) -> Result<(), (u32, Problem)> {
-    let mut open: Vec<StretchBlock> = Vec::new();
+fn append<const N: usize>(
+    run: &mut Vec<Move<N>>,
+    plan: &mut Plan<N>,
+    machine: &Machine<N>,
+    mode: Mode,
+) -> Result<(), (u32, Problem)> {
+    let mut open: Vec<StretchBlock<N>> = Vec::new();
     for block in blocks(run, machine)? {
         open.push(block);
         // Also after the last.
@@ -204,7 +225,11 @@ fn append(run: &mut Vec<Move>, plan: &mut Plan, machine: &Machine, mode: Mode) -
 }
 
 /// Plans the open stretch and appends it.
-fn close(open: &mut Vec<StretchBlock>, plan: &mut Plan, mode: Mode) -> Result<(), (u32, Problem)> {
+fn close<const N: usize>(
+    open: &mut Vec<StretchBlock<N>>,
+    plan: &mut Plan<N>,
+    mode: Mode,
+) -> Result<(), (u32, Problem)> {
     let stretch = Stretch::new(std::mem::take(open), plan.length_mm, mode, plan.tick_s)?;
     plan.blocks.extend(stretch.block_records());
     let (length_mm, time_s) = (plan.length_mm, plan.time_s);

@@ -11,16 +11,16 @@ use crate::trace::TracedBlock;
 
 /// A block of a stretch, before planning.
 #[derive(Clone, Copy, Debug)]
-pub struct StretchBlock {
+pub struct StretchBlock<const N: usize = 3> {
     /// Program line.
     pub line: u32,
     /// Geometry.
-    pub element: Element,
+    pub element: Element<N>,
     /// Ceiling with its reason, and the law for its ramps.
     pub ceiling: Ceiling<f64>,
     /// The same whatever the program's feed.
     pub greatest: Ceiling<f64>,
-    /// The program's feed \[mm/s\]; infinite for a rapid.
+    /// The program's feed along the block \[mm/s\]; infinite for a rapid.
     pub feed_mm_s: f64,
     /// Greatest feed through the junction at its end \[mm/s\].
     pub junction_mm_s: f64,
@@ -29,7 +29,7 @@ pub struct StretchBlock {
     pub tolerance_share: f64,
 }
 
-impl StretchBlock {
+impl<const N: usize> StretchBlock<N> {
     /// The block as look-ahead sees it.
     pub(super) fn for_lookahead(&self) -> Block<f64> {
         let Ceiling { feed_mm_s: cap_mm_s, law, .. } = self.ceiling;
@@ -39,21 +39,21 @@ impl StretchBlock {
 
 /// A planned stretch.
 #[derive(Clone, Debug)]
-pub struct Stretch {
+pub struct Stretch<const N: usize = 3> {
     /// Its start, from the program's start \[mm\].
     pub start_mm: f64,
     /// The stretch's blocks, as programmed.
-    pub blocks: Vec<StretchBlock>,
+    pub blocks: Vec<StretchBlock<N>>,
     /// Path position of every block's end, from the stretch's start \[mm\].
     ends_mm: Vec<f64>,
     /// Feed and time over the stretch.
     pub profile: FeedProfile,
 }
 
-impl Stretch {
+impl<const N: usize> Stretch<N> {
     /// Plans blocks that start and end at rest. An error comes with the program line.
     pub(super) fn new(
-        blocks: Vec<StretchBlock>,
+        blocks: Vec<StretchBlock<N>>,
         start_mm: f64,
         mode: Mode,
         tick_s: f64,

@@ -7,25 +7,25 @@ use motion_kernel::program::Item;
 
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
-use crate::gcode::{Length, Point};
-use crate::machine::Machine;
+use crate::gcode::{Axis, Point};
+use crate::machine::{AxisSettings, Machine};
 
 /// # Errors
 /// A piece leaves the travel of an axis, at its ends or between them.
-pub(super) fn check(
+pub(super) fn check<const N: usize>(
     source_name: &str,
-    executable: &Executable,
-    machine: &Machine,
+    executable: &Executable<N>,
+    machine: &Machine<N>,
 ) -> Result<(), PlanningError> {
     let travel = machine.travel();
     for item in executable.supplied() {
         let Ok(item) = item;
         let (line, piece) = match item {
             Item::Line { line, start, direction, length } => {
-                (line, Piece::<f64, 3>::line(line, start, direction, length))
+                (line, Piece::<f64, N>::line(line, start, direction, length))
             }
             Item::Septic { line, start, coefficients, length } => {
-                (line, Piece::<f64, 3>::septic(line, start, coefficients, length))
+                (line, Piece::<f64, N>::septic(line, start, coefficients, length))
             }
             _ => continue,
         };
@@ -33,22 +33,26 @@ pub(super) fn check(
         let Ok(piece) = piece else { continue };
         let Some((axis, found_mm)) = piece.beyond(&travel) else { continue };
         let axis = &machine.axes[axis];
-        let [low_mm, high_mm] = axis.travel_mm.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        let problem = Problem::Travel { axis: axis.name.clone(), found_mm, low_mm, high_mm };
+        let problem = beyond(axis, found_mm, axis.travel_mm.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]));
         return Err(PlanningError { source_name: source_name.to_owned(), place: line.into(), problem });
     }
     Ok(())
 }
 
 /// Refuses a point beyond the travel: the programmed end of a probing move, wherever the move ends.
-pub(super) fn check_end(end: Point, machine: &Machine) -> Result<(), Problem> {
-    for (axis, found_mm) in machine.axes.iter().zip(end.map(Length::to_mm)) {
+pub(super) fn check_end<const N: usize>(end: Point, machine: &Machine<N>) -> Result<(), Problem> {
+    for (axis, found_mm) in machine.axes.iter().zip(machine.coordinates(end)) {
         let Some([low_mm, high_mm]) = axis.travel_mm else { continue };
         if found_mm < low_mm || found_mm > high_mm {
-            return Err(Problem::Travel { axis: axis.name.clone(), found_mm, low_mm, high_mm });
+            return Err(beyond(axis, found_mm, [low_mm, high_mm]));
         }
     }
     Ok(())
+}
+
+fn beyond(axis: &AxisSettings, found: f64, [low, high]: [f64; 2]) -> Problem {
+    let unit = axis.letter.map_or("mm", Axis::unit);
+    Problem::Travel { axis: axis.name.clone(), found, low, high, unit }
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ pub fn evaluators(course: &Course, feed_mm_s: f64, tick_s: f64) -> [Evaluator; W
         for (error, walk) in errors.iter_mut().zip(walks) {
             *error = error.max(walked(curve, end, travel_mm, length_mm, walk));
         }
-        let pieces = septics::<f32>(element).unwrap_or_default();
+        let pieces = septics::<f32, _>(element).unwrap_or_default();
         errors[WAYS - 1] =
             pieces.iter().map(|piece| piece.deviation.bound().feed).fold(errors[WAYS - 1], f64::max);
     }

@@ -63,14 +63,7 @@ pub const TABLE_2_S: [f64; 8] = [0.055, 0.11, 0.165, 0.222, 0.279, 0.336, 0.393,
 pub fn arcs() -> Course {
     let arc = |radius_mm: f64, centre_y_mm: f64, outward: Vector, onward: Vector| {
         let at = |direction: Vector| [direction[0] * radius_mm, direction[1] * radius_mm + centre_y_mm, 0.0];
-        let shape = Spiral {
-            outward,
-            onward,
-            normal: [0.0, 0.0, -1.0],
-            radius_mm,
-            radius_per_rad: 0.0,
-            height_per_rad: 0.0,
-        };
+        let shape = Spiral { outward, onward, radius_mm, radius_per_rad: 0.0, across_per_rad: [0.0; 3] };
         Element::Arc { from: at(outward), to: at(onward), shape, sweep_rad: FRAC_PI_2 }
     };
     let (left, up, right) = ([-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]);

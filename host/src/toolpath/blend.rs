@@ -61,7 +61,7 @@ const COMPARED_STEPS: usize = 8;
 const MEASURED_STEPS: usize = 32;
 /// How often the place that is nearest to the corner is corrected.
 const NEARER: usize = 3;
-/// The squares of an arc's radius and height by the angle over that of its radius, below which the angle about
+/// The squares of an arc's radius and of what is across it by the angle over that of its radius, below which the angle about
 /// its axis tells where it is nearest.
 const ROUND: f64 = 1.0e-6;
 /// Distance of a blend from a jump of curvature over the jump and the square of its trim.
@@ -76,9 +76,9 @@ const TOLERANCE_USED: f64 = 0.999;
 
 /// A blend, and the path that it replaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Blend {
+pub struct Blend<const N: usize = 3> {
     /// The blend.
-    pub element: Element,
+    pub element: Element<N>,
     /// Length of path that it replaces on either side of the corner \[mm\].
     pub trim_mm: f64,
     /// A bound on its distance from the path and the path's from it \[mm\].
@@ -87,13 +87,13 @@ pub struct Blend {
     pub feed_mm_s: f64,
 }
 
-impl Blend {
+impl<const N: usize> Blend<N> {
     /// The blend of the corner between `before` and `after`, within `tolerance_mm` and with at most `room_mm`
     /// of either element, that allows the greatest feed under `limits`.
     #[must_use]
     pub fn new(
-        before: &Element,
-        after: &Element,
+        before: &Element<N>,
+        after: &Element<N>,
         tolerance_mm: f64,
         room_mm: f64,
         limits: &Limits<f64>,
@@ -129,7 +129,7 @@ impl Blend {
 
 /// Whether blends are made at the ends of an element.
 #[must_use]
-pub fn has_side(element: &Element) -> bool {
+pub fn has_side<const N: usize>(element: &Element<N>) -> bool {
     matches!(element, Element::Line { .. } | Element::Arc { .. })
 }
 
@@ -150,7 +150,7 @@ pub fn trim_mm(angle_rad: f64, tolerance_mm: f64) -> f64 {
 
 /// The greatest feed at which a curve alone keeps the limits \[mm/s\].
 #[must_use]
-pub fn feed_mm_s(curve: &Polynomial, limits: &Limits<f64>) -> f64 {
+pub fn feed_mm_s<const N: usize>(curve: &Polynomial<N>, limits: &Limits<f64>) -> f64 {
     let bend = curve.bend_of(COMPARED_PARTS);
     let third = bend.third_root_per_mm * bend.third_root_per_mm;
     feed_within(limits, [bend.curvature_per_mm, third, bend.fourth_root_per_mm.powi(3)])
@@ -181,24 +181,24 @@ fn mix(a: [f64; 3], b: [f64; 3], part: f64) -> [f64; 3] {
 }
 
 /// Two elements, seen from the corner between them.
-struct Corner {
-    point: Vector,
-    before: Side,
-    after: Side,
+struct Corner<const N: usize> {
+    point: Vector<N>,
+    before: Side<N>,
+    after: Side<N>,
     angle_rad: f64,
     room_mm: f64,
 }
 
 /// One element of a corner. Lengths along it count from the corner.
-enum Side {
+enum Side<const N: usize> {
     /// Away from the corner, and the tangent of the path.
-    Line { away: Vector, tangent: Vector },
+    Line { away: Vector<N>, tangent: Vector<N> },
     /// The angle at the corner, and how it changes with the length from it.
-    Arc { shape: Spiral, corner_rad: f64, rad_per_mm: f64 },
+    Arc { shape: Spiral<N>, corner_rad: f64, rad_per_mm: f64 },
 }
 
-impl Corner {
-    fn new(before: &Element, after: &Element, room_mm: f64) -> Option<Self> {
+impl<const N: usize> Corner<N> {
+    fn new(before: &Element<N>, after: &Element<N>, room_mm: f64) -> Option<Self> {
         let (before_side, after_side) = (Side::new(before, true)?, Side::new(after, false)?);
         let angle_rad = angle(before_side.at(0.0).1[0], after_side.at(0.0).1[0]);
         if !(angle_rad <= ANGLE_MAX_RAD) {
@@ -209,7 +209,7 @@ impl Corner {
     }
 
     /// The blend over `trim_mm` on either side.
-    fn curve(&self, trim_mm: f64, [a1, a2, a3]: &[f64; 3]) -> (Vector, Polynomial) {
+    fn curve(&self, trim_mm: f64, [a1, a2, a3]: &[f64; 3]) -> (Vector<N>, Polynomial<N>) {
         let speed = 7.0 * a1 * trim_mm;
         let (s2, s3) = (42.0 * (a2 - 2.0 * a1) * trim_mm, 210.0 * (a3 - 3.0 * a2 + 3.0 * a1) * trim_mm);
         let ends = [(&self.before, s2), (&self.after, -s2)].map(|(side, s2)| {
@@ -255,8 +255,8 @@ impl Corner {
         shape: &[f64; 3],
         Guess { mut trim_mm, mut power }: Guess,
         steps: usize,
-    ) -> Option<(Guess, Polynomial, f64)> {
-        let mut best: Option<(Guess, Polynomial, f64)> = None;
+    ) -> Option<(Guess, Polynomial<N>, f64)> {
+        let mut best: Option<(Guess, Polynomial<N>, f64)> = None;
         // The last two tries tell the power.
         let mut last: Option<(f64, f64)> = None;
         for _ in 0..CORRECTIONS_MAX {
@@ -292,7 +292,7 @@ impl Corner {
 
     /// The greatest distance between the blend and what it stands for, measured in so many steps on either
     /// side of its middle.
-    fn distance_mm(&self, start: Vector, curve: &Polynomial, trim_mm: f64, steps: usize) -> f64 {
+    fn distance_mm(&self, start: Vector<N>, curve: &Polynomial<N>, trim_mm: f64, steps: usize) -> f64 {
         let point = |u: f64| add(start, curve.offset(0.0, u));
         if self.is_straight() {
             return norm(point(0.5));
@@ -331,7 +331,7 @@ impl Corner {
 }
 
 /// Where a blend that begins `start` from the corner is nearest to it, or close to that; not near its ends.
-fn nearest_to_corner(start: Vector, curve: &Polynomial) -> f64 {
+fn nearest_to_corner<const N: usize>(start: Vector<N>, curve: &Polynomial<N>) -> f64 {
     let mut u = 0.5_f64;
     for _ in 0..NEARER {
         let [first, second, _] = curve.derivatives(u);
@@ -350,9 +350,9 @@ struct Guess {
     power: f64,
 }
 
-impl Side {
+impl<const N: usize> Side<N> {
     /// The side that `element` is, before or after the corner. None for a polynomial.
-    fn new(element: &Element, is_before: bool) -> Option<Self> {
+    fn new(element: &Element<N>, is_before: bool) -> Option<Self> {
         match element {
             Element::Line { from, to } => {
                 let [end, _] = element.ends();
@@ -377,9 +377,9 @@ impl Side {
     }
 
     /// The point `trim_mm` from the corner, relative to it, and the path's derivatives by arc length there.
-    fn at(&self, trim_mm: f64) -> (Vector, [Vector; 3]) {
+    fn at(&self, trim_mm: f64) -> (Vector<N>, [Vector<N>; 3]) {
         match self {
-            Self::Line { away, tangent } => (scale(*away, trim_mm), [*tangent, [0.0; 3], [0.0; 3]]),
+            Self::Line { away, tangent } => (scale(*away, trim_mm), [*tangent, [0.0; N], [0.0; N]]),
             Self::Arc { shape, corner_rad, rad_per_mm } => {
                 let angle = corner_rad + rad_per_mm * trim_mm;
                 (shape.offset(*corner_rad, angle), by_arc_length(shape.derivatives(angle)))
@@ -388,7 +388,7 @@ impl Side {
     }
 
     /// Its first `trim_mm`, to measure distances from.
-    fn near(&self, trim_mm: f64) -> Near {
+    fn near(&self, trim_mm: f64) -> Near<N> {
         match self {
             Self::Line { away, .. } => Near::Line { away: *away, trim_mm },
             Self::Arc { shape, corner_rad, rad_per_mm } => {
@@ -399,13 +399,13 @@ impl Side {
 }
 
 /// A side up to its trim, relative to the corner.
-enum Near {
-    Line { away: Vector, trim_mm: f64 },
-    Arc(NearArc),
+enum Near<const N: usize> {
+    Line { away: Vector<N>, trim_mm: f64 },
+    Arc(NearArc<N>),
 }
 
-impl Near {
-    fn distance_mm(&self, point: Vector) -> f64 {
+impl<const N: usize> Near<N> {
+    fn distance_mm(&self, point: Vector<N>) -> f64 {
         match self {
             Self::Line { away, trim_mm } => {
                 let foot = dot(point, *away).clamp(0.0, *trim_mm);
@@ -417,25 +417,25 @@ impl Near {
 }
 
 /// Part of an arc, its angle counted from the corner.
-struct NearArc {
-    shape: Spiral,
+struct NearArc<const N: usize> {
+    shape: Spiral<N>,
     /// The angle at its end, and its sine and cosine.
     end_rad: f64,
     end_sine: f64,
     end_cosine: f64,
     /// Its other end, relative to the corner.
-    end: Vector,
-    /// Whether radius and height hardly change.
+    end: Vector<N>,
+    /// Whether radius and what is across hardly change.
     is_round: bool,
 }
 
-impl NearArc {
+impl<const N: usize> NearArc<N> {
     /// The part that runs through `swept_rad` from `corner_rad`, either way; less than half a turn.
-    fn new(shape: &Spiral, corner_rad: f64, swept_rad: f64) -> Self {
+    fn new(shape: &Spiral<N>, corner_rad: f64, swept_rad: f64) -> Self {
         let shape = shape.rotated(corner_rad);
         let (end_sine, end_cosine) = libm::sincos(swept_rad);
-        let Spiral { radius_mm, radius_per_rad, height_per_rad, .. } = shape;
-        let square = radius_per_rad * radius_per_rad + height_per_rad * height_per_rad;
+        let Spiral { radius_mm, radius_per_rad, across_per_rad, .. } = shape;
+        let square = radius_per_rad * radius_per_rad + dot(across_per_rad, across_per_rad);
         Self {
             end_rad: swept_rad,
             end_sine,
@@ -447,10 +447,12 @@ impl NearArc {
     }
 
     /// How far `point`, relative to the corner, is from it; never less than that, and hardly more.
-    fn distance_mm(&self, point: Vector) -> f64 {
-        let Spiral { outward, onward, normal, radius_mm, radius_per_rad, height_per_rad } = self.shape;
-        // In the arc's own axes, from its centre.
-        let (x, y, z) = (radius_mm + dot(point, outward), dot(point, onward), dot(point, normal));
+    fn distance_mm(&self, point: Vector<N>) -> f64 {
+        let Spiral { outward, onward, radius_mm, radius_per_rad, across_per_rad } = self.shape;
+        // In the arc's own axes, from its centre, and what is across them.
+        let (out, y) = (dot(point, outward), dot(point, onward));
+        let (x, beside) = (radius_mm + out, subtract(point, add(scale(outward, out), scale(onward, y))));
+        let beside_mm = |angle: f64| norm(subtract(beside, scale(across_per_rad, angle)));
         let out_mm = (x * x + y * y).sqrt();
         if self.is_round {
             // The point of the arc at the same angle; no angle is needed where it is within the part.
@@ -458,11 +460,11 @@ impl NearArc {
             let is_within =
                 if self.end_rad >= 0.0 { y >= 0.0 && past_end <= 0.0 } else { y <= 0.0 && past_end >= 0.0 };
             if is_within && x > -out_mm {
-                if radius_per_rad == 0.0 && height_per_rad == 0.0 {
-                    return length(out_mm - radius_mm, z);
+                if radius_per_rad == 0.0 && across_per_rad == [0.0; N] {
+                    return length(out_mm - radius_mm, norm(beside));
                 }
                 let angle = libm::atan2(y, x);
-                return length(out_mm - (radius_mm + radius_per_rad * angle), z - height_per_rad * angle);
+                return length(out_mm - (radius_mm + radius_per_rad * angle), beside_mm(angle));
             }
             return norm(point).min(norm(subtract(point, self.end)));
         }
@@ -476,15 +478,16 @@ impl NearArc {
             let (sine, cosine) = libm::sincos(ahead);
             let along = out_mm * sine * radius
                 + (out_mm * cosine - radius) * radius_per_rad
-                + (z - height_per_rad * angle) * height_per_rad;
-            let square = radius * radius + radius_per_rad * radius_per_rad + height_per_rad * height_per_rad;
+                + dot(subtract(beside, scale(across_per_rad, angle)), across_per_rad);
+            let square =
+                radius * radius + radius_per_rad * radius_per_rad + dot(across_per_rad, across_per_rad);
             angle = (angle + along / square).clamp(least, most);
         }
         let radius = radius_mm + radius_per_rad * angle;
         let half = libm::sin(0.5 * (at_point - angle));
         // The chord between both in the plane, without cancellation.
         let flat = ((out_mm - radius) * (out_mm - radius) + 4.0 * out_mm * radius * half * half).sqrt();
-        length(flat, z - height_per_rad * angle)
+        length(flat, beside_mm(angle))
     }
 }
 
@@ -511,10 +514,9 @@ mod tests {
         let shape = Spiral {
             outward: [0.0, -1.0, 0.0],
             onward: [1.0, 0.0, 0.0],
-            normal: [0.0, 0.0, 1.0],
             radius_mm: 5.0,
             radius_per_rad: 0.0,
-            height_per_rad: 0.0,
+            across_per_rad: [0.0; 3],
         };
         let sweep_rad = core::f64::consts::FRAC_PI_2;
         let line = Element::Line { from: [-10.0, 0.0, 0.0], to: [0.0; 3] };
@@ -592,8 +594,8 @@ mod tests {
     fn the_distance_from_an_arc_is_that_of_its_nearest_point() {
         let [_, arc] = line_and_arc();
         let Element::Arc { shape, .. } = arc else { panic!("an arc") };
-        let round = Spiral { radius_per_rad: 1e-3, height_per_rad: -3e-3, ..shape };
-        let steep = Spiral { radius_per_rad: 0.3, height_per_rad: -2.0, ..shape };
+        let round = Spiral { radius_per_rad: 1e-3, across_per_rad: [0.0, 0.0, -3e-3], ..shape };
+        let steep = Spiral { radius_per_rad: 0.3, across_per_rad: [0.0, 0.0, -2.0], ..shape };
         for (shape, off_mm) in [(shape, 3.0), (round, 3.0), (steep, 0.1)] {
             for angles in [[0.0, 0.6], [0.6, 0.0], [1.1, 0.4]] {
                 let near = NearArc::new(&shape, angles[0], angles[1] - angles[0]);

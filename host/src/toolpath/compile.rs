@@ -29,14 +29,11 @@ pub enum CompileError {
         length_mm: f64,
     },
     /// The element leaves the space that the kernel has positions for.
-    #[error(
-        "a path through {} = {mm} mm, expected coordinates within ±{} mm",
-        ["X", "Y", "Z"][*axis], Position::LIMIT_MM
-    )]
+    #[error("a path through {mm} of axis {axis}, expected coordinates within ±{}", Position::LIMIT_MM)]
     Coordinate {
-        /// The axis, from 0.
+        /// The axis, by its place from 0.
         axis: usize,
-        /// The coordinate \[mm\].
+        /// The coordinate \[mm, ° of a rotary axis\].
         mm: f64,
     },
     /// The stretch it ends is longer than path positions reach.
@@ -76,8 +73,8 @@ pub fn on_path(mm: f64) -> Result<Position, CompileError> {
 ///
 /// # Errors
 /// A coordinate lies too far out.
-pub fn exact(point: Vector) -> Result<[Position; 3], CompileError> {
-    let mut exact = [Position::ZERO; 3];
+pub fn exact<const N: usize>(point: Vector<N>) -> Result<[Position; N], CompileError> {
+    let mut exact = [Position::ZERO; N];
     for (axis, (exact, mm)) in exact.iter_mut().zip(point).enumerate() {
         *exact = Position::from_mm(mm).ok_or(CompileError::Coordinate { axis, mm })?;
     }
@@ -86,11 +83,11 @@ pub fn exact(point: Vector) -> Result<[Position; 3], CompileError> {
 
 /// A piece of path with its length.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
+pub struct Placed<const N: usize = 3> {
     /// The piece's length.
     pub length: Position,
     /// The piece.
-    pub item: Item<3>,
+    pub item: Item<N>,
 }
 
 /// Longest piece that the number type `R` is sure to take \[mm\].
@@ -103,7 +100,7 @@ fn longest_mm<R: Real>() -> f64 {
 ///
 /// # Errors
 /// The element is not smooth.
-pub fn septics<R: Real>(element: &Element) -> Result<Vec<Septic>, FitError> {
+pub fn septics<R: Real, const N: usize>(element: &Element<N>) -> Result<Vec<Septic<N>>, FitError> {
     element.septics(longest_mm::<R>())
 }
 
@@ -113,11 +110,11 @@ pub fn septics<R: Real>(element: &Element) -> Result<Vec<Septic>, FitError> {
 /// # Errors
 /// The element is too short, too far out, ends too far along the stretch, is not smooth, or makes a piece
 /// that the kernel refuses.
-pub fn compile<R: Real>(
-    element: &Element,
+pub fn compile<R: Real, const N: usize>(
+    element: &Element<N>,
     line: u32,
     start_mm: f64,
-    pieces: &mut Vec<Placed>,
+    pieces: &mut Vec<Placed<N>>,
 ) -> Result<f64, CompileError> {
     let length_mm = element.length_mm();
     let end_mm = start_mm + length_mm;
@@ -139,12 +136,12 @@ pub fn compile<R: Real>(
             let part_end_mm = if part + 1 == parts { end_mm } else { start_mm + length_mm * b };
             let length = length_to(part_end_mm, length_mm / parts as f64)?;
             // What the number type cannot hold is refused here.
-            Piece::<R, 3>::line(line, start, direction, length)?;
+            Piece::<R, N>::line(line, start, direction, length)?;
             pieces.push(Placed { length, item: Item::Line { line, start, direction, length } });
         }
         return Ok(end_mm);
     }
-    let septics = septics::<R>(element)?;
+    let septics = septics::<R, N>(element)?;
     let mut gone_mm = 0.0;
     for (index, septic) in septics.iter().enumerate() {
         let start = exact(add(from, septic.start))?;
@@ -152,7 +149,7 @@ pub fn compile<R: Real>(
         let part_end_mm = if index + 1 == septics.len() { end_mm } else { start_mm + gone_mm };
         let length = length_to(part_end_mm, septic.length_mm)?;
         let coefficients = septic.coefficients.map(|axis| axis.map(|mm| mm / septic.length_mm));
-        Piece::<R, 3>::septic(line, start, coefficients, length)?;
+        Piece::<R, N>::septic(line, start, coefficients, length)?;
         pieces.push(Placed { length, item: Item::Septic { line, start, coefficients, length } });
     }
     Ok(end_mm)

@@ -3,12 +3,12 @@
 use super::{Vector, add, dot, norm, scale, subtract};
 
 /// A smooth curve with a parameter.
-pub trait Curve {
+pub trait Curve<const N: usize = 3> {
     /// The point at `u` minus the point at `origin` \[mm\], without the cancellation of computing both.
-    fn offset(&self, origin: f64, u: f64) -> Vector;
+    fn offset(&self, origin: f64, u: f64) -> Vector<N>;
 
     /// First to third derivative by the parameter at `u`.
-    fn derivatives(&self, u: f64) -> [Vector; 3];
+    fn derivatives(&self, u: f64) -> [Vector<N>; 3];
 
     /// |r'| at `u`.
     fn speed(&self, u: f64) -> f64 {
@@ -40,8 +40,8 @@ pub(super) fn gauss_4(a: f64, b: f64, function: impl Fn(f64) -> f64) -> f64 {
 
 /// The integral of |r'| from `a` to `b` \[mm\], halved until both halves say what the whole, `whole_mm`, says, or so
 /// many times. `agree` takes both halves together and the whole.
-pub(super) fn refined_length(
-    curve: &impl Curve,
+pub(super) fn refined_length<const N: usize>(
+    curve: &impl Curve<N>,
     [a, b]: [f64; 2],
     whole_mm: f64,
     halvings: u32,
@@ -62,7 +62,7 @@ pub(super) fn refined_length(
 ///
 /// With σ = |r'|: t = r'/σ, κn = (r'' − t·(t·r''))/σ², and the third from the derivative of that.
 #[must_use]
-pub fn by_arc_length([d1, d2, d3]: [Vector; 3]) -> [Vector; 3] {
+pub fn by_arc_length<const N: usize>([d1, d2, d3]: [Vector<N>; 3]) -> [Vector<N>; 3] {
     let speed = norm(d1);
     let tangent = scale(d1, 1.0 / speed);
     // s' = σ, s'' = t·r'', s''' = t·r''' + |r''⊥|²/σ
@@ -83,7 +83,7 @@ pub fn by_arc_length([d1, d2, d3]: [Vector; 3]) -> [Vector; 3] {
 /// With σ, s2, s3, s4 the derivatives of the arc length: r4 = x4·σ⁴ + 6x3·σ²·s2 + x2·(4σ·s3 + 3s2²) + t·s4,
 /// and t·x4 = −3x2·x3 because |t| = 1.
 #[must_use]
-pub fn four_by_arc_length([d1, d2, d3, d4]: [Vector; 4]) -> [Vector; 4] {
+pub fn four_by_arc_length<const N: usize>([d1, d2, d3, d4]: [Vector<N>; 4]) -> [Vector<N>; 4] {
     let speed = norm(d1);
     let [tangent, second, third] = by_arc_length([d1, d2, d3]);
     let square = speed * speed;
@@ -116,32 +116,28 @@ const GAUSS_16: [(f64, f64); 8] = [
     (0.989_400_934_991_649_9, 0.027_152_459_411_754_095),
 ];
 
-/// An arc, helix or spiral: the angle is the parameter, radius and height go linearly with it.
+/// An arc, helix or spiral: the angle is the parameter; radius, height and all axes besides go linearly with it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spiral {
+pub struct Spiral<const N: usize = 3> {
     /// Unit vector from the centre to the start, in the plane.
-    pub outward: Vector,
+    pub outward: Vector<N>,
     /// Unit vector a quarter turn on, in the direction of travel.
-    pub onward: Vector,
-    /// Unit normal of the plane.
-    pub normal: Vector,
+    pub onward: Vector<N>,
     /// Radius at the start \[mm\], > 0.
     pub radius_mm: f64,
     /// Change of the radius \[mm/rad\].
     pub radius_per_rad: f64,
-    /// Change of the height along the normal \[mm/rad\].
-    pub height_per_rad: f64,
+    /// Change of what is across the plane \[mm/rad\]: of the height along its normal, and of the axes besides; at right
+    /// angles to the plane.
+    pub across_per_rad: Vector<N>,
 }
 
-impl Spiral {
+impl<const N: usize> Spiral<N> {
     /// Greatest |component| of a unit vector in the plane on each axis; exactly 0 or 1 where it is so but for
     /// rounding.
     #[must_use]
-    pub fn in_plane(&self) -> Vector {
-        core::array::from_fn(|axis| {
-            let part = libm::hypot(self.outward[axis], self.onward[axis]);
-            if (part - part.round()).abs() < 1e-9 { part.round() } else { part }
-        })
+    pub fn in_plane(&self) -> Vector<N> {
+        in_plane(&self.outward, &self.onward)
     }
 
     /// The same spiral, its angle counted from `angle` on.
@@ -153,7 +149,7 @@ impl Spiral {
     }
 
     /// Direction from the centre at `angle`, and a quarter turn on.
-    fn frame(&self, angle: f64) -> (Vector, Vector) {
+    fn frame(&self, angle: f64) -> (Vector<N>, Vector<N>) {
         let (sine, cosine) = libm::sincos(angle);
         (
             add(scale(self.outward, cosine), scale(self.onward, sine)),
@@ -162,8 +158,17 @@ impl Spiral {
     }
 }
 
-impl Curve for Spiral {
-    fn offset(&self, origin: f64, angle: f64) -> Vector {
+/// Greatest |component| of a unit vector in the plane of two at right angles; exactly 0 or 1 where it is so but for
+/// rounding.
+pub(super) fn in_plane<const N: usize>(outward: &Vector<N>, onward: &Vector<N>) -> Vector<N> {
+    core::array::from_fn(|axis| {
+        let part = libm::hypot(outward[axis], onward[axis]);
+        if (part - part.round()).abs() < 1e-9 { part.round() } else { part }
+    })
+}
+
+impl<const N: usize> Curve<N> for Spiral<N> {
+    fn offset(&self, origin: f64, angle: f64) -> Vector<N> {
         let swept = angle - origin;
         let (outward, onward) = self.frame(origin);
         let (here, _) = self.frame(angle);
@@ -173,14 +178,14 @@ impl Curve for Spiral {
         let round =
             add(scale(onward, radius * libm::sin(swept)), scale(outward, -2.0 * radius * half * half));
         let grown = scale(here, self.radius_per_rad * swept);
-        add(add(round, grown), scale(self.normal, self.height_per_rad * swept))
+        add(add(round, grown), scale(self.across_per_rad, swept))
     }
 
-    fn derivatives(&self, angle: f64) -> [Vector; 3] {
+    fn derivatives(&self, angle: f64) -> [Vector<N>; 3] {
         let (outward, onward) = self.frame(angle);
         let (radius, rate) = (self.radius_mm + self.radius_per_rad * angle, self.radius_per_rad);
         [
-            add(add(scale(onward, radius), scale(outward, rate)), scale(self.normal, self.height_per_rad)),
+            add(add(scale(onward, radius), scale(outward, rate)), self.across_per_rad),
             subtract(scale(onward, 2.0 * rate), scale(outward, radius)),
             subtract(scale(onward, -radius), scale(outward, 3.0 * rate)),
         ]
@@ -195,10 +200,9 @@ mod tests {
         Spiral {
             outward: [0.6, 0.8, 0.0],
             onward: [-0.8, 0.6, 0.0],
-            normal: [0.0, 0.0, 1.0],
             radius_mm: 7.0,
             radius_per_rad: 0.3,
-            height_per_rad: -1.1,
+            across_per_rad: [0.0, 0.0, -1.1],
         }
     }
 
@@ -246,7 +250,7 @@ mod tests {
 
     #[test]
     fn a_circles_length_is_exact() {
-        let circle = Spiral { radius_per_rad: 0.0, height_per_rad: 0.0, ..spiral() };
+        let circle = Spiral { radius_per_rad: 0.0, across_per_rad: [0.0; 3], ..spiral() };
         let quarter = circle.length(0.2, 0.2 + core::f64::consts::FRAC_PI_4);
         assert!((quarter - 7.0 * core::f64::consts::FRAC_PI_4).abs() < 1e-14);
     }

@@ -2,7 +2,8 @@
 //!
 //! Consumes moves that follow each other without a stop; produces them with one curve, span by span, in place
 //! of every run of lines and arcs that have no room for the blends at their ends. A curve begins and ends on
-//! a long move, of which it takes a part, or where there is none.
+//! a long move, of which it takes a part, or where there is none. Each span keeps the feeds of all moves that it stands
+//! for, whichever axes these count.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -13,7 +14,8 @@ use super::blend::{ANGLE_MAX_RAD, trim_mm, trim_of_jump_mm};
 use super::element::Element;
 use super::fairing::{Part, Span, fair};
 use super::smooth::{Move, TAKEN_MAX, TANGENT_ROUNDING_RAD, is_smooth};
-use super::{Greatest, angle, norm, subtract};
+use super::{Feeds, Greatest, SpeedRatios, angle, norm, subtract};
+use crate::gcode::Axis;
 
 /// How often a long move has room for what the blends at its ends want.
 const LONG: f64 = 2.0;
@@ -21,17 +23,18 @@ const LONG: f64 = 2.0;
 const MARGIN: f64 = 4.0;
 
 /// Moves with curves in place of what is dense.
-#[derive(Default)]
-pub(super) struct Faired {
-    pub(super) moves: Vec<Move>,
+pub(super) struct Faired<const N: usize> {
+    pub(super) moves: Vec<Move<N>>,
     /// How far each is from those that it stands for \[mm\].
     pub(super) distances_mm: Vec<f64>,
     /// How each bends at its tightest, of the spans of curves.
-    pub(super) greatest: Vec<Option<Greatest>>,
+    pub(super) greatest: Vec<Option<Greatest<N>>>,
 }
 
-impl Faired {
-    fn push(&mut self, step: Move, element: Element, distance_mm: f64, greatest: Option<Greatest>) {
+impl<const N: usize> Faired<N> {
+    const NOTHING: Self = Self { moves: Vec::new(), distances_mm: Vec::new(), greatest: Vec::new() };
+
+    fn push(&mut self, step: Move<N>, element: Element<N>, distance_mm: f64, greatest: Option<Greatest<N>>) {
         self.moves.push(Move { element, ..step });
         self.distances_mm.push(distance_mm);
         self.greatest.push(greatest);
@@ -39,26 +42,33 @@ impl Faired {
 }
 
 /// Curves that were made, by the first and the last of the moves that they stand for, with what is left of both.
-type Known = HashMap<(usize, usize), ([Part; 2], Option<Rc<[Span]>>)>;
+type Known<const N: usize> = HashMap<(usize, usize), ([Part<N>; 2], Option<Rc<[Span<N>]>>)>;
 
 /// The moves with curves in place of what is dense: once for each angle above which a corner stays one, if it
 /// makes a difference; nothing if nothing is dense. See [`Run::faired`](super::smooth::Run::faired).
-pub(super) fn faired(
-    moves: &[Move],
+pub(super) fn faired<const N: usize>(
+    moves: &[Move<N>],
     corners_rad: &[f64],
     limits: &Limits<f64>,
     feed_mm_s: f64,
-) -> Vec<Faired> {
-    let mut runs: Vec<Moves> = corners_rad.iter().map(|&corner_rad| Moves::new(moves, corner_rad)).collect();
+    axes: &[Option<Axis>; N],
+) -> Vec<Faired<N>> {
+    let mut runs: Vec<Moves<N>> =
+        corners_rad.iter().map(|&corner_rad| Moves::new(moves, corner_rad, axes)).collect();
     runs.dedup_by(|run, before| run.wanted_mm == before.wanted_mm);
     // Solving is slow: what the runs have in common is solved once.
     let mut known = Known::new();
     runs.iter().filter_map(|run| with_curves(run, limits, feed_mm_s, &mut known)).collect()
 }
 
-fn with_curves(run: &Moves, limits: &Limits<f64>, feed_mm_s: f64, known: &mut Known) -> Option<Faired> {
+fn with_curves<const N: usize>(
+    run: &Moves<N>,
+    limits: &Limits<f64>,
+    feed_mm_s: f64,
+    known: &mut Known<N>,
+) -> Option<Faired<N>> {
     let moves = run.moves;
-    let mut made = Faired::default();
+    let mut made = Faired::NOTHING;
     let (mut first, mut is_faired) = (0, false);
     // What the curve before has left of the first move.
     let mut rest = moves.first()?.element;
@@ -93,9 +103,9 @@ fn with_curves(run: &Moves, limits: &Limits<f64>, feed_mm_s: f64, known: &mut Kn
         }
         for span in spans.iter() {
             let stands_for = &moves[first + span.parts.0..=first + span.parts.1];
-            let feed_mm_s = stands_for.iter().map(|step| step.feed_mm_s).fold(f64::INFINITY, f64::min);
+            let feeds = stands_for.iter().map(|step| step.feeds).fold(Feeds::RAPID, Feeds::least);
             let tolerance_mm = stands_for.iter().map(tolerance_mm).fold(f64::INFINITY, f64::min);
-            let step = Move { feed_mm_s, tolerance_mm, merging_mm: None, ..stands_for[0] };
+            let step = Move { feeds, tolerance_mm, merging_mm: None, ..stands_for[0] };
             made.push(step, span.element, span.distance_mm, Some(span.greatest));
         }
         (first, rest) = match (cut.behind, moves.get(last + 1)) {
@@ -107,18 +117,19 @@ fn with_curves(run: &Moves, limits: &Limits<f64>, feed_mm_s: f64, known: &mut Kn
 }
 
 /// Moves with what the blends between them want.
-struct Moves<'a> {
-    moves: &'a [Move],
+struct Moves<'a, const N: usize> {
+    moves: &'a [Move<N>],
+    axes: &'a [Option<Axis>; N],
     lengths_mm: Vec<f64>,
     /// What the blend of each junction wants of either move \[mm\]; nothing where no curve goes through.
     wanted_mm: Vec<Option<f64>>,
 }
 
-impl<'a> Moves<'a> {
-    fn new(moves: &'a [Move], corner_rad: f64) -> Self {
+impl<'a, const N: usize> Moves<'a, N> {
+    fn new(moves: &'a [Move<N>], corner_rad: f64, axes: &'a [Option<Axis>; N]) -> Self {
         let lengths_mm = moves.iter().map(|step| step.element.length_mm()).collect();
         let wanted_mm = moves.windows(2).map(|pair| wanted_mm(&pair[0], &pair[1], corner_rad)).collect();
-        Self { moves, lengths_mm, wanted_mm }
+        Self { moves, axes, lengths_mm, wanted_mm }
     }
 
     /// The most that the blends at a move's ends want \[mm\].
@@ -153,7 +164,7 @@ impl<'a> Moves<'a> {
     }
 
     /// Cuts a run, of whose first move `rest` is left, out of its long ends.
-    fn cut(&self, first: usize, rest: Element, last: usize, feed_mm_s: f64) -> Cut {
+    fn cut(&self, first: usize, rest: Element<N>, last: usize, feed_mm_s: f64) -> Cut<N> {
         let (mut start, mut end) = (rest, self.moves[last].element);
         let (mut before, mut behind) = (None, None);
         if self.is_long(first) {
@@ -164,12 +175,12 @@ impl<'a> Moves<'a> {
             let [taken, left] = end.split(self.share(self.lengths_mm[last], last - 1, last - 1));
             (end, behind) = (taken, Some(left));
         }
-        let mut parts: Vec<Part> = self.moves[first..=last]
+        let mut parts: Vec<Part<N>> = self.moves[first..=last]
             .iter()
             .map(|step| Part {
                 element: step.element,
                 tolerance_mm: tolerance_mm(step),
-                feed_mm_s: step.feed_mm_s.min(feed_mm_s),
+                feed_mm_s: step.feeds.along(&SpeedRatios::of(&step.element, self.axes)).min(feed_mm_s),
             })
             .collect();
         parts[0].element = start;
@@ -179,15 +190,15 @@ impl<'a> Moves<'a> {
 }
 
 /// A run with what is left of its long ends before and behind.
-struct Cut {
-    before: Option<Element>,
-    parts: Vec<Part>,
-    behind: Option<Element>,
+struct Cut<const N: usize> {
+    before: Option<Element<N>>,
+    parts: Vec<Part<N>>,
+    behind: Option<Element<N>>,
 }
 
 /// What a blend between two moves wants of either \[mm\]; nothing where there is to be none.
-fn wanted_mm(before: &Move, after: &Move, corner_rad: f64) -> Option<f64> {
-    let is_bent = |step: &Move| matches!(step.element, Element::Line { .. } | Element::Arc { .. });
+fn wanted_mm<const N: usize>(before: &Move<N>, after: &Move<N>, corner_rad: f64) -> Option<f64> {
+    let is_bent = |step: &Move<N>| matches!(step.element, Element::Line { .. } | Element::Arc { .. });
     let tolerance_mm = tolerance_mm(before).min(tolerance_mm(after));
     if !(is_bent(before) && is_bent(after) && tolerance_mm > 0.0) {
         return None;
@@ -207,7 +218,7 @@ fn wanted_mm(before: &Move, after: &Move, corner_rad: f64) -> Option<f64> {
 }
 
 /// How far a curve may be from a move \[mm\]: merging is for lines.
-fn tolerance_mm(step: &Move) -> f64 {
+fn tolerance_mm<const N: usize>(step: &Move<N>) -> f64 {
     match step.element {
         Element::Line { .. } if step.tolerance_mm > 0.0 => step.tolerance_mm + step.merging_mm.unwrap_or(0.0),
         _ => step.tolerance_mm,

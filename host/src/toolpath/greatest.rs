@@ -16,20 +16,20 @@ const PIECE_PARTS: usize = 16;
 
 /// The greatest derivatives by arc length, each where it is greatest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Greatest {
+pub struct Greatest<const N: usize = 3> {
     /// The greatest κ, |r'''| and |r''''|.
     pub bend: Bend<f64>,
     /// |component| of the tangent on each axis, at most 1.
-    pub tangent: Vector,
+    pub tangent: Vector<N>,
     /// Whether the axis takes part in the bend.
-    pub curved: [bool; 3],
+    pub curved: [bool; N],
 }
 
-impl Greatest {
+impl<const N: usize> Greatest<N> {
     /// The greatest derivatives of a curve with these figures that is driven as `pieces`. Their tangents are
     /// unit vectors to a millionth.
     #[must_use]
-    pub fn driven_as(self, pieces: &[Septic]) -> Self {
+    pub fn driven_as(self, pieces: &[Septic<N>]) -> Self {
         let mut norms = [0.0_f64; 3];
         for piece in pieces {
             for (greatest, of_piece) in norms.iter_mut().zip(of_piece(piece)) {
@@ -52,7 +52,7 @@ fn greater(a: f64, b: f64) -> f64 {
 }
 
 /// |r''|, |r'''| and |r''''| of a piece, each where it is greatest.
-fn of_piece(piece: &Septic) -> [f64; 3] {
+fn of_piece<const N: usize>(piece: &Septic<N>) -> [f64; 3] {
     let mut peaks = [Peak::default(); 3];
     for part in 0..=PIECE_PARTS {
         let derivatives = piece.second_to_fourth(part as f64 / PIECE_PARTS as f64);

@@ -16,9 +16,9 @@
 
 use motion_kernel::plan::Bend;
 
-use super::curve::Curve;
+use super::curve::{Curve, in_plane};
 use super::greatest::Greatest;
-use super::{Vector, add, cross, dot, norm, scale, subtract};
+use super::{Vector, add, dot, norm, scale, subtract};
 
 /// The least angle that an involute may reach \[rad\]: a radius of curvature of a thousandth of its base
 /// circle's.
@@ -59,28 +59,32 @@ pub enum InvoluteError {
 
 /// A part of an involute. Its parameter is the angle run through, from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Involute {
+pub struct Involute<const N: usize = 3> {
     /// e₁: unit vector from the centre to where the involute leaves its base circle.
-    outward: Vector,
+    outward: Vector<N>,
     /// e₂: unit vector a quarter turn on, in the direction of unwinding.
-    onward: Vector,
+    onward: Vector<N>,
     base_mm: f64,
     /// Angles of unwinding at the start and at the end \[rad\]; from the greater to the smaller one it winds
     /// up.
     angles_rad: (f64, f64),
 }
 
-impl Involute {
+impl<const N: usize> Involute<N> {
     /// The part between two angles of unwinding, φ, in the order in which they are run through.
     ///
     /// # Errors
     /// The radius is not positive, the frame is none, or an angle is out of range.
-    pub fn new(frame: (Vector, Vector), base_mm: f64, angles_rad: (f64, f64)) -> Result<Self, InvoluteError> {
+    pub fn new(
+        frame: (Vector<N>, Vector<N>),
+        base_mm: f64,
+        angles_rad: (f64, f64),
+    ) -> Result<Self, InvoluteError> {
         let (outward, onward) = frame;
         if !(base_mm > 0.0 && base_mm.is_finite()) {
             return Err(InvoluteError::Base { mm: base_mm });
         }
-        let is_unit = |vector: Vector| (norm(vector) - 1.0).abs() <= FRAME_TOLERANCE;
+        let is_unit = |vector: Vector<N>| (norm(vector) - 1.0).abs() <= FRAME_TOLERANCE;
         if !(is_unit(outward) && is_unit(onward) && dot(outward, onward).abs() <= FRAME_TOLERANCE) {
             return Err(InvoluteError::Frame);
         }
@@ -114,7 +118,7 @@ impl Involute {
 
     /// Where it starts, from the base circle's centre \[mm\].
     #[must_use]
-    pub fn start_mm(&self) -> Vector {
+    pub fn start_mm(&self) -> Vector<N> {
         let (tangent, normal) = self.frame(self.angles_rad.0);
         scale(subtract(tangent, scale(normal, self.angles_rad.0)), self.base_mm)
     }
@@ -122,7 +126,7 @@ impl Involute {
     /// How it bends at its tightest, which is its smallest angle: |r'''| = κ²·√(1 + φ⁻²) and
     /// |r''''| = κ³·√(1 + 3φ⁻² + 9φ⁻⁴), of which each falls as φ grows; and which axes take part.
     #[must_use]
-    pub fn greatest(&self) -> Greatest {
+    pub fn greatest(&self) -> Greatest<N> {
         let angle = self.angles_rad.0.min(self.angles_rad.1);
         let curvature = 1.0 / (self.base_mm * angle);
         let steep = 1.0 / (angle * angle);
@@ -132,9 +136,19 @@ impl Involute {
             fourth_root_per_mm: curvature * libm::cbrt((1.0 + 3.0 * steep + 9.0 * steep * steep).sqrt()),
         };
         // Of all directions in the plane: conservative where it turns through a part of them only.
-        let normal = cross(self.outward, self.onward);
-        let tangent = normal.map(|component| (1.0 - component * component).max(0.0).sqrt());
+        let tangent = self.in_plane();
         Greatest { bend, tangent, curved: tangent.map(|component| component > 0.0) }
+    }
+
+    /// The same in a space where its frame is that of `map`, which keeps lengths and angles.
+    pub(super) fn mapped<const M: usize>(&self, map: impl Fn(Vector<N>) -> Vector<M>) -> Involute<M> {
+        let Self { outward, onward, base_mm, angles_rad } = *self;
+        Involute { outward: map(outward), onward: map(onward), base_mm, angles_rad }
+    }
+
+    /// Greatest |component| of a unit vector in its plane on each axis.
+    pub(super) fn in_plane(&self) -> Vector<N> {
+        in_plane(&self.outward, &self.onward)
     }
 
     /// +1 as it unwinds, −1 as it winds up.
@@ -148,7 +162,7 @@ impl Involute {
     }
 
     /// T and N.
-    fn frame(&self, angle: f64) -> (Vector, Vector) {
+    fn frame(&self, angle: f64) -> (Vector<N>, Vector<N>) {
         let (sine, cosine) = libm::sincos(angle);
         (
             add(scale(self.outward, cosine), scale(self.onward, sine)),
@@ -157,8 +171,8 @@ impl Involute {
     }
 }
 
-impl Curve for Involute {
-    fn offset(&self, origin: f64, u: f64) -> Vector {
+impl<const N: usize> Curve<N> for Involute<N> {
+    fn offset(&self, origin: f64, u: f64) -> Vector<N> {
         let (start, end) = (self.angle(origin), self.angle(u));
         let (tangent, normal) = self.frame(start);
         // φ − φ₀ from the parameters, whose difference is exact; T − T₀ and N − N₀ without cancellation.
@@ -170,7 +184,7 @@ impl Curve for Involute {
         scale(add(scale(tangent, along), scale(normal, across)), self.base_mm)
     }
 
-    fn derivatives(&self, u: f64) -> [Vector; 3] {
+    fn derivatives(&self, u: f64) -> [Vector<N>; 3] {
         let (angle, sense) = (self.angle(u), self.sense());
         let (tangent, normal) = self.frame(angle);
         [

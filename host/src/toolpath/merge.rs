@@ -9,9 +9,12 @@
 //! together, by their projection on the line or by the angle about the arc's centre, which have to grow along
 //! the run. So every point of either has a partner on the other, and the greatest distance between partners
 //! bounds both.
+//!
+//! **Arcs** are looked for in space only: where more than three coordinates move, lines alone stand for the run.
 
 use super::curve::Spiral;
 use super::element::Element;
+use super::subspace::Subspace;
 use super::{Vector, add, cross, dot, norm, scale, subtract};
 
 /// The widest arc that stands for a run \[rad\]: three quarters of a turn, so that its ends stay apart.
@@ -23,18 +26,18 @@ const RADIUS_RATIO_MAX: f64 = 1.0e5;
 
 /// A line or arc for the segments from one point of a run to a later one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Merged {
+pub struct Merged<const N: usize = 3> {
     /// Index of the segment it begins with.
     pub first: usize,
     /// The line or arc.
-    pub element: Element,
+    pub element: Element<N>,
     /// A bound on the distance between it and the segments \[mm\]; 0 for a segment that stays.
     pub distance_mm: f64,
 }
 
 /// Lines and arcs for the run through `points`, at most `tolerance_mm` from it.
 #[must_use]
-pub fn merge(points: &[Vector], tolerance_mm: f64) -> Vec<Merged> {
+pub fn merge<const N: usize>(points: &[Vector<N>], tolerance_mm: f64) -> Vec<Merged<N>> {
     let mut merged = Vec::new();
     let mut first = 0;
     while first + 1 < points.len() {
@@ -70,11 +73,11 @@ pub fn merge(points: &[Vector], tolerance_mm: f64) -> Vec<Merged> {
 
 /// The line from the first point to the last, or the arc through one in the middle too, if it is close
 /// enough.
-fn fit(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
+fn fit<const N: usize>(points: &[Vector<N>], tolerance_mm: f64) -> Option<(Element<N>, f64)> {
     line(points, tolerance_mm).or_else(|| arc(points, tolerance_mm))
 }
 
-fn line(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
+fn line<const N: usize>(points: &[Vector<N>], tolerance_mm: f64) -> Option<(Element<N>, f64)> {
     let (&from, &to) = (points.first()?, points.last()?);
     let chord = subtract(to, from);
     let length_mm = norm(chord);
@@ -94,12 +97,14 @@ fn line(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
     Some((Element::Line { from, to }, distance_mm))
 }
 
-fn arc(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
+fn arc<const N: usize>(points: &[Vector<N>], tolerance_mm: f64) -> Option<(Element<N>, f64)> {
     if points.len() <= ARC_SEGMENTS_MIN {
         return None;
     }
-    let (&from, &to) = (points.first()?, points.last()?);
-    let middle = *points.get(points.len() / 2)?;
+    let (&rest, last) = (points.first()?, points.last()?);
+    let space = moving(points)?;
+    let (from, to) = (space.narrow(rest), space.narrow(*last));
+    let middle = space.narrow(*points.get(points.len() / 2)?);
     // The circle through three points, relative to the first.
     let (chord, part) = (subtract(to, from), subtract(middle, from));
     let normal = cross(part, chord);
@@ -118,6 +123,7 @@ fn arc(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
     let (mut sweep_rad, mut distance_mm) = (0.0, 0.0_f64);
     let mut before: Option<(Vector, f64)> = None;
     for &point in points {
+        let point = space.narrow(point);
         let spoke = subtract(subtract(point, from), to_centre);
         let height_mm = dot(spoke, axis);
         let spoke = subtract(spoke, scale(axis, height_mm));
@@ -145,8 +151,15 @@ fn arc(points: &[Vector], tolerance_mm: f64) -> Option<(Element, f64)> {
         }
         distance_mm = distance_mm.max(point_mm);
     }
-    let shape = Spiral { outward, onward, normal: axis, radius_mm, radius_per_rad: 0.0, height_per_rad: 0.0 };
-    Some((Element::Arc { from, to, shape, sweep_rad }, distance_mm))
+    let shape = Spiral { outward, onward, radius_mm, radius_per_rad: 0.0, across_per_rad: [0.0; 3] };
+    Some((space.widen_element(&Element::Arc { from, to, shape, sweep_rad }, rest), distance_mm))
+}
+
+/// The coordinates that move from point to point, if they are three at most.
+fn moving<const N: usize>(points: &[Vector<N>]) -> Option<Subspace> {
+    let first = points.first()?;
+    let moves: [bool; N] = core::array::from_fn(|axis| points.iter().any(|point| point[axis] != first[axis]));
+    Subspace::of(moves)
 }
 
 #[cfg(test)]

@@ -16,7 +16,13 @@
 //!   [`fairing`]: the curve that bends least within a tolerance;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`greatest`]: how curves and their pieces bend at their tightest;
+//! - [`speeds`]: the speeds of the axes on an element, and what feed a program allows along it;
+//! - [`subspace`]: what moves in few coordinates, in these;
 //! - [`mod@compile`]: elements to pieces over exact path positions.
+//!
+//! **Space.** All geometry is in the machine's space of `N` axes, in the order of the machine file. Rotary axes count
+//! degrees there, and a degree is as long as a millimetre: in lengths along the path, in curvatures and in tolerances. So
+//! a path that may be led 0.01 mm past a corner may turn 0.01° past it; all coordinates together keep the tolerance.
 
 pub mod blend;
 pub mod compile;
@@ -31,42 +37,62 @@ pub mod polynomial;
 pub mod rational;
 pub mod septic;
 pub mod smooth;
+pub mod speeds;
 pub mod spline;
+pub mod subspace;
 
 pub use compile::{CompileError, Placed, compile, exact, on_path, septics};
-pub use element::{Element, Role};
+pub(crate) use element::from_xyz;
+pub use element::{Element, NoAxis, Role};
 pub use greatest::Greatest;
 pub use involute::Involute;
 pub use polynomial::Polynomial;
+pub use speeds::{Feeds, SpeedRatios};
 
-/// A point or a vector, X Y Z \[mm\].
-pub type Vector = [f64; 3];
+/// A point or a vector of a machine's space: a coordinate for each of its axes, in their order \[mm\].
+pub type Vector<const N: usize = 3> = [f64; N];
 
-pub(crate) fn add(a: Vector, b: Vector) -> Vector {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+pub(crate) fn add<const N: usize>(a: Vector<N>, b: Vector<N>) -> Vector<N> {
+    core::array::from_fn(|axis| a[axis] + b[axis])
 }
 
-pub(crate) fn subtract(a: Vector, b: Vector) -> Vector {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+pub(crate) fn subtract<const N: usize>(a: Vector<N>, b: Vector<N>) -> Vector<N> {
+    core::array::from_fn(|axis| a[axis] - b[axis])
 }
 
-pub(crate) fn scale(a: Vector, factor: f64) -> Vector {
+pub(crate) fn scale<const N: usize>(a: Vector<N>, factor: f64) -> Vector<N> {
     a.map(|component| component * factor)
 }
 
-pub(crate) fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+pub(crate) fn dot<const N: usize>(a: Vector<N>, b: Vector<N>) -> f64 {
+    let mut sum = a[0] * b[0];
+    for axis in 1..N {
+        sum += a[axis] * b[axis];
+    }
+    sum
 }
 
 pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-pub(crate) fn norm(a: Vector) -> f64 {
+pub(crate) fn norm<const N: usize>(a: Vector<N>) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// The area that two vectors span, |a|·|b|·sin of their angle: of three coordinates the norm of the cross product.
+fn area<const N: usize>(a: Vector<N>, b: Vector<N>) -> f64 {
+    let mut square = 0.0;
+    for low in (0..N).rev() {
+        for high in (low + 1..N).rev() {
+            let part = a[low] * b[high] - a[high] * b[low];
+            square += part * part;
+        }
+    }
+    square.sqrt()
+}
+
 /// The angle between two directions \[rad\], precise for small ones too.
-pub(crate) fn angle(a: Vector, b: Vector) -> f64 {
-    libm::atan2(norm(cross(a, b)), dot(a, b))
+pub(crate) fn angle<const N: usize>(a: Vector<N>, b: Vector<N>) -> f64 {
+    libm::atan2(area(a, b), dot(a, b))
 }

@@ -29,21 +29,21 @@ const STRAIGHT: f64 = 1.0e-9;
 
 /// Σ cₖ·uᵏ, k = 1 … 7, u from 0 to 1: a curve relative to its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Polynomial {
+pub struct Polynomial<const N: usize = 3> {
     /// c₁ … c₇ \[mm\].
-    coefficients: [Vector; DEGREE],
+    coefficients: [Vector<N>; DEGREE],
 }
 
-impl Polynomial {
+impl<const N: usize> Polynomial<N> {
     /// The curve with c₁ … c₇ \[mm\].
     #[must_use]
-    pub const fn new(coefficients: [Vector; DEGREE]) -> Self {
+    pub const fn new(coefficients: [Vector<N>; DEGREE]) -> Self {
         Self { coefficients }
     }
 
     /// The Bézier curve of degree seven with these control points \[mm\], relative to the first one or not.
     #[must_use]
-    pub fn bezier(points: [Vector; DEGREE + 1]) -> Self {
+    pub fn bezier(points: [Vector<N>; DEGREE + 1]) -> Self {
         // cₖ = C(7, k)·Δᵏb₀, the k-th forward difference of the control points.
         const BINOMIALS: [f64; DEGREE] = [7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
         let mut differences = points;
@@ -58,13 +58,13 @@ impl Polynomial {
 
     /// c₁ … c₇ \[mm\].
     #[must_use]
-    pub fn coefficients(&self) -> &[Vector; DEGREE] {
+    pub fn coefficients(&self) -> &[Vector<N>; DEGREE] {
         &self.coefficients
     }
 
     /// The vector from the start to the end \[mm\].
     #[must_use]
-    pub fn chord(&self) -> Vector {
+    pub fn chord(&self) -> Vector<N> {
         self.offset(0.0, 1.0)
     }
 
@@ -81,18 +81,18 @@ impl Polynomial {
 
     /// First to fourth derivative by the parameter at `u`.
     #[must_use]
-    pub fn four_derivatives(&self, u: f64) -> [Vector; 4] {
+    pub fn four_derivatives(&self, u: f64) -> [Vector<N>; 4] {
         let [c1, c2, c3, c4, ..] = self.first_about(u, 4);
         [c1, scale(c2, 2.0), scale(c3, 6.0), scale(c4, 24.0)]
     }
 
     /// The greatest derivatives by arc length of the curve itself, from 64 parts.
     #[must_use]
-    pub fn greatest(&self) -> Greatest {
-        let mut tangents = [Peak::default(); 3];
-        let mut curvatures = [0.0_f64; 3];
+    pub fn greatest(&self) -> Greatest<N> {
+        let mut tangents = [Peak::default(); N];
+        let mut curvatures = [0.0_f64; N];
         let norms = self.norms(BEND_PARTS, |tangent, second| {
-            for axis in 0..3 {
+            for axis in 0..N {
                 tangents[axis].next(tangent[axis].abs());
                 curvatures[axis] = curvatures[axis].max(second[axis].abs());
             }
@@ -112,7 +112,7 @@ impl Polynomial {
 
     /// The greatest second to fourth derivative by arc length, from so many parts; calls `each` with tangent
     /// and curvature where they are taken.
-    fn norms(&self, parts: usize, mut each: impl FnMut(Vector, Vector)) -> [f64; 3] {
+    fn norms(&self, parts: usize, mut each: impl FnMut(Vector<N>, Vector<N>)) -> [f64; 3] {
         add_work(parts);
         let mut norms = [Peak::default(); 3];
         for part in 0..=parts {
@@ -127,12 +127,12 @@ impl Polynomial {
     }
 
     /// The coefficients of the same curve in u − `origin`, relative to the point at `origin`.
-    fn about(&self, origin: f64) -> [Vector; DEGREE] {
+    fn about(&self, origin: f64) -> [Vector<N>; DEGREE] {
         self.first_about(origin, DEGREE)
     }
 
     /// The first `count` of them; the others mean nothing.
-    fn first_about(&self, origin: f64, count: usize) -> [Vector; DEGREE] {
+    fn first_about(&self, origin: f64, count: usize) -> [Vector<N>; DEGREE] {
         let mut shifted = self.coefficients;
         if origin == 0.0 {
             return shifted;
@@ -148,19 +148,19 @@ impl Polynomial {
     }
 }
 
-impl Curve for Polynomial {
-    fn offset(&self, origin: f64, u: f64) -> Vector {
+impl<const N: usize> Curve<N> for Polynomial<N> {
+    fn offset(&self, origin: f64, u: f64) -> Vector<N> {
         let step = u - origin;
-        self.about(origin).iter().rev().fold([0.0; 3], |sum, &c| scale(add(sum, c), step))
+        self.about(origin).iter().rev().fold([0.0; N], |sum, &c| scale(add(sum, c), step))
     }
 
-    fn derivatives(&self, u: f64) -> [Vector; 3] {
+    fn derivatives(&self, u: f64) -> [Vector<N>; 3] {
         let [first, second, third, _] = self.four_derivatives(u);
         [first, second, third]
     }
 
     fn speed(&self, u: f64) -> f64 {
-        let mut slope = [0.0; 3];
+        let mut slope = [0.0; N];
         for (index, &coefficient) in self.coefficients.iter().enumerate().rev() {
             slope = add(scale(slope, u), scale(coefficient, (index + 1) as f64));
         }

@@ -37,15 +37,15 @@ const SPEEDS: u32 = 64;
 
 /// One piece: its span of the parameter, its length and its polynomial.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Septic {
+pub struct Septic<const N: usize = 3> {
     /// Parameter at the start and at the end.
     pub span: (f64, f64),
     /// Its start minus the curve's \[mm\].
-    pub start: Vector,
+    pub start: Vector<N>,
     /// Arc length \[mm\].
     pub length_mm: f64,
     /// c₁ … c₇ per axis \[mm\] over u = s/length.
-    pub coefficients: [[f64; 7]; 3],
+    pub coefficients: [[f64; 7]; N],
     /// How far it is from the curve.
     pub deviation: Deviation,
 }
@@ -127,13 +127,13 @@ pub enum FitError {
 /// # Errors
 /// The curve is not finite, too long, stands still somewhere, or is missed after [`HALVINGS_MAX`] halvings or
 /// with [`REFINEMENTS_MAX`] pieces more than its length asks for.
-pub fn fit(
-    curve: &(impl Curve + ?Sized),
+pub fn fit<const N: usize>(
+    curve: &(impl Curve<N> + ?Sized),
     from: f64,
     to: f64,
     widest: f64,
     longest_mm: f64,
-) -> Result<Vec<Septic>, FitError> {
+) -> Result<Vec<Septic<N>>, FitError> {
     let mut pieces = Vec::new();
     let parts = ((to - from) / widest).ceil().max(1.0) as u64;
     let at = |part: u64| if part == parts { to } else { from + (to - from) * (part as f64 / parts as f64) };
@@ -171,7 +171,12 @@ pub fn fit(
 }
 
 /// Whether `curve` stands still where a piece failed, compared with its speed elsewhere.
-fn still(curve: &(impl Curve + ?Sized), from: f64, to: f64, failed: &Septic) -> Option<FitError> {
+fn still<const N: usize>(
+    curve: &(impl Curve<N> + ?Sized),
+    from: f64,
+    to: f64,
+    failed: &Septic<N>,
+) -> Option<FitError> {
     let speed = |u: f64| norm(curve.derivatives(u)[0]);
     let everywhere = (0..=SPEEDS).map(|part| from + (to - from) * f64::from(part) / f64::from(SPEEDS));
     let fastest = everywhere.map(speed).fold(0.0, f64::max);
@@ -181,13 +186,13 @@ fn still(curve: &(impl Curve + ?Sized), from: f64, to: f64, failed: &Septic) -> 
 }
 
 /// The piece over one span of a curve that starts at `from`.
-fn hermite(curve: &(impl Curve + ?Sized), from: f64, a: f64, b: f64) -> Septic {
+fn hermite<const N: usize>(curve: &(impl Curve<N> + ?Sized), from: f64, a: f64, b: f64) -> Septic<N> {
     let length_mm = curve.length(a, b);
     let (start, end) = (by_arc_length(curve.derivatives(a)), by_arc_length(curve.derivatives(b)));
     let chord = curve.offset(a, b);
     let powers = [length_mm, length_mm * length_mm, length_mm * length_mm * length_mm];
     let coefficients = core::array::from_fn(|axis| {
-        let scaled = |of: &[Vector; 3]| core::array::from_fn(|order| of[order][axis] * powers[order]);
+        let scaled = |of: &[Vector<N>; 3]| core::array::from_fn(|order| of[order][axis] * powers[order]);
         between(chord[axis], scaled(&start), scaled(&end))
     });
     let start = curve.offset(from, a);
@@ -217,7 +222,7 @@ pub(crate) fn between(rise: f64, start: [f64; 3], end: [f64; 3]) -> [f64; 7] {
 }
 
 /// Greatest distance between piece and curve, and greatest error of |r'|, at seven inner points.
-fn deviation(curve: &(impl Curve + ?Sized), piece: &Septic) -> Deviation {
+fn deviation<const N: usize>(curve: &(impl Curve<N> + ?Sized), piece: &Septic<N>) -> Deviation {
     let (a, b) = piece.span;
     let mut greatest = Deviation::default();
     let (mut before, mut gone_mm) = (a, 0.0);
@@ -239,7 +244,7 @@ fn deviation(curve: &(impl Curve + ?Sized), piece: &Septic) -> Deviation {
     greatest
 }
 
-impl Septic {
+impl<const N: usize> Septic<N> {
     /// The greatest sum over an axis of |third derivative|'s terms, in parts of the length.
     fn steepness(&self) -> f64 {
         let [_, factors, _] = FACTORS;
@@ -250,7 +255,7 @@ impl Septic {
 
     /// Offset from the start and derivative by arc length at u = s/length.
     #[must_use]
-    pub fn at(&self, u: f64) -> (Vector, Vector) {
+    pub fn at(&self, u: f64) -> (Vector<N>, Vector<N>) {
         let horner = |axis: usize| {
             let (mut value, mut slope) = (0.0, 0.0);
             for c in self.coefficients[axis].iter().rev() {
@@ -259,15 +264,15 @@ impl Septic {
             }
             (value * u, slope * u + value)
         };
-        let both: [(f64, f64); 3] = core::array::from_fn(horner);
+        let both: [(f64, f64); N] = core::array::from_fn(horner);
         (both.map(|(value, _)| value), both.map(|(_, slope)| slope / self.length_mm))
     }
 
     /// Second to fourth derivative by arc length at u = s/length.
     #[must_use]
-    pub fn second_to_fourth(&self, u: f64) -> [Vector; 3] {
+    pub fn second_to_fourth(&self, u: f64) -> [Vector<N>; 3] {
         let per_mm = 1.0 / self.length_mm;
-        let mut derivatives = [[0.0; 3]; 3];
+        let mut derivatives = [[0.0; N]; 3];
         let mut per_power = per_mm;
         for (index, (derivative, factors)) in derivatives.iter_mut().zip(&FACTORS).enumerate() {
             per_power *= per_mm;

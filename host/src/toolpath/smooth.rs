@@ -21,7 +21,8 @@ use super::blend::{Blend, has_side, trim_mm};
 use super::dense::{Faired, faired};
 use super::element::Element;
 use super::merge::{Merged, merge};
-use super::{Greatest, Vector, angle, norm, subtract};
+use super::{Feeds, Greatest, Vector, angle, norm, subtract};
+use crate::gcode::Axis;
 
 /// Part of an element that blends may take together.
 pub(super) const TAKEN_MAX: f64 = 0.9;
@@ -35,13 +36,13 @@ pub const TANGENT_ROUNDING_RAD: f64 = 1.0e-9;
 
 /// An element of the path with what the program says of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Move {
+pub struct Move<const N: usize = 3> {
     /// Program line.
     pub line: u32,
     /// Geometry.
-    pub element: Element,
-    /// Programmed feed \[mm/s\], infinite for a rapid.
-    pub feed_mm_s: f64,
+    pub element: Element<N>,
+    /// Programmed feed.
+    pub feeds: Feeds,
     /// Greatest distance that the path may be led past the move and its ends \[mm\]; 0 for exact path. At a
     /// junction the smaller one of both moves holds.
     pub tolerance_mm: f64,
@@ -50,7 +51,7 @@ pub struct Move {
     pub merging_mm: Option<f64>,
 }
 
-impl Move {
+impl<const N: usize> Move<N> {
     /// What merging takes of the tolerance where it leaves the path by `distance_mm`.
     fn spent_mm(&self, distance_mm: f64) -> f64 {
         if self.merging_mm.is_some() { 0.0 } else { distance_mm }
@@ -60,28 +61,34 @@ impl Move {
 /// A run of moves, its short lines merged, ready to be blended junction by junction. Junction `i` is that
 /// between the moves `i` and `i + 1`.
 #[derive(Clone, Debug)]
-pub struct Run {
-    moves: Vec<Move>,
+pub struct Run<const N: usize = 3> {
+    moves: Vec<Move<N>>,
     lengths_mm: Vec<f64>,
     /// How far each move is from those that it stands for \[mm\].
     distances_mm: Vec<f64>,
     /// How each move bends at its tightest where that is known already.
-    greatest: Vec<Option<Greatest>>,
+    greatest: Vec<Option<Greatest<N>>>,
 }
 
-impl Run {
+impl<const N: usize> Run<N> {
     /// The run of `moves`, which follow each other without a stop.
     #[must_use]
-    pub fn new(moves: &[Move]) -> Self {
+    pub fn new(moves: &[Move<N>]) -> Self {
         let (moves, distances_mm) = merged(moves);
         Self::of(moves, distances_mm, Vec::new())
     }
 
-    /// The runs of `moves` with curves in place of what is dense, made for `limits` and at most `feed_mm_s`:
-    /// one for each of `corners_rad` that makes a difference. A turn of more than that stays a corner.
+    /// The runs of `moves` with curves in place of what is dense, made for `limits` and at most `feed_mm_s` on a machine
+    /// with these `axes`: one for each of `corners_rad` that makes a difference. A turn of more than that stays a corner.
     #[must_use]
-    pub fn faired(moves: &[Move], corners_rad: &[f64], limits: &Limits<f64>, feed_mm_s: f64) -> Vec<Self> {
-        let made = faired(moves, corners_rad, limits, feed_mm_s).into_iter();
+    pub fn faired(
+        moves: &[Move<N>],
+        corners_rad: &[f64],
+        limits: &Limits<f64>,
+        feed_mm_s: f64,
+        axes: &[Option<Axis>; N],
+    ) -> Vec<Self> {
+        let made = faired(moves, corners_rad, limits, feed_mm_s, axes).into_iter();
         let mut runs: Vec<Self> = made
             .map(|Faired { moves, distances_mm, greatest }| Self::of(moves, distances_mm, greatest))
             .collect();
@@ -91,25 +98,25 @@ impl Run {
 
     /// The run of `moves` as they are, nothing merged.
     #[must_use]
-    pub fn exact(moves: &[Move]) -> Self {
+    pub fn exact(moves: &[Move<N>]) -> Self {
         Self::of(moves.to_vec(), vec![0.0; moves.len()], Vec::new())
     }
 
-    fn of(moves: Vec<Move>, distances_mm: Vec<f64>, greatest: Vec<Option<Greatest>>) -> Self {
+    fn of(moves: Vec<Move<N>>, distances_mm: Vec<f64>, greatest: Vec<Option<Greatest<N>>>) -> Self {
         let lengths_mm = moves.iter().map(|step| step.element.length_mm()).collect();
         Self { moves, lengths_mm, distances_mm, greatest }
     }
 
     /// How a move bends at its tightest.
     #[must_use]
-    pub fn greatest(&self, index: usize) -> Greatest {
+    pub fn greatest(&self, index: usize) -> Greatest<N> {
         let known = self.greatest.get(index).copied().flatten();
         known.unwrap_or_else(|| self.moves[index].element.greatest())
     }
 
     /// The moves.
     #[must_use]
-    pub fn moves(&self) -> &[Move] {
+    pub fn moves(&self) -> &[Move<N>] {
         &self.moves
     }
 
@@ -134,8 +141,8 @@ impl Run {
 
     /// The same of a blend of a junction: what its moves are off adds to what it is off these.
     #[must_use]
-    pub fn tolerance_share_of(&self, junction: usize, blend: &Blend) -> f64 {
-        let [before, after] = [junction, junction + 1].map(|index| self.moves[index]);
+    pub fn tolerance_share_of(&self, junction: usize, blend: &Blend<N>) -> f64 {
+        let [before, after] = [junction, junction + 1].map(|index| &self.moves[index]);
         let merging_mm = before.merging_mm.unwrap_or(0.0).max(after.merging_mm.unwrap_or(0.0));
         let distance_mm = self.distances_mm[junction].max(self.distances_mm[junction + 1]);
         share(blend.distance_mm + distance_mm, before.tolerance_mm.min(after.tolerance_mm) + merging_mm)
@@ -143,7 +150,7 @@ impl Run {
 
     /// The blend of a junction with at most `room_mm` of either move; none where nothing steps.
     #[must_use]
-    pub fn blend(&self, junction: usize, room_mm: f64, limits: &Limits<f64>) -> Option<Blend> {
+    pub fn blend(&self, junction: usize, room_mm: f64, limits: &Limits<f64>) -> Option<Blend<N>> {
         let (before, after) = (&self.moves[junction], &self.moves[junction + 1]);
         if !(has_side(&before.element) && has_side(&after.element))
             || is_smooth([&before.element, &after.element])
@@ -183,7 +190,7 @@ fn share(distance_mm: f64, tolerance_mm: f64) -> f64 {
 
 /// The moves, with fewer in place of runs of short lines, and each one's distance from the moves it stands
 /// for.
-fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
+fn merged<const N: usize>(moves: &[Move<N>]) -> (Vec<Move<N>>, Vec<f64>) {
     let (mut merged, mut distances_mm) = (Vec::with_capacity(moves.len()), Vec::with_capacity(moves.len()));
     let mut rest = moves;
     while let Some(first) = rest.first() {
@@ -207,7 +214,7 @@ fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
                 continue;
             }
             let ends = steps.iter().map(|step| step.element.ends_mm());
-            let points: Vec<Vector> =
+            let points: Vec<Vector<N>> =
                 core::iter::once(steps[0].element.ends_mm().0).chain(ends.map(|(_, to)| to)).collect();
             let parts = merge(&points, tolerance_mm);
             if let ([part], Some((before, distance_mm))) = (&parts[..], before)
@@ -226,7 +233,12 @@ fn merged(moves: &[Move]) -> (Vec<Move>, Vec<f64>) {
 }
 
 /// One line in place of two, the second of them alone between longer ones, and its distance from the path.
-fn straightened(before: &Move, before_mm: f64, part: &Merged, tolerance_mm: f64) -> Option<(Element, f64)> {
+fn straightened<const N: usize>(
+    before: &Move<N>,
+    before_mm: f64,
+    part: &Merged<N>,
+    tolerance_mm: f64,
+) -> Option<(Element<N>, f64)> {
     let (Element::Line { from, to: corner }, Element::Line { to, .. }) = (before.element, part.element)
     else {
         return None;
@@ -236,12 +248,13 @@ fn straightened(before: &Move, before_mm: f64, part: &Merged, tolerance_mm: f64)
     Some((line.element, spent_mm + line.distance_mm))
 }
 
-/// Whether two moves may become one: lines with one feed and one tolerance.
-fn is_same_run(before: &Move, after: &Move) -> bool {
-    let is_line = |step: &Move| matches!(step.element, Element::Line { .. });
+/// Whether two moves may become one: lines with one feed and one tolerance. What becomes of them is driven at the feed of
+/// its own direction.
+fn is_same_run<const N: usize>(before: &Move<N>, after: &Move<N>) -> bool {
+    let is_line = |step: &Move<N>| matches!(step.element, Element::Line { .. });
     is_line(before)
         && is_line(after)
-        && before.feed_mm_s == after.feed_mm_s
+        && before.feeds == after.feeds
         && before.tolerance_mm == after.tolerance_mm
         && before.merging_mm == after.merging_mm
         && before.merging_mm.unwrap_or(before.tolerance_mm) > 0.0
@@ -259,8 +272,8 @@ enum Room {
 }
 
 impl Room {
-    fn of(run: &[Move], index: usize) -> Self {
-        let trim_mm = |before: Option<&Move>, after: Option<&Move>| {
+    fn of<const N: usize>(run: &[Move<N>], index: usize) -> Self {
+        let trim_mm = |before: Option<&Move<N>>, after: Option<&Move<N>>| {
             let (before, after) = (before?, after?);
             let angle_rad = angle(before.element.ends()[1].tangent, after.element.ends()[0].tangent);
             (angle_rad > TANGENT_ROUNDING_RAD).then(|| trim_mm(angle_rad, before.tolerance_mm))
@@ -277,7 +290,7 @@ impl Room {
 }
 
 /// Whether nothing steps from one element to the next.
-pub(super) fn is_smooth([before, after]: [&Element; 2]) -> bool {
+pub(super) fn is_smooth<const N: usize>([before, after]: [&Element<N>; 2]) -> bool {
     let ([_, end], [start, _]) = (before.ends(), after.ends());
     let step = norm(subtract(start.curvature, end.curvature));
     angle(end.tangent, start.tangent) <= TANGENT_ROUNDING_RAD
@@ -298,7 +311,8 @@ pub(crate) mod tests {
             .zip(1..)
             .map(|(pair, line)| {
                 let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
-                Move { line, element, feed_mm_s: feed_mm_s(line), tolerance_mm, merging_mm: None }
+                let feeds = Feeds::xyz(feed_mm_s(line));
+                Move { line, element, feeds, tolerance_mm, merging_mm: None }
             })
             .collect()
     }
@@ -317,7 +331,7 @@ pub(crate) mod tests {
         let run = Run::new(&moves);
         assert_eq!(run.moves(), moves);
         assert_eq!(run.blend(0, 1.0, &LIMITS), None);
-        assert_eq!(Run::new(&[]).junctions(), 0);
+        assert_eq!(Run::<3>::new(&[]).junctions(), 0);
     }
 
     /// A corner that was cut off by a micrometre is one corner.
@@ -325,7 +339,7 @@ pub(crate) mod tests {
     fn a_tiny_line_among_long_ones_joins_the_one_before() {
         let mut moves = path(&[[0.0, 0.0], [10.0, 0.0], [10.0007, 0.0007], [10.0007, 10.0]], 0.05, own_feed);
         assert_eq!(Run::new(&moves).moves().len(), 3);
-        moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
+        moves.iter_mut().for_each(|step| step.feeds = Feeds::xyz(50.0));
         let run = Run::new(&moves);
         assert_eq!(kinds(run.moves()), [(1, "line"), (3, "line")]);
         assert_eq!(run.moves()[1].element.ends_mm().1, [10.0007, 10.0, 0.0]);
@@ -341,9 +355,9 @@ pub(crate) mod tests {
             })
             .collect();
         let mut moves = path(&points, 0.01, own_feed);
-        moves.iter_mut().for_each(|step| step.feed_mm_s = 50.0);
+        moves.iter_mut().for_each(|step| step.feeds = Feeds::xyz(50.0));
         assert_eq!(kinds(Run::new(&moves).moves()), [(1, "arc")]);
-        moves.iter_mut().for_each(|step| step.feed_mm_s = if step.line <= 40 { 50.0 } else { 60.0 });
+        moves.iter_mut().for_each(|step| step.feeds = Feeds::xyz(if step.line <= 40 { 50.0 } else { 60.0 }));
         assert_eq!(kinds(Run::new(&moves).moves()), [(1, "arc"), (41, "arc")]);
         // The chords' sagitta, 0.125 µm, is more than a part of this tolerance.
         moves.iter_mut().for_each(|step| step.tolerance_mm = 1e-4);

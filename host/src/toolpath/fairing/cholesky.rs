@@ -2,42 +2,42 @@
 
 use core::ops::Range;
 
-use super::super::Vector;
+use super::super::{Vector, scale};
 
 /// Control points that act on one span.
 pub(super) const ACTING: usize = 6;
-/// Entries of a column, the diagonal first.
-const WIDTH: usize = 3 * ACTING;
-
 /// What the diagonal is made greater by, as a part of it, so that rounding leaves the pivots above 0.
 const REGULARISATION: f64 = 1.0e-13;
 
 /// The lower triangle of the matrix of points whose entries couple at most [`ACTING`] neighbours, by columns.
-pub(super) struct Cholesky {
-    columns: Vec<[f64; WIDTH]>,
+pub(super) struct Cholesky<const N: usize> {
+    /// The entries of each, the diagonal first.
+    columns: Vec<Column<N>>,
 }
 
-impl Cholesky {
+type Column<const N: usize> = [Vector<N>; ACTING];
+
+impl<const N: usize> Cholesky<N> {
+    /// Entries of a column.
+    const WIDTH: usize = N * ACTING;
+
     pub(super) fn new(points: usize) -> Self {
-        Self { columns: vec![[0.0; WIDTH]; 3 * points] }
+        Self { columns: vec![[[0.0; N]; ACTING]; N * points] }
     }
 
     pub(super) fn clear(&mut self) {
-        self.columns.fill([0.0; WIDTH]);
+        self.columns.fill([[0.0; N]; ACTING]);
     }
 
-    /// Adds a symmetric 3 × 3 matrix to the blocks of all pairs of [`ACTING`] points from `first` on, times the
+    /// Adds a symmetric `N` × `N` matrix to the blocks of all pairs of [`ACTING`] points from `first` on, times the
     /// factors of both.
-    pub(super) fn add(&mut self, first: usize, factors: &[f64; ACTING], matrix: &[Vector; 3]) {
+    pub(super) fn add(&mut self, first: usize, factors: &[f64; ACTING], matrix: &[Vector<N>; N]) {
         for (axis, line) in matrix.iter().enumerate() {
-            let mut whole = [0.0; WIDTH];
-            for (entries, factor) in whole.chunks_exact_mut(3).zip(factors) {
-                entries.iter_mut().zip(line).for_each(|(entry, of_line)| *entry = factor * of_line);
-            }
+            let whole: Column<N> = factors.map(|factor| scale(*line, factor));
             for (point, factor) in factors.iter().enumerate() {
-                let diagonal = 3 * point + axis;
-                let column = &mut self.columns[3 * first + diagonal];
-                for (entry, below) in column.iter_mut().zip(&whole[diagonal..]) {
+                let diagonal = N * point + axis;
+                let column = self.columns[N * first + diagonal].as_flattened_mut();
+                for (entry, below) in column.iter_mut().zip(&whole.as_flattened()[diagonal..]) {
                     *entry += factor * below;
                 }
             }
@@ -46,29 +46,29 @@ impl Cholesky {
 
     /// Adds `factor` times the identity to the block of the points `row` ≥ `column`.
     pub(super) fn add_unit(&mut self, row: usize, column: usize, factor: f64) {
-        for axis in 0..3 {
-            self.columns[3 * column + axis][3 * (row - column)] += factor;
+        for axis in 0..N {
+            self.columns[N * column + axis][row - column][0] += factor;
         }
     }
 
     /// Makes the equations of these points say that they stay at their side, and leaves them out of the others.
     pub(super) fn hold(&mut self, points: Range<usize>) {
-        for index in 3 * points.start..3 * points.end {
-            self.columns[index] = [0.0; WIDTH];
-            self.columns[index][0] = 1.0;
-            for back in 1..WIDTH.min(index + 1) {
-                self.columns[index - back][back] = 0.0;
+        for index in N * points.start..N * points.end {
+            self.columns[index] = [[0.0; N]; ACTING];
+            self.columns[index][0][0] = 1.0;
+            for back in 1..Self::WIDTH.min(index + 1) {
+                self.columns[index - back].as_flattened_mut()[back] = 0.0;
             }
         }
     }
 
     /// Solves for `sides` in place; false if the matrix is not positive definite. The matrix is used up.
-    pub(super) fn solve(&mut self, sides: &mut [Vector]) -> bool {
+    pub(super) fn solve(&mut self, sides: &mut [Vector<N>]) -> bool {
         let size = self.columns.len();
-        self.columns.iter_mut().for_each(|column| column[0] *= 1.0 + REGULARISATION);
+        self.columns.iter_mut().for_each(|column| column[0][0] *= 1.0 + REGULARISATION);
         for index in 0..size {
             let (done, rest) = self.columns.split_at_mut(index + 1);
-            let column = &mut done[index];
+            let column = done[index].as_flattened_mut();
             if !(column[0] > 0.0) {
                 return false;
             }
@@ -76,15 +76,16 @@ impl Cholesky {
             column[0] = pivot;
             column[1..].iter_mut().for_each(|entry| *entry /= pivot);
             // What is left of the matrix loses the product of this column with itself.
-            for (below, other) in (1..WIDTH).zip(rest) {
+            for (below, other) in (1..Self::WIDTH).zip(rest) {
                 let factor = column[below];
-                for (entry, of_column) in other.iter_mut().zip(&column[below..]) {
+                for (entry, of_column) in other.as_flattened_mut().iter_mut().zip(&column[below..]) {
                     *entry -= factor * of_column;
                 }
             }
         }
         let sides = sides.as_flattened_mut();
         for (index, column) in self.columns.iter().enumerate() {
+            let column = column.as_flattened();
             let side = sides[index] / column[0];
             sides[index] = side;
             for (below, entry) in sides[index + 1..].iter_mut().zip(&column[1..]) {
@@ -92,6 +93,7 @@ impl Cholesky {
             }
         }
         for (index, column) in self.columns.iter().enumerate().rev() {
+            let column = column.as_flattened();
             let known = sides[index + 1..].iter().zip(&column[1..]);
             sides[index] = known.fold(sides[index], |rest, (below, entry)| rest - entry * below) / column[0];
         }
@@ -115,7 +117,7 @@ mod tests {
         };
         let size = 3 * points;
         let mut full = vec![vec![0.0; size]; size];
-        let mut band = Cholesky::new(points);
+        let mut band = Cholesky::<3>::new(points);
         for first in 0..=points - ACTING {
             let factors: [f64; ACTING] = core::array::from_fn(|_| random());
             let [a, b, c, d, e, f] = core::array::from_fn(|_| random());
@@ -151,7 +153,7 @@ mod tests {
         for (index, expected) in expected.iter().enumerate() {
             assert!((sides[index / 3][index % 3] - expected).abs() < 1e-13);
         }
-        let mut indefinite = Cholesky::new(2);
+        let mut indefinite = Cholesky::<3>::new(2);
         indefinite.add_unit(0, 0, 1.0);
         indefinite.add_unit(1, 1, -1.0);
         assert!(!indefinite.solve(&mut [[0.0; 3]; 2]));
@@ -169,7 +171,7 @@ mod tests {
             let held: Vector = core::array::from_fn(|_| random());
             let matrix: [Vector; 3] = held.map(|a| held.map(|b| 1e16 * a * b));
             let factors = core::array::from_fn(|_| random());
-            let mut equations = Cholesky::new(ACTING);
+            let mut equations = Cholesky::<3>::new(ACTING);
             equations.add(0, &factors, &matrix);
             (0..ACTING).for_each(|point| equations.add_unit(point, point, 1e-3));
             let mut sides = [[1.0; 3]; ACTING];

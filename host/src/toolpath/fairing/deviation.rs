@@ -25,25 +25,25 @@ pub(super) struct Deviation {
 
 /// How far the walk has come.
 #[derive(Clone, Copy)]
-pub(super) struct Walk {
+pub(super) struct Walk<const N: usize> {
     /// The partner on the path \[mm\], and its part.
     foot_mm: f64,
     foot_part: usize,
     /// The point of the curve.
-    before: Option<Vector>,
+    before: Option<Vector<N>>,
 }
 
-impl Walk {
+impl<const N: usize> Walk<N> {
     /// The start of the path.
     pub(super) const START: Self = Self { foot_mm: 0.0, foot_part: 0, before: None };
 }
 
 /// How far each span is from the path; the walk goes on to their end.
-pub(super) fn deviations(
-    guide: &Guide,
+pub(super) fn deviations<const N: usize>(
+    guide: &Guide<N>,
     breaks: &[f64],
-    shapes: &[(Vector, Polynomial)],
-    walk: &mut Walk,
+    shapes: &[(Vector<N>, Polynomial<N>)],
+    walk: &mut Walk<N>,
 ) -> Vec<Deviation> {
     let mut deviations = Vec::with_capacity(shapes.len());
     let Walk { mut foot_mm, mut foot_part, mut before } = *walk;
@@ -86,7 +86,13 @@ pub(super) fn deviations(
 
 /// The point of the path from `least_mm` to about `most_mm` that is nearest to `point`: how far it is, where,
 /// and on which part, from `first` on.
-fn partner(guide: &Guide, point: Vector, first: usize, least_mm: f64, most_mm: f64) -> (f64, f64, usize) {
+fn partner<const N: usize>(
+    guide: &Guide<N>,
+    point: Vector<N>,
+    first: usize,
+    least_mm: f64,
+    most_mm: f64,
+) -> (f64, f64, usize) {
     let mut best = (f64::INFINITY, least_mm, first);
     for part in first..guide.parts.len() {
         let (start_mm, end_mm) = guide.range_mm(part);
@@ -103,7 +109,7 @@ fn partner(guide: &Guide, point: Vector, first: usize, least_mm: f64, most_mm: f
 }
 
 /// The distance of a point from the line between two others.
-fn from_line(point: Vector, from: Vector, to: Vector) -> f64 {
+fn from_line<const N: usize>(point: Vector<N>, from: Vector<N>, to: Vector<N>) -> f64 {
     let (along, offset) = (subtract(to, from), subtract(point, from));
     let square = dot(along, along);
     let share = if square > 0.0 { (dot(offset, along) / square).clamp(0.0, 1.0) } else { 0.0 };

@@ -6,15 +6,15 @@ use super::Part;
 use crate::toolpath::Element;
 
 /// Lines and arcs that follow each other.
-pub(super) struct Guide<'a> {
-    pub(super) parts: &'a [Part],
+pub(super) struct Guide<'a, const N: usize> {
+    pub(super) parts: &'a [Part<N>],
     /// Where each part starts, and where the last one ends \[mm\].
     starts_mm: Vec<f64>,
 }
 
-impl<'a> Guide<'a> {
+impl<'a, const N: usize> Guide<'a, N> {
     /// Nothing if a part is neither a line nor an arc, or has no length.
-    pub(super) fn new(parts: &'a [Part]) -> Option<Self> {
+    pub(super) fn new(parts: &'a [Part<N>]) -> Option<Self> {
         let mut starts_mm = Vec::with_capacity(parts.len() + 1);
         let mut end_mm = 0.0;
         starts_mm.push(end_mm);
@@ -47,7 +47,7 @@ impl<'a> Guide<'a> {
     }
 
     /// Point and tangent of a part at `mm` of the path.
-    pub(super) fn at(&self, part: usize, mm: f64) -> (Vector, Vector) {
+    pub(super) fn at(&self, part: usize, mm: f64) -> (Vector<N>, Vector<N>) {
         let (start_mm, end_mm) = self.range_mm(part);
         let share = ((mm - start_mm) / (end_mm - start_mm)).clamp(0.0, 1.0);
         match self.parts[part].element {
@@ -65,7 +65,7 @@ impl<'a> Guide<'a> {
     }
 
     /// Point and first to third derivative by the length at the start or the end.
-    pub(super) fn end(&self, is_end: bool) -> [Vector; 4] {
+    pub(super) fn end(&self, is_end: bool) -> [Vector<N>; 4] {
         let part = if is_end { self.parts.len() - 1 } else { 0 };
         let (point, tangent) = self.at(part, if is_end { self.length_mm() } else { 0.0 });
         match self.parts[part].element {
@@ -74,12 +74,12 @@ impl<'a> Guide<'a> {
                 let [first, second, third] = by_arc_length(shape.derivatives(angle));
                 [point, first, second, third]
             }
-            _ => [point, tangent, [0.0; 3], [0.0; 3]],
+            _ => [point, tangent, [0.0; N], [0.0; N]],
         }
     }
 
     /// Where a part is nearest to `point` \[mm\].
-    pub(super) fn nearest_mm(&self, part: usize, point: Vector) -> f64 {
+    pub(super) fn nearest_mm(&self, part: usize, point: Vector<N>) -> f64 {
         let (start_mm, end_mm) = self.range_mm(part);
         match self.parts[part].element {
             Element::Arc { from, shape, sweep_rad, .. } => {

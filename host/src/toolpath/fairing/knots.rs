@@ -36,7 +36,7 @@ pub(super) struct Mesh {
 }
 
 impl Mesh {
-    pub(super) fn new(guide: &Guide) -> Self {
+    pub(super) fn new<const N: usize>(guide: &Guide<N>) -> Self {
         let chords = chords(guide);
         let breaks_mm = breaks_mm(&chords, guide.length_mm());
         let mut first = 0;
@@ -90,9 +90,9 @@ impl Mesh {
 }
 
 /// A point of the path.
-struct Point {
+struct Point<const N: usize> {
     mm: f64,
-    at: Vector,
+    at: Vector<N>,
     tolerance_mm: f64,
 }
 
@@ -153,7 +153,7 @@ fn breaks_mm(chords: &[Chord], length_mm: f64) -> Vec<f64> {
     breaks_mm
 }
 
-fn points(guide: &Guide) -> Vec<Point> {
+fn points<const N: usize>(guide: &Guide<N>) -> Vec<Point<N>> {
     let mut points = Vec::with_capacity(guide.parts.len() + 1);
     for (index, part) in guide.parts.iter().enumerate() {
         let (start_mm, end_mm) = guide.range_mm(index);
@@ -177,12 +177,12 @@ fn points(guide: &Guide) -> Vec<Point> {
 }
 
 /// The longest lines that stand for the path, one after the other.
-fn chords(guide: &Guide) -> Vec<Chord> {
+fn chords<const N: usize>(guide: &Guide<N>) -> Vec<Chord> {
     let points = points(guide);
     let mut chords: Vec<Chord> = Vec::new();
     // By the length of the path: a line that stands for what goes to and fro is slower than it.
     let [mut velocity, end_velocity] = [false, true].map(|is_end| guide.end(is_end)[1]);
-    let turn_mm = |room: f64, point: &Point, before: Vector, after: Vector| {
+    let turn_mm = |room: f64, point: &Point<N>, before: Vector<N>, after: Vector<N>| {
         room * point.tolerance_mm / norm(subtract(after, before))
     };
     let mut first = 0;
@@ -226,17 +226,17 @@ fn chords(guide: &Guide) -> Vec<Chord> {
 
 /// Whether a line through the middle of the points, in the direction from the first to the last, is within
 /// the tolerance of all.
-fn is_straight(points: &[Point]) -> bool {
+fn is_straight<const N: usize>(points: &[Point<N>]) -> bool {
     let [first, .., last] = points else { return false };
     let chord = subtract(last.at, first.at);
     let direction = scale(chord, 1.0 / norm(chord));
-    let across = |point: &Point| {
+    let across = |point: &Point<N>| {
         let offset = subtract(point.at, first.at);
         subtract(offset, scale(direction, dot(offset, direction)))
     };
     // The first point is at 0 across.
-    let farther = |a: Vector, b: Vector| if norm(b) > norm(a) { b } else { a };
-    let middle = scale(points.iter().map(across).fold([0.0; 3], farther), 0.5);
+    let farther = |a: Vector<N>, b: Vector<N>| if norm(b) > norm(a) { b } else { a };
+    let middle = scale(points.iter().map(across).fold([0.0; N], farther), 0.5);
     let mut before_mm = 0.0;
     points.iter().all(|point| {
         let along_mm = dot(subtract(point.at, first.at), direction);

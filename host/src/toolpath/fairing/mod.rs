@@ -38,6 +38,7 @@ use self::knots::Mesh;
 use self::problem::{DECIDED, Problem};
 use super::curve::Curve as _;
 use super::element::{Element, Role};
+use super::subspace::Subspace;
 use super::{Greatest, Vector, scale};
 
 /// Spans of a window, and those that it looks ahead. What is not much longer is one window.
@@ -82,9 +83,9 @@ const THIRD: f64 = 100.0;
 
 /// A line or an arc of the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
+pub struct Part<const N: usize = 3> {
     /// The line or arc.
-    pub element: Element,
+    pub element: Element<N>,
     /// How far the curve may be from it \[mm\], above 0.
     pub tolerance_mm: f64,
     /// The greatest feed \[mm/s\].
@@ -93,28 +94,51 @@ pub struct Part {
 
 /// A span of the curve.
 #[derive(Clone, Copy, Debug)]
-pub struct Span {
+pub struct Span<const N: usize = 3> {
     /// The span.
-    pub element: Element,
+    pub element: Element<N>,
     /// The first and the last of the parts that it stands for.
     pub parts: (usize, usize),
     /// A bound on the distance between it and the path \[mm\].
     pub distance_mm: f64,
     /// How it bends at its tightest.
-    pub greatest: Greatest,
+    pub greatest: Greatest<N>,
 }
 
 /// The curve that stands for `parts`, made for `limits`; nothing if none was found, or if a part is neither a
-/// line nor an arc.
+/// line nor an arc. Where three coordinates at most move, it is made in these.
 #[must_use]
-pub fn fair(parts: &[Part], limits: &Limits<f64>) -> Option<Vec<Span>> {
+pub fn fair<const N: usize>(parts: &[Part<N>], limits: &Limits<f64>) -> Option<Vec<Span<N>>> {
+    let mut moves = [false; N];
+    for part in parts {
+        moves.iter_mut().zip(part.element.moves()).for_each(|(moves, of_part)| *moves |= of_part);
+    }
+    let Some(space) = Subspace::<3>::of(moves) else { return in_space(parts, limits) };
+    let rest = parts.first()?.element.ends_mm().0;
+    let narrow = |part: &Part<N>| Part {
+        element: space.narrow_element(&part.element),
+        tolerance_mm: part.tolerance_mm,
+        feed_mm_s: part.feed_mm_s,
+    };
+    let spans = in_space(&parts.iter().map(narrow).collect::<Vec<_>>(), limits)?;
+    let widened = spans.into_iter().map(|span| Span {
+        element: space.widen_element(&span.element, rest),
+        parts: span.parts,
+        distance_mm: span.distance_mm,
+        greatest: space.widen_greatest(&span.greatest),
+    });
+    Some(widened.collect())
+}
+
+/// The curve in all coordinates.
+fn in_space<const N: usize>(parts: &[Part<N>], limits: &Limits<f64>) -> Option<Vec<Span<N>>> {
     let guide = Guide::new(parts)?;
     let mesh = Mesh::new(&guide);
     let mut spans = Vec::new();
     let mut start = Start { point: guide.end(false), walk: Walk::START, past: None };
     let (mut first, mut size) = (0, WINDOW);
     // Where the last window began.
-    let mut before: Option<(usize, usize, Start)> = None;
+    let mut before: Option<(usize, usize, Start<N>)> = None;
     while first < mesh.len() {
         let is_last = mesh.len() - first <= size + 2 * AHEAD;
         let next = if is_last { mesh.len() } else { first + size };
@@ -142,19 +166,19 @@ pub fn fair(parts: &[Part], limits: &Limits<f64>) -> Option<Vec<Span>> {
 
 /// What a window begins with.
 #[derive(Clone, Copy)]
-struct Start {
+struct Start<const N: usize> {
     /// Point and first to third derivative by the length of the path.
-    point: [Vector; DECIDED],
+    point: [Vector<N>; DECIDED],
     /// How far the curve and the path have been walked.
-    walk: Walk,
+    walk: Walk<N>,
     /// Length and feed of the span before \[mm, mm/s\].
     past: Option<(f64, f64)>,
 }
 
 /// A part of a curve that is made at once.
-struct Window<'a> {
-    guide: &'a Guide<'a>,
-    start: Start,
+struct Window<'a, const N: usize> {
+    guide: &'a Guide<'a, N>,
+    start: Start<N>,
     /// Where it ends \[mm\]. The mesh goes farther, unless the path ends there.
     end_mm: f64,
     is_last: bool,
@@ -162,9 +186,9 @@ struct Window<'a> {
 }
 
 /// The spans of a window, and what the next one begins with.
-struct Made {
-    spans: Vec<Span>,
-    next: Start,
+struct Made<const N: usize> {
+    spans: Vec<Span<N>>,
+    next: Start<N>,
 }
 
 /// Spans, and what their tolerance has to be made smaller by.
@@ -178,9 +202,9 @@ enum Failure {
     Unsolved,
 }
 
-impl Window<'_> {
+impl<const N: usize> Window<'_, N> {
     /// The spans, with more knots than the mesh has where that is needed; nothing if none were found.
-    fn spans(&self, mut mesh: Mesh) -> Option<Made> {
+    fn spans(&self, mut mesh: Mesh) -> Option<Made<N>> {
         let mut is_halved = false;
         for _ in 0..=REFINEMENTS {
             mesh = match self.with_knots(&mesh) {
@@ -197,7 +221,7 @@ impl Window<'_> {
     }
 
     /// The spans with these knots.
-    fn with_knots(&self, mesh: &Mesh) -> Result<Made, Failure> {
+    fn with_knots(&self, mesh: &Mesh) -> Result<Made<N>, Failure> {
         let (guide, limits) = (self.guide, self.limits);
         let programmed = programmed_mm_s(guide, mesh);
         let lengths_mm = mesh.lengths_mm();
@@ -319,7 +343,7 @@ impl Approach {
 }
 
 /// The programmed feed of each span \[mm/s\].
-fn programmed_mm_s(guide: &Guide, mesh: &Mesh) -> Vec<f64> {
+fn programmed_mm_s<const N: usize>(guide: &Guide<N>, mesh: &Mesh) -> Vec<f64> {
     let of_span = |ends: &[f64]| {
         let parts = &guide.parts[guide.part_at(ends[0])..=guide.part_at(ends[1])];
         parts.iter().map(|part| part.feed_mm_s).fold(f64::INFINITY, f64::min)
@@ -328,7 +352,7 @@ fn programmed_mm_s(guide: &Guide, mesh: &Mesh) -> Vec<f64> {
 }
 
 /// The feeds that the scale of the path promises, to begin with \[mm/s\].
-fn promised_mm_s(guide: &Guide, mesh: &Mesh, limits: &Limits<f64>) -> Vec<f64> {
+fn promised_mm_s<const N: usize>(guide: &Guide<N>, mesh: &Mesh, limits: &Limits<f64>) -> Vec<f64> {
     let of_span = |(ends, scale_mm): (&[f64], &f64)| {
         let tolerance_mm = guide.parts[guide.part_at(ends[0])].tolerance_mm;
         scale_mm * libm::cbrt(limits.jerk_mm_s3 / (THIRD * tolerance_mm))
@@ -336,10 +360,10 @@ fn promised_mm_s(guide: &Guide, mesh: &Mesh, limits: &Limits<f64>) -> Vec<f64> {
     mesh.breaks_mm.windows(2).zip(&mesh.scales_mm).map(of_span).collect()
 }
 
-impl Window<'_> {
+impl<const N: usize> Window<'_, N> {
     /// The spans as they stand, and what the next window begins with; or those that are farther from the path
     /// than their tolerance or can't be driven, with what the tolerance has to be made smaller by.
-    fn made(&self, problem: &Problem) -> Result<(Vec<Span>, Start), TooFar> {
+    fn made(&self, problem: &Problem<N>) -> Result<(Vec<Span<N>>, Start<N>), TooFar> {
         let (guide, breaks) = (self.guide, problem.breaks());
         let kept = breaks.partition_point(|&mm| mm < self.end_mm);
         let shapes = problem.shapes();
@@ -357,7 +381,7 @@ impl Window<'_> {
             let parts = (guide.part_at(ends[0]), guide.part_at(ends[1]));
             let deviation = deviations[index];
             let from = if index == 0 { self.start.point[0] } else { *from };
-            let to: Vector = shapes.get(index + 1).map_or(end, |next| next.0);
+            let to: Vector<N> = shapes.get(index + 1).map_or(end, |next| next.0);
             let element = Element::Polynomial { from, to, shape: *shape, role: Role::Curve };
             match element.greatest_driven() {
                 Ok(greatest) if deviation.share <= 1.0 => {
@@ -582,7 +606,7 @@ mod tests {
 
     #[test]
     fn what_has_no_curve_has_none() {
-        assert!(fair(&[], &LIMITS).is_none());
+        assert!(fair::<3>(&[], &LIMITS).is_none());
         let mut parts = lines(&chords(20, 0.0), 0.01);
         let curve = Polynomial::bezier(core::array::from_fn(|index| [index as f64, 0.0, 0.0]));
         parts.push(Part { element: Element::polynomial([0.0; 3], curve, Role::Spline), ..parts[0] });

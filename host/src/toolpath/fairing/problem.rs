@@ -34,11 +34,11 @@ const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 /// A point of the path that holds the curve.
-struct Sample {
+struct Sample<const N: usize> {
     /// The first control point that acts on it.
     first: usize,
     row: Row,
-    at: Vector,
+    at: Vector<N>,
     /// 1/tolerance² \[1/mm²\].
     per_square: f64,
     /// The slack variable, above 0: with [`Problem::square`] it makes 1, and what it is off by is the
@@ -48,8 +48,8 @@ struct Sample {
     multiplier: f64,
 }
 
-impl Sample {
-    fn new(knots: &[f64], span: usize, mm: f64, at: Vector, tolerance_mm: f64) -> Self {
+impl<const N: usize> Sample<N> {
+    fn new(knots: &[f64], span: usize, mm: f64, at: Vector<N>, tolerance_mm: f64) -> Self {
         let tolerance_mm = USED * tolerance_mm;
         let per_square = 1.0 / (tolerance_mm * tolerance_mm);
         Self {
@@ -74,30 +74,30 @@ struct Bending {
 }
 
 /// The problem and where its solution stands.
-pub(super) struct Problem<'a> {
+pub(super) struct Problem<'a, const N: usize> {
     /// Ends of the spans \[mm\].
     breaks: &'a [f64],
     knots: Vec<f64>,
-    samples: Vec<Sample>,
+    samples: Vec<Sample<N>>,
     bendings: Vec<Bending>,
-    control: Vec<Vector>,
+    control: Vec<Vector<N>>,
     /// Control points that the end has decided.
     decided_at_end: usize,
-    equations: Cholesky,
+    equations: Cholesky<N>,
 }
 
-impl<'a> Problem<'a> {
+impl<'a, const N: usize> Problem<'a, N> {
     /// The curve over `breaks`, which starts with this point and its first to third derivative by the length of
     /// the path, and ends with these, or freely.
     pub(super) fn new(
-        guide: &Guide,
+        guide: &Guide<N>,
         breaks: &'a [f64],
-        start: &[Vector; DECIDED],
-        end: Option<&[Vector; DECIDED]>,
+        start: &[Vector<N>; DECIDED],
+        end: Option<&[Vector<N>; DECIDED]>,
     ) -> Self {
         let knots = clamped(breaks, DEGREE);
         let points = breaks.len() - 1 + DEGREE;
-        let mut control: Vec<Vector> = (0..points)
+        let mut control: Vec<Vector<N>> = (0..points)
             .map(|index| {
                 let mm = knots[index + 1..=index + DEGREE].iter().sum::<f64>() / DEGREE as f64;
                 guide.at(guide.part_at(mm), mm).0
@@ -157,12 +157,12 @@ impl<'a> Problem<'a> {
     }
 
     /// Second to fourth derivative at a point of the quadrature on a span.
-    fn bent(&self, span: usize, rows: &[Row; 3]) -> [Vector; 3] {
+    fn bent(&self, span: usize, rows: &[Row; 3]) -> [Vector<N>; 3] {
         let acting = &self.control[span..span + ACTING];
         // Relative to one of them, so that nothing is lost far from the origin.
         rows.map(|row| {
             let terms = acting.iter().zip(row);
-            terms.fold([0.0; 3], |sum, (&c, factor)| add(sum, scale(subtract(c, acting[2]), factor)))
+            terms.fold([0.0; N], |sum, (&c, factor)| add(sum, scale(subtract(c, acting[2]), factor)))
         })
     }
 
@@ -179,7 +179,7 @@ impl<'a> Problem<'a> {
         0.5 * sum
     }
 
-    fn distance(&self, sample: &Sample) -> Vector {
+    fn distance(&self, sample: &Sample<N>) -> Vector<N> {
         let acting = &self.control[sample.first..sample.first + ACTING];
         let offset = subtract(acting[2], sample.at);
         let terms = acting.iter().zip(sample.row);
@@ -193,7 +193,7 @@ impl<'a> Problem<'a> {
 
     /// The spans where the curve is farther from a sample than so many of its tolerances.
     pub(super) fn tight(&self, tolerances: f64) -> Vec<usize> {
-        let is_far = |sample: &&Sample| self.square(sample) > tolerances * tolerances;
+        let is_far = |sample: &&Sample<N>| self.square(sample) > tolerances * tolerances;
         let mut spans: Vec<usize> = self.samples.iter().filter(is_far).map(|sample| sample.first).collect();
         spans.dedup();
         spans
@@ -212,7 +212,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The square of the distance from a sample, in units of its tolerance: at most 1 within it.
-    fn square(&self, sample: &Sample) -> f64 {
+    fn square(&self, sample: &Sample<N>) -> f64 {
         let e = self.distance(sample);
         sample.per_square * dot(e, e)
     }
@@ -254,7 +254,7 @@ impl<'a> Problem<'a> {
         add_work(self.bendings.len() + self.samples.len());
         let per_sample = gap_aim / self.samples.len() as f64;
         self.equations.clear();
-        let mut slope = vec![[0.0; 3]; self.control.len()];
+        let mut slope = vec![[0.0; N]; self.control.len()];
         for (span, bending) in self.bendings.iter().enumerate() {
             for (rows, factors) in bending.rows.iter().zip(&bending.factors) {
                 for ((row, derivative), factor) in rows.iter().zip(self.bent(span, rows)).zip(factors) {
@@ -278,7 +278,7 @@ impl<'a> Problem<'a> {
                 (2.0 * sample.multiplier * sample.per_square, sample.multiplier / sample.slack);
             let push = per_sample / sample.slack + square * violation;
             pushes.push((pulled, violation, push));
-            let curvature: [Vector; 3] = core::array::from_fn(|a| {
+            let curvature: [Vector<N>; N] = core::array::from_fn(|a| {
                 core::array::from_fn(|b| square * pulled[a] * pulled[b] + if a == b { linear } else { 0.0 })
             });
             for (slope, entry) in slope[sample.first..].iter_mut().zip(&sample.row) {
@@ -288,7 +288,7 @@ impl<'a> Problem<'a> {
         }
         let last = self.control.len() - self.decided_at_end;
         for held in [0..DECIDED, last..self.control.len()] {
-            slope[held.clone()].fill([0.0; 3]);
+            slope[held.clone()].fill([0.0; N]);
             self.equations.hold(held);
         }
         if !self.equations.solve(&mut slope) {
@@ -300,7 +300,7 @@ impl<'a> Problem<'a> {
         let mut changes = Vec::with_capacity(self.samples.len());
         for (sample, (pulled, violation, push)) in self.samples.iter().zip(pushes) {
             let acting = step[sample.first..].iter().zip(&sample.row);
-            let moved = acting.fold([0.0; 3], |sum, (&step, &entry)| add(sum, scale(step, entry)));
+            let moved = acting.fold([0.0; N], |sum, (&step, &entry)| add(sum, scale(step, entry)));
             let along = dot(pulled, moved);
             let multiplier_change = push + sample.multiplier / sample.slack * along - sample.multiplier;
             let slack_change = -violation - along;
@@ -345,11 +345,12 @@ impl<'a> Problem<'a> {
     }
 
     /// Start and shape of each span.
-    pub(super) fn shapes(&self) -> Vec<(Vector, Polynomial)> {
+    pub(super) fn shapes(&self) -> Vec<(Vector<N>, Polynomial<N>)> {
         let of_span = |span: usize| {
             let acting = &self.control[span..span + ACTING];
             // Relative to the first control point, so that nothing is lost far from the origin.
-            let relative: [Vector; ACTING] = core::array::from_fn(|index| subtract(acting[index], acting[0]));
+            let relative: [Vector<N>; ACTING] =
+                core::array::from_fn(|index| subtract(acting[index], acting[0]));
             let (offset, shape) = polynomial(&self.knots, DEGREE, DEGREE + span, &relative);
             (add(acting[0], offset), shape)
         };
@@ -365,7 +366,12 @@ const SLACK_MIN: f64 = 0.1;
 const APART_MAX: f64 = 100.0;
 
 /// The control points at the start or the end of the knots, from point and derivatives there.
-fn decide(knots: &[f64], control: &mut [Vector], point: &[Vector; DECIDED], is_end: bool) {
+fn decide<const N: usize>(
+    knots: &[f64],
+    control: &mut [Vector<N>],
+    point: &[Vector<N>; DECIDED],
+    is_end: bool,
+) {
     let (count, last_span) = (control.len(), control.len() - 1);
     let (span, mm) = if is_end { (last_span, knots[count]) } else { (DEGREE, knots[DEGREE]) };
     for (order, &derivative) in point.iter().enumerate() {
@@ -385,7 +391,12 @@ fn decide(knots: &[f64], control: &mut [Vector], point: &[Vector; DECIDED], is_e
 
 /// Samples at every joint of the path's parts, and so many between that each span has some; none at the start,
 /// and one at the end if that is free.
-fn samples(guide: &Guide, breaks: &[f64], knots: &[f64], is_end_free: bool) -> Vec<Sample> {
+fn samples<const N: usize>(
+    guide: &Guide<N>,
+    breaks: &[f64],
+    knots: &[f64],
+    is_end_free: bool,
+) -> Vec<Sample<N>> {
     let mut samples = Vec::new();
     let last = breaks.len() - 2;
     let (mut mm, end_mm) = (breaks[0], breaks[last + 1]);

@@ -11,26 +11,26 @@ use crate::toolpath::{Vector, add, scale, subtract};
 const PIVOT_MIN: f64 = 1.0e-11;
 
 /// Rows rotated into a triangle.
-pub(super) struct Band {
+pub(super) struct Band<const N: usize> {
     /// Row i holds columns i … i + [`DEGREE_MAX`].
     triangle: Vec<Row>,
-    sides: Vec<Vector>,
+    sides: Vec<Vector<N>>,
     /// Greatest |entry| of each column, as the rows came.
     greatest: Vec<f64>,
 }
 
-impl Band {
+impl<const N: usize> Band<N> {
     /// For `unknowns` points.
     pub(super) fn new(unknowns: usize) -> Self {
         Self {
             triangle: vec![[0.0; DEGREE_MAX + 1]; unknowns],
-            sides: vec![[0.0; 3]; unknowns],
+            sides: vec![[0.0; N]; unknowns],
             greatest: vec![0.0; unknowns],
         }
     }
 
     /// Adds Σ rowᵢ·unknown[first + i] = side. Entries beyond the last unknown are 0.
-    pub(super) fn add(&mut self, first: usize, mut row: Row, mut side: Vector) {
+    pub(super) fn add(&mut self, first: usize, mut row: Row, mut side: Vector<N>) {
         for (greatest, entry) in self.greatest[first..].iter_mut().zip(row) {
             *greatest = greatest.max(entry.abs());
         }
@@ -53,7 +53,7 @@ impl Band {
     }
 
     /// The unknowns; nothing if the rows leave one of them undetermined.
-    pub(super) fn solve(mut self) -> Option<Vec<Vector>> {
+    pub(super) fn solve(mut self) -> Option<Vec<Vector<N>>> {
         for index in (0..self.triangle.len()).rev() {
             let row = self.triangle[index];
             if !(row[0].abs() > PIVOT_MIN * self.greatest[index]) {

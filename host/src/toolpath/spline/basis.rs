@@ -43,19 +43,19 @@ pub(in crate::toolpath) fn row(knots: &[f64], degree: usize, span: usize, u: f64
 
 /// The start, and the polynomial from there, of the span between `knots[span]` and the knot behind it, on
 /// which the control points `acting` act.
-pub(in crate::toolpath) fn polynomial(
+pub(in crate::toolpath) fn polynomial<const N: usize>(
     knots: &[f64],
     degree: usize,
     span: usize,
-    acting: &[Vector],
-) -> (Vector, Polynomial) {
+    acting: &[Vector<N>],
+) -> (Vector<N>, Polynomial<N>) {
     let (u, width) = (knots[span], knots[span + 1] - knots[span]);
     let derivative = |order: usize| {
         let row = row(knots, degree, span, u, order);
         let terms = row.iter().zip(acting);
-        terms.fold([0.0; 3], |sum, (&factor, &point)| add(sum, scale(point, factor)))
+        terms.fold([0.0; N], |sum, (&factor, &point)| add(sum, scale(point, factor)))
     };
-    let mut coefficients = [[0.0; 3]; polynomial::DEGREE];
+    let mut coefficients = [[0.0; N]; polynomial::DEGREE];
     let mut power = 1.0;
     for (order, coefficient) in (1..=degree).zip(&mut coefficients) {
         // hᵏ/k!

@@ -56,21 +56,21 @@ impl Degree {
 
 /// Derivatives by the parameter at one end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Derivatives {
+pub struct Derivatives<const N: usize = 3> {
     /// dr/du \[mm\].
-    pub first: Vector,
+    pub first: Vector<N>,
     /// d²r/du² \[mm\]; a cubic spline has no use for it.
-    pub second: Vector,
+    pub second: Vector<N>,
 }
 
 /// What is known of the ends of an interpolating spline.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Ends {
+pub enum Ends<const N: usize = 3> {
     /// Nothing: no knot next to them.
     #[default]
     Free,
     /// The derivatives at the start and at the end.
-    Clamped([Derivatives; 2]),
+    Clamped([Derivatives<N>; 2]),
 }
 
 /// Why there is no spline. Points are counted from 0. Displays as "…, expected …".
@@ -150,18 +150,18 @@ impl SplineError {
 
 /// Polynomials, one after the other, over a common parameter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Spline {
+pub struct Spline<const N: usize = 3> {
     degree: Degree,
     knots: Vec<f64>,
     /// Where each span starts \[mm\].
-    starts: Vec<Vector>,
-    spans: Vec<Polynomial>,
+    starts: Vec<Vector<N>>,
+    spans: Vec<Polynomial<N>>,
     deviation_mm: f64,
     /// How many points lie at or before the end of each span.
     points_to: Vec<usize>,
 }
 
-impl Spline {
+impl<const N: usize> Spline<N> {
     /// Its degree.
     #[must_use]
     pub fn degree(&self) -> Degree {
@@ -170,7 +170,7 @@ impl Spline {
 
     /// Where it starts \[mm\].
     #[must_use]
-    pub fn start_mm(&self) -> Vector {
+    pub fn start_mm(&self) -> Vector<N> {
         self.starts[0]
     }
 
@@ -182,7 +182,7 @@ impl Spline {
 
     /// Polynomials of the spans, each over 0 … 1.
     #[must_use]
-    pub fn spans(&self) -> &[Polynomial] {
+    pub fn spans(&self) -> &[Polynomial<N>] {
         &self.spans
     }
 
@@ -193,7 +193,7 @@ impl Spline {
     }
 
     /// The spans as blocks of a path, each with the index, from 0, of the last given point on it.
-    pub fn elements(&self) -> impl Iterator<Item = (usize, Element)> + '_ {
+    pub fn elements(&self) -> impl Iterator<Item = (usize, Element<N>)> + '_ {
         let spans = self.starts.iter().zip(&self.spans).zip(&self.points_to);
         spans.map(|((&start, &shape), &points)| {
             (points.saturating_sub(1), Element::polynomial(start, shape, Role::Spline))
@@ -215,7 +215,7 @@ impl Spline {
 
     /// The point at `u` \[mm\].
     #[must_use]
-    pub fn at(&self, u: f64) -> Vector {
+    pub fn at(&self, u: f64) -> Vector<N> {
         use super::curve::Curve;
         let (span, part) = self.local(u);
         add(self.starts[span], self.spans[span].offset(0.0, part))
@@ -227,7 +227,7 @@ impl Spline {
 ///
 /// # Errors
 /// A coordinate is not finite, or a point is the one before.
-pub fn chord_lengths(points: &[Vector]) -> Result<Vec<f64>, SplineError> {
+pub fn chord_lengths<const N: usize>(points: &[Vector<N>]) -> Result<Vec<f64>, SplineError> {
     check_points(points)?;
     let mut u = 0.0;
     let steps = points.windows(2).map(|pair| {
@@ -237,7 +237,7 @@ pub fn chord_lengths(points: &[Vector]) -> Result<Vec<f64>, SplineError> {
     Ok(std::iter::once(0.0).take(points.len()).chain(steps).collect())
 }
 
-fn check_points(points: &[Vector]) -> Result<(), SplineError> {
+fn check_points<const N: usize>(points: &[Vector<N>]) -> Result<(), SplineError> {
     for (index, point) in points.iter().enumerate() {
         if let Some(&value) = point.iter().find(|mm| !mm.is_finite()) {
             return Err(SplineError::NotFinite { index, value });
@@ -249,7 +249,11 @@ fn check_points(points: &[Vector]) -> Result<(), SplineError> {
     Ok(())
 }
 
-fn check(points: &[Vector], parameters: &[f64], degree: Degree) -> Result<(), SplineError> {
+fn check<const N: usize>(
+    points: &[Vector<N>],
+    parameters: &[f64],
+    degree: Degree,
+) -> Result<(), SplineError> {
     if points.len() != parameters.len() {
         return Err(SplineError::Parameters { points: points.len(), parameters: parameters.len() });
     }
@@ -277,12 +281,12 @@ fn check(points: &[Vector], parameters: &[f64], degree: Degree) -> Result<(), Sp
 /// # Errors
 /// There are too few points (also for clamped ends), a number is not finite, a point is the one before, or
 /// the parameters don't grow, or so unevenly that double precision can't solve for the spline.
-pub fn interpolate(
-    points: &[Vector],
+pub fn interpolate<const N: usize>(
+    points: &[Vector<N>],
     parameters: &[f64],
     degree: Degree,
-    ends: &Ends,
-) -> Result<Spline, SplineError> {
+    ends: &Ends<N>,
+) -> Result<Spline<N>, SplineError> {
     check(points, parameters, degree)?;
     let last = points.len() - 1;
     let breaks: Vec<f64> = match ends {
@@ -310,12 +314,12 @@ pub fn interpolate(
 ///
 /// # Errors
 /// Those of [`interpolate`]; the tolerance is negative or not finite.
-pub fn fit(
-    points: &[Vector],
+pub fn fit<const N: usize>(
+    points: &[Vector<N>],
     parameters: &[f64],
     degree: Degree,
     tolerance_mm: f64,
-) -> Result<Spline, SplineError> {
+) -> Result<Spline<N>, SplineError> {
     if !(tolerance_mm >= 0.0 && tolerance_mm.is_finite()) {
         return Err(SplineError::Tolerance { mm: tolerance_mm });
     }
@@ -352,20 +356,20 @@ pub fn fit(
 
 /// The spline with knots at `breaks` that comes closest to the points and meets the first and the last one;
 /// before it, the point it misses most, and by how much \[mm\]. Nothing if the points don't determine it.
-fn least_squares(
-    points: &[Vector],
+fn least_squares<const N: usize>(
+    points: &[Vector<N>],
     parameters: &[f64],
     degree: Degree,
     breaks: &[f64],
-    ends: &Ends,
-) -> Option<(usize, f64, Spline)> {
+    ends: &Ends<N>,
+) -> Option<(usize, f64, Spline<N>)> {
     let p = degree.number();
     let knots = basis::clamped(breaks, p);
     let unknowns = breaks.len() - 1 + p;
     // All is relative to the first point, so that the first control point is 0.
     let chord = subtract(points[points.len() - 1], points[0]);
     let mut band = Band::new(unknowns);
-    let mut equation = |first: usize, mut row: basis::Row, side: Vector| {
+    let mut equation = |first: usize, mut row: basis::Row, side: Vector<N>| {
         if first == 0 {
             row[0] = 0.0;
         }
@@ -400,7 +404,7 @@ fn least_squares(
     }
     let mut alone = [0.0; DEGREE_MAX + 1];
     alone[0] = 1.0;
-    band.add(0, alone, [0.0; 3]);
+    band.add(0, alone, [0.0; N]);
     band.add(unknowns - 1, alone, chord);
     let control = band.solve()?;
 
