@@ -185,7 +185,9 @@ impl<const AXES: usize, const LINE: usize, const CHIPS: usize> SimMachine<AXES, 
     }
 }
 
-impl<const AXES: usize, const LINE: usize, const CHIPS: usize> Encoder<AXES> for &SimMachine<AXES, LINE, CHIPS> {
+impl<const AXES: usize, const LINE: usize, const CHIPS: usize> Encoder<AXES>
+    for &SimMachine<AXES, LINE, CHIPS>
+{
     type Error = Infallible;
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
@@ -194,7 +196,9 @@ impl<const AXES: usize, const LINE: usize, const CHIPS: usize> Encoder<AXES> for
     }
 }
 
-impl<const AXES: usize, const LINE: usize, const CHIPS: usize> Inputs<AXES> for &SimMachine<AXES, LINE, CHIPS> {
+impl<const AXES: usize, const LINE: usize, const CHIPS: usize> Inputs<AXES>
+    for &SimMachine<AXES, LINE, CHIPS>
+{
     type Error = Infallible;
 
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
@@ -202,7 +206,9 @@ impl<const AXES: usize, const LINE: usize, const CHIPS: usize> Inputs<AXES> for 
     }
 }
 
-impl<const AXES: usize, const LINE: usize, const CHIPS: usize> DriveEnable<AXES> for &SimMachine<AXES, LINE, CHIPS> {
+impl<const AXES: usize, const LINE: usize, const CHIPS: usize> DriveEnable<AXES>
+    for &SimMachine<AXES, LINE, CHIPS>
+{
     type Error = Infallible;
 
     fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {

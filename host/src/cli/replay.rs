@@ -54,7 +54,7 @@ pub fn replay(arguments: &ReplayArguments, out: &mut dyn Write) -> Result<Outcom
     let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
     let source = input::read(&arguments.recording)?;
     let refused = |error| CliError::Recording { path: source.name.clone(), source: error };
-    let recording = Recording::from_bytes(&source.text).map_err(refused)?;
+    let recording = Recording::<3>::from_bytes(&source.text).map_err(refused)?;
     let job = recording.job().map_err(refused)?;
     let (replayed, written) = outputs.of_run(
         &job,

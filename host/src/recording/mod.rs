@@ -6,24 +6,27 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MREC` |
-//! | 1 | version of this format, 3 |
+//! | 1 | version of this format, 4 |
+//! | 1 | places for axes, 3 or 9: [`places`] |
 //! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
 //! A [`Recording`] holds, in this order: the number type; the compiled program with the blocks of its path
 //! and its guards ([`motion_kernel::program`]); the learnt correction and the commands as text, if there are
-//! any; what a report shows of the run; the counts before the first tick; and the answers of every tick, some
-//! eight bytes each ([`answers`]).
+//! any; what a report shows of the run, with the letters of the axes in the first places; the counts before the first tick; and the answers of every tick, some
+//! eight bytes each on three places ([`answers`]).
 //!
 //! - [`answers`]: what the hardware answered, tick by tick;
 //! - [`recorder`]: hardware that writes it down;
-//! - [`replay`](mod@replay): hardware that answers from it, and the comparison.
+//! - [`replay`](mod@replay): hardware that answers from it, and the comparison;
+//! - `array`: arrays of one for each place.
 //!
 //! [`Player`]: replay::Player
 
 pub mod recorder;
 pub mod replay;
 pub mod answers;
+mod array;
 
 pub use recorder::Recorder;
 pub use replay::{Difference, Replay, replay};
@@ -36,14 +39,13 @@ use serde::{Deserialize, Serialize};
 use self::answers::RecordedAnswers;
 use crate::simulate::live::Script;
 use crate::simulate::{Job, Number, RunInfo, StretchCorrection};
-use crate::trace::AXES;
 
 const MAGIC: [u8; 4] = *b"MREC";
-const VERSION: u8 = 3;
+const VERSION: u8 = 4;
 
-/// A recorded run.
+/// A recorded run of a machine with `N` places for axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Recording {
+pub struct Recording<const N: usize = 3> {
     number: Number,
     /// A compiled program, blocks and guards included.
     program: Vec<u8>,
@@ -51,7 +53,8 @@ pub struct Recording {
     script: Option<Script>,
     info: RunInfo,
     /// What the encoders read before the first tick.
-    start: [Counts; AXES],
+    #[serde(with = "array")]
+    start: [Counts; N],
     answers: RecordedAnswers,
 }
 
@@ -69,6 +72,14 @@ pub enum RecordingError {
     Version {
         /// Theirs.
         found: u8,
+    },
+    /// They are of a machine with another number of places for axes.
+    #[error("found a recording of {found} places for axes, expected {expected}")]
+    Places {
+        /// Theirs.
+        found: u8,
+        /// What was asked for.
+        expected: usize,
     },
     /// They have been damaged, or end too early.
     #[error("found checksum {found:08x}, expected {expected:08x}: the recording is damaged or not whole")]
@@ -92,13 +103,13 @@ pub enum RecordingError {
     Check(CheckError<ProgramError>),
 }
 
-impl Recording {
+impl<const N: usize> Recording<N> {
     /// Of a job, with what a [`Recorder`] has seen of it.
     #[must_use]
-    pub(self) fn new(job: &Job, start: [Counts; AXES], answers: RecordedAnswers) -> Self {
+    pub(self) fn new(job: &Job<N>, start: [Counts; N], answers: RecordedAnswers) -> Self {
         let mut program = Vec::new();
-        // Entries of three axes fit the format.
-        program::write(&job.header, Some(&job.guards), &job.items, &mut program).expect("three axes");
+        // Entries of nine axes fit the format.
+        program::write(&job.header, Some(&job.guards), &job.items, &mut program).expect("at most nine axes");
         let Job { number, correction, script, info, .. } = job.clone();
         Self { number, program, correction, script, info, start, answers }
     }
@@ -106,7 +117,7 @@ impl Recording {
     /// The recording as bytes.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = [&MAGIC[..], &[VERSION]].concat();
+        let mut bytes = [&MAGIC[..], &[VERSION, N as u8]].concat();
         // Only what is endless, or of unknown length, can't be written.
         bytes.extend(postcard::to_stdvec(self).expect("figures, texts and lists"));
         bytes.extend(Checksum::of(&bytes).to_le_bytes());
@@ -118,15 +129,7 @@ impl Recording {
     /// # Errors
     /// Nothing but a whole, undamaged recording of a program that the kernel accepts.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RecordingError> {
-        let Some(rest) = bytes.strip_prefix(&MAGIC) else {
-            return Err(RecordingError::NotARecording { found: beginning(bytes) });
-        };
-        let [version, rest @ ..] = rest else {
-            return Err(RecordingError::NotARecording { found: "its first four bytes alone".to_owned() });
-        };
-        if *version != VERSION {
-            return Err(RecordingError::Version { found: *version });
-        }
+        let (places, rest) = head(bytes)?;
         let Some((body, &sum)) = rest.split_last_chunk() else {
             return Err(RecordingError::Malformed(format!("{} bytes in all", bytes.len())));
         };
@@ -134,12 +137,19 @@ impl Recording {
         if found != expected {
             return Err(RecordingError::Checksum { found, expected });
         }
+        if usize::from(places) != N {
+            return Err(RecordingError::Places { found: places, expected: N });
+        }
         let (recording, left) = postcard::take_from_bytes::<Self>(body)
             .map_err(|error| RecordingError::Malformed(error.to_string()))?;
         if !left.is_empty() {
             return Err(RecordingError::Malformed(format!("{} bytes too many", left.len())));
         }
-        recording.answers.check()?;
+        recording.answers.check::<N>()?;
+        if recording.info.axes.len() > N {
+            let found = format!("{} axes on {N} places", recording.info.axes.len());
+            return Err(RecordingError::Malformed(found));
+        }
         match recording.number {
             Number::F32 => recording.check::<f32>(),
             Number::F64 => recording.check::<f64>(),
@@ -149,10 +159,10 @@ impl Recording {
     }
 
     fn check<R: Real>(&self) -> Result<(), RecordingError> {
-        let reader = Reader::<AXES>::new(&self.program)?;
+        let reader = Reader::<N>::new(&self.program)?;
         reader.guards()?.ok_or(RecordingError::Unguarded)?;
         let items = program::switches_as_stops(reader.items());
-        program::check::<R, AXES, _>(reader.header(), items).map_err(|error| match error {
+        program::check::<R, N, _>(reader.header(), items).map_err(|error| match error {
             CheckError::Item { cause: SupplyError::Source(error), .. } => error.into(),
             error => RecordingError::Check(error),
         })
@@ -162,7 +172,7 @@ impl Recording {
     ///
     /// # Errors
     /// The program in it can't be read.
-    pub fn job(&self) -> Result<Job, RecordingError> {
+    pub fn job(&self) -> Result<Job<N>, RecordingError> {
         let reader = Reader::new(&self.program)?;
         Ok(Job {
             number: self.number,
@@ -185,6 +195,27 @@ impl Recording {
     #[must_use]
     pub fn digest(&self) -> u64 {
         self.answers.digest
+    }
+}
+
+/// How many places for axes the machine of a recording has: with as many its bytes can be read.
+///
+/// # Errors
+/// The bytes do not begin as a recording of this version.
+pub fn places(bytes: &[u8]) -> Result<usize, RecordingError> {
+    head(bytes).map(|(places, _)| usize::from(places))
+}
+
+/// The places for axes, and what is behind the head.
+fn head(bytes: &[u8]) -> Result<(u8, &[u8]), RecordingError> {
+    let Some(rest) = bytes.strip_prefix(&MAGIC) else {
+        return Err(RecordingError::NotARecording { found: beginning(bytes) });
+    };
+    match *rest {
+        [] => Err(RecordingError::NotARecording { found: "its first four bytes alone".to_owned() }),
+        [version, ..] if version != VERSION => Err(RecordingError::Version { found: version }),
+        [_] => Err(RecordingError::Malformed(format!("{} bytes in all", bytes.len()))),
+        [_, places, ref rest @ ..] => Ok((places, rest)),
     }
 }
 

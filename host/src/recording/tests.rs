@@ -51,7 +51,7 @@ fn one_count_off_is_found_in_its_tick() {
         assert_eq!(replayed(&recording).difference, None);
         let (mut in_its_tick, mut later) = (0, 0);
         for tick in (0..recording.ticks()).step_by(37) {
-            for axis in 0..AXES {
+            for axis in 0..3 {
                 let changed = tampered(&recording, tick, |answers| {
                     answers.counts.as_mut().expect("read")[axis].0 += 1;
                 });
@@ -143,7 +143,7 @@ fn recorded_answers_read_what_was_written() {
         writer.add(answers, index as u8);
     }
     let recorded = writer.finish(0);
-    recorded.check().expect("entries");
+    recorded.check::<3>().expect("entries");
     for (index, (read, written)) in recorded.read(start).zip(&all).enumerate() {
         assert_eq!(read, (*written, index as u8));
     }
@@ -151,7 +151,7 @@ fn recorded_answers_read_what_was_written() {
 
 #[test]
 fn strangers_are_named() {
-    let message = |bytes: &[u8]| Recording::from_bytes(bytes).expect_err("no recording").to_string();
+    let message = |bytes: &[u8]| Recording::<3>::from_bytes(bytes).expect_err("no recording").to_string();
     let bytes = recorded(Number::F32).to_bytes();
     assert_eq!(message(b""), "found nothing, expected a recording, which begins with MREC");
     assert_eq!(
@@ -160,11 +160,12 @@ fn strangers_are_named() {
     );
     let mut newer = bytes.clone();
     newer[4] = 9;
-    assert_eq!(message(&newer), "found a recording of format 9, expected format 3");
+    assert_eq!(message(&newer), "found a recording of format 9, expected format 4");
     assert!(message(&bytes[..bytes.len() - 1]).contains("damaged or not whole"));
 
     // With a checksum that fits.
-    let sealed = |recording: &Recording| Recording::from_bytes(&recording.to_bytes()).expect_err("refused");
+    let sealed =
+        |recording: &Recording| Recording::<3>::from_bytes(&recording.to_bytes()).expect_err("refused");
     let recording = recorded(Number::F32);
     let mut foreign = recording.clone();
     foreign.program[4] = 9;
