@@ -4,6 +4,7 @@
 //! cargo test -p motion-host --test suite gcode::      one suite
 //! ```
 
+mod axes_runs;
 mod cli;
 mod compare;
 mod curves;

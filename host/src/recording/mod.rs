@@ -11,10 +11,10 @@
 //! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
-//! A [`Recording`] holds, in this order: the number type; the compiled program with the blocks of its path
-//! and its guards ([`motion_kernel::program`]); the learnt correction and the commands as text, if there are
-//! any; what a report shows of the run, with the letters of the axes in the first places; the counts before the first tick; and the answers of every tick, some
-//! eight bytes each on three places ([`answers`]).
+//! A [`Recording`] holds, in this order: the [`Job`], which is the number type, machine and guards as the kernel knows them,
+//! the program's items with the blocks of its path, the learnt correction and the commands as text, if there are any, and
+//! what a report shows of the run, with the letters of the axes in the first places; the counts before the first tick; and
+//! the answers of every tick, some eight bytes each on three places ([`answers`]).
 //!
 //! - [`answers`]: what the hardware answered, tick by tick;
 //! - [`recorder`]: hardware that writes it down;
@@ -31,14 +31,15 @@ mod array;
 pub use recorder::Recorder;
 pub use replay::{Difference, Replay, replay};
 
+use std::convert::Infallible;
+
 use motion_kernel::num::{Fixed, Real};
-use motion_kernel::program::{self, CheckError, Checksum, ProgramError, Reader, SupplyError};
+use motion_kernel::program::{self, CheckError, Checksum};
 use motion_kernel::units::Counts;
 use serde::{Deserialize, Serialize};
 
 use self::answers::RecordedAnswers;
-use crate::simulate::live::Script;
-use crate::simulate::{Job, Number, RunInfo, StretchCorrection};
+use crate::simulate::{Job, Number};
 
 const MAGIC: [u8; 4] = *b"MREC";
 const VERSION: u8 = 4;
@@ -46,12 +47,7 @@ const VERSION: u8 = 4;
 /// A recorded run of a machine with `N` places for axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Recording<const N: usize = 3> {
-    number: Number,
-    /// A compiled program, blocks and guards included.
-    program: Vec<u8>,
-    correction: Option<StretchCorrection>,
-    script: Option<Script>,
-    info: RunInfo,
+    job: Job<N>,
     /// What the encoders read before the first tick.
     #[serde(with = "array")]
     start: [Counts; N],
@@ -92,26 +88,16 @@ pub enum RecordingError {
     /// Behind an intact checksum something is not as it is written.
     #[error("found no recording behind an intact checksum: {0}")]
     Malformed(String),
-    /// The program in it is not one for this kernel.
-    #[error("program in the recording: found {0}")]
-    Program(#[from] ProgramError),
-    /// The program in it does not say how its faults end.
-    #[error("program in the recording: found no guards, expected how its faults are told and end")]
-    Unguarded,
     /// The kernel does not accept the program in it.
     #[error("program in the recording: found {0}, expected what this kernel accepts")]
-    Check(CheckError<ProgramError>),
+    Check(CheckError<Infallible>),
 }
 
 impl<const N: usize> Recording<N> {
     /// Of a job, with what a [`Recorder`] has seen of it.
     #[must_use]
     pub(self) fn new(job: &Job<N>, start: [Counts; N], answers: RecordedAnswers) -> Self {
-        let mut program = Vec::new();
-        // Entries of nine axes fit the format.
-        program::write(&job.header, Some(&job.guards), &job.items, &mut program).expect("at most nine axes");
-        let Job { number, correction, script, info, .. } = job.clone();
-        Self { number, program, correction, script, info, start, answers }
+        Self { job: job.clone(), start, answers }
     }
 
     /// The recording as bytes.
@@ -146,11 +132,11 @@ impl<const N: usize> Recording<N> {
             return Err(RecordingError::Malformed(format!("{} bytes too many", left.len())));
         }
         recording.answers.check::<N>()?;
-        if recording.info.axes.len() > N {
-            let found = format!("{} axes on {N} places", recording.info.axes.len());
+        if recording.job.info.axes.len() > N {
+            let found = format!("{} axes on {N} places", recording.job.info.axes.len());
             return Err(RecordingError::Malformed(found));
         }
-        match recording.number {
+        match recording.job.number {
             Number::F32 => recording.check::<f32>(),
             Number::F64 => recording.check::<f64>(),
             Number::Fixed => recording.check::<Fixed>(),
@@ -159,30 +145,14 @@ impl<const N: usize> Recording<N> {
     }
 
     fn check<R: Real>(&self) -> Result<(), RecordingError> {
-        let reader = Reader::<N>::new(&self.program)?;
-        reader.guards()?.ok_or(RecordingError::Unguarded)?;
-        let items = program::switches_as_stops(reader.items());
-        program::check::<R, N, _>(reader.header(), items).map_err(|error| match error {
-            CheckError::Item { cause: SupplyError::Source(error), .. } => error.into(),
-            error => RecordingError::Check(error),
-        })
+        let items = program::switches_as_stops(self.job.items.iter().map(|&item| Ok(item)));
+        program::check::<R, N, _>(&self.job.header, items).map_err(RecordingError::Check)
     }
 
     /// What was run.
-    ///
-    /// # Errors
-    /// The program in it can't be read.
-    pub fn job(&self) -> Result<Job<N>, RecordingError> {
-        let reader = Reader::new(&self.program)?;
-        Ok(Job {
-            number: self.number,
-            header: *reader.header(),
-            guards: reader.guards()?.ok_or(RecordingError::Unguarded)?,
-            items: reader.items().collect::<Result<_, _>>()?,
-            correction: self.correction.clone(),
-            script: self.script.clone(),
-            info: self.info.clone(),
-        })
+    #[must_use]
+    pub fn job(&self) -> &Job<N> {
+        &self.job
     }
 
     /// Ticks in it, those included in which the machine settled after the program's end.

@@ -61,7 +61,7 @@ pub struct RunOptions<'a> {
 }
 
 /// A program with its machine, and with what is commanded on the way.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Job<const N: usize = 3> {
     /// The kernel's number type.
     pub number: Number,
