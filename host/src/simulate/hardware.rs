@@ -63,8 +63,8 @@ impl<'a, const N: usize> SimulatedHardware<'a, N> {
     /// # Errors
     /// A converter does not take its configuration.
     pub fn new(machine: &'a Simulated<N>) -> Result<Self, RunError> {
-        let outputs =
-            Converters::setup(machine.chips()).map_err(|error| RunError::Simulation(format!("{error:?}")))?;
+        let outputs = Converters::setup(machine.chips(), N)
+            .map_err(|error| RunError::Simulation(format!("{error:?}")))?;
         let homes = [const { None }; N];
         Ok(Self { machine, outputs, injector: Injector::new(), breaks: Vec::new(), homes, ticks: 0 })
     }
