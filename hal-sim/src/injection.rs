@@ -83,9 +83,9 @@ impl<const AXES: usize> Injector<AXES> {
     }
 
     /// Breaks a part of an axis, counted from 0; without effect if there is no such axis.
-    pub fn inject<const LINE: usize>(
+    pub fn inject<const LINE: usize, const CHIPS: usize>(
         &mut self,
-        machine: &SimMachine<AXES, LINE>,
+        machine: &SimMachine<AXES, LINE, CHIPS>,
         axis: usize,
         injection: Injection,
     ) {
@@ -127,7 +127,10 @@ impl<const AXES: usize> Injector<AXES> {
 
     /// The inputs of a machine in its present state.
     #[must_use]
-    pub fn inputs<const LINE: usize>(&self, machine: &SimMachine<AXES, LINE>) -> MachineInputs<AXES> {
+    pub fn inputs<const LINE: usize, const CHIPS: usize>(
+        &self,
+        machine: &SimMachine<AXES, LINE, CHIPS>,
+    ) -> MachineInputs<AXES> {
         let mut axes = [AxisInputs::HEALTHY; AXES];
         for ((broken, inputs), truth) in self.axes.iter().zip(&mut axes).zip(machine.truth()) {
             let [low_mm, high_mm] = broken.limits_mm;

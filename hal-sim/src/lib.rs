@@ -25,7 +25,7 @@
 //!
 //! [`closed_loop`] runs a compiled program on it, the same way on a PC and inside an emulated board.
 //! [`Injector`] breaks it on demand.
-//! [`SimMachine`] holds one chip and up to four such axes and advances them one control tick at a time.
+//! [`SimMachine`] holds such axes, up to four to a chip, and advances them one control tick at a time.
 //!
 //! # Example
 //!

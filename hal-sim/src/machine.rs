@@ -1,6 +1,6 @@
-//! A machine of simulated axes behind one DAC chip, as the kernel's hardware.
+//! A machine of simulated axes behind DAC chips, as the kernel's hardware.
 //!
-//! Consumes the chip's voltages and the drive enable; produces encoder counts, all axes at once. One
+//! Consumes the chips' voltages and the drive enable; produces encoder counts, all axes at once. One
 //! [`SimMachine::advance`] is one control tick; its cost is constant: axes × sub-steps.
 //!
 //! Everything goes through a shared reference, as on a board where several peripherals connect to the same
@@ -29,7 +29,7 @@ pub const REFERENCE_LINE: usize = 64;
 /// A machine. Immutable once given to a [`SimMachine`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineParameters<const AXES: usize> {
-    /// The axes, on the DAC's channels from A upwards.
+    /// The axes, on the DAC's channels from A upwards; each four have a chip.
     pub axes: [AxisParameters; AXES],
     /// Control tick \[s\], > 0.
     pub tick_s: f64,
@@ -75,7 +75,7 @@ pub struct AxisTruth {
     pub bed_mm: f64,
 }
 
-/// One to four simulated axes and their DAC. More than four axes do not compile:
+/// Simulated axes and their DACs: up to four axes to a chip. More axes do not compile:
 ///
 /// ```compile_fail,E0080
 /// use hal_sim::{AxisParameters, MachineParameters, SimMachine};
@@ -83,18 +83,18 @@ pub struct AxisTruth {
 /// let _ = SimMachine::<5>::new(&parameters);
 /// ```
 #[derive(Debug)]
-pub struct SimMachine<const AXES: usize, const LINE: usize = REFERENCE_LINE> {
-    chip: Ad5754Chip,
+pub struct SimMachine<const AXES: usize, const LINE: usize = REFERENCE_LINE, const CHIPS: usize = 1> {
+    chips: [Ad5754Chip; CHIPS],
     axes: RefCell<[SimAxis<LINE>; AXES]>,
     is_enabled: Cell<bool>,
     tick_ns: u64,
     ticks: Cell<u64>,
 }
 
-impl<const AXES: usize, const LINE: usize> SimMachine<AXES, LINE> {
-    const AXES_FIT: () = assert!(AXES >= 1 && AXES <= CHANNELS, "the DAC has four channels");
+impl<const AXES: usize, const LINE: usize, const CHIPS: usize> SimMachine<AXES, LINE, CHIPS> {
+    const AXES_FIT: () = assert!(AXES >= 1 && AXES <= CHIPS * CHANNELS, "a DAC has four channels");
 
-    /// A machine at rest, drives disabled, its chip just powered on.
+    /// A machine at rest, drives disabled, its chips just powered on.
     ///
     /// # Errors
     /// The first axis that cannot be simulated and why.
@@ -112,7 +112,7 @@ impl<const AXES: usize, const LINE: usize> SimMachine<AXES, LINE> {
             *place = build(axis)?;
         }
         Ok(Self {
-            chip: Ad5754Chip::new(),
+            chips: [const { Ad5754Chip::new() }; CHIPS],
             axes: RefCell::new(built),
             is_enabled: Cell::new(false),
             tick_ns: (tick_s * 1e9) as u64,
@@ -120,19 +120,26 @@ impl<const AXES: usize, const LINE: usize> SimMachine<AXES, LINE> {
         })
     }
 
-    /// The DAC chip: the SPI device of the velocity output's driver.
+    /// The DAC chip of the first four axes: the SPI device of the velocity output's driver.
     #[must_use]
     pub fn chip(&self) -> &Ad5754Chip {
-        &self.chip
+        &self.chips[0]
     }
 
-    /// One control tick: the chip's present voltages act on the drives until the next call.
+    /// The DAC chips that have axes, each of the four that follow those of the chip before.
+    #[must_use]
+    pub fn chips(&self) -> &[Ad5754Chip] {
+        &self.chips[..AXES.div_ceil(CHANNELS)]
+    }
+
+    /// One control tick: the chips' present voltages act on the drives until the next call.
     pub fn advance(&self) {
-        let volts = self.chip.volts();
-        for (axis, output_v) in self.axes.borrow_mut().iter_mut().zip(volts) {
-            axis.advance(output_v, self.is_enabled.get());
+        for (axes, chip) in self.axes.borrow_mut().chunks_mut(CHANNELS).zip(&self.chips) {
+            for (axis, output_v) in axes.iter_mut().zip(chip.volts()) {
+                axis.advance(output_v, self.is_enabled.get());
+            }
+            chip.elapse_ns(self.tick_ns);
         }
-        self.chip.elapse_ns(self.tick_ns);
         self.ticks.set(self.ticks.get() + 1);
     }
 
@@ -178,7 +185,9 @@ impl<const AXES: usize, const LINE: usize> SimMachine<AXES, LINE> {
     }
 }
 
-impl<const AXES: usize, const LINE: usize> Encoder<AXES> for &SimMachine<AXES, LINE> {
+impl<const AXES: usize, const LINE: usize, const CHIPS: usize> Encoder<AXES>
+    for &SimMachine<AXES, LINE, CHIPS>
+{
     type Error = Infallible;
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
@@ -187,7 +196,9 @@ impl<const AXES: usize, const LINE: usize> Encoder<AXES> for &SimMachine<AXES, L
     }
 }
 
-impl<const AXES: usize, const LINE: usize> Inputs<AXES> for &SimMachine<AXES, LINE> {
+impl<const AXES: usize, const LINE: usize, const CHIPS: usize> Inputs<AXES>
+    for &SimMachine<AXES, LINE, CHIPS>
+{
     type Error = Infallible;
 
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
@@ -195,7 +206,9 @@ impl<const AXES: usize, const LINE: usize> Inputs<AXES> for &SimMachine<AXES, LI
     }
 }
 
-impl<const AXES: usize, const LINE: usize> DriveEnable<AXES> for &SimMachine<AXES, LINE> {
+impl<const AXES: usize, const LINE: usize, const CHIPS: usize> DriveEnable<AXES>
+    for &SimMachine<AXES, LINE, CHIPS>
+{
     type Error = Infallible;
 
     fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
@@ -206,6 +219,9 @@ impl<const AXES: usize, const LINE: usize> DriveEnable<AXES> for &SimMachine<AXE
 
 #[cfg(test)]
 mod tests {
+    use motion_kernel::hal::{Ad5754Output, VelocityChannel};
+    use motion_kernel::units::DacCode;
+
     use super::*;
     use crate::{DriveParameters, REFERENCE_Y};
 
@@ -225,5 +241,21 @@ mod tests {
         let axes = [apart(1.0), apart(2.0), apart(3.0)];
         let machine = SimMachine::<3>::new(&MachineParameters::at_reference_tick(axes)).unwrap();
         assert_eq!((&machine).latch(), Ok([Counts(10_000), Counts(20_000), Counts(30_000)]));
+    }
+
+    #[test]
+    fn each_four_axes_have_a_chip() {
+        let parameters = MachineParameters::at_reference_tick([AxisParameters::REFERENCE_X; 6]);
+        let machine = SimMachine::<6, REFERENCE_LINE, 3>::new(&parameters).unwrap();
+        let [first, second] = machine.chips() else { panic!("{} chips", machine.chips().len()) };
+        let _first = Ad5754Output::<_, 4>::setup(first, &mut &*first).unwrap();
+        let mut second = Ad5754Output::<_, 4>::setup(second, &mut &*second).unwrap();
+        (&machine).set_enabled(true).unwrap();
+        second.write(&[DacCode::ZERO, DacCode(1000), DacCode::ZERO, DacCode::ZERO]).unwrap();
+        for _ in 0..100 {
+            machine.advance();
+        }
+        let moved = machine.truth().map(|axis| axis.position_mm > 0.1);
+        assert_eq!(moved, [false, false, false, false, false, true]);
     }
 }

@@ -7,9 +7,10 @@
 use motion_kernel::flight::{FlightRow, FrameError};
 
 use crate::machine::Machine;
+use crate::simulate::RunInfo;
 use crate::simulate::contour::Contour;
 use crate::simulate::run::state_name;
-use crate::trace::{AXES, AxisTick, TraceRow};
+use crate::trace::{AxisTick, TraceRow};
 
 /// What is in front of a frame's bytes.
 const MARK: &str = "flight [";
@@ -52,8 +53,8 @@ pub enum FlightError {
 ///
 /// # Errors
 /// There is no frame, or a frame is not whole.
-pub fn read(log: &str) -> Result<Vec<FlightRow<f64, AXES>>, FlightError> {
-    let mut rows: Vec<FlightRow<f64, AXES>> = Vec::new();
+pub fn read<const N: usize>(log: &str) -> Result<Vec<FlightRow<f64, N>>, FlightError> {
+    let mut rows: Vec<FlightRow<f64, N>> = Vec::new();
     for (index, text) in log.lines().enumerate() {
         let line = index + 1;
         let Some((_, bytes)) = text.split_once(MARK) else { continue };
@@ -77,12 +78,11 @@ fn frame(line: usize, text: &str) -> Result<Vec<u8>, FlightError> {
     bytes.split(',').map(byte).collect()
 }
 
-/// The rows as ticks of a run; the path position counts from the start of each stretch. Names and units are
-/// `machine`'s.
+/// The rows as ticks of a run of `machine`; the path position counts from the start of each stretch.
 #[must_use]
-pub fn ticks(rows: &[FlightRow<f64, AXES>]) -> Vec<TraceRow> {
-    let mut contour = Contour::default();
-    let tick = |row: &FlightRow<f64, AXES>| {
+pub fn ticks<const N: usize>(rows: &[FlightRow<f64, N>], machine: &Machine<N>) -> Vec<TraceRow<N>> {
+    let mut contour = Contour::new(RunInfo::of_machine(machine).linear_places());
+    let tick = |row: &FlightRow<f64, N>| {
         let axes = row.axes.map(|axis| AxisTick {
             set_mm: axis.set.to_mm(),
             vel_mm_s: axis.velocity_mm_s,
@@ -110,7 +110,7 @@ pub fn ticks(rows: &[FlightRow<f64, AXES>]) -> Vec<TraceRow> {
 
 /// What of the flight people are told, line by line.
 #[must_use]
-pub fn words(rows: &[FlightRow<f64, AXES>], machine: &Machine) -> Vec<String> {
+pub fn words<const N: usize>(rows: &[FlightRow<f64, N>], machine: &Machine<N>) -> Vec<String> {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Vec::new() };
     let spanned = last.tick - first.tick + 1;
     let mut words = vec![format!("ticks {} to {}, {} rows", first.tick, last.tick, rows.len())];
@@ -126,17 +126,18 @@ pub fn words(rows: &[FlightRow<f64, AXES>], machine: &Machine) -> Vec<String> {
         }
         None => words.push("no fault latched".to_owned()),
     }
-    for (axis, settings) in machine.axes.iter().enumerate() {
+    for (axis, settings) in machine.driven_axes().iter().enumerate() {
         if let Some(row) = rows.iter().find(|row| row.axes[axis].saturated) {
             words.push(format!("output of axis {} at its limit from tick {} on", settings.name, row.tick));
         }
         let errors_mm = rows.iter().map(|row| row.axes[axis].following_error_mm);
         let greater = |most: f64, error: f64| if error.abs() > most.abs() { error } else { most };
         words.push(format!(
-            "following error of axis {} at most {:.4} mm, limit {} mm",
+            "following error of axis {} at most {:.4} {unit}, limit {} {unit}",
             settings.name,
             errors_mm.fold(0.0, greater),
-            settings.following_error_limit_mm
+            settings.following_error_limit_mm,
+            unit = settings.unit().symbol(),
         ));
     }
     words
@@ -151,7 +152,7 @@ mod tests {
 
     use super::*;
 
-    fn row(tick: u64, is_faulted: bool) -> FlightRow<f64, AXES> {
+    fn row(tick: u64, is_faulted: bool) -> FlightRow<f64, 3> {
         let axis = FlightAxis {
             counts: Counts(-7),
             set: Position::from_mm(12.5).expect("near"),
@@ -172,12 +173,12 @@ mod tests {
             state: ExecState::Moving,
             emergency_stop: false,
             is_faulted,
-            axes: [axis; AXES],
+            axes: [axis; 3],
         }
     }
 
-    fn line(row: &FlightRow<f64, AXES>) -> String {
-        let mut buffer = [0; frame_max(AXES)];
+    fn line(row: &FlightRow<f64, 3>) -> String {
+        let mut buffer = [0; frame_max(3)];
         let bytes = row.to_frame(&mut buffer).expect("room");
         // As defmt shows `{=[u8]:02x}`.
         let bytes: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
@@ -205,7 +206,7 @@ mod tests {
         ] {
             assert!(words[3..].contains(&said.to_owned()), "{said}");
         }
-        let ticks = ticks(&found);
+        let ticks = ticks(&found, &Machine::reference());
         assert_eq!(
             ticks.iter().map(|tick| tick.state).collect::<Vec<_>>(),
             ["moving", "moving", "fault", "fault"]
@@ -218,7 +219,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_log_is_named_with_its_line() {
-        let message = |log: &str| read(log).expect_err("refused").to_string();
+        let message = |log: &str| read::<3>(log).expect_err("refused").to_string();
         let good = line(&row(10, false));
         assert_eq!(message("0 INFO ready"), ": found no frame, expected lines with `flight […]`");
         assert_eq!(

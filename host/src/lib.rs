@@ -16,7 +16,8 @@
 //!   simulate   Plan ─► ticks                      the kernel against hal-sim
 //!   recording  a run ─► bytes ─► the same run    replay from what the kernel was told
 //!   flight     a board's log ─► TraceRow       the ticks around a fault
-//!   record     TraceRow, RunTrace              what a run leaves behind
+//!   trace      TraceRow, RunTrace              what a run leaves behind
+//!   axis_unit                                  mm or °
 //!   drive      Machine ─► figures of its axes     step, harmonics, circles
 //!   identify   recordings ─► drive parameters     what an axis is, from its runs
 //!   tuning     drive parameters ─► gains          with the reason for each
@@ -38,6 +39,7 @@ pub mod compare;
 pub mod simulate;
 pub mod recording;
 pub mod flight;
+pub mod axis_unit;
 pub mod trace;
 pub mod drive;
 pub mod identify;

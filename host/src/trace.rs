@@ -7,12 +7,12 @@ use std::borrow::Cow;
 use motion_kernel::hal::OutputState;
 use serde::{Deserialize, Serialize};
 
-/// Axes of the machine.
-pub const AXES: usize = 3;
+use crate::axis_unit::AxisUnit;
+use crate::gcode::Axis;
 
-/// A whole run.
+/// A whole run, of a machine with `N` places for axes.
 #[derive(Clone, Debug, Default)]
-pub struct RunTrace {
+pub struct RunTrace<const N: usize = 3> {
     /// Program name as the user gave it.
     pub program: String,
     /// Machine name from the machine file.
@@ -21,16 +21,12 @@ pub struct RunTrace {
     pub tick_s: f64,
     /// Limits along the path.
     pub limits: PathLimits,
-    /// Axis names, in order.
-    pub axis_names: [String; AXES],
-    /// Following error at which each axis faults \[µm\]; 0 if not known.
-    pub following_error_limit_um: [f64; AXES],
-    /// Set − actual position of each axis after settling \[counts\].
-    pub end_error_counts: [i64; AXES],
+    /// The axes that there are, which have the first places.
+    pub axes: Vec<TracedAxis>,
     /// Blocks of the plan, in path order over the whole program.
     pub blocks: Vec<TracedBlock>,
     /// Every tick, in order.
-    pub ticks: Vec<TraceRow>,
+    pub ticks: Vec<TraceRow<N>>,
     /// Duration of the plan, dwells included \[s\].
     pub planned_time_s: f64,
     /// How it ended.
@@ -43,6 +39,27 @@ pub struct RunTrace {
     pub faults: Vec<TracedFault>,
     /// What was accepted and not acted on, and other remarks for the reader.
     pub notices: Vec<String>,
+}
+
+/// An axis of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TracedAxis {
+    /// Its name.
+    pub name: String,
+    /// The axis of a program that moves it.
+    pub letter: Axis,
+    /// Following error at which it faults \[µm, m°\]; 0 if not known.
+    pub following_error_limit_um: f64,
+    /// Set − actual position after settling \[counts\].
+    pub end_error_counts: i64,
+}
+
+impl TracedAxis {
+    /// What it counts.
+    #[must_use]
+    pub fn unit(&self) -> AxisUnit {
+        AxisUnit::of(self.letter)
+    }
 }
 
 /// A switch of spindle and coolant.
@@ -152,7 +169,7 @@ pub struct TracedBlock {
 
 /// One tick: set values along the path, and every axis.
 #[derive(Clone, Copy, Debug)]
-pub struct TraceRow {
+pub struct TraceRow<const N: usize = 3> {
     /// Tick number from 0.
     pub tick: u64,
     /// Path position from the program's start \[mm\].
@@ -169,13 +186,13 @@ pub struct TraceRow {
     pub state: &'static str,
     /// G-code line of the path piece.
     pub line: u32,
-    /// Contour error, the part of the following error across the path, 0 or more \[µm\].
+    /// Contour error, the part of the linear axes' following error across the path, 0 or more \[µm\].
     pub contour_um: f64,
-    /// Per axis.
-    pub axes: [AxisTick; AXES],
+    /// Per place; where there is no axis, nothing moves.
+    pub axes: [AxisTick; N],
 }
 
-/// One axis in one tick.
+/// One axis in one tick. Of a rotary one read ° for mm and m° for µm.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AxisTick {
     /// Set position \[mm\].

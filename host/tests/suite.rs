@@ -6,6 +6,7 @@
 
 mod axes_reading;
 mod axes_planning;
+mod axes_runs;
 mod cli;
 mod compare;
 mod curves;

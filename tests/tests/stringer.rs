@@ -140,7 +140,8 @@ fn following_error_falls_with_each_feedforward() {
                 axis.feedforward.jerk_s2 = 0.0;
             }
         }
-        let [x, y, _] = executed(&machine, Number::F32).axes;
+        let axes = executed(&machine, Number::F32).axes;
+        let (x, y) = (&axes[0], &axes[1]);
         [
             x.following_error_um_rms,
             y.following_error_um_rms,

@@ -59,13 +59,15 @@ pub fn flight(arguments: &FlightArguments, out: &mut dyn Write) -> Result<Outcom
         fault: "fault latched".to_owned(),
         detail: "what it was stands in the log".to_owned(),
     });
-    let trace = RunTrace {
+    let mut trace = RunTrace {
         faults: faults.into_iter().collect(),
         notices: flight::words(&rows, &machine),
-        following_error_limit_um: machine.axes.each_ref().map(|axis| axis.following_error_limit_mm * 1e3),
-        ticks: flight::ticks(&rows),
+        ticks: flight::ticks(&rows, &machine),
         ..info.empty_trace()
     };
+    for (axis, settings) in trace.axes.iter_mut().zip(machine.driven_axes()) {
+        axis.following_error_limit_um = settings.following_error_limit_mm * 1e3;
+    }
     let written = outputs.of_trace(&info, &trace);
     for line in &trace.notices {
         writeln!(out, "  {line}").map_err(CliError::Output)?;

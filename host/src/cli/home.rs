@@ -9,9 +9,9 @@ use serde::Serialize;
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
 use super::table::{self, Align};
+use super::units::{InUnit, TableUnits};
 use super::{input, write_json};
 use crate::files::Files;
-use crate::machine::Machine;
 use crate::simulate::home::{HomeError, HomedAxis, Homes};
 use crate::simulate::job::RunInfo;
 
@@ -23,7 +23,8 @@ Examples:
                                       every tick of every axis, for a spreadsheet
 
 JSON: list of {axis, counts, index_counts (how far the index was beyond the switch; null: the switch is the reference),
-time_s, position_mm (where the axis stands now), true_mm (the same from where it was switched on)}.
+time_s, position_mm (where the axis stands now), true_mm (the same from where it was switched on)}; of a rotary axis deg in
+place of mm.
 
 Exit status: 1 if an axis was not homed, 2 if the machine file homes none; the axes before it are printed.";
 
@@ -70,35 +71,38 @@ pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     // Axes already homed are written and shown, even if the next axis failed.
     let written = ticks.write(|_| info.empty_trace());
     if arguments.json {
-        let axes: Vec<AxisJson<'_>> = homed.iter().map(|axis| axis_json(axis, &machine)).collect();
+        let axis = |axis| axis_json(axis, machine.tick_s);
+        let axes: Vec<InUnit<AxisJson<'_>>> = homed.iter().map(axis).collect();
         write_json(&axes, out)?;
     } else if !homed.is_empty() {
-        write_table(&homed, &machine, out).map_err(CliError::Output)?;
+        write_table(&homed, machine.tick_s, out).map_err(CliError::Output)?;
     }
     ended.map_err(refused)?;
     written.outcome(Outcome::Done)
 }
 
-fn axis_json<'a>(axis: &'a HomedAxis, machine: &Machine) -> AxisJson<'a> {
-    let HomedAxis { name, homed, ticks, position_mm, true_mm } = axis;
-    AxisJson {
+fn axis_json(axis: &HomedAxis, tick_s: f64) -> InUnit<AxisJson<'_>> {
+    let HomedAxis { name, homed, ticks, unit, position_mm, true_mm } = axis;
+    let json = AxisJson {
         axis: name,
         counts: homed.counts.0,
         index_counts: homed.index_counts,
-        time_s: *ticks as f64 * machine.tick_s,
+        time_s: *ticks as f64 * tick_s,
         position_mm: *position_mm,
         true_mm: *true_mm,
-    }
+    };
+    InUnit(*unit, json)
 }
 
-fn write_table(homed: &[HomedAxis], machine: &Machine, out: &mut dyn Write) -> io::Result<()> {
+fn write_table(homed: &[HomedAxis], tick_s: f64, out: &mut dyn Write) -> io::Result<()> {
+    let units = TableUnits::of(homed.iter().map(|axis| axis.unit));
     let columns = [
         ("axis", "", Align::Left),
         ("reference", "counts", Align::Right),
         ("index behind", "counts", Align::Right),
         ("time", "s", Align::Right),
-        ("stands at", "mm", Align::Right),
-        ("from switching on", "mm", Align::Right),
+        ("stands at", units.head("mm"), Align::Right),
+        ("from switching on", units.head("mm"), Align::Right),
     ];
     let rows: Vec<[String; 6]> = homed
         .iter()
@@ -107,9 +111,9 @@ fn write_table(homed: &[HomedAxis], machine: &Machine, out: &mut dyn Write) -> i
                 axis.name.clone(),
                 axis.homed.counts.0.to_string(),
                 axis.homed.index_counts.map_or_else(|| "-".to_owned(), |counts| counts.to_string()),
-                format!("{:.4}", axis.ticks as f64 * machine.tick_s),
-                format!("{:.4}", axis.position_mm),
-                format!("{:.4}", axis.true_mm),
+                format!("{:.4}", axis.ticks as f64 * tick_s),
+                units.cell(format!("{:.4}", axis.position_mm), axis.unit.symbol()),
+                units.cell(format!("{:.4}", axis.true_mm), axis.unit.symbol()),
             ]
         })
         .collect();

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
 use super::table::{self, Align};
+use super::units::{InUnit, TableUnits};
 use super::{input, write_json};
 use crate::files::Files;
 use crate::simulate::job::RunInfo;
@@ -16,14 +17,14 @@ use crate::simulate::jog::{Ended, Jogged, Keys, Press};
 
 const EXAMPLES: &str = "\
 Examples:
-  motion jog X+20 Y-2.5               by an increment [mm]
+  motion jog X+20 Y-2.5               by an increment [mm; degrees for rotary axes]
   motion jog X+20@300 --feed 50       the key is released after 300 ticks
   motion jog X+ X- --machine mine.toml
                                       from one soft limit, [axis.travel], to the other
   motion jog X+20 --trace jog.csv     every tick, for a spreadsheet
 
 JSON: list of {press, from_mm, to_mm, time_s, feed_mm_s (the greatest), ended (\"distance\", \"soft limit\" or \"released\"),
-stop_s, stop_mm (from the key's release to rest; null if it was not released on the way)}.
+stop_s, stop_mm (from the key's release to rest; null if it was not released on the way)}; of a rotary axis deg in place of mm.
 
 Exit status: 1 if a fault ended a jog, 2 if a key is refused; the jogs before it are printed.";
 
@@ -33,11 +34,11 @@ Exit status: 1 if a fault ended a jog, 2 if a key is refused; the jogs before it
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct JogArguments {
-    /// Keys: axis, + or -, a distance in mm (without one: to the soft limit), and @TICKS for the key's
+    /// Keys: axis, + or -, a distance in mm or degrees (without one: to the soft limit), and @TICKS for the key's
     /// release.
     #[arg(value_name = "KEY", required = true)]
     presses: Vec<Press>,
-    /// Feed, mm/s; without it, the axis' greatest.
+    /// Feed, mm/s or degrees/s; without it, the axis' greatest.
     #[arg(long, value_name = "MM_S")]
     feed: Option<f64>,
     /// Machine file (`motion machine` prints one); without it, the reference machine.
@@ -65,7 +66,7 @@ struct PressJson {
 
 impl PressJson {
     fn new(jogged: &Jogged, tick_s: f64) -> Self {
-        let &Jogged { ref press, from_mm, to_mm, ticks, feed_mm_s, ended } = jogged;
+        let &Jogged { ref press, from_mm, to_mm, ticks, feed_mm_s, ended, .. } = jogged;
         let (ended, stop) = match ended {
             Ended::Distance => ("distance", None),
             Ended::SoftLimit => ("soft limit", None),
@@ -98,8 +99,8 @@ pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let (ended, ticks) = outputs.of_ticks(&info, |observe| keys.jog(&mut jogged, observe));
     // Finished jogs are written and shown, even if the next key failed.
     let written = ticks.write(|_| info.empty_trace());
-    let presses: Vec<PressJson> =
-        jogged.iter().map(|jogged| PressJson::new(jogged, machine.tick_s)).collect();
+    let press = |jogged: &Jogged| InUnit(jogged.unit, PressJson::new(jogged, machine.tick_s));
+    let presses: Vec<InUnit<PressJson>> = jogged.iter().map(press).collect();
     if arguments.json {
         write_json(&presses, out)?;
     } else if !presses.is_empty() {
@@ -109,30 +110,32 @@ pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     written.outcome(Outcome::Done)
 }
 
-fn write_table(presses: &[PressJson], out: &mut dyn Write) -> io::Result<()> {
+fn write_table(presses: &[InUnit<PressJson>], out: &mut dyn Write) -> io::Result<()> {
+    let units = TableUnits::of(presses.iter().map(|InUnit(unit, _)| *unit));
     let columns = [
         ("key", "", Align::Left),
-        ("from", "mm", Align::Right),
-        ("to", "mm", Align::Right),
+        ("from", units.head("mm"), Align::Right),
+        ("to", units.head("mm"), Align::Right),
         ("time", "s", Align::Right),
-        ("feed", "mm/s", Align::Right),
+        ("feed", units.head("mm/s"), Align::Right),
         ("ended by", "", Align::Left),
         ("stop", "s", Align::Right),
-        ("stop", "mm", Align::Right),
+        ("stop", units.head("mm"), Align::Right),
     ];
     let stop = |figure: Option<f64>| figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.4}"));
     let rows: Vec<[String; 8]> = presses
         .iter()
-        .map(|press| {
+        .map(|InUnit(unit, press)| {
+            let symbol = unit.symbol();
             [
                 press.press.clone(),
-                format!("{:.4}", press.from_mm),
-                format!("{:.4}", press.to_mm),
+                units.cell(format!("{:.4}", press.from_mm), symbol),
+                units.cell(format!("{:.4}", press.to_mm), symbol),
                 format!("{:.4}", press.time_s),
-                format!("{:.3}", press.feed_mm_s),
+                units.cell(format!("{:.3}", press.feed_mm_s), &format!("{symbol}/s")),
                 press.ended.to_owned(),
                 stop(press.stop_s),
-                stop(press.stop_mm),
+                units.cell(stop(press.stop_mm), symbol),
             ]
         })
         .collect();

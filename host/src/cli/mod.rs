@@ -35,7 +35,7 @@
 //! - [`machine`]: the reference machine's file, and the meaning of its keys;
 //! - [`demo`]: `motion` without a command;
 //! - [`error`]: errors and exit statuses;
-//! - `input`, `outputs`, `until_closed`, `table`, `trace`, `progress`: shared by the commands.
+//! - `input`, `outputs`, `until_closed`, `table`, `trace`, `units`, `progress`: shared by the commands.
 
 pub mod check;
 pub mod compare;
@@ -59,6 +59,7 @@ mod outputs;
 mod progress;
 mod table;
 mod trace;
+mod units;
 mod until_closed;
 
 use std::io::{self, BufWriter, Write};

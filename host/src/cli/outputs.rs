@@ -90,10 +90,10 @@ impl Outputs {
     }
 
     /// Runs a job with `run` and writes the files about it. A run that can't be made leaves no files.
-    pub(super) fn of_run<T>(
+    pub(super) fn of_run<const N: usize, T>(
         self,
-        job: &Job,
-        run: impl FnOnce(&mut Observer<'_>) -> Result<T, RunError>,
+        job: &Job<N>,
+        run: impl FnOnce(&mut Observer<'_, N>) -> Result<T, RunError>,
         summary_of: impl Fn(&T) -> &RunSummary,
     ) -> Result<(T, Written), CliError> {
         let (ran, ticks) = self.of_ticks(&job.info, |observe| {
@@ -111,13 +111,17 @@ impl Outputs {
     }
 
     /// Writes the files about an existing trace.
-    pub(super) fn of_trace(self, info: &RunInfo, trace: &RunTrace) -> Written {
+    pub(super) fn of_trace<const N: usize>(self, info: &RunInfo, trace: &RunTrace<N>) -> Written {
         let ((), ticks) = self.of_ticks(info, |observe| trace.ticks.iter().for_each(observe));
         ticks.write(|ticks| RunTrace { ticks, ..trace.clone() })
     }
 
     /// Returns the result of `run`, and its ticks, from which the files are to be written.
-    pub(super) fn of_ticks<T>(self, info: &RunInfo, run: impl FnOnce(&mut Observer<'_>) -> T) -> (T, Ticks) {
+    pub(super) fn of_ticks<const N: usize, T>(
+        self,
+        info: &RunInfo,
+        run: impl FnOnce(&mut Observer<'_, N>) -> T,
+    ) -> (T, Ticks<N>) {
         let trace = self.trace.map(|output| {
             let (name, failure) = (output.name().to_owned(), output.failure());
             (name, failure, TraceWriter::new(output, info))
@@ -129,14 +133,14 @@ impl Outputs {
 }
 
 /// The ticks of a run. Only a report needs all of them at once.
-pub(super) struct Ticks {
+pub(super) struct Ticks<const N: usize> {
     trace: Option<(String, Failure, TraceWriter<OutputFile>)>,
     report: Option<OutputFile>,
-    ticks: Vec<TraceRow>,
+    ticks: Vec<TraceRow<N>>,
 }
 
-impl Ticks {
-    fn add(&mut self, tick: &TraceRow) {
+impl<const N: usize> Ticks<N> {
+    fn add(&mut self, tick: &TraceRow<N>) {
         if let Some((_, _, trace)) = &mut self.trace {
             trace.add(tick);
         }
@@ -146,7 +150,7 @@ impl Ticks {
     }
 
     /// Writes the trace, and the report of the ticks as converted by `trace`.
-    pub(super) fn write(self, trace: impl FnOnce(Vec<TraceRow>) -> RunTrace) -> Written {
+    pub(super) fn write(self, trace: impl FnOnce(Vec<TraceRow<N>>) -> RunTrace<N>) -> Written {
         let mut written = Written::default();
         if let Some((name, failure, writer)) = self.trace {
             let done = writer.finish().map_err(|source| failure.of(source));
@@ -158,11 +162,8 @@ impl Ticks {
     }
 }
 
-fn trace_of(job: &Job, summary: &RunSummary, ticks: Vec<TraceRow>) -> RunTrace {
-    let limit_um = job.header.axes.each_ref().map(|axis| axis.following_error_limit_mm * 1e3);
-    RunTrace {
-        following_error_limit_um: limit_um,
-        end_error_counts: summary.axes.each_ref().map(|axis| axis.end_error_counts),
+fn trace_of<const N: usize>(job: &Job<N>, summary: &RunSummary, ticks: Vec<TraceRow<N>>) -> RunTrace<N> {
+    let mut trace = RunTrace {
         ticks,
         end: summary.end,
         commands: summary.commands.clone(),
@@ -170,5 +171,10 @@ fn trace_of(job: &Job, summary: &RunSummary, ticks: Vec<TraceRow>) -> RunTrace {
         faults: summary.faults.clone(),
         notices: summary.notices.clone(),
         ..job.info.empty_trace()
+    };
+    for ((axis, figures), ended) in trace.axes.iter_mut().zip(&job.header.axes).zip(&summary.axes) {
+        axis.following_error_limit_um = figures.following_error_limit_mm * 1e3;
+        axis.end_error_counts = ended.end_error_counts;
     }
+    trace
 }

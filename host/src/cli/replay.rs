@@ -54,11 +54,11 @@ pub fn replay(arguments: &ReplayArguments, out: &mut dyn Write) -> Result<Outcom
     let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
     let source = input::read(&arguments.recording)?;
     let refused = |error| CliError::Recording { path: source.name.clone(), source: error };
-    let recording = Recording::from_bytes(&source.text).map_err(refused)?;
-    let job = recording.job().map_err(refused)?;
+    let recording = Recording::<3>::from_bytes(&source.text).map_err(refused)?;
+    let job = recording.job();
     let (replayed, written) = outputs.of_run(
-        &job,
-        |observe| recording::replay(&recording, &job, observe),
+        job,
+        |observe| recording::replay(&recording, job, observe),
         |replayed| &replayed.summary,
     )?;
     let recording::Replay { summary, ticks, difference } = &replayed;

@@ -12,15 +12,17 @@ use super::input;
 use super::outputs::{self, Outputs, Written};
 use super::read::direction;
 use super::table::{self, Align};
+use super::units::{InUnit, TableUnits};
 use super::write_json;
 use crate::files::{Files, OutputFile};
+use crate::gcode::Axis;
 use crate::machine::Machine;
 use crate::planning::{Mode, Plan, plan_program};
 use crate::recording::Recorder;
 use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
 use crate::simulate::{self, AxisSummary, Job, Probed, RunError, RunOptions, RunSummary};
-use crate::trace::{AXES, RunEnd, TracedCommand, TracedFault, TracedSwitch};
+use crate::trace::{RunEnd, TracedCommand, TracedFault, TracedSwitch};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -37,8 +39,9 @@ Exit status: 0 the program finished, 1 a fault, 3 held, 4 aborted, 5 a command o
 be written. In all these cases the summary is printed, and the files are written.
 
 JSON: finished, stopped_by (null, \"hold\", \"single block\", \"override\", \"abort\" or \"fault\"), reached_mm, reached_line
-(how far the run came), commands_not_reached, probes, outputs, and the figures of the run. probes are the probing moves: line,
-tick, tripped, position_mm (where the encoders read the axes then), program_mm (where the program reads the trip, in machine
+(how far the run came), commands_not_reached, probes, outputs, and the figures of the run; those of a rotary axis have mdeg
+in place of um. probes are the probing moves: line,
+tick, tripped, position_mm (where the encoders read X, Y, Z then), program_mm (where the program reads the trip, in machine
 coordinates). outputs are the switches of spindle and coolant: tick (before which), line (null: all off by an abort or a
 fault), spindle (\"clockwise\", \"counterclockwise\" or null: off), speed_rpm, flood, mist.";
 
@@ -74,9 +77,9 @@ pub struct RunArguments {
     /// Break the simulated machine before given ticks, such as `2000:encoder-lost=X`.
     ///
     /// What can break: `encoder-lost=AXIS`, `encoder-jump=AXIS:COUNTS`, `encoder-reversed=AXIS`,
-    /// `drive-reversed=AXIS`, `overload=AXIS:ACCELERATION` (the drive's remaining acceleration, in mm/s²),
+    /// `drive-reversed=AXIS`, `overload=AXIS:ACCELERATION` (the drive's remaining acceleration, in mm/s² or °/s²),
     /// `drive-not-ready=AXIS`, `drive-fault=AXIS`, `limit-low=AXIS:POSITION` and `limit-high=AXIS:POSITION`
-    /// (a limit switch up to or from this position, in mm), and `emergency-stop`.
+    /// (a limit switch up to or from this position, in mm or °), and `emergency-stop`.
     #[arg(long, value_name = "TICK:FAULT,…")]
     inject: Option<Injections>,
     /// Print JSON: ticks, times, maxima along the path, share of the path with an active limit, errors of the
@@ -171,7 +174,7 @@ pub(super) struct RunJson<'run> {
     path_length_mm: f64,
     max: MaxJson,
     limit_active_share: f64,
-    axes: Vec<AxisJson<'run>>,
+    axes: Vec<InUnit<AxisJson<'run>>>,
     contour_error_um_max: f64,
     probes: Vec<ProbeJson>,
     commands: &'run [TracedCommand],
@@ -203,8 +206,8 @@ struct ProbeJson {
     line: u32,
     tick: u64,
     tripped: bool,
-    position_mm: [f64; AXES],
-    program_mm: Option<[f64; AXES]>,
+    position_mm: [f64; 3],
+    program_mm: Option<[f64; 3]>,
 }
 
 #[derive(Serialize)]
@@ -265,7 +268,7 @@ pub(super) fn json<'run>(summary: &'run RunSummary) -> RunJson<'run> {
             snap_mm_s4: summary.max_snap_mm_s4,
         },
         limit_active_share: summary.limit_active_share,
-        axes: summary.axes.iter().map(axis).collect(),
+        axes: summary.axes.iter().map(|of| InUnit(of.unit(), axis(of))).collect(),
         contour_error_um_max: summary.contour_error_um_max,
         probes: summary.probes.iter().map(probe).collect(),
         commands: &summary.commands,
@@ -303,10 +306,13 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
     )?;
     writeln!(out, "  a limit is active on {:.1} % of the length", summary.limit_active_share * 100.0)?;
     writeln!(out, "  contour error at most {:.2} µm\n", summary.contour_error_um_max)?;
+    let units = TableUnits::of(summary.axes.iter().map(AxisSummary::unit));
+    let error =
+        |axis: &AxisSummary, error: f64| units.cell(format!("{error:.2}"), axis.unit().thousandth_symbol());
     let columns = [
         ("axis", "", Align::Left),
-        ("following error max", "µm", Align::Right),
-        ("rms", "µm", Align::Right),
+        ("following error max", units.head("µm"), Align::Right),
+        ("rms", units.head("µm"), Align::Right),
         ("at the end", "counts", Align::Right),
         ("output max", "V", Align::Right),
     ];
@@ -316,8 +322,8 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
         .map(|axis| {
             [
                 axis.name.clone(),
-                format!("{:.2}", axis.following_error_um_max),
-                format!("{:.2}", axis.following_error_um_rms),
+                error(axis, axis.following_error_um_max),
+                error(axis, axis.following_error_um_rms),
                 axis.end_error_counts.to_string(),
                 format!("{:.3}", axis.output_v_max),
             ]
@@ -344,13 +350,16 @@ pub(super) fn write_summary(summary: &RunSummary, out: &mut dyn Write) -> io::Re
             None => writeln!(out)?,
         }
     }
-    for Probed { line, tick, tripped, position_mm: [x, y, z], .. } in &summary.probes {
+    for Probed { line, tick, tripped, position_mm, .. } in &summary.probes {
         let tripped = if *tripped { "tripped" } else { "did not trip" };
         let time_s = *tick as f64 * tick_s;
-        writeln!(
-            out,
-            "  line {line}: the probe {tripped}, in tick {tick} ({time_s:.4} s) at X{x:.4} Y{y:.4} Z{z:.4} of the machine"
-        )?;
+        write!(out, "  line {line}: the probe {tripped}, in tick {tick} ({time_s:.4} s) at")?;
+        for (letter, at_mm) in [Axis::X, Axis::Y, Axis::Z].into_iter().zip(position_mm) {
+            if summary.axes.iter().any(|axis| axis.letter == letter) {
+                write!(out, " {letter}{at_mm:.4}")?;
+            }
+        }
+        writeln!(out, " of the machine")?;
     }
     for TracedFault { tick, axis, fault, detail } in &summary.faults {
         let axis = axis.as_ref().map_or_else(String::new, |name| format!(" of axis {name}"));

@@ -3,13 +3,26 @@
 use std::io::{self, Write};
 
 use super::csv_failure;
+use crate::axis_unit::AxisUnit;
 use crate::simulate::RunInfo;
 use crate::trace::TraceRow;
 
-/// Columns of the path, then seven of each axis.
+/// Columns of the path, then seven of each axis that there is.
 const PATH_COLUMNS: [&str; 8] = ["tick", "t_s", "s_mm", "v_mm_s", "a_mm_s2", "j_mm_s3", "state", "line"];
-const AXIS_COLUMNS: [&str; 7] =
-    ["set_mm", "vel_mm_s", "acc_mm_s2", "jerk_mm_s3", "act_mm", "err_um", "out_v"];
+
+/// The columns of an axis, in its unit.
+fn axis_columns(unit: AxisUnit) -> [String; 7] {
+    let (mm, um) = (unit.name(), unit.thousandth_name());
+    [
+        format!("set_{mm}"),
+        format!("vel_{mm}_s"),
+        format!("acc_{mm}_s2"),
+        format!("jerk_{mm}_s3"),
+        format!("act_{mm}"),
+        format!("err_{um}"),
+        "out_v".to_owned(),
+    ]
+}
 
 // Decimals. A position step is 2⁻³² mm = 2.3·10⁻¹⁰ mm, a step of the converter 0.3 mV.
 const TIME: usize = 9;
@@ -23,6 +36,8 @@ const VOLTS: usize = 6;
 pub(super) struct TraceWriter<W: Write> {
     csv: csv::Writer<W>,
     tick_s: f64,
+    /// The axes that there are.
+    axis_count: usize,
     /// The text of one field, kept to reuse its memory.
     field: Vec<u8>,
     /// The first failure; nothing is written after it.
@@ -33,13 +48,14 @@ impl<W: Write> TraceWriter<W> {
     /// Writes the header. A failure is kept for [`Self::finish`]: it does not stop the run.
     pub(super) fn new(out: W, info: &RunInfo) -> Self {
         let csv = csv::Writer::from_writer(out);
-        let mut writer = Self { csv, tick_s: info.tick_s, field: Vec::new(), failure: None };
+        let (tick_s, axis_count) = (info.tick_s, info.axes.len());
+        let mut writer = Self { csv, tick_s, axis_count, field: Vec::new(), failure: None };
         writer.failure = writer.header(info).err();
         writer
     }
 
     /// Adds a row, or keeps its failure.
-    pub(super) fn add(&mut self, tick: &TraceRow) {
+    pub(super) fn add<const N: usize>(&mut self, tick: &TraceRow<N>) {
         if self.failure.is_none() {
             self.failure = self.row(tick).err();
         }
@@ -58,14 +74,14 @@ impl<W: Write> TraceWriter<W> {
             self.csv.write_field(column).map_err(csv_failure)?;
         }
         for axis in &info.axes {
-            for column in AXIS_COLUMNS {
+            for column in axis_columns(axis.unit()) {
                 self.csv.write_field(format!("{}_{column}", axis.name)).map_err(csv_failure)?;
             }
         }
         self.csv.write_record(None::<&[u8]>).map_err(csv_failure)
     }
 
-    fn row(&mut self, tick: &TraceRow) -> io::Result<()> {
+    fn row<const N: usize>(&mut self, tick: &TraceRow<N>) -> io::Result<()> {
         self.text(format_args!("{}", tick.tick))?;
         self.number(tick.tick as f64 * self.tick_s, TIME)?;
         self.number(tick.s_mm, POSITION)?;
@@ -74,7 +90,7 @@ impl<W: Write> TraceWriter<W> {
         self.number(tick.j_mm_s3, CHANGE)?;
         self.text(format_args!("{}", tick.state))?;
         self.text(format_args!("{}", tick.line))?;
-        for axis in &tick.axes {
+        for axis in tick.axes.iter().take(self.axis_count) {
             self.number(axis.set_mm, POSITION)?;
             self.number(axis.vel_mm_s, VELOCITY)?;
             self.number(axis.acc_mm_s2, CHANGE)?;
@@ -101,7 +117,7 @@ impl<W: Write> TraceWriter<W> {
 mod tests {
     use super::*;
     use crate::machine::Machine;
-    use crate::trace::{AXES, AxisTick};
+    use crate::trace::AxisTick;
 
     #[test]
     fn header_and_row() {
@@ -118,7 +134,7 @@ mod tests {
             state: "moving",
             line: 12,
             contour_um: 0.0,
-            axes: [axis; AXES],
+            axes: [axis; 3],
         });
         trace.finish().expect("memory");
         let text = String::from_utf8(text).expect("UTF-8");

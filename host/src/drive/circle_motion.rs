@@ -6,11 +6,12 @@
 
 use core::f64::consts::TAU;
 
+use super::AXES;
 use super::experiment::{Demands, DriveError, Recording, raised, within};
 use crate::gcode::Plane;
 use crate::machine::Machine;
 use crate::simulate::RunOptions;
-use crate::trace::{AXES, AxisTick, TraceRow};
+use crate::trace::{AxisTick, TraceRow};
 
 /// Revolutions for reaching the feed and for braking from it.
 const RAMP_REVOLUTIONS: f64 = 6.0;

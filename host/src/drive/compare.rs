@@ -19,6 +19,7 @@
 
 use motion_kernel::axis::{Feedforward, Gains};
 
+use super::AXES;
 use super::circle;
 use super::circle_motion::Circle;
 use super::experiment::{CLOSED_LOOP_ERROR_MM, DriveError, Recording, Terms};
@@ -26,7 +27,6 @@ use super::inverse::inverse;
 use super::peer_regulator::PeerGains;
 use super::replay::{Law, Replayed, replay};
 use crate::machine::Machine;
-use crate::trace::AXES;
 
 /// Frequencies at which the differencing regulator's gains are fitted \[Hz\].
 pub const FIT_HZ: [f64; 3] = [4.0, 10.0, 16.0];

@@ -8,12 +8,13 @@ use std::ops::Range;
 use motion_kernel::axis::{Feedforward, Gains};
 use motion_kernel::law::Pulse;
 
+use super::AXES;
 use crate::gcode::{self, GcodeError};
 use crate::identify::IdentifyError;
 use crate::machine::{AxisSettings, Machine};
 use crate::planning::{Mode, PlanningError, plan_program};
 use crate::simulate::{self, RunError, RunOptions};
-use crate::trace::{AXES, AxisTick, TraceRow, TracedFault};
+use crate::trace::{AxisTick, TraceRow, TracedFault};
 
 /// Relative tolerance for comparing feeds and limits in f32.
 pub(super) const ROUNDING: f64 = 1e-6;

@@ -6,12 +6,12 @@
 
 use std::thread;
 
+use super::AXES;
 use super::circle_motion::{Circle, plane_of};
 use super::experiment::{DriveError, Recording, fastest_mm_s, open_loop, raised};
 use super::step;
 use crate::identify::{AxisRecording, Excitation, Identification, identification_plan, identify};
 use crate::machine::Machine;
-use crate::trace::AXES;
 
 const LETTERS: [&str; AXES] = ["X", "Y", "Z"];
 

@@ -43,5 +43,8 @@ pub mod circle_motion;
 
 pub use experiment::{DriveError, Recording, Terms};
 
+/// Axes of the machines that experiments are made on.
+pub(crate) const AXES: usize = 3;
+
 /// −3 dB as a ratio of amplitudes.
 pub const HALF_POWER: f64 = core::f64::consts::FRAC_1_SQRT_2;

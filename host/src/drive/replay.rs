@@ -10,13 +10,15 @@ use motion_kernel::num::Scalar;
 use motion_kernel::path::Setpoint;
 use motion_kernel::units::{Counts, DacCode, Position};
 
+use super::AXES;
 use super::experiment::{DriveError, Recording, within};
 use super::peer_regulator::{PeerGains, PeerRegulator};
 use crate::machine::Machine;
 use crate::simulate::RunError;
+use crate::simulate::RunInfo;
 use crate::simulate::contour::Contour;
 use crate::simulate::hardware::{SimulatedHardware, simulated};
-use crate::trace::{AXES, TraceRow};
+use crate::trace::TraceRow;
 
 /// The regulator.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,7 +132,7 @@ fn close_loop(
     let simulated = simulated(machine)?;
     let mut hardware = SimulatedHardware::new(&simulated)?;
     let mut regulator = Regulator::new(law, machine)?;
-    let mut contour = Contour::default();
+    let mut contour = Contour::new(RunInfo::of_machine(machine).linear_places());
     let mut before_mm = [0.0; AXES];
     for recorded in &recording.ticks {
         let mut tick = *recorded;

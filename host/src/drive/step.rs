@@ -6,10 +6,10 @@
 //! 0.5 ms), so velocities are means over [`AVERAGED_S`]; the peaks of acceleration and jerk are plain
 //! backward differences, as S4 gives them.
 
+use super::AXES;
 use super::experiment::{Demands, DriveError, Recording, differences, open_loop, raised, within};
 use super::spectrum::Spectrum;
 use crate::machine::Machine;
-use crate::trace::AXES;
 
 /// Time over which velocities are averaged \[s\]: rounding of 0.1 µm is then 0.04 mm/s, a thirtieth of a per
 /// cent of S4's step, and the overshoot loses half a per cent of itself.

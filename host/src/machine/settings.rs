@@ -17,6 +17,7 @@ use motion_kernel::units::{DacCode, Position};
 
 use super::error::{AxisError, MachineError};
 use super::file;
+use crate::axis_unit::AxisUnit;
 use crate::gcode::{Axes, Axis, PathMode, Point, Probe, ReadOptions};
 use crate::touch::Surface;
 
@@ -491,6 +492,12 @@ impl AxisSettings {
     #[must_use]
     pub fn idle() -> Self {
         Self { letter: None, name: String::new(), ..Self::reference(Axis::X, REFERENCE_X) }
+    }
+
+    /// What it counts.
+    #[must_use]
+    pub fn unit(&self) -> AxisUnit {
+        self.letter.map_or(AxisUnit::Millimetre, AxisUnit::of)
     }
 
     /// The velocity that the output can command in either direction \[mm/s\].

@@ -12,38 +12,39 @@ use motion_kernel::trace::{Digest, Trace};
 use motion_kernel::units::Counts;
 use serde::{Deserialize, Serialize};
 
-use super::RecordingError;
-use crate::trace::AXES;
+use super::{RecordingError, array};
+use crate::gcode::AXES_MAX;
 
 /// What the hardware answered in one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Answers {
+pub struct Answers<const N: usize = 3> {
     /// What the encoders read; none if they could not be read.
-    pub counts: Option<[Counts; AXES]>,
+    pub counts: Option<[Counts; N]>,
     /// The digital inputs; none if they could not be read.
-    pub inputs: Option<MachineInputs<AXES>>,
+    pub inputs: Option<MachineInputs<N>>,
     /// Whether the converter took its codes.
     pub is_written: bool,
     /// Whether the drives were told to be enabled, if they were told, and whether they took it.
     pub told: Option<(bool, bool)>,
 }
 
-impl Answers {
+impl<const N: usize> Answers<N> {
     /// Before anything was asked.
     pub(super) const NONE: Self = Self { counts: None, inputs: None, is_written: true, told: None };
 }
 
 /// An entry of the recorded answers.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-struct Entry {
+struct Entry<const N: usize> {
     flags: u8,
     /// Of every encoder since it was last read \[counts\]; 0 if it could not be.
-    moved: [i64; AXES],
+    #[serde(with = "array")]
+    moved: [i64; N],
     check: u8,
 }
 
 /// No entry is longer: two bytes, and ten for a number of 64 bits.
-const ENTRY_MAX: usize = 2 + 10 * AXES;
+const ENTRY_MAX: usize = 2 + 10 * AXES_MAX;
 
 /// Bits of the flags.
 const UNREAD: u8 = 1 << 0;
@@ -55,18 +56,21 @@ const INPUTS_UNREAD: u8 = 1 << 5;
 const INPUTS_FOLLOW: u8 = 1 << 6;
 const KNOWN: u8 = (1 << 7) - 1;
 
-/// Inputs as they are kept: a byte for each axis, and one for the machine.
-type InputBytes = [u8; AXES + 1];
+/// Bit of the machine's inputs.
 const EMERGENCY_STOP: u8 = 1;
 
-fn input_bytes(inputs: &MachineInputs<AXES>) -> InputBytes {
-    let [x, y, z] = inputs.axes.map(AxisInputs::to_bits);
-    [x, y, z, if inputs.emergency_stop { EMERGENCY_STOP } else { 0 }]
+/// Appends inputs as they are kept: a byte for each axis, and one for the machine.
+fn keep_inputs<const N: usize>(inputs: &MachineInputs<N>, bytes: &mut Vec<u8>) {
+    bytes.extend(inputs.axes.map(AxisInputs::to_bits));
+    bytes.push(if inputs.emergency_stop { EMERGENCY_STOP } else { 0 });
 }
 
-fn inputs_of(&[x, y, z, machine]: &InputBytes) -> MachineInputs<AXES> {
-    let axes = [x, y, z].map(AxisInputs::from_bits);
-    MachineInputs { axes, emergency_stop: machine & EMERGENCY_STOP != 0 }
+/// The inputs that `bytes` begin with, and what is behind them.
+fn take_inputs<const N: usize>(bytes: &[u8]) -> Option<(MachineInputs<N>, &[u8])> {
+    let (axes, bytes) = bytes.split_first_chunk::<N>()?;
+    let (machine, bytes) = bytes.split_first()?;
+    let axes = axes.map(AxisInputs::from_bits);
+    Some((MachineInputs { axes, emergency_stop: machine & EMERGENCY_STOP != 0 }, bytes))
 }
 
 /// All ticks of a run.
@@ -84,7 +88,7 @@ pub(super) struct Checks(Digest);
 
 impl Checks {
     /// Adds a tick: the byte that its entry keeps, of a product in which each bit of the digest has a part.
-    pub(super) fn add<R: Scalar>(&mut self, trace: &Trace<R, AXES>) -> u8 {
+    pub(super) fn add<R: Scalar, const N: usize>(&mut self, trace: &Trace<R, N>) -> u8 {
         self.0.add(trace);
         (self.digest().wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 56) as u8
     }
@@ -101,21 +105,21 @@ impl Checks {
 
 /// Recorded answers being written.
 #[derive(Clone, Debug)]
-pub(super) struct AnswerWriter {
+pub(super) struct AnswerWriter<const N: usize> {
     recorded: RecordedAnswers,
     /// As read last.
-    counts: [Counts; AXES],
-    inputs: MachineInputs<AXES>,
+    counts: [Counts; N],
+    inputs: MachineInputs<N>,
 }
 
-impl AnswerWriter {
+impl<const N: usize> AnswerWriter<N> {
     /// From what the encoders read before the first tick.
-    pub(super) fn new(start: [Counts; AXES]) -> Self {
+    pub(super) fn new(start: [Counts; N]) -> Self {
         Self { recorded: RecordedAnswers::default(), counts: start, inputs: MachineInputs::HEALTHY }
     }
 
-    pub(super) fn add(&mut self, answers: &Answers, check: u8) {
-        let mut moved = [0; AXES];
+    pub(super) fn add(&mut self, answers: &Answers<N>, check: u8) {
+        let mut moved = [0; N];
         let read = answers.counts.iter().flatten();
         for ((moved, before), now) in moved.iter_mut().zip(&mut self.counts).zip(read) {
             *moved = now.0.wrapping_sub(before.0);
@@ -130,11 +134,12 @@ impl AnswerWriter {
             | flag(answers.told.is_some_and(|(_, is_taken)| !is_taken), TOLD_IN_VAIN)
             | flag(answers.inputs.is_none(), INPUTS_UNREAD)
             | flag(changed.is_some(), INPUTS_FOLLOW);
+        const { assert!(N <= AXES_MAX, "no entry is longer") };
         let mut buffer = [0; ENTRY_MAX];
         let entry = postcard::to_slice(&Entry { flags, moved, check }, &mut buffer);
         self.recorded.entries.extend_from_slice(entry.expect("room for the longest"));
         if let Some(inputs) = changed {
-            self.recorded.entries.extend_from_slice(&input_bytes(&inputs));
+            keep_inputs(&inputs, &mut self.recorded.entries);
             self.inputs = inputs;
         }
         self.recorded.ticks += 1;
@@ -148,8 +153,8 @@ impl AnswerWriter {
 
 impl RecordedAnswers {
     /// Whether it holds as many entries as it says, and nothing else.
-    pub(super) fn check(&self) -> Result<(), RecordingError> {
-        let mut reader = self.read([Counts(0); AXES]);
+    pub(super) fn check<const N: usize>(&self) -> Result<(), RecordingError> {
+        let mut reader = self.read([Counts(0); N]);
         while reader.next().is_some() {}
         if reader.ticks == self.ticks && reader.left.is_empty() {
             Ok(())
@@ -160,31 +165,30 @@ impl RecordedAnswers {
     }
 
     /// From the start.
-    pub(super) fn read(&self, start: [Counts; AXES]) -> AnswerReader<'_> {
+    pub(super) fn read<const N: usize>(&self, start: [Counts; N]) -> AnswerReader<'_, N> {
         AnswerReader { left: &self.entries, counts: start, inputs: MachineInputs::HEALTHY, ticks: 0 }
     }
 }
 
 /// Recorded answers being read: the answers of each tick, and the check byte after them.
 #[derive(Clone, Debug)]
-pub(super) struct AnswerReader<'a> {
+pub(super) struct AnswerReader<'a, const N: usize> {
     left: &'a [u8],
-    counts: [Counts; AXES],
-    inputs: MachineInputs<AXES>,
+    counts: [Counts; N],
+    inputs: MachineInputs<N>,
     ticks: u64,
 }
 
-impl Iterator for AnswerReader<'_> {
-    type Item = (Answers, u8);
+impl<const N: usize> Iterator for AnswerReader<'_, N> {
+    type Item = (Answers<N>, u8);
 
     fn next(&mut self) -> Option<Self::Item> {
-        let (Entry { flags, moved, check }, mut left) = postcard::take_from_bytes(self.left).ok()?;
+        let (Entry::<N> { flags, moved, check }, mut left) = postcard::take_from_bytes(self.left).ok()?;
         if flags & !KNOWN != 0 {
             return None;
         }
         if flags & INPUTS_FOLLOW != 0 {
-            let (bytes, behind) = left.split_first_chunk()?;
-            (self.inputs, left) = (inputs_of(bytes), behind);
+            (self.inputs, left) = take_inputs(left)?;
         }
         self.left = left;
         self.ticks += 1;

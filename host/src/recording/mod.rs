@@ -6,52 +6,51 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MREC` |
-//! | 1 | version of this format, 3 |
+//! | 1 | version of this format, 4 |
+//! | 1 | places for axes, 3 or 9: [`places`] |
 //! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
-//! A [`Recording`] holds, in this order: the number type; the compiled program with the blocks of its path
-//! and its guards ([`motion_kernel::program`]); the learnt correction and the commands as text, if there are
-//! any; what a report shows of the run; the counts before the first tick; and the answers of every tick, some
-//! eight bytes each ([`answers`]).
+//! A [`Recording`] holds, in this order: the [`Job`], which is the number type, machine and guards as the kernel knows them,
+//! the program's items with the blocks of its path, the learnt correction and the commands as text, if there are any, and
+//! what a report shows of the run, with the letters of the axes in the first places; the counts before the first tick; and
+//! the answers of every tick, some eight bytes each on three places ([`answers`]).
 //!
 //! - [`answers`]: what the hardware answered, tick by tick;
 //! - [`recorder`]: hardware that writes it down;
-//! - [`replay`](mod@replay): hardware that answers from it, and the comparison.
+//! - [`replay`](mod@replay): hardware that answers from it, and the comparison;
+//! - `array`: arrays of one for each place.
 //!
 //! [`Player`]: replay::Player
 
 pub mod recorder;
 pub mod replay;
 pub mod answers;
+mod array;
 
 pub use recorder::Recorder;
 pub use replay::{Difference, Replay, replay};
 
+use std::convert::Infallible;
+
 use motion_kernel::num::{Fixed, Real};
-use motion_kernel::program::{self, CheckError, Checksum, ProgramError, Reader, SupplyError};
+use motion_kernel::program::{self, CheckError, Checksum};
 use motion_kernel::units::Counts;
 use serde::{Deserialize, Serialize};
 
 use self::answers::RecordedAnswers;
-use crate::simulate::live::Script;
-use crate::simulate::{Job, Number, RunInfo, StretchCorrection};
-use crate::trace::AXES;
+use crate::simulate::{Job, Number};
 
 const MAGIC: [u8; 4] = *b"MREC";
-const VERSION: u8 = 3;
+const VERSION: u8 = 4;
 
-/// A recorded run.
+/// A recorded run of a machine with `N` places for axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Recording {
-    number: Number,
-    /// A compiled program, blocks and guards included.
-    program: Vec<u8>,
-    correction: Option<StretchCorrection>,
-    script: Option<Script>,
-    info: RunInfo,
+pub struct Recording<const N: usize = 3> {
+    job: Job<N>,
     /// What the encoders read before the first tick.
-    start: [Counts; AXES],
+    #[serde(with = "array")]
+    start: [Counts; N],
     answers: RecordedAnswers,
 }
 
@@ -70,6 +69,14 @@ pub enum RecordingError {
         /// Theirs.
         found: u8,
     },
+    /// They are of a machine with another number of places for axes.
+    #[error("found a recording of {found} places for axes, expected {expected}")]
+    Places {
+        /// Theirs.
+        found: u8,
+        /// What was asked for.
+        expected: usize,
+    },
     /// They have been damaged, or end too early.
     #[error("found checksum {found:08x}, expected {expected:08x}: the recording is damaged or not whole")]
     Checksum {
@@ -81,32 +88,22 @@ pub enum RecordingError {
     /// Behind an intact checksum something is not as it is written.
     #[error("found no recording behind an intact checksum: {0}")]
     Malformed(String),
-    /// The program in it is not one for this kernel.
-    #[error("program in the recording: found {0}")]
-    Program(#[from] ProgramError),
-    /// The program in it does not say how its faults end.
-    #[error("program in the recording: found no guards, expected how its faults are told and end")]
-    Unguarded,
     /// The kernel does not accept the program in it.
     #[error("program in the recording: found {0}, expected what this kernel accepts")]
-    Check(CheckError<ProgramError>),
+    Check(CheckError<Infallible>),
 }
 
-impl Recording {
+impl<const N: usize> Recording<N> {
     /// Of a job, with what a [`Recorder`] has seen of it.
     #[must_use]
-    pub(self) fn new(job: &Job, start: [Counts; AXES], answers: RecordedAnswers) -> Self {
-        let mut program = Vec::new();
-        // Entries of three axes fit the format.
-        program::write(&job.header, Some(&job.guards), &job.items, &mut program).expect("three axes");
-        let Job { number, correction, script, info, .. } = job.clone();
-        Self { number, program, correction, script, info, start, answers }
+    pub(self) fn new(job: &Job<N>, start: [Counts; N], answers: RecordedAnswers) -> Self {
+        Self { job: job.clone(), start, answers }
     }
 
     /// The recording as bytes.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = [&MAGIC[..], &[VERSION]].concat();
+        let mut bytes = [&MAGIC[..], &[VERSION, N as u8]].concat();
         // Only what is endless, or of unknown length, can't be written.
         bytes.extend(postcard::to_stdvec(self).expect("figures, texts and lists"));
         bytes.extend(Checksum::of(&bytes).to_le_bytes());
@@ -118,15 +115,7 @@ impl Recording {
     /// # Errors
     /// Nothing but a whole, undamaged recording of a program that the kernel accepts.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RecordingError> {
-        let Some(rest) = bytes.strip_prefix(&MAGIC) else {
-            return Err(RecordingError::NotARecording { found: beginning(bytes) });
-        };
-        let [version, rest @ ..] = rest else {
-            return Err(RecordingError::NotARecording { found: "its first four bytes alone".to_owned() });
-        };
-        if *version != VERSION {
-            return Err(RecordingError::Version { found: *version });
-        }
+        let (places, rest) = head(bytes)?;
         let Some((body, &sum)) = rest.split_last_chunk() else {
             return Err(RecordingError::Malformed(format!("{} bytes in all", bytes.len())));
         };
@@ -134,13 +123,20 @@ impl Recording {
         if found != expected {
             return Err(RecordingError::Checksum { found, expected });
         }
+        if usize::from(places) != N {
+            return Err(RecordingError::Places { found: places, expected: N });
+        }
         let (recording, left) = postcard::take_from_bytes::<Self>(body)
             .map_err(|error| RecordingError::Malformed(error.to_string()))?;
         if !left.is_empty() {
             return Err(RecordingError::Malformed(format!("{} bytes too many", left.len())));
         }
-        recording.answers.check()?;
-        match recording.number {
+        recording.answers.check::<N>()?;
+        if recording.job.info.axes.len() > N {
+            let found = format!("{} axes on {N} places", recording.job.info.axes.len());
+            return Err(RecordingError::Malformed(found));
+        }
+        match recording.job.number {
             Number::F32 => recording.check::<f32>(),
             Number::F64 => recording.check::<f64>(),
             Number::Fixed => recording.check::<Fixed>(),
@@ -149,30 +145,14 @@ impl Recording {
     }
 
     fn check<R: Real>(&self) -> Result<(), RecordingError> {
-        let reader = Reader::<AXES>::new(&self.program)?;
-        reader.guards()?.ok_or(RecordingError::Unguarded)?;
-        let items = program::switches_as_stops(reader.items());
-        program::check::<R, AXES, _>(reader.header(), items).map_err(|error| match error {
-            CheckError::Item { cause: SupplyError::Source(error), .. } => error.into(),
-            error => RecordingError::Check(error),
-        })
+        let items = program::switches_as_stops(self.job.items.iter().map(|&item| Ok(item)));
+        program::check::<R, N, _>(&self.job.header, items).map_err(RecordingError::Check)
     }
 
     /// What was run.
-    ///
-    /// # Errors
-    /// The program in it can't be read.
-    pub fn job(&self) -> Result<Job, RecordingError> {
-        let reader = Reader::new(&self.program)?;
-        Ok(Job {
-            number: self.number,
-            header: *reader.header(),
-            guards: reader.guards()?.ok_or(RecordingError::Unguarded)?,
-            items: reader.items().collect::<Result<_, _>>()?,
-            correction: self.correction.clone(),
-            script: self.script.clone(),
-            info: self.info.clone(),
-        })
+    #[must_use]
+    pub fn job(&self) -> &Job<N> {
+        &self.job
     }
 
     /// Ticks in it, those included in which the machine settled after the program's end.
@@ -185,6 +165,27 @@ impl Recording {
     #[must_use]
     pub fn digest(&self) -> u64 {
         self.answers.digest
+    }
+}
+
+/// How many places for axes the machine of a recording has: with as many its bytes can be read.
+///
+/// # Errors
+/// The bytes do not begin as a recording of this version.
+pub fn places(bytes: &[u8]) -> Result<usize, RecordingError> {
+    head(bytes).map(|(places, _)| usize::from(places))
+}
+
+/// The places for axes, and what is behind the head.
+fn head(bytes: &[u8]) -> Result<(u8, &[u8]), RecordingError> {
+    let Some(rest) = bytes.strip_prefix(&MAGIC) else {
+        return Err(RecordingError::NotARecording { found: beginning(bytes) });
+    };
+    match *rest {
+        [] => Err(RecordingError::NotARecording { found: "its first four bytes alone".to_owned() }),
+        [version, ..] if version != VERSION => Err(RecordingError::Version { found: version }),
+        [_] => Err(RecordingError::Malformed(format!("{} bytes in all", bytes.len()))),
+        [_, places, ref rest @ ..] => Ok((places, rest)),
     }
 }
 

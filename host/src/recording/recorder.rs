@@ -10,22 +10,21 @@ use motion_kernel::units::{Counts, DacCode};
 use super::Recording;
 use super::answers::{AnswerWriter, Answers, Checks};
 use crate::simulate::{Hardware, Job};
-use crate::trace::AXES;
 
 /// Passes everything on to `H`, and keeps its answers.
 #[derive(Debug)]
-pub struct Recorder<'a, H> {
+pub struct Recorder<'a, H, const N: usize = 3> {
     hardware: &'a mut H,
-    start: [Counts; AXES],
-    answers: Answers,
+    start: [Counts; N],
+    answers: Answers<N>,
     checks: Checks,
-    writer: AnswerWriter,
+    writer: AnswerWriter<N>,
 }
 
-impl<'a, H: Hardware> Recorder<'a, H> {
+impl<'a, H: Hardware<N>, const N: usize> Recorder<'a, H, N> {
     /// Of `hardware`, before its first tick.
     pub fn new(hardware: &'a mut H) -> Self {
-        let start = [Counts(0); AXES];
+        let start = [Counts(0); N];
         Self {
             hardware,
             start,
@@ -37,57 +36,57 @@ impl<'a, H: Hardware> Recorder<'a, H> {
 
     /// What was recorded of the run of `job`.
     #[must_use]
-    pub fn finish(self, job: &Job) -> Recording {
+    pub fn finish(self, job: &Job<N>) -> Recording<N> {
         Recording::new(job, self.start, self.writer.finish(self.checks.digest()))
     }
 }
 
-impl<H: Hardware> Hardware for Recorder<'_, H> {
-    fn start_counts(&mut self) -> [Counts; AXES] {
+impl<H: Hardware<N>, const N: usize> Hardware<N> for Recorder<'_, H, N> {
+    fn start_counts(&mut self) -> [Counts; N] {
         self.start = self.hardware.start_counts();
         self.writer = AnswerWriter::new(self.start);
         self.start
     }
 
-    fn advance<R: Scalar>(&mut self, trace: &Trace<R, AXES>) -> bool {
+    fn advance<R: Scalar>(&mut self, trace: &Trace<R, N>) -> bool {
         self.writer.add(&self.answers, self.checks.add(trace));
         self.answers = Answers::NONE;
         self.hardware.advance(trace)
     }
 }
 
-impl<H: Hardware> Encoder<AXES> for Recorder<'_, H> {
-    type Error = <H as Encoder<AXES>>::Error;
+impl<H: Hardware<N>, const N: usize> Encoder<N> for Recorder<'_, H, N> {
+    type Error = <H as Encoder<N>>::Error;
 
-    fn latch(&mut self) -> Result<[Counts; AXES], Self::Error> {
+    fn latch(&mut self) -> Result<[Counts; N], Self::Error> {
         let latched = self.hardware.latch();
         self.answers.counts = latched.as_ref().ok().copied();
         latched
     }
 }
 
-impl<H: Hardware> Inputs<AXES> for Recorder<'_, H> {
-    type Error = <H as Inputs<AXES>>::Error;
+impl<H: Hardware<N>, const N: usize> Inputs<N> for Recorder<'_, H, N> {
+    type Error = <H as Inputs<N>>::Error;
 
-    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Self::Error> {
+    fn read_inputs(&mut self) -> Result<MachineInputs<N>, Self::Error> {
         let read = self.hardware.read_inputs();
         self.answers.inputs = read.as_ref().ok().copied();
         read
     }
 }
 
-impl<H: Hardware> VelocityChannel<AXES> for Recorder<'_, H> {
-    type Error = <H as VelocityChannel<AXES>>::Error;
+impl<H: Hardware<N>, const N: usize> VelocityChannel<N> for Recorder<'_, H, N> {
+    type Error = <H as VelocityChannel<N>>::Error;
 
-    fn write(&mut self, codes: &[DacCode; AXES]) -> Result<(), Self::Error> {
+    fn write(&mut self, codes: &[DacCode; N]) -> Result<(), Self::Error> {
         let written = self.hardware.write(codes);
         self.answers.is_written = written.is_ok();
         written
     }
 }
 
-impl<H: Hardware> DriveEnable<AXES> for Recorder<'_, H> {
-    type Error = <H as DriveEnable<AXES>>::Error;
+impl<H: Hardware<N>, const N: usize> DriveEnable<N> for Recorder<'_, H, N> {
+    type Error = <H as DriveEnable<N>>::Error;
 
     fn set_enabled(&mut self, enabled: bool) -> Result<(), Self::Error> {
         let taken = self.hardware.set_enabled(enabled);
@@ -96,7 +95,7 @@ impl<H: Hardware> DriveEnable<AXES> for Recorder<'_, H> {
     }
 }
 
-impl<H: Hardware> Outputs for Recorder<'_, H> {
+impl<H: Hardware<N>, const N: usize> Outputs for Recorder<'_, H, N> {
     fn switch(&mut self, to: &OutputState) {
         self.checks.switch(to);
         self.hardware.switch(to);

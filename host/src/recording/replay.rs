@@ -12,7 +12,6 @@ use motion_kernel::units::{Counts, DacCode};
 use super::Recording;
 use super::answers::{AnswerReader, Answers, Checks};
 use crate::simulate::{self, Hardware, Job, Observer, RunError, RunSummary};
-use crate::trace::AXES;
 
 /// A run that was made again.
 #[derive(Clone, Debug)]
@@ -71,7 +70,11 @@ impl fmt::Display for Difference {
 ///
 /// # Errors
 /// The job can't be executed.
-pub fn replay(recording: &Recording, job: &Job, observe: &mut Observer<'_>) -> Result<Replay, RunError> {
+pub fn replay<const N: usize>(
+    recording: &Recording<N>,
+    job: &Job<N>,
+    observe: &mut Observer<'_, N>,
+) -> Result<Replay, RunError> {
     let mut player = Player::new(recording);
     let summary = simulate::run_on(job, &mut player, observe)?;
     let (ticks, expected) = (player.ticks, recording.ticks());
@@ -90,11 +93,11 @@ pub fn replay(recording: &Recording, job: &Job, observe: &mut Observer<'_>) -> R
 
 /// Hardware that answers from a recording, until what it is asked differs.
 #[derive(Debug)]
-pub struct Player<'a> {
-    start: [Counts; AXES],
-    reader: AnswerReader<'a>,
+pub struct Player<'a, const N: usize = 3> {
+    start: [Counts; N],
+    reader: AnswerReader<'a, N>,
     /// Of the tick under way, with its check byte.
-    answers: Option<(Answers, u8)>,
+    answers: Option<(Answers<N>, u8)>,
     told: Option<bool>,
     checks: Checks,
     ticks: u64,
@@ -105,8 +108,8 @@ pub struct Player<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordedFailure;
 
-impl<'a> Player<'a> {
-    fn new(recording: &'a Recording) -> Self {
+impl<'a, const N: usize> Player<'a, N> {
+    fn new(recording: &'a Recording<N>) -> Self {
         Self {
             start: recording.start,
             reader: recording.answers.read(recording.start),
@@ -119,12 +122,12 @@ impl<'a> Player<'a> {
     }
 }
 
-impl Hardware for Player<'_> {
-    fn start_counts(&mut self) -> [Counts; AXES] {
+impl<const N: usize> Hardware<N> for Player<'_, N> {
+    fn start_counts(&mut self) -> [Counts; N] {
         self.start
     }
 
-    fn advance<R: Scalar>(&mut self, trace: &Trace<R, AXES>) -> bool {
+    fn advance<R: Scalar>(&mut self, trace: &Trace<R, N>) -> bool {
         let told = self.told.take();
         self.difference = match self.answers.take() {
             None => Some(Difference::Longer { ticks: self.ticks }),
@@ -139,34 +142,34 @@ impl Hardware for Player<'_> {
     }
 }
 
-impl Outputs for Player<'_> {
+impl<const N: usize> Outputs for Player<'_, N> {
     fn switch(&mut self, to: &OutputState) {
         self.checks.switch(to);
     }
 }
 
-impl Encoder<AXES> for Player<'_> {
+impl<const N: usize> Encoder<N> for Player<'_, N> {
     type Error = RecordedFailure;
 
     // The first thing that a tick asks for.
-    fn latch(&mut self) -> Result<[Counts; AXES], RecordedFailure> {
+    fn latch(&mut self) -> Result<[Counts; N], RecordedFailure> {
         self.answers = self.reader.next();
         self.answers.and_then(|(answers, _)| answers.counts).ok_or(RecordedFailure)
     }
 }
 
-impl Inputs<AXES> for Player<'_> {
+impl<const N: usize> Inputs<N> for Player<'_, N> {
     type Error = RecordedFailure;
 
-    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, RecordedFailure> {
+    fn read_inputs(&mut self) -> Result<MachineInputs<N>, RecordedFailure> {
         self.answers.and_then(|(answers, _)| answers.inputs).ok_or(RecordedFailure)
     }
 }
 
-impl VelocityChannel<AXES> for Player<'_> {
+impl<const N: usize> VelocityChannel<N> for Player<'_, N> {
     type Error = RecordedFailure;
 
-    fn write(&mut self, _: &[DacCode; AXES]) -> Result<(), RecordedFailure> {
+    fn write(&mut self, _: &[DacCode; N]) -> Result<(), RecordedFailure> {
         match self.answers {
             Some((Answers { is_written: false, .. }, _)) => Err(RecordedFailure),
             _ => Ok(()),
@@ -174,7 +177,7 @@ impl VelocityChannel<AXES> for Player<'_> {
     }
 }
 
-impl DriveEnable<AXES> for Player<'_> {
+impl<const N: usize> DriveEnable<N> for Player<'_, N> {
     type Error = RecordedFailure;
 
     fn set_enabled(&mut self, enabled: bool) -> Result<(), RecordedFailure> {

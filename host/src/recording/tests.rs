@@ -1,13 +1,16 @@
 //! Recordings that are not what they were.
 
-use motion_kernel::hal::{AxisInputs, MachineInputs};
-use motion_kernel::program::ProgramError;
+use motion_kernel::hal::{AxisInputs, MachineInputs, OutputState};
+use motion_kernel::law::{PlannedRamp, Ramp, Ticks};
+use motion_kernel::program::{Allowed, Item, PathBlock};
+use motion_kernel::units::Position;
 
 use super::answers::{AnswerWriter, Answers};
 use super::*;
 use crate::gcode;
 use crate::machine::Machine;
 use crate::planning::{Mode, plan_program};
+use crate::simulate::live::Script;
 use crate::simulate::{self, RunOptions};
 use crate::trace::TraceRow;
 
@@ -29,7 +32,7 @@ fn recorded(number: Number) -> Recording {
 }
 
 fn replayed(recording: &Recording) -> Replay {
-    replay(recording, &recording.job().expect("a job"), &mut |_: &TraceRow| ()).expect("a replay")
+    replay(recording, recording.job(), &mut |_: &TraceRow| ()).expect("a replay")
 }
 
 /// The recorded answers with the answers of one tick changed; its check bytes are those of the run.
@@ -51,7 +54,7 @@ fn one_count_off_is_found_in_its_tick() {
         assert_eq!(replayed(&recording).difference, None);
         let (mut in_its_tick, mut later) = (0, 0);
         for tick in (0..recording.ticks()).step_by(37) {
-            for axis in 0..AXES {
+            for axis in 0..3 {
                 let changed = tampered(&recording, tick, |answers| {
                     answers.counts.as_mut().expect("read")[axis].0 += 1;
                 });
@@ -143,15 +146,42 @@ fn recorded_answers_read_what_was_written() {
         writer.add(answers, index as u8);
     }
     let recorded = writer.finish(0);
-    recorded.check().expect("entries");
+    recorded.check::<3>().expect("entries");
     for (index, (read, written)) in recorded.read(start).zip(&all).enumerate() {
         assert_eq!(read, (*written, index as u8));
     }
 }
 
+/// A field more or less of what the kernel consumes is another format, and needs another version.
+#[test]
+fn the_format_has_these_lengths() {
+    let Job { header, guards, .. } = recorded(Number::F32).job;
+    let still = [Position::ZERO; 3];
+    let limits = Machine::reference().path.limits();
+    let allowed = Allowed { cap_mm_s: 1.0, limits };
+    let ramp = Ramp::cruise(1.0, 1.0);
+    let items = [
+        Item::Line { line: 1, start: still, direction: [1.0, 0.0, 0.0], length: Position::ZERO },
+        Item::Septic { line: 1, start: still, coefficients: [[0.0; 7]; 3], length: Position::ZERO },
+        Item::Feed(PlannedRamp { ramp, length: Position::ZERO }),
+        Item::EndOfStretch(still),
+        Item::Dwell(Ticks::ONE),
+        Item::Stop,
+        Item::Switch(OutputState::OFF),
+        Item::Block(PathBlock::new(Position::ZERO, 1.0, allowed, allowed, 0.0)),
+    ];
+    let length = |bytes: postcard::Result<Vec<u8>>| bytes.expect("figures").len();
+    let found = (
+        length(postcard::to_stdvec(&header)),
+        length(postcard::to_stdvec(&guards)),
+        items.map(|item| length(postcard::to_stdvec(&item))),
+    );
+    assert_eq!((VERSION, found), (4, (360, 206, [30, 174, 51, 4, 6, 1, 12, 82])));
+}
+
 #[test]
 fn strangers_are_named() {
-    let message = |bytes: &[u8]| Recording::from_bytes(bytes).expect_err("no recording").to_string();
+    let message = |bytes: &[u8]| Recording::<3>::from_bytes(bytes).expect_err("no recording").to_string();
     let bytes = recorded(Number::F32).to_bytes();
     assert_eq!(message(b""), "found nothing, expected a recording, which begins with MREC");
     assert_eq!(
@@ -160,20 +190,20 @@ fn strangers_are_named() {
     );
     let mut newer = bytes.clone();
     newer[4] = 9;
-    assert_eq!(message(&newer), "found a recording of format 9, expected format 3");
+    assert_eq!(message(&newer), "found a recording of format 9, expected format 4");
     assert!(message(&bytes[..bytes.len() - 1]).contains("damaged or not whole"));
 
     // With a checksum that fits.
-    let sealed = |recording: &Recording| Recording::from_bytes(&recording.to_bytes()).expect_err("refused");
+    let sealed =
+        |recording: &Recording| Recording::<3>::from_bytes(&recording.to_bytes()).expect_err("refused");
     let recording = recorded(Number::F32);
-    let mut foreign = recording.clone();
-    foreign.program[4] = 9;
-    assert_eq!(sealed(&foreign), RecordingError::Program(ProgramError::Version { found: 9 }));
-    let job = recording.job().expect("a job");
-    let mut unguarded = recording.clone();
-    unguarded.program.clear();
-    program::write(&job.header, None, &job.items, &mut unguarded.program).expect("three axes");
-    assert_eq!(sealed(&unguarded), RecordingError::Unguarded);
+    let mut refused = recording.clone();
+    refused.job.items.retain(|item| !matches!(item, Item::Line { .. }));
+    assert!(matches!(sealed(&refused), RecordingError::Check(_)));
+    let mut crowded = recording.clone();
+    crowded.job.info.axes.push(recording.job.info.axes[0].clone());
+    let found = "4 axes on 3 places".to_owned();
+    assert_eq!(sealed(&crowded), RecordingError::Malformed(found));
     let mut missing = recording.clone();
     missing.answers.ticks += 1;
     assert!(matches!(sealed(&missing), RecordingError::Malformed(_)));

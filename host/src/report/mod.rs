@@ -21,7 +21,7 @@ use self::palette::Ink;
 use self::plots::path::View;
 use self::plots::{Caption, contour, feed, marks, path, time};
 use self::summary::{Outcome, Span, Summary};
-use crate::trace::{AXES, RunTrace, TracedFault};
+use crate::trace::{RunTrace, TracedFault};
 
 /// Faults named in the sentence at the top; the table below it has the others.
 const FAULTS_IN_SENTENCE: usize = 3;
@@ -42,7 +42,7 @@ const NOTICES_MAX: usize = 100;
 /// # Errors
 ///
 /// Whatever `out` reports. Drawing itself happens in memory.
-pub fn write_html(trace: &RunTrace, out: &mut impl Write) -> io::Result<()> {
+pub fn write_html<const N: usize>(trace: &RunTrace<N>, out: &mut impl Write) -> io::Result<()> {
     let summary = Summary::of(trace);
     let names = axis_names(trace);
     head(file_name(program_name(trace)), out)?;
@@ -61,11 +61,12 @@ pub fn write_html(trace: &RunTrace, out: &mut impl Write) -> io::Result<()> {
 }
 
 /// Names to call the axes by; one without a name gets its number.
-fn axis_names(trace: &RunTrace) -> [String; AXES] {
-    std::array::from_fn(|axis| match trace.axis_names[axis].trim() {
+fn axis_names<const N: usize>(trace: &RunTrace<N>) -> Vec<String> {
+    let name = |(axis, name): (usize, &str)| match name {
         "" => format!("axis {}", axis + 1),
         name => name.to_string(),
-    })
+    };
+    trace.axes.iter().map(|axis| axis.name.trim()).enumerate().map(name).collect()
 }
 
 /// Everything before what the page has to say about `subject`.
@@ -81,7 +82,7 @@ fn head(subject: &str, out: &mut impl Write) -> io::Result<()> {
     )
 }
 
-fn program_name(trace: &RunTrace) -> &str {
+fn program_name<const N: usize>(trace: &RunTrace<N>) -> &str {
     if trace.program.is_empty() { "unnamed program" } else { &trace.program }
 }
 
@@ -90,10 +91,10 @@ fn file_name(program: &str) -> &str {
     program.rsplit(['/', '\\']).next().filter(|name| !name.is_empty()).unwrap_or(program)
 }
 
-fn header(
-    trace: &RunTrace,
+fn header<const N: usize>(
+    trace: &RunTrace<N>,
     summary: &Summary,
-    names: &[String; AXES],
+    names: &[String],
     out: &mut impl Write,
 ) -> io::Result<()> {
     let program = program_name(trace);
@@ -118,7 +119,7 @@ fn header(
 }
 
 /// How the run ended, in one sentence.
-fn result(trace: &RunTrace, summary: &Summary) -> String {
+fn result<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> String {
     let blocks = counted(trace.blocks.len(), "block", "blocks");
     let length = figure(summary.path_length_mm, 6);
     let time = duration(summary.executed_time_s);
@@ -154,7 +155,7 @@ fn result(trace: &RunTrace, summary: &Summary) -> String {
 }
 
 /// The line that the run came to, if it came to one.
-fn reached_line(trace: &RunTrace) -> String {
+fn reached_line<const N: usize>(trace: &RunTrace<N>) -> String {
     let line = trace.ticks.iter().rev().map(|tick| tick.line).find(|&line| line > 0);
     line.map_or_else(String::new, |line| format!(", line {line}"))
 }
@@ -166,7 +167,7 @@ fn name_fault(fault: &TracedFault, tick_s: f64) -> String {
     format!("{}{axis} at {:.4} s{detail}", escape(&fault.fault), fault.tick as f64 * tick_s)
 }
 
-fn notices(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+fn notices<const N: usize>(trace: &RunTrace<N>, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
     if trace.notices.is_empty() && summary.not_finite == 0 {
         return Ok(());
     }
@@ -211,26 +212,35 @@ fn figure_html(
     writeln!(out, "</figure>")
 }
 
-/// The planes in which there is something to see: of two axes that moved theirs, of three the first with each
-/// of the others, and the third plane if the tool moved within it (G19), which the other two show as a line.
+/// The planes in which there is something to see, of linear axes: of two that moved theirs, of more the first with each
+/// of the others, and the plane of two others if the tool moved within it (G19), which those show as a line. An axis that
+/// moved alone is shown with the first, or the next.
 fn views(summary: &Summary) -> Vec<View> {
-    let view = |right, up| View { right, up };
-    match [0, 1, 2].map(|axis: usize| summary.axes[axis].moved()) {
-        [true, true, true] if summary.moved_beside_first => vec![view(0, 1), view(0, 2), view(1, 2)],
-        [true, true, true] => vec![view(0, 1), view(0, 2)],
-        [false, true, true] => vec![view(1, 2)],
-        [_, false, true] => vec![view(0, 2)],
-        [_, _, false] => vec![view(0, 1)],
+    let view = |&(right, up): &(usize, usize)| View { right, up };
+    let moved: Vec<usize> =
+        summary.linear.iter().copied().filter(|&axis| summary.axes[axis].moved()).collect();
+    match (&moved[..], &summary.linear[..]) {
+        (&[first, ref others @ ..], _) if !others.is_empty() => {
+            let with_first = others.iter().map(|&other| (first, other)).collect::<Vec<_>>();
+            let is_shown = |&(a, b): &&(usize, usize)| others.contains(a) && others.contains(b);
+            with_first.iter().chain(summary.moved_together.iter().filter(is_shown)).map(view).collect()
+        }
+        (&[alone], &[first, ..]) if alone != first => vec![view(&(first, alone))],
+        (_, &[first, second, ..]) => vec![view(&(first, second))],
+        _ => Vec::new(),
     }
 }
 
-fn path_section(
-    trace: &RunTrace,
+fn path_section<const N: usize>(
+    trace: &RunTrace<N>,
     summary: &Summary,
-    names: &[String; AXES],
+    names: &[String],
     out: &mut impl Write,
 ) -> io::Result<()> {
     let views = views(summary);
+    if views.is_empty() {
+        return Ok(());
+    }
     writeln!(out, "<section><h2>Path</h2>")?;
     let classes = path::classes(summary.feed_mm_s);
     let legend: Vec<_> = palette::CLASSES
@@ -256,7 +266,7 @@ fn path_section(
 }
 
 /// The places on the path where faults were latched.
-fn faults_mm(trace: &RunTrace) -> Vec<f64> {
+fn faults_mm<const N: usize>(trace: &RunTrace<N>) -> Vec<f64> {
     let place = |fault: &TracedFault| {
         let index = trace.ticks.partition_point(|tick| tick.tick < fault.tick);
         trace.ticks.get(index).map(|tick| tick.s_mm)
@@ -264,7 +274,11 @@ fn faults_mm(trace: &RunTrace) -> Vec<f64> {
     trace.faults.iter().filter_map(place).collect()
 }
 
-fn feed_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+fn feed_section<const N: usize>(
+    trace: &RunTrace<N>,
+    summary: &Summary,
+    out: &mut impl Write,
+) -> io::Result<()> {
     let (top_mm_s, beyond) = feed::top(trace, summary);
     let reasons = feed::reasons(&trace.blocks, top_mm_s);
     let description = format!(
@@ -308,7 +322,11 @@ fn feed_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io
     writeln!(out, "</section>")
 }
 
-fn contour_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+fn contour_section<const N: usize>(
+    trace: &RunTrace<N>,
+    summary: &Summary,
+    out: &mut impl Write,
+) -> io::Result<()> {
     if summary.contour_um.is_empty() {
         return Ok(());
     }
@@ -319,7 +337,11 @@ fn contour_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) ->
     );
     let caption =
         Caption { id: "contour", title: "Contour error over path length", description: &description };
-    let mut words = "The part of the following error across the path. ".to_string();
+    let mut words = if trace.axes.len() > summary.linear.len() {
+        "The part of the linear axes' following error across the path. ".to_string()
+    } else {
+        "The part of the following error across the path. ".to_string()
+    };
     if feed::has_line_numbers(trace, summary) {
         words += LINE_NUMBERS;
     }
@@ -358,7 +380,11 @@ fn rests_key(summary: &Summary) -> String {
     }
 }
 
-fn time_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io::Result<()> {
+fn time_section<const N: usize>(
+    trace: &RunTrace<N>,
+    summary: &Summary,
+    out: &mut impl Write,
+) -> io::Result<()> {
     let description = format!(
         "Four curves over {}: feed up to {} mm/s, acceleration up to {} mm/s², jerk up to {} mm/s³, snap up to {} mm/s⁴.",
         duration(summary.executed_time_s),
@@ -392,20 +418,22 @@ fn time_section(trace: &RunTrace, summary: &Summary, out: &mut impl Write) -> io
     writeln!(out, "</section>")
 }
 
-fn axes_section(
-    trace: &RunTrace,
+fn axes_section<const N: usize>(
+    trace: &RunTrace<N>,
     summary: &Summary,
-    names: &[String; AXES],
+    names: &[String],
     out: &mut impl Write,
 ) -> io::Result<()> {
     writeln!(out, "<section><h2>Axes over time</h2>")?;
-    for (axis, (name, figures)) in names.iter().zip(&summary.axes).enumerate() {
+    let axes = names.iter().zip(&summary.axes).zip(&trace.axes).enumerate();
+    for (axis, ((name, figures), of_run)) in axes {
+        let unit = of_run.unit().thousandth_symbol();
         // An axis that failed is of interest even if it was to stand still.
-        let failed = trace.faults.iter().any(|fault| fault.axis.as_ref() == Some(&trace.axis_names[axis]));
+        let failed = trace.faults.iter().any(|fault| fault.axis.as_ref() == Some(&of_run.name));
         if !figures.moved() && !failed {
             writeln!(
                 out,
-                "<p>{} was not moved: following error at most {} µm, output at most {} V.</p>",
+                "<p>{} was not moved: following error at most {} {unit}, output at most {} V.</p>",
                 escape(name),
                 figure(figures.err_um.magnitude(), 3),
                 figure(figures.out_v.magnitude(), 3),
@@ -414,20 +442,20 @@ fn axes_section(
         }
         let title = format!("Following error and output of {name}");
         let description = format!(
-            "Following error at most {} µm, {} µm rms; output at most {} V.",
+            "Following error at most {} {unit}, {} {unit} rms; output at most {} V.",
             figure(figures.err_um.magnitude(), 3),
             figure(figures.err_um_rms, 3),
             figure(figures.out_v.magnitude(), 3),
         );
         let caption = Caption { id: &format!("axis{axis}"), title: &title, description: &description };
         let drawing = time::of_axis(trace, summary, axis, &caption)?;
-        let limit_um = trace.following_error_limit_um[axis];
+        let limit_um = of_run.following_error_limit_um;
         let mut legend = Vec::new();
         if time::shows_limit(figures.err_um, limit_um) {
             legend.push((palette::LIMIT, "limit".to_string()));
         }
         legend.extend(fault_key(trace));
-        let beyond = limits_beyond([("following error", figures.err_um, limit_um, "µm")].into_iter());
+        let beyond = limits_beyond([("following error", figures.err_um, limit_um, unit)].into_iter());
         writeln!(out, "<div class=\"axis\"><h3>{}</h3>", escape(name))?;
         figure_html(&drawing, &legend, &(beyond + &rests_key(summary)), out)?;
         writeln!(out, "</div>")?;
@@ -436,7 +464,7 @@ fn axes_section(
 }
 
 /// Legend of the commands' lines, where there are any.
-fn command_key(trace: &RunTrace) -> Option<(Ink, String)> {
+fn command_key<const N: usize>(trace: &RunTrace<N>) -> Option<(Ink, String)> {
     let number = trace.commands.len();
     let words = if number > marks::COMMAND_MARKS_MAX {
         format!("command, the first {} of {number}", marks::COMMAND_MARKS_MAX)
@@ -447,7 +475,7 @@ fn command_key(trace: &RunTrace) -> Option<(Ink, String)> {
 }
 
 /// Legend of the fault lines, where there are any.
-fn fault_key(trace: &RunTrace) -> Vec<(Ink, String)> {
+fn fault_key<const N: usize>(trace: &RunTrace<N>) -> Vec<(Ink, String)> {
     if trace.faults.is_empty() { Vec::new() } else { vec![(palette::FAULT, "fault latched".to_string())] }
 }
 

@@ -1,6 +1,9 @@
 //! The figures of a run, from one pass over its ticks.
 
-use crate::trace::{AXES, RunEnd, RunTrace, TraceRow};
+use std::collections::BTreeSet;
+
+use crate::axis_unit::AxisUnit;
+use crate::trace::{RunEnd, RunTrace, TraceRow};
 
 /// A path counts as finished when less than this is left of it \[mm\]. Far above rounding, far below any
 /// tolerance.
@@ -76,7 +79,7 @@ pub(super) struct Rest {
     pub(super) to_s: f64,
 }
 
-/// Figures of one axis.
+/// Figures of one axis. Of a rotary one read ° for mm.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AxisSummary {
     /// Set position \[mm\].
@@ -119,34 +122,46 @@ pub(super) struct Summary {
     pub(super) jerk_mm_s3: Span,
     /// Snap along the path \[mm/s⁴\].
     pub(super) snap_mm_s4: Span,
-    /// Contour error \[µm\].
+    /// Contour error \[µm\]; empty without linear axes.
     pub(super) contour_um: Span,
     /// Dwells and program stops, in order.
     pub(super) rests: Vec<Rest>,
-    /// Per axis.
-    pub(super) axes: [AxisSummary; AXES],
-    /// Whether at some time the second and the third axis moved together without the first.
-    pub(super) moved_beside_first: bool,
+    /// Per axis that there is.
+    pub(super) axes: Vec<AxisSummary>,
+    /// The linear axes.
+    pub(super) linear: Vec<usize>,
+    /// Pairs of linear axes that at some time moved together, while those before them stood; but for pairs with the
+    /// first.
+    pub(super) moved_together: BTreeSet<(usize, usize)>,
     /// Values in the trace that are not finite and can therefore not be shown.
     pub(super) not_finite: u64,
 }
 
 impl Summary {
     /// Reads a trace once.
-    pub(super) fn of(trace: &RunTrace) -> Self {
+    pub(super) fn of<const N: usize>(trace: &RunTrace<N>) -> Self {
         let mut path = [Span::default(); 4];
-        let mut axes = [AxisSummary::default(); AXES];
-        let mut squares = [(0.0, 0u64); AXES];
+        let mut axes = vec![AxisSummary::default(); trace.axes.len()];
+        let mut squares = vec![(0.0, 0u64); axes.len()];
         let mut done_mm = Span::default();
         let mut contour_um = Span::default();
-        let mut moved_beside_first = false;
+        let units = trace.axes.iter().enumerate();
+        let linear: Vec<usize> =
+            units.filter(|(_, axis)| axis.unit() == AxisUnit::Millimetre).map(|(index, _)| index).collect();
+        let mut moved_together = BTreeSet::new();
         let mut not_finite = 0;
         for tick in &trace.ticks {
             done_mm.add(tick.s_mm);
-            contour_um.add(tick.contour_um);
+            if !linear.is_empty() {
+                contour_um.add(tick.contour_um);
+            }
             not_finite += u64::from(!tick.contour_um.is_finite());
             let still = |axis: usize| tick.axes[axis].vel_mm_s.abs() <= STILL_PART * tick.v_mm_s.abs();
-            moved_beside_first |= still(0) && !still(1) && !still(2);
+            let first_moving = linear.iter().position(|&axis| !still(axis));
+            if let Some(place) = first_moving.filter(|&place| place > 0) {
+                let others = linear[place + 1..].iter().filter(|&&axis| !still(axis));
+                moved_together.extend(others.map(|&axis| (linear[place], axis)));
+            }
             for (span, value) in path.iter_mut().zip(along_path(tick)) {
                 span.add(value);
                 not_finite += u64::from(!value.is_finite());
@@ -177,7 +192,7 @@ impl Summary {
         } else {
             Outcome::Done
         };
-        let instant = |tick: Option<&TraceRow>| tick.map_or(0.0, |tick| tick.tick as f64 * trace.tick_s);
+        let instant = |tick: Option<&TraceRow<N>>| tick.map_or(0.0, |tick| tick.tick as f64 * trace.tick_s);
         let [feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4] = path;
         Self {
             outcome,
@@ -192,14 +207,15 @@ impl Summary {
             contour_um,
             rests: rests(trace),
             axes,
-            moved_beside_first,
+            linear,
+            moved_together,
             not_finite,
         }
     }
 }
 
 /// Dwells, program stops and holds: ticks that follow each other in one of these states.
-fn rests(trace: &RunTrace) -> Vec<Rest> {
+fn rests<const N: usize>(trace: &RunTrace<N>) -> Vec<Rest> {
     let mut rests = Vec::new();
     for ticks in trace.ticks.chunk_by(|a, b| a.state == b.state) {
         let [first, ..] = ticks else { continue };
@@ -213,6 +229,6 @@ fn rests(trace: &RunTrace) -> Vec<Rest> {
 }
 
 /// Feed and its three derivatives.
-fn along_path(tick: &TraceRow) -> [f64; 4] {
+fn along_path<const N: usize>(tick: &TraceRow<N>) -> [f64; 4] {
     [tick.v_mm_s, tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4]
 }

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use super::format::{count, counted, duration, escape, figure, fixed, share};
 use super::plots::marks;
 use super::summary::{Span, Summary};
-use crate::trace::{AXES, RunTrace};
+use crate::axis_unit::AxisUnit;
+use crate::trace::RunTrace;
 
 /// Rows of a table on the page; the rest is in the trace file.
 pub(super) const ROWS_MAX: usize = 200;
@@ -54,12 +55,12 @@ fn wrapped(name: &str, head: &[&str], body: &str) -> String {
 }
 
 /// Blocks at whose end the machine stands.
-pub(super) fn full_stops(trace: &RunTrace) -> usize {
+pub(super) fn full_stops<const N: usize>(trace: &RunTrace<N>) -> usize {
     trace.blocks.iter().filter(|block| block.exit_mm_s <= 0.0).count()
 }
 
 /// Figures of the whole run, as terms and values.
-pub(super) fn key_figures(trace: &RunTrace, summary: &Summary) -> String {
+pub(super) fn key_figures<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> String {
     let feed = summary.feed_mm_s.magnitude();
     let path = if summary.path_done_mm < summary.path_length_mm - 1e-3 {
         format!("{} of {} mm", figure(summary.path_done_mm, 6), figure(summary.path_length_mm, 6))
@@ -114,41 +115,47 @@ pub(super) fn key_figures(trace: &RunTrace, summary: &Summary) -> String {
     list
 }
 
-/// A row per axis.
-pub(super) fn axes(trace: &RunTrace, summary: &Summary, names: &[String; AXES]) -> String {
-    let mut body = String::new();
-    for ((axis, name), end) in summary.axes.iter().zip(names).zip(trace.end_error_counts) {
-        let _ = writeln!(
-            body,
-            "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            escape(name),
-            fixed(axis.err_um.magnitude(), 2),
-            fixed(axis.err_um_rms, 2),
-            fixed(end as f64, 0),
-            fixed(axis.out_v.magnitude(), 3),
-            fixed(axis.vel_mm_s.magnitude(), 2),
-            fixed(axis.set_mm.low, 4),
-            fixed(axis.set_mm.high, 4),
-        );
-    }
-    let head = [
-        "*Axis",
-        "Error max [µm]",
-        "Error rms [µm]",
-        "End error [counts]",
-        "Output max [V]",
-        "Speed max [mm/s]",
-        "Lowest [mm]",
-        "Highest [mm]",
-    ];
+/// A row per axis: a table of the linear ones, and one of the rotary ones.
+pub(super) fn axes<const N: usize>(trace: &RunTrace<N>, summary: &Summary, names: &[String]) -> String {
+    let of_unit = |unit: AxisUnit, name: &str| {
+        let mut body = String::new();
+        let axes = trace.axes.iter().zip(&summary.axes).zip(names);
+        for ((of_run, axis), name) in axes.filter(|((of_run, _), _)| of_run.unit() == unit) {
+            let _ = writeln!(
+                body,
+                "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+                escape(name),
+                fixed(axis.err_um.magnitude(), 2),
+                fixed(axis.err_um_rms, 2),
+                fixed(of_run.end_error_counts as f64, 0),
+                fixed(axis.out_v.magnitude(), 3),
+                fixed(axis.vel_mm_s.magnitude(), 2),
+                fixed(axis.set_mm.low, 4),
+                fixed(axis.set_mm.high, 4),
+            );
+        }
+        let (symbol, thousandth) = (unit.symbol(), unit.thousandth_symbol());
+        let head = [
+            "*Axis",
+            &format!("Error max [{thousandth}]"),
+            &format!("Error rms [{thousandth}]"),
+            "End error [counts]",
+            "Output max [V]",
+            &format!("Speed max [{symbol}/s]"),
+            &format!("Lowest [{symbol}]"),
+            &format!("Highest [{symbol}]"),
+        ];
+        if body.is_empty() { String::new() } else { wrapped(name, &head, &body) }
+    };
     format!(
-        "<p>Error is the following error, set minus actual position; end error is what is left of it once the axes have settled.</p>\n{}",
-        wrapped("Axes", &head, &body)
+        "<p>Error is the following error, set minus actual position; end error is what is left of it once the axes have settled.</p>\n{}{}",
+        of_unit(AxisUnit::Millimetre, "Axes"),
+        of_unit(AxisUnit::Degree, "Rotary axes"),
     )
 }
 
 /// A row per fault; nothing if there was none.
-pub(super) fn faults(trace: &RunTrace) -> String {
+pub(super) fn faults<const N: usize>(trace: &RunTrace<N>) -> String {
     if trace.faults.is_empty() {
         return String::new();
     }
@@ -171,7 +178,7 @@ pub(super) fn faults(trace: &RunTrace) -> String {
 }
 
 /// A row per command; nothing if there was none.
-pub(super) fn commands(trace: &RunTrace) -> String {
+pub(super) fn commands<const N: usize>(trace: &RunTrace<N>) -> String {
     if trace.commands.is_empty() {
         return String::new();
     }
@@ -209,7 +216,7 @@ pub(super) fn commands(trace: &RunTrace) -> String {
 }
 
 /// A row per block.
-pub(super) fn blocks(trace: &RunTrace) -> String {
+pub(super) fn blocks<const N: usize>(trace: &RunTrace<N>) -> String {
     let mut body = String::new();
     for block in trace.blocks.iter().take(ROWS_MAX) {
         let _ = writeln!(

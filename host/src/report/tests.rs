@@ -1,7 +1,8 @@
 //! The page as a whole, on made-up runs.
 
 use super::*;
-use crate::trace::{AxisTick, PathLimits, TraceRow, TracedBlock, TracedCommand, TracedStop};
+use crate::gcode::Axis;
+use crate::trace::{AxisTick, PathLimits, TraceRow, TracedAxis, TracedBlock, TracedCommand, TracedStop};
 
 /// Ramps and cruises of the sample: duration \[s\], feed at both ends \[mm/s\]. A ramp is a raised cosine in
 /// acceleration.
@@ -49,6 +50,10 @@ fn feed_at(mut time_s: f64) -> [f64; 4] {
     [0.0; 4]
 }
 
+fn axis(letter: Axis, end_error_counts: i64) -> TracedAxis {
+    TracedAxis { name: letter.to_string(), letter, following_error_limit_um: 1000.0, end_error_counts }
+}
+
 /// The five-block path in ticks of `tick_s`, Z dipping if `with_z`.
 fn sample(tick_s: f64, with_z: bool) -> RunTrace {
     let mut trace = RunTrace {
@@ -56,9 +61,7 @@ fn sample(tick_s: f64, with_z: bool) -> RunTrace {
         machine: "reference machine".to_string(),
         tick_s,
         limits: PathLimits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 },
-        axis_names: ["X", "Y", "Z"].map(String::from),
-        following_error_limit_um: [1000.0; AXES],
-        end_error_counts: [0, -3, 1],
+        axes: vec![axis(Axis::X, 0), axis(Axis::Y, -3), axis(Axis::Z, 1)],
         planned_time_s: FEED.iter().map(|ramp| ramp.0).sum(),
         ..RunTrace::default()
     };
@@ -85,7 +88,7 @@ fn sample(tick_s: f64, with_z: bool) -> RunTrace {
     for tick in 0..ticks {
         let [v, a, j, snap] = feed_at(tick as f64 * tick_s);
         let index = trace.blocks.iter().rposition(|block| s >= block.start_mm).unwrap_or(0);
-        let mut axes = [AxisTick::default(); AXES];
+        let mut axes = [AxisTick::default(); 3];
         let z = if with_z { -4.0 * (s / start_mm * std::f64::consts::PI).sin() } else { 0.0 };
         for (axis, (set, along)) in axes.iter_mut().zip([(x, heading.cos()), (y, heading.sin()), (z, 0.0)]) {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -246,7 +249,7 @@ fn text_from_the_program_cannot_become_markup() {
     trace.program = hostile.to_string();
     trace.machine = hostile.to_string();
     trace.notices = vec![hostile.to_string()];
-    trace.axis_names = [hostile, "", "Z"].map(String::from);
+    (trace.axes[0].name, trace.axes[1].name) = (hostile.to_string(), String::new());
     trace.faults.push(TracedFault {
         tick: 20,
         axis: Some(hostile.to_string()),
@@ -288,7 +291,7 @@ fn values_that_are_not_finite_are_reported_and_not_drawn() {
     for tick in &mut trace.ticks {
         tick.v_mm_s = f64::NAN;
         tick.axes =
-            [AxisTick { set_mm: f64::NAN, err_um: f64::NAN, out_v: f64::NAN, ..AxisTick::default() }; AXES];
+            [AxisTick { set_mm: f64::NAN, err_um: f64::NAN, out_v: f64::NAN, ..AxisTick::default() }; 3];
     }
     page(&trace);
 }

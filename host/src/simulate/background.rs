@@ -14,7 +14,7 @@ use motion_kernel::units::Position;
 
 use super::live::{Command, Script};
 use super::switches::Switches;
-use crate::trace::{AXES, HeldBy, RunEnd};
+use crate::trace::{HeldBy, RunEnd};
 
 /// Capacities of the two streams, as a board has them.
 const PIECES: usize = 64;
@@ -25,24 +25,24 @@ const LIVE_SEGMENTS: usize = 16;
 const PLACES: usize = LIVE_PIECES;
 
 /// The memory of the streams.
-pub(super) enum Storage<'script, R: Real> {
-    Plain(Box<Streams<R, AXES, PIECES, SEGMENTS>>),
-    Live(Box<LiveStreams<R, AXES, LIVE_PIECES, LIVE_SEGMENTS>>, &'script Script),
+pub(super) enum Storage<'script, R: Real, const N: usize> {
+    Plain(Box<Streams<R, N, PIECES, SEGMENTS>>),
+    Live(Box<LiveStreams<R, N, LIVE_PIECES, LIVE_SEGMENTS>>, &'script Script),
 }
 
 /// What fills them.
-pub(super) enum Background<'a, R: Real, I> {
-    Plain(Box<Plain<'a, R, I>>),
-    Live(Box<Live<'a, R, I>>),
+pub(super) enum Background<'a, R: Real, I, const N: usize> {
+    Plain(Box<Plain<'a, R, I, N>>),
+    Live(Box<Live<'a, R, I, N>>),
 }
 
 /// Without live control.
-type Plain<'a, R, I> = (Feeder<'a, R, AXES>, Supply<R, AXES, Switching<I>, Infallible>);
+type Plain<'a, R, I, const N: usize> = (Feeder<'a, R, N>, Supply<R, N, Switching<I>, Infallible>);
 
 /// Under live control.
-pub(super) struct Live<'a, R: Real, I> {
-    feeder: LiveFeeder<'a, R, AXES>,
-    control: LiveControl<R, AXES, Switching<I>, Infallible, PLACES>,
+pub(super) struct Live<'a, R: Real, I, const N: usize> {
+    feeder: LiveFeeder<'a, R, N>,
+    control: LiveControl<R, N, Switching<I>, Infallible, PLACES>,
     script: &'a Script,
     /// Commands given so far.
     given: usize,
@@ -50,7 +50,7 @@ pub(super) struct Live<'a, R: Real, I> {
     is_on_hold: bool,
 }
 
-impl<'script, R: Real> Storage<'script, R> {
+impl<'script, R: Real, const N: usize> Storage<'script, R, N> {
     /// For a run under live control, if there is a script.
     pub(super) fn new(script: Option<&'script Script>) -> Self {
         match script {
@@ -60,13 +60,13 @@ impl<'script, R: Real> Storage<'script, R> {
     }
 
     /// The two ends, at `start` and within the travel.
-    pub(super) fn split<'a, I: Iterator<Item = Result<Item<AXES>, Infallible>>>(
+    pub(super) fn split<'a, I: Iterator<Item = Result<Item<N>, Infallible>>>(
         &'a mut self,
         rules: PathRules,
-        (start, travel): ([Position; AXES], Travel<AXES>),
+        (start, travel): ([Position; N], Travel<N>),
         items: I,
         (pulse, tick_s): (Pulse, f64),
-    ) -> (Background<'a, R, I>, Intake<'a, R, AXES>) {
+    ) -> (Background<'a, R, I, N>, Intake<'a, R, N>) {
         let items = Switching::new(items);
         match self {
             Self::Plain(streams) => {
@@ -85,7 +85,7 @@ impl<'script, R: Real> Storage<'script, R> {
     }
 }
 
-impl<R: Real, I: Iterator<Item = Result<Item<AXES>, Infallible>>> Background<'_, R, I> {
+impl<R: Real, I: Iterator<Item = Result<Item<N>, Infallible>>, const N: usize> Background<'_, R, I, N> {
     /// Before a tick; the one before ended in `state`.
     pub(super) fn poll(
         &mut self,

@@ -25,7 +25,7 @@ impl<'run> Commands<'run> {
         Self { ahead: script.map_or(&[], Script::commands), tick_s, ..Self::default() }
     }
 
-    pub(super) fn add(&mut self, tick: &TraceRow) {
+    pub(super) fn add<const N: usize>(&mut self, tick: &TraceRow<N>) {
         while let [next, ahead @ ..] = self.ahead
             && next.tick <= tick.tick
         {
@@ -108,7 +108,7 @@ fn is_ended_by(waiting: Command, command: Command) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::{AXES, AxisTick};
+    use crate::trace::AxisTick;
 
     /// Ticks of 1 ms with these feeds; the path grows by a hundredth of the feed.
     fn records(script: &str, feeds_mm_s: &[f64]) -> Vec<TracedCommand> {
@@ -127,7 +127,7 @@ mod tests {
                 state: "moving",
                 line: 0,
                 contour_um: 0.0,
-                axes: [AxisTick::default(); AXES],
+                axes: [AxisTick::default(); 3],
             });
         }
         commands.finish().0

@@ -8,34 +8,35 @@ use motion_kernel::path::Setpoint;
 use motion_kernel::program::Header;
 
 use super::job::RunInfo;
-use crate::trace::{AXES, TracedFault};
+use crate::trace::TracedFault;
 
 /// A fault as a run records it, of a job's machine in the tick's motion.
-pub(super) fn traced<R: Real>(
+pub(super) fn traced<R: Real, const N: usize>(
     fault: &Fault<R>,
-    job: (&Header<AXES>, &RunInfo),
-    config: &AxesConfig<R, AXES>,
-    setpoints: &[Setpoint<R>; AXES],
+    job: (&Header<N>, &RunInfo),
+    config: &AxesConfig<R, N>,
+    setpoints: &[Setpoint<R>; N],
 ) -> TracedFault {
     let (header, info) = job;
     let (name, axis) = (name(&fault.kind), axis(&fault.kind));
+    let unit = axis.map_or("mm", |axis| info.unit_of(axis).symbol());
     let detail = match fault.kind {
         FaultKind::Executor(cause) => format!("{cause:?}"),
         FaultKind::FollowingError { axis, error_mm } => {
             let limit_mm = config.axes[axis].following_error_limit_mm_in(&setpoints[axis]);
-            format!("{:.3} mm, limit {:.3} mm", error_mm.to_f64(), limit_mm.to_f64())
+            format!("{:.3} {unit}, limit {:.3} {unit}", error_mm.to_f64(), limit_mm.to_f64())
         }
         FaultKind::EncoderJump { axis, jump_mm } => {
             let counts = jump_mm.to_f64() / header.axes[axis].mm_per_count;
             format!("{counts:.0} counts in a tick that no motor moves")
         }
         FaultKind::SetpointJump { jump_mm, .. } => {
-            format!("{:.4} mm in a tick that no accepted motion makes", jump_mm.to_f64())
+            format!("{:.4} {unit} in a tick that no accepted motion makes", jump_mm.to_f64())
         }
         FaultKind::TickMissed { ticks } => format!("{ticks} ticks did not come"),
         ref kind => row(kind).rule.to_owned(),
     };
-    let axis = axis.map(|axis| info.axes[axis].name.clone());
+    let axis = axis.map(|axis| info.name_of(axis));
     TracedFault { tick: fault.tick, axis, fault: name.to_owned(), detail }
 }
 

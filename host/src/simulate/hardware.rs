@@ -1,76 +1,77 @@
 //! The simulated machine as the kernel's hardware: encoders, inputs and enable from hal-sim, the velocity
-//! outputs through the converter's adapter and real SPI frames; with home switches and index latches where
+//! outputs through the converters' adapters and real SPI frames; with home switches and index latches where
 //! they are asked for.
 //!
 //! [`Hardware`] is what a run asks of any machine.
 
 use core::convert::Infallible;
 
-use hal_sim::{Ad5754Chip, ChipError, Injection, Injector, SimHome, SimMachine};
+use hal_sim::{CHANNELS, ChipError, Injection, Injector, SimHome, SimMachine};
 use motion_kernel::hal::{
-    Ad5754Error, Ad5754Output, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, OutputState, Outputs,
+    Ad5754Error, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, OutputState, Outputs,
     VelocityChannel,
 };
 use motion_kernel::num::Scalar;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode};
 
+use super::converters::Converters;
 use super::error::RunError;
 use super::inject::Break;
+use crate::gcode::AXES_MAX;
 use crate::machine::{DEAD_TIME_CELLS, Machine};
-use crate::trace::AXES;
 
 /// A machine to run a program on: what the kernel asks of a board, and the time between two ticks.
-pub trait Hardware:
-    Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> + Outputs
+pub trait Hardware<const N: usize = 3>:
+    Encoder<N> + Inputs<N> + VelocityChannel<N> + DriveEnable<N> + Outputs
 {
     /// What the encoders read before the first tick.
-    fn start_counts(&mut self) -> [Counts; AXES];
+    fn start_counts(&mut self) -> [Counts; N];
 
     /// Lets the time from one tick to the next pass; `trace` is what the tick did. False ends the run there.
-    fn advance<R: Scalar>(&mut self, trace: &Trace<R, AXES>) -> bool;
+    fn advance<R: Scalar>(&mut self, trace: &Trace<R, N>) -> bool;
 }
 
 /// The simulated machine, with room for every dead time a machine file may ask for.
-pub type Simulated = SimMachine<AXES, DEAD_TIME_CELLS>;
+pub type Simulated<const N: usize = 3> = SimMachine<N, DEAD_TIME_CELLS, { AXES_MAX.div_ceil(CHANNELS) }>;
 
-/// The machine's drives, converter and encoders, at rest at the origin.
+/// The machine's drives, converters and encoders, at rest at the origin.
 ///
 /// # Errors
 /// They can't be simulated.
-pub fn simulated(machine: &Machine) -> Result<Simulated, RunError> {
-    Simulated::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))
+pub fn simulated<const N: usize>(machine: &Machine<N>) -> Result<Simulated<N>, RunError> {
+    Simulated::<N>::new(&machine.simulated()).map_err(|error| RunError::Simulation(error.to_string()))
 }
 
-/// The machine and the adapter that talks to its converter.
-pub struct SimulatedHardware<'a> {
-    machine: &'a Simulated,
-    outputs: Ad5754Output<&'a Ad5754Chip, AXES>,
+/// The machine and the adapters that talk to its converters.
+pub struct SimulatedHardware<'a, const N: usize = 3> {
+    machine: &'a Simulated<N>,
+    outputs: Converters<'a>,
     /// What is broken.
-    pub injector: Injector<AXES>,
+    pub injector: Injector<N>,
     /// What will break.
     pub(super) breaks: Vec<Break>,
     /// What axes that can be homed have for it.
-    homes: [Option<SimHome>; AXES],
+    homes: [Option<SimHome>; N],
     /// Ticks so far.
     ticks: u64,
 }
 
-impl<'a> SimulatedHardware<'a> {
-    /// Sets up the converter.
+impl<'a, const N: usize> SimulatedHardware<'a, N> {
+    /// Sets up the converters.
     ///
     /// # Errors
-    /// The converter does not take its configuration.
-    pub fn new(machine: &'a Simulated) -> Result<Self, RunError> {
-        let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())
+    /// A converter does not take its configuration.
+    pub fn new(machine: &'a Simulated<N>) -> Result<Self, RunError> {
+        let outputs = Converters::setup(machine.chips(), N)
             .map_err(|error| RunError::Simulation(format!("{error:?}")))?;
-        let homes = [const { None }; AXES];
+        let homes = [const { None }; N];
         Ok(Self { machine, outputs, injector: Injector::new(), breaks: Vec::new(), homes, ticks: 0 })
     }
 
     /// Adds home switches and index latches of the axes that have settings for them, where encoders read
     /// `counts`.
-    pub(super) fn add_homes(&mut self, machine: &Machine, counts: [Counts; AXES]) {
+    pub(super) fn add_homes(&mut self, machine: &Machine<N>, counts: [Counts; N]) {
         let truth = self.machine.truth();
         self.homes = core::array::from_fn(|axis| {
             let homing = machine.axes[axis].homing.as_ref()?;
@@ -96,14 +97,14 @@ impl<'a> SimulatedHardware<'a> {
     }
 }
 
-impl Hardware for SimulatedHardware<'_> {
-    fn start_counts(&mut self) -> [Counts; AXES] {
+impl<const N: usize> Hardware<N> for SimulatedHardware<'_, N> {
+    fn start_counts(&mut self) -> [Counts; N] {
         let Ok(counts) = self.latch();
         self.break_now();
         counts
     }
 
-    fn advance<R: Scalar>(&mut self, _: &Trace<R, AXES>) -> bool {
+    fn advance<R: Scalar>(&mut self, _: &Trace<R, N>) -> bool {
         self.machine.advance();
         self.ticks += 1;
         self.break_now();
@@ -111,10 +112,10 @@ impl Hardware for SimulatedHardware<'_> {
     }
 }
 
-impl Encoder<AXES> for SimulatedHardware<'_> {
+impl<const N: usize> Encoder<N> for SimulatedHardware<'_, N> {
     type Error = Infallible;
 
-    fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
+    fn latch(&mut self) -> Result<[Counts; N], Infallible> {
         let Ok(counts) = self.machine.latch();
         let counts = self.injector.counts(counts);
         for ((home, truth), counts) in self.homes.iter_mut().zip(self.machine.truth()).zip(counts) {
@@ -126,10 +127,10 @@ impl Encoder<AXES> for SimulatedHardware<'_> {
     }
 }
 
-impl Inputs<AXES> for SimulatedHardware<'_> {
+impl<const N: usize> Inputs<N> for SimulatedHardware<'_, N> {
     type Error = Infallible;
 
-    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
+    fn read_inputs(&mut self) -> Result<MachineInputs<N>, Infallible> {
         let mut inputs = self.injector.inputs(self.machine);
         for (axis, home) in inputs.axes.iter_mut().zip(&self.homes) {
             if let Some(home) = home {
@@ -140,15 +141,15 @@ impl Inputs<AXES> for SimulatedHardware<'_> {
     }
 }
 
-impl VelocityChannel<AXES> for SimulatedHardware<'_> {
+impl<const N: usize> VelocityChannel<N> for SimulatedHardware<'_, N> {
     type Error = Ad5754Error<ChipError>;
 
-    fn write(&mut self, codes: &[DacCode; AXES]) -> Result<(), Self::Error> {
+    fn write(&mut self, codes: &[DacCode; N]) -> Result<(), Self::Error> {
         self.outputs.write(codes)
     }
 }
 
-impl DriveEnable<AXES> for SimulatedHardware<'_> {
+impl<const N: usize> DriveEnable<N> for SimulatedHardware<'_, N> {
     type Error = Infallible;
 
     fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
@@ -157,11 +158,11 @@ impl DriveEnable<AXES> for SimulatedHardware<'_> {
 }
 
 /// Neither moves an axis.
-impl Outputs for SimulatedHardware<'_> {
+impl<const N: usize> Outputs for SimulatedHardware<'_, N> {
     fn switch(&mut self, _: &OutputState) {}
 }
 
-impl IndexLatch for SimulatedHardware<'_> {
+impl<const N: usize> IndexLatch for SimulatedHardware<'_, N> {
     type Error = Infallible;
 
     fn arm(&mut self, axis: usize) -> Result<(), Infallible> {

@@ -12,8 +12,8 @@ use super::Observer;
 use super::error::RunError;
 use super::hardware::simulated;
 use super::session::{Session, SessionError, Then, jog_axis};
+use crate::axis_unit::AxisUnit;
 use crate::machine::{HomingSettings, Machine};
-use crate::trace::AXES;
 
 /// Why the machine is not homed. Displays as one line.
 #[derive(Debug, thiserror::Error)]
@@ -49,13 +49,15 @@ pub struct HomedAxis {
     pub homed: Homed,
     /// How long it took \[ticks\].
     pub ticks: u64,
-    /// Where the axis stands: its actual position \[mm\].
+    /// What it counts.
+    pub unit: AxisUnit,
+    /// Where the axis stands: its actual position \[mm, °\].
     pub position_mm: f64,
-    /// Where it truly stands, from where it was switched on \[mm\].
+    /// Where it truly stands, from where it was switched on \[mm, °\].
     pub true_mm: f64,
 }
 
-impl<R: Real> Session<'_, R> {
+impl<R: Real, const N: usize> Session<'_, R, N> {
     /// Homes an axis.
     ///
     /// # Errors
@@ -64,13 +66,13 @@ impl<R: Real> Session<'_, R> {
         &mut self,
         axis: usize,
         settings: &HomingSettings,
-        observe: &mut Observer<'_>,
+        observe: &mut Observer<'_, N>,
     ) -> Result<HomedAxis, HomeError> {
-        let name = &self.machine.axes[axis].name;
+        let (name, unit) = (&self.machine.axes[axis].name, self.machine.axes[axis].unit());
         let mut homing =
             Homing::new(settings.config, &jog_axis(self.machine, axis), axis, self.machine.tick_s);
         let failed = |source: HomingError| HomeError::Axis { axis: name.clone(), source };
-        let (mut jog, first) = (None::<Jog<AXES>>, self.ticks);
+        let (mut jog, first) = (None::<Jog<N>>, self.ticks);
         loop {
             let mut next = HomingStep::Wait;
             self.drive(jog.take().into_iter().flatten(), observe, |trace, hardware, state| {
@@ -106,7 +108,7 @@ impl<R: Real> Session<'_, R> {
                     let position_mm = self.set[axis].to_mm();
                     let true_mm = self.simulated.truth()[axis].position_mm;
                     let ticks = self.ticks - first;
-                    return Ok(HomedAxis { name: name.clone(), homed, ticks, position_mm, true_mm });
+                    return Ok(HomedAxis { name: name.clone(), homed, ticks, unit, position_mm, true_mm });
                 }
                 _ => {}
             }
@@ -116,18 +118,18 @@ impl<R: Real> Session<'_, R> {
 
 /// The axes that have settings.
 #[derive(Clone, Debug)]
-pub struct Homes<'a> {
-    machine: &'a Machine,
+pub struct Homes<'a, const N: usize = 3> {
+    machine: &'a Machine<N>,
     axes: Vec<(usize, &'a HomingSettings)>,
 }
 
-impl<'a> Homes<'a> {
+impl<'a, const N: usize> Homes<'a, N> {
     /// Those of a machine.
     ///
     /// # Errors
     /// There are none.
-    pub fn new(machine: &'a Machine) -> Result<Self, HomeError> {
-        let settings = machine.axes.iter().enumerate();
+    pub fn new(machine: &'a Machine<N>) -> Result<Self, HomeError> {
+        let settings = machine.driven_axes().iter().enumerate();
         let axes: Vec<_> = settings.filter_map(|(axis, of)| Some((axis, of.homing.as_ref()?))).collect();
         if axes.is_empty() { Err(HomeError::NoAxis) } else { Ok(Self { machine, axes }) }
     }
@@ -136,9 +138,9 @@ impl<'a> Homes<'a> {
     ///
     /// # Errors
     /// An axis is not homed, or the machine can't be simulated.
-    pub fn home(&self, homed: &mut Vec<HomedAxis>, observe: &mut Observer<'_>) -> Result<(), HomeError> {
+    pub fn home(&self, homed: &mut Vec<HomedAxis>, observe: &mut Observer<'_, N>) -> Result<(), HomeError> {
         let simulated = simulated(self.machine)?;
-        let mut session = Session::<f32>::new(self.machine, &simulated)?;
+        let mut session = Session::<f32, N>::new(self.machine, &simulated)?;
         for &(axis, settings) in &self.axes {
             homed.push(session.home(axis, settings, observe)?);
         }

@@ -15,11 +15,11 @@ pub const INJECTIONS: [(&str, &str); 10] = [
     ("encoder-jump=AXIS:COUNTS", "the encoder counts so many that were none"),
     ("encoder-reversed=AXIS", "the encoder counts the other way"),
     ("drive-reversed=AXIS", "the drive turns the other way"),
-    ("overload=AXIS:ACCELERATION", "the drive has that much acceleration left, in mm/s²"),
+    ("overload=AXIS:ACCELERATION", "the drive has that much acceleration left, in mm/s² or °/s²"),
     ("drive-not-ready=AXIS", "the drive's ready line drops"),
     ("drive-fault=AXIS", "the drive's fault line rises"),
-    ("limit-low=AXIS:POSITION", "there is a limit switch up to that position, in mm"),
-    ("limit-high=AXIS:POSITION", "there is a limit switch from that position on, in mm"),
+    ("limit-low=AXIS:POSITION", "there is a limit switch up to that position, in mm or °"),
+    ("limit-high=AXIS:POSITION", "there is a limit switch from that position on, in mm or °"),
     ("emergency-stop", "the emergency stop opens"),
 ];
 
@@ -62,8 +62,8 @@ impl Injections {
     ///
     /// # Errors
     /// The first axis that it has not.
-    pub(super) fn of(&self, machine: &Machine) -> Result<Vec<Break>, InjectionError> {
-        let names = machine.axes.each_ref().map(|axis| axis.name.as_str());
+    pub(super) fn of<const N: usize>(&self, machine: &Machine<N>) -> Result<Vec<Break>, InjectionError> {
+        let names: Vec<&str> = machine.driven_axes().iter().map(|axis| axis.name.as_str()).collect();
         let all = self.0.iter().map(|(tick, broken)| {
             let of_axis = match broken {
                 Broken::EmergencyStop => None,

@@ -11,10 +11,12 @@ use serde::{Deserialize, Serialize};
 use super::error::RunError;
 use super::inject::Injections;
 use super::live::Script;
-use crate::machine::{AxisError, Machine};
+use crate::axis_unit::AxisUnit;
+use crate::gcode::Axis;
+use crate::machine::{AxisError, AxisSettings, Machine};
 use crate::planning::{Executable, Item as PlanItem, Plan, PlannedProbe};
 use crate::touch::Surface;
-use crate::trace::{AXES, PathLimits, RunTrace, TracedBlock};
+use crate::trace::{PathLimits, RunTrace, TracedAxis, TracedBlock};
 
 /// The number type of the kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,8 +38,8 @@ pub struct StretchCorrection {
     pub stretch: u32,
     /// Ticks from knot to knot.
     pub knot_ticks: u16,
-    /// Velocity commands \[mm/s\], the first one in the stretch's first tick.
-    pub knots_mm_s: Vec<[f64; AXES]>,
+    /// Velocity commands of the first three axes \[mm/s\], the first one in the stretch's first tick.
+    pub knots_mm_s: Vec<[f64; 3]>,
     /// No knot is of a greater magnitude \[mm/s\].
     pub bound_mm_s: f64,
 }
@@ -59,16 +61,16 @@ pub struct RunOptions<'a> {
 }
 
 /// A program with its machine, and with what is commanded on the way.
-#[derive(Clone, Debug)]
-pub struct Job {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Job<const N: usize = 3> {
     /// The kernel's number type.
     pub number: Number,
     /// The machine, as the kernel has to know it.
-    pub header: Header<AXES>,
+    pub header: Header<N>,
     /// How its faults are told and end.
-    pub guards: Guards<AXES>,
+    pub guards: Guards<N>,
     /// The program, with the blocks of its path.
-    pub items: Vec<Item<AXES>>,
+    pub items: Vec<Item<N>>,
     /// What was learnt of one of its stretches.
     pub correction: Option<StretchCorrection>,
     /// Live control.
@@ -88,8 +90,8 @@ pub struct RunInfo {
     pub tick_s: f64,
     /// Limits along the path.
     pub limits: PathLimits,
-    /// The axes.
-    pub axes: [SheetAxis; AXES],
+    /// The axes that there are, which have the first places.
+    pub axes: Vec<SheetAxis>,
     /// Blocks of the plan, in path order.
     pub blocks: Vec<TracedBlock>,
     /// Where each stretch starts, from the program's start along the path \[mm\].
@@ -108,11 +110,14 @@ pub struct RunInfo {
     pub notices: Vec<String>,
 }
 
-/// An axis' name and limits.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// An axis' name and limits. Of a rotary one read ° for mm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SheetAxis {
     /// Name.
     pub name: String,
+    /// The axis of a program that moves it.
+    #[serde(with = "super::letter")]
+    pub letter: Axis,
     /// Greatest velocity \[mm/s\].
     pub feed_mm_s: f64,
     /// Greatest acceleration \[mm/s²\].
@@ -121,10 +126,27 @@ pub struct SheetAxis {
     pub jerk_mm_s3: f64,
 }
 
+impl SheetAxis {
+    /// What it counts.
+    #[must_use]
+    pub fn unit(&self) -> AxisUnit {
+        AxisUnit::of(self.letter)
+    }
+}
+
 impl RunInfo {
     /// Of a machine, without a program.
     #[must_use]
-    pub fn of_machine(machine: &Machine) -> Self {
+    pub fn of_machine<const N: usize>(machine: &Machine<N>) -> Self {
+        let axis = |axis: &AxisSettings| {
+            Some(SheetAxis {
+                name: axis.name.clone(),
+                letter: axis.letter?,
+                feed_mm_s: axis.feed_mm_s,
+                accel_mm_s2: axis.accel_mm_s2,
+                jerk_mm_s3: axis.jerk_mm_s3,
+            })
+        };
         Self {
             machine: machine.name.clone(),
             tick_s: machine.tick_s,
@@ -133,29 +155,50 @@ impl RunInfo {
                 jerk_mm_s3: machine.path.jerk_mm_s3,
                 snap_mm_s4: machine.path.snap_mm_s4,
             },
-            axes: machine.axes.each_ref().map(|axis| SheetAxis {
-                name: axis.name.clone(),
-                feed_mm_s: axis.feed_mm_s,
-                accel_mm_s2: axis.accel_mm_s2,
-                jerk_mm_s3: axis.jerk_mm_s3,
-            }),
+            axes: machine.driven_axes().iter().filter_map(axis).collect(),
             ..Self::default()
         }
     }
 
     /// A trace with what the info has for it, and no tick.
     #[must_use]
-    pub fn empty_trace(&self) -> RunTrace {
+    pub fn empty_trace<const N: usize>(&self) -> RunTrace<N> {
+        let axis = |axis: &SheetAxis| TracedAxis {
+            name: axis.name.clone(),
+            letter: axis.letter,
+            following_error_limit_um: 0.0,
+            end_error_counts: 0,
+        };
         RunTrace {
             program: self.program.clone(),
             machine: self.machine.clone(),
             tick_s: self.tick_s,
             limits: self.limits,
-            axis_names: self.axes.each_ref().map(|axis| axis.name.clone()),
+            axes: self.axes.iter().map(axis).collect(),
             blocks: self.blocks.clone(),
             planned_time_s: self.planned_time_s,
             ..RunTrace::default()
         }
+    }
+
+    /// The place of an axis, if there is one of this letter.
+    pub(super) fn place_of(&self, letter: Axis) -> Option<usize> {
+        self.axes.iter().position(|axis| axis.letter == letter)
+    }
+
+    /// What the axis of a place is called.
+    pub(super) fn name_of(&self, place: usize) -> String {
+        self.axes.get(place).map_or_else(|| format!("of place {place}"), |axis| axis.name.clone())
+    }
+
+    /// What the axis of a place counts.
+    pub(super) fn unit_of(&self, place: usize) -> AxisUnit {
+        self.axes.get(place).map_or(AxisUnit::Millimetre, SheetAxis::unit)
+    }
+
+    /// Which places have linear axes.
+    pub(crate) fn linear_places<const N: usize>(&self) -> [bool; N] {
+        core::array::from_fn(|place| self.axes.get(place).is_some_and(|axis| !axis.letter.is_rotary()))
     }
 
     fn new(plan: &Plan, machine: &Machine) -> Self {
@@ -203,12 +246,14 @@ impl Job {
             info: RunInfo::new(plan, machine),
         })
     }
+}
 
+impl<const N: usize> Job<N> {
     /// The kernel's axes.
-    pub(super) fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, AXES>, AxisError> {
+    pub(super) fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, N>, AxisError> {
         let tick_s = self.header.tick_s;
         let axes = AxesConfig::new(&self.header.axes, tick_s);
         axes.and_then(|axes| axes.guarded(&self.guards, tick_s))
-            .map_err(|error| AxisError { axis: self.info.axes[error.axis].name.clone(), source: error.cause })
+            .map_err(|error| AxisError { axis: self.info.name_of(error.axis), source: error.cause })
     }
 }

@@ -1,6 +1,6 @@
 //! Jog of the simulated machine: keys pressed one after the other, each released after some ticks or never.
 //!
-//! A [`Press`] as text is the axis, the direction, a distance in mm unless it goes to the soft limit, and the
+//! A [`Press`] as text is the axis, the direction, a distance in mm or degrees unless it goes to the soft limit, and the
 //! ticks after which the key is released: `X+`, `X-2.5`, `Y+@800`. It displays as the text it is read from.
 //!
 //! Consumes a machine and presses; produces what became of each, and every tick's record.
@@ -19,6 +19,7 @@ use super::Observer;
 use super::error::RunError;
 use super::hardware::simulated;
 use super::session::{Session, SessionError, Then, jog_axis};
+use crate::axis_unit::AxisUnit;
 use crate::machine::Machine;
 
 /// The shortest distance \[mm\]: some position steps, below which a ramp has no length.
@@ -41,11 +42,11 @@ pub struct Press {
 pub enum PressError {
     /// It has another form.
     #[error(
-        "found `{0}`, expected an axis, + or -, a distance in mm or none, and @TICKS until it is released: X+, X-2.5, Y+@800"
+        "found `{0}`, expected an axis, + or -, a distance in mm or degrees or none, and @TICKS until it is released: X+, X-2.5, Y+@800"
     )]
     Form(String),
     /// The distance is too short for motion, or beyond what positions hold.
-    #[error("found a distance of {0} mm, expected {LEAST_MM} to {most} mm", most = Position::LIMIT_MM)]
+    #[error("found a distance of {0} mm or degrees, expected {LEAST_MM} to {most}", most = Position::LIMIT_MM)]
     Distance(String),
     /// The ticks are no positive whole number.
     #[error("found `@{0}`, expected a whole number of ticks, at least 1")]
@@ -107,11 +108,13 @@ pub enum Ended {
     },
 }
 
-/// What became of a press.
+/// What became of a press. Of a rotary axis read ° for mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jogged {
     /// The press.
     pub press: Press,
+    /// What its axis counts.
+    pub unit: AxisUnit,
     /// Set position before it \[mm\].
     pub from_mm: f64,
     /// Set position after it \[mm\].
@@ -136,7 +139,7 @@ pub enum JogError {
         names: String,
     },
     /// The feed is none that its axis has.
-    #[error("{press}: found a feed of {feed_mm_s} mm/s, expected above 0, at most {most_mm_s}")]
+    #[error("{press}: found a feed of {feed_mm_s} {unit}/s, expected above 0, at most {most_mm_s}", unit = .unit.symbol())]
     Feed {
         /// The press.
         press: String,
@@ -144,6 +147,8 @@ pub enum JogError {
         feed_mm_s: f64,
         /// The greatest of the axis.
         most_mm_s: f64,
+        /// What its axis counts.
+        unit: AxisUnit,
     },
     /// It would have no end.
     #[error("{0}: found no [axis.travel] for its axis, expected one to go on to, or a distance")]
@@ -157,12 +162,14 @@ pub enum JogError {
         source: motion_kernel::jog::JogError,
     },
     /// At its feed there is no motion over its length.
-    #[error("{press}: found no motion at {feed_mm_s} mm/s ({source}), expected a greater feed")]
+    #[error("{press}: found no motion at {feed_mm_s} {unit}/s ({source}), expected a greater feed", unit = .unit.symbol())]
     NoMotion {
         /// The press.
         press: String,
         /// Its feed.
         feed_mm_s: f64,
+        /// What its axis counts.
+        unit: AxisUnit,
         /// Why.
         source: StraightError,
     },
@@ -179,7 +186,7 @@ pub enum JogError {
     Run(#[from] RunError),
 }
 
-impl<R: Real> Session<'_, R> {
+impl<R: Real, const N: usize> Session<'_, R, N> {
     /// Presses a key of `axis` at `feed_mm_s`, and waits until the machine stands.
     ///
     /// # Errors
@@ -189,16 +196,16 @@ impl<R: Real> Session<'_, R> {
         axis: usize,
         press: &Press,
         feed_mm_s: f64,
-        observe: &mut Observer<'_>,
+        observe: &mut Observer<'_, N>,
     ) -> Result<Jogged, JogError> {
         let travel = self.machine.travel()[axis].map(|[least, greatest]| Travel { least, greatest });
         let of_axis = JogAxis { travel, ..jog_axis(self.machine, axis) };
         let jog = Jog::new(&of_axis, axis, self.set, press.target, feed_mm_s, self.machine.tick_s);
         let jog = jog.map_err(|source| {
-            let press = press.to_string();
+            let (press, unit) = (press.to_string(), self.machine.axes[axis].unit());
             match source {
                 motion_kernel::jog::JogError::Straight(source) => {
-                    JogError::NoMotion { press, feed_mm_s, source }
+                    JogError::NoMotion { press, feed_mm_s, unit, source }
                 }
                 source => JogError::Refused { press, source },
             }
@@ -231,35 +238,42 @@ impl<R: Real> Session<'_, R> {
             _ if ends_at_limit => Ended::SoftLimit,
             _ => Ended::Distance,
         };
-        Ok(Jogged { press: press.clone(), from_mm, to_mm, ticks, feed_mm_s: greatest_mm_s, ended })
+        let (press, unit) = (press.clone(), self.machine.axes[axis].unit());
+        Ok(Jogged { press, unit, from_mm, to_mm, ticks, feed_mm_s: greatest_mm_s, ended })
     }
 }
 
 /// Keys of a machine, each at a feed that its axis has.
 #[derive(Clone, Debug)]
-pub struct Keys<'a> {
-    machine: &'a Machine,
+pub struct Keys<'a, const N: usize = 3> {
+    machine: &'a Machine<N>,
     /// With the axis, from 0, and the feed \[mm/s\].
     presses: Vec<(usize, f64, &'a Press)>,
 }
 
-impl<'a> Keys<'a> {
+impl<'a, const N: usize> Keys<'a, N> {
     /// `presses` at `feed_mm_s`, or at the greatest feed of each axis.
     ///
     /// # Errors
     /// There is no such axis, or it has no such feed, or no soft limit to go on to.
-    pub fn new(machine: &'a Machine, presses: &'a [Press], feed_mm_s: Option<f64>) -> Result<Self, JogError> {
+    pub fn new(
+        machine: &'a Machine<N>,
+        presses: &'a [Press],
+        feed_mm_s: Option<f64>,
+    ) -> Result<Self, JogError> {
+        let axes = machine.driven_axes();
         let key = |press: &'a Press| {
-            let axis = machine.axes.iter().position(|axis| axis.name == press.axis);
+            let axis = axes.iter().position(|axis| axis.name == press.axis);
             let axis = axis.ok_or_else(|| JogError::Axis {
                 press: press.to_string(),
-                names: machine.axes.each_ref().map(|axis| axis.name.as_str()).join(", "),
+                names: axes.iter().map(|axis| axis.name.as_str()).collect::<Vec<_>>().join(", "),
             })?;
             let most_mm_s = jog_axis(machine, axis).feed_mm_s;
             let feed_mm_s = feed_mm_s.unwrap_or(most_mm_s);
             // Written so that what is not a number is refused.
             if !(feed_mm_s > 0.0 && feed_mm_s <= most_mm_s) {
-                return Err(JogError::Feed { press: press.to_string(), feed_mm_s, most_mm_s });
+                let (press, unit) = (press.to_string(), axes[axis].unit());
+                return Err(JogError::Feed { press, feed_mm_s, most_mm_s, unit });
             }
             if matches!(press.target, JogTarget::Continuous(_)) && machine.travel()[axis].is_none() {
                 return Err(JogError::NoTravel(press.to_string()));
@@ -274,9 +288,9 @@ impl<'a> Keys<'a> {
     ///
     /// # Errors
     /// A press is refused, there was a fault, or the machine can't be simulated.
-    pub fn jog(&self, jogged: &mut Vec<Jogged>, observe: &mut Observer<'_>) -> Result<(), JogError> {
+    pub fn jog(&self, jogged: &mut Vec<Jogged>, observe: &mut Observer<'_, N>) -> Result<(), JogError> {
         let simulated = simulated(self.machine)?;
-        let mut session = Session::<f32>::new(self.machine, &simulated)?;
+        let mut session = Session::<f32, N>::new(self.machine, &simulated)?;
         for &(axis, feed_mm_s, press) in &self.presses {
             jogged.push(session.jog(axis, press, feed_mm_s, observe)?);
         }

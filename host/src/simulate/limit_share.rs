@@ -1,7 +1,7 @@
 //! On how much of the path some limit holds the motion back.
 //!
 //! Consumes the executed ticks; produces the share of the path length on which the feed is at its block's
-//! ceiling, or acceleration, jerk or snap along the path, as vectors or of an axis, are at their limit. The
+//! ceiling, or acceleration, jerk or snap along the path, as vectors of all axes or of an axis, are at their limit. The
 //! rest of the length is what a better plan could still gain on. A sin² pulse touches the limits of jerk and
 //! snap only at the top of its curves, so that ramps count for little; one with a plateau holds its jerk
 //! there, so that only its edges do not count. A plan that wastes nothing is still below 1.
@@ -28,7 +28,7 @@ impl<'run> LimitShare<'run> {
         Self { info, blocks: &info.blocks, limited_mm: 0.0, length_mm: 0.0 }
     }
 
-    pub(super) fn add(&mut self, tick: &TraceRow) {
+    pub(super) fn add<const N: usize>(&mut self, tick: &TraceRow<N>) {
         let ends_before = |block: &&TracedBlock| block.start_mm + block.length_mm < tick.s_mm - ROUNDING_MM;
         self.blocks = &self.blocks[self.blocks.iter().take_while(ends_before).count()..];
         let step_mm = tick.v_mm_s * self.info.tick_s;
@@ -38,7 +38,7 @@ impl<'run> LimitShare<'run> {
         }
     }
 
-    fn is_limited(&self, tick: &TraceRow) -> bool {
+    fn is_limited<const N: usize>(&self, tick: &TraceRow<N>) -> bool {
         let path = &self.info.limits;
         let reached = |value: f64, limit: f64| value.abs() >= REACHED * limit;
         let vector = |of: fn(&crate::trace::AxisTick) -> f64| {

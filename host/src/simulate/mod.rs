@@ -1,16 +1,19 @@
 //! A plan executed by the kernel on the simulated machine, tick by tick.
 //!
 //! Consumes a [`Plan`](crate::planning::Plan) and a [`Machine`](crate::machine::Machine), as a [`Job`];
-//! produces one [`TraceRow`] per tick and a [`RunSummary`]. The kernel, the streams, the converter's adapter
+//! produces one [`TraceRow`] per tick and a [`RunSummary`]. All is made for `N` places for axes, of which the first have axes; the kernel
+//! runs the others, too, and no record shows them. The kernel, the streams, the converter's adapter
 //! and the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
 //! - [`error`]: why a run could not be made;
 //! - [`job`]: what is executed, and what its records call it by;
+//! - `letter`: axes in records;
 //! - [`faults`]: names and table of faults;
 //! - [`inject`]: what breaks before given ticks;
 //! - [`live`]: commands before given ticks;
 //! - `background`: what fills the streams, with commands or without;
 //! - [`hardware`]: the simulated machine as the kernel's hardware;
+//! - `converters`: its velocity outputs;
 //! - `commands`: what became of them;
 //! - `contour`: how far the machine is off its path;
 //! - `switches`: spindle and coolant;
@@ -24,6 +27,7 @@
 
 mod background;
 mod commands;
+mod letter;
 pub(crate) mod contour;
 pub mod error;
 pub mod job;
@@ -31,6 +35,7 @@ pub mod faults;
 pub mod inject;
 mod limit_share;
 pub mod live;
+mod converters;
 pub mod hardware;
 mod switches;
 pub mod run;
@@ -42,7 +47,7 @@ pub mod jog;
 
 pub use error::RunError;
 pub use hardware::Hardware;
-pub use job::{Job, Number, RunInfo, RunOptions, StretchCorrection};
+pub use job::{Job, Number, RunInfo, RunOptions, SheetAxis, StretchCorrection};
 pub use probing::Probed;
 pub use run::{on_simulated, run, run_on, run_with};
 pub use summary::{AxisSummary, RunSummary};
@@ -50,4 +55,4 @@ pub use summary::{AxisSummary, RunSummary};
 use crate::trace::TraceRow;
 
 /// Called with every tick.
-pub type Observer<'a> = dyn FnMut(&TraceRow) + 'a;
+pub type Observer<'a, const N: usize = 3> = dyn FnMut(&TraceRow<N>) + 'a;

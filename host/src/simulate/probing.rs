@@ -9,8 +9,8 @@ use motion_kernel::num::Real;
 use motion_kernel::trace::Trace;
 
 use super::job::RunInfo;
+use crate::gcode::Axis;
 use crate::planning::PlannedProbe;
-use crate::trace::AXES;
 
 /// What came of a probing move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,10 +21,10 @@ pub struct Probed {
     pub tick: u64,
     /// Whether it tripped.
     pub tripped: bool,
-    /// Where the encoders read the axes in this tick \[mm\].
-    pub position_mm: [f64; AXES],
+    /// Where the encoders read X, Y and Z in this tick \[mm\]; 0 for one that there is not.
+    pub position_mm: [f64; 3],
     /// Where the program reads it to have tripped \[mm\], in machine coordinates; absent if it reads that it did not.
-    pub program_mm: Option<[f64; AXES]>,
+    pub program_mm: Option<[f64; 3]>,
 }
 
 impl Probed {
@@ -53,15 +53,18 @@ impl Probed {
 /// The probing moves of a run.
 pub(super) struct Probing<'a> {
     info: &'a RunInfo,
-    /// Stretches that were driven, and the tick after the last one, where the axes are.
-    now: (u32, u64, [f64; AXES]),
+    /// The places of X, Y and Z.
+    places: [Option<usize>; 3],
+    /// Stretches that were driven, and the tick after the last one, where X, Y and Z are.
+    now: (u32, u64, [f64; 3]),
     /// What came of those that are over.
     probed: Vec<Probed>,
 }
 
 impl<'a> Probing<'a> {
     pub(super) fn new(info: &'a RunInfo) -> Self {
-        Self { info, now: (0, 0, [0.0; AXES]), probed: Vec::new() }
+        let places = [Axis::X, Axis::Y, Axis::Z].map(|letter| info.place_of(letter));
+        Self { info, places, now: (0, 0, [0.0; 3]), probed: Vec::new() }
     }
 
     /// The probing move that is next or under way.
@@ -69,8 +72,9 @@ impl<'a> Probing<'a> {
         self.info.probes.get(self.probed.len())
     }
 
-    pub(super) fn tick<R: Real>(&mut self, trace: &Trace<R, AXES>) {
-        let position_mm = trace.axes.each_ref().map(|axis| axis.actual.to_mm());
+    pub(super) fn tick<R: Real, const N: usize>(&mut self, trace: &Trace<R, N>) {
+        let actual_mm = |place: usize| trace.axes.get(place).map_or(0.0, |axis| axis.actual.to_mm());
+        let position_mm = self.places.map(|place| place.map_or(0.0, actual_mm));
         self.now = (trace.executed.stretches, trace.tick, position_mm);
         while let Some(probe) = self.next() {
             let has_begun = trace.executed.stretches >= probe.stretch;

@@ -21,11 +21,11 @@ use super::inject::Injections;
 use super::job::{Job, Number, RunOptions, StretchCorrection};
 use super::limit_share::LimitShare;
 use super::probing::{Probed, Probing};
-use super::summary::{Collector, RunSummary};
+use super::summary::{AxisSummary, Collector, RunSummary};
 use super::switches::Switches;
 use crate::machine::Machine;
 use crate::planning::Plan;
-use crate::trace::{AXES, AxisTick, RunEnd, TraceRow};
+use crate::trace::{AxisTick, RunEnd, TraceRow};
 
 /// How long the machine is given to settle before its end position is read \[s\].
 const SETTLE_S: f64 = 0.2;
@@ -56,10 +56,10 @@ pub fn run_with(
 ///
 /// # Errors
 /// The machine can't be simulated, or has no such axis; and those of `work`.
-pub fn on_simulated<T>(
-    machine: &Machine,
+pub fn on_simulated<const N: usize, T>(
+    machine: &Machine<N>,
     injections: Option<&Injections>,
-    work: impl FnOnce(&mut SimulatedHardware<'_>) -> Result<T, RunError>,
+    work: impl FnOnce(&mut SimulatedHardware<'_, N>) -> Result<T, RunError>,
 ) -> Result<T, RunError> {
     let simulated = simulated(machine)?;
     let mut hardware = SimulatedHardware::new(&simulated)?;
@@ -73,34 +73,35 @@ pub fn on_simulated<T>(
 ///
 /// # Errors
 /// The job can't be executed. Faults of the run itself are in the summary.
-pub fn run_on(
-    job: &Job,
-    hardware: &mut impl Hardware,
-    observe: &mut Observer<'_>,
+pub fn run_on<const N: usize>(
+    job: &Job<N>,
+    hardware: &mut impl Hardware<N>,
+    observe: &mut Observer<'_, N>,
 ) -> Result<RunSummary, RunError> {
     match job.number {
-        Number::F32 => run_in::<f32>(job, hardware, observe),
-        Number::F64 => run_in::<f64>(job, hardware, observe),
-        Number::Fixed => run_in::<Fixed>(job, hardware, observe),
+        Number::F32 => run_in::<f32, N>(job, hardware, observe),
+        Number::F64 => run_in::<f64, N>(job, hardware, observe),
+        Number::Fixed => run_in::<Fixed, N>(job, hardware, observe),
     }
 }
 
-fn run_in<R: Real>(
-    job: &Job,
-    hardware: &mut impl Hardware,
-    observe: &mut Observer<'_>,
+fn run_in<R: Real, const N: usize>(
+    job: &Job<N>,
+    hardware: &mut impl Hardware<N>,
+    observe: &mut Observer<'_, N>,
 ) -> Result<RunSummary, RunError> {
     let Job { header, info, correction, script, .. } = job;
     let tick_s = header.tick_s;
     let config = job.axes_config()?;
-    let mut kernel = Kernel::<R, AXES>::new(&config, header.start, hardware.start_counts());
+    let mut kernel = Kernel::<R, N>::new(&config, header.start, hardware.start_counts());
     kernel.enable(0);
-    let knots_mm_s: Vec<[R; AXES]> = correction
+    let of_axis = |knot: &[f64; 3], axis: usize| R::from_f64(knot.get(axis).copied().unwrap_or_default());
+    let knots_mm_s: Vec<[R; N]> = correction
         .iter()
         .flat_map(|correction| &correction.knots_mm_s)
-        .map(|knot| knot.map(R::from_f64))
+        .map(|knot| core::array::from_fn(|axis| of_axis(knot, axis)))
         .collect();
-    let mut storage = Storage::<R>::new(script.as_ref());
+    let mut storage = Storage::<R, N>::new(script.as_ref());
     let items = job.items.iter().map(|&item| Ok(item));
     let (mut background, intake) =
         storage.split(header.rules, (header.start, job.guards.travel()), items, (header.pulse, tick_s));
@@ -113,11 +114,12 @@ fn run_in<R: Real>(
         tick_s,
         planned_time_s: info.planned_time_s,
         path_length_mm: info.path_length_mm,
+        axes: info.axes.iter().map(|axis| AxisSummary::new(&axis.name, axis.letter)).collect(),
         notices: info.notices.clone(),
         ..RunSummary::default()
     };
-    let mut collector = Collector::default();
-    let mut contour = Contour::default();
+    let mut collector = Collector::new();
+    let mut contour = Contour::new(info.linear_places());
     let mut limit_share = LimitShare::new(info);
     let mut probing = Probing::new(info);
     let mut commands = Commands::new(script.as_ref(), tick_s);
@@ -198,17 +200,19 @@ fn run_in<R: Real>(
     }
     summary.probes = probing.finish();
     summary.notices.extend(summary.probes.iter().filter_map(Probed::disagreement));
-    for (index, axis) in summary.axes.iter_mut().enumerate() {
-        axis.name.clone_from(&info.axes[index].name);
-        if let Some(trace) = &last {
-            let error_mm = trace.axes[index].following_error_mm.to_f64();
-            axis.end_error_counts = (error_mm / header.axes[index].mm_per_count.abs()).round() as i64;
-        }
+    let end = last.iter().flat_map(|trace| &trace.axes);
+    for ((axis, end), figures) in summary.axes.iter_mut().zip(end).zip(&header.axes) {
+        let error_mm = end.following_error_mm.to_f64();
+        axis.end_error_counts = (error_mm / figures.mm_per_count.abs()).round() as i64;
     }
     Ok(summary)
 }
 
-pub(super) fn trace_row<R: Real>(trace: &Trace<R, AXES>, start_mm: f64, contour: &mut Contour) -> TraceRow {
+pub(super) fn trace_row<R: Real, const N: usize>(
+    trace: &Trace<R, N>,
+    start_mm: f64,
+    contour: &mut Contour<N>,
+) -> TraceRow<N> {
     let executed = &trace.executed;
     let motion = &executed.motion;
     let axes = core::array::from_fn(|index| {

@@ -27,7 +27,7 @@ use super::hardware::{Simulated, SimulatedHardware};
 use super::job::RunInfo;
 use super::run::trace_row;
 use crate::machine::{AxisSettings, Machine};
-use crate::trace::{AXES, TracedFault};
+use crate::trace::TracedFault;
 
 /// Path enough to stop on at any feed, as for a run under live control.
 const PIECES: usize = 64;
@@ -54,16 +54,16 @@ pub enum SessionError {
 }
 
 /// A simulated machine, switched on.
-pub struct Session<'a, R: Real> {
-    pub(super) machine: &'a Machine,
-    pub(super) simulated: &'a Simulated,
-    pub(super) kernel: Kernel<R, AXES>,
-    config: AxesConfig<R, AXES>,
-    hardware: SimulatedHardware<'a>,
-    streams: Box<LiveStreams<R, AXES, PIECES, SEGMENTS>>,
+pub struct Session<'a, R: Real, const N: usize = 3> {
+    pub(super) machine: &'a Machine<N>,
+    pub(super) simulated: &'a Simulated<N>,
+    pub(super) kernel: Kernel<R, N>,
+    config: AxesConfig<R, N>,
+    hardware: SimulatedHardware<'a, N>,
+    streams: Box<LiveStreams<R, N, PIECES, SEGMENTS>>,
     /// Where it stands.
-    pub(super) set: [Position; AXES],
-    contour: Contour,
+    pub(super) set: [Position; N],
+    contour: Contour<N>,
     pub(super) ticks: u64,
 }
 
@@ -75,25 +75,26 @@ pub(super) enum Then {
     End,
 }
 
-impl<'a, R: Real> Session<'a, R> {
+impl<'a, R: Real, const N: usize> Session<'a, R, N> {
     /// A machine at rest, drives on.
     ///
     /// # Errors
     /// It can't be simulated, or regulated.
-    pub fn new(machine: &'a Machine, simulated: &'a Simulated) -> Result<Self, RunError> {
+    pub fn new(machine: &'a Machine<N>, simulated: &'a Simulated<N>) -> Result<Self, RunError> {
         let mut hardware = SimulatedHardware::new(simulated)?;
         let Ok(counts) = hardware.latch();
         hardware.add_homes(machine, counts);
-        let (config, set) = (machine.axes_config()?, [Position::ZERO; AXES]);
+        let (config, set) = (machine.axes_config()?, [Position::ZERO; N]);
         let mut kernel = Kernel::new(&config, set, counts);
         kernel.enable(0);
-        let (streams, contour) = (Box::default(), Contour::default());
+        let contour = Contour::new(RunInfo::of_machine(machine).linear_places());
+        let streams = Box::default();
         Ok(Self { machine, simulated, kernel, config, hardware, streams, set, contour, ticks: 0 })
     }
 
     /// Where the machine stands: its set positions, at rest.
     #[must_use]
-    pub fn position(&self) -> [Position; AXES] {
+    pub fn position(&self) -> [Position; N] {
         self.set
     }
 
@@ -103,8 +104,8 @@ impl<'a, R: Real> Session<'a, R> {
     /// An item can't be executed, or there was a fault.
     pub fn run(
         &mut self,
-        items: impl Iterator<Item = Result<Item<AXES>, Infallible>>,
-        observe: &mut Observer<'_>,
+        items: impl Iterator<Item = Result<Item<N>, Infallible>>,
+        observe: &mut Observer<'_, N>,
     ) -> Result<(), SessionError> {
         self.drive(items, observe, |trace, _, state| {
             let is_done = state == State::Done && trace.executed.state == ExecState::Idle;
@@ -122,13 +123,13 @@ impl<'a, R: Real> Session<'a, R> {
     /// Ticks under live control, until one asks for the end.
     pub(super) fn drive<E: From<SessionError>>(
         &mut self,
-        items: impl Iterator<Item = Result<Item<AXES>, Infallible>>,
-        observe: &mut Observer<'_>,
-        mut after_tick: impl FnMut(&Trace<R, AXES>, &mut SimulatedHardware<'a>, State) -> Result<Then, E>,
+        items: impl Iterator<Item = Result<Item<N>, Infallible>>,
+        observe: &mut Observer<'_, N>,
+        mut after_tick: impl FnMut(&Trace<R, N>, &mut SimulatedHardware<'a, N>, State) -> Result<Then, E>,
     ) -> Result<(), E> {
         let (mut feeder, mut intake) = self.streams.split(self.machine.rules(), self.set);
         let mut control =
-            LiveControl::<R, AXES, _, _, PLACES>::new(items, self.machine.path.pulse, self.machine.tick_s, 0);
+            LiveControl::<R, N, _, _, PLACES>::new(items, self.machine.path.pulse, self.machine.tick_s, 0);
         loop {
             control.poll(&mut feeder).map_err(|error| SessionError::Run(RunError::Rejected(error)))?;
             let trace = *self.kernel.tick(&mut intake, &mut self.hardware);
@@ -139,8 +140,10 @@ impl<'a, R: Real> Session<'a, R> {
                 let job = (&self.machine.header(), &RunInfo::of_machine(self.machine));
                 let setpoints = &trace.executed.setpoints;
                 let fault = Box::new(faults::traced(&fault, job, &self.config, setpoints));
-                let axes = self.machine.axes.iter().zip(setpoints);
-                let at = axes.map(|(axis, set)| format!("{} {:.4} mm", axis.name, set.position.to_mm()));
+                let axes = self.machine.driven_axes().iter().zip(setpoints);
+                let at = axes.map(|(axis, set)| {
+                    format!("{} {:.4} {}", axis.name, set.position.to_mm(), axis.unit().symbol())
+                });
                 let at = at.collect::<Vec<_>>().join(", ");
                 return Err(SessionError::Fault { fault, at }.into());
             }
@@ -154,7 +157,7 @@ impl<'a, R: Real> Session<'a, R> {
 }
 
 /// What an axis may do by itself, not knowing where it is: its limits, and those of any path.
-pub(super) fn jog_axis(machine: &Machine, axis: usize) -> JogAxis {
+pub(super) fn jog_axis<const N: usize>(machine: &Machine<N>, axis: usize) -> JogAxis {
     let &AxisSettings { feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, .. } = &machine.axes[axis];
     let path = &machine.path;
     let limits = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }.least(&path.limits());

@@ -1,7 +1,9 @@
 //! Figures of a run, collected tick by tick.
 
 use super::probing::Probed;
-use crate::trace::{AXES, RunEnd, TraceRow, TracedCommand, TracedFault, TracedSwitch};
+use crate::axis_unit::AxisUnit;
+use crate::gcode::Axis;
+use crate::trace::{RunEnd, TraceRow, TracedCommand, TracedFault, TracedSwitch};
 
 /// The figures of a run.
 #[derive(Clone, Debug, Default)]
@@ -33,9 +35,9 @@ pub struct RunSummary {
     /// Share of the path length on which some limit holds the motion back: the feed is at its block's
     /// ceiling, or acceleration, jerk or snap of the path or of an axis at 98 % of their limit or more.
     pub limit_active_share: f64,
-    /// Per axis.
-    pub axes: [AxisSummary; AXES],
-    /// Greatest distance of the actual position from the programmed path \[µm\].
+    /// Per axis that there is.
+    pub axes: Vec<AxisSummary>,
+    /// Greatest distance of the linear axes' actual position from the programmed path \[µm\].
     pub contour_error_um_max: f64,
     /// Commands of live control that were given, in order.
     pub commands: Vec<TracedCommand>,
@@ -51,11 +53,13 @@ pub struct RunSummary {
     pub notices: Vec<String>,
 }
 
-/// The figures of one axis.
-#[derive(Clone, Debug, Default)]
+/// The figures of one axis. Of a rotary one read m° for µm.
+#[derive(Clone, Debug)]
 pub struct AxisSummary {
     /// Name.
     pub name: String,
+    /// The axis of a program that moves it.
+    pub letter: Axis,
     /// Greatest |following error| \[µm\].
     pub following_error_um_max: f64,
     /// Root of the mean square of the following error \[µm\].
@@ -66,26 +70,60 @@ pub struct AxisSummary {
     pub output_v_max: f64,
 }
 
+impl AxisSummary {
+    /// Of an axis that has not run.
+    pub(super) fn new(name: &str, letter: Axis) -> Self {
+        Self {
+            name: name.to_owned(),
+            letter,
+            following_error_um_max: 0.0,
+            following_error_um_rms: 0.0,
+            end_error_counts: 0,
+            output_v_max: 0.0,
+        }
+    }
+
+    /// What the axis counts.
+    #[must_use]
+    pub fn unit(&self) -> AxisUnit {
+        AxisUnit::of(self.letter)
+    }
+}
+
 /// Collects ticks into figures.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Collector {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Collector<const N: usize> {
     max: [f64; 4],
-    error_um_max: [f64; AXES],
-    error_um_square_sum: [f64; AXES],
-    output_v_max: [f64; AXES],
+    error_um_max: [f64; N],
+    error_um_square_sum: [f64; N],
+    output_v_max: [f64; N],
     contour_um_max: f64,
     reached_mm: f64,
     reached_line: u32,
     ticks: u64,
 }
 
-impl Collector {
+impl<const N: usize> Collector<N> {
+    /// Before the first tick.
+    pub(super) fn new() -> Self {
+        Self {
+            max: [0.0; 4],
+            error_um_max: [0.0; N],
+            error_um_square_sum: [0.0; N],
+            output_v_max: [0.0; N],
+            contour_um_max: 0.0,
+            reached_mm: 0.0,
+            reached_line: 0,
+            ticks: 0,
+        }
+    }
+
     /// Ticks so far.
     pub(super) fn ticks(&self) -> u64 {
         self.ticks
     }
 
-    pub(super) fn add(&mut self, tick: &TraceRow) {
+    pub(super) fn add(&mut self, tick: &TraceRow<N>) {
         self.ticks += 1;
         let along = [tick.v_mm_s, tick.a_mm_s2, tick.j_mm_s3, tick.snap_mm_s4];
         for (max, value) in self.max.iter_mut().zip(along) {

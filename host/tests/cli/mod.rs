@@ -10,4 +10,4 @@ mod probing;
 mod running;
 mod spline;
 mod unfinished;
-mod workspace;
+pub(crate) mod workspace;

@@ -246,7 +246,7 @@ fn a_converter_bus_that_comes_back_first_gets_0_v() {
     for frames in [0, 1, 2, 3, 401, 402, 403, 404] {
         let axis = AxisParameters::REFERENCE_X;
         let parameters = MachineParameters::at_reference_tick([axis; 3]);
-        let simulated = SimMachine::<3, _>::new(&parameters).expect("a machine");
+        let simulated = SimMachine::<3, _, _>::new(&parameters).expect("a machine");
         let mut hardware = SimulatedHardware::new(&simulated).expect("a converter");
         let Ok(counts) = hardware.latch();
         let start = [Position::ZERO; 3];

@@ -37,9 +37,10 @@ use hal_sim::DriveParameters;
 use motion_kernel::axis::KNOT_TICKS_MAX;
 
 use super::experiment::{DriveError, Recording, within};
+use crate::drive::AXES;
 use crate::machine::Machine;
 use crate::simulate::{Number, RunError, RunOptions, StretchCorrection};
-use crate::trace::{AXES, TraceRow, TracedFault};
+use crate::trace::{TraceRow, TracedFault};
 
 pub mod motion;
 

@@ -11,8 +11,8 @@ use crate::trace::RunTrace;
 
 /// Draws the contour error on the path axis of the feed. `faults_mm` is where on the path a fault was
 /// latched.
-pub(in crate::report) fn draw(
-    trace: &RunTrace,
+pub(in crate::report) fn draw<const N: usize>(
+    trace: &RunTrace<N>,
     summary: &Summary,
     faults_mm: &[f64],
     caption: &Caption<'_>,

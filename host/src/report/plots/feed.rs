@@ -43,7 +43,7 @@ impl Step<'_> {
 }
 
 /// Whether there are more blocks than columns, so that a column shows a range of ceilings.
-pub(in crate::report) fn is_crowded(trace: &RunTrace, summary: &Summary) -> bool {
+pub(in crate::report) fn is_crowded<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> bool {
     let (top_mm_s, _) = top(trace, summary);
     steps(&trace.blocks, top_mm_s, summary.path_length_mm, NARROW.columns).iter().any(Step::is_range)
 }
@@ -69,7 +69,7 @@ pub(in crate::report) fn reasons(blocks: &[TracedBlock], top_mm_s: f64) -> Vec<&
 }
 
 /// Top of the feed axis \[mm/s\], and whether a ceiling lies above it.
-pub(in crate::report) fn top(trace: &RunTrace, summary: &Summary) -> (f64, bool) {
+pub(in crate::report) fn top<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> (f64, bool) {
     let planned = trace.blocks.iter().map(|block| block.peak_mm_s).filter(|peak| peak.is_finite());
     let feed = planned.fold(summary.feed_mm_s.magnitude(), f64::max);
     let limit = if feed > 0.0 { CEILING_TO_FEED_MAX * feed } else { f64::INFINITY };
@@ -122,7 +122,7 @@ fn steps<'a>(blocks: &'a [TracedBlock], top_mm_s: f64, length_mm: f64, columns: 
 }
 
 /// Whether there is room in a wide plot for the number of at least one line.
-pub(in crate::report) fn has_line_numbers(trace: &RunTrace, summary: &Summary) -> bool {
+pub(in crate::report) fn has_line_numbers<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> bool {
     !numbered(&WIDE, &trace.blocks, length_shown(summary)).is_empty()
 }
 
@@ -172,8 +172,8 @@ fn lines(blocks: &[TracedBlock]) -> Vec<(u32, f64, f64)> {
 }
 
 /// Draws feed and ceilings, with commands and faults where on the path they came.
-pub(in crate::report) fn draw(
-    trace: &RunTrace,
+pub(in crate::report) fn draw<const N: usize>(
+    trace: &RunTrace<N>,
     summary: &Summary,
     caption: &Caption<'_>,
 ) -> io::Result<String> {
@@ -184,10 +184,10 @@ pub(in crate::report) fn draw(
     on_both_layouts(caption, height, |area, layout| draw_on(area, layout, trace, summary, &words(layout)))
 }
 
-fn draw_on(
+fn draw_on<const N: usize>(
     area: &Area<'_>,
     layout: &Layout,
-    trace: &RunTrace,
+    trace: &RunTrace<N>,
     summary: &Summary,
     words: &marks::Words,
 ) -> Drawn {
@@ -307,7 +307,7 @@ mod tests {
             block(5, 40.0, 10.0, 40.0, "programmed"),
         ];
         blocks[2].peak_mm_s = 40.0;
-        let trace = RunTrace { blocks, ..RunTrace::default() };
+        let trace = RunTrace::<3> { blocks, ..RunTrace::default() };
         let summary = Summary::of(&trace);
         let (top_mm_s, beyond) = top(&trace, &summary);
         assert!((top_mm_s - 50.0).abs() < 1e-12 && beyond);

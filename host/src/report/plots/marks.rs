@@ -33,7 +33,7 @@ pub(in crate::report) fn word(command: &TracedCommand) -> String {
 }
 
 /// The marks of `trace`, each where `place` finds its tick.
-fn marks(trace: &RunTrace, place: impl Fn(u64) -> Option<f64>) -> Vec<Mark> {
+fn marks<const N: usize>(trace: &RunTrace<N>, place: impl Fn(u64) -> Option<f64>) -> Vec<Mark> {
     let commands =
         trace.commands.iter().take(COMMAND_MARKS_MAX).filter_map(|command| {
             Some(Mark { at: place(command.tick)?, word: word(command), is_fault: false })
@@ -48,12 +48,12 @@ fn marks(trace: &RunTrace, place: impl Fn(u64) -> Option<f64>) -> Vec<Mark> {
 }
 
 /// Over time \[s\].
-pub(super) fn over_time(trace: &RunTrace) -> Vec<Mark> {
+pub(super) fn over_time<const N: usize>(trace: &RunTrace<N>) -> Vec<Mark> {
     marks(trace, |tick| Some(tick as f64 * trace.tick_s))
 }
 
 /// Over the path \[mm\]: where the machine was when the tick began.
-pub(super) fn over_path(trace: &RunTrace) -> Vec<Mark> {
+pub(super) fn over_path<const N: usize>(trace: &RunTrace<N>) -> Vec<Mark> {
     marks(trace, |tick| {
         let index = trace.ticks.partition_point(|row| row.tick < tick);
         let row = trace.ticks.get(index.saturating_sub(1)).or(trace.ticks.last());

@@ -10,7 +10,7 @@ use crate::report::decimate;
 use crate::report::format::figure;
 use crate::report::palette::{self, CLASSES};
 use crate::report::summary::{Span, Summary};
-use crate::trace::{AXES, RunTrace, TraceRow};
+use crate::trace::{RunTrace, TraceRow};
 
 /// Corners of the drawn path: far more than a screen resolves, and a bound on the size of the file.
 const CORNERS_MAX: usize = 12_000;
@@ -20,7 +20,7 @@ const TALL: f64 = 0.52;
 const TALL_NARROW: f64 = 1.1;
 const LOW: f64 = 0.18;
 
-/// Two axes of the machine, to the right and upwards.
+/// Two linear axes of the machine, to the right and upwards.
 pub(in crate::report) struct View {
     /// Number of the axis to the right.
     pub(in crate::report) right: usize,
@@ -83,16 +83,16 @@ impl Scale {
 }
 
 /// Draws one view of the path.
-pub(in crate::report) fn draw(
-    trace: &RunTrace,
+pub(in crate::report) fn draw<const N: usize>(
+    trace: &RunTrace<N>,
     summary: &Summary,
-    names: &[String; AXES],
+    names: &[String],
     view: &View,
     caption: &Caption<'_>,
 ) -> io::Result<String> {
     let (x, y) = (summary.axes[view.right].set_mm, summary.axes[view.up].set_mm);
     let feed_max = summary.feed_mm_s.magnitude();
-    let place = |tick: &TraceRow| (tick.axes[view.right].set_mm, tick.axes[view.up].set_mm);
+    let place = |tick: &TraceRow<N>| (tick.axes[view.right].set_mm, tick.axes[view.up].set_mm);
     on_both_layouts(
         caption,
         |layout| Scale::fit(x, y, layout).height,
@@ -120,7 +120,7 @@ pub(in crate::report) fn draw(
                 super::curve(&mut chart, points, CLASSES[stretch.class], 14)?;
             }
             let area = chart.plotting_area().strip_coord_spec();
-            let on_area = |tick: &TraceRow| {
+            let on_area = |tick: &TraceRow<N>| {
                 let (x, y) = place(tick);
                 let (x, y) = scale.to_units(x, y);
                 let (_, height) = area.dim_in_pixel();
@@ -184,7 +184,7 @@ fn marks(
 }
 
 /// A sentence for those who cannot see the picture.
-pub(in crate::report) fn describe(summary: &Summary, names: &[String; AXES], view: &View) -> String {
+pub(in crate::report) fn describe(summary: &Summary, names: &[String], view: &View) -> String {
     let part = |axis: usize| {
         let span = summary.axes[axis].set_mm;
         format!("{} from {} to {} mm", names[axis], figure(span.low, 5), figure(span.high, 5))

@@ -22,8 +22,8 @@ const RAIL_V: f64 = 10.0;
 const RAIL_SHOWN_FROM_V: f64 = 7.0;
 
 /// A quantity over time.
-struct Curve<V: Fn(&TraceRow) -> f64> {
-    title: &'static str,
+struct Curve<V> {
+    title: String,
     span: Span,
     /// The machine's limit in both directions; 0 if that is not known.
     limit: f64,
@@ -39,7 +39,7 @@ pub(in crate::report) fn shows_limit(span: Span, limit: f64) -> bool {
     limit > 0.0 && limit.is_finite() && span.magnitude() >= LIMIT_SHOWN_FROM * limit
 }
 
-impl<V: Fn(&TraceRow) -> f64> Curve<V> {
+impl<V> Curve<V> {
     /// The limits to be drawn: in the directions in which the curve goes.
     fn limits(&self) -> impl Iterator<Item = f64> {
         let shown = shows_limit(self.span, self.limit);
@@ -53,7 +53,7 @@ impl<V: Fn(&TraceRow) -> f64> Curve<V> {
         if shows_limit(self.span, self.limit) {
             format!("{}, limit ±{}", self.title, figure(self.limit, 4))
         } else {
-            self.title.to_string()
+            self.title.clone()
         }
     }
 
@@ -84,14 +84,20 @@ fn shades(rests: &[Rest], x: (f64, f64), columns: usize) -> Vec<(f64, f64)> {
 }
 
 /// Feed, acceleration, jerk and snap along the path.
-pub(in crate::report) fn along_path(
-    trace: &RunTrace,
+pub(in crate::report) fn along_path<const N: usize>(
+    trace: &RunTrace<N>,
     summary: &Summary,
     caption: &Caption<'_>,
 ) -> io::Result<String> {
-    type Value = fn(&TraceRow) -> f64;
+    type Value<const N: usize> = fn(&TraceRow<N>) -> f64;
     let limits = &trace.limits;
-    let curve = |title, span, limit, ink, value: Value| Curve { title, span, limit, ink, value };
+    let curve = |title: &str, span, limit, ink, value: Value<N>| Curve {
+        title: title.to_owned(),
+        span,
+        limit,
+        ink,
+        value,
+    };
     let curves = [
         curve("Feed [mm/s]", summary.feed_mm_s, 0.0, palette::FEED, |tick| tick.v_mm_s),
         curve(
@@ -108,30 +114,36 @@ pub(in crate::report) fn along_path(
 }
 
 /// Following error and output of one axis.
-pub(in crate::report) fn of_axis(
-    trace: &RunTrace,
+pub(in crate::report) fn of_axis<const N: usize>(
+    trace: &RunTrace<N>,
     summary: &Summary,
     axis: usize,
     caption: &Caption<'_>,
 ) -> io::Result<String> {
-    let figures = &summary.axes[axis];
-    let error = move |tick: &TraceRow| tick.axes[axis].err_um;
-    let volts = move |tick: &TraceRow| tick.axes[axis].out_v;
+    let (figures, of_run) = (&summary.axes[axis], &trace.axes[axis]);
+    let error = move |tick: &TraceRow<N>| tick.axes[axis].err_um;
+    let volts = move |tick: &TraceRow<N>| tick.axes[axis].out_v;
     let mut output = figures.out_v;
     if output.magnitude() >= RAIL_SHOWN_FROM_V {
         output.add(RAIL_V);
         output.add(-RAIL_V);
     }
-    type Value<'a> = Box<dyn Fn(&TraceRow) -> f64 + 'a>;
+    type Value<'a, const N: usize> = Box<dyn Fn(&TraceRow<N>) -> f64 + 'a>;
     let curves = [
         Curve {
-            title: "Following error [µm]",
+            title: format!("Following error [{}]", of_run.unit().thousandth_symbol()),
             span: figures.err_um,
-            limit: trace.following_error_limit_um[axis],
+            limit: of_run.following_error_limit_um,
             ink: palette::ERROR,
-            value: Box::new(error) as Value<'_>,
+            value: Box::new(error) as Value<'_, N>,
         },
-        Curve { title: "Output [V]", span: output, limit: 0.0, ink: palette::VOLTS, value: Box::new(volts) },
+        Curve {
+            title: "Output [V]".to_owned(),
+            span: output,
+            limit: 0.0,
+            ink: palette::VOLTS,
+            value: Box::new(volts),
+        },
     ];
     stack(trace, summary, &curves, caption, &[])
 }
@@ -145,7 +157,7 @@ struct LiveControl {
 }
 
 impl LiveControl {
-    fn new(trace: &RunTrace, layout: &Layout, x: (f64, f64)) -> Self {
+    fn new<const N: usize>(trace: &RunTrace<N>, layout: &Layout, x: (f64, f64)) -> Self {
         let mut course = vec![(x.0, 100.0)];
         let mut present = 100.0;
         for command in &trace.commands {
@@ -188,8 +200,8 @@ impl LiveControl {
     }
 }
 
-fn stack<V: Fn(&TraceRow) -> f64>(
-    trace: &RunTrace,
+fn stack<V: Fn(&TraceRow<N>) -> f64, const N: usize>(
+    trace: &RunTrace<N>,
     summary: &Summary,
     curves: &[Curve<V>],
     caption: &Caption<'_>,
@@ -246,7 +258,7 @@ mod tests {
     #[test]
     fn a_limit_far_above_its_curve_does_not_flatten_it() {
         let curve = |low, high| Curve {
-            title: "Jerk [mm/s³]",
+            title: "Jerk [mm/s³]".to_owned(),
             span: Span { low, high },
             limit: 5000.0,
             ink: palette::JERK,
