@@ -14,7 +14,7 @@ use super::write_json;
 use crate::check::needs::system_word;
 use crate::check::{Check, Reason, check};
 use crate::gcode::{Axis, Program, Refusal};
-use crate::machine::Machine;
+use crate::machine::{Machine, on_machine};
 use crate::planning::PlanningError;
 
 const EXAMPLES: &str = "\
@@ -94,11 +94,11 @@ struct NeedsJson<'a> {
 /// # Errors
 /// The program or the machine file is refused, or `out` can't be written.
 pub fn run(arguments: &CheckArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
-    let machine = input::machine(arguments.machine.as_ref())?;
+    let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let options = arguments.reading.options(machine.read_options())?;
     match source.program(&options) {
-        Ok(program) => accepted(arguments, &source, &program, &machine, out),
+        Ok(program) => on_machine!(machine, machine => accepted(arguments, &source, &program, machine, out)),
         Err(_) => {
             let refusals = source.refusals(&options);
             refused(arguments, &source.name, refusals.iter().map(refusal_json).collect(), out)
@@ -106,11 +106,11 @@ pub fn run(arguments: &CheckArguments, out: &mut dyn Write) -> Result<Outcome, C
     }
 }
 
-fn accepted(
+fn accepted<const N: usize>(
     arguments: &CheckArguments,
     source: &Source,
     program: &Program,
-    machine: &Machine,
+    machine: &Machine<N>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     let checked = match check(&source.name, program, machine) {
@@ -167,7 +167,7 @@ fn refusal_json(refusal: &Refusal) -> RefusalJson<'_> {
     }
 }
 
-fn json<'a>(program: &'a Program, checked: &'a Check) -> AcceptedJson<'a> {
+fn json<'a, const N: usize>(program: &'a Program, checked: &'a Check<N>) -> AcceptedJson<'a> {
     let Check { plan, needs, times, advice } = checked;
     let by_reason = Reason::ALL.map(|reason| (reason.name().to_owned(), times.of_reason_s(reason).into()));
     AcceptedJson {
@@ -203,7 +203,12 @@ fn write_refusals(refusals: &[RefusalJson<'_>], out: &mut dyn Write) -> io::Resu
     table::write(&columns, &rows, out)
 }
 
-fn write_check(name: &str, program: &Program, checked: &Check, out: &mut dyn Write) -> io::Result<()> {
+fn write_check<const N: usize>(
+    name: &str,
+    program: &Program,
+    checked: &Check<N>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let Check { plan, needs, times, advice } = checked;
     writeln!(out, "{name} is accepted: {}, {:.3} mm", duration(plan.time_s), plan.length_mm)?;
     let stops = |count: usize, one: &str, more: &str| match count {

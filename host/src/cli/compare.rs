@@ -14,7 +14,7 @@ use super::table::{self, Align};
 use super::{csv_failure, input, write_json};
 use crate::compare::{Figures, Path, figures, is_blended};
 use crate::gcode::Program;
-use crate::machine::Machine;
+use crate::machine::{Machine, on_machine};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -113,9 +113,9 @@ struct CompareJson<'a> {
 /// A program can't be read or is refused (after the others are printed), the machine file is refused, or
 /// `out` can't be written.
 pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
-    let machine = input::machine(arguments.machine.as_ref())?;
+    let machine = input::any_machine(arguments.machine.as_ref())?;
     let programs = programs(&arguments.programs)?;
-    let own = [machine.path.blend_tolerance_mm];
+    let own = [on_machine!(machine, machine => machine.path.blend_tolerance_mm)];
     let tolerances_mm = if arguments.tolerances.is_empty() { &own[..] } else { &arguments.tolerances };
     let options = arguments.reading.options(machine.read_options())?;
     let (mut rows, mut refused) = (Vec::new(), Vec::new());
@@ -123,8 +123,10 @@ pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outc
     for path in &programs {
         let source = input::read(path)?;
         match source.program(&options) {
-            Ok(program) => rows_of(&source.name, &program, tolerances_mm, &machine, &mut rows)
-                .unwrap_or_else(|error| refused.push(error.to_string())),
+            Ok(program) => on_machine!(machine, machine => {
+                rows_of(&source.name, &program, tolerances_mm, machine, &mut rows)
+            })
+            .unwrap_or_else(|error| refused.push(error.to_string())),
             Err(error) => refused.push(error.to_string()),
         }
         progress.step();
@@ -163,11 +165,11 @@ fn programs(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
     Ok(programs)
 }
 
-fn rows_of(
+fn rows_of<const N: usize>(
     name: &str,
     program: &Program,
     tolerances_mm: &[f64],
-    machine: &Machine,
+    machine: &Machine<N>,
     rows: &mut Vec<Row>,
 ) -> Result<(), crate::compare::CompareError> {
     let written = is_blended(program).then_some(Path::Written);

@@ -9,8 +9,9 @@ use motion_kernel::num::{Fixed, Root};
 use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::Written;
-use crate::files::Files;
-use crate::machine::Machine;
+use crate::files::{Files, OutputFile};
+use crate::gcode::Program;
+use crate::machine::{Machine, on_machine};
 use crate::planning::{Executable, Mode, Plan, plan_program, require_outputs};
 
 const EXAMPLES: &str = "\
@@ -70,25 +71,37 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
         ("--tools", arguments.reading.tools.as_deref()),
     ]);
     let output = files.output("--output", &arguments.output)?;
-    let machine = input::machine(arguments.machine.as_ref())?;
+    let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
     let program = arguments.reading.program(&source, machine.read_options())?;
+    on_machine!(machine, machine => compile_for(machine, arguments, &source.name, (&program, mode), output, out))
+}
+
+/// Compiles a program for a machine.
+fn compile_for<const N: usize>(
+    machine: &Machine<N>,
+    arguments: &CompileArguments,
+    source_name: &str,
+    (program, mode): (&Program, Mode),
+    output: OutputFile,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
     if !arguments.no_spindle {
-        require_outputs(&source.name, &program, &machine)?;
+        require_outputs(source_name, program, machine)?;
     }
-    let plan = plan_program(&source.name, &program, &machine, mode)?;
+    let plan = plan_program(source_name, program, machine, mode)?;
     if let Some(probe) = plan.probes.first() {
-        return Err(CliError::NoProbeInput { program: source.name, line: probe.line });
+        return Err(CliError::NoProbeInput { program: source_name.to_owned(), line: probe.line });
     }
     let executable = match arguments.number {
-        Number::F32 => executable::<f32>(&plan, &machine),
-        Number::Fixed => executable::<Fixed>(&plan, &machine),
+        Number::F32 => executable::<f32, N>(&plan, machine),
+        Number::Fixed => executable::<Fixed, N>(&plan, machine),
     }?;
     let (count, bytes) = if arguments.live {
-        (executable.items.len(), executable.to_live_bytes(&machine))
+        (executable.items.len(), executable.to_live_bytes(machine))
     } else {
-        (executable.without_blocks().count(), executable.to_bytes(&machine))
+        (executable.without_blocks().count(), executable.to_bytes(machine))
     };
     let mut written = Written::default();
     written.write("program", Some(output), |file| file.write_all(&bytes));
@@ -111,7 +124,10 @@ pub fn compile(arguments: &CompileArguments, out: &mut dyn Write) -> Result<Outc
 }
 
 /// The program in the board's number type, if that holds its axes, too.
-fn executable<R: Root>(plan: &Plan, machine: &Machine) -> Result<Executable, CliError> {
+fn executable<R: Root, const N: usize>(
+    plan: &Plan<N>,
+    machine: &Machine<N>,
+) -> Result<Executable<N>, CliError> {
     machine.axes_config::<R>().map_err(|source| CliError::Axis { machine: machine.name.clone(), source })?;
     Ok(Executable::new::<R>(plan)?)
 }

@@ -6,10 +6,11 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::error::{CliError, Outcome};
-use super::input;
+use super::input::{self, Source};
 use super::outputs::Outputs;
 use crate::files::Files;
 use crate::flight;
+use crate::machine::{Machine, on_machine};
 use crate::simulate::RunInfo;
 use crate::trace::{RunTrace, TracedFault};
 
@@ -48,11 +49,20 @@ pub fn flight(arguments: &FlightArguments, out: &mut dyn Write) -> Result<Outcom
     let mut files =
         Files::reading([("LOG", Some(arguments.log.as_path())), ("--machine", arguments.machine.as_deref())]);
     let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
-    let machine = input::machine(arguments.machine.as_ref())?;
+    let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.log)?;
+    on_machine!(machine, machine => show(machine, source, outputs, out))
+}
+
+fn show<const N: usize>(
+    machine: &Machine<N>,
+    source: Source,
+    outputs: Outputs,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
     let rows = flight::read(&String::from_utf8_lossy(&source.text))
         .map_err(|error| CliError::Flight { path: source.name.clone(), source: error })?;
-    let info = RunInfo { program: source.name, ..RunInfo::of_machine(&machine) };
+    let info = RunInfo { program: source.name, ..RunInfo::of_machine(machine) };
     let faults = rows.iter().find(|row| row.is_faulted).map(|row| TracedFault {
         tick: row.tick,
         axis: None,
@@ -61,8 +71,8 @@ pub fn flight(arguments: &FlightArguments, out: &mut dyn Write) -> Result<Outcom
     });
     let mut trace = RunTrace {
         faults: faults.into_iter().collect(),
-        notices: flight::words(&rows, &machine),
-        ticks: flight::ticks(&rows, &machine),
+        notices: flight::words(&rows, machine),
+        ticks: flight::ticks(&rows, machine),
         ..info.empty_trace()
     };
     for (axis, settings) in trace.axes.iter_mut().zip(machine.driven_axes()) {

@@ -12,6 +12,7 @@ use super::table::{self, Align};
 use super::units::{InUnit, TableUnits};
 use super::{input, write_json};
 use crate::files::Files;
+use crate::machine::{Machine, on_machine};
 use crate::simulate::home::{HomeError, HomedAxis, Homes};
 use crate::simulate::job::RunInfo;
 
@@ -61,12 +62,21 @@ struct AxisJson<'a> {
 pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let mut files = Files::reading([("--machine", Some(arguments.machine.as_path()))]);
     let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), None)?;
-    let machine = input::machine(Some(&arguments.machine))?;
+    let machine = input::any_machine(Some(&arguments.machine))?;
+    on_machine!(machine, machine => home(machine, arguments, outputs, out))
+}
+
+fn home<const N: usize>(
+    machine: &Machine<N>,
+    arguments: &HomeArguments,
+    outputs: Outputs,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
     let name = arguments.machine.display().to_string();
     let refused = |source: HomeError| CliError::Home { machine: name.clone(), source };
-    let homes = Homes::new(&machine).map_err(refused)?;
+    let homes = Homes::new(machine).map_err(refused)?;
     let mut homed = Vec::new();
-    let info = RunInfo::of_machine(&machine);
+    let info = RunInfo::of_machine(machine);
     let (ended, ticks) = outputs.of_ticks(&info, |observe| homes.home(&mut homed, observe));
     // Axes already homed are written and shown, even if the next axis failed.
     let written = ticks.write(|_| info.empty_trace());

@@ -12,6 +12,7 @@ use super::table::{self, Align};
 use super::units::{InUnit, TableUnits};
 use super::{input, write_json};
 use crate::files::Files;
+use crate::machine::{Machine, on_machine};
 use crate::simulate::job::RunInfo;
 use crate::simulate::jog::{Ended, Jogged, Keys, Press};
 
@@ -92,10 +93,19 @@ impl PressJson {
 pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let mut files = Files::reading([("--machine", arguments.machine.as_deref())]);
     let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), None)?;
-    let machine = input::machine(arguments.machine.as_ref())?;
-    let keys = Keys::new(&machine, &arguments.presses, arguments.feed)?;
+    let machine = input::any_machine(arguments.machine.as_ref())?;
+    on_machine!(machine, machine => jog(machine, arguments, outputs, out))
+}
+
+fn jog<const N: usize>(
+    machine: &Machine<N>,
+    arguments: &JogArguments,
+    outputs: Outputs,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    let keys = Keys::new(machine, &arguments.presses, arguments.feed)?;
     let mut jogged = Vec::new();
-    let info = RunInfo::of_machine(&machine);
+    let info = RunInfo::of_machine(machine);
     let (ended, ticks) = outputs.of_ticks(&info, |observe| keys.jog(&mut jogged, observe));
     // Finished jogs are written and shown, even if the next key failed.
     let written = ticks.write(|_| info.empty_trace());

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::error::{CliError, Outcome};
 use super::table::{self, Align};
 use super::{input, write_json};
+use crate::machine::on_machine;
 use crate::planning::{Mode, PlacedRamp, Plan, plan_blocks, plan_program};
 use crate::trace::TracedBlock;
 
@@ -89,29 +90,36 @@ struct FeedJson {
 /// # Errors
 /// The program, block list or machine file is refused, there is no plan, or `out` can't be written.
 pub fn plan(arguments: &PlanArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
-    let machine = input::machine(arguments.machine.as_ref())?;
+    let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let mode = if arguments.per_block { Mode::PerBlock } else { Mode::Spanning };
     let is_block_list =
         arguments.program.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    let mut plan = if is_block_list {
-        plan_blocks(&source.name, &source.text, mode)?
-    } else {
-        let program = arguments.reading.program(&source, machine.read_options())?;
-        plan_program(&source.name, &program, &machine, mode)?
-    };
-    if is_block_list && arguments.machine.is_some() {
-        plan.notices.push("a block list has its own limits: --machine is not acted on".to_owned());
+    if is_block_list {
+        let mut plan = plan_blocks(&source.name, &source.text, mode)?;
+        if arguments.machine.is_some() {
+            plan.notices.push("a block list has its own limits: --machine is not acted on".to_owned());
+        }
+        return show(arguments, &plan, out);
     }
+    let program = arguments.reading.program(&source, machine.read_options())?;
+    on_machine!(machine, machine => show(arguments, &plan_program(&source.name, &program, machine, mode)?, out))
+}
+
+fn show<const N: usize>(
+    arguments: &PlanArguments,
+    plan: &Plan<N>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
     if arguments.json {
-        write_json(&json(&plan), out)?;
+        write_json(&json(plan), out)?;
     } else {
-        write_plan(&plan, out).map_err(CliError::Output)?;
+        write_plan(plan, out).map_err(CliError::Output)?;
     }
     Ok(Outcome::Done)
 }
 
-fn json<'plan>(plan: &'plan Plan) -> PlanJson<'plan> {
+fn json<'plan, const N: usize>(plan: &'plan Plan<N>) -> PlanJson<'plan> {
     let block = |block: &'plan TracedBlock| BlockJson {
         line: block.line,
         kind: &block.kind,
@@ -150,7 +158,7 @@ fn json<'plan>(plan: &'plan Plan) -> PlanJson<'plan> {
 }
 
 /// Writes the plan for people.
-pub(super) fn write_plan(plan: &Plan, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write_plan<const N: usize>(plan: &Plan<N>, out: &mut dyn Write) -> io::Result<()> {
     let columns = [
         ("block", "", Align::Right),
         ("line", "", Align::Right),

@@ -7,10 +7,12 @@ use clap::Args;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
+use super::input::{self, Source};
 use super::outputs::Outputs;
 use super::run::{self, RunJson};
-use super::{input, write_json};
+use super::write_json;
 use crate::files::Files;
+use crate::gcode::AXES_MAX;
 use crate::recording::{self, Difference, Recording};
 
 const EXAMPLES: &str = "\
@@ -54,7 +56,21 @@ pub fn replay(arguments: &ReplayArguments, out: &mut dyn Write) -> Result<Outcom
     let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
     let source = input::read(&arguments.recording)?;
     let refused = |error| CliError::Recording { path: source.name.clone(), source: error };
-    let recording = Recording::<3>::from_bytes(&source.text).map_err(refused)?;
+    match recording::places(&source.text).map_err(refused)? {
+        AXES_MAX => again::<AXES_MAX>(arguments, &source, outputs, out),
+        _ => again::<3>(arguments, &source, outputs, out),
+    }
+}
+
+/// Runs a recording of a machine with `N` places again.
+fn again<const N: usize>(
+    arguments: &ReplayArguments,
+    source: &Source,
+    outputs: Outputs,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    let refused = |error| CliError::Recording { path: source.name.clone(), source: error };
+    let recording = Recording::<N>::from_bytes(&source.text).map_err(refused)?;
     let job = recording.job();
     let (replayed, written) = outputs.of_run(
         job,

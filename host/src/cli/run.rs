@@ -16,7 +16,7 @@ use super::units::{InUnit, TableUnits};
 use super::write_json;
 use crate::files::{Files, OutputFile};
 use crate::gcode::Axis;
-use crate::machine::Machine;
+use crate::machine::{Machine, on_machine};
 use crate::planning::{Mode, Plan, plan_program};
 use crate::recording::Recorder;
 use crate::simulate::inject::Injections;
@@ -103,18 +103,20 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let record = outputs::open(&mut files, "--record", arguments.record.as_ref())?;
     let kept = arguments.reading.parameters.as_ref();
     let kept = kept.map(|path| files.edited("--parameters", path, "--parameters")).transpose()?;
-    let machine = input::machine(arguments.machine.as_ref())?;
+    let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let options = arguments.reading.options(machine.read_options())?;
     let program = source.program(&options)?;
     let after = options.parameters.after(&program.parameters);
-    let plan = plan_program(&source.name, &program, &machine, Mode::Spanning)?;
     let options = RunOptions {
         script: arguments.at.as_ref(),
         injections: arguments.inject.as_ref(),
         ..RunOptions::default()
     };
-    let (summary, mut written) = execute(&options, &plan, &machine, outputs, record)?;
+    let (summary, mut written) = on_machine!(machine, machine => {
+        let plan = plan_program(&source.name, &program, machine, Mode::Spanning)?;
+        execute(&options, &plan, machine, outputs, record)
+    })?;
     // A run that ended early has not set what the program would set later.
     if Outcome::of(&summary) == Outcome::Done {
         written.write("parameters", kept, |file| write!(file, "{after}"));
@@ -132,24 +134,24 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
 }
 
 /// Runs a plan; writes the trace during the run, report and recording afterwards.
-pub(super) fn execute(
+pub(super) fn execute<const N: usize>(
     options: &RunOptions<'_>,
-    plan: &Plan,
-    machine: &Machine,
+    plan: &Plan<N>,
+    machine: &Machine<N>,
     outputs: Outputs,
     record: Option<OutputFile>,
 ) -> Result<(RunSummary, Written), CliError> {
     let refused = |source: RunError| CliError::Run { program: plan.source.clone(), source };
     let job = Job::new(options, plan, machine).map_err(refused)?;
     let Some(record) = record else {
-        let run = |observe: &mut simulate::Observer<'_>| {
+        let run = |observe: &mut simulate::Observer<'_, N>| {
             simulate::on_simulated(machine, options.injections, |hardware| {
                 simulate::run_on(&job, hardware, observe)
             })
         };
         return outputs.of_run(&job, run, |summary| summary);
     };
-    let run = |observe: &mut simulate::Observer<'_>| {
+    let run = |observe: &mut simulate::Observer<'_, N>| {
         simulate::on_simulated(machine, options.injections, |hardware| {
             let mut recorder = Recorder::new(hardware);
             let summary = simulate::run_on(&job, &mut recorder, observe)?;

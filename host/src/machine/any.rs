@@ -36,3 +36,15 @@ impl AnyMachine {
         }
     }
 }
+
+/// Evaluates an expression with the machine in an [`AnyMachine`], whatever its places.
+macro_rules! on_machine {
+    ($any:expr, $machine:ident => $result:expr) => {
+        match &$any {
+            $crate::machine::AnyMachine::Three($machine) => $result,
+            $crate::machine::AnyMachine::Nine($machine) => $result,
+        }
+    };
+}
+
+pub(crate) use on_machine;

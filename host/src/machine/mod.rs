@@ -39,6 +39,7 @@ mod range;
 mod tests;
 
 pub use any::AnyMachine;
+pub(crate) use any::on_machine;
 pub use edit::{AxisEdit, edited};
 pub use error::{AxisError, MachineError};
 pub(crate) use law_name::{LAW_NAMES, law_named};

@@ -9,9 +9,10 @@ use motion_kernel::exec::PIECES_PER_TICK_MAX;
 use motion_kernel::law::Ticks;
 use motion_kernel::num::Real;
 use motion_kernel::plan::Ceiling;
-use motion_kernel::program::{Allowed, Item, PathBlock, write};
+use motion_kernel::program::{Allowed, Item, PathBlock};
 use motion_kernel::units::Position;
 
+use super::compiled::bytes;
 use super::density::{PiecePace, SegmentPace};
 use super::error::{PlanningError, Problem};
 use super::lookahead::block_at;
@@ -103,13 +104,6 @@ fn named<const N: usize>(problem: Problem, axes: &[Option<Axis>; N]) -> Problem 
         }
         problem => problem,
     }
-}
-
-fn bytes<'a, const N: usize>(machine: &Machine<N>, items: impl IntoIterator<Item = &'a Item<N>>) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    // Entries of nine axes fit the format.
-    write(&machine.header(), Some(&machine.guards()), items, &mut bytes).expect("nine axes at most");
-    bytes
 }
 
 fn stretch_items<R: Real, const N: usize>(

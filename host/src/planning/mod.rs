@@ -20,12 +20,14 @@
 //! - [`profile`]: feed and time at any path position of a planned stretch;
 //! - [`blocks`]: bare block lists, BLOCKS.json;
 //! - [`executable`]: a plan in the kernel's terms;
+//! - `compiled`: a plan as bytes for a board;
 //! - `density`: refuses what is too dense for a tick;
 //! - [`error`]: refusals, with file and line.
 
 pub mod blocks;
 mod blending;
 mod ceilings;
+mod compiled;
 mod curves;
 mod density;
 pub mod error;

@@ -201,12 +201,12 @@ impl RunInfo {
         core::array::from_fn(|place| self.axes.get(place).is_some_and(|axis| !axis.letter.is_rotary()))
     }
 
-    fn new(plan: &Plan, machine: &Machine) -> Self {
-        let start_mm = |item: &PlanItem| match item {
+    fn new<const N: usize>(plan: &Plan<N>, machine: &Machine<N>) -> Self {
+        let start_mm = |item: &PlanItem<N>| match item {
             PlanItem::Stretch(stretch) => Some(stretch.start_mm),
             PlanItem::Dwell { .. } | PlanItem::Switch { .. } | PlanItem::Stop { .. } => None,
         };
-        let switch_line = |item: &PlanItem| match item {
+        let switch_line = |item: &PlanItem<N>| match item {
             &PlanItem::Switch { line, .. } => Some(line),
             _ => None,
         };
@@ -225,12 +225,12 @@ impl RunInfo {
     }
 }
 
-impl Job {
+impl<const N: usize> Job<N> {
     /// `plan` on `machine`, as `options` say.
     ///
     /// # Errors
     /// The plan can't be executed in the number type.
-    pub fn new(options: &RunOptions<'_>, plan: &Plan, machine: &Machine) -> Result<Self, RunError> {
+    pub fn new(options: &RunOptions<'_>, plan: &Plan<N>, machine: &Machine<N>) -> Result<Self, RunError> {
         let executable = match options.number {
             Number::F32 => Executable::new::<f32>(plan),
             Number::F64 => Executable::new::<f64>(plan),
@@ -246,9 +246,7 @@ impl Job {
             info: RunInfo::new(plan, machine),
         })
     }
-}
 
-impl<const N: usize> Job<N> {
     /// The kernel's axes.
     pub(super) fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, N>, AxisError> {
         let tick_s = self.header.tick_s;
