@@ -111,7 +111,7 @@ impl Default for FaultSettings {
     }
 }
 
-/// Limits along the path, and rules for its junctions. The four limits are from 0.001 to 10¹².
+/// Limits along the path, of the linear axes together, and rules for its junctions. The four limits are from 0.001 to 10¹².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathSettings {
     /// Greatest feed \[mm/s\].
@@ -134,7 +134,7 @@ pub struct PathSettings {
     pub curve_feed_share: f64,
     /// How corners are passed before a program says so.
     pub mode: DefaultPathMode,
-    /// How far blends may leave the path under a G64 without P \[mm\]; 0 to 10, 0 for exact path.
+    /// How far blends may leave the path under a G64 without P \[mm, of rotary axes °\]; 0 to 10, 0 for exact path.
     pub blend_tolerance_mm: f64,
 }
 
