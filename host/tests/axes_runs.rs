@@ -8,6 +8,7 @@ use motion_host::report;
 use motion_host::simulate::home::Homes;
 use motion_host::simulate::inject::Injections;
 use motion_host::simulate::jog::{Ended, Keys, Press};
+use motion_host::simulate::live::Script;
 use motion_host::simulate::session::Session;
 use motion_host::simulate::{self, Job, Number, RunInfo, RunSummary, hardware};
 use motion_host::trace::{RunEnd, RunTrace, TraceRow};
@@ -89,11 +90,22 @@ const POINTS_MM: [[f64; 9]; 2] =
 
 #[test]
 fn six_axes_come_to_their_ends_in_every_number_type() {
+    // Streams of nine places pass through the stack.
+    let checked = std::thread::Builder::new().stack_size(8 << 20).spawn(six_axes);
+    checked.expect("a thread").join().expect("what it asserts");
+}
+
+fn six_axes() {
     let machine = machine::<9>(SIX);
-    for number in [Number::F32, Number::F64, Number::Fixed] {
-        let job = job(&machine, number, &POINTS_MM);
+    let held: Script = "300:hold,900:resume".parse().expect("commands");
+    let numbers = [Number::F32, Number::F64, Number::Fixed];
+    for (number, script) in
+        numbers.into_iter().flat_map(|number| [None, Some(&held)].map(|held| (number, held)))
+    {
+        let job = Job { script: script.cloned(), ..job(&machine, number, &POINTS_MM) };
         let (summary, rows, recording) = run(&machine, &job);
         assert_eq!((summary.end, summary.faults.len()), (RunEnd::Finished, 0), "{:?}", summary.faults);
+        assert_eq!(summary.commands.len(), script.map_or(0, |_| 2));
         let last = rows.last().expect("ticks");
         for ((axis, tick), end_mm) in summary.axes.iter().zip(&last.axes).zip(POINTS_MM[1]) {
             let name = &axis.name;

@@ -116,8 +116,40 @@ impl<W: Write> TraceWriter<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gcode::Axis;
     use crate::machine::Machine;
     use crate::trace::AxisTick;
+
+    /// A nine-place machine of X, A and W.
+    #[test]
+    fn columns_are_of_the_axes_that_there_are_in_their_units() {
+        let mut info = RunInfo::of_machine(&Machine::reference());
+        for (axis, letter) in info.axes.iter_mut().zip([Axis::X, Axis::A, Axis::W]) {
+            (axis.name, axis.letter) = (letter.to_string(), letter);
+        }
+        let mut text = Vec::new();
+        let mut trace = TraceWriter::new(&mut text, &info);
+        trace.add(&TraceRow {
+            tick: 0,
+            s_mm: 0.0,
+            v_mm_s: 0.0,
+            a_mm_s2: 0.0,
+            j_mm_s3: 0.0,
+            snap_mm_s4: 0.0,
+            state: "idle",
+            line: 0,
+            contour_um: 0.0,
+            axes: [AxisTick::default(); 9],
+        });
+        trace.finish().expect("memory");
+        let text = String::from_utf8(text).expect("UTF-8");
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(
+            lines[0].contains(",X_act_mm,X_err_um,X_out_v,A_set_deg,A_vel_deg_s,A_acc_deg_s2,A_jerk_deg_s3,")
+        );
+        assert!(lines[0].contains(",A_act_deg,A_err_mdeg,A_out_v,W_set_mm,"));
+        assert_eq!(lines.iter().map(|line| line.split(',').count()).collect::<Vec<_>>(), [29, 29]);
+    }
 
     #[test]
     fn header_and_row() {

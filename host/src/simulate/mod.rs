@@ -1,8 +1,8 @@
 //! A plan executed by the kernel on the simulated machine, tick by tick.
 //!
 //! Consumes a [`Plan`](crate::planning::Plan) and a [`Machine`](crate::machine::Machine), as a [`Job`];
-//! produces one [`TraceRow`] per tick and a [`RunSummary`]. All is made for `N` places for axes, of which the first have axes; the kernel
-//! runs the others, too, and no record shows them. The kernel, the streams, the converter's adapter
+//! produces one [`TraceRow`] per tick and a [`RunSummary`]. A machine has `N` places, of which the first have
+//! axes; the kernel runs the others, too, and no record shows them. The kernel, the streams, the converter's adapter
 //! and the encoder's count extension are the ones a board runs; only the drive is a model.
 //!
 //! - [`error`]: why a run could not be made;
