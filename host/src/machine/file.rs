@@ -105,7 +105,9 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
             return Err(refuse(at.clone(), expected));
         }
         if let (Some(places), Some(HomingSettings { config, .. })) = (&places.homing, axis.homing) {
-            let feed_mm_s = axis.feed_mm_s.min(file.path.feed_mm_s.0);
+            let is_rotary = axis.letter.is_some_and(Axis::is_rotary);
+            let path_mm_s = if is_rotary { f64::INFINITY } else { file.path.feed_mm_s.0 };
+            let feed_mm_s = axis.feed_mm_s.min(path_mm_s);
             for (at, homing_mm_s) in
                 [(&places.search_mm_s, config.fast_mm_s), (&places.approach_mm_s, config.slow_mm_s)]
             {

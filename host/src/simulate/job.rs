@@ -173,7 +173,8 @@ impl RunInfo {
             program: self.program.clone(),
             machine: self.machine.clone(),
             tick_s: self.tick_s,
-            limits: self.limits,
+            // They bind linear axes alone, and a trace tells the motion of all along the path.
+            limits: if self.has_rotary_axis() { PathLimits::default() } else { self.limits },
             axes: self.axes.iter().map(axis).collect(),
             blocks: self.blocks.clone(),
             planned_time_s: self.planned_time_s,
@@ -194,6 +195,11 @@ impl RunInfo {
     /// What the axis of a place counts.
     pub(super) fn unit_of(&self, place: usize) -> AxisUnit {
         self.axes.get(place).map_or(AxisUnit::Millimetre, SheetAxis::unit)
+    }
+
+    /// Whether an axis counts degrees.
+    pub(super) fn has_rotary_axis(&self) -> bool {
+        self.axes.iter().any(|axis| axis.letter.is_rotary())
     }
 
     /// Which places have linear axes.

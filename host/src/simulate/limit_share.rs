@@ -1,7 +1,7 @@
 //! On how much of the path some limit holds the motion back.
 //!
 //! Consumes the executed ticks; produces the share of the path length on which the feed is at its block's
-//! ceiling, or acceleration, jerk or snap along the path, as vectors of all axes or of an axis, are at their limit. The
+//! ceiling, or acceleration, jerk or snap, as vectors of the linear axes or of an axis, are at their limit. The
 //! rest of the length is what a better plan could still gain on. A sin² pulse touches the limits of jerk and
 //! snap only at the top of its curves, so that ramps count for little; one with a plateau holds its jerk
 //! there, so that only its edges do not count. A plan that wastes nothing is still below 1.
@@ -41,13 +41,16 @@ impl<'run> LimitShare<'run> {
     fn is_limited<const N: usize>(&self, tick: &TraceRow<N>) -> bool {
         let path = &self.info.limits;
         let reached = |value: f64, limit: f64| value.abs() >= REACHED * limit;
+        let linear: [bool; N] = self.info.linear_places();
         let vector = |of: fn(&crate::trace::AxisTick) -> f64| {
-            tick.axes.iter().map(|axis| of(axis).powi(2)).sum::<f64>().sqrt()
+            let axes = tick.axes.iter().zip(linear).filter(|(_, is_linear)| *is_linear);
+            axes.map(|(axis, _)| of(axis).powi(2)).sum::<f64>().sqrt()
         };
         self.blocks.first().is_some_and(|block| reached(tick.v_mm_s, block.cap_mm_s))
             || reached(vector(|axis| axis.acc_mm_s2), path.accel_mm_s2)
             || reached(vector(|axis| axis.jerk_mm_s3), path.jerk_mm_s3)
-            || reached(tick.snap_mm_s4, path.snap_mm_s4)
+            // Along the path, which rotary axes may make longer than the limit counts.
+            || !self.info.has_rotary_axis() && reached(tick.snap_mm_s4, path.snap_mm_s4)
             || tick.axes.iter().zip(&self.info.axes).any(|(axis, limits)| {
                 reached(axis.vel_mm_s, limits.feed_mm_s)
                     || reached(axis.acc_mm_s2, limits.accel_mm_s2)

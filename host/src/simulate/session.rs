@@ -156,10 +156,14 @@ impl<'a, R: Real, const N: usize> Session<'a, R, N> {
     }
 }
 
-/// What an axis may do by itself, not knowing where it is: its limits, and those of any path.
+/// What an axis may do by itself, not knowing where it is: its limits, and those of any path, which bind linear axes.
 pub(super) fn jog_axis<const N: usize>(machine: &Machine<N>, axis: usize) -> JogAxis {
     let &AxisSettings { feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, .. } = &machine.axes[axis];
     let path = &machine.path;
-    let limits = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 }.least(&path.limits());
-    JogAxis { feed_mm_s: feed_mm_s.min(path.feed_mm_s), limits, pulse: path.pulse, travel: None }
+    let own = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 };
+    let (feed_mm_s, limits) = match machine.axes[axis].letter {
+        Some(letter) if letter.is_rotary() => (feed_mm_s, own),
+        _ => (feed_mm_s.min(path.feed_mm_s), own.least(&path.limits())),
+    };
+    JogAxis { feed_mm_s, limits, pulse: path.pulse, travel: None }
 }

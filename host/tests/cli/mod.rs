@@ -4,6 +4,7 @@ mod axes;
 mod checking;
 mod drive;
 mod files;
+mod machines;
 mod planning;
 mod reading;
 mod probing;
