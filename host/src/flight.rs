@@ -7,7 +7,6 @@
 use motion_kernel::flight::{FlightRow, FrameError};
 
 use crate::machine::Machine;
-use crate::simulate::RunInfo;
 use crate::simulate::contour::Contour;
 use crate::simulate::run::state_name;
 use crate::trace::{AxisTick, TraceRow};
@@ -81,7 +80,7 @@ fn frame(line: usize, text: &str) -> Result<Vec<u8>, FlightError> {
 /// The rows as ticks of a run of `machine`; the path position counts from the start of each stretch.
 #[must_use]
 pub fn ticks<const N: usize>(rows: &[FlightRow<f64, N>], machine: &Machine<N>) -> Vec<TraceRow<N>> {
-    let mut contour = Contour::new(RunInfo::of_machine(machine).linear_places());
+    let mut contour = Contour::new(machine.linear_places());
     let tick = |row: &FlightRow<f64, N>| {
         let axes = row.axes.map(|axis| AxisTick {
             set_mm: axis.set.to_mm(),

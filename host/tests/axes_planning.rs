@@ -490,6 +490,16 @@ fn merged_lines_keep_the_feed_of_their_own_direction() {
     assert!(plan.blocks.len() < 100, "{} blocks", plan.blocks.len());
     let fastest = speed_max(&executed(&plan, &machine), &machine, is_xyz);
     assert!(fastest <= 5.0 * (1.0 + 1e-5), "{fastest}");
+    // X swings within the tolerance while A turns: one line of A alone, no faster than A was before.
+    let swing =
+        |index: u32| point(&[(Axis::X, 0.25 * f64::from(index % 2)), (Axis::A, 2.0 * f64::from(index))]);
+    let points: Vec<(Point, f64)> = (1..60).map(|index| (swing(index), 100.0)).collect();
+    let mode = PathMode::Blend { tolerance_mm: Some(0.5), merging_mm: None };
+    let plan = planned(&lines(&points, mode), &machine);
+    assert!(plan.blocks.len() < 10, "{} blocks", plan.blocks.len());
+    let fastest = speed_max(&executed(&plan, &machine), &machine, |letter| letter == Axis::A);
+    let programmed = 100.0 / 60.0 * libm::hypot(2.0, 0.25) / 0.25;
+    assert!(fastest <= programmed * (1.0 + 1e-5) && fastest > 0.9 * programmed, "{fastest} {programmed}");
 }
 
 /// The idle axes of a larger machine, and rotary ones that stand, change nothing.

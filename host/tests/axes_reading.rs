@@ -33,6 +33,7 @@ fn moves(program: &Program) -> Vec<(String, Option<f64>)> {
         Feed::MmPerMin(feed) => Some(feed),
     };
     let shown = program.steps.iter().filter_map(|step| match step.kind {
+        StepKind::Through(point) => Some((words(point.to), of(point.feed))),
         StepKind::Line(line) => Some((words(line.to), of(line.feed))),
         StepKind::Arc(arc) => Some((words(arc.to), of(arc.feed))),
         _ => None,
@@ -52,6 +53,7 @@ fn every_letter_moves_its_axis() {
     // Degrees are degrees in inches, too; U is a length.
     assert_eq!(ends(all, "G20 G0 X1 A90 U0.1"), ["X25.4 A90 U2.54"]);
     assert_eq!(ends("XZ", "G18 G0 X5\nG2 X0 Z-5 K-5 F60"), ["X5", "Z-5"]);
+    assert_eq!(ends("XZ", "G10 L2 P1 R180\nG18 G0 X5\nG2 X0 Z-5 K-5 F60"), ["X-5", "Z-5"]);
 }
 
 /// LinuxCNC: over X, Y and Z where one of them moves, else over U, V and W, else over A, B and C.
@@ -65,6 +67,10 @@ fn feeds_count_along_the_first_group_that_moves() {
     // Four moves of a quarter of a minute.
     assert_eq!(feeds("G93 G1 F4 X3 Y4 A90\nF4 A0 B0\nF4 U6 V8 A1\nF4 A31 C40"), [20.0, 360.0, 40.0, 200.0]);
     assert_eq!(feeds("G95 S100 M3 G1 F0.5 X1\nA9\nG20 F0.5 A0 \nX0"), [50.0, 50.0, 50.0, 1270.0]);
+    // Points of a spline, too.
+    assert_eq!(feeds("G20 F100 G5.5 A30\nA60\nX1 A90"), [100.0, 100.0, 2540.0]);
+    // And moves beside a compensated path that leave its plane alone.
+    assert_eq!(feeds("G20 G41.1 D0.1 G1 F10 X1 Y1 A9\nA30\nX3"), [254.0, 10.0, 254.0, 254.0]);
     // A helix counts X, Y and Z; the turning table follows.
     assert_eq!(feeds("G93 G2 X10 Y0 I5 A90 F2"), [10.0 * std::f64::consts::PI]);
 }
@@ -120,6 +126,13 @@ fn axes_that_the_machine_does_not_have_are_refused_by_name() {
             "a.ngc:1:7: found A3 in a line of G5 or G5.1, expected X and Y only",
         ),
         ("XYZA", "F60 G5.2 X1 Y1 A3 P1", "a.ngc:1:16: found A3, expected no coordinate across the plane"),
+        ("XZ", "G18 G10 L2 P1 R90\nG2 X10 I5 F100", "a.ngc:2:1: found G2 in the XY plane"),
+        (
+            "XZ",
+            "T1 M6 G43",
+            "a.ngc:1:7: found tool 1 with an offset along A, expected offsets along the machine's axes: X, Z",
+        ),
+        ("XYZA", "G0 X1 A2000000", "a.ngc:1:7: found A2000000, expected a value within ±1000000 °"),
     ] {
         let error = try_read(letters, text).expect_err(text);
         assert!(error.starts_with(expected), "{error}\n{expected}");

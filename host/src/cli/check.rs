@@ -11,6 +11,7 @@ use super::input::{self, Source};
 use super::read;
 use super::table::{self, Align};
 use super::write_json;
+use crate::axis_unit::AxisUnit;
 use crate::check::needs::system_word;
 use crate::check::{Check, Reason, check};
 use crate::gcode::{Axis, Program, Refusal};
@@ -222,7 +223,7 @@ fn write_check<const N: usize>(
     if let Some(extent) = needs.extent {
         let of_axis = |axis: Axis| {
             let [low, high] = extent[axis.index()];
-            format!("{axis} {low:.3} to {high:.3} {}", axis.unit())
+            format!("{axis} {low:.3} to {high:.3} {}", AxisUnit::of(axis).symbol())
         };
         let axes: Vec<String> = program.axes.iter().map(of_axis).collect();
         writeln!(out, "  machine coordinates: {}", axes.join(", "))?;

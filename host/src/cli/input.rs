@@ -8,7 +8,7 @@ use clap::{ArgAction, Args};
 
 use super::error::CliError;
 use crate::files::STANDARD_INPUT;
-use crate::gcode::{self, GcodeError, ParameterFile, Program, ReadOptions, Refusal, ToolTable};
+use crate::gcode::{self, Axis, GcodeError, ParameterFile, Program, ReadOptions, Refusal, ToolTable};
 use crate::machine::{AnyMachine, Machine};
 
 /// What G-code is read with.
@@ -127,15 +127,19 @@ pub(super) fn any_machine(path: Option<&PathBuf>) -> Result<AnyMachine, CliError
     }
 }
 
-/// Reads the file of a machine of at most three axes; without one, the reference machine.
-pub(super) fn machine(path: Option<&PathBuf>) -> Result<Machine, CliError> {
-    match path {
-        Some(path) => {
-            let (name, text) = machine_text(path)?;
-            Ok(Machine::from_toml(&name, &text)?)
-        }
-        None => Ok(Machine::reference()),
+/// Reads the file of a machine of X, Y and Z, in this order, for commands that know their axes by it; without a file, the
+/// reference machine.
+pub(super) fn xyz_machine(path: Option<&PathBuf>) -> Result<Machine, CliError> {
+    let Some(path) = path else { return Ok(Machine::reference()) };
+    let (name, text) = machine_text(path)?;
+    let machine = Machine::from_toml(&name, &text)?;
+    if machine.axes.each_ref().map(|axis| axis.letter) == [Axis::X, Axis::Y, Axis::Z].map(Some) {
+        return Ok(machine);
     }
+    let letters = machine.axes.iter().filter_map(|axis| axis.letter).map(Axis::name);
+    let letters: Vec<&str> = letters.collect();
+    let expected = "X, Y and Z, in this order, for this command";
+    Err(CliError::Arguments { found: format!("{name} with the axes {}", letters.join(", ")), expected })
 }
 
 fn machine_text(path: &Path) -> Result<(String, String), CliError> {

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::table::{self, Align};
+use crate::axis_unit::AxisUnit;
 use crate::gcode::{
     AXES_MAX, Axes, Axis, Feed, NoticeKind, Nurbs, Outputs, PathMode, Point, Program, SpindleSpeed, Step,
     StepKind, xyz_mm,
@@ -265,7 +266,9 @@ fn mm_min(feed: Feed) -> Option<f64> {
 
 fn write_table(program: &Program, out: &mut dyn Write) -> io::Result<()> {
     let mut columns = vec![("line", "", Align::Right), ("step", "", Align::Left)];
-    columns.extend(shown_axes(program.axes).map(|axis| (axis.name(), axis.unit(), Align::Right)));
+    columns.extend(
+        shown_axes(program.axes).map(|axis| (axis.name(), AxisUnit::of(axis).symbol(), Align::Right)),
+    );
     columns.extend([("feed", "mm/min", Align::Right), ("path", "", Align::Left), ("more", "", Align::Left)]);
     let rows: Vec<Vec<String>> = program.steps.iter().map(|step| row(program, step)).collect();
     table::write(&columns, &rows, out)?;

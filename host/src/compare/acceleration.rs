@@ -6,7 +6,6 @@
 //! acceleration along the path is taken as constant, so on curves the time is good to some 10⁻³. The limits of the path
 //! bind the linear axes.
 
-use crate::gcode::Axis;
 use crate::machine::{AxisSettings, Machine};
 use crate::planning::stretch::StretchBlock;
 use crate::planning::{Item, Plan, Stretch};
@@ -91,13 +90,13 @@ impl<const N: usize> Point<N> {
 
     /// The part that the limits of the path bind.
     fn linear(&self, machine: &Machine<N>) -> Linear {
-        let is_rotary = |axis: usize| machine.axes[axis].letter.is_some_and(Axis::is_rotary);
+        let is_linear = machine.linear_places();
         let is_still = |axis: usize| self.tangent[axis] == 0.0 && self.curvature[axis] == 0.0;
-        if (0..N).all(|axis| !is_rotary(axis) || is_still(axis)) {
+        if (0..N).all(|axis| is_linear[axis] || is_still(axis)) {
             return Linear { share: 1.0, bend_per_mm: norm(self.curvature), lean_per_mm: 0.0 };
         }
         let linear = |vector: Vector<N>| -> Vector<N> {
-            core::array::from_fn(|axis| if is_rotary(axis) { 0.0 } else { vector[axis] })
+            core::array::from_fn(|axis| if is_linear[axis] { vector[axis] } else { 0.0 })
         };
         let (tangent, curvature) = (linear(self.tangent), linear(self.curvature));
         Linear { share: norm(tangent), bend_per_mm: norm(curvature), lean_per_mm: dot(tangent, curvature) }

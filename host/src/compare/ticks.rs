@@ -10,7 +10,6 @@ use motion_kernel::program::{Supply, SupplyError};
 use motion_kernel::queue::Streams;
 use motion_kernel::units::Position;
 
-use crate::gcode::Axis;
 use crate::machine::Machine;
 use crate::planning::{Executable, Plan, PlanningError};
 use crate::toolpath::{Vector, norm, subtract};
@@ -58,7 +57,7 @@ pub fn ratios<const N: usize>(plan: &Plan<N>, machine: &Machine<N>) -> Result<Ra
     let mut executor = Executor::<f64, N>::new(start);
     let mut supply = Supply::new(executable.supplied(), executable.tick_s);
     let (path, jerk_mm_s3) = (&machine.path, machine.rules().limits.jerk_mm_s3);
-    let is_linear = machine.axes.each_ref().map(|axis| !axis.letter.is_some_and(Axis::is_rotary));
+    let is_linear = machine.linear_places();
     // The part of a vector that the limits of the path bind.
     let linear = |vector: Vector<N>| -> Vector<N> {
         core::array::from_fn(|axis| if is_linear[axis] { vector[axis] } else { 0.0 })

@@ -15,7 +15,6 @@ use super::experiment::{DriveError, Recording, within};
 use super::peer_regulator::{PeerGains, PeerRegulator};
 use crate::machine::Machine;
 use crate::simulate::RunError;
-use crate::simulate::RunInfo;
 use crate::simulate::contour::Contour;
 use crate::simulate::hardware::{SimulatedHardware, simulated};
 use crate::trace::TraceRow;
@@ -132,7 +131,7 @@ fn close_loop(
     let simulated = simulated(machine)?;
     let mut hardware = SimulatedHardware::new(&simulated)?;
     let mut regulator = Regulator::new(law, machine)?;
-    let mut contour = Contour::new(RunInfo::of_machine(machine).linear_places());
+    let mut contour = Contour::new(machine.linear_places());
     let mut before_mm = [0.0; AXES];
     for recorded in &recording.ticks {
         let mut tick = *recorded;

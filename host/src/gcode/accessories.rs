@@ -2,7 +2,7 @@
 //!
 //! Spindle and coolant become a step where they change, each change a step of its own, as LinuxCNC's calls come.
 
-use super::axis::ORIGIN;
+use super::axis::{Axis, ORIGIN, Point};
 use super::block::{Block, GGroup, MGroup};
 use super::cutter::compensated;
 use super::decimal::Length;
@@ -266,6 +266,17 @@ impl Interpreter {
         }
     }
 
+    /// A tool's offset; along other axes than the machine's it is refused.
+    fn tool_offset(&mut self, number: u32, place: usize) -> Result<Point, Located> {
+        let offset = self.tool(number, place)?.offset;
+        let axes = self.program.axes;
+        let is_lost = |axis: &Axis| !axes.contains(*axis) && offset[axis.index()] != Length::ZERO;
+        match Axis::ALL.into_iter().find(is_lost) {
+            Some(axis) => Err(Located::new(place, Problem::ToolOffsetAxis { number, axis, axes })),
+            None => Ok(offset),
+        }
+    }
+
     /// G43 to G49.
     pub(super) fn tool_length(&mut self, block: &Block<'_>) -> Result<(), Located> {
         let Some(code) = block.g(GGroup::ToolLength) else { return Ok(()) };
@@ -276,7 +287,7 @@ impl Interpreter {
             430 => {
                 let number =
                     h.map_or(Ok(self.tools.current), |word| word.count(0, "a whole tool number, 0 or more"))?;
-                self.tool(number, h.map_or(code.word.offset, |word| word.offset))?.offset
+                self.tool_offset(number, h.map_or(code.word.offset, |word| word.offset))?
             }
             _ => self.frame.tool,
         };
@@ -295,7 +306,7 @@ impl Interpreter {
             }
             if let Some(word) = h {
                 let number = word.count(0, "a whole tool number, 0 or more")?;
-                let offset = self.tool(number, word.offset)?.offset;
+                let offset = self.tool_offset(number, word.offset)?;
                 for (sum, more) in tool.iter_mut().zip(offset) {
                     let beyond = || word.problem(|word| Problem::PositionOutOfRange { word });
                     *sum = sum.checked_add(more).ok_or_else(beyond)?;

@@ -16,10 +16,10 @@ pub const ORIGIN: Point = [Length::ZERO; AXES_MAX];
 /// The length that the feed of a straight move counts along, as LinuxCNC has it: over X, Y and Z if one of them moves, else
 /// over U, V and W \[mm\], else over A, B and C \[°\].
 pub(super) fn feed_length(from: Point, to: Point) -> f64 {
-    let groups = [[Axis::X, Axis::Y, Axis::Z], [Axis::U, Axis::V, Axis::W], [Axis::A, Axis::B, Axis::C]];
-    let lengths = groups.map(|axes| {
-        let [first, second, third] = axes.map(|axis| to[axis.index()].to_mm() - from[axis.index()].to_mm());
-        libm::sqrt(first * first + second * second + third * third)
+    let lengths = [AxisGroup::Xyz, AxisGroup::Uvw, AxisGroup::Abc].map(|group| {
+        let of_group = Axis::ALL.into_iter().filter(|axis| axis.group() == group);
+        let ways = of_group.map(|axis| to[axis.index()].to_mm() - from[axis.index()].to_mm());
+        libm::sqrt(ways.map(|way| way * way).sum())
     });
     lengths.into_iter().find(|&length| length > 0.0).unwrap_or(0.0)
 }
@@ -93,11 +93,26 @@ impl Axis {
         matches!(self, Self::A | Self::B | Self::C)
     }
 
-    /// Its unit, "mm" or "°".
+    /// The axes that a feed counts together with it.
     #[must_use]
-    pub const fn unit(self) -> &'static str {
-        if self.is_rotary() { "°" } else { "mm" }
+    pub const fn group(self) -> AxisGroup {
+        match self {
+            Self::X | Self::Y | Self::Z => AxisGroup::Xyz,
+            Self::U | Self::V | Self::W => AxisGroup::Uvw,
+            Self::A | Self::B | Self::C => AxisGroup::Abc,
+        }
     }
+}
+
+/// Axes that a feed counts together; as in LinuxCNC the first group that moves counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisGroup {
+    /// X, Y and Z.
+    Xyz,
+    /// U, V and W.
+    Uvw,
+    /// A, B and C.
+    Abc,
 }
 
 /// The letters, in the order of [`Axis::ALL`].

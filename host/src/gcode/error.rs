@@ -80,14 +80,22 @@ pub enum Problem {
     NumberMalformed { word: String },
     #[error("found {word}, expected a number within ±1.7e308")]
     NumberTooLarge { word: String },
-    #[error("found {word}, expected a length within ±{} mm", Length::LIMIT)]
+    #[error("found {word}, expected a value within ±{} {}", Length::LIMIT, unit(.word))]
     LengthOutOfRange { word: String },
-    #[error("found {word}, which adds up beyond the range, expected a position within ±{} mm", Length::LIMIT)]
+    #[error(
+        "found {word}, which adds up beyond the range, expected a position within ±{} {}",
+        Length::LIMIT,
+        unit(.word)
+    )]
     PositionOutOfRange { word: String },
     #[error("found {word}, expected an axis of the machine: {axes}")]
     NoSuchAxis { word: String, axes: Axes },
     #[error("found a move of {axis}, expected moves of the machine's axes: {axes}")]
     MissingAxisMoves { axis: Axis, axes: Axes },
+    #[error(
+        "found tool {number} with an offset along {axis}, expected offsets along the machine's axes: {axes}"
+    )]
+    ToolOffsetAxis { number: u32, axis: Axis, axes: Axes },
     #[error("found {motion} in the {plane} plane, expected a plane of the machine's axes: {axes}")]
     PlaneWithoutAxes { motion: &'static str, plane: Plane, axes: Axes },
     #[error(
@@ -248,9 +256,7 @@ pub enum Problem {
     ArcWithoutChord { word: String, plane: Plane },
     #[error("found {motion} in the {plane} plane, expected it in the XY plane (G17)")]
     SplinePlane { motion: &'static str, plane: Plane },
-    #[error(
-        "found {word} in a line of {cycle}, expected X, Y and Z only: a drilling cycle moves no other axis"
-    )]
+    #[error("found {word} in a line of {cycle}, expected X, Y and Z only")]
     CycleAxis { word: String, cycle: &'static str },
     #[error("found {word} in a line of G5 or G5.1, expected X and Y only")]
     SplineOutsidePlane { word: String },
@@ -313,6 +319,12 @@ pub enum Problem {
     ToolNotChanged { tool: u32, found: Option<f64> },
     #[error("found G5 without P and Q, expected the offset from its end to its second control point")]
     SplineWithoutEnd,
+}
+
+/// The unit of a word's value.
+fn unit(word: &str) -> &'static str {
+    let axis = word.bytes().next().and_then(Axis::of_letter);
+    if axis.is_some_and(Axis::is_rotary) { "°" } else { "mm" }
 }
 
 impl Problem {

@@ -70,21 +70,26 @@ pub(super) fn turn(vector: [i64; AXES_MAX], angle_deg: f64) -> [i64; AXES_MAX] {
     turned
 }
 
+/// Sine and cosine of a turn \[°\]; of quarter turns exact.
+pub(crate) fn turn_sin_cos(angle_deg: f64) -> (f64, f64) {
+    match angle_deg % 360.0 {
+        0.0 => (0.0, 1.0),
+        90.0 | -270.0 => (1.0, 0.0),
+        180.0 | -180.0 => (0.0, -1.0),
+        270.0 | -90.0 => (-1.0, 0.0),
+        angle_deg => libm::sincos(angle_deg.to_radians()),
+    }
+}
+
 fn turn_xy([x, y]: [i64; 2], angle_deg: f64) -> [i64; 2] {
-    let angle_deg = angle_deg % 360.0;
-    if angle_deg == 0.0 {
-        return [x, y];
+    match turn_sin_cos(angle_deg) {
+        (0.0, 1.0) => return [x, y],
+        (1.0, 0.0) => return [-y, x],
+        (0.0, -1.0) => return [-x, -y],
+        (-1.0, 0.0) => return [y, -x],
+        _ => {}
     }
-    if angle_deg == 90.0 || angle_deg == -270.0 {
-        return [-y, x];
-    }
-    if angle_deg == 180.0 || angle_deg == -180.0 {
-        return [-x, -y];
-    }
-    if angle_deg == 270.0 || angle_deg == -90.0 {
-        return [y, -x];
-    }
-    let (sin, cos) = libm::sincos(angle_deg.to_radians());
+    let (sin, cos) = turn_sin_cos(angle_deg);
     let (x, y) = (x as f64, y as f64);
     [(x * cos - y * sin).round() as i64, (x * sin + y * cos).round() as i64]
 }

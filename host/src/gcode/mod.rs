@@ -46,7 +46,7 @@
 //! | I J K, R, P | centre of an arc (relative, or absolute after G90.1), or its radius (negative: more than half a turn); P whole turns. Start and end radius may differ as [`RADIUS_MISMATCH_RATIO`] says |
 //! | G5, X Y, \[I J\] P Q | cubic Bézier curve in XY: I J from its start to its first control point, P Q from its end to its second; modal. Without I J it continues the G5 before it, whose P Q are turned round. Control points that are no point of their own (I0 J0) or fold back make a curve that stands still, which is refused |
 //! | G5.1, X Y I J | quadratic Bézier curve in XY: I J from its start to its control point; modal |
-//! | G5.5, X Y Z | quintic spline through points, one a line, from where the machine is; modal. At least five points; a line with the word G5.5 begins another spline. Of this project alone |
+//! | G5.5, axis words | quintic spline through points, one a line, from where the machine is; modal. At least five points; a line with the word G5.5 begins another spline. Of this project alone |
 //! | G5.2 \[P\] \[X Y P\] \[L\], X Y P, G5.3 | NURBS in the plane (here XY) from where the machine is, with uniform knots: control points with weights P, one a line; P alone in the first line is the weight of its start, otherwise 1; L: order, without it 3. Under G91 all control points count from the start. As in LinuxCNC 2.9, in ZX and YZ as in 2.10 |
 //! | G6.2 X Y R K P Q, X Y R K, G6.2 K | NURBS in the plane of arcs with knots K, whole numbers: control points with weights R; P: order; Q1 to Q3, a way of approximation, is not acted on. The first K stands in as many lines as the order, as does the last, whose lines end the NURBS and are no control points. A line leads to its first point. G6.3 may follow. As in LinuxCNC 2.10 |
 //! | G38.2 to G38.5 | a straight move at F up to where the probe touches the surface (.2, .3) or leaves it (.4, .5), modal; the machine brakes from there, and the program goes on from where it rests. #5061 to #5063 are where the probe tripped, in the coordinates and units in force, #5070 is 1. Without: .2 and .4 are refused; .3 and .5 set the programmed end, and 0 |
@@ -80,6 +80,8 @@
 //!
 //! Where this reader differs from LinuxCNC's interpreter:
 //!
+//! - What parameters store for axes that the machine does not have (origins, shifts, places) moves nothing; a tool with an
+//!   offset along one of them is refused.
 //! - Drilling cycles, G5 and NURBS move no axes but X, Y and Z; LinuxCNC leaves A, B and C in a drilling cycle out without a word. So
 //!   do probing moves. There are no wrapped rotary axes and no indexers.
 //! - F in a line that switches the units is taken in the new unit, with a notice.
@@ -162,10 +164,11 @@ mod survey;
 mod tool;
 
 pub use arc::{RADIUS_MISMATCH_INCH, RADIUS_MISMATCH_MM, RADIUS_MISMATCH_RATIO};
-pub use axis::{AXES_MAX, Axes, Axis, ORIGIN, Point, xyz_mm};
+pub use axis::{AXES_MAX, Axes, Axis, AxisGroup, ORIGIN, Point, xyz_mm};
 pub use decimal::{Decimal, Length};
 pub(crate) use error::describe;
 pub use error::{GcodeError, Problem};
+pub(crate) use frame::turn_sin_cos;
 pub use options::ReadOptions;
 pub use parameter_file::ParameterFile;
 pub use parameters::{PARAMETER_MAX, Parameters};

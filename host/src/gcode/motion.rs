@@ -7,7 +7,7 @@ use super::axis::{AXES_MAX, Axis, Point, feed_length, is_rotary};
 use super::block::{Block, GGroup};
 use super::decimal::Length;
 use super::error::{Located, Problem};
-use super::frame::{lengths, turn};
+use super::frame::{lengths, turn, turn_sin_cos};
 use super::interpreter::Interpreter;
 use super::lexer::Word;
 use super::modal::{Distance, FeedMode, Modal, Motion};
@@ -111,6 +111,10 @@ impl Interpreter {
     fn circular(&mut self, line: MoveLine<'_, '_>) -> Result<(), Located> {
         let [work, to] = self.target(line)?;
         self.refuse_plane(line.motion, self.modal.plane, line.offset)?;
+        if self.plane_turn_deg() % 180.0 != 0.0 {
+            // Turned, the plane needs both axes of the turn.
+            self.refuse_plane(line.motion, Plane::Xy, line.offset)?;
+        }
         // In the program's coordinates: turned to another plane's and rounded, the same point would be another.
         let [first_axis, second_axis, _] = self.modal.plane.axes();
         let closes = [first_axis, second_axis].iter().all(|&axis| work[axis] == self.work[axis]);
@@ -156,7 +160,8 @@ impl Interpreter {
             return Ok(());
         }
         self.untimed(line.motion, line.offset)?;
-        self.step(StepKind::Through(ThroughMove { from, to, begins, feed: line.feed, mode }))
+        let feed = self.straight_feed(line.feed, from, to);
+        self.step(StepKind::Through(ThroughMove { from, to, begins, feed, mode }))
     }
 
     /// Machine coordinates of a point; `None` beyond the range. Turned to the program's axes and back they are rounded:
@@ -278,7 +283,7 @@ impl Interpreter {
         if self.frame.rotation_deg == 0.0 {
             return [x, y];
         }
-        let (sin, cos) = libm::sincos(self.frame.rotation_deg.to_radians());
+        let (sin, cos) = turn_sin_cos(self.frame.rotation_deg);
         [x * cos - y * sin, x * sin + y * cos]
     }
 

@@ -213,9 +213,9 @@ impl Default for SpindleSpeed {
 /// A straight move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineMove {
-    /// Start, X Y Z.
+    /// Start.
     pub from: Point,
-    /// End, X Y Z; differs from the start.
+    /// End; differs from the start.
     pub to: Point,
     /// Feed along the line.
     pub feed: Feed,
@@ -230,9 +230,9 @@ pub struct LineMove {
 /// with the angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArcMove {
-    /// Start, X Y Z.
+    /// Start.
     pub from: Point,
-    /// End, X Y Z.
+    /// End.
     pub to: Point,
     /// Plane of the arc, before its turn.
     pub plane: Plane,
@@ -256,9 +256,9 @@ pub struct ArcMove {
 /// A cubic Bézier curve in the XY plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CubicMove {
-    /// Start, X Y Z.
+    /// Start.
     pub from: Point,
-    /// End, X Y Z; Z is that of the start.
+    /// End; Z is that of the start.
     pub to: Point,
     /// X and Y of the first control point from the start, and of the second from the end \[mm\].
     pub controls_mm: [[f64; 2]; 2],
@@ -271,9 +271,9 @@ pub struct CubicMove {
 /// The move to the next point of a quintic spline, which passes through all points of consecutive moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThroughMove {
-    /// The point before, X Y Z.
+    /// The point before.
     pub from: Point,
-    /// The point, X Y Z; differs from the one before.
+    /// The point; differs from the one before.
     pub to: Point,
     /// Whether the spline begins with it, whatever was before.
     pub begins: bool,
@@ -286,9 +286,9 @@ pub struct ThroughMove {
 /// A move along a NURBS.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NurbsMove {
-    /// Start, X Y Z: the first control point.
+    /// Start: the first control point.
     pub from: Point,
-    /// End, X Y Z: the last control point.
+    /// End: the last control point.
     pub to: Point,
     /// Index of the curve in [`Program::nurbs`].
     pub curve: usize,
@@ -301,7 +301,7 @@ pub struct NurbsMove {
 /// A straight move that ends where the probe trips, with a full stop before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbeMove {
-    /// Start, X Y Z.
+    /// Start.
     pub from: Point,
     /// Where the machine comes to rest: braked from where the probe tripped, or the programmed end.
     pub to: Point,
@@ -334,7 +334,7 @@ pub struct Nurbs {
 pub enum Feed {
     /// G0: as fast as the machine may.
     Rapid,
-    /// Programmed feed \[mm/min\], positive.
+    /// Programmed feed \[mm/min; °/min of a move of A, B and C alone\], positive.
     MmPerMin(f64),
 }
 

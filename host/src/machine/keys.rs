@@ -95,7 +95,7 @@ pub const KEY_TABLES: &[KeyTable] = &[
     ),
     table(
         "path",
-        "What holds along the path, whatever the axes could do.",
+        "What holds along the path, whatever the axes could do; rotary axes alone are bound by their own limits.",
         &[
             Key::new("feed_mm_s", "mm/s", Limit::EXPECTED, "Greatest feed, also of rapids."),
             Key::new("accel_mm_s2", "mm/s²", Limit::EXPECTED, "Greatest acceleration, as a vector."),

@@ -17,9 +17,9 @@ pub(super) trait Range {
     fn contains(value: f64) -> bool;
 }
 
-/// The rule for the name of an axis, which heads seven columns of a trace.
-/// Expected letter of an axis.
+/// The rule for the letter of an axis.
 pub(super) const AXIS_LETTER: &str = "one of the letters X, Y, Z, A, B, C, U, V, W";
+/// The rule for the name of an axis, which heads seven columns of a trace.
 pub(super) const AXIS_NAME: &str = "1 to 8 letters and digits";
 /// Most characters of an axis's name.
 pub(super) const NAME_CHARACTERS_MAX: usize = 8;

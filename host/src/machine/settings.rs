@@ -295,6 +295,12 @@ impl<const N: usize> Machine<N> {
         self.axes.each_ref().map(|axis| axis.letter)
     }
 
+    /// Which places have linear axes.
+    #[must_use]
+    pub fn linear_places(&self) -> [bool; N] {
+        self.letters_by_place().map(|letter| letter.is_some_and(|letter| !letter.is_rotary()))
+    }
+
     /// The place of an axis, if there is one of this letter.
     #[must_use]
     pub fn place_of(&self, letter: Axis) -> Option<usize> {

@@ -197,11 +197,29 @@ fn a_machine_has_one_to_nine_axes() {
         ("XYZA", "found 4 [[axis]] tables, expected at most 3 for this command"),
         ("XYX", "letter = \"X\", expected a letter that no other axis has"),
         ("XQ", "found letter = \"Q\", expected one of the letters X, Y, Z, A, B, C, U, V, W"),
-        ("", "missing"),
     ] {
         let error = Machine::from_toml("few.toml", &with_axes(letters)).expect_err(letters).to_string();
-        assert!(error.contains(expected) || letters.is_empty(), "{error}");
+        assert!(error.contains(expected), "{error}");
     }
+    let ten = with_axes("XYZABCUVW") + &with_axes("X").split_off(with_axes("").len());
+    for (text, expected) in
+        [(with_axes(""), "found no key `axis`"), (ten, "10 [[axis]] tables, expected 1 to 9")]
+    {
+        let error = AnyMachine::from_toml("count.toml", &text).expect_err(expected).to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+    // A rotary axis homes as fast as it can; [path] does not bind it.
+    let fast = |letter: char| {
+        let slow_path = with_optional_keys().replacen("feed_mm_s = 300.0", "feed_mm_s = 20", 1);
+        slow_path.replacen("letter = \"X\"", &format!("letter = \"{letter}\""), 1).replacen(
+            "name = \"X\"",
+            "name = \"first\"",
+            1,
+        )
+    };
+    assert!(Machine::from_toml("turn.toml", &fast('A')).is_ok());
+    let error = Machine::from_toml("line.toml", &fast('X')).expect_err("faster than the path").to_string();
+    assert!(error.contains("expected a magnitude of at most feed_mm_s = 20"), "{error}");
     let moved = REFERENCE_TOML.replacen("name = \"Z\"", "name = \"A\"", 1);
     let error = Machine::from_toml("moved.toml", &moved).expect_err("moved by Z").to_string();
     assert!(error.contains("expected Z or a name that is no axis' letter"), "{error}");

@@ -52,9 +52,8 @@ fn path_limits<const N: usize>(
     ratios: &SpeedRatios,
     machine: &Machine<N>,
 ) -> AxisLimits<f64> {
-    let is_linear = |letter: Option<Axis>| letter.is_some_and(|letter| !letter.is_rotary());
     let is_bent =
-        machine.axes.iter().zip(greatest.curved).any(|(axis, curved)| curved && is_linear(axis.letter));
+        machine.linear_places().iter().zip(greatest.curved).any(|(&linear, curved)| linear && curved);
     let part = if is_bent { 1.0 } else { ratios.linear };
     // Where nothing linear moves they bind nothing; limits are finite.
     let most = |limit: f64| (limit / part).min(f64::MAX);

@@ -25,17 +25,13 @@ pub(super) struct Point<const N: usize> {
     pub(super) mode: PathMode,
 }
 
-/// The element of a G5. Axes besides X and Y go linearly with its parameter. An error has no line yet.
+/// The element of a G5, which moves X and Y alone. An error has no line yet.
 pub(super) fn cubic<const N: usize>(step: &CubicMove, machine: &Machine<N>) -> Result<Element<N>, Problem> {
     let (from, to) = (machine.coordinates(step.from), machine.coordinates(step.to));
     let [[i, j], [p, q]] = step.controls_mm;
     let chord = subtract(to, from);
-    let third = core::array::from_fn(|place| match machine.axes[place].letter {
-        Some(Axis::X | Axis::Y) => 0.0,
-        _ => chord[place] / 3.0,
-    });
-    let b1 = add(from_xyz([i, j, 0.0], machine)?, third);
-    let b2 = subtract(add(chord, from_xyz([p, q, 0.0], machine)?), third);
+    let b1 = from_xyz([i, j, 0.0], machine)?;
+    let b2 = add(chord, from_xyz([p, q, 0.0], machine)?);
     // Bézier's points 0, b1, b2, chord to powers of u.
     let c1 = scale(b1, 3.0);
     let c2 = scale(subtract(b2, scale(b1, 2.0)), 3.0);
@@ -92,7 +88,7 @@ pub(super) fn through<const N: usize>(
         let Some(passed @ [.., point]) = points.get(done..last) else { continue };
         let element = checked(element).map_err(|problem| (point.line, problem))?;
         // Where points of one span differ in feed, the slowest holds.
-        let feeds = passed.iter().map(|point| point.feeds).fold(Feeds::RAPID, Feeds::least);
+        let feeds = passed.iter().map(|point| point.feeds).reduce(Feeds::least).unwrap_or(Feeds::RAPID);
         moves.push(move_at(point.line, element, feeds, point.mode, machine));
         done = last;
     }

@@ -4,6 +4,7 @@ use motion_kernel::law::{LimitError, SegmentError, Ticks};
 use motion_kernel::plan::PlanError;
 use motion_kernel::units::Position;
 
+use crate::axis_unit::AxisUnit;
 use crate::gcode::Axis;
 use crate::toolpath::spline::SplineError;
 use crate::toolpath::{CompileError, NoAxis};
@@ -85,7 +86,7 @@ pub enum Problem {
     /// A move leaves the space that the kernel has positions for.
     #[error(
         "found a path through {axis} = {found} {}, expected coordinates within ±{} {}",
-        axis.unit(), Position::LIMIT_MM, axis.unit()
+        AxisUnit::of(*axis).symbol(), Position::LIMIT_MM, AxisUnit::of(*axis).symbol()
     )]
     Coordinate {
         /// The axis.

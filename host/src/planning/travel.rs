@@ -7,7 +7,8 @@ use motion_kernel::program::Item;
 
 use super::error::{PlanningError, Problem};
 use super::executable::Executable;
-use crate::gcode::{Axis, Point};
+use crate::axis_unit::AxisUnit;
+use crate::gcode::Point;
 use crate::machine::{AxisSettings, Machine};
 
 /// # Errors
@@ -51,7 +52,7 @@ pub(super) fn check_end<const N: usize>(end: Point, machine: &Machine<N>) -> Res
 }
 
 fn beyond(axis: &AxisSettings, found: f64, [low, high]: [f64; 2]) -> Problem {
-    let unit = axis.letter.map_or("mm", Axis::unit);
+    let unit = axis.letter.map_or("mm", |letter| AxisUnit::of(letter).symbol());
     Problem::Travel { axis: axis.name.clone(), found, low, high, unit }
 }
 

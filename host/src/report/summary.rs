@@ -146,8 +146,10 @@ impl Summary {
         let mut done_mm = Span::default();
         let mut contour_um = Span::default();
         let units = trace.axes.iter().enumerate();
-        let linear: Vec<usize> =
+        let mut linear: Vec<usize> =
             units.filter(|(_, axis)| axis.unit() == AxisUnit::Millimetre).map(|(index, _)| index).collect();
+        // X, Y and Z before U, V and W, whatever the order of the machine.
+        linear.sort_by_key(|&index| trace.axes[index].letter);
         let mut moved_together = BTreeSet::new();
         let mut not_finite = 0;
         for tick in &trace.ticks {

@@ -87,7 +87,7 @@ impl<'a, R: Real, const N: usize> Session<'a, R, N> {
         let (config, set) = (machine.axes_config()?, [Position::ZERO; N]);
         let mut kernel = Kernel::new(&config, set, counts);
         kernel.enable(0);
-        let contour = Contour::new(RunInfo::of_machine(machine).linear_places());
+        let contour = Contour::new(machine.linear_places());
         let streams = Box::default();
         Ok(Self { machine, simulated, kernel, config, hardware, streams, set, contour, ticks: 0 })
     }

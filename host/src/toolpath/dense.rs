@@ -103,7 +103,7 @@ fn with_curves<const N: usize>(
         }
         for span in spans.iter() {
             let stands_for = &moves[first + span.parts.0..=first + span.parts.1];
-            let feeds = stands_for.iter().map(|step| step.feeds).fold(Feeds::RAPID, Feeds::least);
+            let feeds = stands_for.iter().map(|step| step.feeds).reduce(Feeds::least).unwrap_or(Feeds::RAPID);
             let tolerance_mm = stands_for.iter().map(tolerance_mm).fold(f64::INFINITY, f64::min);
             let step = Move { feeds, tolerance_mm, merging_mm: None, ..stands_for[0] };
             made.push(step, span.element, span.distance_mm, Some(span.greatest));

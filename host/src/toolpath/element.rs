@@ -9,7 +9,7 @@ use super::involute::Involute;
 use super::polynomial::Polynomial;
 use super::septic::{FitError, Septic, fit};
 use super::{Vector, add, cross, dot, norm, scale, subtract};
-use crate::gcode::{ArcMove, Axis, LineMove, xyz_mm};
+use crate::gcode::{ArcMove, Axis, LineMove, turn_sin_cos, xyz_mm};
 use crate::machine::Machine;
 
 /// Widest piece of an arc or an involute \[rad\]: 45°, where septic pieces are 1.4·10⁻⁸ of the radius off,
@@ -119,10 +119,7 @@ impl<const N: usize> Element<N> {
         // In X, Y and Z first, whatever the order of the machine's axes.
         let (start, end) = (xyz_mm(step.from), xyz_mm(step.to));
         let [first, second, normal] = step.plane.axes();
-        let (sine, cosine) = match step.turn_deg {
-            0.0 => (0.0, 1.0),
-            turn_deg => libm::sincos(turn_deg.to_radians()),
-        };
+        let (sine, cosine) = turn_sin_cos(step.turn_deg);
         let axis = |index: usize| match index {
             0 => [cosine, sine, 0.0],
             1 => [-sine, cosine, 0.0],

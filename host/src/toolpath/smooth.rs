@@ -217,14 +217,20 @@ fn merged<const N: usize>(moves: &[Move<N>]) -> (Vec<Move<N>>, Vec<f64>) {
             let points: Vec<Vector<N>> =
                 core::iter::once(steps[0].element.ends_mm().0).chain(ends.map(|(_, to)| to)).collect();
             let parts = merge(&points, tolerance_mm);
+            let feeds_of = |part: usize| {
+                let end = parts.get(part + 1).map_or(steps.len(), |next| next.first);
+                let feeds = steps[parts[part].first..end].iter().map(|step| step.feeds);
+                feeds.reduce(Feeds::least).unwrap_or(steps[parts[part].first].feeds)
+            };
             if let ([part], Some((before, distance_mm))) = (&parts[..], before)
                 && let Some((line, straight_mm)) = straightened(before, *distance_mm, part, tolerance_mm)
             {
+                before.feeds = before.feeds.least(feeds_of(0));
                 (before.element, *distance_mm) = (line, straight_mm);
                 continue;
             }
-            for part in parts {
-                merged.push(Move { element: part.element, ..steps[part.first] });
+            for (index, part) in parts.iter().enumerate() {
+                merged.push(Move { element: part.element, feeds: feeds_of(index), ..steps[part.first] });
                 distances_mm.push(part.distance_mm);
             }
         }
@@ -254,7 +260,7 @@ fn is_same_run<const N: usize>(before: &Move<N>, after: &Move<N>) -> bool {
     let is_line = |step: &Move<N>| matches!(step.element, Element::Line { .. });
     is_line(before)
         && is_line(after)
-        && before.feeds == after.feeds
+        && before.feeds.ask_alike(after.feeds)
         && before.tolerance_mm == after.tolerance_mm
         && before.merging_mm == after.merging_mm
         && before.merging_mm.unwrap_or(before.tolerance_mm) > 0.0

@@ -13,28 +13,10 @@ use super::curve::Curve;
 use super::element::Element;
 use super::greatest::Peak;
 use super::{Vector, dot, norm};
-use crate::gcode::Axis;
+use crate::gcode::{Axis, AxisGroup};
 
 /// The number of parts that a polynomial is cut into to find the greatest part of its tangent.
 const PARTS: usize = 64;
-
-/// The axes that a feed may count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Xyz,
-    Uvw,
-    Abc,
-}
-
-impl Kind {
-    fn of(axis: Axis) -> Self {
-        match axis {
-            Axis::X | Axis::Y | Axis::Z => Self::Xyz,
-            Axis::U | Axis::V | Axis::W => Self::Uvw,
-            Axis::A | Axis::B | Axis::C => Self::Abc,
-        }
-    }
-}
 
 /// The greatest speeds of some axes together over the speed along the path, on one element: 1 where nothing else moves,
 /// 0 where none of them does.
@@ -58,19 +40,19 @@ impl SpeedRatios {
     #[must_use]
     pub fn of<const N: usize>(element: &Element<N>, axes: &[Option<Axis>; N]) -> Self {
         let moves = element.moves();
-        let kinds = axes.map(|axis| axis.map(Kind::of));
-        if kinds.iter().zip(moves).all(|(&kind, moves)| !moves || kind == Some(Kind::Xyz)) {
+        let groups = axes.map(|axis| axis.map(Axis::group));
+        if groups.iter().zip(moves).all(|(&group, moves)| !moves || group == Some(AxisGroup::Xyz)) {
             return Self::XYZ;
         }
-        let of = |is_counted: &dyn Fn(Kind) -> bool| {
-            let counts = kinds.map(|kind| kind.is_some_and(is_counted));
+        let of = |is_counted: &dyn Fn(AxisGroup) -> bool| {
+            let counts = groups.map(|group| group.is_some_and(is_counted));
             greatest_part(element, &moves, &counts)
         };
         Self {
-            xyz: of(&|kind| kind == Kind::Xyz),
-            uvw: of(&|kind| kind == Kind::Uvw),
-            abc: of(&|kind| kind == Kind::Abc),
-            linear: of(&|kind| kind != Kind::Abc),
+            xyz: of(&|group| group == AxisGroup::Xyz),
+            uvw: of(&|group| group == AxisGroup::Uvw),
+            abc: of(&|group| group == AxisGroup::Abc),
+            linear: of(&|group| group != AxisGroup::Abc),
         }
     }
 }
@@ -123,6 +105,9 @@ pub struct Feeds {
     pub uvw_mm_s: f64,
     /// Of A, B and C together \[°/s\].
     pub abc_deg_s: f64,
+    /// Of all axes together along the path \[mm/s\]: the axes that do not count go along no faster than on the moves that
+    /// were programmed, where what stands for these hardly moves those that count.
+    pub path_mm_s: f64,
 }
 
 impl Feeds {
@@ -132,7 +117,12 @@ impl Feeds {
     /// Of X, Y and Z \[mm/s\].
     #[must_use]
     pub const fn xyz(feed_mm_s: f64) -> Self {
-        Self { xyz_mm_s: feed_mm_s, uvw_mm_s: f64::INFINITY, abc_deg_s: f64::INFINITY }
+        Self {
+            xyz_mm_s: feed_mm_s,
+            uvw_mm_s: f64::INFINITY,
+            abc_deg_s: f64::INFINITY,
+            path_mm_s: f64::INFINITY,
+        }
     }
 
     /// What F means for a move along `element`, of a machine with these axes; `feed_mm_s` in degrees per second where
@@ -144,25 +134,34 @@ impl Feeds {
         axes: &[Option<Axis>; N],
     ) -> Self {
         let moves = element.moves();
-        let is_moved = |kind: Kind| {
-            axes.iter().zip(moves).any(|(axis, moves)| moves && axis.map(Kind::of) == Some(kind))
+        let is_moved = |group: AxisGroup| {
+            axes.iter().zip(moves).any(|(axis, moves)| moves && axis.map(Axis::group) == Some(group))
         };
-        if is_moved(Kind::Uvw) && !is_moved(Kind::Xyz) {
+        let counted = if is_moved(AxisGroup::Uvw) && !is_moved(AxisGroup::Xyz) {
             Self { uvw_mm_s: feed_mm_s, ..Self::RAPID }
-        } else if is_moved(Kind::Abc) && !is_moved(Kind::Xyz) {
+        } else if is_moved(AxisGroup::Abc) && !is_moved(AxisGroup::Xyz) {
             Self { abc_deg_s: feed_mm_s, ..Self::RAPID }
         } else {
             Self::xyz(feed_mm_s)
-        }
+        };
+        Self { path_mm_s: counted.along(&SpeedRatios::of(element, axes)), ..counted }
     }
 
-    /// The smaller of each: what holds for what stands for both.
+    /// Whether both ask for the same speeds of the axes that count.
+    #[must_use]
+    pub fn ask_alike(self, other: Self) -> bool {
+        let path_mm_s = self.path_mm_s;
+        self == Self { path_mm_s, ..other }
+    }
+
+    /// What holds for what stands for both: the smaller speed of each group, and along the path the greater.
     #[must_use]
     pub fn least(self, other: Self) -> Self {
         Self {
             xyz_mm_s: self.xyz_mm_s.min(other.xyz_mm_s),
             uvw_mm_s: self.uvw_mm_s.min(other.uvw_mm_s),
             abc_deg_s: self.abc_deg_s.min(other.abc_deg_s),
+            path_mm_s: self.path_mm_s.max(other.path_mm_s),
         }
     }
 
@@ -170,7 +169,7 @@ impl Feeds {
     #[must_use]
     pub fn along(self, ratios: &SpeedRatios) -> f64 {
         let by_xyz = self.xyz_mm_s / ratios.xyz;
-        by_xyz.min(self.uvw_mm_s / ratios.uvw).min(self.abc_deg_s / ratios.abc)
+        by_xyz.min(self.uvw_mm_s / ratios.uvw).min(self.abc_deg_s / ratios.abc).min(self.path_mm_s)
     }
 }
 
@@ -250,10 +249,15 @@ mod tests {
         let x = Feeds::programmed(10.0, &line([1.0, 0.0, 0.0, 0.0, 0.0]), &AXES);
         let a = Feeds::programmed(30.0, &line([0.0, 1.0, 0.0, 0.0, 0.0]), &AXES);
         let both = x.least(a);
-        assert_eq!(both, Feeds { xyz_mm_s: 10.0, uvw_mm_s: f64::INFINITY, abc_deg_s: 30.0 });
-        assert_eq!(both.least(Feeds::RAPID), both);
+        assert_eq!(both, Feeds { xyz_mm_s: 10.0, uvw_mm_s: f64::INFINITY, abc_deg_s: 30.0, path_mm_s: 30.0 });
         let ratios = SpeedRatios { xyz: 0.6, uvw: 0.0, abc: 0.8, linear: 0.6 };
         assert!((both.along(&ratios) - 10.0 / 0.6).abs() < 1e-13);
-        assert!((a.along(&ratios) - 30.0 / 0.8).abs() < 1e-13);
+        // A alone turned at 30 °/s.
+        assert_eq!(a.along(&ratios), 30.0);
+        assert_eq!(both.least(Feeds::RAPID).path_mm_s, f64::INFINITY);
+        // What moves X hardly at all is no faster than the moves that it stands for.
+        let slanted = Feeds::programmed(10.0, &line([3.0, 4.0, 0.0, 0.0, 0.0]), &AXES);
+        assert!((slanted.along(&SpeedRatios { xyz: 1e-9, ..ratios }) - 50.0 / 3.0).abs() < 1e-13);
+        assert!(slanted.ask_alike(x) && !slanted.ask_alike(a));
     }
 }

@@ -10,7 +10,7 @@ const TESTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests");
 
 /// Machine file, program, letters or names of the axes.
 const MACHINES: [(&str, &str, &[&str]); 3] = [
-    ("lathe", "lathe", &["X", "Z"]),
+    ("lathe", "lathe", &["Z", "X"]),
     ("mill_xyza", "rotary_table", &["X", "Y", "Z", "A"]),
     ("nine", "nine", &["X", "Y", "Z", "A", "B", "table", "quill", "V", "W"]),
 ];
@@ -126,6 +126,16 @@ fn what_is_for_three_axes_says_so() {
     let workspace = workspace("refused", "mill_xyza", "rotary_table");
     let error = workspace.refusal(&["drive", "step", "--machine", "machine.toml"]);
     assert!(error.contains("found 4 [[axis]] tables, expected at most 3 for this command"), "{error}");
+    let lathe = self::workspace("refused", "lathe", "lathe");
+    lathe.put("points.csv", "x_mm,y_mm,z_mm\n0,0,0\n10,2,1\n20,0,2\n");
+    let expected =
+        "found machine.toml with the axes Z, X, expected X, Y and Z, in this order, for this command";
+    for command in [&["drive", "circle"][..], &["spline", "points.csv", "--feed", "600"]] {
+        assert_eq!(lathe.refusal(&[command, &["--machine", "machine.toml"]].concat()), expected);
+    }
+    // An arc across a lathe's plane, turned back into it.
+    lathe.put("turned.ngc", "G18 G10 L2 P1 R180\nG0 X-20\nG2 X-30 I-5 F100\nM2\n");
+    lathe.stdout(&["plan", "turned.ngc", "--machine", "machine.toml"]);
     let error = workspace.refusal(&["plan", "program.ngc"]);
     assert_eq!(error, "program.ngc:3:14: found A0, expected an axis of the machine: X, Y, Z");
     workspace.put("far.ngc", "G0 A5\nG1 Z150 F900\nM2\n");

@@ -104,7 +104,7 @@ pub(super) struct Common {
 
 impl Common {
     fn machine(&self) -> Result<Machine, CliError> {
-        input::machine(self.machine.as_ref())
+        input::xyz_machine(self.machine.as_ref())
     }
 
     /// Opened before the experiment: a wrong path should not cost the user a long run.

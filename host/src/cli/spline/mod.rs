@@ -125,7 +125,7 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
     }
     let mut files = Files::reading([("POINTS.csv", Some(path)), ("--machine", arguments.machine.as_deref())]);
     let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
-    let machine = input::machine(arguments.machine.as_ref())?;
+    let machine = input::xyz_machine(arguments.machine.as_ref())?;
     let source = input::read(path)?;
     let points = points::read(&source.name, &source.text)?;
     let spline = fit(&points, arguments).map_err(|error| {
