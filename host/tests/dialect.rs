@@ -305,6 +305,7 @@ fn a_subroutine_changes_tools() {
     let program =
         gcode::read_with("a.ngc", format!("{by_itself}T3 M6").as_bytes(), &options(None)).expect("a program");
     assert_eq!(shown(&program.steps[0].kind), "r -1 -1 0");
+    assert_eq!(program.tools, [3]);
     // In it the number may be taken by M61, and it may call others.
     let others = "o<b> sub\nM61 Q#<_selected_tool>\no<b> endsub\no<change> sub\no<b> call\no<change> endsub\nT2 M6\nG0 X#5400";
     assert_eq!(read(others), ["r 2 0 0"]);

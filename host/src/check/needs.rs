@@ -7,7 +7,7 @@ use crate::gcode::{AXES_MAX, Length, NoticeKind, Program, StepKind};
 /// What has to be ready.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Needs {
-    /// Tools that the operator changes to, in the order of their first use.
+    /// Tools that are put in the spindle, by the operator or a subroutine, in the order of their first use.
     pub tools: Vec<u32>,
     /// Coordinate systems that moves are made in: 1 for G54 to 9 for G59.3, in this order.
     pub systems: Vec<u32>,
@@ -22,16 +22,13 @@ impl Needs {
     /// The needs of a program.
     #[must_use]
     pub fn of(program: &Program) -> Self {
-        let mut needs = Self { systems: program.systems.iter().collect(), ..Self::default() };
+        let (tools, systems) = (program.tools.clone(), program.systems.iter().collect());
+        let mut needs = Self { tools, systems, ..Self::default() };
         let (mut turns, mut flows) = (false, false);
         for step in &program.steps {
-            match step.kind {
-                StepKind::ToolChange { tool } if !needs.tools.contains(&tool) => needs.tools.push(tool),
-                StepKind::Switch(to) => {
-                    turns |= to.spindle != Spindle::Off;
-                    flows |= to.flood || to.mist;
-                }
-                _ => {}
+            if let StepKind::Switch(to) = step.kind {
+                turns |= to.spindle != Spindle::Off;
+                flows |= to.flood || to.mist;
             }
             if let Some(ends) = step.kind.ends() {
                 for point in ends.map(|point| point.map(Length::to_mm)) {
@@ -81,6 +78,8 @@ mod tests {
         let text = "G55\nT3 M6\nM3 S1000\nG10 L2 P2 X-5\nG0 X1 Z2\nG54\nT1 M6\nG1 Y-4 F60\nT3 M6\nG56\nM2\n";
         let program = gcode::read("a.ngc", text.as_bytes()).expect("G-code");
         let needs = Needs::of(&program);
+        let loaded = gcode::read("a.ngc", b"M61 Q4\nT0 M6\nT4 M6\nG0 X1\nM2\n").expect("G-code");
+        assert_eq!(Needs::of(&loaded).tools, [4]);
         let off = gcode::read("a.ngc", b"M5 M9\nG0 X1\nM2").expect("G-code");
         assert_eq!(Needs::of(&off).outputs, [""; 0]);
         // No move is made in G56.

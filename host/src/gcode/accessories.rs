@@ -177,7 +177,7 @@ impl Interpreter {
             };
             let number = word.count(0, "a whole tool number, 0 or more")?;
             self.tool(number, word.offset)?;
-            self.tools.current = number;
+            self.take_tool(number);
             return Ok(());
         }
         // The position is read anew: behind G40 the tool is beside the point that was programmed.
@@ -201,7 +201,7 @@ impl Interpreter {
             self.tools.change_to = Some(number);
             return Ok(());
         }
-        self.tools.current = number;
+        self.take_tool(number);
         let tool = self.tool(number, code.word.offset)?;
         let text = match (number, tool.remark.as_str()) {
             (0, _) => "take the tool out".to_owned(),
@@ -210,6 +210,15 @@ impl Interpreter {
         };
         self.message(text)?;
         self.step(StepKind::ToolChange { tool: number })
+    }
+
+    /// The tool is in the spindle; 0: none is.
+    fn take_tool(&mut self, number: u32) {
+        self.tools.current = number;
+        let tools = &mut self.program.tools;
+        if number != 0 && !tools.contains(&number) {
+            tools.push(number);
+        }
     }
 
     /// The subroutine that changes tools begins: in it M6 is a stop for the operator. It has the names of LinuxCNC's.
@@ -235,7 +244,7 @@ impl Interpreter {
         }
         match self.returned {
             Some(value) if value > 0.0 => {
-                self.tools.current = tool;
+                self.take_tool(tool);
                 self.stop_spindle()
             }
             found => Err(Located::new(0, Problem::ToolNotChanged { tool, found })),

@@ -20,6 +20,8 @@ pub struct Program {
     pub notices: Vec<Notice>,
     /// What the operator is to read, in the order of the program.
     pub messages: Vec<Message>,
+    /// Tools that were in the spindle, whoever changed them, in the order of their first use.
+    pub tools: Vec<u32>,
     /// Tools that were used without a tool table: taken to have length 0, and the radius of the options.
     pub tools_assumed: Vec<u32>,
     /// That radius \[mm\].
