@@ -119,7 +119,7 @@
 //! # Bounds
 //!
 //! Subroutines within each other: 100. Brackets: 64. Lines executed and steps made: [`ReadOptions::lines_max`],
-//! [`ReadOptions::steps_max`]. A program takes its text and some 170 bytes a step.
+//! [`ReadOptions::steps_max`]. A program takes its text and some 320 bytes a step.
 //!
 //! # Exactness
 //!

@@ -30,7 +30,7 @@ pub struct ReadOptions {
     pub probe: Option<Probe>,
     /// Most lines to execute, so that endless loops end; 100 million by default.
     pub lines_max: u64,
-    /// Most steps, and most messages, that the program may have; 20 million by default, some 4 GB.
+    /// Most steps, and most messages, that the program may have; 20 million by default, some 6 GB.
     pub steps_max: usize,
 }
 
