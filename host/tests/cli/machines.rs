@@ -117,6 +117,12 @@ fn axes_of_the_machine_jog_and_home_by_their_names() {
     let jogs = workspace.json(&["jog", "table+12.5", "quill-3", "--machine", "machine.toml", "--json"]);
     let [table, quill] = &jogs.as_array().expect("two jogs")[..] else { panic!("{jogs}") };
     assert_eq!((number(&table["to_deg"]), number(&quill["to_mm"])), (12.5, -3.0));
+    // The limits of the path bind linear axes alone.
+    let slow = workspace.read("machine.toml").replacen("feed_mm_s = 300", "feed_mm_s = 20", 1);
+    workspace.put("slow.toml", &slow);
+    let jogs = workspace.json(&["jog", "table+60@60", "X+60@60", "--machine", "slow.toml", "--json"]);
+    let [table, x] = &jogs.as_array().expect("two jogs")[..] else { panic!("{jogs}") };
+    assert!(number(&table["feed_deg_s"]) > 59.0 && number(&x["feed_mm_s"]) <= 20.0, "{jogs}");
     let error = workspace.refusal(&["jog", "U+1", "--machine", "machine.toml"]);
     assert!(error.contains("X, Y, Z, A, B, table, quill, V, W"), "{error}");
 }
