@@ -1,5 +1,20 @@
 //! Arrays whose length is a parameter, which serde itself does not know: as tuples, element by element,
-//! without a panic path.
+//! without a panic path. For `#[serde(with = "motion_kernel::array")]`, of one element at least.
+//!
+//! ```
+//! #[derive(serde::Serialize, serde::Deserialize)]
+//! struct Places<const N: usize> {
+//!     #[serde(with = "motion_kernel::array")]
+//!     counts: [i32; N],
+//! }
+//!
+//! let mut bytes = [0; 8];
+//! let written = postcard::to_slice(&Places { counts: [1, -1, 2] }, &mut bytes)?;
+//! assert_eq!(written, [2, 1, 4]);
+//! let read: Places<3> = postcard::from_bytes(written)?;
+//! assert_eq!(read.counts, [1, -1, 2]);
+//! # Ok::<(), postcard::Error>(())
+//! ```
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -7,7 +22,11 @@ use core::marker::PhantomData;
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 
-pub(crate) fn serialize<T: Serialize, S: Serializer, const N: usize>(
+/// Writes the elements, one after the other.
+///
+/// # Errors
+/// Those of the serializer.
+pub fn serialize<T: Serialize, S: Serializer, const N: usize>(
     array: &[T; N],
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
@@ -18,7 +37,11 @@ pub(crate) fn serialize<T: Serialize, S: Serializer, const N: usize>(
     tuple.end()
 }
 
-pub(crate) fn deserialize<'de, T: Copy + Deserialize<'de>, D: Deserializer<'de>, const N: usize>(
+/// Reads as many elements as the array has.
+///
+/// # Errors
+/// There are fewer, or those of the deserializer.
+pub fn deserialize<'de, T: Copy + Deserialize<'de>, D: Deserializer<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<[T; N], D::Error> {
     deserializer.deserialize_tuple(N, Elements(PhantomData))

@@ -86,7 +86,7 @@
     deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic)
 )]
 
-mod array;
+pub mod array;
 pub mod units;
 pub mod num;
 pub mod plan;

@@ -83,15 +83,15 @@ pub(crate) fn turn_sin_cos(angle_deg: f64) -> (f64, f64) {
 
 fn turn_xy([x, y]: [i64; 2], angle_deg: f64) -> [i64; 2] {
     match turn_sin_cos(angle_deg) {
-        (0.0, 1.0) => return [x, y],
-        (1.0, 0.0) => return [-y, x],
-        (0.0, -1.0) => return [-x, -y],
-        (-1.0, 0.0) => return [y, -x],
-        _ => {}
+        (0.0, 1.0) => [x, y],
+        (1.0, 0.0) => [-y, x],
+        (0.0, -1.0) => [-x, -y],
+        (-1.0, 0.0) => [y, -x],
+        (sin, cos) => {
+            let (x, y) = (x as f64, y as f64);
+            [(x * cos - y * sin).round() as i64, (x * sin + y * cos).round() as i64]
+        }
     }
-    let (sin, cos) = turn_sin_cos(angle_deg);
-    let (x, y) = (x as f64, y as f64);
-    [(x * cos - y * sin).round() as i64, (x * sin + y * cos).round() as i64]
 }
 
 #[cfg(test)]

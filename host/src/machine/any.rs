@@ -5,6 +5,18 @@ use super::file;
 use super::settings::Machine;
 use crate::gcode::{AXES_MAX, ReadOptions};
 
+/// Evaluates an expression with the machine in an [`AnyMachine`], whatever its places.
+macro_rules! on_machine {
+    ($any:expr, $machine:ident => $result:expr) => {
+        match &$any {
+            $crate::machine::AnyMachine::Three($machine) => $result,
+            $crate::machine::AnyMachine::Nine($machine) => $result,
+        }
+    };
+}
+
+pub(crate) use on_machine;
+
 /// A machine with the fewest places that hold its axes. Planning and simulation are made for both.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AnyMachine {
@@ -30,21 +42,6 @@ impl AnyMachine {
     /// What the machine adds to the options that its programs are read with.
     #[must_use]
     pub fn read_options(&self) -> ReadOptions {
-        match self {
-            Self::Three(machine) => machine.read_options(),
-            Self::Nine(machine) => machine.read_options(),
-        }
+        on_machine!(self, machine => machine.read_options())
     }
 }
-
-/// Evaluates an expression with the machine in an [`AnyMachine`], whatever its places.
-macro_rules! on_machine {
-    ($any:expr, $machine:ident => $result:expr) => {
-        match &$any {
-            $crate::machine::AnyMachine::Three($machine) => $result,
-            $crate::machine::AnyMachine::Nine($machine) => $result,
-        }
-    };
-}
-
-pub(crate) use on_machine;

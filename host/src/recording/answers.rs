@@ -12,7 +12,7 @@ use motion_kernel::trace::{Digest, Trace};
 use motion_kernel::units::Counts;
 use serde::{Deserialize, Serialize};
 
-use super::{RecordingError, array};
+use super::RecordingError;
 use crate::gcode::AXES_MAX;
 
 /// What the hardware answered in one tick.
@@ -38,7 +38,7 @@ impl<const N: usize> Answers<N> {
 struct Entry<const N: usize> {
     flags: u8,
     /// Of every encoder since it was last read \[counts\]; 0 if it could not be.
-    #[serde(with = "array")]
+    #[serde(with = "motion_kernel::array")]
     moved: [i64; N],
     check: u8,
 }

@@ -19,14 +19,12 @@
 //! - [`answers`]: what the hardware answered, tick by tick;
 //! - [`recorder`]: hardware that writes it down;
 //! - [`replay`](mod@replay): hardware that answers from it, and the comparison;
-//! - `array`: arrays of one for each place.
 //!
 //! [`Player`]: replay::Player
 
 pub mod recorder;
 pub mod replay;
 pub mod answers;
-mod array;
 
 pub use recorder::Recorder;
 pub use replay::{Difference, Replay, replay};
@@ -49,7 +47,7 @@ const VERSION: u8 = 4;
 pub struct Recording<const N: usize = 3> {
     job: Job<N>,
     /// What the encoders read before the first tick.
-    #[serde(with = "array")]
+    #[serde(with = "motion_kernel::array")]
     start: [Counts; N],
     answers: RecordedAnswers,
 }

@@ -15,20 +15,25 @@ const REACHED: f64 = 0.98;
 const ROUNDING_MM: f64 = 1.0e-9;
 
 /// Collects ticks.
-pub(super) struct LimitShare<'run> {
+pub(super) struct LimitShare<'run, const N: usize> {
     info: &'run RunInfo,
+    /// Which places have linear axes, and whether all axes are: only then snap along the path tells of its limit, as rotary
+    /// axes may make the path longer than the limit counts.
+    linear: [bool; N],
+    is_linear: bool,
     /// Blocks that do not end before the latest tick.
     blocks: &'run [TracedBlock],
     limited_mm: f64,
     length_mm: f64,
 }
 
-impl<'run> LimitShare<'run> {
+impl<'run, const N: usize> LimitShare<'run, N> {
     pub(super) fn new(info: &'run RunInfo) -> Self {
-        Self { info, blocks: &info.blocks, limited_mm: 0.0, length_mm: 0.0 }
+        let (linear, is_linear) = (info.linear_places(), !info.has_rotary_axis());
+        Self { info, linear, is_linear, blocks: &info.blocks, limited_mm: 0.0, length_mm: 0.0 }
     }
 
-    pub(super) fn add<const N: usize>(&mut self, tick: &TraceRow<N>) {
+    pub(super) fn add(&mut self, tick: &TraceRow<N>) {
         let ends_before = |block: &&TracedBlock| block.start_mm + block.length_mm < tick.s_mm - ROUNDING_MM;
         self.blocks = &self.blocks[self.blocks.iter().take_while(ends_before).count()..];
         let step_mm = tick.v_mm_s * self.info.tick_s;
@@ -38,19 +43,17 @@ impl<'run> LimitShare<'run> {
         }
     }
 
-    fn is_limited<const N: usize>(&self, tick: &TraceRow<N>) -> bool {
+    fn is_limited(&self, tick: &TraceRow<N>) -> bool {
         let path = &self.info.limits;
         let reached = |value: f64, limit: f64| value.abs() >= REACHED * limit;
-        let linear: [bool; N] = self.info.linear_places();
         let vector = |of: fn(&crate::trace::AxisTick) -> f64| {
-            let axes = tick.axes.iter().zip(linear).filter(|(_, is_linear)| *is_linear);
+            let axes = tick.axes.iter().zip(self.linear).filter(|(_, is_linear)| *is_linear);
             axes.map(|(axis, _)| of(axis).powi(2)).sum::<f64>().sqrt()
         };
         self.blocks.first().is_some_and(|block| reached(tick.v_mm_s, block.cap_mm_s))
             || reached(vector(|axis| axis.acc_mm_s2), path.accel_mm_s2)
             || reached(vector(|axis| axis.jerk_mm_s3), path.jerk_mm_s3)
-            // Along the path, which rotary axes may make longer than the limit counts.
-            || !self.info.has_rotary_axis() && reached(tick.snap_mm_s4, path.snap_mm_s4)
+            || self.is_linear && reached(tick.snap_mm_s4, path.snap_mm_s4)
             || tick.axes.iter().zip(&self.info.axes).any(|(axis, limits)| {
                 reached(axis.vel_mm_s, limits.feed_mm_s)
                     || reached(axis.acc_mm_s2, limits.accel_mm_s2)
