@@ -106,14 +106,28 @@ pub struct Span<const N: usize = 3> {
 }
 
 /// The curve that stands for `parts`, made for `limits`; nothing if none was found, or if a part is neither a
-/// line nor an arc. Where three coordinates at most move, it is made in these.
+/// line nor an arc. It is made in the coordinates that move: a step costs as much as their third power.
 #[must_use]
 pub fn fair<const N: usize>(parts: &[Part<N>], limits: &Limits<f64>) -> Option<Vec<Span<N>>> {
     let mut moves = [false; N];
     for part in parts {
         moves.iter_mut().zip(part.element.moves()).for_each(|(moves, of_part)| *moves |= of_part);
     }
-    let Some(space) = Subspace::<3>::of(moves) else { return in_space(parts, limits) };
+    if let Some(plane) = Subspace::<2>::of(moves) {
+        return in_subspace(plane, parts, limits);
+    }
+    match Subspace::<3>::of(moves) {
+        Some(space) => in_subspace(space, parts, limits),
+        None => in_space(parts, limits),
+    }
+}
+
+/// The curve in some coordinates; the others stand.
+fn in_subspace<const M: usize, const N: usize>(
+    space: Subspace<M>,
+    parts: &[Part<N>],
+    limits: &Limits<f64>,
+) -> Option<Vec<Span<N>>> {
     let rest = parts.first()?.element.ends_mm().0;
     let narrow = |part: &Part<N>| Part {
         element: space.narrow_element(&part.element),
