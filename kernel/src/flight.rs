@@ -129,7 +129,7 @@ impl<R: Scalar, const AXES: usize> FlightRow<R, AXES> {
     /// The row of a tick.
     #[must_use]
     #[inline]
-    pub fn new(trace: &Trace<R, AXES>) -> Self {
+    pub(crate) fn new(trace: &Trace<R, AXES>) -> Self {
         let Trace { tick, ref executed, ref axes, ref inputs, ref fault } = *trace;
         let empty = FlightAxis {
             counts: Counts(0),
@@ -324,21 +324,10 @@ impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> FlightRe
         matches!(self.fault, Some((_, 0)))
     }
 
-    /// The fault that freezes it; known from the fault's tick on.
-    #[must_use]
-    pub fn fault(&self) -> Option<Fault<R>> {
-        self.fault.map(|(fault, _)| fault)
-    }
-
     /// The row `index` ticks after the oldest.
     #[must_use]
     pub fn row(&self, index: usize) -> Option<&FlightRow<R, AXES>> {
         self.rows.get(index)
-    }
-
-    /// All rows, oldest first.
-    pub fn rows(&self) -> impl ExactSizeIterator<Item = &FlightRow<R, AXES>> {
-        self.rows.iter()
     }
 
     /// Forgets everything, and records again. Clear the kernel's fault first: one that is still latched

@@ -68,7 +68,7 @@ pub enum Direction {
 impl Direction {
     /// The opposite direction.
     #[must_use]
-    pub fn reversed(self) -> Self {
+    pub(crate) fn reversed(self) -> Self {
         match self {
             Self::Positive => Self::Negative,
             Self::Negative => Self::Positive,
@@ -243,6 +243,7 @@ impl<const AXES: usize> Jog<AXES> {
     }
 
     /// Where it ends if it is not aborted.
+    #[doc(hidden)]
     #[must_use]
     pub fn end(&self) -> [Position; AXES] {
         self.motion.end()

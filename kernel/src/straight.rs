@@ -128,7 +128,7 @@ impl<const AXES: usize> Straight<AXES> {
 
     /// Where it ends.
     #[must_use]
-    pub fn end(&self) -> [Position; AXES] {
+    pub(crate) fn end(&self) -> [Position; AXES] {
         self.end
     }
 

@@ -93,6 +93,7 @@ impl Position {
     }
 
     /// The value as a local offset in mm; exact to the resolution of `R`.
+    #[doc(hidden)]
     #[must_use]
     pub fn to_offset<R: Real>(self) -> R {
         R::from_q32(self.to_bits())

@@ -4,8 +4,7 @@
 //! Errors are absolute in units of the shapes' scales, and relative from x = 10⁻⁴ up, where a ramp begins (a
 //! ramp's other end is the mirror image). Fixed point has steps and no relative precision.
 
-use motion_kernel::internals::Shape;
-use motion_kernel::num::sine::{Libm, Micromath, Own, SineCosine};
+use motion_kernel::internals::{Libm, Micromath, Own, Shape, SineCosine};
 use motion_kernel::num::{Fixed, Real, Unit};
 use motion_tests::dd::{Dd, dd};
 use motion_tests::figures::{Table, hold};

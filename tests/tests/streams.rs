@@ -8,7 +8,7 @@ use std::convert::Infallible;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Problem};
 use motion_kernel::exec::{ExecFault, ExecState, Executed, Executor, PIECES_PER_TICK_MAX};
-use motion_kernel::internals::Ready;
+use motion_kernel::internals::{Ready, peak};
 use motion_kernel::law::{FeedSegment, Limits, Pulse, Ticks};
 use motion_kernel::path::{Piece, PieceError};
 use motion_kernel::program::{self, CheckError, Header, Item, Supply, SupplyError};
@@ -379,7 +379,7 @@ fn stretches_shorter_than_a_tick_stay_within_the_step_bound() {
         let mut streams = Box::new(Streams::<f32, 2, 256, 512>::new());
         let (mut feeder, mut intake) = streams.split(rules, point([0.0, 0.0]));
         let law = motion_kernel::law::Law::new(Pulse::Plateau, limits).expect("limits");
-        let top = motion_kernel::law::peak(&law, 0.0, 0.0, length_mm);
+        let top = peak(&law, 0.0, 0.0, length_mm);
         let length = mm(length_mm);
         let mut at = point([0.0, 0.0]);
         let mut stretches = 0;

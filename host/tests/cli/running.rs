@@ -214,7 +214,7 @@ fn flight_of_a_boards_log() {
         recorder.add(kernel.tick(&mut intake, &mut board));
     }
     assert!(recorder.is_frozen());
-    for row in recorder.rows() {
+    for row in (0..).map_while(|index| recorder.row(index)) {
         let mut buffer = [0; frame_max(3)];
         let bytes: Vec<_> =
             row.to_frame(&mut buffer).expect("room").iter().map(|b| format!("{b:02x}")).collect();

@@ -88,6 +88,7 @@ impl Table {
     }
 
     /// The points \[mm/s\].
+    #[doc(hidden)]
     #[must_use]
     pub fn mm_s(&self) -> [f64; TABLE_POINTS] {
         self.steps.map(|step| f64::from(step) * self.mm_s_per_step)

@@ -57,7 +57,8 @@ pub use feedforward::{
 pub use guards::{GuardFigures, Guards};
 pub(crate) use preview::Preview;
 pub use preview::{LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX};
-pub use regulator::{Command, Gains, Regulator, RegulatorState};
+pub use regulator::Gains;
+use regulator::{Regulator, RegulatorState};
 pub use scale::{EncoderScale, OutputScale, ScaleError};
 
 use serde::{Deserialize, Serialize};
@@ -100,7 +101,7 @@ pub struct AxisConfig<R> {
     /// Velocity command to converter code.
     pub output: OutputScale<R>,
     /// The regulator.
-    pub regulator: Regulator<R>,
+    pub(crate) regulator: Regulator<R>,
     /// Following error above which the axis faults \[mm\].
     pub following_error_limit_mm: R,
     guard: GuardConfig<R>,
@@ -161,6 +162,7 @@ impl<R: Real, const AXES: usize> AxesConfig<R, AXES> {
     ///
     /// # Errors
     /// A lead is not from 0 to [`PREVIEW_TICKS_MAX`] ticks; the first such.
+    #[doc(hidden)]
     pub fn preview_ticks(figures: &[AxisFigures; AXES], tick_s: f64) -> Result<u8, AxesError> {
         preview::preview_ticks(figures, tick_s).map_err(|(axis, cause)| AxesError { axis, cause })
     }
@@ -172,6 +174,7 @@ impl<R: Real> AxisConfig<R> {
     ///
     /// # Errors
     /// The first figure that is out of its range or beyond the number type's.
+    #[doc(hidden)]
     pub fn new(figures: &AxisFigures, preview_ticks: u8, tick_s: f64) -> Result<Self, ScaleError> {
         Check::all(|check| Self::checked(check, figures, preview_ticks, tick_s))
     }
@@ -210,7 +213,7 @@ pub struct AxisState<R> {
     /// Added to the encoder's position: set by homing.
     pub offset: Position,
     /// The regulator's state.
-    pub regulator: RegulatorState<R>,
+    pub(crate) regulator: RegulatorState<R>,
     /// Largest |following error| since it was last cleared \[mm\].
     pub peak_following_error_mm: R,
     guard: Guard<R>,
@@ -238,6 +241,7 @@ pub struct AxisOutput<R> {
 
 impl<R: Real> AxisState<R> {
     /// Declares the encoder's present reading to be `position`.
+    #[doc(hidden)]
     pub fn set_position(&mut self, config: &AxisConfig<R>, counts: Counts, position: Position) {
         self.refer(config, counts, position);
         self.guard = Guard::at(counts);
@@ -252,7 +256,7 @@ impl<R: Real> AxisState<R> {
 
     /// The actual position at the encoder's reading.
     #[inline]
-    pub fn position(&self, config: &AxisConfig<R>, counts: Counts) -> Position {
+    pub(crate) fn position(&self, config: &AxisConfig<R>, counts: Counts) -> Position {
         config.encoder.position(counts) + self.offset
     }
 

@@ -32,7 +32,7 @@ pub struct Gains {
 
 /// The regulator's configuration, per tick. Immutable.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Regulator<R> {
+pub(crate) struct Regulator<R> {
     kp: R,
     ki: R,
     kd: R,
@@ -41,7 +41,7 @@ pub struct Regulator<R> {
 
 /// The regulator's state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RegulatorState<R> {
+pub(crate) struct RegulatorState<R> {
     /// ki·Σε \[mm/s\]: in units of the output, so that a new ki does not move it.
     integral_mm_s: R,
     /// ε of the tick before \[mm\].
@@ -53,7 +53,7 @@ pub struct RegulatorState<R> {
 
 /// The regulator's output.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Command<R> {
+pub(crate) struct Command<R> {
     /// Velocity command \[mm/s\].
     pub velocity_mm_s: R,
     /// The command was cut at a limit.
@@ -63,7 +63,7 @@ pub struct Command<R> {
 impl<R: Real> RegulatorState<R> {
     /// Notes a tick without output, so that the next one has no derivative kick.
     #[inline]
-    pub fn watch(&mut self, error_mm: R) {
+    pub(crate) fn watch(&mut self, error_mm: R) {
         self.last_error_mm = error_mm;
     }
 
@@ -99,7 +99,7 @@ impl<R: Real> Regulator<R> {
 
     /// One tick: the velocity command, cut at `limits` \[mm/s\].
     #[inline]
-    pub fn tick(
+    pub(crate) fn tick(
         &self,
         state: &mut RegulatorState<R>,
         error_mm: R,

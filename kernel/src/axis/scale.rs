@@ -70,7 +70,7 @@ impl EncoderScale {
 
     /// Millimetres per count, with its sign.
     #[must_use]
-    pub fn mm_per_count(&self) -> f64 {
+    pub(crate) fn mm_per_count(&self) -> f64 {
         (f64::from(self.step_high) + f64::from(self.step_low) / 4_294_967_296.0) / 4_294_967_296.0
     }
 }

@@ -140,7 +140,7 @@ impl<R: Real, const AXES: usize> Executor<R, AXES> {
     }
 
     /// Whether no stretch is under way: at rest between stretches, dwelling or stopped.
-    pub fn is_at_rest(&self) -> bool {
+    pub(crate) fn is_at_rest(&self) -> bool {
         !matches!(self.activity, Activity::Moving(_) | Activity::Between { .. })
     }
 

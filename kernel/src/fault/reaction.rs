@@ -29,5 +29,6 @@ pub struct Reactions {
 
 impl Reactions {
     /// Every reaction is immediate.
-    pub const IMMEDIATE: Self = Self { ramp_ticks: 0, stop_ticks: 0, emergency_stop: Reaction::Immediate };
+    pub(crate) const IMMEDIATE: Self =
+        Self { ramp_ticks: 0, stop_ticks: 0, emergency_stop: Reaction::Immediate };
 }

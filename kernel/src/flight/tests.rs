@@ -97,21 +97,25 @@ fn keeps_what_a_list_keeps<R: Real, const ROWS: usize, const AFTER: usize>(seed:
             // Kept rows: the last of those up to `AFTER` ticks after the fault.
             let end = all.len().min(usize::try_from(faulty).expect("few").saturating_add(1 + AFTER));
             let kept = &all[end.saturating_sub(ROWS)..end];
-            assert_eq!(recorder.rows().len(), kept.len(), "seed {seed}, tick {index}");
+            assert_eq!(recorder.rows.len(), kept.len(), "seed {seed}, tick {index}");
             assert!(
-                recorder.rows().zip(kept).all(|(row, trace)| is_of(row, trace)),
+                recorder.rows.iter().zip(kept).all(|(row, trace)| is_of(row, trace)),
                 "seed {seed}, tick {index}"
             );
             assert!(
                 (0..ROWS + 1).all(|at| recorder.row(at).map(|row| row.tick) == kept.get(at).map(|t| t.tick))
             );
-            assert_eq!(recorder.fault(), (index >= faulty).then_some(fault), "seed {seed}");
+            assert_eq!(
+                recorder.fault.map(|(fault, _)| fault),
+                (index >= faulty).then_some(fault),
+                "seed {seed}"
+            );
             assert_eq!(recorder.is_frozen(), index >= faulty + AFTER as u64, "seed {seed}, tick {index}");
             has_wrapped |= end > ROWS;
             was_frozen |= recorder.is_frozen();
         }
         recorder.clear();
-        assert!(recorder.rows().len() == 0 && recorder.fault().is_none() && !recorder.is_frozen());
+        assert!(recorder.rows.is_empty() && recorder.fault.is_none() && !recorder.is_frozen());
     }
     (has_wrapped, was_frozen)
 }

@@ -37,7 +37,7 @@ const CHANNELS: [ChannelQuad; 4] =
 
 /// Time from power-up of a channel until its output register may be loaded \[µs\] (AD5754 data sheet,
 /// power control register).
-pub const POWER_UP_TIME_US: u32 = 10;
+const POWER_UP_TIME_US: u32 = 10;
 
 /// The frame that could not be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,7 +130,7 @@ impl<SPI: SpiDevice, const AXES: usize> Ad5754Output<SPI, AXES> {
     /// for the channels that were on and for those that are on now, and loaded only then. Unused channels
     /// are switched off.
     ///
-    /// Takes `AXES + 6` frames and [`POWER_UP_TIME_US`]. A timer that pulses LDAC must not run yet. On
+    /// Takes `AXES + 6` frames and 10 µs. A timer that pulses LDAC must not run yet. On
     /// overcurrent the chip clamps to 20 mA (it does not switch the channel off); thermal shutdown is off.
     ///
     /// # Errors
@@ -157,11 +157,6 @@ impl<SPI: SpiDevice, const AXES: usize> Ad5754Output<SPI, AXES> {
             .map_err(in_frame(Ad5754Frame::ZeroCodes))?;
         chip.load_dacs().map_err(in_frame(Ad5754Frame::Load))?;
         Ok(Self { chip })
-    }
-
-    /// Gives the bus back; the outputs keep their last value.
-    pub fn release(self) -> SPI {
-        self.chip.destroy()
     }
 }
 

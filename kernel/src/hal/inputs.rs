@@ -50,25 +50,25 @@ impl AxisInputs {
 
     /// The drive is ready to move. Checked only while the drive is enabled and settled.
     #[must_use]
-    pub const fn is_ready(self) -> bool {
+    pub(crate) const fn is_ready(self) -> bool {
         self.0 & Self::READY != 0
     }
 
     /// The drive reports a fault.
     #[must_use]
-    pub const fn is_fault(self) -> bool {
+    pub(crate) const fn is_fault(self) -> bool {
         self.0 & Self::FAULT != 0
     }
 
     /// The limit switch at the lower end of the travel is reached.
     #[must_use]
-    pub const fn is_limit_low(self) -> bool {
+    pub(crate) const fn is_limit_low(self) -> bool {
         self.0 & Self::LIMIT_LOW != 0
     }
 
     /// The limit switch at the upper end of the travel is reached.
     #[must_use]
-    pub const fn is_limit_high(self) -> bool {
+    pub(crate) const fn is_limit_high(self) -> bool {
         self.0 & Self::LIMIT_HIGH != 0
     }
 
@@ -80,7 +80,7 @@ impl AxisInputs {
 
     /// Nothing but the home switch differs from [`AxisInputs::HEALTHY`].
     #[must_use]
-    pub const fn is_healthy(self) -> bool {
+    pub(crate) const fn is_healthy(self) -> bool {
         self.0 & !Self::HOME == Self::READY
     }
 
@@ -137,7 +137,7 @@ impl<const AXES: usize> MachineInputs<AXES> {
     /// Whether nothing except home switches differs from [`MachineInputs::HEALTHY`].
     #[inline]
     #[must_use]
-    pub fn is_healthy(&self) -> bool {
+    pub(crate) fn is_healthy(&self) -> bool {
         !self.emergency_stop && self.axes.iter().all(|axis| axis.is_healthy())
     }
 }

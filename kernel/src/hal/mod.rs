@@ -11,11 +11,11 @@ mod index;
 mod inputs;
 mod outputs;
 
-pub use ad5754::{Ad5754Error, Ad5754Frame, Ad5754Output, POWER_UP_TIME_US};
+pub use ad5754::{Ad5754Error, Ad5754Frame, Ad5754Output};
 pub use extend::{CountExtender, TimerWidth};
 pub use index::IndexLatch;
 pub use inputs::{AxisInputs, Inputs, MachineInputs};
-pub use outputs::{NoOutputs, OutputState, Outputs, Spindle};
+pub use outputs::{OutputState, Outputs, Spindle};
 
 use crate::units::{Counts, DacCode};
 

@@ -51,18 +51,10 @@ impl OutputState {
     }
 }
 
-/// The outputs for spindle and coolant.
+/// The outputs for spindle and coolant. A board without them refuses programs that switch before the start:
+/// [`check`](crate::program::check()) does.
 pub trait Outputs {
     /// Puts all outputs into a state. Does not wait for the spindle: the program has a dwell behind the switch. It
     /// cannot fail: what a drive of the spindle reports is an input.
     fn switch(&mut self, to: &OutputState);
-}
-
-/// No outputs: nothing is switched. A board without them refuses programs that switch before the start:
-/// [`check`](crate::program::check()) does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NoOutputs;
-
-impl Outputs for NoOutputs {
-    fn switch(&mut self, _: &OutputState) {}
 }

@@ -98,7 +98,7 @@ impl<R: Root> Limits<R> {
 
     /// The greater of each.
     #[must_use]
-    pub fn greatest(&self, other: &Self) -> Self {
+    pub(crate) fn greatest(&self, other: &Self) -> Self {
         Self {
             accel_mm_s2: self.accel_mm_s2.max(other.accel_mm_s2),
             jerk_mm_s3: self.jerk_mm_s3.max(other.jerk_mm_s3),
@@ -110,7 +110,7 @@ impl<R: Root> Limits<R> {
     ///
     /// # Errors
     /// A limit is not positive and finite, or beyond [`Root::LIMITS`].
-    pub fn check(&self) -> Result<(), LimitError> {
+    pub(crate) fn check(&self) -> Result<(), LimitError> {
         let (least, greatest) = R::LIMITS;
         for (quantity, limit) in
             [("acceleration", self.accel_mm_s2), ("jerk", self.jerk_mm_s3), ("snap", self.snap_mm_s4)]
@@ -181,11 +181,13 @@ impl<R: Root> Law<R> {
     }
 
     /// The shape of its pulses.
+    #[doc(hidden)]
     pub fn pulse(&self) -> Pulse {
         self.pulse
     }
 
     /// The duration of a ramp that changes the feed by `change_mm_s` ≥ 0 \[s\]: t_p of (14).
+    #[doc(hidden)]
     pub fn ramp_time_s(&self, change_mm_s: R) -> R {
         let Times { rise_s, fall_start_s, .. } = self.times(change_mm_s);
         rise_s + fall_start_s

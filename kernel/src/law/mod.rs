@@ -36,14 +36,16 @@ pub(crate) mod passing;
 mod planned;
 mod pulse;
 mod ramp;
-mod reach;
+pub(crate) mod reach;
 pub(crate) mod segment;
 pub(crate) mod shape;
 
 pub use limits::{Law, LimitError, Limits, Pulse};
 pub use planned::PlannedRamp;
 pub use ramp::{FeedState, LimitedBy, Ramp};
-pub use reach::{peak, reach};
+pub(crate) use reach::peak;
+pub use reach::reach;
 #[cfg(feature = "live")]
 pub(crate) use segment::CutRamp;
-pub use segment::{FeedSegment, PathMotion, Phase, SegmentError, Ticks};
+pub(crate) use segment::Phase;
+pub use segment::{FeedSegment, PathMotion, SegmentError, Ticks};

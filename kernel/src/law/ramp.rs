@@ -89,6 +89,7 @@ impl<R: Root> Ramp<R> {
     }
 
     /// A constant feed for `time_s`.
+    #[doc(hidden)]
     #[must_use]
     pub fn cruise(feed_mm_s: R, time_s: R) -> Self {
         Self {
@@ -183,6 +184,7 @@ impl<R: Root> Ramp<R> {
 
     /// How far into an accelerating ramp its feed passes `feed_mm_s` \[mm\]: 0 at its start and below, its
     /// length at its end and above. Never too short except by rounding.
+    #[doc(hidden)]
     #[must_use]
     pub fn length_to_feed_mm(&self, feed_mm_s: R) -> R {
         work::add(1);

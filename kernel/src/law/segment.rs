@@ -60,18 +60,21 @@ impl Ticks {
     }
 
     /// A duration of `bits` steps of 2⁻³² tick.
+    #[doc(hidden)]
     #[must_use]
     pub const fn from_bits(bits: u64) -> Self {
         Self(bits)
     }
 
     /// The number of steps of 2⁻³² tick.
+    #[doc(hidden)]
     #[must_use]
     pub const fn to_bits(self) -> u64 {
         self.0
     }
 
     /// The rest of `self` after `other`, or `None` if `other` is longer.
+    #[doc(hidden)]
     #[must_use]
     pub const fn minus(self, other: Self) -> Option<Self> {
         match self.0.checked_sub(other.0) {
@@ -293,6 +296,7 @@ impl<R: Real> FeedSegment<R> {
     ///
     /// # Errors
     /// A figure is not finite, negative or too large, the lengths differ, or the feed steps.
+    #[doc(hidden)]
     pub fn ramp<P: Root>(ramp: &Ramp<P>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
         Self::new(&of_length(ramp, length)?, length, tick_s)
     }
@@ -301,6 +305,7 @@ impl<R: Real> FeedSegment<R> {
     ///
     /// # Errors
     /// A figure is not finite, the feed is not positive, or the duration is too long.
+    #[doc(hidden)]
     pub fn cruise(feed_mm_s: f64, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
         let ramp = Ramp::cruise(feed_mm_s, length.to_mm() / feed_mm_s);
         Self::new(&ramp, length, tick_s)
@@ -367,27 +372,31 @@ impl<R: Real> FeedSegment<R> {
     }
 
     /// The length of path it covers.
+    #[doc(hidden)]
     pub fn length(&self) -> Position {
         self.length
     }
 
     /// The feed at its start \[mm/s\].
+    #[doc(hidden)]
     pub fn from_mm_s(&self) -> R {
         self.from_mm_s
     }
 
     /// The feed at its end \[mm/s\].
+    #[doc(hidden)]
     pub fn to_mm_s(&self) -> R {
         self.to_mm_s
     }
 
     /// Greatest |acceleration| inside \[mm/s²\].
+    #[doc(hidden)]
     pub fn peak_accel_mm_s2(&self) -> R {
         self.hold_a_mm_s2.abs()
     }
 
     /// Greatest |jerk| inside \[mm/s³\]; of a cut ramp, that of the whole.
-    pub fn peak_jerk_mm_s3(&self) -> R {
+    pub(crate) fn peak_jerk_mm_s3(&self) -> R {
         self.pulse.jerk_mm_s3.abs()
     }
 
@@ -462,6 +471,7 @@ impl<R: Real> FeedSegment<R> {
 
     /// The motion at a normalised time of a phase; `s` counts from the segment's start and is never beyond
     /// its end. In the tick.
+    #[doc(hidden)]
     #[inline(always)]
     pub fn at(&self, phase: Phase, fraction: u64) -> PathMotion<R> {
         let is_cut = phase == Phase::Hold && self.cut_at() != 0;

@@ -5,7 +5,7 @@ use heapless::Vec;
 use super::brake::Braking;
 use super::splice::Splice;
 use crate::law::{CutRamp, Limits, Phase, PlannedRamp, Pulse, Ramp, Ticks, segment};
-pub use crate::queue::LIST_ITEMS;
+pub(super) use crate::queue::LIST_ITEMS;
 use crate::units::Position;
 
 /// Rounding between feeds that are calculated differently: of 1 mm/s, plus relative to the feed.

@@ -86,5 +86,4 @@ mod timeline;
 
 pub use crate::program::Source;
 pub use control::{LiveControl, State};
-pub use list::LIST_ITEMS;
 pub use mode::{OVERRIDE_MAX, OVERRIDE_MIN};

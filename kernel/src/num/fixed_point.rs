@@ -79,13 +79,13 @@ pub struct Fixed(I32F32);
 impl Fixed {
     /// Steps of 2⁻³².
     #[must_use]
-    pub const fn from_bits(bits: i64) -> Self {
+    pub(crate) const fn from_bits(bits: i64) -> Self {
         Self(I32F32::from_bits(bits))
     }
 
     /// Steps of 2⁻³².
     #[must_use]
-    pub const fn to_bits(self) -> i64 {
+    pub(crate) const fn to_bits(self) -> i64 {
         self.0.to_bits()
     }
 }

@@ -34,7 +34,7 @@
 mod fixed_point;
 mod float;
 mod series;
-pub mod sine;
+pub(crate) mod sine;
 mod table;
 
 pub use fixed_point::Fixed;

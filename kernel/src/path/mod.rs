@@ -19,6 +19,6 @@
 mod piece;
 mod travel;
 
-pub use piece::{Geometry, Piece, PieceError, Setpoint};
+pub use piece::{Piece, PieceError, Setpoint};
 pub(crate) use piece::{Steepness, magnitude};
 pub use travel::Travel;

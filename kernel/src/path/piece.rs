@@ -30,7 +30,7 @@ pub struct Setpoint<R> {
 
 /// The geometry of a piece, relative to its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Geometry<R: Real, const AXES: usize> {
+pub(crate) enum Geometry<R: Real, const AXES: usize> {
     /// A straight line along a unit vector.
     Line {
         /// The unit vector, per axis.
@@ -215,12 +215,13 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     }
 
     /// The length of path.
+    #[doc(hidden)]
     pub fn length(&self) -> Position {
         self.length
     }
 
     /// Where it starts.
-    pub fn start(&self) -> [Position; AXES] {
+    pub(crate) fn start(&self) -> [Position; AXES] {
         self.start
     }
 
@@ -263,6 +264,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
     }
 
     /// The set-points of all axes at `s_mm` from the piece's start, for the motion along the path.
+    #[doc(hidden)]
     #[must_use]
     pub fn at(&self, s_mm: R, motion: &PathMotion<R>) -> [Setpoint<R>; AXES] {
         let mut setpoints = [Setpoint::default(); AXES];
@@ -272,6 +274,7 @@ impl<R: Real, const AXES: usize> Piece<R, AXES> {
 
     /// [`Piece::at`] into `setpoints`. In the tick: no division, no loop but those over axes and
     /// coefficients.
+    #[doc(hidden)]
     #[inline]
     pub fn set(&self, s_mm: R, motion: &PathMotion<R>, setpoints: &mut [Setpoint<R>; AXES]) {
         let (v, a, j) = (motion.v_mm_s, motion.a_mm_s2, motion.j_mm_s3);

@@ -28,7 +28,7 @@ mod junction;
 mod planner;
 mod ramps;
 mod spanning;
-mod two_pass;
+pub(crate) mod two_pass;
 
 pub use ceiling::{
     AxisLimits, BLEND_FEED_SHARE, Bend, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX, Ceiling, MachineLimits,
@@ -38,4 +38,4 @@ pub use junction::{Junction, junction};
 pub use planner::{Effort, Memory, Path, Planned, plan_ramps};
 pub use ramps::ramps;
 pub use spanning::{Node, nodes_for, plan_spanning};
-pub use two_pass::{Block, BlockPlan, PlanError, merge_equal, plan};
+pub use two_pass::{Block, BlockPlan, PlanError, plan};

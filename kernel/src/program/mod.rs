@@ -186,6 +186,7 @@ impl PathBlock {
     }
 
     /// The program's feed \[mm/s\]; infinite for a rapid.
+    #[doc(hidden)]
     #[must_use]
     pub fn feed_mm_s(&self) -> f64 {
         let [feed_mm_s, ..] = self.figures;
@@ -193,6 +194,7 @@ impl PathBlock {
     }
 
     /// What is allowed up to the program's feed.
+    #[doc(hidden)]
     #[must_use]
     pub fn programmed(&self) -> Allowed {
         let [_, cap_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, ..] = self.figures;

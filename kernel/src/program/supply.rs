@@ -65,6 +65,7 @@ impl<const AXES: usize> Item<AXES> {
     ///
     /// # Errors
     /// The number type does not hold it, or it is none for the streams.
+    #[doc(hidden)]
     #[inline(never)]
     pub fn ready<R: Real, E>(&self, tick_s: f64) -> Result<Ready<R, AXES>, SupplyError<E>> {
         Ok(match *self {

@@ -14,7 +14,7 @@ use crate::law::{Phase, Ticks};
 /// Number of feed lists: one under way, one to follow, one for a more urgent command.
 pub(crate) const LISTS: u8 = 3;
 /// The most items of a feed list: its queue needs one place more.
-pub const LIST_ITEMS: usize = 15;
+pub(crate) const LIST_ITEMS: usize = 15;
 
 /// Where a list takes over from the one under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -62,11 +62,9 @@ mod progress;
 pub(crate) use accept::Acceptance;
 pub use accept::PathRules;
 #[cfg(feature = "live")]
-pub use change::LIST_ITEMS;
-#[cfg(feature = "live")]
-pub(crate) use change::LISTS;
-#[cfg(feature = "live")]
 pub(crate) use change::{Change, Progress};
+#[cfg(feature = "live")]
+pub(crate) use change::{LIST_ITEMS, LISTS};
 #[cfg(feature = "live")]
 pub(crate) use density::Density;
 pub use density::SEGMENTS_PER_TICK_MAX;

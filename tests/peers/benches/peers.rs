@@ -34,10 +34,11 @@ use std::time::{Duration, Instant};
 
 use criterion::Criterion;
 use motion_kernel::exec::Executor;
-use motion_kernel::law::{FeedSegment, Law, Limits, Phase, Pulse, Ramp, Ticks, peak, reach};
+use motion_kernel::internals::{Phase, merge_equal, peak};
+use motion_kernel::law::{FeedSegment, Law, Limits, Pulse, Ramp, Ticks, reach};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
-use motion_kernel::plan::{Block, BlockPlan, Node, merge_equal, nodes_for, plan, plan_spanning, ramps};
+use motion_kernel::plan::{Block, BlockPlan, Node, nodes_for, plan, plan_spanning, ramps};
 use motion_kernel::queue::{Feeder, PathRules, Streams};
 use motion_kernel::units::Position;
 use rsruckig::prelude::{DataArrayOrVec, InputParameter, ThrowErrorHandler, Trajectory};

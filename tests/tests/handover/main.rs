@@ -19,7 +19,8 @@ mod two_cores;
 
 /// What the kernel's files find at the crate's root.
 mod law {
-    pub(crate) use motion_kernel::law::{Phase, Ticks};
+    pub(crate) use motion_kernel::internals::Phase;
+    pub(crate) use motion_kernel::law::Ticks;
 }
 mod num {
     pub(crate) use motion_kernel::num::Real;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use motion_kernel::law::{Phase, Ticks};
+use motion_kernel::internals::Phase;
+use motion_kernel::law::Ticks;
 
 use super::change::{Change, LISTS, Progress};
 use super::item::FeedItem;

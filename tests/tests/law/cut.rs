@@ -1,8 +1,8 @@
 //! Ramps that are cut in their rise, against the integral of their jerk.
 
 use super::{LIMITS, PULSES, feeds, limits};
-use motion_kernel::internals::CutRamp;
-use motion_kernel::law::{FeedSegment, Law, PathMotion, Phase, Ramp, SegmentError, Ticks};
+use motion_kernel::internals::{CutRamp, Phase};
+use motion_kernel::law::{FeedSegment, Law, PathMotion, Ramp, SegmentError, Ticks};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::units::Position;
 use motion_tests::random::Random;

@@ -2,7 +2,8 @@
 
 use super::oracle::length;
 use super::{LIMITS, PULSES, feed, limits, narrow};
-use motion_kernel::law::{Law, Limits, Pulse, peak, reach};
+use motion_kernel::internals::peak;
+use motion_kernel::law::{Law, Limits, Pulse, reach};
 use motion_kernel::num::Root;
 use motion_tests::dd::{Dd, dd};
 use motion_tests::random::Random;

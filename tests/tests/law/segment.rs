@@ -1,8 +1,9 @@
 //! [`FeedSegment`], the form the tick evaluates, against the ramp it was made from.
 
 use super::{LIMITS, PULSES, feeds, limits};
+use motion_kernel::internals::Phase;
 use motion_kernel::law::{
-    FeedSegment, FeedState, Law, LimitedBy, Limits, PathMotion, Phase, Pulse, Ramp, SegmentError, Ticks,
+    FeedSegment, FeedState, Law, LimitedBy, Limits, PathMotion, Pulse, Ramp, SegmentError, Ticks,
 };
 use motion_kernel::num::{Fixed, Real, Root, Scalar};
 use motion_kernel::units::Position;

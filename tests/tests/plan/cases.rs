@@ -1,8 +1,9 @@
 //! Named cases: the field's, and S3's.
 
 use super::{block, from_rest, law, planned, reference, time_s};
+use motion_kernel::internals::merge_equal;
 use motion_kernel::law::reach;
-use motion_kernel::plan::{Block, merge_equal};
+use motion_kernel::plan::Block;
 use motion_tests::random::Random;
 
 fn merged_time_s(mut blocks: Vec<Block<f64>>) -> (usize, f64) {

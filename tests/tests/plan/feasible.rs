@@ -1,7 +1,8 @@
 //! Whatever the blocks are, the plan keeps every ceiling and every ramp has its length.
 
 use super::{from_rest, planned, random_blocks, reference, time_s};
-use motion_kernel::plan::{Block, BlockPlan, PlanError, merge_equal};
+use motion_kernel::internals::merge_equal;
+use motion_kernel::plan::{Block, BlockPlan, PlanError};
 use motion_tests::random::Random;
 
 /// How much longer than its block a block's ramps may be, relative: rounding.

@@ -3,13 +3,13 @@
 
 use super::executed::Supply;
 use motion_kernel::exec::{ExecState, Executor};
+use motion_kernel::internals::{merge_equal, peak};
 use motion_kernel::law::{
-    FeedSegment, Law, LimitError, Limits, PlannedRamp, Pulse, Ramp, SegmentError, peak, reach,
+    FeedSegment, Law, LimitError, Limits, PlannedRamp, Pulse, Ramp, SegmentError, reach,
 };
-use motion_kernel::num::{Fixed, Root, Scalar};
+use motion_kernel::num::{Fixed, Real, Root, Scalar};
 use motion_kernel::plan::{
-    AxisLimits, Bend, Block, BlockPlan, Ceiling, Junction, MachineLimits, PlanError, junction, merge_equal,
-    plan, ramps,
+    AxisLimits, Bend, Block, BlockPlan, Ceiling, Junction, MachineLimits, PlanError, junction, plan, ramps,
 };
 use motion_kernel::queue::{PathRules, Streams};
 use motion_kernel::units::Position;
@@ -155,7 +155,7 @@ fn check(blocks: &[Block<Fixed>], wide: &[Block<f64>], plans: &[BlockPlan<Fixed>
         assert!(block.length_mm == Fixed::ZERO || peak > Fixed::ZERO, "never left: {}", case());
         // Exactly, in fixed point.
         let ramps = [(enter, peak), (peak, exit)];
-        let bits = |mm: Fixed| i128::from(mm.to_bits());
+        let bits = |mm: Fixed| i128::from(mm.to_q32());
         let taken: i128 = ramps.iter().map(|&(from, to)| bits(block.law.ramp_length_mm(from, to))).sum();
         assert!(taken <= bits(block.length_mm), "too short: {}", case());
         // And by the law in f64, which knows nothing of fixed point.
@@ -315,9 +315,9 @@ fn limits_are_kept_where_regimes_meet() {
         for meeting in [(pi / snap).powi(2) * peak.powi(3) / 2.0, by_accel] {
             let from = fixed(*random.pick(&[0.0, 1.0, 1e5]));
             for steps in -40..=40 {
-                let change = fixed(meeting.min(1e6)).to_bits() + steps;
+                let change = fixed(meeting.min(1e6)).to_q32() + steps;
                 if change > 0 {
-                    worst = worst.max(excess(&law, from, from + Fixed::from_bits(change)));
+                    worst = worst.max(excess(&law, from, from + Fixed::from_q32(change)));
                 }
             }
         }
@@ -486,7 +486,7 @@ fn junctions_keep_the_acceleration_step() {
             junction(&Junction { angle_rad: angle, curvature_step_per_mm: bend }, fixed(0.1), step, tick);
         let [v, angle, bend, step, tick] = [feed, angle, bend, step, tick].map(Fixed::to_f64);
         if angle == 0.0 && bend == 0.0 {
-            assert_eq!(feed.to_bits(), i64::MAX);
+            assert_eq!(feed.to_q32(), i64::MAX);
         } else {
             worst = worst.max((v * angle / tick + v * v * bend) / step - 1.0);
         }
@@ -523,7 +523,7 @@ fn segments_join() {
         let (mut end, mut feed) = (Position::ZERO, Fixed::ZERO);
         for (block, plan) in blocks.iter().zip(&plans) {
             let start = end;
-            end = start + Position::from_bits(block.length_mm.to_bits());
+            end = start + Position::from_bits(block.length_mm.to_q32());
             let made = ramps(block, plan, start, end, TICK_S).and_then(|made| {
                 made.iter().flatten().map(|ramp| ramp.segment::<Fixed>(TICK_S)).collect::<Result<Vec<_>, _>>()
             });
@@ -577,7 +577,7 @@ fn plans_are_accepted_and_executed() {
         let mut planned_ramps = Vec::new();
         for (block, plan) in blocks.iter().zip(&plans) {
             let start = end;
-            end = start + Position::from_bits(block.length_mm.to_bits());
+            end = start + Position::from_bits(block.length_mm.to_q32());
             let made = ramps(block, plan, start, end, TICK_S).expect("ramps");
             let length = made.iter().flatten().fold(start, |at, ramp| at + ramp.length);
             assert_eq!(length, end, "{block:?} {plan:?}");

@@ -9,9 +9,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use motion_kernel::internals::Passing;
+use motion_kernel::internals::{Passing, merge_equal};
 use motion_kernel::law::{Law, Limits, Ramp};
-use motion_kernel::plan::{Block, Node, PlanError, merge_equal, nodes_for, plan_spanning};
+use motion_kernel::plan::{Block, Node, PlanError, nodes_for, plan_spanning};
 
 use super::{block, from_rest, law, laws, planned, random_blocks, time_s};
 use motion_tests::PULSES;

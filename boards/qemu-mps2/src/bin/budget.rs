@@ -13,9 +13,9 @@ use hal_sim::closed_loop::{Closed, InMemory, LoopError, close, reference_machine
 use hal_sim::{MachineParameters, SimMachine};
 use motion_kernel::axis::{AxesConfig, AxisConfig, AxisFigures, AxisOutput, AxisState};
 use motion_kernel::exec::ExecState;
-use motion_kernel::internals::Ready;
+use motion_kernel::internals::{Phase, Ready};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::law::{FeedSegment, PathMotion, Phase, Ticks};
+use motion_kernel::law::{FeedSegment, PathMotion, Ticks};
 use motion_kernel::num::Scalar;
 use motion_kernel::path::{Piece, Setpoint};
 use motion_kernel::program::{Header, ProgramError, Reader};

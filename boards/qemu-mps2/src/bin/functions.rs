@@ -7,8 +7,7 @@ use core::hint::black_box;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use motion_kernel::internals::Shape;
-use motion_kernel::num::sine::{Own, SineCosine};
+use motion_kernel::internals::{Own, Shape, SineCosine};
 use motion_kernel::num::{Real, Scalar};
 use qemu_boards::count::Counter;
 use qemu_boards::{Number, exit, fail};
@@ -24,7 +23,7 @@ fn main() -> ! {
     sine(&counter, "sine, own", <Own as SineCosine<Unit>>::sin_cos);
     #[cfg(any(target_abi = "eabihf", feature = "soft-float"))]
     {
-        use motion_kernel::num::sine::{Libm, Micromath};
+        use motion_kernel::internals::{Libm, Micromath};
         shape(&counter, "closed, libm", Shape::closed::<Libm>);
         shape(&counter, "closed, micromath", Shape::closed::<Micromath>);
         sine(&counter, "sine, libm", <Libm as SineCosine<Unit>>::sin_cos);

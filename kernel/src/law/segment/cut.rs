@@ -68,6 +68,7 @@ impl<R: Real> FeedSegment<R> {
     /// # Errors
     /// The ramp is not cut in its opening edge, or rises in less than a tick; a figure is not
     /// finite or too large; the lengths differ.
+    #[doc(hidden)]
     pub fn cut(ramp: &Ramp<f64>, cut_at: Ticks, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
         // As for the whole ramp: rounding here would be a step there.
         let ramp = &super::to_f64(ramp);
