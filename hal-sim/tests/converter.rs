@@ -167,3 +167,12 @@ fn a_frame_may_come_in_pieces_under_one_chip_select() {
     (&chip).transaction(&mut pieces).unwrap();
     assert_eq!(chip.volts().map(f64::to_bits), ZERO_V);
 }
+
+#[test]
+fn releasing_the_bus_keeps_the_outputs() {
+    let chip = Ad5754Chip::new();
+    let mut output = output::<1>(&chip);
+    output.write(&[DacCode(16_384)]).unwrap();
+    let chip = output.release();
+    assert_eq!(chip.volts().map(f64::to_bits), [5.0_f64, 0.0, 0.0, 0.0].map(f64::to_bits));
+}

@@ -158,6 +158,11 @@ impl<SPI: SpiDevice, const AXES: usize> Ad5754Output<SPI, AXES> {
         chip.load_dacs().map_err(in_frame(Ad5754Frame::Load))?;
         Ok(Self { chip })
     }
+
+    /// Gives the bus back; the outputs keep their last value.
+    pub fn release(self) -> SPI {
+        self.chip.destroy()
+    }
 }
 
 impl<SPI: SpiDevice, const AXES: usize> VelocityChannel<AXES> for Ad5754Output<SPI, AXES> {
