@@ -312,7 +312,7 @@ impl<R: Real> FeedSegment<R> {
     }
 
     fn new(ramp: &Ramp<f64>, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
-        let Ramp { from_mm_s, to_mm_s, edge_s, t1_s, t2_s, .. } = *ramp;
+        let Ramp { from_mm_s, to_mm_s, t1_s, t2_s, .. } = *ramp;
         let hold_s = t2_s - t1_s;
         // The first reason to refuse it. The computation still continues to its end: an early return at each
         // figure would take more flash than the computation.
@@ -357,7 +357,7 @@ impl<R: Real> FeedSegment<R> {
             #[cfg(feature = "live")]
             cut_at: 0,
             #[cfg(feature = "live")]
-            closing_at: Ticks::from_seconds(t1_s - edge_s, tick_s).unwrap_or_default(),
+            closing_at: Ticks::from_seconds(t1_s - ramp.edge_s, tick_s).unwrap_or_default(),
             rise_bits,
             fall_bits: -fall_less_bits,
             pulse,
