@@ -1,4 +1,4 @@
-//! The sines of `num::sine` and the law's shapes, by each backend, against 31 digits:
+//! The sines of the kernel, of `libm` and of `micromath` and the law's shapes, by each backend, against 31 digits:
 //! `tests/expected/functions.md`.
 //!
 //! Errors are absolute in units of the shapes' scales, and relative from x = 10⁻⁴ up, where a ramp begins (a
