@@ -19,10 +19,6 @@
 //! acceleration-step limit as under G61, because a path of bounded jerk through them can take longer (on the
 //! arcs of a few millimetres that a corner is rounded with, by a seventh). If no such step is wanted, the
 //! machine's limit says so: with a small one only the blend pays.
-//!
-//! **Kinks** are not passed under G64, however small they are: velocity does not step. A kink has a blend or a stop, or
-//! is a part of what a curve or a merged line stands for. Under G61, and where a spline meets its neighbour, they fall
-//! under the acceleration-step limit.
 
 use std::rc::Rc;
 
@@ -37,9 +33,9 @@ use super::error::Problem;
 use super::lookahead::lookahead;
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
-use crate::toolpath::blend::{Blend, has_side};
-use crate::toolpath::smooth::{Move, Run, TANGENT_ROUNDING_RAD};
-use crate::toolpath::{Element, Greatest, SpeedRatios, angle, norm, subtract};
+use crate::toolpath::blend::Blend;
+use crate::toolpath::smooth::{Move, Run};
+use crate::toolpath::{Greatest, SpeedRatios, norm, subtract};
 
 /// Part of the time that a junction without a blend has to gain over the best one.
 const EXACT_GAIN_MIN: f64 = 0.002;
@@ -261,19 +257,8 @@ impl<'a, const N: usize> Junctions<'a, N> {
     fn exact_at(&self, junction: usize) -> Crossing<N> {
         let [before, after] = [junction, junction + 1]
             .map(|index| (&self.run.moves()[index], &self.ceilings[index].programmed));
-        let is_smoothed = before.0.tolerance_mm.min(after.0.tolerance_mm) > 0.0;
-        let feed_mm_s = self.passed_mm_s([&before.0.element, &after.0.element], is_smoothed);
+        let feed_mm_s = junction_feed(&before.0.element, &after.0.element, self.machine);
         Crossing { blend: None, feed_mm_s: feed_mm_s.min(before.1.feed_mm_s).min(after.1.feed_mm_s) }
-    }
-
-    /// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop. Where the path is to be
-    /// smooth, a kink that a blend could take the place of is not passed.
-    fn passed_mm_s(&self, [before, after]: [&Element<N>; 2], is_smoothed: bool) -> f64 {
-        let is_kink = || angle(before.ends()[1].tangent, after.ends()[0].tangent) > TANGENT_ROUNDING_RAD;
-        if is_smoothed && has_side(before) && has_side(after) && is_kink() {
-            return 0.0;
-        }
-        junction_feed(before, after, self.machine)
     }
 
     /// A junction with a blend that is a part of what `room_mm` allows, driven at the greatest share.
@@ -412,8 +397,6 @@ impl<'a, const N: usize> Junctions<'a, N> {
     /// The blocks of the run.
     fn blocks(&self, crossings: &[Crossing<N>]) -> Vec<StretchBlock<N>> {
         let mut blocks: Vec<StretchBlock<N>> = Vec::with_capacity(2 * self.ceilings.len());
-        // Whether each is to be smooth.
-        let mut are_smoothed = Vec::with_capacity(2 * self.ceilings.len());
         let trim_mm = |junction: Option<usize>| {
             junction.and_then(|junction| crossings.get(junction)).map_or(0.0, Crossing::trim_mm)
         };
@@ -431,17 +414,14 @@ impl<'a, const N: usize> Junctions<'a, N> {
                 tolerance_share,
             };
             blocks.push(block(element, ceilings, self.run.tolerance_share(index)));
-            are_smoothed.push(step.tolerance_mm > 0.0);
             if let Some(rounding) = crossings.get(index).and_then(|crossing| crossing.blend.as_ref()) {
                 let share = self.run.tolerance_share_of(index, &rounding.blend);
                 blocks.push(block(rounding.blend.element, rounding.ceilings, share));
-                are_smoothed.push(true);
             }
         }
         for index in 1..blocks.len() {
-            let pair = [&blocks[index - 1].element, &blocks[index].element];
-            let is_smoothed = are_smoothed[index - 1] && are_smoothed[index];
-            blocks[index - 1].junction_mm_s = self.passed_mm_s(pair, is_smoothed);
+            blocks[index - 1].junction_mm_s =
+                junction_feed(&blocks[index - 1].element, &blocks[index].element, self.machine);
         }
         blocks
     }
@@ -501,7 +481,6 @@ fn stretch_time_s<const N: usize>(stretch: &[StretchBlock<N>], tick_s: f64) -> O
 mod tests {
     use super::*;
     use crate::toolpath::smooth::tests::path;
-    use motion_tests::random::Random;
 
     fn blocks_of(moves: &[Move]) -> Vec<StretchBlock> {
         blocks(moves, &Machine::reference()).expect("a machine's limits")
@@ -532,46 +511,6 @@ mod tests {
             assert!(pair[0].junction_mm_s > 1e6, "{}", pair[0].junction_mm_s);
         }
         assert!(blocks_of(&[]).is_empty());
-    }
-
-    /// Random lines and arcs, most of which go on nearly straight: where the path is to be smooth, velocity steps nowhere.
-    /// Without a tolerance kinks are passed.
-    #[test]
-    fn no_kink_is_passed_within_a_tolerance() {
-        let (mut passed, mut blended, mut curved) = (0, 0, 0);
-        for seed in 0..40 {
-            let mut random = Random::new(seed);
-            let scale_mm = random.log(0.02, 20.0);
-            let (mut at, mut heading_rad, mut points) = ([0.0; 2], 0.0, vec![[0.0; 2]]);
-            for _ in 0..60 {
-                heading_rad += match random.below(4) {
-                    0 => random.between(-2.0, 2.0),
-                    1 => 0.0,
-                    _ => random.log(1e-8, 0.05),
-                };
-                let length_mm = scale_mm * random.between(0.2, 2.0);
-                at = [at[0] + length_mm * libm::cos(heading_rad), at[1] + length_mm * libm::sin(heading_rad)];
-                points.push(at);
-            }
-            for tolerance_mm in [0.0, 0.05] {
-                let moves = path(&points, tolerance_mm, |_| 50.0);
-                let blocks = blocks_of(&moves);
-                blended += blocks.iter().filter(|block| block.element.kind() == "blend").count();
-                curved += blocks.iter().filter(|block| block.element.kind() == "curve").count();
-                for (index, pair) in blocks.windows(2).enumerate() {
-                    let [before, after] = [&pair[0].element, &pair[1].element];
-                    let kink_rad = angle(before.ends()[1].tangent, after.ends()[0].tangent);
-                    let is_passed = kink_rad > TANGENT_ROUNDING_RAD && pair[0].junction_mm_s > 0.0;
-                    assert!(
-                        !is_passed || tolerance_mm == 0.0,
-                        "seed {seed}: {kink_rad} rad after block {index} at {} mm/s",
-                        pair[0].junction_mm_s
-                    );
-                    passed += usize::from(is_passed);
-                }
-            }
-        }
-        assert!(passed > 300 && blended > 100 && curved > 100, "{passed} {blended} {curved}");
     }
 
     /// Between a small blend and a big one, the big one gets what the small one leaves; two big ones share.
