@@ -4,7 +4,7 @@
 //! cargo bench -p motion-tests --bench rate [-- FILE...]
 //! ```
 //!
-//! The samples, exact and blended with either law; or these programs, with the plateau and the reference machine's path
+//! The samples, exact and blended with either law; or these programs (names from `tests/` on), with the plateau and the reference machine's path
 //! limits times √3, so that only the axes bind. The table gives the best of some rounds. Programs that are refused
 //! have a row that says so.
 
@@ -44,9 +44,13 @@ fn main() {
         let name = file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy();
         match std::fs::read(&file) {
             Ok(text) => row(&name, &text, Path::Blended(0.05), &machine),
-            Err(error) => println!("| {name} | {error} | | | | |"),
+            Err(error) => println!("| {name} | {error} | | | | |", name = file.display()),
         }
     }
+}
+
+fn first_line(error: &impl std::fmt::Display) -> String {
+    error.to_string().lines().next().unwrap_or_default().to_owned()
 }
 
 /// The reference machine, on which only the axes bind.
@@ -68,11 +72,15 @@ fn row(name: &str, text: &[u8], path: Path, machine: &Machine) {
         let start = Instant::now();
         let program = match gcode::read(name, black_box(text)) {
             Ok(program) => program,
-            Err(error) => return println!("| {name} | {path} | {law} | {lines} | {error} | |"),
+            Err(error) => {
+                return println!("| {name} | {path} | {law} | {lines} | {} | |", first_line(&error));
+            }
         };
         match plan_program(name, &on(&program, path), machine, Mode::Spanning) {
             Ok(plan) => time_s = plan.time_s,
-            Err(error) => return println!("| {name} | {path} | {law} | {lines} | {error} | |"),
+            Err(error) => {
+                return println!("| {name} | {path} | {law} | {lines} | {} | |", first_line(&error));
+            }
         }
         least_s = least_s.min(start.elapsed().as_secs_f64());
     }

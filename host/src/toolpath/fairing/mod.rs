@@ -106,7 +106,8 @@ pub struct Span<const N: usize = 3> {
 }
 
 /// The curve that stands for `parts`, made for `limits`; nothing if none was found, or if a part is neither a
-/// line nor an arc. It is made in the coordinates that move: a step costs as much as their third power.
+/// line nor an arc. It is made in the coordinates that move: the work of a step grows with the third power of their
+/// number.
 #[must_use]
 pub fn fair<const N: usize>(parts: &[Part<N>], limits: &Limits<f64>) -> Option<Vec<Span<N>>> {
     let mut moves = [false; N];
@@ -498,6 +499,31 @@ mod tests {
             );
             // It is used, or there would have been a better curve.
             assert!(greatest > 0.6 * tolerance_mm, "{greatest} of {tolerance_mm}");
+        }
+    }
+
+    /// What moves in a plane has the curve that it has in space.
+    #[test]
+    fn fewer_coordinates_give_the_same_curve() {
+        let in_plane = |[x, y, _]: Vector| [[x, y, 7.0], [7.0, x, y], [y, 7.0, x]];
+        for plane in 0..3 {
+            let points: Vec<Vector> =
+                chords(120, 0.004).into_iter().map(|point| in_plane(point)[plane]).collect();
+            let parts = lines(&points, 0.02);
+            let (spans, of_space) = (fair(&parts, &LIMITS), in_space(&parts, &LIMITS));
+            let (spans, of_space) = (spans.expect("a curve"), of_space.expect("a curve"));
+            assert_eq!(spans.len(), of_space.len());
+            for (span, of_space) in spans.iter().zip(&of_space) {
+                let ((from, shape), (from_in_space, shape_in_space)) =
+                    (self::shape(span), self::shape(of_space));
+                for u in [0.0, 0.3, 0.7, 1.0] {
+                    let [a, b] =
+                        [add(from, shape.offset(0.0, u)), add(from_in_space, shape_in_space.offset(0.0, u))];
+                    assert!(norm(subtract(a, b)) < 1e-9, "{a:?} {b:?}");
+                }
+                assert!((span.distance_mm - of_space.distance_mm).abs() < 1e-9);
+                assert_eq!(span.greatest.curved, of_space.greatest.curved);
+            }
         }
     }
 
