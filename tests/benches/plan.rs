@@ -17,6 +17,7 @@ use motion_kernel::law::{Pulse, Ramp};
 use motion_kernel::plan::{Block, Node, nodes_for, plan_spanning};
 
 use motion_tests::PULSES;
+use motion_tests::bench;
 use motion_tests::block_lists::{lists, reference};
 use motion_tests::random::Random;
 
@@ -26,15 +27,8 @@ const ROUNDS: usize = 5;
 const RAMPS: usize = 4_000_000;
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // Whoever builds all targets and runs them wants to see that they run, not to wait for figures.
-    if !arguments.iter().any(|argument| argument == "--bench") {
-        return;
-    }
-    let is_asked = |name: &str| {
-        let mut parts = arguments.iter().filter(|argument| !argument.starts_with("--")).peekable();
-        parts.peek().is_none() || parts.any(|part| name.contains(part.as_str()))
-    };
+    let Some(asked) = bench::asked() else { return };
+    let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|part| name.contains(part.as_str()));
     let mut places = vec![Node::EMPTY; nodes_for(BLOCKS)];
     let feeds = feeds();
     println!("| {BLOCKS} blocks | µs a block | ramps a block |");

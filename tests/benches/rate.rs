@@ -4,18 +4,18 @@
 //! cargo bench -p motion-tests --bench rate [-- FILE...]
 //! ```
 //!
-//! The samples, exact and blended with either law; or these programs (names from `tests/` on), with the plateau and the reference machine's path
-//! limits times √3, so that only the axes bind. The table gives the best of some rounds. Programs that are refused
-//! have a row that says so.
+//! The samples, exact and blended with either law; or these programs, named from `tests/` on, with the plateau and the
+//! reference machine's path limits times √3, so that only the axes bind. The table gives the best of some rounds.
+//! A program that is refused has a row that says so.
 
 use std::hint::black_box;
-use std::path::PathBuf;
 use std::time::Instant;
 
 use motion_host::compare::{Path, on};
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Mode, plan_program};
+use motion_tests::bench;
 use motion_tests::check::machine;
 use motion_tests::samples::SAMPLES;
 
@@ -23,13 +23,7 @@ const ROUNDS: usize = 3;
 const PATHS: [Path; 3] = [Path::Exact, Path::Blended(0.01), Path::Blended(0.05)];
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // Whoever builds all targets and runs them wants to see that they run, not to wait for figures.
-    if !arguments.iter().any(|argument| argument == "--bench") {
-        return;
-    }
-    let files: Vec<PathBuf> =
-        arguments.iter().filter(|argument| !argument.starts_with("--")).map(PathBuf::from).collect();
+    let Some(files) = bench::asked() else { return };
     println!("| program | path | law | lines | time [s] | lines a second |");
     println!("|---|---|---|---:|---:|---:|");
     if files.is_empty() {
@@ -41,16 +35,11 @@ fn main() {
     }
     let machine = bound_by_axes();
     for file in files {
-        let name = file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy();
         match std::fs::read(&file) {
-            Ok(text) => row(&name, &text, Path::Blended(0.05), &machine),
-            Err(error) => println!("| {name} | {error} | | | | |", name = file.display()),
+            Ok(text) => row(&file, &text, Path::Blended(0.05), &machine),
+            Err(error) => println!("| {file} | {error} | | | | |"),
         }
     }
-}
-
-fn first_line(error: &impl std::fmt::Display) -> String {
-    error.to_string().lines().next().unwrap_or_default().to_owned()
 }
 
 /// The reference machine, on which only the axes bind.
@@ -66,23 +55,24 @@ fn bound_by_axes() -> Machine {
 fn row(name: &str, text: &[u8], path: Path, machine: &Machine) {
     let lines = text.iter().filter(|&&byte| byte == b'\n').count();
     let law = machine.path.pulse.name();
+    print!("| {name} | {path} | {law} | {lines} | ");
     let mut least_s = f64::INFINITY;
     let mut time_s = 0.0;
     for _ in 0..ROUNDS {
         let start = Instant::now();
-        let program = match gcode::read(name, black_box(text)) {
-            Ok(program) => program,
-            Err(error) => {
-                return println!("| {name} | {path} | {law} | {lines} | {} | |", first_line(&error));
-            }
-        };
-        match plan_program(name, &on(&program, path), machine, Mode::Spanning) {
-            Ok(plan) => time_s = plan.time_s,
-            Err(error) => {
-                return println!("| {name} | {path} | {law} | {lines} | {} | |", first_line(&error));
-            }
+        match planned_s(name, black_box(text), path, machine) {
+            Ok(planned_s) => time_s = planned_s,
+            // A row is one line.
+            Err(error) => return println!("{} | |", error.lines().next().unwrap_or_default()),
         }
         least_s = least_s.min(start.elapsed().as_secs_f64());
     }
-    println!("| {name} | {path} | {law} | {lines} | {time_s:.4} | {:.0} |", lines as f64 / least_s);
+    println!("{time_s:.4} | {:.0} |", lines as f64 / least_s);
+}
+
+/// The time of a program's plan \[s\].
+fn planned_s(name: &str, text: &[u8], path: Path, machine: &Machine) -> Result<f64, String> {
+    let program = gcode::read(name, text).map_err(|error| error.to_string())?;
+    let plan = plan_program(name, &on(&program, path), machine, Mode::Spanning);
+    plan.map(|plan| plan.time_s).map_err(|error| error.to_string())
 }

@@ -12,18 +12,14 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use motion_host::gcode::{self, Program, Step};
+use motion_tests::bench;
 use motion_tests::random::Random;
 
 const LINES: usize = 1_000_000;
 const ROUNDS: usize = 5;
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // Whoever builds all targets and runs them wants to see that they run, not to wait for figures.
-    if !arguments.iter().any(|argument| argument == "--bench") {
-        return;
-    }
-    let asked: Vec<_> = arguments.iter().filter(|argument| !argument.starts_with("--")).collect();
+    let Some(asked) = bench::asked() else { return };
     println!("| {LINES} lines | lines a second | steps, bytes a line |");
     println!("|---|---:|---:|");
     let mut random = Random::new(18);

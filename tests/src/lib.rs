@@ -5,6 +5,7 @@
 pub mod check;
 
 pub mod axes;
+pub mod bench;
 pub mod block_lists;
 pub mod cycles;
 #[allow(missing_docs, reason = "arithmetic")]

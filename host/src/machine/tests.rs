@@ -51,7 +51,8 @@ fn the_stages_take_it() {
     let machine = Machine::reference();
     let narrow: AxesConfig<f32, 3> = machine.axes_config().expect("f32");
     let wide: AxesConfig<f64, 3> = machine.axes_config().expect("f64");
-    assert!((narrow.axes[0].encoder.position(Counts(10_000)).to_mm() - 1.0).abs() < 1e-9);
+    // 10⁻¹⁵ mm a count.
+    assert!((narrow.axes[0].encoder.position(Counts(100_000_000)).to_mm() - 1e4).abs() < 1e-7);
     assert!((wide.axes[2].output.limits().1 - 1000.0 / 3.0).abs() < 1e-9);
     assert_eq!(
         machine.simulated(),
