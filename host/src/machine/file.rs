@@ -21,16 +21,16 @@ use toml::Spanned;
 use super::error::{MachineError, quote};
 use super::law_name::{LAW_NAMES, law_named};
 use super::range::{
-    AXIS_LETTER, AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CurveShare, Damping, DeadTime,
-    EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime,
-    InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio,
-    NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE,
-    Place, Positive, Ramp, Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed, SpindleTime,
-    StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch, Within,
+    AXIS_LETTER, AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CornerAngle, CurveShare, Damping,
+    DeadTime, EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia,
+    IntegralTime, InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load,
+    MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset,
+    PATH_MODE, Place, Positive, Ramp, Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed,
+    SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch, Within,
 };
 use super::settings::{
-    AxisSettings, BLEND_TOLERANCE_MM, CoolantSettings, DefaultPathMode, FaultSettings, HomingSettings,
-    Machine, PathSettings, SpindleSettings, ToolSettings,
+    AxisSettings, BLEND_TOLERANCE_MM, CORNER_ANGLE_DEG, CoolantSettings, DefaultPathMode, FaultSettings,
+    HomingSettings, Machine, PathSettings, SpindleSettings, ToolSettings,
 };
 
 use crate::gcode::{AXES_MAX, Axis};
@@ -244,6 +244,7 @@ struct PathTable {
     curve_feed_share: Within<CurveShare>,
     mode: Option<PathModeName>,
     blend_tolerance_mm: Option<Within<BlendTolerance>>,
+    corner_angle_deg: Option<Within<CornerAngle>>,
 }
 
 #[derive(Deserialize)]
@@ -577,6 +578,11 @@ impl PathTable {
                 .blend_tolerance_mm
                 .as_ref()
                 .map_or(BLEND_TOLERANCE_MM, |tolerance| tolerance.0),
+            corner_angle_rad: self
+                .corner_angle_deg
+                .as_ref()
+                .map_or(CORNER_ANGLE_DEG, |angle| angle.0)
+                .to_radians(),
         }
     }
 }

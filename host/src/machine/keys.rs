@@ -8,12 +8,12 @@ use motion_kernel::axis::TABLE_POINTS;
 
 use super::law_name::LAW_NAMES;
 use super::range::{
-    AXIS_LETTER, AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CurveShare, Damping, DeadTime,
-    EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia, IntegralTime,
-    InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load, MassRatio,
-    NOISE_COUNTS, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp, Range, Resolution,
-    Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick,
-    Velocity, Watch,
+    AXIS_LETTER, AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CornerAngle, CurveShare, Damping,
+    DeadTime, EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia,
+    IntegralTime, InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load,
+    MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp, Range,
+    Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS,
+    TablePoint, Tick, Velocity, Watch,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -143,6 +143,14 @@ pub const KEY_TABLES: &[KeyTable] = &[
                 "How far blends of corners may leave the programmed path without a P of G64; 0 for exact path.",
             )
             .or("0.01"),
+            Key::new(
+                "corner_angle_deg",
+                "°",
+                CornerAngle::EXPECTED,
+                "Greatest change of direction that a curve through dense moves is led past; a sharper one is a corner: the \
+                 curve ends there, and G64 rounds it by a blend.",
+            )
+            .or("130"),
         ],
     ),
     optional(

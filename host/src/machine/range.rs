@@ -62,6 +62,7 @@ ranges! {
     Tick: "a number from 0.00002 to 0.02", |value| (0.00002..=0.02).contains(&value);
     Limit: "a number from 0.001 to 1e12", |value| (0.001..=1e12).contains(&value);
     JunctionAngle: "a number from 0 to 30", |value| (0.0..=30.0).contains(&value);
+    CornerAngle: "a number from 0 to 180", |value| (0.0..=180.0).contains(&value);
     CurveShare: "a number from 0.1 to 0.85", |value| (0.1..=CURVE_FEED_SHARE_MAX).contains(&value);
     BlendTolerance: "a number from 0 to 10", |value| (0.0..=10.0).contains(&value);
     Ramp: "a number from 0 to 1", |value| (0.0..=1.0).contains(&value);
@@ -158,6 +159,7 @@ mod tests {
         words_are_the_range::<Tick>();
         words_are_the_range::<Limit>();
         words_are_the_range::<JunctionAngle>();
+        words_are_the_range::<CornerAngle>();
         words_are_the_range::<CurveShare>();
         words_are_the_range::<FollowingError>();
         words_are_the_range::<Ramp>();

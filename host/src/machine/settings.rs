@@ -30,6 +30,9 @@ const JUNCTION_GAP_MM: f64 = 5e-6;
 /// Tolerance of a G64 without P \[mm\]: so little that a program written for another controller still makes
 /// its part.
 pub(super) const BLEND_TOLERANCE_MM: f64 = 0.01;
+/// The sharpest corner that a curve is led past if the machine does not say: on a sharper one a stop mostly takes less
+/// time.
+pub(super) const CORNER_ANGLE_DEG: f64 = 130.0;
 
 /// The simulation's step \[s\]; a tick is divided into as many as come closest to it, so a step is at least
 /// 3/4 of it.
@@ -136,6 +139,9 @@ pub struct PathSettings {
     pub mode: DefaultPathMode,
     /// How far blends may leave the path under a G64 without P \[mm, of rotary axes °\]; 0 to 10, 0 for exact path.
     pub blend_tolerance_mm: f64,
+    /// Greatest change of direction that a curve through dense moves is led past \[rad\]; 0 to 180° (in the file in
+    /// degrees).
+    pub corner_angle_rad: f64,
 }
 
 /// How corners are passed before G61, G61.1 or G64 is programmed.
@@ -221,6 +227,7 @@ impl Machine {
                 curve_feed_share: CURVE_FEED_SHARE,
                 mode: DefaultPathMode::default(),
                 blend_tolerance_mm: BLEND_TOLERANCE_MM,
+                corner_angle_rad: CORNER_ANGLE_DEG.to_radians(),
             },
             axes: [
                 AxisSettings::reference(Axis::X, REFERENCE_X),

@@ -82,6 +82,7 @@ fn every_range_is_kept() {
         ("accel_step_mm_s2", LIMIT),
         ("curve_feed_share", &["0", "0.86", "-0.5"]),
         ("blend_tolerance_mm", &["-0.01", "11"]),
+        ("corner_angle_deg", &["-1", "181"]),
         ("following_error_limit_mm", &["0", "-1", "1001"]),
         ("mm_per_count", &["0", "-0.0001", "1", "1e-8"]),
         ("mm_min_at_10_v", &["0", "2e9"]),

@@ -40,8 +40,9 @@ use crate::toolpath::{Greatest, SpeedRatios, norm, subtract};
 /// Part of the time that a junction without a blend has to gain over the best one.
 const EXACT_GAIN_MIN: f64 = 0.002;
 
-/// Sharpest corners that curves through dense moves are led past \[rad\]: a stop on one may take less time.
-const CORNERS_RAD: [f64; 2] = [130.0 * core::f64::consts::PI / 180.0, 75.0 * core::f64::consts::PI / 180.0];
+/// A second, smaller bound of the corners that curves through dense moves are led past \[rad\], beside the machine's: a stop
+/// on a corner may take less time.
+const FLAT_CORNER_RAD: f64 = 75.0 * core::f64::consts::PI / 180.0;
 
 /// Lengths of blends that are tried, as parts of the longest one.
 const SIZES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
@@ -128,12 +129,12 @@ pub(super) fn blocks<const N: usize>(
     Ok(best.blocks)
 }
 
-/// The blocks of a run with curves in place of what is dense, once for each of [`CORNERS_RAD`] that makes a
-/// difference.
+/// The blocks of a run with curves in place of what is dense, once for each bound of corners that makes a difference.
 fn curved<const N: usize>(moves: &[Move<N>], machine: &Machine<N>) -> Vec<Timed<N>> {
     let limits = in_any_direction(moves, machine);
+    let corners_rad = [machine.path.corner_angle_rad, machine.path.corner_angle_rad.min(FLAT_CORNER_RAD)];
     let (mut candidates, mut most_s) = (Vec::new(), f64::INFINITY);
-    for run in Run::faired(moves, &CORNERS_RAD, &limits, machine.path.feed_mm_s, &machine.letters_by_place())
+    for run in Run::faired(moves, &corners_rad, &limits, machine.path.feed_mm_s, &machine.letters_by_place())
     {
         // Nobody has programmed a curve: one that has no ceilings is no candidate.
         let Ok(junctions) = Junctions::new(run, machine) else { continue };
@@ -605,5 +606,36 @@ mod tests {
         }
         let ends = (blocks[0].element.ends_mm().0, blocks[blocks.len() - 1].element.ends_mm().1);
         assert_eq!(ends, ([13.37, -7.1, 0.0], [95.123, -30.3, 0.0]));
+    }
+
+    /// Two quarter circles in chords of 1°, which meet in a right angle. A curve is led past it, or ends there, as the
+    /// machine says; where every chord is a corner, there is none.
+    #[test]
+    fn a_curve_ends_at_what_the_machine_calls_a_corner() {
+        let quarter = |centre: [f64; 2]| {
+            (0..=90).map(move |degree: u32| {
+                let (sine, cosine) = libm::sincos(f64::from(degree).to_radians());
+                [centre[0] + 10.0 * sine, centre[1] - 10.0 * cosine]
+            })
+        };
+        let points: Vec<_> = quarter([0.0, 10.0]).chain(quarter([10.0, 20.0]).skip(1)).collect();
+        let moves = path(&points, 0.02, |_| 50.0);
+        let curves = |corner_angle_deg: f64| -> Vec<Vec<StretchBlock>> {
+            let mut machine = Machine::reference();
+            machine.path.corner_angle_rad = corner_angle_deg.to_radians();
+            curved(&moves, &machine).into_iter().map(|timed| timed.blocks).collect()
+        };
+        // The curve stops on it, or a blend rounds it.
+        let is_a_corner = |blocks: &[StretchBlock]| {
+            blocks.iter().any(|block| {
+                let (_, end) = block.element.ends_mm();
+                block.element.kind() == "blend" || norm(subtract(end, [10.0, 10.0, 0.0])) < 1e-9
+            })
+        };
+        let (past, flat, to, none) = (curves(130.0), curves(75.0), curves(45.0), curves(0.5));
+        assert_eq!((past.len(), flat.len(), to.len(), none.len()), (2, 1, 1, 0));
+        assert!(!is_a_corner(&past[0]) && is_a_corner(&to[0]));
+        assert_eq!(kinds(&past[1]), kinds(&to[0]));
+        assert_eq!(kinds(&flat[0]), kinds(&to[0]));
     }
 }
