@@ -11,7 +11,7 @@ use std::error::Error;
 
 use motion_kernel::exec::Executor;
 use motion_kernel::law::{Limits, Pulse};
-use motion_kernel::live::{LiveControl, State};
+use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::queue::{LiveStreams, PathRules};
 use motion_kernel::straight::Straight;
 use motion_kernel::units::Position;
@@ -19,6 +19,8 @@ use motion_kernel::units::Position;
 const TICK_S: f64 = 0.0005;
 /// Ticks between two polls of the background: 5 ms.
 const POLL_TICKS: u32 = 10;
+/// Ramps are changed after the ticks that pass until the poll has ended.
+const LEADS: Leads = Leads { stop_ticks: POLL_TICKS, plan_ticks: POLL_TICKS };
 
 fn main() -> Result<(), Box<dyn Error>> {
     let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 1e4, snap_mm_s4: 1e6 };
@@ -30,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let program = Straight::new(start, end, Pulse::Plateau, limits, [40.0, 50.0], TICK_S)?;
     let mut streams = LiveStreams::<f32, 2, 64, 16>::new();
     let (mut feeder, mut intake) = streams.split(rules, start);
-    let mut control = LiveControl::<f32, 2, _, _, 64>::new(program, Pulse::Plateau, TICK_S, POLL_TICKS);
+    let mut control = LiveControl::<f32, 2, _, _, 64>::new(program, Pulse::Plateau, TICK_S, LEADS);
     let mut executor = Executor::new(start);
 
     let (mut path_mm, mut held_mm, mut greatest_mm_s) = (0.0_f64, None, 0.0_f64);

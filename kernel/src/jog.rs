@@ -15,7 +15,7 @@
 //! use motion_kernel::exec::Executor;
 //! use motion_kernel::jog::{Direction, Jog, JogAxis, Travel, JogTarget};
 //! use motion_kernel::law::{Limits, Pulse};
-//! use motion_kernel::live::{LiveControl, State};
+//! use motion_kernel::live::{Leads, LiveControl, State};
 //! use motion_kernel::queue::{LiveStreams, PathRules};
 //! use motion_kernel::units::Position;
 //!
@@ -31,7 +31,7 @@
 //! let jog = Jog::new(&axis, 0, start, JogTarget::Continuous(Direction::Positive), 20.0, tick_s).unwrap();
 //! let mut streams = LiveStreams::<f32, 2, 32, 16>::new();
 //! let (mut feeder, mut intake) = streams.split(rules, start);
-//! let mut control = LiveControl::<f32, 2, _, _, 64>::new(jog, Pulse::Plateau, tick_s, 0);
+//! let mut control = LiveControl::<f32, 2, _, _, 64>::new(jog, Pulse::Plateau, tick_s, Leads::NONE);
 //! let mut executor = Executor::new(start);
 //! let mut rest = start;
 //! for tick in 0.. {

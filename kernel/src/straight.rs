@@ -178,7 +178,7 @@ mod tests {
     use super::*;
     use crate::exec::Executor;
     use crate::fixture::{LIMITS, RULES};
-    use crate::live::{LiveControl, State};
+    use crate::live::{Leads, LiveControl, State};
     use crate::queue::LiveStreams;
     use crate::random::Random;
 
@@ -212,7 +212,7 @@ mod tests {
             let (mut feeder, mut intake) = streams.split(RULES, start);
             let mut executor = Executor::new(start);
             let mut control =
-                LiveControl::<f64, 3, _, Infallible, 64>::new(straight, Pulse::Plateau, TICK_S, 0);
+                LiveControl::<f64, 3, _, Infallible, 64>::new(straight, Pulse::Plateau, TICK_S, Leads::NONE);
             let (mut ticks, mut place) = (0_u32, start);
             loop {
                 control.poll(&mut feeder).expect("accepted");

@@ -3,7 +3,7 @@
 use motion_kernel::exec::{ExecState, Executed, Executor};
 use motion_kernel::jog::{Direction, Jog, JogAxis, JogError, JogTarget, Travel};
 use motion_kernel::law::{Limits, Pulse};
-use motion_kernel::live::{LiveControl, State};
+use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::queue::{LiveStreams, PathRules};
 use motion_kernel::units::Position;
@@ -100,7 +100,7 @@ fn press<R: Real>(
     let end = jog.end();
     let mut streams = LiveStreams::<R, AXES, 32, 16>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
-    let mut control = LiveControl::<R, AXES, _, _, 64>::new(jog, Pulse::Plateau, machine.tick_s, 0);
+    let mut control = LiveControl::<R, AXES, _, _, 64>::new(jog, Pulse::Plateau, machine.tick_s, Leads::NONE);
     let mut executor = Executor::<R, AXES>::new(start);
     // Feed positions are products with 32 bits of the length that they are parts of.
     let rounding_mm = rounding_mm + 2.0_f64.powi(-32) * (end[axis] - start[axis]).to_mm().abs();

@@ -117,15 +117,20 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         self.report.line(now, &self.board, counts, control)
     }
 
-    /// The second part of a poll, which may take several ticks. Also in a fault: it may end in a stop on the
-    /// path.
-    pub fn plan(&mut self) {
+    /// The second part of a poll, which may take several ticks, unless a hold waits on the `panel`. Also in a fault: it
+    /// may end in a stop on the path.
+    pub fn plan(&mut self, panel: &impl Panel) {
         let Some(run) = &mut self.run else { return };
         if let Some(here) = self.from.take() {
             self.no_way = run.start(here).err();
         }
         run.set(&self.settings);
-        self.refused = run.poll().err();
+        let is_held = matches!(self.phase, Phase::Running { is_held: true, .. });
+        let is_hold_waiting = || {
+            panel.waiting_byte().and_then(Command::of) == Some(Command::Hold)
+                || panel.is_button_down() && !self.button.is_counted()
+        };
+        self.refused = run.poll(&|| !is_held && is_hold_waiting()).err();
     }
 
     /// Notes the duration of a poll, log included, in cycles of the board's counter.
@@ -270,7 +275,7 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
             control.intake = intake;
             control.kernel.enable(self.board.settle_ticks());
         });
-        self.run = Some(Run::new(self.program, feeder, self.board.lead_ticks));
+        self.run = Some(Run::new(self.program, feeder, self.board.leads));
         Some(here)
     }
 
@@ -363,8 +368,11 @@ mod tests {
     }
 
     impl Panel for Hands {
-        fn is_button_down(&mut self) -> bool {
+        fn is_button_down(&self) -> bool {
             (self.down_from..self.down_from + 100).contains(&self.now)
+        }
+        fn waiting_byte(&self) -> Option<u8> {
+            self.byte
         }
         fn next_byte(&mut self) -> Option<u8> {
             self.byte.take()
@@ -437,7 +445,7 @@ mod tests {
             }
             let line = background.poll(now, &mut hands, &mut Exclusive(&mut control));
             lines.extend(line.filter(|line| !is_report(line)).map(|line| (now, line)));
-            background.plan();
+            background.plan(&hands);
         }
         let IdealDrives { is_enabled, switched, .. } = drives;
         SeenOf { lines, position, is_enabled, switched, moved }

@@ -1,5 +1,6 @@
 //! The NUCLEO's board parameters and program, for the tests of this crate.
 
+use motion_kernel::live::Leads;
 use motion_kernel::units::Position;
 
 use crate::parameters::{BoardOutputs, BoardParameters};
@@ -10,7 +11,7 @@ pub(crate) const BOARD: BoardParameters = BoardParameters {
     tick_hz: 2000,
     cycles_hz: 168_000_000,
     counts_per_s_max: 6_000_000,
-    lead_ticks: 8,
+    leads: Leads { stop_ticks: 3, plan_ticks: 8 },
     outputs: BoardOutputs::FixedSpeed,
 };
 

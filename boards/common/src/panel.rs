@@ -2,10 +2,13 @@
 //!
 //! Consumes the level of the button once per poll; produces presses.
 
-/// The board's panel. The background asks it once per poll.
+/// The board's panel. The background asks it once per poll, and between the steps of a plan whether a hold waits.
 pub trait Panel {
     /// Whether the start button is down now. This crate debounces it.
-    fn is_button_down(&mut self) -> bool;
+    fn is_button_down(&self) -> bool;
+
+    /// The byte that [`Panel::next_byte`] would take.
+    fn waiting_byte(&self) -> Option<u8>;
 
     /// The next byte of the console, in order of arrival.
     fn next_byte(&mut self) -> Option<u8>;
@@ -27,6 +30,11 @@ pub(crate) struct Button {
 const PRESS_SAMPLES: u8 = 3;
 
 impl Button {
+    /// Whether a press that still lasts has counted.
+    pub(crate) fn is_counted(&self) -> bool {
+        self.is_counted
+    }
+
     /// Whether it has just been down for `button_ticks` at tick `now`, as seen by the polls. A press counts
     /// once.
     pub(crate) fn is_pressed(&mut self, is_down: bool, now: u32, button_ticks: u32) -> bool {

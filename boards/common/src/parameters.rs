@@ -1,5 +1,7 @@
 //! The figures that differ from board to board.
 
+use motion_kernel::live::Leads;
+
 /// A board's figures; all others follow from them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardParameters {
@@ -9,10 +11,10 @@ pub struct BoardParameters {
     pub cycles_hz: u32,
     /// Count rate that every encoder input passes for certain \[1/s\].
     pub counts_per_s_max: u32,
-    /// How far ahead of the progress last seen the background changes a ramp \[ticks\]: the duration of an
-    /// ordinary poll with a plan. If that was too late, live control tries again, one tick further ahead each
-    /// time, and keeps that lead.
-    pub lead_ticks: u32,
+    /// How far ahead of the progress last seen the background changes a ramp: the duration of an ordinary poll with a
+    /// stop or a plan. If that was too late, live control tries again, one tick further ahead each time, and keeps that
+    /// lead.
+    pub leads: Leads,
     /// What there is for spindle and coolant.
     pub outputs: BoardOutputs,
 }

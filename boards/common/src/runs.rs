@@ -6,7 +6,7 @@
 use core::task::Poll;
 
 use motion_kernel::hal::OutputState;
-use motion_kernel::live::{LiveControl, State};
+use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Item, Items, ProgramError, Reader, Source, SupplyError, Switching};
 use motion_kernel::queue::LiveFeeder;
@@ -48,13 +48,13 @@ pub struct Run<'a, R: Real, const AXES: usize, const PLACES: usize> {
 
 impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACES> {
     /// Begins without a run, with streams that were split where the machine stands, and with changes
-    /// `lead_ticks` ahead.
+    /// `leads` ahead.
     #[must_use]
-    pub fn new(program: Reader<'a, AXES>, feeder: LiveFeeder<'a, R, AXES>, lead_ticks: u32) -> Self {
+    pub fn new(program: Reader<'a, AXES>, feeder: LiveFeeder<'a, R, AXES>, leads: Leads) -> Self {
         let header = program.header();
         let (pulse, tick_s) = (header.pulse, header.tick_s);
         let runs = Switching::new(Runs { program, to_start: None, items: None });
-        Self { feeder, control: LiveControl::new(runs, pulse, tick_s, lead_ticks) }
+        Self { feeder, control: LiveControl::new(runs, pulse, tick_s, leads) }
     }
 
     /// Starts a run on a machine that stands at `here`, where the streams were split or the previous run
@@ -96,13 +96,14 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
         self.control.set_single_block(settings.is_single);
     }
 
-    /// Reads and plans as far as there is room. Ticks come meanwhile: it may take many of them.
+    /// Reads and plans as far as there is room. Ticks come meanwhile: it may take many of them, unless
+    /// `is_stop_asked` says that a hold waits ([`LiveControl::poll_unless`]).
     ///
     /// # Errors
     /// An item can't be executed; every later call returns the same error. The items entered before it end at
     /// rest ([`State::Failed`]).
-    pub fn poll(&mut self) -> Result<(), SupplyError<ProgramError>> {
-        self.control.poll(&mut self.feeder)
+    pub fn poll(&mut self, is_stop_asked: &dyn Fn() -> bool) -> Result<(), SupplyError<ProgramError>> {
+        self.control.poll_unless(is_stop_asked, &mut self.feeder)
     }
 
     /// What the program switches outputs to now, if motion has come to rest for that; from then on it goes on, so the
@@ -161,7 +162,7 @@ mod tests {
         let here = machine.header().start;
         let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
         let (feeder, intake) = streams.split(machine.header().rules, here);
-        let run = Run::new(machine.program, feeder, BOARD.lead_ticks);
+        let run = Run::new(machine.program, feeder, BOARD.leads);
         work(&mut TestBoard { run, intake, executor: Executor::new(here), here, poll_ticks })
     }
 
@@ -173,7 +174,7 @@ mod tests {
             for tick in 0..1_000_000 {
                 command(tick, &mut self.run);
                 if tick % self.poll_ticks == 0 {
-                    self.run.poll().expect("accepted");
+                    self.run.poll(&|| false).expect("accepted");
                     if self.run.state() == State::Waiting {
                         return (tick, self.here);
                     }
@@ -206,13 +207,13 @@ mod tests {
         let program = Reader::new(bytes.leak()).expect("a program");
         let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
         let (feeder, _intake) = streams.split(header.rules, header.start);
-        let mut run = Run::new(program, feeder, BOARD.lead_ticks);
-        run.poll().expect("nothing to do");
+        let mut run = Run::new(program, feeder, BOARD.leads);
+        run.poll(&|| false).expect("nothing to do");
         assert_eq!((run.state(), run.switch()), (State::Waiting, None));
         run.start(header.start).expect("a way");
-        run.poll().expect("accepted");
+        run.poll(&|| false).expect("accepted");
         assert_eq!((run.state(), run.switch()), (State::Running, Some(on)));
-        run.poll().expect("nothing left");
+        run.poll(&|| false).expect("nothing left");
         assert_eq!((run.state(), run.switch()), (State::Waiting, None));
     }
 
@@ -332,7 +333,7 @@ mod tests {
             assert!(holds(board).is_empty());
             board.run.set(&single);
             for _ in 0..3 {
-                board.run.poll().expect("nothing to do");
+                board.run.poll(&|| false).expect("nothing to do");
             }
             let held = holds(board);
             assert_eq!(held.len(), lines.len() + 1, "{held:?}");
@@ -351,13 +352,13 @@ mod tests {
                 let here = direction.map(|part| Position::from_mm(part * mm).expect("in range"));
                 let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
                 let (feeder, mut intake) = streams.split(rules, here);
-                let mut run = Run::new(machine.program, feeder, BOARD.lead_ticks);
+                let mut run = Run::new(machine.program, feeder, BOARD.leads);
                 let mut executor = Executor::new(here);
                 run.start(here).expect("a way");
                 run.control.source_mut().items_mut().items = None;
                 let (mut ticks, mut at) = (0_u32, here);
                 loop {
-                    run.poll().expect("accepted");
+                    run.poll(&|| false).expect("accepted");
                     if run.state() == State::Waiting {
                         break;
                     }

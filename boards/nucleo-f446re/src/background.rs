@@ -25,8 +25,12 @@ pub(crate) struct Panel {
 }
 
 impl motion_board::Panel for Panel {
-    fn is_button_down(&mut self) -> bool {
+    fn is_button_down(&self) -> bool {
         self.button.is_low()
+    }
+
+    fn waiting_byte(&self) -> Option<u8> {
+        self.bytes.peek().copied()
     }
 
     fn next_byte(&mut self) -> Option<u8> {
@@ -54,7 +58,7 @@ pub(crate) fn run(
         if let Some(line) = background.poll(TICKS.load(Ordering::Relaxed), panel, &mut control) {
             log::write(&line);
         }
-        background.plan();
+        background.plan(panel);
         background.note_poll(DWT::cycle_count().wrapping_sub(begin));
     }
 }

@@ -7,6 +7,7 @@
 //! To change the tick, change [`TICK_HZ`]: the rest follows or does not compile.
 
 use motion_board::{BoardOutputs, BoardParameters};
+use motion_kernel::live::Leads;
 
 // --- Clock tree: RM0390 section 6.2, limits DS10693 section 6.3.1 ---------------------------------
 
@@ -125,9 +126,9 @@ pub const POLL_CYCLES_MAX: u32 = 2 * POLL_INSTRUCTIONS_MAX;
 /// The same in ticks, which take their share of the processor: some 33 ms.
 pub const POLL_TICKS_MAX: u32 = (POLL_CYCLES_MAX as u64 * TICK_HZ as u64)
     .div_ceil((SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) as u64) as u32;
-/// How far ahead of the progress last seen the background changes a ramp \[ticks\]: 4 ms, the duration of an
-/// ordinary poll with a plan.
-pub const LEAD_TICKS: u32 = 8;
+/// How far ahead of the progress last seen the background changes a ramp: 1.5 ms for a stop, 4 ms for an ordinary poll
+/// with a plan.
+pub const LEADS: Leads = Leads { stop_ticks: 3, plan_ticks: 8 };
 
 const _: () = assert!(
     3 * POLL_TICKS_MAX < BOARD.silent_ticks_max(),
@@ -159,7 +160,7 @@ pub const BOARD: BoardParameters = BoardParameters {
     tick_hz: TICK_HZ,
     cycles_hz: SYSCLK_HZ,
     counts_per_s_max: ENCODER_COUNTS_PER_S_MAX,
-    lead_ticks: LEAD_TICKS,
+    leads: LEADS,
     // One pin each for spindle and coolant.
     outputs: BoardOutputs::FixedSpeed,
 };

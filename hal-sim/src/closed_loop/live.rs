@@ -5,7 +5,7 @@
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{Ad5754Output, Encoder};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::live::{LiveControl, State};
+use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Items, ProgramError, Reader, SupplyError};
 use motion_kernel::queue::{LiveFeeder, LiveStreams};
@@ -148,7 +148,7 @@ pub fn close<
     };
     let mut kernel = Kernel::new(&axes, header.start, counts);
     kernel.enable(0);
-    let control = LiveControl::new(program.items(), header.pulse, header.tick_s, 0);
+    let control = LiveControl::new(program.items(), header.pulse, header.tick_s, Leads::NONE);
     let commands = Commands { random: SplitMix64::new(seed), polls_left: COMMANDED_POLLS, lost: 0 };
     let producer = LiveProducer { feeder, control, commands };
     Ok((producer, ClosedLoop { kernel, intake: intake.into(), machine, outputs, memory }))

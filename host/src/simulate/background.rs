@@ -5,7 +5,7 @@ use core::convert::Infallible;
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{OutputState, Outputs};
 use motion_kernel::law::Pulse;
-use motion_kernel::live::{LiveControl, State};
+use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::path::Travel;
 use motion_kernel::program::{Item, Supply, SupplyError, Switching};
@@ -77,7 +77,7 @@ impl<'script, R: Real, const N: usize> Storage<'script, R, N> {
             Self::Live(streams, script) => {
                 let (mut feeder, intake) = streams.split(rules, start);
                 feeder.bound(travel);
-                let control = LiveControl::new(items, pulse, tick_s, 0);
+                let control = LiveControl::new(items, pulse, tick_s, Leads::NONE);
                 let live = Live { feeder, control, script, given: 0, is_on_hold: false };
                 (Background::Live(Box::new(live)), intake)
             }

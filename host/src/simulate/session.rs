@@ -12,7 +12,7 @@ use motion_kernel::hal::Encoder;
 use motion_kernel::jog::JogAxis;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::law::Limits;
-use motion_kernel::live::{LiveControl, State};
+use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::Item;
 use motion_kernel::queue::LiveStreams;
@@ -128,8 +128,12 @@ impl<'a, R: Real, const N: usize> Session<'a, R, N> {
         mut after_tick: impl FnMut(&Trace<R, N>, &mut SimulatedHardware<'a, N>, State) -> Result<Then, E>,
     ) -> Result<(), E> {
         let (mut feeder, mut intake) = self.streams.split(self.machine.rules(), self.set);
-        let mut control =
-            LiveControl::<R, N, _, _, PLACES>::new(items, self.machine.path.pulse, self.machine.tick_s, 0);
+        let mut control = LiveControl::<R, N, _, _, PLACES>::new(
+            items,
+            self.machine.path.pulse,
+            self.machine.tick_s,
+            Leads::NONE,
+        );
         loop {
             control.poll(&mut feeder).map_err(|error| SessionError::Run(RunError::Rejected(error)))?;
             let trace = *self.kernel.tick(&mut intake, &mut self.hardware);

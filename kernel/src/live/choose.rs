@@ -23,6 +23,7 @@ use super::replan::{Ramps, Reach, replan};
 use super::splice::{BlockEnd, Extent, Splice};
 use super::timeline::Timeline;
 use crate::law::PlannedRamp;
+use crate::plan::Attention;
 use crate::units::Position;
 
 /// Number of blocks ahead that are tried for a feed to continue with under a lower override.
@@ -65,6 +66,8 @@ pub(super) enum Choice {
 
 /// What a choice depends on.
 pub(super) struct Chooser<'a, const PLACES: usize> {
+    /// Where something more urgent waits, nothing is planned anew; what is chosen then is to be chosen again.
+    pub(super) attention: &'a Attention<'a>,
     pub(super) lookahead: &'a Lookahead<PLACES>,
     pub(super) feed: &'a mut ProgramFeed<PLACES>,
     /// The queued path.
@@ -202,7 +205,7 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         let extent = self.extent_of(from.stretch);
         let reach = if extent.end() > from.at {
             let feed_override = self.mode.feed_override();
-            replan(self.lookahead, &from, feed_override, extent.end(), ramps, self.tick_s, list)
+            replan(self.attention, self.lookahead, &from, feed_override, extent.end(), ramps, list)
         } else {
             // The end of the stretch, or of what is known of it.
             (extent.is_whole() && from.is_at_rest()).then_some(Reach::Whole)
@@ -249,6 +252,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         let mut least_mm_s = from.feed_mm_s;
         for block in lookahead.from(&from).take(BLOCKS_AHEAD) {
             let (cap_mm_s, _) = block.allowed(self.mode.feed_override());
+            if self.attention.is_wanted() {
+                break;
+            }
             if cap_mm_s >= least_mm_s {
                 continue;
             }
@@ -276,6 +282,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         }
         let path_end = self.extent_of(list.start().stretch).end();
         for exit in (1..=list.len().min(LIST_ITEMS - 1)).rev() {
+            if self.attention.is_wanted() {
+                return false;
+            }
             let place = list.after(exit);
             let waits = list.get(exit - 1).is_some_and(|(_, item)| item.is_rest());
             let stop = if !place.is_at_rest() {

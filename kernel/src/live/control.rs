@@ -7,9 +7,10 @@ use super::mode::{Blocks, Mode, Request, Run};
 use super::places::Takeover;
 use super::reader::Reader;
 use super::splice::{BlockEnd, Extent};
-use super::timeline::Timeline;
+use super::timeline::{Leads, Timeline};
 use crate::law::Pulse;
 use crate::num::Real;
+use crate::plan::Attention;
 use crate::program::{Source, SupplyError};
 use crate::queue::{LiveFeeder, Progress};
 use crate::units::Position;
@@ -57,14 +58,11 @@ where
     I: Source<AXES, Error = E>,
 {
     /// Starts at rest with all of `items` still to do, planning anew with ramps of `pulse`s, for ticks of
-    /// `tick_s` and freshly split streams. If
-    /// ticks can interrupt the background, `lead_ticks` is the number that pass during an ordinary poll with
-    /// a plan: a ramp is changed no sooner than that after the progress last seen. Where that was too late,
-    /// the lead grows by a tick, and stays.
-    pub fn new(items: I, pulse: Pulse, tick_s: f64, lead_ticks: u32) -> Self {
+    /// `tick_s` and freshly split streams. Ramps are changed with these `leads`.
+    pub fn new(items: I, pulse: Pulse, tick_s: f64, leads: Leads) -> Self {
         Self {
             reader: Reader::new(items, pulse, tick_s),
-            timeline: Timeline::new(tick_s, lead_ticks),
+            timeline: Timeline::new(tick_s, leads),
             mode: Mode::new(),
             block_end: None,
             error: None,
@@ -155,7 +153,21 @@ where
     /// An item can't be executed. Nothing more is read, every later call returns the same error, and what was
     /// handed over ends at rest. A hold or an abort is still obeyed where possible.
     pub fn poll(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
-        self.advance(feeder).unwrap_or_else(|error| {
+        self.poll_unless(&|| false, feeder)
+    }
+
+    /// [`LiveControl::poll`], which is cut short where `is_stop_asked` says that a hold or an abort waits to be told, or
+    /// where a fault asks for a stop: a plan under way is given up, and the rest of the poll is left to the next one.
+    /// Motion is as before then. `is_stop_asked` is called often, so it should only look.
+    ///
+    /// # Errors
+    /// As [`LiveControl::poll`].
+    pub fn poll_unless(
+        &mut self,
+        is_stop_asked: &dyn Fn() -> bool,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        self.advance(is_stop_asked, feeder).unwrap_or_else(|error| {
             self.error.get_or_insert(error);
         });
         match &self.error {
@@ -164,31 +176,35 @@ where
         }
     }
 
-    fn advance(&mut self, feeder: &mut LiveFeeder<'_, R, AXES>) -> Result<(), SupplyError<E>> {
+    fn advance(
+        &mut self,
+        is_stop_asked: &dyn Fn() -> bool,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
         if feeder.is_stop_wanted() {
             self.mode.hold();
         }
         if feeder.is_refused() {
             // The tick had passed the place: try again, further ahead.
-            self.timeline.lead_more();
-            self.mode.renew(self.timeline.request_of_next());
+            let request = self.timeline.request_of_next();
+            self.timeline.lead_more(request);
+            self.mode.renew(request);
             self.timeline.take_back_next(self.reader.feed_mut(), feeder);
         }
         let progress = self.timeline.follow(self.reader.feed_mut(), feeder);
         self.note_rest(feeder);
         self.reader.pass(&self.timeline.list().after(progress.done as usize), feeder);
+        // A stop needs nothing that could still be read.
+        let is_stop = self.mode.request() == Some(Request::Stop);
+        if is_stop {
+            self.obey_request(is_stop_asked, feeder)?;
+        }
         let read = match self.error {
-            None => self.reader.read(self.mode.run() == Run::Abort, feeder),
+            None => self.reader.read(self.mode.run() == Run::Abort, is_stop_asked, feeder),
             Some(_) => Ok(()),
         };
-        if let Some(request) = self.mode.request()
-            && feeder.has_free_list()
-        {
-            let progress = self.timeline.take_back_next(self.reader.feed_mut(), feeder);
-            // The list taken back may have been the last free one.
-            if feeder.has_free_list() {
-                self.obey(request, &progress, feeder)?;
-            }
+        if !is_stop {
+            self.obey_request(is_stop_asked, feeder)?;
         }
         read?;
         self.note_starvation(feeder);
@@ -199,7 +215,25 @@ where
             && feeder.has_free_list()
             && !self.waits_at_block_end(feeder)
         {
-            self.choose(None, feeder)?;
+            self.choose(None, is_stop_asked, feeder)?;
+        }
+        Ok(())
+    }
+
+    /// Obeys the request that there is, if there is a list for it.
+    fn obey_request(
+        &mut self,
+        is_stop_asked: &dyn Fn() -> bool,
+        feeder: &mut LiveFeeder<'_, R, AXES>,
+    ) -> Result<(), SupplyError<E>> {
+        if let Some(request) = self.mode.request()
+            && feeder.has_free_list()
+        {
+            let progress = self.timeline.take_back_next(self.reader.feed_mut(), feeder);
+            // The list taken back may have been the last free one.
+            if feeder.has_free_list() {
+                self.obey(request, &progress, is_stop_asked, feeder)?;
+            }
         }
         Ok(())
     }
@@ -209,26 +243,32 @@ where
         &mut self,
         request: Request,
         progress: &Progress,
+        is_stop_asked: &dyn Fn() -> bool,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
-        let obeyed = self.choose(Some((request, progress)), feeder);
-        // What can't be done now can't be done in the next poll either; motion ends at rest anyway.
-        self.mode.clear_request();
-        obeyed?;
+        if !self.choose(Some((request, progress)), is_stop_asked, feeder)? {
+            return Ok(());
+        }
         self.timeline.set_request_of_next(request);
         Ok(())
     }
 
     /// Chooses a list and acts on the choice: for a request with motion at that progress, or else to follow
-    /// the list under way.
+    /// the list under way. False if that was given up for something more urgent; a request stays then.
     fn choose(
         &mut self,
         request: Option<(Request, &Progress)>,
+        is_stop_asked: &dyn Fn() -> bool,
         feeder: &mut LiveFeeder<'_, R, AXES>,
-    ) -> Result<(), SupplyError<E>> {
+    ) -> Result<bool, SupplyError<E>> {
         let (path, is_full) = (self.reader.path(), self.reader.is_full());
         let (lookahead, feed) = self.reader.ahead();
+        // Nothing is more urgent than a stop.
+        let is_stop = matches!(request, Some((Request::Stop, _)));
+        let is_wanted = || !is_stop && (is_stop_asked() || feeder.is_stop_wanted());
+        let attention = Attention::new(&is_wanted);
         let mut chooser = Chooser {
+            attention: &attention,
             lookahead,
             feed,
             path,
@@ -243,15 +283,24 @@ where
             Some((request, progress)) => chooser.obey(request, progress, &mut list),
             None => chooser.next(&mut list),
         };
+        if attention.is_wanted() {
+            chooser.feed.roll_back();
+            return Ok(false);
+        }
         self.block_end = chooser.block_end;
-        self.act(choice, list, feeder)
+        if request.is_some() {
+            // What can't be done now can't be done in the next poll either; motion ends at rest anyway.
+            self.mode.clear_request();
+        }
+        self.act(choice, &mut list, feeder)?;
+        Ok(true)
     }
 
     /// Acts on a choice: hands the list over and moves the program's feed accordingly.
     fn act(
         &mut self,
         choice: Choice,
-        mut list: List,
+        list: &mut List,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
         let Self { reader, timeline, .. } = self;

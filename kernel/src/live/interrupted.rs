@@ -3,7 +3,7 @@
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
 
-use super::{LiveControl, State};
+use super::{Leads, LiveControl, State};
 use crate::exec::{ExecState, Executor};
 use crate::law::{Law, Limits, PathMotion, Pulse};
 use crate::plan::{Block, BlockPlan, plan, ramps};
@@ -122,7 +122,7 @@ impl TestMachine<'_> {
 /// A refused or late word costs time, but never breaks a limit: a list is legal whenever the tick finds it.
 #[test]
 fn ticks_between_any_two_operations_of_a_poll() {
-    let (mut ticks, mut inside, mut starvations, mut commands) = (0, 0_u64, 0, 0_u64);
+    let (mut ticks, mut inside, mut starvations, mut commands, mut asked) = (0, 0_u64, 0, 0_u64, 0_u64);
     for seed in 0..150 {
         println!("seed {seed}");
         let random = Random::new(seed);
@@ -156,16 +156,23 @@ fn ticks_between_any_two_operations_of_a_poll() {
             }
         };
         feeder.between = Some(&between);
-        let lead_ticks = (random.unit() * 6.0) as u32;
+        let leads =
+            Leads { stop_ticks: (random.unit() * 3.0) as u32, plan_ticks: (random.unit() * 6.0) as u32 };
+        // Asked for between the steps of plans, and then given or not.
+        let (asks, is_asked) = (random.log(1e-6, 1e-2), Cell::new(false));
         let items = items.into_iter().map(Ok);
-        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items, pulse, TICK_S, lead_ticks);
+        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(items, pulse, TICK_S, leads);
         loop {
             let ticks = machine.borrow().ticks;
             assert!(ticks < 400_000, "seed {seed}: no end, {:?}", control.state(&feeder));
             // In the end every command is withdrawn.
+            let was_asked = is_asked.replace(false);
             if ticks > 60_000 {
                 control.resume();
                 control.set_override(1.0).expect("in range");
+            } else if was_asked && random.chance(0.5) {
+                asked += 1;
+                control.hold();
             } else if random.chance(often) {
                 commands += 1;
                 match (random.unit() * 4.0) as usize {
@@ -175,7 +182,13 @@ fn ticks_between_any_two_operations_of_a_poll() {
                     _ => control.set_override(random.log(0.05, 2.0)).expect("in range"),
                 }
             }
-            control.poll(&mut feeder).unwrap_or_else(|error| panic!("seed {seed}: {error:?}"));
+            let is_stop_asked = || {
+                is_asked.set(is_asked.get() || ticks <= 60_000 && random.chance(asks));
+                is_asked.get()
+            };
+            control
+                .poll_unless(&is_stop_asked, &mut feeder)
+                .unwrap_or_else(|error| panic!("seed {seed}: {error:?}"));
             machine.borrow_mut().tick();
             if control.state(&feeder) == State::Done {
                 break;
@@ -189,7 +202,8 @@ fn ticks_between_any_two_operations_of_a_poll() {
         starvations += control.starvations();
     }
     println!(
-        "{ticks} ticks, {inside} of them in a poll; {commands} commands, {starvations} stops for want of data"
+        "{ticks} ticks, {inside} of them in a poll; {commands} commands, {asked} holds asked for in a plan, {starvations} \
+         stops for want of data"
     );
-    assert!(inside > 10_000 && commands > 5_000, "{inside} {commands}");
+    assert!(inside > 10_000 && commands > 5_000 && asked > 500, "{inside} {commands} {asked}");
 }

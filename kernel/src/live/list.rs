@@ -235,6 +235,11 @@ impl List {
         (self.start, self.exit, self.ends_block) = (start, 0, false);
     }
 
+    /// The control tick that it is for \[s\].
+    pub(super) fn tick_s(&self) -> f64 {
+        self.tick_s
+    }
+
     /// Where it begins.
     pub(super) fn start(&self) -> &Splice {
         &self.start

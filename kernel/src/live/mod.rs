@@ -41,7 +41,7 @@
 //! ```
 //! use motion_kernel::exec::Executor;
 //! use motion_kernel::law::{Limits, Pulse};
-//! use motion_kernel::live::{LiveControl, State};
+//! use motion_kernel::live::{Leads, LiveControl, State};
 //! use motion_kernel::queue::{LiveStreams, PathRules};
 //! use motion_kernel::straight::Straight;
 //! use motion_kernel::units::Position;
@@ -52,7 +52,7 @@
 //! let program = Straight::new(start, end, Pulse::Plateau, limits, [40.0, 50.0], 0.0005).expect("a motion");
 //! let mut streams = LiveStreams::<f32, 1, 64, 16>::new();
 //! let (mut feeder, mut intake) = streams.split(rules, start);
-//! let mut control = LiveControl::<f32, 1, _, _, 64>::new(program, Pulse::Plateau, 0.0005, 1);
+//! let mut control = LiveControl::<f32, 1, _, _, 64>::new(program, Pulse::Plateau, 0.0005, Leads::NONE);
 //! let mut executor = Executor::new(start);
 //! for tick in 0..2000 {
 //!     if tick == 1000 {
@@ -87,3 +87,4 @@ mod timeline;
 pub use crate::program::Source;
 pub use control::{LiveControl, State};
 pub use mode::{OVERRIDE_MAX, OVERRIDE_MIN};
+pub use timeline::Leads;

@@ -131,10 +131,12 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
         self.lookahead.pass(place, feeder.path_queued());
     }
 
-    /// Reads items while there is room; if the program is aborted, only the pending one is entered.
+    /// Reads items while there is room and no stop is asked for; if the program is aborted, only the pending one is
+    /// entered.
     pub(super) fn read(
         &mut self,
         is_given_up: bool,
+        is_stop_asked: &dyn Fn() -> bool,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<I::Error>> {
         loop {
@@ -144,7 +146,7 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
             }
             self.pending = None;
             self.is_full = !self.feed.has_room() || self.lookahead.is_full();
-            if self.is_full || is_given_up || self.answer == Answer::End {
+            if self.is_full || is_given_up || self.answer == Answer::End || is_stop_asked() {
                 return Ok(());
             }
             let polled = self.source.poll_next();

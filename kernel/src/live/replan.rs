@@ -11,7 +11,9 @@ use super::list::{Item, List};
 use super::lookahead::Lookahead;
 use super::splice::{SLIVER, Splice};
 use crate::law::{Law, Limits};
-use crate::plan::{Block, BlockPlan, Effort, Memory, Node, Path, PlanError, nodes_for, plan_ramps};
+use crate::plan::{
+    Attention, Block, BlockPlan, Effort, Memory, Node, Path, PlanError, nodes_for, plan_ramps_unless,
+};
 use crate::units::Position;
 
 /// Number of blocks that ramps may span: a list seldom reaches farther, and the planner's memory grows with
@@ -51,14 +53,14 @@ impl Reach {
 }
 
 /// Appends a plan from `from` to rest at `end` to `list`, as many items as it has room for. `None` if there
-/// is no plan: the feed is above the ceiling, or the path is too short to brake.
+/// is no plan: the feed is above the ceiling, the path is too short to brake, or something more urgent waits.
 pub(super) fn replan<const BLOCKS: usize>(
+    attention: &Attention<'_>,
     lookahead: &Lookahead<BLOCKS>,
     from: &Splice,
     feed_override: f64,
     end: Position,
     ramps: Ramps,
-    tick_s: f64,
     list: &mut List,
 ) -> Option<Reach> {
     let heads = list.len();
@@ -66,12 +68,12 @@ pub(super) fn replan<const BLOCKS: usize>(
     // equal ones merged only.
     for alike in [ALIKE, 0.0] {
         let mut blocks = Blocks::<BLOCKS>::new(lookahead, from, feed_override, end, alike)?;
-        let planned = blocks.plan(from, ramps, tick_s, list);
+        let planned = blocks.plan(attention, from, ramps, list);
         if planned.is_some() {
             return planned;
         }
         list.truncate(heads);
-        if !blocks.are_softer {
+        if !blocks.are_softer || attention.is_wanted() {
             break;
         }
     }
@@ -135,17 +137,23 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
     /// See [`replan`].
     // In its own stack frame: the planner's memory takes kilobytes.
     #[inline(never)]
-    fn plan(&mut self, from: &Splice, ramps: Ramps, tick_s: f64, list: &mut List) -> Option<Reach> {
+    fn plan(
+        &mut self,
+        attention: &Attention<'_>,
+        from: &Splice,
+        ramps: Ramps,
+        list: &mut List,
+    ) -> Option<Reach> {
         let mut plans: Vec<BlockPlan<f64>, BLOCKS> = Vec::new();
         plans.resize(self.blocks.len(), BlockPlan::default()).ok()?;
         let mut nodes = [Node::EMPTY; nodes_for(SPANNED)];
-        let heads = list.len();
+        let (heads, tick_s) = (list.len(), list.tick_s());
         let ends = &mut self.ends;
         let mut plan = |blocks: &mut [Block<f64>], effort| {
             let path =
                 Path { blocks, ends: &mut *ends, start: from.at, feeds_mm_s: [from.feed_mm_s, 0.0], tick_s };
             let memory = Memory { plans: &mut plans, nodes: &mut nodes };
-            plan_ramps(path, effort, memory, &mut |index, ramp| {
+            plan_ramps_unless(attention, path, effort, memory, &mut |index, ramp| {
                 list.truncate(heads + index);
                 let has_room = !list.is_full();
                 if has_room {
@@ -160,7 +168,7 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
         };
         match plan(&mut self.blocks, effort) {
             Ok(planned) => Some(Reach::of(planned.is_whole)),
-            Err(PlanError::Ramp { .. }) => None,
+            Err(PlanError::Ramp { .. } | PlanError::GivenUp) => None,
             Err(_) => {
                 // If it must brake immediately, the feed may be too high for the length by a rounding error.
                 self.blocks.first_mut()?.length_mm += LENGTH_ROUNDING_MM;

@@ -20,6 +20,25 @@ use crate::units::Position;
 /// A ramp is cut at most this many ticks after the progress last seen.
 const LEAD_TICKS_MAX: u64 = 64;
 
+/// How far ahead of the progress last seen a ramp is changed \[ticks\]: as many as pass during an ordinary poll of this
+/// kind, if ticks can interrupt the background. Where that was too late, the lead grows by a tick, and stays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Leads {
+    /// For a stop, which takes a few ramps.
+    pub stop_ticks: u32,
+    /// For everything else, which is planned.
+    pub plan_ticks: u32,
+}
+
+impl Leads {
+    /// For ticks that never interrupt the background.
+    pub const NONE: Self = Self { stop_ticks: 0, plan_ticks: 0 };
+}
+
+fn ticks(count: u32) -> Ticks {
+    Ticks::from_bits(u64::from(count) << 32)
+}
+
 /// A list that the tick has or will have.
 #[derive(Debug)]
 struct Handed {
@@ -49,15 +68,16 @@ pub(super) struct Timeline {
     splice: Splice,
     /// The override of the motion that was handed over last.
     driven_override: f64,
-    /// How long after the progress last seen a ramp is cut.
-    lead: Ticks,
+    /// How long after the progress last seen a ramp is cut: for a stop, and for everything else.
+    stop_lead: Ticks,
+    plan_lead: Ticks,
     /// Where motion was last held, or last waited at the end of a block.
     waited_at: Option<Splice>,
 }
 
 impl Timeline {
     /// At rest before all motion, in the list that the streams begin with.
-    pub(super) fn new(tick_s: f64, lead_ticks: u32) -> Self {
+    pub(super) fn new(tick_s: f64, leads: Leads) -> Self {
         let splice = Splice { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
         Self {
             tick_s,
@@ -65,7 +85,8 @@ impl Timeline {
             next: None,
             splice,
             driven_override: 1.0,
-            lead: Ticks::from_bits(u64::from(lead_ticks) << 32),
+            stop_lead: ticks(leads.stop_ticks),
+            plan_lead: ticks(leads.plan_ticks),
             waited_at: None,
         }
     }
@@ -75,7 +96,7 @@ impl Timeline {
     pub(super) fn driving(list: List, tick_s: f64) -> Self {
         let splice = list.exit_splice();
         let under_way = Handed { id: 0, list, before: Density::NONE };
-        Self { under_way, splice, ..Self::new(tick_s, 0) }
+        Self { under_way, splice, ..Self::new(tick_s, Leads::NONE) }
     }
 
     /// The list under way.
@@ -109,9 +130,13 @@ impl Timeline {
         }
     }
 
-    /// The places where the list under way may be left, with motion at `progress`.
-    pub(super) fn places(&self, progress: &Progress) -> Places<'_> {
-        Places::new(&self.under_way.list, progress, self.lead, self.tick_s)
+    /// The places where the list under way may be left for `request`, with motion at `progress`.
+    pub(super) fn places(&self, request: Request, progress: &Progress) -> Places<'_> {
+        let lead = match request {
+            Request::Stop => self.stop_lead,
+            Request::Override => self.plan_lead,
+        };
+        Places::new(&self.under_way.list, progress, lead, self.tick_s)
     }
 
     /// Whether everything handed over has been driven.
@@ -174,10 +199,14 @@ impl Timeline {
         progress
     }
 
-    /// The tick had passed the place of a change: increases the lead for the next one.
-    pub(super) fn lead_more(&mut self) {
-        if self.lead.to_bits() < LEAD_TICKS_MAX << 32 {
-            self.lead = self.lead.plus(Ticks::ONE);
+    /// The tick had passed the place of a change that was made for `request`: increases the lead for the next one.
+    pub(super) fn lead_more(&mut self, request: Option<Request>) {
+        let lead = match request {
+            Some(Request::Stop) => &mut self.stop_lead,
+            Some(Request::Override) | None => &mut self.plan_lead,
+        };
+        if lead.to_bits() < LEAD_TICKS_MAX << 32 {
+            *lead = lead.plus(Ticks::ONE);
         }
     }
 
@@ -223,7 +252,7 @@ impl Timeline {
     /// be a free feed list. The next list begins at its exit.
     pub(super) fn hand_over<R: Real, E, const AXES: usize, const PLACES: usize>(
         &mut self,
-        list: List,
+        list: &List,
         takeover: Takeover,
         feed_override: f64,
         lookahead: &Lookahead<PLACES>,
@@ -239,7 +268,7 @@ impl Timeline {
             within: matches!(takeover, Takeover::Within(_)),
         };
         let is_asked = self
-            .fill(&list, id, lookahead, feeder)
+            .fill(list, id, lookahead, feeder)
             .and_then(|()| feeder.change(change).map_err(SupplyError::Rejected));
         if let Err(error) = is_asked {
             feeder.give_up(id);
@@ -247,7 +276,7 @@ impl Timeline {
         }
         self.splice = list.exit_splice();
         let before_override = core::mem::replace(&mut self.driven_override, feed_override);
-        let handed = Handed { id, list, before };
+        let handed = Handed { id, list: list.clone(), before };
         self.next = Some(Next { handed, request: None, before_override });
         Ok(())
     }

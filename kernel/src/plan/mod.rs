@@ -10,7 +10,8 @@
 //! - `two_pass`: stages 1 and 2 over the stretch: the feeds that can be reached, and from which it can brake;
 //! - `ramps`: the pair of ramps of a planned block over exact path positions;
 //! - `spanning`: ramps that begin and end between junctions and may span many blocks;
-//! - `planner`: the entry for all callers: the faster of the two, in the caller's memory.
+//! - `planner`: the entry for all callers: the faster of the two, in the caller's memory;
+//! - `attention`: what long plans are given up for.
 //!
 //! ```
 //! use motion_kernel::plan::{Junction, junction};
@@ -23,6 +24,7 @@
 //! assert_eq!(junction(&Junction { angle_rad: 0.03, ..corner }, 0.02, 200.0, 0.0005), 0.0);
 //! ```
 
+mod attention;
 mod ceiling;
 mod junction;
 mod planner;
@@ -30,12 +32,13 @@ mod ramps;
 mod spanning;
 pub(crate) mod two_pass;
 
+pub use attention::Attention;
 pub use ceiling::{
     AxisLimits, BLEND_FEED_SHARE, Bend, CURVE_FEED_SHARE, CURVE_FEED_SHARE_MAX, Ceiling, MachineLimits,
     Reason,
 };
 pub use junction::{Junction, junction};
-pub use planner::{Effort, Memory, Path, Planned, plan_ramps};
+pub use planner::{Effort, Memory, Path, Planned, plan_ramps, plan_ramps_unless};
 pub use ramps::ramps;
 pub use spanning::{Node, nodes_for, plan_spanning};
 pub use two_pass::{Block, BlockPlan, PlanError, plan};

@@ -5,9 +5,10 @@
 //! legal; which one is faster depends on how often the ceilings change. If no spanning plan is found, the
 //! pairs are the fallback.
 
+use super::attention::Attention;
 use super::ramps::ramps;
-use super::spanning::{Node, plan_spanning};
-use super::two_pass::{Block, BlockPlan, PlanError, check, merge_each, plan};
+use super::spanning::{Node, plan_spanning_unless};
+use super::two_pass::{Block, BlockPlan, PlanError, check, merge_each, plan_unless};
 use crate::law::{PlannedRamp, Ramp, SegmentError};
 use crate::units::Position;
 
@@ -77,6 +78,20 @@ pub fn plan_ramps(
     memory: Memory<'_>,
     put: &mut impl FnMut(usize, PlannedRamp) -> bool,
 ) -> Result<Planned, PlanError> {
+    plan_ramps_unless(&Attention::undivided(), path, effort, memory, put)
+}
+
+/// [`plan_ramps`], given up where something more urgent waits.
+///
+/// # Errors
+/// As [`plan_ramps`], and [`PlanError::GivenUp`].
+pub fn plan_ramps_unless(
+    attention: &Attention<'_>,
+    path: Path<'_>,
+    effort: Effort,
+    memory: Memory<'_>,
+    put: &mut impl FnMut(usize, PlannedRamp) -> bool,
+) -> Result<Planned, PlanError> {
     let Path { blocks, ends, start, feeds_mm_s: [start_mm_s, end_mm_s], tick_s } = path;
     let Memory { plans, nodes } = memory;
     let most = match effort {
@@ -88,7 +103,8 @@ pub fn plan_ramps(
     let mut spanning = None;
     // Merging rounds the blocks' lengths: if all blocks may be spanned, span them before merging.
     if spans_all {
-        spanning = span(Stretch { blocks, ends, start, tick_s }, [start_mm_s, end_mm_s], nodes, put)?;
+        spanning =
+            span(attention, Stretch { blocks, ends, start, tick_s }, [start_mm_s, end_mm_s], nodes, put)?;
     }
     let mut count = blocks.len();
     if matches!(effort, Effort::Merged | Effort::Spanning) {
@@ -104,7 +120,7 @@ pub fn plan_ramps(
     let places = plans.len();
     let plans = plans.get_mut(..count).ok_or(PlanError::Room { of: "plans", needed: count, places })?;
     let all = Stretch { blocks, ends, start, tick_s }.first(count);
-    match (plan(all.blocks, start_mm_s, end_mm_s, plans), spanning) {
+    match (plan_unless(attention, all.blocks, start_mm_s, end_mm_s, plans), spanning) {
         (Ok(()), _) => {}
         // Ramps over several blocks reach feeds at the ends that pairs don't.
         (Err(PlanError::TooShortToBrake { .. } | PlanError::TooShortToAccelerate { .. }), Some(found)) => {
@@ -114,16 +130,19 @@ pub fn plan_ramps(
     }
     let compared = if spans_all { count } else { most };
     if let (false, Some(BlockPlan { exit_mm_s, .. })) = (spans_all, plans.get(..most).and_then(<[_]>::last)) {
-        spanning = span(all.first(most), [start_mm_s, *exit_mm_s], nodes, put)?;
+        spanning = span(attention, all.first(most), [start_mm_s, *exit_mm_s], nodes, put)?;
     }
     if let Some(found) = spanning {
-        let by_pairs = pairs(all.first(compared), plans, &mut |_, _| true);
+        let by_pairs = pairs(attention, all.first(compared), plans, &mut |_, _| true);
+        if by_pairs == Err(PlanError::GivenUp) {
+            return by_pairs;
+        }
         if by_pairs.is_err() || by_pairs.is_ok_and(|by_pairs| found.time_s < by_pairs.time_s * (1.0 - EQUAL))
         {
             return Ok(Planned { is_whole: found.is_whole && spans_all, ..found });
         }
     }
-    pairs(all, plans, put)
+    pairs(attention, all, plans, put)
 }
 
 /// Blocks with their exact ends.
@@ -163,12 +182,16 @@ impl<'a, F: FnMut(usize, PlannedRamp) -> bool> Out<'a, F> {
 
 /// Puts one pair of ramps per block, according to `plans`.
 fn pairs(
+    attention: &Attention<'_>,
     stretch: Stretch<'_>,
     plans: &[BlockPlan<f64>],
     put: &mut impl FnMut(usize, PlannedRamp) -> bool,
 ) -> Result<Planned, PlanError> {
     let (mut out, mut start) = (Out::new(put), stretch.start);
     for ((block, plan), &end) in stretch.blocks.iter().zip(plans).zip(stretch.ends) {
+        if attention.is_wanted() {
+            return Err(PlanError::GivenUp);
+        }
         let made = ramps(block, plan, start, end, stretch.tick_s);
         for ramp in made.map_err(|error| PlanError::Ramp { start, error })?.into_iter().flatten() {
             out.put(ramp);
@@ -185,6 +208,7 @@ fn pairs(
 // In its own stack frame: its working memory takes many kilobytes.
 #[inline(never)]
 fn span(
+    attention: &Attention<'_>,
     stretch: Stretch<'_>,
     [start_mm_s, end_mm_s]: [f64; 2],
     nodes: &mut [Node],
@@ -206,9 +230,11 @@ fn span(
             start = end;
         }
     };
-    let found = plan_spanning(stretch.blocks, start_mm_s, end_mm_s, nodes, &mut |start_mm, ramp| {
+    let mut start_at = |start_mm: f64, ramp: &Ramp<f64>| {
         end_at(Position::from_mm(start_mm).map(|length| stretch.start + length), Some(*ramp));
-    })?;
+    };
+    let found =
+        plan_spanning_unless(attention, stretch.blocks, [start_mm_s, end_mm_s], nodes, &mut start_at)?;
     end_at(stretch.ends.last().copied(), None);
     Ok(found.filter(|_| is_made).map(|_| out.planned))
 }

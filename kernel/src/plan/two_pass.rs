@@ -8,6 +8,7 @@
 //! has every junction feed at least as high and one higher. It is *not* always the fastest, because a ramp's
 //! length is not monotone in its lower feed.
 
+use super::attention::Attention;
 use super::ceiling::Reason;
 use crate::law::{Law, SegmentError, peak, reach};
 use crate::num::Root;
@@ -108,6 +109,8 @@ pub enum PlanError {
         /// Number there.
         places: usize,
     },
+    /// It was given up for something more urgent.
+    GivenUp,
 }
 
 impl core::fmt::Display for PlanError {
@@ -135,6 +138,7 @@ impl core::fmt::Display for PlanError {
             }
             Self::Ramp { start, error } => write!(f, "block from {} mm: {error}", start.to_mm()),
             Self::Room { of, needed, places } => write!(f, "room for {places} {of}, expected {needed}"),
+            Self::GivenUp => f.write_str("given up for something more urgent"),
         }
     }
 }
@@ -152,13 +156,25 @@ pub fn plan<R: Root>(
     end_mm_s: R,
     plans: &mut [BlockPlan<R>],
 ) -> Result<(), PlanError> {
+    plan_unless(&Attention::undivided(), blocks, start_mm_s, end_mm_s, plans)
+}
+
+/// [`plan`], given up where something more urgent waits.
+pub(super) fn plan_unless<R: Root>(
+    attention: &Attention<'_>,
+    blocks: &[Block<R>],
+    start_mm_s: R,
+    end_mm_s: R,
+    plans: &mut [BlockPlan<R>],
+) -> Result<(), PlanError> {
     if blocks.len() != plans.len() {
         return Err(PlanError::Room { of: "plans", needed: blocks.len(), places: plans.len() });
     }
     check(blocks, start_mm_s, end_mm_s)?;
-    forward(blocks, start_mm_s, end_mm_s, plans)?;
-    backward(blocks, start_mm_s, plans)?;
+    forward(attention, blocks, [start_mm_s, end_mm_s], plans)?;
+    backward(attention, blocks, start_mm_s, plans)?;
     for (block, plan) in blocks.iter().zip(plans) {
+        go_on(attention)?;
         // The junctions' feeds are below the ceiling already. Most often there is room to reach the ceiling,
         // or the block is passed at it; checking that is cheaper than solving.
         let (enter, exit, cap) = (plan.enter_mm_s, plan.exit_mm_s, block.cap_mm_s);
@@ -204,16 +220,21 @@ pub(super) fn check<R: Root>(blocks: &[Block<R>], start: R, end: R) -> Result<()
     Ok(())
 }
 
+fn go_on(attention: &Attention<'_>) -> Result<(), PlanError> {
+    if attention.is_wanted() { Err(PlanError::GivenUp) } else { Ok(()) }
+}
+
 fn forward<R: Root>(
+    attention: &Attention<'_>,
     blocks: &[Block<R>],
-    start: R,
-    end: R,
+    [start, end]: [R; 2],
     plans: &mut [BlockPlan<R>],
 ) -> Result<(), PlanError> {
     let mut feed = start;
     let mut rest = blocks;
     for plan in plans {
         let [block, after @ ..] = rest else { break };
+        go_on(attention)?;
         let allowed = match after.first() {
             Some(_) if block.junction_mm_s.to_f64() < R::FEEDS_MM_S.0 => R::ZERO,
             Some(next) => block.cap_mm_s.min(block.junction_mm_s).min(next.cap_mm_s),
@@ -238,12 +259,18 @@ fn forward<R: Root>(
     Ok(())
 }
 
-fn backward<R: Root>(blocks: &[Block<R>], start: R, plans: &mut [BlockPlan<R>]) -> Result<(), PlanError> {
+fn backward<R: Root>(
+    attention: &Attention<'_>,
+    blocks: &[Block<R>],
+    start: R,
+    plans: &mut [BlockPlan<R>],
+) -> Result<(), PlanError> {
     let mut exit = match plans.last() {
         Some(last) => last.exit_mm_s,
         None => return Ok(()),
     };
     for (block, plan) in blocks.iter().zip(plans.iter_mut()).rev() {
+        go_on(attention)?;
         plan.exit_mm_s = exit;
         if plan.enter_mm_s > exit && block.law.ramp_length_mm(exit, plan.enter_mm_s) > block.length_mm {
             // Never above what the forward stage allowed, whatever the rounding.

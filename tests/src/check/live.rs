@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Plan};
 use motion_kernel::exec::{ExecState, Executed, Executor};
-use motion_kernel::live::{LiveControl, Source, State};
+use motion_kernel::live::{Leads, LiveControl, Source, State};
 use motion_kernel::queue::LiveStreams;
 use motion_kernel::units::Position;
 
@@ -109,7 +109,8 @@ where
     let mut streams = LiveStreams::<R, 3, PIECES, SEGMENTS>::new();
     let (mut feeder, mut intake) = streams.split(machine.rules(), start);
     let mut executor = Executor::<R, 3>::new(start);
-    let mut control = LiveControl::<R, 3, _, _, PLACES>::new(source, machine.path.pulse, machine.tick_s, 0);
+    let mut control =
+        LiveControl::<R, 3, _, _, PLACES>::new(source, machine.path.pulse, machine.tick_s, Leads::NONE);
     let mut checker = Checker::new::<R>(machine, plan, path, seed).live(1.0);
     let mut greatest = Greatest { ticks: response_ticks, falling: VecDeque::new() };
     let (mut ticks, mut polls, mut stretches, mut feed_override) = (0_u64, 0_u64, 0_usize, 1.0);

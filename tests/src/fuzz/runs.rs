@@ -8,7 +8,7 @@ use arbitrary::{Result, Unstructured};
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{FaultKind, Reaction};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::live::{LiveControl, Source, State};
+use motion_kernel::live::{Leads, LiveControl, Source, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Item, Supply};
 use motion_kernel::queue::{Intake, LiveStreams, Streams};
@@ -228,8 +228,8 @@ pub(super) fn under_live_control<R: Real>(laws: Laws, input: &mut Unstructured<'
     let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO; 2]);
     let there = Cell::new(0);
     let source = Arriving { items: program.items.iter(), there: &there };
-    let mut control =
-        LiveControl::<R, 2, _, _, PLACES>::new(source, laws.live, TICK_S, input.int_in_range(0..=3)?);
+    let leads = Leads { stop_ticks: input.int_in_range(0..=3)?, plan_ticks: input.int_in_range(0..=3)? };
+    let mut control = LiveControl::<R, 2, _, _, PLACES>::new(source, laws.live, TICK_S, leads);
     let mut machine = Machine::<R>::new();
     let (mut is_polled, mut is_aborted) = (true, false);
     while !input.is_empty() {

@@ -7,7 +7,7 @@ use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Reaction;
 use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
-use motion_kernel::live::{LiveControl, State};
+use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::path::Piece;
 use motion_kernel::queue::{LiveStreams, Streams};
@@ -91,7 +91,7 @@ pub(crate) fn run<R: Real>(plan: &Plan, machine: &Machine, between: &mut Between
         executable.supplied(),
         machine.path.pulse,
         executable.tick_s,
-        0,
+        Leads::NONE,
     );
     let mut last: Option<TickView<R>> = None;
     let mut standing = 0;

@@ -5,7 +5,7 @@ use std::convert::Infallible;
 
 use motion_kernel::exec::Executor;
 use motion_kernel::law::{Law, PlannedRamp, Pulse, Ramp};
-use motion_kernel::live::{LiveControl, State};
+use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::program::{Allowed, Item, PathBlock};
 use motion_kernel::queue::{LiveStreams, PathRules};
 use motion_kernel::units::Position;
@@ -64,7 +64,7 @@ fn stopped(machine: &Machine, case: &Value) -> [f64; 2] {
     let mut streams = LiveStreams::<f64, 1, 64, 16>::new();
     let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
     let source = items.into_iter().map(Ok::<_, Infallible>);
-    let mut control = LiveControl::<f64, 1, _, _, 64>::new(source, Pulse::Plateau, tick_s, 0);
+    let mut control = LiveControl::<f64, 1, _, _, 64>::new(source, Pulse::Plateau, tick_s, Leads::NONE);
     let mut executor = Executor::new([Position::ZERO]);
     let mut tick = |control: &mut LiveControl<f64, 1, _, _, 64>| {
         control.poll(&mut feeder).expect("items that can be executed");

@@ -70,7 +70,7 @@ mod live {
 
     use motion_kernel::axis::Correction;
     use motion_kernel::kernel::CorrectedIntake;
-    use motion_kernel::live::LiveControl;
+    use motion_kernel::live::{Leads, LiveControl};
     use motion_kernel::num::Scalar;
     use motion_kernel::queue::{Intake, LiveFeeder};
     use qemu_boards::live::{PLACES, Streams};
@@ -82,7 +82,7 @@ mod live {
     pub(super) type Background<'a> = LiveControl<Number, AXES, Items<'a, AXES>, ProgramError, PLACES>;
 
     pub(super) fn background<'a>(items: Items<'a, AXES>, header: &Header<AXES>) -> Background<'a> {
-        LiveControl::new(items, header.pulse, header.tick_s, 2)
+        LiveControl::new(items, header.pulse, header.tick_s, Leads { stop_ticks: 2, plan_ticks: 2 })
     }
 
     pub(super) fn poll(control: &mut Background<'_>, feeder: &mut Feeder<'_>) -> bool {

@@ -77,13 +77,39 @@ pub(super) struct Gained<R> {
 }
 
 impl<R: Real> TickPulse<R> {
+    /// No pulse.
+    const NONE: Self = Self {
+        arches: ONE,
+        arches_low: 0,
+        edge: 1 << 63,
+        cube_bits: 0,
+        plateau_bits: [0; 4],
+        closing_bits: [0; 3],
+        jerk_mm_s3: R::ZERO,
+        accel_mm_s2: R::ZERO,
+        speed_mm_s: R::ZERO,
+        sine_mm: R::ZERO,
+        snap_mm_s4: R::ZERO,
+        plateau_v_mm_s: R::ZERO,
+        plateau_a_mm_s2: R::ZERO,
+        plateau_gain_mm_s: R::ZERO,
+        plateau_rise_mm_s2: R::ZERO,
+        plateau_bend_mm_s: R::ZERO,
+        end_v_mm_s: R::ZERO,
+        end_a_mm_s2: R::ZERO,
+        end_gain_mm_s: R::ZERO,
+    };
+
     /// `pulse`, and its bend Jp·(2e)²·P/(8π²) \[mm\], which a segment's linear term lacks in a rise. The first
     /// reason to refuse it is kept.
     #[inline(never)]
     pub(super) fn new(refused: &mut Option<SegmentError>, pulse: &JerkPulse<f64>) -> (Self, f64) {
         let &JerkPulse { jerk_mm_s3: jerk, edge_s, duration_s: pulse_s } = pulse;
-        let (is_ramp, arch_s) = (pulse_s > 0.0, edge_s + edge_s);
-        let arches = if is_ramp { pulse_s / arch_s } else { 1.0 };
+        if !(pulse_s > 0.0) {
+            return (Self::NONE, 0.0);
+        }
+        let arch_s = edge_s + edge_s;
+        let arches = pulse_s / arch_s;
         // A pulse may be shorter than its edges by rounding.
         let steps = if arches > 1.0 { arches * ONE as f64 } else { ONE as f64 };
         if !is_within(steps, 0.0, MOST_ARCHES * ONE as f64) {
@@ -97,7 +123,7 @@ impl<R: Real> TickPulse<R> {
         } else {
             1 << 63
         };
-        let snap = if is_ramp { PI * jerk / arch_s } else { 0.0 };
+        let snap = PI * jerk / arch_s;
         let accel = jerk * arch_s;
         let speed = accel * arch_s;
         let length = speed * arch_s;
@@ -109,7 +135,7 @@ impl<R: Real> TickPulse<R> {
         // The segment's linear term lacks the bend, which is an edge's alone.
         // Without a plateau its figures are not used, so they can't be a reason to refuse it.
         let plateau = if arches > ONE { 1.0 } else { 0.0 };
-        let plateau_mm = edge_mm + bent_mm * (edge_s / if is_ramp { pulse_s } else { 1.0 });
+        let plateau_mm = edge_mm + bent_mm * (edge_s / pulse_s);
         let lengths_mm = [
             length / 12.0,
             plateau * plateau_mm,

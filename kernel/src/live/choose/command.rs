@@ -56,7 +56,7 @@ impl Stopping {
 impl<const PLACES: usize> Chooser<'_, PLACES> {
     /// Makes a list that obeys `request`, with motion at `progress`.
     pub(in crate::live) fn obey(&mut self, request: Request, progress: &Progress, list: &mut List) -> Choice {
-        let places = self.timeline.places(progress);
+        let places = self.timeline.places(request, progress);
         match request {
             Request::Stop => self.stop(places, progress, list),
             Request::Override => self.change_override(places, progress, list),
@@ -134,6 +134,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
     ) -> Choice {
         let inside = places.inside().map(|(start, item, _)| (*start, *item));
         for place in places {
+            if self.attention.is_wanted() {
+                break;
+            }
             let (start, splice) = (*place.start(), place.splice(self.tick_s));
             if let Takeover::After(_) = place.takeover() {
                 if start.is_at_rest() {

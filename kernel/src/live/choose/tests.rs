@@ -4,6 +4,7 @@ use super::*;
 use crate::fixture::LIMITS;
 use crate::law::{Law, Phase, Pulse, Ramp, Ticks};
 use crate::live::mode::{Blocks, Request};
+use crate::live::timeline::Leads;
 use crate::program::{Allowed, PathBlock};
 use crate::queue::Progress;
 
@@ -41,7 +42,15 @@ impl Ahead {
             feed.push(item).expect("room");
         }
         let path = QueuedPath::new(1, Position::ZERO);
-        Self { up, whole, lookahead, feed, path, mode: Mode::new(), timeline: Timeline::new(TICK_S, 0) }
+        Self {
+            up,
+            whole,
+            lookahead,
+            feed,
+            path,
+            mode: Mode::new(),
+            timeline: Timeline::new(TICK_S, Leads::NONE),
+        }
     }
 
     fn items(up: Ramp<f64>) -> [Item; 4] {
@@ -68,7 +77,9 @@ impl Ahead {
 
     fn choose(&mut self, request: Option<(Request, Progress)>) -> (Choice, List) {
         let mut list = List::new(*self.timeline.splice(), TICK_S);
+        let attention = Attention::undivided();
         let mut chooser = Chooser {
+            attention: &attention,
             lookahead: &self.lookahead,
             feed: &mut self.feed,
             path: self.path,
@@ -206,7 +217,7 @@ fn a_ramp_is_cut_across_the_end_of_its_rise() {
     list.set_exit_to_end();
     ahead.timeline = Timeline::driving(list, TICK_S);
     for _ in 0..3 {
-        ahead.timeline.lead_more();
+        ahead.timeline.lead_more(Some(Request::Stop));
     }
     let allowed = Allowed { cap_mm_s: 200.0, limits: LIMITS };
     ahead.lookahead = Lookahead::new(Pulse::Plateau);

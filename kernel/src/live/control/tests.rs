@@ -53,7 +53,7 @@ fn a_refused_command_is_made_again() {
             items.into_iter().map(Ok),
             Pulse::Plateau,
             TICK_S,
-            0,
+            Leads::NONE,
         );
         for _ in 0..seen {
             control.poll(&mut feeder).expect("items");
@@ -64,7 +64,7 @@ fn a_refused_command_is_made_again() {
             executor.tick(&mut intake).expect("no fault");
         }
         control.hold();
-        control.obey(Request::Stop, &progress, &mut feeder).expect("a stop");
+        control.obey(Request::Stop, &progress, &|| false, &mut feeder).expect("a stop");
         let mut ticks = 0;
         while control.state(&feeder) != State::Held && ticks < 20_000 {
             executor.tick(&mut intake).expect("no fault");
@@ -93,8 +93,12 @@ fn a_source_may_go_on_later() {
     let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
     let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
     let none = std::vec::Vec::new().into_iter();
-    let mut control =
-        LiveControl::<f64, 1, _, Infallible, 64>::new(Late { items: none }, Pulse::Plateau, TICK_S, 0);
+    let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(
+        Late { items: none },
+        Pulse::Plateau,
+        TICK_S,
+        Leads::NONE,
+    );
     let mut start = Position::ZERO;
     for _ in 0..3 {
         for _ in 0..100 {
@@ -137,7 +141,8 @@ fn a_stop_asks_for_no_more_than_the_number_type_holds() {
     let mut streams = LiveStreams::<Fixed, 1, 8, 16>::new();
     let (mut feeder, mut intake) = streams.split(rules, [Position::ZERO]);
     let mut executor = Executor::<Fixed, 1>::new([Position::ZERO]);
-    let mut control = LiveControl::<Fixed, 1, _, Infallible, 64>::new(items, Pulse::Plateau, TICK_S, 0);
+    let mut control =
+        LiveControl::<Fixed, 1, _, Infallible, 64>::new(items, Pulse::Plateau, TICK_S, Leads::NONE);
     for tick in 0..2100 {
         if tick == 2000 {
             control.hold();
@@ -161,7 +166,7 @@ fn blocks_that_contradict_their_path_are_refused() {
             items.into_iter().map(Ok),
             Pulse::Plateau,
             TICK_S,
-            0,
+            Leads::NONE,
         );
         let mut refused = 0;
         for _ in 0..20_000 {
@@ -170,5 +175,65 @@ fn blocks_that_contradict_their_path_are_refused() {
             executor.tick(&mut intake).expect("no fault");
         }
         assert_eq!((refused, control.state(&feeder)), (20_000, State::Failed), "{steps}");
+    }
+}
+
+/// However soon in a poll a stop is asked for: the plan for an override is given up, motion goes on as before, the stop takes
+/// over, and the override is planned after it.
+#[test]
+fn a_plan_is_given_up_for_a_stop() {
+    // The number of times that a whole poll asks.
+    let mut whole = 0;
+    let mut step = 0;
+    while step <= whole {
+        let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+        let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
+        let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
+        let mut control = LiveControl::<f64, 1, _, Infallible, 64>::new(
+            line(Position::ZERO).into_iter().map(Ok),
+            Pulse::Plateau,
+            TICK_S,
+            Leads::NONE,
+        );
+        for _ in 0..400 {
+            control.poll(&mut feeder).expect("executable");
+            executor.tick(&mut intake).expect("no fault");
+        }
+        let before = control.timeline.list().clone();
+        control.set_override(0.5).expect("in range");
+        let asked = core::cell::Cell::new(0);
+        let is_asked = || {
+            asked.set(asked.get() + 1);
+            step > 0 && asked.get() >= step
+        };
+        control.poll_unless(&is_asked, &mut feeder).expect("executable");
+        if step == 0 {
+            whole = asked.get();
+            assert!(control.timeline.has_next() && whole > 5, "{whole}");
+        } else {
+            assert!(!control.timeline.has_next(), "step {step} of {whole}");
+            assert_eq!(control.mode.request(), Some(Request::Override), "step {step}");
+            assert!(asked.get() <= step + 2, "it goes on asking: {} of {step}", asked.get());
+            assert!(control.timeline.list().items().eq(before.items()));
+            control.hold();
+            control.poll(&mut feeder).expect("executable");
+            assert_eq!(control.timeline.request_of_next(), Some(Request::Stop));
+        }
+        let mut fastest_mm_s = 0.0_f64;
+        for tick in 0..40_000 {
+            let motion = executor.tick(&mut intake).expect("no fault").motion;
+            control.poll(&mut feeder).expect("executable");
+            if control.state(&feeder) == State::Held {
+                control.resume();
+                fastest_mm_s = 0.0;
+            }
+            fastest_mm_s = fastest_mm_s.max(motion.v_mm_s);
+            assert!(tick < 39_999, "step {step}: {:?}", control.state(&feeder));
+            if control.state(&feeder) == State::Done {
+                break;
+            }
+        }
+        assert!(step == 0 || fastest_mm_s <= 0.5 * 20.0 * (1.0 + 1e-9), "step {step}: {fastest_mm_s}");
+        step += 1;
     }
 }

@@ -7,6 +7,7 @@
 
 use super::ramp_fit::{Fit, RampFit};
 use crate::law::{Limits, Pulse, Ramp};
+use crate::plan::Attention;
 
 /// Number of steps considered one by one; if there are more, those that lose least by it are joined.
 const STEPS_MAX: usize = 48;
@@ -122,7 +123,8 @@ impl Reached {
 ///
 /// A chain to a step is the same whatever feed is to be reached in the end, so it is searched once.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ascent {
+pub(super) struct Ascent<'a> {
+    attention: &'a Attention<'a>,
     /// The start, then every step above it.
     reached: [Reached; STEPS_MAX + 1],
     steps: usize,
@@ -136,17 +138,20 @@ pub(super) struct Ascent {
     chain: [u8; RAMPS_MAX],
 }
 
-impl Ascent {
-    /// No chains yet.
-    pub(super) const NONE: Self = Self {
-        reached: [Reached::NOT; STEPS_MAX + 1],
-        steps: 0,
-        known: 0,
-        peak: Reached::NOT,
-        room_mm: 0.0,
-        pulse: Pulse::Sin2,
-        chain: [0; RAMPS_MAX],
-    };
+impl<'a> Ascent<'a> {
+    /// No chains yet. While something more urgent waits, none are found.
+    pub(super) fn new(attention: &'a Attention<'a>) -> Self {
+        Self {
+            attention,
+            reached: [Reached::NOT; STEPS_MAX + 1],
+            steps: 0,
+            known: 0,
+            peak: Reached::NOT,
+            room_mm: 0.0,
+            pulse: Pulse::Sin2,
+            chain: [0; RAMPS_MAX],
+        }
+    }
 
     /// Begins before `steps` at `from_mm_s`, with `room_mm` for the ascent and ramps of `pulse`s. Steps not
     /// above the start only delay it.
@@ -228,6 +233,7 @@ impl Ascent {
         // The time lost before the ramp, as seen from the target.
         let before_s = start.time_s + waited_s - start_mm / target.feed_mm_s;
         let mut wanted = RampFit {
+            attention: self.attention,
             start_mm,
             from_mm_s: start.feed_mm_s,
             to_mm_s: target.feed_mm_s,

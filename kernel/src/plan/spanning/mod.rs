@@ -22,6 +22,7 @@ pub use intervals::Node;
 use self::ascent::{Ascent, AscentRamp};
 use self::intervals::{Interval, Intervals};
 use self::peak::{Sides, lowest_fits};
+use super::attention::Attention;
 use super::two_pass::{Block, PlanError, check};
 use crate::law::Ramp;
 
@@ -47,24 +48,45 @@ pub fn plan_spanning(
     places: &mut [Node],
     put: &mut impl FnMut(f64, &Ramp<f64>),
 ) -> Result<Option<f64>, PlanError> {
+    plan_spanning_unless(&Attention::undivided(), blocks, [start_mm_s, end_mm_s], places, put)
+}
+
+/// [`plan_spanning`], given up where something more urgent waits.
+pub(super) fn plan_spanning_unless(
+    attention: &Attention<'_>,
+    blocks: &[Block<f64>],
+    [start_mm_s, end_mm_s]: [f64; 2],
+    places: &mut [Node],
+    put: &mut impl FnMut(f64, &Ramp<f64>),
+) -> Result<Option<f64>, PlanError> {
     check(blocks, start_mm_s, end_mm_s)?;
     let room = places.len();
     let Some(mut intervals) = Intervals::new(blocks, start_mm_s, end_mm_s, places) else {
         return Err(PlanError::Room { of: "nodes", needed: nodes_for(blocks.len()), places: room });
     };
     // Several kilobytes each, so used for all intervals.
-    let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
-    if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, &mut up, &mut down)) {
-        return Ok(None);
+    let (mut up, mut down) = (Ascent::new(attention), Ascent::new(attention));
+    let found = spanned(&mut intervals, &mut up, &mut down, put);
+    // What was given up looks as if nothing fitted.
+    if attention.is_wanted() { Err(PlanError::GivenUp) } else { Ok(found) }
+}
+
+/// The time of the ramps over all intervals \[s\].
+fn spanned(
+    intervals: &mut Intervals<'_>,
+    up: &mut Ascent<'_>,
+    down: &mut Ascent<'_>,
+    put: &mut impl FnMut(f64, &Ramp<f64>),
+) -> Option<f64> {
+    if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, up, down)) {
+        return None;
     }
     let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
     for interval in intervals.in_order() {
         out.cruise(interval.start_mm, interval.enter_mm_s);
-        if drive(&interval, &intervals, &mut up, &mut down, &mut out).is_none() {
-            return Ok(None);
-        }
+        drive(&interval, intervals, up, down, &mut out)?;
     }
-    Ok(Some(out.time_s))
+    Some(out.time_s)
 }
 
 /// The receiver of ramps, and where the next one starts.
@@ -97,8 +119,8 @@ impl<F: FnMut(f64, &Ramp<f64>)> Out<'_, F> {
 fn drive<F: FnMut(f64, &Ramp<f64>)>(
     interval: &Interval,
     intervals: &Intervals<'_>,
-    up: &mut Ascent,
-    down: &mut Ascent,
+    up: &mut Ascent<'_>,
+    down: &mut Ascent<'_>,
     out: &mut Out<'_, F>,
 ) -> Option<()> {
     let Some(sides) = Sides::new(interval, intervals) else { return Some(()) };

@@ -76,7 +76,7 @@ impl<'a> Sides<'a> {
     }
 
     /// Starts both ascents before their steps.
-    pub(super) fn start(&self, up: &mut Ascent, down: &mut Ascent) {
+    pub(super) fn start(&self, up: &mut Ascent<'_>, down: &mut Ascent<'_>) {
         let pulse = self.intervals.pulse();
         up.start(&self.interval.rising, self.interval.enter_mm_s, self.room_mm(), pulse);
         down.start(&self.interval.falling, self.interval.exit_mm_s, self.room_mm(), pulse);
@@ -84,7 +84,7 @@ impl<'a> Sides<'a> {
 
     /// Plans both sides up to `peak`; returns the length left between them \[mm\], negative if there is no
     /// room. `None` if there is no room even for one side alone.
-    pub(super) fn fit(&self, peak: f64, up: &mut Ascent, down: &mut Ascent) -> Option<f64> {
+    pub(super) fn fit(&self, peak: f64, up: &mut Ascent<'_>, down: &mut Ascent<'_>) -> Option<f64> {
         let (start_mm, end_mm) = (self.interval.start_mm, self.interval.end_mm);
         let up_mm = up.find(peak, |a, b| self.limits(start_mm + a, start_mm + b, false))?;
         let down_mm = down.find(peak, |a, b| self.limits(end_mm - b, end_mm - a, true))?;
@@ -92,7 +92,7 @@ impl<'a> Sides<'a> {
     }
 
     /// Plans both sides up to the peak with the least time, and returns that peak.
-    pub(super) fn best(&self, up: &mut Ascent, down: &mut Ascent) -> Option<f64> {
+    pub(super) fn best(&self, up: &mut Ascent<'_>, down: &mut Ascent<'_>) -> Option<f64> {
         self.start(up, down);
         let (mut low, mut high) = (self.lowest(), self.highest());
         let at_high = self.fit(high, up, down);
@@ -149,8 +149,8 @@ impl<'a> Sides<'a> {
 pub(super) fn lowest_fits(
     interval: &Interval,
     intervals: &Intervals<'_>,
-    up: &mut Ascent,
-    down: &mut Ascent,
+    up: &mut Ascent<'_>,
+    down: &mut Ascent<'_>,
 ) -> bool {
     let Some(sides) = Sides::new(interval, intervals) else {
         return interval.enter_mm_s == interval.exit_mm_s;
@@ -161,7 +161,7 @@ pub(super) fn lowest_fits(
 
 /// The peak of an interval for which both sides together are `room_mm` long, if their last
 /// ramps, now up to `peak_mm_s`, only get longer or shorter by it.
-fn peak_by_ramps(up: &Ascent, down: &Ascent, peak_mm_s: f64, room_mm: f64) -> Option<f64> {
+fn peak_by_ramps(up: &Ascent<'_>, down: &Ascent<'_>, peak_mm_s: f64, room_mm: f64) -> Option<f64> {
     let ramps = [up.last_ramp()?, down.last_ramp()?];
     let mut peak = peak_mm_s;
     for _ in 0..AIM_STEPS {
@@ -194,7 +194,7 @@ mod tests {
 
     use super::*;
     use crate::law::Pulse;
-    use crate::plan::{Block, Node, nodes_for};
+    use crate::plan::{Attention, Block, Node, nodes_for};
     use crate::random::Random;
 
     /// An interval's list of blocks: rising steps, random feeds, up and down, or a random walk; one law or
@@ -229,13 +229,13 @@ mod tests {
     /// what a scan can tell.
     #[test]
     fn no_peak_of_a_scan_is_much_better() {
-        let (mut lost, seed) = (Vec::new(), 20_261);
+        let (mut lost, seed, attention) = (Vec::new(), 20_261, Attention::undivided());
         for case in 0..2000 {
             let random = Random::new(seed + 7919 * case as u64);
             let blocks = blocks(&random, case);
             let mut places = vec![Node::EMPTY; nodes_for(blocks.len())];
             let mut intervals = Intervals::new(&blocks, 0.0, 0.0, &mut places).expect("places");
-            let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
+            let (mut up, mut down) = (Ascent::new(&attention), Ascent::new(&attention));
             if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, &mut up, &mut down)) {
                 continue;
             }

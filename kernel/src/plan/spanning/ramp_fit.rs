@@ -6,6 +6,7 @@
 use super::ascent::{AscentRamp, Reached};
 use crate::law::passing::Passing;
 use crate::law::{Law, Limits, Pulse, Ramp};
+use crate::plan::Attention;
 
 /// Factor by which a ramp below steps is made softer at a time, and how often at most.
 const SOFTER: f64 = 3.0;
@@ -28,6 +29,8 @@ pub(super) enum Fit {
 
 /// One ramp to be found.
 pub(super) struct RampFit<'a, L> {
+    /// No ramp is found while something more urgent waits.
+    pub(super) attention: &'a Attention<'a>,
     /// The place where it may start \[mm\].
     pub(super) start_mm: f64,
     pub(super) from_mm_s: f64,
@@ -144,6 +147,9 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
     /// Places `ramp`, the fastest within `limits`, after the steps that it may not pass earlier, and softens
     /// it by the limits of the blocks it passes.
     fn below_steps(&mut self, ramp: Ramp<f64>, limits: Limits<f64>, most_s: f64) -> Tried {
+        if self.attention.is_wanted() {
+            return Tried::TooSoft;
+        }
         let (mut ramp, mut limits) = (ramp, limits);
         // Blocks passed later may allow less, which makes the ramp longer.
         for _ in 0..LIMITS_STEPS {
