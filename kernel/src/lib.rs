@@ -104,6 +104,8 @@ pub mod tick_monitor;
 pub mod trace;
 pub mod flight;
 pub mod kernel;
+#[cfg(feature = "link")]
+pub mod link;
 #[cfg(feature = "live")]
 pub mod straight;
 #[cfg(feature = "live")]

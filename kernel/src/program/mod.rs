@@ -54,6 +54,8 @@ pub use checksum::Checksum;
 pub use source::Source;
 pub use supply::{Supply, SupplyError};
 pub use switching::{Switching, switches_as_stops};
+#[cfg(feature = "link")]
+pub(crate) use wire::take;
 
 use serde::{Deserialize, Serialize};
 

@@ -11,7 +11,7 @@ use serde::de::{self, DeserializeSeed, Deserializer, IntoDeserializer, Visitor};
 /// A value at the start of `bytes`, and the bytes after it; `None` if there is none.
 // In its caller's stack frame: a header is a kilobyte, and the smallest core has no room for two.
 #[inline(always)]
-pub(super) fn take<'de, T: de::Deserialize<'de>>(bytes: &'de [u8]) -> Option<(T, &'de [u8])> {
+pub(crate) fn take<'de, T: de::Deserialize<'de>>(bytes: &'de [u8]) -> Option<(T, &'de [u8])> {
     let mut wire = Wire { left: bytes, is_sound: true };
     let value = T::deserialize(&mut wire).ok()?;
     wire.is_sound.then_some((value, wire.left))

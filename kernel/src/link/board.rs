@@ -1,0 +1,222 @@
+//! The board's end.
+//!
+//! Consumes bytes from the PC; produces [`Controls`] and the items of the program, which live control takes from the
+//! [`ItemQueue`]; answers with what has come and with the machine's status. Background.
+
+use core::convert::Infallible;
+use core::task::Poll;
+
+use heapless::Deque;
+
+use super::frame::{Deframer, Payload};
+use super::message::{Controls, Identity, Reply, Request, Status, Taken};
+use crate::program::{Item, Source, take};
+
+/// An answer that was lost is repeated after this time \[ms\].
+const REPEAT_MS: u32 = 50;
+
+/// Items that have come, in order, with room for `ITEMS`. The source of live control.
+#[derive(Debug)]
+pub struct ItemQueue<const AXES: usize, const ITEMS: usize> {
+    /// None for the end of a program.
+    entries: Deque<Option<Item<AXES>>, ITEMS>,
+    /// The number of the next item to come.
+    next: u32,
+}
+
+impl<const AXES: usize, const ITEMS: usize> ItemQueue<AXES, ITEMS> {
+    /// Before the first item.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { entries: Deque::new(), next: 0 }
+    }
+
+    /// Drops what was not driven: after an abort. Numbers go on.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+    }
+
+    /// The number of the first item that was not taken from here.
+    #[must_use]
+    pub fn taken(&self) -> u32 {
+        self.next.wrapping_sub(self.entries.len() as u32)
+    }
+
+    /// The number of the next item to come.
+    #[must_use]
+    pub const fn next(&self) -> u32 {
+        self.next
+    }
+
+    /// The number of the first item that there is no room for.
+    fn limit(&self) -> u32 {
+        self.next.wrapping_add((ITEMS - self.entries.len()) as u32)
+    }
+}
+
+impl<const AXES: usize, const ITEMS: usize> Default for ItemQueue<AXES, ITEMS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const AXES: usize, const ITEMS: usize> Source<AXES> for ItemQueue<AXES, ITEMS> {
+    type Error = Infallible;
+
+    /// Pending at the end of a program, too: another may follow.
+    fn poll_next(&mut self) -> Poll<Option<Result<Item<AXES>, Infallible>>> {
+        match self.entries.pop_front() {
+            Some(Some(item)) => Poll::Ready(Some(Ok(item))),
+            Some(None) | None => Poll::Pending,
+        }
+    }
+}
+
+/// The board's end of the link.
+#[derive(Debug)]
+pub struct BoardLink {
+    session: u32,
+    identity: Identity,
+    deframer: Deframer,
+    controls: Controls,
+    /// They have not been obeyed yet.
+    is_changed: bool,
+    is_welcome_due: bool,
+    is_taken_due: bool,
+    is_missing: bool,
+    is_unreadable: bool,
+    /// What was said last about items, and when.
+    said: Taken,
+    said_ms: u32,
+    /// The last frame was about items: a status that waits comes before the next one.
+    is_status_next: bool,
+}
+
+impl BoardLink {
+    /// A board that has just started; `session` must not be that of a start before.
+    #[must_use]
+    pub const fn new(session: u32, identity: Identity) -> Self {
+        let said = Taken { session, controls: 0, next: 0, limit: 0, is_missing: false, is_unreadable: false };
+        Self {
+            session,
+            identity,
+            deframer: Deframer::new(),
+            controls: Controls::NONE,
+            is_changed: false,
+            is_welcome_due: false,
+            is_taken_due: false,
+            is_missing: false,
+            is_unreadable: false,
+            said,
+            said_ms: 0,
+            is_status_next: false,
+        }
+    }
+
+    /// Number of frames that came damaged.
+    #[must_use]
+    pub const fn damaged(&self) -> u32 {
+        self.deframer.damaged()
+    }
+
+    /// Takes what came in.
+    pub fn receive<const AXES: usize, const ITEMS: usize>(
+        &mut self,
+        bytes: &[u8],
+        items: &mut ItemQueue<AXES, ITEMS>,
+    ) {
+        for &byte in bytes {
+            let Some(payload) = self.deframer.push(byte) else { continue };
+            // What has the right checksum and can't be read is of another protocol: a hello will tell.
+            let Some((request, entries)) = take::<Request>(payload) else { continue };
+            match request {
+                Request::Hello { .. } => self.is_welcome_due = true,
+                Request::Controls { session, .. } | Request::Items { session, .. }
+                    if session != self.session =>
+                {
+                    self.is_welcome_due = true;
+                }
+                Request::Controls { controls, .. } => {
+                    if controls.is_newer_than(&self.controls) {
+                        (self.controls, self.is_changed) = (controls, true);
+                    }
+                    self.is_taken_due = true;
+                }
+                Request::Items { first, .. } => {
+                    self.is_taken_due = true;
+                    let known = items.next.wrapping_sub(first);
+                    self.is_missing = known.cast_signed() < 0;
+                    self.is_unreadable = !self.is_missing && !put(entries, known, items);
+                }
+            }
+        }
+    }
+
+    /// The controls, if they have changed since they were taken last.
+    pub fn take_controls(&mut self) -> Option<Controls> {
+        core::mem::take(&mut self.is_changed).then_some(self.controls)
+    }
+
+    /// Writes the next frame to `out`, which needs [`FRAME_MAX`](super::FRAME_MAX) bytes, at the time `now_ms`, which may
+    /// wrap; returns its length, 0 if there is nothing to say. A `status` is said if nothing else is, and in turn with the answers to items.
+    pub fn transmit<const AXES: usize, const ITEMS: usize>(
+        &mut self,
+        now_ms: u32,
+        items: &ItemQueue<AXES, ITEMS>,
+        status: Option<Status<AXES>>,
+        out: &mut [u8],
+    ) -> usize {
+        let (session, identity) = (self.session, self.identity);
+        let reply = if core::mem::take(&mut self.is_welcome_due) {
+            // What was said before may have been said to somebody else.
+            self.is_taken_due = true;
+            Reply::Welcome { session, identity }
+        } else {
+            let taken = Taken {
+                session,
+                controls: self.controls.number,
+                next: items.next,
+                limit: items.limit(),
+                is_missing: self.is_missing,
+                is_unreadable: self.is_unreadable,
+            };
+            let is_late = now_ms.wrapping_sub(self.said_ms) >= REPEAT_MS;
+            let is_due = self.is_taken_due || taken != self.said || is_late;
+            if is_due && !(self.is_status_next && status.is_some()) {
+                self.is_status_next = true;
+                (self.is_taken_due, self.is_missing) = (false, false);
+                (self.said, self.said_ms) = (Taken { is_missing: false, ..taken }, now_ms);
+                Reply::Taken(taken)
+            } else if let Some(status) = status {
+                self.is_status_next = false;
+                Reply::Status { session, status }
+            } else {
+                return 0;
+            }
+        };
+        Payload::of(&reply).map_or(0, |payload| payload.frame(out))
+    }
+}
+
+/// Puts what follows the `known` first of `entries` into the queue, as far as there is room; false where one can't be read.
+fn put<const AXES: usize, const ITEMS: usize>(
+    mut entries: &[u8],
+    known: u32,
+    items: &mut ItemQueue<AXES, ITEMS>,
+) -> bool {
+    let mut known = known;
+    // Bounded: an entry has a byte at least.
+    while !entries.is_empty() {
+        let Some((entry, rest)) = take::<Option<Item<AXES>>>(entries) else { return known > 0 };
+        entries = rest;
+        if known > 0 {
+            known -= 1;
+        } else if items.entries.push_back(entry).is_ok() {
+            items.next = items.next.wrapping_add(1);
+        } else {
+            // More than there was room for: it comes again.
+            return true;
+        }
+    }
+    true
+}

@@ -1,0 +1,326 @@
+//! The PC's end.
+//!
+//! Consumes the items of a program and the operator's commands; produces bytes for the board, and again what got lost;
+//! consumes its answers and produces [`Event`]s. Keeps the items that the board has not confirmed, in places of its own.
+
+use heapless::Deque;
+
+use super::frame::{Deframer, PAYLOAD_MAX, Payload};
+use super::message::{Controls, Identity, Mode, PROTOCOL, Reply, Request, Status, Taken};
+use crate::program::{Item, take};
+
+/// What was not answered is said again after this time \[ms\].
+const REPEAT_MS: u32 = 100;
+/// Controls are said again after this time until they are confirmed \[ms\].
+const CONTROLS_MS: u32 = 20;
+/// Items are sent again at once where the board says that some are missing, but not more often than this \[ms\].
+const AGAIN_MS: u32 = 10;
+
+/// What the board says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event<const AXES: usize> {
+    /// It is there.
+    Welcome(Identity),
+    /// It takes items.
+    Ready {
+        /// The number of the next item that it expects: of a program that another run of the PC's side has begun with,
+        /// those before are there.
+        next: u32,
+    },
+    /// It has started anew, and knows nothing of the items before: [`HostLink::begin`] goes on with it.
+    Restarted {
+        /// The number of the first item that it had not confirmed.
+        confirmed: u32,
+    },
+    /// What the machine does.
+    Status(Status<AXES>),
+    /// It can't read an item. Nothing more is sent.
+    Unreadable {
+        /// The item's number.
+        item: u32,
+    },
+}
+
+/// How far the two ends know each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Session {
+    /// Nothing is known of the board.
+    Unknown,
+    /// The board is known, and what it has is not.
+    Greeted(u32),
+    /// Items may be sent.
+    Ready(u32),
+    /// It is another one now; the caller has to begin anew.
+    Lost(u32),
+}
+
+/// The PC's end of the link to a board of `AXES` axes, with room for `ITEMS` items in `BYTES` bytes that are not confirmed.
+#[derive(Debug)]
+pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
+    deframer: Deframer,
+    session: Session,
+    controls: Controls,
+    /// The number of the controls that the board has confirmed.
+    confirmed_controls: u32,
+    /// The items that are not confirmed: their bytes, and the length of each.
+    bytes: Deque<u8, BYTES>,
+    lengths: Deque<u16, ITEMS>,
+    /// The number of the first of them, of the next to be sent, and of the first that the board has no room for.
+    first: u32,
+    next: u32,
+    limit: u32,
+    /// The board can't read the first of them.
+    is_unreadable: bool,
+    hello_ms: Option<u32>,
+    controls_ms: Option<u32>,
+    /// When something was confirmed last, or sent while nothing was under way.
+    progress_ms: u32,
+    again_ms: u32,
+}
+
+impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, ITEMS, BYTES> {
+    /// Before the first byte.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            deframer: Deframer::new(),
+            session: Session::Unknown,
+            controls: Controls::NONE,
+            confirmed_controls: 0,
+            bytes: Deque::new(),
+            lengths: Deque::new(),
+            first: 0,
+            next: 0,
+            limit: 0,
+            is_unreadable: false,
+            hello_ms: None,
+            controls_ms: None,
+            progress_ms: 0,
+            again_ms: 0,
+        }
+    }
+
+    /// The operator's controls as they are now.
+    #[must_use]
+    pub const fn controls(&self) -> &Controls {
+        &self.controls
+    }
+
+    /// Changes the operator's controls.
+    pub fn control(&mut self, change: impl FnOnce(&mut Controls)) {
+        let number = self.controls.number.wrapping_add(1);
+        change(&mut self.controls);
+        (self.controls.number, self.controls_ms) = (number, None);
+    }
+
+    /// Presses a mode: a resume, a hold, an abort.
+    pub fn press(&mut self, mode: Mode) {
+        self.control(|controls| (controls.mode, controls.presses) = (mode, controls.presses.wrapping_add(1)));
+    }
+
+    /// Whether the board has confirmed the controls.
+    #[must_use]
+    pub const fn is_controlled(&self) -> bool {
+        self.confirmed_controls == self.controls.number
+    }
+
+    /// The number of the first item that the board has not confirmed.
+    #[must_use]
+    pub const fn confirmed(&self) -> u32 {
+        self.first
+    }
+
+    /// Number of items that the board has not confirmed.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.lengths.len()
+    }
+
+    /// Number of frames that came damaged.
+    #[must_use]
+    pub const fn damaged(&self) -> u32 {
+        self.deframer.damaged()
+    }
+
+    /// Goes on with a board that has started anew, without the items that it had not confirmed before.
+    pub fn begin(&mut self) {
+        if let Session::Lost(session) = self.session {
+            self.session = Session::Greeted(session);
+        }
+    }
+
+    /// Takes the next item of a program, or its end. False if there is no room for it now, or the board does not take any
+    /// yet.
+    ///
+    /// # Errors
+    /// It is longer than a frame.
+    pub fn push(&mut self, item: Option<&Item<AXES>>) -> Result<bool, postcard::Error> {
+        let mut entry = [0; PAYLOAD_MAX];
+        let entry = &*postcard::to_slice(&item, &mut entry)?;
+        // A frame has room for the message before it.
+        if entry.len() + HEAD_MAX > PAYLOAD_MAX {
+            return Err(postcard::Error::SerializeBufferFull);
+        }
+        let has_room = !self.lengths.is_full() && BYTES - self.bytes.len() >= entry.len();
+        if !has_room || !matches!(self.session, Session::Ready(_)) {
+            return Ok(false);
+        }
+        // Both have room.
+        let _ = self.lengths.push_back(entry.len() as u16);
+        self.bytes.extend(entry.iter().copied());
+        Ok(true)
+    }
+
+    /// Takes what came in at the time `now_ms`, which may wrap.
+    pub fn receive(&mut self, bytes: &[u8], now_ms: u32, on_event: &mut impl FnMut(Event<AXES>)) {
+        for &byte in bytes {
+            let Some(payload) = self.deframer.push(byte) else { continue };
+            let Some((reply, [])) = take::<Reply<AXES>>(payload) else { continue };
+            match reply {
+                Reply::Welcome { session, identity } => self.greeted(session, identity, on_event),
+                Reply::Taken(taken) => self.taken(&taken, now_ms, on_event),
+                Reply::Status { session, status } if self.is_of(session) => on_event(Event::Status(status)),
+                Reply::Status { .. } => {}
+            }
+        }
+    }
+
+    /// Whether a message is of the board's present session.
+    fn is_of(&self, session: u32) -> bool {
+        match self.session {
+            Session::Greeted(known) | Session::Ready(known) => known == session,
+            Session::Unknown | Session::Lost(_) => false,
+        }
+    }
+
+    fn greeted(&mut self, session: u32, identity: Identity, on_event: &mut impl FnMut(Event<AXES>)) {
+        if self.is_of(session) || self.session == Session::Lost(session) {
+            return;
+        }
+        if self.session == Session::Unknown {
+            self.session = Session::Greeted(session);
+            return on_event(Event::Welcome(identity));
+        }
+        let confirmed = self.first;
+        self.session = Session::Lost(session);
+        self.bytes.clear();
+        self.lengths.clear();
+        self.is_unreadable = false;
+        on_event(Event::Welcome(identity));
+        on_event(Event::Restarted { confirmed });
+    }
+
+    fn taken(&mut self, taken: &Taken, now_ms: u32, on_event: &mut impl FnMut(Event<AXES>)) {
+        if !self.is_of(taken.session) {
+            return;
+        }
+        self.confirmed_controls = taken.controls;
+        if let Session::Greeted(session) = self.session {
+            self.session = Session::Ready(session);
+            (self.first, self.next, self.limit) = (taken.next, taken.next, taken.limit);
+            return on_event(Event::Ready { next: taken.next });
+        }
+        let confirmed = taken.next.wrapping_sub(self.first);
+        // An answer that was overtaken by a later one, or that is of items that were never sent.
+        if confirmed as usize > self.lengths.len() {
+            return;
+        }
+        for _ in 0..confirmed {
+            let length = self.lengths.pop_front().unwrap_or_default();
+            for _ in 0..length {
+                self.bytes.pop_front();
+            }
+        }
+        self.first = taken.next;
+        if is_before(self.next, self.first) {
+            self.next = self.first;
+        }
+        // Room never gets less.
+        if is_before(self.limit, taken.limit) {
+            self.limit = taken.limit;
+        }
+        if confirmed > 0 {
+            self.progress_ms = now_ms;
+        } else if taken.is_missing && now_ms.wrapping_sub(self.again_ms) >= AGAIN_MS {
+            (self.next, self.again_ms, self.progress_ms) = (self.first, now_ms, now_ms);
+        }
+        if taken.is_unreadable && !core::mem::replace(&mut self.is_unreadable, true) {
+            on_event(Event::Unreadable { item: self.first });
+        }
+    }
+
+    /// Writes the next frame to `out`, which needs [`FRAME_MAX`](super::FRAME_MAX) bytes, at the time `now_ms`; returns its
+    /// length, 0 if there is nothing to say.
+    pub fn transmit(&mut self, now_ms: u32, out: &mut [u8]) -> usize {
+        let is_due = |since_ms: Option<u32>, after_ms: u32| {
+            since_ms.is_none_or(|since_ms| now_ms.wrapping_sub(since_ms) >= after_ms)
+        };
+        let (session, is_ready) = match self.session {
+            Session::Unknown => {
+                if !is_due(self.hello_ms, REPEAT_MS) {
+                    return 0;
+                }
+                self.hello_ms = Some(now_ms);
+                return frame(&Request::Hello { protocol: PROTOCOL }, out);
+            }
+            Session::Lost(_) => return 0,
+            Session::Greeted(session) => (session, false),
+            Session::Ready(session) => (session, true),
+        };
+        // Urgent before everything else. What is confirmed is said again, too: the board answers, so both ends know that
+        // the other one is there.
+        let after_ms = if self.is_controlled() { REPEAT_MS } else { CONTROLS_MS };
+        if is_due(self.controls_ms, after_ms) {
+            self.controls_ms = Some(now_ms);
+            return frame(&Request::Controls { session, controls: self.controls }, out);
+        }
+        if is_ready { self.items(session, now_ms, out) } else { 0 }
+    }
+
+    /// A frame of as many items as it has room for.
+    fn items(&mut self, session: u32, now_ms: u32, out: &mut [u8]) -> usize {
+        if self.is_unreadable {
+            return 0;
+        }
+        let under_way = self.next.wrapping_sub(self.first);
+        if under_way == 0 {
+            self.progress_ms = now_ms;
+        } else if now_ms.wrapping_sub(self.progress_ms) >= REPEAT_MS {
+            (self.next, self.progress_ms) = (self.first, now_ms);
+        }
+        let sent = self.next.wrapping_sub(self.first) as usize;
+        let Some(mut payload) = Payload::of(&Request::Items { session, first: self.next }) else { return 0 };
+        let skipped: usize = self.lengths.iter().take(sent).map(|&length| usize::from(length)).sum();
+        let (mut count, mut length) = (0, 0);
+        for &of_entry in self.lengths.iter().skip(sent) {
+            let of_entry = usize::from(of_entry);
+            if !is_before(self.next.wrapping_add(count), self.limit) || length + of_entry > payload.room() {
+                break;
+            }
+            (count, length) = (count + 1, length + of_entry);
+        }
+        if count == 0 || !payload.push_all(self.bytes.iter().copied().skip(skipped).take(length)) {
+            return 0;
+        }
+        self.next = self.next.wrapping_add(count);
+        payload.frame(out)
+    }
+}
+
+impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> Default for HostLink<AXES, ITEMS, BYTES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The longest message before items \[bytes\]: a variant and two numbers.
+const HEAD_MAX: usize = 11;
+
+/// Whether a number comes before another one. They wrap.
+fn is_before(number: u32, other: u32) -> bool {
+    number.wrapping_sub(other).cast_signed() < 0
+}
+
+fn frame(request: &Request, out: &mut [u8]) -> usize {
+    Payload::of(request).map_or(0, |payload| payload.frame(out))
+}

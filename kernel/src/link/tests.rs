@@ -1,0 +1,405 @@
+//! Both ends over a wire that loses, doubles, reorders, cuts and damages frames.
+
+use core::task::Poll;
+use std::collections::VecDeque;
+
+use super::*;
+use crate::law::Ticks;
+use crate::program::{Item, Source};
+use crate::random::Random;
+use crate::units::Position;
+
+const IDENTITY: Identity = Identity {
+    protocol: PROTOCOL,
+    format: 5,
+    axes: 3,
+    is_fixed_point: false,
+    tick_s: 5e-4,
+    items: ROOM as u16,
+    machine: 0xCAFE_F00D,
+};
+/// Items that a board has room for.
+const ROOM: usize = 12;
+
+type Host = HostLink<3, 64, 8192>;
+type Items = ItemQueue<3, ROOM>;
+
+/// Frames on their way in one direction.
+#[derive(Default)]
+struct Wire {
+    frames: VecDeque<Vec<u8>>,
+    /// Of a thousand frames this many suffer each of what frames may suffer.
+    permille: u64,
+    sent: u64,
+    harmed: u64,
+    is_cut: bool,
+}
+
+impl Wire {
+    fn send(&mut self, random: &Random, frame: &[u8]) {
+        self.sent += 1;
+        if self.is_cut {
+            self.harmed += 1;
+            return;
+        }
+        let mut frame = frame.to_vec();
+        let mut times = 1;
+        let mut is_hit = || {
+            let is_hit = random.below(1000) < self.permille;
+            self.harmed += u64::from(is_hit);
+            is_hit
+        };
+        if is_hit() {
+            times = 0;
+        }
+        if is_hit() {
+            times = 2;
+        }
+        if is_hit() {
+            frame.truncate(random.below(frame.len() as u64) as usize);
+        }
+        if is_hit() {
+            let at = random.below(frame.len().max(1) as u64) as usize;
+            if let Some(byte) = frame.get_mut(at) {
+                *byte ^= 1 << random.below(8);
+            }
+        }
+        let swaps = is_hit();
+        for _ in 0..times {
+            self.frames.push_back(frame.clone());
+        }
+        let count = self.frames.len();
+        if swaps && count > 1 {
+            self.frames.swap(count - 1, count - 2);
+        }
+    }
+
+    /// Some of the bytes that have arrived, cut anywhere.
+    fn receive(&mut self, random: &Random) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        // Frames come in bursts.
+        if random.chance(0.5) {
+            return bytes;
+        }
+        while let Some(frame) = self.frames.front_mut() {
+            let count = (random.below(frame.len() as u64 + 40) as usize).min(frame.len());
+            bytes.extend(frame.drain(..count));
+            if !frame.is_empty() {
+                break;
+            }
+            self.frames.pop_front();
+            if random.chance(0.3) {
+                break;
+            }
+        }
+        bytes
+    }
+}
+
+/// An item that is known by its number: dwells, and lines and curves of all lengths in bytes.
+fn item(number: u32) -> Item<3> {
+    let position = |bits: i64| Position::from_bits(bits);
+    let start = [position(i64::from(number) << 20), position(-i64::from(number)), position(1 << 40)];
+    match number % 3 {
+        0 => Item::Dwell(Ticks::from_bits(u64::from(number))),
+        1 => Item::Line { line: number, start, direction: [0.6, 0.8, 0.0], length: position(1 << 33) },
+        _ => Item::Septic {
+            line: number,
+            start,
+            coefficients: [[f64::from(number); 7], [0.1; 7], [0.0; 7]],
+            length: position(1 << 34),
+        },
+    }
+}
+
+/// A board: its end of the link, the items that live control takes from it, in their order, and its controls.
+struct Board {
+    link: BoardLink,
+    items: Items,
+    driven: Vec<Item<3>>,
+    controls: Vec<Controls>,
+}
+
+impl Board {
+    fn new(session: u32) -> Self {
+        Self {
+            link: BoardLink::new(session, IDENTITY),
+            items: Items::new(),
+            driven: Vec::new(),
+            controls: Vec::new(),
+        }
+    }
+}
+
+struct Bench {
+    random: Random,
+    host: Host,
+    board: Board,
+    down: Wire,
+    up: Wire,
+    now_ms: u32,
+    events: Vec<Event<3>>,
+    statuses: u64,
+}
+
+impl Bench {
+    fn new(seed: u64, permille: u64) -> Self {
+        println!("seed {seed}, {permille} of a thousand");
+        let wire = || Wire { permille, ..Wire::default() };
+        Self {
+            random: Random::new(seed),
+            host: Host::new(),
+            board: Board::new(1),
+            down: wire(),
+            up: wire(),
+            // Times wrap.
+            now_ms: u32::MAX - 3000,
+            events: Vec::new(),
+            statuses: 0,
+        }
+    }
+
+    /// A millisecond.
+    fn step(&mut self, takes: f64) {
+        let mut out = [0; FRAME_MAX];
+        self.now_ms = self.now_ms.wrapping_add(1);
+        let length = self.host.transmit(self.now_ms, &mut out);
+        if length > 0 {
+            self.down.send(&self.random, &out[..length]);
+        }
+        let bytes = self.down.receive(&self.random);
+        self.board.link.receive(&bytes, &mut self.board.items);
+        self.board.controls.extend(self.board.link.take_controls());
+        if self.random.chance(takes)
+            && let Poll::Ready(Some(Ok(item))) = self.board.items.poll_next()
+        {
+            self.board.driven.push(item);
+        }
+        let status = Status {
+            tick: self.now_ms,
+            state: State::Moving,
+            set: [Position::ZERO; 3],
+            actual: [Position::ZERO; 3],
+            feed_mm_s: 12.5,
+            line: 7,
+            begun: self.board.items.taken(),
+            fault: 0,
+        };
+        let status = self.random.chance(0.02).then_some(status);
+        let length = self.board.link.transmit(self.now_ms, &self.board.items, status, &mut out);
+        if length > 0 {
+            self.up.send(&self.random, &out[..length]);
+        }
+        let bytes = self.up.receive(&self.random);
+        let (events, statuses) = (&mut self.events, &mut self.statuses);
+        self.host.receive(&bytes, self.now_ms, &mut |event| match event {
+            Event::Status(status) => {
+                assert_eq!((status.feed_mm_s, status.line), (12.5, 7));
+                *statuses += 1;
+            }
+            event => events.push(event),
+        });
+    }
+
+    /// Until the board takes items.
+    fn greet(&mut self) -> u32 {
+        self.events.clear();
+        for _ in 0..10_000 {
+            self.step(0.0);
+            if let Some(Event::Ready { next }) = self.events.last() {
+                return *next;
+            }
+        }
+        panic!("no answer: {:?}", self.events);
+    }
+}
+
+/// Every item comes once and in its order, and the board has the last controls, whatever happens to frames.
+#[test]
+fn nothing_is_lost_or_doubled_on_a_bad_wire() {
+    let (mut frames, mut harmed, mut damaged) = (0, 0, 0);
+    for (seed, permille) in (1..=60).zip([0, 10, 10, 50, 200].into_iter().cycle()) {
+        let mut bench = Bench::new(seed, permille);
+        assert_eq!(bench.greet(), 0);
+        let (count, mut pushed, mut steps) = (600, 0, 0_u32);
+        let takes = bench.random.log(0.02, 1.0);
+        while bench.board.driven.len() < count as usize
+            || bench.host.waiting() > 0
+            || !bench.host.is_controlled()
+        {
+            steps += 1;
+            assert!(steps < 400_000, "{} of {count} driven", bench.board.driven.len());
+            while pushed < count && bench.host.push(Some(&item(pushed))).expect("short") {
+                pushed += 1;
+            }
+            // Now and then one after the other.
+            while pushed < count && bench.random.chance(if steps % 97 < 3 { 0.7 } else { 0.002 }) {
+                bench.step(takes);
+                match bench.random.below(4) {
+                    0 => bench.host.press(Mode::Hold),
+                    1 => bench.host.press(Mode::Run),
+                    2 => bench.host.control(|controls| controls.override_permille ^= 3),
+                    _ => bench.host.control(|controls| controls.is_single_block ^= true),
+                }
+            }
+            // A cable pulled, and back in.
+            if bench.random.chance(2e-4) {
+                (bench.down.is_cut, bench.up.is_cut) = (true, bench.random.chance(0.5));
+            }
+            if bench.random.chance(2e-3) {
+                (bench.down.is_cut, bench.up.is_cut) = (false, false);
+            }
+            bench.step(takes);
+        }
+        for (number, driven) in (0..).zip(&bench.board.driven) {
+            assert_eq!(*driven, item(number), "item {number}");
+        }
+        let controls = &bench.board.controls;
+        assert_eq!(controls.last(), Some(bench.host.controls()));
+        assert!(controls.windows(2).all(|pair| pair[1].is_newer_than(&pair[0])), "an old one comes again");
+        assert!(bench.statuses > 0);
+        frames += bench.down.sent + bench.up.sent;
+        harmed += bench.down.harmed + bench.up.harmed;
+        damaged += bench.board.link.damaged() + bench.host.damaged();
+    }
+    println!("{frames} frames, {harmed} of them harmed, {damaged} found damaged");
+    assert!(frames > 100_000 && harmed > 10_000 && damaged > 2_000);
+}
+
+/// A frame that is lost is sent again as soon as the board has seen a later one, not only when it is late.
+#[test]
+fn what_is_missing_is_sent_again_at_once() {
+    for seed in 1..=20 {
+        let mut bench = Bench::new(seed, 0);
+        bench.greet();
+        let mut number = 0;
+        // An item in each frame, and always room for more.
+        let mut steps = |bench: &mut Bench, count: u32| {
+            for _ in 0..count {
+                number += u32::from(bench.host.push(Some(&item(number))).expect("short"));
+                bench.step(1.0);
+                bench.step(1.0);
+                bench.step(1.0);
+            }
+        };
+        steps(&mut bench, 100);
+        bench.down.is_cut = true;
+        steps(&mut bench, 1);
+        bench.down.is_cut = false;
+        let before = bench.board.driven.len();
+        steps(&mut bench, 25);
+        assert!(bench.board.driven.len() > before + 8, "{} of {before}", bench.board.driven.len());
+    }
+}
+
+/// Controls pass a program that waits for room, and the same mode pressed again is a command again.
+#[test]
+fn controls_wait_for_nothing() {
+    let mut bench = Bench::new(7, 0);
+    bench.greet();
+    let mut number = 0;
+    for _ in 0..2000 {
+        while bench.host.push(Some(&item(number))).expect("short") {
+            number += 1;
+        }
+        bench.step(0.0);
+    }
+    assert_eq!((bench.board.items.taken(), bench.host.confirmed()), (0, ROOM as u32), "the board is full");
+    for mode in [Mode::Run, Mode::Hold, Mode::Hold, Mode::Abort] {
+        bench.host.press(mode);
+        let before = bench.board.controls.len();
+        let mut steps = 0;
+        while bench.board.controls.len() == before {
+            bench.step(0.0);
+            steps += 1;
+            assert!(steps < 60, "{mode:?}");
+        }
+        assert_eq!(bench.board.controls.last(), Some(bench.host.controls()));
+    }
+}
+
+/// A board that starts anew says so; a PC that starts anew learns what the board has, and goes on there.
+#[test]
+fn both_ends_may_start_anew() {
+    let mut bench = Bench::new(8, 20);
+    bench.greet();
+    let push = |bench: &mut Bench, number: &mut u32, until: u32| {
+        while *number < until && bench.host.push(Some(&item(*number))).expect("short") {
+            *number += 1;
+        }
+    };
+    let mut number = 0;
+    for _ in 0..3000 {
+        push(&mut bench, &mut number, 100);
+        bench.step(0.3);
+    }
+    assert_eq!(bench.board.driven.len(), 100);
+    // The PC: its next run goes on with item 100 of the same session.
+    bench.host = Host::new();
+    assert_eq!(bench.greet(), 100);
+    for _ in 0..3000 {
+        push(&mut bench, &mut number, 200);
+        bench.step(0.3);
+    }
+    assert_eq!(bench.board.driven.len(), 200);
+    assert!(bench.board.driven.iter().zip(0..).all(|(driven, number)| *driven == item(number)));
+    // The board, while items are under way.
+    for _ in 0..20 {
+        push(&mut bench, &mut number, 300);
+        bench.step(0.3);
+    }
+    let confirmed = bench.host.confirmed();
+    bench.board = Board::new(2);
+    for _ in 0..1000 {
+        bench.step(0.3);
+    }
+    let Some(&Event::Restarted { confirmed: told }) = bench.events.last() else {
+        panic!("{:?}", bench.events)
+    };
+    assert!(told >= confirmed && bench.board.driven.is_empty(), "{told} {confirmed}");
+    assert_eq!(bench.host.push(Some(&item(0))), Ok(false), "not before the caller has decided");
+    bench.host.begin();
+    assert_eq!(bench.greet(), 0);
+    let mut number = 0;
+    for _ in 0..3000 {
+        push(&mut bench, &mut number, 50);
+        bench.step(0.3);
+    }
+    assert!(bench.board.driven.len() == 50);
+}
+
+/// No bytes can do more than be dropped: random ones, and frames with random payloads and right checksums.
+#[test]
+fn any_bytes_may_come() {
+    let mut read = 0_u32;
+    for seed in 0..40 {
+        let random = Random::new(seed);
+        let (mut board, mut host) = (Board::new(1), Host::new());
+        let mut out = [0; FRAME_MAX];
+        for _ in 0..2000 {
+            let mut payload: Vec<u8> = (0..random.below(60))
+                .map(|_| if random.chance(0.5) { 0 } else { random.next() as u8 })
+                .collect();
+            if random.chance(0.5)
+                && let Some(first) = payload.first_mut()
+            {
+                *first &= 3;
+            }
+            let bytes = if random.chance(0.7) {
+                let mut framed = frame::Payload::of(&()).expect("nothing");
+                assert!(framed.push_all(payload.into_iter()));
+                let length = framed.frame(&mut out);
+                out[..length].to_vec()
+            } else {
+                payload
+            };
+            let before = board.items.next();
+            board.link.receive(&bytes, &mut board.items);
+            host.receive(&bytes, 0, &mut |_| read += 1);
+            assert!(board.items.next().wrapping_sub(before) <= ROOM as u32);
+            while let Poll::Ready(Some(_)) = board.items.poll_next() {}
+        }
+    }
+    println!("{read} were messages");
+    assert!(read > 10);
+}
