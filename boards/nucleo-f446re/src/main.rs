@@ -1,15 +1,19 @@
 //! Firmware: the motion kernel on an ST NUCLEO-F446RE, three axes.
 //!
 //! ```text
-//! TIM7 ─► tick (the only interrupt)                      background (idle)
+//! TIM7 ─► tick                                           background (idle)
 //!         drives: emergency stop, ready   ── Control ──  button, log
 //!         console ── bytes ────────────────────────────  commands
 //!         encoders ─► kernel ─► converter ◄─ streams ──  program
 //!         watchdog ◄───────────────────────── polls ───
+//!
+//! EXTI2 ─► emergency_stop: enables off, outputs 0 V, without waiting for the tick
+//! PVD ─► supply_falls, NMI (clock lost), hard fault, panic ─► stop: the same, then the watchdog resets
 //! ```
 //!
-//! The tick is a hardware task with a static priority and nothing above it: it ends at the latest its own
-//! longest time after the timer's event, plus the longest time for which the background masks interrupts.
+//! The tick is a hardware task with a static priority and nothing above it but the end of everything: it ends at
+//! the latest its own longest time after the timer's event, plus the longest time for which the background masks
+//! interrupts, plus one emergency stop.
 //! `README.md` has wiring, bring-up and what to expect; `design_parameters.rs` has every number.
 #![no_std]
 #![no_main]
@@ -22,20 +26,23 @@ mod dac;
 mod drives;
 mod spindle;
 mod hal;
+mod switches;
+mod supply;
 mod tick_timer;
 mod console_port;
 mod background;
+mod stop;
 
 use core::sync::atomic::Ordering;
 
 use defmt_rtt as _;
-use panic_probe as _;
 
 // The tick's number before every line of the log.
 defmt::timestamp!("{=u32}", background::TICKS.load(Ordering::Relaxed));
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
+    use core::mem::MaybeUninit;
     use core::sync::atomic::Ordering;
 
     use cortex_m::peripheral::DWT;
@@ -56,16 +63,17 @@ mod app {
     use crate::hal::Hardware;
     use crate::tick_timer::TickTimer;
 
-    /// Shared by tick and background.
+    /// Shared by tick and background, and by the interrupts of the tick's priority.
     #[shared]
     struct Shared {
         control: Control,
+        #[lock_free]
+        hardware: Hardware,
     }
 
     /// Owned by one of them.
     #[local]
     struct Local {
-        hardware: Hardware,
         tick_timer: TickTimer,
         watchdog: IndependentWatchdog,
         liveness: Liveness,
@@ -78,12 +86,13 @@ mod app {
         machine: Machine,
     }
 
+    // Written at the start: an initial value that is not all zeros would lie in flash a second time, whole.
     #[init(local = [
-        storage: Streams = Streams::new(),
-        flight: Flight = Flight::new(),
-        console_bytes: Queue<u8, CONSOLE_BYTES> = Queue::new(),
+        storage: MaybeUninit<Streams> = MaybeUninit::uninit(),
+        flight: MaybeUninit<Flight> = MaybeUninit::uninit(),
         // The kernel's streams until there is a program; nothing ever enters them.
-        empty: motion_kernel::queue::Streams<Number, AXES, 2, 2> = motion_kernel::queue::Streams::new(),
+        empty: MaybeUninit<motion_kernel::queue::Streams<Number, AXES, 2, 2>> = MaybeUninit::uninit(),
+        console_bytes: Queue<u8, CONSOLE_BYTES> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let Board { mut hardware, mut tick_timer, mut watchdog, scope, button, console } =
@@ -92,12 +101,12 @@ mod app {
         // The machine's position becomes the program's start.
         let start = machine.header().start;
         let kernel = Kernel::new(&machine.axes, start, hardware.encoders.latch());
-        let (_, intake) = cx.local.empty.split(machine.header().rules, start);
-        let control = Control::new(kernel, intake, start, cx.local.flight);
+        let empty = cx.local.empty.write(motion_kernel::queue::Streams::new());
+        let (_, intake) = empty.split(machine.header().rules, start);
+        let control = Control::new(kernel, intake, start, cx.local.flight.write(Flight::new()));
         let (received, bytes) = cx.local.console_bytes.split();
         Board::start(&mut tick_timer, &mut watchdog);
         let local = Local {
-            hardware,
             tick_timer,
             watchdog,
             liveness: Liveness::new(BOARD.silent_ticks_max()),
@@ -106,10 +115,10 @@ mod app {
             console,
             received,
             panel: Panel { button, bytes },
-            streams: cx.local.storage,
+            streams: cx.local.storage.write(Streams::new()),
             machine,
         };
-        (Shared { control }, local)
+        (Shared { control, hardware }, local)
     }
 
     const _: () = assert!(TICK_PRIORITY == 16, "repeated as a literal below");
@@ -118,16 +127,16 @@ mod app {
     #[task(
         binds = TIM7,
         priority = 16,
-        local = [hardware, tick_timer, watchdog, liveness, monitor, scope, console, received],
-        shared = [control]
+        local = [tick_timer, watchdog, liveness, monitor, scope, console, received],
+        shared = [control, hardware]
     )]
     fn tick(mut cx: tick::Context) {
         let begin = DWT::cycle_count();
         let latency_cycles = cx.local.tick_timer.take();
-        let hardware = cx.local.hardware;
+        let hardware = cx.shared.hardware;
         cx.local.scope.set_high();
         cx.shared.control.lock(|control| {
-            let unhealthy = hardware.drives.check();
+            let unhealthy = hardware.drives.tick();
             control.tick(unhealthy, cx.local.monitor.began(begin), hardware);
             if cx.local.liveness.may_feed(POLLS.load(Ordering::Relaxed)) {
                 cx.local.watchdog.feed();
@@ -141,6 +150,21 @@ mod app {
         });
         TICKS.store(TICKS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         cx.local.scope.set_low();
+    }
+
+    /// The emergency stop has opened: what the next tick would do, now.
+    #[task(binds = EXTI2, priority = 16, shared = [control, hardware])]
+    fn emergency_stop(mut cx: emergency_stop::Context) {
+        let hardware = cx.shared.hardware;
+        if let Some(kind) = hardware.interrupt() {
+            cx.shared.control.lock(|control| control.trip(kind));
+        }
+    }
+
+    /// The supply falls. It takes part of a millisecond from here to the brown-out reset; it may also stay here.
+    #[task(binds = PVD, priority = 16)]
+    fn supply_falls(_: supply_falls::Context) {
+        crate::stop::stop("the supply is below 2.9 V")
     }
 
     /// The background.
