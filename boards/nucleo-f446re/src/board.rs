@@ -9,9 +9,9 @@ use defmt::{info, unwrap};
 use embedded_hal_bus::spi::ExclusiveDevice;
 use motion_kernel::hal::Ad5754Output;
 use nucleo_f446re::design_parameters::{
-    APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, CONSOLE_BAUD, HSE_HZ, SYSCLK_HZ, WATCHDOG_MS,
+    APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, CONSOLE_BAUD, HSE_HZ, SPI_HZ, SYSCLK_HZ, WATCHDOG_MS,
 };
-use stm32f4xx_hal::gpio::{Alternate, Input, Output, PA3, PA10, PC13, Pull, Speed};
+use stm32f4xx_hal::gpio::{Alternate, AnyPin, Input, Output, PA3, PA10, PB12, PC13, Pull, Speed};
 use stm32f4xx_hal::pac::rcc::csr;
 use stm32f4xx_hal::pac::{self, SPI2, USART2};
 use stm32f4xx_hal::prelude::*;
@@ -21,7 +21,8 @@ use stm32f4xx_hal::spi::{Spi, SpiExt};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 use crate::dac::{self, Sync};
-use crate::drives::{Drives, EmergencyStop};
+use crate::drives::Drives;
+use crate::emergency_stop::EmergencyStop;
 use crate::encoders::Encoders;
 use crate::hal::Hardware;
 use crate::spindle::SpindleAndCoolant;
@@ -29,15 +30,35 @@ use crate::supply;
 use crate::switches::Switches;
 use crate::tick_timer::TickTimer;
 
+/// The wires that an emulated board has in another way.
+pub(crate) type Bus = Spi<SPI2>;
+pub(crate) type SyncPin = PB12<Output>;
+pub(crate) type EnablePin = AnyPin<Output>;
+pub(crate) type ScopePin = PA10<Output>;
+pub(crate) type ButtonPin = PC13<Input>;
+
+/// Writes a line of the log.
+pub(crate) use motion_board::log::write;
+
+/// Passes time until an interrupt, or a part of it. (Not with `wfi`: in sleep the probe can't read the log.)
+pub(crate) fn pause() {
+    core::hint::spin_loop();
+}
+
+/// Writes why everything has ended.
+pub(crate) fn write_end(why: core::fmt::Arguments<'_>) {
+    defmt::error!("stopped for good: {}", defmt::Display2Format(&why));
+}
+
 /// Everything the firmware uses, ready to tick.
 pub(crate) struct Board {
     pub(crate) hardware: Hardware,
     pub(crate) tick_timer: TickTimer,
     pub(crate) watchdog: IndependentWatchdog,
     /// High while the tick runs.
-    pub(crate) scope: PA10<Output>,
+    pub(crate) scope: ScopePin,
     /// B1: low while it is pressed (the board has the pull-up).
-    pub(crate) button: PC13<Input>,
+    pub(crate) button: ButtonPin,
     /// ST-LINK's serial port.
     pub(crate) console: Rx<USART2>,
 }
@@ -124,13 +145,8 @@ impl Board {
         let data = gpiob.pb15.into_alternate::<5>().speed(Speed::High);
         let mut sync = gpiob.pb12.into_push_pull_output_in_state(stm32f4xx_hal::gpio::PinState::High);
         sync.set_speed(Speed::High);
-        let bus = Spi::new(
-            device.SPI2,
-            (Some(clock), SPI2::NoMiso, Some(data)),
-            dac::MODE,
-            dac::CLOCK_HZ.Hz(),
-            &mut rcc,
-        );
+        let bus =
+            Spi::new(device.SPI2, (Some(clock), SPI2::NoMiso, Some(data)), dac::MODE, SPI_HZ.Hz(), &mut rcc);
         let spi = unwrap!(ExclusiveDevice::new_no_delay(bus, Sync(sync)).ok(), "SYNC can't fail");
         let mut delay = core.SYST.delay(&rcc.clocks);
         let outputs = match Ad5754Output::setup(spi, &mut delay) {

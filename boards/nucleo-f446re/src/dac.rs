@@ -11,22 +11,18 @@ use embedded_hal::digital::{ErrorType, OutputPin};
 use embedded_hal::spi::{MODE_1, Mode};
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use motion_kernel::hal::Ad5754Output;
-use nucleo_f446re::design_parameters::{SPI_HZ, SYNC_HIGH_CYCLES};
+use nucleo_f446re::design_parameters::SYNC_HIGH_CYCLES;
 use nucleo_f446re::machine::AXES;
-use stm32f4xx_hal::gpio::{Output, PB12};
-use stm32f4xx_hal::pac::SPI2;
-use stm32f4xx_hal::spi::Spi;
+
+use crate::board::{Bus, SyncPin};
 
 /// The converter takes a bit at every falling edge of SCLK, 24 of them while SYNC is low (AD5754, serial
 /// interface, standalone operation). Modes 1 and 2 both do that. Mode 1 is used: its clock rests low, so the
 /// 24th falling edge is the last edge, and no clock edge is left when SYNC rises.
 pub(crate) const MODE: Mode = MODE_1;
 
-/// Frequency of SCLK \[Hz\].
-pub(crate) const CLOCK_HZ: u32 = SPI_HZ;
-
 /// SYNC, which stays high for as long as the converter needs between two frames.
-pub(crate) struct Sync(pub(crate) PB12<Output>);
+pub(crate) struct Sync(pub(crate) SyncPin);
 
 impl ErrorType for Sync {
     type Error = Infallible;
@@ -46,7 +42,7 @@ impl OutputPin for Sync {
 }
 
 /// The converter on a bus of its own.
-pub(crate) type Device = ExclusiveDevice<Spi<SPI2>, Sync, NoDelay>;
+pub(crate) type Device = ExclusiveDevice<Bus, Sync, NoDelay>;
 
 /// The outputs of all axes.
 pub(crate) type Outputs = Ad5754Output<Device, AXES>;

@@ -163,8 +163,8 @@ const _: () = assert!(
     "more bytes may come in a poll of the background than there are places"
 );
 
-/// Ticks that the flight recorder keeps: a twelfth of a second, 28 KB. It reduces the stack by as much.
-pub const FLIGHT_ROWS: usize = TICK_HZ as usize / 12;
+/// Ticks that the flight recorder keeps: an eighteenth of a second, 19 KB, what the stack leaves.
+pub const FLIGHT_ROWS: usize = TICK_HZ as usize / 18;
 /// Ticks of these after the fault's: 25 ms, which show the axes coasting.
 pub const FLIGHT_AFTER: usize = TICK_HZ as usize / 40;
 

@@ -9,49 +9,16 @@
 
 use motion_kernel::fault::FaultKind;
 use nucleo_f446re::machine::AXES;
-use stm32f4xx_hal::gpio::{AnyPin, Edge, ExtiPin, Input, Output, PD2};
-use stm32f4xx_hal::pac::EXTI;
-use stm32f4xx_hal::syscfg::SysCfg;
+use stm32f4xx_hal::gpio::{AnyPin, Input};
+
+use crate::board::EnablePin;
+use crate::emergency_stop::EmergencyStop;
 
 /// The drives' wires.
 pub(crate) struct Drives {
-    pub(crate) enables: [AnyPin<Output>; AXES],
+    pub(crate) enables: [EnablePin; AXES],
     pub(crate) ready: [AnyPin<Input>; AXES],
     pub(crate) emergency_stop: EmergencyStop,
-}
-
-/// The emergency stop's input, and its line of the interrupt controller (EXTI2).
-pub(crate) struct EmergencyStop {
-    pin: PD2<Input>,
-    lines: EXTI,
-    is_armed: bool,
-}
-
-impl EmergencyStop {
-    /// The input; it interrupts at rising edges, as soon as interrupts are on.
-    pub(crate) fn new(mut pin: PD2<Input>, mut lines: EXTI, routing: &mut SysCfg) -> Self {
-        pin.make_interrupt_source(routing);
-        pin.trigger_on_edge(&mut lines, Edge::Rising);
-        pin.enable_interrupt(&mut lines);
-        Self { pin, lines, is_armed: true }
-    }
-
-    /// Lets it interrupt again.
-    #[inline]
-    fn arm(&mut self) {
-        if !self.is_armed {
-            self.is_armed = true;
-            self.pin.clear_interrupt_pending_bit();
-            self.pin.enable_interrupt(&mut self.lines);
-        }
-    }
-
-    /// Takes the interrupt; the next one comes after [`EmergencyStop::arm`].
-    fn take(&mut self) {
-        self.is_armed = false;
-        self.pin.disable_interrupt(&mut self.lines);
-        self.pin.clear_interrupt_pending_bit();
-    }
 }
 
 impl Drives {
@@ -70,7 +37,7 @@ impl Drives {
     /// The reason to stop, if any, the emergency stop first. If there is one, the drives are off when this
     /// returns, whatever else happens in the tick.
     fn check(&mut self) -> Option<FaultKind<f32>> {
-        let fault = if self.emergency_stop.pin.is_high() {
+        let fault = if self.emergency_stop.is_open() {
             Some(FaultKind::EmergencyStop)
         } else {
             self.ready.iter().position(AnyPin::is_high).map(|axis| FaultKind::Drive { axis })

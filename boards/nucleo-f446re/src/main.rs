@@ -20,15 +20,27 @@
 // No panic path in the tick.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
+// What is the board's alone, or an emulated board's in its place; all else is the same.
+#[cfg(not(feature = "emulated"))]
 mod board;
+#[cfg(not(feature = "emulated"))]
+mod emergency_stop;
+#[cfg(not(feature = "emulated"))]
 mod encoders;
+#[cfg(not(feature = "emulated"))]
+mod supply;
+#[cfg(not(feature = "emulated"))]
+mod tick_timer;
+#[cfg(feature = "emulated")]
+mod emulated;
+#[cfg(feature = "emulated")]
+use emulated::{board, emergency_stop, encoders, tick_timer};
+
 mod dac;
 mod drives;
+mod switches;
 mod spindle;
 mod hal;
-mod switches;
-mod supply;
-mod tick_timer;
 mod console_port;
 mod background;
 mod stop;
@@ -45,23 +57,21 @@ mod app {
     use core::mem::MaybeUninit;
     use core::sync::atomic::Ordering;
 
-    use cortex_m::peripheral::DWT;
     use heapless::spsc::{Producer, Queue};
     use motion_board::Liveness;
     use motion_kernel::kernel::Kernel;
     use motion_kernel::tick_monitor::TickMonitor;
     use nucleo_f446re::design_parameters::{BOARD, CONSOLE_BYTES, TICK_CYCLES, TICK_PRIORITY};
     use nucleo_f446re::machine::{AXES, Control, Flight, Machine, Number, PROGRAM, Streams};
-    use stm32f4xx_hal::gpio::{Output, PA10};
     use stm32f4xx_hal::pac::USART2;
     use stm32f4xx_hal::serial::Rx;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
     use crate::background::{self, POLLS, Panel, TICKS};
-    use crate::board::Board;
+    use crate::board::{Board, ScopePin};
     use crate::console_port;
     use crate::hal::Hardware;
-    use crate::tick_timer::TickTimer;
+    use crate::tick_timer::{TickTimer, cycles};
 
     /// Shared by tick and background, and by the interrupts of the tick's priority.
     #[shared]
@@ -78,7 +88,7 @@ mod app {
         watchdog: IndependentWatchdog,
         liveness: Liveness,
         monitor: TickMonitor,
-        scope: PA10<Output>,
+        scope: ScopePin,
         console: Rx<USART2>,
         received: Producer<'static, u8>,
         panel: Panel,
@@ -131,7 +141,7 @@ mod app {
         shared = [control, hardware]
     )]
     fn tick(mut cx: tick::Context) {
-        let begin = DWT::cycle_count();
+        let begin = cycles();
         let latency_cycles = cx.local.tick_timer.take();
         let hardware = cx.shared.hardware;
         cx.local.scope.set_high();
@@ -142,11 +152,11 @@ mod app {
                 cx.local.watchdog.feed();
             }
             console_port::receive(cx.local.console, cx.local.received);
-            if let Some(kind) = cx.local.monitor.ended(DWT::cycle_count()) {
+            if let Some(kind) = cx.local.monitor.ended(cycles()) {
                 control.trip(kind);
             }
             let overrun = cx.local.tick_timer.due_again();
-            control.timing.add(DWT::cycle_count().wrapping_sub(begin), latency_cycles, overrun);
+            control.timing.add(cycles().wrapping_sub(begin), latency_cycles, overrun);
         });
         TICKS.store(TICKS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         cx.local.scope.set_low();

@@ -9,6 +9,7 @@
 //! processor's handlers of hard faults and NMIs have to be declared so.
 #![allow(unsafe_code)]
 
+use core::fmt::Arguments;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -17,6 +18,8 @@ use nucleo_f446re::design_parameters::{DAC_CLEAR_FRAME, SPI_WAIT_TURNS, SYNC_HIG
 use nucleo_f446re::pins::{SYNC_MASK, switching_outputs};
 use stm32f4xx_hal::pac::{Peripherals, SPI2};
 
+use crate::board::write_end;
+
 /// Of each port, the outputs that switch something on.
 const SWITCHING_B: u32 = switching_outputs(b'B');
 const SWITCHING_C: u32 = switching_outputs(b'C');
@@ -24,15 +27,15 @@ const SWITCHING_C: u32 = switching_outputs(b'C');
 /// Everything off; then the reason goes to the log, and the processor waits for the watchdog.
 pub(crate) fn stop(why: &str) -> ! {
     all_off();
-    end(|| defmt::error!("stopped for good: {=str}", why))
+    end(format_args!("{why}"))
 }
 
 /// Logs, unless the log is what has failed, and waits for the watchdog.
-fn end(log: impl FnOnce()) -> ! {
+fn end(why: Arguments<'_>) -> ! {
     static HAS_ENDED: AtomicBool = AtomicBool::new(false);
     if !HAS_ENDED.load(Ordering::Relaxed) {
         HAS_ENDED.store(true, Ordering::Relaxed);
-        log();
+        write_end(why);
     }
     loop {
         cortex_m::asm::nop();
@@ -77,20 +80,20 @@ fn wait_for(spi: &SPI2, is_done: impl Fn(&SPI2) -> bool) {
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     all_off();
-    end(|| defmt::error!("{}", defmt::Display2Format(info)))
+    end(format_args!("{info}"))
 }
 
 /// `defmt` has logged its own message; a second one would say less.
 #[defmt::panic_handler]
 fn panicked() -> ! {
     all_off();
-    end(|| ())
+    end(format_args!("see above"))
 }
 
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     all_off();
-    end(|| defmt::error!("hard fault at {=u32:#010x}, called from {=u32:#010x}", frame.pc(), frame.lr()))
+    end(format_args!("hard fault at {:#010x}, called from {:#010x}", frame.pc(), frame.lr()))
 }
 
 /// The clock's security: nothing else here makes an NMI.
