@@ -5,8 +5,7 @@
 //! hardware differs from `design_parameters.rs`; nothing is enabled then. Without the ST-LINK's clock, or with a supply
 //! that is too low, it waits forever, with everything off.
 
-use defmt::{info, unwrap};
-use embedded_hal_bus::spi::ExclusiveDevice;
+use defmt::info;
 use motion_kernel::hal::Ad5754Output;
 use nucleo_f446re::design_parameters::{
     APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, CONSOLE_BAUD, HSE_HZ, SPI_HZ, SYSCLK_HZ, WATCHDOG_MS,
@@ -20,7 +19,7 @@ use stm32f4xx_hal::serial::{Rx, SerialExt};
 use stm32f4xx_hal::spi::{Spi, SpiExt};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-use crate::dac::{self, Sync};
+use crate::dac::{self, Device, Sender};
 use crate::drives::Drives;
 use crate::emergency_stop::EmergencyStop;
 use crate::encoders::Encoders;
@@ -31,7 +30,7 @@ use crate::switches::Switches;
 use crate::tick_timer::TickTimer;
 
 /// The wires that an emulated board has in another way.
-pub(crate) type Bus = Spi<SPI2>;
+pub(crate) type Bus = Sender;
 pub(crate) type SyncPin = PB12<Output>;
 pub(crate) type EnablePin = AnyPin<Output>;
 pub(crate) type ScopePin = PA10<Output>;
@@ -147,7 +146,7 @@ impl Board {
         sync.set_speed(Speed::High);
         let bus =
             Spi::new(device.SPI2, (Some(clock), SPI2::NoMiso, Some(data)), dac::MODE, SPI_HZ.Hz(), &mut rcc);
-        let spi = unwrap!(ExclusiveDevice::new_no_delay(bus, Sync(sync)).ok(), "SYNC can't fail");
+        let spi = Device::new(Sender::new(bus), sync);
         let mut delay = core.SYST.delay(&rcc.clocks);
         let outputs = match Ad5754Output::setup(spi, &mut delay) {
             Ok(outputs) => outputs,

@@ -74,7 +74,9 @@ fn run(tools: &Tools) -> Result<Vec<String>, String> {
         .args(["-icount", &format!("shift={SHIFT},sleep=off"), "-kernel"])
         .arg(image)
         .stdin(Stdio::piped())
-        .stdout(Stdio::piped());
+        .stdout(Stdio::piped())
+        // It says that it was ended.
+        .stderr(Stdio::null());
     let mut running = emulator.spawn().map_err(|error| format!("qemu-system-arm: {error}"))?;
     let (input, output) = (running.stdin.take(), running.stdout.take());
     let (mut input, output) = input.zip(output).ok_or("no pipes")?;

@@ -7,7 +7,6 @@ use core::sync::atomic::Ordering;
 use cortex_m::peripheral::SCB;
 use cortex_m_semihosting::hprintln;
 use embedded_hal::delay::DelayNs;
-use embedded_hal_bus::spi::ExclusiveDevice;
 use motion_board::LogLine;
 use motion_kernel::hal::Ad5754Output;
 use motion_kernel::program::Reader;
@@ -26,7 +25,7 @@ use super::tick_timer::TickTimer;
 pub(crate) use super::wires::{Bus, ButtonPin, EnablePin, ScopePin, SyncPin};
 use super::{model, script};
 use crate::background::TICKS;
-use crate::dac::{self, Sync};
+use crate::dac::{self, Device, Sender};
 use crate::drives::Drives;
 use crate::hal::Hardware;
 use crate::spindle::SpindleAndCoolant;
@@ -77,6 +76,7 @@ pub(crate) struct Board {
 impl Board {
     /// Sets the board up; the tick does not run yet.
     pub(crate) fn new(device: pac::Peripherals, core: cortex_m::Peripherals) -> Self {
+        let tick_timer = TickTimer::new(core.SYST);
         let program = defmt::unwrap!(Reader::new(PROGRAM));
         model::start(program.header());
         let mut rcc = device.RCC.constrain();
@@ -118,8 +118,8 @@ impl Board {
         let pins = (Some(clock), SPI2::NoMiso, Some(data));
         // Half of the clock that the processor has without its PLL; the emulator's bus takes no time.
         let clock_hz = rcc.clocks.pclk1() / 2;
-        let bus = Bus(Spi::new(device.SPI2, pins, dac::MODE, clock_hz, &mut rcc));
-        let spi = defmt::unwrap!(ExclusiveDevice::new_no_delay(bus, Sync(sync)).ok(), "SYNC can't fail");
+        let bus = Spi::new(device.SPI2, pins, dac::MODE, clock_hz, &mut rcc);
+        let spi = Device::new(Bus::new(Sender::new(bus)), sync);
         let outputs = match Ad5754Output::setup(spi, &mut Delay) {
             Ok(outputs) => outputs,
             Err(error) => defmt::panic!("converter: {}", defmt::Debug2Format(&error)),
@@ -134,7 +134,7 @@ impl Board {
 
         Self {
             hardware: Hardware { encoders: Encoders::new(), outputs, drives, switches, spindle_and_coolant },
-            tick_timer: TickTimer::new(core.SYST),
+            tick_timer,
             watchdog: IndependentWatchdog::new(device.IWDG),
             scope: ScopePin(gpioa.pa10.into_push_pull_output()),
             button: ButtonPin,

@@ -49,19 +49,24 @@ pub(crate) fn aside(work: impl FnOnce()) -> u32 {
 pub(crate) struct TickTimer;
 
 impl TickTimer {
-    /// The timer, configured and stopped.
+    /// The timer; it counts, and makes no ticks yet.
     pub(crate) fn new(mut timer: SYST) -> Self {
         timer.set_clock_source(SystClkSource::Core);
         timer.set_reload(TICK_CYCLES - 1);
         timer.clear_current();
-        timer.enable_interrupt();
+        timer.enable_counter();
         critical_section::with(|cs| TIMER.replace(cs, Some(timer)));
         Self
     }
 
-    /// Starts it.
+    /// Starts it; the first tick comes one period from now.
     pub(crate) fn start(&mut self) {
-        aside(|| ());
+        critical_section::with(|cs| {
+            if let Some(timer) = TIMER.borrow_ref_mut(cs).as_mut() {
+                timer.clear_current();
+                timer.enable_interrupt();
+            }
+        });
     }
 
     /// The cycles since the event.

@@ -2,45 +2,36 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use embedded_hal::spi::{ErrorType, SpiBus};
 use stm32f4xx_hal::gpio::{AnyPin, Output, PA10, PB12, PinState};
-use stm32f4xx_hal::pac::SPI2;
-use stm32f4xx_hal::spi::{self, Spi};
 
 use super::{emergency_stop, model, script};
+use crate::dac::Sender;
 
-/// The bytes since SYNC fell, after a 1.
+/// What the bus has sent since SYNC fell: a 1 and the bytes.
 static FRAME: AtomicU32 = AtomicU32::new(0);
 
 /// SPI2, and what goes over it.
-pub(crate) struct Bus(pub(crate) Spi<SPI2>);
-
-impl ErrorType for Bus {
-    type Error = spi::Error;
+pub(crate) struct Bus {
+    sender: Sender,
+    frame: u32,
 }
 
-impl SpiBus for Bus {
-    fn read(&mut self, words: &mut [u8]) -> Result<(), spi::Error> {
-        SpiBus::read(&mut self.0, words)
+impl Bus {
+    pub(crate) fn new(sender: Sender) -> Self {
+        Self { sender, frame: 1 }
     }
 
-    fn write(&mut self, words: &[u8]) -> Result<(), spi::Error> {
-        for &word in words {
-            FRAME.store(FRAME.load(Ordering::Relaxed) << 8 | u32::from(word), Ordering::Relaxed);
-        }
-        SpiBus::write(&mut self.0, words)
+    #[inline]
+    pub(crate) fn send(&mut self, byte: u8) {
+        self.frame = self.frame << 8 | u32::from(byte);
+        self.sender.send(byte);
     }
 
-    fn transfer(&mut self, read: &mut [u8], write: &[u8]) -> Result<(), spi::Error> {
-        SpiBus::transfer(&mut self.0, read, write)
-    }
-
-    fn transfer_in_place(&mut self, words: &mut [u8]) -> Result<(), spi::Error> {
-        SpiBus::transfer_in_place(&mut self.0, words)
-    }
-
-    fn flush(&mut self) -> Result<(), spi::Error> {
-        SpiBus::flush(&mut self.0)
+    #[inline]
+    pub(crate) fn finish(&mut self) {
+        self.sender.finish();
+        FRAME.store(self.frame, Ordering::Relaxed);
+        self.frame = 1;
     }
 }
 
@@ -50,15 +41,11 @@ pub(crate) struct SyncPin(pub(crate) PB12<Output>);
 impl SyncPin {
     pub(crate) fn set_low(&mut self) {
         self.0.set_low();
-        FRAME.store(1, Ordering::Relaxed);
+        FRAME.store(0, Ordering::Relaxed);
     }
 
     pub(crate) fn set_high(&mut self) {
-        // Also set at the start, when it was not low.
-        let frame = FRAME.swap(0, Ordering::Relaxed);
-        if frame != 0 {
-            model::frame(frame);
-        }
+        model::frame(FRAME.load(Ordering::Relaxed));
         self.0.set_high();
     }
 }
