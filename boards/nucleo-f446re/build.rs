@@ -1,7 +1,8 @@
 //! Gives the compiler the program and the linker the board's memory map and its scripts.
 //!
 //! The program is `common/program/stringer.bin`, or what `MOTION_PROGRAM` names. The map is the repository's
-//! `memory.x`, copied to where the linker looks, so that there is one.
+//! `memory.x`, copied to where the linker looks, so that there is one. The linker also refuses an image with more initial
+//! values than a few bytes.
 
 use std::env;
 use std::error::Error;
@@ -10,6 +11,9 @@ use std::path::PathBuf;
 
 const PROGRAM: &str = "../common/program/stringer.bin";
 const MEMORY: &str = "../../memory.x";
+/// Bytes of initial values that may be copied from flash at the start: the log's own. Whatever is big is initialised
+/// by code, or is all zeros.
+const DATA_MAX: u32 = 64;
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rerun-if-changed=build.rs");
@@ -26,9 +30,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Ok(());
     }
     fs::copy(MEMORY, out.join("memory.x"))?;
+    // The emulated board's model is no part of the firmware.
+    let max = if env::var_os("CARGO_FEATURE_EMULATED").is_some() { DATA_MAX + 4096 } else { DATA_MAX };
+    let check = format!("ASSERT(SIZEOF(.data) <= {max}, \"a static's initial value is not all zeros\");\n");
+    fs::write(out.join("data.x"), check)?;
     println!("cargo:rustc-link-search={}", out.display());
     // --nmagic: sections are not aligned to pages, which flash does not have.
-    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
+    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x", "-Tdata.x"] {
         println!("cargo:rustc-link-arg-bins={argument}");
     }
     Ok(())

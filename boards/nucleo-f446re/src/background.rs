@@ -2,15 +2,15 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use cortex_m::peripheral::DWT;
 use heapless::spsc::Consumer;
-use motion_board::{LogLine, log};
+use motion_board::LogLine;
 use nucleo_f446re::design_parameters::BOARD;
 use nucleo_f446re::machine::{AXES, Background, Control, Machine, Number, Streams};
 use rtic::Mutex;
-use stm32f4xx_hal::gpio::{Input, PC13};
 
+use crate::board::{self, ButtonPin};
 use crate::console_port::LOST;
+use crate::tick_timer::cycles;
 
 /// Number of ticks since the start; counted by the tick.
 pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
@@ -20,7 +20,7 @@ pub(crate) static POLLS: AtomicU32 = AtomicU32::new(0);
 /// The blue button and ST-LINK's serial port.
 pub(crate) struct Panel {
     /// B1: low while it is down.
-    pub(crate) button: PC13<Input>,
+    pub(crate) button: ButtonPin,
     pub(crate) bytes: Consumer<'static, u8>,
 }
 
@@ -50,23 +50,23 @@ pub(crate) fn run(
     panel: &mut Panel,
 ) -> ! {
     let mut background = Background::new(BOARD, machine.program, streams);
-    log::write(&LogLine::<Number, AXES>::Ready);
+    board::write(&LogLine::<Number, AXES>::Ready);
     loop {
         wait_for_tick();
         POLLS.store(POLLS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
-        let begin = DWT::cycle_count();
+        let begin = cycles();
         if let Some(line) = background.poll(TICKS.load(Ordering::Relaxed), panel, &mut control) {
-            log::write(&line);
+            board::write(&line);
         }
         background.plan(panel);
-        background.note_poll(DWT::cycle_count().wrapping_sub(begin));
+        background.note_poll(cycles().wrapping_sub(begin));
     }
 }
 
-/// Returns when a tick has just ended. (Not with `wfi`: in sleep the probe can't read the log.)
+/// Returns when a tick has just ended.
 fn wait_for_tick() {
     let before = TICKS.load(Ordering::Relaxed);
     while TICKS.load(Ordering::Relaxed) == before {
-        core::hint::spin_loop();
+        board::pause();
     }
 }

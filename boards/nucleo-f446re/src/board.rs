@@ -2,16 +2,16 @@
 //!
 //! Consumes the peripherals, once; produces what the tick and the background own. First of all the enables,
 //! spindle and coolant become outputs at low, the level at which their pull-downs have held them since reset. Panics if the
-//! hardware differs from `design_parameters.rs`; nothing is enabled then. Without the ST-LINK's clock it
-//! waits forever, with everything off.
+//! hardware differs from `design_parameters.rs`; nothing is enabled then. Without the ST-LINK's clock, or with a supply
+//! that is too low, it waits forever, with everything off.
 
-use defmt::{info, unwrap};
-use embedded_hal_bus::spi::ExclusiveDevice;
+use defmt::info;
 use motion_kernel::hal::Ad5754Output;
 use nucleo_f446re::design_parameters::{
-    APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, CONSOLE_BAUD, HSE_HZ, SYSCLK_HZ, WATCHDOG_MS,
+    APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, CONSOLE_BAUD, HSE_HZ, SPI_HZ, SYSCLK_HZ, WATCHDOG_MS,
 };
-use stm32f4xx_hal::gpio::{Alternate, Input, Output, PA3, PA10, PC13, Pull, Speed};
+use stm32f4xx_hal::gpio::{Alternate, AnyPin, Input, Output, PA3, PA10, PB12, PC13, Pull, Speed};
+use stm32f4xx_hal::pac::rcc::csr;
 use stm32f4xx_hal::pac::{self, SPI2, USART2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
@@ -19,12 +19,35 @@ use stm32f4xx_hal::serial::{Rx, SerialExt};
 use stm32f4xx_hal::spi::{Spi, SpiExt};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-use crate::dac::{self, Sync};
+use crate::dac::{self, Device, Sender};
 use crate::drives::Drives;
+use crate::emergency_stop::EmergencyStop;
 use crate::encoders::Encoders;
 use crate::hal::Hardware;
 use crate::spindle::SpindleAndCoolant;
+use crate::supply;
+use crate::switches::Switches;
 use crate::tick_timer::TickTimer;
+
+/// The wires that an emulated board has in another way.
+pub(crate) type Bus = Sender;
+pub(crate) type SyncPin = PB12<Output>;
+pub(crate) type EnablePin = AnyPin<Output>;
+pub(crate) type ScopePin = PA10<Output>;
+pub(crate) type ButtonPin = PC13<Input>;
+
+/// Writes a line of the log.
+pub(crate) use motion_board::log::write;
+
+/// Passes time until an interrupt, or a part of it. (Not with `wfi`: in sleep the probe can't read the log.)
+pub(crate) fn pause() {
+    core::hint::spin_loop();
+}
+
+/// Writes why everything has ended.
+pub(crate) fn write_end(why: core::fmt::Arguments<'_>) {
+    defmt::error!("stopped for good: {}", defmt::Display2Format(&why));
+}
 
 /// Everything the firmware uses, ready to tick.
 pub(crate) struct Board {
@@ -32,9 +55,9 @@ pub(crate) struct Board {
     pub(crate) tick_timer: TickTimer,
     pub(crate) watchdog: IndependentWatchdog,
     /// High while the tick runs.
-    pub(crate) scope: PA10<Output>,
+    pub(crate) scope: ScopePin,
     /// B1: low while it is pressed (the board has the pull-up).
-    pub(crate) button: PC13<Input>,
+    pub(crate) button: ButtonPin,
     /// ST-LINK's serial port.
     pub(crate) console: Rx<USART2>,
 }
@@ -48,26 +71,17 @@ impl Board {
         let gpioc = device.GPIOC.split(&mut rcc);
         let gpiod = device.GPIOD.split(&mut rcc);
 
-        let drives = Drives {
-            enables: [
-                gpioc.pc8.into_push_pull_output().erase(),
-                gpioc.pc6.into_push_pull_output().erase(),
-                gpioc.pc5.into_push_pull_output().erase(),
-            ],
-            ready: [
-                gpioc.pc10.into_pull_up_input().erase(),
-                gpioc.pc11.into_pull_up_input().erase(),
-                gpioc.pc12.into_pull_up_input().erase(),
-            ],
-            emergency_stop: gpiod.pd2.into_pull_up_input().erase(),
-        };
-
+        let enables = [
+            gpioc.pc8.into_push_pull_output().erase(),
+            gpioc.pc6.into_push_pull_output().erase(),
+            gpioc.pc5.into_push_pull_output().erase(),
+        ];
         let spindle_and_coolant = SpindleAndCoolant {
             spindle: gpiob.pb1.into_push_pull_output().erase(),
             coolant: gpiob.pb14.into_push_pull_output().erase(),
         };
 
-        let after_watchdog = rcc.csr().read().wdgrstf().bit_is_set();
+        let cause = start_cause(&rcc.csr().read());
         rcc.csr().modify(|_, w| w.rmvf().set_bit());
         // Flash wait states, prefetch and both caches are set by the HAL on the way (RM0390 section 3.4).
         let mut rcc = rcc.freeze(
@@ -83,15 +97,45 @@ impl Board {
         defmt::assert_eq!(clocks.pclk2().raw(), APB2_HZ);
         defmt::assert_eq!(clocks.timclk1().raw(), APB1_TIMER_HZ);
         defmt::assert_eq!(clocks.timclk2().raw(), APB2_TIMER_HZ);
-        info!("nucleo-f446re: {=u32} MHz, {=str}", SYSCLK_HZ / 1_000_000, start_cause(after_watchdog));
+        info!("nucleo-f446re: {=u32} MHz, {=str}", SYSCLK_HZ / 1_000_000, cause);
+        let lines = device.EXTI;
+        supply::watch(&device.FLASH, &device.PWR, &lines, &mut rcc);
+
+        let mut routing = device.SYSCFG.constrain(&mut rcc);
+        let drives = Drives {
+            enables,
+            ready: [
+                gpioc.pc10.into_pull_up_input().erase(),
+                gpioc.pc11.into_pull_up_input().erase(),
+                gpioc.pc12.into_pull_up_input().erase(),
+            ],
+            emergency_stop: EmergencyStop::new(gpiod.pd2.into_pull_up_input(), lines, &mut routing),
+        };
+        let switches = Switches {
+            x: (
+                gpioc.pc0.into_pull_up_input(),
+                gpioc.pc1.into_pull_up_input(),
+                gpioc.pc2.into_pull_up_input(),
+            ),
+            y: (
+                gpioc.pc3.into_pull_up_input(),
+                gpioc.pc4.into_pull_up_input(),
+                gpioc.pc7.into_pull_up_input(),
+            ),
+            z: (
+                gpioa.pa4.into_pull_up_input(),
+                gpiob.pb0.into_pull_up_input(),
+                gpioa.pa9.into_pull_up_input(),
+            ),
+        };
 
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
 
         let encoders = Encoders::new(
             (device.TIM5, gpioa.pa0.into(), gpioa.pa1.into()),
-            (device.TIM2, gpiob.pb8.into(), gpiob.pb9.into()),
-            (device.TIM3, gpioa.pa6.into(), gpioa.pa7.into()),
+            (device.TIM2, gpiob.pb8.into(), gpiob.pb9.into(), gpiob.pb10.into()),
+            (device.TIM3, gpioa.pa6.into(), gpioa.pa7.into(), gpioc.pc9.into()),
             &mut rcc,
         );
 
@@ -100,14 +144,9 @@ impl Board {
         let data = gpiob.pb15.into_alternate::<5>().speed(Speed::High);
         let mut sync = gpiob.pb12.into_push_pull_output_in_state(stm32f4xx_hal::gpio::PinState::High);
         sync.set_speed(Speed::High);
-        let bus = Spi::new(
-            device.SPI2,
-            (Some(clock), SPI2::NoMiso, Some(data)),
-            dac::MODE,
-            dac::CLOCK_HZ.Hz(),
-            &mut rcc,
-        );
-        let spi = unwrap!(ExclusiveDevice::new_no_delay(bus, Sync(sync)).ok(), "SYNC can't fail");
+        let bus =
+            Spi::new(device.SPI2, (Some(clock), SPI2::NoMiso, Some(data)), dac::MODE, SPI_HZ.Hz(), &mut rcc);
+        let spi = Device::new(Sender::new(bus), sync);
         let mut delay = core.SYST.delay(&rcc.clocks);
         let outputs = match Ad5754Output::setup(spi, &mut delay) {
             Ok(outputs) => outputs,
@@ -126,7 +165,7 @@ impl Board {
         watchdog.stop_on_debug(&device.DBGMCU, false);
 
         Self {
-            hardware: Hardware { encoders, outputs, drives, spindle_and_coolant },
+            hardware: Hardware { encoders, outputs, drives, switches, spindle_and_coolant },
             tick_timer: TickTimer::new(device.TIM7, &mut rcc),
             watchdog,
             scope: gpioa.pa10.into_push_pull_output(),
@@ -145,6 +184,13 @@ impl Board {
     }
 }
 
-fn start_cause(after_watchdog: bool) -> &'static str {
-    if after_watchdog { "RESET BY THE WATCHDOG" } else { "started" }
+/// Why the processor was reset, from the flags that its clock control keeps.
+fn start_cause(flags: &csr::R) -> &'static str {
+    if flags.wdgrstf().bit_is_set() {
+        "RESET BY THE WATCHDOG"
+    } else if flags.borrstf().bit_is_set() && flags.porrstf().bit_is_clear() {
+        "RESET BY A BROWN-OUT"
+    } else {
+        "started"
+    }
 }

@@ -43,7 +43,8 @@ pub const TICK_TIMER_RELOAD: u16 = (APB1_TIMER_HZ / TICK_HZ - 1) as u16;
 /// Core cycles per tick.
 pub const TICK_CYCLES: u32 = SYSCLK_HZ / TICK_HZ;
 /// Priority of the tick's interrupt as RTIC counts it: 16 is the highest of the processor's 16 levels, the
-/// NVIC's 0 (DS10693: 4 bits). The only interrupt; `main.rs` repeats it where only a literal is allowed.
+/// NVIC's 0 (DS10693: 4 bits). That of the emergency stop and of the voltage detector too, so none stops another;
+/// `main.rs` repeats it where only a literal is allowed.
 pub const TICK_PRIORITY: u8 = 16;
 
 const _: () = assert!(APB1_TIMER_HZ.is_multiple_of(TICK_HZ), "the period would not be exact");
@@ -69,12 +70,27 @@ pub const SYNC_HIGH_NS: u32 = 100;
 /// The same in core cycles, rounded up.
 pub const SYNC_HIGH_CYCLES: u32 = (SYSCLK_HZ as u64 * SYNC_HIGH_NS as u64).div_ceil(1_000_000_000) as u32;
 
+/// The frame that puts all outputs to 0 V at once, without a load (AD5754: control register, 011, clear, 100).
+pub const DAC_CLEAR_FRAME: [u8; 3] = [0b0001_1100, 0, 0];
+/// Turns of a loop in which a byte has left for certain: some ten cycles each, a byte takes 64.
+pub const SPI_WAIT_TURNS: u32 = 100;
+
 const _: () = assert!(SPI_HZ <= SPI_MAX_HZ);
+
+// --- Supply ----------------------------------------------------------------------------------------
+
+/// Level of the brown-out reset (option byte BOR_LEV): its third, which holds the processor in reset below some
+/// 2.8 V (DS10693, embedded reset and power control block characteristics).
+pub const BROWN_OUT_LEVEL: u8 = 3;
+/// Level of the voltage detector (PWR_CR, PLS): its highest, some 2.9 V when the supply falls, above the reset.
+pub const VOLTAGE_DETECTOR_LEVEL: u8 = 7;
 
 // --- Encoders --------------------------------------------------------------------------------------
 
 /// Samples that must agree before the input filter passes a level: ICxF = 0100 (RM0390, TIMx_CCMR1).
 pub const ENCODER_FILTER_SAMPLES: u32 = 6;
+/// The value of ICxF that says so.
+pub const ENCODER_FILTER_BITS: u8 = 0b0100;
 /// Sampling clock of that filter \[Hz\]: f_DTS / 2, where f_DTS is the timer's clock (CKD = 0).
 pub const ENCODER_FILTER_HZ: u32 = APB1_TIMER_HZ / 2;
 /// The longest pulse that the filter removes for certain \[ns\]: shorter than N − 1 sampling periods.
@@ -148,8 +164,8 @@ const _: () = assert!(
     "more bytes may come in a poll of the background than there are places"
 );
 
-/// Ticks that the flight recorder keeps: a twelfth of a second, 28 KB. It reduces the stack by as much.
-pub const FLIGHT_ROWS: usize = TICK_HZ as usize / 12;
+/// Ticks that the flight recorder keeps: an eighteenth of a second, 19 KB, what the stack leaves.
+pub const FLIGHT_ROWS: usize = TICK_HZ as usize / 18;
 /// Ticks of these after the fault's: 25 ms, which show the axes coasting.
 pub const FLIGHT_AFTER: usize = TICK_HZ as usize / 40;
 
@@ -167,8 +183,14 @@ pub const BOARD: BoardParameters = BoardParameters {
 
 #[cfg(test)]
 mod tests {
+    use core::convert::Infallible;
+
+    use embedded_hal::delay::DelayNs;
+    use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+    use motion_kernel::hal::Ad5754Output;
+
     use super::*;
-    use crate::machine::{Machine, PROGRAM};
+    use crate::machine::{AXES, Machine, PROGRAM};
 
     fn machine() -> Machine {
         Machine::new(PROGRAM, &BOARD).expect("suits")
@@ -200,6 +222,37 @@ mod tests {
         // Even at four times its clock time it is below a twentieth of the tick.
         const { assert!(4 * DAC_BURST_CLOCK_NS < 1_000_000_000 / TICK_HZ / 20) };
         assert_eq!(SYNC_HIGH_CYCLES, 17);
+    }
+
+    /// Frames that a driver sends.
+    #[derive(Default)]
+    struct Frames(Vec<Vec<u8>>);
+
+    impl ErrorType for Frames {
+        type Error = Infallible;
+    }
+
+    impl SpiDevice for Frames {
+        fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+            let written = operations.iter().flat_map(|operation| match operation {
+                Operation::Write(bytes) => bytes.to_vec(),
+                other => panic!("{other:?}"),
+            });
+            self.0.push(written.collect());
+            Ok(())
+        }
+    }
+
+    impl DelayNs for Frames {
+        fn delay_ns(&mut self, _: u32) {}
+    }
+
+    /// The frame that ends everything is the one that the converter's driver clears with: the second of its setup.
+    #[test]
+    fn the_clear_frame_is_the_drivers() {
+        let frames = Ad5754Output::<_, AXES>::setup(Frames::default(), &mut Frames::default());
+        let Frames(frames) = frames.map(Ad5754Output::release).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(frames[1], DAC_CLEAR_FRAME);
     }
 
     #[test]

@@ -1,76 +1,94 @@
 //! Firmware: the motion kernel on an ST NUCLEO-F446RE, three axes.
 //!
 //! ```text
-//! TIM7 ─► tick (the only interrupt)                      background (idle)
+//! TIM7 ─► tick                                           background (idle)
 //!         drives: emergency stop, ready   ── Control ──  button, log
 //!         console ── bytes ────────────────────────────  commands
 //!         encoders ─► kernel ─► converter ◄─ streams ──  program
 //!         watchdog ◄───────────────────────── polls ───
+//!
+//! EXTI2 ─► emergency_stop: enables off, outputs 0 V, without waiting for the tick
+//! PVD ─► supply_falls, NMI (clock lost), hard fault, panic ─► stop: the same, then the watchdog resets
 //! ```
 //!
-//! The tick is a hardware task with a static priority and nothing above it: it ends at the latest its own
-//! longest time after the timer's event, plus the longest time for which the background masks interrupts.
+//! The tick is a hardware task with a static priority and nothing above it but the end of everything: it ends at
+//! the latest its own longest time after the timer's event, plus the longest time for which the background masks
+//! interrupts, plus one emergency stop.
 //! `README.md` has wiring, bring-up and what to expect; `design_parameters.rs` has every number.
 #![no_std]
 #![no_main]
 // No panic path in the tick.
 #![deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used)]
 
+// What is the board's alone, or an emulated board's in its place; all else is the same.
+#[cfg(not(feature = "emulated"))]
 mod board;
+#[cfg(not(feature = "emulated"))]
+mod emergency_stop;
+#[cfg(not(feature = "emulated"))]
 mod encoders;
+#[cfg(not(feature = "emulated"))]
+mod supply;
+#[cfg(not(feature = "emulated"))]
+mod tick_timer;
+#[cfg(feature = "emulated")]
+mod emulated;
+#[cfg(feature = "emulated")]
+use emulated::{board, emergency_stop, encoders, tick_timer};
+
 mod dac;
 mod drives;
+mod switches;
 mod spindle;
 mod hal;
-mod tick_timer;
 mod console_port;
 mod background;
+mod stop;
 
 use core::sync::atomic::Ordering;
 
 use defmt_rtt as _;
-use panic_probe as _;
 
 // The tick's number before every line of the log.
 defmt::timestamp!("{=u32}", background::TICKS.load(Ordering::Relaxed));
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
+    use core::mem::MaybeUninit;
     use core::sync::atomic::Ordering;
 
-    use cortex_m::peripheral::DWT;
     use heapless::spsc::{Producer, Queue};
     use motion_board::Liveness;
     use motion_kernel::kernel::Kernel;
     use motion_kernel::tick_monitor::TickMonitor;
     use nucleo_f446re::design_parameters::{BOARD, CONSOLE_BYTES, TICK_CYCLES, TICK_PRIORITY};
     use nucleo_f446re::machine::{AXES, Control, Flight, Machine, Number, PROGRAM, Streams};
-    use stm32f4xx_hal::gpio::{Output, PA10};
     use stm32f4xx_hal::pac::USART2;
     use stm32f4xx_hal::serial::Rx;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
     use crate::background::{self, POLLS, Panel, TICKS};
-    use crate::board::Board;
+    use crate::board::{Board, ScopePin};
     use crate::console_port;
     use crate::hal::Hardware;
-    use crate::tick_timer::TickTimer;
+    use crate::tick_timer::{TickTimer, cycles};
 
-    /// Shared by tick and background.
+    /// Shared by tick and background, and by the interrupts of the tick's priority.
     #[shared]
     struct Shared {
         control: Control,
+        #[lock_free]
+        hardware: Hardware,
     }
 
     /// Owned by one of them.
     #[local]
     struct Local {
-        hardware: Hardware,
         tick_timer: TickTimer,
         watchdog: IndependentWatchdog,
         liveness: Liveness,
         monitor: TickMonitor,
-        scope: PA10<Output>,
+        scope: ScopePin,
         console: Rx<USART2>,
         received: Producer<'static, u8>,
         panel: Panel,
@@ -78,12 +96,13 @@ mod app {
         machine: Machine,
     }
 
+    // Written at the start: an initial value that is not all zeros would lie in flash a second time, whole.
     #[init(local = [
-        storage: Streams = Streams::new(),
-        flight: Flight = Flight::new(),
-        console_bytes: Queue<u8, CONSOLE_BYTES> = Queue::new(),
+        storage: MaybeUninit<Streams> = MaybeUninit::uninit(),
+        flight: MaybeUninit<Flight> = MaybeUninit::uninit(),
         // The kernel's streams until there is a program; nothing ever enters them.
-        empty: motion_kernel::queue::Streams<Number, AXES, 2, 2> = motion_kernel::queue::Streams::new(),
+        empty: MaybeUninit<motion_kernel::queue::Streams<Number, AXES, 2, 2>> = MaybeUninit::uninit(),
+        console_bytes: Queue<u8, CONSOLE_BYTES> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let Board { mut hardware, mut tick_timer, mut watchdog, scope, button, console } =
@@ -92,12 +111,12 @@ mod app {
         // The machine's position becomes the program's start.
         let start = machine.header().start;
         let kernel = Kernel::new(&machine.axes, start, hardware.encoders.latch());
-        let (_, intake) = cx.local.empty.split(machine.header().rules, start);
-        let control = Control::new(kernel, intake, start, cx.local.flight);
+        let empty = cx.local.empty.write(motion_kernel::queue::Streams::new());
+        let (_, intake) = empty.split(machine.header().rules, start);
+        let control = Control::new(kernel, intake, start, cx.local.flight.write(Flight::new()));
         let (received, bytes) = cx.local.console_bytes.split();
         Board::start(&mut tick_timer, &mut watchdog);
         let local = Local {
-            hardware,
             tick_timer,
             watchdog,
             liveness: Liveness::new(BOARD.silent_ticks_max()),
@@ -106,10 +125,10 @@ mod app {
             console,
             received,
             panel: Panel { button, bytes },
-            streams: cx.local.storage,
+            streams: cx.local.storage.write(Streams::new()),
             machine,
         };
-        (Shared { control }, local)
+        (Shared { control, hardware }, local)
     }
 
     const _: () = assert!(TICK_PRIORITY == 16, "repeated as a literal below");
@@ -118,29 +137,44 @@ mod app {
     #[task(
         binds = TIM7,
         priority = 16,
-        local = [hardware, tick_timer, watchdog, liveness, monitor, scope, console, received],
-        shared = [control]
+        local = [tick_timer, watchdog, liveness, monitor, scope, console, received],
+        shared = [control, hardware]
     )]
     fn tick(mut cx: tick::Context) {
-        let begin = DWT::cycle_count();
+        let begin = cycles();
         let latency_cycles = cx.local.tick_timer.take();
-        let hardware = cx.local.hardware;
+        let hardware = cx.shared.hardware;
         cx.local.scope.set_high();
         cx.shared.control.lock(|control| {
-            let unhealthy = hardware.drives.check();
+            let unhealthy = hardware.drives.tick();
             control.tick(unhealthy, cx.local.monitor.began(begin), hardware);
             if cx.local.liveness.may_feed(POLLS.load(Ordering::Relaxed)) {
                 cx.local.watchdog.feed();
             }
             console_port::receive(cx.local.console, cx.local.received);
-            if let Some(kind) = cx.local.monitor.ended(DWT::cycle_count()) {
+            if let Some(kind) = cx.local.monitor.ended(cycles()) {
                 control.trip(kind);
             }
             let overrun = cx.local.tick_timer.due_again();
-            control.timing.add(DWT::cycle_count().wrapping_sub(begin), latency_cycles, overrun);
+            control.timing.add(cycles().wrapping_sub(begin), latency_cycles, overrun);
         });
         TICKS.store(TICKS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
         cx.local.scope.set_low();
+    }
+
+    /// The emergency stop has opened: what the next tick would do, now.
+    #[task(binds = EXTI2, priority = 16, shared = [control, hardware])]
+    fn emergency_stop(mut cx: emergency_stop::Context) {
+        let hardware = cx.shared.hardware;
+        if let Some(kind) = hardware.interrupt() {
+            cx.shared.control.lock(|control| control.trip(kind));
+        }
+    }
+
+    /// The supply falls. It takes part of a millisecond from here to the brown-out reset; it may also stay here.
+    #[task(binds = PVD, priority = 16)]
+    fn supply_falls(_: supply_falls::Context) {
+        crate::stop::stop("the supply is below 2.9 V")
     }
 
     /// The background.

@@ -34,7 +34,7 @@ const fn pin(
 }
 
 /// The wiring, connector by connector.
-pub const PINS: [Pin; 21] = [
+pub const PINS: [Pin; 32] = [
     pin("drive ready X", "PC10", "CN7-1", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
     pin("drive ready Y", "PC11", "CN7-2", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
     pin("drive ready Z", "PC12", "CN7-3", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
@@ -42,6 +42,13 @@ pub const PINS: [Pin; 21] = [
     pin("start button", "PC13", "CN7-23", "–", "input", "B1 on the board (blue)"),
     pin("encoder X, A", "PA0", "CN7-28", "A0, CN8-1", "TIM5_CH1 AF2, 32 bit", "RS-422 receiver"),
     pin("encoder X, B", "PA1", "CN7-30", "A1, CN8-2", "TIM5_CH2 AF2, 32 bit", "RS-422 receiver"),
+    pin("limit low Z", "PA4", "CN7-32", "A2, CN8-3", "input, pull-up", "contact to GND: low is not reached"),
+    pin("limit high Z", "PB0", "CN7-34", "A3, CN8-4", "input, pull-up", "contact to GND: low is not reached"),
+    pin("home X", "PC2", "CN7-35", "–", "input, pull-up", "contact to GND: low is not reached"),
+    pin("limit high X", "PC1", "CN7-36", "A4, CN8-5", "input, pull-up", "contact to GND: low is not reached"),
+    pin("limit low Y", "PC3", "CN7-37", "–", "input, pull-up", "contact to GND: low is not reached"),
+    pin("limit low X", "PC0", "CN7-38", "A5, CN8-6", "input, pull-up", "contact to GND: low is not reached"),
+    pin("index Z", "PC9", "CN10-1", "–", "TIM3_CH4 AF2", "RS-422 receiver"),
     pin("drive enable X", "PC8", "CN10-2", "–", "output, high is on", "10 kΩ to GND, optocoupler"),
     pin("encoder Y, A", "PB8", "CN10-3", "D15, CN5-10", "TIM2_CH1 AF1, 32 bit", "RS-422 receiver"),
     pin("drive enable Y", "PC6", "CN10-4", "–", "output, high is on", "10 kΩ to GND, optocoupler"),
@@ -50,11 +57,15 @@ pub const PINS: [Pin; 21] = [
     pin("encoder Z, A", "PA6", "CN10-13", "D12, CN5-5", "TIM3_CH1 AF2, 16 bit", "RS-422 receiver"),
     pin("encoder Z, B", "PA7", "CN10-15", "D11, CN5-4", "TIM3_CH2 AF2, 16 bit", "RS-422 receiver"),
     pin("converter SYNC", "PB12", "CN10-16", "–", "output, low is selected", "AD5754 SYNC, 10 kΩ to 3.3 V"),
+    pin("home Y", "PC7", "CN10-19", "D9, CN5-2", "input, pull-up", "contact to GND: low is not reached"),
+    pin("home Z", "PA9", "CN10-21", "D8, CN5-1", "input, pull-up", "contact to GND: low is not reached"),
     pin("spindle on", "PB1", "CN10-24", "–", "output, high is on", "10 kΩ to GND, optocoupler"),
+    pin("index Y", "PB10", "CN10-25", "D6, CN9-7", "TIM2_CH3 AF1", "RS-422 receiver"),
     pin("converter SDIN", "PB15", "CN10-26", "–", "SPI2_MOSI AF5", "AD5754 SDIN"),
     pin("coolant on", "PB14", "CN10-28", "–", "output, high is on", "10 kΩ to GND, optocoupler"),
     pin("converter SCLK", "PB13", "CN10-30", "–", "SPI2_SCK AF5", "AD5754 SCLK"),
     pin("scope", "PA10", "CN10-33", "D2, CN9-3", "output, high in the tick", "oscilloscope"),
+    pin("limit high Y", "PC4", "CN10-34", "–", "input, pull-up", "contact to GND: low is not reached"),
     pin(
         "console",
         "PA3",
@@ -64,6 +75,49 @@ pub const PINS: [Pin; 21] = [
         "ST-LINK's serial port, by bridges SB13 and SB14",
     ),
 ];
+
+/// Of port `port` (`b'A'` …), the outputs that switch something on when high: drives, spindle, coolant. A bit each.
+#[must_use]
+pub const fn switching_outputs(port: u8) -> u32 {
+    bits(port, "output, high is on")
+}
+
+/// SYNC on port B. A bit.
+pub const SYNC_MASK: u32 = bits(b'B', "output, low is selected");
+
+/// Of port `port`, the pins that are used as `function`. A bit each.
+const fn bits(port: u8, function: &str) -> u32 {
+    let (mut mask, mut rows): (u32, &[Pin]) = (0, &PINS);
+    while let [row, rest @ ..] = rows {
+        rows = rest;
+        if let [b'P', at, number @ ..] = row.pin.as_bytes()
+            && *at == port
+            && is_same(row.function.as_bytes(), function.as_bytes())
+        {
+            mask |= 1 << decimal(number);
+        }
+    }
+    mask
+}
+
+const fn is_same(mut left: &[u8], mut right: &[u8]) -> bool {
+    while let ([first, left_rest @ ..], [second, right_rest @ ..]) = (left, right) {
+        if *first != *second {
+            return false;
+        }
+        (left, right) = (left_rest, right_rest);
+    }
+    left.is_empty() && right.is_empty()
+}
+
+const fn decimal(mut digits: &[u8]) -> u32 {
+    let mut number = 0;
+    while let [digit, rest @ ..] = digits {
+        number = 10 * number + (*digit - b'0') as u32;
+        digits = rest;
+    }
+    number
+}
 
 /// Pins of the board that are already in use: the line to ST-LINK's serial port, the green LED, SWD and its
 /// trace output, clocks.
@@ -158,7 +212,7 @@ mod tests {
     ];
 
     /// DS10693, "Alternate function": the rows of the pins that use one here.
-    const FUNCTIONS: [(&str, &str, u8); 9] = [
+    const FUNCTIONS: [(&str, &str, u8); 11] = [
         ("PA0", "TIM5_CH1", 2),
         ("PA1", "TIM5_CH2", 2),
         ("PB8", "TIM2_CH1", 1),
@@ -168,6 +222,8 @@ mod tests {
         ("PB13", "SPI2_SCK", 5),
         ("PB15", "SPI2_MOSI", 5),
         ("PA3", "USART2_RX", 7),
+        ("PB10", "TIM2_CH3", 1),
+        ("PC9", "TIM3_CH4", 2),
     ];
 
     #[test]
@@ -178,6 +234,22 @@ mod tests {
                 assert_ne!(row.signal, other.signal);
             }
             assert!(!RESERVED.contains(&row.pin), "{}", row.pin);
+        }
+    }
+
+    /// What a panic drops is every output that switches something on, and nothing else.
+    #[test]
+    fn the_stop_knows_every_switching_output() {
+        assert_eq!(switching_outputs(b'C'), 1 << 8 | 1 << 6 | 1 << 5);
+        assert_eq!(switching_outputs(b'B'), 1 << 1 | 1 << 14);
+        assert_eq!(switching_outputs(b'A') | switching_outputs(b'D'), 0);
+        assert_eq!(SYNC_MASK, 1 << 12);
+        let switching = ["enable", " on"];
+        for row in &PINS {
+            let port = row.pin.as_bytes()[1];
+            let number: u32 = row.pin[2..].parse().expect("a number");
+            let switches = switching.iter().any(|what| row.signal.contains(what));
+            assert_eq!(switching_outputs(port) >> number & 1 == 1, switches, "{}", row.signal);
         }
     }
 

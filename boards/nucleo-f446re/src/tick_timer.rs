@@ -3,9 +3,16 @@
 //! Produces an interrupt every period. Its counter continues from the event, so it tells the tick how late it
 //! began; a second event before the tick is done is an overrun. Registers: RM0390, basic timers.
 
+use cortex_m::peripheral::DWT;
 use nucleo_f446re::design_parameters::{APB1_TIMER_HZ, SYSCLK_HZ, TICK_TIMER_PRESCALER, TICK_TIMER_RELOAD};
 use stm32f4xx_hal::pac::TIM7;
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+/// Core cycles since the start; it wraps.
+#[inline]
+pub(crate) fn cycles() -> u32 {
+    DWT::cycle_count()
+}
 
 /// Core cycles per count of the timer.
 const CYCLES_PER_COUNT: u32 = SYSCLK_HZ / APB1_TIMER_HZ;

@@ -1,5 +1,5 @@
 //! The kernel on emulated Cortex-M boards: the same bits as on a PC, instruction budgets, sizes, and an image
-//! that cannot panic.
+//! that cannot panic; the firmware of the NUCLEO on an emulated board.
 //!
 //! Needs `qemu-system-arm` and a compiler that builds for Cortex-M; without them every test is listed and ignored
 //! with the reason, but fails where `CI=true`. Figures are held to committed tables (`tests/expected`); a compiler
@@ -14,6 +14,7 @@
 mod budget;
 mod cycles;
 mod digest;
+mod firmware;
 mod functions;
 mod image;
 mod programs;
@@ -28,8 +29,10 @@ use tools::Tools;
 type Test = fn(&Tools) -> Result<(), String>;
 
 /// Name, whether it holds figures that depend on the compiler, and the test. The longest first: others run beside it.
-const TESTS: [(&str, bool, Test); 9] = [
+const TESTS: [(&str, bool, Test); 11] = [
     ("estimated_cycles", true, cycles::estimated_cycles),
+    ("the_firmware_runs", false, firmware::the_firmware_runs),
+    ("instructions_of_the_interrupt", true, firmware::instructions_of_the_interrupt),
     ("the_same_bits_on_every_core", false, digest::the_same_bits_on_every_core),
     ("the_same_bits_from_an_interrupt", false, digest::the_same_bits_from_an_interrupt),
     ("the_same_bits_under_live_control", false, digest::the_same_bits_under_live_control),

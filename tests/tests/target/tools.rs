@@ -151,26 +151,13 @@ impl Tools {
         let images = IMAGES.iter().find(|(of, _)| *of == features).map_or(&[][..], |(_, images)| *images);
         // One folder for all, so that the libraries are built once for a target.
         let target_dir = root().join("target/boards");
-        let mut cargo = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()));
-        // Not what the outer cargo was told.
-        for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
-            cargo.env_remove(name);
-        }
+        let mut cargo = self.cargo("boards/qemu-mps2")?;
         cargo
-            .current_dir(root().join("boards/qemu-mps2"))
-            .args(["build", "--release", "--locked", "--features", features])
+            .args(["--features", features])
             .args(targets.iter().flat_map(|target| ["--target", *target]))
             .args(images.iter().flat_map(|image| ["--bin", *image]))
             .arg("--target-dir")
-            .arg(&target_dir)
-            .env("RUSTC", &self.compiler.rustc);
-        if self.compiler.builds_core {
-            let linker = linker().ok_or("the Rust toolchain has no rust-lld")?;
-            cargo
-                .arg("-Zbuild-std=core")
-                .env("RUSTC_BOOTSTRAP", "1")
-                .env("RUSTFLAGS", format!("-C linker={}", linker.display()));
-        }
+            .arg(&target_dir);
         let done = cargo.output().map_err(|error| format!("cargo: {error}"))?;
         if !done.status.success() {
             return Err(format!("build for {targets:?}: {}", String::from_utf8_lossy(&done.stderr)));
@@ -186,6 +173,47 @@ impl Tools {
             }
         }
         Ok(folder)
+    }
+
+    /// Cargo, about to build in a board's folder.
+    fn cargo(&self, folder: &str) -> Result<Command, String> {
+        let mut cargo = Command::new(std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned()));
+        // Not what the outer cargo was told.
+        for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
+            cargo.env_remove(name);
+        }
+        cargo
+            .current_dir(root().join(folder))
+            .args(["build", "--release", "--locked"])
+            .env("RUSTC", &self.compiler.rustc);
+        if self.compiler.builds_core {
+            let linker = linker().ok_or("the Rust toolchain has no rust-lld")?;
+            cargo
+                .arg("-Zbuild-std=core")
+                .env("RUSTC_BOOTSTRAP", "1")
+                .env("RUSTFLAGS", format!("-C linker={}", linker.display()));
+        }
+        Ok(cargo)
+    }
+
+    /// The firmware of the NUCLEO, for the emulator.
+    pub(crate) fn firmware(&self) -> Result<PathBuf, String> {
+        // Where its plain build has compiled what both need.
+        let mut cargo = self.cargo("boards/nucleo-f446re")?;
+        // Its program is the one that the test knows.
+        cargo.args(["--features", "emulated", "--target", M4F.target]).env_remove("MOTION_PROGRAM");
+        let done = cargo.output().map_err(|error| format!("cargo: {error}"))?;
+        if !done.status.success() {
+            return Err(format!("build of the firmware: {}", String::from_utf8_lossy(&done.stderr)));
+        }
+        let built = root().join("boards/nucleo-f446re/target").join(M4F.target).join("release/nucleo-f446re");
+        // Away from where the plain build would replace it.
+        let folder = root().join("target/boards/images/firmware");
+        let image = folder.join("nucleo-f446re");
+        std::fs::create_dir_all(&folder)
+            .and_then(|()| std::fs::copy(&built, &image))
+            .map_err(|error| format!("{}: {error}", image.display()))?;
+        Ok(image)
     }
 
     /// QEMU with an image and a bundle of programs, not yet started.
