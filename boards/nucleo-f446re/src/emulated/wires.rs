@@ -81,7 +81,7 @@ impl ScopePin {
 pub(crate) struct ButtonPin;
 
 impl ButtonPin {
-    pub(crate) fn is_low(&mut self) -> bool {
+    pub(crate) fn is_low(&self) -> bool {
         script::is_button_down()
     }
 }
