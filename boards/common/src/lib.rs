@@ -18,6 +18,7 @@
 //! - [`parameters`]: the figures that differ from board to board;
 //! - [`machine`]: the program in flash and its axes;
 //! - [`runs`]: the runs that the start button begins, under live control;
+//! - [`streamed`]: a program that comes over the link, under live control;
 //! - [`panel`]: the start button and the console's bytes;
 //! - [`console`]: the commands of the console;
 //! - [`operator`]: the effect of a press or a command in every phase;
@@ -37,6 +38,7 @@
 pub mod parameters;
 pub mod machine;
 pub mod runs;
+pub mod streamed;
 pub mod panel;
 pub mod console;
 pub mod operator;
@@ -58,4 +60,5 @@ pub use machine::Machine;
 pub use panel::Panel;
 pub use parameters::{BoardOutputs, BoardParameters};
 pub use runs::Run;
+pub use streamed::Streamed;
 pub use tick_timing::TickTiming;

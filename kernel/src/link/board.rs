@@ -9,7 +9,7 @@ use core::task::Poll;
 use heapless::Deque;
 
 use super::frame::{Deframer, Payload};
-use super::message::{Controls, Identity, Reply, Request, Status, Taken};
+use super::message::{Controls, Identity, Mode, Reply, Request, Status, Taken};
 use crate::program::{Item, Source, take};
 
 /// An answer that was lost is repeated after this time \[ms\].
@@ -78,6 +78,8 @@ pub struct BoardLink {
     session: u32,
     identity: Identity,
     deframer: Deframer,
+    /// The number of the first of the items that wait in the deframer, if any do.
+    first: Option<u32>,
     controls: Controls,
     /// They have not been obeyed yet.
     is_changed: bool,
@@ -101,6 +103,7 @@ impl BoardLink {
             session,
             identity,
             deframer: Deframer::new(),
+            first: None,
             controls: Controls::NONE,
             is_changed: false,
             is_welcome_due: false,
@@ -119,37 +122,54 @@ impl BoardLink {
         self.deframer.damaged()
     }
 
-    /// Takes what came in.
-    pub fn receive<const AXES: usize, const ITEMS: usize>(
-        &mut self,
-        bytes: &[u8],
-        items: &mut ItemQueue<AXES, ITEMS>,
-    ) {
-        for &byte in bytes {
-            let Some(payload) = self.deframer.push(byte) else { continue };
-            // What has the right checksum and can't be read is of another protocol: a hello will tell.
-            let Some((request, entries)) = take::<Request>(payload) else { continue };
-            match request {
-                Request::Hello { .. } => self.is_welcome_due = true,
-                Request::Controls { session, .. } | Request::Items { session, .. }
-                    if session != self.session =>
-                {
-                    self.is_welcome_due = true;
-                }
-                Request::Controls { controls, .. } => {
-                    if controls.is_newer_than(&self.controls) {
-                        (self.controls, self.is_changed) = (controls, true);
-                    }
-                    self.is_taken_due = true;
-                }
-                Request::Items { first, .. } => {
-                    self.is_taken_due = true;
-                    let known = items.next.wrapping_sub(first);
-                    self.is_missing = known.cast_signed() < 0;
-                    self.is_unreadable = !self.is_missing && !put(entries, known, items);
-                }
+    /// Takes what came in, up to the first items that are to be [put](Self::put_items) away. Controls are known at once.
+    pub fn receive(&mut self, bytes: &mut impl Iterator<Item = u8>) {
+        while self.first.is_none()
+            && let Some(byte) = bytes.next()
+        {
+            if self.deframer.push(byte) {
+                self.read();
             }
         }
+    }
+
+    /// Reads the message that has come.
+    fn read(&mut self) {
+        // What has the right checksum and can't be read is of another protocol: a hello will tell.
+        let Some((request, _)) = take::<Request>(self.deframer.payload()) else { return };
+        match request {
+            Request::Hello { .. } => self.is_welcome_due = true,
+            Request::Controls { session, .. } | Request::Items { session, .. } if session != self.session => {
+                self.is_welcome_due = true;
+            }
+            Request::Controls { controls, .. } => {
+                if controls.is_newer_than(&self.controls) {
+                    (self.controls, self.is_changed) = (controls, true);
+                }
+                self.is_taken_due = true;
+            }
+            Request::Items { first, .. } => self.first = Some(first),
+        }
+    }
+
+    /// Puts away the items that came last; false if none did.
+    pub fn put_items<const AXES: usize, const ITEMS: usize>(
+        &mut self,
+        items: &mut ItemQueue<AXES, ITEMS>,
+    ) -> bool {
+        let Some(first) = self.first.take() else { return false };
+        let Some((_, entries)) = take::<Request>(self.deframer.payload()) else { return false };
+        let known = items.next.wrapping_sub(first);
+        self.is_taken_due = true;
+        self.is_missing = known.cast_signed() < 0;
+        self.is_unreadable = !self.is_missing && !put(entries, known, items);
+        true
+    }
+
+    /// Whether controls have come that ask motion to come to rest, and were not taken yet.
+    #[must_use]
+    pub fn is_stop_asked(&self) -> bool {
+        self.is_changed && (self.controls.mode != Mode::Run || self.controls.override_permille == 0)
     }
 
     /// The controls, if they have changed since they were taken last.

@@ -69,6 +69,8 @@ pub struct Deframer {
     bytes: [u8; FRAME_MAX],
     /// Number of bytes since the last zero, however many there is room for.
     count: usize,
+    /// Number of bytes of the payload that came last.
+    payload: usize,
     /// Number of damaged frames.
     damaged: u32,
 }
@@ -77,7 +79,7 @@ impl Deframer {
     /// Before the first byte.
     #[must_use]
     pub const fn new() -> Self {
-        Self { bytes: [0; FRAME_MAX], count: 0, damaged: 0 }
+        Self { bytes: [0; FRAME_MAX], count: 0, payload: 0, damaged: 0 }
     }
 
     /// Number of frames that were damaged, cut or too long, since the start.
@@ -86,30 +88,37 @@ impl Deframer {
         self.damaged
     }
 
-    /// The payload of the frame that ends with `byte`, if one does.
-    pub fn push(&mut self, byte: u8) -> Option<&[u8]> {
+    /// Takes a byte; whether a payload ends with it. It is there until the next byte is taken.
+    pub fn push(&mut self, byte: u8) -> bool {
         if byte != 0 {
             if let Some(place) = self.bytes.get_mut(self.count) {
                 *place = byte;
             }
             self.count = self.count.saturating_add(1);
-            return None;
+            return false;
         }
         let count = core::mem::take(&mut self.count);
         // Zeros one after the other separate nothing.
         if count == 0 {
-            return None;
+            return false;
         }
         let length = self.bytes.get_mut(..count).and_then(|frame| cobs::decode_in_place(frame).ok());
         let checked = length.and_then(|length| self.bytes.get(..length));
         let split = checked.and_then(<[u8]>::split_last_chunk::<CHECKSUM>);
         match split.filter(|(payload, sum)| Checksum::of(payload).to_le_bytes() == **sum) {
-            Some((payload, _)) => Some(payload),
+            Some((payload, _)) => self.payload = payload.len(),
             None => {
                 self.damaged = self.damaged.wrapping_add(1);
-                None
+                return false;
             }
         }
+        true
+    }
+
+    /// The payload that has just come.
+    #[must_use]
+    pub fn payload(&self) -> &[u8] {
+        self.bytes.get(..self.payload).unwrap_or_default()
     }
 }
 

@@ -174,8 +174,10 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     /// Takes what came in at the time `now_ms`, which may wrap.
     pub fn receive(&mut self, bytes: &[u8], now_ms: u32, on_event: &mut impl FnMut(Event<AXES>)) {
         for &byte in bytes {
-            let Some(payload) = self.deframer.push(byte) else { continue };
-            let Some((reply, [])) = take::<Reply<AXES>>(payload) else { continue };
+            if !self.deframer.push(byte) {
+                continue;
+            }
+            let Some((reply, [])) = take::<Reply<AXES>>(self.deframer.payload()) else { continue };
             match reply {
                 Reply::Welcome { session, identity } => self.greeted(session, identity, on_event),
                 Reply::Taken(taken) => self.taken(&taken, now_ms, on_event),

@@ -168,7 +168,11 @@ impl Bench {
             self.down.send(&self.random, &out[..length]);
         }
         let bytes = self.down.receive(&self.random);
-        self.board.link.receive(&bytes, &mut self.board.items);
+        let mut bytes = bytes.into_iter();
+        while bytes.len() > 0 {
+            self.board.link.receive(&mut bytes);
+            self.board.link.put_items(&mut self.board.items);
+        }
         self.board.controls.extend(self.board.link.take_controls());
         if self.random.chance(takes)
             && let Poll::Ready(Some(Ok(item))) = self.board.items.poll_next()
@@ -394,7 +398,8 @@ fn any_bytes_may_come() {
                 payload
             };
             let before = board.items.next();
-            board.link.receive(&bytes, &mut board.items);
+            board.link.receive(&mut bytes.iter().copied());
+            board.link.put_items(&mut board.items);
             host.receive(&bytes, 0, &mut |_| read += 1);
             assert!(board.items.next().wrapping_sub(before) <= ROOM as u32);
             while let Poll::Ready(Some(_)) = board.items.poll_next() {}

@@ -1,0 +1,364 @@
+//! Motion that comes over the link, under live control.
+//!
+//! Consumes the bytes of a PC's [`HostLink`](motion_kernel::link::HostLink); keeps the tick's streams filled with the items
+//! that come, obeys the operator's controls, and answers. Motion ends at rest on the path wherever items stop coming, so no
+//! time-out of the link decides about it. Background.
+
+use core::cell::RefCell;
+use core::convert::Infallible;
+
+use motion_kernel::hal::OutputState;
+use motion_kernel::law::Pulse;
+use motion_kernel::link::{BoardLink, Controls, ItemQueue, Mode, Status};
+use motion_kernel::live::{Leads, LiveControl, State};
+use motion_kernel::num::Real;
+use motion_kernel::program::{SupplyError, Switching};
+use motion_kernel::queue::LiveFeeder;
+
+/// Frames of items that one poll puts away at most: motion is to be planned, too.
+const FRAMES_PER_POLL: usize = 8;
+
+/// What a poll asks of the rest of the board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Asked {
+    /// The operator enables the drives.
+    pub enables: bool,
+    /// The operator clears the fault.
+    pub clears_fault: bool,
+    /// The operator resumes: also from a program stop, which is the kernel's.
+    pub resumes: bool,
+}
+
+/// A program that comes over the link. `ITEMS` have room before they are taken into the streams; `PLACES` is that of
+/// [`LiveControl`].
+pub struct Streamed<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize> {
+    link: RefCell<BoardLink>,
+    feeder: LiveFeeder<'a, R, AXES>,
+    control: LiveControl<R, AXES, Switching<ItemQueue<AXES, ITEMS>>, Infallible, PLACES>,
+    obeyed: Controls,
+}
+
+impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
+    Streamed<'a, R, AXES, ITEMS, PLACES>
+{
+    /// At rest and held, with streams that were split where the machine stands; what is planned anew has ramps of
+    /// `pulse`s, for ticks of `tick_s`, with these `leads`.
+    #[must_use]
+    pub fn new(
+        link: BoardLink,
+        feeder: LiveFeeder<'a, R, AXES>,
+        pulse: Pulse,
+        tick_s: f64,
+        leads: Leads,
+    ) -> Self {
+        let mut control = LiveControl::new(Switching::new(ItemQueue::new()), pulse, tick_s, leads);
+        // As the controls are before the operator's first command.
+        control.hold();
+        Self { link: RefCell::new(link), feeder, control, obeyed: Controls::NONE }
+    }
+
+    /// One poll of the background: takes what `next_byte` has, obeys the operator, plans. Bytes that come while motion is
+    /// planned are looked at, too: a hold among them ends the plan.
+    ///
+    /// # Errors
+    /// An item can't be executed; every later call returns the same error, and motion ends at rest.
+    pub fn poll(
+        &mut self,
+        next_byte: &mut dyn FnMut() -> Option<u8>,
+    ) -> Result<Asked, SupplyError<Infallible>> {
+        let Self { link, feeder, control, obeyed } = self;
+        let bytes = RefCell::new(core::iter::from_fn(next_byte));
+        for _ in 0..FRAMES_PER_POLL {
+            let mut link = link.borrow_mut();
+            link.receive(&mut *bytes.borrow_mut());
+            if !link.put_items(control.source_mut().items_mut()) {
+                break;
+            }
+        }
+        let asked = match link.borrow_mut().take_controls() {
+            Some(controls) => obey(&controls, obeyed, control),
+            None => Asked::default(),
+        };
+        let is_stop_asked = || {
+            // Both are borrowed nowhere else while motion is planned.
+            let (Ok(mut link), Ok(mut bytes)) = (link.try_borrow_mut(), bytes.try_borrow_mut()) else {
+                return false;
+            };
+            link.receive(&mut *bytes);
+            link.is_stop_asked()
+        };
+        control.poll_unless(&is_stop_asked, feeder)?;
+        Ok(asked)
+    }
+
+    /// Writes the next frame for the PC to `out`; see [`BoardLink::transmit`]. `status` is asked for the machine's status with
+    /// the number of the first item that live control has not taken.
+    pub fn transmit(
+        &mut self,
+        now_ms: u32,
+        status: Option<&dyn Fn(u32) -> Status<AXES>>,
+        out: &mut [u8],
+    ) -> usize {
+        let items = self.control.source_mut().items_mut();
+        let status = status.map(|status| status(items.taken()));
+        self.link.get_mut().transmit(now_ms, items, status, out)
+    }
+
+    /// What the program switches outputs to now, if motion has come to rest for that; from then on it goes on, so the
+    /// caller has to put it out.
+    pub fn switch(&mut self) -> Option<OutputState> {
+        if self.control.state(&self.feeder) != State::Waiting {
+            return None;
+        }
+        let source = self.control.source_mut();
+        let due = source.due();
+        source.switched();
+        due
+    }
+
+    /// The state of live control; [`State::Waiting`] where everything that came is done.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.control.state(&self.feeder)
+    }
+
+    /// Number of stops on the path because items came too late.
+    #[must_use]
+    pub fn starvations(&self) -> u32 {
+        self.control.starvations()
+    }
+}
+
+/// Has live control obey `controls`, where they differ from those `obeyed` before.
+fn obey<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
+    controls: &Controls,
+    obeyed: &mut Controls,
+    control: &mut LiveControl<R, AXES, Switching<ItemQueue<AXES, ITEMS>>, Infallible, PLACES>,
+) -> Asked {
+    let before = core::mem::replace(obeyed, *controls);
+    let is_pressed = controls.presses != before.presses;
+    if is_pressed {
+        match controls.mode {
+            Mode::Run => control.resume(),
+            Mode::Hold => control.hold(),
+            Mode::Abort => control.abort(),
+        }
+    }
+    // What is out of range is no command of this protocol; the last one stays.
+    let _ = control.set_override(f64::from(controls.override_permille) * 1e-3);
+    control.set_single_block(controls.is_single_block);
+    Asked {
+        enables: controls.enables != before.enables,
+        clears_fault: controls.fault_resets != before.fault_resets,
+        resumes: is_pressed && controls.mode == Mode::Run,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motion_kernel::exec::{ExecState, Executor};
+    use motion_kernel::link::{Event, FRAME_MAX, HostLink, Identity, PROTOCOL, State as MachineState};
+    use motion_kernel::program::Item;
+    use motion_kernel::queue::LiveStreams;
+    use motion_kernel::straight::Straight;
+    use motion_kernel::units::Position;
+
+    use super::*;
+    use crate::fixture::{AXES, TICK_S, end, machine};
+
+    const ITEMS: usize = 8;
+    /// How often the stringer is driven: many more items than there is room for.
+    const ROUNDS: usize = 5;
+    const IDENTITY: Identity = Identity {
+        protocol: PROTOCOL,
+        format: 5,
+        axes: AXES as u16,
+        is_fixed_point: false,
+        tick_s: TICK_S,
+        items: ITEMS as u16,
+        machine: 0,
+    };
+
+    /// Knuth's generator of full period; its upper bits.
+    struct Random(u64);
+
+    impl Random {
+        fn below(&mut self, count: u64) -> u64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 33) % count
+        }
+    }
+
+    /// The stringer again and again, with a straight way back between.
+    fn items() -> Vec<Item<AXES>> {
+        let machine = machine();
+        let header = machine.header();
+        let mut items: Vec<Item<AXES>> = Vec::new();
+        for round in 0..ROUNDS {
+            if round > 0 {
+                let (limits, feeds_mm_s) = (header.rules.limits, [20.0; 2]);
+                let back =
+                    Straight::new(end(), header.start, header.pulse, limits, feeds_mm_s, header.tick_s);
+                items.extend(back.expect("a way").map(|item| item.unwrap_or_else(|never| match never {})));
+            }
+            items.extend(machine.program.items().map(|item| item.expect("sound")));
+        }
+        assert!(items.len() > 150, "{}", items.len());
+        items
+    }
+
+    /// What an operator and the wire do in a tick.
+    #[derive(Clone, Copy, Default)]
+    struct Does {
+        press: Option<Mode>,
+        permille: Option<u16>,
+        /// Frames are lost in both directions.
+        is_cut: bool,
+    }
+
+    /// The stringer over a wire that carries a frame each way in a tick, of which `loses` in a thousand get lost or damaged.
+    /// Where every tick was, and how often motion stopped for want of items.
+    fn sent(
+        seed: u64,
+        loses: u64,
+        mut does: impl FnMut(u32, State, [f64; 2]) -> Does,
+    ) -> (Vec<[Position; AXES]>, u32) {
+        let machine = machine();
+        let header = machine.header();
+        let items = items();
+        let mut random = Random(seed);
+        let mut host = HostLink::<AXES, 64, 8192>::new();
+        let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+        let (feeder, mut intake) = streams.split(header.rules, header.start);
+        let link = BoardLink::new(9, IDENTITY);
+        let mut board =
+            Streamed::<f32, AXES, ITEMS, 64>::new(link, feeder, header.pulse, header.tick_s, Leads::NONE);
+        let mut executor = Executor::<f32, AXES>::new(header.start);
+        let (mut pushed, mut ticks, mut state, mut feed) = (0, Vec::new(), ExecState::Idle, [0.0; 2]);
+        let mut out = [0; FRAME_MAX];
+        let mut of_host = std::collections::VecDeque::new();
+        let mut is_pressed = false;
+        for now in 0..200_000 {
+            let Does { press, permille, is_cut } = does(now, board.state(), feed);
+            if let Some(mode) = press {
+                host.press(mode);
+                is_pressed = true;
+            }
+            if let Some(permille) = permille {
+                host.control(|controls| controls.override_permille = permille);
+            }
+            while pushed <= items.len() && host.push(items.get(pushed)).expect("short") {
+                pushed += 1;
+            }
+            let mut harms = |frame: &mut Vec<u8>| {
+                if is_cut || random.below(1000) < loses {
+                    let kept = random.below(frame.len() as u64 + 1) as usize;
+                    frame.truncate(kept);
+                }
+            };
+            let now_ms = now / 2;
+            let length = host.transmit(now_ms, &mut out);
+            let mut frame = out[..length].to_vec();
+            harms(&mut frame);
+            of_host.extend(frame);
+            board.poll(&mut || of_host.pop_front()).expect("executable");
+            let executed = executor.tick(&mut intake).expect("no fault");
+            (state, feed) = (executed.state, [feed[1], f64::from(executed.motion.v_mm_s)]);
+            ticks.push(executed.setpoints.map(|setpoint| setpoint.position));
+            let status = |begun: u32| Status {
+                tick: now,
+                state: MachineState::from(state),
+                set: [Position::ZERO; AXES],
+                actual: [Position::ZERO; AXES],
+                feed_mm_s: 0.0,
+                line: 0,
+                begun,
+                fault: 0,
+            };
+            let length = board.transmit(now_ms, now.is_multiple_of(40).then_some(&status), &mut out);
+            let mut frame = out[..length].to_vec();
+            harms(&mut frame);
+            host.receive(&frame, now_ms, &mut |event| {
+                assert!(!matches!(event, Event::Unreadable { .. } | Event::Restarted { .. }), "{event:?}");
+            });
+            let is_done = pushed > items.len() && host.waiting() == 0 && is_pressed;
+            if is_done && board.state() == State::Waiting && state == ExecState::Idle {
+                return (ticks, board.starvations());
+            }
+        }
+        panic!("it never ends: {state:?}");
+    }
+
+    /// The first and the last tick that moved the machine.
+    fn moving(ticks: &[[Position; AXES]]) -> &[[Position; AXES]] {
+        let first = ticks.windows(2).position(|pair| pair[0] != pair[1]).expect("motion");
+        let last = ticks.windows(2).rposition(|pair| pair[0] != pair[1]).expect("motion");
+        &ticks[first..=last + 1]
+    }
+
+    fn starts(now: u32) -> Does {
+        Does { press: (now == 300).then_some(Mode::Run), ..Does::default() }
+    }
+
+    /// What f32 rounds along a cruise. Where items come late, live control divides a cruise elsewhere.
+    const ROUNDING_MM: f64 = 1e-6;
+
+    /// Held until the operator's command; then every tick is the same, whatever the wire does, as long as items come in time:
+    /// mostly to the bit.
+    #[test]
+    fn a_bad_wire_changes_no_tick() {
+        let (clean, starvations) = sent(1, 0, |now, _, _| starts(now));
+        assert_eq!((starvations, clean.last()), (0, Some(&end())));
+        assert!(clean[..300].iter().all(|at| *at == machine().header().start), "it moves before the command");
+        let mut same = 0;
+        for seed in 2..12 {
+            println!("seed {seed}");
+            let (ticks, starvations) = sent(seed, 100, |now, _, _| starts(now));
+            assert_eq!(starvations, 0);
+            let (ticks, clean) = (moving(&ticks), moving(&clean));
+            assert_eq!(ticks.len(), clean.len());
+            same += u32::from(ticks == clean);
+            for (at, expected) in ticks.iter().zip(clean).flat_map(|(a, b)| a.iter().zip(b)) {
+                assert!((*at - *expected).to_mm().abs() < ROUNDING_MM, "{at:?} {expected:?}");
+            }
+        }
+        assert!(same >= 7, "only {same} of 10 are the same to the bit");
+    }
+
+    /// The cable is out for seconds: motion ends at rest where the items that came end, and goes on when more come.
+    #[test]
+    fn a_cable_that_is_out_is_a_stop_on_the_path() {
+        for (seed, out) in (1..8).zip([301, 1700, 5200, 14_900, 22_600, 33_300, 44_000]) {
+            println!("seed {seed}, out at tick {out}");
+            let (ticks, _) =
+                sent(seed, 20, |now, _, _| Does { is_cut: (out..out + 6000).contains(&now), ..starts(now) });
+            assert_eq!(ticks.last(), Some(&end()));
+        }
+    }
+
+    /// Holds and overrides at random times, over a wire that loses a tenth.
+    #[test]
+    fn commands_get_through() {
+        for seed in 1..8 {
+            println!("seed {seed}");
+            let mut random = Random(seed + 77);
+            let (mut held, mut waits) = (0, 0);
+            let (ticks, _) = sent(seed, 100, |now, state, _| {
+                let mut does = starts(now);
+                if state == State::Held && now > 400 {
+                    waits += 1;
+                    // Until the resume has come.
+                    does.press = (waits % 200 == 1).then_some(Mode::Run);
+                } else if now > 400 && random.below(600) == 0 {
+                    held += 1;
+                    does.press = Some(Mode::Hold);
+                } else if random.below(900) == 0 {
+                    does.permille = Some(300 + random.below(1700) as u16);
+                }
+                does
+            });
+            assert!(held > 3 && waits > 3, "{held} {waits}");
+            assert_eq!(ticks.last(), Some(&end()));
+        }
+    }
+}
