@@ -88,12 +88,6 @@ macro_rules! budgeted_tick {
     };
 }
 
-/// What a tick returns, and the instructions it took; outlined, so that whoever traces it needs little else.
-#[inline(never)]
-pub fn counted_tick<T>(counter: &count::Counter, tick: impl FnOnce() -> T) -> (T, u32) {
-    counter.count(tick)
-}
-
 /// Ends the emulation with a status.
 pub fn exit(is_good: bool) -> ! {
     print::flush();

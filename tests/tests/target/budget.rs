@@ -17,9 +17,9 @@ const UTMOST: [(Board, u32); 2] = [(M4F, 3300), (M3, 5200)];
 /// What the densest program takes at most on an M4F, which is more than the promise for all others: no planner here
 /// makes 15 pieces in every tick.
 const DENSEST: u32 = 1720;
-/// Instructions of a tick of 3 axes with live control and guards, in the committed cases of two seeds. Others take more.
+/// Instructions of a tick of 3 axes with live control and guards, in the committed cases of two seeds. The search finds more.
 const LIVE: u32 = 1560;
-/// Those of a tick with every drive inverted; or then under live control with guards, where a tick goes over to another list.
+/// The same with every drive inverted.
 const INVERTED: u32 = 1800;
 /// Those of the densest program with every drive inverted.
 const DENSEST_INVERTED: u32 = 1980;

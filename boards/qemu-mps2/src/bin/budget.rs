@@ -29,9 +29,7 @@ use motion_kernel::units::{Counts, Position};
 use qemu_boards::count::Counter;
 use qemu_boards::processor::{Timer, entry};
 use qemu_boards::programs::programs;
-use qemu_boards::{
-    AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, counted_tick, exit, fail, println, singleton, stack,
-};
+use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail, println, singleton, stack};
 
 type Axis = AxisState<Number>;
 type Queues<const N: usize> = Streams<Number, N, PIECES, SEGMENTS>;
@@ -117,7 +115,7 @@ fn ticks<const N: usize>(
         let mut spent = 0;
         let trace = closed_loop.tick_by(|kernel, intake, memory| {
             let top = stack::paint();
-            let (trace, instructions) = counted_tick(counter, || black_box(tick)(kernel, intake, memory));
+            let (trace, instructions) = counter.count(|| black_box(tick)(kernel, intake, memory));
             deepest = deepest.max(stack::depth(top));
             spent = instructions;
             *trace

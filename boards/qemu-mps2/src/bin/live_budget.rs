@@ -10,7 +10,7 @@ use qemu_boards::count::Counter;
 use qemu_boards::live::{self, Producer, Streams};
 use qemu_boards::processor::{Timer, entry};
 use qemu_boards::programs::seeded_programs;
-use qemu_boards::{AXES, Number, counted_tick, exit, fail, println, stack};
+use qemu_boards::{AXES, Number, exit, fail, println, stack};
 
 #[entry]
 fn main() -> ! {
@@ -27,7 +27,7 @@ fn main() -> ! {
             let mut spent = 0;
             let trace = closed.tick_by(|kernel, intake, memory| {
                 let top = stack::paint();
-                let (trace, instructions) = counted_tick(&counter, || budgeted_tick(kernel, intake, memory));
+                let (trace, instructions) = counter.count(|| budgeted_tick(kernel, intake, memory));
                 deepest = deepest.max(stack::depth(top));
                 spent = instructions;
                 *trace

@@ -25,7 +25,7 @@ use qemu_boards::interrupt::{self, with_ticks};
 use qemu_boards::live::{Closed, Producer, Streams};
 use qemu_boards::processor::{Timer, entry, wait};
 use qemu_boards::programs::seeded_programs;
-use qemu_boards::{AXES, LINE, SUBSTEPS, counted_tick, exit, fail, println};
+use qemu_boards::{AXES, LINE, SUBSTEPS, exit, fail, println};
 
 /// Instructions from one tick to the next, as powers of two: from some to more than there are between two ticks of
 /// 0.5 ms at 168 MHz.
@@ -71,7 +71,7 @@ fn run(
         let now = accesses.load(Ordering::SeqCst);
         let mut spent = 0;
         let trace = closed.tick_by(|kernel, intake, memory| {
-            let (trace, instructions) = counted_tick(counter, || budgeted_tick(kernel, intake, memory));
+            let (trace, instructions) = counter.count(|| budgeted_tick(kernel, intake, memory));
             spent = instructions;
             *trace
         });
