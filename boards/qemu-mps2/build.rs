@@ -10,6 +10,20 @@ const MPS2: &str = "MEMORY
 }
 ";
 
+/// QEMU's `virt` for RISC-V: one memory for all, which begins there; programs lie 4 MiB behind.
+const VIRT: &str = "MEMORY
+{
+  RAM : ORIGIN = 0x80000000, LENGTH = 4M
+  STACK : ORIGIN = 0x80800000, LENGTH = 4M
+}
+REGION_ALIAS(\"REGION_TEXT\", RAM);
+REGION_ALIAS(\"REGION_RODATA\", RAM);
+REGION_ALIAS(\"REGION_DATA\", RAM);
+REGION_ALIAS(\"REGION_BSS\", RAM);
+REGION_ALIAS(\"REGION_HEAP\", RAM);
+REGION_ALIAS(\"REGION_STACK\", STACK);
+";
+
 /// Bytes for the streams and the semihosting's handle of an image that runs on the microbit: 2804 are used. A multiple of
 /// 8, because the stack begins below.
 const STATICS: u32 = 2832;
@@ -37,13 +51,17 @@ const MICROBIT_LARGE: &str = "MEMORY
   RAM   : ORIGIN = 0x20000000, LENGTH = 16K
 }
 ";
-const LARGE: [&str; 2] = ["interrupt", "kernel_only"];
+const LARGE: [&str; 1] = ["kernel_only"];
 
 fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("set by cargo"));
     let target = env::var("TARGET").expect("set by cargo");
     let is_small = target.starts_with("thumbv6m");
-    let (map, large) = if is_small { (&*microbit(), MICROBIT_LARGE) } else { (MPS2, MPS2) };
+    let (map, large) = match &*target {
+        _ if is_small => (&*microbit(), MICROBIT_LARGE),
+        "riscv32imafc-unknown-none-elf" => (VIRT, VIRT),
+        _ => (MPS2, MPS2),
+    };
     for (folder, map) in [("small", map), ("large", large)] {
         fs::create_dir_all(out.join(folder)).expect("OUT_DIR can be written");
         fs::write(out.join(folder).join("memory.x"), map).expect("OUT_DIR can be written");
@@ -53,6 +71,9 @@ fn main() {
         let bin = bin.file_stem().expect("a file").to_str().expect("a name");
         let folder = out.join(if LARGE.contains(&bin) { "large" } else { "small" });
         println!("cargo:rustc-link-arg-bin={bin}=-L{}", folder.display());
+    }
+    if target.starts_with("riscv") {
+        println!("cargo:rustc-link-arg-bins=-Tmemory.x");
     }
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
     println!("cargo:rerun-if-changed=build.rs");

@@ -16,6 +16,8 @@ pub use crate::program::supply::Ready;
 pub use crate::queue::change::{Change, Progress};
 pub use crate::queue::density::Density;
 pub use crate::queue::item::FeedItem;
+#[cfg(all(feature = "live", feature = "watch"))]
+pub use crate::queue::watch::Access;
 pub use crate::work::add as add_work;
 #[cfg(feature = "count-work")]
 pub use crate::work::work_done;

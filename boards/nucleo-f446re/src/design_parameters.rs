@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn a_poll_takes_no_more_than_was_counted() {
         let stages = include_str!("../../../tests/expected/stages.md");
-        let poll = "| Cortex-M4F | f32 | a poll of live control |";
+        let poll = "| Cortex-M4F, M7 | f32 | a poll of live control |";
         let row = stages.lines().find(|row| row.starts_with(poll)).expect("counted");
         let most = row.trim_end_matches(" |").rsplit(' ').next().expect("a figure");
         let counted: u32 = most.parse().expect("a number");

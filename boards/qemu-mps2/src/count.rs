@@ -1,14 +1,12 @@
-//! Counts executed instructions with SysTick.
+//! Counts executed instructions with the core's timer.
 //!
 //! The emulator's virtual time is told to advance by a fixed time with every instruction (`-icount`), so the
 //! timer counts instructions. How many of its steps make one is measured at the start, whatever the clock.
 
-use core::arch::asm;
 use core::hint::black_box;
 
-use cortex_m::peripheral::{SYST, syst::SystClkSource};
+use crate::processor::{Timer, WRAP, now, spend};
 
-const WRAP: u32 = 0x00FF_FFFF;
 /// Instructions of the calibration.
 const KNOWN: u32 = 1000;
 
@@ -22,38 +20,31 @@ pub struct Counter {
 
 impl Counter {
     /// Starts the timer and calibrates it.
-    pub fn new(mut timer: SYST) -> Self {
-        timer.set_clock_source(SystClkSource::Core);
-        timer.set_reload(WRAP);
-        timer.clear_current();
-        timer.enable_counter();
+    pub fn new(timer: &mut Timer) -> Self {
+        timer.count();
         // The first reading after the start differs by a step.
         let _ = steps(|| ());
         let nothing = steps(|| ());
-        let known = steps(|| {
-            // Sound: counts a register down, two instructions a turn.
-            unsafe {
-                asm!("2:", "subs {turns}, {turns}, #1", "bne 2b", turns = inout(reg) KNOWN / 2 => _,
-                    options(nomem, nostack))
-            }
-        });
+        let known = steps(|| spend(KNOWN / 2));
         Self { nothing, known: known - nothing }
     }
 
     /// What `work` returns, and the instructions it took.
     #[inline(always)]
     pub fn count<T>(&self, work: impl FnOnce() -> T) -> (T, u32) {
-        let before = SYST::get_current();
+        let before = now();
         let result = black_box(work());
-        let after = SYST::get_current();
-        let steps = (before.wrapping_sub(after) & WRAP).saturating_sub(self.nothing);
-        (result, (steps * KNOWN + self.known / 2) / self.known)
+        let after = now();
+        let steps = (after.wrapping_sub(before) & WRAP).saturating_sub(self.nothing);
+        // 32 bits would end below the longest polls.
+        let (steps, known) = (u64::from(steps), u64::from(self.known));
+        (result, ((steps * u64::from(KNOWN) + known / 2) / known) as u32)
     }
 }
 
 #[inline(always)]
 fn steps<T>(work: impl FnOnce() -> T) -> u32 {
-    let before = SYST::get_current();
+    let before = now();
     black_box(work());
-    before.wrapping_sub(SYST::get_current()) & WRAP
+    now().wrapping_sub(before) & WRAP
 }

@@ -8,25 +8,35 @@
 //! | thumbv7em-none-eabihf | mps2-an386 (M4F), mps2-an500 (M7) | f32 |
 //! | thumbv7m-none-eabi | mps2-an385 (M3) | fixed point, or f32 in software (feature `soft-float`) |
 //! | thumbv6m-none-eabi | microbit (M0) | fixed point |
+//! | riscv32imafc-unknown-none-elf | virt (RISC-V with an FPU) | f32 |
 //!
 //! Feature `live` adds live control, which the microbit has no room for.
 #![no_std]
 
+#[cfg(target_arch = "arm")]
+#[path = "processor/arm.rs"]
+pub mod processor;
+#[cfg(target_arch = "riscv32")]
+#[path = "processor/riscv.rs"]
+pub mod processor;
+
 pub mod count;
+pub mod interrupt;
 #[cfg(feature = "live")]
 pub mod live;
+pub mod print;
 pub mod programs;
 pub mod stack;
 
-use core::panic::PanicInfo;
+use ::core::panic::PanicInfo;
 
-use cortex_m_semihosting::{debug, hprintln};
+use semihosting::process;
 
 /// The kernel's number type on this core.
-#[cfg(any(target_abi = "eabihf", feature = "soft-float"))]
+#[cfg(any(target_feature = "f", target_abi = "eabihf", feature = "soft-float"))]
 pub type Number = f32;
 /// The kernel's number type on this core.
-#[cfg(not(any(target_abi = "eabihf", feature = "soft-float")))]
+#[cfg(not(any(target_feature = "f", target_abi = "eabihf", feature = "soft-float")))]
 pub type Number = motion_kernel::num::Fixed;
 
 /// Whether this is the core with 16 KiB of memory.
@@ -42,9 +52,23 @@ pub const PIECES: usize = if IS_SMALL { 8 } else { 64 };
 /// Capacity of the feed stream.
 pub const SEGMENTS: usize = if IS_SMALL { 5 } else { 64 };
 /// Cells for the dead time of a simulated axis.
-pub const LINE: usize = 16;
-/// Sub-steps of a simulated tick: the dead time of 1.42 ms fits the cells.
-pub const SUBSTEPS: u32 = 4;
+pub const LINE: usize = 4;
+/// Sub-steps of a simulated tick: the dead time of 1.42 ms fits the cells. More would be nearer to a drive, but what these
+/// cores compute in f64 takes them longer than all else.
+pub const SUBSTEPS: u32 = 1;
+
+/// A place in static memory with a value, the first time; then none.
+#[macro_export]
+macro_rules! singleton {
+    ($type:ty = $value:expr) => {{
+        static TAKEN: ::critical_section::Mutex<::core::cell::Cell<bool>> =
+            ::critical_section::Mutex::new(::core::cell::Cell::new(false));
+        static mut PLACE: ::core::mem::MaybeUninit<$type> = ::core::mem::MaybeUninit::uninit();
+        let is_taken = ::critical_section::with(|cs| TAKEN.borrow(cs).replace(true));
+        // Sound: nobody else comes here.
+        if is_taken { None } else { Some(unsafe { (*(&raw mut PLACE)).write($value) }) }
+    }};
+}
 
 /// Defines `budgeted_tick`, the whole tick of the kernel, outlined under this name: by it a trace of executed
 /// instructions is cut. In the image's own crate: in a function of the library other parts of the tick are
@@ -66,15 +90,13 @@ macro_rules! budgeted_tick {
 
 /// Ends the emulation with a status.
 pub fn exit(is_good: bool) -> ! {
-    debug::exit(if is_good { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
-    loop {
-        cortex_m::asm::wfi();
-    }
+    print::flush();
+    process::exit(i32::from(!is_good))
 }
 
 /// Says what is wrong and ends the emulation.
-pub fn fail(what: &dyn core::fmt::Debug) -> ! {
-    hprintln!("failed {:?}", what);
+pub fn fail(what: &dyn ::core::fmt::Debug) -> ! {
+    crate::println!("failed {:?}", what);
     exit(false)
 }
 
@@ -82,7 +104,7 @@ pub fn fail(what: &dyn core::fmt::Debug) -> ! {
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn panic_is_linked(info: &PanicInfo<'_>) -> ! {
-    hprintln!("{}", info);
+    crate::println!("{}", info);
     exit(false)
 }
 

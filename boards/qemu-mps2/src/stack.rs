@@ -2,7 +2,7 @@
 //! longer paint after it.
 
 /// What is painted \[bytes\]: more than a tick may take.
-const PAINTED: usize = if super::IS_SMALL { 768 } else { 4096 };
+const PAINTED: usize = if super::IS_SMALL { 768 } else { 1280 };
 /// Left unpainted for the frame of [`paint`] itself \[bytes\].
 const MARGIN: usize = 64;
 const PAINT: u32 = 0x5AFE_C0DE;
@@ -10,7 +10,7 @@ const PAINT: u32 = 0x5AFE_C0DE;
 /// Paints, and says where the stack ends now.
 #[inline(always)]
 pub fn paint() -> usize {
-    let top = cortex_m::register::msp::read() as usize;
+    let top = crate::processor::stack_pointer();
     let mut word = top - MARGIN - PAINTED;
     while word < top - MARGIN {
         // Sound: below the stack pointer, in memory; interrupts don't come.

@@ -2,16 +2,19 @@
 //!
 //! The same seed gives the same commands on a PC and inside an emulated board.
 
+use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::{Ad5754Output, Encoder};
+#[cfg(feature = "watch")]
+use motion_kernel::internals::Access;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{Items, ProgramError, Reader, SupplyError};
-use motion_kernel::queue::{LiveFeeder, LiveStreams};
+use motion_kernel::queue::{LiveFeeder, LiveStreams, Streams};
 use motion_kernel::units::DacCode;
 
-use super::{ClosedLoop, InMemory, LoopError, regulated};
+use super::{Closed, ClosedLoop, InMemory, LoopError, regulated};
 use crate::machine::SimMachine;
 use crate::noise::SplitMix64;
 
@@ -111,6 +114,57 @@ impl<R: Real, const AXES: usize, const PLACES: usize> LiveProducer<'_, R, AXES, 
     }
 }
 
+/// What the background sees of the ticks that come when they like.
+#[cfg(feature = "watch")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ticked {
+    /// How many there were.
+    pub ticks: u32,
+    /// How the last one ended.
+    pub state: ExecState,
+    /// It ended in a fault.
+    pub is_fault: bool,
+}
+
+#[cfg(feature = "watch")]
+impl<'a, R: Real, const AXES: usize, const PLACES: usize> LiveProducer<'a, R, AXES, PLACES> {
+    /// The background of a run whose ticks come when they like: `poll`s and then waits for a tick, unless one came
+    /// meanwhile, until nothing is left to do. `watcher` is called before and after every access to what the tick
+    /// writes, those by `ticked` among them: a tick that comes at the same of these places does the same on any
+    /// machine.
+    ///
+    /// # Errors
+    /// The program holds an item that can't be executed.
+    pub fn run(
+        &mut self,
+        watcher: &'a dyn Fn(Access),
+        ticked: impl Fn() -> Ticked,
+        mut poll: impl FnMut(&mut Self) -> Result<(), SupplyError<ProgramError>>,
+        wait: impl Fn(),
+    ) -> Result<(), SupplyError<ProgramError>> {
+        let ticked = || {
+            watcher(Access::Begins);
+            let ticked = ticked();
+            watcher(Access::Ends);
+            ticked
+        };
+        self.feeder.watch(watcher);
+        let mut seen = ticked();
+        loop {
+            poll(self)?;
+            let mut last = ticked();
+            if last.is_fault || self.is_over(last.state) {
+                return Ok(());
+            }
+            while last.ticks == seen.ticks && !last.is_fault {
+                wait();
+                last = ticked();
+            }
+            seen = last;
+        }
+    }
+}
+
 /// Both parts of a loop under live control.
 pub type LiveClosed<'a, R, const AXES: usize, const PLACES: usize, const LINE: usize> =
     (LiveProducer<'a, R, AXES, PLACES>, ClosedLoop<'a, R, AXES, LINE>);
@@ -141,17 +195,45 @@ pub fn close<
     let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip()).map_err(LoopError::Converter)?;
     let Ok(counts) = (&*machine).latch();
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
-    let axes = regulated(header)?;
-    let axes = match program.guards().map_err(LoopError::Program)? {
-        Some(guards) => axes.guarded(&guards, header.tick_s).map_err(LoopError::Axes)?,
-        None => axes,
-    };
+    let axes = guarded(program)?;
     let mut kernel = Kernel::new(&axes, header.start, counts);
     kernel.enable(0);
     let control = LiveControl::new(program.items(), header.pulse, header.tick_s, Leads::NONE);
     let commands = Commands { random: SplitMix64::new(seed), polls_left: COMMANDED_POLLS, lost: 0 };
     let producer = LiveProducer { feeder, control, commands };
     Ok((producer, ClosedLoop { kernel, intake: intake.into(), machine, outputs, memory }))
+}
+
+/// Closes the loop of a program over `machine` without live control, guarded as the program says.
+///
+/// # Errors
+/// The program's machine can't be regulated, guarded or simulated.
+#[inline(never)]
+pub fn close_guarded<
+    'a,
+    R: Real,
+    const AXES: usize,
+    const PIECES: usize,
+    const SEGMENTS: usize,
+    const LINE: usize,
+>(
+    program: &Reader<'a, AXES>,
+    streams: &'a mut Streams<R, AXES, PIECES, SEGMENTS>,
+    machine: &'a SimMachine<AXES, LINE>,
+) -> Result<Closed<'a, R, AXES, LINE>, LoopError> {
+    let (producer, mut closed) = super::close(program, streams, machine)?;
+    closed.kernel = Kernel::new(&guarded(program)?, program.header().start, closed.memory.counts);
+    closed.kernel.enable(0);
+    Ok((producer, closed))
+}
+
+/// The axes of a program with its guards.
+fn guarded<R: Real, const AXES: usize>(program: &Reader<'_, AXES>) -> Result<AxesConfig<R, AXES>, LoopError> {
+    let axes = regulated(program.header())?;
+    match program.guards().map_err(LoopError::Program)? {
+        Some(guards) => axes.guarded(&guards, program.header().tick_s).map_err(LoopError::Axes),
+        None => Ok(axes),
+    }
 }
 
 #[cfg(test)]

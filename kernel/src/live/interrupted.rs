@@ -8,6 +8,7 @@ use crate::exec::{ExecState, Executor};
 use crate::law::{Law, Limits, PathMotion, Pulse};
 use crate::plan::{Block, BlockPlan, plan, ramps};
 use crate::program::{Allowed, Item, PathBlock};
+use crate::queue::watch::Access;
 use crate::queue::{Intake, LiveStreams, PathRules};
 use crate::random::Random;
 use crate::units::Position;
@@ -149,13 +150,13 @@ fn ticks_between_any_two_operations_of_a_poll() {
         });
         let (often, interrupts) = (random.log(1e-3, 0.5), random.log(1e-3, 0.7));
         let count = Cell::new(0_u64);
-        let between = || {
-            if random.chance(interrupts) {
+        let between = |access| {
+            if access == Access::Begins && random.chance(interrupts) {
                 count.set(count.get() + 1);
                 machine.borrow_mut().tick();
             }
         };
-        feeder.between = Some(&between);
+        feeder.watch(&between);
         let leads =
             Leads { stop_ticks: (random.unit() * 3.0) as u32, plan_ticks: (random.unit() * 6.0) as u32 };
         // Asked for between the steps of plans, and then given or not.

@@ -18,6 +18,9 @@ use super::rejection::Rejection;
 use super::room::{Fill, enter, length};
 use super::shared::Shared;
 use super::streams::Streams;
+use super::watch::Watched;
+#[cfg(any(test, feature = "watch"))]
+use super::watch::{Access, Watcher};
 use crate::law::{FeedSegment, Ticks};
 use crate::num::Real;
 use crate::path::Piece;
@@ -71,8 +74,8 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             feed_accept: acceptance,
             filled: None,
             changes: 0,
-            #[cfg(test)]
-            between: None,
+            #[cfg(any(test, feature = "watch"))]
+            watcher: None,
         };
         let intake = Intake {
             path: path_out,
@@ -107,19 +110,29 @@ pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
     filled: Option<u8>,
     /// Number of changes asked for so far.
     changes: u32,
-    /// Called between any two operations of a poll: ticks.
-    #[cfg(test)]
-    pub(crate) between: Option<&'a dyn Fn()>,
+    #[cfg(any(test, feature = "watch"))]
+    watcher: Watcher<'a>,
 }
 
-impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
-    /// Lets ticks come before any operation, in tests.
-    #[inline]
-    fn interruptible(&self) {
-        #[cfg(test)]
-        if let Some(between) = self.between {
-            between();
-        }
+impl<'a, R: Real, const AXES: usize> LiveFeeder<'a, R, AXES> {
+    /// Begins an access to what the tick shares, which ends where this is dropped.
+    #[cfg(any(test, feature = "watch"))]
+    fn access(&self) -> Watched<'a> {
+        Watched::begin(self.watcher)
+    }
+
+    /// Nothing.
+    #[cfg(not(any(test, feature = "watch")))]
+    #[inline(always)]
+    fn access(&self) -> Watched {
+        Watched
+    }
+
+    /// From now on `watcher` is called before and after every access to what the tick shares.
+    #[cfg(any(test, feature = "watch"))]
+    #[doc(hidden)]
+    pub fn watch(&mut self, watcher: &'a dyn Fn(Access)) {
+        self.watcher = Some(watcher);
     }
 
     /// From now on refuses pieces that leave `travel` anywhere, not only at their ends.
@@ -138,10 +151,10 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// The queue is full, the piece does not continue its predecessor, or at that feed it asks an axis for
     /// more than the number type holds.
     pub fn piece(&mut self, piece: Piece<R, AXES>, fastest_mm_s: f64) -> Result<(), Refused<Piece<R, AXES>>> {
-        self.interruptible();
         let mut next = self.path_accept;
         next.piece(&piece).map_err(Refused::Invalid)?;
         next.fits_at(&piece, fastest_mm_s).map_err(Refused::Invalid)?;
+        let _access = self.access();
         enter(&mut self.path, PathItem::Piece(piece)).map_err(|_| Refused::Full(piece))?;
         self.path_accept = next;
         count(&self.shared.path_entered);
@@ -153,9 +166,9 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// # Errors
     /// The queue is full, or the path does not end there.
     pub fn end_of_path(&mut self, position: [Position; AXES]) -> Result<(), Refused<[Position; AXES]>> {
-        self.interruptible();
         let mut next = self.path_accept;
         next.end_of_path(position).map_err(Refused::Invalid)?;
+        let _access = self.access();
         enter(&mut self.path, PathItem::EndOfStretch(position)).map_err(|_| Refused::Full(position))?;
         self.path_accept = next;
         count(&self.shared.path_entered);
@@ -165,13 +178,14 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Number of pieces and ends of stretch that are queued, including the one under way.
     #[must_use]
     pub fn path_queued(&self) -> usize {
+        let _access = self.access();
         length(&self.path)
     }
 
     /// The executor's progress.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        self.interruptible();
+        let _access = self.access();
         self.mailbox.progress.progress()
     }
 
@@ -182,7 +196,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     }
 
     fn free_list(&self) -> Option<u8> {
-        self.interruptible();
+        let _access = self.access();
         let is_free =
             |(list, queue): &(u8, &Producer<'_, _>)| !self.mailbox.is_owned(*list) && length(queue) == 0;
         (0..LISTS).zip(&self.lists).find(is_free).map(|(list, _)| list)
@@ -192,6 +206,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// at `feed_mm_s`, after `density`. `None` if there is none now.
     pub fn begin(&mut self, start: Position, feed_mm_s: R, density: Density) -> Option<u8> {
         let free = self.free_list()?;
+        let _access = self.access();
         self.mailbox.own(free, true);
         self.feed_accept = self.path_accept.feed_from(start, feed_mm_s, density);
         self.filled = Some(free);
@@ -243,7 +258,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     }
 
     fn append(&mut self, list: u8, item: FeedItem<R>) -> Result<(), FeedItem<R>> {
-        self.interruptible();
+        let _access = self.access();
         match self.lists.get_mut(usize::from(list)) {
             Some(queue) => enter(queue, item),
             None => Err(item),
@@ -253,6 +268,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// Number of items that a list still has room for.
     #[must_use]
     pub fn room(&self, list: u8) -> usize {
+        let _access = self.access();
         self.lists.get(usize::from(list)).map_or(0, |queue| queue.capacity().saturating_sub(length(queue)))
     }
 
@@ -262,7 +278,6 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// # Errors
     /// The list is not the one begun last, or does not end at rest. Then nothing is asked for.
     pub fn change(&mut self, change: Change) -> Result<(), Rejection> {
-        self.interruptible();
         let Change { from, to, after, .. } = change;
         if self.filled != Some(to) || from == to || from >= LISTS || after > Change::AFTER_MAX {
             return Err(Rejection::NoChange { from, to, after });
@@ -272,32 +287,34 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
             return Err(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() });
         }
         self.changes = self.changes.wrapping_add(1);
+        let _access = self.access();
         self.mailbox.ask(Some(change), self.changes);
         Ok(())
     }
 
     /// Takes back the change asked for. The tick may have followed it already.
     pub fn no_change(&mut self) {
-        self.interruptible();
+        let _access = self.access();
         self.mailbox.ask(None, 0);
     }
 
     /// Whether the change asked for came too late.
     #[must_use]
     pub fn is_refused(&self) -> bool {
-        self.interruptible();
+        let _access = self.access();
         self.mailbox.is_refused()
     }
 
     /// Whether a fault asks for a stop on the path; never again after the streams are split anew.
     #[must_use]
     pub fn is_stop_wanted(&self) -> bool {
+        let _access = self.access();
         self.mailbox.is_stop_wanted()
     }
 
     /// Gives up a list: the tick empties it.
     pub fn give_up(&mut self, list: u8) {
-        self.interruptible();
+        let _access = self.access();
         self.mailbox.own(list, false);
     }
 }

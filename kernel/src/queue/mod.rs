@@ -58,6 +58,11 @@ mod live;
 mod mailbox;
 #[cfg(feature = "live")]
 mod progress;
+#[cfg(all(feature = "live", any(test, feature = "watch")))]
+pub(crate) mod watch;
+#[cfg(all(feature = "live", not(any(test, feature = "watch"))))]
+#[path = "unwatched.rs"]
+mod watch;
 
 pub(crate) use accept::Acceptance;
 pub use accept::PathRules;

@@ -65,6 +65,8 @@ pub struct Instruction {
     pub(super) address: Registers,
     /// Words it moves from or to memory, if a list or a pair.
     pub(super) words: u32,
+    /// Bytes from the program counter, a multiple of 4, to what it loads, if that is a constant beside the code.
+    pub(super) constant: Option<i32>,
     /// Moves a float register whole from or to core registers.
     pub(super) between_files: bool,
 }
@@ -111,6 +113,7 @@ impl Instruction {
             }
             _ => all,
         };
+        let constant = constant(between(operands, '[', ']')).map_err(|()| unknown())?;
         let address = match (row, mnemonic.contains("push") || mnemonic.contains("pop")) {
             (Row::Multiple, true) => Registers::SP,
             (Row::Multiple, false) => first,
@@ -118,7 +121,7 @@ impl Instruction {
         };
         // Half of a double is written `d0[1]` and costs less (table 7-1).
         let between_files = row == Row::FloatMove && all.meets(Registers::CORE) && !operands.contains('[');
-        Ok(Self { row, width, results, sources, address, words, between_files })
+        Ok(Self { row, width, results, sources, address, words, constant, between_files })
     }
 
     /// Whether it may continue elsewhere than at the next instruction.
@@ -134,6 +137,20 @@ impl Instruction {
     pub(super) fn is_literal(&self) -> bool {
         self.address.meets(Registers::PC)
     }
+
+    /// The address of the constant that it loads where it stands at `at`. A table of jumps begins there.
+    pub(super) fn constant_at(&self, at: u32) -> Option<u32> {
+        self.constant.map(|bytes| (at.wrapping_add(4) & !3).wrapping_add_signed(bytes))
+    }
+}
+
+/// The offset of `pc, #0x10`; none if the address is made of other registers.
+fn constant(address: &str) -> Result<Option<i32>, ()> {
+    let Some(rest) = address.strip_prefix("pc") else { return Ok(None) };
+    let Some(offset) = rest.trim_start_matches([',', ' ']).strip_prefix('#') else { return Ok(Some(0)) };
+    let (sign, digits) = offset.strip_prefix('-').map_or((1, offset), |digits| (-1, digits));
+    let bytes = digits.strip_prefix("0x").map_or_else(|| digits.parse(), |hex| i32::from_str_radix(hex, 16));
+    bytes.map(|bytes| Some(sign * bytes)).map_err(|_| ())
 }
 
 /// What stands between two brackets, or nothing.
@@ -176,6 +193,15 @@ mod tests {
         assert_eq!(words("vpush {d8, d9}"), 4);
         assert_eq!(words("vstr d0, [sp]"), 2);
         assert_eq!(words("vldr s0, [sp]"), 1);
+    }
+
+    #[test]
+    fn constants_lie_beside_the_code() {
+        let at = |text, at| Instruction::parse(text, 4).unwrap().constant_at(at);
+        assert_eq!(at("ldr r0, [pc, #8]", 0x102), Some(0x10c));
+        assert_eq!(at("vldr d0, [pc, #-0x10]", 0x200), Some(0x1f4));
+        assert_eq!(at("tbh [pc, r2, lsl #1]", 0x200), Some(0x204));
+        assert_eq!(at("ldr r0, [r1, #8]", 0x102), None);
     }
 
     #[test]

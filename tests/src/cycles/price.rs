@@ -14,14 +14,6 @@ const fn cost(nominal: u32, pessimistic: u32) -> Cost {
     Cost { nominal, pessimistic }
 }
 
-impl std::ops::Add for Cost {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        cost(self.nominal + other.nominal, self.pessimistic + other.pessimistic)
-    }
-}
-
 /// Estimated cycles of an instruction that was executed after `previous`; `taken` if execution went on
 /// elsewhere than at the next instruction.
 #[must_use]

@@ -20,6 +20,7 @@ use std::fmt;
 use std::io::{self, BufRead};
 
 use super::Estimate;
+use super::flash::Flash;
 use super::instruction::{Instruction, UnknownInstruction};
 use super::price::price;
 
@@ -52,9 +53,20 @@ pub struct Calls<R> {
 struct Call {
     returns_to: u32,
     estimate: Estimate,
+    flash: Flash,
     before: Instruction,
     last: Instruction,
     last_at: u32,
+}
+
+impl Call {
+    /// What memory makes the last instruction wait.
+    fn fetch(&mut self) {
+        self.estimate.wait(self.flash.fetch(self.last_at, self.last.width));
+        if let Some(address) = self.last.constant_at(self.last_at) {
+            self.estimate.wait(self.flash.load(address));
+        }
+    }
 }
 
 impl<R: BufRead> Calls<R> {
@@ -114,12 +126,15 @@ impl<R: BufRead> Calls<R> {
             if taken && !call.last.may_jump() {
                 return Err(TraceError::Interrupted { at: call.last_at });
             }
-            call.estimate += price(&call.last, taken, Some(&call.before));
+            let cost = price(&call.last, taken, Some(&call.before));
+            call.estimate += cost;
+            call.flash.pass(cost.nominal);
             if at == call.returns_to {
                 finished = self.call.take().map(|call| call.estimate);
             } else {
                 call.before = call.last;
                 (call.last, call.last_at) = (instruction(&self.code, at)?, at);
+                call.fetch();
             }
         } else if self.begin == Begin::Address(at) {
             let caller = self.executed.ok_or(TraceError::NotCalled { from: 0 })?;
@@ -127,13 +142,16 @@ impl<R: BufRead> Calls<R> {
             if !before.is_call() {
                 return Err(TraceError::NotCalled { from: caller });
             }
-            self.call = Some(Call {
+            let mut call = Call {
                 returns_to: caller.wrapping_add(before.width),
                 estimate: Estimate::default(),
+                flash: Flash::default(),
                 before,
                 last: instruction(&self.code, at)?,
                 last_at: at,
-            });
+            };
+            call.fetch();
+            self.call = Some(call);
         }
         self.executed = Some(at);
         Ok(finished)

@@ -1,30 +1,67 @@
-//! Cycles of a tick on a Cortex-M4 with memory that never waits, estimated from the instructions that were executed
-//! and the core's published timing. Not measured: only hardware measures cycles.
+//! Cycles of a tick on a Cortex-M4, estimated from the instructions that were executed and published timing: with memory
+//! that never waits, and from an STM32F446's flash in an interrupt. Not measured: only hardware measures cycles.
+//!
+//! The ticks are those of the seed with the longest one that a search found (`search`).
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
+use std::path::Path;
 use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 
-use motion_tests::cycles::{Begin, Calls};
+use motion_tests::cycles::{Begin, Calls, Estimate, INTERRUPT};
 use motion_tests::figures::{Table, hold};
+use object::{Object, ObjectSymbol, SymbolKind};
 
 use crate::budget::GROWTH;
-use crate::programs;
-use crate::tools::{Bundle, M4F, Tools};
+use crate::search::{KINDS, Kind};
+use crate::tools::{Bundle, COUNTING, M4F, Tools};
+
+/// What the rows hold of an estimate.
+type Figure = (&'static str, fn(&Estimate) -> u64);
+const FIGURES: [Figure; 5] = [
+    ("instructions", |tick| tick.instructions),
+    ("estimated cycles, M4 zero-wait-state, nominal", |tick| tick.nominal_cycles),
+    ("estimated cycles, M4 zero-wait-state, pessimistic", |tick| tick.pessimistic_cycles),
+    ("estimated cycles, with flash and interrupt, nominal", |tick| {
+        tick.nominal_cycles + tick.nominal_waits + u64::from(INTERRUPT.nominal)
+    }),
+    ("estimated cycles, with flash and interrupt, pessimistic", |tick| {
+        tick.pessimistic_cycles + tick.pessimistic_waits + u64::from(INTERRUPT.pessimistic)
+    }),
+];
 
 pub(crate) fn estimated_cycles(tools: &Tools) -> Result<(), String> {
-    let [_, facets, _] = &programs::worst_ticks()[..] else { return Err("three programs".to_owned()) };
-    let bundle = Bundle::new(core::slice::from_ref(facets))?;
+    let mut table = Table::new(&["a tick of 3 axes on a Cortex-M4F, f32", "median", "p99", "max"]);
+    for kind in KINDS {
+        let ticks = traced(tools, kind)?;
+        for (name, of) in FIGURES {
+            let mut figures: Vec<_> = ticks.iter().map(of).collect();
+            figures.sort_unstable();
+            let last = figures.len() - 1;
+            let figures = [last / 2, last * 99 / 100, last].map(|at| figures[at].to_string());
+            table.row(&[&[format!("{}: {name}", kind.name)], &figures[..]].concat());
+        }
+    }
+    tools.accept_compiler()?;
+    hold("cycles", &table, GROWTH)
+}
+
+/// An estimate for every tick of the worst seed of a kind.
+fn traced(tools: &Tools, kind: Kind) -> Result<Vec<Estimate>, String> {
+    let board = kind.on(M4F);
+    let bundle = Bundle::new(&kind.worst_cases()?[..1])?;
     // The log is gigabytes: it goes through a pipe.
-    let pipe = std::env::temp_dir().join(format!("motion-trace-{}", std::process::id()));
+    let pipe = std::env::temp_dir().join(format!("motion-trace-{}-{}", std::process::id(), kind.name.len()));
     let made = Command::new("mkfifo").arg(&pipe).status().map_err(|error| format!("mkfifo: {error}"))?;
     if !made.success() {
         return Err(format!("mkfifo {}: {made}", pipe.display()));
     }
-    let mut emulator = tools.emulator(M4F, "trace", bundle.path())?;
-    emulator.args(["-singlestep", "-d", "in_asm,exec,nochain", "-D"]).arg(&pipe);
+    let mut emulator = tools.emulator(board, kind.image, bundle.path())?;
+    emulator.args(COUNTING).args(["-singlestep", "-d", "in_asm,exec,nochain", "-D"]).arg(&pipe);
+    emulator.arg("-dfilter").arg(code_of_ticks(&tools.image(board, kind.image)?)?);
+    emulator.stdout(std::process::Stdio::null());
     let started = emulator.spawn();
     let counted = started.map_err(|error| format!("qemu-system-arm: {error}")).and_then(|mut running| {
         let figures = count(&pipe);
@@ -32,30 +69,43 @@ pub(crate) fn estimated_cycles(tools: &Tools) -> Result<(), String> {
         if ended.success() { figures } else { Err(format!("trace: {ended}, {figures:?}")) }
     });
     let _ = std::fs::remove_file(&pipe);
-    let mut ticks = counted?;
-    let mut table = Table::new(&["a tick of 3 axes on a Cortex-M4F, f32", "median", "p99", "max"]);
-    for (name, of) in [
-        ("instructions", 0),
-        ("estimated cycles, M4 zero-wait-state, nominal", 1),
-        ("estimated cycles, M4 zero-wait-state, pessimistic", 2),
-    ] {
-        ticks.sort_unstable_by_key(|tick| tick[of]);
-        let last = ticks.len() - 1;
-        let figures = [last / 2, last * 99 / 100, last].map(|at| ticks[at][of].to_string());
-        table.row(&[&[name.to_owned()], &figures[..]].concat());
-    }
-    tools.accept_compiler()?;
-    hold("cycles", &table, GROWTH)
+    counted
 }
 
-/// Instructions, nominal and pessimistic cycles of every tick.
-fn count(pipe: &std::path::Path) -> Result<Vec<[u64; 3]>, String> {
+/// Parts of the names of who calls a tick, and of all functions that a tick calls. If one were missing, so would its instructions be in the trace,
+/// which then is no trace of a tick.
+const PARTS: [&str; 12] = [
+    "6budget5ticks",
+    "14live_interrupt3run",
+    "budgeted_tick",
+    "13motion_kernel4exec",
+    "13motion_kernel5queue",
+    "13motion_kernel3law",
+    "13motion_kernel4path",
+    "13motion_kernel4axis",
+    "13motion_kernel6kernel",
+    "13motion_kernel3num",
+    "compiler_builtins3mem",
+    "aeabi_mem",
+];
+
+/// The code of ticks, as ranges of addresses for the emulator: what it would write of all else is many times as much.
+fn code_of_ticks(image: &Path) -> Result<String, String> {
+    let bytes = std::fs::read(image).map_err(|error| format!("{}: {error}", image.display()))?;
+    let object = object::File::parse(&*bytes).map_err(|error| error.to_string())?;
+    let functions = object.symbols().filter(|symbol| {
+        symbol.kind() == SymbolKind::Text
+            && symbol.size() > 0
+            && symbol.name().is_ok_and(|name| PARTS.iter().any(|part| name.contains(part)))
+    });
+    let ranges = functions.map(|symbol| format!("{:#x}+{:#x}", symbol.address() & !1, symbol.size()));
+    Ok(ranges.collect::<Vec<_>>().join(","))
+}
+
+fn count(pipe: &Path) -> Result<Vec<Estimate>, String> {
     let trace = File::open(pipe).map_err(|error| format!("{}: {error}", pipe.display()))?;
     Calls::new(BufReader::with_capacity(1 << 20, Portions(trace)), Begin::Symbol("budgeted_tick".into()))
-        .map(|call| {
-            let call = call.map_err(|error| error.to_string())?;
-            Ok([call.instructions, call.nominal_cycles, call.pessimistic_cycles])
-        })
+        .map(|call| call.map_err(|error| error.to_string()))
         .collect()
 }
 

@@ -9,19 +9,19 @@ use motion_kernel::queue::{LiveStreams, Streams};
 use motion_kernel::trace::Digest;
 
 use crate::programs;
-use crate::tools::{BOARDS, Board, Clock, LIVE_BOARDS, M0, M3, M4F, M7, Tools};
+use crate::tools::{BOARDS, Board, Case, Clock, LIVE_BOARDS, M0, Tools, bundles, by_place};
 
 /// As the boards simulate (`boards/qemu-mps2/src/lib.rs`).
-const LINE: usize = 16;
-const SUBSTEPS: u32 = 4;
+pub(crate) const LINE: usize = 4;
+pub(crate) const SUBSTEPS: u32 = 1;
 const GENERATED: usize = 50;
 /// So many of the runs must have a stretch that is corrected.
 const CORRECTED_MIN: u32 = 10;
 /// Under live control.
 const LIVE_GENERATED: usize = 20;
 /// As the boards have room (`boards/qemu-mps2/src/live.rs`).
-const LIVE_SEGMENTS: usize = 16;
-const PLACES: usize = 64;
+pub(crate) const LIVE_SEGMENTS: usize = 16;
+pub(crate) const PLACES: usize = 64;
 /// How many ticks must have come in the middle of a fill.
 const INSIDE_MIN: u32 = 20;
 
@@ -83,22 +83,6 @@ fn live_on_the_pc_in<R: Real>(bytes: &[u8], seed: u64) -> String {
     }
 }
 
-/// Programs in bundles that fit the board.
-fn bundles(board: Board, programs: &[Vec<u8>]) -> Vec<Vec<Vec<u8>>> {
-    let mut bundles = vec![Vec::new()];
-    let mut room = board.room - 4;
-    for program in programs {
-        let needed = program.len().next_multiple_of(4) + 4;
-        if needed > room {
-            bundles.push(Vec::new());
-            room = board.room - 4;
-        }
-        room -= needed;
-        bundles.last_mut().expect("one at least").push(program.clone());
-    }
-    bundles
-}
-
 pub(crate) fn the_same_bits_on_every_core(tools: &Tools) -> Result<(), String> {
     let generated = programs::generated(GENERATED);
     let mut all = vec![("the stringer".to_owned(), programs::stringer())];
@@ -109,8 +93,8 @@ pub(crate) fn the_same_bits_on_every_core(tools: &Tools) -> Result<(), String> {
     let bytes: Vec<_> = all.iter().map(|(_, bytes)| bytes.clone()).collect();
     for board in BOARDS {
         let mut printed = String::new();
-        for bundle in bundles(board, &bytes) {
-            printed += &tools.run(board, "closed_loop", &bundle, Clock::Free)?;
+        for bundle in bundles(board, &by_place(&bytes)) {
+            printed += &tools.run_cases(board, "closed_loop", &bundle, Clock::Free)?;
         }
         let lines: Vec<_> = printed.lines().collect();
         if lines.len() != all.len() {
@@ -137,18 +121,18 @@ pub(crate) fn the_same_bits_on_every_core(tools: &Tools) -> Result<(), String> {
 /// Held, resumed, overridden, given up and kept waiting at random: what live control plans anew on a core is what it plans
 /// on the PC.
 pub(crate) fn the_same_bits_under_live_control(tools: &Tools) -> Result<(), String> {
-    let programs = programs::live(LIVE_GENERATED);
+    let cases = by_place(&programs::live(LIVE_GENERATED));
     for board in LIVE_BOARDS {
-        for bundle in bundles(board, &programs) {
-            let printed = tools.run(board, "live", &bundle, Clock::Free)?;
+        for bundle in bundles(board, &cases) {
+            let printed = tools.run_cases(board, "live", &bundle, Clock::Free)?;
             if printed.lines().count() != bundle.len() {
                 return Err(format!("{}: {printed}, {} runs expected", board.core, bundle.len()));
             }
-            for ((seed, bytes), line) in (0..).zip(&bundle).zip(printed.lines()) {
+            for (Case { seed, bytes }, line) in bundle.iter().zip(printed.lines()) {
                 let expected = if board.number == "f32" {
-                    live_on_the_pc_in::<f32>(bytes, seed)
+                    live_on_the_pc_in::<f32>(bytes, u64::from(*seed))
                 } else {
-                    live_on_the_pc_in::<Fixed>(bytes, seed)
+                    live_on_the_pc_in::<Fixed>(bytes, u64::from(*seed))
                 };
                 if line != expected || !line.ends_with("fault false") {
                     return Err(format!("{}, program {seed}: {line}, on the PC {expected}", board.core));
@@ -162,8 +146,7 @@ pub(crate) fn the_same_bits_under_live_control(tools: &Tools) -> Result<(), Stri
 pub(crate) fn the_same_bits_from_an_interrupt(tools: &Tools) -> Result<(), String> {
     // The stringer's items all fit the streams: there would be nothing to stop.
     let facets = programs::facets();
-    // The M0's 16 KiB hold the loop on the stack, stepped, but not moved into what an interrupt owns.
-    for board in [M4F, M7, M3] {
+    for board in BOARDS {
         let printed = tools.run(board, "interrupt", core::slice::from_ref(&facets), Clock::Counting)?;
         let expected = on_the_pc(board, &facets, Correct::Nothing);
         let mut lines = printed.lines();
@@ -183,7 +166,7 @@ pub(crate) fn the_same_bits_from_an_interrupt(tools: &Tools) -> Result<(), Strin
 /// A coefficient of the path that is off by one last place of an f32 gives another digest, and the same other one everywhere.
 pub(crate) fn one_last_place_is_seen(tools: &Tools) -> Result<(), String> {
     let (stringer, changed) = (programs::stringer(), programs::stringer_off_by_a_last_place());
-    for board in [M4F, M0] {
+    for board in BOARDS {
         let [before, after] =
             [&stringer, &changed].map(|bytes| on_the_pc(board, bytes, Correct::SecondStretch));
         let printed = tools.run(board, "closed_loop", core::slice::from_ref(&changed), Clock::Free)?;

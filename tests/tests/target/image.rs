@@ -5,7 +5,7 @@ use object::{Object, ObjectSection, ObjectSymbol};
 
 use crate::budget::{GROWTH, by_name};
 use crate::programs;
-use crate::tools::{BOARDS, Board, Clock, LIVE_BOARDS, M4F, Tools};
+use crate::tools::{BOARDS, Board, Clock, LIVE_BOARDS, M4F, M7, Tools};
 
 /// Whatever a panic needs. The handler's own symbol is in every image in which one is reachable.
 const PANIC: [&str; 5] = ["panic", "unwrap_failed", "expect_failed", "slice_index", "_fail"];
@@ -58,21 +58,22 @@ pub(crate) fn sizes(tools: &Tools) -> Result<(), String> {
         "pieces and segments",
         "stack of a tick [bytes]",
     ]);
-    for board in BOARDS {
+    // An M7 runs the M4F's images.
+    for board in BOARDS.into_iter().filter(|board| board.core != M7.core) {
         let flash = flash(tools, board, "kernel_only")? - flash(tools, board, "empty")?;
         let figures = by_name(&tools.run(board, "budget", &programs::worst_ticks(), Clock::Counting)?);
         let greatest = |name: &str| figures.get(name).and_then(|sorted| sorted.last().copied()).unwrap_or(0);
         let (ram, stack) = (greatest("ram"), greatest("stack"));
         let capacity = format!("{}, {}", greatest("pieces"), greatest("segments"));
         let cells = [flash.to_string(), ram.to_string(), capacity, stack.to_string()];
-        table.row(&[&[board.core.to_owned(), board.number.to_owned()], &cells[..]].concat());
+        table.row(&[&[board.cores().to_owned(), board.number.to_owned()], &cells[..]].concat());
         if board == M4F && (flash > FLASH_MAX || u64::from(stack) > STACK_MAX || stack == 0) {
             return Err(format!(
                 "{flash} bytes of flash, {stack} of stack; promised {FLASH_MAX}, {STACK_MAX}"
             ));
         }
     }
-    for board in LIVE_BOARDS {
+    for board in LIVE_BOARDS.into_iter().filter(|board| board.core != M7.core) {
         let flash = flash(tools, board, "kernel_only")? - flash(tools, board, "empty")?;
         let [reference, _] = programs::worst_live_ticks();
         let figures = by_name(&tools.run(board, "live_budget", &reference, Clock::Counting)?);
@@ -80,7 +81,7 @@ pub(crate) fn sizes(tools: &Tools) -> Result<(), String> {
         let number = format!("{}, live control and guards", board.number);
         let cells = [flash.to_string(), greatest("ram").to_string(), "64, 3 × 16".to_owned()];
         let stack = greatest("stack").to_string();
-        table.row(&[&[board.core.to_owned(), number], &cells[..], &[stack]].concat());
+        table.row(&[&[board.cores().to_owned(), number], &cells[..], &[stack]].concat());
     }
     tools.accept_compiler()?;
     hold("sizes", &table, GROWTH)

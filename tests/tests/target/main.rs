@@ -1,7 +1,7 @@
-//! The kernel on emulated Cortex-M boards: the same bits as on a PC, instruction budgets, sizes, and an image
+//! The kernel on emulated boards with Cortex-M and RISC-V: the same bits as on a PC, instruction budgets, sizes, and an image
 //! that cannot panic; the firmware of the NUCLEO on an emulated board.
 //!
-//! Needs `qemu-system-arm` and a compiler that builds for Cortex-M; without them every test is listed and ignored
+//! Needs `qemu-system-arm`, `qemu-system-riscv32` and a compiler that builds for both; without them every test is listed and ignored
 //! with the reason, but fails where `CI=true`. Figures are held to committed tables (`tests/expected`); a compiler
 //! other than the one they were measured with makes other figures, so outside of CI their tests are then ignored
 //! too.
@@ -17,7 +17,9 @@ mod digest;
 mod firmware;
 mod functions;
 mod image;
+mod preempted;
 mod programs;
+mod search;
 mod tools;
 
 use std::process::ExitCode;
@@ -29,16 +31,23 @@ use tools::Tools;
 type Test = fn(&Tools) -> Result<(), String>;
 
 /// Name, whether it holds figures that depend on the compiler, and the test. The longest first: others run beside it.
-const TESTS: [(&str, bool, Test); 11] = [
+const TESTS: [(&str, bool, Test); 14] = [
     ("estimated_cycles", true, cycles::estimated_cycles),
     ("the_firmware_runs", false, firmware::the_firmware_runs),
     ("instructions_of_the_interrupt", true, firmware::instructions_of_the_interrupt),
     ("the_same_bits_on_every_core", false, digest::the_same_bits_on_every_core),
     ("the_same_bits_from_an_interrupt", false, digest::the_same_bits_from_an_interrupt),
     ("the_same_bits_under_live_control", false, digest::the_same_bits_under_live_control),
+    (
+        "the_same_bits_where_ticks_stop_the_background",
+        false,
+        preempted::the_same_bits_where_ticks_stop_the_background,
+    ),
     ("one_last_place_is_seen", false, digest::one_last_place_is_seen),
+    ("one_last_place_is_seen_under_live_control", false, preempted::one_last_place_is_seen),
     ("nothing_can_panic", false, image::nothing_can_panic),
     ("instructions_of_a_tick", true, budget::instructions_of_a_tick),
+    ("the_longest_ticks_and_turns", true, search::the_longest_ticks_and_turns),
     ("instructions_of_functions", true, functions::instructions_of_functions),
     ("sizes", true, image::sizes),
 ];

@@ -15,6 +15,8 @@ use motion_tests::random::Random;
 const STRINGER: &str = include_str!("../../../host/src/cli/stringer.ngc");
 /// Longer ones take the emulators too long [s].
 const TIME_MAX_S: f64 = 4.0;
+/// Of programs that a search runs by the thousand [s].
+const SEARCHED_TIME_MAX_S: f64 = 1.0;
 /// Bytes that fit the smallest board.
 const BYTES_MAX: usize = 32 << 10;
 
@@ -92,6 +94,16 @@ pub(crate) fn with_tables() -> Vec<u8> {
 
 /// The stringer with one coefficient of its first arc one last place of an f32 off.
 pub(crate) fn stringer_off_by_a_last_place() -> Vec<u8> {
+    off_by_a_last_place().to_bytes(&Machine::reference())
+}
+
+/// The stringer, and the same, for live control.
+pub(crate) fn live_stringer_and_off_by_a_last_place() -> [Vec<u8>; 2] {
+    let machine = Machine::reference();
+    [live_bytes(STRINGER, &machine, Mode::Spanning), off_by_a_last_place().to_live_bytes(&machine)]
+}
+
+fn off_by_a_last_place() -> Executable {
     let machine = Machine::reference();
     let mut executable = executable(&plan(STRINGER, &machine, Mode::Spanning)).expect("within fixed point");
     let arc = executable.items.iter_mut().find_map(|item| match item {
@@ -100,7 +112,7 @@ pub(crate) fn stringer_off_by_a_last_place() -> Vec<u8> {
     });
     let coefficient = &mut arc.expect("the stringer has arcs")[0][0];
     *coefficient = f64::from((*coefficient as f32).next_up());
-    executable.to_bytes(&machine)
+    executable
 }
 
 /// The stringer and facets for live control, on the reference machine and with every drive inverted.
@@ -147,6 +159,73 @@ fn generated_by(count: usize, to_bytes: fn(&Executable, &Machine) -> Vec<u8>) ->
         }
     }
     programs
+}
+
+/// Whose drives a search's programs are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Drives {
+    /// The reference machine's, sometimes too weak for the program: outputs saturate.
+    Any,
+    /// The reference machine's, which its guards watch.
+    Guarded,
+    /// With all that feedforward can have.
+    Inverted,
+}
+
+/// The program of a seed of the search for the longest ticks: the stringer, short lines and arcs, or anything random.
+pub(crate) fn searched(seed: u32, drives: Drives, is_live: bool) -> Vec<u8> {
+    let mut random = Random::new(u64::from(seed));
+    loop {
+        let mut machine = machine::gentle(&mut random);
+        if drives == Drives::Inverted {
+            let inverting = inverting();
+            for (axis, inverting) in machine.axes.iter_mut().zip(inverting.axes) {
+                axis.feedforward = inverting.feedforward;
+            }
+        }
+        if drives == Drives::Any && random.chance(0.3) {
+            for axis in &mut machine.axes {
+                axis.output_limit_v = random.between(0.5, 1.5);
+                axis.following_error_limit_mm = 100.0;
+            }
+        }
+        let mode = if random.chance(0.5) { Mode::Spanning } else { Mode::PerBlock };
+        let text = match random.below(8) {
+            0 => STRINGER.to_owned(),
+            1..=4 => random_facets(&mut random),
+            _ => {
+                let fragments = 1 + random.below(4);
+                program::generate(&mut random, fragments, 30.0).text
+            }
+        };
+        let read = gcode::read("searched.ngc", text.as_bytes()).expect("G-code");
+        let Ok(plan) = plan_program("searched.ngc", &read, &machine, mode) else { continue };
+        let is_short = plan.time_s <= SEARCHED_TIME_MAX_S || text == STRINGER;
+        let Some(executable) = is_short.then(|| executable(&plan)).flatten() else { continue };
+        let bytes = if is_live { executable.to_live_bytes(&machine) } else { executable.to_bytes(&machine) };
+        if bytes.len() <= BYTES_MAX {
+            return bytes;
+        }
+    }
+}
+
+/// Facets whose lengths and feeds are random.
+fn random_facets(random: &mut Random) -> String {
+    use std::fmt::Write;
+    let path = if random.chance(0.5) { "G61" } else { "G64 P0.02" };
+    let mut text = format!("{path} G91 G1 F4000\n");
+    let (shortest_mm, longest_mm) = (random.log(0.005, 0.1), random.log(0.2, 3.0));
+    for _ in 0..30 + random.below(60) {
+        let [x, y] = [0, 1].map(|_| random.log(shortest_mm, longest_mm) * random.sign());
+        let feed_mm_min = random.log(500.0, 6000.0);
+        let _ = match random.below(6) {
+            0 => writeln!(text, "G3 X{x:.3} Y{x:.3} I0 J{x:.3} F{feed_mm_min:.0}\nG1"),
+            1 => writeln!(text, "X{x:.3} Y{y:.3} Z{:.3} F{feed_mm_min:.0}", 0.5 * x),
+            2 => writeln!(text, "X{x:.3} Y{y:.3}"),
+            _ => writeln!(text, "X{:.3} F{feed_mm_min:.0}", x.abs()),
+        };
+    }
+    text + "M2\n"
 }
 
 /// Short lines and arcs, planned per block: pieces, segments and phases end all the time, often several in a tick.

@@ -47,12 +47,44 @@ pub(crate) const M0: Board = Board {
     room: 64 * KIB,
     features: "",
 };
+pub(crate) const RISC_V: Board = Board {
+    core: "RISC-V RV32IMAFC",
+    machine: "virt",
+    target: "riscv32imafc-unknown-none-elf",
+    address: 0x8040_0000,
+    ..M4F
+};
 /// Every core with the number type that is meant for it.
-pub(crate) const BOARDS: [Board; 4] = [M4F, M7, M3, M0];
+pub(crate) const BOARDS: [Board; 5] = [M4F, M7, M3, M0, RISC_V];
 
-/// The cores with room for live control, with it.
-pub(crate) const LIVE_BOARDS: [Board; 3] =
-    [Board { features: "live", ..M4F }, Board { features: "live", ..M7 }, Board { features: "live", ..M3 }];
+/// The cores with room for live control.
+const LARGE: [Board; 4] = [M4F, M7, M3, RISC_V];
+/// Those with it.
+pub(crate) const LIVE_BOARDS: [Board; 4] = all_with("live");
+/// The same with ticks that stop the background, which says where.
+pub(crate) const WATCHED_BOARDS: [Board; 4] = all_with("watch");
+
+const fn all_with(features: &'static str) -> [Board; 4] {
+    let [m4f, m7, m3, risc_v] = LARGE;
+    [m4f.with(features), m7.with(features), m3.with(features), risc_v.with(features)]
+}
+
+impl Board {
+    /// The same core with images of other features.
+    pub(crate) const fn with(self, features: &'static str) -> Self {
+        Self { features, ..self }
+    }
+
+    fn is_arm(self) -> bool {
+        self.target.starts_with("thumb")
+    }
+
+    /// As tables of counts call it: an M4F and an M7 execute the same instructions of the same images
+    /// ([`Tools::count`]).
+    pub(crate) fn cores(self) -> &'static str {
+        if self.core == M4F.core { "Cortex-M4F, M7" } else { self.core }
+    }
+}
 
 /// How instructions become time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,15 +95,50 @@ pub(crate) enum Clock {
     Counting,
 }
 
+/// For ARM and for RISC-V.
+const EMULATORS: [&str; 2] = ["qemu-system-arm", "qemu-system-riscv32"];
+
+/// What makes the emulator count: 64 ns of its time for every instruction.
+pub(crate) const COUNTING: [&str; 2] = ["-icount", "shift=6,sleep=off"];
+
 /// The images that tests ask for, by features.
-const IMAGES: [(&str, &[&str]); 3] = [
-    ("", &["closed_loop", "interrupt", "budget", "functions", "trace", "kernel_only", "empty"]),
+const IMAGES: [(&str, &[&str]); 4] = [
+    ("", &["closed_loop", "interrupt", "budget", "functions", "kernel_only", "empty"]),
     ("live", &["live", "live_budget", "budget", "kernel_only", "empty"]),
+    ("watch", &["live_interrupt"]),
     ("soft-float", &["budget", "functions"]),
 ];
 
+/// A program, and the seed of the commands that it gets under live control.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Case {
+    pub(crate) seed: u32,
+    pub(crate) bytes: Vec<u8>,
+}
+
+/// Programs with their places as seeds.
+pub(crate) fn by_place(programs: &[Vec<u8>]) -> Vec<Case> {
+    (0..).zip(programs).map(|(seed, bytes)| Case { seed, bytes: bytes.clone() }).collect()
+}
+
+/// Cases in bundles that fit the board.
+pub(crate) fn bundles(board: Board, cases: &[Case]) -> Vec<Vec<Case>> {
+    let mut bundles = vec![Vec::new()];
+    let mut room = board.room - 4;
+    for case in cases {
+        let needed = case.bytes.len().next_multiple_of(4) + 8;
+        if needed > room {
+            bundles.push(Vec::new());
+            room = board.room - 4;
+        }
+        room -= needed;
+        bundles.last_mut().expect("one at least").push(case.clone());
+    }
+    bundles
+}
+
 /// Machine, image, programs.
-type Run = (&'static str, PathBuf, Vec<Vec<u8>>);
+type Run = (&'static str, PathBuf, Vec<Case>);
 /// What it printed; empty while the first one who asks runs it.
 type Printed = Arc<Mutex<Option<String>>>;
 
@@ -103,12 +170,14 @@ fn root() -> PathBuf {
 impl Tools {
     /// What this machine has, or what is missing.
     pub(crate) fn find() -> Result<Self, String> {
-        if output(Command::new("qemu-system-arm").arg("--version")).is_none() {
-            return Err("needs qemu-system-arm".to_owned());
+        for emulator in EMULATORS {
+            if output(Command::new(emulator).arg("--version")).is_none() {
+                return Err(format!("needs {emulator}"));
+            }
         }
         let compiler = Compiler::with_source().or_else(Compiler::with_targets).ok_or(
-            "needs a compiler for Cortex-M: Debian's rustc-web and rust-web-src, or rustup target add \
-             thumbv7em-none-eabihf thumbv7m-none-eabi thumbv6m-none-eabi",
+            "needs a compiler for Cortex-M and RISC-V: Debian's rustc-web and rust-web-src, or rustup target add \
+             thumbv7em-none-eabihf thumbv7m-none-eabi thumbv6m-none-eabi riscv32imafc-unknown-none-elf",
         )?;
         Ok(Self { compiler, built: Mutex::default(), counted: Mutex::default() })
     }
@@ -145,22 +214,16 @@ impl Tools {
 
     /// All images with `features`, for all targets, in a folder by target.
     fn build(&self, features: &'static str) -> Result<PathBuf, String> {
-        let boards = BOARDS.into_iter().chain(LIVE_BOARDS).chain([M3_SOFT]);
+        let boards = BOARDS.into_iter().chain(LIVE_BOARDS).chain(WATCHED_BOARDS).chain([M3_SOFT]);
         let targets: BTreeSet<_> =
             boards.filter(|board| board.features == features).map(|board| board.target).collect();
         let images = IMAGES.iter().find(|(of, _)| *of == features).map_or(&[][..], |(_, images)| *images);
         // One folder for all, so that the libraries are built once for a target.
         let target_dir = root().join("target/boards");
-        let mut cargo = self.cargo("boards/qemu-mps2")?;
-        cargo
-            .args(["--features", features])
-            .args(targets.iter().flat_map(|target| ["--target", *target]))
-            .args(images.iter().flat_map(|image| ["--bin", *image]))
-            .arg("--target-dir")
-            .arg(&target_dir);
-        let done = cargo.output().map_err(|error| format!("cargo: {error}"))?;
-        if !done.status.success() {
-            return Err(format!("build for {targets:?}: {}", String::from_utf8_lossy(&done.stderr)));
+        // Apart: cargo would give a crate that both have the features of both.
+        let (arm, other): (Vec<_>, Vec<_>) = targets.iter().partition(|target| target.starts_with("thumb"));
+        for targets in [arm, other].into_iter().filter(|targets| !targets.is_empty()) {
+            self.build_for(&targets, features, images, &target_dir)?;
         }
         // Away from where those with other features would replace them.
         let folder = target_dir.join("images").join(if features.is_empty() { "plain" } else { features });
@@ -173,6 +236,28 @@ impl Tools {
             }
         }
         Ok(folder)
+    }
+
+    /// All of `images` for `targets`.
+    fn build_for(
+        &self,
+        targets: &[&str],
+        features: &str,
+        images: &[&str],
+        target_dir: &Path,
+    ) -> Result<(), String> {
+        let mut cargo = self.cargo("boards/qemu-mps2")?;
+        cargo
+            .args(["--features", features])
+            .args(targets.iter().flat_map(|target| ["--target", *target]))
+            .args(images.iter().flat_map(|image| ["--bin", *image]))
+            .arg("--target-dir")
+            .arg(target_dir);
+        let done = cargo.output().map_err(|error| format!("cargo: {error}"))?;
+        if !done.status.success() {
+            return Err(format!("build for {targets:?}: {}", String::from_utf8_lossy(&done.stderr)));
+        }
+        Ok(())
     }
 
     /// Cargo, about to build in a board's folder.
@@ -219,8 +304,9 @@ impl Tools {
     /// QEMU with an image and a bundle of programs, not yet started.
     pub(crate) fn emulator(&self, board: Board, name: &str, bundle: &Path) -> Result<Command, String> {
         let mut command = Command::new("timeout");
+        let emulator = if board.is_arm() { EMULATORS[0] } else { EMULATORS[1] };
         command
-            .args(["900", "qemu-system-arm", "-M", board.machine, "-nographic"])
+            .args(["900", emulator, "-M", board.machine, "-bios", "none", "-nographic"])
             .args(["-monitor", "none", "-serial", "none"])
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-device")
@@ -230,7 +316,7 @@ impl Tools {
         Ok(command)
     }
 
-    /// Runs an image over `programs`; what it printed.
+    /// Runs an image over `programs`, with their places as seeds; what it printed.
     pub(crate) fn run(
         &self,
         board: Board,
@@ -238,31 +324,55 @@ impl Tools {
         programs: &[Vec<u8>],
         clock: Clock,
     ) -> Result<String, String> {
-        if clock == Clock::Free {
-            return self.run_anew(board, name, programs, clock);
+        self.run_cases(board, name, &by_place(programs), clock)
+    }
+
+    /// Counts instructions: runs an image over `programs`, for an M4F on an M7 too, which must print the same.
+    pub(crate) fn count(&self, board: Board, name: &str, programs: &[Vec<u8>]) -> Result<String, String> {
+        let printed = self.run(board, name, programs, Clock::Counting)?;
+        if board.core == M4F.core {
+            let other = Board { machine: M7.machine, ..board };
+            if self.run(other, name, programs, Clock::Counting)? != printed {
+                return Err(format!("{name}: an M7 counts other instructions than an M4F"));
+            }
         }
-        let key = (board.machine, self.image(board, name)?, programs.to_vec());
+        Ok(printed)
+    }
+
+    /// Runs an image over `cases`; what it printed.
+    pub(crate) fn run_cases(
+        &self,
+        board: Board,
+        name: &str,
+        cases: &[Case],
+        clock: Clock,
+    ) -> Result<String, String> {
+        if clock == Clock::Free {
+            return self.run_anew(board, name, cases, clock);
+        }
+        let key = (board.machine, self.image(board, name)?, cases.to_vec());
         let printed = Arc::clone(self.counted.lock().map_err(|_| "a run panicked")?.entry(key).or_default());
         let mut printed = printed.lock().map_err(|_| "a run panicked")?;
         if printed.is_none() {
-            *printed = Some(self.run_anew(board, name, programs, clock)?);
+            *printed = Some(self.run_anew(board, name, cases, clock)?);
         }
         Ok(printed.clone().unwrap_or_default())
     }
 
-    fn run_anew(
+    /// The same, and nothing of it is kept.
+    pub(crate) fn run_anew(
         &self,
         board: Board,
         name: &str,
-        programs: &[Vec<u8>],
+        cases: &[Case],
         clock: Clock,
     ) -> Result<String, String> {
-        let bundle = Bundle::new(programs)?;
+        let bundle = Bundle::new(cases)?;
         let mut command = self.emulator(board, name, bundle.path())?;
         if clock == Clock::Counting {
-            command.args(["-icount", "shift=6,sleep=off"]);
+            command.args(COUNTING);
         }
-        let done = command.output().map_err(|error| format!("qemu-system-arm: {error}"))?;
+        let done = command.output().map_err(|error| format!("emulator: {error}"))?;
         let printed = String::from_utf8_lossy(&done.stdout).into_owned();
         if done.status.success() {
             Ok(printed)
@@ -313,13 +423,13 @@ pub(crate) struct Bundle(PathBuf);
 
 impl Bundle {
     /// See `boards/qemu-mps2/src/programs.rs`.
-    pub(crate) fn new(programs: &[Vec<u8>]) -> Result<Self, String> {
+    pub(crate) fn new(cases: &[Case]) -> Result<Self, String> {
         use std::sync::atomic::{AtomicU32, Ordering};
         static BUNDLES: AtomicU32 = AtomicU32::new(0);
-        let mut bytes =
-            u32::try_from(programs.len()).map_err(|error| error.to_string())?.to_le_bytes().to_vec();
-        for program in programs {
+        let mut bytes = u32::try_from(cases.len()).map_err(|error| error.to_string())?.to_le_bytes().to_vec();
+        for Case { seed, bytes: program } in cases {
             let length = u32::try_from(program.len()).map_err(|error| error.to_string())?;
+            bytes.extend(seed.to_le_bytes());
             bytes.extend(length.to_le_bytes());
             bytes.extend(program);
             bytes.resize(bytes.len().next_multiple_of(4), 0);

@@ -1,15 +1,19 @@
 //! Counts the instructions of every tick of every program of the bundle, and of the tick's stages; paints the
 //! stack below the tick; says how much memory kernel and streams take.
 //!
+//! With live control's features the axes are guarded as the program says; the program's own plan is driven here, too.
+//!
 //! One line a figure: what, and how many instructions (for `stack` and `ram`: bytes; `pieces` and `segments`: places).
 #![no_std]
 #![no_main]
 
 use core::hint::black_box;
 
-use cortex_m_rt::entry;
-use cortex_m_semihosting::hprintln;
-use hal_sim::closed_loop::{Closed, InMemory, LoopError, close, reference_machine};
+#[cfg(not(feature = "live"))]
+use hal_sim::closed_loop::close;
+#[cfg(feature = "live")]
+use hal_sim::closed_loop::live::close_guarded as close;
+use hal_sim::closed_loop::{Closed, InMemory, LoopError, reference_machine};
 use hal_sim::{MachineParameters, SimMachine};
 use motion_kernel::axis::{AxesConfig, AxisConfig, AxisFigures, AxisOutput, AxisState};
 use motion_kernel::exec::ExecState;
@@ -23,8 +27,9 @@ use motion_kernel::queue::{Intake, Streams};
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, Position};
 use qemu_boards::count::Counter;
+use qemu_boards::processor::{Timer, entry};
 use qemu_boards::programs::programs;
-use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail, stack};
+use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail, println, singleton, stack};
 
 type Axis = AxisState<Number>;
 type Queues<const N: usize> = Streams<Number, N, PIECES, SEGMENTS>;
@@ -37,18 +42,18 @@ type Tick<const N: usize> = for<'a> fn(
 
 #[entry]
 fn main() -> ! {
-    let core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
-    let counter = Counter::new(core.SYST);
+    let mut timer = Timer::take().unwrap_or_else(|| fail(&"timer"));
+    let counter = Counter::new(&mut timer);
     let kernel = size_of::<Kernel<Number, AXES>>();
-    hprintln!("ram {}", kernel + size_of::<Streams<Number, AXES, PIECES, SEGMENTS>>());
-    hprintln!("pieces {}\nsegments {}", PIECES, SEGMENTS);
+    println!("ram {}", kernel + size_of::<Streams<Number, AXES, PIECES, SEGMENTS>>());
+    println!("pieces {}\nsegments {}", PIECES, SEGMENTS);
     // Not on the stack, where the one that is measured needs the room.
-    let streams = cortex_m::singleton!(: Queues<AXES> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
+    let streams = singleton!(Queues<AXES> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     // 16 KiB hold one machine only.
     #[cfg(target_has_atomic = "8")]
-    let one = cortex_m::singleton!(: Queues<1> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
+    let one = singleton!(Queues<1> = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     for bytes in programs() {
-        hprintln!("program");
+        println!("program");
         match refusal(bytes) {
             None => measure(&counter, bytes, streams, budgeted_tick),
             #[cfg(target_has_atomic = "8")]
@@ -115,10 +120,10 @@ fn ticks<const N: usize>(
             spent = instructions;
             *trace
         });
-        hprintln!("tick {}", spent);
+        println!("tick {}", spent);
         let (_, spent) =
             counter.count(|| regulate(&mut axis, &config, &trace.executed.setpoints[0], trace.axes[0]));
-        hprintln!("regulator {}", spent);
+        println!("regulator {}", spent);
         if trace.fault.is_some() {
             fail(&"a fault");
         }
@@ -126,7 +131,7 @@ fn ticks<const N: usize>(
             break;
         }
     }
-    hprintln!("stack {}", deepest);
+    println!("stack {}", deepest);
 }
 
 // Each in a frame of its own, which is gone before the ticks begin: 16 KiB are not much.
@@ -202,7 +207,7 @@ fn stages<const N: usize>(counter: &Counter, bytes: &[u8]) {
                     if segment.phase_duration(phase) > Ticks::ZERO {
                         for eighth in 0..8 {
                             let (_, spent) = counter.count(|| law(&segment, phase, (eighth << 61) + 12345));
-                            hprintln!("law {}", spent);
+                            println!("law {}", spent);
                         }
                     }
                 }
@@ -212,7 +217,7 @@ fn stages<const N: usize>(counter: &Counter, bytes: &[u8]) {
                 for eighth in 0..8 {
                     let s_mm = length * Number::from_f64(0.125 * f64::from(eighth));
                     let (_, spent) = counter.count(|| path(&piece, s_mm, &motion, &mut setpoints));
-                    hprintln!("path {}", spent);
+                    println!("path {}", spent);
                 }
             }
             Ready::EndOfStretch(_) | Ready::Dwell(_) | Ready::Stop | Ready::Block => {}

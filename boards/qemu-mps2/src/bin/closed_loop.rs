@@ -3,22 +3,21 @@
 #![no_std]
 #![no_main]
 
-use cortex_m_rt::entry;
-use cortex_m_semihosting::hprintln;
 use hal_sim::closed_loop::{Closed, LoopError, close, reference_machine, some_knots};
 use hal_sim::{MachineParameters, SimMachine};
 use motion_kernel::exec::ExecState;
 use motion_kernel::program::Reader;
 use motion_kernel::queue::Streams;
 use motion_kernel::trace::Digest;
+use qemu_boards::processor::entry;
 use qemu_boards::programs::programs;
-use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail};
+use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail, println, singleton};
 
 type Queues = Streams<Number, AXES, PIECES, SEGMENTS>;
 
 #[entry]
 fn main() -> ! {
-    let streams = cortex_m::singleton!(: Queues = Streams::new()).unwrap_or_else(|| fail(&"streams"));
+    let streams = singleton!(Queues = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     for bytes in programs() {
         run(bytes, &machine_parameters(bytes), streams);
     }
@@ -46,7 +45,7 @@ fn ticks((producer, closed_loop): &mut Closed<'_, Number, AXES, LINE>) {
         digest.add(&trace);
         ticks += 1;
         if trace.fault.is_some() || (is_all && trace.executed.state == ExecState::Idle) {
-            hprintln!("{} ticks digest {:016x} fault {}", ticks, digest.value(), trace.fault.is_some());
+            println!("{} ticks digest {:016x} fault {}", ticks, digest.value(), trace.fault.is_some());
             return;
         }
     }

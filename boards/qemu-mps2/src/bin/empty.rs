@@ -3,12 +3,11 @@
 #![no_std]
 #![no_main]
 
-use cortex_m_rt::entry;
-use qemu_boards as _;
+use qemu_boards::processor::{entry, wait};
 
 #[entry]
 fn main() -> ! {
     loop {
-        cortex_m::asm::wfi();
+        wait();
     }
 }

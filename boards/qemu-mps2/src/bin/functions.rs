@@ -5,19 +5,18 @@
 
 use core::hint::black_box;
 
-use cortex_m_rt::entry;
-use cortex_m_semihosting::hprintln;
 use motion_kernel::internals::{Own, Shape, SineCosine};
 use motion_kernel::num::{Real, Scalar};
 use qemu_boards::count::Counter;
-use qemu_boards::{Number, exit, fail};
+use qemu_boards::processor::{Timer, entry};
+use qemu_boards::{Number, exit, fail, println};
 
 type Unit = <Number as Real>::Unit;
 
 #[entry]
 fn main() -> ! {
-    let core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
-    let counter = Counter::new(core.SYST);
+    let mut timer = Timer::take().unwrap_or_else(|| fail(&"timer"));
+    let counter = Counter::new(&mut timer);
     shape(&counter, "series", Shape::at);
     shape(&counter, "closed, own", Shape::closed::<Own>);
     sine(&counter, "sine, own", <Own as SineCosine<Unit>>::sin_cos);
@@ -40,7 +39,7 @@ fn shape(counter: &Counter, name: &str, shape: fn(Unit) -> Shape<Unit>) {
         let x = Unit::from_f64(f64::from(point) / f64::from(POINTS));
         let (shape, x) = black_box((shape, x));
         let (_, spent) = counter.count(|| shape(x));
-        hprintln!("{} {}", name, spent);
+        println!("{} {}", name, spent);
     }
 }
 
@@ -49,6 +48,6 @@ fn sine(counter: &Counter, name: &str, sine: fn(Unit) -> (Unit, Unit)) {
         let x = Unit::from_f64(0.5 * f64::from(point) / f64::from(POINTS));
         let (sine, x) = black_box((sine, x));
         let (_, spent) = counter.count(|| sine(x));
-        hprintln!("{} {}", name, spent);
+        println!("{} {}", name, spent);
     }
 }

@@ -7,139 +7,122 @@
 #![no_std]
 #![no_main]
 
-use core::cell::RefCell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::cell::Cell;
 
-use cortex_m::peripheral::{SYST, syst::SystClkSource};
-use cortex_m_rt::{entry, exception};
-use cortex_m_semihosting::hprintln;
 use critical_section::Mutex;
-use hal_sim::SimMachine;
-use hal_sim::closed_loop::{Closed, ClosedLoop, close, reference_machine};
+use hal_sim::closed_loop::{Closed, LoopError, close, reference_machine};
+use hal_sim::{MachineParameters, SimMachine};
 use motion_kernel::exec::ExecState;
 use motion_kernel::program::Reader;
 use motion_kernel::queue::Streams;
 use motion_kernel::trace::Digest;
+use qemu_boards::interrupt::with_ticks;
+use qemu_boards::processor::{Timer, entry, wait};
 use qemu_boards::programs::programs;
-use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail};
+use qemu_boards::{AXES, LINE, Number, PIECES, SEGMENTS, SUBSTEPS, exit, fail, println, singleton};
 
-/// Timer steps until a tick that the background is to have time for: several times what a fill takes.
-const LONG_STEPS: u32 = 2_000_000;
-/// Timer steps until a tick that is to come in the middle of a fill: from some instructions to some items.
-const SHORT_STEPS: core::ops::Range<u32> = 200..40_000;
+type Queues = Streams<Number, AXES, PIECES, SEGMENTS>;
 
-/// The background is filling the streams.
-static FILLING: AtomicBool = AtomicBool::new(false);
+/// Instructions until a tick that the background is to have time for: several times what a fill takes.
+const LONG: u32 = 1_250_000;
+/// Instructions until a tick that is to come in the middle of a fill: from some to those of some items.
+const SHORT: core::ops::Range<u32> = 125..25_000;
 
-/// What the interrupt owns.
-struct Foreground {
-    closed_loop: ClosedLoop<'static, Number, AXES, LINE>,
-    timer: SYST,
-    digest: Digest,
+/// What background and tick tell each other.
+#[derive(Clone, Copy, Default)]
+struct Told {
+    /// The background is filling the streams.
+    is_filling: bool,
     ticks: u32,
     /// Ticks that came in the middle of a fill.
     inside: u32,
-    random: u32,
-    /// The state after the last tick, for the background.
+    /// The state after the last tick.
     is_idle: bool,
     is_faulted: bool,
 }
 
-// Sound: the machine is behind a shared reference that only `closed_loop` keeps, so all of it moves into the
-// interrupt together.
-unsafe impl Send for Foreground {}
-
-static FOREGROUND: Mutex<RefCell<Option<Foreground>>> = Mutex::new(RefCell::new(None));
-
 #[entry]
 fn main() -> ! {
-    let mut core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
+    let streams = singleton!(Queues = Streams::new()).unwrap_or_else(|| fail(&"streams"));
     let bytes = programs().next().unwrap_or_else(|| fail(&"a bundle without a program"));
-    let (mut producer, closed_loop) = closed(bytes);
-    let mut is_all = producer.fill().unwrap_or_else(|error| fail(&error));
-    core.SYST.set_clock_source(SystClkSource::Core);
-    core.SYST.set_reload(LONG_STEPS - 1);
-    core.SYST.clear_current();
-    core.SYST.enable_interrupt();
-    core.SYST.enable_counter();
-    let foreground = Foreground {
-        closed_loop,
-        timer: core.SYST,
-        digest: Digest::new(),
-        ticks: 0,
-        inside: 0,
-        random: 1,
-        is_idle: false,
-        is_faulted: false,
+    let machine = &simulated(&machine_parameters(bytes));
+    let mut closed = closed(bytes, streams, machine);
+    ticks(closed.as_mut().unwrap_or_else(|error| fail(error)));
+    exit(true)
+}
+
+// Closing the loop is what needs the most room: nothing of this is in the frame then.
+#[inline(never)]
+fn ticks((producer, closed_loop): &mut Closed<'_, Number, AXES, LINE>) {
+    let mut timer = Timer::take();
+    let told = &Mutex::new(Cell::new(Told::default()));
+    let tell = |change: fn(&mut Told)| {
+        critical_section::with(|cs| {
+            let mut now = told.borrow(cs).get();
+            change(&mut now);
+            told.borrow(cs).set(now);
+            now
+        })
     };
-    critical_section::with(|cs| FOREGROUND.replace(cs, Some(foreground)));
-    loop {
-        if !is_all {
-            FILLING.store(true, Ordering::Relaxed);
-            is_all = producer.fill().unwrap_or_else(|error| fail(&error));
-            FILLING.store(false, Ordering::Relaxed);
-        }
-        cortex_m::asm::wfi();
-        let end = critical_section::with(|cs| {
-            let mut foreground = FOREGROUND.borrow_ref_mut(cs);
-            let foreground = foreground.as_mut()?;
-            let is_over = foreground.is_faulted || (is_all && foreground.is_idle);
-            if !is_over {
-                return None;
+    let (mut digest, mut random) = (Digest::new(), 1_u32);
+    let mut tick = || {
+        let trace = closed_loop.tick();
+        digest.add(&trace);
+        critical_section::with(|cs| {
+            let told = told.borrow(cs);
+            let mut now = told.get();
+            now.ticks += 1;
+            now.inside += u32::from(now.is_filling);
+            now.is_idle = trace.executed.state == ExecState::Idle;
+            now.is_faulted = trace.fault.is_some();
+            told.set(now);
+            if now.ticks.is_multiple_of(2) {
+                return LONG;
             }
-            foreground.timer.disable_interrupt();
-            Some((foreground.ticks, foreground.digest, foreground.is_faulted, foreground.inside))
-        });
-        if let Some((ticks, digest, is_faulted, inside)) = end {
-            hprintln!("{} ticks digest {:016x} fault {}", ticks, digest.value(), is_faulted);
-            hprintln!("{} ticks inside a fill", inside);
-            exit(true)
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            SHORT.start + (random >> 8) % (SHORT.end - SHORT.start)
+        })
+    };
+    let mut is_all = producer.fill().unwrap_or_else(|error| fail(&error));
+    let end = with_ticks(&mut timer, LONG, &mut tick, || {
+        loop {
+            if !is_all {
+                tell(|told| told.is_filling = true);
+                is_all = producer.fill().unwrap_or_else(|error| fail(&error));
+                tell(|told| told.is_filling = false);
+            }
+            wait();
+            let now = tell(|_| ());
+            if now.is_faulted || (is_all && now.is_idle) {
+                return now;
+            }
         }
-    }
+    });
+    println!("{} ticks digest {:016x} fault {}", end.ticks, digest.value(), end.is_faulted);
+    println!("{} ticks inside a fill", end.inside);
 }
 
 // Each made in a frame of its own, which is gone before the ticks begin.
 
 #[inline(never)]
-fn closed(bytes: &'static [u8]) -> Closed<'static, Number, AXES, LINE> {
-    let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
-    close(&program, streams(), machine(&program)).unwrap_or_else(|error| fail(&error))
+fn machine_parameters(bytes: &[u8]) -> MachineParameters<AXES> {
+    let program = &Reader::<AXES>::new(bytes);
+    reference_machine(program.as_ref().unwrap_or_else(|error| fail(error)).header(), SUBSTEPS)
 }
 
 #[inline(never)]
-fn machine(program: &Reader<'_, AXES>) -> &'static SimMachine<AXES, LINE> {
-    let parameters = reference_machine(program.header(), SUBSTEPS);
-    cortex_m::singleton!(: SimMachine<AXES, LINE> =
-        SimMachine::new(&parameters).unwrap_or_else(|error| fail(&error)))
-    .unwrap_or_else(|| fail(&"machine"))
+fn simulated(parameters: &MachineParameters<AXES>) -> SimMachine<AXES, LINE> {
+    SimMachine::new(parameters).unwrap_or_else(|error| fail(&error))
 }
 
 #[inline(never)]
-fn streams() -> &'static mut Streams<Number, AXES, PIECES, SEGMENTS> {
-    cortex_m::singleton!(: Streams<Number, AXES, PIECES, SEGMENTS> = Streams::new())
-        .unwrap_or_else(|| fail(&"streams"))
+fn closed<'a>(
+    bytes: &'a [u8],
+    streams: &'a mut Queues,
+    machine: &'a SimMachine<AXES, LINE>,
+) -> Result<Closed<'a, Number, AXES, LINE>, LoopError> {
+    let program = &Reader::<AXES>::new(bytes);
+    close(program.as_ref().unwrap_or_else(|error| fail(error)), streams, machine)
 }
 
-#[exception]
-fn SysTick() {
-    critical_section::with(|cs| {
-        if let Some(foreground) = FOREGROUND.borrow_ref_mut(cs).as_mut() {
-            foreground.timer.disable_counter();
-            foreground.inside += u32::from(FILLING.load(Ordering::Relaxed));
-            let trace = foreground.closed_loop.tick();
-            foreground.digest.add(&trace);
-            foreground.ticks += 1;
-            foreground.is_idle = trace.executed.state == ExecState::Idle;
-            foreground.is_faulted = trace.fault.is_some();
-            let steps = if foreground.ticks.is_multiple_of(2) {
-                LONG_STEPS
-            } else {
-                foreground.random = foreground.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                SHORT_STEPS.start + (foreground.random >> 8) % (SHORT_STEPS.end - SHORT_STEPS.start)
-            };
-            foreground.timer.set_reload(steps - 1);
-            foreground.timer.clear_current();
-            foreground.timer.enable_counter();
-        }
-    });
-}
+qemu_boards::ticks_by_interrupt!();

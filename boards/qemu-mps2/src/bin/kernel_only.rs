@@ -7,7 +7,6 @@
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use cortex_m_rt::{entry, exception};
 use critical_section::Mutex;
 use hal_sim::closed_loop::InMemory;
 use motion_kernel::axis::AxesConfig;
@@ -16,8 +15,9 @@ use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Scalar;
 use motion_kernel::program::{Header, Items, ProgramError, Reader};
 use motion_kernel::units::{Counts, DacCode};
+use qemu_boards::processor::{entry, wait};
 use qemu_boards::programs::programs;
-use qemu_boards::{AXES, Number};
+use qemu_boards::{AXES, Number, singleton};
 
 #[cfg(feature = "live")]
 use live::{Background, Feeder, Queues, TickIntake, background, correct, for_tick, poll, tick};
@@ -140,14 +140,14 @@ static COMMAND: AtomicU32 = AtomicU32::new(0);
 fn main() -> ! {
     run();
     loop {
-        cortex_m::asm::wfi();
+        wait();
     }
 }
 
 fn run() -> Option<()> {
     let program = Reader::<AXES>::new(programs().next()?).ok()?;
     let header = program.header();
-    let streams = cortex_m::singleton!(: Queues = Queues::new())?;
+    let streams = singleton!(Queues = Queues::new())?;
     let (mut feeder, intake) = streams.split(header.rules, header.start);
     let mut background: Background<'_> = background(program.items(), header);
     let config = AxesConfig::<Number, AXES>::new(&header.axes, header.tick_s).ok()?;
@@ -155,8 +155,7 @@ fn run() -> Option<()> {
     let mut kernel = Kernel::new(&config, header.start, counts);
     kernel.enable(100);
     let memory = InMemory { counts, codes: [DacCode::ZERO; AXES], enabled: None };
-    let foreground =
-        cortex_m::singleton!(: Foreground = Foreground { kernel, intake: for_tick(intake), memory })?;
+    let foreground = singleton!(Foreground = Foreground { kernel, intake: for_tick(intake), memory })?;
     critical_section::with(|cs| {
         *FOREGROUND.borrow(cs).try_borrow_mut().ok()? = Some(foreground);
         Some(())
@@ -167,11 +166,13 @@ fn run() -> Option<()> {
 
 fn go_on(background: &mut Background<'_>, feeder: &mut Feeder<'_>) {
     while poll(background, feeder) {
-        cortex_m::asm::wfi();
+        wait();
     }
 }
 
-#[exception]
+#[cfg_attr(target_arch = "arm", cortex_m_rt::exception)]
+#[cfg_attr(target_arch = "riscv32", riscv_rt::core_interrupt(riscv::interrupt::Interrupt::MachineTimer))]
+#[allow(non_snake_case)]
 fn SysTick() {
     critical_section::with(|cs| {
         // A tick that comes while it is borrowed is a tick that comes inside itself: there is none.

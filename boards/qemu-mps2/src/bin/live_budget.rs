@@ -5,22 +5,22 @@
 #![no_std]
 #![no_main]
 
-use cortex_m_rt::entry;
-use cortex_m_semihosting::hprintln;
 use motion_kernel::kernel::Kernel;
 use qemu_boards::count::Counter;
 use qemu_boards::live::{self, Producer, Streams};
-use qemu_boards::programs::programs;
-use qemu_boards::{AXES, Number, exit, fail, stack};
+use qemu_boards::processor::{Timer, entry};
+use qemu_boards::programs::seeded_programs;
+use qemu_boards::{AXES, Number, exit, fail, println, stack};
 
 #[entry]
 fn main() -> ! {
-    let core = cortex_m::Peripherals::take().unwrap_or_else(|| fail(&"peripherals"));
-    let counter = Counter::new(core.SYST);
+    let mut timer = Timer::take().unwrap_or_else(|| fail(&"timer"));
+    let counter = Counter::new(&mut timer);
     let kernel = size_of::<Kernel<Number, AXES>>();
-    hprintln!("ram {}", kernel + size_of::<Streams>() + size_of::<Producer<'_>>());
+    println!("ram {}", kernel + size_of::<Streams>() + size_of::<Producer<'_>>());
     let mut deepest = 0;
-    for (seed, bytes) in (0..).zip(programs()) {
+    for (seed, bytes) in seeded_programs() {
+        println!("program");
         let is_fault = live::run(bytes, seed, |producer, closed| {
             let (polled, instructions) = counter.count(|| producer.poll());
             polled.unwrap_or_else(|error| fail(&error));
@@ -32,14 +32,14 @@ fn main() -> ! {
                 spent = instructions;
                 *trace
             });
-            hprintln!("poll {}\ntick {}", instructions, spent);
+            println!("poll {}\ntick {}", instructions, spent);
             trace
         });
         if is_fault {
             fail(&"a fault");
         }
     }
-    hprintln!("stack {}", deepest);
+    println!("stack {}", deepest);
     exit(true)
 }
 
