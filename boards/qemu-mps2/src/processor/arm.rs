@@ -23,7 +23,7 @@ impl Timer {
     }
 
     /// Starts it for counting, [`WRAP`] steps long.
-    pub(crate) fn count(&mut self) {
+    pub fn count(&mut self) {
         self.start(WRAP);
     }
 
