@@ -15,6 +15,7 @@
 //!   program both as data; keeps the queues full  Item ─► Feeder       │
 //!   live    hold, override, abort (optional)     feed lists           │
 //!   straight, jog, homing (optional)             Item ─► live         │
+//!   link    a wire to a PC (optional)            Item ─► live         │
 //!   queue   bounded, checked on entry            Feeder ─► Intake ◄───┘
 //!   ─────── tick ───────────────────────────────────────────────────────
 //!   exec    feed law ─► s, v, a, j, snap         PathMotion

@@ -128,9 +128,13 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
         let is_held = matches!(self.phase, Phase::Running { is_held: true, .. });
         let is_hold_waiting = || {
             panel.waiting_byte().and_then(Command::of) == Some(Command::Hold)
-                || panel.is_button_down() && !self.button.is_counted()
+                || panel.is_button_down() && !self.button.is_seen()
         };
-        self.refused = run.poll(&|| !is_held && is_hold_waiting()).err();
+        let is_stop_asked = || {
+            panel.note_step();
+            !is_held && is_hold_waiting()
+        };
+        self.refused = run.poll(&is_stop_asked).err();
     }
 
     /// Notes the duration of a poll, log included, in cycles of the board's counter.
@@ -371,6 +375,7 @@ mod tests {
         fn is_button_down(&self) -> bool {
             (self.down_from..self.down_from + 100).contains(&self.now)
         }
+        fn note_step(&self) {}
         fn waiting_byte(&self) -> Option<u8> {
             self.byte
         }

@@ -7,6 +7,9 @@ pub trait Panel {
     /// Whether the start button is down now. This crate debounces it.
     fn is_button_down(&self) -> bool;
 
+    /// Called between the steps of a plan: the background is alive, however long the plan takes.
+    fn note_step(&self);
+
     /// The byte that [`Panel::next_byte`] would take.
     fn waiting_byte(&self) -> Option<u8>;
 
@@ -30,9 +33,9 @@ pub(crate) struct Button {
 const PRESS_SAMPLES: u8 = 3;
 
 impl Button {
-    /// Whether a press that still lasts has counted.
-    pub(crate) fn is_counted(&self) -> bool {
-        self.is_counted
+    /// Whether a poll has seen it down. So a press, or a bounce, ends one plan and no more.
+    pub(crate) fn is_seen(&self) -> bool {
+        self.since.is_some()
     }
 
     /// Whether it has just been down for `button_ticks` at tick `now`, as seen by the polls. A press counts

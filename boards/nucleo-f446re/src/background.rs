@@ -14,8 +14,9 @@ use crate::tick_timer::cycles;
 
 /// Number of ticks since the start; counted by the tick.
 pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
-/// Number of polls of the background; the tick feeds the watchdog only while it increases.
-pub(crate) static POLLS: AtomicU32 = AtomicU32::new(0);
+/// Number of steps of the background: polls, and steps of plans in them. The tick feeds the watchdog only while it
+/// increases.
+pub(crate) static STEPS: AtomicU32 = AtomicU32::new(0);
 
 /// The blue button and ST-LINK's serial port.
 pub(crate) struct Panel {
@@ -27,6 +28,10 @@ pub(crate) struct Panel {
 impl motion_board::Panel for Panel {
     fn is_button_down(&self) -> bool {
         self.button.is_low()
+    }
+
+    fn note_step(&self) {
+        count_step();
     }
 
     fn waiting_byte(&self) -> Option<u8> {
@@ -42,6 +47,11 @@ impl motion_board::Panel for Panel {
     }
 }
 
+/// The background is alive.
+fn count_step() {
+    STEPS.store(STEPS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+}
+
 /// Runs forever.
 pub(crate) fn run(
     mut control: impl Mutex<T = Control>,
@@ -53,7 +63,7 @@ pub(crate) fn run(
     board::write(&LogLine::<Number, AXES>::Ready);
     loop {
         wait_for_tick();
-        POLLS.store(POLLS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        count_step();
         let begin = cycles();
         if let Some(line) = background.poll(TICKS.load(Ordering::Relaxed), panel, &mut control) {
             board::write(&line);

@@ -5,7 +5,7 @@
 //!         drives: emergency stop, ready   ── Control ──  button, log
 //!         console ── bytes ────────────────────────────  commands
 //!         encoders ─► kernel ─► converter ◄─ streams ──  program
-//!         watchdog ◄───────────────────────── polls ───
+//!         watchdog ◄───────────────────────── steps ───
 //!
 //! EXTI2 ─► emergency_stop: enables off, outputs 0 V, without waiting for the tick
 //! PVD ─► supply_falls, NMI (clock lost), hard fault, panic ─► stop: the same, then the watchdog resets
@@ -67,7 +67,7 @@ mod app {
     use stm32f4xx_hal::serial::Rx;
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-    use crate::background::{self, POLLS, Panel, TICKS};
+    use crate::background::{self, Panel, STEPS, TICKS};
     use crate::board::{Board, ScopePin};
     use crate::console_port;
     use crate::hal::Hardware;
@@ -148,7 +148,7 @@ mod app {
         cx.shared.control.lock(|control| {
             let unhealthy = hardware.drives.tick();
             control.tick(unhealthy, cx.local.monitor.began(begin), hardware);
-            if cx.local.liveness.may_feed(POLLS.load(Ordering::Relaxed)) {
+            if cx.local.liveness.may_feed(STEPS.load(Ordering::Relaxed)) {
                 cx.local.watchdog.feed();
             }
             console_port::receive(cx.local.console, cx.local.received);

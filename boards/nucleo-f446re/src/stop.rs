@@ -50,7 +50,7 @@ fn all_off() {
     // Sound: in these registers every bit may be written; a 0 changes nothing, the upper half switches to low.
     port_c.bsrr().write(|w| unsafe { w.bits(SWITCHING_C << 16) });
     port_b.bsrr().write(|w| unsafe { w.bits(SWITCHING_B << 16) });
-    // Not set up yet: the converter has not left 0 V.
+    // Not set up yet: after a supply that comes up the converter is at 0 V, after a reset it keeps its voltage until it is.
     if spi.cr1().read().spe().bit_is_clear() {
         return;
     }

@@ -35,10 +35,14 @@ impl Counter {
         let before = now();
         let result = black_box(work());
         let after = now();
-        let steps = (after.wrapping_sub(before) & WRAP).saturating_sub(self.nothing);
+        (result, self.instructions((after.wrapping_sub(before) & WRAP).into()))
+    }
+
+    /// The instructions of so many steps of the timer from one reading to another.
+    pub fn instructions(&self, steps: u64) -> u32 {
         // 32 bits would end below the longest polls.
-        let (steps, known) = (u64::from(steps), u64::from(self.known));
-        (result, ((steps * u64::from(KNOWN) + known / 2) / known) as u32)
+        let (steps, known) = (steps.saturating_sub(self.nothing.into()), u64::from(self.known));
+        ((steps * u64::from(KNOWN) + known / 2) / known) as u32
     }
 }
 

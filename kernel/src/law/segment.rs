@@ -15,8 +15,6 @@
 mod cut;
 mod tick_pulse;
 
-use core::hint::black_box;
-
 use serde::{Deserialize, Serialize};
 
 use self::tick_pulse::TickPulse;
@@ -198,16 +196,15 @@ impl Clock {
 /// (high·2⁶⁴ + low)/by, rounded down, for high < by ≤ 2⁶³. Bit by bit: it is for the background, and a
 /// 128-bit division takes a kilobyte of flash.
 fn quotient(high: u64, low: u64, by: u64) -> u64 {
-    let (mut remainder, mut quotient) = (high, low);
-    // Not unrolled: the optimiser does not see how often.
-    for _ in 0..black_box(u64::BITS) {
-        // The next digit takes the place of the dividend's digits that are used up.
-        (remainder, quotient) = (remainder << 1 | quotient >> 63, quotient << 1);
-        if remainder >= by {
-            (remainder, quotient) = (remainder - by, quotient | 1);
-        }
-    }
-    quotient
+    (0..u64::BITS).fold([high, low], |digits, _| next_digit(digits, by))[1]
+}
+
+/// Appends the next digit of a quotient, in place of the dividend's digits that are used up.
+// Not inlined, because the loop around it would be unrolled.
+#[inline(never)]
+fn next_digit([remainder, quotient]: [u64; 2], by: u64) -> [u64; 2] {
+    let (remainder, quotient) = (remainder << 1 | quotient >> 63, quotient << 1);
+    if remainder >= by { [remainder - by, quotient | 1] } else { [remainder, quotient] }
 }
 
 /// a·b/2³² for b ≤ 2³².

@@ -8,7 +8,7 @@ use core::task::Poll;
 
 use heapless::Deque;
 
-use super::frame::{Deframer, Payload};
+use super::frame::{Deframer, FRAME_MAX, Payload};
 use super::message::{Controls, Identity, Mode, Reply, Request, Status, Taken};
 use crate::program::{Item, Source, take};
 
@@ -81,8 +81,11 @@ pub struct BoardLink {
     /// The number of the first of the items that wait in the deframer, if any do.
     first: Option<u32>,
     controls: Controls,
-    /// They have not been obeyed yet.
+    /// They were not taken yet; how many aborts were.
     is_changed: bool,
+    taken_aborts: u16,
+    /// The number of the last hello.
+    asker: u32,
     is_welcome_due: bool,
     is_taken_due: bool,
     is_missing: bool,
@@ -106,6 +109,8 @@ impl BoardLink {
             first: None,
             controls: Controls::NONE,
             is_changed: false,
+            taken_aborts: 0,
+            asker: 0,
             is_welcome_due: false,
             is_taken_due: false,
             is_missing: false,
@@ -116,20 +121,42 @@ impl BoardLink {
         }
     }
 
+    /// Says again who it is.
+    #[cfg(test)]
+    pub(super) fn is_welcome_due_again(&mut self) {
+        self.is_welcome_due = true;
+    }
+
     /// Number of frames that came damaged.
     #[must_use]
     pub const fn damaged(&self) -> u32 {
         self.deframer.damaged()
     }
 
-    /// Takes what came in, up to the first items that are to be [put](Self::put_items) away. Controls are known at once.
+    /// Takes what came in, up to the first items that are to be [put](Self::put_items) away, and no more than two frames at a
+    /// time. Controls are known at once.
     pub fn receive(&mut self, bytes: &mut impl Iterator<Item = u8>) {
-        while self.first.is_none()
-            && let Some(byte) = bytes.next()
-        {
+        for _ in 0..2 * FRAME_MAX {
+            if self.first.is_some() {
+                break;
+            }
+            let Some(byte) = bytes.next() else { break };
             if self.deframer.push(byte) {
                 self.read();
             }
+        }
+    }
+
+    /// [`Self::receive`] where there is no time to put items away: they are dropped, and come again.
+    pub fn receive_controls(&mut self, bytes: &mut impl Iterator<Item = u8>) {
+        self.drop_items();
+        self.receive(bytes);
+        self.drop_items();
+    }
+
+    fn drop_items(&mut self) {
+        if self.first.take().is_some() {
+            (self.is_missing, self.is_taken_due) = (true, true);
         }
     }
 
@@ -138,12 +165,16 @@ impl BoardLink {
         // What has the right checksum and can't be read is of another protocol: a hello will tell.
         let Some((request, _)) = take::<Request>(self.deframer.payload()) else { return };
         match request {
-            Request::Hello { .. } => self.is_welcome_due = true,
+            Request::Hello { asker } => {
+                self.asker = asker;
+                // Another one may read what the one before could not make.
+                (self.is_welcome_due, self.is_unreadable) = (true, false);
+            }
             Request::Controls { session, .. } | Request::Items { session, .. } if session != self.session => {
                 self.is_welcome_due = true;
             }
             Request::Controls { controls, .. } => {
-                if controls.is_newer_than(&self.controls) {
+                if controls.is_newer_than(&self.controls) && controls.are_within_range() {
                     (self.controls, self.is_changed) = (controls, true);
                 }
                 self.is_taken_due = true;
@@ -169,11 +200,13 @@ impl BoardLink {
     /// Whether controls have come that ask motion to come to rest, and were not taken yet.
     #[must_use]
     pub fn is_stop_asked(&self) -> bool {
-        self.is_changed && (self.controls.mode != Mode::Run || self.controls.override_permille == 0)
+        let Controls { mode, override_permille, aborts, .. } = self.controls;
+        self.is_changed && (mode == Mode::Hold || override_permille == 0 || aborts != self.taken_aborts)
     }
 
     /// The controls, if they have changed since they were taken last.
     pub fn take_controls(&mut self) -> Option<Controls> {
+        self.taken_aborts = self.controls.aborts;
         core::mem::take(&mut self.is_changed).then_some(self.controls)
     }
 
@@ -190,7 +223,7 @@ impl BoardLink {
         let reply = if core::mem::take(&mut self.is_welcome_due) {
             // What was said before may have been said to somebody else.
             self.is_taken_due = true;
-            Reply::Welcome { session, identity }
+            Reply::Welcome { session, asker: self.asker, identity, controls: self.controls }
         } else {
             let taken = Taken {
                 session,

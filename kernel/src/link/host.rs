@@ -21,6 +21,8 @@ const AGAIN_MS: u32 = 10;
 pub enum Event<const AXES: usize> {
     /// It is there.
     Welcome(Identity),
+    /// It is there, and is of another protocol or has another number of axes. Nothing is sent to it.
+    Refused(Identity),
     /// It takes items.
     Ready {
         /// The number of the next item that it expects: of a program that another run of the PC's side has begun with,
@@ -59,6 +61,8 @@ enum Session {
 pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     deframer: Deframer,
     session: Session,
+    /// The number of the present hello: an answer to one before is old.
+    asker: u32,
     controls: Controls,
     /// The number of the controls that the board has confirmed.
     confirmed_controls: u32,
@@ -71,6 +75,8 @@ pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     limit: u32,
     /// The board can't read the first of them.
     is_unreadable: bool,
+    /// A board says that it is another one than before.
+    is_asking: bool,
     hello_ms: Option<u32>,
     controls_ms: Option<u32>,
     /// When something was confirmed last, or sent while nothing was under way.
@@ -79,12 +85,13 @@ pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
 }
 
 impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, ITEMS, BYTES> {
-    /// Before the first byte.
+    /// Before the first byte; `asker` is a number that other starts of the PC's side do not have, such as the time.
     #[must_use]
-    pub const fn new() -> Self {
+    pub const fn new(asker: u32) -> Self {
         Self {
             deframer: Deframer::new(),
             session: Session::Unknown,
+            asker,
             controls: Controls::NONE,
             confirmed_controls: 0,
             bytes: Deque::new(),
@@ -93,6 +100,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             next: 0,
             limit: 0,
             is_unreadable: false,
+            is_asking: false,
             hello_ms: None,
             controls_ms: None,
             progress_ms: 0,
@@ -106,16 +114,32 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         &self.controls
     }
 
-    /// Changes the operator's controls.
-    pub fn control(&mut self, change: impl FnOnce(&mut Controls)) {
+    /// Changes the operator's controls. False, and nothing is changed, before the board has answered: what it obeys is not
+    /// known yet.
+    #[must_use]
+    pub fn control(&mut self, change: impl FnOnce(&mut Controls)) -> bool {
+        if !matches!(self.session, Session::Greeted(_) | Session::Ready(_)) {
+            return false;
+        }
         let number = self.controls.number.wrapping_add(1);
         change(&mut self.controls);
         (self.controls.number, self.controls_ms) = (number, None);
+        true
     }
 
-    /// Presses a mode: a resume, a hold, an abort.
-    pub fn press(&mut self, mode: Mode) {
-        self.control(|controls| (controls.mode, controls.presses) = (mode, controls.presses.wrapping_add(1)));
+    /// Presses a mode, a resume or a hold; see [`Self::control`].
+    #[must_use]
+    pub fn press(&mut self, mode: Mode) -> bool {
+        self.control(|controls| (controls.mode, controls.presses) = (mode, controls.presses.wrapping_add(1)))
+    }
+
+    /// Gives up the rest of the program that the board has; more may be driven only after another resume. See
+    /// [`Self::control`].
+    #[must_use]
+    pub fn abort(&mut self) -> bool {
+        self.control(|controls| {
+            (controls.mode, controls.aborts) = (Mode::Hold, controls.aborts.wrapping_add(1))
+        })
     }
 
     /// Whether the board has confirmed the controls.
@@ -179,7 +203,15 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             }
             let Some((reply, [])) = take::<Reply<AXES>>(self.deframer.payload()) else { continue };
             match reply {
-                Reply::Welcome { session, identity } => self.greeted(session, identity, on_event),
+                Reply::Welcome { session, asker, identity, controls } => {
+                    if asker == self.asker {
+                        self.greeted(session, &identity, &controls, on_event);
+                    } else if !self.is_of(session) && self.session != Session::Unknown {
+                        // Old, or of a board that has started anew: ask.
+                        self.asker = self.asker.wrapping_add(1);
+                        self.is_asking = true;
+                    }
+                }
                 Reply::Taken(taken) => self.taken(&taken, now_ms, on_event),
                 Reply::Status { session, status } if self.is_of(session) => on_event(Event::Status(status)),
                 Reply::Status { .. } => {}
@@ -195,20 +227,34 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         }
     }
 
-    fn greeted(&mut self, session: u32, identity: Identity, on_event: &mut impl FnMut(Event<AXES>)) {
+    fn greeted(
+        &mut self,
+        session: u32,
+        identity: &Identity,
+        controls: &Controls,
+        on_event: &mut impl FnMut(Event<AXES>),
+    ) {
+        self.is_asking = false;
         if self.is_of(session) || self.session == Session::Lost(session) {
             return;
         }
+        if identity.protocol != PROTOCOL || usize::from(identity.axes) != AXES {
+            (self.session, self.is_asking) = (Session::Unknown, false);
+            self.hello_ms = None;
+            return on_event(Event::Refused(*identity));
+        }
+        // What was pressed before is no command for this board: only what is pressed from now on.
+        (self.controls, self.confirmed_controls) = (*controls, controls.number);
+        on_event(Event::Welcome(*identity));
         if self.session == Session::Unknown {
             self.session = Session::Greeted(session);
-            return on_event(Event::Welcome(identity));
+            return;
         }
         let confirmed = self.first;
         self.session = Session::Lost(session);
         self.bytes.clear();
         self.lengths.clear();
         self.is_unreadable = false;
-        on_event(Event::Welcome(identity));
         on_event(Event::Restarted { confirmed });
     }
 
@@ -243,7 +289,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         }
         if confirmed > 0 {
             self.progress_ms = now_ms;
-        } else if taken.is_missing && now_ms.wrapping_sub(self.again_ms) >= AGAIN_MS {
+        }
+        if taken.is_missing && now_ms.wrapping_sub(self.again_ms) >= AGAIN_MS {
             (self.next, self.again_ms, self.progress_ms) = (self.first, now_ms, now_ms);
         }
         if taken.is_unreadable && !core::mem::replace(&mut self.is_unreadable, true) {
@@ -257,15 +304,12 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         let is_due = |since_ms: Option<u32>, after_ms: u32| {
             since_ms.is_none_or(|since_ms| now_ms.wrapping_sub(since_ms) >= after_ms)
         };
+        if (self.session == Session::Unknown || self.is_asking) && is_due(self.hello_ms, REPEAT_MS) {
+            self.hello_ms = Some(now_ms);
+            return frame(&Request::Hello { asker: self.asker }, out);
+        }
         let (session, is_ready) = match self.session {
-            Session::Unknown => {
-                if !is_due(self.hello_ms, REPEAT_MS) {
-                    return 0;
-                }
-                self.hello_ms = Some(now_ms);
-                return frame(&Request::Hello { protocol: PROTOCOL }, out);
-            }
-            Session::Lost(_) => return 0,
+            Session::Unknown | Session::Lost(_) => return 0,
             Session::Greeted(session) => (session, false),
             Session::Ready(session) => (session, true),
         };
@@ -306,12 +350,6 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         }
         self.next = self.next.wrapping_add(count);
         payload.frame(out)
-    }
-}
-
-impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> Default for HostLink<AXES, ITEMS, BYTES> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 use crate::exec::ExecState;
 use crate::units::Position;
 
-/// The version of this protocol. Ends of other versions refuse each other.
+/// The version of this protocol. A PC refuses a board of another version.
 pub const PROTOCOL: u16 = 1;
 
 /// From the PC.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Request {
-    /// Who is there?
-    Hello { protocol: u16 },
+    /// Who is there? The answer has the same number.
+    Hello { asker: u32 },
     /// What the operator wants.
     Controls { session: u32, controls: Controls },
     /// Items follow, to the payload's end: of each an `Option`, none for the end of the program. The first one has this
@@ -23,8 +23,8 @@ pub(super) enum Request {
 /// From the board.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Reply<const AXES: usize> {
-    /// The answer to a hello, and to what is of another session.
-    Welcome { session: u32, identity: Identity },
+    /// The answer to a hello, and to what is of another session; with the controls that are obeyed.
+    Welcome { session: u32, asker: u32, identity: Identity, controls: Controls },
     /// What has come.
     Taken(Taken),
     /// What the machine does.
@@ -47,6 +47,9 @@ pub(super) struct Taken {
     pub(super) is_unreadable: bool,
 }
 
+/// The greatest feed override \[0.1 %\].
+const OVERRIDE_PERMILLE_MAX: u16 = 2000;
+
 /// What the operator wants, as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Controls {
@@ -56,7 +59,9 @@ pub struct Controls {
     pub mode: Mode,
     /// Counts what was pressed to get there: the same mode pressed again is a command again.
     pub presses: u16,
-    /// The feed override \[0.1 %\], at most 2000.
+    /// Counts commands to come to rest and give up the rest of the program.
+    pub aborts: u16,
+    /// The feed override \[0.1 %\], at most 2000; controls with more are not obeyed.
     pub override_permille: u16,
     /// Rest at the end of every program block.
     pub is_single_block: bool,
@@ -72,11 +77,17 @@ impl Controls {
         number: 0,
         mode: Mode::Hold,
         presses: 0,
+        aborts: 0,
         override_permille: 1000,
         is_single_block: false,
         enables: 0,
         fault_resets: 0,
     };
+
+    /// Whether all of them are within their ranges.
+    pub(super) fn are_within_range(&self) -> bool {
+        self.override_permille <= OVERRIDE_PERMILLE_MAX
+    }
 
     /// Whether these are newer than `other`. Numbers wrap.
     pub(super) fn is_newer_than(&self, other: &Self) -> bool {
@@ -91,8 +102,6 @@ pub enum Mode {
     Run,
     /// At rest on the path.
     Hold,
-    /// At rest; the rest of the program is given up.
-    Abort,
 }
 
 /// What a board is.
@@ -131,8 +140,8 @@ pub struct Status<const AXES: usize> {
     pub feed_mm_s: f64,
     /// The program line; 0 at rest.
     pub line: u32,
-    /// The number of the first item that motion has not begun with.
-    pub begun: u32,
+    /// The number of the first item that was not taken into the streams: motion is somewhere before it.
+    pub taken: u32,
     /// The number of the fault, from 1; 0 for none.
     pub fault: u16,
 }

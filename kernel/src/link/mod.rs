@@ -4,7 +4,7 @@
 //! no clock; the caller hands it what came in, and sends what it hands out.
 //!
 //! ```text
-//! PC                                                              board
+//! PC                                                              board, background
 //! ──                                                              ─────
 //! HostLink  ── controls: what the operator wants, as a whole ──►  BoardLink ─► Controls      urgent
 //!           ── items, numbered, as far as there is room ───────►            ─► ItemQueue     bulk

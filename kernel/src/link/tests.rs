@@ -148,7 +148,7 @@ impl Bench {
         let wire = || Wire { permille, ..Wire::default() };
         Self {
             random: Random::new(seed),
-            host: Host::new(),
+            host: Host::new(1),
             board: Board::new(1),
             down: wire(),
             up: wire(),
@@ -186,7 +186,7 @@ impl Bench {
             actual: [Position::ZERO; 3],
             feed_mm_s: 12.5,
             line: 7,
-            begun: self.board.items.taken(),
+            taken: self.board.items.taken(),
             fault: 0,
         };
         let status = self.random.chance(0.02).then_some(status);
@@ -239,12 +239,13 @@ fn nothing_is_lost_or_doubled_on_a_bad_wire() {
             // Now and then one after the other.
             while pushed < count && bench.random.chance(if steps % 97 < 3 { 0.7 } else { 0.002 }) {
                 bench.step(takes);
-                match bench.random.below(4) {
+                let is_taken = match bench.random.below(4) {
                     0 => bench.host.press(Mode::Hold),
                     1 => bench.host.press(Mode::Run),
                     2 => bench.host.control(|controls| controls.override_permille ^= 3),
                     _ => bench.host.control(|controls| controls.is_single_block ^= true),
-                }
+                };
+                assert!(is_taken);
             }
             // A cable pulled, and back in.
             if bench.random.chance(2e-4) {
@@ -309,8 +310,11 @@ fn controls_wait_for_nothing() {
         bench.step(0.0);
     }
     assert_eq!((bench.board.items.taken(), bench.host.confirmed()), (0, ROOM as u32), "the board is full");
-    for mode in [Mode::Run, Mode::Hold, Mode::Hold, Mode::Abort] {
-        bench.host.press(mode);
+    for mode in [Some(Mode::Run), Some(Mode::Hold), Some(Mode::Hold), None] {
+        assert!(match mode {
+            Some(mode) => bench.host.press(mode),
+            None => bench.host.abort(),
+        });
         let before = bench.board.controls.len();
         let mut steps = 0;
         while bench.board.controls.len() == before {
@@ -338,9 +342,23 @@ fn both_ends_may_start_anew() {
         bench.step(0.3);
     }
     assert_eq!(bench.board.driven.len(), 100);
-    // The PC: its next run goes on with item 100 of the same session.
-    bench.host = Host::new();
+    // The PC: its next run goes on with item 100 of the same session, with the controls as they are there.
+    for _ in 0..5 {
+        assert!(bench.host.press(Mode::Run));
+    }
+    for _ in 0..1000 {
+        bench.step(0.3);
+    }
+    let known = *bench.host.controls();
+    bench.host = Host::new(2);
+    assert!(!bench.host.press(Mode::Run), "not before the board has answered");
     assert_eq!(bench.greet(), 100);
+    assert_eq!(bench.host.controls(), &known);
+    assert!(bench.host.press(Mode::Hold));
+    for _ in 0..1000 {
+        bench.step(0.3);
+    }
+    assert_eq!(bench.board.controls.last().map(|controls| controls.mode), Some(Mode::Hold));
     for _ in 0..3000 {
         push(&mut bench, &mut number, 200);
         bench.step(0.3);
@@ -364,12 +382,53 @@ fn both_ends_may_start_anew() {
     assert_eq!(bench.host.push(Some(&item(0))), Ok(false), "not before the caller has decided");
     bench.host.begin();
     assert_eq!(bench.greet(), 0);
+    // What was pressed before is no command for it.
+    assert_eq!(bench.host.controls(), &Controls::NONE);
     let mut number = 0;
     for _ in 0..3000 {
         push(&mut bench, &mut number, 50);
         bench.step(0.3);
     }
-    assert!(bench.board.driven.len() == 50);
+    assert!(bench.board.driven.len() == 50 && bench.board.controls.is_empty(), "{:?}", bench.board.controls);
+}
+
+/// What a wire still holds of the answers to another PC's side is not taken for the board's.
+#[test]
+fn old_answers_are_not_taken_for_new_ones() {
+    let mut bench = Bench::new(9, 0);
+    bench.greet();
+    let mut old = Vec::new();
+    for number in 0..ROOM as u32 {
+        let mut out = [0; FRAME_MAX];
+        bench.board.link.receive(&mut [0].into_iter());
+        bench.board.link.is_welcome_due_again();
+        for _ in 0..2 {
+            let length = bench.board.link.transmit(bench.now_ms, &bench.board.items, None, &mut out);
+            old.extend_from_slice(&out[..length]);
+        }
+        assert!(bench.host.push(Some(&item(number))).expect("short"));
+        for _ in 0..10 {
+            bench.step(0.0);
+        }
+    }
+    bench.host = Host::new(77);
+    bench.host.receive(&old, bench.now_ms, &mut |event| panic!("{event:?}"));
+    assert_eq!(bench.greet(), ROOM as u32);
+}
+
+/// A board of another protocol, or with other axes.
+#[test]
+fn what_does_not_fit_is_refused() {
+    for identity in [Identity { protocol: PROTOCOL + 1, ..IDENTITY }, Identity { axes: 2, ..IDENTITY }] {
+        let mut bench = Bench::new(10, 0);
+        bench.board.link = BoardLink::new(1, identity);
+        for _ in 0..1000 {
+            bench.step(0.0);
+        }
+        assert_eq!(bench.events.first(), Some(&Event::Refused(identity)));
+        assert!(bench.events.iter().all(|event| matches!(event, Event::Refused(_))));
+        assert_eq!(bench.host.push(Some(&item(0))), Ok(false));
+    }
 }
 
 /// No bytes can do more than be dropped: random ones, and frames with random payloads and right checksums.
@@ -378,7 +437,7 @@ fn any_bytes_may_come() {
     let mut read = 0_u32;
     for seed in 0..40 {
         let random = Random::new(seed);
-        let (mut board, mut host) = (Board::new(1), Host::new());
+        let (mut board, mut host) = (Board::new(1), Host::new(1));
         let mut out = [0; FRAME_MAX];
         for _ in 0..2000 {
             let mut payload: Vec<u8> = (0..random.below(60))
@@ -401,7 +460,9 @@ fn any_bytes_may_come() {
             board.link.receive(&mut bytes.iter().copied());
             board.link.put_items(&mut board.items);
             host.receive(&bytes, 0, &mut |_| read += 1);
-            assert!(board.items.next().wrapping_sub(before) <= ROOM as u32);
+            let came = board.items.next().wrapping_sub(before);
+            assert!(came <= ROOM as u32);
+            read += came + u32::from(board.link.take_controls().is_some());
             while let Poll::Ready(Some(_)) = board.items.poll_next() {}
         }
     }

@@ -113,6 +113,16 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
         let inverted =
             row(&mut table, board, "3 axes, live control and guards, drives inverted", &inverted["tick"])[3];
         row(&mut stages, board, "a poll of live control", &reference["poll"]);
+        let [programs, _] = programs::worst_live_ticks();
+        let answers = by_name(&tools.count(board, "answers", &programs)?);
+        for (what, name) in [
+            ("the poll that takes a hold", "hold"),
+            ("the poll that takes an override", "override"),
+            ("the poll that takes a resume", "resume"),
+            ("the longest step of a poll between two looks for a stop", "step"),
+        ] {
+            row(&mut stages, board, what, &answers[name]);
+        }
         if board.core == M4F.core && (most > LIVE || inverted > INVERTED) {
             return Err(format!(
                 "{}: {most} and {inverted} under live control, promised {LIVE} and {INVERTED}",

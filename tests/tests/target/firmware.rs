@@ -157,9 +157,7 @@ pub(crate) fn the_firmware_runs(tools: &Tools) -> Result<(), String> {
         of_model.nth(nth).map(|line| (line.contains("enabled true"), numbers(line)))
     };
     match (enabled(0), enabled(1)) {
-        (Some((true, _)), Some((false, after)))
-            if after.iter().all(|&cycles| cycles as u64 <= OFF_CYCLES_MAX) =>
-        {
+        (Some((true, _)), Some((false, after))) if matches!(after[..], [cycles] if cycles as u64 <= OFF_CYCLES_MAX) => {
             Ok(())
         }
         others => Err(format!("enabled, then off at once: {others:?}")),

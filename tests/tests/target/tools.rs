@@ -104,7 +104,7 @@ pub(crate) const COUNTING: [&str; 2] = ["-icount", "shift=6,sleep=off"];
 /// The images that tests ask for, by features.
 const IMAGES: [(&str, &[&str]); 4] = [
     ("", &["closed_loop", "interrupt", "budget", "functions", "kernel_only", "empty"]),
-    ("live", &["live", "live_budget", "budget", "kernel_only", "empty"]),
+    ("live", &["live", "live_budget", "answers", "budget", "kernel_only", "empty"]),
     ("watch", &["live_interrupt"]),
     ("soft-float", &["budget", "functions"]),
 ];

@@ -6,7 +6,7 @@ use cortex_m::peripheral::{SCB, SYST, syst::SystClkSource};
 pub use cortex_m_rt::entry;
 
 /// Until this the timer counts, and from 0 on again.
-pub(crate) const WRAP: u32 = 0x00FF_FFFF;
+pub const WRAP: u32 = 0x00FF_FFFF;
 /// Steps of the timer in as many instructions, as the emulator is told (`-icount shift=6`): 25 MHz, 64 ns each.
 const STEPS: u32 = 8;
 const INSTRUCTIONS: u32 = 5;
@@ -77,7 +77,7 @@ pub(crate) fn instructions(steps: u32) -> u32 {
 
 /// A count that rises with time; it wraps after [`WRAP`].
 #[inline(always)]
-pub(crate) fn now() -> u32 {
+pub fn now() -> u32 {
     WRAP - SYST::get_current()
 }
 

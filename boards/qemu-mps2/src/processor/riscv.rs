@@ -5,7 +5,8 @@ use core::arch::asm;
 use riscv::register::{mie, minstret, mstatus};
 pub use riscv_rt::entry;
 
-pub(crate) const WRAP: u32 = u32::MAX;
+/// The count wraps after this.
+pub const WRAP: u32 = u32::MAX;
 /// The core-local interruptor's registers, and the rate of its clock: 10 MHz, as QEMU has them.
 const TIME: *const u32 = 0x0200_BFF8 as *const u32;
 const COMPARE: *mut u32 = 0x0200_4000 as *mut u32;
@@ -96,7 +97,7 @@ pub(crate) fn instructions(steps: u32) -> u32 {
 
 /// A count that rises with time.
 #[inline(always)]
-pub(crate) fn now() -> u32 {
+pub fn now() -> u32 {
     minstret::read() as u32
 }
 

@@ -1,0 +1,107 @@
+//! Counts the instructions of the polls in which the background answers a command, of every program of the bundle: holds,
+//! resumes and overrides, at random moments of all kinds of motion; and of the longest step of every poll, after which it
+//! looks whether a stop is asked for. Encoders read what was set in the tick before.
+//!
+//! One line a figure, as `budget` prints them.
+#![no_std]
+#![no_main]
+
+use core::cell::Cell;
+
+use hal_sim::closed_loop::InMemory;
+use motion_kernel::axis::AxesConfig;
+use motion_kernel::kernel::Kernel;
+use motion_kernel::live::{Leads, LiveControl, State};
+use motion_kernel::program::Reader;
+use motion_kernel::units::{Counts, DacCode};
+use qemu_boards::count::Counter;
+use qemu_boards::live::{PLACES, Streams};
+use qemu_boards::processor::{Timer, WRAP, entry, now};
+use qemu_boards::programs::seeded_programs;
+use qemu_boards::{AXES, Number, exit, fail, println};
+
+/// Runs of each program.
+const RUNS: u32 = 8;
+/// A run ends by then.
+const TICKS_MAX: u32 = 200_000;
+
+#[entry]
+fn main() -> ! {
+    let mut timer = Timer::take().unwrap_or_else(|| fail(&"timer"));
+    let counter = Counter::new(&mut timer);
+    for (_, bytes) in seeded_programs() {
+        println!("program");
+        for seed in 0..RUNS {
+            run(seed, bytes, &counter);
+        }
+    }
+    exit(true)
+}
+
+fn run(seed: u32, bytes: &[u8], counter: &Counter) {
+    let program = Reader::<AXES>::new(bytes).unwrap_or_else(|error| fail(&error));
+    let header = program.header();
+    let config =
+        AxesConfig::<Number, _>::new(&header.axes, header.tick_s).unwrap_or_else(|error| fail(&error));
+    let steps = config.axes.map(|config| config.encoder.position(Counts(1)).to_bits());
+    let mut streams = Streams::new();
+    let (mut feeder, mut intake) = streams.split(header.rules, header.start);
+    let mut memory = InMemory { counts: [Counts(0); AXES], codes: [DacCode::ZERO; AXES], enabled: None };
+    let mut kernel = Kernel::new(&config, header.start, memory.counts);
+    kernel.enable(0);
+    let mut control =
+        LiveControl::<_, AXES, _, _, PLACES>::new(program.items(), header.pulse, header.tick_s, Leads::NONE);
+    let (mut random, mut wait) = (u64::from(seed), 0);
+    for _ in 0..TICKS_MAX {
+        let mut kind = None;
+        if wait == 0 {
+            // Knuth's generator of full period; its upper bits.
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let bits = random >> 20;
+            wait = 5 + bits % 300;
+            kind = match control.state(&feeder) {
+                State::Held => {
+                    control.resume();
+                    Some("resume")
+                }
+                State::Running if bits >> 40 & 3 == 0 => {
+                    control.set_override(0.125 * (1 + (bits >> 32 & 15)) as f64).unwrap_or_default();
+                    Some("override")
+                }
+                State::Running => {
+                    control.hold();
+                    Some("hold")
+                }
+                _ => None,
+            };
+        }
+        wait -= 1;
+        // In steps of the timer.
+        let (since, longest, whole) = (Cell::new(now()), Cell::new(0), Cell::new(0));
+        let look = || {
+            let at = now();
+            let step = at.wrapping_sub(since.replace(at)) & WRAP;
+            longest.set(step.max(longest.get()));
+            whole.set(whole.get() + u64::from(step));
+            false
+        };
+        let polled = control.poll_unless(&look, &mut feeder);
+        look();
+        polled.unwrap_or_else(|error| fail(&error));
+        println!("step {}", counter.instructions(longest.get().into()));
+        if let Some(kind) = kind {
+            println!("{} {}", kind, counter.instructions(whole.get()));
+        }
+        let trace = kernel.tick(&mut intake, &mut memory);
+        if trace.fault.is_some() {
+            fail(&"a fault");
+        }
+        for ((counts, setpoint), step) in memory.counts.iter_mut().zip(&trace.executed.setpoints).zip(steps) {
+            *counts = Counts(setpoint.position.to_bits() / step);
+        }
+        if control.state(&feeder) == State::Done {
+            return;
+        }
+    }
+    fail(&"it never ends");
+}
