@@ -443,10 +443,11 @@ fn any_bytes_may_come() {
             let mut payload: Vec<u8> = (0..random.below(60))
                 .map(|_| if random.chance(0.5) { 0 } else { random.next() as u8 })
                 .collect();
+            // Near a message of this session.
             if random.chance(0.5)
-                && let Some(first) = payload.first_mut()
+                && let [first, second, ..] = &mut payload[..]
             {
-                *first &= 3;
+                (*first, *second) = (*first & 3, 1);
             }
             let bytes = if random.chance(0.7) {
                 let mut framed = frame::Payload::of(&()).expect("nothing");

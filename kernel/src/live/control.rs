@@ -292,7 +292,7 @@ where
             // What can't be done now can't be done in the next poll either; motion ends at rest anyway.
             self.mode.clear_request();
         }
-        self.act(choice, &mut list, feeder)?;
+        self.act(choice, list, feeder)?;
         Ok(true)
     }
 
@@ -300,7 +300,7 @@ where
     fn act(
         &mut self,
         choice: Choice,
-        list: &mut List,
+        mut list: List,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<(), SupplyError<E>> {
         let Self { reader, timeline, .. } = self;

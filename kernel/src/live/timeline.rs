@@ -252,7 +252,7 @@ impl Timeline {
     /// be a free feed list. The next list begins at its exit.
     pub(super) fn hand_over<R: Real, E, const AXES: usize, const PLACES: usize>(
         &mut self,
-        list: &List,
+        list: List,
         takeover: Takeover,
         feed_override: f64,
         lookahead: &Lookahead<PLACES>,
@@ -268,7 +268,7 @@ impl Timeline {
             within: matches!(takeover, Takeover::Within(_)),
         };
         let is_asked = self
-            .fill(list, id, lookahead, feeder)
+            .fill(&list, id, lookahead, feeder)
             .and_then(|()| feeder.change(change).map_err(SupplyError::Rejected));
         if let Err(error) = is_asked {
             feeder.give_up(id);
@@ -276,7 +276,7 @@ impl Timeline {
         }
         self.splice = list.exit_splice();
         let before_override = core::mem::replace(&mut self.driven_override, feed_override);
-        let handed = Handed { id, list: list.clone(), before };
+        let handed = Handed { id, list, before };
         self.next = Some(Next { handed, request: None, before_override });
         Ok(())
     }

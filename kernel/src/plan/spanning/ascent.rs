@@ -124,7 +124,7 @@ impl Reached {
 /// A chain to a step is the same whatever feed is to be reached in the end, so it is searched once.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ascent<'a> {
-    attention: &'a Attention<'a>,
+    attention: Option<&'a Attention<'a>>,
     /// The start, then every step above it.
     reached: [Reached; STEPS_MAX + 1],
     steps: usize,
@@ -139,18 +139,22 @@ pub(super) struct Ascent<'a> {
 }
 
 impl<'a> Ascent<'a> {
-    /// No chains yet. While something more urgent waits, none are found.
-    pub(super) fn new(attention: &'a Attention<'a>) -> Self {
-        Self {
-            attention,
-            reached: [Reached::NOT; STEPS_MAX + 1],
-            steps: 0,
-            known: 0,
-            peak: Reached::NOT,
-            room_mm: 0.0,
-            pulse: Pulse::Sin2,
-            chain: [0; RAMPS_MAX],
-        }
+    /// No chains yet. A constant, so that it is made in its place: it is several kilobytes, and a copy would be as much of
+    /// the stack.
+    pub(super) const NONE: Self = Self {
+        attention: None,
+        reached: [Reached::NOT; STEPS_MAX + 1],
+        steps: 0,
+        known: 0,
+        peak: Reached::NOT,
+        room_mm: 0.0,
+        pulse: Pulse::Sin2,
+        chain: [0; RAMPS_MAX],
+    };
+
+    /// While something more urgent waits, no chains are found.
+    pub(super) fn attend(&mut self, attention: &'a Attention<'a>) {
+        self.attention = Some(attention);
     }
 
     /// Begins before `steps` at `from_mm_s`, with `room_mm` for the ascent and ramps of `pulse`s. Steps not

@@ -65,7 +65,9 @@ pub(super) fn plan_spanning_unless(
         return Err(PlanError::Room { of: "nodes", needed: nodes_for(blocks.len()), places: room });
     };
     // Several kilobytes each, so used for all intervals.
-    let (mut up, mut down) = (Ascent::new(attention), Ascent::new(attention));
+    let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
+    up.attend(attention);
+    down.attend(attention);
     let found = spanned(&mut intervals, &mut up, &mut down, put);
     // What was given up looks as if nothing fitted.
     if attention.is_wanted() { Err(PlanError::GivenUp) } else { Ok(found) }

@@ -30,7 +30,7 @@ pub(super) enum Fit {
 /// One ramp to be found.
 pub(super) struct RampFit<'a, L> {
     /// No ramp is found while something more urgent waits.
-    pub(super) attention: &'a Attention<'a>,
+    pub(super) attention: Option<&'a Attention<'a>>,
     /// The place where it may start \[mm\].
     pub(super) start_mm: f64,
     pub(super) from_mm_s: f64,
@@ -147,7 +147,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
     /// Places `ramp`, the fastest within `limits`, after the steps that it may not pass earlier, and softens
     /// it by the limits of the blocks it passes.
     fn below_steps(&mut self, ramp: Ramp<f64>, limits: Limits<f64>, most_s: f64) -> Tried {
-        if self.attention.is_wanted() {
+        if self.attention.is_some_and(Attention::is_wanted) {
             return Tried::TooSoft;
         }
         let (mut ramp, mut limits) = (ramp, limits);
