@@ -106,16 +106,9 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
         self.control.poll_unless(is_stop_asked, &mut self.feeder)
     }
 
-    /// What the program switches outputs to now, if motion has come to rest for that; from then on it goes on, so the
-    /// caller has to put it out.
+    /// What the program switches outputs to now; see [`LiveControl::switch`].
     pub fn switch(&mut self) -> Option<OutputState> {
-        if self.control.state(&self.feeder) != State::Waiting {
-            return None;
-        }
-        let source = self.control.source_mut();
-        let due = source.due();
-        source.switched();
-        due
+        self.control.switch(&self.feeder)
     }
 
     /// The state of live control; [`State::Waiting`] before, between and after runs.

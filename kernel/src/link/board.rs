@@ -210,8 +210,8 @@ impl BoardLink {
         core::mem::take(&mut self.is_changed).then_some(self.controls)
     }
 
-    /// Writes the next frame to `out`, which needs [`FRAME_MAX`] bytes, at the time `now_ms`, which may
-    /// wrap; returns its length, 0 if there is nothing to say. A `status` is said if nothing else is, and in turn with the answers to items.
+    /// Writes the next frame to `out`, which needs [`FRAME_MAX`] bytes, at the time `now_ms`, which may wrap; returns its
+    /// length, 0 if there is nothing to say. A `status` is said if nothing else is, and in turn with the answers to items.
     pub fn transmit<const AXES: usize, const ITEMS: usize>(
         &mut self,
         now_ms: u32,

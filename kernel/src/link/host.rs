@@ -239,8 +239,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             return;
         }
         if identity.protocol != PROTOCOL || usize::from(identity.axes) != AXES {
-            (self.session, self.is_asking) = (Session::Unknown, false);
-            self.hello_ms = None;
+            // Asked again, as seldom as one that does not answer.
+            self.session = Session::Unknown;
             return on_event(Event::Refused(*identity));
         }
         // What was pressed before is no command for this board: only what is pressed from now on.

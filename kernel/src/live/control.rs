@@ -8,10 +8,11 @@ use super::places::Takeover;
 use super::reader::Reader;
 use super::splice::{BlockEnd, Extent};
 use super::timeline::{Leads, Timeline};
+use crate::hal::OutputState;
 use crate::law::Pulse;
 use crate::num::Real;
 use crate::plan::Attention;
-use crate::program::{Source, SupplyError};
+use crate::program::{Source, SupplyError, Switching};
 use crate::queue::{LiveFeeder, Progress};
 use crate::units::Position;
 
@@ -158,7 +159,8 @@ where
 
     /// [`LiveControl::poll`], which is cut short where `is_stop_asked` says that a hold or an abort waits to be told, or
     /// where a fault asks for a stop: a plan under way is given up, and the rest of the poll is left to the next one.
-    /// Motion is as before then. `is_stop_asked` is called often, so it should only look.
+    /// Motion goes on as handed over, or into the stop at the end of its list: a next list may have been taken back.
+    /// `is_stop_asked` is called often, so it should only look.
     ///
     /// # Errors
     /// As [`LiveControl::poll`].
@@ -370,6 +372,25 @@ where
         if (self.mode.run() != Run::On || !self.mode.is_single_block()) && self.rests(feeder) {
             self.timeline.has_waited();
         }
+    }
+}
+
+impl<R, const AXES: usize, I, E, const PLACES: usize> LiveControl<R, AXES, Switching<I>, E, PLACES>
+where
+    R: Real,
+    E: Clone,
+    I: Source<AXES, Error = E>,
+{
+    /// What the program switches outputs to now, if motion has come to rest for that; from then on it goes on, so the
+    /// caller has to put it out.
+    pub fn switch(&mut self, feeder: &LiveFeeder<'_, R, AXES>) -> Option<OutputState> {
+        if self.state(feeder) != State::Waiting {
+            return None;
+        }
+        let source = self.source_mut();
+        let due = source.due();
+        source.switched();
+        due
     }
 }
 
