@@ -6,6 +6,7 @@
 use motion_kernel::num::Real;
 use motion_kernel::path::{Piece, PieceError};
 use motion_kernel::program::Item;
+use motion_kernel::program::compact::{direction, line_end, septic_end};
 use motion_kernel::units::Position;
 
 use super::element::Element;
@@ -128,29 +129,62 @@ pub fn compile<R: Real, const N: usize>(
         if length > Position::ZERO { Ok(length) } else { Err(CompileError::TooShort { length_mm }) }
     };
     if matches!(element, Element::Line { .. }) {
-        let direction = scale(subtract(to, from), 1.0 / length_mm);
         let parts = (length_mm / longest_mm).ceil().max(1.0) as u64;
+        let along = |part: u64| exact(add(from, scale(subtract(to, from), part as f64 / parts as f64)));
+        let mut start = along(0)?;
+        let direction = line_direction(start, along(1)?, length_mm / parts as f64)
+            .unwrap_or_else(|| scale(subtract(to, from), 1.0 / length_mm));
         for part in 0..parts {
-            let (a, b) = (part as f64 / parts as f64, (part + 1) as f64 / parts as f64);
-            let start = exact(add(from, scale(subtract(to, from), a)))?;
-            let part_end_mm = if part + 1 == parts { end_mm } else { start_mm + length_mm * b };
+            let part_end_mm =
+                if part + 1 == parts { end_mm } else { start_mm + length_mm * ((part + 1) as f64 / parts as f64) };
             let length = length_to(part_end_mm, length_mm / parts as f64)?;
             // What the number type cannot hold is refused here.
             Piece::<R, N>::line(line, start, direction, length)?;
             pieces.push(Placed { length, item: Item::Line { line, start, direction, length } });
+            start = near(line_end(start, &direction, length), along(part + 1)?);
         }
         return Ok(end_mm);
     }
     let septics = septics::<R, N>(element)?;
     let mut gone_mm = 0.0;
+    let mut start = exact(from)?;
     for (index, septic) in septics.iter().enumerate() {
-        let start = exact(add(from, septic.start))?;
+        start = near(start, exact(add(from, septic.start))?);
         gone_mm += septic.length_mm;
         let part_end_mm = if index + 1 == septics.len() { end_mm } else { start_mm + gone_mm };
         let length = length_to(part_end_mm, septic.length_mm)?;
-        let coefficients = septic.coefficients.map(|axis| axis.map(|mm| mm / septic.length_mm));
+        let coefficients = septic.coefficients.map(|axis| axis.map(|mm| on_grid(mm / septic.length_mm)));
         Piece::<R, N>::septic(line, start, coefficients, length)?;
         pieces.push(Placed { length, item: Item::Septic { line, start, coefficients, length } });
+        start = septic_end(start, &coefficients, length);
     }
     Ok(end_mm)
+}
+
+/// A piece starts where its predecessor ends, which takes fewest bytes, if that is this near to where it should start
+/// \[mm\]; so gaps do not add up.
+const NEAR_MM: f64 = 2.0e-8;
+
+/// `end`, if that is near `start`.
+fn near<const N: usize>(end: [Position; N], start: [Position; N]) -> [Position; N] {
+    let is_near = end.iter().zip(start).all(|(&end, start)| (end - start).to_mm().abs() <= NEAR_MM);
+    if is_near { end } else { start }
+}
+
+/// Bits of coefficients after the point.
+const GRID_BITS: i32 = 28;
+
+fn on_grid(coefficient: f64) -> f64 {
+    let steps = f64::exp2(f64::from(GRID_BITS));
+    // Without the sign of a zero.
+    (coefficient * steps).round() / steps + 0.0
+}
+
+/// Lines shorter than this have a direction of their own \[mm\].
+const DIRECTION_MM_MIN: f64 = 1.0e-3;
+
+fn line_direction<const N: usize>(start: [Position; N], end: [Position; N], length_mm: f64) -> Option<[f64; N]> {
+    let mut offset = end;
+    offset.iter_mut().zip(start).for_each(|(end, start)| *end = *end - start);
+    (length_mm >= DIRECTION_MM_MIN).then(|| direction(offset).0)
 }

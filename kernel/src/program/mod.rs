@@ -41,6 +41,7 @@
 mod bytes;
 mod check;
 mod checksum;
+pub mod compact;
 mod source;
 pub(crate) mod supply;
 mod switching;

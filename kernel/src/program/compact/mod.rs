@@ -1,0 +1,223 @@
+//! Items as few bytes: each as what differs from what the items before it let expect.
+//!
+//! Consumes and produces [`Item`]s; lossless, whatever the items. Background. An [`Encoder`] and a [`Decoder`]
+//! keep the same [`State`], so items are read in the order in which they were written, from the first on.
+//!
+//! An item is a row of nibbles, the low one of a byte first, filled up to whole bytes with 0. The first is its
+//! kind:
+//!
+//! | kind | item | then |
+//! |---|---|---|
+//! | 0 | [`Item::Line`] | line, its end from its start; length less the distance to that end |
+//! | 1 | [`Item::Line`] in the last one's direction | line; length less the last piece's |
+//! | 2 | [`Item::Line`] | line, length, direction in full |
+//! | 3 | [`Item::Septic`] | line, length less the last piece's, [`Grid`], coefficients |
+//! | 4 | [`Item::Feed`], a cruise from the last feed | length |
+//! | 5 | [`Item::Feed`] | what fixes its times, feeds and times; length less the ramp's own |
+//! | 6 | [`Item::EndOfStretch`] | its place from the last piece's end |
+//! | 7 | [`Item::Dwell`] | steps of a tick |
+//! | 8 | [`Item::Stop`] | |
+//! | 9 | [`Item::Switch`] | spindle and coolant, speed |
+//! | 10 | [`Item::Block`] | length, ten figures |
+//! | 11 | [`Item::Block`] with the last one's limits | length, the junction's feed |
+//! | 12 | a piece that starts elsewhere than the last one ended | how far from there; one of kinds 0 to 3 |
+//!
+//! **Whole numbers** are a count of nibbles, 15 for 16, and that many of the number, the low ones first; the
+//! sign is the least significant bit. The program line is its difference to the last one.
+//!
+//! **Figures** are a nibble: 0 for the expected one, 1 to 11 for one of the last eleven that were written in
+//! full, 12 to 14 for the upper 5, 8 or 11 nibbles of an f64, whose others are 0, 15 for all 16.
+//!
+//! What is expected is computed with IEEE basic operations and roots of `libm`, which are the same on every
+//! target. The writer computes it, too, and where it is not the item's own, down to the bits, writes that.
+
+mod read;
+mod write;
+
+pub use read::Decoder;
+pub use write::Encoder;
+
+use crate::law::segment::to_f64;
+use crate::law::{LimitedBy, PlannedRamp, Ramp};
+use crate::path::magnitude;
+use crate::units::Position;
+
+/// Kinds of items.
+mod kind {
+    pub(super) const LINE_TO: u8 = 0;
+    pub(super) const LINE_ON: u8 = 1;
+    pub(super) const LINE: u8 = 2;
+    pub(super) const SEPTIC: u8 = 3;
+    pub(super) const CRUISE: u8 = 4;
+    pub(super) const RAMP: u8 = 5;
+    pub(super) const END: u8 = 6;
+    pub(super) const DWELL: u8 = 7;
+    pub(super) const STOP: u8 = 8;
+    pub(super) const SWITCH: u8 = 9;
+    pub(super) const BLOCK: u8 = 10;
+    pub(super) const BLOCK_ON: u8 = 11;
+    pub(super) const ELSEWHERE: u8 = 12;
+}
+
+/// What fixes the times of a ramp.
+mod form {
+    /// Acceleration: edge, t₁ and the acceleration.
+    pub(super) const BY_ACCELERATION: u8 = 0;
+    /// Jerk: edge and jerk.
+    pub(super) const BY_JERK: u8 = 1;
+    /// Snap: t₁.
+    pub(super) const BY_SNAP: u8 = 2;
+    /// All times; and the limit, from here on.
+    pub(super) const TIMES: u8 = 3;
+    /// All of a ramp's figures; and the limit, from here on.
+    pub(super) const FIGURES: u8 = 6;
+}
+
+/// Nibbles of a figure that are written; the others are 0.
+const LENGTHS: [u8; 4] = [5, 8, 11, 16];
+/// The code of the first of them.
+const FIRST_LENGTH: u8 = 12;
+/// The count of nibbles that stands for all 16.
+const WHOLE: u8 = 15;
+
+/// Figures that were written in full of late.
+#[derive(Clone, Copy, Debug)]
+struct Recent {
+    figures: [f64; FIRST_LENGTH as usize - 1],
+    next: u8,
+}
+
+impl Recent {
+    const NONE: Self = Self { figures: [0.0; FIRST_LENGTH as usize - 1], next: 0 };
+
+    fn push(&mut self, figure: f64) {
+        if let Some(place) = self.figures.get_mut(usize::from(self.next)) {
+            *place = figure;
+        }
+        let next = self.next + 1;
+        self.next = if usize::from(next) < self.figures.len() { next } else { 0 };
+    }
+}
+
+/// What both ends know from the items before.
+#[derive(Clone, Copy, Debug)]
+struct State<const AXES: usize> {
+    line: u32,
+    /// Where the last piece ended.
+    end: [Position; AXES],
+    /// The direction of the last line.
+    direction: [f64; AXES],
+    /// The length of the last piece.
+    length: Position,
+    feed_mm_s: f64,
+    #[cfg(feature = "live")]
+    block: [f64; 10],
+    feeds: Recent,
+    others: Recent,
+}
+
+impl<const AXES: usize> State<AXES> {
+    const NEW: Self = Self {
+        line: 0,
+        end: [Position::ZERO; AXES],
+        direction: [0.0; AXES],
+        length: Position::ZERO,
+        feed_mm_s: 0.0,
+        #[cfg(feature = "live")]
+        block: [0.0; 10],
+        feeds: Recent::NONE,
+        others: Recent::NONE,
+    };
+}
+
+/// The direction of a line from its start to `offset` from there, and its length \[mm\]: the line that takes the
+/// fewest bytes. Not finite where there is no offset.
+#[must_use]
+pub fn direction<const AXES: usize>(offset: [Position; AXES]) -> ([f64; AXES], f64) {
+    let mut direction = [0.0; AXES];
+    for (part, offset) in direction.iter_mut().zip(offset) {
+        *part = offset.to_mm();
+    }
+    let length_mm = magnitude(&direction);
+    for part in &mut direction {
+        *part /= length_mm;
+    }
+    (direction, length_mm)
+}
+
+/// Where a line ends, to a few position steps.
+#[must_use]
+pub fn line_end<const AXES: usize>(
+    start: [Position; AXES],
+    direction: &[f64; AXES],
+    length: Position,
+) -> [Position; AXES] {
+    let mut end = start;
+    let length_mm = length.to_mm();
+    for (end, part) in end.iter_mut().zip(direction) {
+        *end = *end + Position::from_mm(part * length_mm).unwrap_or_default();
+    }
+    end
+}
+
+/// Where a septic ends, to a few position steps.
+#[must_use]
+pub fn septic_end<const AXES: usize>(
+    start: [Position; AXES],
+    coefficients: &[[f64; 7]; AXES],
+    length: Position,
+) -> [Position; AXES] {
+    let mut sums = [0.0; AXES];
+    for (sum, coefficients) in sums.iter_mut().zip(coefficients) {
+        for coefficient in coefficients {
+            *sum += coefficient;
+        }
+    }
+    line_end(start, &sums, length)
+}
+
+/// 2 to the power of `exponent`, from −1022 to 1023.
+fn power_of_2(exponent: i32) -> f64 {
+    f64::from_bits((1023 + i64::from(exponent)).cast_unsigned() << 52)
+}
+
+/// The scale of coefficients that are whole numbers: 2⁻¹⁶ and less by a factor of four each.
+fn grid(code: u8) -> i32 {
+    16 + 2 * i32::from(code)
+}
+
+/// A ramp with the peak jerk that its feeds and times make.
+fn with_peak_jerk(ramp: Ramp<f64>) -> Ramp<f64> {
+    to_f64(&Ramp { peak_jerk_mm_s3: 0.0, ..ramp })
+}
+
+/// The length that a ramp has of itself.
+fn own_length(ramp: &Ramp<f64>) -> Position {
+    Position::from_mm(ramp.length_mm()).unwrap_or_default()
+}
+
+/// A cruise from `feed_mm_s` over `length`.
+fn cruise(feed_mm_s: f64, length: Position) -> PlannedRamp {
+    PlannedRamp { ramp: Ramp::cruise(feed_mm_s, length.to_mm() / feed_mm_s), length }
+}
+
+/// A ramp between two feeds whose times the law's figures fix: by acceleration with edge, t₁ and acceleration, by jerk with
+/// edge and jerk, by snap with t₁.
+fn by_law(limited_by: LimitedBy, from_mm_s: f64, to_mm_s: f64, edge_s: f64, t1_s: f64, limit: f64) -> Ramp<f64> {
+    let change_mm_s = libm::fabs(to_mm_s - from_mm_s);
+    let mut ramp = Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3: limit, edge_s, t1_s, t2_s: t1_s, limited_by };
+    match limited_by {
+        LimitedBy::Acceleration => {
+            let t2_s = change_mm_s / limit;
+            if t2_s > t1_s {
+                ramp.t2_s = t2_s;
+            }
+        }
+        LimitedBy::Jerk => {
+            ramp.t1_s = ramp.rise_for_s(change_mm_s);
+            ramp.t2_s = ramp.t1_s;
+        }
+        LimitedBy::Snap => ramp.edge_s = 0.5 * t1_s,
+    }
+    with_peak_jerk(ramp)
+}

@@ -1,0 +1,265 @@
+//! Items out of few bytes.
+//!
+//! Like [`wire`](crate::program::wire), it does not return at every nibble that is missing or wrong: that is noted, and
+//! makes the whole item `None` at its end.
+
+use super::{
+    FIRST_LENGTH, LENGTHS, Recent, State, WHOLE, by_law, cruise, direction, form, grid, kind, line_end,
+    own_length, power_of_2, septic_end, with_peak_jerk,
+};
+use crate::hal::{OutputState, Spindle};
+use crate::law::{LimitedBy, PlannedRamp, Ramp, Ticks};
+use crate::program::{Item, PathBlock};
+use crate::units::Position;
+
+/// Reads items that an [`Encoder`](super::Encoder) wrote, from its first on.
+#[derive(Clone, Copy, Debug)]
+pub struct Decoder<const AXES: usize> {
+    state: State<AXES>,
+}
+
+impl<const AXES: usize> Default for Decoder<AXES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const AXES: usize> Decoder<AXES> {
+    /// For the first item.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { state: State::NEW }
+    }
+
+    /// The item at the start of `bytes`, and the bytes after it; `None` if there is none. After that it is of
+    /// no more use.
+    pub fn take<'a>(&mut self, bytes: &'a [u8]) -> Option<(Item<AXES>, &'a [u8])> {
+        let mut nibbles = Nibbles { left: bytes, is_half: false, is_sound: true };
+        let item = self.item(&mut nibbles);
+        if nibbles.is_half && nibbles.nibble() != 0 {
+            nibbles.is_sound = false;
+        }
+        nibbles.is_sound.then_some((item, nibbles.left))
+    }
+
+    fn item(&mut self, nibbles: &mut Nibbles<'_>) -> Item<AXES> {
+        let state = &mut self.state;
+        let mut what = nibbles.nibble();
+        let mut start = state.end;
+        if what == kind::ELSEWHERE {
+            nibbles.move_by(&mut start);
+            what = nibbles.nibble();
+            nibbles.is_sound &= what <= kind::SEPTIC;
+        }
+        match what {
+            kind::LINE_TO | kind::LINE_ON | kind::LINE | kind::SEPTIC => state.piece(nibbles, what, start),
+            kind::CRUISE => Item::Feed(cruise(state.feed_mm_s, Position::from_bits(nibbles.number()))),
+            kind::RAMP => Item::Feed(state.ramp(nibbles)),
+            kind::END => {
+                nibbles.move_by(&mut state.end);
+                return Item::EndOfStretch(state.end);
+            }
+            kind::DWELL => Item::Dwell(Ticks::from_bits(nibbles.number().cast_unsigned())),
+            kind::STOP => Item::Stop,
+            kind::SWITCH => {
+                let how = nibbles.nibble();
+                let spindle = match how & 3 {
+                    0 => Spindle::Off,
+                    1 => Spindle::Clockwise,
+                    2 => Spindle::Counterclockwise,
+                    _ => nibbles.unsound(Spindle::Off),
+                };
+                let speed_rpm = nibbles.figure(&mut state.others, 0.0);
+                Item::Switch(OutputState { spindle, speed_rpm, flood: how & 4 != 0, mist: how & 8 != 0 })
+            }
+            #[cfg(feature = "live")]
+            kind::BLOCK | kind::BLOCK_ON => Item::Block(state.block(nibbles, what)),
+            _ => nibbles.unsound(Item::Stop),
+        }
+    }
+}
+
+impl<const AXES: usize> State<AXES> {
+    #[inline(never)]
+    fn piece(&mut self, nibbles: &mut Nibbles<'_>, what: u8, start: [Position; AXES]) -> Item<AXES> {
+        #[allow(clippy::cast_possible_truncation)]
+        let line = self.line.wrapping_add(nibbles.number() as u32);
+        self.line = line;
+        if what == kind::SEPTIC {
+            self.length = self.length + Position::from_bits(nibbles.number());
+            let mut coefficients = [[0.0; 7]; AXES];
+            nibbles.coefficients(coefficients.iter_mut());
+            self.end = septic_end(start, &coefficients, self.length);
+            return Item::Septic { line, start, coefficients, length: self.length };
+        }
+        let mut expected = self.length;
+        let mut end = None;
+        if what == kind::LINE_TO {
+            let mut offset = [Position::ZERO; AXES];
+            nibbles.move_by(&mut offset);
+            let (towards, length_mm) = direction(offset);
+            self.direction = towards;
+            expected = Position::from_mm(length_mm).unwrap_or_default();
+            for (offset, start) in offset.iter_mut().zip(start) {
+                *offset = start + *offset;
+            }
+            end = Some(offset);
+        } else if what == kind::LINE {
+            for part in &mut self.direction {
+                *part = f64::from_bits(nibbles.bits(16));
+            }
+        }
+        let length = expected + Position::from_bits(nibbles.number());
+        self.length = length;
+        self.end = match end {
+            Some(end) => end,
+            None => line_end(start, &self.direction, length),
+        };
+        Item::Line { line, start, direction: self.direction, length }
+    }
+
+    #[inline(never)]
+    fn ramp(&mut self, nibbles: &mut Nibbles<'_>) -> PlannedRamp {
+        let how = nibbles.nibble();
+        let from_mm_s =
+            if how >= form::FIGURES { nibbles.figure(&mut self.feeds, self.feed_mm_s) } else { self.feed_mm_s };
+        let to_mm_s = nibbles.figure(&mut self.feeds, 0.0);
+        self.feed_mm_s = to_mm_s;
+        let others = &mut self.others;
+        let limited_by = match how {
+            form::BY_ACCELERATION | form::TIMES | form::FIGURES => LimitedBy::Acceleration,
+            form::BY_JERK | 4 | 7 => LimitedBy::Jerk,
+            form::BY_SNAP | 5 | 8 => LimitedBy::Snap,
+            _ => nibbles.unsound(LimitedBy::Snap),
+        };
+        let t1_s = if how == form::BY_JERK { 0.0 } else { nibbles.figure(others, 0.0) };
+        let edge_s = if how == form::BY_SNAP { 0.0 } else { nibbles.figure(others, 0.5 * t1_s) };
+        let ramp = if how < form::TIMES {
+            let limit = if how == form::BY_SNAP { 0.0 } else { nibbles.figure(others, 0.0) };
+            by_law(limited_by, from_mm_s, to_mm_s, edge_s, t1_s, limit)
+        } else {
+            let t2_s = nibbles.figure(others, t1_s);
+            let ramp =
+                Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3: 0.0, edge_s, t1_s, t2_s, limited_by };
+            if how < form::FIGURES {
+                with_peak_jerk(ramp)
+            } else {
+                Ramp { peak_jerk_mm_s3: nibbles.figure(others, 0.0), ..ramp }
+            }
+        };
+        PlannedRamp { ramp, length: own_length(&ramp) + Position::from_bits(nibbles.number()) }
+    }
+
+    #[cfg(feature = "live")]
+    #[inline(never)]
+    fn block(&mut self, nibbles: &mut Nibbles<'_>, what: u8) -> PathBlock {
+        let length = Position::from_bits(nibbles.number());
+        let (feeds, others) = (&mut self.feeds, &mut self.others);
+        let [feed, programmed @ .., _, _, _, _, _] = &mut self.block;
+        if what == kind::BLOCK {
+            *feed = nibbles.figure(feeds, *feed);
+            nibbles.allowed(feeds, others, programmed);
+            let programmed = *programmed;
+            let [_, _, _, _, _, greatest @ .., _] = &mut self.block;
+            *greatest = programmed;
+            nibbles.allowed(feeds, others, greatest);
+        }
+        let [.., junction] = &mut self.block;
+        *junction = nibbles.figure(feeds, *junction);
+        PathBlock { length, figures: self.block }
+    }
+}
+
+/// The nibbles not read yet.
+struct Nibbles<'a> {
+    left: &'a [u8],
+    /// The low one of the first byte is read.
+    is_half: bool,
+    /// All so far were there and sound.
+    is_sound: bool,
+}
+
+// Not inlined: each is in the image once.
+impl Nibbles<'_> {
+    fn unsound<T>(&mut self, instead: T) -> T {
+        self.is_sound = false;
+        instead
+    }
+
+    #[inline(never)]
+    fn nibble(&mut self) -> u8 {
+        let Some((&byte, left)) = self.left.split_first() else { return self.unsound(0) };
+        self.is_half = !self.is_half;
+        if self.is_half {
+            byte & 15
+        } else {
+            self.left = left;
+            byte >> 4
+        }
+    }
+
+    /// The lowest `count` nibbles of a number, at most 16.
+    #[inline(never)]
+    fn bits(&mut self, count: u8) -> u64 {
+        let mut bits = 0;
+        for place in 0..u32::from(count) {
+            bits |= u64::from(self.nibble()) << (4 * place);
+        }
+        bits
+    }
+
+    #[inline(never)]
+    fn number(&mut self) -> i64 {
+        let count = self.nibble();
+        let bits = self.bits(if count == WHOLE { 16 } else { count });
+        (bits >> 1).cast_signed() ^ -((bits & 1).cast_signed())
+    }
+
+    #[inline(never)]
+    fn figure(&mut self, recent: &mut Recent, expected: f64) -> f64 {
+        let code = self.nibble();
+        let Some(length) = code.checked_sub(FIRST_LENGTH) else {
+            return match code.checked_sub(1) {
+                None => expected,
+                Some(place) => recent.figures.get(usize::from(place)).copied().unwrap_or_default(),
+            };
+        };
+        let count = LENGTHS.get(usize::from(length)).copied().unwrap_or(16);
+        let figure = f64::from_bits(self.bits(count) << (64 - 4 * u32::from(count)));
+        recent.push(figure);
+        figure
+    }
+
+    /// Cap and limits, where others are expected.
+    #[cfg(feature = "live")]
+    fn allowed(&mut self, feeds: &mut Recent, others: &mut Recent, allowed: &mut [f64; 4]) {
+        let [cap, limits @ ..] = allowed;
+        *cap = self.figure(feeds, *cap);
+        for limit in limits {
+            *limit = self.figure(others, *limit);
+        }
+    }
+
+    #[inline(never)]
+    fn move_by(&mut self, positions: &mut [Position]) {
+        for position in positions {
+            *position = *position + Position::from_bits(self.number());
+        }
+    }
+
+    fn coefficients<'b>(&mut self, axes: impl Iterator<Item = &'b mut [f64; 7]>) {
+        let code = self.nibble();
+        let to_grid = power_of_2(32 - grid(code));
+        for coefficients in axes {
+            let count = self.nibble();
+            self.is_sound &= count <= 7;
+            for coefficient in coefficients.iter_mut().take(usize::from(count)) {
+                *coefficient = if code == WHOLE {
+                    f64::from_bits(self.bits(16))
+                } else {
+                    Position::from_bits(self.number()).to_mm() * to_grid
+                };
+            }
+        }
+    }
+}
