@@ -12,6 +12,7 @@ use motion_kernel::plan::Ceiling;
 use motion_kernel::program::{Allowed, Item, PathBlock};
 use motion_kernel::units::Position;
 
+use super::ceilings::few_digits;
 use super::compiled::bytes;
 use super::density::{PiecePace, SegmentPace};
 use super::error::{PlanningError, Problem};
@@ -187,7 +188,7 @@ fn block_ends<const N: usize>(stretch: &Stretch<N>) -> Result<Vec<Position>, (u3
 /// The ceilings of the feed along the path. Neighbours with equal ceilings are one block.
 fn path_blocks<const N: usize>(stretch: &Stretch<N>, ends: &[Position], dense: &[Dense]) -> Vec<Placed<N>> {
     let allowed = |ceiling: &Ceiling<f64>, most_mm_s: f64| Allowed {
-        cap_mm_s: ceiling.feed_mm_s.min(most_mm_s),
+        cap_mm_s: ceiling.feed_mm_s.min(few_digits(most_mm_s)),
         limits: ceiling.law.limits(),
     };
     let mut blocks: Vec<PathBlock> = Vec::new();

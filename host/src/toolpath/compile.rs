@@ -6,11 +6,11 @@
 use motion_kernel::num::Real;
 use motion_kernel::path::{Piece, PieceError};
 use motion_kernel::program::Item;
-use motion_kernel::program::compact::{direction, line_end, septic_end};
+use motion_kernel::program::compact::{as_septic, continued, direction, line_end, septic_end, turned};
 use motion_kernel::units::Position;
 
 use super::element::Element;
-use super::septic::{FitError, Septic};
+use super::septic::{FitError, Septic, between};
 use super::{Vector, add, scale, subtract};
 
 /// The shortest piece that is sure to advance the path position, which goes in steps of 2⁻³² mm and is
@@ -147,16 +147,15 @@ pub fn compile<R: Real, const N: usize>(
     }
     let septics = septics::<R, N>(element)?;
     let mut gone_mm = 0.0;
-    let mut start = exact(from)?;
     for (index, septic) in septics.iter().enumerate() {
-        start = near(start, exact(add(from, septic.start))?);
         gone_mm += septic.length_mm;
         let part_end_mm = if index + 1 == septics.len() { end_mm } else { start_mm + gone_mm };
         let length = length_to(part_end_mm, septic.length_mm)?;
-        let coefficients = septic.coefficients.map(|axis| axis.map(|mm| on_grid(mm / septic.length_mm)));
+        let start = exact(add(from, septic.start))?;
+        let wanted = septic.coefficients.map(|axis| axis.map(|mm| mm / septic.length_mm));
+        let (start, coefficients) = short(pieces.last(), start, wanted, length, index + 1 < septics.len());
         Piece::<R, N>::septic(line, start, coefficients, length)?;
         pieces.push(Placed { length, item: Item::Septic { line, start, coefficients, length } });
-        start = septic_end(start, &coefficients, length);
     }
     Ok(end_mm)
 }
@@ -171,11 +170,75 @@ fn near<const N: usize>(end: [Position; N], start: [Position; N]) -> [Position; 
     if is_near { end } else { start }
 }
 
-/// Bits of coefficients after the point.
+/// Bits of coefficients after the point; of those that are turned on, too.
 const GRID_BITS: i32 = 28;
+const TURNED_GRID_BITS: i32 = 32;
+/// How far q₁ … q₃ may be from those of the curve, where a piece goes on as its predecessor ends.
+const CONTINUED: [f64; 3] = [1.0e-7, 3.0e-7, 1.0e-6];
+/// The same for all coefficients of a piece that is its predecessor turned.
+const TURNED: f64 = 2.0e-8;
 
-fn on_grid(coefficient: f64) -> f64 {
-    let steps = f64::exp2(f64::from(GRID_BITS));
+/// A piece near one with these coefficients from `start`, that takes fewer bytes after the one before.
+fn short<const N: usize>(
+    before: Option<&Placed<N>>,
+    start: [Position; N],
+    wanted: [[f64; 7]; N],
+    length: Position,
+    is_followed: bool,
+) -> ([Position; N], [[f64; 7]; N]) {
+    let grid = |bits| wanted.map(|axis| axis.map(|coefficient| on_grid(coefficient, bits)));
+    let (end, before, length_before) = match before.map(|before| before.item) {
+        Some(Item::Line { start, direction, length, .. }) => {
+            (line_end(start, &direction, length), as_septic(&direction), length)
+        }
+        Some(Item::Septic { start, coefficients, length, .. }) => {
+            (septic_end(start, &coefficients, length), coefficients, length)
+        }
+        _ => return (start, grid(if is_followed { TURNED_GRID_BITS } else { GRID_BITS })),
+    };
+    let start_at = near(end, start);
+    let turned = turned(&before);
+    let is_turned = turned
+        .as_flattened()
+        .iter()
+        .zip(wanted.as_flattened())
+        .all(|(turned, wanted)| (turned - wanted).abs() <= TURNED);
+    if is_turned {
+        return (start_at, turned);
+    }
+    let on = continued(&before, length_before, length);
+    let goes_on = on.iter().zip(&wanted).all(|(on, wanted)| {
+        on.iter().zip(wanted).zip(CONTINUED).all(|((on, wanted), most)| (on - wanted).abs() <= most)
+    });
+    if !goes_on {
+        return (start_at, grid(if is_followed { TURNED_GRID_BITS } else { GRID_BITS }));
+    }
+    // Its end stays as far from its start, and so does how it goes on.
+    let coefficients = core::array::from_fn(|axis| {
+        let [q1, q2, q3] = on[axis];
+        let [rise, end1, end2, end3] = derivatives_at_end(&wanted[axis]);
+        let [_, _, _, upper @ ..] = between(rise, [q1, 2.0 * q2, 6.0 * q3], [end1, end2, end3]);
+        let [q4, q5, q6, q7] = upper.map(|coefficient| on_grid(coefficient, GRID_BITS));
+        [q1, q2, q3, q4, q5, q6, q7]
+    });
+    (start_at, coefficients)
+}
+
+/// Value and first to third derivative at 1.
+fn derivatives_at_end(coefficients: &[f64; 7]) -> [f64; 4] {
+    let mut at_end = [0.0; 4];
+    for (k, coefficient) in (1_u8..).zip(coefficients) {
+        let mut part = *coefficient;
+        for (order, sum) in (0_u8..).zip(&mut at_end) {
+            *sum += part;
+            part *= f64::from(k) - f64::from(order);
+        }
+    }
+    at_end
+}
+
+fn on_grid(coefficient: f64, bits: i32) -> f64 {
+    let steps = f64::exp2(f64::from(bits));
     // Without the sign of a zero.
     (coefficient * steps).round() / steps + 0.0
 }

@@ -20,7 +20,9 @@
 //! | 9 | [`Item::Switch`] | spindle and coolant, speed |
 //! | 10 | [`Item::Block`] | length, ten figures |
 //! | 11 | [`Item::Block`] with the last one's limits | length, the junction's feed |
-//! | 12 | a piece that starts elsewhere than the last one ended | how far from there; one of kinds 0 to 3 |
+//! | 12 | [`Item::Septic`] that goes on as the last piece ended: see [`continued`] | line, length less the last piece's, grid, q₄ … q₇ |
+//! | 13 | [`Item::Septic`] that is the last one [`turned`] | line, length less the last piece's |
+//! | 14 | a piece that starts elsewhere than the last one ended | how far from there; the piece |
 //!
 //! **Whole numbers** are a count of nibbles, 15 for 16, and that many of the number, the low ones first; the
 //! sign is the least significant bit. The program line is its difference to the last one.
@@ -56,7 +58,9 @@ mod kind {
     pub(super) const SWITCH: u8 = 9;
     pub(super) const BLOCK: u8 = 10;
     pub(super) const BLOCK_ON: u8 = 11;
-    pub(super) const ELSEWHERE: u8 = 12;
+    pub(super) const SEPTIC_ON: u8 = 12;
+    pub(super) const SEPTIC_TURNED: u8 = 13;
+    pub(super) const ELSEWHERE: u8 = 14;
 }
 
 /// What fixes the times of a ramp.
@@ -105,9 +109,9 @@ struct State<const AXES: usize> {
     line: u32,
     /// Where the last piece ended.
     end: [Position; AXES],
-    /// The direction of the last line.
-    direction: [f64; AXES],
-    /// The length of the last piece.
+    /// The last piece; a line's are its direction and zeros.
+    coefficients: [[f64; 7]; AXES],
+    /// Its length.
     length: Position,
     feed_mm_s: f64,
     #[cfg(feature = "live")]
@@ -120,7 +124,7 @@ impl<const AXES: usize> State<AXES> {
     const NEW: Self = Self {
         line: 0,
         end: [Position::ZERO; AXES],
-        direction: [0.0; AXES],
+        coefficients: [[0.0; 7]; AXES],
         length: Position::ZERO,
         feed_mm_s: 0.0,
         #[cfg(feature = "live")]
@@ -134,15 +138,9 @@ impl<const AXES: usize> State<AXES> {
 /// fewest bytes. Not finite where there is no offset.
 #[must_use]
 pub fn direction<const AXES: usize>(offset: [Position; AXES]) -> ([f64; AXES], f64) {
-    let mut direction = [0.0; AXES];
-    for (part, offset) in direction.iter_mut().zip(offset) {
-        *part = offset.to_mm();
-    }
+    let direction = offset.map(Position::to_mm);
     let length_mm = magnitude(&direction);
-    for part in &mut direction {
-        *part /= length_mm;
-    }
-    (direction, length_mm)
+    (unit(direction), length_mm)
 }
 
 /// Where a line ends, to a few position steps.
@@ -174,6 +172,87 @@ pub fn septic_end<const AXES: usize>(
         }
     }
     line_end(start, &sums, length)
+}
+
+/// A line's direction as q₁ of a septic.
+#[must_use]
+pub fn as_septic<const AXES: usize>(direction: &[f64; AXES]) -> [[f64; 7]; AXES] {
+    direction.map(|part| [part, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+}
+
+/// q₁ … q₃ of a piece of `length` that goes on with the tangent, curvature and its change with which a piece ends.
+#[must_use]
+pub fn continued<const AXES: usize>(
+    coefficients: &[[f64; 7]; AXES],
+    length_before: Position,
+    length: Position,
+) -> [[f64; 3]; AXES] {
+    let ratio = length.to_mm() / length_before.to_mm();
+    let mut at_end = [[0.0; 3]; AXES];
+    for (at_end, coefficients) in at_end.iter_mut().zip(coefficients) {
+        // Binomial coefficients: derivatives of powers at 1, by their factorials.
+        let [mut once, mut twice, mut thrice] = [1.0, 0.0, 0.0];
+        let [first, second, third] = at_end;
+        for coefficient in coefficients {
+            *first += once * coefficient;
+            *second += twice * coefficient;
+            *third += thrice * coefficient;
+            thrice += twice;
+            twice += once;
+            once += 1.0;
+        }
+        *second *= ratio;
+        *third = *third * ratio * ratio;
+    }
+    at_end
+}
+
+/// A piece of a circle or helix turned so that it goes on where it ended.
+#[must_use]
+pub fn turned<const AXES: usize>(coefficients: &[[f64; 7]; AXES]) -> [[f64; 7]; AXES] {
+    let column = |of: fn(&[f64; 7]) -> f64| {
+        let mut column = [0.0; AXES];
+        for (part, coefficients) in column.iter_mut().zip(coefficients) {
+            *part = of(coefficients);
+        }
+        column
+    };
+    // Across the circle and, but for the sign, along it, where the piece starts.
+    let across = unit(column(|&[_, q2, ..]| q2));
+    let along = unit(column(|&[_, _, q3, ..]| q3));
+    let parts = |vector: &[f64; AXES]| (dot(vector, &along), dot(vector, &across));
+    let (a, b) = parts(&column(|&[q1, ..]| q1));
+    let (a_end, b_end) = parts(&continued(coefficients, Position::from_bits(1), Position::from_bits(1)).map(|[first, ..]| first));
+    let squares = libm::sqrt((a * a + b * b) * (a_end * a_end + b_end * b_end));
+    let (less, sine) = ((a * a_end + b * b_end) / squares - 1.0, (a * b_end - b * a_end) / squares);
+    let mut turned = *coefficients;
+    for power in 0..7 {
+        let mut vector = [0.0; AXES];
+        for (part, coefficients) in vector.iter_mut().zip(coefficients) {
+            *part = coefficients.get(power).copied().unwrap_or_default();
+        }
+        let (a, b) = parts(&vector);
+        let (more_along, more_across) = (less * a - sine * b, less * b + sine * a);
+        for ((turned, along), across) in turned.iter_mut().zip(along).zip(across) {
+            if let Some(place) = turned.get_mut(power) {
+                *place += more_along * along + more_across * across;
+            }
+        }
+    }
+    turned
+}
+
+fn dot<const AXES: usize>(a: &[f64; AXES], b: &[f64; AXES]) -> f64 {
+    let mut sum = 0.0;
+    for (a, b) in a.iter().zip(b) {
+        sum += a * b;
+    }
+    sum
+}
+
+fn unit<const AXES: usize>(vector: [f64; AXES]) -> [f64; AXES] {
+    let magnitude = magnitude(&vector);
+    vector.map(|part| part / magnitude)
 }
 
 /// 2 to the power of `exponent`, from −1022 to 1023.

@@ -4,8 +4,8 @@
 //! makes the whole item `None` at its end.
 
 use super::{
-    FIRST_LENGTH, LENGTHS, Recent, State, WHOLE, by_law, cruise, direction, form, grid, kind, line_end,
-    own_length, power_of_2, septic_end, with_peak_jerk,
+    FIRST_LENGTH, LENGTHS, Recent, State, WHOLE, as_septic, by_law, continued, cruise, direction, form, grid,
+    kind, line_end, own_length, power_of_2, septic_end, turned, with_peak_jerk,
 };
 use crate::hal::{OutputState, Spindle};
 use crate::law::{LimitedBy, PlannedRamp, Ramp, Ticks};
@@ -49,10 +49,11 @@ impl<const AXES: usize> Decoder<AXES> {
         if what == kind::ELSEWHERE {
             nibbles.move_by(&mut start);
             what = nibbles.nibble();
-            nibbles.is_sound &= what <= kind::SEPTIC;
+            nibbles.is_sound &= what < kind::ELSEWHERE;
         }
         match what {
-            kind::LINE_TO | kind::LINE_ON | kind::LINE | kind::SEPTIC => state.piece(nibbles, what, start),
+            kind::LINE_TO | kind::LINE_ON | kind::LINE => state.line(nibbles, what, start),
+            kind::SEPTIC | kind::SEPTIC_ON | kind::SEPTIC_TURNED => state.septic(nibbles, what, start),
             kind::CRUISE => Item::Feed(cruise(state.feed_mm_s, Position::from_bits(nibbles.number()))),
             kind::RAMP => Item::Feed(state.ramp(nibbles)),
             kind::END => {
@@ -80,42 +81,61 @@ impl<const AXES: usize> Decoder<AXES> {
 }
 
 impl<const AXES: usize> State<AXES> {
-    #[inline(never)]
-    fn piece(&mut self, nibbles: &mut Nibbles<'_>, what: u8, start: [Position; AXES]) -> Item<AXES> {
+    fn line_number(&mut self, nibbles: &mut Nibbles<'_>) -> u32 {
         #[allow(clippy::cast_possible_truncation)]
         let line = self.line.wrapping_add(nibbles.number() as u32);
         self.line = line;
-        if what == kind::SEPTIC {
-            self.length = self.length + Position::from_bits(nibbles.number());
-            let mut coefficients = [[0.0; 7]; AXES];
-            nibbles.coefficients(coefficients.iter_mut());
-            self.end = septic_end(start, &coefficients, self.length);
-            return Item::Septic { line, start, coefficients, length: self.length };
-        }
-        let mut expected = self.length;
-        let mut end = None;
+        line
+    }
+
+    #[inline(never)]
+    fn line(&mut self, nibbles: &mut Nibbles<'_>, what: u8, start: [Position; AXES]) -> Item<AXES> {
+        let line = self.line_number(nibbles);
+        let mut along = self.coefficients.map(|[q1, ..]| q1);
+        let (mut expected, mut offset) = (self.length, [Position::ZERO; AXES]);
         if what == kind::LINE_TO {
-            let mut offset = [Position::ZERO; AXES];
             nibbles.move_by(&mut offset);
             let (towards, length_mm) = direction(offset);
-            self.direction = towards;
+            along = towards;
             expected = Position::from_mm(length_mm).unwrap_or_default();
-            for (offset, start) in offset.iter_mut().zip(start) {
-                *offset = start + *offset;
-            }
-            end = Some(offset);
         } else if what == kind::LINE {
-            for part in &mut self.direction {
+            for part in &mut along {
                 *part = f64::from_bits(nibbles.bits(16));
             }
         }
         let length = expected + Position::from_bits(nibbles.number());
+        self.end = line_end(start, &along, length);
+        if what == kind::LINE_TO {
+            for ((end, start), offset) in self.end.iter_mut().zip(start).zip(offset) {
+                *end = start + offset;
+            }
+        }
+        (self.coefficients, self.length) = (as_septic(&along), length);
+        Item::Line { line, start, direction: along, length }
+    }
+
+    #[inline(never)]
+    fn septic(&mut self, nibbles: &mut Nibbles<'_>, what: u8, start: [Position; AXES]) -> Item<AXES> {
+        let line = self.line_number(nibbles);
+        let length = self.length + Position::from_bits(nibbles.number());
+        if what == kind::SEPTIC_TURNED {
+            self.coefficients = turned(&self.coefficients);
+        } else {
+            let mut coefficients = [[0.0; 7]; AXES];
+            let mut first = 0;
+            if what == kind::SEPTIC_ON {
+                first = 3;
+                let known = continued(&self.coefficients, self.length, length);
+                for ([a, b, c, ..], [first, second, third]) in coefficients.iter_mut().zip(known) {
+                    (*a, *b, *c) = (first, second, third);
+                }
+            }
+            nibbles.coefficients(first, coefficients.as_mut_slice());
+            self.coefficients = coefficients;
+        }
         self.length = length;
-        self.end = match end {
-            Some(end) => end,
-            None => line_end(start, &self.direction, length),
-        };
-        Item::Line { line, start, direction: self.direction, length }
+        self.end = septic_end(start, &self.coefficients, length);
+        Item::Septic { line, start, coefficients: self.coefficients, length }
     }
 
     #[inline(never)]
@@ -247,13 +267,14 @@ impl Nibbles<'_> {
         }
     }
 
-    fn coefficients<'b>(&mut self, axes: impl Iterator<Item = &'b mut [f64; 7]>) {
+    /// The coefficients of every axis from the one at `first` on.
+    fn coefficients(&mut self, first: usize, axes: &mut [[f64; 7]]) {
         let code = self.nibble();
         let to_grid = power_of_2(32 - grid(code));
         for coefficients in axes {
-            let count = self.nibble();
-            self.is_sound &= count <= 7;
-            for coefficient in coefficients.iter_mut().take(usize::from(count)) {
+            let end = usize::from(self.nibble());
+            self.is_sound &= end <= 7;
+            for coefficient in coefficients.iter_mut().take(end).skip(first) {
                 *coefficient = if code == WHOLE {
                     f64::from_bits(self.bits(16))
                 } else {

@@ -1,8 +1,8 @@
 //! Items to few bytes: each in the shortest form that gives it back to the bit.
 
 use super::{
-    FIRST_LENGTH, LENGTHS, Recent, State, WHOLE, by_law, cruise, direction, form, grid, kind, line_end,
-    own_length, power_of_2, septic_end, with_peak_jerk,
+    FIRST_LENGTH, LENGTHS, Recent, State, WHOLE, as_septic, by_law, continued, cruise, direction, form, grid,
+    kind, line_end, own_length, power_of_2, septic_end, turned, with_peak_jerk,
 };
 use crate::hal::{OutputState, Spindle};
 use crate::law::{LimitedBy, PlannedRamp, Ramp};
@@ -90,7 +90,7 @@ impl<const AXES: usize> State<AXES> {
         length: Position,
     ) {
         let offset = offset_of(&along, length);
-        let goes_on = along.iter().zip(&self.direction).all(|(&along, &before)| is(before, along));
+        let goes_on = along.iter().zip(self.coefficients).all(|(&along, [before, ..])| is(before, along));
         let (what, expected) = match offset {
             _ if goes_on => (kind::LINE_ON, self.length),
             Some((_, expected)) => (kind::LINE_TO, expected),
@@ -115,7 +115,7 @@ impl<const AXES: usize> State<AXES> {
             _ => {}
         }
         nibbles.number((length - expected).to_bits());
-        (self.line, self.direction, self.length) = (line, along, length);
+        (self.line, self.coefficients, self.length) = (line, as_septic(&along), length);
     }
 
     fn put_septic(
@@ -126,24 +126,29 @@ impl<const AXES: usize> State<AXES> {
         coefficients: &[[f64; 7]; AXES],
         length: Position,
     ) {
+        let on = continued(&self.coefficients, self.length, length);
+        let goes_on = coefficients.iter().zip(on).all(|(&[q1, q2, q3, ..], [first, second, third])| {
+            is(first, q1) && is(second, q2) && is(third, q3)
+        });
+        let turned = turned(&self.coefficients);
+        let is_turned = coefficients
+            .as_flattened()
+            .iter()
+            .zip(turned.as_flattened())
+            .all(|(&coefficient, &turned)| is(turned, coefficient));
+        let (what, first) = match (is_turned, goes_on) {
+            (true, _) => (kind::SEPTIC_TURNED, 7),
+            (false, true) => (kind::SEPTIC_ON, 3),
+            (false, false) => (kind::SEPTIC, 0),
+        };
         nibbles.starts(&self.end, &start);
-        nibbles.nibble(kind::SEPTIC);
+        nibbles.nibble(what);
         nibbles.number(i64::from(line.wrapping_sub(self.line).cast_signed()));
         nibbles.number((length - self.length).to_bits());
-        let code = (0..WHOLE)
-            .find(|&code| coefficients.as_flattened().iter().all(|&c| on_grid(c, grid(code)).is_some()))
-            .unwrap_or(WHOLE);
-        nibbles.nibble(code);
-        for coefficients in coefficients {
-            let count = coefficients.iter().rposition(|&c| !is(0.0, c)).map_or(0, |last| last as u8 + 1);
-            nibbles.nibble(count);
-            for &coefficient in coefficients.iter().take(usize::from(count)) {
-                match on_grid(coefficient, grid(code)) {
-                    Some(whole) if code < WHOLE => nibbles.number(whole),
-                    _ => nibbles.bits(coefficient.to_bits(), 16),
-                }
-            }
+        if what != kind::SEPTIC_TURNED {
+            nibbles.coefficients(first, coefficients);
         }
+        self.coefficients = *coefficients;
         (self.line, self.length) = (line, length);
         self.end = septic_end(start, coefficients, length);
     }
@@ -325,6 +330,24 @@ impl Nibbles<'_> {
         self.figure(feeds, *expected_cap, *cap);
         for (&expected, &limit) in expected.iter().zip(limits) {
             self.figure(others, expected, limit);
+        }
+    }
+
+    /// The coefficients of every axis from the one at `first` on, up to the last that is not 0.
+    fn coefficients(&mut self, first: usize, axes: &[[f64; 7]]) {
+        let written = || axes.iter().flat_map(|coefficients| coefficients.iter().skip(first));
+        let code = (0..WHOLE).find(|&code| written().all(|&c| on_grid(c, grid(code)).is_some())).unwrap_or(WHOLE);
+        self.nibble(code);
+        for coefficients in axes {
+            let end = coefficients.iter().rposition(|&c| !is(0.0, c)).map_or(0, |last| last + 1);
+            let end = if end > first { end } else { 0 };
+            self.nibble(end as u8);
+            for &coefficient in coefficients.iter().take(end).skip(first) {
+                match on_grid(coefficient, grid(code)) {
+                    Some(whole) if code < WHOLE => self.number(whole),
+                    _ => self.bits(coefficient.to_bits(), 16),
+                }
+            }
         }
     }
 
