@@ -16,6 +16,7 @@ use motion_tests::samples::SAMPLES;
 fn main() {
     let Some(files) = bench::asked() else { return };
     let machine = Machine::reference();
+    let mut totals = [(0, 0); 4];
     let dump = std::env::var("DUMP").is_ok();
     for (name, text) in SAMPLES {
         for path in [Path::Exact, Path::Blended(0.01), Path::Blended(0.05)] {
@@ -50,9 +51,11 @@ fn main() {
             for (k, n) in [("line", lines), ("curve", curves)] {
                 let c = c[usize::from(k == "curve")];
                 let total: usize = c.iter().map(|x| x.1).sum();
+                let t = usize::from(k == "curve") + if name == "modes" { 2 } else { 0 }; totals[t].0 += total; totals[t].1 += n;
                 println!("{name:12} {path:16} {k:6} blocks {n:6} total/block {:7.1} | piece {:?} block {:?} cruise {:?} ramp {:?} other {:?}", total as f64 / f64::from(n), c[0], c[1], c[2], c[3], c[4]);
             }
         }
     }
+    println!("{totals:?} {:?}", totals.map(|(b, n)| b as f64 / n as f64));
     let _ = files;
 }

@@ -46,9 +46,9 @@ pub(super) fn ceilings<const N: usize>(
     Ok(Ceilings { feed_mm_s, programmed, greatest })
 }
 
-/// A figure with the upper 20 digits of its fraction, which takes half the bytes: at most a millionth less.
+/// A figure with the upper 16 digits of its fraction, which takes fewer bytes: at most 1.6·10⁻⁵ less.
 pub(super) fn few_digits(figure: f64) -> f64 {
-    f64::from_bits(figure.to_bits() >> 32 << 32)
+    f64::from_bits(figure.to_bits() >> 36 << 36)
 }
 
 /// The ceiling with figures of few digits. The program's own feed stays.

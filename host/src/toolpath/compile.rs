@@ -176,7 +176,9 @@ const TURNED_GRID_BITS: i32 = 32;
 /// How far q₁ … q₃ may be from those of the curve, where a piece goes on as its predecessor ends.
 const CONTINUED: [f64; 3] = [1.0e-7, 3.0e-7, 1.0e-6];
 /// The same for all coefficients of a piece that is its predecessor turned.
-const TURNED: f64 = 2.0e-8;
+const TURNED: f64 = 1.0e-7;
+/// The same as a length \[mm\].
+const TURNED_MM: f64 = 1.0e-7;
 
 /// A piece near one with these coefficients from `start`, that takes fewer bytes after the one before.
 fn short<const N: usize>(
@@ -198,11 +200,12 @@ fn short<const N: usize>(
     };
     let start_at = near(end, start);
     let turned = turned(&before);
+    let most = TURNED.min(TURNED_MM / length.to_mm());
     let is_turned = turned
         .as_flattened()
         .iter()
         .zip(wanted.as_flattened())
-        .all(|(turned, wanted)| (turned - wanted).abs() <= TURNED);
+        .all(|(turned, wanted)| (turned - wanted).abs() <= most);
     if is_turned {
         return (start_at, turned);
     }

@@ -18,17 +18,18 @@
 //! | 7 | [`Item::Dwell`] | steps of a tick |
 //! | 8 | [`Item::Stop`] | |
 //! | 9 | [`Item::Switch`] | spindle and coolant, speed |
-//! | 10 | [`Item::Block`] | length, ten figures |
+//! | 10 | [`Item::Block`] | length, which figures are others than expected, and those |
 //! | 11 | [`Item::Block`] with the last one's limits | length, the junction's feed |
 //! | 12 | [`Item::Septic`] that goes on as the last piece ended: see [`continued`] | line, length less the last piece's, grid, q₄ … q₇ |
 //! | 13 | [`Item::Septic`] that is the last one [`turned`] | line, length less the last piece's |
 //! | 14 | a piece that starts elsewhere than the last one ended | how far from there; the piece |
+//! | 15 | [`Item::Line`] to the end of the block | line, its end from its start but for one axis, that one's end less what the length lets expect; length less what is left of the block |
 //!
 //! **Whole numbers** are a count of nibbles, 15 for 16, and that many of the number, the low ones first; the
 //! sign is the least significant bit. The program line is its difference to the last one.
 //!
-//! **Figures** are a nibble: 0 for the expected one, 1 to 11 for one of the last eleven that were written in
-//! full, 12 to 14 for the upper 5, 8 or 11 nibbles of an f64, whose others are 0, 15 for all 16.
+//! **Figures** are a nibble: 0 for the expected one, 1 to 11 for one of the eleven that were written last, other
+//! than as expected, the last one first, 12 to 14 for the upper 5, 7 or 11 nibbles of an f64, whose others are 0, 15 for all 16.
 //!
 //! What is expected is computed with IEEE basic operations and roots of `libm`, which are the same on every
 //! target. The writer computes it, too, and where it is not the item's own, down to the bits, writes that.
@@ -61,6 +62,7 @@ mod kind {
     pub(super) const SEPTIC_ON: u8 = 12;
     pub(super) const SEPTIC_TURNED: u8 = 13;
     pub(super) const ELSEWHERE: u8 = 14;
+    pub(super) const LINE_OVER: u8 = 15;
 }
 
 /// What fixes the times of a ramp.
@@ -75,31 +77,47 @@ mod form {
     pub(super) const TIMES: u8 = 3;
     /// All of a ramp's figures; and the limit, from here on.
     pub(super) const FIGURES: u8 = 6;
+    /// Acceleration, with the figures of the last ramp by it.
+    pub(super) const BY_ACCELERATION_AGAIN: u8 = 9;
+    /// Jerk, with the figures of the last ramp by it.
+    pub(super) const BY_JERK_AGAIN: u8 = 10;
+}
+
+/// Which figures of a block are others than expected.
+#[cfg(feature = "live")]
+mod other {
+    /// The program's feed and the cap up to it: others than the last block's.
+    pub(super) const FEED: u8 = 1;
+    /// The limits up to that feed: others than the last block's.
+    pub(super) const LIMITS: u8 = 2;
+    /// The cap at any feed: another than up to the program's.
+    pub(super) const GREATEST_CAP: u8 = 4;
+    /// The limits at any feed: others than up to the program's.
+    pub(super) const GREATEST_LIMITS: u8 = 8;
 }
 
 /// Nibbles of a figure that are written; the others are 0.
-const LENGTHS: [u8; 4] = [5, 8, 11, 16];
+const LENGTHS: [u8; 4] = [5, 7, 11, 16];
 /// The code of the first of them.
 const FIRST_LENGTH: u8 = 12;
 /// The count of nibbles that stands for all 16.
 const WHOLE: u8 = 15;
 
-/// Figures that were written in full of late.
+/// Figures that were written or referred to of late, the last one first.
 #[derive(Clone, Copy, Debug)]
-struct Recent {
-    figures: [f64; FIRST_LENGTH as usize - 1],
-    next: u8,
-}
+struct Recent([f64; FIRST_LENGTH as usize - 1]);
 
 impl Recent {
-    const NONE: Self = Self { figures: [0.0; FIRST_LENGTH as usize - 1], next: 0 };
+    const NONE: Self = Self([0.0; FIRST_LENGTH as usize - 1]);
+    /// The place of a figure that is not there.
+    const NEW: u8 = FIRST_LENGTH - 2;
 
-    fn push(&mut self, figure: f64) {
-        if let Some(place) = self.figures.get_mut(usize::from(self.next)) {
-            *place = figure;
+    /// Puts `figure`, which is at `place`, before the others.
+    fn to_front(&mut self, place: u8, figure: f64) {
+        let mut next = figure;
+        for figure in self.0.iter_mut().take(usize::from(place) + 1) {
+            core::mem::swap(figure, &mut next);
         }
-        let next = self.next + 1;
-        self.next = if usize::from(next) < self.figures.len() { next } else { 0 };
     }
 }
 
@@ -114,8 +132,17 @@ struct State<const AXES: usize> {
     /// Its length.
     length: Position,
     feed_mm_s: f64,
+    /// Edge, t₁ and acceleration of the last ramp that acceleration fixes.
+    by_acceleration: [f64; 3],
+    /// Edge and jerk of the last ramp that jerk fixes.
+    by_jerk: [f64; 2],
     #[cfg(feature = "live")]
     block: [f64; 10],
+    /// What pieces leave of the last block, and whether that is all.
+    #[cfg(feature = "live")]
+    left: Position,
+    #[cfg(feature = "live")]
+    is_whole: bool,
     feeds: Recent,
     others: Recent,
 }
@@ -127,11 +154,45 @@ impl<const AXES: usize> State<AXES> {
         coefficients: [[0.0; 7]; AXES],
         length: Position::ZERO,
         feed_mm_s: 0.0,
+        by_acceleration: [0.0; 3],
+        by_jerk: [0.0; 2],
         #[cfg(feature = "live")]
         block: [0.0; 10],
+        #[cfg(feature = "live")]
+        left: Position::ZERO,
+        #[cfg(feature = "live")]
+        is_whole: false,
         feeds: Recent::NONE,
         others: Recent::NONE,
     };
+
+    /// What is left of the block; 0 without one.
+    fn left(&self) -> Position {
+        #[cfg(feature = "live")]
+        return self.left;
+        #[cfg(not(feature = "live"))]
+        Position::ZERO
+    }
+
+    /// The expected length of a septic: like the last one's, but all of a block that has not begun and at most what is
+    /// left of it.
+    fn expected_length(&self) -> Position {
+        #[cfg(feature = "live")]
+        if self.left > Position::ZERO && (self.is_whole || self.left < self.length) {
+            return self.left;
+        }
+        self.length
+    }
+
+    /// Goes on behind a piece.
+    fn follow(&mut self, line: u32, length: Position, coefficients: &[[f64; 7]; AXES], end: [Position; AXES]) {
+        (self.line, self.length, self.coefficients, self.end) = (line, length, *coefficients, end);
+        #[cfg(feature = "live")]
+        {
+            self.left = self.left - length;
+            self.is_whole = false;
+        }
+    }
 }
 
 /// The direction of a line from its start to `offset` from there, and its length \[mm\]: the line that takes the
@@ -141,6 +202,17 @@ pub fn direction<const AXES: usize>(offset: [Position; AXES]) -> ([f64; AXES], f
     let direction = offset.map(Position::to_mm);
     let length_mm = magnitude(&direction);
     (unit(direction), length_mm)
+}
+
+/// How far a line of this length goes along one axis, of which `others` are the offsets along the others.
+fn remaining(length: Position, others: &[Position]) -> Position {
+    let length_mm = length.to_mm();
+    let mut square = length_mm * length_mm;
+    for other in others {
+        let other_mm = other.to_mm();
+        square -= other_mm * other_mm;
+    }
+    Position::from_mm(libm::sqrt(square)).unwrap_or_default()
 }
 
 /// Where a line ends, to a few position steps.

@@ -3,13 +3,17 @@
 //! Like [`wire`](crate::program::wire), it does not return at every nibble that is missing or wrong: that is noted, and
 //! makes the whole item `None` at its end.
 
+#[cfg(feature = "live")]
+use super::other;
 use super::{
     FIRST_LENGTH, LENGTHS, Recent, State, WHOLE, as_septic, by_law, continued, cruise, direction, form, grid,
-    kind, line_end, own_length, power_of_2, septic_end, turned, with_peak_jerk,
+    kind, line_end, own_length, power_of_2, remaining, septic_end, turned, with_peak_jerk,
 };
 use crate::hal::{OutputState, Spindle};
 use crate::law::{LimitedBy, PlannedRamp, Ramp, Ticks};
-use crate::program::{Item, PathBlock};
+use crate::program::Item;
+#[cfg(feature = "live")]
+use crate::program::PathBlock;
 use crate::units::Position;
 
 /// Reads items that an [`Encoder`](super::Encoder) wrote, from its first on.
@@ -49,10 +53,10 @@ impl<const AXES: usize> Decoder<AXES> {
         if what == kind::ELSEWHERE {
             nibbles.move_by(&mut start);
             what = nibbles.nibble();
-            nibbles.is_sound &= what < kind::ELSEWHERE;
+            nibbles.is_sound &= what != kind::ELSEWHERE;
         }
         match what {
-            kind::LINE_TO | kind::LINE_ON | kind::LINE => state.line(nibbles, what, start),
+            kind::LINE_TO | kind::LINE_ON | kind::LINE | kind::LINE_OVER => state.line(nibbles, what, start),
             kind::SEPTIC | kind::SEPTIC_ON | kind::SEPTIC_TURNED => state.septic(nibbles, what, start),
             kind::CRUISE => Item::Feed(cruise(state.feed_mm_s, Position::from_bits(nibbles.number()))),
             kind::RAMP => Item::Feed(state.ramp(nibbles)),
@@ -83,9 +87,7 @@ impl<const AXES: usize> Decoder<AXES> {
 impl<const AXES: usize> State<AXES> {
     fn line_number(&mut self, nibbles: &mut Nibbles<'_>) -> u32 {
         #[allow(clippy::cast_possible_truncation)]
-        let line = self.line.wrapping_add(nibbles.number() as u32);
-        self.line = line;
-        line
+        self.line.wrapping_add(nibbles.number() as u32)
     }
 
     #[inline(never)]
@@ -93,35 +95,44 @@ impl<const AXES: usize> State<AXES> {
         let line = self.line_number(nibbles);
         let mut along = self.coefficients.map(|[q1, ..]| q1);
         let (mut expected, mut offset) = (self.length, [Position::ZERO; AXES]);
-        if what == kind::LINE_TO {
-            nibbles.move_by(&mut offset);
-            let (towards, length_mm) = direction(offset);
-            along = towards;
-            expected = Position::from_mm(length_mm).unwrap_or_default();
-        } else if what == kind::LINE {
-            for part in &mut along {
-                *part = f64::from_bits(nibbles.bits(16));
+        match what {
+            kind::LINE_TO => {
+                nibbles.move_by(&mut offset);
+                let (towards, length_mm) = direction(offset);
+                along = towards;
+                expected = Position::from_mm(length_mm).unwrap_or_default();
             }
+            kind::LINE_OVER => {
+                expected = self.left();
+                nibbles.move_over(expected, &mut offset);
+                (along, _) = direction(offset);
+            }
+            kind::LINE => {
+                for part in &mut along {
+                    *part = f64::from_bits(nibbles.bits(16));
+                }
+            }
+            _ => {}
         }
         let length = expected + Position::from_bits(nibbles.number());
-        self.end = line_end(start, &along, length);
-        if what == kind::LINE_TO {
-            for ((end, start), offset) in self.end.iter_mut().zip(start).zip(offset) {
+        let mut end = line_end(start, &along, length);
+        if what == kind::LINE_TO || what == kind::LINE_OVER {
+            for ((end, start), offset) in end.iter_mut().zip(start).zip(offset) {
                 *end = start + offset;
             }
         }
-        (self.coefficients, self.length) = (as_septic(&along), length);
+        self.follow(line, length, &as_septic(&along), end);
         Item::Line { line, start, direction: along, length }
     }
 
     #[inline(never)]
     fn septic(&mut self, nibbles: &mut Nibbles<'_>, what: u8, start: [Position; AXES]) -> Item<AXES> {
         let line = self.line_number(nibbles);
-        let length = self.length + Position::from_bits(nibbles.number());
+        let length = self.expected_length() + Position::from_bits(nibbles.number());
+        let mut coefficients = [[0.0; 7]; AXES];
         if what == kind::SEPTIC_TURNED {
-            self.coefficients = turned(&self.coefficients);
+            coefficients = turned(&self.coefficients);
         } else {
-            let mut coefficients = [[0.0; 7]; AXES];
             let mut first = 0;
             if what == kind::SEPTIC_ON {
                 first = 3;
@@ -131,40 +142,56 @@ impl<const AXES: usize> State<AXES> {
                 }
             }
             nibbles.coefficients(first, coefficients.as_mut_slice());
-            self.coefficients = coefficients;
         }
-        self.length = length;
-        self.end = septic_end(start, &self.coefficients, length);
-        Item::Septic { line, start, coefficients: self.coefficients, length }
+        self.follow(line, length, &coefficients, septic_end(start, &coefficients, length));
+        Item::Septic { line, start, coefficients, length }
     }
 
     #[inline(never)]
     fn ramp(&mut self, nibbles: &mut Nibbles<'_>) -> PlannedRamp {
         let how = nibbles.nibble();
+        let (feeds, others) = (&mut self.feeds, &mut self.others);
+        let is_irregular = (form::FIGURES..form::BY_ACCELERATION_AGAIN).contains(&how);
         let from_mm_s =
-            if how >= form::FIGURES { nibbles.figure(&mut self.feeds, self.feed_mm_s) } else { self.feed_mm_s };
-        let to_mm_s = nibbles.figure(&mut self.feeds, 0.0);
+            if is_irregular { nibbles.figure(feeds, self.feed_mm_s) } else { self.feed_mm_s };
+        let to_mm_s = nibbles.figure(feeds, 0.0);
         self.feed_mm_s = to_mm_s;
-        let others = &mut self.others;
         let limited_by = match how {
-            form::BY_ACCELERATION | form::TIMES | form::FIGURES => LimitedBy::Acceleration,
-            form::BY_JERK | 4 | 7 => LimitedBy::Jerk,
+            form::BY_ACCELERATION | 3 | 6 | form::BY_ACCELERATION_AGAIN => LimitedBy::Acceleration,
+            form::BY_JERK | 4 | 7 | form::BY_JERK_AGAIN => LimitedBy::Jerk,
             form::BY_SNAP | 5 | 8 => LimitedBy::Snap,
             _ => nibbles.unsound(LimitedBy::Snap),
         };
-        let t1_s = if how == form::BY_JERK { 0.0 } else { nibbles.figure(others, 0.0) };
-        let edge_s = if how == form::BY_SNAP { 0.0 } else { nibbles.figure(others, 0.5 * t1_s) };
-        let ramp = if how < form::TIMES {
-            let limit = if how == form::BY_SNAP { 0.0 } else { nibbles.figure(others, 0.0) };
-            by_law(limited_by, from_mm_s, to_mm_s, edge_s, t1_s, limit)
-        } else {
-            let t2_s = nibbles.figure(others, t1_s);
-            let ramp =
-                Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3: 0.0, edge_s, t1_s, t2_s, limited_by };
-            if how < form::FIGURES {
-                with_peak_jerk(ramp)
-            } else {
-                Ramp { peak_jerk_mm_s3: nibbles.figure(others, 0.0), ..ramp }
+        let ramp = match how {
+            form::BY_ACCELERATION | form::BY_ACCELERATION_AGAIN => {
+                if how == form::BY_ACCELERATION {
+                    for figure in &mut self.by_acceleration {
+                        *figure = nibbles.figure(others, 0.0);
+                    }
+                }
+                let [edge_s, t1_s, accel_mm_s2] = self.by_acceleration;
+                by_law(limited_by, from_mm_s, to_mm_s, edge_s, t1_s, accel_mm_s2)
+            }
+            form::BY_JERK | form::BY_JERK_AGAIN => {
+                if how == form::BY_JERK {
+                    for figure in &mut self.by_jerk {
+                        *figure = nibbles.figure(others, 0.0);
+                    }
+                }
+                let [edge_s, jerk_mm_s3] = self.by_jerk;
+                by_law(limited_by, from_mm_s, to_mm_s, edge_s, 0.0, jerk_mm_s3)
+            }
+            form::BY_SNAP => by_law(limited_by, from_mm_s, to_mm_s, 0.0, nibbles.figure(others, 0.0), 0.0),
+            _ => {
+                let t1_s = nibbles.figure(others, 0.0);
+                let edge_s = nibbles.figure(others, 0.5 * t1_s);
+                let t2_s = nibbles.figure(others, t1_s);
+                let ramp = Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3: 0.0, edge_s, t1_s, t2_s, limited_by };
+                if is_irregular {
+                    Ramp { peak_jerk_mm_s3: nibbles.figure(others, 0.0), ..ramp }
+                } else {
+                    with_peak_jerk(ramp)
+                }
             }
         };
         PlannedRamp { ramp, length: own_length(&ramp) + Position::from_bits(nibbles.number()) }
@@ -175,17 +202,29 @@ impl<const AXES: usize> State<AXES> {
     fn block(&mut self, nibbles: &mut Nibbles<'_>, what: u8) -> PathBlock {
         let length = Position::from_bits(nibbles.number());
         let (feeds, others) = (&mut self.feeds, &mut self.others);
-        let [feed, programmed @ .., _, _, _, _, _] = &mut self.block;
         if what == kind::BLOCK {
-            *feed = nibbles.figure(feeds, *feed);
-            nibbles.allowed(feeds, others, programmed);
-            let programmed = *programmed;
-            let [_, _, _, _, _, greatest @ .., _] = &mut self.block;
-            *greatest = programmed;
-            nibbles.allowed(feeds, others, greatest);
+            let others_are = nibbles.nibble();
+            let [feed, cap, limits @ .., _, _, _, _, _] = &mut self.block;
+            if others_are & other::FEED != 0 {
+                *feed = nibbles.figure(feeds, *feed);
+                *cap = nibbles.figure(feeds, *cap);
+            }
+            if others_are & other::LIMITS != 0 {
+                nibbles.limits(others, limits);
+            }
+            let (cap, limits) = (*cap, *limits);
+            let [_, _, _, _, _, greatest_cap, greatest @ .., _] = &mut self.block;
+            (*greatest_cap, *greatest) = (cap, limits);
+            if others_are & other::GREATEST_CAP != 0 {
+                *greatest_cap = nibbles.figure(feeds, cap);
+            }
+            if others_are & other::GREATEST_LIMITS != 0 {
+                nibbles.limits(others, greatest);
+            }
         }
         let [.., junction] = &mut self.block;
         *junction = nibbles.figure(feeds, *junction);
+        (self.left, self.is_whole) = (length, true);
         PathBlock { length, figures: self.block }
     }
 }
@@ -241,22 +280,40 @@ impl Nibbles<'_> {
         let Some(length) = code.checked_sub(FIRST_LENGTH) else {
             return match code.checked_sub(1) {
                 None => expected,
-                Some(place) => recent.figures.get(usize::from(place)).copied().unwrap_or_default(),
+                Some(place) => {
+                    let figure = recent.0.get(usize::from(place)).copied().unwrap_or_default();
+                    recent.to_front(place, figure);
+                    figure
+                }
             };
         };
         let count = LENGTHS.get(usize::from(length)).copied().unwrap_or(16);
         let figure = f64::from_bits(self.bits(count) << (64 - 4 * u32::from(count)));
-        recent.push(figure);
+        recent.to_front(Recent::NEW, figure);
         figure
     }
 
-    /// Cap and limits, where others are expected.
+    /// Limits, where others are expected.
     #[cfg(feature = "live")]
-    fn allowed(&mut self, feeds: &mut Recent, others: &mut Recent, allowed: &mut [f64; 4]) {
-        let [cap, limits @ ..] = allowed;
-        *cap = self.figure(feeds, *cap);
+    fn limits(&mut self, others: &mut Recent, limits: &mut [f64; 3]) {
         for limit in limits {
             *limit = self.figure(others, *limit);
+        }
+    }
+
+    /// How far a line of this length goes.
+    #[inline(never)]
+    fn move_over(&mut self, length: Position, offset: &mut [Position]) {
+        let axis = usize::from(self.nibble());
+        for (_, offset) in offset.iter_mut().enumerate().filter(|&(index, _)| index != axis) {
+            *offset = Position::from_bits(self.number());
+        }
+        let expected = remaining(length, offset);
+        let less = self.number();
+        let expected = if less & 1 == 0 { expected } else { -expected };
+        match offset.get_mut(axis) {
+            Some(place) => *place = expected + Position::from_bits(less >> 1),
+            None => self.is_sound = false,
         }
     }
 

@@ -1,18 +1,24 @@
 //! Items to few bytes: each in the shortest form that gives it back to the bit.
 
+#[cfg(feature = "live")]
+use super::other;
 use super::{
     FIRST_LENGTH, LENGTHS, Recent, State, WHOLE, as_septic, by_law, continued, cruise, direction, form, grid,
-    kind, line_end, own_length, power_of_2, septic_end, turned, with_peak_jerk,
+    kind, line_end, own_length, power_of_2, remaining, septic_end, turned, with_peak_jerk,
 };
 use crate::hal::{OutputState, Spindle};
 use crate::law::{LimitedBy, PlannedRamp, Ramp};
-use crate::program::{Item, PathBlock};
+use crate::program::Item;
+#[cfg(feature = "live")]
+use crate::program::PathBlock;
 use crate::units::Position;
 
+/// Position steps by which a line may end elsewhere than its block.
+const NEAR_STEPS: u64 = 16;
 /// How far from a line's length, in halves of a position step, its end is searched along its direction.
 const HALF_STEPS: i32 = 4;
 /// Digits of an f64 of which jerk and acceleration of a ramp are tried: the limits of a plan may have as few.
-const DIGITS: [u32; 2] = [20, 32];
+const DIGITS: [u32; 2] = [16, 32];
 
 /// Writes items for a [`Decoder`](super::Decoder), from its first on.
 #[derive(Clone, Copy, Debug)]
@@ -91,19 +97,26 @@ impl<const AXES: usize> State<AXES> {
     ) {
         let offset = offset_of(&along, length);
         let goes_on = along.iter().zip(self.coefficients).all(|(&along, [before, ..])| is(before, along));
+        let left = self.left();
+        let is_to_end = left > Position::ZERO && (length - left).to_bits().unsigned_abs() <= NEAR_STEPS;
         let (what, expected) = match offset {
             _ if goes_on => (kind::LINE_ON, self.length),
+            Some(_) if is_to_end => (kind::LINE_OVER, left),
             Some((_, expected)) => (kind::LINE_TO, expected),
             None => (kind::LINE, self.length),
         };
         nibbles.starts(&self.end, &start);
         nibbles.nibble(what);
         nibbles.number(i64::from(line.wrapping_sub(self.line).cast_signed()));
-        self.end = line_end(start, &along, length);
+        let mut end = line_end(start, &along, length);
         match offset {
-            Some((offset, _)) if what == kind::LINE_TO => {
-                nibbles.moved(&[Position::ZERO; AXES], &offset);
-                for ((end, start), offset) in self.end.iter_mut().zip(start).zip(offset) {
+            Some((offset, _)) if what == kind::LINE_TO || what == kind::LINE_OVER => {
+                if what == kind::LINE_TO {
+                    nibbles.moved(&[Position::ZERO; AXES], &offset);
+                } else {
+                    nibbles.moved_over(left, offset);
+                }
+                for ((end, start), offset) in end.iter_mut().zip(start).zip(offset) {
                     *end = start + offset;
                 }
             }
@@ -115,7 +128,7 @@ impl<const AXES: usize> State<AXES> {
             _ => {}
         }
         nibbles.number((length - expected).to_bits());
-        (self.line, self.coefficients, self.length) = (line, as_septic(&along), length);
+        self.follow(line, length, &as_septic(&along), end);
     }
 
     fn put_septic(
@@ -144,13 +157,11 @@ impl<const AXES: usize> State<AXES> {
         nibbles.starts(&self.end, &start);
         nibbles.nibble(what);
         nibbles.number(i64::from(line.wrapping_sub(self.line).cast_signed()));
-        nibbles.number((length - self.length).to_bits());
+        nibbles.number((length - self.expected_length()).to_bits());
         if what != kind::SEPTIC_TURNED {
             nibbles.coefficients(first, coefficients);
         }
-        self.coefficients = *coefficients;
-        (self.line, self.length) = (line, length);
-        self.end = septic_end(start, coefficients, length);
+        self.follow(line, length, coefficients, septic_end(start, coefficients, length));
     }
 
     fn put_feed(&mut self, nibbles: &mut Nibbles<'_>, planned: &PlannedRamp) {
@@ -174,27 +185,45 @@ impl<const AXES: usize> State<AXES> {
             None if is(from_mm_s, ramp.from_mm_s) && same(&with_peak_jerk(ramp), &ramp) => form::TIMES + limit,
             None => form::FIGURES + limit,
         };
+        let (feeds, others) = (&mut self.feeds, &mut self.others);
+        let again = |how: u8, again: u8, last: &[f64], figures: &[f64]| {
+            let is_again = last.iter().zip(figures).all(|(&last, &figure)| is(last, figure));
+            if is_again { again } else { how }
+        };
+        let &Ramp { edge_s, t1_s, t2_s, .. } = &ramp;
+        let limit = by_law.unwrap_or_default();
+        let (by_acceleration, by_jerk) = ([edge_s, t1_s, limit], [edge_s, limit]);
+        let how = match how {
+            form::BY_ACCELERATION => again(how, form::BY_ACCELERATION_AGAIN, &self.by_acceleration, &by_acceleration),
+            form::BY_JERK => again(how, form::BY_JERK_AGAIN, &self.by_jerk, &by_jerk),
+            _ => how,
+        };
         nibbles.nibble(kind::RAMP);
         nibbles.nibble(how);
-        if how >= form::FIGURES {
-            nibbles.figure(&mut self.feeds, from_mm_s, ramp.from_mm_s);
+        let is_irregular = (form::FIGURES..form::BY_ACCELERATION_AGAIN).contains(&how);
+        if is_irregular {
+            nibbles.figure(feeds, from_mm_s, ramp.from_mm_s);
         }
-        nibbles.figure(&mut self.feeds, 0.0, ramp.to_mm_s);
-        let others = &mut self.others;
-        if how != form::BY_JERK {
-            nibbles.figure(others, 0.0, ramp.t1_s);
-        }
-        if how != form::BY_SNAP {
-            let t1_s = if how == form::BY_JERK { 0.0 } else { ramp.t1_s };
-            nibbles.figure(others, 0.5 * t1_s, ramp.edge_s);
-        }
-        match by_law {
-            Some(_) if how == form::BY_SNAP => {}
-            Some(limit) => nibbles.figure(others, 0.0, limit),
-            None => nibbles.figure(others, ramp.t1_s, ramp.t2_s),
-        }
-        if how >= form::FIGURES {
-            nibbles.figure(others, 0.0, ramp.peak_jerk_mm_s3);
+        nibbles.figure(feeds, 0.0, ramp.to_mm_s);
+        match how {
+            form::BY_ACCELERATION_AGAIN | form::BY_JERK_AGAIN => {}
+            form::BY_ACCELERATION => {
+                by_acceleration.iter().for_each(|&figure| nibbles.figure(others, 0.0, figure));
+                self.by_acceleration = by_acceleration;
+            }
+            form::BY_JERK => {
+                by_jerk.iter().for_each(|&figure| nibbles.figure(others, 0.0, figure));
+                self.by_jerk = by_jerk;
+            }
+            form::BY_SNAP => nibbles.figure(others, 0.0, t1_s),
+            _ => {
+                nibbles.figure(others, 0.0, t1_s);
+                nibbles.figure(others, 0.5 * t1_s, edge_s);
+                nibbles.figure(others, t1_s, t2_s);
+                if is_irregular {
+                    nibbles.figure(others, 0.0, ramp.peak_jerk_mm_s3);
+                }
+            }
         }
         nibbles.number((length - own_length(&ramp)).to_bits());
     }
@@ -211,7 +240,7 @@ impl<const AXES: usize> State<AXES> {
             LimitedBy::Snap => return makes(&0.0).then_some(0.0),
         };
         let steps = DIGITS.iter().map(|digits| rounded(near, 52 - digits));
-        steps.chain(self.others.figures).chain((-4..=4).map(|ulps| f64::from_bits(near.to_bits().wrapping_add_signed(ulps)))).find(makes)
+        steps.chain(self.others.0).chain((-4..=4).map(|ulps| f64::from_bits(near.to_bits().wrapping_add_signed(ulps)))).find(makes)
     }
 
     #[cfg(feature = "live")]
@@ -222,16 +251,35 @@ impl<const AXES: usize> State<AXES> {
         let goes_on = held.iter().zip(before).all(|(&held, before)| is(before, held));
         nibbles.nibble(if goes_on { kind::BLOCK_ON } else { kind::BLOCK });
         nibbles.number(block.length.to_bits());
-        let [feed_mm_s, programmed @ .., _, _, _, _, _] = block.figures;
-        let [_, _, _, _, _, greatest @ .., junction_mm_s] = block.figures;
+        let [feed_mm_s, cap, limits @ .., greatest_cap, _, _, _, junction_mm_s] = block.figures;
+        let [_, _, _, _, _, _, greatest @ .., _] = block.figures;
         if !goes_on {
-            let [feed_before, before @ .., _, _, _, _, _] = self.block;
-            nibbles.figure(feeds, feed_before, feed_mm_s);
-            nibbles.allowed(feeds, others, &before, &programmed);
-            nibbles.allowed(feeds, others, &programmed, &greatest);
+            let [feed_before, cap_before, limits_before @ .., _, _, _, _, _] = self.block;
+            let differ = |bit: u8, expected: &[f64], figures: &[f64]| {
+                if expected.iter().zip(figures).all(|(&expected, &figure)| is(expected, figure)) { 0 } else { bit }
+            };
+            let others_are = differ(other::FEED, &[feed_before, cap_before], &[feed_mm_s, cap])
+                | differ(other::LIMITS, &limits_before, &limits)
+                | differ(other::GREATEST_CAP, &[cap], &[greatest_cap])
+                | differ(other::GREATEST_LIMITS, &limits, &greatest);
+            nibbles.nibble(others_are);
+            if others_are & other::FEED != 0 {
+                nibbles.figure(feeds, feed_before, feed_mm_s);
+                nibbles.figure(feeds, cap_before, cap);
+            }
+            if others_are & other::LIMITS != 0 {
+                nibbles.limits(others, &limits_before, &limits);
+            }
+            if others_are & other::GREATEST_CAP != 0 {
+                nibbles.figure(feeds, cap, greatest_cap);
+            }
+            if others_are & other::GREATEST_LIMITS != 0 {
+                nibbles.limits(others, &limits, &greatest);
+            }
         }
         nibbles.figure(feeds, junction, junction_mm_s);
         self.block = block.figures;
+        (self.left, self.is_whole) = (block.length, true);
     }
 }
 
@@ -309,7 +357,8 @@ impl Nibbles<'_> {
         if is(expected, figure) {
             return self.nibble(0);
         }
-        if let Some(place) = recent.figures.iter().position(|&recent| is(recent, figure)) {
+        if let Some(place) = recent.0.iter().position(|&recent| is(recent, figure)) {
+            recent.to_front(place as u8, figure);
             return self.nibble(place as u8 + 1);
         }
         let bits = figure.to_bits();
@@ -321,16 +370,33 @@ impl Nibbles<'_> {
             .unwrap_or((FIRST_LENGTH + 3, 16));
         self.nibble(code);
         self.bits(bits >> shift(count), count);
-        recent.push(figure);
+        recent.to_front(Recent::NEW, figure);
     }
 
     #[cfg(feature = "live")]
-    fn allowed(&mut self, feeds: &mut Recent, others: &mut Recent, expected: &[f64; 4], allowed: &[f64; 4]) {
-        let ([expected_cap, expected @ ..], [cap, limits @ ..]) = (expected, allowed);
-        self.figure(feeds, *expected_cap, *cap);
+    fn limits(&mut self, others: &mut Recent, expected: &[f64; 3], limits: &[f64; 3]) {
         for (&expected, &limit) in expected.iter().zip(limits) {
             self.figure(others, expected, limit);
         }
+    }
+
+    /// The offset of a line of this length: of its greatest part, what the others let expect is left out.
+    fn moved_over<const AXES: usize>(&mut self, length: Position, mut offset: [Position; AXES]) {
+        let greatest = offset.iter().enumerate().max_by_key(|(_, part)| part.to_bits().unsigned_abs());
+        let axis = greatest.map_or(0, |(axis, _)| axis);
+        self.nibble(axis as u8);
+        let mut greatest = Position::ZERO;
+        for (index, part) in offset.iter_mut().enumerate() {
+            if index == axis {
+                greatest = core::mem::take(part);
+            } else {
+                self.number(part.to_bits());
+            }
+        }
+        let expected = remaining(length, &offset);
+        let is_back = greatest < Position::ZERO;
+        let less = greatest - if is_back { -expected } else { expected };
+        self.number(less.to_bits() << 1 | i64::from(is_back));
     }
 
     /// The coefficients of every axis from the one at `first` on, up to the last that is not 0.
