@@ -6,7 +6,7 @@
 use motion_kernel::num::Real;
 use motion_kernel::path::{Piece, PieceError};
 use motion_kernel::program::Item;
-use motion_kernel::program::compact::{as_septic, continued, direction, line_end, septic_end, turned};
+use motion_kernel::program::compact::{continued, direction, line_end, piece, turned};
 use motion_kernel::units::Position;
 
 use super::element::Element;
@@ -163,6 +163,8 @@ pub fn compile<R: Real, const N: usize>(
 /// A piece starts where its predecessor ends, which takes fewest bytes, if that is this near to where it should start
 /// \[mm\]; so gaps do not add up.
 const NEAR_MM: f64 = 2.0e-8;
+/// How far its end may be from where its length leads along the curve \[mm\].
+const END_MM: f64 = 1.0e-7;
 
 /// `end`, if that is near `start`.
 fn near<const N: usize>(end: [Position; N], start: [Position; N]) -> [Position; N] {
@@ -170,15 +172,13 @@ fn near<const N: usize>(end: [Position; N], start: [Position; N]) -> [Position; 
     if is_near { end } else { start }
 }
 
-/// Bits of coefficients after the point; of those that are turned on, too.
-const GRID_BITS: i32 = 28;
+/// Bits of coefficients after the point, for pieces up to 1 mm and longer ones.
+const GRID_BITS: [i32; 2] = [26, 28];
+/// The same for a piece that may be turned on: its rounding adds up.
 const TURNED_GRID_BITS: i32 = 32;
-/// How far q₁ … q₃ may be from those of the curve, where a piece goes on as its predecessor ends.
-const CONTINUED: [f64; 3] = [1.0e-7, 3.0e-7, 1.0e-6];
-/// The same for all coefficients of a piece that is its predecessor turned.
-const TURNED: f64 = 1.0e-7;
-/// The same as a length \[mm\].
-const TURNED_MM: f64 = 1.0e-7;
+/// How far a piece's q₁ … q₃ may be from the curve's, and those with which the next would go on. Less than a number of 24
+/// bits resolves in the derivatives that they stand for.
+const NEAR: [f64; 3] = [2.0e-7, 6.0e-7, 2.0e-6];
 
 /// A piece near one with these coefficients from `start`, that takes fewer bytes after the one before.
 fn short<const N: usize>(
@@ -188,53 +188,59 @@ fn short<const N: usize>(
     length: Position,
     is_followed: bool,
 ) -> ([Position; N], [[f64; 7]; N]) {
-    let grid = |bits| wanted.map(|axis| axis.map(|coefficient| on_grid(coefficient, bits)));
-    let (end, before, length_before) = match before.map(|before| before.item) {
-        Some(Item::Line { start, direction, length, .. }) => {
-            (line_end(start, &direction, length), as_septic(&direction), length)
-        }
-        Some(Item::Septic { start, coefficients, length, .. }) => {
-            (septic_end(start, &coefficients, length), coefficients, length)
-        }
-        _ => return (start, grid(if is_followed { TURNED_GRID_BITS } else { GRID_BITS })),
+    let length_mm = length.to_mm();
+    let [fine, _] = GRID_BITS;
+    let bits = if length_mm > 1.0 { GRID_BITS[1] } else { fine };
+    let Some((end, before, length_before)) = before.and_then(|before| piece(&before.item)) else {
+        return (start, rounded(&wanted, if is_followed { TURNED_GRID_BITS } else { bits }));
     };
-    let start_at = near(end, start);
+    let start = near(end, start);
     let turned = turned(&before);
-    let most = TURNED.min(TURNED_MM / length.to_mm());
-    let is_turned = turned
-        .as_flattened()
-        .iter()
-        .zip(wanted.as_flattened())
-        .all(|(turned, wanted)| (turned - wanted).abs() <= most);
-    if is_turned {
-        return (start_at, turned);
+    if is_near(&turned, &wanted, length_mm) {
+        return (start, turned);
     }
     let on = continued(&before, length_before, length);
-    let goes_on = on.iter().zip(&wanted).all(|(on, wanted)| {
-        on.iter().zip(wanted).zip(CONTINUED).all(|((on, wanted), most)| (on - wanted).abs() <= most)
-    });
-    if !goes_on {
-        return (start_at, grid(if is_followed { TURNED_GRID_BITS } else { GRID_BITS }));
-    }
     // Its end stays as far from its start, and so does how it goes on.
     let coefficients = core::array::from_fn(|axis| {
         let [q1, q2, q3] = on[axis];
-        let [rise, end1, end2, end3] = derivatives_at_end(&wanted[axis]);
-        let [_, _, _, upper @ ..] = between(rise, [q1, 2.0 * q2, 6.0 * q3], [end1, end2, end3]);
-        let [q4, q5, q6, q7] = upper.map(|coefficient| on_grid(coefficient, GRID_BITS));
+        let [rise, first, second, third] = at_end(&wanted[axis]);
+        let to = [first, 2.0 * second, 6.0 * third];
+        let [_, _, _, upper @ ..] = between(rise, [q1, 2.0 * q2, 6.0 * q3], to);
+        let [q4, q5, q6, q7] = upper.map(|coefficient| on_grid(coefficient, bits));
         [q1, q2, q3, q4, q5, q6, q7]
     });
-    (start_at, coefficients)
+    if is_near(&coefficients, &wanted, length_mm) {
+        return (start, coefficients);
+    }
+    (start, rounded(&wanted, if is_followed { TURNED_GRID_BITS } else { bits }))
 }
 
-/// Value and first to third derivative at 1.
-fn derivatives_at_end(coefficients: &[f64; 7]) -> [f64; 4] {
+/// Whether a piece starts and ends as `wanted`.
+fn is_near<const N: usize>(found: &[[f64; 7]; N], wanted: &[[f64; 7]; N], length_mm: f64) -> bool {
+    found.iter().zip(wanted).all(|(found, wanted)| {
+        let [rise, ends @ ..] = at_end(found);
+        let [wanted_rise, wanted_ends @ ..] = at_end(wanted);
+        let is_near = |(found, wanted): (&[f64], &[f64])| {
+            found.iter().zip(wanted).zip(NEAR).all(|((found, wanted), most)| (found - wanted).abs() <= most)
+        };
+        (rise - wanted_rise).abs() <= NEAR[0].min(END_MM / length_mm)
+            && [(&found[..3], &wanted[..3]), (&ends, &wanted_ends)].into_iter().all(is_near)
+    })
+}
+
+fn rounded<const N: usize>(wanted: &[[f64; 7]; N], bits: i32) -> [[f64; 7]; N] {
+    wanted.map(|axis| axis.map(|coefficient| on_grid(coefficient, bits)))
+}
+
+/// The value at 1, and q₁ … q₃ with which a polynomial goes on from there.
+fn at_end(coefficients: &[f64; 7]) -> [f64; 4] {
     let mut at_end = [0.0; 4];
     for (k, coefficient) in (1_u8..).zip(coefficients) {
+        // Binomial coefficients.
         let mut part = *coefficient;
         for (order, sum) in (0_u8..).zip(&mut at_end) {
             *sum += part;
-            part *= f64::from(k) - f64::from(order);
+            part *= (f64::from(k) - f64::from(order)) / f64::from(order + 1);
         }
     }
     at_end

@@ -3,22 +3,22 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MOTN` |
-//! | 1 | version of this format, 5 |
+//! | 1 | version of this format, 6 |
 //! | 1 | number of axes |
 //! | 2 | length of the guards, least significant byte first; 0 for none |
 //! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format; a kernel without guards skips them |
-//! | … | [`Header`], then [`Item`]s to the end, each in the same format |
+//! | … | [`Header`], in the same format |
+//! | … | [`Item`]s to the end, each [as few bytes](super::compact) |
 //! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
 //!
 //! A [`Reader`] is made only of a whole and undamaged program. [`check`](super::check()) tells a board
 //! whether its items can be executed, before anything moves. Figures are kept in f64, so the program runs in
 //! any number type and gives the same bits wherever it is read.
 
-use core::marker::PhantomData;
-
 use serde::{Deserialize, Serialize};
 
 use super::checksum::Checksum;
+use super::compact::{Decoder, Encoder};
 use super::{Item, wire};
 use crate::axis::{AxisFigures, Guards};
 use crate::law::Pulse;
@@ -26,11 +26,11 @@ use crate::queue::PathRules;
 use crate::units::Position;
 
 const MAGIC: [u8; 4] = *b"MOTN";
-const VERSION: u8 = 5;
+const VERSION: u8 = 6;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 9;
-/// Greatest length of a header or an item with that many axes \[bytes\].
+/// Greatest length of guards, a header or an item with that many axes \[bytes\].
 const ENTRY_MAX: usize = 4096;
 
 /// The machine and tick that a program was planned for. A board executes it with these or not at all.
@@ -60,7 +60,7 @@ pub enum ProgramError {
     NotAProgram,
     /// It has another version of the format.
     Version {
-        /// Its version; 5 is expected.
+        /// Its version; 6 is expected.
         found: u8,
     },
     /// It is for a machine with another number of axes.
@@ -103,7 +103,8 @@ impl core::error::Error for ProgramError {}
 /// Appends a program to `out`.
 ///
 /// # Errors
-/// There are more than nine axes, for which an entry may exceed the format's bound.
+/// There are more than nine axes, for which an entry may exceed the format's bound; or there is a block, and the
+/// kernel is one without live control.
 pub fn write<'a, const AXES: usize>(
     header: &Header<AXES>,
     guards: Option<&Guards<AXES>>,
@@ -129,8 +130,11 @@ pub fn write<'a, const AXES: usize>(
     put(&(guards.len() as u16).to_le_bytes());
     put(guards);
     put(postcard::to_slice(header, &mut entry)?);
+    let mut encoder = Encoder::new();
     for item in items {
-        put(postcard::to_slice(item, &mut entry)?);
+        // There is room, but a kernel without live control has no blocks.
+        let length = encoder.encode(item, &mut entry).ok_or(postcard::Error::SerdeSerCustom)?;
+        put(entry.get(..length).unwrap_or_default());
     }
     out.extend(sum.finish().to_le_bytes());
     Ok(())
@@ -142,16 +146,19 @@ pub struct Reader<'a, const AXES: usize> {
     header: Header<AXES>,
     #[cfg(feature = "guards")]
     guards: &'a [u8],
-    items: Items<'a, AXES>,
+    items: &'a [u8],
+    /// Where the items end, from the start of the program.
+    end: usize,
 }
 
-/// A program's items, in order. A few words in size; the header, a kilobyte, stays with the [`Reader`].
+/// A program's items, in order, with what they have in common with the items before. The header, a kilobyte, stays
+/// with the [`Reader`].
 #[derive(Clone, Copy, Debug)]
 pub struct Items<'a, const AXES: usize> {
     left: &'a [u8],
     /// Where the items end, from the start of the program.
     end: usize,
-    items: PhantomData<Item<AXES>>,
+    decoder: Decoder<AXES>,
 }
 
 impl<'a, const AXES: usize> Reader<'a, AXES> {
@@ -186,7 +193,8 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
             header,
             #[cfg(feature = "guards")]
             guards: _guards,
-            items: Items { left, end: summed.len(), items: PhantomData },
+            items: left,
+            end: summed.len(),
         })
     }
 
@@ -212,7 +220,7 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
 
     /// All of its items.
     pub fn items(&self) -> Items<'a, AXES> {
-        self.items
+        Items { left: self.items, end: self.end, decoder: Decoder::new() }
     }
 }
 
@@ -224,7 +232,7 @@ impl<const AXES: usize> Iterator for Items<'_, AXES> {
             return None;
         }
         let at = self.end - self.left.len();
-        Some(match wire::take(self.left) {
+        Some(match self.decoder.take(self.left) {
             Some((item, left)) => {
                 self.left = left;
                 Ok(item)

@@ -37,9 +37,13 @@
 mod read;
 mod write;
 
+#[cfg(test)]
+mod tests;
+
 pub use read::Decoder;
 pub use write::Encoder;
 
+use super::Item;
 use crate::law::segment::to_f64;
 use crate::law::{LimitedBy, PlannedRamp, Ramp};
 use crate::path::magnitude;
@@ -231,8 +235,7 @@ pub fn line_end<const AXES: usize>(
 }
 
 /// Where a septic ends, to a few position steps.
-#[must_use]
-pub fn septic_end<const AXES: usize>(
+fn septic_end<const AXES: usize>(
     start: [Position; AXES],
     coefficients: &[[f64; 7]; AXES],
     length: Position,
@@ -246,9 +249,24 @@ pub fn septic_end<const AXES: usize>(
     line_end(start, &sums, length)
 }
 
-/// A line's direction as q₁ of a septic.
+/// Where a piece ends, its coefficients and its length: what the next piece may be expected from. A line's coefficients
+/// are its direction and zeros. `None` of other items.
 #[must_use]
-pub fn as_septic<const AXES: usize>(direction: &[f64; AXES]) -> [[f64; 7]; AXES] {
+pub fn piece<const AXES: usize>(
+    item: &Item<AXES>,
+) -> Option<([Position; AXES], [[f64; 7]; AXES], Position)> {
+    match item {
+        Item::Line { start, direction, length, .. } => {
+            Some((line_end(*start, direction, *length), as_septic(direction), *length))
+        }
+        Item::Septic { start, coefficients, length, .. } => {
+            Some((septic_end(*start, coefficients, *length), *coefficients, *length))
+        }
+        _ => None,
+    }
+}
+
+fn as_septic<const AXES: usize>(direction: &[f64; AXES]) -> [[f64; 7]; AXES] {
     direction.map(|part| [part, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 }
 

@@ -301,8 +301,10 @@ fn offset_of<const AXES: usize>(
     along: &[f64; AXES],
     length: Position,
 ) -> Option<([Position; AXES], Position)> {
-    (-HALF_STEPS..=HALF_STEPS).find_map(|half_steps| {
-        let length_mm = length.to_mm() + f64::from(half_steps) * power_of_2(-33);
+    // The nearest first.
+    (0..=2 * HALF_STEPS).find_map(|number| {
+        let half_steps = f64::from((number + 1) / 2) * power_of_2(-33);
+        let length_mm = length.to_mm() + if number % 2 == 0 { half_steps } else { -half_steps };
         let mut offset = [Position::ZERO; AXES];
         for (offset, part) in offset.iter_mut().zip(along) {
             *offset = Position::from_mm(part * length_mm)?;
