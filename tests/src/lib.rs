@@ -7,6 +7,8 @@ pub mod check;
 pub mod axes;
 pub mod bench;
 pub mod block_lists;
+#[cfg(feature = "host")]
+pub mod bytes;
 pub mod cycles;
 #[allow(missing_docs, reason = "arithmetic")]
 pub mod dd;

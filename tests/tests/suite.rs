@@ -11,6 +11,7 @@
 mod accuracy;
 mod blends;
 mod boards;
+mod bytes;
 mod faults;
 mod feedforward;
 mod fixed_range;

@@ -162,9 +162,9 @@ pub fn compile<R: Real, const N: usize>(
 
 /// A piece starts where its predecessor ends, which takes fewest bytes, if that is this near to where it should start
 /// \[mm\]; so gaps do not add up.
-const NEAR_MM: f64 = 2.0e-8;
+const NEAR_MM: f64 = 2.0e-7;
 /// How far its end may be from where its length leads along the curve \[mm\].
-const END_MM: f64 = 1.0e-7;
+const END_MM: f64 = 3.0e-7;
 
 /// `end`, if that is near `start`.
 fn near<const N: usize>(end: [Position; N], start: [Position; N]) -> [Position; N] {
@@ -172,7 +172,7 @@ fn near<const N: usize>(end: [Position; N], start: [Position; N]) -> [Position; 
     if is_near { end } else { start }
 }
 
-/// Bits of coefficients after the point, for pieces up to 1 mm and longer ones.
+/// Bits of coefficients after the point: for the last pieces of their curves up to 1 mm, and for all others.
 const GRID_BITS: [i32; 2] = [26, 28];
 /// The same for a piece that may be turned on: its rounding adds up.
 const TURNED_GRID_BITS: i32 = 32;
@@ -189,8 +189,8 @@ fn short<const N: usize>(
     is_followed: bool,
 ) -> ([Position; N], [[f64; 7]; N]) {
     let length_mm = length.to_mm();
-    let [fine, _] = GRID_BITS;
-    let bits = if length_mm > 1.0 { GRID_BITS[1] } else { fine };
+    let [of_short, of_long] = GRID_BITS;
+    let bits = if length_mm > 1.0 || is_followed { of_long } else { of_short };
     let Some((end, before, length_before)) = before.and_then(|before| piece(&before.item)) else {
         return (start, rounded(&wanted, if is_followed { TURNED_GRID_BITS } else { bits }));
     };

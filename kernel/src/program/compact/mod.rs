@@ -307,12 +307,21 @@ pub fn turned<const AXES: usize>(coefficients: &[[f64; 7]; AXES]) -> [[f64; 7]; 
         }
         column
     };
-    // Across the circle and, but for the sign, along it, where the piece starts.
+    let one = Position::from_bits(1);
+    let end = continued(coefficients, one, one);
+    // Across the circle where the piece starts, and the part along it of what is across where it ends: a sharper plane than
+    // that of the third derivative.
     let across = unit(column(|&[_, q2, ..]| q2));
-    let along = unit(column(|&[_, _, q3, ..]| q3));
+    let across_end = end.map(|[_, second, _]| second);
+    let part = dot(&across_end, &across);
+    let mut along = across_end;
+    for (along, across) in along.iter_mut().zip(&across) {
+        *along -= part * across;
+    }
+    let along = unit(along);
     let parts = |vector: &[f64; AXES]| (dot(vector, &along), dot(vector, &across));
     let (a, b) = parts(&column(|&[q1, ..]| q1));
-    let (a_end, b_end) = parts(&continued(coefficients, Position::from_bits(1), Position::from_bits(1)).map(|[first, ..]| first));
+    let (a_end, b_end) = parts(&end.map(|[first, ..]| first));
     let squares = libm::sqrt((a * a + b * b) * (a_end * a_end + b_end * b_end));
     let (less, sine) = ((a * a_end + b * b_end) / squares - 1.0, (a * b_end - b * a_end) / squares);
     let mut turned = *coefficients;
