@@ -162,9 +162,9 @@ pub fn compile<R: Real, const N: usize>(
 
 /// A piece starts where its predecessor ends, which takes fewest bytes, if that is this near to where it should start
 /// \[mm\]; so gaps do not add up.
-const NEAR_MM: f64 = 2.0e-7;
+const NEAR_MM: f64 = 1.0e-9;
 /// How far its end may be from where its length leads along the curve \[mm\].
-const END_MM: f64 = 3.0e-7;
+const END_MM: f64 = 1.0e-9;
 
 /// `end`, if that is near `start`.
 fn near<const N: usize>(end: [Position; N], start: [Position; N]) -> [Position; N] {
@@ -172,13 +172,12 @@ fn near<const N: usize>(end: [Position; N], start: [Position; N]) -> [Position; 
     if is_near { end } else { start }
 }
 
-/// Bits of coefficients after the point: for the last pieces of their curves up to 1 mm, and for all others.
-const GRID_BITS: [i32; 2] = [26, 28];
+/// Bits of coefficients after the point: a third derivative of seven of them is good to 10⁻⁸ of what it may be.
+const GRID_BITS: i32 = 36;
 /// The same for a piece that may be turned on: its rounding adds up.
-const TURNED_GRID_BITS: i32 = 32;
-/// How far a piece's q₁ … q₃ may be from the curve's, and those with which the next would go on. Less than a number of 24
-/// bits resolves in the derivatives that they stand for.
-const NEAR: [f64; 3] = [2.0e-7, 6.0e-7, 2.0e-6];
+const TURNED_GRID_BITS: i32 = 38;
+/// How far a piece's q₁ … q₃ may be from the curve's, and those with which the next would go on.
+const NEAR: [f64; 3] = [6.0e-10, 3.0e-10, 1.5e-9];
 
 /// A piece near one with these coefficients from `start`, that takes fewer bytes after the one before.
 fn short<const N: usize>(
@@ -189,10 +188,9 @@ fn short<const N: usize>(
     is_followed: bool,
 ) -> ([Position; N], [[f64; 7]; N]) {
     let length_mm = length.to_mm();
-    let [of_short, of_long] = GRID_BITS;
-    let bits = if length_mm > 1.0 || is_followed { of_long } else { of_short };
+    let bits = if is_followed { TURNED_GRID_BITS } else { GRID_BITS };
     let Some((end, before, length_before)) = before.and_then(|before| piece(&before.item)) else {
-        return (start, rounded(&wanted, if is_followed { TURNED_GRID_BITS } else { bits }));
+        return (start, rounded(&wanted, bits));
     };
     let start = near(end, start);
     let turned = turned(&before);
@@ -206,13 +204,13 @@ fn short<const N: usize>(
         let [rise, first, second, third] = at_end(&wanted[axis]);
         let to = [first, 2.0 * second, 6.0 * third];
         let [_, _, _, upper @ ..] = between(rise, [q1, 2.0 * q2, 6.0 * q3], to);
-        let [q4, q5, q6, q7] = upper.map(|coefficient| on_grid(coefficient, bits));
+        let [q4, q5, q6, q7] = upper.map(|coefficient| on_grid(coefficient, GRID_BITS));
         [q1, q2, q3, q4, q5, q6, q7]
     });
     if is_near(&coefficients, &wanted, length_mm) {
         return (start, coefficients);
     }
-    (start, rounded(&wanted, if is_followed { TURNED_GRID_BITS } else { bits }))
+    (start, rounded(&wanted, bits))
 }
 
 /// Whether a piece starts and ends as `wanted`.
