@@ -29,7 +29,10 @@ fn main() {
         for (name, text) in SAMPLES {
             let program = gcode::read(name, text.as_bytes()).map_err(|error| error.to_string());
             for path in PATHS {
-                let bytes = program.as_ref().map_err(Clone::clone).and_then(|program| measured(name, &on(program, path)));
+                let bytes = program
+                    .as_ref()
+                    .map_err(Clone::clone)
+                    .and_then(|program| measured(name, &on(program, path)));
                 row(name, &path.to_string(), bytes, &mut all);
             }
         }

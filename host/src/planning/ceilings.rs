@@ -46,9 +46,14 @@ pub(super) fn ceilings<const N: usize>(
     Ok(Ceilings { feed_mm_s, programmed, greatest })
 }
 
-/// A figure with the upper 16 digits of its fraction, which takes fewer bytes: at most 1.6·10⁻⁵ less.
+/// What the limits of axes along a line leave for the rounding of its direction to position steps.
+const DIRECTION_ROUNDING: f64 = 3.0e-7;
+
+/// A figure with the upper 16 digits of its fraction, which takes fewer bytes: at most 1.6·10⁻⁵ less. One that has no more
+/// stays; any other leaves room for the rounding of directions.
 pub(super) fn few_digits(figure: f64) -> f64 {
-    f64::from_bits(figure.to_bits() >> 36 << 36)
+    let cut = |figure: f64| f64::from_bits(figure.to_bits() >> 36 << 36);
+    if cut(figure) == figure { figure } else { cut(figure * (1.0 - DIRECTION_ROUNDING)) }
 }
 
 /// The ceiling with figures of few digits. The program's own feed stays.

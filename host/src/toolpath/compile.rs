@@ -135,8 +135,11 @@ pub fn compile<R: Real, const N: usize>(
         let direction = line_direction(start, along(1)?, length_mm / parts as f64)
             .unwrap_or_else(|| scale(subtract(to, from), 1.0 / length_mm));
         for part in 0..parts {
-            let part_end_mm =
-                if part + 1 == parts { end_mm } else { start_mm + length_mm * ((part + 1) as f64 / parts as f64) };
+            let part_end_mm = if part + 1 == parts {
+                end_mm
+            } else {
+                start_mm + length_mm * ((part + 1) as f64 / parts as f64)
+            };
             let length = length_to(part_end_mm, length_mm / parts as f64)?;
             // What the number type cannot hold is refused here.
             Piece::<R, N>::line(line, start, direction, length)?;
@@ -172,12 +175,23 @@ fn near<const N: usize>(end: [Position; N], start: [Position; N]) -> [Position; 
     if is_near { end } else { start }
 }
 
-/// Bits of coefficients after the point: a third derivative of seven of them is good to 10⁻⁸ of what it may be.
-const GRID_BITS: i32 = 36;
-/// The same for a piece that may be turned on: its rounding adds up.
-const TURNED_GRID_BITS: i32 = 38;
-/// How far a piece's q₁ … q₃ may be from the curve's, and those with which the next would go on.
+/// Bits of coefficients after the point: at least, at most, and how many more for a piece that may be turned on, whose
+/// rounding adds up. A piece that asks for more keeps its coefficients as they are.
+const GRID_BITS: [i32; 2] = [36, 44];
+const TURNED_GRID_BITS: i32 = 2;
+/// The third derivative, as a part of the length, down to which the least bits do: coefficients are good to 10⁻⁸ of it.
+const BENT: f64 = 1.5e-3;
+/// How far a piece's q₁ … q₃ may be from the curve's, and those with which the next would go on, with the least bits.
 const NEAR: [f64; 3] = [6.0e-10, 3.0e-10, 1.5e-9];
+
+/// The bits for a piece: more for one that bends little, whose jerk is small.
+fn grid_bits<const N: usize>(wanted: &[[f64; 7]; N]) -> Option<i32> {
+    let thirds = wanted.iter().flat_map(|axis| [axis[2], at_end(axis)[3]]);
+    let third = thirds.fold(0.0, |most, third| f64::max(most, 6.0 * third.abs()));
+    let [least, most] = GRID_BITS;
+    let more = (BENT / third).log2().max(0.0);
+    (more <= f64::from(most - least)).then(|| least + 2 * (0.5 * more).ceil() as i32)
+}
 
 /// A piece near one with these coefficients from `start`, that takes fewer bytes after the one before.
 fn short<const N: usize>(
@@ -187,14 +201,15 @@ fn short<const N: usize>(
     length: Position,
     is_followed: bool,
 ) -> ([Position; N], [[f64; 7]; N]) {
-    let length_mm = length.to_mm();
-    let bits = if is_followed { TURNED_GRID_BITS } else { GRID_BITS };
+    let Some(bits) = grid_bits(&wanted) else { return (start, wanted) };
+    let near_part = f64::exp2(f64::from(GRID_BITS[0] - bits));
+    let first_bits = if is_followed { (bits + TURNED_GRID_BITS).min(GRID_BITS[1]) } else { bits };
     let Some((end, before, length_before)) = before.and_then(|before| piece(&before.item)) else {
-        return (start, rounded(&wanted, bits));
+        return (start, rounded(&wanted, first_bits));
     };
     let start = near(end, start);
     let turned = turned(&before);
-    if is_near(&turned, &wanted, length_mm) {
+    if is_near(&turned, &wanted, length, near_part) {
         return (start, turned);
     }
     let on = continued(&before, length_before, length);
@@ -204,24 +219,33 @@ fn short<const N: usize>(
         let [rise, first, second, third] = at_end(&wanted[axis]);
         let to = [first, 2.0 * second, 6.0 * third];
         let [_, _, _, upper @ ..] = between(rise, [q1, 2.0 * q2, 6.0 * q3], to);
-        let [q4, q5, q6, q7] = upper.map(|coefficient| on_grid(coefficient, GRID_BITS));
+        let [q4, q5, q6, q7] = upper.map(|coefficient| on_grid(coefficient, bits));
         [q1, q2, q3, q4, q5, q6, q7]
     });
-    if is_near(&coefficients, &wanted, length_mm) {
+    if is_near(&coefficients, &wanted, length, near_part) {
         return (start, coefficients);
     }
-    (start, rounded(&wanted, bits))
+    (start, rounded(&wanted, first_bits))
 }
 
-/// Whether a piece starts and ends as `wanted`.
-fn is_near<const N: usize>(found: &[[f64; 7]; N], wanted: &[[f64; 7]; N], length_mm: f64) -> bool {
+/// Whether a piece starts and ends as `wanted`, within a part of [`NEAR`].
+fn is_near<const N: usize>(
+    found: &[[f64; 7]; N],
+    wanted: &[[f64; 7]; N],
+    length: Position,
+    part: f64,
+) -> bool {
     found.iter().zip(wanted).all(|(found, wanted)| {
         let [rise, ends @ ..] = at_end(found);
         let [wanted_rise, wanted_ends @ ..] = at_end(wanted);
         let is_near = |(found, wanted): (&[f64], &[f64])| {
-            found.iter().zip(wanted).zip(NEAR).all(|((found, wanted), most)| (found - wanted).abs() <= most)
+            found
+                .iter()
+                .zip(wanted)
+                .zip(NEAR)
+                .all(|((found, wanted), most)| (found - wanted).abs() <= part * most)
         };
-        (rise - wanted_rise).abs() <= NEAR[0].min(END_MM / length_mm)
+        (rise - wanted_rise).abs() <= (part * NEAR[0]).min(END_MM / length.to_mm())
             && [(&found[..3], &wanted[..3]), (&ends, &wanted_ends)].into_iter().all(is_near)
     })
 }
@@ -253,7 +277,11 @@ fn on_grid(coefficient: f64, bits: i32) -> f64 {
 /// Lines shorter than this have a direction of their own \[mm\].
 const DIRECTION_MM_MIN: f64 = 1.0e-3;
 
-fn line_direction<const N: usize>(start: [Position; N], end: [Position; N], length_mm: f64) -> Option<[f64; N]> {
+fn line_direction<const N: usize>(
+    start: [Position; N],
+    end: [Position; N],
+    length_mm: f64,
+) -> Option<[f64; N]> {
     let mut offset = end;
     offset.iter_mut().zip(start).for_each(|(end, start)| *end = *end - start);
     (length_mm >= DIRECTION_MM_MIN).then(|| direction(offset).0)

@@ -189,7 +189,13 @@ impl<const AXES: usize> State<AXES> {
     }
 
     /// Goes on behind a piece.
-    fn follow(&mut self, line: u32, length: Position, coefficients: &[[f64; 7]; AXES], end: [Position; AXES]) {
+    fn follow(
+        &mut self,
+        line: u32,
+        length: Position,
+        coefficients: &[[f64; 7]; AXES],
+        end: [Position; AXES],
+    ) {
         (self.line, self.length, self.coefficients, self.end) = (line, length, *coefficients, end);
         #[cfg(feature = "live")]
         {
@@ -252,9 +258,7 @@ fn septic_end<const AXES: usize>(
 /// Where a piece ends, its coefficients and its length: what the next piece may be expected from. A line's coefficients
 /// are its direction and zeros. `None` of other items.
 #[must_use]
-pub fn piece<const AXES: usize>(
-    item: &Item<AXES>,
-) -> Option<([Position; AXES], [[f64; 7]; AXES], Position)> {
+pub fn piece<const AXES: usize>(item: &Item<AXES>) -> Option<([Position; AXES], [[f64; 7]; AXES], Position)> {
     match item {
         Item::Line { start, direction, length, .. } => {
             Some((line_end(*start, direction, *length), as_septic(direction), *length))
@@ -381,7 +385,14 @@ fn cruise(feed_mm_s: f64, length: Position) -> PlannedRamp {
 
 /// A ramp between two feeds whose times the law's figures fix: by acceleration with edge, t₁ and acceleration, by jerk with
 /// edge and jerk, by snap with t₁.
-fn by_law(limited_by: LimitedBy, from_mm_s: f64, to_mm_s: f64, edge_s: f64, t1_s: f64, limit: f64) -> Ramp<f64> {
+fn by_law(
+    limited_by: LimitedBy,
+    from_mm_s: f64,
+    to_mm_s: f64,
+    edge_s: f64,
+    t1_s: f64,
+    limit: f64,
+) -> Ramp<f64> {
     let change_mm_s = libm::fabs(to_mm_s - from_mm_s);
     let mut ramp = Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3: limit, edge_s, t1_s, t2_s: t1_s, limited_by };
     match limited_by {

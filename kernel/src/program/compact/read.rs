@@ -152,8 +152,7 @@ impl<const AXES: usize> State<AXES> {
         let how = nibbles.nibble();
         let (feeds, others) = (&mut self.feeds, &mut self.others);
         let is_irregular = (form::FIGURES..form::BY_ACCELERATION_AGAIN).contains(&how);
-        let from_mm_s =
-            if is_irregular { nibbles.figure(feeds, self.feed_mm_s) } else { self.feed_mm_s };
+        let from_mm_s = if is_irregular { nibbles.figure(feeds, self.feed_mm_s) } else { self.feed_mm_s };
         let to_mm_s = nibbles.figure(feeds, 0.0);
         self.feed_mm_s = to_mm_s;
         let limited_by = match how {

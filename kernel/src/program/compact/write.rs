@@ -182,7 +182,9 @@ impl<const AXES: usize> State<AXES> {
         let by_law = is(from_mm_s, ramp.from_mm_s).then(|| self.law_limit(&ramp)).flatten();
         let how = match by_law {
             Some(_) => limit,
-            None if is(from_mm_s, ramp.from_mm_s) && same(&with_peak_jerk(ramp), &ramp) => form::TIMES + limit,
+            None if is(from_mm_s, ramp.from_mm_s) && same(&with_peak_jerk(ramp), &ramp) => {
+                form::TIMES + limit
+            }
             None => form::FIGURES + limit,
         };
         let (feeds, others) = (&mut self.feeds, &mut self.others);
@@ -194,7 +196,9 @@ impl<const AXES: usize> State<AXES> {
         let limit = by_law.unwrap_or_default();
         let (by_acceleration, by_jerk) = ([edge_s, t1_s, limit], [edge_s, limit]);
         let how = match how {
-            form::BY_ACCELERATION => again(how, form::BY_ACCELERATION_AGAIN, &self.by_acceleration, &by_acceleration),
+            form::BY_ACCELERATION => {
+                again(how, form::BY_ACCELERATION_AGAIN, &self.by_acceleration, &by_acceleration)
+            }
             form::BY_JERK => again(how, form::BY_JERK_AGAIN, &self.by_jerk, &by_jerk),
             _ => how,
         };
@@ -231,16 +235,17 @@ impl<const AXES: usize> State<AXES> {
     /// The limit by which the law's figures give this ramp; of snap, any.
     fn law_limit(&self, ramp: &Ramp<f64>) -> Option<f64> {
         let &Ramp { from_mm_s, to_mm_s, peak_jerk_mm_s3, edge_s, t1_s, limited_by, .. } = ramp;
-        let makes = |&limit: &f64| {
-            same(&by_law(limited_by, from_mm_s, to_mm_s, edge_s, t1_s, limit), ramp)
-        };
+        let makes = |&limit: &f64| same(&by_law(limited_by, from_mm_s, to_mm_s, edge_s, t1_s, limit), ramp);
         let near = match limited_by {
             LimitedBy::Acceleration => ramp.peak_accel_mm_s2(),
             LimitedBy::Jerk => peak_jerk_mm_s3,
             LimitedBy::Snap => return makes(&0.0).then_some(0.0),
         };
         let steps = DIGITS.iter().map(|digits| rounded(near, 52 - digits));
-        steps.chain(self.others.0).chain((-4..=4).map(|ulps| f64::from_bits(near.to_bits().wrapping_add_signed(ulps)))).find(makes)
+        steps
+            .chain(self.others.0)
+            .chain((-4..=4).map(|ulps| f64::from_bits(near.to_bits().wrapping_add_signed(ulps))))
+            .find(makes)
     }
 
     #[cfg(feature = "live")]
@@ -256,7 +261,11 @@ impl<const AXES: usize> State<AXES> {
         if !goes_on {
             let [feed_before, cap_before, limits_before @ .., _, _, _, _, _] = self.block;
             let differ = |bit: u8, expected: &[f64], figures: &[f64]| {
-                if expected.iter().zip(figures).all(|(&expected, &figure)| is(expected, figure)) { 0 } else { bit }
+                if expected.iter().zip(figures).all(|(&expected, &figure)| is(expected, figure)) {
+                    0
+                } else {
+                    bit
+                }
             };
             let others_are = differ(other::FEED, &[feed_before, cap_before], &[feed_mm_s, cap])
                 | differ(other::LIMITS, &limits_before, &limits)
@@ -290,8 +299,9 @@ fn is(expected: f64, figure: f64) -> bool {
 }
 
 fn same(expected: &Ramp<f64>, ramp: &Ramp<f64>) -> bool {
-    let figures =
-        |ramp: &Ramp<f64>| [ramp.from_mm_s, ramp.to_mm_s, ramp.peak_jerk_mm_s3, ramp.edge_s, ramp.t1_s, ramp.t2_s];
+    let figures = |ramp: &Ramp<f64>| {
+        [ramp.from_mm_s, ramp.to_mm_s, ramp.peak_jerk_mm_s3, ramp.edge_s, ramp.t1_s, ramp.t2_s]
+    };
     figures(expected).into_iter().zip(figures(ramp)).all(|(expected, figure)| is(expected, figure))
         && expected.limited_by == ramp.limited_by
 }
@@ -404,7 +414,8 @@ impl Nibbles<'_> {
     /// The coefficients of every axis from the one at `first` on, up to the last that is not 0.
     fn coefficients(&mut self, first: usize, axes: &[[f64; 7]]) {
         let written = || axes.iter().flat_map(|coefficients| coefficients.iter().skip(first));
-        let code = (0..WHOLE).find(|&code| written().all(|&c| on_grid(c, grid(code)).is_some())).unwrap_or(WHOLE);
+        let code =
+            (0..WHOLE).find(|&code| written().all(|&c| on_grid(c, grid(code)).is_some())).unwrap_or(WHOLE);
         self.nibble(code);
         for coefficients in axes {
             let end = coefficients.iter().rposition(|&c| !is(0.0, c)).map_or(0, |last| last + 1);
