@@ -13,7 +13,7 @@ const PATHS: [Path; 3] = [Path::Exact, Path::Blended(0.01), Path::Blended(0.05)]
 const STRAIGHT_MAX: f64 = 48.0;
 const CURVED_MAX: f64 = 120.0;
 /// Bytes that every further piece of a line may take that is longer than one.
-const MORE_MAX: f64 = 2.1;
+const MORE_MAX: f64 = 2.2;
 
 /// Piece, ramps, limits and what follows: everything is counted.
 #[test]

@@ -36,6 +36,7 @@ pub mod merge;
 pub mod polynomial;
 pub mod rational;
 pub mod septic;
+mod short;
 pub mod smooth;
 pub mod speeds;
 pub mod spline;

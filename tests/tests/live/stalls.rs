@@ -20,7 +20,7 @@ use motion_tests::random::Random;
 #[test]
 fn a_late_background_is_waited_for_at_rest() {
     let (mut runs, mut stalls) = (Runs::default(), 0_u64);
-    for seed in seeds(300) {
+    for seed in seeds(450) {
         let Some(case) = Case::random(seed, 6_000.0) else { continue };
         let mut random = Random::new(seed ^ 0x57A11);
         let often = random.log(1e-3, 0.3);

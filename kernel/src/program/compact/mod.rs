@@ -1,7 +1,7 @@
 //! Items as few bytes: each as what differs from what the items before it let expect.
 //!
 //! Consumes and produces [`Item`]s; lossless, whatever the items. Background. An [`Encoder`] and a [`Decoder`]
-//! keep the same [`State`], so items are read in the order in which they were written, from the first on.
+//! keep the same state, so items are read in the order in which they were written, from the first on.
 //!
 //! An item is a row of nibbles, the low one of a byte first, filled up to whole bytes with 0. The first is its
 //! kind:
@@ -10,8 +10,8 @@
 //! |---|---|---|
 //! | 0 | [`Item::Line`] | line, its end from its start; length less the distance to that end |
 //! | 1 | [`Item::Line`] in the last one's direction | line; length less the last piece's |
-//! | 2 | [`Item::Line`] | line, length, direction in full |
-//! | 3 | [`Item::Septic`] | line, length less the last piece's, [`Grid`], coefficients |
+//! | 2 | [`Item::Line`] | line, direction in full; length less the last piece's |
+//! | 3 | [`Item::Septic`] | line, length less the last piece's, the coefficients' grid, their count and themselves by axis |
 //! | 4 | [`Item::Feed`], a cruise from the last feed | length |
 //! | 5 | [`Item::Feed`] | what fixes its times, feeds and times; length less the ramp's own |
 //! | 6 | [`Item::EndOfStretch`] | its place from the last piece's end |
@@ -20,13 +20,18 @@
 //! | 9 | [`Item::Switch`] | spindle and coolant, speed |
 //! | 10 | [`Item::Block`] | length, which figures are others than expected, and those |
 //! | 11 | [`Item::Block`] with the last one's limits | length, the junction's feed |
-//! | 12 | [`Item::Septic`] that goes on as the last piece ended: see [`continued`] | line, length less the last piece's, grid, q₄ … q₇ |
+//! | 12 | [`Item::Septic`] that goes on as the last piece ended: see [`continued`] | line, length less the last piece's, as above but for q₁ … q₃ |
 //! | 13 | [`Item::Septic`] that is the last one [`turned`] | line, length less the last piece's |
 //! | 14 | a piece that starts elsewhere than the last one ended | how far from there; the piece |
 //! | 15 | [`Item::Line`] to the end of the block | line, its end from its start but for one axis, that one's end less what the length lets expect; length less what is left of the block |
 //!
 //! **Whole numbers** are a count of nibbles, 15 for 16, and that many of the number, the low ones first; the
 //! sign is the least significant bit. The program line is its difference to the last one.
+//!
+//! **Coefficients** are whole multiples of 2⁻¹⁶, 2⁻¹⁸ … 2⁻⁴⁴ by a nibble from 0 on, or by nibble 15 all 16 nibbles of an f64.
+//!
+//! **Lengths** of pieces are less what is left of the block where that is expected: of its first piece, and of one that would
+//! otherwise be longer.
 //!
 //! **Figures** are a nibble: 0 for the expected one, 1 to 11 for one of the eleven that were written last, other
 //! than as expected, the last one first, 12 to 14 for the upper 5, 7 or 11 nibbles of an f64, whose others are 0, 15 for all 16.
@@ -199,7 +204,10 @@ impl<const AXES: usize> State<AXES> {
         (self.line, self.length, self.coefficients, self.end) = (line, length, *coefficients, end);
         #[cfg(feature = "live")]
         {
-            self.left = self.left - length;
+            // Without blocks as in a kernel without live control: nothing is ever left.
+            if self.left > Position::ZERO {
+                self.left = self.left - length;
+            }
             self.is_whole = false;
         }
     }
