@@ -122,7 +122,7 @@ impl Recent {
     const NEW: u8 = FIRST_LENGTH - 2;
 
     /// Puts `figure`, which is at `place`, before the others.
-    fn to_front(&mut self, place: u8, figure: f64) {
+    fn put_first(&mut self, place: u8, figure: f64) {
         let mut next = figure;
         for figure in self.0.iter_mut().take(usize::from(place) + 1) {
             core::mem::swap(figure, &mut next);

@@ -62,7 +62,7 @@ impl<const AXES: usize> Decoder<AXES> {
             kind::RAMP => Item::Feed(state.ramp(nibbles)),
             kind::END => {
                 nibbles.move_by(&mut state.end);
-                return Item::EndOfStretch(state.end);
+                Item::EndOfStretch(state.end)
             }
             kind::DWELL => Item::Dwell(Ticks::from_bits(nibbles.number().cast_unsigned())),
             kind::STOP => Item::Stop,
@@ -281,14 +281,14 @@ impl Nibbles<'_> {
                 None => expected,
                 Some(place) => {
                     let figure = recent.0.get(usize::from(place)).copied().unwrap_or_default();
-                    recent.to_front(place, figure);
+                    recent.put_first(place, figure);
                     figure
                 }
             };
         };
         let count = LENGTHS.get(usize::from(length)).copied().unwrap_or(16);
         let figure = f64::from_bits(self.bits(count) << (64 - 4 * u32::from(count)));
-        recent.to_front(Recent::NEW, figure);
+        recent.put_first(Recent::NEW, figure);
         figure
     }
 

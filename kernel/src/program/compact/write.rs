@@ -346,7 +346,7 @@ struct Nibbles<'a> {
 impl Nibbles<'_> {
     fn nibble(&mut self, nibble: u8) {
         if let Some(byte) = self.bytes.get_mut(self.count / 2) {
-            *byte = if self.count % 2 == 0 { nibble } else { *byte | nibble << 4 };
+            *byte = if self.count.is_multiple_of(2) { nibble } else { *byte | nibble << 4 };
         }
         self.count += 1;
     }
@@ -370,7 +370,7 @@ impl Nibbles<'_> {
             return self.nibble(0);
         }
         if let Some(place) = recent.0.iter().position(|&recent| is(recent, figure)) {
-            recent.to_front(place as u8, figure);
+            recent.put_first(place as u8, figure);
             return self.nibble(place as u8 + 1);
         }
         let bits = figure.to_bits();
@@ -382,7 +382,7 @@ impl Nibbles<'_> {
             .unwrap_or((FIRST_LENGTH + 3, 16));
         self.nibble(code);
         self.bits(bits >> shift(count), count);
-        recent.to_front(Recent::NEW, figure);
+        recent.put_first(Recent::NEW, figure);
     }
 
     #[cfg(feature = "live")]
