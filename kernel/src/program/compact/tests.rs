@@ -186,7 +186,36 @@ fn random_bytes_are_an_item_or_none() {
             }
             none += 1;
         }
-        assert!(items > 10_000 && none == 20_000, "seed {seed}: {items}");
+        assert!(items > 5_000 && none == 20_000, "seed {seed}: {items}");
+    }
+}
+
+/// Both ends would agree on a wrong expectation, too.
+#[test]
+fn a_curve_goes_on_and_an_arc_is_turned() {
+    let (before, length) = (Position::from_bits(1 << 32), Position::from_bits(3 << 31));
+    let cubic = [[0.5, -0.25, 0.125, 0.0, 0.0, 0.0, 0.0]];
+    assert_eq!(continued(&cubic, before, length), [[0.375, 0.125 * 1.5, 0.125 * 1.5 * 1.5]]);
+    let fourth = [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]];
+    assert_eq!(continued(&fourth, before, before), [[4.0, 6.0, 4.0]]);
+    // A helix of half a radian a piece, its axis along the third axis: series of sine and cosine.
+    let (theta, rise) = (0.5_f64, 0.6);
+    let helix = |from: f64| {
+        let (mut along, mut across, mut scale) = ([0.0; 7], [0.0; 7], 0.8);
+        for power in 0..7 {
+            // The derivatives of the tangent by the angle are the tangent turned by quarters.
+            let quarter = from + f64::from(power) * std::f64::consts::FRAC_PI_2;
+            scale /= f64::from(power + 1);
+            along[power as usize] = scale * quarter.cos();
+            across[power as usize] = scale * quarter.sin();
+            scale *= theta;
+        }
+        [along, across, [rise, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    };
+    let (found, expected) = (turned(&helix(0.3)), helix(0.3 + theta));
+    for (found, expected) in found.as_flattened().iter().zip(expected.as_flattened()) {
+        // What is left out of the series.
+        assert!((found - expected).abs() < 0.8 * theta.powi(7) / 5040.0, "{found} {expected}");
     }
 }
 
