@@ -51,6 +51,7 @@ pub use write::Encoder;
 use super::Item;
 use crate::law::segment::to_f64;
 use crate::law::{LimitedBy, PlannedRamp, Ramp};
+use crate::num::rolled;
 use crate::path::magnitude;
 use crate::units::Position;
 
@@ -216,8 +217,13 @@ impl<const AXES: usize> State<AXES> {
 /// The direction of a line from its start to `offset` from there, and its length \[mm\]: the line that takes the
 /// fewest bytes. Not finite where there is no offset.
 #[must_use]
+#[inline(never)]
 pub fn direction<const AXES: usize>(offset: [Position; AXES]) -> ([f64; AXES], f64) {
-    let direction = offset.map(Position::to_mm);
+    let mut direction = [0.0; AXES];
+    let (places, offsets) = rolled((direction.as_mut_slice(), offset.as_slice()));
+    for (part, offset) in places.iter_mut().zip(offsets) {
+        *part = offset.to_mm();
+    }
     let length_mm = magnitude(&direction);
     (unit(direction), length_mm)
 }
@@ -226,7 +232,7 @@ pub fn direction<const AXES: usize>(offset: [Position; AXES]) -> ([f64; AXES], f
 fn remaining(length: Position, others: &[Position]) -> Position {
     let length_mm = length.to_mm();
     let mut square = length_mm * length_mm;
-    for other in others {
+    for other in rolled(others) {
         let other_mm = other.to_mm();
         square -= other_mm * other_mm;
     }
@@ -235,6 +241,7 @@ fn remaining(length: Position, others: &[Position]) -> Position {
 
 /// Where a line ends, to a few position steps.
 #[must_use]
+#[inline(never)]
 pub fn line_end<const AXES: usize>(
     start: [Position; AXES],
     direction: &[f64; AXES],
@@ -242,7 +249,8 @@ pub fn line_end<const AXES: usize>(
 ) -> [Position; AXES] {
     let mut end = start;
     let length_mm = length.to_mm();
-    for (end, part) in end.iter_mut().zip(direction) {
+    let (places, parts) = rolled((end.as_mut_slice(), direction.as_slice()));
+    for (end, part) in places.iter_mut().zip(parts) {
         *end = *end + Position::from_mm(part * length_mm).unwrap_or_default();
     }
     end
@@ -255,9 +263,10 @@ fn septic_end<const AXES: usize>(
     length: Position,
 ) -> [Position; AXES] {
     let mut sums = [0.0; AXES];
-    for (sum, coefficients) in sums.iter_mut().zip(coefficients) {
-        for coefficient in coefficients {
-            *sum += coefficient;
+    let (places, axes) = rolled((sums.as_mut_slice(), coefficients.as_slice()));
+    for (sum, coefficients) in places.iter_mut().zip(axes) {
+        for coefficient in rolled(coefficients.as_slice()) {
+            *sum += *rolled(coefficient);
         }
     }
     line_end(start, &sums, length)
@@ -284,6 +293,7 @@ fn as_septic<const AXES: usize>(direction: &[f64; AXES]) -> [[f64; 7]; AXES] {
 
 /// q₁ … q₃ of a piece of `length` that goes on with the tangent, curvature and its change with which a piece ends.
 #[must_use]
+#[inline(never)]
 pub fn continued<const AXES: usize>(
     coefficients: &[[f64; 7]; AXES],
     length_before: Position,
@@ -291,11 +301,14 @@ pub fn continued<const AXES: usize>(
 ) -> [[f64; 3]; AXES] {
     let ratio = length.to_mm() / length_before.to_mm();
     let mut at_end = [[0.0; 3]; AXES];
-    for (at_end, coefficients) in at_end.iter_mut().zip(coefficients) {
+    let (places, axes) = rolled((at_end.as_mut_slice(), coefficients.as_slice()));
+    for (at_end, coefficients) in places.iter_mut().zip(axes) {
+        let at_end = rolled(at_end);
         // Binomial coefficients: derivatives of powers at 1, by their factorials.
         let [mut once, mut twice, mut thrice] = [1.0, 0.0, 0.0];
         let [first, second, third] = at_end;
-        for coefficient in coefficients {
+        for coefficient in rolled(coefficients.as_slice()) {
+            let coefficient = *rolled(coefficient);
             *first += once * coefficient;
             *second += twice * coefficient;
             *third += thrice * coefficient;
@@ -311,59 +324,68 @@ pub fn continued<const AXES: usize>(
 
 /// A piece of a circle or helix turned so that it goes on where it ended.
 #[must_use]
+#[inline(never)]
 pub fn turned<const AXES: usize>(coefficients: &[[f64; 7]; AXES]) -> [[f64; 7]; AXES] {
-    let column = |of: fn(&[f64; 7]) -> f64| {
-        let mut column = [0.0; AXES];
-        for (part, coefficients) in column.iter_mut().zip(coefficients) {
-            *part = of(coefficients);
-        }
-        column
-    };
     let one = Position::from_bits(1);
     let end = continued(coefficients, one, one);
     // Across the circle where the piece starts, and the part along it of what is across where it ends: a sharper plane than
     // that of the third derivative.
-    let across = unit(column(|&[_, q2, ..]| q2));
+    let across = unit(column(coefficients, 1));
     let across_end = end.map(|[_, second, _]| second);
-    let part = dot(&across_end, &across);
     let mut along = across_end;
-    for (along, across) in along.iter_mut().zip(&across) {
-        *along -= part * across;
-    }
+    add(&mut along, -dot(&across_end, &across), &across);
     let along = unit(along);
     let parts = |vector: &[f64; AXES]| (dot(vector, &along), dot(vector, &across));
-    let (a, b) = parts(&column(|&[q1, ..]| q1));
+    let (a, b) = parts(&column(coefficients, 0));
     let (a_end, b_end) = parts(&end.map(|[first, ..]| first));
     let squares = libm::sqrt((a * a + b * b) * (a_end * a_end + b_end * b_end));
     let (less, sine) = ((a * a_end + b * b_end) / squares - 1.0, (a * b_end - b * a_end) / squares);
     let mut turned = *coefficients;
-    for power in 0..7 {
-        let mut vector = [0.0; AXES];
-        for (part, coefficients) in vector.iter_mut().zip(coefficients) {
-            *part = coefficients.get(power).copied().unwrap_or_default();
-        }
+    for power in rolled(0..7) {
+        let mut vector = column(coefficients, power);
         let (a, b) = parts(&vector);
-        let (more_along, more_across) = (less * a - sine * b, less * b + sine * a);
-        for ((turned, along), across) in turned.iter_mut().zip(along).zip(across) {
+        add(&mut vector, less * a - sine * b, &along);
+        add(&mut vector, less * b + sine * a, &across);
+        for (turned, part) in turned.iter_mut().zip(vector) {
             if let Some(place) = turned.get_mut(power) {
-                *place += more_along * along + more_across * across;
+                *place = part;
             }
         }
     }
     turned
 }
 
+/// The coefficients of a power, from 0 for the first.
+fn column<const AXES: usize>(coefficients: &[[f64; 7]; AXES], power: usize) -> [f64; AXES] {
+    coefficients.map(|of_axis| of_axis.get(power).copied().unwrap_or_default())
+}
+
+/// Adds `part` of another vector.
+#[inline(never)]
+fn add<const AXES: usize>(vector: &mut [f64; AXES], part: f64, other: &[f64; AXES]) {
+    let (places, other) = rolled((vector.as_mut_slice(), other.as_slice()));
+    for (place, other) in places.iter_mut().zip(other) {
+        *place += part * *rolled(other);
+    }
+}
+
+#[inline(never)]
 fn dot<const AXES: usize>(a: &[f64; AXES], b: &[f64; AXES]) -> f64 {
     let mut sum = 0.0;
+    let (a, b) = rolled((a.as_slice(), b.as_slice()));
     for (a, b) in a.iter().zip(b) {
-        sum += a * b;
+        sum += *rolled(a) * b;
     }
     sum
 }
 
-fn unit<const AXES: usize>(vector: [f64; AXES]) -> [f64; AXES] {
+#[inline(never)]
+fn unit<const AXES: usize>(mut vector: [f64; AXES]) -> [f64; AXES] {
     let magnitude = magnitude(&vector);
-    vector.map(|part| part / magnitude)
+    for part in rolled(vector.as_mut_slice()) {
+        *rolled(part) /= magnitude;
+    }
+    vector
 }
 
 /// 2 to the power of `exponent`, from −1022 to 1023.

@@ -3,12 +3,12 @@
 //! Like [`wire`](crate::program::wire), it does not return at every nibble that is missing or wrong: that is noted, and
 //! makes the whole item `None` at its end.
 
-#[cfg(feature = "live")]
-use super::other;
 use super::{
     FIRST_LENGTH, LENGTHS, Recent, State, WHOLE, as_septic, by_law, continued, cruise, direction, form, grid,
-    kind, line_end, own_length, power_of_2, remaining, septic_end, turned, with_peak_jerk,
+    kind, line_end, own_length, power_of_2, septic_end, turned, with_peak_jerk,
 };
+#[cfg(feature = "live")]
+use super::{other, remaining};
 use crate::hal::{OutputState, Spindle};
 use crate::law::{LimitedBy, PlannedRamp, Ramp, Ticks};
 use crate::program::Item;
@@ -56,7 +56,10 @@ impl<const AXES: usize> Decoder<AXES> {
             nibbles.is_sound &= what != kind::ELSEWHERE;
         }
         match what {
-            kind::LINE_TO | kind::LINE_ON | kind::LINE | kind::LINE_OVER => state.line(nibbles, what, start),
+            kind::LINE_TO | kind::LINE_ON | kind::LINE => state.line(nibbles, what, start),
+            // Without live control there are no blocks.
+            #[cfg(feature = "live")]
+            kind::LINE_OVER => state.line(nibbles, what, start),
             kind::SEPTIC | kind::SEPTIC_ON | kind::SEPTIC_TURNED => state.septic(nibbles, what, start),
             kind::CRUISE => Item::Feed(cruise(state.feed_mm_s, Position::from_bits(nibbles.number()))),
             kind::RAMP => Item::Feed(state.ramp(nibbles)),
@@ -102,6 +105,7 @@ impl<const AXES: usize> State<AXES> {
                 along = towards;
                 expected = Position::from_mm(length_mm).unwrap_or_default();
             }
+            #[cfg(feature = "live")]
             kind::LINE_OVER => {
                 expected = self.left();
                 nibbles.move_over(expected, &mut offset);
@@ -301,6 +305,7 @@ impl Nibbles<'_> {
     }
 
     /// How far a line of this length goes.
+    #[cfg(feature = "live")]
     #[inline(never)]
     fn move_over(&mut self, length: Position, offset: &mut [Position]) {
         let axis = usize::from(self.nibble());
