@@ -7,11 +7,11 @@
 //! anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
-use motion_kernel::hal::{OutputState, Spindle};
+use motion_kernel::hal::{BoardOutputs, OutputState, Spindle};
 use motion_kernel::num::Real;
 use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check_live, switches_as_stops};
 
-use crate::parameters::{BoardOutputs, BoardParameters};
+use crate::parameters::BoardParameters;
 
 /// Why the board can't run a program.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,7 +13,8 @@ use motion_kernel::link::{BoardLink, Controls, ItemQueue, Mode, Status};
 use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{SupplyError, Switching};
-use motion_kernel::queue::LiveFeeder;
+use motion_kernel::queue::{Intake, LiveFeeder};
+use motion_kernel::units::Position;
 
 /// Frames of items that one poll puts away at most: motion is to be planned, too.
 const FRAMES_PER_POLL: usize = 8;
@@ -21,8 +22,8 @@ const FRAMES_PER_POLL: usize = 8;
 /// What the operator asks of the rest of the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Requests {
-    /// The operator enables the drives.
-    pub enables: bool,
+    /// The operator enables the drives, or disables them.
+    pub power: Option<bool>,
     /// The operator clears the fault.
     pub clears_fault: bool,
     /// The operator resumes: also from a program stop, which is the kernel's.
@@ -34,9 +35,16 @@ pub struct Requests {
 pub struct Streamed<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize> {
     link: RefCell<BoardLink>,
     feeder: LiveFeeder<'a, R, AXES>,
-    control: LiveControl<R, AXES, Switching<ItemQueue<AXES, ITEMS>>, Infallible, PLACES>,
+    control: Live<R, AXES, ITEMS, PLACES>,
+    pulse: Pulse,
+    tick_s: f64,
+    leads: Leads,
     obeyed: Controls,
 }
+
+/// Live control of items that come over the link.
+type Live<R, const AXES: usize, const ITEMS: usize, const PLACES: usize> =
+    LiveControl<R, AXES, Switching<ItemQueue<AXES, ITEMS>>, Infallible, PLACES>;
 
 impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     Streamed<'a, R, AXES, ITEMS, PLACES>
@@ -54,7 +62,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         let mut control = LiveControl::new(Switching::new(ItemQueue::new()), pulse, tick_s, leads);
         // As the controls are before the operator's first command.
         control.hold();
-        Self { link: RefCell::new(link), feeder, control, obeyed: Controls::NONE }
+        Self { link: RefCell::new(link), feeder, control, pulse, tick_s, leads, obeyed: Controls::NONE }
     }
 
     /// One poll of the background: takes what `next_byte` has, obeys the operator, plans. `next_byte` is asked between the
@@ -67,7 +75,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         &mut self,
         next_byte: &mut dyn FnMut() -> Option<u8>,
     ) -> (Requests, Result<(), SupplyError<Infallible>>) {
-        let Self { link, feeder, control, obeyed } = self;
+        let Self { link, feeder, control, obeyed, .. } = self;
         let mut bytes = core::iter::from_fn(next_byte);
         let received = link.get_mut();
         for _ in 0..FRAMES_PER_POLL {
@@ -92,14 +100,21 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         (requests, control.poll_unless(&is_stop_asked, feeder))
     }
 
-    /// After an abort ([`State::Aborted`]): drops what was not driven, and begins anew, held, with streams that were split
-    /// where the machine stands now. The link goes on.
-    pub fn restart(&mut self, feeder: LiveFeeder<'a, R, AXES>, pulse: Pulse, tick_s: f64, leads: Leads) {
-        let mut items = core::mem::take(self.control.source_mut().items_mut());
-        items.clear();
-        self.control = LiveControl::new(Switching::new(items), pulse, tick_s, leads);
-        self.control.hold();
-        self.feeder = feeder;
+    /// After an abort ([`State::Aborted`]), or where the drives are enabled: drops what was not driven, and begins anew on a
+    /// machine that stands at `here`, with the items of the program after it. The operator's settings stay. `intake` is the
+    /// other end of the streams.
+    // In its own stack frame, which is free again while motion is planned.
+    #[inline(never)]
+    pub fn restart(&mut self, intake: &mut Intake<'_, R, AXES>, here: [Position; AXES]) {
+        let Self { feeder, control, pulse, tick_s, leads, obeyed, .. } = self;
+        let items = core::mem::take(control.source_mut().items_mut());
+        *control = LiveControl::new(Switching::new(items), *pulse, *tick_s, *leads);
+        if obeyed.mode == Mode::Hold {
+            control.hold();
+        }
+        set(obeyed, control);
+        let is_restarted = feeder.restart(intake, here);
+        debug_assert!(is_restarted, "both are ends of the same streams");
     }
 
     /// Writes the next frame for the PC to `out`; see [`BoardLink::transmit`]. `status` is asked for the machine's status with
@@ -120,10 +135,13 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         self.control.switch(&self.feeder)
     }
 
-    /// The state of live control; [`State::Waiting`] where everything that came is done.
+    /// The state of live control; [`State::Waiting`] where everything that came is done, switches of outputs too.
     #[must_use]
-    pub fn state(&self) -> State {
-        self.control.state(&self.feeder)
+    pub fn state(&mut self) -> State {
+        match self.control.state(&self.feeder) {
+            State::Waiting if self.control.source_mut().due().is_some() => State::Running,
+            state => state,
+        }
     }
 
     /// Number of stops on the path because items came too late.
@@ -137,7 +155,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
 fn obey<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
     controls: &Controls,
     obeyed: &mut Controls,
-    control: &mut LiveControl<R, AXES, Switching<ItemQueue<AXES, ITEMS>>, Infallible, PLACES>,
+    control: &mut Live<R, AXES, ITEMS, PLACES>,
 ) -> Requests {
     let before = core::mem::replace(obeyed, *controls);
     let is_pressed = controls.presses != before.presses;
@@ -149,24 +167,32 @@ fn obey<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
             Mode::Hold => control.hold(),
         }
     }
-    let set = control.set_override(f64::from(controls.override_permille) * 1e-3);
-    debug_assert!(set.is_ok(), "the link takes no other");
-    control.set_single_block(controls.is_single_block);
+    set(controls, control);
     Requests {
-        enables: controls.enables != before.enables,
+        power: (controls.power_presses != before.power_presses).then_some(controls.is_enabled),
         clears_fault: controls.fault_resets != before.fault_resets,
         resumes: is_pressed && controls.mode == Mode::Run,
     }
 }
 
+/// Applies the settings among `controls`.
+fn set<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
+    controls: &Controls,
+    control: &mut Live<R, AXES, ITEMS, PLACES>,
+) {
+    let set = control.set_override(f64::from(controls.override_permille) * 1e-3);
+    debug_assert!(set.is_ok(), "the link takes no other");
+    control.set_single_block(controls.is_single_block);
+}
+
 #[cfg(test)]
 mod tests {
     use motion_kernel::exec::{ExecState, Executor};
+    use motion_kernel::hal::BoardOutputs;
     use motion_kernel::link::{Event, FRAME_MAX, HostLink, Identity, PROTOCOL, State as MachineState};
     use motion_kernel::program::Item;
     use motion_kernel::queue::LiveStreams;
     use motion_kernel::straight::Straight;
-    use motion_kernel::units::Position;
 
     use super::*;
     use crate::fixture::{AXES, TICK_S, end, machine};
@@ -183,6 +209,7 @@ mod tests {
         is_fixed_point: false,
         tick_s: TICK_S,
         items: ITEMS as u16,
+        outputs: BoardOutputs::None,
         machine: 0,
     };
 
@@ -274,13 +301,15 @@ mod tests {
             ticks.push(executed.setpoints.map(|setpoint| setpoint.position));
             let status = |taken: u32| Status {
                 tick: now,
-                state: MachineState::from(state),
+                state: MachineState::Moving,
                 set: [Position::ZERO; AXES],
                 actual: [Position::ZERO; AXES],
                 feed_mm_s: 0.0,
                 line: 0,
                 taken,
-                fault: 0,
+                starvations: 0,
+                is_ready: true,
+                fault: None,
             };
             let length = board.transmit(now_ms, now.is_multiple_of(40).then_some(&status), &mut out);
             let mut frame = out[..length].to_vec();
@@ -293,7 +322,7 @@ mod tests {
                 let resumes = requests.iter().filter(|requests| requests.resumes).count();
                 assert!(
                     resumes > 0
-                        && requests.iter().all(|requests| !requests.enables && !requests.clears_fault)
+                        && requests.iter().all(|requests| requests.power.is_none() && !requests.clears_fault)
                 );
                 return (ticks, board.starvations());
             }

@@ -113,7 +113,7 @@ mod app {
         let kernel = Kernel::new(&machine.axes, start, hardware.encoders.latch());
         let empty = cx.local.empty.write(motion_kernel::queue::Streams::new());
         let (_, intake) = empty.split(machine.header().rules, start);
-        let control = Control::new(kernel, intake, start, cx.local.flight.write(Flight::new()));
+        let control = Control::new(kernel, intake, cx.local.flight.write(Flight::new()));
         let (received, bytes) = cx.local.console_bytes.split();
         Board::start(&mut tick_timer, &mut watchdog);
         let local = Local {

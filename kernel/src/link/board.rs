@@ -22,18 +22,22 @@ pub struct ItemQueue<const AXES: usize, const ITEMS: usize> {
     entries: Deque<Option<Item<AXES>>, ITEMS>,
     /// The number of the next item to come.
     next: u32,
+    /// How many programs were given up before this one.
+    aborts: u16,
 }
 
 impl<const AXES: usize, const ITEMS: usize> ItemQueue<AXES, ITEMS> {
     /// Before the first item.
     #[must_use]
     pub const fn new() -> Self {
-        Self { entries: Deque::new(), next: 0 }
+        Self { entries: Deque::new(), next: 0, aborts: 0 }
     }
 
-    /// Drops what was not driven: after an abort. Numbers go on.
-    pub fn clear(&mut self) {
-        self.entries.clear();
+    /// Drops what is left of a program that was given up, if it is not the one after `aborts`. Numbers go on.
+    pub fn begin(&mut self, aborts: u16) {
+        if core::mem::replace(&mut self.aborts, aborts) != aborts {
+            self.entries.clear();
+        }
     }
 
     /// The number of the first item that was not taken from here.
@@ -78,8 +82,8 @@ pub struct BoardLink {
     session: u32,
     identity: Identity,
     deframer: Deframer,
-    /// The number of the first of the items that wait in the deframer, if any do.
-    first: Option<u32>,
+    /// Items wait in the deframer.
+    has_items: bool,
     controls: Controls,
     /// They were not taken yet; how many aborts were.
     is_changed: bool,
@@ -101,12 +105,20 @@ impl BoardLink {
     /// A board that has just started; `session` must not be that of a start before.
     #[must_use]
     pub const fn new(session: u32, identity: Identity) -> Self {
-        let said = Taken { session, controls: 0, next: 0, limit: 0, is_missing: false, is_unreadable: false };
+        let said = Taken {
+            session,
+            aborts: 0,
+            controls: 0,
+            next: 0,
+            limit: 0,
+            is_missing: false,
+            is_unreadable: false,
+        };
         Self {
             session,
             identity,
             deframer: Deframer::new(),
-            first: None,
+            has_items: false,
             controls: Controls::NONE,
             is_changed: false,
             taken_aborts: 0,
@@ -137,7 +149,7 @@ impl BoardLink {
     /// time. Controls are known at once.
     pub fn receive(&mut self, bytes: &mut impl Iterator<Item = u8>) {
         for _ in 0..2 * FRAME_MAX {
-            if self.first.is_some() {
+            if self.has_items {
                 break;
             }
             let Some(byte) = bytes.next() else { break };
@@ -155,7 +167,7 @@ impl BoardLink {
     }
 
     fn drop_items(&mut self) {
-        if self.first.take().is_some() {
+        if core::mem::take(&mut self.has_items) {
             (self.is_missing, self.is_taken_due) = (true, true);
         }
     }
@@ -179,7 +191,11 @@ impl BoardLink {
                 }
                 self.is_taken_due = true;
             }
-            Request::Items { first, .. } => self.first = Some(first),
+            Request::Items { aborts, .. } if aborts != self.controls.aborts => {
+                // Of a program that was given up, or of one that is known only with controls that are still to come.
+                (self.is_missing, self.is_taken_due) = (true, true);
+            }
+            Request::Items { .. } => self.has_items = true,
         }
     }
 
@@ -188,8 +204,13 @@ impl BoardLink {
         &mut self,
         items: &mut ItemQueue<AXES, ITEMS>,
     ) -> bool {
-        let Some(first) = self.first.take() else { return false };
-        let Some((_, entries)) = take::<Request>(self.deframer.payload()) else { return false };
+        items.begin(self.controls.aborts);
+        if !core::mem::take(&mut self.has_items) {
+            return false;
+        }
+        let Some((Request::Items { first, .. }, entries)) = take::<Request>(self.deframer.payload()) else {
+            return false;
+        };
         let known = items.next.wrapping_sub(first);
         self.is_taken_due = true;
         self.is_missing = known.cast_signed() < 0;
@@ -227,6 +248,7 @@ impl BoardLink {
         } else {
             let taken = Taken {
                 session,
+                aborts: items.aborts,
                 controls: self.controls.number,
                 next: items.next,
                 limit: items.limit(),

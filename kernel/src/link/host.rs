@@ -23,10 +23,10 @@ pub enum Event<const AXES: usize> {
     Welcome(Identity),
     /// It is there, and is of another protocol or has another number of axes. Nothing is sent to it.
     Refused(Identity),
-    /// It takes items.
+    /// It takes items: those of a program that has not begun yet, after a greeting or an abort, or what follows those that
+    /// another run of the PC's side has sent.
     Ready {
-        /// The number of the next item that it expects: of a program that another run of the PC's side has begun with,
-        /// those before are there.
+        /// The number of the next item that it expects.
         next: u32,
     },
     /// It has started anew, and knows nothing of the items before: [`HostLink::begin`] goes on with it.
@@ -133,13 +133,47 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         self.control(|controls| (controls.mode, controls.presses) = (mode, controls.presses.wrapping_add(1)))
     }
 
-    /// Gives up the rest of the program that the board has; more may be driven only after another resume. See
-    /// [`Self::control`].
+    /// Gives up the rest of the program: all items that were pushed and not driven. [`Event::Ready`] tells that another
+    /// program may follow, which is driven only after another resume. See [`Self::control`].
     #[must_use]
     pub fn abort(&mut self) -> bool {
-        self.control(|controls| {
-            (controls.mode, controls.aborts) = (Mode::Hold, controls.aborts.wrapping_add(1))
+        self.give_up(|_| {})
+    }
+
+    /// Enables the drives where the machine stands, or disables them: another program has to follow, as after an abort.
+    /// See [`Self::control`].
+    #[must_use]
+    pub fn enable(&mut self, is_enabled: bool) -> bool {
+        self.give_up(|controls| {
+            (controls.is_enabled, controls.power_presses) =
+                (is_enabled, controls.power_presses.wrapping_add(1));
         })
+    }
+
+    /// Clears the board's fault. See [`Self::control`].
+    #[must_use]
+    pub fn clear_fault(&mut self) -> bool {
+        self.control(|controls| controls.fault_resets = controls.fault_resets.wrapping_add(1))
+    }
+
+    fn give_up(&mut self, change: impl FnOnce(&mut Controls)) -> bool {
+        let is_taken = self.control(|controls| {
+            (controls.mode, controls.aborts) = (Mode::Hold, controls.aborts.wrapping_add(1));
+            change(controls);
+        });
+        if is_taken {
+            self.drop_items();
+            if let Session::Ready(session) = self.session {
+                self.session = Session::Greeted(session);
+            }
+        }
+        is_taken
+    }
+
+    fn drop_items(&mut self) {
+        self.bytes.clear();
+        self.lengths.clear();
+        self.is_unreadable = false;
     }
 
     /// Whether the board has confirmed the controls.
@@ -252,9 +286,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         }
         let confirmed = self.first;
         self.session = Session::Lost(session);
-        self.bytes.clear();
-        self.lengths.clear();
-        self.is_unreadable = false;
+        self.drop_items();
         on_event(Event::Restarted { confirmed });
     }
 
@@ -263,6 +295,10 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             return;
         }
         self.confirmed_controls = taken.controls;
+        // Of a program that was given up.
+        if taken.aborts != self.controls.aborts {
+            return;
+        }
         if let Session::Greeted(session) = self.session {
             self.session = Session::Ready(session);
             (self.first, self.next, self.limit) = (taken.next, taken.next, taken.limit);
@@ -335,7 +371,11 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             (self.next, self.progress_ms) = (self.first, now_ms);
         }
         let sent = self.next.wrapping_sub(self.first) as usize;
-        let Some(mut payload) = Payload::of(&Request::Items { session, first: self.next }) else { return 0 };
+        let Some(mut payload) =
+            Payload::of(&Request::Items { session, aborts: self.controls.aborts, first: self.next })
+        else {
+            return 0;
+        };
         let skipped: usize = self.lengths.iter().take(sent).map(|&length| usize::from(length)).sum();
         let (mut count, mut length) = (0, 0);
         for &of_entry in self.lengths.iter().skip(sent) {
@@ -353,8 +393,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     }
 }
 
-/// The longest message before items \[bytes\]: a variant and two numbers.
-const HEAD_MAX: usize = 11;
+/// The longest message before items \[bytes\]: a variant and three numbers.
+const HEAD_MAX: usize = 14;
 
 /// Whether a number comes before another one. They wrap.
 fn is_before(number: u32, other: u32) -> bool {

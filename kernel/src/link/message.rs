@@ -2,11 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::exec::ExecState;
+use crate::fault::Fault;
+use crate::hal::BoardOutputs;
 use crate::units::Position;
 
 /// The version of this protocol. A PC refuses a board of another version.
-pub const PROTOCOL: u16 = 1;
+pub const PROTOCOL: u16 = 2;
 
 /// From the PC.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,8 +17,8 @@ pub(super) enum Request {
     /// What the operator wants.
     Controls { session: u32, controls: Controls },
     /// Items follow, to the payload's end: of each an `Option`, none for the end of the program. The first one has this
-    /// number.
-    Items { session: u32, first: u32 },
+    /// number. They are of the program after so many aborts.
+    Items { session: u32, aborts: u16, first: u32 },
 }
 
 /// From the board.
@@ -35,6 +36,8 @@ pub(super) enum Reply<const AXES: usize> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Taken {
     pub(super) session: u32,
+    /// How many programs were given up: items of those before are dropped.
+    pub(super) aborts: u16,
     /// The number of the controls obeyed last.
     pub(super) controls: u32,
     /// The number of the next item: all before it are here.
@@ -59,14 +62,16 @@ pub struct Controls {
     pub mode: Mode,
     /// Counts what was pressed to get there: the same mode pressed again is a command again.
     pub presses: u16,
-    /// Counts commands to come to rest and give up the rest of the program.
+    /// Counts commands to come to rest and give up the rest of the program: of the items that were sent before, too.
     pub aborts: u16,
     /// The feed override \[0.1 %\], at most 2000; controls with more are not obeyed.
     pub override_permille: u16,
     /// Rest at the end of every program block.
     pub is_single_block: bool,
-    /// Counts commands to enable the drives.
-    pub enables: u16,
+    /// Whether the drives are to be on.
+    pub is_enabled: bool,
+    /// Counts what was pressed to get there: enabled again after a fault is a command again.
+    pub power_presses: u16,
     /// Counts commands to clear a fault.
     pub fault_resets: u16,
 }
@@ -80,7 +85,8 @@ impl Controls {
         aborts: 0,
         override_permille: 1000,
         is_single_block: false,
-        enables: 0,
+        is_enabled: false,
+        power_presses: 0,
         fault_resets: 0,
     };
 
@@ -119,6 +125,8 @@ pub struct Identity {
     pub tick_s: f64,
     /// Items that it has room for.
     pub items: u16,
+    /// What there is for spindle and coolant.
+    pub outputs: BoardOutputs,
     /// Checksum of the machine's parameters.
     pub machine: u32,
 }
@@ -142,37 +150,29 @@ pub struct Status<const AXES: usize> {
     pub line: u32,
     /// The number of the first item that was not taken into the streams: motion is somewhere before it.
     pub taken: u32,
-    /// The number of the fault, from 1; 0 for none.
-    pub fault: u16,
+    /// Stops on the path because items came too late.
+    pub starvations: u32,
+    /// The inputs allow the drives to be enabled.
+    pub is_ready: bool,
+    /// What went wrong, until it is cleared.
+    pub fault: Option<Fault<f64>>,
 }
 
-/// A machine's state.
+/// A machine's state. Whether it is in a fault, [`Status::fault`] tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum State {
     /// The drives are off.
     Off,
-    /// Nothing to do.
+    /// At rest: everything that came is driven.
     Idle,
-    /// Moving along the path.
+    /// A program is under way.
     Moving,
     /// At rest for a programmed time.
     Dwell,
     /// At a program stop.
     Stopped,
-    /// Held.
+    /// Held, at rest.
     Held,
-    /// In a fault.
-    Fault,
-}
-
-impl From<ExecState> for State {
-    fn from(state: ExecState) -> Self {
-        match state {
-            ExecState::Idle => Self::Idle,
-            ExecState::Moving => Self::Moving,
-            ExecState::Dwell => Self::Dwell,
-            ExecState::Stopped => Self::Stopped,
-            ExecState::Held => Self::Held,
-        }
-    }
+    /// An item can't be executed; at rest after those before it.
+    Refused,
 }

@@ -4,6 +4,7 @@ use core::task::Poll;
 use std::collections::VecDeque;
 
 use super::*;
+use crate::hal::BoardOutputs;
 use crate::law::Ticks;
 use crate::program::{Item, Source};
 use crate::random::Random;
@@ -16,6 +17,7 @@ const IDENTITY: Identity = Identity {
     is_fixed_point: false,
     tick_s: 5e-4,
     items: ROOM as u16,
+    outputs: BoardOutputs::None,
     machine: 0xCAFE_F00D,
 };
 /// Items that a board has room for.
@@ -187,7 +189,9 @@ impl Bench {
             feed_mm_s: 12.5,
             line: 7,
             taken: self.board.items.taken(),
-            fault: 0,
+            starvations: 3,
+            is_ready: true,
+            fault: None,
         };
         let status = self.random.chance(0.02).then_some(status);
         let length = self.board.link.transmit(self.now_ms, &self.board.items, status, &mut out);
