@@ -434,7 +434,7 @@ mod tests {
             });
             let switched: Vec<_> = seen.drives.switched.iter().map(|&(_, to)| to).collect();
             assert_eq!(switched, [ON, OutputState::OFF]);
-            assert_eq!(seen.drives.switched[1].0 < 4000, is_aborted, "{:?}", seen.drives.switched);
+            assert_eq!(seen.drives.switched[1].0 < 4500, is_aborted, "{:?}", seen.drives.switched);
         }
     }
 
