@@ -135,13 +135,15 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
                 actual: trace.axes.each_ref().map(|axis| axis.actual),
                 feed_mm_s: trace.executed.motion.v_mm_s.to_f64(),
                 line: trace.executed.line,
+                // Both are known where it is written.
+                aborts: 0,
                 taken: 0,
                 starvations,
                 is_ready: control.is_healthy(),
                 fault: trace.fault.map(|fault| fault.to_f64()),
             }
         });
-        self.streamed.transmit(now_ms, Some(&|taken| Status { taken, ..status }), out)
+        self.streamed.transmit(now_ms, Some(&|aborts, taken| Status { aborts, taken, ..status }), out)
     }
 }
 
@@ -220,7 +222,9 @@ mod tests {
             self.items.is_empty()
                 && self.host.waiting() == 0
                 && self.status.is_some_and(|status| {
-                    status.state == State::Idle && status.taken == self.host.confirmed()
+                    status.state == State::Idle
+                        && status.aborts == self.host.controls().aborts
+                        && status.taken == self.host.confirmed()
                 })
         }
     }

@@ -118,15 +118,15 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     }
 
     /// Writes the next frame for the PC to `out`; see [`BoardLink::transmit`]. `status` is asked for the machine's status with
-    /// the number of the first item that live control has not taken.
+    /// the number of programs given up, and of the first item that live control has not taken.
     pub fn transmit(
         &mut self,
         now_ms: u32,
-        status: Option<&dyn Fn(u32) -> Status<AXES>>,
+        status: Option<&dyn Fn(u16, u32) -> Status<AXES>>,
         out: &mut [u8],
     ) -> usize {
         let items = self.control.source_mut().items_mut();
-        let status = status.map(|status| status(items.taken()));
+        let status = status.map(|status| status(items.aborts(), items.taken()));
         self.link.get_mut().transmit(now_ms, items, status, out)
     }
 
@@ -299,13 +299,14 @@ mod tests {
             let executed = executor.tick(&mut intake).expect("no fault");
             state = executed.state;
             ticks.push(executed.setpoints.map(|setpoint| setpoint.position));
-            let status = |taken: u32| Status {
+            let status = |aborts: u16, taken: u32| Status {
                 tick: now,
                 state: MachineState::Moving,
                 set: [Position::ZERO; AXES],
                 actual: [Position::ZERO; AXES],
                 feed_mm_s: 0.0,
                 line: 0,
+                aborts,
                 taken,
                 starvations: 0,
                 is_ready: true,

@@ -33,11 +33,18 @@ impl<const AXES: usize, const ITEMS: usize> ItemQueue<AXES, ITEMS> {
         Self { entries: Deque::new(), next: 0, aborts: 0 }
     }
 
-    /// Drops what is left of a program that was given up, if it is not the one after `aborts`. Numbers go on.
-    pub fn begin(&mut self, aborts: u16) {
+    /// Drops what is left of a program that was given up, if it is not the one after `aborts`.
+    fn begin(&mut self, aborts: u16) {
         if core::mem::replace(&mut self.aborts, aborts) != aborts {
             self.entries.clear();
+            self.next = 0;
         }
+    }
+
+    /// How many programs were given up before this one.
+    #[must_use]
+    pub const fn aborts(&self) -> u16 {
+        self.aborts
     }
 
     /// The number of the first item that was not taken from here.

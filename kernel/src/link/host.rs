@@ -16,6 +16,10 @@ const CONTROLS_MS: u32 = 20;
 /// Items are sent again at once where the board says that some are missing, but not more often than this \[ms\].
 const AGAIN_MS: u32 = 10;
 
+/// No more items are sent while more than this is not confirmed \[bytes\]: what a hold has to wait for on a slow wire, and
+/// enough to keep it busy while an answer comes.
+const UNDER_WAY_MAX: usize = PAYLOAD_MAX;
+
 /// What the board says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event<const AXES: usize> {
@@ -23,13 +27,13 @@ pub enum Event<const AXES: usize> {
     Welcome(Identity),
     /// It is there, and is of another protocol or has another number of axes. Nothing is sent to it.
     Refused(Identity),
-    /// It takes items: those of a program that has not begun yet, after a greeting or an abort, or what follows those that
-    /// another run of the PC's side has sent.
+    /// It takes items: those of [`Controls::program`], after a greeting, or of the program that was begun or none, after
+    /// another one was given up.
     Ready {
-        /// The number of the next item that it expects.
+        /// The number in the program of the next item that it expects: not 0 if another run of the PC's side has begun it.
         next: u32,
     },
-    /// It has started anew, and knows nothing of the items before: [`HostLink::begin`] goes on with it.
+    /// It has started anew, and knows nothing of the items before: [`HostLink::accept`] goes on with it.
     Restarted {
         /// The number of the first item that it had not confirmed.
         confirmed: u32,
@@ -134,17 +138,24 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     }
 
     /// Gives up the rest of the program: all items that were pushed and not driven. [`Event::Ready`] tells that another
-    /// program may follow, which is driven only after another resume. See [`Self::control`].
+    /// one may follow, which is driven only after another resume. See [`Self::control`].
     #[must_use]
     pub fn abort(&mut self) -> bool {
-        self.give_up(|_| {})
+        self.give_up(0, |_| {})
     }
 
-    /// Enables the drives where the machine stands, or disables them: another program has to follow, as after an abort.
-    /// See [`Self::control`].
+    /// Begins `program`, a name that is not 0, whose items are to be pushed after [`Event::Ready`]; what there was before is
+    /// given up. See [`Self::abort`].
+    #[must_use]
+    pub fn begin(&mut self, program: u32) -> bool {
+        self.give_up(program, |_| {})
+    }
+
+    /// Enables the drives where the machine stands, or disables them; what there was before is given up. See
+    /// [`Self::abort`].
     #[must_use]
     pub fn enable(&mut self, is_enabled: bool) -> bool {
-        self.give_up(|controls| {
+        self.give_up(0, |controls| {
             (controls.is_enabled, controls.power_presses) =
                 (is_enabled, controls.power_presses.wrapping_add(1));
         })
@@ -156,9 +167,10 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         self.control(|controls| controls.fault_resets = controls.fault_resets.wrapping_add(1))
     }
 
-    fn give_up(&mut self, change: impl FnOnce(&mut Controls)) -> bool {
+    fn give_up(&mut self, program: u32, change: impl FnOnce(&mut Controls)) -> bool {
         let is_taken = self.control(|controls| {
             (controls.mode, controls.aborts) = (Mode::Hold, controls.aborts.wrapping_add(1));
+            controls.program = program;
             change(controls);
         });
         if is_taken {
@@ -201,7 +213,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     }
 
     /// Goes on with a board that has started anew, without the items that it had not confirmed before.
-    pub fn begin(&mut self) {
+    pub fn accept(&mut self) {
         if let Session::Lost(session) = self.session {
             self.session = Session::Greeted(session);
         }
@@ -377,6 +389,9 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             return 0;
         };
         let skipped: usize = self.lengths.iter().take(sent).map(|&length| usize::from(length)).sum();
+        if skipped > UNDER_WAY_MAX {
+            return 0;
+        }
         let (mut count, mut length) = (0, 0);
         for &of_entry in self.lengths.iter().skip(sent) {
             let of_entry = usize::from(of_entry);

@@ -16,8 +16,8 @@ pub(super) enum Request {
     Hello { asker: u32 },
     /// What the operator wants.
     Controls { session: u32, controls: Controls },
-    /// Items follow, to the payload's end: of each an `Option`, none for the end of the program. The first one has this
-    /// number. They are of the program after so many aborts.
+    /// Items follow, to the payload's end: of each an `Option`, none for the end of the program. They are of the program after
+    /// so many aborts; the first one has this number in it, from 0.
     Items { session: u32, aborts: u16, first: u32 },
 }
 
@@ -64,6 +64,8 @@ pub struct Controls {
     pub presses: u16,
     /// Counts commands to come to rest and give up the rest of the program: of the items that were sent before, too.
     pub aborts: u16,
+    /// The PC's name for the program whose items follow; 0 if it has none.
+    pub program: u32,
     /// The feed override \[0.1 %\], at most 2000; controls with more are not obeyed.
     pub override_permille: u16,
     /// Rest at the end of every program block.
@@ -83,6 +85,7 @@ impl Controls {
         mode: Mode::Hold,
         presses: 0,
         aborts: 0,
+        program: 0,
         override_permille: 1000,
         is_single_block: false,
         is_enabled: false,
@@ -148,6 +151,8 @@ pub struct Status<const AXES: usize> {
     pub feed_mm_s: f64,
     /// The program line; 0 at rest.
     pub line: u32,
+    /// How many programs were given up before the one that is driven, as in [`Controls::aborts`].
+    pub aborts: u16,
     /// The number of the first item that was not taken into the streams: motion is somewhere before it.
     pub taken: u32,
     /// Stops on the path because items came too late.

@@ -188,6 +188,7 @@ impl Bench {
             actual: [Position::ZERO; 3],
             feed_mm_s: 12.5,
             line: 7,
+            aborts: self.board.items.aborts(),
             taken: self.board.items.taken(),
             starvations: 3,
             is_ready: true,
@@ -384,7 +385,7 @@ fn both_ends_may_start_anew() {
     };
     assert!(told >= confirmed && bench.board.driven.is_empty(), "{told} {confirmed}");
     assert_eq!(bench.host.push(Some(&item(0))), Ok(false), "not before the caller has decided");
-    bench.host.begin();
+    bench.host.accept();
     assert_eq!(bench.greet(), 0);
     // What was pressed before is no command for it.
     assert_eq!(bench.host.controls(), &Controls::NONE);
@@ -461,10 +462,12 @@ fn any_bytes_may_come() {
             } else {
                 payload
             };
-            let before = board.items.next();
+            let before = (board.items.aborts(), board.items.next());
             board.link.receive(&mut bytes.iter().copied());
             board.link.put_items(&mut board.items);
             host.receive(&bytes, 0, &mut |_| read += 1);
+            // Numbers begin anew with a program.
+            let before = if before.0 == board.items.aborts() { before.1 } else { 0 };
             let came = board.items.next().wrapping_sub(before);
             assert!(came <= ROOM as u32);
             read += came + u32::from(board.link.take_controls().is_some());
@@ -473,4 +476,49 @@ fn any_bytes_may_come() {
     }
     println!("{read} were messages");
     assert!(read > 10);
+}
+
+/// Programs one after the other, each given up somewhere, over a bad wire: nothing of one comes after the next has begun,
+/// whatever frames the wire still holds, and numbers begin anew.
+#[test]
+fn nothing_of_a_program_that_was_given_up_comes_after_it() {
+    let mut given_up = 0;
+    for (seed, permille) in (100..=130).zip([0, 10, 50, 200].into_iter().cycle()) {
+        let mut bench = Bench::new(seed, permille);
+        assert_eq!(bench.greet(), 0);
+        for program in 1..=20_u32 {
+            let before = bench.board.driven.len();
+            assert!(match bench.random.below(3) {
+                0 => bench.host.enable(true) && bench.host.begin(program),
+                1 => bench.host.abort() && bench.host.begin(program),
+                _ => bench.host.begin(program),
+            });
+            assert_eq!((bench.host.waiting(), bench.host.push(Some(&item(0)))), (0, Ok(false)));
+            assert_eq!(bench.greet(), 0);
+            let count = bench.random.below(60) as u32;
+            let mut pushed = 0;
+            for _ in 0..bench.random.below(1500) {
+                while pushed < count && bench.host.push(Some(&item(1000 * program + pushed))).expect("short")
+                {
+                    pushed += 1;
+                }
+                bench.step(0.2);
+            }
+            let driven = &bench.board.driven[before..];
+            given_up += u32::from(driven.len() < count as usize);
+            // The last ones of the program before may have been taken until the board knew of this one.
+            let first =
+                driven.iter().position(|driven| *driven == item(1000 * program)).unwrap_or(driven.len());
+            for (number, driven) in (0..).zip(&driven[first..]) {
+                assert_eq!(*driven, item(1000 * program + number), "item {number} of program {program}");
+            }
+            assert!(
+                driven[..first]
+                    .iter()
+                    .all(|driven| { (0..60).any(|number| *driven == item(1000 * (program - 1) + number)) })
+            );
+        }
+        assert_eq!(bench.board.controls.last().map(|controls| controls.program), Some(20));
+    }
+    assert!(given_up > 50, "{given_up}");
 }
