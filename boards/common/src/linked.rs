@@ -169,12 +169,12 @@ mod tests {
     use motion_kernel::link::{Event, FRAME_MAX, HostLink, Identity, Mode, PROTOCOL};
     use motion_kernel::program::Item;
     use motion_kernel::queue::LiveStreams;
-    use motion_kernel::straight::Straight;
     use motion_kernel::units::{Counts, Position};
     use rtic_core::Exclusive;
 
     use super::*;
     use crate::fixture::{AXES, BOARD, IdealDrives, TICK_S, end, machine};
+    use crate::runs::to_start;
 
     type Host = HostLink<AXES, 64, 8192>;
     type State = MachineState;
@@ -194,10 +194,9 @@ mod tests {
     /// A program from `from` on: a straight way to the stringer's start, and the stringer.
     fn stringer(from: [Position; AXES]) -> Vec<Option<Item<AXES>>> {
         let machine = machine();
-        let header = machine.header();
-        let (limits, feeds_mm_s) = (header.rules.limits, [20.0; 2]);
-        let way = Straight::new(from, header.start, header.pulse, limits, feeds_mm_s, header.tick_s);
-        let way = way.expect("a way").map(|item| item.unwrap_or_else(|never| match never {}));
+        let way = to_start(machine.header(), from)
+            .expect("a way")
+            .map(|item| item.unwrap_or_else(|never| match never {}));
         way.chain(machine.program.items().map(|item| item.expect("sound"))).map(Some).chain([None]).collect()
     }
 

@@ -5,12 +5,30 @@
 
 use std::io;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
 
 /// Temporary files of outputs that are not committed, with the outputs' names.
 static PENDING: Mutex<Vec<(PathBuf, String)>> = Mutex::new(Vec::new());
+
+/// The next Ctrl-C is noted, and ends nothing.
+static IS_HELD_FIRST: AtomicBool = AtomicBool::new(false);
+/// It has come.
+static IS_ASKED: AtomicBool = AtomicBool::new(false);
+
+/// From now on the next Ctrl-C is noted for [`take_asked`], and only another one after it ends the process: for a command that
+/// brings a machine to rest first.
+pub fn hold_first() {
+    IS_HELD_FIRST.store(true, Ordering::Relaxed);
+}
+
+/// Whether a Ctrl-C was noted since the last call.
+#[must_use]
+pub fn take_asked() -> bool {
+    IS_ASKED.swap(false, Ordering::Relaxed)
+}
 
 fn lock() -> MutexGuard<'static, Vec<(PathBuf, String)>> {
     PENDING.lock().unwrap_or_else(PoisonError::into_inner)
@@ -61,6 +79,7 @@ pub fn watch() {
 #[cfg(unix)]
 mod unix {
     use std::io::{self, IsTerminal, Write};
+    use std::sync::atomic::Ordering;
     use std::{fs, process, thread};
 
     use signal_hook::consts::{SIGINT, SIGTERM};
@@ -73,7 +92,11 @@ mod unix {
         // Without the handler, a signal ends the process as usual.
         let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
         thread::spawn(move || {
-            if let Some(signal) = signals.forever().next() {
+            for signal in signals.forever() {
+                if signal == SIGINT && super::IS_HELD_FIRST.swap(false, Ordering::Relaxed) {
+                    super::IS_ASKED.store(true, Ordering::Relaxed);
+                    continue;
+                }
                 end(signal);
             }
         });

@@ -200,6 +200,13 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         self.first
     }
 
+    /// The number in the program of the next item to be pushed; `None` while the board takes none.
+    #[must_use]
+    pub fn next(&self) -> Option<u32> {
+        let is_ready = matches!(self.session, Session::Ready(_));
+        is_ready.then(|| self.first.wrapping_add(self.lengths.len() as u32))
+    }
+
     /// Number of items that the board has not confirmed.
     #[must_use]
     pub fn waiting(&self) -> usize {

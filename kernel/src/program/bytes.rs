@@ -26,7 +26,8 @@ use crate::queue::PathRules;
 use crate::units::Position;
 
 const MAGIC: [u8; 4] = *b"MOTN";
-const VERSION: u8 = 5;
+/// The version of this format, and of the items in it.
+pub const FORMAT: u8 = 5;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 9;
@@ -88,7 +89,7 @@ impl core::fmt::Display for ProgramError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NotAProgram => write!(f, "no compiled program: expected MOTN at its start"),
-            Self::Version { found } => write!(f, "format {found}, expected {VERSION}"),
+            Self::Version { found } => write!(f, "format {found}, expected {FORMAT}"),
             Self::Axes { found, expected } => write!(f, "a program for {found} axes, expected {expected}"),
             Self::Checksum { found, expected } => {
                 write!(f, "damaged: checksum {found:08x}, expected {expected:08x}")
@@ -120,7 +121,7 @@ pub fn write<'a, const AXES: usize>(
     };
     let mut entry = [0; ENTRY_MAX];
     put(&MAGIC);
-    put(&[VERSION, AXES as u8]);
+    put(&[FORMAT, AXES as u8]);
     let guards = match guards {
         Some(guards) => &*postcard::to_slice(guards, &mut entry)?,
         None => &[],
@@ -166,7 +167,7 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
         if *magic != MAGIC {
             return Err(ProgramError::NotAProgram);
         }
-        if version != VERSION {
+        if version != FORMAT {
             return Err(ProgramError::Version { found: version });
         }
         if usize::from(axes) != AXES {

@@ -1,0 +1,412 @@
+//! `motion send`: drives a program on a board.
+
+use std::io::{self, BufRead, IsTerminal, Write};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::thread;
+use std::time::Duration;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use motion_kernel::link::{Mode, State, Status};
+use motion_kernel::num::{Fixed, Root};
+
+use super::error::{CliError, Outcome};
+use super::input;
+use super::port::PortArguments;
+use crate::board::sender::{Found, Permissions, check_outputs};
+use crate::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
+use crate::files::{Files, STANDARD_INPUT, interrupt};
+use crate::machine::{Machine, on_machine};
+use crate::planning::{Executable, Mode as PlanMode, Plan, on_axis_count, plan_program, require_outputs};
+
+const EXAMPLES: &str = "\
+Examples:
+  motion send part.ngc --port simulator --enable     on the simulated machine, at the pace of the clock
+  motion send part.ngc --port tcp:localhost:5000 --enable
+                                                     on a board behind an address (`motion board` starts one)
+  motion send part.ngc --port /dev/ttyACM0 --machine mine.toml
+                                                     on a board at a serial port, with its drives on
+  motion send part.ngc --port /dev/ttyACM0 --continue
+                                                     goes on after what the board has of the program
+
+The board first moves straight to the program's start, slowly, then drives the program.
+
+Keys, each with Enter: h holds, r resumes (also from a program stop), a aborts, + and - change the override by 10 %, 0
+resets it, s switches single block. Ctrl-C holds; Ctrl-C again ends this command, and the board stays held.
+
+A board without this command comes to rest on the path where its items end. A cable that was out is noticed: the board is
+held when it is in again, and r goes on.
+
+Exit status: 0 done; 1 a fault, or the board was lost or reset; 2 the program or the board does not fit; 3 held, at a program
+stop, or lost, and nobody there to resume (the end of standard input); 4 aborted; 130 interrupted, the board is held.";
+
+/// Drive a program on a board, and show what it does.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct SendArguments {
+    /// G-code (`-`: standard input; then there are no keys).
+    program: PathBuf,
+    #[command(flatten)]
+    port: PortArguments,
+    /// Machine file (`motion machine` prints one); without it, the reference machine. The board must have the same.
+    #[arg(long, value_name = "FILE")]
+    machine: Option<PathBuf>,
+    #[command(flatten)]
+    reading: input::ReadingArguments,
+    /// Switch the drives on if they are off.
+    #[arg(long)]
+    enable: bool,
+    /// Clear a fault of the board before that.
+    #[arg(long, requires = "enable")]
+    clear_fault: bool,
+    /// Go on after what the board has of this program: after this command was killed, or the PC was restarted.
+    #[arg(long = "continue", conflicts_with = "restart")]
+    continues: bool,
+    /// Give up what the board has of a program.
+    #[arg(long)]
+    restart: bool,
+    /// Leave out the words of spindle and coolant that the machine has no output for.
+    #[arg(long)]
+    no_spindle: bool,
+    /// Print lines of JSON: {step, state, line, set_mm, actual_mm, feed_mm_s, override, taken, items}, at every change, and
+    /// twice a second.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Plans, connects, drives.
+///
+/// # Errors
+/// The program, the machine file or the board is refused, or the board is in a fault.
+pub fn send(arguments: &SendArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    // Only to refuse a program that is also something else.
+    let _ = Files::reading([
+        ("PROGRAM", Some(arguments.program.as_path())),
+        ("--machine", arguments.machine.as_deref()),
+        ("--parameters", arguments.reading.parameters.as_deref()),
+        ("--tools", arguments.reading.tools.as_deref()),
+    ]);
+    let machine = input::any_machine(arguments.machine.as_ref())?;
+    let source = input::read(&arguments.program)?;
+    let program = arguments.reading.program(&source, machine.read_options())?;
+    on_machine!(machine, machine => {
+        if !arguments.no_spindle {
+            require_outputs(&source.name, &program, machine)?;
+        }
+        let plan = plan_program(&source.name, &program, machine, PlanMode::Spanning)?;
+        if let Some(probe) = plan.probes.first() {
+            return Err(CliError::NoProbeInput { program: source.name.clone(), line: probe.line });
+        }
+        for notice in &plan.notices {
+            writeln!(out, "note: {notice}").map_err(CliError::Output)?;
+        }
+        send_plan(arguments, &plan, machine, out)
+    })
+}
+
+fn send_plan<const N: usize>(
+    arguments: &SendArguments,
+    plan: &Plan<N>,
+    machine: &Machine<N>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    if arguments.port.port == Port::Simulator {
+        let job = job::<f32, N, N>(plan, machine)?;
+        let (connection, _board) = arguments.port.connect(machine)?;
+        return drive(arguments, (&job, plan), machine, connection, out);
+    }
+    on_axis_count!(machine.axis_count(), M => {
+        let mut job = job::<f32, N, M>(plan, machine)?;
+        let mut connection = arguments.port.open::<M>()?;
+        // The number type is the board's.
+        greet(&mut connection).map_err(|error| arguments.port.refused(error))?;
+        if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
+            job = self::job::<Fixed, N, M>(plan, machine)?;
+        }
+        drive(arguments, (&job, plan), machine, connection, out)
+    })
+}
+
+/// The plan as items, in the board's number type, if that holds its axes, too.
+fn job<R: Root, const N: usize, const M: usize>(
+    plan: &Plan<N>,
+    machine: &Machine<N>,
+) -> Result<Job<M>, CliError> {
+    machine.axes_config::<R>().map_err(|source| CliError::Axis { machine: machine.name.clone(), source })?;
+    Ok(Job::new(machine, &Executable::new::<R>(plan)?.items))
+}
+
+/// Waits for the board's answer.
+pub(super) fn greet<const M: usize>(connection: &mut Connection<M>) -> Result<(), BoardError> {
+    let mut lost = None;
+    for _ in 0..200 {
+        connection.step(Duration::from_millis(50), &mut |heard| {
+            if let Heard::Lost(cause) = heard {
+                lost = Some(cause);
+            }
+        });
+        if connection.identity().is_some() {
+            return Ok(());
+        }
+        if let Some(cause) = lost.take() {
+            return Err(BoardError::Wire(io::Error::other(cause)));
+        }
+    }
+    Err(BoardError::Silent)
+}
+
+/// What the operator types.
+enum Typed {
+    Key(char),
+    /// Nobody types any more.
+    End,
+}
+
+/// The keys of standard input, unless the program comes from there.
+fn keys(arguments: &SendArguments) -> Receiver<Typed> {
+    let (typed, keys) = channel();
+    let is_taken = arguments.program.as_os_str() == STANDARD_INPUT;
+    thread::spawn(move || {
+        if !is_taken {
+            for line in io::stdin().lock().lines().map_while(Result::ok) {
+                for key in line.trim().chars() {
+                    if typed.send(Typed::Key(key)).is_err() {
+                        return;
+                    }
+                }
+            }
+        }
+        let _ = typed.send(Typed::End);
+    });
+    keys
+}
+
+fn drive<const N: usize, const M: usize>(
+    arguments: &SendArguments,
+    (job, plan): (&Job<M>, &Plan<N>),
+    machine: &Machine<N>,
+    mut connection: Connection<M>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    let refused = |error: BoardError| arguments.port.refused(error);
+    let names: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
+    let found = match (arguments.continues, arguments.restart) {
+        (true, _) => Found::Continued,
+        (_, true) => Found::GivenUp,
+        _ => Found::Stays,
+    };
+    let may = Permissions { enables: arguments.enable, clears_fault: arguments.clear_fault, found };
+    let mut sender = Sender::new(job, &names, may);
+    // A greeting that was heard already.
+    if let Some(identity) = connection.identity() {
+        sender.check(identity).map_err(refused)?;
+    }
+    let keys = keys(arguments);
+    let mut shown = Shown::new(arguments, &names, job.items.len() as u64);
+    interrupt::hold_first();
+    let (mut is_attended, mut is_checked) = (true, false);
+    loop {
+        let mut heard = Vec::new();
+        connection.step(Duration::from_millis(2), &mut |one| heard.push(one));
+        for one in heard {
+            match &one {
+                Heard::Lost(cause) => {
+                    shown.say(out, &format!("lost the board: {cause}; it comes to rest on the path"))?;
+                }
+                Heard::Back => shown.say(out, "the board is back, and is held: r resumes")?,
+                Heard::Board(_) => {}
+            }
+            sender.hear(&one).map_err(refused)?;
+        }
+        if let (false, Some(identity)) = (is_checked, connection.identity()) {
+            check_outputs(&plan.source, job, identity.outputs).map_err(refused)?;
+            is_checked = true;
+        }
+        if interrupt::take_asked() {
+            shown.say(out, "holding: r resumes, a aborts, Ctrl-C again leaves the board held")?;
+            let _ = connection.command(|link| link.press(Mode::Hold));
+        }
+        loop {
+            match keys.try_recv() {
+                Ok(Typed::Key(key)) => command(key, &mut connection, &mut sender),
+                Ok(Typed::End) | Err(TryRecvError::Disconnected) => is_attended = false,
+                Err(TryRecvError::Empty) => break,
+            }
+            if !is_attended {
+                break;
+            }
+        }
+        let step = sender.advance(&mut connection).map_err(refused)?;
+        shown.show(out, step, &connection)?;
+        match step {
+            Step::Done => return shown.end(out, "done").map(|()| Outcome::Done),
+            Step::Aborted => return shown.end(out, "aborted").map(|()| Outcome::Aborted),
+            _ => {}
+        }
+        let waits = matches!(step, Step::Drives | Step::ToStart)
+            && connection.controls().mode == Mode::Hold
+            && connection.status().is_some_and(|status| status.state == State::Held)
+            || connection.status().is_some_and(|status| status.state == State::Stopped);
+        if !is_attended && waits {
+            let goes_on = if step == Step::Drives { "; motion send --continue goes on" } else { "" };
+            let what = format!("nobody resumes: the board stays held{goes_on}");
+            return shown.end(out, &what).map(|()| Outcome::Held);
+        }
+    }
+}
+
+/// Obeys a key.
+fn command<const M: usize>(key: char, connection: &mut Connection<M>, sender: &mut Sender<'_, M>) {
+    let change = |permille: u16, by: i16| permille.saturating_add_signed(by).clamp(100, 2000);
+    // Where the board has not answered, there is nothing to command.
+    let _ = match key {
+        'h' => connection.command(|link| link.press(Mode::Hold)),
+        'r' => {
+            interrupt::hold_first();
+            connection.command(|link| link.press(Mode::Run))
+        }
+        'a' => {
+            sender.abort(connection);
+            true
+        }
+        '+' | '-' => {
+            let by = if key == '+' { 100 } else { -100 };
+            connection.command(|link| {
+                link.control(|controls| controls.override_permille = change(controls.override_permille, by))
+            })
+        }
+        '0' => connection.command(|link| link.control(|controls| controls.override_permille = 1000)),
+        's' => connection.command(|link| link.control(|controls| controls.is_single_block ^= true)),
+        _ => false,
+    };
+}
+
+/// What is shown of it: lines for what changes, and on a terminal a bar.
+struct Shown<'a> {
+    axes: &'a [String],
+    is_json: bool,
+    bar: ProgressBar,
+    last: Option<(Step, Option<State>)>,
+    told: std::time::Instant,
+}
+
+impl<'a> Shown<'a> {
+    fn new(arguments: &SendArguments, axes: &'a [String], items: u64) -> Self {
+        let is_shown = io::stderr().is_terminal() && !arguments.json;
+        let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(items), target);
+        // A template that does not parse would only change the look of the bar.
+        if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {msg}") {
+            bar.set_style(style);
+        }
+        Self { axes, is_json: arguments.json, bar, last: None, told: std::time::Instant::now() }
+    }
+
+    /// A line.
+    fn say(&self, out: &mut dyn Write, text: &str) -> Result<(), CliError> {
+        if self.is_json {
+            return Ok(());
+        }
+        self.bar.suspend(|| writeln!(out, "{text}").and_then(|()| out.flush())).map_err(CliError::Output)
+    }
+
+    fn end(&self, out: &mut dyn Write, text: &str) -> Result<(), CliError> {
+        self.bar.finish_and_clear();
+        self.say(out, text)
+    }
+
+    fn show<const M: usize>(
+        &mut self,
+        out: &mut dyn Write,
+        step: Step,
+        connection: &Connection<M>,
+    ) -> Result<(), CliError> {
+        let status = connection.status();
+        let now = (step, status.map(|status| status.state));
+        let is_new = self.last != Some(now);
+        let is_late = self.told.elapsed() > Duration::from_millis(if self.is_json { 500 } else { 100 });
+        if !is_new && !is_late {
+            return Ok(());
+        }
+        (self.last, self.told) = (Some(now), std::time::Instant::now());
+        if self.is_json {
+            let line = self.json(step, status, connection);
+            return writeln!(out, "{line}").and_then(|()| out.flush()).map_err(CliError::Output);
+        }
+        let Some(status) = status else { return Ok(()) };
+        if step == Step::Drives {
+            self.bar.set_position(u64::from(status.taken));
+        }
+        let position: Vec<String> = self
+            .axes
+            .iter()
+            .zip(status.set)
+            .map(|(name, set)| format!("{name} {:.3}", set.to_mm()))
+            .collect();
+        let percent = f64::from(connection.controls().override_permille) * 0.1;
+        let state = state_words(status.state);
+        let text = format!(
+            "{state}, line {}  {}  F {:.0} mm/min  {percent:.0} %",
+            status.line,
+            position.join("  "),
+            status.feed_mm_s * 60.0
+        );
+        self.bar.set_message(text);
+        if is_new {
+            self.say(out, &format!("{}: {state} at {}", step_words(step), position.join(" ")))?;
+        }
+        Ok(())
+    }
+
+    fn json<const M: usize>(
+        &self,
+        step: Step,
+        status: Option<&Status<M>>,
+        connection: &Connection<M>,
+    ) -> serde_json::Value {
+        let count = self.axes.len();
+        let mm = |positions: &[motion_kernel::units::Position; M]| -> Vec<f64> {
+            positions.iter().take(count).map(|position| position.to_mm()).collect()
+        };
+        serde_json::json!({
+            "step": step_words(step),
+            "state": status.map(|status| state_words(status.state)),
+            "line": status.map(|status| status.line),
+            "set_mm": status.map(|status| mm(&status.set)),
+            "actual_mm": status.map(|status| mm(&status.actual)),
+            "feed_mm_s": status.map(|status| status.feed_mm_s),
+            "override": f64::from(connection.controls().override_permille) * 1e-3,
+            "taken": status.map(|status| status.taken),
+            "items": self.bar.length(),
+        })
+    }
+}
+
+/// The word for a step.
+fn step_words(step: Step) -> &'static str {
+    match step {
+        Step::Greets => "connecting",
+        Step::Clears => "clearing the fault",
+        Step::Enables => "enabling",
+        Step::GivesUp => "giving up what the board has",
+        Step::ToStart => "to the start",
+        Step::Drives => "program",
+        Step::Aborts => "aborting",
+        Step::Done => "done",
+        Step::Aborted => "aborted",
+    }
+}
+
+/// The word for a state.
+pub(super) fn state_words(state: State) -> &'static str {
+    match state {
+        State::Off => "drives off",
+        State::Idle => "idle",
+        State::Moving => "moving",
+        State::Dwell => "dwell",
+        State::Stopped => "program stop",
+        State::Held => "held",
+        State::Refused => "refused",
+    }
+}
