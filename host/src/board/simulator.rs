@@ -13,8 +13,9 @@ use std::time::{Duration, Instant};
 
 use motion_board::{BoardParameters, Control, Linked};
 use motion_kernel::axis::AxesConfig;
+use motion_kernel::fault::FaultKind;
 use motion_kernel::flight::FlightRecorder;
-use motion_kernel::hal::{BoardOutputs, Encoder};
+use motion_kernel::hal::{BoardOutputs, Encoder, Inputs};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::link::{BoardLink, FRAME_MAX, Identity, PROTOCOL};
 use motion_kernel::live::Leads;
@@ -47,10 +48,22 @@ const LATE: Duration = Duration::from_millis(100);
 /// A simulated board in a thread. It ends with this.
 pub struct SimulatedBoard {
     thread: Option<JoinHandle<()>>,
-    is_over: Arc<AtomicBool>,
+    switches: Arc<Switches>,
+}
+
+/// What is switched from outside.
+#[derive(Default)]
+struct Switches {
+    is_over: AtomicBool,
+    emergency_stop: AtomicBool,
 }
 
 impl SimulatedBoard {
+    /// Opens its emergency stop, or closes it.
+    pub fn set_emergency_stop(&self, is_open: bool) {
+        self.switches.emergency_stop.store(is_open, Ordering::Relaxed);
+    }
+
     /// Waits for its end, which only a panic is.
     pub fn wait(mut self) {
         if let Some(thread) = self.thread.take() {
@@ -62,7 +75,7 @@ impl SimulatedBoard {
 
 impl Drop for SimulatedBoard {
     fn drop(&mut self) {
-        self.is_over.store(true, Ordering::Relaxed);
+        self.switches.is_over.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             // A thread that has panicked has said so.
             let _ = thread.join();
@@ -74,19 +87,23 @@ impl Drop for SimulatedBoard {
 type Wires = Box<dyn FnMut() -> io::Result<Option<Box<dyn Wire>>> + Send>;
 
 /// Starts a board with `machine`; returns it and the other end of its wire. `session` is a number that other starts do not
-/// have.
+/// have; its time passes `pace` times as fast as the wall clock's, if this computer can.
 ///
 /// # Errors
 /// The machine can't be simulated, or regulated.
-pub fn start<const N: usize>(machine: &Machine<N>, session: u32) -> Result<(SimulatedBoard, Pipe), RunError> {
+pub fn start<const N: usize>(
+    machine: &Machine<N>,
+    session: u32,
+    pace: f64,
+) -> Result<(SimulatedBoard, Pipe), RunError> {
     let (here, there) = Pipe::pair();
     let mut there = Some(there);
     let wires: Wires = Box::new(move || Ok(there.take().map(|wire| Box::new(wire) as Box<dyn Wire>)));
-    Ok((spawn(machine, session, wires)?, here))
+    Ok((spawn(machine, session, wires, pace)?, here))
 }
 
 /// Starts a board with `machine` that takes connections of `listener`, one after the other: the newest one replaces those
-/// before it, as a cable that is plugged in elsewhere does.
+/// before it, as a cable that is plugged in elsewhere does. `session` and `pace` are those of [`start`].
 ///
 /// # Errors
 /// The machine can't be simulated, or regulated, or the listener can't be used so.
@@ -94,6 +111,7 @@ pub fn listen<const N: usize>(
     machine: &Machine<N>,
     session: u32,
     listener: TcpListener,
+    pace: f64,
 ) -> Result<SimulatedBoard, RunError> {
     let refused = |error: io::Error| RunError::Simulation(error.to_string());
     listener.set_nonblocking(true).map_err(refused)?;
@@ -105,13 +123,14 @@ pub fn listen<const N: usize>(
         Err(error) if error.kind() == io::ErrorKind::WouldBlock => Ok(None),
         Err(error) => Err(error),
     });
-    spawn(machine, session, wires)
+    spawn(machine, session, wires, pace)
 }
 
 fn spawn<const N: usize>(
     machine: &Machine<N>,
     session: u32,
     mut wires: Wires,
+    pace: f64,
 ) -> Result<SimulatedBoard, RunError> {
     if parameters(machine).tick_s() != machine.tick_s {
         let found = format!("a tick of {} s; boards have a whole number of ticks a second", machine.tick_s);
@@ -120,15 +139,15 @@ fn spawn<const N: usize>(
     // Both are made again in the thread, where they can't be refused any more.
     simulated(machine)?;
     let axes: AxesConfig<Number, N> = machine.axes_config()?;
-    let is_over = Arc::new(AtomicBool::new(false));
-    let (machine, is_ended) = (machine.clone(), Arc::clone(&is_over));
+    let switches = Arc::new(Switches::default());
+    let (machine, seen) = (machine.clone(), Arc::clone(&switches));
     let thread = thread::Builder::new().name("board".to_owned()).spawn(move || {
         let Ok(simulated) = simulated(&machine) else { return };
         let Ok(hardware) = SimulatedHardware::new(&simulated) else { return };
-        run(&machine, &axes, session, (&simulated, hardware), &mut wires, &is_ended);
+        run(&machine, &axes, session, (&simulated, hardware), (&mut wires, pace), &seen);
     });
     let thread = thread.map_err(|error| RunError::Simulation(error.to_string()))?;
-    Ok(SimulatedBoard { thread: Some(thread), is_over })
+    Ok(SimulatedBoard { thread: Some(thread), switches })
 }
 
 /// The board's figures.
@@ -148,8 +167,8 @@ fn run<const N: usize>(
     axes: &AxesConfig<Number, N>,
     session: u32,
     (simulated, mut hardware): (&Simulated<N>, SimulatedHardware<'_, N>),
-    wires: &mut Wires,
-    is_over: &AtomicBool,
+    (wires, pace): (&mut Wires, f64),
+    switches: &Switches,
 ) {
     let (job, board, header) = (Job::<N>::new(machine, &[]), parameters(machine), machine.header());
     let identity = Identity {
@@ -173,7 +192,8 @@ fn run<const N: usize>(
     let (mut wire, mut frame, mut bytes) = (None::<Box<dyn Wire>>, [0; FRAME_MAX], [0; 4096]);
     let (mut begin, mut ticks) = (Instant::now(), 0_u64);
     let mut came = std::collections::VecDeque::new();
-    while !is_over.load(Ordering::Relaxed) {
+    while !switches.is_over.load(Ordering::Relaxed) {
+        hardware.injector.emergency_stop = switches.emergency_stop.load(Ordering::Relaxed);
         if let Ok(Some(newest)) = wires() {
             wire = Some(newest);
             came.clear();
@@ -184,20 +204,22 @@ fn run<const N: usize>(
             Some(Err(_)) => wire = None,
             None => thread::sleep(STEP),
         }
-        let due = begin.elapsed();
-        let mut passed = Duration::from_secs_f64(ticks as f64 * machine.tick_s);
-        if due > passed + LATE {
-            begin += due - passed - LATE;
+        // Of the wall clock, when a tick is due.
+        let due = |ticks: u64| Duration::from_secs_f64(ticks as f64 * machine.tick_s / pace);
+        if begin.elapsed() > due(ticks) + LATE {
+            begin += begin.elapsed() - due(ticks) - LATE;
         }
-        while passed <= begin.elapsed() {
-            control.tick(None, None, &mut hardware);
+        while due(ticks) <= begin.elapsed() {
+            let Ok(inputs) = hardware.read_inputs();
+            let unhealthy = inputs.emergency_stop.then_some(FaultKind::EmergencyStop);
+            control.tick(unhealthy, None, &mut hardware);
             simulated.advance();
             ticks += 1;
-            passed = Duration::from_secs_f64(ticks as f64 * machine.tick_s);
             let mut shared = Exclusive(&mut control);
             linked.poll(&mut || came.pop_front(), &mut shared);
             // Times wrap.
-            let length = linked.transmit(passed.as_millis() as u32, &mut shared, &mut frame);
+            let now_ms = (ticks as f64 * machine.tick_s * 1e3) as u64 as u32;
+            let length = linked.transmit(now_ms, &mut shared, &mut frame);
             if length > 0 && wire.as_mut().is_some_and(|wire| wire.write(&frame[..length]).is_err()) {
                 wire = None;
             }

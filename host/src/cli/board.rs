@@ -45,7 +45,7 @@ pub fn run(arguments: &BoardArguments, out: &mut dyn Write) -> Result<Outcome, C
     let listener = TcpListener::bind(&arguments.listen).map_err(refused)?;
     let address = listener.local_addr().map_err(refused)?;
     on_machine!(machine, machine => {
-        let board = simulator::listen(machine, number(), listener)
+        let board = simulator::listen(machine, number(), listener, 1.0)
             .map_err(|source| CliError::Run { program: machine.name.clone(), source })?;
         writeln!(out, "machine {:?} at tcp:{address}", machine.name)
             .and_then(|()| out.flush())

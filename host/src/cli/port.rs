@@ -33,7 +33,7 @@ impl PortArguments {
         &self,
         machine: &Machine<N>,
     ) -> Result<(Connection<N>, SimulatedBoard), CliError> {
-        let (board, wire) = simulator::start(machine, number())
+        let (board, wire) = simulator::start(machine, number(), 1.0)
             .map_err(|source| CliError::Run { program: machine.name.clone(), source })?;
         let mut wire = Some(Box::new(wire) as Box<dyn Wire>);
         let open = Box::new(move || wire.take().ok_or_else(|| std::io::ErrorKind::BrokenPipe.into()));
