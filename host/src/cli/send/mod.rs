@@ -1,22 +1,28 @@
 //! `motion send`: drives a program on a board.
 
-use std::io::{self, BufRead, IsTerminal, Write};
+mod shown;
+mod stops;
+
+use std::io::{self, BufRead, Write};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 use std::time::Duration;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use motion_kernel::link::{Mode, State, Status};
+use motion_kernel::link::{Mode, State};
 use motion_kernel::num::{Fixed, Root};
 
+use self::shown::Shown;
+pub(super) use self::shown::state_words;
+use self::stops::Stops;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::port::PortArguments;
 use crate::board::sender::{Found, Permissions, check_outputs};
 use crate::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
 use crate::files::{Files, STANDARD_INPUT, interrupt};
+use crate::gcode::Program;
 use crate::machine::{Machine, on_machine};
 use crate::planning::{Executable, Mode as PlanMode, Plan, on_axis_count, plan_program, require_outputs};
 
@@ -101,20 +107,21 @@ pub fn send(arguments: &SendArguments, out: &mut dyn Write) -> Result<Outcome, C
         for notice in &plan.notices {
             writeln!(out, "note: {notice}").map_err(CliError::Output)?;
         }
-        send_plan(arguments, &plan, machine, out)
+        send_plan(arguments, (&program, &plan), machine, out)
     })
 }
 
 fn send_plan<const N: usize>(
     arguments: &SendArguments,
-    plan: &Plan<N>,
+    (program, plan): (&Program, &Plan<N>),
     machine: &Machine<N>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     if arguments.port.port == Port::Simulator {
         let job = job::<f32, N, N>(plan, machine)?;
         let (connection, _board) = arguments.port.connect(machine)?;
-        return drive(arguments, (&job, plan), machine, connection, out);
+        let stops = Stops::new(program, plan, &job);
+        return drive(arguments, (&job, stops), machine, connection, out);
     }
     on_axis_count!(machine.axis_count(), M => {
         let mut job = job::<f32, N, M>(plan, machine)?;
@@ -124,7 +131,8 @@ fn send_plan<const N: usize>(
         if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
             job = self::job::<Fixed, N, M>(plan, machine)?;
         }
-        drive(arguments, (&job, plan), machine, connection, out)
+        let stops = Stops::new(program, plan, &job);
+        drive(arguments, (&job, stops), machine, connection, out)
     })
 }
 
@@ -184,7 +192,7 @@ fn keys(arguments: &SendArguments) -> Receiver<Typed> {
 
 fn drive<const N: usize, const M: usize>(
     arguments: &SendArguments,
-    (job, plan): (&Job<M>, &Plan<N>),
+    (job, stops): (&Job<M>, Stops),
     machine: &Machine<N>,
     mut connection: Connection<M>,
     out: &mut dyn Write,
@@ -203,7 +211,7 @@ fn drive<const N: usize, const M: usize>(
         sender.check(identity).map_err(refused)?;
     }
     let keys = keys(arguments);
-    let mut shown = Shown::new(arguments, &names, job.items.len() as u64);
+    let mut shown = Shown::new(arguments, &names, stops, job.items.len() as u64);
     interrupt::hold_first();
     let (mut is_attended, mut is_checked) = (true, false);
     loop {
@@ -220,7 +228,8 @@ fn drive<const N: usize, const M: usize>(
             sender.hear(&one).map_err(refused)?;
         }
         if let (false, Some(identity)) = (is_checked, connection.identity()) {
-            check_outputs(&plan.source, job, identity.outputs).map_err(refused)?;
+            check_outputs(&arguments.program.display().to_string(), job, identity.outputs)
+                .map_err(refused)?;
             is_checked = true;
         }
         if interrupt::take_asked() {
@@ -280,133 +289,4 @@ fn command<const M: usize>(key: char, connection: &mut Connection<M>, sender: &m
         's' => connection.command(|link| link.control(|controls| controls.is_single_block ^= true)),
         _ => false,
     };
-}
-
-/// What is shown of it: lines for what changes, and on a terminal a bar.
-struct Shown<'a> {
-    axes: &'a [String],
-    is_json: bool,
-    bar: ProgressBar,
-    last: Option<(Step, Option<State>)>,
-    told: std::time::Instant,
-}
-
-impl<'a> Shown<'a> {
-    fn new(arguments: &SendArguments, axes: &'a [String], items: u64) -> Self {
-        let is_shown = io::stderr().is_terminal() && !arguments.json;
-        let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(items), target);
-        // A template that does not parse would only change the look of the bar.
-        if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {msg}") {
-            bar.set_style(style);
-        }
-        Self { axes, is_json: arguments.json, bar, last: None, told: std::time::Instant::now() }
-    }
-
-    /// A line.
-    fn say(&self, out: &mut dyn Write, text: &str) -> Result<(), CliError> {
-        if self.is_json {
-            return Ok(());
-        }
-        self.bar.suspend(|| writeln!(out, "{text}").and_then(|()| out.flush())).map_err(CliError::Output)
-    }
-
-    fn end(&self, out: &mut dyn Write, text: &str) -> Result<(), CliError> {
-        self.bar.finish_and_clear();
-        self.say(out, text)
-    }
-
-    fn show<const M: usize>(
-        &mut self,
-        out: &mut dyn Write,
-        step: Step,
-        connection: &Connection<M>,
-    ) -> Result<(), CliError> {
-        let status = connection.status();
-        let now = (step, status.map(|status| status.state));
-        let is_new = self.last != Some(now);
-        let is_late = self.told.elapsed() > Duration::from_millis(if self.is_json { 500 } else { 100 });
-        if !is_new && !is_late {
-            return Ok(());
-        }
-        (self.last, self.told) = (Some(now), std::time::Instant::now());
-        if self.is_json {
-            let line = self.json(step, status, connection);
-            return writeln!(out, "{line}").and_then(|()| out.flush()).map_err(CliError::Output);
-        }
-        let Some(status) = status else { return Ok(()) };
-        if step == Step::Drives {
-            self.bar.set_position(u64::from(status.taken));
-        }
-        let position: Vec<String> = self
-            .axes
-            .iter()
-            .zip(status.set)
-            .map(|(name, set)| format!("{name} {:.3}", set.to_mm()))
-            .collect();
-        let percent = f64::from(connection.controls().override_permille) * 0.1;
-        let state = state_words(status.state);
-        let text = format!(
-            "{state}, line {}  {}  F {:.0} mm/min  {percent:.0} %",
-            status.line,
-            position.join("  "),
-            status.feed_mm_s * 60.0
-        );
-        self.bar.set_message(text);
-        if is_new {
-            self.say(out, &format!("{}: {state} at {}", step_words(step), position.join(" ")))?;
-        }
-        Ok(())
-    }
-
-    fn json<const M: usize>(
-        &self,
-        step: Step,
-        status: Option<&Status<M>>,
-        connection: &Connection<M>,
-    ) -> serde_json::Value {
-        let count = self.axes.len();
-        let mm = |positions: &[motion_kernel::units::Position; M]| -> Vec<f64> {
-            positions.iter().take(count).map(|position| position.to_mm()).collect()
-        };
-        serde_json::json!({
-            "step": step_words(step),
-            "state": status.map(|status| state_words(status.state)),
-            "line": status.map(|status| status.line),
-            "set_mm": status.map(|status| mm(&status.set)),
-            "actual_mm": status.map(|status| mm(&status.actual)),
-            "feed_mm_s": status.map(|status| status.feed_mm_s),
-            "override": f64::from(connection.controls().override_permille) * 1e-3,
-            "taken": status.map(|status| status.taken),
-            "items": self.bar.length(),
-        })
-    }
-}
-
-/// The word for a step.
-fn step_words(step: Step) -> &'static str {
-    match step {
-        Step::Greets => "connecting",
-        Step::Clears => "clearing the fault",
-        Step::Enables => "enabling",
-        Step::GivesUp => "giving up what the board has",
-        Step::ToStart => "to the start",
-        Step::Drives => "program",
-        Step::Aborts => "aborting",
-        Step::Done => "done",
-        Step::Aborted => "aborted",
-    }
-}
-
-/// The word for a state.
-pub(super) fn state_words(state: State) -> &'static str {
-    match state {
-        State::Off => "drives off",
-        State::Idle => "idle",
-        State::Moving => "moving",
-        State::Dwell => "dwell",
-        State::Stopped => "program stop",
-        State::Held => "held",
-        State::Refused => "refused",
-    }
 }
