@@ -8,12 +8,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use motion_host::board::job::parameters;
+use motion_host::board::parameters::{Figures, read, write};
 use motion_host::board::sender::{Found, Permissions};
 use motion_host::board::simulator::{self, SimulatedBoard};
 use motion_host::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
 use motion_host::machine::Machine;
 use motion_host::planning::Executable;
-use motion_kernel::link::{Mode, State};
+use motion_kernel::link::{Mode, State, WriteError};
 use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 use motion_tests::check::planned;
@@ -317,4 +319,47 @@ fn an_abort_ends_at_rest_on_the_way() {
     assert_ne!(stands(&connection), end(&job));
     assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
     assert_eq!(stands(&connection), end(&job));
+}
+
+/// A board is given another machine while its drives are off, and drives a program for that one then; what differs is named.
+#[test]
+fn a_board_gets_other_parameters() {
+    let machine = Machine::reference();
+    let mut other = Machine::reference();
+    other.axes[1].gains.kp_per_s *= 1.5;
+    let (first, second) = (parameters::<3, 3>(&machine), parameters::<3, 3>(&other));
+    println!("{} bytes for three axes", first.len());
+    let (_board, address) = board(&machine, 20);
+    let mut connection = connect(address, 20);
+    let figures = |record: &[u8]| Figures::of::<3>(record).expect("a record");
+    let read = |connection: &mut Connection<3>| read(connection).expect("an answer");
+    // Before the greeting nothing is asked.
+    assert_eq!(read(&mut connection), first);
+    let differences = figures(&first).differences(&figures(&second));
+    let names: Vec<&str> = differences.iter().map(|difference| difference.name.as_str()).collect();
+    // Guards follow from the gain.
+    assert!(names.first() == Some(&"axes[1].gains.kp_per_s"), "{names:?}");
+    assert!(names.len() < 6 && names.iter().all(|name| name.starts_with("axes[1].")), "{names:?}");
+    // Nothing that is damaged, or for another tick.
+    let mut damaged = second.clone();
+    damaged[100] ^= 1;
+    let slow = parameters::<3, 3>(&Machine { tick_s: 0.001, ..Machine::reference() });
+    for bad in [damaged, slow, vec![1; 3000]] {
+        let refused = write(&mut connection, &bad);
+        let is_refused = match bad.len() {
+            3000 => matches!(refused, Err(BoardError::Parameters(WriteError::Length { room: 2048 }))),
+            _ => matches!(refused, Err(BoardError::Parameters(WriteError::Unsuitable))),
+        };
+        assert!(is_refused, "{refused:?}");
+    }
+    assert_eq!(read(&mut connection), first);
+    write(&mut connection, &second).expect("suits");
+    assert_eq!(read(&mut connection), second);
+    let job = job(&zigzag(20), &other);
+    let mut connection = connect(address, 21);
+    assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+    // The drives are on now.
+    let refused = write(&mut connection, &first);
+    assert!(matches!(refused, Err(BoardError::Parameters(WriteError::DrivesOn))), "{refused:?}");
+    assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
 }

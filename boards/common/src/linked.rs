@@ -10,23 +10,32 @@
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::OutputState;
 use motion_kernel::law::Pulse;
-use motion_kernel::link::{BoardLink, State as MachineState, Status};
+use motion_kernel::link::{BoardLink, ParameterBuffer, State as MachineState, Status, WriteError};
 use motion_kernel::live::State;
 use motion_kernel::num::Real;
 use motion_kernel::queue::LiveFeeder;
 use rtic_core::Mutex;
 
 use crate::control::Control;
+use crate::machine::Machine;
 use crate::parameters::BoardParameters;
 use crate::streamed::{Requests, Streamed};
 
 /// Time between two messages about the machine \[ms\].
 const STATUS_MS: u32 = 20;
 
+/// Room for new parameters \[bytes\]: three axes of the reference machine take 578, nine less than 1800.
+const PARAMETERS_MAX: usize = 2048;
+
 /// The background. `ITEMS` and `PLACES` are those of [`Streamed`].
 pub struct Linked<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize> {
     streamed: Streamed<'a, R, AXES, ITEMS, PLACES>,
-    settle_ticks: u32,
+    board: BoardParameters,
+    /// The present parameters, a compiled program without items; none if they can't be changed.
+    parameters: &'a [u8],
+    new_parameters: ParameterBuffer<PARAMETERS_MAX>,
+    /// How many bytes of these are to be stored.
+    to_store: Option<usize>,
     /// Spindle or coolant may be on.
     is_on: bool,
     status_ms: u32,
@@ -44,7 +53,34 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         pulse: Pulse,
     ) -> Self {
         let streamed = Streamed::new(link, feeder, pulse, board.tick_s(), board.leads);
-        Self { streamed, settle_ticks: board.settle_ticks(), is_on: false, status_ms: 0 }
+        Self {
+            streamed,
+            board: *board,
+            parameters: &[],
+            new_parameters: ParameterBuffer::new(),
+            to_store: None,
+            is_on: false,
+            status_ms: 0,
+        }
+    }
+
+    /// From now on `parameters`, the present ones as a compiled program without items, may be read and replaced by the PC: by
+    /// [`Self::new_parameters`].
+    pub fn set_parameters(&mut self, parameters: &'a [u8]) {
+        self.parameters = parameters;
+    }
+
+    /// Parameters that the PC has written, and that suit the board. It is to store them and to start anew with them;
+    /// if it can't store them, [`Self::not_stored`].
+    #[must_use]
+    pub fn new_parameters(&self) -> Option<&[u8]> {
+        self.new_parameters.bytes().get(..self.to_store?)
+    }
+
+    /// The new parameters could not be stored: the PC is told, and the present ones stay.
+    pub fn not_stored(&mut self) {
+        self.to_store = None;
+        self.streamed.link_mut().refuse_parameters(&mut self.new_parameters, WriteError::Storage);
     }
 
     /// One poll: takes what `next_byte` has, obeys the operator, plans, which may take several ticks. `next_byte` is that of
@@ -57,7 +93,32 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         // An item that can't be executed is told by the state.
         let (requests, _) = self.streamed.poll(next_byte);
         let is_given_up = self.act(requests, control);
+        self.receive_parameters(control);
         self.switch(is_given_up, control);
+    }
+
+    /// Puts away what came of new parameters, and checks them where they are complete.
+    #[inline(never)]
+    fn receive_parameters<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) {
+        let Self { streamed, board, parameters, new_parameters, to_store, .. } = self;
+        let link = streamed.link_mut();
+        let is_off = control.lock(|control| control.kernel.is_off());
+        if !link.put_parameters(new_parameters, is_off) {
+            return;
+        }
+        let Some(bytes) = new_parameters.take() else { return };
+        let error = match Machine::<R, AXES>::new(bytes, board) {
+            _ if parameters.is_empty() => WriteError::Storage,
+            Ok(_) => {
+                *to_store = Some(bytes.len());
+                return;
+            }
+            Err(_) => WriteError::Unsuitable,
+        };
+        link.refuse_parameters(new_parameters, error);
     }
 
     /// What the operator asks of drives and faults; and the end of an abort. Whether the program was given up.
@@ -67,7 +128,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         requests: Requests,
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) -> bool {
-        let Self { streamed, settle_ticks, .. } = self;
+        let Self { streamed, board, .. } = self;
         let is_aborted = streamed.state() == State::Aborted;
         control.lock(|control| {
             if requests.clears_fault {
@@ -77,7 +138,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
                 Some(false) => Some(control.kernel.stand_here()),
                 Some(true) if control.may_enable() => {
                     let here = control.kernel.stand_here();
-                    control.kernel.enable(*settle_ticks);
+                    control.kernel.enable(board.settle_ticks());
                     Some(here)
                 }
                 _ if is_aborted => control.kernel.rest_here(),
@@ -120,6 +181,11 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
         out: &mut [u8],
     ) -> usize {
+        let Self { streamed, parameters, new_parameters, .. } = self;
+        let length = streamed.link_mut().transmit_parameters(parameters, new_parameters, out);
+        if length > 0 {
+            return length;
+        }
         if now_ms.wrapping_sub(self.status_ms) < STATUS_MS {
             return self.streamed.transmit(now_ms, None, out);
         }

@@ -130,6 +130,11 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         self.link.get_mut().transmit(now_ms, items, status, out)
     }
 
+    /// The board's end of the link.
+    pub(crate) fn link_mut(&mut self) -> &mut BoardLink {
+        self.link.get_mut()
+    }
+
     /// What the program switches outputs to now; see [`LiveControl::switch`].
     pub fn switch(&mut self) -> Option<OutputState> {
         self.control.switch(&self.feeder)

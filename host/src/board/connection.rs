@@ -17,6 +17,8 @@ const REOPEN_AFTER: Duration = Duration::from_millis(500);
 const SILENT_AFTER: Duration = Duration::from_secs(3);
 
 /// What is heard of a board.
+// As the link's events, which it hands on.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Heard<const N: usize> {
     /// What the board's end of the link says.
@@ -186,6 +188,16 @@ impl<const N: usize> Connection<N> {
     /// It is longer than a frame.
     pub fn push(&mut self, item: Option<&Item<N>>) -> Result<bool, postcard::Error> {
         self.link.push(item)
+    }
+
+    /// Asks for the board's parameters; see [`HostLink::read_parameters`].
+    pub fn read_parameters(&mut self, offset: u32) {
+        self.link.read_parameters(offset);
+    }
+
+    /// Writes a piece of new parameters; see [`HostLink::write_parameters`].
+    pub fn write_parameters(&mut self, parameters: &[u8], offset: u32) {
+        self.link.write_parameters(parameters, offset);
     }
 
     /// Whether everything that was pushed is confirmed and taken into motion, and that has come to its end.

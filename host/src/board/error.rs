@@ -3,6 +3,8 @@
 use std::io;
 
 use motion_kernel::hal::BoardOutputs;
+use motion_kernel::link::WriteError;
+use motion_kernel::program::ProgramError;
 use thiserror::Error;
 
 /// What a board and a program have to agree on.
@@ -110,6 +112,12 @@ pub enum BoardError {
         /// The program line there.
         at: String,
     },
+    /// The board does not take new parameters.
+    #[error("found {}", refusal(.0))]
+    Parameters(WriteError),
+    /// What it has are no parameters.
+    #[error("found parameters on the board that can't be read: {0}")]
+    NoParameters(ProgramError),
     /// An item is longer than a frame.
     #[error("found an item of more bytes than a frame has: {0}")]
     Long(postcard::Error),
@@ -127,6 +135,7 @@ impl BoardError {
             | Self::Fault { .. }
             | Self::Reset { .. }
             | Self::Item { .. }
+            | Self::NoParameters(_)
             | Self::Long(_) => false,
             Self::Disagrees { .. }
             | Self::Outputs { .. }
@@ -134,6 +143,7 @@ impl BoardError {
             | Self::Begun { .. }
             | Self::Busy
             | Self::NotBegun
+            | Self::Parameters(_)
             | Self::NoWay(_) => true,
         }
     }
@@ -146,6 +156,20 @@ fn shown(what: Agreement, value: &str) -> String {
         Agreement::Axes => format!("{value} axes"),
         Agreement::Tick => format!("a tick of {value} s"),
         Agreement::Machine => format!("the machine {value}"),
+    }
+}
+
+fn refusal(error: &WriteError) -> String {
+    match error {
+        WriteError::DrivesOn => "the drives on, expected them off for new parameters".to_owned(),
+        WriteError::Length { room } => {
+            format!("more parameters than the board has room for, expected {room} bytes")
+        }
+        WriteError::Unsuitable => {
+            "parameters that the board refuses, expected its axes and tick, and counts that its inputs pass"
+                .to_owned()
+        }
+        WriteError::Storage => "a board that can't store parameters, expected one that can".to_owned(),
     }
 }
 

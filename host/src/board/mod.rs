@@ -8,6 +8,7 @@
 //! - [`connection`]: the link over a wire that may come and go;
 //! - [`job`]: the items of a program for a board's axes, and its name;
 //! - [`sender`]: drives a job, step by step;
+//! - [`parameters`]: a board's parameters, read, written and compared;
 //! - [`simulator`]: a board with a simulated machine, in a thread or behind an address;
 //! - [`error`]: what boards and wires refuse.
 
@@ -16,6 +17,7 @@ pub mod wire;
 pub mod connection;
 pub mod job;
 pub mod sender;
+pub mod parameters;
 pub mod simulator;
 pub mod error;
 

@@ -23,7 +23,7 @@ use motion_kernel::program::FORMAT;
 use motion_kernel::queue::LiveStreams;
 use rtic_core::Exclusive;
 
-use super::job::Job;
+use super::job;
 use super::wire::{Pipe, Tcp, Wire};
 use crate::machine::Machine;
 use crate::simulate::RunError;
@@ -129,7 +129,7 @@ pub fn listen<const N: usize>(
 fn spawn<const N: usize>(
     machine: &Machine<N>,
     session: u32,
-    mut wires: Wires,
+    wires: Wires,
     pace: f64,
 ) -> Result<SimulatedBoard, RunError> {
     if parameters(machine).tick_s() != machine.tick_s {
@@ -138,13 +138,15 @@ fn spawn<const N: usize>(
     }
     // Both are made again in the thread, where they can't be refused any more.
     simulated(machine)?;
-    let axes: AxesConfig<Number, N> = machine.axes_config()?;
+    let _: AxesConfig<Number, N> = machine.axes_config()?;
+    let record = job::parameters::<N, N>(machine);
     let switches = Arc::new(Switches::default());
     let (machine, seen) = (machine.clone(), Arc::clone(&switches));
     let thread = thread::Builder::new().name("board".to_owned()).spawn(move || {
         let Ok(simulated) = simulated(&machine) else { return };
         let Ok(hardware) = SimulatedHardware::new(&simulated) else { return };
-        run(&machine, &axes, session, (&simulated, hardware), (&mut wires, pace), &seen);
+        let world = World { wires, wire: None, pace, switches: &seen };
+        run(&machine, (session, record), (&simulated, hardware), world);
     });
     let thread = thread.map_err(|error| RunError::Simulation(error.to_string()))?;
     Ok(SimulatedBoard { thread: Some(thread), switches })
@@ -162,67 +164,94 @@ fn parameters<const N: usize>(machine: &Machine<N>) -> BoardParameters {
     }
 }
 
+/// A board from power-on to power-on: with the parameters that it was given last.
 fn run<const N: usize>(
     machine: &Machine<N>,
-    axes: &AxesConfig<Number, N>,
-    session: u32,
+    (mut session, mut record): (u32, Vec<u8>),
     (simulated, mut hardware): (&Simulated<N>, SimulatedHardware<'_, N>),
-    (wires, pace): (&mut Wires, f64),
-    switches: &Switches,
+    mut world: World<'_>,
 ) {
-    let (job, board, header) = (Job::<N>::new(machine, &[]), parameters(machine), machine.header());
+    let board = parameters(machine);
+    while let Ok(started) = motion_board::Machine::<Number, N>::new(&record, &board) {
+        let on = (session, &*record, &board, &started);
+        let Some(next) = run_once(on, (simulated, &mut hardware), &mut world) else { return };
+        (session, record) = (session.wrapping_add(1), next);
+    }
+}
+
+/// What is around a board.
+struct World<'a> {
+    wires: Wires,
+    wire: Option<Box<dyn Wire>>,
+    pace: f64,
+    switches: &'a Switches,
+}
+
+/// Until it is over, or until there are new parameters.
+fn run_once<const N: usize>(
+    (session, record, board, machine): (u32, &[u8], &BoardParameters, &motion_board::Machine<'_, Number, N>),
+    (simulated, hardware): (&Simulated<N>, &mut SimulatedHardware<'_, N>),
+    world: &mut World<'_>,
+) -> Option<Vec<u8>> {
+    let header = *machine.header();
     let identity = Identity {
         protocol: PROTOCOL,
         format: FORMAT.into(),
         axes: N as u16,
         is_fixed_point: false,
-        tick_s: machine.tick_s,
+        tick_s: header.tick_s,
         items: ITEMS as u16,
         outputs: board.outputs,
-        machine: job.machine,
+        machine: record.last_chunk().map_or(0, |sum| u32::from_le_bytes(*sum)),
     };
     let mut flight = Box::new(FlightRecorder::<Number, N, ROWS, AFTER>::new());
     let mut streams = Box::new(LiveStreams::<Number, N, PIECES, SEGMENTS>::new());
     let (feeder, intake) = streams.split(header.rules, header.start);
     let Ok(counts) = hardware.latch();
-    let kernel = Kernel::new(axes, header.start, counts);
+    let kernel = Kernel::new(&machine.axes, header.start, counts);
     let mut control = Control::new(kernel, intake, &mut flight);
     let link = BoardLink::new(session, identity);
-    let mut linked = Box::new(Linked::<Number, N, ITEMS, PLACES>::new(&board, link, feeder, header.pulse));
-    let (mut wire, mut frame, mut bytes) = (None::<Box<dyn Wire>>, [0; FRAME_MAX], [0; 4096]);
+    let mut linked = Box::new(Linked::<Number, N, ITEMS, PLACES>::new(board, link, feeder, header.pulse));
+    linked.set_parameters(record);
+    let World { wires, wire, pace, switches } = world;
+    let (mut frame, mut bytes) = ([0; FRAME_MAX], [0; 4096]);
     let (mut begin, mut ticks) = (Instant::now(), 0_u64);
     let mut came = std::collections::VecDeque::new();
     while !switches.is_over.load(Ordering::Relaxed) {
         hardware.injector.emergency_stop = switches.emergency_stop.load(Ordering::Relaxed);
         if let Ok(Some(newest)) = wires() {
-            wire = Some(newest);
+            *wire = Some(newest);
             came.clear();
         }
         // What is read is waited for no longer than the clock allows.
         match wire.as_mut().map(|wire| wire.read(&mut bytes, STEP)) {
             Some(Ok(count)) => came.extend(&bytes[..count]),
-            Some(Err(_)) => wire = None,
+            Some(Err(_)) => *wire = None,
             None => thread::sleep(STEP),
         }
         // Of the wall clock, when a tick is due.
-        let due = |ticks: u64| Duration::from_secs_f64(ticks as f64 * machine.tick_s / pace);
+        let due = |ticks: u64| Duration::from_secs_f64(ticks as f64 * header.tick_s / *pace);
         if begin.elapsed() > due(ticks) + LATE {
             begin += begin.elapsed() - due(ticks) - LATE;
         }
         while due(ticks) <= begin.elapsed() {
             let Ok(inputs) = hardware.read_inputs();
             let unhealthy = inputs.emergency_stop.then_some(FaultKind::EmergencyStop);
-            control.tick(unhealthy, None, &mut hardware);
+            control.tick(unhealthy, None, hardware);
             simulated.advance();
             ticks += 1;
             let mut shared = Exclusive(&mut control);
             linked.poll(&mut || came.pop_front(), &mut shared);
             // Times wrap.
-            let now_ms = (ticks as f64 * machine.tick_s * 1e3) as u64 as u32;
+            let now_ms = (ticks as f64 * header.tick_s * 1e3) as u64 as u32;
             let length = linked.transmit(now_ms, &mut shared, &mut frame);
             if length > 0 && wire.as_mut().is_some_and(|wire| wire.write(&frame[..length]).is_err()) {
-                wire = None;
+                *wire = None;
+            }
+            if let Some(next) = linked.new_parameters() {
+                return Some(next.to_vec());
             }
         }
     }
+    None
 }

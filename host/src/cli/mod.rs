@@ -32,6 +32,7 @@
 //! - [`compile`]: a program as bytes, for a board;
 //! - [`send`]: a program on a board, over a wire;
 //! - [`watch`]: what a board does;
+//! - [`parameters`]: a board's parameters;
 //! - [`board`]: a board with the simulated machine;
 //! - [`home`]: the simulated axes find their references;
 //! - [`jog`]: presses and releases jog keys of the simulated machine;
@@ -51,6 +52,7 @@ pub mod flight;
 pub mod home;
 pub mod jog;
 pub mod machine;
+pub mod parameters;
 pub mod plan;
 pub mod profile;
 pub mod read;
@@ -93,6 +95,8 @@ Examples:
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
   motion send part.ngc --port /dev/ttyACM0       a program on a board, over a wire
   motion watch --port /dev/ttyACM0               what the board does
+  motion parameters diff --port /dev/ttyACM0 --machine mine.toml
+                                                 what the board and the file have not in common
   motion board                                   the simulated machine as a board, behind an address
   motion home --machine mine.toml                the axes find their references
   motion jog X+20 Y-2.5@300 --feed 50            press keys, release one after 300 ticks
@@ -135,6 +139,7 @@ enum Command {
     Compile(compile::CompileArguments),
     Send(send::SendArguments),
     Watch(watch::WatchArguments),
+    Parameters(parameters::ParametersArguments),
     Board(board::BoardArguments),
     Home(home::HomeArguments),
     Jog(jog::JogArguments),
@@ -176,6 +181,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),
         Some(Command::Send(arguments)) => send::send(arguments, out),
         Some(Command::Watch(arguments)) => watch::watch(arguments, out),
+        Some(Command::Parameters(arguments)) => parameters::run(arguments, out),
         Some(Command::Board(arguments)) => board::run(arguments, out),
         Some(Command::Home(arguments)) => home::run(arguments, out),
         Some(Command::Jog(arguments)) => jog::run(arguments, out),

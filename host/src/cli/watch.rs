@@ -4,13 +4,14 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use motion_kernel::link::{Identity, Status};
+use motion_kernel::link::Status;
 use motion_kernel::units::Position;
 
 use super::error::{CliError, Outcome};
+use super::parameters::identity;
 use super::port::PortArguments;
 use super::send::state_words;
-use crate::board::{BoardError, Connection, Heard, Port};
+use crate::board::{BoardError, Connection, Heard};
 use crate::planning::on_axis_count;
 use crate::simulate::faults;
 
@@ -41,11 +42,7 @@ pub struct WatchArguments {
 /// # Errors
 /// There is no board, or it is lost.
 pub fn watch(arguments: &WatchArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
-    if arguments.port.port == Port::Simulator {
-        let found = "--port simulator, which nobody drives".to_owned();
-        return Err(CliError::Arguments { found, expected: "the port of a board" });
-    }
-    let identity = identity(arguments)?;
+    let identity = identity(&arguments.port)?;
     writeln!(
         out,
         "{} axes, {}, {} ticks/s, machine {:08x}",
@@ -56,16 +53,6 @@ pub fn watch(arguments: &WatchArguments, out: &mut dyn Write) -> Result<Outcome,
     )
     .map_err(CliError::Output)?;
     on_axis_count!(usize::from(identity.axes), M => show::<M>(arguments, out))
-}
-
-/// What the board is: of however many axes.
-fn identity(arguments: &WatchArguments) -> Result<Identity, CliError> {
-    let mut connection = arguments.port.open::<1>()?;
-    super::send::greet(&mut connection).map_err(|error| arguments.port.refused(error))?;
-    match connection.identity() {
-        Some(identity) if (1..=9).contains(&identity.axes) => Ok(*identity),
-        _ => Err(arguments.port.refused(BoardError::Silent)),
-    }
 }
 
 fn show<const M: usize>(arguments: &WatchArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {

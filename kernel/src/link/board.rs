@@ -9,7 +9,8 @@ use core::task::Poll;
 use heapless::Deque;
 
 use super::frame::{Deframer, FRAME_MAX, Payload};
-use super::message::{Controls, Identity, Mode, Reply, Request, Status, Taken};
+use super::message::{Controls, Identity, Mode, Piece, Reply, Request, Status, Taken, WriteError};
+use super::parameters::ParameterBuffer;
 use crate::program::{Item, Source, take};
 
 /// An answer that was lost is repeated after this time \[ms\].
@@ -89,8 +90,12 @@ pub struct BoardLink {
     session: u32,
     identity: Identity,
     deframer: Deframer,
-    /// Items wait in the deframer.
+    /// Items, or parameters, wait in the deframer.
     has_items: bool,
+    has_parameters: bool,
+    /// The byte from which on the parameters are asked for.
+    read_from: Option<u32>,
+    is_written_due: bool,
     controls: Controls,
     /// They were not taken yet; how many aborts were.
     is_changed: bool,
@@ -126,6 +131,9 @@ impl BoardLink {
             identity,
             deframer: Deframer::new(),
             has_items: false,
+            has_parameters: false,
+            read_from: None,
+            is_written_due: false,
             controls: Controls::NONE,
             is_changed: false,
             taken_aborts: 0,
@@ -156,7 +164,7 @@ impl BoardLink {
     /// time. Controls are known at once.
     pub fn receive(&mut self, bytes: &mut impl Iterator<Item = u8>) {
         for _ in 0..2 * FRAME_MAX {
-            if self.has_items {
+            if self.has_items || self.has_parameters {
                 break;
             }
             let Some(byte) = bytes.next() else { break };
@@ -174,6 +182,8 @@ impl BoardLink {
     }
 
     fn drop_items(&mut self) {
+        // They come again.
+        self.has_parameters = false;
         if core::mem::take(&mut self.has_items) {
             (self.is_missing, self.is_taken_due) = (true, true);
         }
@@ -189,7 +199,12 @@ impl BoardLink {
                 // Another one may read what the one before could not make.
                 (self.is_welcome_due, self.is_unreadable) = (true, false);
             }
-            Request::Controls { session, .. } | Request::Items { session, .. } if session != self.session => {
+            Request::Controls { session, .. }
+            | Request::Items { session, .. }
+            | Request::Read { session, .. }
+            | Request::Write { session, .. }
+                if session != self.session =>
+            {
                 self.is_welcome_due = true;
             }
             Request::Controls { controls, .. } => {
@@ -203,6 +218,8 @@ impl BoardLink {
                 (self.is_missing, self.is_taken_due) = (true, true);
             }
             Request::Items { .. } => self.has_items = true,
+            Request::Read { offset, .. } => self.read_from = Some(offset),
+            Request::Write { .. } => self.has_parameters = true,
         }
     }
 
@@ -223,6 +240,55 @@ impl BoardLink {
         self.is_missing = known.cast_signed() < 0;
         self.is_unreadable = !self.is_missing && !put(entries, known, items);
         true
+    }
+
+    /// Puts away the bytes of new parameters that came last; false if none did. They are refused unless the drives are off.
+    pub fn put_parameters<const BYTES: usize>(
+        &mut self,
+        buffer: &mut ParameterBuffer<BYTES>,
+        is_off: bool,
+    ) -> bool {
+        if !core::mem::take(&mut self.has_parameters) {
+            return false;
+        }
+        if let Some((Request::Write { record, offset, .. }, bytes)) = take::<Request>(self.deframer.payload())
+        {
+            buffer.put(record, offset, bytes, is_off);
+            self.is_written_due = true;
+        }
+        true
+    }
+
+    /// The new parameters were refused after they had come: says so.
+    pub fn refuse_parameters<const BYTES: usize>(
+        &mut self,
+        buffer: &mut ParameterBuffer<BYTES>,
+        error: WriteError,
+    ) {
+        buffer.refuse(error);
+        self.is_written_due = true;
+    }
+
+    /// Writes the next frame about parameters to `out`, as [`Self::transmit`] does about all else: `parameters` are the
+    /// present ones.
+    pub fn transmit_parameters<const BYTES: usize>(
+        &mut self,
+        parameters: &[u8],
+        buffer: &ParameterBuffer<BYTES>,
+        out: &mut [u8],
+    ) -> usize {
+        let session = self.session;
+        if core::mem::take(&mut self.is_written_due) {
+            let (record, bytes, error) = buffer.written();
+            let reply = Reply::<1>::Written { session, record, bytes, error };
+            return Payload::of(&reply).map_or(0, |payload| payload.frame(out));
+        }
+        let Some(offset) = self.read_from.take() else { return 0 };
+        let reply = Reply::<1>::Parameters { session, offset, length: parameters.len() as u32 };
+        let piece = Piece::of(parameters.get(offset as usize..).unwrap_or_default());
+        let Some(mut payload) = Payload::of(&reply) else { return 0 };
+        // There is room for a piece.
+        if payload.push_all(piece.bytes().iter().copied()) { payload.frame(out) } else { 0 }
     }
 
     /// Whether controls have come that ask motion to come to rest, and were not taken yet.

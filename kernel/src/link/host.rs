@@ -6,8 +6,10 @@
 use heapless::Deque;
 
 use super::frame::{Deframer, PAYLOAD_MAX, Payload};
-use super::message::{Controls, Identity, Mode, PROTOCOL, Reply, Request, Status, Taken};
-use crate::program::{Item, take};
+use super::message::{
+    Controls, Identity, Mode, PROTOCOL, Piece, Record, Reply, Request, Status, Taken, WriteError,
+};
+use crate::program::{Checksum, Item, take};
 
 /// What was not answered is said again after this time \[ms\].
 const REPEAT_MS: u32 = 100;
@@ -21,6 +23,8 @@ const AGAIN_MS: u32 = 10;
 const UNDER_WAY_MAX: usize = PAYLOAD_MAX;
 
 /// What the board says.
+// There is no heap to put the bytes on.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event<const AXES: usize> {
     /// It is there.
@@ -40,6 +44,23 @@ pub enum Event<const AXES: usize> {
     },
     /// What the machine does.
     Status(Status<AXES>),
+    /// Bytes of its parameters that were [asked for](HostLink::read_parameters).
+    Parameters {
+        /// The first one's place.
+        offset: u32,
+        /// How many there are altogether.
+        length: u32,
+        /// The bytes.
+        piece: Piece,
+    },
+    /// It has so many bytes of new parameters, or does not take them. Once it has all of them and finds them good, it starts
+    /// anew.
+    Written {
+        /// Bytes.
+        bytes: u32,
+        /// Why they are not taken.
+        error: Option<WriteError>,
+    },
     /// It can't read an item. Nothing more is sent.
     Unreadable {
         /// The item's number.
@@ -58,6 +79,15 @@ enum Session {
     Ready(u32),
     /// It is another one now; the caller has to begin anew.
     Lost(u32),
+}
+
+/// What is asked for until it is answered.
+// There is no heap to put the bytes on.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Ask {
+    Read { offset: u32 },
+    Write { record: Record, offset: u32, piece: Piece },
 }
 
 /// The PC's end of the link to a board of `AXES` axes, with room for `ITEMS` items in `BYTES` bytes that are not confirmed.
@@ -81,8 +111,12 @@ pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     is_unreadable: bool,
     /// A board says that it is another one than before.
     is_asking: bool,
+    ask: Option<Ask>,
+    /// Counts the parameters written: answers about those before are old.
+    attempt: u32,
     hello_ms: Option<u32>,
     controls_ms: Option<u32>,
+    ask_ms: Option<u32>,
     /// When something was confirmed last, or sent while nothing was under way.
     progress_ms: u32,
     again_ms: u32,
@@ -105,8 +139,11 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             limit: 0,
             is_unreadable: false,
             is_asking: false,
+            ask: None,
+            attempt: asker,
             hello_ms: None,
             controls_ms: None,
+            ask_ms: None,
             progress_ms: 0,
             again_ms: 0,
         }
@@ -248,14 +285,49 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         Ok(true)
     }
 
+    /// Asks for the board's parameters from byte `offset` on, until [`Event::Parameters`] comes.
+    pub fn read_parameters(&mut self, offset: u32) {
+        (self.ask, self.ask_ms) = (Some(Ask::Read { offset }), None);
+    }
+
+    /// Writes new parameters, which are a [compiled program](crate::program::write) without items: a piece of them from byte
+    /// `offset` on, until [`Event::Written`] comes.
+    pub fn write_parameters(&mut self, parameters: &[u8], offset: u32) {
+        if offset == 0 {
+            self.attempt = self.attempt.wrapping_add(1);
+        }
+        let (length, sum) = (parameters.len() as u32, Checksum::of(parameters));
+        let record = Record { length, sum, attempt: self.attempt };
+        let piece = Piece::of(parameters.get(offset as usize..).unwrap_or_default());
+        (self.ask, self.ask_ms) = (Some(Ask::Write { record, offset, piece }), None);
+    }
+
     /// Takes what came in at the time `now_ms`, which may wrap.
     pub fn receive(&mut self, bytes: &[u8], now_ms: u32, on_event: &mut impl FnMut(Event<AXES>)) {
         for &byte in bytes {
             if !self.deframer.push(byte) {
                 continue;
             }
-            let Some((reply, [])) = take::<Reply<AXES>>(self.deframer.payload()) else { continue };
+            let Some((reply, rest)) = take::<Reply<AXES>>(self.deframer.payload()) else { continue };
             match reply {
+                Reply::Parameters { session, offset, length } if self.is_of(session) => {
+                    let piece = Piece::of(rest);
+                    if self.ask == Some(Ask::Read { offset }) {
+                        self.ask = None;
+                        on_event(Event::Parameters { offset, length, piece });
+                    }
+                }
+                Reply::Written { session, record, bytes, error } if self.is_of(session) => {
+                    if let Some(Ask::Write { record: asked, offset, piece }) = self.ask
+                        && asked == record
+                        && (error.is_some() || bytes > offset || piece.bytes().is_empty())
+                    {
+                        self.ask = None;
+                        on_event(Event::Written { bytes, error });
+                    }
+                }
+                Reply::Parameters { .. } | Reply::Written { .. } => {}
+                _ if !rest.is_empty() => {}
                 Reply::Welcome { session, asker, identity, controls } => {
                     if asker == self.asker {
                         self.greeted(session, &identity, &controls, on_event);
@@ -374,6 +446,21 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         if is_due(self.controls_ms, after_ms) {
             self.controls_ms = Some(now_ms);
             return frame(&Request::Controls { session, controls: self.controls }, out);
+        }
+        if let Some(ask) = self.ask
+            && is_due(self.ask_ms, REPEAT_MS)
+        {
+            self.ask_ms = Some(now_ms);
+            return match ask {
+                Ask::Read { offset } => frame(&Request::Read { session, offset }, out),
+                Ask::Write { record, offset, piece } => {
+                    let Some(mut payload) = Payload::of(&Request::Write { session, record, offset }) else {
+                        return 0;
+                    };
+                    // There is room for a piece.
+                    if payload.push_all(piece.bytes().iter().copied()) { payload.frame(out) } else { 0 }
+                }
+            };
         }
         if is_ready { self.items(session, now_ms, out) } else { 0 }
     }

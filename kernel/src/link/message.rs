@@ -7,7 +7,7 @@ use crate::hal::BoardOutputs;
 use crate::units::Position;
 
 /// The version of this protocol. A PC refuses a board of another version.
-pub const PROTOCOL: u16 = 2;
+pub const PROTOCOL: u16 = 3;
 
 /// From the PC.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,6 +19,63 @@ pub(super) enum Request {
     /// Items follow, to the payload's end: of each an `Option`, none for the end of the program. They are of the program after
     /// so many aborts; the first one has this number in it, from 0.
     Items { session: u32, aborts: u16, first: u32 },
+    /// Asks for the board's parameters from this byte on.
+    Read { session: u32, offset: u32 },
+    /// Bytes of new parameters follow, to the payload's end, from this one on; what they are as a whole.
+    Write { session: u32, record: Record, offset: u32 },
+}
+
+/// Parameters on their way: how many bytes, their checksum, and which attempt it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Record {
+    pub(super) length: u32,
+    pub(super) sum: u32,
+    pub(super) attempt: u32,
+}
+
+/// Most bytes of parameters in a message.
+pub(super) const PIECE_MAX: usize = 256;
+
+/// Some bytes of parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    bytes: [u8; PIECE_MAX],
+    count: u16,
+}
+
+impl Piece {
+    /// The first of `bytes`, as many as a message has.
+    pub(super) fn of(bytes: &[u8]) -> Self {
+        let mut piece = Self { bytes: [0; PIECE_MAX], count: 0 };
+        for (place, byte) in piece.bytes.iter_mut().zip(bytes) {
+            *place = *byte;
+            piece.count += 1;
+        }
+        piece
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.count.into()).unwrap_or_default()
+    }
+}
+
+/// Why a board does not take parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum WriteError {
+    /// The drives are on.
+    DrivesOn,
+    /// They are longer than the board has room for.
+    Length {
+        /// The room \[bytes\].
+        room: u32,
+    },
+    /// They are damaged, or not for this board: another number of axes, another tick, a count rate that its inputs do not
+    /// pass, a figure out of its range.
+    Unsuitable,
+    /// The board could not store them.
+    Storage,
 }
 
 /// From the board.
@@ -30,6 +87,10 @@ pub(super) enum Reply<const AXES: usize> {
     Taken(Taken),
     /// What the machine does.
     Status { session: u32, status: Status<AXES> },
+    /// Bytes of the board's parameters follow, from this one on, of so many.
+    Parameters { session: u32, offset: u32, length: u32 },
+    /// What has come of new parameters: bytes, or why they are not taken.
+    Written { session: u32, record: Record, bytes: u32, error: Option<WriteError> },
 }
 
 /// What has come to the board.

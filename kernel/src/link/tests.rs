@@ -120,6 +120,10 @@ struct Board {
     items: Items,
     driven: Vec<Item<3>>,
     controls: Vec<Controls>,
+    parameters: Vec<u8>,
+    /// New ones, and whether they may come.
+    buffer: ParameterBuffer<1024>,
+    is_off: bool,
 }
 
 impl Board {
@@ -129,6 +133,9 @@ impl Board {
             items: Items::new(),
             driven: Vec::new(),
             controls: Vec::new(),
+            parameters: Vec::new(),
+            buffer: ParameterBuffer::new(),
+            is_off: true,
         }
     }
 }
@@ -171,9 +178,15 @@ impl Bench {
         }
         let bytes = self.down.receive(&self.random);
         let mut bytes = bytes.into_iter();
+        let Board { link, items, buffer, is_off, parameters, .. } = &mut self.board;
         while bytes.len() > 0 {
-            self.board.link.receive(&mut bytes);
-            self.board.link.put_items(&mut self.board.items);
+            link.receive(&mut bytes);
+            link.put_items(items);
+            link.put_parameters(buffer, *is_off);
+        }
+        let length = link.transmit_parameters(parameters, buffer, &mut out);
+        if length > 0 {
+            self.up.send(&self.random, &out[..length]);
         }
         self.board.controls.extend(self.board.link.take_controls());
         if self.random.chance(takes)
@@ -465,6 +478,8 @@ fn any_bytes_may_come() {
             let before = (board.items.aborts(), board.items.next());
             board.link.receive(&mut bytes.iter().copied());
             board.link.put_items(&mut board.items);
+            board.link.put_parameters(&mut board.buffer, seed % 2 == 0);
+            board.link.transmit_parameters(&[1; 300], &board.buffer, &mut out);
             host.receive(&bytes, 0, &mut |_| read += 1);
             // Numbers begin anew with a program.
             let before = if before.0 == board.items.aborts() { before.1 } else { 0 };
@@ -521,4 +536,63 @@ fn nothing_of_a_program_that_was_given_up_comes_after_it() {
         assert_eq!(bench.board.controls.last().map(|controls| controls.program), Some(20));
     }
     assert!(given_up > 50, "{given_up}");
+}
+
+/// New parameters of every length come whole over a bad wire, and are read back; not with drives on, not if there is no room.
+#[test]
+fn parameters_come_whole() {
+    for (seed, permille) in (200..=230).zip([0, 10, 50, 200].into_iter().cycle()) {
+        let mut bench = Bench::new(seed, permille);
+        bench.greet();
+        let length = bench.random.below(1500) as usize + 1;
+        let parameters: Vec<u8> = (0..length).map(|_| bench.random.next() as u8).collect();
+        let expected = if length > 1024 { Err(WriteError::Length { room: 1024 }) } else { Ok(()) };
+        bench.board.is_off = false;
+        assert_eq!(bench.write(&parameters), Err(WriteError::DrivesOn));
+        bench.board.is_off = true;
+        for _ in 0..2 {
+            assert_eq!(bench.write(&parameters), expected, "{length} bytes");
+            let Board { link, buffer, .. } = &mut bench.board;
+            assert_eq!(buffer.take(), expected.ok().map(|()| &parameters[..]));
+            assert_eq!(buffer.take(), None, "once");
+            if expected.is_ok() {
+                // What a board says that finds them no good.
+                link.refuse_parameters(buffer, WriteError::Unsuitable);
+            }
+        }
+        bench.board.parameters = parameters.clone();
+        let mut read = Vec::new();
+        bench.events.clear();
+        bench.host.read_parameters(0);
+        for _ in 0..50_000 {
+            bench.step(0.0);
+            if let Some(Event::Parameters { offset, length, piece }) = bench.events.pop() {
+                assert_eq!((offset as usize, length as usize), (read.len(), parameters.len()));
+                read.extend_from_slice(piece.bytes());
+                bench.host.read_parameters(read.len() as u32);
+            }
+            if read.len() >= length {
+                break;
+            }
+        }
+        assert_eq!(read, parameters);
+    }
+}
+
+impl Bench {
+    /// Writes parameters until the board has them, or refuses them.
+    fn write(&mut self, parameters: &[u8]) -> Result<(), WriteError> {
+        self.events.clear();
+        self.host.write_parameters(parameters, 0);
+        for _ in 0..50_000 {
+            self.step(0.0);
+            match self.events.pop() {
+                Some(Event::Written { error: Some(error), .. }) => return Err(error),
+                Some(Event::Written { bytes, .. }) if bytes as usize == parameters.len() => return Ok(()),
+                Some(Event::Written { bytes, .. }) => self.host.write_parameters(parameters, bytes),
+                _ => {}
+            }
+        }
+        panic!("no answer");
+    }
 }
