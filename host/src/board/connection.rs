@@ -79,6 +79,14 @@ impl<const N: usize> Connection<N> {
         }
     }
 
+    /// Until the board has confirmed what the operator wants, or for a second.
+    pub fn settle(&mut self) {
+        let begin = Instant::now();
+        while !self.link.is_controlled() && begin.elapsed() < Duration::from_secs(1) {
+            self.step(Duration::from_millis(10), &mut |_| {});
+        }
+    }
+
     fn exchange(&mut self, wait: Duration, on_heard: &mut dyn FnMut(Heard<N>)) -> io::Result<()> {
         let now_ms = self.now_ms();
         // While nobody listened, nothing could be heard.

@@ -10,6 +10,7 @@
 //! - [`sender`]: drives a job, step by step;
 //! - [`parameters`]: a board's parameters, read, written and compared;
 //! - [`simulator`]: a board with a simulated machine, in a thread or behind an address;
+//! - [`emulated`]: a board in an emulator;
 //! - [`error`]: what boards and wires refuse.
 
 pub mod port;
@@ -19,6 +20,7 @@ pub mod job;
 pub mod sender;
 pub mod parameters;
 pub mod simulator;
+pub mod emulated;
 pub mod error;
 
 pub use connection::{Connection, Heard};

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use thiserror::Error;
 
 use crate::board::BoardError;
+use crate::board::emulated::EmulatedError;
 use crate::drive::DriveError;
 use crate::files::FilesError;
 use crate::flight::FlightError;
@@ -189,6 +190,9 @@ pub enum CliError {
         /// Why.
         source: BoardError,
     },
+    /// There is no emulated board.
+    #[error(transparent)]
+    Emulated(#[from] EmulatedError),
     /// Programs among several are refused.
     #[error("{}", programs.join("\nmotion: "))]
     Refused {

@@ -5,7 +5,7 @@
 
 use std::io;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
@@ -13,21 +13,34 @@ use tempfile::NamedTempFile;
 /// Temporary files of outputs that are not committed, with the outputs' names.
 static PENDING: Mutex<Vec<(PathBuf, String)>> = Mutex::new(Vec::new());
 
-/// The next Ctrl-C is noted, and ends nothing.
+/// The next signal is noted, and ends nothing.
 static IS_HELD_FIRST: AtomicBool = AtomicBool::new(false);
-/// It has come.
-static IS_ASKED: AtomicBool = AtomicBool::new(false);
+/// What has come: 0 for nothing, or an [`Asked`].
+static ASKED: AtomicU8 = AtomicU8::new(0);
 
-/// From now on the next Ctrl-C is noted for [`take_asked`], and only another one after it ends the process: for a command that
-/// brings a machine to rest first.
+/// What a signal asks of a command that holds first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// Ctrl-C: hold.
+    Hold = 1,
+    /// The request to end: hold, and end.
+    End = 2,
+}
+
+/// From now on the next Ctrl-C or request to end is noted for [`take_asked`], and only another one after it ends the process: for
+/// a command that brings a machine to rest first.
 pub fn hold_first() {
     IS_HELD_FIRST.store(true, Ordering::Relaxed);
 }
 
-/// Whether a Ctrl-C was noted since the last call.
+/// The signal that was noted since the last call.
 #[must_use]
-pub fn take_asked() -> bool {
-    IS_ASKED.swap(false, Ordering::Relaxed)
+pub fn take_asked() -> Option<Asked> {
+    match ASKED.swap(0, Ordering::Relaxed) {
+        1 => Some(Asked::Hold),
+        2 => Some(Asked::End),
+        _ => None,
+    }
 }
 
 fn lock() -> MutexGuard<'static, Vec<(PathBuf, String)>> {
@@ -93,8 +106,9 @@ mod unix {
         let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
         thread::spawn(move || {
             for signal in signals.forever() {
-                if signal == SIGINT && super::IS_HELD_FIRST.swap(false, Ordering::Relaxed) {
-                    super::IS_ASKED.store(true, Ordering::Relaxed);
+                if super::IS_HELD_FIRST.swap(false, Ordering::Relaxed) {
+                    let asked = if signal == SIGINT { super::Asked::Hold } else { super::Asked::End };
+                    super::ASKED.store(asked as u8, Ordering::Relaxed);
                     continue;
                 }
                 end(signal);

@@ -21,7 +21,8 @@ use super::input;
 use super::port::PortArguments;
 use crate::board::sender::{Found, Permissions, check_outputs};
 use crate::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
-use crate::files::{Files, STANDARD_INPUT, interrupt};
+use crate::files::interrupt::{self, Asked};
+use crate::files::{Files, STANDARD_INPUT};
 use crate::gcode::Program;
 use crate::machine::{Machine, on_machine};
 use crate::planning::{Executable, Mode as PlanMode, Plan, on_axis_count, plan_program, require_outputs};
@@ -39,7 +40,8 @@ Examples:
 The board first moves straight to the program's start, slowly, then drives the program.
 
 Keys, each with Enter: h holds, r resumes (also from a program stop), a aborts, + and - change the override by 10 %, 0
-resets it, s switches single block. Ctrl-C holds; Ctrl-C again ends this command, and the board stays held.
+resets it, s switches single block. Ctrl-C holds; Ctrl-C again ends this command, and the board stays held. A request to end
+(SIGTERM) does both.
 
 A board without this command comes to rest on the path where its items end. A cable that was out is noticed: the board is
 held when it is in again, and r goes on.
@@ -232,9 +234,13 @@ fn drive<const N: usize, const M: usize>(
                 .map_err(refused)?;
             is_checked = true;
         }
-        if interrupt::take_asked() {
-            shown.say(out, "holding: r resumes, a aborts, Ctrl-C again leaves the board held")?;
+        if let Some(asked) = interrupt::take_asked() {
             let _ = connection.command(|link| link.press(Mode::Hold));
+            if asked == Asked::End {
+                connection.settle();
+                return shown.end(out, "ended: the board is held").map(|()| Outcome::Held);
+            }
+            shown.say(out, "holding: r resumes, a aborts, Ctrl-C again leaves the board held")?;
         }
         loop {
             match keys.try_recv() {
