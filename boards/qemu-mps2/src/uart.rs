@@ -14,7 +14,7 @@ use critical_section::Mutex;
 use heapless::spsc::{Consumer, Producer, Queue};
 use motion_kernel::link::FRAME_MAX;
 
-/// The number of the interrupt for a byte that has come; what comes in [`receive`]'s vector.
+/// The number of the interrupt that is to call [`receive`]: a byte has come.
 pub const INTERRUPT: u16 = 0;
 /// Bytes that the background may be late for.
 const RECEIVED: usize = 4096;

@@ -32,7 +32,7 @@ use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::link::{BoardLink, Identity, PROTOCOL};
 use motion_kernel::live::Leads;
-use motion_kernel::program::{ProgramError, Reader, FORMAT};
+use motion_kernel::program::{FORMAT, ProgramError, Reader};
 use qemu_boards::hardware::{Hardware, Simulated};
 use qemu_boards::live::{PLACES, Streams};
 use qemu_boards::processor::{entry, wait};
