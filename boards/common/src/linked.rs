@@ -7,18 +7,23 @@
 //! Nothing from the wire enables drives but the operator's command, and that only without a fault and with inputs that allow
 //! it.
 
+use core::convert::Infallible;
+
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::OutputState;
 use motion_kernel::law::Pulse;
 use motion_kernel::link::{BoardLink, ParameterBuffer, State as MachineState, Status, WriteError};
 use motion_kernel::live::State;
 use motion_kernel::num::Real;
+use motion_kernel::program::SupplyError;
 use motion_kernel::queue::LiveFeeder;
 use rtic_core::Mutex;
 
 use crate::control::Control;
+use crate::log::LogLine;
 use crate::machine::Machine;
 use crate::parameters::BoardParameters;
+use crate::report::{FlightDump, Report};
 use crate::streamed::{Requests, Streamed};
 
 /// Time between two messages about the machine \[ms\].
@@ -39,6 +44,14 @@ pub struct Linked<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLAC
     /// Spindle or coolant may be on.
     is_on: bool,
     status_ms: u32,
+    /// Why the program ends early.
+    refused: Option<SupplyError<Infallible>>,
+    /// The log has said so.
+    has_refused: bool,
+    /// The log has said that there is a fault.
+    has_faulted: bool,
+    dump: FlightDump,
+    report: Report,
 }
 
 impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
@@ -61,6 +74,11 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
             to_store: None,
             is_on: false,
             status_ms: 0,
+            refused: None,
+            has_refused: false,
+            has_faulted: false,
+            dump: FlightDump::default(),
+            report: Report::default(),
         }
     }
 
@@ -90,8 +108,18 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         next_byte: &mut dyn FnMut() -> Option<u8>,
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) {
-        // An item that can't be executed is told by the state.
-        let (requests, _) = self.streamed.poll(next_byte);
+        self.poll_unless(&|| false, next_byte, control);
+    }
+
+    /// [`Self::poll`] with a hold on the board; see [`Streamed::poll_unless`].
+    pub fn poll_unless<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        is_hold_asked: &dyn Fn() -> bool,
+        next_byte: &mut dyn FnMut() -> Option<u8>,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) {
+        let (requests, polled) = self.streamed.poll_unless(is_hold_asked, next_byte);
+        self.refused = polled.err();
         let is_given_up = self.act(requests, control);
         self.receive_parameters(control);
         self.switch(is_given_up, control);
@@ -131,8 +159,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         let Self { streamed, board, .. } = self;
         let is_aborted = streamed.state() == State::Aborted;
         control.lock(|control| {
-            if requests.clears_fault {
-                control.kernel.clear_fault();
+            if requests.clears_fault && control.kernel.clear_fault().is_some() {
+                control.flight.clear();
             }
             let here = match requests.power {
                 Some(false) => Some(control.kernel.stand_here()),
@@ -171,6 +199,42 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         if core::mem::replace(&mut self.is_on, to != OutputState::OFF) || self.is_on {
             control.lock(|control| control.switch(to));
         }
+    }
+
+    /// A line to log, if any, at tick `now`; for boards with a log, right after a tick. Bytes of the link were lost
+    /// `bytes_lost` times since the start.
+    #[inline(never)]
+    pub fn line<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        now: u32,
+        bytes_lost: u32,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) -> Option<LogLine<R, AXES>> {
+        let fault = control.lock(|control| control.seen().fault);
+        let had_faulted = core::mem::replace(&mut self.has_faulted, fault.is_some());
+        if let Some(fault) = fault
+            && !had_faulted
+        {
+            self.dump = FlightDump::default();
+            return Some(LogLine::Fault(fault));
+        }
+        let had_refused = core::mem::replace(&mut self.has_refused, self.refused.is_some());
+        if let Some(error) = self.refused
+            && !had_refused
+        {
+            return Some(LogLine::Refused(error.of_any_source()));
+        }
+        if fault.is_some()
+            && let Some(line) = self.dump.line(now, &self.board, control)
+        {
+            return Some(line);
+        }
+        self.report.line(now, &self.board, [self.streamed.starvations(), bytes_lost], control)
+    }
+
+    /// Notes the duration of a poll, log included, in cycles of the board's counter.
+    pub fn note_poll(&mut self, cycles: u32) {
+        self.report.note_poll(cycles);
     }
 
     /// Writes the next frame for the PC to `out`, which needs [`FRAME_MAX`](motion_kernel::link::FRAME_MAX) bytes, at the time
@@ -275,6 +339,8 @@ mod tests {
         is_ready: bool,
         /// The fault that the board's inputs find from now on.
         unhealthy: Option<FaultKind<f32>>,
+        /// The board's own hold.
+        is_held: bool,
     }
 
     impl Operator {
@@ -299,6 +365,7 @@ mod tests {
         /// Every state with the set position when it was told first.
         states: Vec<(State, [Position; AXES])>,
         drives: IdealDrives,
+        lines: Vec<LogLine<f32, AXES>>,
     }
 
     /// A board and an operator over a good wire, until `script` says that it is over; it is called before every tick.
@@ -319,14 +386,15 @@ mod tests {
             items: std::collections::VecDeque::new(),
             is_ready: false,
             unhealthy: None,
+            is_held: false,
         };
         let (mut out, mut to_board) = ([0; FRAME_MAX], std::collections::VecDeque::new());
-        let mut states: Vec<(State, _)> = Vec::new();
+        let (mut states, mut lines): (Vec<(State, _)>, _) = (Vec::new(), Vec::new());
         for now in 1..200_000 {
             if script(now, &mut operator) {
-                return Seen { states, drives };
+                return Seen { states, drives, lines };
             }
-            let Operator { host, items, status, is_ready, unhealthy } = &mut operator;
+            let Operator { host, items, status, is_ready, unhealthy, is_held } = &mut operator;
             while let Some(item) = items.front()
                 && *is_ready
                 && host.push(item.as_ref()).expect("short")
@@ -339,7 +407,8 @@ mod tests {
             drives.now = now;
             control.tick(*unhealthy, None, &mut drives);
             let mut control = Exclusive(&mut control);
-            linked.poll(&mut || to_board.pop_front(), &mut control);
+            lines.extend(linked.line(now, 0, &mut control));
+            linked.poll_unless(&|| *is_held, &mut || to_board.pop_front(), &mut control);
             let length = linked.transmit(now_ms, &mut control, &mut out);
             host.receive(&out[..length], now_ms, &mut |event| match event {
                 Event::Status(told) => {
@@ -478,6 +547,47 @@ mod tests {
         assert_eq!(names.first_chunk(), Some(&[Off, Held, Moving]));
         assert_eq!(names.last_chunk(), Some(&[Off, Held, Moving, Idle]), "{names:?}");
         assert_eq!(seen.states.last().map(|(_, set)| *set), Some(end()));
+        // The log has the fault once, and then what the flight recorder kept.
+        let told = seen.lines.iter().filter(|line| matches!(line, LogLine::Fault(_)));
+        let rows = seen.lines.iter().filter(|line| matches!(line, LogLine::Flight(_)));
+        assert_eq!((told.count(), rows.count()), (1, 16));
+    }
+
+    /// An item that does not follow the one before it: told by the state and once in the log.
+    #[test]
+    fn what_is_refused_is_told() {
+        let mut step = 0;
+        let seen = board(|_, operator| {
+            let before = step;
+            assert!(!drive(&mut step, operator));
+            if (before, step) == (1, 2) {
+                // Without the way to the start.
+                operator.items.drain(..4);
+            }
+            operator.state() == Some(State::Refused)
+        });
+        let told: Vec<_> = seen.lines.iter().filter(|line| matches!(line, LogLine::Refused(_))).collect();
+        assert!(matches!(told[..], [LogLine::Refused(SupplyError::Rejected(_))]), "{told:?}");
+    }
+
+    /// The board's own hold, short or long: at rest until it is over and the operator resumes.
+    #[test]
+    fn a_hold_on_the_board_waits_for_the_operator() {
+        for ticks in [1, 1500] {
+            let mut step = 0;
+            let seen = board(|now, operator| {
+                operator.is_held = (2500..2500 + ticks).contains(&now);
+                // What is pressed while it lasts is in vain.
+                if now == 3500 || now == 2500 + ticks + 1500 {
+                    assert_eq!(operator.state(), Some(State::Held), "{ticks} {now}");
+                    assert!(now == 3500 && ticks == 1 || operator.host.press(Mode::Run));
+                }
+                drive(&mut step, operator)
+            });
+            use MachineState::{Held, Idle, Moving, Off};
+            assert_eq!(names(&seen), [Off, Held, Moving, Held, Moving, Idle]);
+            assert_eq!(seen.states.last().map(|(_, set)| *set), Some(end()));
+        }
     }
 
     const ON: OutputState =

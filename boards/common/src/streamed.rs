@@ -36,9 +36,6 @@ pub struct Streamed<'a, R: Real, const AXES: usize, const ITEMS: usize, const PL
     link: RefCell<BoardLink>,
     feeder: LiveFeeder<'a, R, AXES>,
     control: Live<R, AXES, ITEMS, PLACES>,
-    pulse: Pulse,
-    tick_s: f64,
-    leads: Leads,
     obeyed: Controls,
 }
 
@@ -62,7 +59,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         let mut control = LiveControl::new(Switching::new(ItemQueue::new()), pulse, tick_s, leads);
         // As the controls are before the operator's first command.
         control.hold();
-        Self { link: RefCell::new(link), feeder, control, pulse, tick_s, leads, obeyed: Controls::NONE }
+        Self { link: RefCell::new(link), feeder, control, obeyed: Controls::NONE }
     }
 
     /// One poll of the background: takes what `next_byte` has, obeys the operator, plans. `next_byte` is asked between the
@@ -73,6 +70,17 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     /// error of this and every later call, and motion ends at rest.
     pub fn poll(
         &mut self,
+        next_byte: &mut dyn FnMut() -> Option<u8>,
+    ) -> (Requests, Result<(), SupplyError<Infallible>>) {
+        self.poll_unless(&|| false, next_byte)
+    }
+
+    /// [`Self::poll`], in which motion is held wherever `is_hold_asked` says so, which a hold on the board does: a button. It
+    /// is asked between the steps of a plan, too, and needs no filter, as what bounces holds again. Only the operator's next
+    /// resume over the link goes on, and not while it still says so.
+    pub fn poll_unless(
+        &mut self,
+        is_hold_asked: &dyn Fn() -> bool,
         next_byte: &mut dyn FnMut() -> Option<u8>,
     ) -> (Requests, Result<(), SupplyError<Infallible>>) {
         let Self { link, feeder, control, obeyed, .. } = self;
@@ -88,14 +96,19 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
             Some(controls) => obey(&controls, obeyed, control),
             None => Requests::default(),
         };
+        let is_held = is_hold_asked();
+        if is_held {
+            control.hold();
+        }
         let bytes = RefCell::new(bytes);
         let is_stop_asked = || {
+            let is_hold_new = !is_held && is_hold_asked();
             // Both are borrowed nowhere else while motion is planned.
             let (Ok(mut link), Ok(mut bytes)) = (link.try_borrow_mut(), bytes.try_borrow_mut()) else {
-                return false;
+                return is_hold_new;
             };
             link.receive_controls(&mut *bytes);
-            link.is_stop_asked()
+            is_hold_new || link.is_stop_asked()
         };
         (requests, control.poll_unless(&is_stop_asked, feeder))
     }
@@ -103,12 +116,11 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     /// After an abort ([`State::Aborted`]), or where the drives are enabled: drops what was not driven, and begins anew on a
     /// machine that stands at `here`, with the items of the program after it. The operator's settings stay. `intake` is the
     /// other end of the streams.
-    // In its own stack frame, which is free again while motion is planned.
-    #[inline(never)]
     pub fn restart(&mut self, intake: &mut Intake<'_, R, AXES>, here: [Position; AXES]) {
-        let Self { feeder, control, pulse, tick_s, leads, obeyed, .. } = self;
-        let items = core::mem::take(control.source_mut().items_mut());
-        *control = LiveControl::new(Switching::new(items), *pulse, *tick_s, *leads);
+        let Self { feeder, control, obeyed, .. } = self;
+        // Of the program before, even if it was never put out.
+        control.source_mut().switched();
+        control.restart();
         if obeyed.mode == Mode::Hold {
             control.hold();
         }

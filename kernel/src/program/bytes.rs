@@ -143,6 +143,9 @@ pub struct Reader<'a, const AXES: usize> {
     header: Header<AXES>,
     #[cfg(feature = "guards")]
     guards: &'a [u8],
+    /// All before the items.
+    #[cfg(feature = "link")]
+    machine: &'a [u8],
     items: Items<'a, AXES>,
 }
 
@@ -187,6 +190,8 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
             header,
             #[cfg(feature = "guards")]
             guards: _guards,
+            #[cfg(feature = "link")]
+            machine: summed.get(..summed.len() - left.len()).unwrap_or_default(),
             items: Items { left, end: summed.len(), items: PhantomData },
         })
     }
@@ -209,6 +214,14 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
             Some((guards, [])) => Ok(Some(guards)),
             _ => Err(ProgramError::Malformed { at: PREFIX + 2 }),
         }
+    }
+
+    /// The checksum of the machine and tick that it was planned for: the one that a program without items ends with. Two
+    /// programs have the same if they are for the same machine.
+    #[cfg(feature = "link")]
+    #[must_use]
+    pub fn machine_checksum(&self) -> u32 {
+        Checksum::of(self.machine)
     }
 
     /// All of its items.
@@ -293,6 +306,25 @@ mod tests {
         #[cfg(feature = "guards")]
         assert_eq!(reader.guards(), Ok(Some(guards())));
         assert_eq!(reader.items().collect::<Result<Vec<_>, _>>(), Ok(items));
+    }
+
+    /// A program of the same machine without items ends with it; one of another machine does not.
+    #[cfg(feature = "link")]
+    #[test]
+    fn the_machine_has_a_checksum() {
+        let of = |bytes: &[u8]| Reader::<2>::new(bytes).expect("a program").machine_checksum();
+        let (_, bytes) = program();
+        for guards in [Some(guards()), None] {
+            let mut without = Vec::new();
+            write(&header(), guards.as_ref(), &[], &mut without).expect("short entries");
+            let sum = without.last_chunk().map(|sum| u32::from_le_bytes(*sum));
+            assert_eq!(Some(of(&without)), sum);
+            assert_eq!(of(&bytes) == of(&without), guards.is_some());
+        }
+        let mut other = Vec::new();
+        let header = Header { tick_s: 0.00025, ..header() };
+        write(&header, Some(&guards()), &[], &mut other).expect("short entries");
+        assert_ne!(of(&other), of(&bytes));
     }
 
     /// Entries are longest with every figure there and every number at its longest.
