@@ -118,10 +118,10 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         next_byte: &mut dyn FnMut() -> Option<u8>,
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) {
-        let (requests, polled) = self.streamed.poll_unless(is_hold_asked, next_byte);
-        self.refused = polled.err();
-        let is_given_up = self.act(requests, control);
+        let requests = self.streamed.receive(next_byte);
         self.receive_parameters(control);
+        self.refused = self.streamed.plan(is_hold_asked, next_byte).err();
+        let is_given_up = self.act(requests, control);
         self.switch(is_given_up, control);
     }
 

@@ -83,19 +83,36 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         is_hold_asked: &dyn Fn() -> bool,
         next_byte: &mut dyn FnMut() -> Option<u8>,
     ) -> (Requests, Result<(), SupplyError<Infallible>>) {
-        let Self { link, feeder, control, obeyed, .. } = self;
+        let requests = self.receive(next_byte);
+        (requests, self.plan(is_hold_asked, next_byte))
+    }
+
+    /// The first part of a poll: takes what `next_byte` has, and obeys the operator. Parameters that came wait for who puts
+    /// them away before the second part.
+    pub(crate) fn receive(&mut self, next_byte: &mut dyn FnMut() -> Option<u8>) -> Requests {
+        let Self { link, control, obeyed, .. } = self;
         let mut bytes = core::iter::from_fn(next_byte);
-        let received = link.get_mut();
+        let link = link.get_mut();
         for _ in 0..FRAMES_PER_POLL {
-            received.receive(&mut bytes);
-            if !received.put_items(control.source_mut().items_mut()) {
+            link.receive(&mut bytes);
+            if !link.put_items(control.source_mut().items_mut()) {
                 break;
             }
         }
-        let requests = match received.take_controls() {
+        match link.take_controls() {
             Some(controls) => obey(&controls, obeyed, control),
             None => Requests::default(),
-        };
+        }
+    }
+
+    /// The second part: plans.
+    pub(crate) fn plan(
+        &mut self,
+        is_hold_asked: &dyn Fn() -> bool,
+        next_byte: &mut dyn FnMut() -> Option<u8>,
+    ) -> Result<(), SupplyError<Infallible>> {
+        let Self { link, feeder, control, .. } = self;
+        let bytes = core::iter::from_fn(next_byte);
         let is_held = is_hold_asked();
         if is_held {
             control.hold();
@@ -110,7 +127,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
             link.receive_controls(&mut *bytes);
             is_hold_new || link.is_stop_asked()
         };
-        (requests, control.poll_unless(&is_stop_asked, feeder))
+        control.poll_unless(&is_stop_asked, feeder)
     }
 
     /// After an abort ([`State::Aborted`]), or where the drives are enabled: drops what was not driven, and begins anew on a

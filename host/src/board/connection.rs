@@ -198,6 +198,11 @@ impl<const N: usize> Connection<N> {
         self.link.push(item)
     }
 
+    /// Goes on with a board that has started anew.
+    pub fn accept(&mut self) {
+        self.link.accept();
+    }
+
     /// Asks for the board's parameters; see [`HostLink::read_parameters`].
     pub fn read_parameters(&mut self, offset: u32) {
         self.link.read_parameters(offset);

@@ -122,7 +122,10 @@ pub fn write<const M: usize>(connection: &mut Connection<M>, record: &[u8]) -> R
             connection.write_parameters(record, bytes);
             Ok(None)
         }
-        Event::Welcome(identity) if identity.machine == machine => Ok(Some(identity)),
+        Event::Restarted { .. } => {
+            connection.accept();
+            Ok(connection.identity().copied().filter(|identity| identity.machine == machine))
+        }
         _ => Ok(None),
     })
 }
