@@ -73,8 +73,13 @@ macro_rules! singleton {
             ::critical_section::Mutex::new(::core::cell::Cell::new(false));
         static mut PLACE: ::core::mem::MaybeUninit<$type> = ::core::mem::MaybeUninit::uninit();
         let is_taken = ::critical_section::with(|cs| TAKEN.borrow(cs).replace(true));
-        // Sound: nobody else comes here.
-        if is_taken { None } else { Some(unsafe { (*(&raw mut PLACE)).write($value) }) }
+        if is_taken {
+            None
+        } else {
+            let value = $value;
+            // Sound: nobody else comes here.
+            Some(unsafe { (*(&raw mut PLACE)).write(value) })
+        }
     }};
 }
 

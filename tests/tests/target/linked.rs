@@ -45,8 +45,8 @@ impl Emulator {
         // What the board writes byte by byte is not to wait for anything.
         let serial = format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on");
         let mut emulator = tools.emulator(board, "linked", record.path(), &serial)?;
-        // It says that it was ended.
-        emulator.stdin(Stdio::null()).stderr(Stdio::null());
+        // It says that it was ended, and nothing of it is to hold this test's output open.
+        emulator.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         let running = emulator.spawn().map_err(|error| format!("emulator: {error}"))?;
         Ok(Self { running, port })
     }
