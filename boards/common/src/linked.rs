@@ -127,6 +127,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     }
 
     /// Switches spindle and coolant where the program says so, and all off where it was given up.
+    // In its own stack frame, as `act`, `line` and `transmit`: what they need is free again while motion is planned.
+    #[inline(never)]
     fn switch<const ROWS: usize, const AFTER: usize>(
         &mut self,
         is_given_up: bool,
@@ -183,6 +185,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
 
     /// Writes the next frame for the PC to `out`, which needs [`FRAME_MAX`](motion_kernel::link::FRAME_MAX) bytes, at the time
     /// `now_ms`, which may wrap; returns its length, 0 if there is nothing to say.
+    #[inline(never)]
     pub fn transmit<const ROWS: usize, const AFTER: usize>(
         &mut self,
         now_ms: u32,

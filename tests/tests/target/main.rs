@@ -17,6 +17,7 @@ mod digest;
 mod firmware;
 mod functions;
 mod image;
+mod linked;
 mod preempted;
 mod programs;
 mod search;
@@ -31,9 +32,10 @@ use tools::Tools;
 type Test = fn(&Tools) -> Result<(), String>;
 
 /// Name, whether it holds figures that depend on the compiler, and the test. The longest first: others run beside it.
-const TESTS: [(&str, bool, Test); 14] = [
+const TESTS: [(&str, bool, Test); 15] = [
     ("estimated_cycles", true, cycles::estimated_cycles),
     ("the_firmware_runs", false, firmware::the_firmware_runs),
+    ("a_pc_drives_the_firmware", false, linked::a_pc_drives_the_firmware),
     ("instructions_of_the_interrupt", true, firmware::instructions_of_the_interrupt),
     ("the_same_bits_on_every_core", false, digest::the_same_bits_on_every_core),
     ("the_same_bits_from_an_interrupt", false, digest::the_same_bits_from_an_interrupt),
