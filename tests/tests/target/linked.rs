@@ -22,6 +22,11 @@ use crate::firmware::{AT_REST_MM, END_MM, emulator, instructions};
 use crate::tools::Tools;
 
 const AXES: usize = 3;
+/// The emulated port takes a byte whenever the emulator looks, some hundred a second: the PC repeats itself so much later.
+const SLOWER: u128 = 20;
+/// The emulator's time for an instruction is 2 to this power \[ns\]: a processor so slow that an emulated second does not take
+/// many, as the time in which nothing happens can't be skipped here.
+const SHIFT: u32 = 5;
 /// Written as the firmware has it in flash.
 const PROGRAM: &[u8] = include_bytes!("../../../boards/common/program/stringer.bin");
 /// Path after which the second program is aborted \[mm\].
@@ -31,6 +36,8 @@ const ABORT_AFTER_MM: f64 = 2.0;
 struct Pc {
     stream: TcpStream,
     begin: Instant,
+    /// The checksum of its machine.
+    machine: u32,
     link: HostLink<AXES, 64, 8192>,
     status: Option<Status<AXES>>,
     is_ready: bool,
@@ -47,7 +54,7 @@ impl Pc {
         {
             self.items.pop_front();
         }
-        let now_ms = self.begin.elapsed().as_millis() as u32;
+        let now_ms = (self.begin.elapsed().as_millis() / SLOWER) as u32;
         let mut frame = [0; FRAME_MAX];
         let length = self.link.transmit(now_ms, &mut frame);
         self.stream.write_all(&frame[..length]).map_err(failed)?;
@@ -58,7 +65,7 @@ impl Pc {
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => 0,
             Err(error) => return Err(failed(error)),
         };
-        let (mut refused, machine) = (None, Job::<AXES>::new(&Machine::<AXES>::reference(), &[]).machine);
+        let (mut refused, machine) = (None, self.machine);
         self.link.receive(&bytes[..count], now_ms, &mut |event| match event {
             Event::Status(status) => self.status = Some(status),
             Event::Ready { .. } => self.is_ready = true,
@@ -170,7 +177,7 @@ fn run(image: &Path) -> Result<Vec<String>, String> {
     let failed = |error: std::io::Error| error.to_string();
     let listener = TcpListener::bind("127.0.0.1:0").map_err(failed)?;
     let port = listener.local_addr().map_err(failed)?.port();
-    let mut running = emulator(image, &format!("tcp:127.0.0.1:{port}"))
+    let mut running = emulator(image, &format!("tcp:127.0.0.1:{port}"), SHIFT)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
@@ -186,7 +193,8 @@ fn run(image: &Path) -> Result<Vec<String>, String> {
     });
     let driven = connect(&listener, &mut running).and_then(|stream| {
         let (begin, link) = (Instant::now(), HostLink::new(1));
-        drive(&mut Pc { stream, begin, link, status: None, is_ready: false, items: VecDeque::new() })
+        let machine = Job::<AXES>::new(&Machine::reference(), &[]).machine;
+        drive(&mut Pc { stream, begin, machine, link, status: None, is_ready: false, items: VecDeque::new() })
     });
     // It would run forever; a signal to `timeout` ends both.
     let ended = std::process::Command::new("kill").arg(running.id().to_string()).status();
@@ -227,7 +235,7 @@ fn connect(listener: &TcpListener, running: &mut std::process::Child) -> Result<
 
 pub(crate) fn a_pc_drives_the_firmware(tools: &Tools) -> Result<(), String> {
     let lines = run(&tools.firmware("emulated,link")?)?;
-    println!("instructions of the interrupt, linked: {:?}", instructions(lines.iter())?);
+    println!("instructions of the interrupt, linked: {:?}", instructions(lines.iter(), SHIFT)?);
     if let Some(line) = lines.iter().find(|line| line.contains("Fault(") || line.contains("Refused(")) {
         return Err(format!("the log says {line:?}"));
     }
