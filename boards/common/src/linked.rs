@@ -29,16 +29,21 @@ use crate::streamed::{Requests, Streamed};
 /// Time between two messages about the machine \[ms\].
 const STATUS_MS: u32 = 20;
 
-/// Room for new parameters \[bytes\]: three axes of the reference machine take 578, nine less than 1800.
-const PARAMETERS_MAX: usize = 2048;
-
-/// The background. `ITEMS` and `PLACES` are those of [`Streamed`].
-pub struct Linked<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize> {
+/// The background. `ITEMS` and `PLACES` are those of [`Streamed`]; there is room for `PARAMETERS` bytes of new parameters (three
+/// axes of the reference machine take 578, nine less than 1800), none on a board that can't store them.
+pub struct Linked<
+    'a,
+    R: Real,
+    const AXES: usize,
+    const ITEMS: usize,
+    const PLACES: usize,
+    const PARAMETERS: usize = 0,
+> {
     streamed: Streamed<'a, R, AXES, ITEMS, PLACES>,
     board: BoardParameters,
-    /// The present parameters, a compiled program without items; none if they can't be changed.
+    /// The present parameters: a compiled program, whose items do not matter.
     parameters: &'a [u8],
-    new_parameters: ParameterBuffer<PARAMETERS_MAX>,
+    new_parameters: ParameterBuffer<PARAMETERS>,
     /// How many bytes of these are to be stored.
     to_store: Option<usize>,
     /// Spindle or coolant may be on.
@@ -54,8 +59,8 @@ pub struct Linked<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLAC
     report: Report,
 }
 
-impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
-    Linked<'a, R, AXES, ITEMS, PLACES>
+impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, const PARAMETERS: usize>
+    Linked<'a, R, AXES, ITEMS, PLACES, PARAMETERS>
 {
     /// With drives off. What is planned anew has ramps of `pulse`s.
     #[must_use]
@@ -82,8 +87,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         }
     }
 
-    /// From now on `parameters`, the present ones as a compiled program without items, may be read and replaced by the PC: by
-    /// [`Self::new_parameters`].
+    /// From now on `parameters`, the present ones as a compiled program, may be read by the PC. Its items do not matter.
     pub fn set_parameters(&mut self, parameters: &'a [u8]) {
         self.parameters = parameters;
     }
@@ -131,15 +135,19 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         &mut self,
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) {
-        let Self { streamed, board, parameters, new_parameters, to_store, .. } = self;
+        let Self { streamed, board, new_parameters, to_store, .. } = self;
         let link = streamed.link_mut();
+        if PARAMETERS == 0 {
+            // There is no room for any, so they are refused.
+            link.put_parameters(new_parameters, true);
+            return;
+        }
         let is_off = control.lock(|control| control.kernel.is_off());
         if !link.put_parameters(new_parameters, is_off) {
             return;
         }
         let Some(bytes) = new_parameters.take() else { return };
         let error = match Machine::<R, AXES>::new(bytes, board) {
-            _ if parameters.is_empty() => WriteError::Storage,
             Ok(_) => {
                 *to_store = Some(bytes.len());
                 return;
@@ -183,6 +191,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     }
 
     /// Switches spindle and coolant where the program says so, and all off where it was given up.
+    // In its own stack frame, as `act`, `line` and `transmit`: what they need is free again while motion is planned.
+    #[inline(never)]
     fn switch<const ROWS: usize, const AFTER: usize>(
         &mut self,
         is_given_up: bool,
@@ -239,6 +249,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
 
     /// Writes the next frame for the PC to `out`, which needs [`FRAME_MAX`](motion_kernel::link::FRAME_MAX) bytes, at the time
     /// `now_ms`, which may wrap; returns its length, 0 if there is nothing to say.
+    #[inline(never)]
     pub fn transmit<const ROWS: usize, const AFTER: usize>(
         &mut self,
         now_ms: u32,
@@ -286,6 +297,7 @@ fn machine_state(is_off: bool, live: State, tick: ExecState) -> MachineState {
         (_, ExecState::Dwell) => MachineState::Dwell,
         (State::Held | State::Aborted, _) => MachineState::Held,
         (State::Waiting | State::Done, ExecState::Idle) => MachineState::Idle,
+        (State::Running, ExecState::Held) => MachineState::Starved,
         _ => MachineState::Moving,
     }
 }
@@ -378,7 +390,7 @@ mod tests {
         let kernel = Kernel::new(&machine.axes, header.start, [Counts(0); AXES]);
         let mut control = Control::new(kernel, intake, &mut flight);
         let link = BoardLink::new(3, IDENTITY);
-        let mut linked = Linked::<f32, AXES, ITEMS, 64>::new(&BOARD, link, feeder, header.pulse);
+        let mut linked = Linked::<f32, AXES, ITEMS, 64, 0>::new(&BOARD, link, feeder, header.pulse);
         let mut drives = IdealDrives::new();
         let mut operator = Operator {
             host: Host::new(1),

@@ -99,7 +99,7 @@ impl LinkPort {
 
     /// The next byte, in the order in which they came.
     pub(crate) fn next_byte(&mut self) -> Option<u8> {
-        let place = match self.ring.next() {
+        let place = match self.ring.next_place() {
             Some(place) => place,
             None => {
                 let has_passed = [DmaFlag::HalfTransfer, DmaFlag::TransferComplete].map(|flag| {
@@ -112,7 +112,7 @@ impl LinkPort {
                 self.ring.look(self.at(), has_passed);
                 // The bytes are read after the place.
                 asm::dmb();
-                self.ring.next()?
+                self.ring.next_place()?
             }
         };
         RING.get(place).map(|byte| byte.load(Ordering::Relaxed))

@@ -26,7 +26,7 @@ impl<const SIZE: usize> ReceiveRing<SIZE> {
     }
 
     /// The next place to read, or none: then the DMA is to be looked at.
-    pub fn next(&mut self) -> Option<usize> {
+    pub fn next_place(&mut self) -> Option<usize> {
         if self.next == self.end {
             return None;
         }
@@ -82,7 +82,7 @@ mod tests {
                     (read, losses) = (written, losses + 1);
                 }
                 assert!(count < SIZE as u64 || ring.lost() > before, "{count}");
-                while let Some(place) = ring.next() {
+                while let Some(place) = ring.next_place() {
                     assert_eq!(bytes[place], read);
                     read += 1;
                 }

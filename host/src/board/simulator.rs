@@ -37,6 +37,8 @@ const ITEMS: usize = 256;
 const PIECES: usize = 256;
 const SEGMENTS: usize = 16;
 const PLACES: usize = 256;
+/// Room for new parameters \[bytes\].
+const PARAMETERS: usize = 2048;
 /// Rows of its flight recorder, and how many of them come after a fault.
 const ROWS: usize = 64;
 const AFTER: usize = 16;
@@ -211,7 +213,8 @@ fn run_once<const N: usize>(
     let kernel = Kernel::new(&machine.axes, header.start, counts);
     let mut control = Control::new(kernel, intake, &mut flight);
     let link = BoardLink::new(session, identity);
-    let mut linked = Box::new(Linked::<Number, N, ITEMS, PLACES>::new(board, link, feeder, header.pulse));
+    let mut linked =
+        Box::new(Linked::<Number, N, ITEMS, PLACES, PARAMETERS>::new(board, link, feeder, header.pulse));
     linked.set_parameters(record);
     let World { wires, wire, pace, switches } = world;
     let (mut frame, mut bytes) = ([0; FRAME_MAX], [0; 4096]);

@@ -237,6 +237,8 @@ pub enum State {
     Dwell,
     /// At a program stop.
     Stopped,
+    /// At rest in the middle of a program: the items that follow have not come.
+    Starved,
     /// Held, at rest.
     Held,
     /// An item can't be executed; at rest after those before it.

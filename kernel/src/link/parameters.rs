@@ -52,7 +52,9 @@ impl<const BYTES: usize> ParameterBuffer<BYTES> {
         if record != self.record {
             (self.record, self.count, self.error, self.is_taken) = (record, 0, None, false);
         }
-        if !is_off {
+        if BYTES == 0 {
+            self.error = Some(WriteError::Storage);
+        } else if !is_off {
             self.error = Some(WriteError::DrivesOn);
         } else if record.length as usize > BYTES {
             self.error = Some(WriteError::Length { room: BYTES as u32 });

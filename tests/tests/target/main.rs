@@ -15,6 +15,7 @@ mod budget;
 mod cycles;
 mod digest;
 mod firmware;
+mod firmware_link;
 mod functions;
 mod image;
 mod linked;
@@ -35,6 +36,7 @@ type Test = fn(&Tools) -> Result<(), String>;
 const TESTS: [(&str, bool, Test); 15] = [
     ("estimated_cycles", true, cycles::estimated_cycles),
     ("the_firmware_runs", false, firmware::the_firmware_runs),
+    ("a_pc_drives_the_firmware", false, firmware_link::a_pc_drives_the_firmware),
     ("instructions_of_the_interrupt", true, firmware::instructions_of_the_interrupt),
     ("the_same_bits_on_every_core", false, digest::the_same_bits_on_every_core),
     ("the_same_bits_from_an_interrupt", false, digest::the_same_bits_from_an_interrupt),

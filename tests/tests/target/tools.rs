@@ -286,12 +286,15 @@ impl Tools {
         Ok(cargo)
     }
 
-    /// The firmware of the NUCLEO, for the emulator.
-    pub(crate) fn firmware(&self) -> Result<PathBuf, String> {
+    /// The firmware of the NUCLEO with `features`, among them that for the emulator.
+    pub(crate) fn firmware(&self, features: &str) -> Result<PathBuf, String> {
+        // One at a time: they leave their images in the same place.
+        static BUILDS: Mutex<()> = Mutex::new(());
+        let _build = BUILDS.lock().map_err(|_| "a build panicked".to_owned())?;
         // Where its plain build has compiled what both need.
         let mut cargo = self.cargo("boards/nucleo-f446re")?;
         // Its program is the one that the test knows.
-        cargo.args(["--features", "emulated", "--target", M4F.target]).env_remove("MOTION_PROGRAM");
+        cargo.args(["--features", features, "--target", M4F.target]).env_remove("MOTION_PROGRAM");
         let done = cargo.output().map_err(|error| format!("cargo: {error}"))?;
         if !done.status.success() {
             return Err(format!("build of the firmware: {}", String::from_utf8_lossy(&done.stderr)));
@@ -299,7 +302,7 @@ impl Tools {
         let built = root().join("boards/nucleo-f446re/target").join(M4F.target).join("release/nucleo-f446re");
         // Away from where the plain build would replace it.
         let folder = root().join("target/boards/images/firmware");
-        let image = folder.join("nucleo-f446re");
+        let image = folder.join(features);
         std::fs::create_dir_all(&folder)
             .and_then(|()| std::fs::copy(&built, &image))
             .map_err(|error| format!("{}: {error}", image.display()))?;

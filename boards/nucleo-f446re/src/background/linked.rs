@@ -10,7 +10,7 @@ use motion_kernel::law::Pulse;
 use motion_kernel::link::{BoardLink, Identity, PROTOCOL};
 use motion_kernel::program::FORMAT;
 use nucleo_f446re::design_parameters::{BOARD, LINK_ITEMS, TICK_HZ};
-use nucleo_f446re::machine::{AXES, Control, Feeder, Intake, Linked, Machine, Number, Streams};
+use nucleo_f446re::machine::{AXES, Control, Feeder, Intake, Linked, Machine, Number, PROGRAM, Streams};
 use rtic::Mutex;
 
 use super::{TICKS, count_step, wait_for_tick};
@@ -79,9 +79,8 @@ impl Background {
         }
         // Of two starts the memory, the unique identifier and the timers can all be the same. What differs is when the PC's
         // first byte comes, which its clock decides and not this one's: here in cycles of 6 ns since the start.
-        let link = BoardLink::new(cycles(), *identity);
-        let feeder = defmt::unwrap!(feeder.take());
-        let mut linked = Linked::new(&BOARD, link, feeder, *pulse);
+        let mut linked = begin(cycles(), identity, defmt::unwrap!(feeder.take()), *pulse);
+        linked.set_parameters(PROGRAM);
         let mut clock = Clock { ticks: 0, ms: 0 };
         loop {
             wait_for_tick();
@@ -101,6 +100,12 @@ impl Background {
             linked.note_poll(cycles().wrapping_sub(begin));
         }
     }
+}
+
+/// Made where it stays; the parts are in a stack frame that is free again afterwards.
+#[inline(never)]
+fn begin(session: u32, identity: &Identity, feeder: Feeder, pulse: Pulse) -> Linked {
+    Linked::new(&BOARD, BoardLink::new(session, *identity), feeder, pulse)
 }
 
 /// The link's time: milliseconds that wrap only where 32 bits do, as ticks would not.

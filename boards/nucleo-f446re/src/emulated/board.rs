@@ -49,9 +49,14 @@ pub(crate) fn write(line: &LogLine<Number, AXES>) {
     }
 }
 
-/// Sleeps until an interrupt: the emulator then skips the time.
+/// Sleeps until an interrupt: the emulator then skips the time. Not where a PC is at the other end of the link, which can't
+/// skip it.
 pub(crate) fn pause() {
-    cortex_m::asm::wfi();
+    if cfg!(feature = "link") {
+        core::hint::spin_loop();
+    } else {
+        cortex_m::asm::wfi();
+    }
 }
 
 /// Writes why everything has ended, and ends the emulator.

@@ -135,6 +135,7 @@ fn run() -> Result<Infallible, &'static CStr> {
     })?;
     let pulse = machine.header().pulse;
     let linked = singleton!(Linked = Linked::new(&board, link, feeder, pulse)).ok_or(TWICE)?;
+    linked.set_parameters(record);
     let mut port = Port::start(&mut peripherals.NVIC).ok_or(TWICE)?;
     tick_every(period, &mut peripherals.SYST);
     loop {

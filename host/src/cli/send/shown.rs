@@ -143,6 +143,7 @@ pub(in crate::cli) fn state_words(state: State) -> &'static str {
         State::Moving => "moving",
         State::Dwell => "dwell",
         State::Stopped => "program stop",
+        State::Starved => "waiting for items",
         State::Held => "held",
         State::Refused => "refused",
     }
