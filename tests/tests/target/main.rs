@@ -33,7 +33,7 @@ use tools::Tools;
 type Test = fn(&Tools) -> Result<(), String>;
 
 /// Name, whether it holds figures that depend on the compiler, and the test. The longest first: others run beside it.
-const TESTS: [(&str, bool, Test); 15] = [
+const TESTS: [(&str, bool, Test); 16] = [
     ("estimated_cycles", true, cycles::estimated_cycles),
     ("the_firmware_runs", false, firmware::the_firmware_runs),
     ("a_pc_drives_the_firmware", false, firmware_link::a_pc_drives_the_firmware),
