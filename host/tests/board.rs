@@ -15,7 +15,7 @@ use motion_host::board::simulator::{self, SimulatedBoard};
 use motion_host::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
 use motion_host::machine::Machine;
 use motion_host::planning::Executable;
-use motion_kernel::link::{Mode, State, WriteError};
+use motion_kernel::link::{State, WriteError};
 use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 use motion_tests::check::planned;
@@ -25,11 +25,11 @@ const PACE: f64 = 20.0;
 /// Against a test that hangs; nothing is compared with it.
 const LONGEST: Duration = Duration::from_secs(300);
 
-/// Zigzag of straight lines with a stop at each corner: several times the items that a board has room for.
+/// Zigzag of straight lines, blended, so that all of it is one stretch: several times the items that a board has room for.
 fn zigzag(lines: u32) -> String {
     let lines: String =
         (1..=lines).map(|line| format!("G1 X{} Y{} F3000\n", f64::from(line) * 0.7, line % 2)).collect();
-    format!("G21 G90 G61\n{lines}M2\n")
+    format!("G21 G90 G64 P0.05\n{lines}M2\n")
 }
 
 fn job(text: &str, machine: &Machine) -> Job<3> {
@@ -57,7 +57,8 @@ fn connect(address: SocketAddr, asker: u32) -> Connection<3> {
     Connection::open(Box::new(move || port.open(0)), asker).expect("a board")
 }
 
-const ENABLES: Permissions = Permissions { enables: true, clears_fault: false, found: Found::Stays };
+const ENABLES: Permissions =
+    Permissions { enables: true, clears_fault: false, disables: false, found: Found::Stays };
 
 /// Drives a job to its end; `each` is called after every step of the connection.
 fn drive(
@@ -183,7 +184,7 @@ fn a_cable_that_was_cut_is_a_hold() {
         if since.is_some() && !connection.is_lost() && backs == cuts && state == Some(State::Held) {
             rests.push(stands(connection));
             since = None;
-            assert!(connection.command(|link| link.press(Mode::Run)));
+            assert!(sender.resume(connection));
         }
         false
     });
@@ -296,8 +297,42 @@ fn drives_and_faults() {
     let refused = drive(&job, ENABLES, &mut connection, |_, _, _| false);
     assert!(matches!(refused, Err(BoardError::Fault { .. })), "{refused:?}");
     board.set_emergency_stop(false);
+    // Where the drives were off nothing is gone on with, and what is left of a program is not dropped unasked.
     let clears = Permissions { clears_fault: true, ..ENABLES };
+    let refused = drive(&job, clears, &mut connection, |_, _, _| false);
+    assert!(matches!(refused, Err(BoardError::Begun { .. })), "{refused:?}");
+    let continued = Permissions { found: Found::Continued, ..clears };
+    let refused = drive(&job, continued, &mut connection, |_, _, _| false);
+    assert!(matches!(refused, Err(BoardError::Interrupted { .. })), "{refused:?}");
+    let clears = Permissions { found: Found::GivenUp, disables: true, ..clears };
     assert_eq!(drive(&job, clears, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+    // Off, it stands where the encoders say.
+    assert_eq!(connection.status().map(|status| status.state), Some(State::Off));
+    let off_mm = stands(&connection).into_iter().zip(end(&job)).map(|(at, end)| (at - end).to_mm().abs());
+    assert!(off_mm.fold(0.0, f64::max) < 2e-3);
+}
+
+/// Held before anything moves: nothing starts, on the way or after it, until the operator resumes.
+#[test]
+fn a_hold_before_the_start_is_kept() {
+    let machine = Machine::reference();
+    let job = job(&zigzag(20), &machine);
+    let (_board, address) = board(&machine, 13);
+    let mut connection = connect(address, 13);
+    let (mut looks, mut is_resumed) = (0, false);
+    let step = drive(&job, ENABLES, &mut connection, |connection, sender, _| {
+        if looks == 0 {
+            sender.hold(connection);
+        }
+        looks += 1;
+        let moved = connection.status().is_some_and(|status| status.set != job.header.start);
+        assert!(is_resumed || !moved);
+        if sender.step() == Step::Drives && looks > 400 && !is_resumed {
+            is_resumed = sender.resume(connection);
+        }
+        false
+    });
+    assert_eq!((step.expect("driven"), is_resumed), (Step::Done, true));
     assert_eq!(stands(&connection), end(&job));
 }
 
@@ -356,6 +391,8 @@ fn a_board_gets_other_parameters() {
     write(&mut connection, &second).expect("suits");
     assert_eq!(read(&mut connection), second);
     let job = job(&zigzag(20), &other);
+    // There is one wire.
+    drop(connection);
     let mut connection = connect(address, 21);
     assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
     // The drives are on now.

@@ -326,6 +326,11 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         &self.trace
     }
 
+    /// Whether the drives are on and have settled: the streams are executed.
+    pub fn is_on(&self) -> bool {
+        self.power == Power::On
+    }
+
     /// Whether the drives are off, or told to be.
     pub fn is_off(&self) -> bool {
         self.power == Power::Off

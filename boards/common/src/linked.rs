@@ -12,7 +12,7 @@ use core::convert::Infallible;
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::OutputState;
 use motion_kernel::law::Pulse;
-use motion_kernel::link::{BoardLink, ParameterBuffer, State as MachineState, Status, WriteError};
+use motion_kernel::link::{BoardLink, Came, ParameterBuffer, State as MachineState, Status, WriteError};
 use motion_kernel::live::State;
 use motion_kernel::num::Real;
 use motion_kernel::program::SupplyError;
@@ -123,9 +123,10 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) {
         let requests = self.streamed.receive(next_byte);
+        let is_given_up = self.act(requests, control);
+        // Behind what may have enabled the drives.
         self.receive_parameters(control);
         self.refused = self.streamed.plan(is_hold_asked, next_byte).err();
-        let is_given_up = self.act(requests, control);
         self.switch(is_given_up, control);
     }
 
@@ -146,6 +147,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         if !link.put_parameters(new_parameters, is_off) {
             return;
         }
+        // Of those before.
+        *to_store = None;
         let Some(bytes) = new_parameters.take() else { return };
         let error = match Machine::<R, AXES>::new(bytes, board) {
             Ok(_) => {
@@ -164,15 +167,20 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         requests: Requests,
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) -> bool {
-        let Self { streamed, board, .. } = self;
-        let is_aborted = streamed.state() == State::Aborted;
+        let Self { streamed, board, to_store, .. } = self;
+        let live = streamed.state();
+        // Parameters that are to be stored need the drives off.
+        let may_enable = to_store.is_none();
         control.lock(|control| {
+            let is_waiting = matches!(control.seen().state, ExecState::Stopped | ExecState::Dwell);
+            // At a program stop, or in a dwell, there is nothing to come to rest from.
+            let is_aborted = live == State::Aborted || live == State::Aborting && is_waiting;
             if requests.clears_fault && control.kernel.clear_fault().is_some() {
                 control.flight.clear();
             }
             let here = match requests.power {
                 Some(false) => Some(control.kernel.stand_here()),
-                Some(true) if control.may_enable() => {
+                Some(true) if may_enable && control.may_enable() => {
                     let here = control.kernel.stand_here();
                     control.kernel.enable(board.settle_ticks());
                     Some(here)
@@ -201,6 +209,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         let to = match self.streamed.state() {
             _ if is_given_up => OutputState::OFF,
             State::Failed => OutputState::OFF,
+            // Nothing turns before the drives hold the machine.
+            _ if !control.lock(|control| control.kernel.is_on()) => return,
             _ => match self.streamed.switch() {
                 Some(to) => to,
                 None => return,
@@ -276,15 +286,25 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
                 actual: trace.axes.each_ref().map(|axis| axis.actual),
                 feed_mm_s: trace.executed.motion.v_mm_s.to_f64(),
                 line: trace.executed.line,
-                // Both are known where it is written.
+                // What has come is known where it is written.
                 aborts: 0,
                 taken: 0,
+                is_ended: false,
                 starvations,
                 is_ready: control.is_healthy(),
                 fault: trace.fault.map(|fault| fault.to_f64()),
             }
         });
-        self.streamed.transmit(now_ms, Some(&|aborts, taken| Status { aborts, taken, ..status }), out)
+        self.streamed.transmit(
+            now_ms,
+            Some(&|came: Came| Status {
+                aborts: came.aborts,
+                taken: came.taken,
+                is_ended: came.is_ended,
+                ..status
+            }),
+            out,
+        )
     }
 }
 
@@ -476,12 +496,13 @@ mod tests {
         let seen = board(|now, operator| {
             if now % 300 == 100 && operator.is_ready {
                 assert!(operator.host.press(Mode::Run));
+                operator.items.push_back(Some(Item::Switch(ON)));
                 operator.items.extend(stringer(machine().header().start));
             }
             now == 5000
         });
         assert_eq!(names(&seen), [State::Off]);
-        assert!(!seen.drives.is_enabled);
+        assert!(!seen.drives.is_enabled && seen.drives.switched.is_empty());
     }
 
     /// An abort in the middle of a program that the board has only the beginning of: nothing of it is driven any more, and
@@ -626,6 +647,37 @@ mod tests {
             let switched: Vec<_> = seen.drives.switched.iter().map(|&(_, to)| to).collect();
             assert_eq!(switched, [ON, OutputState::OFF]);
             assert_eq!(seen.drives.switched[1].0 < 4500, is_aborted, "{:?}", seen.drives.switched);
+        }
+    }
+
+    /// An abort at a program stop, in a dwell of minutes, and after an item that can't be executed: another program follows.
+    #[test]
+    fn an_abort_waits_for_nothing() {
+        let dwell = Item::Dwell(motion_kernel::law::Ticks::from_seconds(600.0, TICK_S).expect("some ticks"));
+        let stringer_of = |from| stringer(from).into_iter().flatten();
+        let far = stringer_of(end()).find(|item| matches!(item, Item::Line { .. })).expect("a line");
+        let waits = [(Item::Stop, State::Stopped), (dwell, State::Dwell), (far, State::Refused)];
+        for (item, state) in waits {
+            let (mut step, mut next, mut aborted) = (0, 1, None);
+            let seen = board(|now, operator| {
+                if let Some(aborted) = aborted {
+                    assert!(now < aborted + 8000, "it waits at {:?}", operator.state());
+                    return drive(&mut next, operator);
+                }
+                let before = step;
+                drive(&mut step, operator);
+                if (before, step) == (1, 2) {
+                    operator.items.clear();
+                    operator.items.push_front(Some(item));
+                }
+                if operator.state() == Some(state) {
+                    assert!(operator.host.abort());
+                    (aborted, operator.is_ready) = (Some(now), false);
+                    operator.items.clear();
+                }
+                false
+            });
+            assert_eq!(seen.states.last(), Some(&(State::Idle, end())), "{state:?}");
         }
     }
 

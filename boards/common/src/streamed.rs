@@ -9,7 +9,7 @@ use core::convert::Infallible;
 
 use motion_kernel::hal::OutputState;
 use motion_kernel::law::Pulse;
-use motion_kernel::link::{BoardLink, Controls, ItemQueue, Mode, Status};
+use motion_kernel::link::{BoardLink, Came, Controls, ItemQueue, Mode, Status};
 use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{SupplyError, Switching};
@@ -147,15 +147,15 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     }
 
     /// Writes the next frame for the PC to `out`; see [`BoardLink::transmit`]. `status` is asked for the machine's status with
-    /// the number of programs given up, and of the first item that live control has not taken.
+    /// what has come of the program.
     pub fn transmit(
         &mut self,
         now_ms: u32,
-        status: Option<&dyn Fn(u16, u32) -> Status<AXES>>,
+        status: Option<&dyn Fn(Came) -> Status<AXES>>,
         out: &mut [u8],
     ) -> usize {
         let items = self.control.source_mut().items_mut();
-        let status = status.map(|status| status(items.aborts(), items.taken()));
+        let status = status.map(|status| status(items.came()));
         self.link.get_mut().transmit(now_ms, items, status, out)
     }
 
@@ -333,15 +333,16 @@ mod tests {
             let executed = executor.tick(&mut intake).expect("no fault");
             state = executed.state;
             ticks.push(executed.setpoints.map(|setpoint| setpoint.position));
-            let status = |aborts: u16, taken: u32| Status {
+            let status = |came: Came| Status {
                 tick: now,
                 state: MachineState::Moving,
                 set: [Position::ZERO; AXES],
                 actual: [Position::ZERO; AXES],
                 feed_mm_s: 0.0,
                 line: 0,
-                aborts,
-                taken,
+                aborts: came.aborts,
+                taken: came.taken,
+                is_ended: came.is_ended,
                 starvations: 0,
                 is_ready: true,
                 fault: None,

@@ -79,12 +79,19 @@ impl<const N: usize> Connection<N> {
         }
     }
 
-    /// Until the board has confirmed what the operator wants, or for a second.
-    pub fn settle(&mut self) {
+    /// Until the board has confirmed what the operator wants, or for a second; whether it has.
+    #[must_use]
+    pub fn settle(&mut self) -> bool {
         let begin = Instant::now();
-        while !self.link.is_controlled() && begin.elapsed() < Duration::from_secs(1) {
+        while !self.is_settled() && begin.elapsed() < Duration::from_secs(1) {
             self.step(Duration::from_millis(10), &mut |_| {});
         }
+        self.is_settled()
+    }
+
+    /// Whether the board has confirmed what the operator wants.
+    fn is_settled(&self) -> bool {
+        self.link.next().is_some() && !self.is_lost && self.link.is_controlled()
     }
 
     fn exchange(&mut self, wait: Duration, on_heard: &mut dyn FnMut(Heard<N>)) -> io::Result<()> {
@@ -114,11 +121,10 @@ impl<const N: usize> Connection<N> {
         }
         let mut bytes = [0; 4096];
         let count = wire.read(&mut bytes, wait)?;
-        if count == 0 {
-            if self.identity.is_some() && self.heard.elapsed() > SILENT_AFTER {
-                self.lose("no answer".to_owned(), on_heard);
-            }
-            return Ok(());
+        if self.identity.is_some() && self.heard.elapsed() > SILENT_AFTER {
+            // Opened anew: a socket whose other end has vanished stays silent for ever.
+            self.heard = Instant::now();
+            return Err(io::Error::other("no answer"));
         }
         let (status, identity, mut has_come) = (&mut self.status, &mut self.identity, false);
         let mut events = Vec::new();
@@ -126,6 +132,7 @@ impl<const N: usize> Connection<N> {
             match event {
                 Event::Status(told) => *status = Some(told),
                 Event::Welcome(told) | Event::Refused(told) => *identity = Some(told),
+                Event::Restarted { .. } => *status = None,
                 _ => {}
             }
             has_come = true;
@@ -218,6 +225,7 @@ impl<const N: usize> Connection<N> {
     pub fn is_driven(&self) -> bool {
         use motion_kernel::link::State::Idle;
         let taken = self.status().map(|status| (status.state, status.taken));
-        self.link.waiting() == 0 && self.link.is_controlled() && taken == Some((Idle, self.link.confirmed()))
+        let runs = self.link.controls().mode == Mode::Run && self.link.is_controlled();
+        runs && self.link.waiting() == 0 && taken == Some((Idle, self.link.confirmed()))
     }
 }

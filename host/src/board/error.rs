@@ -76,7 +76,7 @@ pub enum BoardError {
     },
     /// The board has a part of this program.
     #[error(
-        "found {has} of the program's {of} items on the board, expected --continue to go on after them, or --restart to \
+        "found {has} of the program's {of} items (its end is one) on the board, expected --continue to go on after them, or --restart to \
          give them up"
     )]
     Begun {
@@ -85,6 +85,21 @@ pub enum BoardError {
         /// Items of the program.
         of: u32,
     },
+    /// The program can't be gone on with.
+    #[error(
+        "found {why}, expected a program that was held or waits for --continue: where the drives were off it can only be \
+         driven from its start, with --restart"
+    )]
+    Interrupted {
+        /// Why not.
+        why: &'static str,
+    },
+    /// Another sender has the board.
+    #[error("found another sender that has asked the board since, expected to be the only one")]
+    Replaced,
+    /// The board does not come to rest.
+    #[error("found a board that does not come to rest, expected an abort to be obeyed")]
+    Moves,
     /// The board has another program.
     #[error(
         "found a board with another program under way, expected one at rest, or --restart to give that up"
@@ -135,6 +150,8 @@ impl BoardError {
             | Self::Fault { .. }
             | Self::Reset { .. }
             | Self::Item { .. }
+            | Self::Replaced
+            | Self::Moves
             | Self::NoParameters(_)
             | Self::Long(_) => false,
             Self::Disagrees { .. }
@@ -143,6 +160,7 @@ impl BoardError {
             | Self::Begun { .. }
             | Self::Busy
             | Self::NotBegun
+            | Self::Interrupted { .. }
             | Self::Parameters(_)
             | Self::NoWay(_) => true,
         }

@@ -19,6 +19,8 @@ use crate::simulate::faults;
 const ANSWER: Duration = Duration::from_secs(10);
 /// The longest time for drives to go on.
 const ENABLE: Duration = Duration::from_secs(5);
+/// The longest time for an abort: a stop from any feed, and a busy board.
+const REST: Duration = Duration::from_secs(60);
 
 /// What is to become of a program that the board has already.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,6 +41,8 @@ pub struct Permissions {
     pub enables: bool,
     /// To clear a fault before that.
     pub clears_fault: bool,
+    /// To switch the drives off at the end.
+    pub disables: bool,
     /// About what it finds.
     pub found: Found,
 }
@@ -58,6 +62,8 @@ pub enum Step {
     ToStart,
     /// Drives the program.
     Drives,
+    /// Has the drives switched off.
+    Disables,
     /// Comes to rest after an abort.
     Aborts,
     /// All is driven.
@@ -74,6 +80,8 @@ pub struct Sender<'a, const M: usize> {
     may: Permissions,
     step: Step,
     since: Instant,
+    /// The operator has held: nothing here starts motion.
+    is_held: bool,
     way: Vec<Item<M>>,
     /// Items pushed of the way or the job, the end of it among them.
     pushed: usize,
@@ -84,13 +92,40 @@ impl<'a, const M: usize> Sender<'a, M> {
     #[must_use]
     pub fn new(job: &'a Job<M>, axes: &'a [String], may: Permissions) -> Self {
         let since = Instant::now();
-        Self { job, axes, may, step: Step::Greets, since, way: Vec::new(), pushed: 0 }
+        Self { job, axes, may, step: Step::Greets, since, is_held: false, way: Vec::new(), pushed: 0 }
     }
 
     /// How far it is.
     #[must_use]
     pub fn step(&self) -> Step {
         self.step
+    }
+
+    /// The operator holds: also what this would start next.
+    pub fn hold(&mut self, connection: &mut Connection<M>) {
+        self.is_held = true;
+        // Where the board has not answered, nothing of this moves.
+        let _ = connection.command(|link| link.press(Mode::Hold));
+    }
+
+    /// The operator resumes. False where the board is lost: it would start whenever the wire is back.
+    pub fn resume(&mut self, connection: &mut Connection<M>) -> bool {
+        if connection.is_lost() {
+            return false;
+        }
+        self.is_held = false;
+        // Before there is a program, the sender starts.
+        if matches!(self.step, Step::ToStart | Step::Drives) {
+            let _ = connection.command(|link| link.press(Mode::Run));
+        }
+        true
+    }
+
+    /// Starts what it is about to drive, unless the operator holds.
+    fn run(&self, connection: &mut Connection<M>) {
+        if !self.is_held {
+            let _ = connection.command(|link| link.press(Mode::Run));
+        }
     }
 
     /// The operator has aborted the program.
@@ -109,8 +144,16 @@ impl<'a, const M: usize> Sender<'a, M> {
     /// # Errors
     /// The board does not fit, was reset, or refuses an item.
     pub fn hear(&mut self, heard: &Heard<M>) -> Result<(), BoardError> {
-        let Heard::Board(event) = heard else { return Ok(()) };
+        let event = match heard {
+            Heard::Board(event) => event,
+            Heard::Lost(_) => {
+                self.is_held = true;
+                return Ok(());
+            }
+            Heard::Back => return Ok(()),
+        };
         match *event {
+            Event::Replaced => Err(BoardError::Replaced),
             Event::Welcome(identity) => self.check(&identity),
             Event::Refused(identity) => self.check(&identity).and(Err(BoardError::Silent)),
             Event::Restarted { confirmed } => {
@@ -170,6 +213,12 @@ impl<'a, const M: usize> Sender<'a, M> {
             Step::Enables if self.since.elapsed() > ENABLE => {
                 return Err(BoardError::StaysOff { is_ready: status.is_ready });
             }
+            Step::GivesUp | Step::Aborts
+                if self.since.elapsed() > REST
+                    && !matches!(status.state, State::Held | State::Idle | State::Off) =>
+            {
+                return Err(BoardError::Moves);
+            }
             Step::GivesUp if matches!(status.state, State::Held | State::Idle) => {
                 self.approach(&status, connection)?;
             }
@@ -177,7 +226,14 @@ impl<'a, const M: usize> Sender<'a, M> {
                 self.go(Step::Aborted);
             }
             Step::ToStart | Step::Drives => self.drive(&status, connection)?,
-            Step::Clears | Step::Enables | Step::GivesUp | Step::Aborts | Step::Done | Step::Aborted => {}
+            Step::Disables if status.state == State::Off => self.go(Step::Done),
+            Step::Disables
+            | Step::Clears
+            | Step::Enables
+            | Step::GivesUp
+            | Step::Aborts
+            | Step::Done
+            | Step::Aborted => {}
         }
         Ok(self.step)
     }
@@ -189,10 +245,35 @@ impl<'a, const M: usize> Sender<'a, M> {
         next: u32,
         connection: &mut Connection<M>,
     ) -> Result<(), BoardError> {
-        if let Some(fault) = status.fault {
-            if !(self.may.clears_fault && self.may.enables) {
-                return Err(self.fault(fault));
+        if let Some(fault) = status.fault
+            && !(self.may.clears_fault && self.may.enables)
+        {
+            return Err(self.fault(fault));
+        }
+        let of = self.job.items.len() as u32 + 1;
+        let program = connection.controls().program;
+        let is_mine = program == self.job.name && next > 0;
+        let is_finished = status.state == State::Idle && status.taken == next && status.is_ended;
+        match self.may.found {
+            Found::Continued if !is_mine => return Err(BoardError::NotBegun),
+            Found::Continued if status.fault.is_some() => {
+                return Err(BoardError::Interrupted { why: "a fault" });
             }
+            Found::Continued if status.state == State::Off => {
+                return Err(BoardError::Interrupted { why: "the drives off" });
+            }
+            Found::Continued => {
+                self.pushed = next as usize;
+                self.go(Step::Drives);
+                self.run(connection);
+                return Ok(());
+            }
+            Found::Stays if is_mine && !is_finished => return Err(BoardError::Begun { has: next, of }),
+            // The way to the start has no name.
+            Found::Stays if program != 0 && next > 0 && !is_finished => return Err(BoardError::Busy),
+            Found::Stays | Found::GivenUp => {}
+        }
+        if status.fault.is_some() {
             connection.command(|link| link.clear_fault());
             self.go(Step::Clears);
             return Ok(());
@@ -203,23 +284,6 @@ impl<'a, const M: usize> Sender<'a, M> {
             }
             self.enable(connection);
             return Ok(());
-        }
-        let of = self.job.items.len() as u32 + 1;
-        let is_driven = status.state == State::Idle && status.taken == next;
-        let program = connection.controls().program;
-        let is_mine = program == self.job.name && next > 0;
-        match self.may.found {
-            Found::Continued if is_mine => {
-                self.pushed = next as usize;
-                self.go(Step::Drives);
-                connection.command(|link| link.press(Mode::Run));
-                return Ok(());
-            }
-            Found::Continued => return Err(BoardError::NotBegun),
-            Found::Stays if is_mine && !is_driven => return Err(BoardError::Begun { has: next, of }),
-            // The way to the start has no name.
-            Found::Stays if program != 0 && next > 0 && !is_driven => return Err(BoardError::Busy),
-            Found::Stays | Found::GivenUp => {}
         }
         connection.command(|link| link.abort());
         self.go(Step::GivesUp);
@@ -241,7 +305,7 @@ impl<'a, const M: usize> Sender<'a, M> {
             return Ok(());
         }
         self.pushed = 0;
-        connection.command(|link| link.press(Mode::Run));
+        self.run(connection);
         self.go(Step::ToStart);
         Ok(())
     }
@@ -249,7 +313,8 @@ impl<'a, const M: usize> Sender<'a, M> {
     /// Begins the program, at its start.
     fn begin(&mut self, connection: &mut Connection<M>) {
         self.pushed = 0;
-        connection.command(|link| link.begin(self.job.name) && link.press(Mode::Run));
+        let _ = connection.command(|link| link.begin(self.job.name));
+        self.run(connection);
         self.go(Step::Drives);
     }
 
@@ -270,10 +335,20 @@ impl<'a, const M: usize> Sender<'a, M> {
             if self.step == Step::ToStart {
                 self.begin(connection);
             } else {
-                self.go(Step::Done);
+                self.end(connection);
             }
         }
         Ok(())
+    }
+
+    /// All is driven.
+    fn end(&mut self, connection: &mut Connection<M>) {
+        if self.may.disables {
+            let _ = connection.command(|link| link.enable(false));
+            self.go(Step::Disables);
+        } else {
+            self.go(Step::Done);
+        }
     }
 
     fn fault(&self, fault: motion_kernel::fault::Fault<f64>) -> BoardError {

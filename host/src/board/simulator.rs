@@ -104,8 +104,8 @@ pub fn start<const N: usize>(
     Ok((spawn(machine, session, wires, pace)?, here))
 }
 
-/// Starts a board with `machine` that takes connections of `listener`, one after the other: the newest one replaces those
-/// before it, as a cable that is plugged in elsewhere does. `session` and `pace` are those of [`start`].
+/// Starts a board with `machine` that takes connections of `listener`, one after the other, as a serial port does: the next one
+/// waits until the one before is closed. `session` and `pace` are those of [`start`].
 ///
 /// # Errors
 /// The machine can't be simulated, or regulated, or the listener can't be used so.
@@ -142,6 +142,9 @@ fn spawn<const N: usize>(
     simulated(machine)?;
     let _: AxesConfig<Number, N> = machine.axes_config()?;
     let record = job::parameters::<N, N>(machine);
+    if let Err(refused) = motion_board::Machine::<Number, N>::new(&record, &parameters(machine)) {
+        return Err(RunError::Simulation(format!("{refused:?}")));
+    }
     let switches = Arc::new(Switches::default());
     let (machine, seen) = (machine.clone(), Arc::clone(&switches));
     let thread = thread::Builder::new().name("board".to_owned()).spawn(move || {
@@ -222,8 +225,10 @@ fn run_once<const N: usize>(
     let mut came = std::collections::VecDeque::new();
     while !switches.is_over.load(Ordering::Relaxed) {
         hardware.injector.emergency_stop = switches.emergency_stop.load(Ordering::Relaxed);
-        if let Ok(Some(newest)) = wires() {
-            *wire = Some(newest);
+        if wire.is_none()
+            && let Ok(Some(next)) = wires()
+        {
+            *wire = Some(next);
             came.clear();
         }
         // What is read is waited for no longer than the clock allows.

@@ -1,7 +1,7 @@
 //! `motion board`: a board behind an address, for those who have none.
 
 use std::io::{self, Write};
-use std::net::{SocketAddr, TcpListener};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::thread;
 use std::time::Duration;
@@ -24,8 +24,7 @@ Examples:
   motion board --emulated                            a Cortex-M4F in QEMU runs what boards run
   motion board --emulated m3 --image linked          a Cortex-M3, in fixed point
 
-Runs at the pace of the clock, until it is ended. A new connection to the simulated machine replaces the one before; an
-emulated board takes one after the other.";
+Runs at the pace of the clock, until it is ended. It takes one connection after the other, as a serial port does.";
 
 /// Be a board with the simulated machine, behind an address.
 #[derive(Debug, Args)]
@@ -76,9 +75,10 @@ pub fn run(arguments: &BoardArguments, out: &mut dyn Write) -> Result<Outcome, C
         writeln!(out, "machine {:?} at tcp:{address}", machine.name)
             .and_then(|()| out.flush())
             .map_err(CliError::Output)?;
+        // It ends with this process, or by a failure that it has told.
         board.wait();
     });
-    Ok(Outcome::Done)
+    Ok(Outcome::Failed)
 }
 
 fn emulate<const N: usize>(
@@ -95,6 +95,10 @@ fn emulate<const N: usize>(
     let record = job::parameters::<N, 3>(machine);
     interrupt::hold_first();
     let mut emulated = Emulated::start(core, &image, &record, number(), address)?;
+    // Until it takes connections, or has ended.
+    while TcpStream::connect(address).is_err() && !emulated.has_ended().map_err(EmulatedError::Emulator)? {
+        thread::sleep(Duration::from_millis(20));
+    }
     writeln!(out, "machine {:?} at tcp:{address}", machine.name)
         .and_then(|()| out.flush())
         .map_err(CliError::Output)?;

@@ -4,15 +4,16 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use motion_kernel::link::Identity;
+use motion_kernel::link::{Identity, PROTOCOL};
 use serde_json::Value;
 
 use super::error::{CliError, Outcome};
 use super::outputs::Written;
 use super::port::PortArguments;
 use super::{input, send, write_json};
+use crate::board::error::Agreement;
 use crate::board::job;
-use crate::board::parameters::{Difference, Figures, read, write};
+use crate::board::parameters::{Difference, Figures, disable, read, write};
 use crate::board::{BoardError, Connection, Port};
 use crate::files::Files;
 use crate::machine::{Machine, on_machine};
@@ -25,7 +26,7 @@ Examples:
   motion parameters diff --port /dev/ttyACM0 --machine mine.toml   what the board and the file have not in common
   motion parameters set --port /dev/ttyACM0 --machine mine.toml    gives the board the file's machine
 
-A board takes parameters while its drives are off, checks them, and starts anew with them. Its machine is a compiled
+A board takes parameters while its drives are off (--disable switches them off), checks them, and starts anew with them. Its machine is a compiled
 program without items: limits, scales, gains, feedforward, guards.
 
 JSON: get: {name: figure, …}; diff: list of {name, board, file}.
@@ -56,8 +57,12 @@ enum What {
     Set {
         #[command(flatten)]
         port: PortArguments,
-        #[command(flatten)]
-        machine: MachineArguments,
+        /// Machine file (`motion machine` prints one).
+        #[arg(long, value_name = "FILE")]
+        machine: PathBuf,
+        /// Switch the drives off before.
+        #[arg(long)]
+        disable: bool,
     },
     /// List what the board and a machine file have not in common.
     Diff {
@@ -101,9 +106,11 @@ pub fn run(arguments: &ParametersArguments, out: &mut dyn Write) -> Result<Outco
             }
             written.outcome(Outcome::Done)
         }
-        What::Set { port, machine } => {
-            let machine = input::any_machine(machine.machine.as_ref())?;
-            on_machine!(machine, machine => on_axis_count!(machine.axis_count(), M => set::<_, M>(port, machine, out)))
+        What::Set { port, machine, disable } => {
+            let machine = input::any_machine(Some(machine))?;
+            on_machine!(machine, machine => on_axis_count!(machine.axis_count(), M => {
+                set::<_, M>(port, machine, *disable, out)
+            }))
         }
         What::Diff { port, machine, json } => {
             let machine = input::any_machine(machine.machine.as_ref())?;
@@ -126,6 +133,11 @@ pub(super) fn identity(port: &PortArguments) -> Result<Identity, CliError> {
     let mut connection = port.open::<1>()?;
     send::greet(&mut connection).map_err(|error| port.refused(error))?;
     match connection.identity() {
+        Some(identity) if identity.protocol != PROTOCOL => {
+            let what = Agreement::Protocol;
+            let (found, expected) = (identity.protocol.to_string(), PROTOCOL.to_string());
+            Err(port.refused(BoardError::Disagrees { what, found, expected }))
+        }
         Some(identity) if (1..=9).contains(&identity.axes) => Ok(*identity),
         _ => Err(port.refused(BoardError::Silent)),
     }
@@ -136,7 +148,7 @@ fn connected<const M: usize>(port: &PortArguments) -> Result<Connection<M>, CliE
     send::greet(&mut connection).map_err(|error| port.refused(error))?;
     match connection.identity() {
         Some(identity) if usize::from(identity.axes) != M => {
-            let what = crate::board::error::Agreement::Axes;
+            let what = Agreement::Axes;
             let (found, expected) = (identity.axes.to_string(), M.to_string());
             Err(port.refused(BoardError::Disagrees { what, found, expected }))
         }
@@ -154,11 +166,16 @@ fn of_board<const M: usize>(port: &PortArguments) -> Result<(Vec<u8>, Figures), 
 fn set<const N: usize, const M: usize>(
     port: &PortArguments,
     machine: &Machine<N>,
+    disable: bool,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     identity(port)?;
     let record = job::parameters::<N, M>(machine);
-    let identity = write(&mut connected::<M>(port)?, &record).map_err(|error| port.refused(error))?;
+    let mut connection = connected::<M>(port)?;
+    if disable {
+        self::disable(&mut connection).map_err(|error| port.refused(error))?;
+    }
+    let identity = write(&mut connection, &record).map_err(|error| port.refused(error))?;
     writeln!(out, "{} has machine {:?}, {:08x}", port.port, machine.name, identity.machine)
         .map_err(CliError::Output)?;
     Ok(Outcome::Done)

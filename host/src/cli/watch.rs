@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use motion_kernel::link::Status;
+use motion_kernel::link::{Event, Status};
 use motion_kernel::units::Position;
 
 use super::error::{CliError, Outcome};
@@ -21,7 +21,8 @@ Examples:
   motion watch --port tcp:localhost:5000 --json      lines of JSON: {tick, state, line, set_mm, actual_mm, feed_mm_s, taken,
                                                      starvations, is_ready, fault}
 
-Commands nothing. Most wires have one end: while it watches, nobody else can send. Ctrl-C ends it.";
+Commands nothing. A wire has one end: while it watches, nobody else can send, and while somebody sends it finds no answer.
+Ctrl-C ends it.";
 
 /// Show what a board does.
 #[derive(Debug, Args)]
@@ -43,15 +44,16 @@ pub struct WatchArguments {
 /// There is no board, or it is lost.
 pub fn watch(arguments: &WatchArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let identity = identity(&arguments.port)?;
-    writeln!(
-        out,
+    let header = format!(
         "{} axes, {}, {} ticks/s, machine {:08x}",
         identity.axes,
         if identity.is_fixed_point { "fixed point" } else { "f32" },
         (1.0 / identity.tick_s).round(),
         identity.machine
-    )
-    .map_err(CliError::Output)?;
+    );
+    if !arguments.json {
+        writeln!(out, "{header}").map_err(CliError::Output)?;
+    }
     on_axis_count!(usize::from(identity.axes), M => show::<M>(arguments, out))
 }
 
@@ -59,14 +61,21 @@ fn show<const M: usize>(arguments: &WatchArguments, out: &mut dyn Write) -> Resu
     let mut connection: Connection<M> = arguments.port.open()?;
     let (begin, mut last, mut told) = (Instant::now(), None, Instant::now());
     while arguments.seconds.is_none_or(|seconds| begin.elapsed().as_secs_f64() < seconds) {
-        let mut lost = None;
-        connection.step(Duration::from_millis(20), &mut |heard| {
-            if let Heard::Lost(cause) = heard {
-                lost = Some(cause);
-            }
+        let (mut lost, mut is_new) = (None, false);
+        connection.step(Duration::from_millis(20), &mut |heard| match heard {
+            Heard::Lost(cause) => lost = Some(BoardError::Wire(std::io::Error::other(cause))),
+            Heard::Board(Event::Replaced) => lost = Some(BoardError::Replaced),
+            Heard::Board(Event::Restarted { .. }) => is_new = true,
+            _ => {}
         });
+        if is_new {
+            connection.accept();
+            if !arguments.json {
+                writeln!(out, "the board has started anew").map_err(CliError::Output)?;
+            }
+        }
         if let Some(cause) = lost {
-            return Err(arguments.port.refused(BoardError::Wire(std::io::Error::other(cause))));
+            return Err(arguments.port.refused(cause));
         }
         let Some(status) = connection.status() else { continue };
         let now = (status.state, status.line, status.fault.map(|fault| fault.tick));

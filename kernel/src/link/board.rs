@@ -25,27 +25,31 @@ pub struct ItemQueue<const AXES: usize, const ITEMS: usize> {
     next: u32,
     /// How many programs were given up before this one.
     aborts: u16,
+    /// The end of the program has come.
+    is_ended: bool,
 }
 
 impl<const AXES: usize, const ITEMS: usize> ItemQueue<AXES, ITEMS> {
     /// Before the first item.
     #[must_use]
     pub const fn new() -> Self {
-        Self { entries: Deque::new(), next: 0, aborts: 0 }
+        Self { entries: Deque::new(), next: 0, aborts: 0, is_ended: false }
     }
 
-    /// Drops what is left of a program that was given up, if it is not the one after `aborts`.
-    fn begin(&mut self, aborts: u16) {
-        if core::mem::replace(&mut self.aborts, aborts) != aborts {
+    /// Drops what is left of a program that was given up, if it is not the one after `aborts`; whether it is not.
+    fn begin(&mut self, aborts: u16) -> bool {
+        let is_new = core::mem::replace(&mut self.aborts, aborts) != aborts;
+        if is_new {
             self.entries.clear();
-            self.next = 0;
+            (self.next, self.is_ended) = (0, false);
         }
+        is_new
     }
 
-    /// How many programs were given up before this one.
+    /// What has come of the program.
     #[must_use]
-    pub const fn aborts(&self) -> u16 {
-        self.aborts
+    pub fn came(&self) -> Came {
+        Came { aborts: self.aborts, taken: self.taken(), is_ended: self.is_ended }
     }
 
     /// The number of the first item that was not taken from here.
@@ -84,6 +88,17 @@ impl<const AXES: usize, const ITEMS: usize> Source<AXES> for ItemQueue<AXES, ITE
     }
 }
 
+/// What has come of a program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Came {
+    /// How many programs were given up before it.
+    pub aborts: u16,
+    /// The number of the first item that was not taken into the streams.
+    pub taken: u32,
+    /// Its end has come.
+    pub is_ended: bool,
+}
+
 /// The board's end of the link.
 #[derive(Debug)]
 pub struct BoardLink {
@@ -119,6 +134,7 @@ impl BoardLink {
     pub const fn new(session: u32, identity: Identity) -> Self {
         let said = Taken {
             session,
+            asker: 0,
             aborts: 0,
             controls: 0,
             next: 0,
@@ -199,11 +215,12 @@ impl BoardLink {
                 // Another one may read what the one before could not make.
                 (self.is_welcome_due, self.is_unreadable) = (true, false);
             }
-            Request::Controls { session, .. }
-            | Request::Items { session, .. }
-            | Request::Read { session, .. }
-            | Request::Write { session, .. }
-                if session != self.session =>
+            // Of another start, or of somebody who was replaced: the answer tells.
+            Request::Controls { session, asker, .. }
+            | Request::Items { session, asker, .. }
+            | Request::Read { session, asker, .. }
+            | Request::Write { session, asker, .. }
+                if (session, asker) != (self.session, self.asker) =>
             {
                 self.is_welcome_due = true;
             }
@@ -228,7 +245,9 @@ impl BoardLink {
         &mut self,
         items: &mut ItemQueue<AXES, ITEMS>,
     ) -> bool {
-        items.begin(self.controls.aborts);
+        if items.begin(self.controls.aborts) {
+            self.is_unreadable = false;
+        }
         if !core::mem::take(&mut self.has_items) {
             return false;
         }
@@ -321,6 +340,7 @@ impl BoardLink {
         } else {
             let taken = Taken {
                 session,
+                asker: self.asker,
                 aborts: items.aborts,
                 controls: self.controls.number,
                 next: items.next,
@@ -361,6 +381,7 @@ fn put<const AXES: usize, const ITEMS: usize>(
             known -= 1;
         } else if items.entries.push_back(entry).is_ok() {
             items.next = items.next.wrapping_add(1);
+            items.is_ended = entry.is_none();
         } else {
             // More than there was room for: it comes again.
             return true;

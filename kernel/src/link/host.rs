@@ -13,6 +13,8 @@ use crate::program::{Checksum, Item, take};
 
 /// What was not answered is said again after this time \[ms\].
 const REPEAT_MS: u32 = 100;
+/// And at the latest after this time, however slow the wire is \[ms\].
+const REPEAT_MAX_MS: u32 = 2000;
 /// Controls are said again after this time until they are confirmed \[ms\].
 const CONTROLS_MS: u32 = 20;
 /// Items are sent again at once where the board says that some are missing, but not more often than this \[ms\].
@@ -42,6 +44,8 @@ pub enum Event<const AXES: usize> {
         /// The number of the first item that it had not confirmed.
         confirmed: u32,
     },
+    /// Somebody else has asked it since, and has it now. Nothing more is sent.
+    Replaced,
     /// What the machine does.
     Status(Status<AXES>),
     /// Bytes of its parameters that were [asked for](HostLink::read_parameters).
@@ -95,8 +99,10 @@ enum Ask {
 pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     deframer: Deframer,
     session: Session,
-    /// The number of the present hello: an answer to one before is old.
+    /// The number of the present hello, and of the first: an answer to one before is old.
     asker: u32,
+    first_asker: u32,
+    is_replaced: bool,
     controls: Controls,
     /// The number of the controls that the board has confirmed.
     confirmed_controls: u32,
@@ -117,8 +123,10 @@ pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     hello_ms: Option<u32>,
     controls_ms: Option<u32>,
     ask_ms: Option<u32>,
-    /// When something was confirmed last, or sent while nothing was under way.
+    /// When something was confirmed last, or sent while nothing was under way; and after what time it is sent again: a slow
+    /// wire has no room for repeats that come too early.
     progress_ms: u32,
+    repeat_ms: u32,
     again_ms: u32,
 }
 
@@ -130,6 +138,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             deframer: Deframer::new(),
             session: Session::Unknown,
             asker,
+            first_asker: asker,
+            is_replaced: false,
             controls: Controls::NONE,
             confirmed_controls: 0,
             bytes: Deque::new(),
@@ -145,6 +155,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             controls_ms: None,
             ask_ms: None,
             progress_ms: 0,
+            repeat_ms: REPEAT_MS,
             again_ms: 0,
         }
     }
@@ -331,7 +342,15 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
                 Reply::Welcome { session, asker, identity, controls } => {
                     if asker == self.asker {
                         self.greeted(session, &identity, &controls, on_event);
-                    } else if !self.is_of(session) && self.session != Session::Unknown {
+                    } else if self.is_of(session) {
+                        let is_own =
+                            asker.wrapping_sub(self.first_asker) <= self.asker.wrapping_sub(self.first_asker);
+                        if !is_own {
+                            (self.session, self.is_replaced) = (Session::Unknown, true);
+                            self.drop_items();
+                            on_event(Event::Replaced);
+                        }
+                    } else if self.session != Session::Unknown {
                         // Old, or of a board that has started anew: ask.
                         self.asker = self.asker.wrapping_add(1);
                         self.is_asking = true;
@@ -382,7 +401,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     }
 
     fn taken(&mut self, taken: &Taken, now_ms: u32, on_event: &mut impl FnMut(Event<AXES>)) {
-        if !self.is_of(taken.session) {
+        if !self.is_of(taken.session) || taken.asker != self.asker {
             return;
         }
         self.confirmed_controls = taken.controls;
@@ -415,6 +434,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             self.limit = taken.limit;
         }
         if confirmed > 0 {
+            let took_ms = now_ms.wrapping_sub(self.progress_ms);
+            self.repeat_ms = took_ms.saturating_mul(3).clamp(REPEAT_MS, REPEAT_MAX_MS);
             self.progress_ms = now_ms;
         }
         if taken.is_missing && now_ms.wrapping_sub(self.again_ms) >= AGAIN_MS {
@@ -431,6 +452,9 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         let is_due = |since_ms: Option<u32>, after_ms: u32| {
             since_ms.is_none_or(|since_ms| now_ms.wrapping_sub(since_ms) >= after_ms)
         };
+        if self.is_replaced {
+            return 0;
+        }
         if (self.session == Session::Unknown || self.is_asking) && is_due(self.hello_ms, REPEAT_MS) {
             self.hello_ms = Some(now_ms);
             return frame(&Request::Hello { asker: self.asker }, out);
@@ -445,16 +469,17 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         let after_ms = if self.is_controlled() { REPEAT_MS } else { CONTROLS_MS };
         if is_due(self.controls_ms, after_ms) {
             self.controls_ms = Some(now_ms);
-            return frame(&Request::Controls { session, controls: self.controls }, out);
+            return frame(&Request::Controls { session, asker: self.asker, controls: self.controls }, out);
         }
         if let Some(ask) = self.ask
             && is_due(self.ask_ms, REPEAT_MS)
         {
             self.ask_ms = Some(now_ms);
             return match ask {
-                Ask::Read { offset } => frame(&Request::Read { session, offset }, out),
+                Ask::Read { offset } => frame(&Request::Read { session, asker: self.asker, offset }, out),
                 Ask::Write { record, offset, piece } => {
-                    let Some(mut payload) = Payload::of(&Request::Write { session, record, offset }) else {
+                    let request = Request::Write { session, asker: self.asker, record, offset };
+                    let Some(mut payload) = Payload::of(&request) else {
                         return 0;
                     };
                     // There is room for a piece.
@@ -473,13 +498,17 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         let under_way = self.next.wrapping_sub(self.first);
         if under_way == 0 {
             self.progress_ms = now_ms;
-        } else if now_ms.wrapping_sub(self.progress_ms) >= REPEAT_MS {
+        } else if now_ms.wrapping_sub(self.progress_ms) >= self.repeat_ms {
             (self.next, self.progress_ms) = (self.first, now_ms);
+            self.repeat_ms = (2 * self.repeat_ms).min(REPEAT_MAX_MS);
         }
         let sent = self.next.wrapping_sub(self.first) as usize;
-        let Some(mut payload) =
-            Payload::of(&Request::Items { session, aborts: self.controls.aborts, first: self.next })
-        else {
+        let Some(mut payload) = Payload::of(&Request::Items {
+            session,
+            asker: self.asker,
+            aborts: self.controls.aborts,
+            first: self.next,
+        }) else {
             return 0;
         };
         let skipped: usize = self.lengths.iter().take(sent).map(|&length| usize::from(length)).sum();
@@ -502,8 +531,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     }
 }
 
-/// The longest message before items \[bytes\]: a variant and three numbers.
-const HEAD_MAX: usize = 14;
+/// The longest message before items \[bytes\]: a variant and four numbers.
+const HEAD_MAX: usize = 19;
 
 /// Whether a number comes before another one. They wrap.
 fn is_before(number: u32, other: u32) -> bool {

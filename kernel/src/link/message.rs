@@ -7,22 +7,22 @@ use crate::hal::BoardOutputs;
 use crate::units::Position;
 
 /// The version of this protocol. A PC refuses a board of another version.
-pub const PROTOCOL: u16 = 3;
+pub const PROTOCOL: u16 = 4;
 
 /// From the PC.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Request {
     /// Who is there? The answer has the same number.
     Hello { asker: u32 },
-    /// What the operator wants.
-    Controls { session: u32, controls: Controls },
+    /// What the operator wants. As all that follows, by who asked last.
+    Controls { session: u32, asker: u32, controls: Controls },
     /// Items follow, to the payload's end: of each an `Option`, none for the end of the program. They are of the program after
     /// so many aborts; the first one has this number in it, from 0.
-    Items { session: u32, aborts: u16, first: u32 },
+    Items { session: u32, asker: u32, aborts: u16, first: u32 },
     /// Asks for the board's parameters from this byte on.
-    Read { session: u32, offset: u32 },
+    Read { session: u32, asker: u32, offset: u32 },
     /// Bytes of new parameters follow, to the payload's end, from this one on; what they are as a whole.
-    Write { session: u32, record: Record, offset: u32 },
+    Write { session: u32, asker: u32, record: Record, offset: u32 },
 }
 
 /// Parameters on their way: how many bytes, their checksum, and which attempt it is.
@@ -97,6 +97,8 @@ pub(super) enum Reply<const AXES: usize> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Taken {
     pub(super) session: u32,
+    /// Who asked last: what was said to somebody before may still be in a wire.
+    pub(super) asker: u32,
     /// How many programs were given up: items of those before are dropped.
     pub(super) aborts: u16,
     /// The number of the controls obeyed last.
@@ -216,6 +218,8 @@ pub struct Status<const AXES: usize> {
     pub aborts: u16,
     /// The number of the first item that was not taken into the streams: motion is somewhere before it.
     pub taken: u32,
+    /// The end of the program has come.
+    pub is_ended: bool,
     /// Stops on the path because items came too late.
     pub starvations: u32,
     /// The inputs allow the drives to be enabled.

@@ -26,7 +26,7 @@
 //! counted.
 //!
 //! **A session** is the time between two starts of the board. Its number is in every message, so neither end goes on with
-//! the other's past.
+//! the other's past. Who asked last has the board; whoever had it before is told, and commands nothing any more.
 
 mod board;
 mod frame;
@@ -36,7 +36,7 @@ mod parameters;
 #[cfg(test)]
 mod tests;
 
-pub use board::{BoardLink, ItemQueue};
+pub use board::{BoardLink, Came, ItemQueue};
 pub use frame::{Deframer, FRAME_MAX};
 pub use host::{Event, HostLink};
 pub use message::{Controls, Identity, Mode, PROTOCOL, Piece, State, Status, WriteError};

@@ -201,8 +201,9 @@ impl Bench {
             actual: [Position::ZERO; 3],
             feed_mm_s: 12.5,
             line: 7,
-            aborts: self.board.items.aborts(),
+            aborts: self.board.items.came().aborts,
             taken: self.board.items.taken(),
+            is_ended: self.board.items.came().is_ended,
             starvations: 3,
             is_ready: true,
             fault: None,
@@ -475,14 +476,14 @@ fn any_bytes_may_come() {
             } else {
                 payload
             };
-            let before = (board.items.aborts(), board.items.next());
+            let before = (board.items.came().aborts, board.items.next());
             board.link.receive(&mut bytes.iter().copied());
             board.link.put_items(&mut board.items);
             board.link.put_parameters(&mut board.buffer, seed % 2 == 0);
             board.link.transmit_parameters(&[1; 300], &board.buffer, &mut out);
             host.receive(&bytes, 0, &mut |_| read += 1);
             // Numbers begin anew with a program.
-            let before = if before.0 == board.items.aborts() { before.1 } else { 0 };
+            let before = if before.0 == board.items.came().aborts { before.1 } else { 0 };
             let came = board.items.next().wrapping_sub(before);
             assert!(came <= ROOM as u32);
             read += came + u32::from(board.link.take_controls().is_some());
@@ -594,5 +595,37 @@ impl Bench {
             }
         }
         panic!("no answer");
+    }
+}
+
+/// Somebody else asks the board: whoever had it is told, and nothing that he presses or pushes gets there any more, until he
+/// asks anew himself.
+#[test]
+fn who_asked_last_has_the_board() {
+    for (seed, permille) in (300..=320).zip([0, 10, 50, 200].into_iter().cycle()) {
+        let mut bench = Bench::new(seed, permille);
+        bench.greet();
+        assert!(bench.host.press(Mode::Run) && bench.host.push(Some(&item(0))) == Ok(true));
+        for _ in 0..3000 {
+            bench.step(1.0);
+        }
+        // Held back while the second one has the board.
+        let mut first = core::mem::replace(&mut bench.host, Host::new(1 << 20));
+        assert_eq!(bench.greet(), 1);
+        assert!(bench.host.press(Mode::Hold));
+        for _ in 0..3000 {
+            bench.step(1.0);
+        }
+        let known = (*bench.host.controls(), bench.board.driven.len());
+        assert!(first.enable(true) && first.press(Mode::Run));
+        core::mem::swap(&mut first, &mut bench.host);
+        bench.events.clear();
+        for _ in 0..3000 {
+            bench.step(1.0);
+        }
+        assert_eq!(bench.events.first(), Some(&Event::Replaced));
+        assert_eq!(bench.board.controls.last(), Some(&known.0), "a press of who was replaced");
+        assert_eq!((bench.host.push(Some(&item(1))), bench.board.driven.len()), (Ok(false), known.1));
+        assert!(!bench.host.press(Mode::Run));
     }
 }

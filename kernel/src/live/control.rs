@@ -132,8 +132,8 @@ where
     pub fn state(&self, feeder: &LiveFeeder<'_, R, AXES>) -> State {
         let rests = self.rests(feeder);
         match self.mode.run() {
-            _ if rests && self.error.is_some() => State::Failed,
             Run::Abort if rests => State::Aborted,
+            _ if rests && self.error.is_some() => State::Failed,
             Run::Abort => State::Aborting,
             Run::Hold if rests => State::Held,
             Run::Hold => State::Holding,

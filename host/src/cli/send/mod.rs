@@ -7,10 +7,10 @@ use std::io::{self, BufRead, Write};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
-use motion_kernel::link::{Mode, State};
+use motion_kernel::link::State;
 use motion_kernel::num::{Fixed, Root};
 
 use self::shown::Shown;
@@ -21,8 +21,8 @@ use super::input;
 use super::port::PortArguments;
 use crate::board::sender::{Found, Permissions, check_outputs};
 use crate::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
+use crate::files::STANDARD_INPUT;
 use crate::files::interrupt::{self, Asked};
-use crate::files::{Files, STANDARD_INPUT};
 use crate::gcode::Program;
 use crate::machine::{Machine, on_machine};
 use crate::planning::{Executable, Mode as PlanMode, Plan, on_axis_count, plan_program, require_outputs};
@@ -46,8 +46,8 @@ resets it, s switches single block. Ctrl-C holds; Ctrl-C again ends this command
 A board without this command comes to rest on the path where its items end. A cable that was out is noticed: the board is
 held when it is in again, and r goes on.
 
-Exit status: 0 done; 1 a fault, or the board was lost or reset; 2 the program or the board does not fit; 3 held, at a program
-stop, or lost, and nobody there to resume (the end of standard input); 4 aborted; 130 interrupted, the board is held.";
+Exit status: 0 done; 1 a fault, or the board was lost, reset, or asked by another sender; 2 the program or the board does not fit; 3 held, or at a
+program stop, and nobody there to resume (the end of standard input), or ended by SIGTERM; 4 aborted; 130 interrupted, the board is held.";
 
 /// Drive a program on a board, and show what it does.
 #[derive(Debug, Args)]
@@ -68,6 +68,9 @@ pub struct SendArguments {
     /// Clear a fault of the board before that.
     #[arg(long, requires = "enable")]
     clear_fault: bool,
+    /// Switch the drives off at the end.
+    #[arg(long)]
+    disable: bool,
     /// Go on after what the board has of this program: after this command was killed, or the PC was restarted.
     #[arg(long = "continue", conflicts_with = "restart")]
     continues: bool,
@@ -88,13 +91,6 @@ pub struct SendArguments {
 /// # Errors
 /// The program, the machine file or the board is refused, or the board is in a fault.
 pub fn send(arguments: &SendArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
-    // Only to refuse a program that is also something else.
-    let _ = Files::reading([
-        ("PROGRAM", Some(arguments.program.as_path())),
-        ("--machine", arguments.machine.as_deref()),
-        ("--parameters", arguments.reading.parameters.as_deref()),
-        ("--tools", arguments.reading.tools.as_deref()),
-    ]);
     let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let program = arguments.reading.program(&source, machine.read_options())?;
@@ -106,7 +102,7 @@ pub fn send(arguments: &SendArguments, out: &mut dyn Write) -> Result<Outcome, C
         if let Some(probe) = plan.probes.first() {
             return Err(CliError::NoProbeInput { program: source.name.clone(), line: probe.line });
         }
-        for notice in &plan.notices {
+        for notice in plan.notices.iter().filter(|_| !arguments.json) {
             writeln!(out, "note: {notice}").map_err(CliError::Output)?;
         }
         send_plan(arguments, (&program, &plan), machine, out)
@@ -166,6 +162,9 @@ pub(super) fn greet<const M: usize>(connection: &mut Connection<M>) -> Result<()
     Err(BoardError::Silent)
 }
 
+/// So long a board that only an operator can go on with is waited for where there is none.
+const UNATTENDED: Duration = Duration::from_secs(5);
+
 /// What the operator types.
 enum Typed {
     Key(char),
@@ -206,7 +205,12 @@ fn drive<const N: usize, const M: usize>(
         (_, true) => Found::GivenUp,
         _ => Found::Stays,
     };
-    let may = Permissions { enables: arguments.enable, clears_fault: arguments.clear_fault, found };
+    let may = Permissions {
+        enables: arguments.enable,
+        clears_fault: arguments.clear_fault,
+        disables: arguments.disable,
+        found,
+    };
     let mut sender = Sender::new(job, &names, may);
     // A greeting that was heard already.
     if let Some(identity) = connection.identity() {
@@ -215,7 +219,7 @@ fn drive<const N: usize, const M: usize>(
     let keys = keys(arguments);
     let mut shown = Shown::new(arguments, &names, stops, job.items.len() as u64);
     interrupt::hold_first();
-    let (mut is_attended, mut is_checked) = (true, false);
+    let (mut is_attended, mut is_checked, mut waits_since) = (true, false, Instant::now());
     loop {
         let mut heard = Vec::new();
         connection.step(Duration::from_millis(2), &mut |one| heard.push(one));
@@ -235,16 +239,23 @@ fn drive<const N: usize, const M: usize>(
             is_checked = true;
         }
         if let Some(asked) = interrupt::take_asked() {
-            let _ = connection.command(|link| link.press(Mode::Hold));
+            sender.hold(&mut connection);
             if asked == Asked::End {
-                connection.settle();
+                if !connection.settle() {
+                    let told = "no confirmation of a hold: it drives what it has, and rests";
+                    return Err(refused(BoardError::Wire(io::Error::other(told))));
+                }
                 return shown.end(out, "ended: the board is held").map(|()| Outcome::Held);
             }
             shown.say(out, "holding: r resumes, a aborts, Ctrl-C again leaves the board held")?;
         }
         loop {
             match keys.try_recv() {
-                Ok(Typed::Key(key)) => command(key, &mut connection, &mut sender),
+                Ok(Typed::Key(key)) => {
+                    if !command(key, &mut connection, &mut sender) {
+                        shown.say(out, "nothing is done: the board is lost, or there is no such key")?;
+                    }
+                }
                 Ok(Typed::End) | Err(TryRecvError::Disconnected) => is_attended = false,
                 Err(TryRecvError::Empty) => break,
             }
@@ -259,11 +270,16 @@ fn drive<const N: usize, const M: usize>(
             Step::Aborted => return shown.end(out, "aborted").map(|()| Outcome::Aborted),
             _ => {}
         }
+        // Somewhere where only an operator goes on.
         let waits = matches!(step, Step::Drives | Step::ToStart)
-            && connection.controls().mode == Mode::Hold
-            && connection.status().is_some_and(|status| status.state == State::Held)
-            || connection.status().is_some_and(|status| status.state == State::Stopped);
-        if !is_attended && waits {
+            && connection.status().is_some_and(|status| matches!(status.state, State::Held | State::Stopped));
+        if !waits && !connection.is_lost() {
+            waits_since = Instant::now();
+        }
+        if !is_attended && waits_since.elapsed() > UNATTENDED {
+            if connection.is_lost() {
+                return Err(refused(BoardError::Wire(io::Error::other("no board any more"))));
+            }
             let goes_on = if step == Step::Drives { "; motion send --continue goes on" } else { "" };
             let what = format!("nobody resumes: the board stays held{goes_on}");
             return shown.end(out, &what).map(|()| Outcome::Held);
@@ -271,15 +287,17 @@ fn drive<const N: usize, const M: usize>(
     }
 }
 
-/// Obeys a key.
-fn command<const M: usize>(key: char, connection: &mut Connection<M>, sender: &mut Sender<'_, M>) {
+/// Obeys a key; false if nothing comes of it.
+fn command<const M: usize>(key: char, connection: &mut Connection<M>, sender: &mut Sender<'_, M>) -> bool {
     let change = |permille: u16, by: i16| permille.saturating_add_signed(by).clamp(100, 2000);
-    // Where the board has not answered, there is nothing to command.
-    let _ = match key {
-        'h' => connection.command(|link| link.press(Mode::Hold)),
+    match key {
+        'h' => {
+            sender.hold(connection);
+            true
+        }
         'r' => {
             interrupt::hold_first();
-            connection.command(|link| link.press(Mode::Run))
+            sender.resume(connection)
         }
         'a' => {
             sender.abort(connection);
@@ -294,5 +312,5 @@ fn command<const M: usize>(key: char, connection: &mut Connection<M>, sender: &m
         '0' => connection.command(|link| link.control(|controls| controls.override_permille = 1000)),
         's' => connection.command(|link| link.control(|controls| controls.is_single_block ^= true)),
         _ => false,
-    };
+    }
 }

@@ -129,6 +129,7 @@ fn step_words(step: Step) -> &'static str {
         Step::GivesUp => "giving up what the board has",
         Step::ToStart => "to the start",
         Step::Drives => "program",
+        Step::Disables => "switching the drives off",
         Step::Aborts => "aborting",
         Step::Done => "done",
         Step::Aborted => "aborted",
