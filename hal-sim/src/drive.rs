@@ -140,7 +140,12 @@ impl DriveModel {
         let error = state.command_mm_s - velocity;
         let demand = self.parameters.velocity_gain_per_s * error + state.integral_mm_s2;
         let limit = self.parameters.accel_limit_mm_s2;
-        let limited = demand.clamp(-limit, limit);
+        // `clamp` has a panic, for limits that are none.
+        let limited = match demand {
+            _ if demand > limit => limit,
+            _ if demand < -limit => -limit,
+            _ => demand,
+        };
         let is_limited = demand > limit || demand < -limit;
         if !(is_limited && demand * error > 0.0) {
             state.integral_mm_s2 += self.integral_gain * error;

@@ -102,14 +102,14 @@ impl<const AXES: usize, const LINE: usize, const CHIPS: usize> SimMachine<AXES, 
         let () = Self::AXES_FIT;
         let &MachineParameters { axes, tick_s, substeps } = parameters;
         positive("tick_s", tick_s).map_err(|cause| MachineError { axis: 0, cause })?;
-        let build = |axis: usize| {
-            SimAxis::<LINE>::new(axes[axis], tick_s, substeps).map_err(|cause| MachineError { axis, cause })
+        let build = |axis: usize, parameters: AxisParameters| {
+            SimAxis::<LINE>::new(parameters, tick_s, substeps).map_err(|cause| MachineError { axis, cause })
         };
         // Without allocation an array is filled by a fallible function only over something already there.
-        let first = build(0)?;
+        let first = build(0, axes[0])?;
         let mut built: [SimAxis<LINE>; AXES] = core::array::from_fn(|_| first.clone());
-        for (axis, place) in built.iter_mut().enumerate().skip(1) {
-            *place = build(axis)?;
+        for (axis, (place, parameters)) in built.iter_mut().zip(axes).enumerate().skip(1) {
+            *place = build(axis, parameters)?;
         }
         Ok(Self {
             chips: [const { Ad5754Chip::new() }; CHIPS],
@@ -134,7 +134,9 @@ impl<const AXES: usize, const LINE: usize, const CHIPS: usize> SimMachine<AXES, 
 
     /// One control tick: the chips' present voltages act on the drives until the next call.
     pub fn advance(&self) {
-        for (axes, chip) in self.axes.borrow_mut().chunks_mut(CHANNELS).zip(&self.chips) {
+        // It can: nothing here is called from within. Without the panic of `borrow_mut`, for images that have none.
+        let Ok(mut axes) = self.axes.try_borrow_mut() else { return };
+        for (axes, chip) in axes.chunks_mut(CHANNELS).zip(&self.chips) {
             for (axis, output_v) in axes.iter_mut().zip(chip.volts()) {
                 axis.advance(output_v, self.is_enabled.get());
             }
@@ -191,8 +193,14 @@ impl<const AXES: usize, const LINE: usize, const CHIPS: usize> Encoder<AXES>
     type Error = Infallible;
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
-        let mut axes = self.axes.borrow_mut();
-        Ok(core::array::from_fn(|axis| axes[axis].latch()))
+        let mut counts = [Counts(0); AXES];
+        // As in `advance`.
+        if let Ok(mut axes) = self.axes.try_borrow_mut() {
+            for (counts, axis) in counts.iter_mut().zip(&mut *axes) {
+                *counts = axis.latch();
+            }
+        }
+        Ok(counts)
     }
 }
 

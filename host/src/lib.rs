@@ -17,6 +17,7 @@
 //!   recording  a run ─► bytes ─► the same run    replay from what the kernel was told
 //!   flight     a board's log ─► TraceRow       the ticks around a fault
 //!   trace      TraceRow, RunTrace              what a run leaves behind
+//!   board      items ─► a board, and its state ◄─   over a wire, or simulated
 //!   axis_unit                                  mm or °
 //!   drive      Machine ─► figures of its axes     step, harmonics, circles
 //!   identify   recordings ─► drive parameters     what an axis is, from its runs
@@ -39,6 +40,7 @@ pub mod compare;
 pub mod simulate;
 pub mod recording;
 pub mod flight;
+pub mod board;
 pub mod axis_unit;
 pub mod trace;
 pub mod drive;

@@ -7,6 +7,7 @@
 mod axes_reading;
 mod axes_planning;
 mod axes_runs;
+mod board;
 mod cli;
 mod compare;
 mod curves;

@@ -39,11 +39,14 @@
 
 pub(crate) mod reaction;
 
+use serde::{Deserialize, Serialize};
+
 use crate::exec::ExecFault;
+use crate::num::Real;
 pub use reaction::{Reaction, Reactions};
 
 /// What went wrong, and when.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fault<R> {
     /// The tick in which it was found.
@@ -54,7 +57,7 @@ pub struct Fault<R> {
 
 /// The kinds of fault. Exhaustive on purpose: a program that reacts to faults should not build with one that
 /// it does not know.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FaultKind<R> {
     /// The executor could not continue.
@@ -165,5 +168,37 @@ impl<R> FaultKind<R> {
                 Reaction::Immediate
             }
         }
+    }
+}
+
+impl<R: Real> Fault<R> {
+    /// The same in f64.
+    #[must_use]
+    pub fn to_f64(&self) -> Fault<f64> {
+        use FaultKind as Kind;
+        let kind = match self.kind {
+            Kind::Executor(cause) => Kind::Executor(cause),
+            Kind::FollowingError { axis, error_mm } => {
+                Kind::FollowingError { axis, error_mm: error_mm.to_f64() }
+            }
+            Kind::EncoderLost { axis } => Kind::EncoderLost { axis },
+            Kind::EncoderJump { axis, jump_mm } => Kind::EncoderJump { axis, jump_mm: jump_mm.to_f64() },
+            Kind::Runaway { axis } => Kind::Runaway { axis },
+            Kind::Saturated { axis } => Kind::Saturated { axis },
+            Kind::SoftLimit { axis } => Kind::SoftLimit { axis },
+            Kind::SetpointJump { axis, jump_mm } => Kind::SetpointJump { axis, jump_mm: jump_mm.to_f64() },
+            Kind::NotFinite { axis } => Kind::NotFinite { axis },
+            Kind::Encoder => Kind::Encoder,
+            Kind::Inputs => Kind::Inputs,
+            Kind::Output => Kind::Output,
+            Kind::Enable => Kind::Enable,
+            Kind::EmergencyStop => Kind::EmergencyStop,
+            Kind::Drive { axis } => Kind::Drive { axis },
+            Kind::DriveNotReady { axis } => Kind::DriveNotReady { axis },
+            Kind::LimitSwitch { axis } => Kind::LimitSwitch { axis },
+            Kind::TickOverrun => Kind::TickOverrun,
+            Kind::TickMissed { ticks } => Kind::TickMissed { ticks },
+        };
+        Fault { tick: self.tick, kind }
     }
 }

@@ -321,6 +321,21 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.executor.resume();
     }
 
+    /// The trace of the latest tick.
+    pub fn trace(&self) -> &Trace<R, AXES> {
+        &self.trace
+    }
+
+    /// Whether the drives are on and have settled: the streams are executed.
+    pub fn is_on(&self) -> bool {
+        self.power == Power::On
+    }
+
+    /// Whether the drives are off, or told to be.
+    pub fn is_off(&self) -> bool {
+        self.power == Power::Off
+    }
+
     /// The latched fault.
     pub fn fault(&self) -> Option<Fault<R>> {
         self.trace.fault

@@ -294,74 +294,18 @@ impl<'a, R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize,
 
 #[cfg(test)]
 mod tests {
-    use core::convert::Infallible;
-
     use motion_kernel::fault::FaultKind;
     use motion_kernel::flight::FlightRecorder;
-    use motion_kernel::hal::{
-        DriveEnable, Encoder, Inputs, MachineInputs, Outputs, Spindle, VelocityChannel,
-    };
+    use motion_kernel::hal::Spindle;
     use motion_kernel::kernel::Kernel;
     use motion_kernel::law::Ticks;
     use motion_kernel::program::{Item, write};
     use motion_kernel::queue::Streams;
-    use motion_kernel::units::{Counts, DacCode};
+    use motion_kernel::units::Counts;
     use rtic_core::Exclusive;
 
     use super::*;
-    use crate::fixture::{AXES, BOARD, TICK_S, end, machine};
-
-    /// Drives without inertia: a velocity is there in the tick that asks for it.
-    struct IdealDrives {
-        counts: [f64; AXES],
-        counts_per_code: [f64; AXES],
-        is_enabled: bool,
-        now: u32,
-        /// Ticks in which outputs were switched.
-        switched: Vec<(u32, OutputState)>,
-    }
-
-    impl Outputs for IdealDrives {
-        fn switch(&mut self, to: &OutputState) {
-            self.switched.push((self.now, *to));
-        }
-    }
-
-    impl Encoder<AXES> for IdealDrives {
-        type Error = Infallible;
-        fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
-            Ok(self.counts.map(|counts| Counts(counts.round() as i64)))
-        }
-    }
-
-    impl Inputs<AXES> for IdealDrives {
-        type Error = Infallible;
-        fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
-            Ok(MachineInputs::HEALTHY)
-        }
-    }
-
-    impl VelocityChannel<AXES> for IdealDrives {
-        type Error = Infallible;
-        fn write(&mut self, codes: &[DacCode; AXES]) -> Result<(), Infallible> {
-            if self.is_enabled {
-                for ((counts, per_code), DacCode(code)) in
-                    self.counts.iter_mut().zip(self.counts_per_code).zip(codes)
-                {
-                    *counts += per_code * f64::from(*code);
-                }
-            }
-            Ok(())
-        }
-    }
-
-    impl DriveEnable<AXES> for IdealDrives {
-        type Error = Infallible;
-        fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
-            self.is_enabled = enabled;
-            Ok(())
-        }
-    }
+    use crate::fixture::{AXES, BOARD, IdealDrives, TICK_S, end, machine};
 
     /// What an operator does at which tick.
     #[derive(Default)]
@@ -420,20 +364,10 @@ mod tests {
         let mut flight = FlightRecorder::<f32, AXES, 16, 8>::new();
         let mut empty = Streams::<f32, AXES, 2, 2>::new();
         let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
-        let counts_per_code = header.axes.map(|axis| {
-            let mm_s_per_code = axis.mm_s_at_10_v / f64::from(DacCode::from_volts(10.0_f64).0);
-            mm_s_per_code * BOARD.tick_s() / axis.mm_per_count
-        });
-        let mut drives = IdealDrives {
-            counts: [0.0; AXES],
-            counts_per_code,
-            is_enabled: false,
-            now: 0,
-            switched: Vec::new(),
-        };
+        let mut drives = IdealDrives::new();
         let kernel = Kernel::new(&machine.axes, header.start, [Counts(0); AXES]);
         let (_, intake) = empty.split(header.rules, header.start);
-        let mut control = Control::new(kernel, intake, header.start, &mut flight);
+        let mut control = Control::new(kernel, intake, &mut flight);
         let mut background = Background::<f32, AXES, 64, 16, 64>::new(BOARD, program, &mut streams);
         let (mut hands, mut lines, mut moved) = (Hands::default(), Lines::new(), [0; 2]);
         let mut position = header.start;
@@ -653,7 +587,7 @@ mod tests {
         let start = machine.header().start;
         let kernel = Kernel::new(&machine.axes, start, [Counts(0); AXES]);
         let (_, intake) = empty.split(machine.header().rules, start);
-        let mut control = Control::new(kernel, intake, start, &mut flight);
+        let mut control = Control::new(kernel, intake, &mut flight);
         let mut background = Background::<f32, AXES, 64, 16, 64>::new(BOARD, machine.program, &mut streams);
         let mut hands = Hands { down_from: u32::MAX - 100, ..Hands::default() };
         for now in 1..=10_000 {

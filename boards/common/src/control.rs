@@ -23,8 +23,6 @@ pub struct Control<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTE
     /// The tick's own figures; the board's interrupt adds to them.
     pub timing: TickTiming,
     pub(crate) flight: &'a mut FlightRecorder<R, AXES, ROWS, AFTER>,
-    state: ExecState,
-    position: [Position; AXES],
     is_healthy: bool,
     /// What spindle and coolant are to be switched to in the next tick.
     due: Option<OutputState>,
@@ -46,25 +44,14 @@ pub(crate) struct Seen<R: Real, const AXES: usize> {
 impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
     Control<'a, R, AXES, ROWS, AFTER>
 {
-    /// A kernel at rest at `position`, with streams that nothing ever enters: the first start brings others.
+    /// A kernel at rest, with its end of the streams: of streams that nothing ever enters, if the first start brings others.
     pub fn new(
         kernel: Kernel<R, AXES>,
         intake: Intake<'a, R, AXES>,
-        position: [Position; AXES],
         flight: &'a mut FlightRecorder<R, AXES, ROWS, AFTER>,
     ) -> Self {
         let timing = TickTiming::new();
-        Self {
-            kernel,
-            intake,
-            timing,
-            flight,
-            state: ExecState::Idle,
-            position,
-            is_healthy: false,
-            due: None,
-            is_switched: false,
-        }
+        Self { kernel, intake, timing, flight, is_healthy: false, due: None, is_switched: false }
     }
 
     /// One control tick. `unhealthy` is the fault found in the inputs (the emergency stop, a drive that is
@@ -81,8 +68,6 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         }
         let trace = self.kernel.tick(&mut self.intake, hal);
         self.flight.add(trace);
-        self.state = trace.executed.state;
-        self.position = trace.executed.setpoints.map(|setpoint| setpoint.position);
         if trace.fault.is_some() {
             self.due = self.is_switched.then_some(OutputState::OFF);
         }
@@ -103,8 +88,23 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         self.kernel.trip(kind);
     }
 
+    /// Whether the inputs allow a start.
+    pub(crate) fn is_healthy(&self) -> bool {
+        self.is_healthy
+    }
+
+    /// Whether the drives are off and may be enabled.
+    pub(crate) fn may_enable(&self) -> bool {
+        self.is_healthy && self.kernel.is_off() && self.kernel.fault().is_none()
+    }
+
     pub(crate) fn seen(&self) -> Seen<R, AXES> {
-        let &Self { state, position, is_healthy, .. } = self;
-        Seen { state, position, fault: self.kernel.fault(), is_healthy }
+        let trace = self.kernel.trace();
+        Seen {
+            state: trace.executed.state,
+            position: trace.executed.setpoints.map(|setpoint| setpoint.position),
+            fault: trace.fault,
+            is_healthy: self.is_healthy,
+        }
     }
 }

@@ -1,9 +1,14 @@
-//! The NUCLEO's board parameters and program, for the tests of this crate.
+//! The NUCLEO's board parameters and program, and ideal drives, for the tests of this crate.
 
+use core::convert::Infallible;
+
+use motion_kernel::hal::{
+    BoardOutputs, DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
+};
 use motion_kernel::live::Leads;
-use motion_kernel::units::Position;
+use motion_kernel::units::{Counts, DacCode, Position};
 
-use crate::parameters::{BoardOutputs, BoardParameters};
+use crate::parameters::BoardParameters;
 
 pub(crate) const AXES: usize = 3;
 
@@ -32,4 +37,66 @@ pub(crate) fn machine() -> Machine<'static> {
 /// Where the stringer ends, as `motion compile` prints it.
 pub(crate) fn end() -> [Position; AXES] {
     [102.045_923_136, 0.0, 0.0].map(|mm| Position::from_mm(mm).expect("in range"))
+}
+
+/// Drives without inertia: a velocity is there in the tick that asks for it.
+pub(crate) struct IdealDrives {
+    counts: [f64; AXES],
+    counts_per_code: [f64; AXES],
+    pub(crate) is_enabled: bool,
+    pub(crate) now: u32,
+    /// Ticks in which outputs were switched.
+    pub(crate) switched: Vec<(u32, OutputState)>,
+}
+
+impl Outputs for IdealDrives {
+    fn switch(&mut self, to: &OutputState) {
+        self.switched.push((self.now, *to));
+    }
+}
+
+impl Encoder<AXES> for IdealDrives {
+    type Error = Infallible;
+    fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
+        Ok(self.counts.map(|counts| Counts(counts.round() as i64)))
+    }
+}
+
+impl Inputs<AXES> for IdealDrives {
+    type Error = Infallible;
+    fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
+        Ok(MachineInputs::HEALTHY)
+    }
+}
+
+impl VelocityChannel<AXES> for IdealDrives {
+    type Error = Infallible;
+    fn write(&mut self, codes: &[DacCode; AXES]) -> Result<(), Infallible> {
+        if self.is_enabled {
+            for ((counts, per_code), DacCode(code)) in
+                self.counts.iter_mut().zip(self.counts_per_code).zip(codes)
+            {
+                *counts += per_code * f64::from(*code);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl DriveEnable<AXES> for IdealDrives {
+    type Error = Infallible;
+    fn set_enabled(&mut self, enabled: bool) -> Result<(), Infallible> {
+        self.is_enabled = enabled;
+        Ok(())
+    }
+}
+
+impl IdealDrives {
+    pub(crate) fn new() -> Self {
+        let counts_per_code = machine().header().axes.map(|axis| {
+            let mm_s_per_code = axis.mm_s_at_10_v / f64::from(DacCode::from_volts(10.0_f64).0);
+            mm_s_per_code * BOARD.tick_s() / axis.mm_per_count
+        });
+        Self { counts: [0.0; AXES], counts_per_code, is_enabled: false, now: 0, switched: Vec::new() }
+    }
 }

@@ -18,6 +18,8 @@ use crate::tick_timing::TickTiming;
 pub enum LogLine<R: Real, const AXES: usize> {
     /// The board waits for its first start.
     Ready,
+    /// The board waits for a PC on the link.
+    Linked,
     /// A run starts from here.
     Started([Position; AXES]),
     /// There is no start: the emergency stop is open or a drive is not ready.
@@ -63,7 +65,7 @@ pub enum LogLine<R: Real, const AXES: usize> {
         longest_poll_us: u32,
         /// Number of stops for want of data since the start.
         starvations: u32,
-        /// Number of console bytes lost since the start.
+        /// Number of times that bytes of console or link were lost since the start.
         bytes_lost: u32,
     },
 }
@@ -81,6 +83,7 @@ pub fn write<R: Real + defmt::Format, const AXES: usize>(line: &LogLine<R, AXES>
     const { assert!(AXES <= FLIGHT_AXES_MAX, "a row of the flight recorder does not fit its frame") };
     match *line {
         LogLine::Ready => info!("ready: press the start button"),
+        LogLine::Linked => info!("ready: waits for a PC on the link"),
         LogLine::Started(from) => info!("started: from {=[?]} mm", from.map(Position::to_mm)),
         LogLine::NotReady => warn!("not started: the emergency stop is open or a drive is not ready"),
         LogLine::Done => info!("done: press the start button to run again"),
@@ -97,13 +100,9 @@ pub fn write<R: Real + defmt::Format, const AXES: usize>(line: &LogLine<R, AXES>
         LogLine::Override(percent) => info!("feed override {=u8} %", percent),
         LogLine::SingleBlock(is_on) => info!("single block {=str}", if is_on { "on" } else { "off" }),
         LogLine::Nothing(why) => info!("{=str}", why),
-        LogLine::Fault(fault) => error!("stopped: {}; reset the board to go on", fault),
-        LogLine::Refused(error) => {
-            error!("program refused: {}; motion comes to rest; reset the board to go on", error);
-        }
-        LogLine::NoWay(error) => {
-            error!("no way to the program's start: {}; reset the board to go on", error);
-        }
+        LogLine::Fault(fault) => error!("stopped: {}", fault),
+        LogLine::Refused(error) => error!("program refused: {}; motion comes to rest", error),
+        LogLine::NoWay(error) => error!("no way to the program's start: {}", error),
         LogLine::Flight(ref row) => {
             let mut buffer = [0; motion_kernel::flight::frame_max(FLIGHT_AXES_MAX)];
             if let Some(frame) = row.to_frame(&mut buffer) {
@@ -123,7 +122,7 @@ pub fn write<R: Real + defmt::Format, const AXES: usize>(line: &LogLine<R, AXES>
             info!("peak following error {=[?]} um", peaks_mm.map(|mm| R::from_f64(1e3) * mm));
         }
         LogLine::Background { longest_poll_us, starvations, bytes_lost } => info!(
-            "longest background poll {=u32} us, {=u32} stops for want of data, {=u32} console bytes lost",
+            "longest background poll {=u32} us, {=u32} stops for want of data, {=u32} times bytes lost",
             longest_poll_us, starvations, bytes_lost
         ),
     }

@@ -7,11 +7,11 @@
 //! anything is enabled.
 
 use motion_kernel::axis::{AxesConfig, AxesError};
-use motion_kernel::hal::{OutputState, Spindle};
+use motion_kernel::hal::{BoardOutputs, OutputState, Spindle};
 use motion_kernel::num::Real;
 use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check_live, switches_as_stops};
 
-use crate::parameters::{BoardOutputs, BoardParameters};
+use crate::parameters::BoardParameters;
 
 /// Why the board can't run a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +77,22 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
     /// # Errors
     /// [`MachineError`].
     pub fn new(bytes: &'a [u8], board: &BoardParameters) -> Result<Self, MachineError> {
+        let machine = Self::without_items(bytes, board)?;
+        let program = &machine.program;
+        let checked = match board.outputs {
+            BoardOutputs::None => check_live::<R, AXES, _>(program.header(), program.items()),
+            _ => check_live::<R, AXES, _>(program.header(), switches_as_stops(program.items())),
+        };
+        checked.map_err(MachineError::Items)?;
+        check_switches(program, board.outputs)?;
+        Ok(machine)
+    }
+
+    /// The machine alone, for a board whose items come over the link: what the program drives is not looked at.
+    ///
+    /// # Errors
+    /// [`MachineError`].
+    pub fn without_items(bytes: &'a [u8], board: &BoardParameters) -> Result<Self, MachineError> {
         let program = Reader::new(bytes).map_err(MachineError::Program)?;
         let Header { tick_s, rules, axes, .. } = program.header();
         // Compared to the bit: both are the same decimal, or they are different ticks.
@@ -94,12 +110,6 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
         let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
         let axes = AxesConfig::new(axes, expected).and_then(|axes| axes.guarded(&guards, expected));
         let axes = axes.map_err(MachineError::Axes)?;
-        let checked = match board.outputs {
-            BoardOutputs::None => check_live::<R, AXES, _>(program.header(), program.items()),
-            _ => check_live::<R, AXES, _>(program.header(), switches_as_stops(program.items())),
-        };
-        checked.map_err(MachineError::Items)?;
-        check_switches(&program, board.outputs)?;
         Ok(Self { program, axes })
     }
 

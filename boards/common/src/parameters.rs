@@ -1,5 +1,6 @@
 //! The figures that differ from board to board.
 
+use motion_kernel::hal::BoardOutputs;
 use motion_kernel::live::Leads;
 
 /// A board's figures; all others follow from them.
@@ -17,18 +18,6 @@ pub struct BoardParameters {
     pub leads: Leads,
     /// What there is for spindle and coolant.
     pub outputs: BoardOutputs,
-}
-
-/// What a board has for spindle and coolant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BoardOutputs {
-    /// Nothing: programs that switch are refused.
-    None,
-    /// An output for a spindle that turns clockwise at the speed that is set at its drive. M4 and a second speed are
-    /// refused.
-    FixedSpeed,
-    /// A spindle that turns both ways at the commanded speed.
-    CommandedSpeed,
 }
 
 impl BoardParameters {

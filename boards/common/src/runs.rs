@@ -8,7 +8,7 @@ use core::task::Poll;
 use motion_kernel::hal::OutputState;
 use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
-use motion_kernel::program::{Item, Items, ProgramError, Reader, Source, SupplyError, Switching};
+use motion_kernel::program::{Header, Item, Items, ProgramError, Reader, Source, SupplyError, Switching};
 use motion_kernel::queue::LiveFeeder;
 use motion_kernel::straight::{Straight, StraightError};
 use motion_kernel::units::Position;
@@ -17,6 +17,18 @@ use crate::operator::Settings;
 
 /// Greatest feed to the program's start \[mm/s\]: slow, because the machine may come from anywhere.
 const TO_START_MM_S: f64 = 20.0;
+
+/// The way from where the machine stands to a program's start.
+///
+/// # Errors
+/// There is none.
+pub fn to_start<const AXES: usize>(
+    header: &Header<AXES>,
+    here: [Position; AXES],
+) -> Result<Straight<AXES>, StraightError> {
+    let feed_mm_s = TO_START_MM_S.min(header.rules.feed_mm_s);
+    Straight::new(here, header.start, header.pulse, header.rules.limits, [feed_mm_s; 2], header.tick_s)
+}
 
 /// The items of one run after the other; pending while no run is started.
 #[derive(Debug)]
@@ -64,11 +76,7 @@ impl<'a, R: Real, const AXES: usize, const PLACES: usize> Run<'a, R, AXES, PLACE
     /// There is no way to the program's start.
     pub fn start(&mut self, here: [Position; AXES]) -> Result<(), StraightError> {
         let runs = self.control.source_mut().items_mut();
-        let header = runs.program.header();
-        let feed_mm_s = TO_START_MM_S.min(header.rules.feed_mm_s);
-        let (limits, feeds_mm_s) = (header.rules.limits, [feed_mm_s; 2]);
-        let to_start = Straight::new(here, header.start, header.pulse, limits, feeds_mm_s, header.tick_s)?;
-        runs.to_start = Some(to_start);
+        runs.to_start = Some(to_start(runs.program.header(), here)?);
         runs.items = Some(runs.program.items());
         Ok(())
     }

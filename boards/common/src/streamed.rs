@@ -9,11 +9,12 @@ use core::convert::Infallible;
 
 use motion_kernel::hal::OutputState;
 use motion_kernel::law::Pulse;
-use motion_kernel::link::{BoardLink, Controls, ItemQueue, Mode, Status};
+use motion_kernel::link::{BoardLink, Came, Controls, ItemQueue, Mode, Status};
 use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{SupplyError, Switching};
-use motion_kernel::queue::LiveFeeder;
+use motion_kernel::queue::{Intake, LiveFeeder};
+use motion_kernel::units::Position;
 
 /// Frames of items that one poll puts away at most: motion is to be planned, too.
 const FRAMES_PER_POLL: usize = 8;
@@ -21,8 +22,8 @@ const FRAMES_PER_POLL: usize = 8;
 /// What the operator asks of the rest of the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Requests {
-    /// The operator enables the drives.
-    pub enables: bool,
+    /// The operator enables the drives, or disables them.
+    pub power: Option<bool>,
     /// The operator clears the fault.
     pub clears_fault: bool,
     /// The operator resumes: also from a program stop, which is the kernel's.
@@ -34,9 +35,13 @@ pub struct Requests {
 pub struct Streamed<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize> {
     link: RefCell<BoardLink>,
     feeder: LiveFeeder<'a, R, AXES>,
-    control: LiveControl<R, AXES, Switching<ItemQueue<AXES, ITEMS>>, Infallible, PLACES>,
+    control: Live<R, AXES, ITEMS, PLACES>,
     obeyed: Controls,
 }
+
+/// Live control of items that come over the link.
+type Live<R, const AXES: usize, const ITEMS: usize, const PLACES: usize> =
+    LiveControl<R, AXES, Switching<ItemQueue<AXES, ITEMS>>, Infallible, PLACES>;
 
 impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     Streamed<'a, R, AXES, ITEMS, PLACES>
@@ -67,52 +72,96 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         &mut self,
         next_byte: &mut dyn FnMut() -> Option<u8>,
     ) -> (Requests, Result<(), SupplyError<Infallible>>) {
-        let Self { link, feeder, control, obeyed } = self;
+        self.poll_unless(&|| false, next_byte)
+    }
+
+    /// [`Self::poll`], in which motion is held wherever `is_hold_asked` says so, which a hold on the board does: a button. It
+    /// is asked between the steps of a plan, too, and needs no filter, as what bounces holds again. Only the operator's next
+    /// resume over the link goes on, and not while it still says so.
+    pub fn poll_unless(
+        &mut self,
+        is_hold_asked: &dyn Fn() -> bool,
+        next_byte: &mut dyn FnMut() -> Option<u8>,
+    ) -> (Requests, Result<(), SupplyError<Infallible>>) {
+        let requests = self.receive(next_byte);
+        (requests, self.plan(is_hold_asked, next_byte))
+    }
+
+    /// The first part of a poll: takes what `next_byte` has, and obeys the operator. Parameters that came wait for who puts
+    /// them away before the second part.
+    pub(crate) fn receive(&mut self, next_byte: &mut dyn FnMut() -> Option<u8>) -> Requests {
+        let Self { link, control, obeyed, .. } = self;
         let mut bytes = core::iter::from_fn(next_byte);
-        let received = link.get_mut();
+        let link = link.get_mut();
         for _ in 0..FRAMES_PER_POLL {
-            received.receive(&mut bytes);
-            if !received.put_items(control.source_mut().items_mut()) {
+            link.receive(&mut bytes);
+            if !link.put_items(control.source_mut().items_mut()) {
                 break;
             }
         }
-        let requests = match received.take_controls() {
+        match link.take_controls() {
             Some(controls) => obey(&controls, obeyed, control),
             None => Requests::default(),
-        };
-        let bytes = RefCell::new(bytes);
-        let is_stop_asked = || {
-            // Both are borrowed nowhere else while motion is planned.
-            let (Ok(mut link), Ok(mut bytes)) = (link.try_borrow_mut(), bytes.try_borrow_mut()) else {
-                return false;
-            };
-            link.receive_controls(&mut *bytes);
-            link.is_stop_asked()
-        };
-        (requests, control.poll_unless(&is_stop_asked, feeder))
+        }
     }
 
-    /// After an abort ([`State::Aborted`]): drops what was not driven, and begins anew, held, with streams that were split
-    /// where the machine stands now. The link goes on.
-    pub fn restart(&mut self, feeder: LiveFeeder<'a, R, AXES>, pulse: Pulse, tick_s: f64, leads: Leads) {
-        let mut items = core::mem::take(self.control.source_mut().items_mut());
-        items.clear();
-        self.control = LiveControl::new(Switching::new(items), pulse, tick_s, leads);
-        self.control.hold();
-        self.feeder = feeder;
+    /// The second part: plans.
+    pub(crate) fn plan(
+        &mut self,
+        is_hold_asked: &dyn Fn() -> bool,
+        next_byte: &mut dyn FnMut() -> Option<u8>,
+    ) -> Result<(), SupplyError<Infallible>> {
+        let Self { link, feeder, control, .. } = self;
+        let bytes = core::iter::from_fn(next_byte);
+        let is_held = is_hold_asked();
+        if is_held {
+            control.hold();
+        }
+        let bytes = RefCell::new(bytes);
+        let is_stop_asked = || {
+            let is_hold_new = !is_held && is_hold_asked();
+            // Both are borrowed nowhere else while motion is planned.
+            let (Ok(mut link), Ok(mut bytes)) = (link.try_borrow_mut(), bytes.try_borrow_mut()) else {
+                return is_hold_new;
+            };
+            link.receive_controls(&mut *bytes);
+            is_hold_new || link.is_stop_asked()
+        };
+        control.poll_unless(&is_stop_asked, feeder)
+    }
+
+    /// After an abort ([`State::Aborted`]), or where the drives are enabled: drops what was not driven, and begins anew on a
+    /// machine that stands at `here`, with the items of the program after it. The operator's settings stay. `intake` is the
+    /// other end of the streams.
+    pub fn restart(&mut self, intake: &mut Intake<'_, R, AXES>, here: [Position; AXES]) {
+        let Self { feeder, control, obeyed, .. } = self;
+        // Of the program before, even if it was never put out.
+        control.source_mut().switched();
+        control.restart();
+        if obeyed.mode == Mode::Hold {
+            control.hold();
+        }
+        set(obeyed, control);
+        let is_restarted = feeder.restart(intake, here);
+        debug_assert!(is_restarted, "both are ends of the same streams");
     }
 
     /// Writes the next frame for the PC to `out`; see [`BoardLink::transmit`]. `status` is asked for the machine's status with
-    /// the number of the first item that live control has not taken.
+    /// what has come of the program.
     pub fn transmit(
         &mut self,
         now_ms: u32,
-        status: Option<&dyn Fn(u32) -> Status<AXES>>,
+        status: Option<&dyn Fn(Came) -> Status<AXES>>,
         out: &mut [u8],
     ) -> usize {
         let items = self.control.source_mut().items_mut();
-        let status = status.map(|status| status(items.taken()));
+        let status = status.map(|status| status(items.came()));
         self.link.get_mut().transmit(now_ms, items, status, out)
+    }
+
+    /// The board's end of the link.
+    pub(crate) fn link_mut(&mut self) -> &mut BoardLink {
+        self.link.get_mut()
     }
 
     /// What the program switches outputs to now; see [`LiveControl::switch`].
@@ -120,10 +169,13 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         self.control.switch(&self.feeder)
     }
 
-    /// The state of live control; [`State::Waiting`] where everything that came is done.
+    /// The state of live control; [`State::Waiting`] where everything that came is done, switches of outputs too.
     #[must_use]
-    pub fn state(&self) -> State {
-        self.control.state(&self.feeder)
+    pub fn state(&mut self) -> State {
+        match self.control.state(&self.feeder) {
+            State::Waiting if self.control.source_mut().due().is_some() => State::Running,
+            state => state,
+        }
     }
 
     /// Number of stops on the path because items came too late.
@@ -137,7 +189,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
 fn obey<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
     controls: &Controls,
     obeyed: &mut Controls,
-    control: &mut LiveControl<R, AXES, Switching<ItemQueue<AXES, ITEMS>>, Infallible, PLACES>,
+    control: &mut Live<R, AXES, ITEMS, PLACES>,
 ) -> Requests {
     let before = core::mem::replace(obeyed, *controls);
     let is_pressed = controls.presses != before.presses;
@@ -149,24 +201,32 @@ fn obey<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
             Mode::Hold => control.hold(),
         }
     }
-    let set = control.set_override(f64::from(controls.override_permille) * 1e-3);
-    debug_assert!(set.is_ok(), "the link takes no other");
-    control.set_single_block(controls.is_single_block);
+    set(controls, control);
     Requests {
-        enables: controls.enables != before.enables,
+        power: (controls.power_presses != before.power_presses).then_some(controls.is_enabled),
         clears_fault: controls.fault_resets != before.fault_resets,
         resumes: is_pressed && controls.mode == Mode::Run,
     }
 }
 
+/// Applies the settings among `controls`.
+fn set<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
+    controls: &Controls,
+    control: &mut Live<R, AXES, ITEMS, PLACES>,
+) {
+    let set = control.set_override(f64::from(controls.override_permille) * 1e-3);
+    debug_assert!(set.is_ok(), "the link takes no other");
+    control.set_single_block(controls.is_single_block);
+}
+
 #[cfg(test)]
 mod tests {
     use motion_kernel::exec::{ExecState, Executor};
+    use motion_kernel::hal::BoardOutputs;
     use motion_kernel::link::{Event, FRAME_MAX, HostLink, Identity, PROTOCOL, State as MachineState};
     use motion_kernel::program::Item;
     use motion_kernel::queue::LiveStreams;
     use motion_kernel::straight::Straight;
-    use motion_kernel::units::Position;
 
     use super::*;
     use crate::fixture::{AXES, TICK_S, end, machine};
@@ -183,6 +243,7 @@ mod tests {
         is_fixed_point: false,
         tick_s: TICK_S,
         items: ITEMS as u16,
+        outputs: BoardOutputs::None,
         machine: 0,
     };
 
@@ -272,15 +333,19 @@ mod tests {
             let executed = executor.tick(&mut intake).expect("no fault");
             state = executed.state;
             ticks.push(executed.setpoints.map(|setpoint| setpoint.position));
-            let status = |taken: u32| Status {
+            let status = |came: Came| Status {
                 tick: now,
-                state: MachineState::from(state),
+                state: MachineState::Moving,
                 set: [Position::ZERO; AXES],
                 actual: [Position::ZERO; AXES],
                 feed_mm_s: 0.0,
                 line: 0,
-                taken,
-                fault: 0,
+                aborts: came.aborts,
+                taken: came.taken,
+                is_ended: came.is_ended,
+                starvations: 0,
+                is_ready: true,
+                fault: None,
             };
             let length = board.transmit(now_ms, now.is_multiple_of(40).then_some(&status), &mut out);
             let mut frame = out[..length].to_vec();
@@ -293,7 +358,7 @@ mod tests {
                 let resumes = requests.iter().filter(|requests| requests.resumes).count();
                 assert!(
                     resumes > 0
-                        && requests.iter().all(|requests| !requests.enables && !requests.clears_fault)
+                        && requests.iter().all(|requests| requests.power.is_none() && !requests.clears_fault)
                 );
                 return (ticks, board.starvations());
             }

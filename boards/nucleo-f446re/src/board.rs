@@ -8,14 +8,14 @@
 use defmt::info;
 use motion_kernel::hal::Ad5754Output;
 use nucleo_f446re::design_parameters::{
-    APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, CONSOLE_BAUD, HSE_HZ, SPI_HZ, SYSCLK_HZ, WATCHDOG_MS,
+    APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, HSE_HZ, SPI_HZ, SYSCLK_HZ, WATCHDOG_MS,
 };
 use stm32f4xx_hal::gpio::{Alternate, AnyPin, Input, Output, PA3, PA10, PB12, PC13, Pull, Speed};
 use stm32f4xx_hal::pac::rcc::csr;
-use stm32f4xx_hal::pac::{self, SPI2, USART2};
+use stm32f4xx_hal::pac::{self, SPI2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
-use stm32f4xx_hal::serial::{Rx, SerialExt};
+use stm32f4xx_hal::serial::SerialExt;
 use stm32f4xx_hal::spi::{Spi, SpiExt};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
@@ -35,6 +35,11 @@ pub(crate) type SyncPin = PB12<Output>;
 pub(crate) type EnablePin = AnyPin<Output>;
 pub(crate) type ScopePin = PA10<Output>;
 pub(crate) type ButtonPin = PC13<Input>;
+/// ST-LINK's serial port: the console, or the link.
+#[cfg(not(feature = "link"))]
+pub(crate) type Line = stm32f4xx_hal::serial::Rx<pac::USART2>;
+#[cfg(feature = "link")]
+pub(crate) type Line = crate::link_port::LinkPort;
 
 /// Writes a line of the log.
 pub(crate) use motion_board::log::write;
@@ -59,7 +64,7 @@ pub(crate) struct Board {
     /// B1: low while it is pressed (the board has the pull-up).
     pub(crate) button: ButtonPin,
     /// ST-LINK's serial port.
-    pub(crate) console: Rx<USART2>,
+    pub(crate) line: Line,
 }
 
 impl Board {
@@ -155,9 +160,26 @@ impl Board {
 
         // Pulled up: without ST-LINK's power nobody drives the line.
         let receive: PA3<Alternate<7>> = gpioa.pa3.into_alternate().internal_resistor(Pull::Up);
-        let console = match device.USART2.rx(receive, CONSOLE_BAUD.bps(), &mut rcc) {
-            Ok(console) => console,
-            Err(_) => defmt::panic!("console: {=u32} baud can't be had", CONSOLE_BAUD),
+        #[cfg(not(feature = "link"))]
+        let line = {
+            use nucleo_f446re::design_parameters::CONSOLE_BAUD;
+            match device.USART2.rx(receive, CONSOLE_BAUD.bps(), &mut rcc) {
+                Ok(console) => console,
+                Err(_) => defmt::panic!("console: {=u32} baud can't be had", CONSOLE_BAUD),
+            }
+        };
+        #[cfg(feature = "link")]
+        let line = {
+            use nucleo_f446re::design_parameters::{LINK_BAUD, LINK_DIVIDER};
+            use stm32f4xx_hal::serial::config::{Config, DmaConfig};
+            let config = Config::default().baudrate(LINK_BAUD.bps()).dma(DmaConfig::TxRx);
+            let serial = match device.USART2.serial((gpioa.pa2, receive), config, &mut rcc) {
+                Ok(serial) => serial,
+                Err(_) => defmt::panic!("link: {=u32} baud can't be had", LINK_BAUD),
+            };
+            let line = Line::new(serial, device.DMA1, &mut rcc);
+            defmt::assert_eq!(line.divider(), LINK_DIVIDER);
+            line
         };
 
         let watchdog = IndependentWatchdog::new(device.IWDG);
@@ -170,7 +192,7 @@ impl Board {
             watchdog,
             scope: gpioa.pa10.into_push_pull_output(),
             button: gpioc.pc13.into_input(),
-            console,
+            line,
         }
     }
 

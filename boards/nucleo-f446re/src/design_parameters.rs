@@ -173,8 +173,34 @@ const _: () = assert!(
     "more bytes may come in a poll of the background than there are places"
 );
 
-/// Ticks that the flight recorder keeps: an eighteenth of a second, 19 KB, what the stack leaves.
-pub const FLIGHT_ROWS: usize = TICK_HZ as usize / 18;
+// --- Link ------------------------------------------------------------------------------------------
+
+/// Bits per second of the link: what ports of PCs offer next to what ST-LINK's takes.
+pub const LINK_BAUD: u32 = 921_600;
+/// The divider that comes closest (RM0390, USART: fractional baud rate generation, 16 samples a bit).
+pub const LINK_DIVIDER: u32 = (APB1_HZ + LINK_BAUD / 2) / LINK_BAUD;
+/// What it makes \[1/s\].
+pub const LINK_ACTUAL_BAUD: u32 = APB1_HZ / LINK_DIVIDER;
+/// Its error \[0.01 %\], rounded away from 0. A receiver tolerates 3.33 % in all (RM0390, table of the USART receiver's
+/// tolerance: 8 bits, 16 samples, a divider with a fraction, noise detected).
+pub const LINK_ERROR_BASIS_POINTS: i32 =
+    ((LINK_ACTUAL_BAUD as i64 - LINK_BAUD as i64) * 10_000 / LINK_BAUD as i64) as i32 - 1;
+/// Places for bytes that the DMA has brought: twice what may come between two looks of the background at them, a step of a
+/// plan.
+pub const LINK_RING: usize = 4096;
+/// Items that have room before live control takes them: what comes while an answer is under way.
+pub const LINK_ITEMS: usize = 16;
+
+const _: () = assert!(LINK_DIVIDER >= 16, "the divider has a whole part of 1 at least");
+const _: () = assert!(
+    STEP_TICKS_MAX as u64 * LINK_ACTUAL_BAUD as u64 / (10 * TICK_HZ as u64) < LINK_RING as u64 / 2,
+    "more bytes may come in a step of a plan than half of the ring holds"
+);
+const _: () = assert!(TICK_HZ.is_multiple_of(1000), "the link counts whole milliseconds");
+
+/// Ticks that the flight recorder keeps: an eighteenth of a second, 19 KB, what the stack leaves; with the link, which needs
+/// some of it, a twentieth.
+pub const FLIGHT_ROWS: usize = TICK_HZ as usize / if cfg!(feature = "link") { 20 } else { 18 };
 /// Ticks of these after the fault's: 25 ms, which show the axes coasting.
 pub const FLIGHT_AFTER: usize = TICK_HZ as usize / 40;
 
@@ -278,6 +304,14 @@ mod tests {
         // Ten times in hand even at the rate that the filter passes at most.
         let counts_per_tick = ENCODER_COUNTS_PER_S_MAX / TICK_HZ;
         assert!(10 * counts_per_tick < 1 << (ENCODER_BITS_MIN - 1));
+    }
+
+    #[test]
+    fn the_links_rate_is_close_enough() {
+        assert_eq!((LINK_DIVIDER, LINK_ACTUAL_BAUD), (46, 913_043));
+        // A quarter of the tolerance, so that the other side may have as much and more.
+        assert_eq!(LINK_ERROR_BASIS_POINTS, -93);
+        assert!(include_str!("../README.md").contains("921 600 baud; 42 MHz / 46 is 913 043, −0.93 %"));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //!
 //! - [`design_parameters`]: every number of the firmware with its derivation;
 //! - [`pins`]: which signal is on which pin;
+//! - [`receive_ring`]: where bytes that the DMA brings are read;
 //! - [`machine`]: the number of axes, the program in flash, and the sizes that follow.
 //!
 //! The firmware itself is `main.rs` and its modules; the part shared with other boards is the crate
@@ -20,4 +21,5 @@
 
 pub mod design_parameters;
 pub mod pins;
+pub mod receive_ring;
 pub mod machine;

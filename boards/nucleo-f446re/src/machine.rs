@@ -1,6 +1,6 @@
 //! The board's number of axes and memory sizes, for the types of `motion_board`.
 
-use crate::design_parameters::{FLIGHT_AFTER, FLIGHT_ROWS, PLACES};
+use crate::design_parameters::{FLIGHT_AFTER, FLIGHT_ROWS, LINK_ITEMS, PLACES};
 
 /// Number of axes: X, Y, Z.
 pub const AXES: usize = 3;
@@ -18,13 +18,22 @@ pub type Machine = motion_board::Machine<'static, Number, AXES>;
 /// The streams: 63 pieces, and three lists of 15 ramps.
 pub type Streams = motion_kernel::queue::LiveStreams<Number, AXES, 64, 16>;
 
+/// The kernel's end of streams.
+pub type Intake = motion_kernel::queue::Intake<'static, Number, AXES>;
+
+/// The background's end of the streams.
+pub type Feeder = motion_kernel::queue::LiveFeeder<'static, Number, AXES>;
+
 /// The last ticks, and some after a fault.
 pub type Flight = motion_kernel::flight::FlightRecorder<Number, AXES, FLIGHT_ROWS, FLIGHT_AFTER>;
 
 /// Shared by tick and background.
 pub type Control = motion_board::Control<'static, Number, AXES, FLIGHT_ROWS, FLIGHT_AFTER>;
 
-/// The background.
+/// The background of a board that a PC drives over the link.
+pub type Linked = motion_board::Linked<'static, Number, AXES, LINK_ITEMS, PLACES>;
+
+/// The background of a board on its own.
 pub type Background = motion_board::Background<'static, Number, AXES, 64, 16, PLACES>;
 
 #[cfg(test)]

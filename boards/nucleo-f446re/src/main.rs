@@ -27,12 +27,16 @@ mod board;
 mod emergency_stop;
 #[cfg(not(feature = "emulated"))]
 mod encoders;
+#[cfg(all(feature = "link", not(feature = "emulated")))]
+mod link_port;
 #[cfg(not(feature = "emulated"))]
 mod supply;
 #[cfg(not(feature = "emulated"))]
 mod tick_timer;
 #[cfg(feature = "emulated")]
 mod emulated;
+#[cfg(all(feature = "link", feature = "emulated"))]
+use emulated::link_port;
 #[cfg(feature = "emulated")]
 use emulated::{board, emergency_stop, encoders, tick_timer};
 
@@ -41,6 +45,7 @@ mod drives;
 mod switches;
 mod spindle;
 mod hal;
+#[cfg(not(feature = "link"))]
 mod console_port;
 mod background;
 mod stop;
@@ -57,19 +62,15 @@ mod app {
     use core::mem::MaybeUninit;
     use core::sync::atomic::Ordering;
 
-    use heapless::spsc::{Producer, Queue};
     use motion_board::Liveness;
     use motion_kernel::kernel::Kernel;
     use motion_kernel::tick_monitor::TickMonitor;
-    use nucleo_f446re::design_parameters::{BOARD, CONSOLE_BYTES, TICK_CYCLES, TICK_PRIORITY};
-    use nucleo_f446re::machine::{AXES, Control, Flight, Machine, Number, PROGRAM, Streams};
-    use stm32f4xx_hal::pac::USART2;
-    use stm32f4xx_hal::serial::Rx;
+    use nucleo_f446re::design_parameters::{BOARD, TICK_CYCLES, TICK_PRIORITY};
+    use nucleo_f446re::machine::{Control, Flight, Machine, PROGRAM, Streams};
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-    use crate::background::{self, Panel, STEPS, TICKS};
+    use crate::background::{Background, OfTick, Places, STEPS, TICKS};
     use crate::board::{Board, ScopePin};
-    use crate::console_port;
     use crate::hal::Hardware;
     use crate::tick_timer::{TickTimer, cycles};
 
@@ -89,32 +90,30 @@ mod app {
         liveness: Liveness,
         monitor: TickMonitor,
         scope: ScopePin,
-        console: Rx<USART2>,
-        received: Producer<'static, u8>,
-        panel: Panel,
-        streams: &'static mut Streams,
-        machine: Machine,
+        of_background: OfTick,
+        background: Background,
     }
 
     // Written at the start: an initial value that is not all zeros would lie in flash a second time, whole.
     #[init(local = [
         storage: MaybeUninit<Streams> = MaybeUninit::uninit(),
         flight: MaybeUninit<Flight> = MaybeUninit::uninit(),
-        // The kernel's streams until there is a program; nothing ever enters them.
-        empty: MaybeUninit<motion_kernel::queue::Streams<Number, AXES, 2, 2>> = MaybeUninit::uninit(),
-        console_bytes: Queue<u8, CONSOLE_BYTES> = Queue::new(),
+        places: Places = Places::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let Board { mut hardware, mut tick_timer, mut watchdog, scope, button, console } =
+        let Board { mut hardware, mut tick_timer, mut watchdog, scope, button, line } =
             Board::new(cx.device, cx.core);
-        let machine = defmt::unwrap!(Machine::new(PROGRAM, &BOARD));
+        let machine = defmt::unwrap!(if cfg!(feature = "link") {
+            Machine::without_items(PROGRAM, &BOARD)
+        } else {
+            Machine::new(PROGRAM, &BOARD)
+        });
         // The machine's position becomes the program's start.
-        let start = machine.header().start;
-        let kernel = Kernel::new(&machine.axes, start, hardware.encoders.latch());
-        let empty = cx.local.empty.write(motion_kernel::queue::Streams::new());
-        let (_, intake) = empty.split(machine.header().rules, start);
-        let control = Control::new(kernel, intake, start, cx.local.flight.write(Flight::new()));
-        let (received, bytes) = cx.local.console_bytes.split();
+        let kernel = Kernel::new(&machine.axes, machine.header().start, hardware.encoders.latch());
+        let streams = cx.local.storage.write(Streams::new());
+        let (background, intake, of_background) =
+            Background::new(cx.local.places, streams, machine, button, line);
+        let control = Control::new(kernel, intake, cx.local.flight.write(Flight::new()));
         Board::start(&mut tick_timer, &mut watchdog);
         let local = Local {
             tick_timer,
@@ -122,11 +121,8 @@ mod app {
             liveness: Liveness::new(BOARD.silent_ticks_max()),
             monitor: defmt::unwrap!(TickMonitor::new(32, TICK_CYCLES)),
             scope,
-            console,
-            received,
-            panel: Panel { button, bytes },
-            streams: cx.local.storage.write(Streams::new()),
-            machine,
+            of_background,
+            background,
         };
         (Shared { control, hardware }, local)
     }
@@ -137,7 +133,7 @@ mod app {
     #[task(
         binds = TIM7,
         priority = 16,
-        local = [tick_timer, watchdog, liveness, monitor, scope, console, received],
+        local = [tick_timer, watchdog, liveness, monitor, scope, of_background],
         shared = [control, hardware]
     )]
     fn tick(mut cx: tick::Context) {
@@ -151,7 +147,7 @@ mod app {
             if cx.local.liveness.may_feed(STEPS.load(Ordering::Relaxed)) {
                 cx.local.watchdog.feed();
             }
-            console_port::receive(cx.local.console, cx.local.received);
+            cx.local.of_background.tick();
             if let Some(kind) = cx.local.monitor.ended(cycles()) {
                 control.trip(kind);
             }
@@ -178,9 +174,8 @@ mod app {
     }
 
     /// The background.
-    #[idle(local = [streams, panel, machine], shared = [control])]
+    #[idle(local = [background], shared = [control])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { streams, panel, machine, .. } = cx.local;
-        background::run(cx.shared.control, streams, machine, panel)
+        cx.local.background.run(cx.shared.control)
     }
 }

@@ -34,7 +34,7 @@ const fn pin(
 }
 
 /// The wiring, connector by connector.
-pub const PINS: [Pin; 32] = [
+pub const PINS: [Pin; 33] = [
     pin("drive ready X", "PC10", "CN7-1", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
     pin("drive ready Y", "PC11", "CN7-2", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
     pin("drive ready Z", "PC12", "CN7-3", "–", "input, pull-up", "optocoupler to GND: low is healthy"),
@@ -66,6 +66,14 @@ pub const PINS: [Pin; 32] = [
     pin("converter SCLK", "PB13", "CN10-30", "–", "SPI2_SCK AF5", "AD5754 SCLK"),
     pin("scope", "PA10", "CN10-33", "D2, CN9-3", "output, high in the tick", "oscilloscope"),
     pin("limit high Y", "PC4", "CN10-34", "–", "input, pull-up", "contact to GND: low is not reached"),
+    pin(
+        "link",
+        "PA2",
+        "CN10-35",
+        "D1, CN9-2",
+        "USART2_TX AF7",
+        "ST-LINK's serial port; only with the feature link",
+    ),
     pin(
         "console",
         "PA3",
@@ -119,9 +127,8 @@ const fn decimal(mut digits: &[u8]) -> u32 {
     number
 }
 
-/// Pins of the board that are already in use: the line to ST-LINK's serial port, the green LED, SWD and its
-/// trace output, clocks.
-pub const RESERVED: [&str; 9] = ["PA2", "PA5", "PA13", "PA14", "PB3", "PC14", "PC15", "PH0", "PH1"];
+/// Pins of the board that are already in use: the green LED, SWD and its trace output, clocks.
+pub const RESERVED: [&str; 8] = ["PA5", "PA13", "PA14", "PB3", "PC14", "PC15", "PH0", "PH1"];
 
 #[cfg(test)]
 mod tests {
@@ -212,7 +219,7 @@ mod tests {
     ];
 
     /// DS10693, "Alternate function": the rows of the pins that use one here.
-    const FUNCTIONS: [(&str, &str, u8); 11] = [
+    const FUNCTIONS: [(&str, &str, u8); 12] = [
         ("PA0", "TIM5_CH1", 2),
         ("PA1", "TIM5_CH2", 2),
         ("PB8", "TIM2_CH1", 1),
@@ -221,6 +228,7 @@ mod tests {
         ("PA7", "TIM3_CH2", 2),
         ("PB13", "SPI2_SCK", 5),
         ("PB15", "SPI2_MOSI", 5),
+        ("PA2", "USART2_TX", 7),
         ("PA3", "USART2_RX", 7),
         ("PB10", "TIM2_CH3", 1),
         ("PC9", "TIM3_CH4", 2),

@@ -10,7 +10,7 @@
 //! | thumbv6m-none-eabi | microbit (M0) | fixed point |
 //! | riscv32imafc-unknown-none-elf | virt (RISC-V with an FPU) | f32 |
 //!
-//! Feature `live` adds live control, which the microbit has no room for.
+//! Feature `live` adds live control, which the microbit has no room for; `link` what a board that a PC drives has.
 #![no_std]
 
 #[cfg(target_arch = "arm")]
@@ -21,12 +21,16 @@ pub mod processor;
 pub mod processor;
 
 pub mod count;
+#[cfg(feature = "link")]
+pub mod hardware;
 pub mod interrupt;
 #[cfg(feature = "live")]
 pub mod live;
 pub mod print;
 pub mod programs;
 pub mod stack;
+#[cfg(all(feature = "link", target_arch = "arm"))]
+pub mod uart;
 
 use ::core::panic::PanicInfo;
 
@@ -38,6 +42,10 @@ pub type Number = f32;
 /// The kernel's number type on this core.
 #[cfg(not(any(target_feature = "f", target_abi = "eabihf", feature = "soft-float")))]
 pub type Number = motion_kernel::num::Fixed;
+
+/// Whether that is fixed point.
+pub const IS_FIXED_POINT: bool =
+    cfg!(not(any(target_feature = "f", target_abi = "eabihf", feature = "soft-float")));
 
 /// Whether this is the core with 16 KiB of memory.
 #[cfg(not(target_has_atomic = "8"))]
@@ -65,8 +73,13 @@ macro_rules! singleton {
             ::critical_section::Mutex::new(::core::cell::Cell::new(false));
         static mut PLACE: ::core::mem::MaybeUninit<$type> = ::core::mem::MaybeUninit::uninit();
         let is_taken = ::critical_section::with(|cs| TAKEN.borrow(cs).replace(true));
-        // Sound: nobody else comes here.
-        if is_taken { None } else { Some(unsafe { (*(&raw mut PLACE)).write($value) }) }
+        if is_taken {
+            None
+        } else {
+            let value = $value;
+            // Sound: nobody else comes here.
+            Some(unsafe { (*(&raw mut PLACE)).write(value) })
+        }
     }};
 }
 

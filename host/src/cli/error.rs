@@ -5,6 +5,8 @@ use std::process::ExitCode;
 
 use thiserror::Error;
 
+use crate::board::BoardError;
+use crate::board::emulated::EmulatedError;
 use crate::drive::DriveError;
 use crate::files::FilesError;
 use crate::flight::FlightError;
@@ -180,6 +182,17 @@ pub enum CliError {
     /// There is too little to tune an axis by.
     #[error(transparent)]
     Tuning(#[from] TuningError),
+    /// A board, or what leads to it, is refused; or it is in a fault.
+    #[error("{port}: {source}")]
+    Board {
+        /// Where it is.
+        port: String,
+        /// Why.
+        source: BoardError,
+    },
+    /// There is no emulated board.
+    #[error(transparent)]
+    Emulated(#[from] EmulatedError),
     /// Programs among several are refused.
     #[error("{}", programs.join("\nmotion: "))]
     Refused {
@@ -230,8 +243,8 @@ impl CliError {
 
     /// 2 if the user's input is wrong. Otherwise 6 for results that could not be written; 5 for commands that
     /// a finished run did not reach; 1 for a fault, for a plan or a motion that the kernel refuses, for an
-    /// experiment that found nothing to measure or too little to tune by, and for an axis that found no
-    /// reference.
+    /// experiment that found nothing to measure or too little to tune by, for an axis that found no reference,
+    /// and for a board that is in a fault or lost.
     #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         match self {
@@ -243,6 +256,7 @@ impl CliError {
             Self::Home { source: HomeError::Axis { .. }, .. } => ExitCode::FAILURE,
             Self::Home { source: HomeError::Session(ended), .. }
             | Self::Jog(JogError::Session { source: ended, .. }) => ended_badly(ended),
+            Self::Board { source, .. } if !source.is_input() => ExitCode::FAILURE,
             Self::Drive(
                 DriveError::Fault { .. }
                 | DriveError::NotSteady { .. }

@@ -30,13 +30,18 @@
 //! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
+//! - [`send`]: a program on a board, over a wire;
+//! - [`watch`]: what a board does;
+//! - [`parameters`]: a board's parameters;
+//! - [`board`]: a board with the simulated machine;
 //! - [`home`]: the simulated axes find their references;
 //! - [`jog`]: presses and releases jog keys of the simulated machine;
 //! - [`machine`]: the reference machine's file, and the meaning of its keys;
 //! - [`demo`]: `motion` without a command;
 //! - [`error`]: errors and exit statuses;
-//! - `input`, `outputs`, `until_closed`, `table`, `trace`, `units`, `progress`: shared by the commands.
+//! - `input`, `outputs`, `port`, `until_closed`, `table`, `trace`, `units`, `progress`: shared by the commands.
 
+pub mod board;
 pub mod check;
 pub mod compare;
 pub mod compile;
@@ -47,15 +52,19 @@ pub mod flight;
 pub mod home;
 pub mod jog;
 pub mod machine;
+pub mod parameters;
 pub mod plan;
 pub mod profile;
 pub mod read;
 pub mod replay;
 pub mod run;
+pub mod send;
 pub mod spline;
+pub mod watch;
 
 mod input;
 mod outputs;
+mod port;
 mod progress;
 mod table;
 mod trace;
@@ -84,6 +93,11 @@ Examples:
   motion spline points.csv --tolerance 0.01      a quintic spline close to points, and its run
   motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
+  motion send part.ngc --port /dev/ttyACM0       a program on a board, over a wire
+  motion watch --port /dev/ttyACM0               what the board does
+  motion parameters diff --port /dev/ttyACM0 --machine mine.toml
+                                                 what the board and the file have not in common
+  motion board                                   the simulated machine as a board, behind an address
   motion home --machine mine.toml                the axes find their references
   motion jog X+20 Y-2.5@300 --feed 50            press keys, release one after 300 ticks
   motion machine > mine.toml                     a machine file to start from
@@ -123,6 +137,10 @@ enum Command {
     Spline(spline::SplineArguments),
     Drive(drive::DriveArguments),
     Compile(compile::CompileArguments),
+    Send(send::SendArguments),
+    Watch(watch::WatchArguments),
+    Parameters(parameters::ParametersArguments),
+    Board(board::BoardArguments),
     Home(home::HomeArguments),
     Jog(jog::JogArguments),
     Machine(machine::MachineArguments),
@@ -161,6 +179,10 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Spline(arguments)) => spline::run(arguments, out),
         Some(Command::Drive(arguments)) => drive::drive(arguments, out),
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),
+        Some(Command::Send(arguments)) => send::send(arguments, out),
+        Some(Command::Watch(arguments)) => watch::watch(arguments, out),
+        Some(Command::Parameters(arguments)) => parameters::run(arguments, out),
+        Some(Command::Board(arguments)) => board::run(arguments, out),
         Some(Command::Home(arguments)) => home::run(arguments, out),
         Some(Command::Jog(arguments)) => jog::run(arguments, out),
         Some(Command::Machine(arguments)) => machine::print(arguments, out),

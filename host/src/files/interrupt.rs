@@ -5,12 +5,43 @@
 
 use std::io;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
 
 /// Temporary files of outputs that are not committed, with the outputs' names.
 static PENDING: Mutex<Vec<(PathBuf, String)>> = Mutex::new(Vec::new());
+
+/// The next signal is noted, and ends nothing.
+static IS_HELD_FIRST: AtomicBool = AtomicBool::new(false);
+/// What has come: 0 for nothing, or an [`Asked`].
+static ASKED: AtomicU8 = AtomicU8::new(0);
+
+/// What a signal asks of a command that holds first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// Ctrl-C: hold.
+    Hold = 1,
+    /// The request to end: hold, and end.
+    End = 2,
+}
+
+/// From now on the next Ctrl-C or request to end is noted for [`take_asked`], and only another one after it ends the process: for
+/// a command that brings a machine to rest first.
+pub fn hold_first() {
+    IS_HELD_FIRST.store(true, Ordering::Relaxed);
+}
+
+/// The signal that was noted since the last call.
+#[must_use]
+pub fn take_asked() -> Option<Asked> {
+    match ASKED.swap(0, Ordering::Relaxed) {
+        1 => Some(Asked::Hold),
+        2 => Some(Asked::End),
+        _ => None,
+    }
+}
 
 fn lock() -> MutexGuard<'static, Vec<(PathBuf, String)>> {
     PENDING.lock().unwrap_or_else(PoisonError::into_inner)
@@ -61,6 +92,7 @@ pub fn watch() {
 #[cfg(unix)]
 mod unix {
     use std::io::{self, IsTerminal, Write};
+    use std::sync::atomic::Ordering;
     use std::{fs, process, thread};
 
     use signal_hook::consts::{SIGINT, SIGTERM};
@@ -73,7 +105,12 @@ mod unix {
         // Without the handler, a signal ends the process as usual.
         let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
         thread::spawn(move || {
-            if let Some(signal) = signals.forever().next() {
+            for signal in signals.forever() {
+                if super::IS_HELD_FIRST.swap(false, Ordering::Relaxed) {
+                    let asked = if signal == SIGINT { super::Asked::Hold } else { super::Asked::End };
+                    super::ASKED.store(asked as u8, Ordering::Relaxed);
+                    continue;
+                }
                 end(signal);
             }
         });

@@ -9,6 +9,24 @@ use motion_kernel::program::{Header, Item, write};
 
 use crate::machine::Machine;
 
+/// Evaluates an expression with a count of axes as a constant.
+macro_rules! on_axis_count {
+    (@arm $count:expr, $name:ident => $result:expr; $($number:literal)*) => {
+        match $count {
+            $($number => {
+                const $name: usize = $number;
+                $result
+            })*
+            count => panic!("{count} axes, where machines have one to nine"),
+        }
+    };
+    ($count:expr, $name:ident => $result:expr) => {
+        $crate::planning::on_axis_count!(@arm $count, $name => $result; 1 2 3 4 5 6 7 8 9)
+    };
+}
+
+pub(crate) use on_axis_count;
+
 /// The bytes of `items` for `machine`.
 ///
 /// # Panics
@@ -17,18 +35,7 @@ pub(super) fn bytes<'a, const N: usize>(
     machine: &Machine<N>,
     items: impl IntoIterator<Item = &'a Item<N>>,
 ) -> Vec<u8> {
-    match machine.axis_count() {
-        1 => bytes_of::<N, 1>(machine, items),
-        2 => bytes_of::<N, 2>(machine, items),
-        3 => bytes_of::<N, 3>(machine, items),
-        4 => bytes_of::<N, 4>(machine, items),
-        5 => bytes_of::<N, 5>(machine, items),
-        6 => bytes_of::<N, 6>(machine, items),
-        7 => bytes_of::<N, 7>(machine, items),
-        8 => bytes_of::<N, 8>(machine, items),
-        9 => bytes_of::<N, 9>(machine, items),
-        count => panic!("{count} axes, where machines have one to nine"),
-    }
+    on_axis_count!(machine.axis_count(), M => bytes_of::<N, M>(machine, items))
 }
 
 fn bytes_of<'a, const N: usize, const M: usize>(
@@ -38,22 +45,24 @@ fn bytes_of<'a, const N: usize, const M: usize>(
     let items: Vec<Item<M>> = items.into_iter().map(first_axes).collect();
     let mut bytes = Vec::new();
     // Entries of nine axes fit the format.
-    write(&header(&machine.header()), Some(&guards(&machine.guards())), &items, &mut bytes)
+    write(&header_of_axes(&machine.header()), Some(&guards_of_axes(&machine.guards())), &items, &mut bytes)
         .expect("nine axes at most");
     bytes
 }
 
-fn header<const N: usize, const M: usize>(header: &Header<N>) -> Header<M> {
+/// The header with the first `M` axes.
+pub(crate) fn header_of_axes<const N: usize, const M: usize>(header: &Header<N>) -> Header<M> {
     let &Header { tick_s, rules, pulse, axes, start } = header;
     Header { tick_s, rules, pulse, axes: from_fn(|axis| axes[axis]), start: from_fn(|axis| start[axis]) }
 }
 
-fn guards<const N: usize, const M: usize>(guards: &Guards<N>) -> Guards<M> {
+/// The guards of the first `M` axes.
+pub(crate) fn guards_of_axes<const N: usize, const M: usize>(guards: &Guards<N>) -> Guards<M> {
     Guards { axes: from_fn(|axis| guards.axes[axis]), reactions: guards.reactions }
 }
 
 /// The item with the first `M` of its axes.
-fn first_axes<const N: usize, const M: usize>(item: &Item<N>) -> Item<M> {
+pub(crate) fn first_axes<const N: usize, const M: usize>(item: &Item<N>) -> Item<M> {
     match *item {
         Item::Line { line, start, direction, length } => Item::Line {
             line,

@@ -69,6 +69,21 @@ pub fn name<R>(kind: &FaultKind<R>) -> &'static str {
     row(kind).name
 }
 
+/// A fault that a board tells, in one line, with what has to be done before it is cleared.
+pub(crate) fn told<R: Real>(kind: &FaultKind<R>, name_of_axis: impl Fn(usize) -> String) -> String {
+    let Row { name, rule, clears, .. } = row(kind);
+    let axis = axis(kind).map(|axis| format!(" of {}", name_of_axis(axis))).unwrap_or_default();
+    let figure = match kind {
+        FaultKind::FollowingError { error_mm: mm, .. }
+        | FaultKind::EncoderJump { jump_mm: mm, .. }
+        | FaultKind::SetpointJump { jump_mm: mm, .. } => format!(" ({:.4})", mm.to_f64()),
+        FaultKind::Executor(cause) => format!(" ({cause:?})"),
+        FaultKind::TickMissed { ticks } => format!(" ({ticks})"),
+        _ => String::new(),
+    };
+    format!("{name}{axis}{figure}: {rule}; to clear it: {clears}")
+}
+
 /// What is said of a kind of fault.
 struct Row {
     name: &'static str,

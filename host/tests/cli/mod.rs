@@ -9,6 +9,7 @@ mod planning;
 mod reading;
 mod probing;
 mod running;
+mod sending;
 mod spline;
 mod unfinished;
 pub(crate) mod workspace;

@@ -25,10 +25,16 @@ impl Workspace {
         fs::read_to_string(self.0.join(name)).expect("a file")
     }
 
+    /// `motion` in this directory, to be started.
+    pub(crate) fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_motion"));
+        command.args(arguments).current_dir(&self.0);
+        command
+    }
+
     /// Runs `motion` in this directory.
     pub(crate) fn motion(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_motion"));
-        command.args(arguments).current_dir(&self.0).output().expect("motion starts")
+        self.command(arguments).output().expect("motion starts")
     }
 
     /// Runs `motion`, which must end with `status` and say something on standard output.

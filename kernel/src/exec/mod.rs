@@ -64,7 +64,7 @@ pub enum ExecState {
 }
 
 /// Why the executor can't continue. Latched by the kernel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ExecFault {
     /// The next feed segment was needed and had not arrived.

@@ -15,7 +15,7 @@ pub use ad5754::{Ad5754Error, Ad5754Frame, Ad5754Output};
 pub use extend::{CountExtender, TimerWidth};
 pub use index::IndexLatch;
 pub use inputs::{AxisInputs, Inputs, MachineInputs};
-pub use outputs::{OutputState, Outputs, Spindle};
+pub use outputs::{BoardOutputs, OutputState, Outputs, Spindle};
 
 use crate::units::{Counts, DacCode};
 

@@ -51,6 +51,18 @@ impl OutputState {
     }
 }
 
+/// What a board has for spindle and coolant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum BoardOutputs {
+    /// Nothing: programs that switch are refused.
+    None,
+    /// An output for a spindle that turns clockwise at the speed that is set at its drive. M4 and a second speed are
+    /// refused.
+    FixedSpeed,
+    /// A spindle that turns both ways at the commanded speed.
+    CommandedSpeed,
+}
+
 /// The outputs for spindle and coolant. A board without them refuses programs that switch before the start:
 /// [`check`](crate::program::check()) does.
 pub trait Outputs {

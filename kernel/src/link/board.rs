@@ -9,7 +9,8 @@ use core::task::Poll;
 use heapless::Deque;
 
 use super::frame::{Deframer, FRAME_MAX, Payload};
-use super::message::{Controls, Identity, Mode, Reply, Request, Status, Taken};
+use super::message::{Controls, Identity, Mode, Piece, Reply, Request, Status, Taken, WriteError};
+use super::parameters::ParameterBuffer;
 use crate::program::{Item, Source, take};
 
 /// An answer that was lost is repeated after this time \[ms\].
@@ -22,18 +23,33 @@ pub struct ItemQueue<const AXES: usize, const ITEMS: usize> {
     entries: Deque<Option<Item<AXES>>, ITEMS>,
     /// The number of the next item to come.
     next: u32,
+    /// How many programs were given up before this one.
+    aborts: u16,
+    /// The end of the program has come.
+    is_ended: bool,
 }
 
 impl<const AXES: usize, const ITEMS: usize> ItemQueue<AXES, ITEMS> {
     /// Before the first item.
     #[must_use]
     pub const fn new() -> Self {
-        Self { entries: Deque::new(), next: 0 }
+        Self { entries: Deque::new(), next: 0, aborts: 0, is_ended: false }
     }
 
-    /// Drops what was not driven: after an abort. Numbers go on.
-    pub fn clear(&mut self) {
-        self.entries.clear();
+    /// Drops what is left of a program that was given up, if it is not the one after `aborts`; whether it is not.
+    fn begin(&mut self, aborts: u16) -> bool {
+        let is_new = core::mem::replace(&mut self.aborts, aborts) != aborts;
+        if is_new {
+            self.entries.clear();
+            (self.next, self.is_ended) = (0, false);
+        }
+        is_new
+    }
+
+    /// What has come of the program.
+    #[must_use]
+    pub fn came(&self) -> Came {
+        Came { aborts: self.aborts, taken: self.taken(), is_ended: self.is_ended }
     }
 
     /// The number of the first item that was not taken from here.
@@ -72,14 +88,29 @@ impl<const AXES: usize, const ITEMS: usize> Source<AXES> for ItemQueue<AXES, ITE
     }
 }
 
+/// What has come of a program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Came {
+    /// How many programs were given up before it.
+    pub aborts: u16,
+    /// The number of the first item that was not taken into the streams.
+    pub taken: u32,
+    /// Its end has come.
+    pub is_ended: bool,
+}
+
 /// The board's end of the link.
 #[derive(Debug)]
 pub struct BoardLink {
     session: u32,
     identity: Identity,
     deframer: Deframer,
-    /// The number of the first of the items that wait in the deframer, if any do.
-    first: Option<u32>,
+    /// Items, or parameters, wait in the deframer.
+    has_items: bool,
+    has_parameters: bool,
+    /// The byte from which on the parameters are asked for.
+    read_from: Option<u32>,
+    is_written_due: bool,
     controls: Controls,
     /// They were not taken yet; how many aborts were.
     is_changed: bool,
@@ -101,12 +132,24 @@ impl BoardLink {
     /// A board that has just started; `session` must not be that of a start before.
     #[must_use]
     pub const fn new(session: u32, identity: Identity) -> Self {
-        let said = Taken { session, controls: 0, next: 0, limit: 0, is_missing: false, is_unreadable: false };
+        let said = Taken {
+            session,
+            asker: 0,
+            aborts: 0,
+            controls: 0,
+            next: 0,
+            limit: 0,
+            is_missing: false,
+            is_unreadable: false,
+        };
         Self {
             session,
             identity,
             deframer: Deframer::new(),
-            first: None,
+            has_items: false,
+            has_parameters: false,
+            read_from: None,
+            is_written_due: false,
             controls: Controls::NONE,
             is_changed: false,
             taken_aborts: 0,
@@ -137,7 +180,7 @@ impl BoardLink {
     /// time. Controls are known at once.
     pub fn receive(&mut self, bytes: &mut impl Iterator<Item = u8>) {
         for _ in 0..2 * FRAME_MAX {
-            if self.first.is_some() {
+            if self.has_items || self.has_parameters {
                 break;
             }
             let Some(byte) = bytes.next() else { break };
@@ -155,7 +198,9 @@ impl BoardLink {
     }
 
     fn drop_items(&mut self) {
-        if self.first.take().is_some() {
+        // They come again.
+        self.has_parameters = false;
+        if core::mem::take(&mut self.has_items) {
             (self.is_missing, self.is_taken_due) = (true, true);
         }
     }
@@ -170,7 +215,13 @@ impl BoardLink {
                 // Another one may read what the one before could not make.
                 (self.is_welcome_due, self.is_unreadable) = (true, false);
             }
-            Request::Controls { session, .. } | Request::Items { session, .. } if session != self.session => {
+            // Of another start, or of somebody who was replaced: the answer tells.
+            Request::Controls { session, asker, .. }
+            | Request::Items { session, asker, .. }
+            | Request::Read { session, asker, .. }
+            | Request::Write { session, asker, .. }
+                if (session, asker) != (self.session, self.asker) =>
+            {
                 self.is_welcome_due = true;
             }
             Request::Controls { controls, .. } => {
@@ -179,7 +230,13 @@ impl BoardLink {
                 }
                 self.is_taken_due = true;
             }
-            Request::Items { first, .. } => self.first = Some(first),
+            Request::Items { aborts, .. } if aborts != self.controls.aborts => {
+                // Of a program that was given up, or of one that is known only with controls that are still to come.
+                (self.is_missing, self.is_taken_due) = (true, true);
+            }
+            Request::Items { .. } => self.has_items = true,
+            Request::Read { offset, .. } => self.read_from = Some(offset),
+            Request::Write { .. } => self.has_parameters = true,
         }
     }
 
@@ -188,13 +245,69 @@ impl BoardLink {
         &mut self,
         items: &mut ItemQueue<AXES, ITEMS>,
     ) -> bool {
-        let Some(first) = self.first.take() else { return false };
-        let Some((_, entries)) = take::<Request>(self.deframer.payload()) else { return false };
+        if items.begin(self.controls.aborts) {
+            self.is_unreadable = false;
+        }
+        if !core::mem::take(&mut self.has_items) {
+            return false;
+        }
+        let Some((Request::Items { first, .. }, entries)) = take::<Request>(self.deframer.payload()) else {
+            return false;
+        };
         let known = items.next.wrapping_sub(first);
         self.is_taken_due = true;
         self.is_missing = known.cast_signed() < 0;
         self.is_unreadable = !self.is_missing && !put(entries, known, items);
         true
+    }
+
+    /// Puts away the bytes of new parameters that came last; false if none did. They are refused unless the drives are off.
+    pub fn put_parameters<const BYTES: usize>(
+        &mut self,
+        buffer: &mut ParameterBuffer<BYTES>,
+        is_off: bool,
+    ) -> bool {
+        if !core::mem::take(&mut self.has_parameters) {
+            return false;
+        }
+        if let Some((Request::Write { record, offset, .. }, bytes)) = take::<Request>(self.deframer.payload())
+        {
+            buffer.put(record, offset, bytes, is_off);
+            self.is_written_due = true;
+        }
+        true
+    }
+
+    /// The new parameters were refused after they had come: says so.
+    pub fn refuse_parameters<const BYTES: usize>(
+        &mut self,
+        buffer: &mut ParameterBuffer<BYTES>,
+        error: WriteError,
+    ) {
+        buffer.refuse(error);
+        self.is_written_due = true;
+    }
+
+    /// Writes the next frame about parameters to `out`, as [`Self::transmit`] does about all else: `parameters` are the
+    /// present ones.
+    pub fn transmit_parameters<const BYTES: usize>(
+        &mut self,
+        parameters: &[u8],
+        buffer: &ParameterBuffer<BYTES>,
+        out: &mut [u8],
+    ) -> usize {
+        let session = self.session;
+        if core::mem::take(&mut self.is_written_due) {
+            let (record, bytes, error) = buffer.written();
+            let reply = Reply::<1>::Written { session, record, bytes, error };
+            return Payload::of(&reply).map_or(0, |payload| payload.frame(out));
+        }
+        let Some(offset) = self.read_from.take() else { return 0 };
+        let reply = Reply::<1>::Parameters { session, offset, length: parameters.len() as u32 };
+        let piece = Piece::of(parameters.get(offset as usize..).unwrap_or_default());
+        let Some(mut payload) = Payload::of(&reply) else { return 0 };
+        // There is room for a piece.
+        if payload.push_all(piece.bytes().iter().copied()) { payload.frame(out) } else { 0 }
     }
 
     /// Whether controls have come that ask motion to come to rest, and were not taken yet.
@@ -227,6 +340,8 @@ impl BoardLink {
         } else {
             let taken = Taken {
                 session,
+                asker: self.asker,
+                aborts: items.aborts,
                 controls: self.controls.number,
                 next: items.next,
                 limit: items.limit(),
@@ -266,6 +381,7 @@ fn put<const AXES: usize, const ITEMS: usize>(
             known -= 1;
         } else if items.entries.push_back(entry).is_ok() {
             items.next = items.next.wrapping_add(1);
+            items.is_ended = entry.is_none();
         } else {
             // More than there was room for: it comes again.
             return true;

@@ -6,36 +6,65 @@
 use heapless::Deque;
 
 use super::frame::{Deframer, PAYLOAD_MAX, Payload};
-use super::message::{Controls, Identity, Mode, PROTOCOL, Reply, Request, Status, Taken};
-use crate::program::{Item, take};
+use super::message::{
+    Controls, Identity, Mode, PROTOCOL, Piece, Record, Reply, Request, Status, Taken, WriteError,
+};
+use crate::program::{Checksum, Item, take};
 
 /// What was not answered is said again after this time \[ms\].
 const REPEAT_MS: u32 = 100;
+/// And at the latest after this time, however slow the wire is \[ms\].
+const REPEAT_MAX_MS: u32 = 2000;
 /// Controls are said again after this time until they are confirmed \[ms\].
 const CONTROLS_MS: u32 = 20;
 /// Items are sent again at once where the board says that some are missing, but not more often than this \[ms\].
 const AGAIN_MS: u32 = 10;
 
+/// No more items are sent while more than this is not confirmed \[bytes\]: what a hold has to wait for on a slow wire, and
+/// enough to keep it busy while an answer comes.
+const UNDER_WAY_MAX: usize = PAYLOAD_MAX;
+
 /// What the board says.
+// There is no heap to put the bytes on.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event<const AXES: usize> {
     /// It is there.
     Welcome(Identity),
     /// It is there, and is of another protocol or has another number of axes. Nothing is sent to it.
     Refused(Identity),
-    /// It takes items.
+    /// It takes items: those of [`Controls::program`], after a greeting, or of the program that was begun or none, after
+    /// another one was given up.
     Ready {
-        /// The number of the next item that it expects: of a program that another run of the PC's side has begun with,
-        /// those before are there.
+        /// The number in the program of the next item that it expects: not 0 if another run of the PC's side has begun it.
         next: u32,
     },
-    /// It has started anew, and knows nothing of the items before: [`HostLink::begin`] goes on with it.
+    /// It has started anew, and knows nothing of the items before: [`HostLink::accept`] goes on with it.
     Restarted {
         /// The number of the first item that it had not confirmed.
         confirmed: u32,
     },
+    /// Somebody else has asked it since, and has it now. Nothing more is sent.
+    Replaced,
     /// What the machine does.
     Status(Status<AXES>),
+    /// Bytes of its parameters that were [asked for](HostLink::read_parameters).
+    Parameters {
+        /// The first one's place.
+        offset: u32,
+        /// How many there are altogether.
+        length: u32,
+        /// The bytes.
+        piece: Piece,
+    },
+    /// It has so many bytes of new parameters, or does not take them. Once it has all of them and finds them good, it starts
+    /// anew.
+    Written {
+        /// Bytes.
+        bytes: u32,
+        /// Why they are not taken.
+        error: Option<WriteError>,
+    },
     /// It can't read an item. Nothing more is sent.
     Unreadable {
         /// The item's number.
@@ -56,13 +85,24 @@ enum Session {
     Lost(u32),
 }
 
+/// What is asked for until it is answered.
+// There is no heap to put the bytes on.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Ask {
+    Read { offset: u32 },
+    Write { record: Record, offset: u32, piece: Piece },
+}
+
 /// The PC's end of the link to a board of `AXES` axes, with room for `ITEMS` items in `BYTES` bytes that are not confirmed.
 #[derive(Debug)]
 pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     deframer: Deframer,
     session: Session,
-    /// The number of the present hello: an answer to one before is old.
+    /// The number of the present hello, and of the first: an answer to one before is old.
     asker: u32,
+    first_asker: u32,
+    is_replaced: bool,
     controls: Controls,
     /// The number of the controls that the board has confirmed.
     confirmed_controls: u32,
@@ -77,10 +117,16 @@ pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     is_unreadable: bool,
     /// A board says that it is another one than before.
     is_asking: bool,
+    ask: Option<Ask>,
+    /// Counts the parameters written: answers about those before are old.
+    attempt: u32,
     hello_ms: Option<u32>,
     controls_ms: Option<u32>,
-    /// When something was confirmed last, or sent while nothing was under way.
+    ask_ms: Option<u32>,
+    /// When something was confirmed last, or sent while nothing was under way; and after what time it is sent again: a slow
+    /// wire has no room for repeats that come too early.
     progress_ms: u32,
+    repeat_ms: u32,
     again_ms: u32,
 }
 
@@ -92,6 +138,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             deframer: Deframer::new(),
             session: Session::Unknown,
             asker,
+            first_asker: asker,
+            is_replaced: false,
             controls: Controls::NONE,
             confirmed_controls: 0,
             bytes: Deque::new(),
@@ -101,9 +149,13 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             limit: 0,
             is_unreadable: false,
             is_asking: false,
+            ask: None,
+            attempt: asker,
             hello_ms: None,
             controls_ms: None,
+            ask_ms: None,
             progress_ms: 0,
+            repeat_ms: REPEAT_MS,
             again_ms: 0,
         }
     }
@@ -133,13 +185,55 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         self.control(|controls| (controls.mode, controls.presses) = (mode, controls.presses.wrapping_add(1)))
     }
 
-    /// Gives up the rest of the program that the board has; more may be driven only after another resume. See
-    /// [`Self::control`].
+    /// Gives up the rest of the program: all items that were pushed and not driven. [`Event::Ready`] tells that another
+    /// one may follow, which is driven only after another resume. See [`Self::control`].
     #[must_use]
     pub fn abort(&mut self) -> bool {
-        self.control(|controls| {
-            (controls.mode, controls.aborts) = (Mode::Hold, controls.aborts.wrapping_add(1))
+        self.give_up(0, |_| {})
+    }
+
+    /// Begins `program`, a name that is not 0, whose items are to be pushed after [`Event::Ready`]; what there was before is
+    /// given up. See [`Self::abort`].
+    #[must_use]
+    pub fn begin(&mut self, program: u32) -> bool {
+        self.give_up(program, |_| {})
+    }
+
+    /// Enables the drives where the machine stands, or disables them; what there was before is given up. See
+    /// [`Self::abort`].
+    #[must_use]
+    pub fn enable(&mut self, is_enabled: bool) -> bool {
+        self.give_up(0, |controls| {
+            (controls.is_enabled, controls.power_presses) =
+                (is_enabled, controls.power_presses.wrapping_add(1));
         })
+    }
+
+    /// Clears the board's fault. See [`Self::control`].
+    #[must_use]
+    pub fn clear_fault(&mut self) -> bool {
+        self.control(|controls| controls.fault_resets = controls.fault_resets.wrapping_add(1))
+    }
+
+    fn give_up(&mut self, program: u32, change: impl FnOnce(&mut Controls)) -> bool {
+        let is_taken = self.control(|controls| {
+            (controls.mode, controls.aborts) = (Mode::Hold, controls.aborts.wrapping_add(1));
+            controls.program = program;
+            change(controls);
+        });
+        if is_taken {
+            self.drop_items();
+            if let Session::Ready(session) = self.session {
+                self.session = Session::Greeted(session);
+            }
+        }
+        is_taken
+    }
+
+    fn drop_items(&mut self) {
+        self.bytes.clear();
+        self.lengths.clear();
+        self.is_unreadable = false;
     }
 
     /// Whether the board has confirmed the controls.
@@ -152,6 +246,13 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     #[must_use]
     pub const fn confirmed(&self) -> u32 {
         self.first
+    }
+
+    /// The number in the program of the next item to be pushed; `None` while the board takes none.
+    #[must_use]
+    pub fn next(&self) -> Option<u32> {
+        let is_ready = matches!(self.session, Session::Ready(_));
+        is_ready.then(|| self.first.wrapping_add(self.lengths.len() as u32))
     }
 
     /// Number of items that the board has not confirmed.
@@ -167,7 +268,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     }
 
     /// Goes on with a board that has started anew, without the items that it had not confirmed before.
-    pub fn begin(&mut self) {
+    pub fn accept(&mut self) {
         if let Session::Lost(session) = self.session {
             self.session = Session::Greeted(session);
         }
@@ -195,18 +296,61 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         Ok(true)
     }
 
+    /// Asks for the board's parameters from byte `offset` on, until [`Event::Parameters`] comes.
+    pub fn read_parameters(&mut self, offset: u32) {
+        (self.ask, self.ask_ms) = (Some(Ask::Read { offset }), None);
+    }
+
+    /// Writes new parameters, which are a [compiled program](crate::program::write) without items: a piece of them from byte
+    /// `offset` on, until [`Event::Written`] comes.
+    pub fn write_parameters(&mut self, parameters: &[u8], offset: u32) {
+        if offset == 0 {
+            self.attempt = self.attempt.wrapping_add(1);
+        }
+        let (length, sum) = (parameters.len() as u32, Checksum::of(parameters));
+        let record = Record { length, sum, attempt: self.attempt };
+        let piece = Piece::of(parameters.get(offset as usize..).unwrap_or_default());
+        (self.ask, self.ask_ms) = (Some(Ask::Write { record, offset, piece }), None);
+    }
+
     /// Takes what came in at the time `now_ms`, which may wrap.
     pub fn receive(&mut self, bytes: &[u8], now_ms: u32, on_event: &mut impl FnMut(Event<AXES>)) {
         for &byte in bytes {
             if !self.deframer.push(byte) {
                 continue;
             }
-            let Some((reply, [])) = take::<Reply<AXES>>(self.deframer.payload()) else { continue };
+            let Some((reply, rest)) = take::<Reply<AXES>>(self.deframer.payload()) else { continue };
             match reply {
+                Reply::Parameters { session, offset, length } if self.is_of(session) => {
+                    let piece = Piece::of(rest);
+                    if self.ask == Some(Ask::Read { offset }) {
+                        self.ask = None;
+                        on_event(Event::Parameters { offset, length, piece });
+                    }
+                }
+                Reply::Written { session, record, bytes, error } if self.is_of(session) => {
+                    if let Some(Ask::Write { record: asked, offset, piece }) = self.ask
+                        && asked == record
+                        && (error.is_some() || bytes > offset || piece.bytes().is_empty())
+                    {
+                        self.ask = None;
+                        on_event(Event::Written { bytes, error });
+                    }
+                }
+                Reply::Parameters { .. } | Reply::Written { .. } => {}
+                _ if !rest.is_empty() => {}
                 Reply::Welcome { session, asker, identity, controls } => {
                     if asker == self.asker {
                         self.greeted(session, &identity, &controls, on_event);
-                    } else if !self.is_of(session) && self.session != Session::Unknown {
+                    } else if self.is_of(session) {
+                        let is_own =
+                            asker.wrapping_sub(self.first_asker) <= self.asker.wrapping_sub(self.first_asker);
+                        if !is_own {
+                            (self.session, self.is_replaced) = (Session::Unknown, true);
+                            self.drop_items();
+                            on_event(Event::Replaced);
+                        }
+                    } else if self.session != Session::Unknown {
                         // Old, or of a board that has started anew: ask.
                         self.asker = self.asker.wrapping_add(1);
                         self.is_asking = true;
@@ -252,17 +396,19 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         }
         let confirmed = self.first;
         self.session = Session::Lost(session);
-        self.bytes.clear();
-        self.lengths.clear();
-        self.is_unreadable = false;
+        self.drop_items();
         on_event(Event::Restarted { confirmed });
     }
 
     fn taken(&mut self, taken: &Taken, now_ms: u32, on_event: &mut impl FnMut(Event<AXES>)) {
-        if !self.is_of(taken.session) {
+        if !self.is_of(taken.session) || taken.asker != self.asker {
             return;
         }
         self.confirmed_controls = taken.controls;
+        // Of a program that was given up.
+        if taken.aborts != self.controls.aborts {
+            return;
+        }
         if let Session::Greeted(session) = self.session {
             self.session = Session::Ready(session);
             (self.first, self.next, self.limit) = (taken.next, taken.next, taken.limit);
@@ -288,6 +434,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             self.limit = taken.limit;
         }
         if confirmed > 0 {
+            let took_ms = now_ms.wrapping_sub(self.progress_ms);
+            self.repeat_ms = took_ms.saturating_mul(3).clamp(REPEAT_MS, REPEAT_MAX_MS);
             self.progress_ms = now_ms;
         }
         if taken.is_missing && now_ms.wrapping_sub(self.again_ms) >= AGAIN_MS {
@@ -304,6 +452,9 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         let is_due = |since_ms: Option<u32>, after_ms: u32| {
             since_ms.is_none_or(|since_ms| now_ms.wrapping_sub(since_ms) >= after_ms)
         };
+        if self.is_replaced {
+            return 0;
+        }
         if (self.session == Session::Unknown || self.is_asking) && is_due(self.hello_ms, REPEAT_MS) {
             self.hello_ms = Some(now_ms);
             return frame(&Request::Hello { asker: self.asker }, out);
@@ -318,7 +469,23 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         let after_ms = if self.is_controlled() { REPEAT_MS } else { CONTROLS_MS };
         if is_due(self.controls_ms, after_ms) {
             self.controls_ms = Some(now_ms);
-            return frame(&Request::Controls { session, controls: self.controls }, out);
+            return frame(&Request::Controls { session, asker: self.asker, controls: self.controls }, out);
+        }
+        if let Some(ask) = self.ask
+            && is_due(self.ask_ms, REPEAT_MS)
+        {
+            self.ask_ms = Some(now_ms);
+            return match ask {
+                Ask::Read { offset } => frame(&Request::Read { session, asker: self.asker, offset }, out),
+                Ask::Write { record, offset, piece } => {
+                    let request = Request::Write { session, asker: self.asker, record, offset };
+                    let Some(mut payload) = Payload::of(&request) else {
+                        return 0;
+                    };
+                    // There is room for a piece.
+                    if payload.push_all(piece.bytes().iter().copied()) { payload.frame(out) } else { 0 }
+                }
+            };
         }
         if is_ready { self.items(session, now_ms, out) } else { 0 }
     }
@@ -331,12 +498,23 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         let under_way = self.next.wrapping_sub(self.first);
         if under_way == 0 {
             self.progress_ms = now_ms;
-        } else if now_ms.wrapping_sub(self.progress_ms) >= REPEAT_MS {
+        } else if now_ms.wrapping_sub(self.progress_ms) >= self.repeat_ms {
             (self.next, self.progress_ms) = (self.first, now_ms);
+            self.repeat_ms = (2 * self.repeat_ms).min(REPEAT_MAX_MS);
         }
         let sent = self.next.wrapping_sub(self.first) as usize;
-        let Some(mut payload) = Payload::of(&Request::Items { session, first: self.next }) else { return 0 };
+        let Some(mut payload) = Payload::of(&Request::Items {
+            session,
+            asker: self.asker,
+            aborts: self.controls.aborts,
+            first: self.next,
+        }) else {
+            return 0;
+        };
         let skipped: usize = self.lengths.iter().take(sent).map(|&length| usize::from(length)).sum();
+        if skipped > UNDER_WAY_MAX {
+            return 0;
+        }
         let (mut count, mut length) = (0, 0);
         for &of_entry in self.lengths.iter().skip(sent) {
             let of_entry = usize::from(of_entry);
@@ -353,8 +531,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     }
 }
 
-/// The longest message before items \[bytes\]: a variant and two numbers.
-const HEAD_MAX: usize = 11;
+/// The longest message before items \[bytes\]: a variant and four numbers.
+const HEAD_MAX: usize = 19;
 
 /// Whether a number comes before another one. They wrap.
 fn is_before(number: u32, other: u32) -> bool {

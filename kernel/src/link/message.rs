@@ -2,22 +2,80 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::exec::ExecState;
+use crate::fault::Fault;
+use crate::hal::BoardOutputs;
 use crate::units::Position;
 
 /// The version of this protocol. A PC refuses a board of another version.
-pub const PROTOCOL: u16 = 1;
+pub const PROTOCOL: u16 = 4;
 
 /// From the PC.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Request {
     /// Who is there? The answer has the same number.
     Hello { asker: u32 },
-    /// What the operator wants.
-    Controls { session: u32, controls: Controls },
-    /// Items follow, to the payload's end: of each an `Option`, none for the end of the program. The first one has this
-    /// number.
-    Items { session: u32, first: u32 },
+    /// What the operator wants. As all that follows, by who asked last.
+    Controls { session: u32, asker: u32, controls: Controls },
+    /// Items follow, to the payload's end: of each an `Option`, none for the end of the program. They are of the program after
+    /// so many aborts; the first one has this number in it, from 0.
+    Items { session: u32, asker: u32, aborts: u16, first: u32 },
+    /// Asks for the board's parameters from this byte on.
+    Read { session: u32, asker: u32, offset: u32 },
+    /// Bytes of new parameters follow, to the payload's end, from this one on; what they are as a whole.
+    Write { session: u32, asker: u32, record: Record, offset: u32 },
+}
+
+/// Parameters on their way: how many bytes, their checksum, and which attempt it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Record {
+    pub(super) length: u32,
+    pub(super) sum: u32,
+    pub(super) attempt: u32,
+}
+
+/// Most bytes of parameters in a message.
+pub(super) const PIECE_MAX: usize = 256;
+
+/// Some bytes of parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    bytes: [u8; PIECE_MAX],
+    count: u16,
+}
+
+impl Piece {
+    /// The first of `bytes`, as many as a message has.
+    pub(super) fn of(bytes: &[u8]) -> Self {
+        let mut piece = Self { bytes: [0; PIECE_MAX], count: 0 };
+        for (place, byte) in piece.bytes.iter_mut().zip(bytes) {
+            *place = *byte;
+            piece.count += 1;
+        }
+        piece
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.count.into()).unwrap_or_default()
+    }
+}
+
+/// Why a board does not take parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum WriteError {
+    /// The drives are on.
+    DrivesOn,
+    /// They are longer than the board has room for.
+    Length {
+        /// The room \[bytes\].
+        room: u32,
+    },
+    /// They are damaged, or not for this board: another number of axes, another tick, a count rate that its inputs do not
+    /// pass, a figure out of its range.
+    Unsuitable,
+    /// The board could not store them.
+    Storage,
 }
 
 /// From the board.
@@ -29,12 +87,20 @@ pub(super) enum Reply<const AXES: usize> {
     Taken(Taken),
     /// What the machine does.
     Status { session: u32, status: Status<AXES> },
+    /// Bytes of the board's parameters follow, from this one on, of so many.
+    Parameters { session: u32, offset: u32, length: u32 },
+    /// What has come of new parameters: bytes, or why they are not taken.
+    Written { session: u32, record: Record, bytes: u32, error: Option<WriteError> },
 }
 
 /// What has come to the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Taken {
     pub(super) session: u32,
+    /// Who asked last: what was said to somebody before may still be in a wire.
+    pub(super) asker: u32,
+    /// How many programs were given up: items of those before are dropped.
+    pub(super) aborts: u16,
     /// The number of the controls obeyed last.
     pub(super) controls: u32,
     /// The number of the next item: all before it are here.
@@ -59,14 +125,18 @@ pub struct Controls {
     pub mode: Mode,
     /// Counts what was pressed to get there: the same mode pressed again is a command again.
     pub presses: u16,
-    /// Counts commands to come to rest and give up the rest of the program.
+    /// Counts commands to come to rest and give up the rest of the program: of the items that were sent before, too.
     pub aborts: u16,
+    /// The PC's name for the program whose items follow; 0 if it has none.
+    pub program: u32,
     /// The feed override \[0.1 %\], at most 2000; controls with more are not obeyed.
     pub override_permille: u16,
     /// Rest at the end of every program block.
     pub is_single_block: bool,
-    /// Counts commands to enable the drives.
-    pub enables: u16,
+    /// Whether the drives are to be on.
+    pub is_enabled: bool,
+    /// Counts what was pressed to get there: enabled again after a fault is a command again.
+    pub power_presses: u16,
     /// Counts commands to clear a fault.
     pub fault_resets: u16,
 }
@@ -78,9 +148,11 @@ impl Controls {
         mode: Mode::Hold,
         presses: 0,
         aborts: 0,
+        program: 0,
         override_permille: 1000,
         is_single_block: false,
-        enables: 0,
+        is_enabled: false,
+        power_presses: 0,
         fault_resets: 0,
     };
 
@@ -119,6 +191,8 @@ pub struct Identity {
     pub tick_s: f64,
     /// Items that it has room for.
     pub items: u16,
+    /// What there is for spindle and coolant.
+    pub outputs: BoardOutputs,
     /// Checksum of the machine's parameters.
     pub machine: u32,
 }
@@ -140,39 +214,37 @@ pub struct Status<const AXES: usize> {
     pub feed_mm_s: f64,
     /// The program line; 0 at rest.
     pub line: u32,
+    /// How many programs were given up before the one that is driven, as in [`Controls::aborts`].
+    pub aborts: u16,
     /// The number of the first item that was not taken into the streams: motion is somewhere before it.
     pub taken: u32,
-    /// The number of the fault, from 1; 0 for none.
-    pub fault: u16,
+    /// The end of the program has come.
+    pub is_ended: bool,
+    /// Stops on the path because items came too late.
+    pub starvations: u32,
+    /// The inputs allow the drives to be enabled.
+    pub is_ready: bool,
+    /// What went wrong, until it is cleared.
+    pub fault: Option<Fault<f64>>,
 }
 
-/// A machine's state.
+/// A machine's state. Whether it is in a fault, [`Status::fault`] tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum State {
     /// The drives are off.
     Off,
-    /// Nothing to do.
+    /// At rest: everything that came is driven.
     Idle,
-    /// Moving along the path.
+    /// A program is under way.
     Moving,
     /// At rest for a programmed time.
     Dwell,
     /// At a program stop.
     Stopped,
-    /// Held.
+    /// At rest in the middle of a program: the items that follow have not come.
+    Starved,
+    /// Held, at rest.
     Held,
-    /// In a fault.
-    Fault,
-}
-
-impl From<ExecState> for State {
-    fn from(state: ExecState) -> Self {
-        match state {
-            ExecState::Idle => Self::Idle,
-            ExecState::Moving => Self::Moving,
-            ExecState::Dwell => Self::Dwell,
-            ExecState::Stopped => Self::Stopped,
-            ExecState::Held => Self::Held,
-        }
-    }
+    /// An item can't be executed; at rest after those before it.
+    Refused,
 }

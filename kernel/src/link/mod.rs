@@ -8,12 +8,14 @@
 //! ──                                                              ─────
 //! HostLink  ── controls: what the operator wants, as a whole ──►  BoardLink ─► Controls      urgent
 //!           ── items, numbered, as far as there is room ───────►            ─► ItemQueue     bulk
+//!           ── parameters, in pieces, while drives are off ────►            ─► ParameterBuffer
 //!           ◄── taken: which came, how many more may ───────────            ◄─ ItemQueue
 //!           ◄── status: position, feed, line, fault ────────────            ◄─ Status        may be lost
 //! ```
 //!
 //! - `frame`: messages on the wire, in COBS with a CRC-32;
 //! - `message`: what is said;
+//! - `parameters`: new parameters on a board, as they come;
 //! - `board`, `host`: the two ends.
 //!
 //! **Nothing is lost or doubled.** Items have numbers; the board takes the next one only, says which it has, and the PC
@@ -24,16 +26,18 @@
 //! counted.
 //!
 //! **A session** is the time between two starts of the board. Its number is in every message, so neither end goes on with
-//! the other's past.
+//! the other's past. Who asked last has the board; whoever had it before is told, and commands nothing any more.
 
 mod board;
 mod frame;
 mod host;
 mod message;
+mod parameters;
 #[cfg(test)]
 mod tests;
 
-pub use board::{BoardLink, ItemQueue};
+pub use board::{BoardLink, Came, ItemQueue};
 pub use frame::{Deframer, FRAME_MAX};
 pub use host::{Event, HostLink};
-pub use message::{Controls, Identity, Mode, PROTOCOL, State, Status};
+pub use message::{Controls, Identity, Mode, PROTOCOL, Piece, State, Status, WriteError};
+pub use parameters::ParameterBuffer;

@@ -4,6 +4,7 @@ use core::task::Poll;
 use std::collections::VecDeque;
 
 use super::*;
+use crate::hal::BoardOutputs;
 use crate::law::Ticks;
 use crate::program::{Item, Source};
 use crate::random::Random;
@@ -16,6 +17,7 @@ const IDENTITY: Identity = Identity {
     is_fixed_point: false,
     tick_s: 5e-4,
     items: ROOM as u16,
+    outputs: BoardOutputs::None,
     machine: 0xCAFE_F00D,
 };
 /// Items that a board has room for.
@@ -118,6 +120,10 @@ struct Board {
     items: Items,
     driven: Vec<Item<3>>,
     controls: Vec<Controls>,
+    parameters: Vec<u8>,
+    /// New ones, and whether they may come.
+    buffer: ParameterBuffer<1024>,
+    is_off: bool,
 }
 
 impl Board {
@@ -127,6 +133,9 @@ impl Board {
             items: Items::new(),
             driven: Vec::new(),
             controls: Vec::new(),
+            parameters: Vec::new(),
+            buffer: ParameterBuffer::new(),
+            is_off: true,
         }
     }
 }
@@ -169,9 +178,15 @@ impl Bench {
         }
         let bytes = self.down.receive(&self.random);
         let mut bytes = bytes.into_iter();
+        let Board { link, items, buffer, is_off, parameters, .. } = &mut self.board;
         while bytes.len() > 0 {
-            self.board.link.receive(&mut bytes);
-            self.board.link.put_items(&mut self.board.items);
+            link.receive(&mut bytes);
+            link.put_items(items);
+            link.put_parameters(buffer, *is_off);
+        }
+        let length = link.transmit_parameters(parameters, buffer, &mut out);
+        if length > 0 {
+            self.up.send(&self.random, &out[..length]);
         }
         self.board.controls.extend(self.board.link.take_controls());
         if self.random.chance(takes)
@@ -186,8 +201,12 @@ impl Bench {
             actual: [Position::ZERO; 3],
             feed_mm_s: 12.5,
             line: 7,
+            aborts: self.board.items.came().aborts,
             taken: self.board.items.taken(),
-            fault: 0,
+            is_ended: self.board.items.came().is_ended,
+            starvations: 3,
+            is_ready: true,
+            fault: None,
         };
         let status = self.random.chance(0.02).then_some(status);
         let length = self.board.link.transmit(self.now_ms, &self.board.items, status, &mut out);
@@ -380,7 +399,7 @@ fn both_ends_may_start_anew() {
     };
     assert!(told >= confirmed && bench.board.driven.is_empty(), "{told} {confirmed}");
     assert_eq!(bench.host.push(Some(&item(0))), Ok(false), "not before the caller has decided");
-    bench.host.begin();
+    bench.host.accept();
     assert_eq!(bench.greet(), 0);
     // What was pressed before is no command for it.
     assert_eq!(bench.host.controls(), &Controls::NONE);
@@ -457,10 +476,14 @@ fn any_bytes_may_come() {
             } else {
                 payload
             };
-            let before = board.items.next();
+            let before = (board.items.came().aborts, board.items.next());
             board.link.receive(&mut bytes.iter().copied());
             board.link.put_items(&mut board.items);
+            board.link.put_parameters(&mut board.buffer, seed % 2 == 0);
+            board.link.transmit_parameters(&[1; 300], &board.buffer, &mut out);
             host.receive(&bytes, 0, &mut |_| read += 1);
+            // Numbers begin anew with a program.
+            let before = if before.0 == board.items.came().aborts { before.1 } else { 0 };
             let came = board.items.next().wrapping_sub(before);
             assert!(came <= ROOM as u32);
             read += came + u32::from(board.link.take_controls().is_some());
@@ -469,4 +492,140 @@ fn any_bytes_may_come() {
     }
     println!("{read} were messages");
     assert!(read > 10);
+}
+
+/// Programs one after the other, each given up somewhere, over a bad wire: nothing of one comes after the next has begun,
+/// whatever frames the wire still holds, and numbers begin anew.
+#[test]
+fn nothing_of_a_program_that_was_given_up_comes_after_it() {
+    let mut given_up = 0;
+    for (seed, permille) in (100..=130).zip([0, 10, 50, 200].into_iter().cycle()) {
+        let mut bench = Bench::new(seed, permille);
+        assert_eq!(bench.greet(), 0);
+        for program in 1..=20_u32 {
+            let before = bench.board.driven.len();
+            assert!(match bench.random.below(3) {
+                0 => bench.host.enable(true) && bench.host.begin(program),
+                1 => bench.host.abort() && bench.host.begin(program),
+                _ => bench.host.begin(program),
+            });
+            assert_eq!((bench.host.waiting(), bench.host.push(Some(&item(0)))), (0, Ok(false)));
+            assert_eq!(bench.greet(), 0);
+            let count = bench.random.below(60) as u32;
+            let mut pushed = 0;
+            for _ in 0..bench.random.below(1500) {
+                while pushed < count && bench.host.push(Some(&item(1000 * program + pushed))).expect("short")
+                {
+                    pushed += 1;
+                }
+                bench.step(0.2);
+            }
+            let driven = &bench.board.driven[before..];
+            given_up += u32::from(driven.len() < count as usize);
+            // The last ones of the program before may have been taken until the board knew of this one.
+            let first =
+                driven.iter().position(|driven| *driven == item(1000 * program)).unwrap_or(driven.len());
+            for (number, driven) in (0..).zip(&driven[first..]) {
+                assert_eq!(*driven, item(1000 * program + number), "item {number} of program {program}");
+            }
+            assert!(
+                driven[..first]
+                    .iter()
+                    .all(|driven| { (0..60).any(|number| *driven == item(1000 * (program - 1) + number)) })
+            );
+        }
+        assert_eq!(bench.board.controls.last().map(|controls| controls.program), Some(20));
+    }
+    assert!(given_up > 50, "{given_up}");
+}
+
+/// New parameters of every length come whole over a bad wire, and are read back; not with drives on, not if there is no room.
+#[test]
+fn parameters_come_whole() {
+    for (seed, permille) in (200..=230).zip([0, 10, 50, 200].into_iter().cycle()) {
+        let mut bench = Bench::new(seed, permille);
+        bench.greet();
+        let length = bench.random.below(1500) as usize + 1;
+        let parameters: Vec<u8> = (0..length).map(|_| bench.random.next() as u8).collect();
+        let expected = if length > 1024 { Err(WriteError::Length { room: 1024 }) } else { Ok(()) };
+        bench.board.is_off = false;
+        assert_eq!(bench.write(&parameters), Err(WriteError::DrivesOn));
+        bench.board.is_off = true;
+        for _ in 0..2 {
+            assert_eq!(bench.write(&parameters), expected, "{length} bytes");
+            let Board { link, buffer, .. } = &mut bench.board;
+            assert_eq!(buffer.take(), expected.ok().map(|()| &parameters[..]));
+            assert_eq!(buffer.take(), None, "once");
+            if expected.is_ok() {
+                // What a board says that finds them no good.
+                link.refuse_parameters(buffer, WriteError::Unsuitable);
+            }
+        }
+        bench.board.parameters = parameters.clone();
+        let mut read = Vec::new();
+        bench.events.clear();
+        bench.host.read_parameters(0);
+        for _ in 0..50_000 {
+            bench.step(0.0);
+            if let Some(Event::Parameters { offset, length, piece }) = bench.events.pop() {
+                assert_eq!((offset as usize, length as usize), (read.len(), parameters.len()));
+                read.extend_from_slice(piece.bytes());
+                bench.host.read_parameters(read.len() as u32);
+            }
+            if read.len() >= length {
+                break;
+            }
+        }
+        assert_eq!(read, parameters);
+    }
+}
+
+impl Bench {
+    /// Writes parameters until the board has them, or refuses them.
+    fn write(&mut self, parameters: &[u8]) -> Result<(), WriteError> {
+        self.events.clear();
+        self.host.write_parameters(parameters, 0);
+        for _ in 0..50_000 {
+            self.step(0.0);
+            match self.events.pop() {
+                Some(Event::Written { error: Some(error), .. }) => return Err(error),
+                Some(Event::Written { bytes, .. }) if bytes as usize == parameters.len() => return Ok(()),
+                Some(Event::Written { bytes, .. }) => self.host.write_parameters(parameters, bytes),
+                _ => {}
+            }
+        }
+        panic!("no answer");
+    }
+}
+
+/// Somebody else asks the board: whoever had it is told, and nothing that he presses or pushes gets there any more, until he
+/// asks anew himself.
+#[test]
+fn who_asked_last_has_the_board() {
+    for (seed, permille) in (300..=320).zip([0, 10, 50, 200].into_iter().cycle()) {
+        let mut bench = Bench::new(seed, permille);
+        bench.greet();
+        assert!(bench.host.press(Mode::Run) && bench.host.push(Some(&item(0))) == Ok(true));
+        for _ in 0..3000 {
+            bench.step(1.0);
+        }
+        // Held back while the second one has the board.
+        let mut first = core::mem::replace(&mut bench.host, Host::new(1 << 20));
+        assert_eq!(bench.greet(), 1);
+        assert!(bench.host.press(Mode::Hold));
+        for _ in 0..3000 {
+            bench.step(1.0);
+        }
+        let known = (*bench.host.controls(), bench.board.driven.len());
+        assert!(first.enable(true) && first.press(Mode::Run));
+        core::mem::swap(&mut first, &mut bench.host);
+        bench.events.clear();
+        for _ in 0..3000 {
+            bench.step(1.0);
+        }
+        assert_eq!(bench.events.first(), Some(&Event::Replaced));
+        assert_eq!(bench.board.controls.last(), Some(&known.0), "a press of who was replaced");
+        assert_eq!((bench.host.push(Some(&item(1))), bench.board.driven.len()), (Ok(false), known.1));
+        assert!(!bench.host.press(Mode::Run));
+    }
 }

@@ -72,6 +72,15 @@ where
         }
     }
 
+    /// Begins anew, as [`LiveControl::new`] does, with the items that the source still has, and with streams that begin anew
+    /// too ([`LiveFeeder::restart`]). In place, for boards whose stack has no room for a second one.
+    pub fn restart(&mut self) {
+        self.reader.restart();
+        self.timeline.restart();
+        self.mode = Mode::new();
+        (self.block_end, self.error, self.starvations) = (None, None, 0);
+    }
+
     /// Feed hold: comes to rest on the path as soon as the law and the ceilings allow.
     pub fn hold(&mut self) {
         self.mode.hold();
@@ -123,8 +132,8 @@ where
     pub fn state(&self, feeder: &LiveFeeder<'_, R, AXES>) -> State {
         let rests = self.rests(feeder);
         match self.mode.run() {
-            _ if rests && self.error.is_some() => State::Failed,
             Run::Abort if rests => State::Aborted,
+            _ if rests && self.error.is_some() => State::Failed,
             Run::Abort => State::Aborting,
             Run::Hold if rests => State::Held,
             Run::Hold => State::Holding,

@@ -91,6 +91,13 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         }
     }
 
+    /// Forgets everything but the pulse.
+    pub(super) fn restart(&mut self) {
+        self.blocks.clear();
+        self.ends.clear();
+        (self.last, self.line, self.queued) = ((0, Position::ZERO), None, 0);
+    }
+
     /// The shape of the pulses of every ramp planned here.
     pub(super) fn pulse(&self) -> Pulse {
         self.pulse

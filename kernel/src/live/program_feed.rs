@@ -29,6 +29,12 @@ impl<const PLACES: usize> ProgramFeed<PLACES> {
         Self { items: Deque::new(), under_way: 0, cursor: 0, replanned: None }
     }
 
+    /// Forgets everything.
+    pub(super) fn restart(&mut self) {
+        self.items.clear();
+        (self.under_way, self.cursor, self.replanned) = (0, 0, None);
+    }
+
     /// Whether there is a place for one more item, and for an end of stretch that waits for the path queue.
     pub(super) fn has_room(&self) -> bool {
         const { assert!(PLACES >= 4 * LIST_ITEMS, "places for what lies ahead, and for two lists") };

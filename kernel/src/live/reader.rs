@@ -101,6 +101,14 @@ impl<R: Real, const AXES: usize, I: Source<AXES>, const PLACES: usize> Reader<R,
         &mut self.feed
     }
 
+    /// As new, with the items that the source still has.
+    pub(super) fn restart(&mut self) {
+        (self.answer, self.pending, self.is_full) = (Answer::Item, None, false);
+        self.path = QueuedPath::new(0, Position::ZERO);
+        self.lookahead.restart();
+        self.feed.restart();
+    }
+
     /// The lookahead and the program's feed.
     pub(super) fn ahead(&mut self) -> (&Lookahead<PLACES>, &mut ProgramFeed<PLACES>) {
         (&self.lookahead, &mut self.feed)

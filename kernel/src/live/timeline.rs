@@ -76,19 +76,29 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
+    /// Before all motion.
+    const BEGIN: Splice = Splice { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
+
     /// At rest before all motion, in the list that the streams begin with.
     pub(super) fn new(tick_s: f64, leads: Leads) -> Self {
-        let splice = Splice { stretch: 0, at: Position::ZERO, feed_mm_s: 0.0 };
         Self {
             tick_s,
-            under_way: Handed { id: 0, list: List::new(splice, tick_s), before: Density::NONE },
+            under_way: Handed { id: 0, list: List::new(Self::BEGIN, tick_s), before: Density::NONE },
             next: None,
-            splice,
+            splice: Self::BEGIN,
             driven_override: 1.0,
             stop_lead: ticks(leads.stop_ticks),
             plan_lead: ticks(leads.plan_ticks),
             waited_at: None,
         }
+    }
+
+    /// As new. The leads stay as far as they have grown.
+    pub(super) fn restart(&mut self) {
+        let Handed { id, list, before } = &mut self.under_way;
+        list.restart(Self::BEGIN);
+        (*id, *before, self.next) = (0, Density::NONE, None);
+        (self.splice, self.driven_override, self.waited_at) = (Self::BEGIN, 1.0, None);
     }
 
     /// A timeline with `list` under way, without handing it over.

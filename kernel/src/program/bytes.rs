@@ -26,7 +26,8 @@ use crate::queue::PathRules;
 use crate::units::Position;
 
 const MAGIC: [u8; 4] = *b"MOTN";
-const VERSION: u8 = 6;
+/// The version of this format, and of the items in it.
+pub const FORMAT: u8 = 6;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 9;
@@ -88,7 +89,7 @@ impl core::fmt::Display for ProgramError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NotAProgram => write!(f, "no compiled program: expected MOTN at its start"),
-            Self::Version { found } => write!(f, "format {found}, expected {VERSION}"),
+            Self::Version { found } => write!(f, "format {found}, expected {FORMAT}"),
             Self::Axes { found, expected } => write!(f, "a program for {found} axes, expected {expected}"),
             Self::Checksum { found, expected } => {
                 write!(f, "damaged: checksum {found:08x}, expected {expected:08x}")
@@ -121,7 +122,7 @@ pub fn write<'a, const AXES: usize>(
     };
     let mut entry = [0; ENTRY_MAX];
     put(&MAGIC);
-    put(&[VERSION, AXES as u8]);
+    put(&[FORMAT, AXES as u8]);
     let guards = match guards {
         Some(guards) => &*postcard::to_slice(guards, &mut entry)?,
         None => &[],
@@ -149,6 +150,9 @@ pub struct Reader<'a, const AXES: usize> {
     items: &'a [u8],
     /// Where the items end, from the start of the program.
     end: usize,
+    /// All before the items.
+    #[cfg(feature = "link")]
+    machine: &'a [u8],
 }
 
 /// A program's items, in order, with what they have in common with the items before. The header, a kilobyte, stays
@@ -173,7 +177,7 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
         if *magic != MAGIC {
             return Err(ProgramError::NotAProgram);
         }
-        if version != VERSION {
+        if version != FORMAT {
             return Err(ProgramError::Version { found: version });
         }
         if usize::from(axes) != AXES {
@@ -195,6 +199,8 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
             guards: _guards,
             items: left,
             end: summed.len(),
+            #[cfg(feature = "link")]
+            machine: summed.get(..summed.len() - left.len()).unwrap_or_default(),
         })
     }
 
@@ -216,6 +222,14 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
             Some((guards, [])) => Ok(Some(guards)),
             _ => Err(ProgramError::Malformed { at: PREFIX + 2 }),
         }
+    }
+
+    /// The checksum of the machine and tick that it was planned for: the one that a program without items ends with. Two
+    /// programs have the same if they are for the same machine.
+    #[cfg(feature = "link")]
+    #[must_use]
+    pub fn machine_checksum(&self) -> u32 {
+        Checksum::of(self.machine)
     }
 
     /// All of its items.
@@ -300,6 +314,25 @@ mod tests {
         #[cfg(feature = "guards")]
         assert_eq!(reader.guards(), Ok(Some(guards())));
         assert_eq!(reader.items().collect::<Result<Vec<_>, _>>(), Ok(items));
+    }
+
+    /// A program of the same machine without items ends with it; one of another machine does not.
+    #[cfg(feature = "link")]
+    #[test]
+    fn the_machine_has_a_checksum() {
+        let of = |bytes: &[u8]| Reader::<2>::new(bytes).expect("a program").machine_checksum();
+        let (_, bytes) = program();
+        for guards in [Some(guards()), None] {
+            let mut without = Vec::new();
+            write(&header(), guards.as_ref(), &[], &mut without).expect("short entries");
+            let sum = without.last_chunk().map(|sum| u32::from_le_bytes(*sum));
+            assert_eq!(Some(of(&without)), sum);
+            assert_eq!(of(&bytes) == of(&without), guards.is_some());
+        }
+        let mut other = Vec::new();
+        let header = Header { tick_s: 0.00025, ..header() };
+        write(&header, Some(&guards()), &[], &mut other).expect("short entries");
+        assert_ne!(of(&other), of(&bytes));
     }
 
     /// Entries are longest with every figure there and every number at its longest.

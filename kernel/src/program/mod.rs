@@ -47,7 +47,7 @@ pub(crate) mod supply;
 mod switching;
 mod wire;
 
-pub use bytes::{Header, Items, ProgramError, Reader, write};
+pub use bytes::{FORMAT, Header, Items, ProgramError, Reader, write};
 #[cfg(feature = "live")]
 pub use check::check_live;
 pub use check::{CheckError, check};

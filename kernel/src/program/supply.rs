@@ -3,6 +3,7 @@
 //! Consumes the [`Item`]s of a [`Source`]; at every call it offers them to the [`Feeder`] until that is full. Here an item is
 //! converted to the kernel's number type, so a board needs room for only one item in addition to its queues.
 
+use core::convert::Infallible;
 use core::task::Poll;
 
 use super::{Item, Source};
@@ -27,6 +28,20 @@ pub enum SupplyError<E> {
     Rejected(Rejection),
     /// The item switches outputs, and nothing here does; see [`Switching`](super::Switching).
     NoOutputs,
+}
+
+impl SupplyError<Infallible> {
+    /// The same for any source.
+    #[must_use]
+    pub fn of_any_source<E>(self) -> SupplyError<E> {
+        match self {
+            Self::Source(never) => match never {},
+            Self::Piece(error) => SupplyError::Piece(error),
+            Self::Segment(error) => SupplyError::Segment(error),
+            Self::Rejected(rejection) => SupplyError::Rejected(rejection),
+            Self::NoOutputs => SupplyError::NoOutputs,
+        }
+    }
 }
 
 impl<E: core::fmt::Display> core::fmt::Display for SupplyError<E> {

@@ -68,7 +68,7 @@ impl<R: Real, const AXES: usize> Acceptance<R, AXES> {
     }
 
     /// Between stretches, at `position`.
-    fn restarted(&self, position: [Position; AXES]) -> Self {
+    pub(super) fn restarted(&self, position: [Position; AXES]) -> Self {
         Self { bounds: self.bounds, ..Self::new(self.rules, position) }
     }
 

@@ -36,6 +36,16 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         self.lists.want_stop()
     }
 
+    /// Drops everything queued, as if the streams had been split anew. The mailbox of the lists has been reset.
+    #[cfg(feature = "live")]
+    pub(super) fn restart(&mut self) {
+        while self.path.dequeue().is_some() {}
+        self.finished = 0;
+        self.path_fill = self.path_fill.restarted(&self.shared.path_entered);
+        self.feed_fill = self.feed_fill.restarted(&self.shared.feed_entered);
+        self.lists.restart(&mut self.feed);
+    }
+
     /// Begins a tick: the producer has had its turn.
     #[inline]
     pub(crate) fn start_tick(&mut self) {

@@ -48,6 +48,21 @@ impl<'a, R: Real> Lists<'a, R> {
         }))
     }
 
+    /// Drops everything and begins as after [`Lists::new`], with the first list as `feed` again. The mailbox has been reset.
+    pub(super) fn restart(&mut self, feed: &mut Consumer<'a, FeedItem<R>>) {
+        let Some(lists) = &mut self.0 else { return };
+        for (list, queue) in &mut lists.others {
+            if *list == 0 {
+                *list = lists.place.list();
+                core::mem::swap(queue, feed);
+            }
+            while queue.dequeue().is_some() {}
+        }
+        while feed.dequeue().is_some() {}
+        (lists.place, lists.seen) = (ListPlace::new(0, 0), lists.mailbox.generation());
+        (lists.due, lists.change, lists.refused) = (ListPlace::NEVER, None, None);
+    }
+
     #[inline]
     pub(super) fn is_live(&self) -> bool {
         self.0.is_some()

@@ -135,6 +135,23 @@ impl<'a, R: Real, const AXES: usize> LiveFeeder<'a, R, AXES> {
         self.watcher = Some(watcher);
     }
 
+    /// Begins anew, for a machine that stands at `position`, as if the streams had been split anew: everything queued is
+    /// dropped; rules and travel stay. For a caller that has both ends, so that no tick comes meanwhile. False, and nothing is
+    /// changed, if `intake` is the end of other streams.
+    #[must_use]
+    pub fn restart(&mut self, intake: &mut Intake<'_, R, AXES>, position: [Position; AXES]) -> bool {
+        if !core::ptr::eq(self.shared, intake.shared) {
+            return false;
+        }
+        let _access = self.access();
+        self.mailbox.reset();
+        intake.restart();
+        self.path_accept = self.path_accept.restarted(position);
+        self.feed_accept = self.path_accept;
+        (self.filled, self.changes) = (None, 0);
+        true
+    }
+
     /// From now on refuses pieces that leave `travel` anywhere, not only at their ends.
     #[cfg(feature = "guards")]
     pub fn bound(&mut self, travel: crate::path::Travel<AXES>) {

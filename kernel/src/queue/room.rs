@@ -43,6 +43,13 @@ impl Fill {
         Self { so_far, before_tick: so_far, capacity: capacity as i32 }
     }
 
+    /// That of the same queue, empty again.
+    #[cfg(feature = "live")]
+    pub(super) fn restarted(self, entered: &AtomicU32) -> Self {
+        let so_far = entered.load(Ordering::Relaxed);
+        Self { so_far, before_tick: so_far, ..self }
+    }
+
     /// Begins a tick: the producer has had its turn.
     #[inline]
     pub(super) fn start_tick(&mut self) {

@@ -58,7 +58,7 @@ fn traced(tools: &Tools, kind: Kind) -> Result<Vec<Estimate>, String> {
     if !made.success() {
         return Err(format!("mkfifo {}: {made}", pipe.display()));
     }
-    let mut emulator = tools.emulator(board, kind.image, bundle.path())?;
+    let mut emulator = tools.emulator(board, kind.image, bundle.path(), "none")?;
     emulator.args(COUNTING).args(["-singlestep", "-d", "in_asm,exec,nochain", "-D"]).arg(&pipe);
     emulator.arg("-dfilter").arg(code_of_ticks(&tools.image(board, kind.image)?)?);
     emulator.stdout(std::process::Stdio::null());

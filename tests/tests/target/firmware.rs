@@ -5,6 +5,7 @@
 //! of the machine has seen.
 
 use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
@@ -15,13 +16,11 @@ use crate::tools::Tools;
 
 /// The emulator's time for an instruction is 2 to this power \[ns\].
 const SHIFT: u32 = 3;
-/// Cycles of the processor in that time: it runs at 168 MHz.
-const CYCLES_PER_INSTRUCTION: f64 = 0.168 * (1 << SHIFT) as f64;
 
 /// Where the stringer ends \[mm\].
-const END_MM: [f64; 3] = [102.045_923_136, 0.0, 0.0];
+pub(crate) const END_MM: [f64; 3] = [102.045_923_136, 0.0, 0.0];
 /// The regulator holds the machine there so well \[mm\].
-const AT_REST_MM: f64 = 0.005;
+pub(crate) const AT_REST_MM: f64 = 0.005;
 /// Frames of the converter's setup: configuration, clear, codes, a range for each axis, power, codes, load.
 const SETUP_FRAMES: u64 = 9;
 /// And of a write: a code for each axis, and a load.
@@ -64,15 +63,22 @@ fn printed(tools: &Tools) -> Result<&'static [String], String> {
     }
 }
 
-fn run(tools: &Tools) -> Result<Vec<String>, String> {
-    let image = tools.firmware()?;
+/// The emulator with an image, not yet started. Of its serial ports the second one is the console, or the link. Ended with
+/// `timeout`, which runs it.
+pub(crate) fn emulator(image: &Path, serial: &str, shift: u32) -> Command {
     let mut emulator = Command::new("timeout");
     emulator
         .args(["600", "qemu-system-arm", "-M", "netduinoplus2", "-display", "none", "-monitor", "none"])
-        // Of its serial ports the second one is the console.
-        .args(["-serial", "null", "-serial", "stdio", "-semihosting-config", "enable=on,target=native"])
-        .args(["-icount", &format!("shift={SHIFT},sleep=off"), "-kernel"])
-        .arg(image)
+        .args(["-serial", "null", "-serial", serial, "-semihosting-config", "enable=on,target=native"])
+        .args(["-icount", &format!("shift={shift},sleep=off"), "-kernel"])
+        .arg(image);
+    emulator
+}
+
+fn run(tools: &Tools) -> Result<Vec<String>, String> {
+    let image = tools.firmware("emulated")?;
+    let mut emulator = emulator(&image, "stdio", SHIFT);
+    emulator
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         // It says that it was ended.
@@ -164,17 +170,28 @@ pub(crate) fn the_firmware_runs(tools: &Tools) -> Result<(), String> {
     }
 }
 
+/// Least, median, 99th percentile and most of the instructions of the interrupts in `lines`, where an instruction takes 2 to
+/// the power `shift` \[ns\].
+pub(crate) fn instructions<'a>(
+    lines: impl Iterator<Item = &'a String>,
+    shift: u32,
+) -> Result<[u32; 4], String> {
+    // The processor runs at 168 MHz.
+    let cycles_per_instruction = 0.168 * f64::from(1 << shift);
+    let cycles = lines.filter_map(|line| line.strip_prefix("interrupt ")?.parse::<f64>().ok());
+    let mut counted: Vec<u32> =
+        cycles.map(|cycles| (cycles / cycles_per_instruction).round() as u32).collect();
+    counted.sort_unstable();
+    let last = counted.len().checked_sub(1).ok_or("no interrupt was counted")?;
+    Ok([counted[0], counted[last / 2], counted[last * 99 / 100], counted[last]])
+}
+
 pub(crate) fn instructions_of_the_interrupt(tools: &Tools) -> Result<(), String> {
     let lines = printed(tools)?;
     let first_boot = lines.iter().take_while(|line| !line.starts_with("model: reset"));
-    let cycles = first_boot.filter_map(|line| line.strip_prefix("interrupt ")?.parse::<f64>().ok());
-    let mut counted: Vec<u32> =
-        cycles.map(|cycles| (cycles / CYCLES_PER_INSTRUCTION).round() as u32).collect();
-    counted.sort_unstable();
-    let last = counted.len().checked_sub(1).ok_or("no interrupt was counted")?;
+    let figures = instructions(first_boot, SHIFT)?;
     let mut table =
         Table::new(&["instructions of the interrupt, NUCLEO-F446RE", "min", "median", "p99", "max"]);
-    let figures = [counted[0], counted[last / 2], counted[last * 99 / 100], counted[last]];
     table.row(
         &[&["live control and guards, a hold".to_owned()], &figures.map(|figure| figure.to_string())[..]]
             .concat(),

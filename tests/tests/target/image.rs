@@ -5,7 +5,7 @@ use object::{Object, ObjectSection, ObjectSymbol};
 
 use crate::budget::{GROWTH, by_name};
 use crate::programs;
-use crate::tools::{BOARDS, Board, Clock, LIVE_BOARDS, M4F, M7, Tools};
+use crate::tools::{BOARDS, Board, Clock, LINKED_BOARDS, LIVE_BOARDS, M4F, M7, Tools};
 
 /// Whatever a panic needs. The handler's own symbol is in every image in which one is reachable.
 const PANIC: [&str; 5] = ["panic", "unwrap_failed", "expect_failed", "slice_index", "_fail"];
@@ -21,32 +21,41 @@ fn file(tools: &Tools, board: Board, name: &str) -> Result<Vec<u8>, String> {
 }
 
 pub(crate) fn nothing_can_panic(tools: &Tools) -> Result<(), String> {
-    for board in BOARDS.into_iter().chain(LIVE_BOARDS) {
-        let symbols = |name: &str| -> Result<Vec<String>, String> {
-            let bytes = file(tools, board, name)?;
-            let object = object::File::parse(&*bytes).map_err(|error| error.to_string())?;
-            let names = object.symbols().filter_map(|symbol| symbol.name().ok().map(str::to_owned));
-            Ok(names.filter(|name| PANIC.iter().any(|panic| name.contains(panic))).collect())
-        };
-        let found = symbols("kernel_only")?;
+    let panics = |board: Board, name: &str| -> Result<Vec<String>, String> {
+        let bytes = file(tools, board, name)?;
+        let object = object::File::parse(&*bytes).map_err(|error| error.to_string())?;
+        let names = object.symbols().filter_map(|symbol| symbol.name().ok().map(str::to_owned));
+        Ok(names.filter(|name| PANIC.iter().any(|panic| name.contains(panic))).collect())
+    };
+    let kernels = BOARDS.into_iter().chain(LIVE_BOARDS).map(|board| (board, "kernel_only"));
+    // With the link, the board's background, and even the simulated machine.
+    for (board, name) in kernels.chain(LINKED_BOARDS.map(|board| (board, "linked"))) {
+        let found = panics(board, name)?;
         if !found.is_empty() {
-            return Err(format!("the kernel's image for {} can panic: {found:?}", board.core));
+            return Err(format!("the image {name} for {} can panic: {found:?}", board.core));
         }
-        // The search itself works: an image with a panic has the handler's symbol.
-        if !symbols("budget")?.iter().any(|name| name.contains("panic_is_linked")) {
+    }
+    // The search itself works: an image with a panic has the handler's symbol.
+    for board in BOARDS.into_iter().chain(LIVE_BOARDS) {
+        if !panics(board, "budget")?.iter().any(|name| name.contains("panic_is_linked")) {
             return Err("no panic found where there is one".to_owned());
         }
     }
     Ok(())
 }
 
-/// Bytes of code, constants, and what memory starts with.
-fn flash(tools: &Tools, board: Board, name: &str) -> Result<u64, String> {
+/// Bytes of sections of an image.
+fn size(tools: &Tools, board: Board, name: &str, sections: &[&str]) -> Result<u64, String> {
     let bytes = file(tools, board, name)?;
     let object = object::File::parse(&*bytes).map_err(|error| error.to_string())?;
-    let sections =
-        object.sections().filter(|section| matches!(section.name(), Ok(".text" | ".rodata" | ".data")));
-    Ok(sections.map(|section| section.size()).sum())
+    let of_these =
+        object.sections().filter(|section| section.name().is_ok_and(|name| sections.contains(&name)));
+    Ok(of_these.map(|section| section.size()).sum())
+}
+
+/// Bytes of code, constants, and what memory starts with.
+fn flash(tools: &Tools, board: Board, name: &str) -> Result<u64, String> {
+    size(tools, board, name, &[".text", ".rodata", ".data"])
 }
 
 pub(crate) fn sizes(tools: &Tools) -> Result<(), String> {
@@ -82,6 +91,14 @@ pub(crate) fn sizes(tools: &Tools) -> Result<(), String> {
         let cells = [flash.to_string(), greatest("ram").to_string(), "64, 3 × 16".to_owned()];
         let stack = greatest("stack").to_string();
         table.row(&[&[board.cores().to_owned(), number], &cells[..], &[stack]].concat());
+    }
+    // All of the image: kernel, link and queue of items, the board's background, the simulated machine.
+    for board in LINKED_BOARDS {
+        let flash = flash(tools, board, "linked")? - flash(tools, board, "empty")?;
+        let ram = size(tools, board, "linked", &[".data", ".bss", ".uninit"])?;
+        let number = format!("{}, a board on the link, its machine simulated", board.number);
+        let cells = [flash.to_string(), ram.to_string(), "64, 3 × 16".to_owned(), "–".to_owned()];
+        table.row(&[&[board.core.to_owned(), number], &cells[..]].concat());
     }
     tools.accept_compiler()?;
     hold("sizes", &table, GROWTH)

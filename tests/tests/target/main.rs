@@ -1,5 +1,5 @@
 //! The kernel on emulated boards with Cortex-M and RISC-V: the same bits as on a PC, instruction budgets, sizes, and an image
-//! that cannot panic; the firmware of the NUCLEO on an emulated board.
+//! that cannot panic; the firmware of the NUCLEO on an emulated board; boards that a PC drives over the link.
 //!
 //! Needs `qemu-system-arm`, `qemu-system-riscv32` and a compiler that builds for both; without them every test is listed and ignored
 //! with the reason, but fails where `CI=true`. Figures are held to committed tables (`tests/expected`); a compiler
@@ -15,8 +15,10 @@ mod budget;
 mod cycles;
 mod digest;
 mod firmware;
+mod firmware_link;
 mod functions;
 mod image;
+mod linked;
 mod preempted;
 mod programs;
 mod search;
@@ -31,9 +33,10 @@ use tools::Tools;
 type Test = fn(&Tools) -> Result<(), String>;
 
 /// Name, whether it holds figures that depend on the compiler, and the test. The longest first: others run beside it.
-const TESTS: [(&str, bool, Test); 14] = [
+const TESTS: [(&str, bool, Test); 16] = [
     ("estimated_cycles", true, cycles::estimated_cycles),
     ("the_firmware_runs", false, firmware::the_firmware_runs),
+    ("a_pc_drives_the_firmware", false, firmware_link::a_pc_drives_the_firmware),
     ("instructions_of_the_interrupt", true, firmware::instructions_of_the_interrupt),
     ("the_same_bits_on_every_core", false, digest::the_same_bits_on_every_core),
     ("the_same_bits_from_an_interrupt", false, digest::the_same_bits_from_an_interrupt),
@@ -43,6 +46,7 @@ const TESTS: [(&str, bool, Test); 14] = [
         false,
         preempted::the_same_bits_where_ticks_stop_the_background,
     ),
+    ("a_pc_drives_boards_over_the_link", false, linked::a_pc_drives_boards_over_the_link),
     ("one_last_place_is_seen", false, digest::one_last_place_is_seen),
     ("one_last_place_is_seen_under_live_control", false, preempted::one_last_place_is_seen),
     ("nothing_can_panic", false, image::nothing_can_panic),

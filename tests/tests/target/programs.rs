@@ -97,10 +97,14 @@ pub(crate) fn stringer_off_by_a_last_place() -> Vec<u8> {
     off_by_a_last_place().to_bytes(&Machine::reference())
 }
 
-/// The stringer, and the same, for live control.
+/// The stringer for live control.
+pub(crate) fn live_stringer() -> Vec<u8> {
+    live_bytes(STRINGER, &Machine::reference(), Mode::Spanning)
+}
+
+/// The stringer, and one a last place off, for live control.
 pub(crate) fn live_stringer_and_off_by_a_last_place() -> [Vec<u8>; 2] {
-    let machine = Machine::reference();
-    [live_bytes(STRINGER, &machine, Mode::Spanning), off_by_a_last_place().to_live_bytes(&machine)]
+    [live_stringer(), off_by_a_last_place().to_live_bytes(&Machine::reference())]
 }
 
 fn off_by_a_last_place() -> Executable {
@@ -231,6 +235,18 @@ fn random_facets(random: &mut Random) -> String {
 /// Short lines and arcs, planned per block: pieces, segments and phases end all the time, often several in a tick.
 pub(crate) fn facets() -> Vec<u8> {
     bytes(&facets_text(), &Machine::reference(), Mode::PerBlock)
+}
+
+/// For live control, with some hundred items a second for a quarter of a minute: much more than a board on the link has room
+/// for.
+pub(crate) fn long() -> Vec<u8> {
+    use std::fmt::Write;
+    let mut text = "G61 G91 G1\n".to_owned();
+    for line in 0..1200 {
+        let sign = if line / 200 % 2 == 0 { "" } else { "-" };
+        let _ = writeln!(text, "X{sign}0.25 Y0.02 F{}", 1300 + line * 37 % 400);
+    }
+    live_bytes(&text, &Machine::reference(), Mode::Spanning)
 }
 
 fn facets_text() -> String {

@@ -64,6 +64,9 @@ pub(crate) const LIVE_BOARDS: [Board; 4] = all_with("live");
 /// The same with ticks that stop the background, which says where.
 pub(crate) const WATCHED_BOARDS: [Board; 4] = all_with("watch");
 
+/// Those that run as a board on the link: the UART is that of the MPS2.
+pub(crate) const LINKED_BOARDS: [Board; 2] = [M4F.with("link"), M3.with("link")];
+
 const fn all_with(features: &'static str) -> [Board; 4] {
     let [m4f, m7, m3, risc_v] = LARGE;
     [m4f.with(features), m7.with(features), m3.with(features), risc_v.with(features)]
@@ -102,10 +105,11 @@ const EMULATORS: [&str; 2] = ["qemu-system-arm", "qemu-system-riscv32"];
 pub(crate) const COUNTING: [&str; 2] = ["-icount", "shift=6,sleep=off"];
 
 /// The images that tests ask for, by features.
-const IMAGES: [(&str, &[&str]); 4] = [
+const IMAGES: [(&str, &[&str]); 5] = [
     ("", &["closed_loop", "interrupt", "budget", "functions", "kernel_only", "empty"]),
     ("live", &["live", "live_budget", "answers", "budget", "kernel_only", "empty"]),
     ("watch", &["live_interrupt"]),
+    ("link", &["linked", "empty"]),
     ("soft-float", &["budget", "functions"]),
 ];
 
@@ -214,7 +218,8 @@ impl Tools {
 
     /// All images with `features`, for all targets, in a folder by target.
     fn build(&self, features: &'static str) -> Result<PathBuf, String> {
-        let boards = BOARDS.into_iter().chain(LIVE_BOARDS).chain(WATCHED_BOARDS).chain([M3_SOFT]);
+        let boards = BOARDS.into_iter().chain(LIVE_BOARDS).chain(WATCHED_BOARDS);
+        let boards = boards.chain(LINKED_BOARDS).chain([M3_SOFT]);
         let targets: BTreeSet<_> =
             boards.filter(|board| board.features == features).map(|board| board.target).collect();
         let images = IMAGES.iter().find(|(of, _)| *of == features).map_or(&[][..], |(_, images)| *images);
@@ -281,12 +286,15 @@ impl Tools {
         Ok(cargo)
     }
 
-    /// The firmware of the NUCLEO, for the emulator.
-    pub(crate) fn firmware(&self) -> Result<PathBuf, String> {
+    /// The firmware of the NUCLEO with `features`, among them that for the emulator.
+    pub(crate) fn firmware(&self, features: &str) -> Result<PathBuf, String> {
+        // One at a time: they leave their images in the same place.
+        static BUILDS: Mutex<()> = Mutex::new(());
+        let _build = BUILDS.lock().map_err(|_| "a build panicked".to_owned())?;
         // Where its plain build has compiled what both need.
         let mut cargo = self.cargo("boards/nucleo-f446re")?;
         // Its program is the one that the test knows.
-        cargo.args(["--features", "emulated", "--target", M4F.target]).env_remove("MOTION_PROGRAM");
+        cargo.args(["--features", features, "--target", M4F.target]).env_remove("MOTION_PROGRAM");
         let done = cargo.output().map_err(|error| format!("cargo: {error}"))?;
         if !done.status.success() {
             return Err(format!("build of the firmware: {}", String::from_utf8_lossy(&done.stderr)));
@@ -294,20 +302,26 @@ impl Tools {
         let built = root().join("boards/nucleo-f446re/target").join(M4F.target).join("release/nucleo-f446re");
         // Away from where the plain build would replace it.
         let folder = root().join("target/boards/images/firmware");
-        let image = folder.join("nucleo-f446re");
+        let image = folder.join(features);
         std::fs::create_dir_all(&folder)
             .and_then(|()| std::fs::copy(&built, &image))
             .map_err(|error| format!("{}: {error}", image.display()))?;
         Ok(image)
     }
 
-    /// QEMU with an image and a bundle of programs, not yet started.
-    pub(crate) fn emulator(&self, board: Board, name: &str, bundle: &Path) -> Result<Command, String> {
+    /// QEMU with an image and a bundle of programs, not yet started; its first serial port is `serial`.
+    pub(crate) fn emulator(
+        &self,
+        board: Board,
+        name: &str,
+        bundle: &Path,
+        serial: &str,
+    ) -> Result<Command, String> {
         let mut command = Command::new("timeout");
         let emulator = if board.is_arm() { EMULATORS[0] } else { EMULATORS[1] };
         command
             .args(["900", emulator, "-M", board.machine, "-bios", "none", "-nographic"])
-            .args(["-monitor", "none", "-serial", "none"])
+            .args(["-monitor", "none", "-serial", serial])
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-device")
             .arg(format!("loader,file={},addr={:#x},force-raw=on", bundle.display(), board.address))
@@ -368,7 +382,7 @@ impl Tools {
         clock: Clock,
     ) -> Result<String, String> {
         let bundle = Bundle::new(cases)?;
-        let mut command = self.emulator(board, name, bundle.path())?;
+        let mut command = self.emulator(board, name, bundle.path(), "none")?;
         if clock == Clock::Counting {
             command.args(COUNTING);
         }

@@ -10,12 +10,11 @@ use embedded_hal::delay::DelayNs;
 use motion_board::LogLine;
 use motion_kernel::hal::Ad5754Output;
 use motion_kernel::program::Reader;
-use nucleo_f446re::design_parameters::CONSOLE_BAUD;
 use nucleo_f446re::machine::{AXES, Number, PROGRAM};
 use stm32f4xx_hal::gpio::{Alternate, PA3, PinState};
-use stm32f4xx_hal::pac::{self, SPI2, USART2};
+use stm32f4xx_hal::pac::{self, SPI2};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::serial::{Rx, SerialExt};
+use stm32f4xx_hal::serial::SerialExt;
 use stm32f4xx_hal::spi::Spi;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
@@ -31,6 +30,12 @@ use crate::hal::Hardware;
 use crate::spindle::SpindleAndCoolant;
 use crate::switches::Switches;
 
+/// The emulator's second serial port: the console, or the link.
+#[cfg(not(feature = "link"))]
+pub(crate) type Line = stm32f4xx_hal::serial::Rx<pac::USART2>;
+#[cfg(feature = "link")]
+pub(crate) type Line = crate::link_port::LinkPort;
+
 /// Writes a line of the log, and lets the script go on.
 pub(crate) fn write(line: &LogLine<Number, AXES>) {
     hprintln!("{} {:?}", TICKS.load(Ordering::Relaxed), line);
@@ -44,9 +49,14 @@ pub(crate) fn write(line: &LogLine<Number, AXES>) {
     }
 }
 
-/// Sleeps until an interrupt: the emulator then skips the time.
+/// Sleeps until an interrupt: the emulator then skips the time. Not where a PC is at the other end of the link, which can't
+/// skip it.
 pub(crate) fn pause() {
-    cortex_m::asm::wfi();
+    if cfg!(feature = "link") {
+        core::hint::spin_loop();
+    } else {
+        cortex_m::asm::wfi();
+    }
 }
 
 /// Writes why everything has ended, and ends the emulator.
@@ -70,7 +80,7 @@ pub(crate) struct Board {
     pub(crate) watchdog: IndependentWatchdog,
     pub(crate) scope: ScopePin,
     pub(crate) button: ButtonPin,
-    pub(crate) console: Rx<USART2>,
+    pub(crate) line: Line,
 }
 
 impl Board {
@@ -127,9 +137,21 @@ impl Board {
         model::elapse(0);
 
         let receive: PA3<Alternate<7>> = gpioa.pa3.into_alternate();
-        let console = match device.USART2.rx(receive, CONSOLE_BAUD.bps(), &mut rcc) {
-            Ok(console) => console,
-            Err(_) => defmt::panic!("console: {=u32} baud can't be had", CONSOLE_BAUD),
+        #[cfg(not(feature = "link"))]
+        let line = {
+            use nucleo_f446re::design_parameters::CONSOLE_BAUD;
+            match device.USART2.rx(receive, CONSOLE_BAUD.bps(), &mut rcc) {
+                Ok(console) => console,
+                Err(_) => defmt::panic!("console: {=u32} baud can't be had", CONSOLE_BAUD),
+            }
+        };
+        #[cfg(feature = "link")]
+        let line = {
+            use nucleo_f446re::design_parameters::LINK_BAUD;
+            match device.USART2.serial::<u8>((gpioa.pa2, receive), LINK_BAUD.bps(), &mut rcc) {
+                Ok(serial) => Line::new(serial.release().0),
+                Err(_) => defmt::panic!("link: {=u32} baud can't be had", LINK_BAUD),
+            }
         };
 
         Self {
@@ -138,7 +160,7 @@ impl Board {
             watchdog: IndependentWatchdog::new(device.IWDG),
             scope: ScopePin(gpioa.pa10.into_push_pull_output()),
             button: ButtonPin,
-            console,
+            line,
         }
     }
 

@@ -22,6 +22,8 @@
 pub(crate) mod board;
 pub(crate) mod emergency_stop;
 pub(crate) mod encoders;
+#[cfg(feature = "link")]
+pub(crate) mod link_port;
 pub(crate) mod tick_timer;
 mod model;
 mod script;

@@ -68,6 +68,10 @@ pub(super) fn enable(axis: usize, is_on: bool, since_opened: Option<u32>) {
     let (before, bit) = (ENABLES.load(Ordering::Relaxed), 1 << axis);
     let after = if is_on { before | bit } else { before & !bit };
     ENABLES.store(after, Ordering::Relaxed);
+    const ALL: u32 = (1 << AXES) - 1;
+    if after == ALL && before != ALL {
+        script::enabled();
+    }
     if let (0, true, Some(cycles)) = (after, before != 0, since_opened) {
         OFF_AFTER.store(cycles, Ordering::Relaxed);
     }

@@ -3,6 +3,8 @@
 //! In the first run the button starts, holds and resumes, and every interrupt is counted. In the second run letters
 //! have to come over the console to hold and resume; then the emergency stop opens. When the log has the first rows of
 //! the flight recorder, the board is reset, and all begins anew.
+//!
+//! Where a PC drives the board over the link, the button is pressed once, in the middle of the first program.
 
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -74,6 +76,16 @@ pub(super) fn tick() -> bool {
         }
         script.is_running && script.runs == 1
     })
+}
+
+/// The drives have been enabled: over the link, as the log says nothing of it.
+pub(super) fn enabled() {
+    if cfg!(feature = "link") {
+        change(|script| {
+            (script.runs, script.is_running) = (script.runs + 1, true);
+            script.next = (script.runs == 1).then_some((script.tick + 1500, Act::Press));
+        });
+    }
 }
 
 /// What follows a line of the log. Returns whether the board is to be reset.

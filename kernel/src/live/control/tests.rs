@@ -153,6 +153,45 @@ fn a_stop_asks_for_no_more_than_the_number_type_holds() {
     assert_eq!(control.state(&feeder), State::Held);
 }
 
+/// After an abort, a failure or a hold, with settings and items left: all of it is as new, and so is the motion that follows.
+#[test]
+fn a_restart_leaves_nothing_behind() {
+    for end in [2000, 100_000] {
+        let wrong = Item::Line { line: 2, start: [Position::ZERO], direction: [1.0], length: at(1.0) };
+        let items = line(Position::ZERO).into_iter().chain([wrong]).chain(line(Position::ZERO));
+        let items: Vec<Result<_, Infallible>> = items.map(Ok).collect();
+        let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+        let (mut feeder, mut intake) = streams.split(RULES, [Position::ZERO]);
+        let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
+        let new =
+            |items| LiveControl::<f64, 1, _, Infallible, 64>::new(items, Pulse::Plateau, TICK_S, Leads::NONE);
+        let mut control = new(items.into_iter());
+        control.set_override(0.9).expect("in range");
+        control.set_single_block(true);
+        for tick in 0.. {
+            if tick == end {
+                control.abort();
+            }
+            let state = (control.poll(&mut feeder), control.state(&feeder));
+            executor.tick(&mut intake).expect("no fault");
+            if matches!(state, (_, State::Aborted | State::Failed)) {
+                break;
+            }
+        }
+        control.restart();
+        assert!(feeder.restart(&mut intake, [Position::ZERO]));
+        let mut executor = Executor::<f64, 1>::new([Position::ZERO]);
+        let fresh = new(control.source_mut().clone());
+        assert_eq!(format!("{control:?}"), format!("{fresh:?}"));
+        *control.source_mut() = line(Position::ZERO).map(Ok).to_vec().into_iter();
+        for _ in 0..100_000 {
+            control.poll(&mut feeder).expect("executable");
+            executor.tick(&mut intake).expect("no fault");
+        }
+        assert_eq!(control.state(&feeder), State::Done);
+    }
+}
+
 /// A block that is a step longer or shorter than its path: what was handed over ends at rest, and the rest is
 /// refused.
 #[test]

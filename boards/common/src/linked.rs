@@ -1,0 +1,709 @@
+//! The background of a board that a PC drives over the link.
+//!
+//! Consumes the bytes of the wire and the tick's results in [`Control`]; produces items for the streams, switches drives and
+//! outputs as the operator and the program say, and tells the PC what the machine does. Runs in the time that the ticks leave:
+//! the board calls [`Linked::poll`] and [`Linked::transmit`], over and over.
+//!
+//! Nothing from the wire enables drives but the operator's command, and that only without a fault and with inputs that allow
+//! it.
+
+use core::convert::Infallible;
+
+use motion_kernel::exec::ExecState;
+use motion_kernel::hal::OutputState;
+use motion_kernel::law::Pulse;
+use motion_kernel::link::{BoardLink, Came, ParameterBuffer, State as MachineState, Status, WriteError};
+use motion_kernel::live::State;
+use motion_kernel::num::Real;
+use motion_kernel::program::SupplyError;
+use motion_kernel::queue::LiveFeeder;
+use rtic_core::Mutex;
+
+use crate::control::Control;
+use crate::log::LogLine;
+use crate::machine::Machine;
+use crate::parameters::BoardParameters;
+use crate::report::{FlightDump, Report};
+use crate::streamed::{Requests, Streamed};
+
+/// Time between two messages about the machine \[ms\].
+const STATUS_MS: u32 = 20;
+
+/// The background. `ITEMS` and `PLACES` are those of [`Streamed`]; there is room for `PARAMETERS` bytes of new parameters (three
+/// axes of the reference machine take 578, nine less than 1800), none on a board that can't store them.
+pub struct Linked<
+    'a,
+    R: Real,
+    const AXES: usize,
+    const ITEMS: usize,
+    const PLACES: usize,
+    const PARAMETERS: usize = 0,
+> {
+    streamed: Streamed<'a, R, AXES, ITEMS, PLACES>,
+    board: BoardParameters,
+    /// The present parameters: a compiled program, whose items do not matter.
+    parameters: &'a [u8],
+    new_parameters: ParameterBuffer<PARAMETERS>,
+    /// How many bytes of these are to be stored.
+    to_store: Option<usize>,
+    /// Spindle or coolant may be on.
+    is_on: bool,
+    status_ms: u32,
+    /// Why the program ends early.
+    refused: Option<SupplyError<Infallible>>,
+    /// The log has said so.
+    has_refused: bool,
+    /// The log has said that there is a fault.
+    has_faulted: bool,
+    dump: FlightDump,
+    report: Report,
+}
+
+impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, const PARAMETERS: usize>
+    Linked<'a, R, AXES, ITEMS, PLACES, PARAMETERS>
+{
+    /// With drives off. What is planned anew has ramps of `pulse`s.
+    #[must_use]
+    pub fn new(
+        board: &BoardParameters,
+        link: BoardLink,
+        feeder: LiveFeeder<'a, R, AXES>,
+        pulse: Pulse,
+    ) -> Self {
+        let streamed = Streamed::new(link, feeder, pulse, board.tick_s(), board.leads);
+        Self {
+            streamed,
+            board: *board,
+            parameters: &[],
+            new_parameters: ParameterBuffer::new(),
+            to_store: None,
+            is_on: false,
+            status_ms: 0,
+            refused: None,
+            has_refused: false,
+            has_faulted: false,
+            dump: FlightDump::default(),
+            report: Report::default(),
+        }
+    }
+
+    /// From now on `parameters`, the present ones as a compiled program, may be read by the PC. Its items do not matter.
+    pub fn set_parameters(&mut self, parameters: &'a [u8]) {
+        self.parameters = parameters;
+    }
+
+    /// Parameters that the PC has written, and that suit the board. It is to store them and to start anew with them;
+    /// if it can't store them, [`Self::not_stored`].
+    #[must_use]
+    pub fn new_parameters(&self) -> Option<&[u8]> {
+        self.new_parameters.bytes().get(..self.to_store?)
+    }
+
+    /// The new parameters could not be stored: the PC is told, and the present ones stay.
+    pub fn not_stored(&mut self) {
+        self.to_store = None;
+        self.streamed.link_mut().refuse_parameters(&mut self.new_parameters, WriteError::Storage);
+    }
+
+    /// One poll: takes what `next_byte` has, obeys the operator, plans, which may take several ticks. `next_byte` is that of
+    /// [`Streamed::poll`].
+    pub fn poll<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        next_byte: &mut dyn FnMut() -> Option<u8>,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) {
+        self.poll_unless(&|| false, next_byte, control);
+    }
+
+    /// [`Self::poll`] with a hold on the board; see [`Streamed::poll_unless`].
+    pub fn poll_unless<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        is_hold_asked: &dyn Fn() -> bool,
+        next_byte: &mut dyn FnMut() -> Option<u8>,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) {
+        let requests = self.streamed.receive(next_byte);
+        let is_given_up = self.act(requests, control);
+        // Behind what may have enabled the drives.
+        self.receive_parameters(control);
+        self.refused = self.streamed.plan(is_hold_asked, next_byte).err();
+        self.switch(is_given_up, control);
+    }
+
+    /// Puts away what came of new parameters, and checks them where they are complete.
+    #[inline(never)]
+    fn receive_parameters<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) {
+        let Self { streamed, board, new_parameters, to_store, .. } = self;
+        let link = streamed.link_mut();
+        if PARAMETERS == 0 {
+            // There is no room for any, so they are refused.
+            link.put_parameters(new_parameters, true);
+            return;
+        }
+        let is_off = control.lock(|control| control.kernel.is_off());
+        if !link.put_parameters(new_parameters, is_off) {
+            return;
+        }
+        // Of those before.
+        *to_store = None;
+        let Some(bytes) = new_parameters.take() else { return };
+        let error = match Machine::<R, AXES>::new(bytes, board) {
+            Ok(_) => {
+                *to_store = Some(bytes.len());
+                return;
+            }
+            Err(_) => WriteError::Unsuitable,
+        };
+        link.refuse_parameters(new_parameters, error);
+    }
+
+    /// What the operator asks of drives and faults; and the end of an abort. Whether the program was given up.
+    #[inline(never)]
+    fn act<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        requests: Requests,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) -> bool {
+        let Self { streamed, board, to_store, .. } = self;
+        let live = streamed.state();
+        // Parameters that are to be stored need the drives off.
+        let may_enable = to_store.is_none();
+        control.lock(|control| {
+            let is_waiting = matches!(control.seen().state, ExecState::Stopped | ExecState::Dwell);
+            // At a program stop, or in a dwell, there is nothing to come to rest from.
+            let is_aborted = live == State::Aborted || live == State::Aborting && is_waiting;
+            if requests.clears_fault && control.kernel.clear_fault().is_some() {
+                control.flight.clear();
+            }
+            let here = match requests.power {
+                Some(false) => Some(control.kernel.stand_here()),
+                Some(true) if may_enable && control.may_enable() => {
+                    let here = control.kernel.stand_here();
+                    control.kernel.enable(board.settle_ticks());
+                    Some(here)
+                }
+                _ if is_aborted => control.kernel.rest_here(),
+                _ => None,
+            };
+            if let Some(here) = here {
+                streamed.restart(&mut control.intake, here);
+            }
+            if requests.resumes {
+                control.kernel.resume();
+            }
+            here.is_some()
+        })
+    }
+
+    /// Switches spindle and coolant where the program says so, and all off where it was given up.
+    // In its own stack frame, as `act`, `line` and `transmit`: what they need is free again while motion is planned.
+    #[inline(never)]
+    fn switch<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        is_given_up: bool,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) {
+        let to = match self.streamed.state() {
+            _ if is_given_up => OutputState::OFF,
+            State::Failed => OutputState::OFF,
+            // Nothing turns before the drives hold the machine.
+            _ if !control.lock(|control| control.kernel.is_on()) => return,
+            _ => match self.streamed.switch() {
+                Some(to) => to,
+                None => return,
+            },
+        };
+        if core::mem::replace(&mut self.is_on, to != OutputState::OFF) || self.is_on {
+            control.lock(|control| control.switch(to));
+        }
+    }
+
+    /// A line to log, if any, at tick `now`; for boards with a log, right after a tick. Bytes of the link were lost
+    /// `bytes_lost` times since the start.
+    #[inline(never)]
+    pub fn line<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        now: u32,
+        bytes_lost: u32,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) -> Option<LogLine<R, AXES>> {
+        let fault = control.lock(|control| control.seen().fault);
+        let had_faulted = core::mem::replace(&mut self.has_faulted, fault.is_some());
+        if let Some(fault) = fault
+            && !had_faulted
+        {
+            self.dump = FlightDump::default();
+            return Some(LogLine::Fault(fault));
+        }
+        let had_refused = core::mem::replace(&mut self.has_refused, self.refused.is_some());
+        if let Some(error) = self.refused
+            && !had_refused
+        {
+            return Some(LogLine::Refused(error.of_any_source()));
+        }
+        if fault.is_some()
+            && let Some(line) = self.dump.line(now, &self.board, control)
+        {
+            return Some(line);
+        }
+        self.report.line(now, &self.board, [self.streamed.starvations(), bytes_lost], control)
+    }
+
+    /// Notes the duration of a poll, log included, in cycles of the board's counter.
+    pub fn note_poll(&mut self, cycles: u32) {
+        self.report.note_poll(cycles);
+    }
+
+    /// Writes the next frame for the PC to `out`, which needs [`FRAME_MAX`](motion_kernel::link::FRAME_MAX) bytes, at the time
+    /// `now_ms`, which may wrap; returns its length, 0 if there is nothing to say.
+    #[inline(never)]
+    pub fn transmit<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        now_ms: u32,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+        out: &mut [u8],
+    ) -> usize {
+        let Self { streamed, parameters, new_parameters, .. } = self;
+        let length = streamed.link_mut().transmit_parameters(parameters, new_parameters, out);
+        if length > 0 {
+            return length;
+        }
+        if now_ms.wrapping_sub(self.status_ms) < STATUS_MS {
+            return self.streamed.transmit(now_ms, None, out);
+        }
+        self.status_ms = now_ms;
+        let (live, starvations) = (self.streamed.state(), self.streamed.starvations());
+        let status = control.lock(|control| {
+            let (trace, is_off) = (control.kernel.trace(), control.kernel.is_off());
+            Status {
+                // Counts wrap.
+                tick: trace.tick as u32,
+                state: machine_state(is_off, live, trace.executed.state),
+                set: trace.axes.each_ref().map(|axis| axis.set),
+                actual: trace.axes.each_ref().map(|axis| axis.actual),
+                feed_mm_s: trace.executed.motion.v_mm_s.to_f64(),
+                line: trace.executed.line,
+                // What has come is known where it is written.
+                aborts: 0,
+                taken: 0,
+                is_ended: false,
+                starvations,
+                is_ready: control.is_healthy(),
+                fault: trace.fault.map(|fault| fault.to_f64()),
+            }
+        });
+        self.streamed.transmit(
+            now_ms,
+            Some(&|came: Came| Status {
+                aborts: came.aborts,
+                taken: came.taken,
+                is_ended: came.is_ended,
+                ..status
+            }),
+            out,
+        )
+    }
+}
+
+/// What the machine does, by its drives, live control and the tick.
+fn machine_state(is_off: bool, live: State, tick: ExecState) -> MachineState {
+    match (live, tick) {
+        _ if is_off => MachineState::Off,
+        (State::Failed, _) => MachineState::Refused,
+        (_, ExecState::Stopped) => MachineState::Stopped,
+        (_, ExecState::Dwell) => MachineState::Dwell,
+        (State::Held | State::Aborted, _) => MachineState::Held,
+        (State::Waiting | State::Done, ExecState::Idle) => MachineState::Idle,
+        (State::Running, ExecState::Held) => MachineState::Starved,
+        _ => MachineState::Moving,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motion_kernel::fault::FaultKind;
+    use motion_kernel::flight::FlightRecorder;
+    use motion_kernel::hal::{BoardOutputs, Spindle};
+    use motion_kernel::kernel::Kernel;
+    use motion_kernel::link::{Event, FRAME_MAX, HostLink, Identity, Mode, PROTOCOL};
+    use motion_kernel::program::Item;
+    use motion_kernel::queue::LiveStreams;
+    use motion_kernel::units::{Counts, Position};
+    use rtic_core::Exclusive;
+
+    use super::*;
+    use crate::fixture::{AXES, BOARD, IdealDrives, TICK_S, end, machine};
+    use crate::runs::to_start;
+
+    type Host = HostLink<AXES, 64, 8192>;
+    type State = MachineState;
+
+    const ITEMS: usize = 8;
+    const IDENTITY: Identity = Identity {
+        protocol: PROTOCOL,
+        format: 5,
+        axes: AXES as u16,
+        is_fixed_point: false,
+        tick_s: TICK_S,
+        items: ITEMS as u16,
+        outputs: BoardOutputs::FixedSpeed,
+        machine: 0,
+    };
+
+    /// A program from `from` on: a straight way to the stringer's start, and the stringer.
+    fn stringer(from: [Position; AXES]) -> Vec<Option<Item<AXES>>> {
+        let machine = machine();
+        let way = to_start(machine.header(), from)
+            .expect("a way")
+            .map(|item| item.unwrap_or_else(|never| match never {}));
+        way.chain(machine.program.items().map(|item| item.expect("sound"))).map(Some).chain([None]).collect()
+    }
+
+    /// What an operator's side knows and does.
+    struct Operator {
+        host: Host,
+        status: Option<Status<AXES>>,
+        /// What it still has to send.
+        items: std::collections::VecDeque<Option<Item<AXES>>>,
+        is_ready: bool,
+        /// The fault that the board's inputs find from now on.
+        unhealthy: Option<FaultKind<f32>>,
+        /// The board's own hold.
+        is_held: bool,
+    }
+
+    impl Operator {
+        fn state(&self) -> Option<State> {
+            self.status.map(|status| status.state)
+        }
+
+        /// Everything is sent and driven.
+        fn is_done(&self) -> bool {
+            self.items.is_empty()
+                && self.host.waiting() == 0
+                && self.status.is_some_and(|status| {
+                    status.state == State::Idle
+                        && status.aborts == self.host.controls().aborts
+                        && status.taken == self.host.confirmed()
+                })
+        }
+    }
+
+    /// What was seen of a board.
+    struct Seen {
+        /// Every state with the set position when it was told first.
+        states: Vec<(State, [Position; AXES])>,
+        drives: IdealDrives,
+        lines: Vec<LogLine<f32, AXES>>,
+    }
+
+    /// A board and an operator over a good wire, until `script` says that it is over; it is called before every tick.
+    fn board(mut script: impl FnMut(u32, &mut Operator) -> bool) -> Seen {
+        let machine = machine();
+        let header = *machine.header();
+        let mut flight = FlightRecorder::<f32, AXES, 16, 8>::new();
+        let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+        let (feeder, intake) = streams.split(header.rules, header.start);
+        let kernel = Kernel::new(&machine.axes, header.start, [Counts(0); AXES]);
+        let mut control = Control::new(kernel, intake, &mut flight);
+        let link = BoardLink::new(3, IDENTITY);
+        let mut linked = Linked::<f32, AXES, ITEMS, 64, 0>::new(&BOARD, link, feeder, header.pulse);
+        let mut drives = IdealDrives::new();
+        let mut operator = Operator {
+            host: Host::new(1),
+            status: None,
+            items: std::collections::VecDeque::new(),
+            is_ready: false,
+            unhealthy: None,
+            is_held: false,
+        };
+        let (mut out, mut to_board) = ([0; FRAME_MAX], std::collections::VecDeque::new());
+        let (mut states, mut lines): (Vec<(State, _)>, _) = (Vec::new(), Vec::new());
+        for now in 1..200_000 {
+            if script(now, &mut operator) {
+                return Seen { states, drives, lines };
+            }
+            let Operator { host, items, status, is_ready, unhealthy, is_held } = &mut operator;
+            while let Some(item) = items.front()
+                && *is_ready
+                && host.push(item.as_ref()).expect("short")
+            {
+                items.pop_front();
+            }
+            let now_ms = now / 2;
+            let length = host.transmit(now_ms, &mut out);
+            to_board.extend(out[..length].iter().copied());
+            drives.now = now;
+            control.tick(*unhealthy, None, &mut drives);
+            let mut control = Exclusive(&mut control);
+            lines.extend(linked.line(now, 0, &mut control));
+            linked.poll_unless(&|| *is_held, &mut || to_board.pop_front(), &mut control);
+            let length = linked.transmit(now_ms, &mut control, &mut out);
+            host.receive(&out[..length], now_ms, &mut |event| match event {
+                Event::Status(told) => {
+                    if states.last().is_none_or(|(state, _)| *state != told.state) {
+                        states.push((told.state, told.set));
+                    }
+                    *status = Some(told);
+                }
+                Event::Ready { .. } => *is_ready = true,
+                Event::Welcome(identity) => assert_eq!(identity, IDENTITY),
+                other => panic!("{other:?}"),
+            });
+        }
+        panic!("it never ends: {states:?}")
+    }
+
+    /// The states alone.
+    fn names(seen: &Seen) -> Vec<State> {
+        seen.states.iter().map(|&(state, _)| state).collect()
+    }
+
+    /// Enables, drives the stringer from where the machine stands, and is over.
+    fn drive(step: &mut u32, operator: &mut Operator) -> bool {
+        match *step {
+            0 if operator.status.is_some_and(|status| status.is_ready) => {
+                assert!(operator.host.enable(true));
+                operator.is_ready = false;
+                *step = 1;
+            }
+            1 if operator.is_ready && operator.state() == Some(State::Held) => {
+                operator.items.extend(stringer(operator.status.expect("held").set));
+                assert!(operator.host.press(Mode::Run));
+                *step = 2;
+            }
+            2 if operator.is_done() => *step = 3,
+            _ => {}
+        }
+        *step == 3
+    }
+
+    #[test]
+    fn a_program_is_driven_from_where_the_machine_stands() {
+        let mut step = 0;
+        let seen = board(|_, operator| drive(&mut step, operator));
+        assert_eq!(names(&seen), [State::Off, State::Held, State::Moving, State::Idle]);
+        assert_eq!(seen.states.last().map(|(_, set)| *set), Some(end()));
+        assert!(seen.drives.is_enabled);
+    }
+
+    /// Off before the operator's command, whatever else was pressed.
+    #[test]
+    fn only_the_operators_command_enables() {
+        let seen = board(|now, operator| {
+            if now % 300 == 100 && operator.is_ready {
+                assert!(operator.host.press(Mode::Run));
+                operator.items.push_back(Some(Item::Switch(ON)));
+                operator.items.extend(stringer(machine().header().start));
+            }
+            now == 5000
+        });
+        assert_eq!(names(&seen), [State::Off]);
+        assert!(!seen.drives.is_enabled && seen.drives.switched.is_empty());
+    }
+
+    /// An abort in the middle of a program that the board has only the beginning of: nothing of it is driven any more, and
+    /// another program follows from where the machine came to rest.
+    #[test]
+    fn after_an_abort_another_program_is_driven() {
+        for at in [2000, 2500, 3100, 4000] {
+            println!("abort at {at}");
+            let (mut step, mut next) = (0, 1);
+            let seen = board(|now, operator| {
+                if now < at {
+                    assert!(!drive(&mut step, operator));
+                    return false;
+                }
+                if now == at {
+                    assert!(
+                        operator.host.abort()
+                            && operator.host.control(|controls| {
+                                controls.override_permille = 500;
+                            })
+                    );
+                    operator.items.clear();
+                    operator.is_ready = false;
+                    return false;
+                }
+                drive(&mut next, operator)
+            });
+            use MachineState::{Held, Idle, Moving, Off};
+            assert_eq!(names(&seen), [Off, Held, Moving, Held, Moving, Idle], "{:?}", seen.states);
+            let ((_, before), (_, after)) = (seen.states[3], seen.states[4]);
+            // Comes to rest at a place of the path, and goes on from there.
+            assert_ne!(before, end());
+            let gone_mm = after.iter().zip(&before).map(|(a, b)| (*a - *b).to_mm().abs()).fold(0.0, f64::max);
+            assert!(gone_mm < 1.0, "{gone_mm}");
+            assert_eq!(seen.states[5].1, end());
+        }
+    }
+
+    /// The emergency stop in motion: off, with the fault until it is cleared; nothing moves before drives are enabled again.
+    #[test]
+    fn a_fault_is_told_and_cleared() {
+        let (mut step, mut next, mut is_off) = (0, 0, 0);
+        let seen = board(|now, operator| {
+            match now {
+                ..3000 => {
+                    drive(&mut step, operator);
+                    return false;
+                }
+                3000 => operator.unhealthy = Some(FaultKind::EmergencyStop),
+                3600 => {
+                    let fault = operator.status.and_then(|status| status.fault).expect("a fault");
+                    assert_eq!((fault.kind, fault.tick), (FaultKind::EmergencyStop, 2999));
+                    // Neither is obeyed in a fault.
+                    assert!(operator.host.enable(true) && operator.host.press(Mode::Run));
+                    operator.items.clear();
+                    operator.unhealthy = None;
+                }
+                4000 => {
+                    assert_eq!(operator.state(), Some(State::Off));
+                    assert!(operator.host.clear_fault());
+                }
+                4100.. => {
+                    let status = operator.status.expect("told");
+                    assert_eq!(status.fault, None);
+                    is_off += u32::from(now < 4200 && status.state == State::Off);
+                    return now > 4200 && drive(&mut next, operator);
+                }
+                _ => {}
+            }
+            false
+        });
+        use MachineState::{Held, Idle, Moving, Off};
+        assert_eq!(is_off, 100);
+        let names = names(&seen);
+        assert_eq!(names.first_chunk(), Some(&[Off, Held, Moving]));
+        assert_eq!(names.last_chunk(), Some(&[Off, Held, Moving, Idle]), "{names:?}");
+        assert_eq!(seen.states.last().map(|(_, set)| *set), Some(end()));
+        // The log has the fault once, and then what the flight recorder kept.
+        let told = seen.lines.iter().filter(|line| matches!(line, LogLine::Fault(_)));
+        let rows = seen.lines.iter().filter(|line| matches!(line, LogLine::Flight(_)));
+        assert_eq!((told.count(), rows.count()), (1, 16));
+    }
+
+    /// An item that does not follow the one before it: told by the state and once in the log.
+    #[test]
+    fn what_is_refused_is_told() {
+        let mut step = 0;
+        let seen = board(|_, operator| {
+            let before = step;
+            assert!(!drive(&mut step, operator));
+            if (before, step) == (1, 2) {
+                // Without the way to the start.
+                operator.items.drain(..4);
+            }
+            operator.state() == Some(State::Refused)
+        });
+        let told: Vec<_> = seen.lines.iter().filter(|line| matches!(line, LogLine::Refused(_))).collect();
+        assert!(matches!(told[..], [LogLine::Refused(SupplyError::Rejected(_))]), "{told:?}");
+    }
+
+    /// The board's own hold, short or long: at rest until it is over and the operator resumes.
+    #[test]
+    fn a_hold_on_the_board_waits_for_the_operator() {
+        for ticks in [1, 1500] {
+            let mut step = 0;
+            let seen = board(|now, operator| {
+                operator.is_held = (2500..2500 + ticks).contains(&now);
+                // What is pressed while it lasts is in vain.
+                if now == 3500 || now == 2500 + ticks + 1500 {
+                    assert_eq!(operator.state(), Some(State::Held), "{ticks} {now}");
+                    assert!(now == 3500 && ticks == 1 || operator.host.press(Mode::Run));
+                }
+                drive(&mut step, operator)
+            });
+            use MachineState::{Held, Idle, Moving, Off};
+            assert_eq!(names(&seen), [Off, Held, Moving, Held, Moving, Idle]);
+            assert_eq!(seen.states.last().map(|(_, set)| *set), Some(end()));
+        }
+    }
+
+    const ON: OutputState =
+        OutputState { spindle: Spindle::Clockwise, speed_rpm: 9000.0, flood: true, mist: false };
+
+    /// Spindle and coolant on before the motion and off after it, or off because of an abort.
+    #[test]
+    fn outputs_are_switched_and_off_after_an_abort() {
+        for is_aborted in [false, true] {
+            let mut step = 0;
+            let seen = board(|now, operator| {
+                let before = step;
+                let is_over = drive(&mut step, operator);
+                if (before, step) == (1, 2) {
+                    operator.items.push_front(Some(Item::Switch(ON)));
+                    operator.items.insert(operator.items.len() - 1, Some(Item::Switch(OutputState::OFF)));
+                }
+                if is_aborted && now == 3000 {
+                    assert!(operator.host.abort());
+                    operator.items.clear();
+                }
+                is_over || is_aborted && now == 5000
+            });
+            let switched: Vec<_> = seen.drives.switched.iter().map(|&(_, to)| to).collect();
+            assert_eq!(switched, [ON, OutputState::OFF]);
+            assert_eq!(seen.drives.switched[1].0 < 4500, is_aborted, "{:?}", seen.drives.switched);
+        }
+    }
+
+    /// An abort at a program stop, in a dwell of minutes, and after an item that can't be executed: another program follows.
+    #[test]
+    fn an_abort_waits_for_nothing() {
+        let dwell = Item::Dwell(motion_kernel::law::Ticks::from_seconds(600.0, TICK_S).expect("some ticks"));
+        let stringer_of = |from| stringer(from).into_iter().flatten();
+        let far = stringer_of(end()).find(|item| matches!(item, Item::Line { .. })).expect("a line");
+        let waits = [(Item::Stop, State::Stopped), (dwell, State::Dwell), (far, State::Refused)];
+        for (item, state) in waits {
+            let (mut step, mut next, mut aborted) = (0, 1, None);
+            let seen = board(|now, operator| {
+                if let Some(aborted) = aborted {
+                    assert!(now < aborted + 8000, "it waits at {:?}", operator.state());
+                    return drive(&mut next, operator);
+                }
+                let before = step;
+                drive(&mut step, operator);
+                if (before, step) == (1, 2) {
+                    operator.items.clear();
+                    operator.items.push_front(Some(item));
+                }
+                if operator.state() == Some(state) {
+                    assert!(operator.host.abort());
+                    (aborted, operator.is_ready) = (Some(now), false);
+                    operator.items.clear();
+                }
+                false
+            });
+            assert_eq!(seen.states.last(), Some(&(State::Idle, end())), "{state:?}");
+        }
+    }
+
+    /// A program stop waits for the operator, and goes on.
+    #[test]
+    fn a_program_stop_waits() {
+        let (mut step, mut stopped) = (0, 0);
+        let seen = board(|_, operator| {
+            let before = step;
+            let is_over = drive(&mut step, operator);
+            if (before, step) == (1, 2) {
+                operator.items.push_front(Some(Item::Stop));
+            }
+            if operator.state() == Some(State::Stopped) {
+                stopped += 1;
+                if stopped == 500 {
+                    assert!(operator.host.press(Mode::Run));
+                }
+            }
+            is_over
+        });
+        use MachineState::{Held, Idle, Moving, Off, Stopped};
+        assert!(stopped >= 500);
+        let names: Vec<_> =
+            names(&seen).into_iter().filter(|state| !matches!(state, Idle | Moving)).collect();
+        assert_eq!(names, [Off, Held, Stopped]);
+        assert_eq!(seen.states.last().map(|(state, set)| (*state, *set)), Some((Idle, end())));
+    }
+}

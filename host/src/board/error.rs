@@ -1,0 +1,200 @@
+//! Why a board or a wire refuses. Displays as "found …, expected …", without the port's name.
+
+use std::io;
+
+use motion_kernel::hal::BoardOutputs;
+use motion_kernel::link::WriteError;
+use motion_kernel::program::ProgramError;
+use thiserror::Error;
+
+/// What a board and a program have to agree on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Agreement {
+    /// The version of the link's protocol.
+    Protocol,
+    /// The version of the format of items.
+    Format,
+    /// The number of axes.
+    Axes,
+    /// The control tick.
+    Tick,
+    /// The machine's parameters, by their checksum.
+    Machine,
+}
+
+/// Why a board does not drive a program.
+#[derive(Debug, Error)]
+pub enum BoardError {
+    /// The wire can't be opened.
+    #[error("found {0}, expected a board")]
+    Wire(#[from] io::Error),
+    /// Nothing answers.
+    #[error("found no answer, expected a board that speaks the link's protocol")]
+    Silent,
+    /// The board is for something else.
+    #[error("found a board with {}, expected {}", shown(*.what, .found), shown(*.what, .expected))]
+    Disagrees {
+        /// In what.
+        what: Agreement,
+        /// What the board has.
+        found: String,
+        /// What the program is for.
+        expected: String,
+    },
+    /// The program switches what the board has no output for.
+    #[error("{program}:{line}: found {found}, expected what the board has outputs for: {}", outputs(*.has))]
+    Outputs {
+        /// The program.
+        program: String,
+        /// Its line.
+        line: u32,
+        /// What it switches.
+        found: &'static str,
+        /// What there is.
+        has: BoardOutputs,
+    },
+    /// The drives are off, and were not to be switched on.
+    #[error("found the drives off, expected --enable, which switches them on")]
+    Off,
+    /// The drives do not go on.
+    #[error("found drives that stay off, expected {}",
+        if *.is_ready { "them on" } else { "inputs that allow it: the emergency stop closed, no drive in a fault" })]
+    StaysOff {
+        /// The inputs allow it.
+        is_ready: bool,
+    },
+    /// Somebody has switched the drives off.
+    #[error("found the drives switched off, expected them on")]
+    SwitchedOff,
+    /// The board is in a fault.
+    #[error("fault in tick {tick}: {told}")]
+    Fault {
+        /// The tick in which it was found.
+        tick: u64,
+        /// What.
+        told: String,
+    },
+    /// The board has a part of this program.
+    #[error(
+        "found {has} of the program's {of} items (its end is one) on the board, expected --continue to go on after them, or --restart to \
+         give them up"
+    )]
+    Begun {
+        /// Items that the board has.
+        has: u32,
+        /// Items of the program.
+        of: u32,
+    },
+    /// The program can't be gone on with.
+    #[error(
+        "found {why}, expected a program that was held or waits for --continue: where the drives were off it can only be \
+         driven from its start, with --restart"
+    )]
+    Interrupted {
+        /// Why not.
+        why: &'static str,
+    },
+    /// Another sender has the board.
+    #[error("found another sender that has asked the board since, expected to be the only one")]
+    Replaced,
+    /// The board does not come to rest.
+    #[error("found a board that does not come to rest, expected an abort to be obeyed")]
+    Moves,
+    /// The board has another program.
+    #[error(
+        "found a board with another program under way, expected one at rest, or --restart to give that up"
+    )]
+    Busy,
+    /// The board has nothing of this program.
+    #[error("found nothing of this program on the board, expected some of it for --continue")]
+    NotBegun,
+    /// There is no way to the program's start.
+    #[error("found no way to the program's start: {0}")]
+    NoWay(motion_kernel::straight::StraightError),
+    /// The board was reset.
+    #[error(
+        "found a board that has started anew, expected it to go on: it had confirmed {confirmed} items{at}"
+    )]
+    Reset {
+        /// Items that it had confirmed.
+        confirmed: u32,
+        /// The program line there.
+        at: String,
+    },
+    /// The board can't read or execute an item.
+    #[error("found an item that the board refuses{at}, expected all to be executable")]
+    Item {
+        /// The program line there.
+        at: String,
+    },
+    /// The board does not take new parameters.
+    #[error("found {}", refusal(.0))]
+    Parameters(WriteError),
+    /// What it has are no parameters.
+    #[error("found parameters on the board that can't be read: {0}")]
+    NoParameters(ProgramError),
+    /// An item is longer than a frame.
+    #[error("found an item of more bytes than a frame has: {0}")]
+    Long(postcard::Error),
+}
+
+impl BoardError {
+    /// Whether the user's input is wrong, and not what the board or the wire did.
+    #[must_use]
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Wire(_)
+            | Self::Silent
+            | Self::StaysOff { .. }
+            | Self::SwitchedOff
+            | Self::Fault { .. }
+            | Self::Reset { .. }
+            | Self::Item { .. }
+            | Self::Replaced
+            | Self::Moves
+            | Self::NoParameters(_)
+            | Self::Long(_) => false,
+            Self::Disagrees { .. }
+            | Self::Outputs { .. }
+            | Self::Off
+            | Self::Begun { .. }
+            | Self::Busy
+            | Self::NotBegun
+            | Self::Interrupted { .. }
+            | Self::Parameters(_)
+            | Self::NoWay(_) => true,
+        }
+    }
+}
+
+fn shown(what: Agreement, value: &str) -> String {
+    match what {
+        Agreement::Protocol => format!("protocol {value}"),
+        Agreement::Format => format!("format {value} of items"),
+        Agreement::Axes => format!("{value} axes"),
+        Agreement::Tick => format!("a tick of {value} s"),
+        Agreement::Machine => format!("the machine {value}"),
+    }
+}
+
+fn refusal(error: &WriteError) -> String {
+    match error {
+        WriteError::DrivesOn => "the drives on, expected them off for new parameters".to_owned(),
+        WriteError::Length { room } => {
+            format!("more parameters than the board has room for, expected {room} bytes")
+        }
+        WriteError::Unsuitable => {
+            "parameters that the board refuses, expected its axes and tick, and counts that its inputs pass"
+                .to_owned()
+        }
+        WriteError::Storage => "a board that can't store parameters, expected one that can".to_owned(),
+    }
+}
+
+fn outputs(has: BoardOutputs) -> &'static str {
+    match has {
+        BoardOutputs::None => "none",
+        BoardOutputs::FixedSpeed => "a spindle that turns clockwise at one speed, and coolant",
+        BoardOutputs::CommandedSpeed => "a spindle at any speed, and coolant",
+    }
+}

@@ -1,0 +1,30 @@
+//! Motion boards over a wire, and a simulated one that is driven in the same way.
+//!
+//! Consumes a [`Job`], the items of a program; produces motion on a board, and what the board tells of it. Nothing here
+//! decides about motion: the board plans and comes to rest by itself, whatever becomes of the wire.
+//!
+//! - [`port`]: where a board is: an address, a serial port, the simulator;
+//! - [`wire`]: bytes in and out;
+//! - [`connection`]: the link over a wire that may come and go;
+//! - [`job`]: the items of a program for a board's axes, and its name;
+//! - [`sender`]: drives a job, step by step;
+//! - [`parameters`]: a board's parameters, read, written and compared;
+//! - [`simulator`]: a board with a simulated machine, in a thread or behind an address;
+//! - [`emulated`]: a board in an emulator;
+//! - [`error`]: what boards and wires refuse.
+
+pub mod port;
+pub mod wire;
+pub mod connection;
+pub mod job;
+pub mod sender;
+pub mod parameters;
+pub mod simulator;
+pub mod emulated;
+pub mod error;
+
+pub use connection::{Connection, Heard};
+pub use error::BoardError;
+pub use job::Job;
+pub use port::Port;
+pub use sender::{Sender, Step};

@@ -1,0 +1,402 @@
+//! Programs on the simulated board, over wires that break: everything is driven once and to its end, whatever becomes of the
+//! wire and of who sends.
+
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use motion_host::board::job::parameters;
+use motion_host::board::parameters::{Figures, read, write};
+use motion_host::board::sender::{Found, Permissions};
+use motion_host::board::simulator::{self, SimulatedBoard};
+use motion_host::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
+use motion_host::machine::Machine;
+use motion_host::planning::Executable;
+use motion_kernel::link::{State, WriteError};
+use motion_kernel::program::Item;
+use motion_kernel::units::Position;
+use motion_tests::check::planned;
+
+/// So many times as fast as the wall clock.
+const PACE: f64 = 20.0;
+/// Against a test that hangs; nothing is compared with it.
+const LONGEST: Duration = Duration::from_secs(300);
+
+/// Zigzag of straight lines, blended, so that all of it is one stretch: several times the items that a board has room for.
+fn zigzag(lines: u32) -> String {
+    let lines: String =
+        (1..=lines).map(|line| format!("G1 X{} Y{} F3000\n", f64::from(line) * 0.7, line % 2)).collect();
+    format!("G21 G90 G64 P0.05\n{lines}M2\n")
+}
+
+fn job(text: &str, machine: &Machine) -> Job<3> {
+    let plan = planned(text, machine).expect("a plan");
+    Job::new(machine, &Executable::new::<f32>(&plan).expect("executable").items)
+}
+
+/// Where a job ends.
+fn end(job: &Job<3>) -> [Position; 3] {
+    let end = job.items.iter().rev().find_map(|item| match item {
+        Item::EndOfStretch(end) => Some(*end),
+        _ => None,
+    });
+    end.expect("a stretch")
+}
+
+fn board(machine: &Machine, session: u32) -> (SimulatedBoard, SocketAddr) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("bound");
+    (simulator::listen(machine, session, listener, PACE).expect("a board"), address)
+}
+
+fn connect(address: SocketAddr, asker: u32) -> Connection<3> {
+    let port: Port = format!("tcp:{address}").parse().expect("an address");
+    Connection::open(Box::new(move || port.open(0)), asker).expect("a board")
+}
+
+const ENABLES: Permissions =
+    Permissions { enables: true, clears_fault: false, disables: false, found: Found::Stays };
+
+/// Drives a job to its end; `each` is called after every step of the connection.
+fn drive(
+    job: &Job<3>,
+    may: Permissions,
+    connection: &mut Connection<3>,
+    mut each: impl FnMut(&mut Connection<3>, &mut Sender<'_, 3>, &[Heard<3>]) -> bool,
+) -> Result<Step, BoardError> {
+    let names = ["X", "Y", "Z"].map(str::to_owned);
+    let (mut sender, begin) = (Sender::new(job, &names, may), Instant::now());
+    loop {
+        assert!(begin.elapsed() < LONGEST, "it hangs: {:?} {:?}", sender.step(), connection.status());
+        let mut heard = Vec::new();
+        connection.step(Duration::from_millis(1), &mut |one| heard.push(one));
+        for one in &heard {
+            sender.hear(one)?;
+        }
+        let is_over = each(connection, &mut sender, &heard);
+        let step = sender.advance(connection)?;
+        if is_over || matches!(step, Step::Done | Step::Aborted) {
+            return Ok(step);
+        }
+    }
+}
+
+/// Where the machine stands, as told last.
+fn stands(connection: &Connection<3>) -> [Position; 3] {
+    connection.status().expect("told").set
+}
+
+#[test]
+fn a_job_is_driven_and_again() {
+    let machine = Machine::reference();
+    let job = job(&zigzag(120), &machine);
+    assert!(job.items.len() > 400, "{}", job.items.len());
+    let (_board, address) = board(&machine, 1);
+    let mut connection = connect(address, 1);
+    for _ in 0..2 {
+        assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+        assert_eq!(stands(&connection), end(&job));
+        assert_eq!(connection.status().map(|status| status.starvations), Some(0));
+    }
+}
+
+/// A wire between, which can be cut.
+struct Cable {
+    address: SocketAddr,
+    is_cut: Arc<AtomicBool>,
+}
+
+impl Cable {
+    fn to(board: SocketAddr) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let (address, is_cut) = (listener.local_addr().expect("bound"), Arc::new(AtomicBool::new(false)));
+        let cut = Arc::clone(&is_cut);
+        thread::spawn(move || {
+            for near in listener.incoming().flatten() {
+                // As an address where nobody is.
+                if cut.load(Ordering::Relaxed) {
+                    continue;
+                }
+                let far = TcpStream::connect(board).expect("a board");
+                for (from, to) in [(&near, &far), (&far, &near)] {
+                    let (from, to) = (from.try_clone().expect("a socket"), to.try_clone().expect("a socket"));
+                    let cut = Arc::clone(&cut);
+                    thread::spawn(move || forward(from, to, &cut));
+                }
+            }
+        });
+        Self { address, is_cut }
+    }
+
+    fn cut(&self, is_cut: bool) {
+        self.is_cut.store(is_cut, Ordering::Relaxed);
+    }
+}
+
+/// Until one end is closed, or the cable is cut: in the middle of what is under way.
+fn forward(mut from: TcpStream, mut to: TcpStream, cut: &AtomicBool) {
+    let mut bytes = [0; 64];
+    let _ = from.set_read_timeout(Some(Duration::from_millis(5)));
+    loop {
+        let read = from.read(&mut bytes);
+        if cut.load(Ordering::Relaxed) {
+            break;
+        }
+        let is_passed = match read {
+            Ok(0) => false,
+            Ok(count) => to.write_all(&bytes[..count]).is_ok(),
+            Err(error) => matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut),
+        };
+        if !is_passed {
+            break;
+        }
+    }
+    let _ = from.shutdown(std::net::Shutdown::Both);
+    let _ = to.shutdown(std::net::Shutdown::Both);
+}
+
+/// The cable is cut and plugged in again, several times in a program: motion comes to rest, the board is held when it is back,
+/// and goes on after the operator's resume, with no item twice.
+#[test]
+fn a_cable_that_was_cut_is_a_hold() {
+    let machine = Machine::reference();
+    let job = job(&zigzag(150), &machine);
+    let (_board, address) = board(&machine, 2);
+    let cable = Cable::to(address);
+    let mut connection = connect(cable.address, 2);
+    let (mut cuts, mut since, mut backs) = (0, None::<Instant>, 0);
+    let mut rests = Vec::new();
+    let step = drive(&job, ENABLES, &mut connection, |connection, sender, heard| {
+        let taken = connection.status().map_or(0, |status| status.taken);
+        if sender.step() == Step::Drives && since.is_none() && cuts < 4 && taken > 100 * (cuts + 1) {
+            cable.cut(true);
+            (cuts, since) = (cuts + 1, Some(Instant::now()));
+        }
+        // Longer than the board has items for.
+        if since.is_some_and(|since| since.elapsed() > Duration::from_secs(1)) {
+            cable.cut(false);
+        }
+        backs += heard.iter().filter(|one| **one == Heard::Back).count() as u32;
+        let state = connection.status().map(|status| status.state);
+        if since.is_some() && !connection.is_lost() && backs == cuts && state == Some(State::Held) {
+            rests.push(stands(connection));
+            since = None;
+            assert!(sender.resume(connection));
+        }
+        false
+    });
+    assert_eq!((step.expect("driven"), cuts, backs), (Step::Done, 4, 4));
+    assert!(rests.windows(2).all(|pair| pair[0] != pair[1]) && !rests.contains(&end(&job)), "{rests:?}");
+    assert_eq!(stands(&connection), end(&job));
+}
+
+/// Who sends is gone in the middle, as by a kill: another one finds the program on the board, and goes on after it.
+#[test]
+fn another_sender_goes_on() {
+    let machine = Machine::reference();
+    let (job, other) = (job(&zigzag(150), &machine), job(&zigzag(20), &machine));
+    let (_board, address) = board(&machine, 3);
+    let mut gone_at = 0;
+    let mut connection = connect(address, 3);
+    drive(&job, ENABLES, &mut connection, |connection, sender, _| {
+        gone_at = connection.next().unwrap_or(gone_at);
+        sender.step() == Step::Drives && gone_at > 300
+    })
+    .expect("no fault");
+    drop(connection);
+    // Whose it is not.
+    let refused = drive(&other, ENABLES, &mut connect(address, 4), |_, _, _| false);
+    assert!(matches!(refused, Err(BoardError::Busy)), "{refused:?}");
+    let continued = Permissions { found: Found::Continued, ..ENABLES };
+    let refused = drive(&other, continued, &mut connect(address, 5), |_, _, _| false);
+    assert!(matches!(refused, Err(BoardError::NotBegun)), "{refused:?}");
+    // Who does not say what is to become of it.
+    let refused = drive(&job, ENABLES, &mut connect(address, 6), |_, _, _| false);
+    let of = job.items.len() as u32 + 1;
+    let is_begun =
+        matches!(refused, Err(BoardError::Begun { has, of: all }) if all == of && (1..of).contains(&has));
+    assert!(is_begun, "{refused:?}");
+    let mut connection = connect(address, 7);
+    let mut first = None;
+    let step = drive(&job, continued, &mut connection, |connection, sender, _| {
+        if sender.step() == Step::Greets {
+            first = connection.next().or(first);
+        }
+        assert_ne!(sender.step(), Step::ToStart, "not from the start");
+        false
+    });
+    assert_eq!(step.expect("driven"), Step::Done);
+    assert!(first.is_some_and(|first| (1..=gone_at).contains(&first)), "{first:?} {gone_at}");
+    assert_eq!(stands(&connection), end(&job));
+}
+
+/// A board that was reset knows nothing; the sender says where its program was.
+#[test]
+fn a_reset_is_told_with_the_line() {
+    let machine = Machine::reference();
+    let job = job(&zigzag(150), &machine);
+    let (first, address) = board(&machine, 8);
+    let cable_to = |board| Cable::to(board);
+    let mut first = Some(first);
+    let cable = cable_to(address);
+    let mut connection = connect(cable.address, 8);
+    let mut second = None;
+    let refused = drive(&job, ENABLES, &mut connection, |connection, sender, _| {
+        if sender.step() == Step::Drives
+            && connection.next().is_some_and(|next| next > 300)
+            && second.is_none()
+        {
+            drop(first.take());
+            // The cable leads to where the first one was.
+            let listener = TcpListener::bind(address).expect("the same port");
+            second = Some(simulator::listen(&machine, 9, listener, PACE).expect("a board"));
+        }
+        false
+    });
+    let Err(BoardError::Reset { confirmed, at }) = refused else { panic!("{refused:?}") };
+    assert!((1..job.items.len() as u32).contains(&confirmed), "{confirmed}");
+    let line = job.line_of(confirmed).expect("a line");
+    assert_eq!(at, format!(", at line {line} of the program"));
+}
+
+#[test]
+fn a_board_with_another_machine_is_refused() {
+    let machine = Machine::reference();
+    let job = job(&zigzag(3), &machine);
+    let mut other = Machine::reference();
+    other.axes[1].gains.kp_per_s *= 1.5;
+    let (_board, address) = board(&other, 10);
+    let refused = drive(&job, ENABLES, &mut connect(address, 10), |_, _, _| false);
+    let Err(BoardError::Disagrees { found, expected, .. }) = refused else { panic!("{refused:?}") };
+    assert_eq!(expected, format!("{:08x}", job.machine));
+    assert_ne!(found, expected);
+}
+
+/// Off without the permission, on with it; the emergency stop is a fault until it is closed and cleared.
+#[test]
+fn drives_and_faults() {
+    let machine = Machine::reference();
+    let job = job(&zigzag(60), &machine);
+    let (board, address) = board(&machine, 11);
+    let mut connection = connect(address, 11);
+    let refused = drive(&job, Permissions::default(), &mut connection, |_, _, _| false);
+    assert!(matches!(refused, Err(BoardError::Off)), "{refused:?}");
+    let refused = drive(&job, ENABLES, &mut connection, |connection, sender, _| {
+        board.set_emergency_stop(
+            sender.step() == Step::Drives && connection.next().is_some_and(|next| next > 150),
+        );
+        false
+    });
+    let Err(BoardError::Fault { told, .. }) = refused else { panic!("{refused:?}") };
+    assert_eq!(told, "emergency stop: the emergency stop is open; to clear it: closing it");
+    // Without the permission to clear it, and while it is open.
+    board.set_emergency_stop(true);
+    let refused = drive(&job, ENABLES, &mut connection, |_, _, _| false);
+    assert!(matches!(refused, Err(BoardError::Fault { .. })), "{refused:?}");
+    board.set_emergency_stop(false);
+    // Where the drives were off nothing is gone on with, and what is left of a program is not dropped unasked.
+    let clears = Permissions { clears_fault: true, ..ENABLES };
+    let refused = drive(&job, clears, &mut connection, |_, _, _| false);
+    assert!(matches!(refused, Err(BoardError::Begun { .. })), "{refused:?}");
+    let continued = Permissions { found: Found::Continued, ..clears };
+    let refused = drive(&job, continued, &mut connection, |_, _, _| false);
+    assert!(matches!(refused, Err(BoardError::Interrupted { .. })), "{refused:?}");
+    let clears = Permissions { found: Found::GivenUp, disables: true, ..clears };
+    assert_eq!(drive(&job, clears, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+    // Off, it stands where the encoders say.
+    assert_eq!(connection.status().map(|status| status.state), Some(State::Off));
+    let off_mm = stands(&connection).into_iter().zip(end(&job)).map(|(at, end)| (at - end).to_mm().abs());
+    assert!(off_mm.fold(0.0, f64::max) < 2e-3);
+}
+
+/// Held before anything moves: nothing starts, on the way or after it, until the operator resumes.
+#[test]
+fn a_hold_before_the_start_is_kept() {
+    let machine = Machine::reference();
+    let job = job(&zigzag(20), &machine);
+    let (_board, address) = board(&machine, 13);
+    let mut connection = connect(address, 13);
+    let (mut looks, mut is_resumed) = (0, false);
+    let step = drive(&job, ENABLES, &mut connection, |connection, sender, _| {
+        if looks == 0 {
+            sender.hold(connection);
+        }
+        looks += 1;
+        let moved = connection.status().is_some_and(|status| status.set != job.header.start);
+        assert!(is_resumed || !moved);
+        if sender.step() == Step::Drives && looks > 400 && !is_resumed {
+            is_resumed = sender.resume(connection);
+        }
+        false
+    });
+    assert_eq!((step.expect("driven"), is_resumed), (Step::Done, true));
+    assert_eq!(stands(&connection), end(&job));
+}
+
+#[test]
+fn an_abort_ends_at_rest_on_the_way() {
+    let machine = Machine::reference();
+    let job = job(&zigzag(150), &machine);
+    let (_board, address) = board(&machine, 12);
+    let mut connection = connect(address, 12);
+    let mut is_aborted = false;
+    let step = drive(&job, ENABLES, &mut connection, |connection, sender, _| {
+        if !is_aborted && sender.step() == Step::Drives && connection.next().is_some_and(|next| next > 300) {
+            is_aborted = true;
+            sender.abort(connection);
+        }
+        false
+    });
+    assert_eq!(step.expect("no fault"), Step::Aborted);
+    assert_ne!(stands(&connection), end(&job));
+    assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+    assert_eq!(stands(&connection), end(&job));
+}
+
+/// A board is given another machine while its drives are off, and drives a program for that one then; what differs is named.
+#[test]
+fn a_board_gets_other_parameters() {
+    let machine = Machine::reference();
+    let mut other = Machine::reference();
+    other.axes[1].gains.kp_per_s *= 1.5;
+    let (first, second) = (parameters::<3, 3>(&machine), parameters::<3, 3>(&other));
+    println!("{} bytes for three axes", first.len());
+    let (_board, address) = board(&machine, 20);
+    let mut connection = connect(address, 20);
+    let figures = |record: &[u8]| Figures::of::<3>(record).expect("a record");
+    let read = |connection: &mut Connection<3>| read(connection).expect("an answer");
+    // Before the greeting nothing is asked.
+    assert_eq!(read(&mut connection), first);
+    let differences = figures(&first).differences(&figures(&second));
+    let names: Vec<&str> = differences.iter().map(|difference| difference.name.as_str()).collect();
+    // Guards follow from the gain.
+    assert!(names.first() == Some(&"axes[1].gains.kp_per_s"), "{names:?}");
+    assert!(names.len() < 6 && names.iter().all(|name| name.starts_with("axes[1].")), "{names:?}");
+    // Nothing that is damaged, or for another tick.
+    let mut damaged = second.clone();
+    damaged[100] ^= 1;
+    let slow = parameters::<3, 3>(&Machine { tick_s: 0.001, ..Machine::reference() });
+    for bad in [damaged, slow, vec![1; 3000]] {
+        let refused = write(&mut connection, &bad);
+        let is_refused = match bad.len() {
+            3000 => matches!(refused, Err(BoardError::Parameters(WriteError::Length { room: 2048 }))),
+            _ => matches!(refused, Err(BoardError::Parameters(WriteError::Unsuitable))),
+        };
+        assert!(is_refused, "{refused:?}");
+    }
+    assert_eq!(read(&mut connection), first);
+    write(&mut connection, &second).expect("suits");
+    assert_eq!(read(&mut connection), second);
+    let job = job(&zigzag(20), &other);
+    // There is one wire.
+    drop(connection);
+    let mut connection = connect(address, 21);
+    assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+    // The drives are on now.
+    let refused = write(&mut connection, &first);
+    assert!(matches!(refused, Err(BoardError::Parameters(WriteError::DrivesOn))), "{refused:?}");
+    assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+}
