@@ -3,7 +3,7 @@
 use std::io;
 use std::time::{Duration, Instant};
 
-use motion_kernel::link::{Controls, Event, FRAME_MAX, HostLink, Identity, Mode, Status};
+use motion_kernel::link::{Controls, Event, FRAME_MAX, HostLink, Identity, Mode, PushError, Status};
 use motion_kernel::program::Item;
 
 use super::wire::Wire;
@@ -197,11 +197,16 @@ impl<const N: usize> Connection<N> {
         self.link.next()
     }
 
+    /// An item that the board has already, of a program that is gone on with; see [`HostLink::skip`].
+    pub fn skip(&mut self, item: &Item<N>) {
+        self.link.skip(item);
+    }
+
     /// Takes the next item of a program, or its end; false if there is no room now.
     ///
     /// # Errors
-    /// It is longer than a frame.
-    pub fn push(&mut self, item: Option<&Item<N>>) -> Result<bool, postcard::Error> {
+    /// See [`PushError`].
+    pub fn push(&mut self, item: Option<&Item<N>>) -> Result<bool, PushError> {
         self.link.push(item)
     }
 

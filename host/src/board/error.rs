@@ -3,7 +3,7 @@
 use std::io;
 
 use motion_kernel::hal::BoardOutputs;
-use motion_kernel::link::WriteError;
+use motion_kernel::link::{PushError, WriteError};
 use motion_kernel::program::ProgramError;
 use thiserror::Error;
 
@@ -133,9 +133,9 @@ pub enum BoardError {
     /// What it has are no parameters.
     #[error("found parameters on the board that can't be read: {0}")]
     NoParameters(ProgramError),
-    /// An item is longer than a frame.
-    #[error("found an item of more bytes than a frame has: {0}")]
-    Long(postcard::Error),
+    /// An item can't be sent.
+    #[error("found an item that can't be sent: {0}")]
+    Push(PushError),
 }
 
 impl BoardError {
@@ -153,7 +153,7 @@ impl BoardError {
             | Self::Replaced
             | Self::Moves
             | Self::NoParameters(_)
-            | Self::Long(_) => false,
+            | Self::Push(_) => false,
             Self::Disagrees { .. }
             | Self::Outputs { .. }
             | Self::Off

@@ -264,6 +264,7 @@ impl<'a, const M: usize> Sender<'a, M> {
             }
             Found::Continued => {
                 self.pushed = next as usize;
+                self.job.items.iter().take(self.pushed).for_each(|item| connection.skip(item));
                 self.go(Step::Drives);
                 self.run(connection);
                 return Ok(());
@@ -327,7 +328,7 @@ impl<'a, const M: usize> Sender<'a, M> {
             _ => {}
         }
         while self.pushed <= items.len()
-            && connection.push(items.get(self.pushed)).map_err(BoardError::Long)?
+            && connection.push(items.get(self.pushed)).map_err(BoardError::Push)?
         {
             self.pushed += 1;
         }

@@ -11,6 +11,7 @@ use heapless::Deque;
 use super::frame::{Deframer, FRAME_MAX, Payload};
 use super::message::{Controls, Identity, Mode, Piece, Reply, Request, Status, Taken, WriteError};
 use super::parameters::ParameterBuffer;
+use crate::program::compact::Decoder;
 use crate::program::{Item, Source, take};
 
 /// An answer that was lost is repeated after this time \[ms\].
@@ -27,13 +28,15 @@ pub struct ItemQueue<const AXES: usize, const ITEMS: usize> {
     aborts: u16,
     /// The end of the program has come.
     is_ended: bool,
+    /// What the next item is read with.
+    decoder: Decoder<AXES>,
 }
 
 impl<const AXES: usize, const ITEMS: usize> ItemQueue<AXES, ITEMS> {
     /// Before the first item.
     #[must_use]
     pub const fn new() -> Self {
-        Self { entries: Deque::new(), next: 0, aborts: 0, is_ended: false }
+        Self { entries: Deque::new(), next: 0, aborts: 0, is_ended: false, decoder: Decoder::new() }
     }
 
     /// Drops what is left of a program that was given up, if it is not the one after `aborts`; whether it is not.
@@ -41,7 +44,7 @@ impl<const AXES: usize, const ITEMS: usize> ItemQueue<AXES, ITEMS> {
         let is_new = core::mem::replace(&mut self.aborts, aborts) != aborts;
         if is_new {
             self.entries.clear();
-            (self.next, self.is_ended) = (0, false);
+            (self.next, self.is_ended, self.decoder) = (0, false, Decoder::new());
         }
         is_new
     }
@@ -251,13 +254,16 @@ impl BoardLink {
         if !core::mem::take(&mut self.has_items) {
             return false;
         }
-        let Some((Request::Items { first, .. }, entries)) = take::<Request>(self.deframer.payload()) else {
+        let Some((Request::Items { first, is_last, .. }, bytes)) = take::<Request>(self.deframer.payload()) else {
             return false;
         };
-        let known = items.next.wrapping_sub(first);
         self.is_taken_due = true;
-        self.is_missing = known.cast_signed() < 0;
-        self.is_unreadable = !self.is_missing && !put(entries, known, items);
+        let known = items.next.wrapping_sub(first).cast_signed();
+        self.is_missing = known < 0;
+        // Items are read from the next one on. Where some are known already the PC learns so, and begins there.
+        if known == 0 && !self.is_unreadable {
+            self.is_unreadable = !put(bytes, is_last, items);
+        }
         true
     }
 
@@ -366,26 +372,31 @@ impl BoardLink {
     }
 }
 
-/// Puts what follows the `known` first of `entries` into the queue, as far as there is room; false where one can't be read.
+/// Puts items into the queue, and the program's end, as far as there is room; false where one can't be read.
 fn put<const AXES: usize, const ITEMS: usize>(
-    mut entries: &[u8],
-    known: u32,
+    mut bytes: &[u8],
+    is_last: bool,
     items: &mut ItemQueue<AXES, ITEMS>,
 ) -> bool {
-    let mut known = known;
-    // Bounded: an entry has a byte at least.
-    while !entries.is_empty() {
-        let Some((entry, rest)) = take::<Option<Item<AXES>>>(entries) else { return known > 0 };
-        entries = rest;
-        if known > 0 {
-            known -= 1;
-        } else if items.entries.push_back(entry).is_ok() {
-            items.next = items.next.wrapping_add(1);
-            items.is_ended = entry.is_none();
-        } else {
-            // More than there was room for: it comes again.
+    // Bounded: an item has a byte at least.
+    loop {
+        // What there is no room for comes again.
+        if items.entries.is_full() || bytes.is_empty() && !is_last {
+            return true;
+        }
+        let entry = match bytes {
+            [] => None,
+            _ => {
+                let Some((item, rest)) = items.decoder.take(bytes) else { return false };
+                bytes = rest;
+                Some(item)
+            }
+        };
+        // There is room.
+        let _ = items.entries.push_back(entry);
+        (items.next, items.is_ended) = (items.next.wrapping_add(1), entry.is_none());
+        if entry.is_none() {
             return true;
         }
     }
-    true
 }

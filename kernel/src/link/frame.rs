@@ -27,11 +27,6 @@ impl Payload {
         Some(payload)
     }
 
-    /// The room that is left \[bytes\].
-    pub(super) fn room(&self) -> usize {
-        PAYLOAD_MAX - self.length
-    }
-
     /// Appends bytes; false if there is no room for all of them.
     pub(super) fn push_all(&mut self, bytes: impl Iterator<Item = u8>) -> bool {
         for byte in bytes {

@@ -9,6 +9,7 @@ use super::frame::{Deframer, PAYLOAD_MAX, Payload};
 use super::message::{
     Controls, Identity, Mode, PROTOCOL, Piece, Record, Reply, Request, Status, Taken, WriteError,
 };
+use crate::program::compact::Encoder;
 use crate::program::{Checksum, Item, take};
 
 /// What was not answered is said again after this time \[ms\].
@@ -106,9 +107,12 @@ pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     controls: Controls,
     /// The number of the controls that the board has confirmed.
     confirmed_controls: u32,
-    /// The items that are not confirmed: their bytes, and the length of each.
+    /// The items that are not confirmed: their bytes, and the length of each; the end of a program has none.
     bytes: Deque<u8, BYTES>,
     lengths: Deque<u16, ITEMS>,
+    /// What items are written with, and the number of the next one it writes.
+    encoder: Encoder<AXES>,
+    encoded: u32,
     /// The number of the first of them, of the next to be sent, and of the first that the board has no room for.
     first: u32,
     next: u32,
@@ -144,6 +148,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             confirmed_controls: 0,
             bytes: Deque::new(),
             lengths: Deque::new(),
+            encoder: Encoder::new(),
+            encoded: 0,
             first: 0,
             next: 0,
             limit: 0,
@@ -231,6 +237,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     }
 
     fn drop_items(&mut self) {
+        (self.encoder, self.encoded) = (Encoder::new(), 0);
         self.bytes.clear();
         self.lengths.clear();
         self.is_unreadable = false;
@@ -274,25 +281,37 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         }
     }
 
+    /// An item that the board has already, of a program that another run of the PC's side has begun: those before
+    /// [`HostLink::next`], all of them and in their order.
+    pub fn skip(&mut self, item: &Item<AXES>) {
+        // One that is too long for a frame was never sent.
+        let _ = self.encoder.encode(item, &mut [0; PAYLOAD_MAX]);
+        self.encoded = self.encoded.wrapping_add(1);
+    }
+
     /// Takes the next item of a program, or its end. False if there is no room for it now, or the board does not take any
     /// yet.
     ///
     /// # Errors
-    /// It is longer than a frame.
-    pub fn push(&mut self, item: Option<&Item<AXES>>) -> Result<bool, postcard::Error> {
-        let mut entry = [0; PAYLOAD_MAX];
-        let entry = &*postcard::to_slice(&item, &mut entry)?;
-        // A frame has room for the message before it.
-        if entry.len() + HEAD_MAX > PAYLOAD_MAX {
-            return Err(postcard::Error::SerializeBufferFull);
+    /// It is longer than a frame, or items before it were not [skipped](HostLink::skip).
+    pub fn push(&mut self, item: Option<&Item<AXES>>) -> Result<bool, PushError> {
+        let Some(next) = self.next() else { return Ok(false) };
+        if next != self.encoded {
+            return Err(PushError::Skipped { expected: self.encoded, found: next });
         }
-        let has_room = !self.lengths.is_full() && BYTES - self.bytes.len() >= entry.len();
-        if !has_room || !matches!(self.session, Session::Ready(_)) {
+        // A frame has room for the message before it.
+        let mut entry = [0; PAYLOAD_MAX - HEAD_MAX];
+        let (mut encoder, mut length) = (self.encoder, 0);
+        if let Some(item) = item {
+            length = encoder.encode(item, &mut entry).ok_or(PushError::Long)?;
+        }
+        if self.lengths.is_full() || BYTES - self.bytes.len() < length {
             return Ok(false);
         }
         // Both have room.
-        let _ = self.lengths.push_back(entry.len() as u16);
-        self.bytes.extend(entry.iter().copied());
+        let _ = self.lengths.push_back(length as u16);
+        self.bytes.extend(entry.iter().copied().take(length));
+        (self.encoder, self.encoded) = (encoder, next.wrapping_add(1));
         Ok(true)
     }
 
@@ -503,27 +522,27 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             self.repeat_ms = (2 * self.repeat_ms).min(REPEAT_MAX_MS);
         }
         let sent = self.next.wrapping_sub(self.first) as usize;
-        let Some(mut payload) = Payload::of(&Request::Items {
-            session,
-            asker: self.asker,
-            aborts: self.controls.aborts,
-            first: self.next,
-        }) else {
-            return 0;
-        };
         let skipped: usize = self.lengths.iter().take(sent).map(|&length| usize::from(length)).sum();
         if skipped > UNDER_WAY_MAX {
             return 0;
         }
-        let (mut count, mut length) = (0, 0);
+        let (mut count, mut length, mut is_last) = (0, 0, false);
         for &of_entry in self.lengths.iter().skip(sent) {
             let of_entry = usize::from(of_entry);
-            if !is_before(self.next.wrapping_add(count), self.limit) || length + of_entry > payload.room() {
+            let has_room = length + of_entry <= PAYLOAD_MAX - HEAD_MAX;
+            if is_last || !is_before(self.next.wrapping_add(count), self.limit) || !has_room {
                 break;
             }
-            (count, length) = (count + 1, length + of_entry);
+            (count, length, is_last) = (count + 1, length + of_entry, of_entry == 0);
         }
-        if count == 0 || !payload.push_all(self.bytes.iter().copied().skip(skipped).take(length)) {
+        if count == 0 {
+            return 0;
+        }
+        let (asker, aborts, first) = (self.asker, self.controls.aborts, self.next);
+        let Some(mut payload) = Payload::of(&Request::Items { session, asker, aborts, first, is_last }) else {
+            return 0;
+        };
+        if !payload.push_all(self.bytes.iter().copied().skip(skipped).take(length)) {
             return 0;
         }
         self.next = self.next.wrapping_add(count);
@@ -531,8 +550,35 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     }
 }
 
-/// The longest message before items \[bytes\]: a variant and four numbers.
-const HEAD_MAX: usize = 19;
+/// Why an item can't be pushed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PushError {
+    /// It is longer than a frame.
+    Long,
+    /// It is not the one behind those that were pushed or skipped.
+    Skipped {
+        /// Number of the item that would follow these.
+        expected: u32,
+        /// Number of the item that the board expects.
+        found: u32,
+    },
+}
+
+impl core::fmt::Display for PushError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Long => f.write_str("an item is longer than a frame"),
+            Self::Skipped { expected, found } => {
+                write!(f, "item {found} is next, expected {expected}: items before it were not skipped")
+            }
+        }
+    }
+}
+
+impl core::error::Error for PushError {}
+
+/// The longest message before items \[bytes\]: a variant, four numbers and a flag.
+const HEAD_MAX: usize = 20;
 
 /// Whether a number comes before another one. They wrap.
 fn is_before(number: u32, other: u32) -> bool {

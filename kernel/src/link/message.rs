@@ -7,7 +7,7 @@ use crate::hal::BoardOutputs;
 use crate::units::Position;
 
 /// The version of this protocol. A PC refuses a board of another version.
-pub const PROTOCOL: u16 = 4;
+pub const PROTOCOL: u16 = 5;
 
 /// From the PC.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,9 +16,9 @@ pub(super) enum Request {
     Hello { asker: u32 },
     /// What the operator wants. As all that follows, by who asked last.
     Controls { session: u32, asker: u32, controls: Controls },
-    /// Items follow, to the payload's end: of each an `Option`, none for the end of the program. They are of the program after
-    /// so many aborts; the first one has this number in it, from 0.
-    Items { session: u32, asker: u32, aborts: u16, first: u32 },
+    /// Compact items follow, to the payload's end, and after them the program's end, if it comes then; that has a number, too.
+    /// They are of the program after so many aborts; the first one has this number in it, from 0.
+    Items { session: u32, asker: u32, aborts: u16, first: u32, is_last: bool },
     /// Asks for the board's parameters from this byte on.
     Read { session: u32, asker: u32, offset: u32 },
     /// Bytes of new parameters follow, to the payload's end, from this one on; what they are as a whole.

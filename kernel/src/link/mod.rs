@@ -38,6 +38,6 @@ mod tests;
 
 pub use board::{BoardLink, Came, ItemQueue};
 pub use frame::{Deframer, FRAME_MAX};
-pub use host::{Event, HostLink};
+pub use host::{Event, HostLink, PushError};
 pub use message::{Controls, Identity, Mode, PROTOCOL, Piece, State, Status, WriteError};
 pub use parameters::ParameterBuffer;

@@ -372,6 +372,10 @@ fn both_ends_may_start_anew() {
     bench.host = Host::new(2);
     assert!(!bench.host.press(Mode::Run), "not before the board has answered");
     assert_eq!(bench.greet(), 100);
+    assert_eq!(bench.host.push(Some(&item(100))), Err(PushError::Skipped { expected: 0, found: 100 }));
+    for number in 0..100 {
+        bench.host.skip(&item(number));
+    }
     assert_eq!(bench.host.controls(), &known);
     assert!(bench.host.press(Mode::Hold));
     for _ in 0..1000 {
